@@ -1,10 +1,10 @@
-//! What an agent does in this tick.
+//! The action of an agent in a tick.
 //!
 //! ```
 //! use bevy::prelude::*;
 //! use bevy_playbot::prelude::*;
 //!
-//! /// The game's own system: choice 1 is to jump.
+//! /// A system of the game: action 1 jumps.
 //! fn jump(mut agents: Query<(&Action, &mut Transform)>) {
 //!     for (action, mut body) in &mut agents {
 //!         if action.discrete() == Some(1) {
@@ -24,13 +24,14 @@
 use bevy::prelude::*;
 pub use playbot_learner::{Action as ActionValue, ActionSpace};
 
-use crate::{agent::Agent, control::Control, episode::Episode, fault::Faults};
+use crate::{agent::Agent, carry_over::ReflectCarryComponent, control::Control, episode::Episode, fault::Faults};
 
-/// The action of this tick, written in [`PlaybotSystems::Decide`](crate::systems::PlaybotSystems::Decide) by whoever
-/// holds the [`Control`] and read by the game in `FixedUpdate`.
+/// The action of this tick. The holder of the [`Control`] writes it in
+/// [`PlaybotSystems::Decide`](crate::systems::PlaybotSystems::Decide); the game reads it in
+/// `FixedUpdate`.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque)]
-#[reflect(Component, Clone, Debug, PartialEq)]
+#[reflect(Component, CarryComponent, Clone, Debug, PartialEq)]
 pub struct Action(pub ActionValue);
 
 impl Default for Action {
@@ -40,7 +41,7 @@ impl Default for Action {
 }
 
 impl Action {
-    /// The index of a discrete action, or `None` for a continuous one.
+    /// Returns the index of a discrete action, or `None` for a continuous one.
     pub fn discrete(&self) -> Option<u32> {
         match self.0 {
             ActionValue::Discrete(index) => Some(index),
@@ -48,7 +49,7 @@ impl Action {
         }
     }
 
-    /// The values of a continuous action, or `None` for a discrete one.
+    /// Returns the values of a continuous action, or `None` for a discrete one.
     pub fn continuous(&self) -> Option<&[f32]> {
         match &self.0 {
             ActionValue::Discrete(_) => None,
@@ -62,7 +63,7 @@ pub(crate) fn plugin(app: &mut App) {
     app.register_required_components::<Agent, Action>();
 }
 
-/// Why an action does not belong to its space, or `None` if it does.
+/// Returns why an action does not belong to its space, or `None` if it does.
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
@@ -82,8 +83,8 @@ pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
     }
 }
 
-/// Reports actions that do not belong to their agent's space, with agent and tick, and stops those agents: a game need
-/// not be able to bear what its agents cannot do.
+/// Reports actions outside their agent's space, with agent and tick, and stops those agents. The
+/// game need not handle impossible actions.
 #[doc(hidden)]
 pub fn check_actions(mut agents: Query<(&Agent, &Action, &Episode, &mut Control)>, mut faults: ResMut<Faults>) {
     for (agent, action, episode, mut control) in &mut agents {

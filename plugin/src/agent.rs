@@ -1,4 +1,4 @@
-//! The agent: whoever acts in the game, be it a person, a script or a policy.
+//! Agents: the entities that act in the game, played by a person, a script or a policy.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -9,35 +9,38 @@
 //! let first = app.world_mut().spawn(Agent::new(0, ActionSpace::Continuous(2))).id();
 //! app.tick().expect("each has a number of its own");
 //! assert_eq!(app.world().resource::<AgentOrder>().entities(), [first, second]);
-//! // What is kept of every agent came along, and nobody plays yet.
+//! // The required components are there, and the agent is idle.
 //! assert_eq!(app.world().get::<Control>(first), Some(&Control::Idle));
 //! ```
 
 use bevy::prelude::*;
 use playbot_learner::ActionSpace;
 
-use crate::{control::Control, fault::Faults, level::LevelQueue, reward::Reward, state_hash::StateHash};
+use crate::{
+    carry_over::ReflectCarryResource, control::Control, fault::Faults, level::LevelQueue, reward::Reward,
+    state_hash::StateHash,
+};
 
 /// An entity that acts in the game.
 ///
-/// Everything else that is kept per agent comes along as required components; each part of the
-/// [`PlaybotPlugin`](crate::plugin::PlaybotPlugin) registers what it adds: action, episode, observation, random streams,
-/// policy and skill. Add a [`VectorSensor`](crate::observation::VectorSensor) for what the agent sees and set its
-/// [`Control`].
+/// Required components bring everything else that is kept per agent. Each part of the
+/// [`PlaybotPlugin`](crate::plugin::PlaybotPlugin) registers its own: action, episode, observation,
+/// random streams, policy and skill. Add a [`VectorSensor`](crate::observation::VectorSensor) for
+/// its observations and set its [`Control`].
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]
 #[require(Control, LevelQueue, Reward, StateHash)]
 pub struct Agent {
-    /// Number of the agent, unique in its World. Random streams and the order of batches come from it, so that a run
-    /// does not depend on the order in which entities were stored.
+    /// Number of the agent, unique in its World. Random streams and the order of batches derive
+    /// from it, so a run does not depend on the storage order of entities.
     pub index: u32,
-    /// What the agent can do.
+    /// The actions that the agent can take.
     pub actions: ActionSpace,
 }
 
 impl Agent {
-    /// An agent with this number and these actions.
+    /// Creates an agent with this number and these actions.
     pub fn new(index: u32, actions: ActionSpace) -> Self {
         Self { index, actions }
     }
@@ -45,7 +48,7 @@ impl Agent {
 
 /// All agents of the World in the order of their numbers: the row order of every batch.
 #[derive(Resource, Default, Debug, Reflect)]
-#[reflect(Resource)]
+#[reflect(Resource, CarryResource)]
 pub struct AgentOrder(Vec<Entity>);
 
 impl AgentOrder {
@@ -55,7 +58,7 @@ impl AgentOrder {
     }
 }
 
-/// Most agents that the World of a game can hold.
+/// Largest number of agents that the World of a game can hold.
 #[derive(Resource, Clone, Copy, Debug, Reflect)]
 #[reflect(Resource)]
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
@@ -63,17 +66,17 @@ impl AgentOrder {
 pub struct AgentLimit {
     /// Name of the game.
     pub game: &'static str,
-    /// The number.
+    /// The limit.
     pub most: u32,
 }
 
-/// Whether nothing can be done in this space.
+/// Returns whether the space holds no action.
 #[doc(hidden)]
 pub fn has_no_actions(space: &ActionSpace) -> bool {
     matches!(space, ActionSpace::Discrete(0) | ActionSpace::Continuous(0))
 }
 
-/// Reports agents that cannot do anything, and more of them than the game bears, and stops those.
+/// Reports agents without any action, and agents above the game's limit, and stops those.
 pub(crate) fn check_agents(
     limit: Option<Res<AgentLimit>>,
     mut agents: Query<(Ref<Agent>, &mut Control)>,
@@ -92,13 +95,14 @@ pub(crate) fn check_agents(
     }
     for (agent, mut control) in &mut agents {
         if agent.is_added() && has_no_actions(&agent.actions) {
-            faults.report(format!("agent {} has no actions: say what it can do", agent.index));
+            faults.report(format!("agent {} has no actions: give its action space at least one", agent.index));
             *control = Control::Idle;
         }
     }
 }
 
-/// Keeps [`AgentOrder`] true when agents come or go, and reports numbers that two of them share.
+/// Keeps [`AgentOrder`] up to date as agents come and go, and reports numbers that two agents
+/// share.
 pub(crate) fn order_agents(
     mut order: ResMut<AgentOrder>,
     agents: Query<(Entity, &Agent)>,

@@ -1,4 +1,4 @@
-//! Bots that do not look: the baselines that any learner has to beat.
+//! Bots without sensors: the baselines that every learner has to beat.
 //!
 //! ```
 //! use std::collections::BTreeSet;
@@ -21,39 +21,42 @@ use bevy::prelude::*;
 use playbot_learner::{Action as ActionValue, ActionSpace, rng::normal};
 use rand::RngExt;
 
-use crate::{action::Action, agent::Agent, control::Control, episode::Episode, streams::AgentStreams};
+use crate::{
+    action::Action, agent::Agent, carry_over::ReflectCarryComponent, control::Control, episode::Episode,
+    streams::AgentStreams,
+};
 
-/// A scripted bot without eyes. Acts while the agent's control is [`Control::Bot`].
+/// A scripted bot without sensors. Acts while the agent's control is [`Control::Bot`].
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque)]
-#[reflect(Component, Clone, Debug, PartialEq)]
+#[reflect(Component, CarryComponent, Clone, Debug, PartialEq)]
 #[require(HeldAction)]
 pub enum BlindBot {
     /// The same action in every tick.
     Constant(ActionValue),
     /// Uniformly random: over the indices of a discrete space, over [-1, 1] per continuous value.
     Uniform,
-    /// Chaos: uniformly random actions, each held for 1 to 30 ticks, every number of which is as likely. It begins anew in
-    /// every episode.
+    /// Chaos: uniformly random actions, each held for a uniformly random number of ticks from 1 to
+    /// 30. It begins anew in every episode.
     Chaos,
 }
 
-/// Most ticks for which chaos holds an action.
+/// Longest time for which chaos holds an action, in ticks.
 const LONGEST_HOLD: u32 = 30;
 
-/// What [`BlindBot::Chaos`] holds.
+/// The action that [`BlindBot::Chaos`] holds.
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]
 #[doc(hidden)]
 pub struct HeldAction {
     action: Action,
-    /// Ticks for which it is held on.
+    /// Remaining ticks.
     left: u32,
 }
 
 impl HeldAction {
-    /// What is done in this tick of the episode.
+    /// Returns the action of this tick of the episode.
     fn next(&mut self, tick: u32, space: &ActionSpace, rng: &mut impl rand::Rng) -> &ActionValue {
         if tick == 0 || self.left == 0 {
             self.action = Action(uniform(space, rng));
@@ -81,7 +84,7 @@ pub(crate) fn run_blind_bots(
     }
 }
 
-/// A uniformly random action of a space.
+/// Returns a uniformly random action of a space.
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
@@ -91,9 +94,9 @@ pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
     }
 }
 
-/// What a demonstrator plans to do, with noise: the probability with which a discrete action is replaced by a uniformly
-/// random one, or the standard deviation of the normal noise on each value of a continuous one. Without noise nothing is drawn
-/// and the action stays what it is.
+/// Returns the planned action of a demonstrator with noise. The noise is the probability of
+/// replacing a discrete action by a uniformly random one, or the standard deviation of the normal
+/// noise on each continuous value. Zero noise draws no random number and keeps the action.
 #[doc(hidden)]
 pub fn with_noise(planned: ActionValue, space: &ActionSpace, noise: f64, rng: &mut impl rand::Rng) -> ActionValue {
     match planned {
@@ -111,7 +114,7 @@ mod tests {
     use super::*;
     use crate::prelude::*;
 
-    /// What chaos does in episodes of this length.
+    /// Returns the actions of chaos in episodes of this length.
     fn chaos(seed: u64, length: u32, ticks: usize) -> Vec<f32> {
         let mut app = headless_app();
         app.insert_resource(PlaybotSeed(seed));

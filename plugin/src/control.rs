@@ -1,4 +1,4 @@
-//! Who decides for an agent.
+//! The source of an agent's actions.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -7,7 +7,7 @@
 //! let mut app = headless_app();
 //! let agent = app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human)).id();
 //! app.ticks(3).expect("no agent broke its contract");
-//! // A script goes on in the middle of the episode.
+//! // A script takes over in the middle of the episode.
 //! app.world_mut().entity_mut(agent).insert((Control::Bot, BlindBot::Constant(ActionValue::Discrete(1))));
 //! app.ticks(2).expect("no agent broke its contract");
 //! assert_eq!(app.world().get::<Action>(agent), Some(&Action(ActionValue::Discrete(1))));
@@ -16,9 +16,11 @@
 
 use bevy::prelude::*;
 
-/// Who writes the agent's [`Action`](crate::action::Action). May be changed at any tick.
+use crate::carry_over::ReflectCarryComponent;
+
+/// The source of the agent's [`Action`](crate::action::Action). May be changed at any tick.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
-#[reflect(Component)]
+#[reflect(Component, CarryComponent)]
 pub enum Control {
     /// A person: the game turns input into actions.
     Human,
@@ -28,18 +30,20 @@ pub enum Control {
     Policy,
     /// A recording: [`Replay`](crate::demo::replay::Replay).
     Replay,
-    /// Nobody: no episode is started, and a running one stands still. Games leave the arena of an idle agent alone.
+    /// No source: no episode is started, and a running one is paused. Games leave the arena of an
+    /// idle agent alone.
     #[default]
     Idle,
 }
 
 impl Control {
-    /// Who decides for an agent now; [`Idle`](Self::Idle) for an entity that is none.
+    /// Returns the current source of an agent's actions, or [`Idle`](Self::Idle) for an entity that
+    /// is no agent.
     pub fn of(world: &World, agent: Entity) -> Self {
         world.get::<Self>(agent).copied().unwrap_or_default()
     }
 
-    /// Whether somebody decides, so that the game goes on.
+    /// Returns whether there is a source of actions, so that the game goes on.
     pub fn is_active(self) -> bool {
         self != Self::Idle
     }

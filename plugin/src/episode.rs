@@ -1,4 +1,4 @@
-//! Episodes: their start, their end and what they brought.
+//! Episodes: their start, their end and their result.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -27,6 +27,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::{
     agent::{Agent, AgentOrder},
+    carry_over::ReflectCarryComponent,
     control::Control,
     fault::Faults,
     level::LevelQueue,
@@ -34,12 +35,12 @@ use crate::{
     streams::{AgentStreams, EpisodeSeeds},
 };
 
-/// How an episode ended.
+/// The end of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Reflect)]
 pub enum EpisodeEnd {
     /// The game is over; no reward could follow.
     Terminated {
-        /// Whether the agent reached what the level asks for.
+        /// True if the agent reached the level's goal.
         success: bool,
     },
     /// Time is up; the game could have gone on.
@@ -52,7 +53,7 @@ impl EpisodeEnd {
     /// The game is over, and lost.
     pub const LOST: Self = Self::Terminated { success: false };
 
-    /// Whether the game is over because the level's aim was reached.
+    /// Returns whether the game is over because the level's goal was reached.
     pub fn is_success(self) -> bool {
         matches!(self, Self::Terminated { success: true })
     }
@@ -62,13 +63,13 @@ impl EpisodeEnd {
 #[derive(Component, Clone, Debug, Default, Reflect)]
 #[reflect(Component)]
 pub struct Episode {
-    /// Level that is played.
+    /// The level that is played.
     pub level: u64,
     /// Ticks played so far; 0 while the first observation is made.
     pub tick: u32,
     /// Sum of rewards so far, undiscounted.
     pub total_reward: f64,
-    /// Ticks so far whose action lay outside the game's range and was clipped to it.
+    /// Ticks so far with an action outside the game's range, which was clipped to it.
     pub clipped: u32,
     state: EpisodeState,
     reached: bool,
@@ -84,23 +85,24 @@ enum EpisodeState {
 }
 
 impl Episode {
-    /// The game is over. The first call in a tick decides, and termination outranks truncation. Between two episodes it
-    /// means nothing.
+    /// Ends the episode: the game is over. The first call in a tick decides, and termination
+    /// outranks truncation. Has no effect between two episodes.
     pub fn terminate(&mut self, success: bool) {
         if self.is_running() && !matches!(self.end(), Some(EpisodeEnd::Terminated { .. })) {
             self.state = EpisodeState::Ended(EpisodeEnd::Terminated { success });
         }
     }
 
-    /// Time is up. Between two episodes it means nothing.
+    /// Ends the episode: time is up. Has no effect between two episodes.
     pub fn truncate(&mut self) {
         if self.is_running() && self.end().is_none() {
             self.state = EpisodeState::Ended(EpisodeEnd::Truncated);
         }
     }
 
-    /// The level's aim has been reached and the game goes on, as it does in games that only the clock ends: the episode
-    /// counts as a success even if it is truncated. Between two episodes it means nothing.
+    /// Notes that the level's goal has been reached and the game goes on, as in games that only the
+    /// time limit ends. The episode counts as a success even if it is truncated. Has no effect
+    /// between two episodes.
     pub fn reach(&mut self) {
         self.reached |= self.is_running();
     }
@@ -110,12 +112,12 @@ impl Episode {
         self.clipped += u32::from(self.is_running());
     }
 
-    /// Whether the level's aim was reached: by the end of the episode, or before it.
+    /// Returns whether the level's goal was reached, by the end of the episode or before it.
     pub fn is_success(&self) -> bool {
         self.reached || self.end().is_some_and(EpisodeEnd::is_success)
     }
 
-    /// The end, in the tick in which it came.
+    /// Returns the end, in the tick in which the episode ended.
     pub fn end(&self) -> Option<EpisodeEnd> {
         match self.state {
             EpisodeState::Ended(end) => Some(end),
@@ -123,20 +125,21 @@ impl Episode {
         }
     }
 
-    /// Whether a level is being played, the tick of its end included.
+    /// Returns whether a level is being played, the tick of its end included.
     pub fn is_running(&self) -> bool {
         matches!(self.state, EpisodeState::Running | EpisodeState::Ended(_))
     }
 
-    /// The level takes some frames to be built: to be called by the game's observer of [`StartEpisode`]. Until it is
-    /// [`ready`](Self::ready) nothing is observed, decided, judged, recorded or counted for this agent.
+    /// Delays the start while a level is built over several frames. Call it from the game's
+    /// observer of [`StartEpisode`]. Until the episode is [`ready`](Self::ready), the plugin skips
+    /// the agent: no observation, decision, reward or recording, and no tick is counted.
     pub fn wait(&mut self) {
         if self.state == EpisodeState::Running {
             self.state = EpisodeState::Loading;
         }
     }
 
-    /// The level is there: the episode's first observation may be made. To be called in
+    /// Declares the level built: the episode's first observation may be made. Call it in
     /// [`PlaybotSystems::Load`](crate::systems::PlaybotSystems::Load).
     pub fn ready(&mut self) {
         if self.is_loading() {
@@ -144,12 +147,12 @@ impl Episode {
         }
     }
 
-    /// Whether the level is still being built.
+    /// Returns whether the level is still being built.
     pub fn is_loading(&self) -> bool {
         self.state == EpisodeState::Loading
     }
 
-    /// Where it stands, as messages have it: `agent 0, level 3, tick 7`.
+    /// Returns the agent, level and tick in the form of messages: `agent 0, level 3, tick 7`.
     pub fn moment(&self, agent: &Agent) -> String {
         format!("agent {}, level {}, tick {}", agent.index, self.level, self.tick)
     }
@@ -160,7 +163,8 @@ impl Episode {
     }
 }
 
-/// Build level `level` for agent `entity`, now: triggered by the plugin, observed by the game.
+/// Asks the game to build level `level` for agent `entity` now. Triggered by the plugin, observed
+/// by the game.
 #[derive(EntityEvent, Clone, Copy, Debug, Reflect)]
 pub struct StartEpisode {
     /// The agent.
@@ -169,18 +173,18 @@ pub struct StartEpisode {
     pub level: u64,
 }
 
-/// A finished episode: what it was and what came of it.
+/// The result of a finished episode.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Reflect)]
 pub struct EpisodeResult {
-    /// Level that was played.
+    /// The level that was played.
     pub level: u64,
-    /// How it ended.
+    /// The end of the episode.
     pub end: EpisodeEnd,
-    /// Whether the level's aim was reached, at the end or before it: see [`Episode::reach`].
+    /// True if the level's goal was reached, at the end or before it: see [`Episode::reach`].
     pub success: bool,
     /// Length in ticks.
     pub ticks: u32,
-    /// Ticks whose action was clipped to the game's range.
+    /// Ticks with an action that was clipped to the game's range.
     pub clipped: u32,
     /// Sum of rewards, undiscounted.
     pub total_reward: f64,
@@ -193,18 +197,18 @@ pub struct EpisodeResult {
 pub struct EpisodeEnded {
     /// The agent.
     pub entity: Entity,
-    /// What came of it.
+    /// The result.
     #[deref]
     pub result: EpisodeResult,
 }
 
 /// Totals of an agent over all its finished episodes.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
-#[reflect(Component)]
+#[reflect(Component, CarryComponent)]
 pub struct EpisodeCount {
     /// Finished episodes.
     pub finished: u64,
-    /// Those that reached the level's aim.
+    /// Finished episodes that reached the level's goal.
     pub successes: u64,
 }
 
@@ -213,7 +217,7 @@ pub(crate) fn plugin(app: &mut App) {
     app.register_required_components::<Agent, Episode>().register_required_components::<Agent, EpisodeCount>();
 }
 
-/// Starts an episode for every agent that waits for one and is not idle.
+/// Starts an episode for every agent that has none and is not idle.
 pub(crate) fn begin_episodes(
     mut agents: Query<(
         (Entity, &Agent, &mut Control, &mut Episode),

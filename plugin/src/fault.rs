@@ -1,17 +1,20 @@
-//! Breaches of contract by the game: said out loud where they happen instead of a panic.
+//! Faults: breaches of contract by the game, reported instead of a panic.
 //!
 //! Under [`tick`](crate::headless::PlaybotAppExt::tick) the first fault of a tick is returned as an error. In an app that
 //! runs by itself each fault is logged as an error and triggers a [`FaultOccurred`] in the same frame.
 
 use bevy::prelude::*;
+
+use crate::carry_over::ReflectCarryResource;
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
-/// Faults that nobody has heard of yet.
+/// Faults that have not been reported yet.
 #[derive(Resource, Default, Debug, Reflect)]
-#[reflect(Resource)]
+#[reflect(Resource, CarryResource)]
 pub struct Faults {
     waiting: Vec<String>,
-    /// Whether the caller of this tick gets the fault, so that nobody else has to be told.
+    /// True if the caller of this tick gets the fault, so that it need not be announced.
     has_caller: bool,
 }
 
@@ -20,7 +23,14 @@ pub struct Faults {
 #[error("{0}")]
 pub struct Fault(pub String);
 
-/// The game broke its contract, in an app that nobody ticks by hand. Triggered in [`FaultSystems`].
+impl HasExitCode for Fault {
+    fn exit_code(&self) -> u8 {
+        2
+    }
+}
+
+/// A fault of the game, in an app without a caller that ticks it by hand. Triggered in
+/// [`FaultSystems`].
 ///
 /// ```
 /// use bevy::{prelude::*, time::TimePlugin};
@@ -39,7 +49,7 @@ pub struct Fault(pub String);
 /// ```
 #[derive(Event, Debug, Clone, PartialEq, Eq, Reflect)]
 pub struct FaultOccurred {
-    /// What is wrong.
+    /// The fault.
     pub fault: Fault,
 }
 
@@ -50,28 +60,28 @@ pub struct FaultOccurred {
 pub struct FaultSystems;
 
 impl Faults {
-    /// Notes a fault: say which agent, which level, which tick and what.
+    /// Notes a fault. The text names the agent, the level, the tick and the problem.
     pub fn report(&mut self, what: String) {
         self.waiting.push(what);
     }
 
-    /// Takes the faults, if any, and gives out the first: the others may well follow from it.
+    /// Takes all faults and returns the first: the others may follow from it.
     pub fn take(&mut self) -> Result<(), Fault> {
         std::mem::take(&mut self.waiting).into_iter().next().map_or(Ok(()), |what| Err(Fault(what)))
     }
 
-    /// From here on a caller takes the faults, or no longer.
+    /// Sets whether a caller takes the faults from here on.
     pub(crate) fn set_caller(&mut self, has_caller: bool) {
         self.has_caller = has_caller;
     }
 
-    /// Whether a caller ticks this World by hand and takes its faults.
+    /// Returns whether a caller ticks this World by hand and takes its faults.
     pub(crate) fn has_caller(&self) -> bool {
         self.has_caller
     }
 }
 
-/// Tells everybody about the faults of this frame, where no caller is told.
+/// Announces the faults of this frame, unless a caller takes them.
 pub(crate) fn announce_faults(mut faults: ResMut<Faults>, mut commands: Commands) {
     if faults.has_caller || faults.waiting.is_empty() {
         return;

@@ -1,4 +1,4 @@
-//! Running a game without a window: as fast as it goes, one fixed tick at a time, never by the clock.
+//! Headless runs: no window, full speed, one fixed tick at a time, independent of the clock.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -11,7 +11,7 @@
 //! set_tick_rate(&mut app, 50.0);
 //! app.init_resource::<Metres>()
 //!     .add_systems(FixedUpdate, |time: Res<Time>, mut way: ResMut<Metres>| way.0 += 10.0 * time.delta_secs());
-//! // A second of game time, in no time.
+//! // One second of game time.
 //! app.ticks(50).expect("no agent broke its contract");
 //! assert!((app.world().resource::<Metres>().0 - 10.0).abs() < 1e-3);
 //! ```
@@ -36,10 +36,10 @@ use crate::{
     tick::Tick,
 };
 
-/// An app with time and [`PlaybotPlugin`], and nothing that needs a screen, a GPU or the clock.
+/// Creates an app with time and [`PlaybotPlugin`] that needs no screen, GPU or clock.
 ///
-/// Each [`tick`](PlaybotAppExt::tick) runs Bevy's whole `Main` schedule with exactly one fixed tick in it, so that a
-/// game behaves as it does in a window.
+/// Each [`tick`](PlaybotAppExt::tick) runs Bevy's whole `Main` schedule with exactly one fixed tick
+/// in it, so the game behaves as it does in a window.
 pub fn headless_app() -> App {
     let mut app = App::new();
     app.add_plugins((TimePlugin, PlaybotPlugin::default()));
@@ -47,7 +47,7 @@ pub fn headless_app() -> App {
     app
 }
 
-/// Sets the length of a fixed tick, in ticks per second of game time, and lets each update run one.
+/// Sets the length of a fixed tick, in ticks per second of game time. Each update runs one tick.
 pub fn set_tick_rate(app: &mut App, hz: f64) {
     let step = set_fixed_step(app, hz);
     app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
@@ -56,8 +56,8 @@ pub fn set_tick_rate(app: &mut App, hz: f64) {
 
 /// Sets the length of a fixed tick for an app that runs by the clock, and returns it.
 ///
-/// No frame runs more than one tick: on a machine that is too slow to draw them all, the game slows down, and every tick
-/// is still seen and played.
+/// A frame runs at most one tick. On a machine that is too slow to draw every tick the game slows
+/// down, and no tick is skipped.
 pub fn set_fixed_step(app: &mut App, hz: f64) -> Duration {
     let step = Duration::from_secs_f64(1.0 / hz);
     app.insert_resource(Time::<Fixed>::from_duration(step));
@@ -65,14 +65,15 @@ pub fn set_fixed_step(app: &mut App, hz: f64) -> Duration {
     step
 }
 
-/// Gives every frame the same length, however long it takes: `hz` frames are a second of game time. With a window, it is
-/// for the window to draw no more than that.
+/// Gives every frame the same length of game time: `hz` frames are one second. With a window, the
+/// window limits the rate of drawing.
 pub fn set_frame_rate(app: &mut App, hz: f64) {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / hz)));
 }
 
-/// An app with all that Bevy brings, except a screen, for games in which a frame is a tick:
-/// [`HeadlessPlugins`](crate::headless_plugins::HeadlessPlugins), with or without a renderer, and [`PlaybotPlugin`] under [`TickPlacement::Frame`].
+/// Creates an app for games in which a frame is a tick, with all of Bevy but a screen. It has
+/// [`HeadlessPlugins`](crate::headless_plugins::HeadlessPlugins), with or without a renderer, and
+/// [`PlaybotPlugin`] under [`TickPlacement::Frame`].
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub fn headless_frame_app(plugins: PluginGroupBuilder, hz: f64) -> App {
@@ -84,8 +85,8 @@ pub fn headless_frame_app(plugins: PluginGroupBuilder, hz: f64) -> App {
 
 /// Finishes an app's plugins and takes its World, so that it can move to another thread.
 ///
-/// Bevy's own threads cost more than they bring in a World of this size, and several Worlds side by side use the cores
-/// better: see [`run_on_one_thread`].
+/// Bevy's own threads cost more than they save in a World of this size. Several Worlds side by side
+/// use the cores better: see [`run_on_one_thread`].
 #[doc(hidden)]
 pub fn into_world(mut app: App) -> World {
     app.finish();
@@ -94,10 +95,11 @@ pub fn into_world(mut app: App) -> World {
     std::mem::take(app.world_mut())
 }
 
-/// Sets the schedules of a World to run on the thread that calls them. To be done before they run.
+/// Sets the schedules of a World to run on the calling thread. Call it before they run.
 ///
-/// A system that cannot run, for instance because a resource does not exist, is a fault of the next tick there, and no
-/// panic. Where ticks are frames, the game may have left the order of its systems open: they get one.
+/// A system that cannot run, for instance because a resource does not exist, becomes a fault of the
+/// next tick instead of a panic. Where ticks are frames, the game may leave the order of its
+/// systems open, and the systems are ordered here.
 #[doc(hidden)]
 pub fn run_on_one_thread(world: &mut World) {
     for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
@@ -109,8 +111,9 @@ pub fn run_on_one_thread(world: &mut World) {
     system_errors::listen(world);
 }
 
-/// Runs one tick. Under [`TickPlacement::Frame`] that may take several frames, while a level is being made ready.
-/// A World with a [`Renewal`](renewal::Renewal) is replaced by a new one before an episode begins in it.
+/// Runs one tick. Under [`TickPlacement::Frame`] this may take several frames, while a level is
+/// being built. A World with a [`Renewal`](renewal::Renewal) is replaced by a new one before an
+/// episode begins in it.
 ///
 /// # Errors
 ///
@@ -122,17 +125,17 @@ pub fn tick_world(world: &mut World) -> Result<(), Fault> {
         faults.set_caller(true);
     }
     let ticked = panics::guard(world, run_frames);
-    // A World that has panicked may have lost anything.
+    // A World that has panicked may have lost the note.
     if let Some(mut faults) = world.get_resource_mut::<Faults>() {
         faults.set_caller(false);
     }
     ticked
 }
 
-/// Frames of a level that is being made ready in which the clock is not waited for.
+/// Frames of a level under construction that do not wait for the clock.
 const QUICK_FRAMES: u32 = 60;
 
-/// Runs frames up to and with the next tick.
+/// Runs frames up to and including the next tick.
 fn run_frames(world: &mut World) -> Result<(), Fault> {
     let before = *world.resource::<Tick>();
     if renewal::renew_if_due(world)? {
@@ -162,7 +165,7 @@ fn run_frames(world: &mut World) -> Result<(), Fault> {
     Ok(())
 }
 
-/// Whether somebody's level is not ready yet, where that keeps ticks from passing.
+/// Returns whether an unfinished level of some agent keeps ticks from passing.
 fn is_loading(world: &mut World) -> bool {
     if !world.contains_resource::<FrameGate>() {
         return false;
@@ -171,7 +174,7 @@ fn is_loading(world: &mut World) -> bool {
     agents.iter(world).any(|(control, episode)| control.is_active() && episode.is_loading())
 }
 
-/// Ticking an app by hand.
+/// Methods that tick an app by hand.
 pub trait PlaybotAppExt {
     /// Runs one fixed tick.
     ///

@@ -1,4 +1,4 @@
-//! Bevy without a screen.
+//! Bevy's default plugins without a screen.
 //!
 //! ```
 //! use bevy::{prelude::*, window::PrimaryWindow};
@@ -9,7 +9,7 @@
 //! app.finish();
 //! app.cleanup();
 //! app.tick().expect("no agent broke its contract");
-//! // What games ask for is there.
+//! // The resources that games need are there.
 //! let mut windows = app.world_mut().query_filtered::<&Window, With<PrimaryWindow>>();
 //! assert_eq!(windows.single(app.world()).expect("one window").width(), 1280.0);
 //! assert!(app.world().contains_resource::<ButtonInput<KeyCode>>());
@@ -24,21 +24,21 @@ use bevy::{
 
 use crate::no_screen::NoScreenPlugin;
 
-/// Bevy's `DefaultPlugins`, as this program is built with them, for a World that nobody looks at: input, assets, states,
-/// text, meshes and materials are there, and a window of 1280 by 720 that exists for the game only. There is no event
-/// loop, and the renderer has nothing to draw on.
+/// Bevy's `DefaultPlugins`, as this program is built with them, for a World without a screen.
+/// Input, assets, states, text, meshes and materials are there, and a window of 1280 by 720 that
+/// only the game sees. There is no event loop, and the renderer has no surface to draw on.
 ///
-/// Built with Bevy's feature `bevy_winit`, it needs the feature `window` of this crate; with `bevy_render`, the feature
-/// `camera`: a plugin can only be left out by name. Others are left out with
-/// [`disable`](bevy::app::PluginGroupBuilder::disable), as of any group.
+/// With Bevy's feature `bevy_winit`, it needs the feature `window` of this crate; with
+/// `bevy_render`, the feature `camera`: a plugin can be left out only by its type. Leave out others
+/// with [`disable`](bevy::app::PluginGroupBuilder::disable), as with any group.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HeadlessPlugins {
-    /// Draw, for agents that see through a camera.
+    /// True if pictures are drawn for agents that see through a camera.
     draws: bool,
 }
 
 impl HeadlessPlugins {
-    /// With a renderer that draws for [`CameraSensor`](crate::camera::CameraSensor)s.
+    /// Creates the plugins with a renderer that draws for [`CameraSensor`](crate::camera::CameraSensor)s.
     #[cfg(feature = "camera")]
     pub fn drawing() -> Self {
         Self { draws: true }

@@ -1,4 +1,4 @@
-//! Which keys a person plays with, and which action they mean.
+//! Key bindings of a person, and the actions that the keys stand for.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -18,7 +18,7 @@ use bevy::prelude::*;
 
 use crate::action::ActionValue;
 
-/// Two directions and the keys that push each way. Keys for both ways at once cancel out.
+/// An axis with the keys that push it in each direction. Keys for opposite directions cancel out.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct KeyAxis {
     /// Keys for -1: left, down.
@@ -28,19 +28,20 @@ pub struct KeyAxis {
 }
 
 impl KeyAxis {
-    /// An axis with these keys.
+    /// Creates an axis with these keys.
     pub fn new(negative: impl Into<Vec<KeyCode>>, positive: impl Into<Vec<KeyCode>>) -> Self {
         Self { negative: negative.into(), positive: positive.into() }
     }
 
-    /// -1, 0 or 1.
+    /// Returns -1, 0 or 1.
     fn value(&self, held: &impl Fn(KeyCode) -> bool) -> i8 {
         let any = |keys: &[KeyCode]| i8::from(keys.iter().any(|&key| held(key)));
         any(&self.positive) - any(&self.negative)
     }
 }
 
-/// The keys of an agent that a person plays: each axis has a value of -1, 0 or 1, and all values together are an action.
+/// The keys of an agent that a person plays. Each axis has a value of -1, 0 or 1, and all values
+/// together are an action.
 ///
 /// Works on agents under [`Control::Human`](crate::control::Control::Human) in an app with
 /// [`KeyboardPlugin`](crate::keyboard::KeyboardPlugin).
@@ -60,7 +61,8 @@ impl fmt::Debug for KeyBindings {
 }
 
 impl KeyBindings {
-    /// A map over these axes. `action` gets one value per axis; `help` tells a person which keys there are.
+    /// Creates bindings over these axes. `action` gets one value per axis; `help` describes the
+    /// keys to a person.
     pub fn new(
         axes: impl Into<Vec<KeyAxis>>,
         action: impl Fn(&[i8]) -> ActionValue + Send + Sync + 'static,
@@ -69,8 +71,8 @@ impl KeyBindings {
         Self { axes: axes.into(), action: Arc::new(action), help: help.into() }
     }
 
-    /// The way back from a game's own keys: discrete action i means that the keys of set i are held. Of several that fit
-    /// the one with the most keys counts.
+    /// Creates bindings from a game's own keys: discrete action i means that the keys of set i are
+    /// held. Of several sets that are held, the one with the most keys counts.
     pub fn of_sets(sets: &[Vec<KeyCode>]) -> Self {
         let mut keys = Vec::new();
         for key in sets.iter().flatten() {
@@ -92,13 +94,13 @@ impl KeyBindings {
         Self::new(axes, action, help)
     }
 
-    /// The action of the keys that are held.
+    /// Returns the action of the keys that are held.
     pub fn action(&self, held: impl Fn(KeyCode) -> bool) -> ActionValue {
         let values: Vec<_> = self.axes.iter().map(|axis| axis.value(&held)).collect();
         (self.action)(&values)
     }
 
-    /// Which keys there are, for people.
+    /// Returns the description of the keys, for people.
     pub fn help(&self) -> &str {
         &self.help
     }

@@ -6,7 +6,7 @@
 //!
 //! let mut app = headless_app();
 //! app.add_plugins((InputPlugin, KeyboardPlugin));
-//! // Action 0 is nobody's key, action 1 the space bar.
+//! // Action 0 has no key, action 1 the space bar.
 //! let keys = KeyBindings::of_sets(&[vec![], vec![KeyCode::Space]]);
 //! let agent = app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human, keys)).id();
 //! app.tick().expect("no agent broke its contract");
@@ -28,15 +28,15 @@ use crate::{
     systems::PlaybotSystems,
 };
 
-/// Turns keys into the actions of agents under [`Control::Human`] that have [`KeyBindings`]. To be added after
-/// [`PlaybotPlugin`](crate::plugin::PlaybotPlugin).
+/// Turns keys into the actions of agents under [`Control::Human`] that have [`KeyBindings`]. Add it
+/// after [`PlaybotPlugin`](crate::plugin::PlaybotPlugin).
 ///
-/// Ticks and frames have their own rates. A key counts in a tick if it is held then, or was pressed at any time since
-/// the tick before, so that a short tap is never lost between two ticks. Needs Bevy's `InputPlugin`.
+/// Ticks and frames have their own rates. A key counts in a tick if it is held then, or was pressed
+/// since the tick before. So a short tap between two ticks is not lost. Needs Bevy's `InputPlugin`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct KeyboardPlugin;
 
-/// Keys that were pressed since the last tick, whether or not they are still held.
+/// Keys that were pressed since the last tick, even if they are released by now.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
@@ -44,7 +44,7 @@ pub struct KeyboardPlugin;
 pub struct TappedKeys(Vec<KeyCode>);
 
 impl TappedKeys {
-    /// Forgets them: what was pressed while the game stood still is not meant for it.
+    /// Drops the taps: keys pressed while the game was paused are not meant for it.
     pub fn clear(&mut self) {
         self.0.clear();
     }
@@ -57,14 +57,14 @@ impl Plugin for KeyboardPlugin {
             TickPlacement::Fixed => {
                 app.add_systems(FixedPreUpdate, decide.in_set(PlaybotSystems::Decide).before(bot::run_blind_bots))
             }
-            // The game sees the keys of this very frame, so the action is made of those.
+            // The game reads the keys of this frame, so the action is made of the same keys.
             TickPlacement::Frame => app.add_systems(PreUpdate, decide.after(note_taps).run_if(is_tick)),
         };
     }
 }
 
 pub(crate) fn note_taps(keys: Res<ButtonInput<KeyCode>>, mut tapped: ResMut<TappedKeys>) {
-    // They come in no certain order, and none is needed: they are only searched.
+    // Their order is unspecified, and irrelevant: they are only searched.
     tapped.0.extend(keys.get_just_pressed());
 }
 

@@ -1,6 +1,7 @@
-//! Which plugin brings a resource: what a game is told when it asks for one that is not there.
+//! Plugins of Bevy by the resources that they add, for error messages about missing resources.
 
-/// Resources of Bevy by their short names, and who brings them; `*` stands for any rest. The first match counts.
+/// Resources of Bevy by their short names, and the plugins that add them; `*` stands for any rest.
+/// The first match counts.
 const KNOWN: [(&str, &str); 37] = [
     ("ButtonInput<*", "`InputPlugin`"),
     ("Axis<*", "`InputPlugin`"),
@@ -41,7 +42,7 @@ const KNOWN: [(&str, &str); 37] = [
     ("Rapier*", "`RapierPhysicsPlugin`"),
 ];
 
-/// Who brings a resource of this short name.
+/// Returns the plugin that adds a resource of this short name.
 pub(crate) fn plugin_of(resource: &str) -> Option<&'static str> {
     KNOWN.iter().find(|(name, _)| is_named(resource, name)).map(|(_, plugin)| *plugin)
 }

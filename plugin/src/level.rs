@@ -1,4 +1,4 @@
-//! Which level an agent plays next.
+//! Queues of the levels that agents play.
 //!
 //! ```
 //! use bevy_playbot::{prelude::*, streams::AgentStreams};
@@ -28,30 +28,32 @@
 use std::sync::Arc;
 
 use bevy::prelude::*;
+
+use crate::carry_over::ReflectCarryComponent;
 use rand::{Rng, RngExt};
 
 /// Source of level numbers for one agent.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(opaque)]
-#[reflect(Component, Clone, Debug)]
+#[reflect(Component, CarryComponent, Clone, Debug)]
 pub enum LevelQueue {
-    /// The same level for ever.
+    /// The same level forever.
     Always(u64),
-    /// These levels, each once, in order; the agent idles afterwards.
+    /// These levels, each once, in order. The agent idles afterwards.
     List {
-        /// What is left to play is `levels[next..]`.
+        /// The levels; `levels[next..]` remain to be played.
         levels: Arc<[u64]>,
         /// Index of the next level.
         next: usize,
     },
     /// These levels over and over, in order. At least one.
     Rounds {
-        /// All of them.
+        /// The levels.
         levels: Arc<[u64]>,
         /// Index of the next level.
         next: usize,
     },
-    /// Levels `first..=last`, uniformly and with replacement, from the agent's own stream of random numbers.
+    /// Levels `first..=last`, uniformly and with replacement, from the agent's own random stream.
     Uniform {
         /// Lowest level.
         first: u64,
@@ -69,17 +71,17 @@ impl Default for LevelQueue {
 }
 
 impl LevelQueue {
-    /// A queue over a list of levels, each played once.
+    /// Creates a queue over a list of levels, each played once.
     pub fn list(levels: impl Into<Arc<[u64]>>) -> Self {
         Self::List { levels: levels.into(), next: 0 }
     }
 
-    /// A queue that goes through a list of levels again and again.
+    /// Creates a queue that goes through a list of levels again and again.
     pub fn rounds(levels: impl Into<Arc<[u64]>>) -> Self {
         Self::Rounds { levels: levels.into(), next: 0 }
     }
 
-    /// The next level, or `None` when there is none left.
+    /// Returns the next level, or `None` when no level is left.
     pub fn next_level(&mut self, rng: &mut impl Rng) -> Option<u64> {
         match self {
             Self::Always(level) => Some(*level),
@@ -99,12 +101,12 @@ impl LevelQueue {
     }
 }
 
-/// A game's own way of choosing levels.
+/// A game's own choice of levels.
 pub trait LevelSource: Send + Sync + std::fmt::Debug {
-    /// The next level, or `None` when there is none left.
+    /// Returns the next level, or `None` when no level is left.
     fn next_level(&mut self) -> Option<u64>;
 
-    /// A copy with the same future.
+    /// Returns a copy that will yield the same levels.
     fn clone_box(&self) -> Box<dyn LevelSource>;
 }
 

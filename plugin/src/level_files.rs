@@ -1,19 +1,20 @@
-//! Levels that are files: which file each level number of a World stands for.
+//! Level files: the files that stand for the level numbers of a World.
 //!
-//! A level number says which level is played only as long as nobody adds, renames or edits a file. So recordings keep the
-//! path of the file and a hash of the level in it, and a replay asks here whether that is still the level it gets.
+//! A level number identifies a level only until a file is added, renamed or edited. Recordings
+//! therefore keep the path of the file and a hash of the level in it. A replay checks here that it
+//! gets the same level.
 
 use std::fmt;
 
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The file of a level: where it is, and a hash of the level in it.
+/// The file of a level: its path, and a hash of the level in it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Reflect)]
 pub struct LevelFile {
     /// Path of the file, as it was found.
     pub path: String,
-    /// Hash of the level, however the file is laid out.
+    /// Hash of the level, independent of the file's layout.
     pub hash: u64,
 }
 
@@ -23,7 +24,7 @@ impl fmt::Display for LevelFile {
     }
 }
 
-/// The files that the level numbers of a World stand for: level i is file i. Missing where levels are no files.
+/// The files of a World's levels: level i is file i. Missing where levels are not files.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
 pub struct LevelFiles(Vec<LevelFile>);
@@ -34,13 +35,13 @@ impl LevelFiles {
         Self(files)
     }
 
-    /// The file of a level.
+    /// Returns the file of a level.
     pub fn of(&self, level: u64) -> Option<&LevelFile> {
         self.0.get(usize::try_from(level).ok()?)
     }
 
-    /// The level number that a recorded file has now: that of the same file, or else of the same level in another file, or
-    /// else of another level in a file of that name.
+    /// Returns the current level number of a recorded file. The same file is preferred, then the
+    /// same level in another file, then another level in a file of that name.
     pub fn number_of(&self, recorded: &LevelFile) -> Option<u64> {
         let find = |is_it: &dyn Fn(&LevelFile) -> bool| self.0.iter().position(is_it);
         let index = find(&|file| file == recorded)
@@ -49,20 +50,20 @@ impl LevelFiles {
         u64::try_from(index).ok()
     }
 
-    /// What is wrong if this level is to be the recorded one, with what helps whoever recorded it; `None` if it is.
+    /// Returns why this level is not the recorded one, with advice for the recording's owner;
+    /// `None` if it is.
     pub fn difference(&self, level: u64, recorded: &LevelFile) -> Option<String> {
         match self.of(level) {
             Some(file) if file.hash == recorded.hash => None,
             Some(file) if file.path == recorded.path => Some(format!(
-                "the level file {} has the hash {:016x}, recorded was {:016x}: it was changed since; bring the \
-                 recorded file back",
+                "the level file {} has the hash {:016x}, but {:016x} in the recording: it has changed; restore the \
+                 recorded file",
                 file.path, file.hash, recorded.hash
             )),
             Some(file) => Some(format!(
-                "recorded was the level file {recorded}, which is not there any more; the level is {file} now: bring the \
-                 recorded file back"
+                "the recorded level file {recorded} is missing; the level is {file} now: restore the recorded file"
             )),
-            None => Some(format!("recorded was the level file {recorded}, which is not there any more: bring it back")),
+            None => Some(format!("the recorded level file {recorded} is missing: restore it")),
         }
     }
 }
@@ -90,8 +91,8 @@ mod tests {
         assert_eq!(files.difference(0, &file("a.json", 0x1f)), None);
         assert_eq!(files.difference(0, &file("renamed.json", 0x1f)), None);
         let words = files.difference(0, &file("a.json", 0x2e)).expect("another level");
-        assert!(words.contains("a.json has the hash 000000000000001f, recorded was 000000000000002e"), "{words}");
-        assert!(words.ends_with("bring the recorded file back"), "what is no recording is not recorded again: {words}");
+        assert!(words.contains("the hash 000000000000001f, but 000000000000002e in the recording"), "{words}");
+        assert!(words.ends_with("restore the recorded file"), "what is no recording is not recorded again: {words}");
         let words = files.difference(0, &file("b.json", 0x2e)).expect("another file");
         assert!(words.contains("b.json (hash 000000000000002e)") && words.contains("a.json"), "{words}");
         assert!(files.difference(1, &file("b.json", 0x2e)).expect("no level").contains("not there any more"));

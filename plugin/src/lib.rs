@@ -2,18 +2,20 @@
 //!
 //! # Concepts
 //!
-//! - An [`Agent`](agent::Agent) is an entity that acts in the game. Each fixed tick its sensors fill an
-//!   [`Observation`](observation::Observation), whoever holds its [`Control`](control::Control) writes its
-//!   [`Action`](action::Action), and the game answers with a [`Reward`](reward::Reward) and, sooner or later, with the
-//!   end of the [`Episode`](episode::Episode).
-//! - A *level* is named by a number. The plugin picks it from the agent's [`LevelQueue`](level::LevelQueue) and triggers
-//!   [`StartEpisode`](episode::StartEpisode); the game builds the level in an observer.
-//! - An episode ends as [`Terminated`](episode::EpisodeEnd::Terminated) (the game is over: won or lost) or
-//!   [`Truncated`](episode::EpisodeEnd::Truncated) (time is up). The two are never merged: after a termination there is
-//!   no more reward to expect, after a truncation there would have been.
-//! - A [`SkillPrior`](skill_prior::SkillPrior) draws a skill z for each agent every T ticks; a policy decodes it into
-//!   actions together with the observation.
-//! - [`demo`] records who did what, and replays it to the bit.
+//! - An [`Agent`](agent::Agent) is an entity that acts in the game. Each fixed tick its sensors
+//!   fill an [`Observation`](observation::Observation), and the source that its
+//!   [`Control`](control::Control) names writes its [`Action`](action::Action). The game answers
+//!   with a [`Reward`](reward::Reward) and eventually with the end of the
+//!   [`Episode`](episode::Episode).
+//! - A *level* is identified by a number. The plugin takes it from the agent's
+//!   [`LevelQueue`](level::LevelQueue) and triggers [`StartEpisode`](episode::StartEpisode); the
+//!   game builds the level in an observer.
+//! - An episode ends as [`Terminated`](episode::EpisodeEnd::Terminated) (the game is over: won or
+//!   lost) or [`Truncated`](episode::EpisodeEnd::Truncated) (time is up). The two are never merged:
+//!   no reward can follow a termination, but reward could have followed a truncation.
+//! - A [`SkillPrior`](skill_prior::SkillPrior) draws a skill z for each agent every T ticks. The
+//!   policy decodes z, together with the observation, into actions.
+//! - [`demo`] records the actions of people, bots and policies, and replays them bit by bit.
 //! - A [`policy_file`] brings a trained policy into a game that ships with it.
 //!
 //! Training, evaluation and reports are in `playbot_lab`, the command line for any list of games in `playbot_cli`.
@@ -26,10 +28,11 @@
 //! FixedPostUpdate  PlaybotSystems::Judge → Record → Reset
 //! ```
 //!
-//! `Load` is for games whose levels take several frames to build: until [`Episode::ready`](episode::Episode::ready) is
-//! called, nothing is observed, decided or counted for the agent. For a game that simulates in `Update` each frame is a
-//! tick ([`TickPlacement::Frame`](placement::TickPlacement::Frame)): the first line then runs in `PreUpdate`, the last in
-//! `Last`.
+//! `Load` is for games whose levels take several frames to build. Until
+//! [`Episode::ready`](episode::Episode::ready) is called, the agent is not observed and its ticks
+//! are not counted. For a game that simulates in `Update` each frame is a tick
+//! ([`TickPlacement::Frame`](placement::TickPlacement::Frame)): the first line then runs in
+//! `PreUpdate`, the last in `Last`.
 //!
 //! # A game in thirty lines
 //!
@@ -89,6 +92,7 @@ pub mod agent;
 pub mod bot;
 #[cfg(feature = "camera")]
 pub mod camera;
+mod carry_over;
 pub mod control;
 pub mod demo;
 pub mod episode;
@@ -141,7 +145,7 @@ mod waves;
 pub use plugin::PlaybotPlugin;
 pub use plugins::PlaybotPlugins;
 
-/// What the README shows is compiled.
+/// Compiles the examples of the README.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

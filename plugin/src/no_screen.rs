@@ -1,8 +1,8 @@
-//! A mark for apps that nobody looks at.
+//! A marker for apps without a screen.
 
 use bevy::prelude::*;
 
-/// The app has no screen, so that nothing needs to be drawn but what agents ask for.
+/// Marks an app without a screen: only the pictures of agents need to be drawn.
 #[derive(Resource, Clone, Copy, Debug, Reflect)]
 #[reflect(Resource)]
 pub(crate) struct NoScreen;

@@ -1,10 +1,10 @@
-//! What an agent sees.
+//! Observations of agents and the sensors of named values.
 //!
 //! ```
 //! use bevy::prelude::*;
 //! use bevy_playbot::prelude::*;
 //!
-//! /// The game's own system: numbers of about the size of 1, as policies like them.
+//! /// A system of the game: numbers near 1, which suit policies.
 //! fn see(mut agents: Query<(&Transform, &mut Observation)>) {
 //!     for (body, mut seen) in &mut agents {
 //!         seen.set([body.translation.x / 8.0, body.translation.y / 8.0]);
@@ -18,7 +18,7 @@
 //! app.tick().expect("two names and two numbers");
 //! assert_eq!(app.world().get::<Observation>(agent).expect("every agent has one").vector, [0.5, 0.25]);
 //! app.world_mut().entity_mut(agent).insert(VectorSensor::new(["x", "y", "speed"]));
-//! assert!(app.tick().is_err(), "nobody fills in the speed");
+//! assert!(app.tick().is_err(), "the speed is missing");
 //! ```
 
 use std::sync::Arc;
@@ -27,7 +27,7 @@ use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations};
 use serde::{Deserialize, Serialize};
 
-use crate::{agent::Agent, episode::Episode, fault::Faults};
+use crate::{agent::Agent, carry_over::ReflectCarryComponent, episode::Episode, fault::Faults};
 
 /// Names and number of the values of a vector observation, in order.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -37,34 +37,34 @@ pub struct ObservationSpace {
 }
 
 impl ObservationSpace {
-    /// Number of values.
+    /// Returns the number of values.
     pub fn len(&self) -> usize {
         self.names.len()
     }
 
-    /// Whether there are no values.
+    /// Returns whether there are no values.
     pub fn is_empty(&self) -> bool {
         self.names.is_empty()
     }
 }
 
-/// The game fills a named vector: its names are the contract, and each tick is checked against it.
+/// A sensor of named values that the game fills. Each tick is checked against the names.
 ///
 /// Fill [`Observation`] in a system of [`ObserveSchedule`](crate::systems::ObserveSchedule).
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(opaque)]
-#[reflect(Component, Clone, Debug)]
+#[reflect(Component, CarryComponent, Clone, Debug)]
 pub struct VectorSensor {
     space: Arc<ObservationSpace>,
 }
 
 impl VectorSensor {
-    /// A sensor with one value per name.
+    /// Creates a sensor with one value per name.
     pub fn new(names: impl IntoIterator<Item = impl Into<String>>) -> Self {
         Self::from_space(Arc::new(ObservationSpace { names: names.into_iter().map(Into::into).collect() }))
     }
 
-    /// A sensor that shares its names with others: cheap for many agents of one kind.
+    /// Creates a sensor that shares its names with others: cheap for many agents of one kind.
     pub fn from_space(space: Arc<ObservationSpace>) -> Self {
         Self { space }
     }
@@ -82,7 +82,7 @@ pub struct Observation {
     /// Values in the order of the sensor's names; empty without a [`VectorSensor`].
     pub vector: Vec<f32>,
     /// Pixels `[channels, height, width]` of 0 to 255, top row first; empty without an
-    /// [`ImageSensor`](crate::vision::ImageSensor). With stacked pictures the oldest comes first.
+    /// [`ImageSensor`](crate::vision::ImageSensor). In a stack the oldest picture comes first.
     pub image: Vec<u8>,
 }
 
@@ -107,7 +107,7 @@ pub(crate) fn plugin(app: &mut App) {
     app.register_required_components::<Agent, Observation>();
 }
 
-/// Empties a batch for observations of a kind, and keeps its memory where it can.
+/// Empties a batch for observations of a kind, reusing its memory where possible.
 pub(crate) fn start_batch(batch: &mut Observations, kind: &ObsKind) {
     match (&mut *batch, kind) {
         (Observations::Vector(_), ObsKind::Vector(_)) | (Observations::Image(_), ObsKind::Image(_)) => batch.clear(),
@@ -140,7 +140,8 @@ pub fn check_observations(agents: Query<(&Agent, &VectorSensor, &Observation, &E
     }
 }
 
-/// Index of the first value that is NaN or infinite. Sums first, since almost all vectors are sound.
+/// Returns the index of the first value that is NaN or infinite. Sums first, since almost all
+/// vectors are finite.
 fn first_non_finite(values: &[f32]) -> Option<usize> {
     let sum: f32 = values.iter().map(|value| value * 0.0).sum();
     if sum == 0.0 { None } else { values.iter().position(|value| !value.is_finite()) }

@@ -1,4 +1,4 @@
-//! Panics of a game: an error with the way back to it, instead of the end of the program.
+//! Panics of a game: turned into faults, with a file that replays to the panic.
 
 use std::{
     cell::{Cell, RefCell},
@@ -12,6 +12,7 @@ use bevy::prelude::*;
 use crate::{
     action::{Action, check_actions},
     agent::{Agent, AgentOrder},
+    carry_over::{ReflectCarryComponent, ReflectCarryResource},
     control::Control,
     demo::{
         file::{DemoEpisode, DemoHeader, DemoWriter},
@@ -30,20 +31,20 @@ use crate::{
 /// episodes of all agents kept in a file that replays to the panic.
 #[derive(Resource, Clone, Debug, Reflect)]
 #[reflect(opaque)]
-#[reflect(Resource, Clone, Debug)]
+#[reflect(Resource, CarryResource, Clone, Debug)]
 pub struct PanicReports {
     header: DemoHeader,
-    /// `None` if nothing is written.
+    /// The folder, or `None` if no file is written.
     folder: Option<PathBuf>,
 }
 
-/// What an agent has done in its running episode, kept for the report of a panic.
+/// The actions and outcomes of an agent's running episode, kept for the report of a panic.
 #[derive(Component, Clone, Debug, Default, Reflect)]
 #[reflect(opaque)]
-#[reflect(Component, Clone, Debug)]
+#[reflect(Component, CarryComponent, Clone, Debug)]
 pub struct EpisodeTrace(Option<DemoEpisode>);
 
-/// The World has panicked, and what it holds may be half of something.
+/// Marks a World that has panicked: its state may be inconsistent.
 #[derive(Resource, Reflect)]
 #[reflect(Resource)]
 struct Broken;
@@ -63,18 +64,19 @@ impl PanicReports {
             .add_systems(judge, note_outcomes.in_set(PlaybotSystems::Record));
     }
 
-    /// Writes elsewhere from now on.
+    /// Writes to another folder from now on.
     pub fn move_to(&mut self, folder: impl Into<PathBuf>) {
         self.folder = Some(folder.into());
     }
 
-    /// Writes no files from now on: for who can play the episodes again anyway.
+    /// Writes no files from now on, for callers that can play the episodes again anyway.
     pub fn keep_no_files(&mut self) {
         self.folder = None;
     }
 }
 
-/// Keeps the action of this tick. Whatever hands it on to the game runs after this, because it may panic.
+/// Keeps the action of this tick. Systems that hand it on to the game run after this, because they
+/// may panic.
 pub fn note_actions(mut agents: Query<(&Agent, &Control, &Episode, &Action, &mut EpisodeTrace)>) {
     for (agent, control, episode, action, mut trace) in &mut agents {
         if !control.is_active() || !episode.is_running() {
@@ -103,12 +105,12 @@ fn note_outcomes(mut agents: Query<(&Control, &Episode, &Reward, &StateHash, &mu
 }
 
 thread_local! {
-    /// Whether this thread runs a World whose panics are reported.
+    /// True if this thread runs a World with reported panics.
     static GUARDED: Cell<bool> = const { Cell::new(false) };
     static WORDS: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Lets panics of guarded Worlds be heard instead of printed.
+/// Captures panics of guarded Worlds instead of printing them.
 fn hear_panics() {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
@@ -128,7 +130,7 @@ fn hear_panics() {
     });
 }
 
-/// Runs a World; a panic in it becomes a fault if it has [`PanicReports`].
+/// Runs a World. A panic in it becomes a fault if it has [`PanicReports`].
 pub(crate) fn guard(world: &mut World, work: impl FnOnce(&mut World) -> Result<(), Fault>) -> Result<(), Fault> {
     if !world.contains_resource::<PanicReports>() {
         return work(world);
@@ -142,8 +144,8 @@ pub(crate) fn guard(world: &mut World, work: impl FnOnce(&mut World) -> Result<(
     })
 }
 
-/// Does what may panic. The words of a panic are returned instead of printed; what the work has left behind may be half of
-/// something.
+/// Runs work that may panic. Returns the message of a panic instead of printing it. After a panic
+/// the work may leave inconsistent state behind.
 pub fn hear<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     hear_panics();
     let outer = GUARDED.replace(true);
@@ -152,7 +154,7 @@ pub fn hear<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     result.map_err(|_| WORDS.take())
 }
 
-/// Says where the game has panicked, and keeps the way there.
+/// Returns a report of where the game has panicked, and writes the recording that leads there.
 fn report(world: &mut World, words: &str) -> String {
     let agents = world.get_resource::<AgentOrder>().map_or_else(Vec::new, |order| order.entities().to_vec());
     let mut episodes = Vec::new();
@@ -181,7 +183,8 @@ fn report(world: &mut World, words: &str) -> String {
     format!("{place}: the game panicked: {words}{kept}")
 }
 
-/// A trace with all its lists filled: the tick that panicked has no outcome. One without any tick gets its first.
+/// Returns a trace with lists of equal length: the tick that panicked has no outcome yet. A trace
+/// without any tick gets its first.
 fn whole(trace: Option<DemoEpisode>, agent: &Agent, episode: &Episode) -> DemoEpisode {
     use playbot_learner::{Action as Value, ActionSpace};
     let mut trace = trace.unwrap_or_else(|| DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
@@ -206,7 +209,7 @@ fn keep(
     let (Some(reports), Some(first)) = (world.get_resource::<PanicReports>(), at.first()) else { return Ok(None) };
     let Some(folder) = &reports.folder else { return Ok(None) };
     let place = first.replace(", ", "-").replace(' ', "");
-    // The folder may be everybody's, and two programs may well panic at the same place.
+    // The folder may be shared, and two programs may panic at the same position.
     let name = format!("panic-{}-{place}-{}.demo", reports.header.game, std::process::id());
     let path = folder.join(name);
     let note = "kept when the game panicked in its last tick".to_owned();

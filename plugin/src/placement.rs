@@ -1,4 +1,4 @@
-//! Where in a frame a tick lies, and in which frames there is one.
+//! The position of a tick within a frame, and the frames that have one.
 //!
 //! ```
 //! use bevy::{prelude::*, time::TimePlugin};
@@ -7,7 +7,7 @@
 //! #[derive(Resource, Default)]
 //! struct Judged(u32);
 //!
-//! /// For games of either placement: the app knows where its ticks end.
+//! /// Works for both placements: the app knows the end of its ticks.
 //! fn count_ticks(app: &mut App) {
 //!     let judge = TickSchedules::of(app).judge;
 //!     app.init_resource::<Judged>()
@@ -31,25 +31,25 @@ use bevy::{
 
 use crate::{agent::Agent, control::Control, episode::Episode, tick::Tick};
 
-/// What a tick is made of.
+/// The extent of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
 pub enum TickPlacement {
-    /// One run of Bevy's fixed schedules: agents decide in `FixedPreUpdate` and are judged in `FixedPostUpdate`. For
-    /// games that know the plugin and simulate in `FixedUpdate`.
+    /// One run of Bevy's fixed schedules: agents decide in `FixedPreUpdate`, and outcomes are
+    /// counted in `FixedPostUpdate`. For games that know the plugin and simulate in `FixedUpdate`.
     #[default]
     Fixed,
-    /// One whole frame of a fixed length: agents decide in `PreUpdate`, before Bevy's own input, and are judged in
-    /// `Last`. For games that know nothing of the plugin, whatever schedules they use.
+    /// One whole frame of a fixed length: agents decide in `PreUpdate`, before Bevy's own input,
+    /// and outcomes are counted in `Last`. For games that do not know the plugin, in any schedules.
     Frame,
 }
 
-/// The schedules in which the parts of a tick run. [`PlaybotPlugin`](crate::plugin::PlaybotPlugin) inserts it; whoever
-/// adds systems to a [`PlaybotSystems`](crate::systems::PlaybotSystems) set asks it where.
+/// The schedules in which the parts of a tick run. [`PlaybotPlugin`](crate::plugin::PlaybotPlugin)
+/// inserts it; use it to add systems to a [`PlaybotSystems`](crate::systems::PlaybotSystems) set.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone, Debug, PartialEq)]
 pub struct TickSchedules {
-    /// What a tick is made of.
+    /// The extent of a tick.
     pub placement: TickPlacement,
     /// Schedule of `Begin` to `Act`.
     pub decide: InternedScheduleLabel,
@@ -58,7 +58,7 @@ pub struct TickSchedules {
 }
 
 impl TickSchedules {
-    /// The schedules of a placement.
+    /// Returns the schedules of a placement.
     pub fn new(placement: TickPlacement) -> Self {
         let (decide, judge) = match placement {
             TickPlacement::Fixed => (FixedPreUpdate.intern(), FixedPostUpdate.intern()),
@@ -67,14 +67,14 @@ impl TickSchedules {
         Self { placement, decide, judge }
     }
 
-    /// Those of an app; before it has the plugin, the fixed ones.
+    /// Returns the schedules of an app; before it has the plugin, the fixed ones.
     pub fn of(app: &App) -> Self {
         app.world().get_resource().copied().unwrap_or(Self::new(TickPlacement::Fixed))
     }
 }
 
-/// Which frames are ticks, under [`TickPlacement::Frame`]: not the first, which only starts the clock, and none while an
-/// agent waits for its level.
+/// The frames that are ticks, under [`TickPlacement::Frame`]. The first frame only starts the
+/// clock, and a frame in which an agent waits for its level is no tick.
 #[derive(Resource, Clone, Copy, Debug, Default, Reflect)]
 #[reflect(Resource)]
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
@@ -89,18 +89,19 @@ pub(crate) fn begin_frame(mut gate: ResMut<FrameGate>) {
     gate.is_tick = false;
 }
 
-/// Whether agents may be given levels in this frame.
+/// Returns whether agents may be given levels in this frame.
 pub(crate) fn has_begun(gate: Res<FrameGate>) -> bool {
     gate.frames > 1
 }
 
-/// A run condition: whether this frame is a tick. Always under [`TickPlacement::Fixed`], where systems run in ticks only.
+/// Returns whether this frame is a tick, as a run condition. Always true under
+/// [`TickPlacement::Fixed`], where systems run only in ticks.
 #[doc(hidden)]
 pub fn is_tick(gate: Option<Res<FrameGate>>) -> bool {
     gate.is_none_or(|gate| gate.is_tick)
 }
 
-/// Opens the gate and counts the tick, unless somebody waits for a level.
+/// Opens the gate and counts the tick, unless an agent waits for a level.
 pub(crate) fn open_gate(
     agents: Query<(&Control, &Episode), With<Agent>>,
     mut gate: ResMut<FrameGate>,

@@ -1,11 +1,11 @@
-//! The plugin itself: resources and the order of its systems.
+//! The plugin: resources and the order of its systems.
 //!
 //! ```
 //! use bevy::{prelude::*, time::TimePlugin};
 //! use bevy_playbot::{prelude::*, tick::Tick};
 //!
 //! let mut app = App::new();
-//! // A game with a window adds `DefaultPlugins`, which bring the time along.
+//! // A game with a window adds `DefaultPlugins`, which include time.
 //! app.add_plugins((TimePlugin, PlaybotPlugin::default()));
 //! app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Bot, BlindBot::Uniform));
 //! app.update();
@@ -26,10 +26,10 @@ use crate::{
 
 /// Adds agents, episodes, skills, policies, recording and replay to a game.
 ///
-/// It draws nothing, opens nothing and starts nothing: agents that the game spawns bring it to life.
+/// It draws nothing and opens nothing. It acts on the agents that the game spawns.
 #[derive(Default, Debug, Clone, Copy)]
 pub struct PlaybotPlugin {
-    /// What a tick is made of.
+    /// The extent of a tick.
     pub placement: TickPlacement,
 }
 
@@ -70,7 +70,7 @@ impl Plugin for PlaybotPlugin {
     }
 }
 
-/// A frame is a tick, but for the first one and those in which a level is being made ready.
+/// Makes each frame a tick, except the first and those in which a level is being built.
 fn place_in_frames(app: &mut App) {
     use PlaybotSystems::{Act, Begin, Decide, Judge, Load, Observe, Record, Reset};
     app.init_resource::<FrameGate>()
@@ -87,7 +87,7 @@ fn place_in_frames(app: &mut App) {
         );
 }
 
-/// Everything up to the action.
+/// Adds the systems up to the action.
 fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
     app.add_systems(
         schedule,
@@ -118,7 +118,7 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
     );
 }
 
-/// Everything after the game has answered.
+/// Adds the systems that follow the game's step.
 fn add_outcome_systems(app: &mut App, schedule: impl ScheduleLabel) {
     app.add_systems(
         schedule,

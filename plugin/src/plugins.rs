@@ -10,7 +10,7 @@ use crate::{
     virtual_input::{InputRoute, VirtualInputPlugin},
 };
 
-/// Everything that a game with agents needs at run time:
+/// The plugins that a game with agents needs at run time:
 ///
 /// | plugin | what it brings |
 /// |---|---|
@@ -38,17 +38,18 @@ pub struct PlaybotPlugins {
 }
 
 impl PlaybotPlugins {
-    /// For a game of this name, at this version of its rules: see [`GameIdentity`].
+    /// Creates the plugins for a game of this name, at this version of its rules: see
+    /// [`GameIdentity`].
     pub fn new(name: &str, version: u32) -> Self {
         Self { game: GameIdentity::new(name, version), placement: TickPlacement::Fixed }
     }
 
-    /// For a mode of the game.
+    /// Sets the mode of the game.
     pub fn with_mode(self, mode: &str) -> Self {
         Self { game: self.game.with_mode(mode), ..self }
     }
 
-    /// For a game whose ticks are whole frames: virtual input then goes by messages.
+    /// Adapts to a game whose ticks are whole frames: virtual input then uses messages.
     pub fn in_frames(self) -> Self {
         Self { placement: TickPlacement::Frame, ..self }
     }

@@ -1,4 +1,4 @@
-//! Agents that are driven by a learned policy.
+//! Agents driven by a learned policy.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -7,7 +7,7 @@
 //! # let spec = PolicySpec { obs: 1.into(), latent: 0, action_space: ActionSpace::Discrete(3) };
 //! # let policy = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex).expect("good settings").policy();
 //!
-//! /// The game's own system.
+//! /// A system of the game.
 //! fn see(mut agents: Query<&mut Observation>) {
 //!     agents.iter_mut().for_each(|mut seen| seen.set([0.5]));
 //! }
@@ -30,6 +30,7 @@ use playbot_learner::{ObsKind, Policy};
 use crate::{
     action::Action,
     agent::{Agent, AgentOrder},
+    carry_over::{ReflectCarryComponent, ReflectCarryResource},
     control::Control,
     episode::Episode,
     fault::Faults,
@@ -41,7 +42,7 @@ use crate::{
     vision::{ImageSensor, seen_as},
 };
 
-/// How an action is taken from the policy's distribution.
+/// The choice of an action from the policy's distribution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 pub enum ActionDraw {
     /// A random draw.
@@ -54,16 +55,17 @@ pub enum ActionDraw {
 /// The policy that drives every agent under [`Control::Policy`].
 #[derive(Resource, Clone, Reflect)]
 #[reflect(opaque)]
-#[reflect(Resource, Clone)]
+#[reflect(Resource, CarryResource, Clone)]
 pub struct ActivePolicy {
     /// Actor and critic.
     pub policy: Policy,
-    /// How actions are drawn.
+    /// The choice of actions.
     pub draw: ActionDraw,
 }
 
 impl ActivePolicy {
-    /// Lets it drive the agents of this World, with skills from this prior, or with none. What was there before goes.
+    /// Lets the policy drive the agents of this World, with skills from this prior, or without.
+    /// Replaces an earlier policy.
     pub fn install(self, world: &mut World, skills: Option<SkillPrior>) {
         world.insert_resource(self);
         match skills {
@@ -73,9 +75,9 @@ impl ActivePolicy {
     }
 }
 
-/// What the policy thought when it chose the action of this tick.
+/// The policy's estimates for the action of this tick.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
-#[reflect(Component)]
+#[reflect(Component, CarryComponent)]
 pub struct Decision {
     /// Natural logarithm of the action's probability (density for continuous actions).
     pub log_prob: f32,
@@ -83,7 +85,7 @@ pub struct Decision {
     pub value: f32,
 }
 
-/// What a policy adds to every agent.
+/// Adds the components of a policy to every agent.
 pub(crate) fn plugin(app: &mut App) {
     app.init_resource::<PolicyBatch>().register_required_components::<Agent, Decision>();
 }
@@ -141,7 +143,7 @@ pub(crate) fn run_policy(
     }
 }
 
-/// Why the policy cannot decide for this agent.
+/// Returns why the policy cannot decide for this agent.
 fn misfit(
     policy: &Policy,
     agent: &Agent,
@@ -151,7 +153,7 @@ fn misfit(
 ) -> Option<String> {
     let (wanted, seen) = (policy.observation(), seen_as(&policy.observation(), observation, sensor));
     let spaces = (policy.latent(), policy.action_space());
-    // A policy without skills does not mind that a prior draws some.
+    // A policy without skills ignores the skills of a prior.
     let skills_fit = spaces.0 == 0 || spaces.0 == skill.z.len();
     if skills_fit && (wanted, spaces.1) == (seen, agent.actions) {
         return None;
@@ -164,7 +166,7 @@ fn misfit(
             "give the agent a `VectorSensor`, or load a policy that reads such pictures"
         }
         (ObsKind::Image(wanted), ObsKind::Image(seen)) if wanted != seen => {
-            "set the sensor's `ImageOptions` to what the policy reads, or load a policy for these pictures"
+            "set the sensor's `ImageOptions` to those of the policy, or load a policy for these pictures"
         }
         _ => "load a policy that was trained for this game",
     };

@@ -1,4 +1,4 @@
-//! What the policy decides in a tick, for all agents of a World in one pass.
+//! Decisions of the policy in a tick, for all agents of a World in one pass.
 
 use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations, Policy, PolicyOutput};
@@ -10,7 +10,7 @@ use crate::{
     skill_prior::ActiveSkill,
 };
 
-/// The states for which the policy has decided in this tick, and the agents that were in them.
+/// The states for which the policy has decided in this tick, and their agents.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone, Debug, Default)]
@@ -20,17 +20,17 @@ pub struct PolicyBatch {
 }
 
 impl PolicyBatch {
-    /// What the agents saw, in their order.
+    /// Returns the observations, in the order of the agents.
     pub fn observations(&self) -> &Observations {
         &self.rows.observations
     }
 
-    /// What was left of their skills; empty without skills.
+    /// Returns the remaining shares of their skills; empty without skills.
     pub fn left(&self) -> &[f32] {
         &self.rows.left
     }
 
-    /// Whose they are.
+    /// Returns the agents.
     pub(crate) fn agents(&self) -> &[Entity] {
         &self.agents
     }
@@ -44,7 +44,7 @@ impl PolicyBatch {
         self.agents.clear();
     }
 
-    /// An agent, what it sees, and its skill, of which there is a new one every `horizon` ticks.
+    /// Adds an agent with its observation and its skill, which is drawn anew every `horizon` ticks.
     pub(crate) fn push(&mut self, agent: Entity, observation: &Observation, skill: &ActiveSkill, horizon: Option<u32>) {
         self.agents.push(agent);
         observation.push_to(&mut self.rows.observations);
@@ -53,7 +53,7 @@ impl PolicyBatch {
         self.rows.count += 1;
     }
 
-    /// In one pass, together with other Worlds if there are any.
+    /// Decides in one pass, together with other Worlds if there are any.
     pub(crate) fn decide(&mut self, policy: &Policy, shared: Option<&SharedBatch>) -> Result<PolicyOutput, String> {
         match shared {
             Some(shared) => shared.decide(&mut self.rows),

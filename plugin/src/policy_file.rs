@@ -1,4 +1,4 @@
-//! Policies that a game ships with: checked against the game, and put to work.
+//! Shipped policies: checking them against the game and installing them.
 //!
 //! ```
 //! use bevy_playbot::{
@@ -23,7 +23,7 @@
 //!     action_names: Vec::new(),
 //!     has_picture: false,
 //! };
-//! // `path` leads to a file that `playbot policy export` or `PolicyFile::save` has written.
+//! // `path` leads to a file written by `playbot policy export` or `PolicyFile::save`.
 //! let file = PolicyFile::load(&path, DeviceKind::default())?;
 //! check_policy(&walk, &file)?;
 //! let mut app = headless_app();
@@ -37,6 +37,7 @@
 
 use bevy::prelude::*;
 pub use playbot_learner::{DeviceKind, PolicyCard, PolicyFile, SkillSource};
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 use crate::{
@@ -46,7 +47,8 @@ use crate::{
     vision::{ObservationConfig, UnknownObservation},
 };
 
-/// What a game says of itself: a policy that was made for another game, or another state of this one, does not fit.
+/// Metadata of a game. A policy that was made for another game, or another version of this one,
+/// does not fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GameCard<'a> {
     /// Name of the game.
@@ -59,19 +61,19 @@ pub struct GameCard<'a> {
     pub actions: ActionSpace,
     /// Names of the discrete choices, or of the dimensions of continuous actions; may be empty.
     pub action_names: Vec<String>,
-    /// Whether it can be drawn, for policies that read pictures.
+    /// True if the game can be drawn, for policies that read pictures.
     pub has_picture: bool,
 }
 
 /// A policy file does not fit the game.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum PolicyMisfit {
-    /// It was made for another game.
+    /// The policy was made for another game.
     #[error("the policy was made for the game `{made_for}`, not for `{game}`")]
     Game {
-        /// The policy's game.
+        /// Name of the policy's game.
         made_for: String,
-        /// This game.
+        /// Name of this game.
         game: String,
     },
     /// The rules have changed since.
@@ -80,14 +82,15 @@ pub enum PolicyMisfit {
          again"
     )]
     Version {
-        /// This game.
+        /// Name of this game.
         game: String,
-        /// Version that the policy knows.
+        /// Version that the policy was made for.
         made_for: u32,
         /// Version of the game.
         now: u32,
     },
-    /// The policy reads another number of values than its card names: it was trained with another observation.
+    /// The policy reads another number of values than its metadata names: it was trained with
+    /// another observation.
     #[error("the policy reads {reads} observation values, but {named} are named: train it again with this observation")]
     Card {
         /// Values that it reads.
@@ -95,15 +98,15 @@ pub enum PolicyMisfit {
         /// Values that are named.
         named: usize,
     },
-    /// The file does not say what its policy sees.
+    /// The file does not state the observation of its policy.
     #[error(transparent)]
     ObservationConfig(#[from] UnknownObservation),
     /// The policy reads pictures, and the game cannot be drawn.
     #[error("the policy reads {observation_config}, but `{game}` cannot be drawn")]
     NoPicture {
-        /// This game.
+        /// Name of this game.
         game: String,
-        /// What the policy reads.
+        /// The observation that the policy reads.
         observation_config: ObservationConfig,
     },
     /// The observation has changed.
@@ -114,7 +117,7 @@ pub enum PolicyMisfit {
         quoted(.found)
     )]
     Observation {
-        /// This game.
+        /// Name of this game.
         game: String,
         /// Values that the policy reads.
         made_for: usize,
@@ -127,10 +130,10 @@ pub enum PolicyMisfit {
         /// Its name in the game; empty if there is none.
         found: String,
     },
-    /// A discrete choice or a dimension of the actions means something else now.
+    /// A discrete choice or a dimension of the actions has another meaning in the game.
     #[error("action {at} of the policy is `{expected}`, that of `{game}` is `{found}`: train and export it again")]
     ActionName {
-        /// This game.
+        /// Name of this game.
         game: String,
         /// Number of the first action that differs, from 0.
         at: usize,
@@ -139,10 +142,10 @@ pub enum PolicyMisfit {
         /// Its name in the game.
         found: String,
     },
-    /// The actions have changed.
+    /// The game's actions differ from the policy's.
     #[error("the policy acts with {made_for}, `{game}` with {now}")]
     Actions {
-        /// This game.
+        /// Name of this game.
         game: String,
         /// The policy's actions.
         made_for: ActionSpace,
@@ -151,22 +154,25 @@ pub enum PolicyMisfit {
     },
 }
 
-/// A name as messages have it.
+impl HasExitCode for PolicyMisfit {}
+
+/// Returns a name in the form of messages.
 fn quoted(name: &str) -> String {
     if name.is_empty() { "nothing".to_owned() } else { format!("`{name}`") }
 }
 
-/// What a policy sees: the sensor that its agents need.
+/// Returns the observation of a policy: the sensor that its agents need.
 ///
 /// # Errors
 ///
-/// The file does not say so.
+/// The file does not state it.
 pub fn policy_observation(file: &PolicyFile) -> Result<ObservationConfig, UnknownObservation> {
     ObservationConfig::from_card(file.card.picture.as_ref(), &file.policy.observation())
 }
 
-/// Checks that a policy was made for this game, these rules, this observation and these actions. Pictures must be
-/// possible; whether this program has the sensor is for the sensor to say.
+/// Checks that a policy was made for this game, these rules, this observation and these actions. A
+/// policy that reads pictures needs a game that can be drawn. The sensor itself reports if this
+/// program lacks it.
 ///
 /// # Errors
 ///
@@ -219,9 +225,9 @@ fn check_names(game: &GameCard<'_>, file: &PolicyFile) -> Result<(), PolicyMisfi
     Ok(())
 }
 
-/// Lets a policy, with its skills, drive every agent of this World that is under
-/// [`Control::Policy`](crate::control::Control::Policy). An agent of a policy that reads pictures carries the sensor that
-/// [`policy_observation`] names.
+/// Lets a policy, with its skills, drive every agent of this World under
+/// [`Control::Policy`](crate::control::Control::Policy). If the policy reads pictures, its agents
+/// need the sensor that [`policy_observation`] names.
 pub fn install_policy(world: &mut World, file: &PolicyFile, draw: ActionDraw) {
     let active = ActivePolicy { policy: file.policy.clone(), draw };
     active.install(world, file.skills.as_ref().map(SkillPrior::from));

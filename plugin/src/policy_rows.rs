@@ -1,15 +1,15 @@
-//! The states for which a policy decides in one pass.
+//! Rows of states for which a policy decides in one pass.
 
 use playbot_learner::{LearnError, Observations, Policy, PolicyOutput};
 
-/// The states for which a policy decides at once.
+/// The states for which a policy decides in one pass.
 #[derive(Clone, Debug)]
 pub struct PolicyRows {
     /// `count` observations.
     pub observations: Observations,
-    /// `count` skills, one behind the other; empty without skills.
+    /// `count` skills, one after the other; empty without skills.
     pub skills: Vec<f32>,
-    /// The share of each skill's ticks that is left, this one included; empty without skills.
+    /// The remaining share of each skill's ticks, this one included; empty without skills.
     pub left: Vec<f32>,
     /// Number of states.
     pub count: usize,
@@ -22,7 +22,7 @@ impl Default for PolicyRows {
 }
 
 impl PolicyRows {
-    /// What the policy thinks of them.
+    /// Returns the policy's output for the states.
     ///
     /// # Errors
     ///

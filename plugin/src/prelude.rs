@@ -1,4 +1,4 @@
-//! What almost every game with agents needs.
+//! The items that almost every game with agents needs.
 //!
 //! ```
 //! use bevy_playbot::prelude::*;

@@ -1,10 +1,10 @@
-//! Worlds that are built anew for each episode, so that nothing of a game outlives one.
+//! Worlds that are rebuilt for each episode, so that no state of a game outlives one.
 //!
 //! ```
 //! use bevy::prelude::*;
 //! use bevy_playbot::{prelude::*, renewal::Renewal};
 //!
-//! /// A game that counts where nobody can set it back, and ends after three ticks.
+//! /// A game with a counter that it cannot reset. An episode ends after three ticks.
 //! fn count(mut ticks: Local<u32>, mut episodes: Query<&mut Episode>) {
 //!     *ticks += 1;
 //!     if *ticks == 3 {
@@ -27,58 +27,45 @@
 //! assert_eq!(world.get::<EpisodeCount>(agent).expect("it goes over").finished, 3);
 //! ```
 
-use std::{any::TypeId, sync::Arc};
+use std::sync::Arc;
 
 use bevy::prelude::*;
 
 use crate::{
-    action::Action,
-    agent::{Agent, AgentOrder},
-    bot::BlindBot,
+    agent::Agent,
+    carry_over::CarryOver,
     control::Control,
-    demo::{
-        recorder::{Recorder, Recording},
-        replay::Replay,
-    },
-    episode::{Episode, EpisodeCount},
-    fault::{Fault, Faults},
+    episode::Episode,
+    fault::Fault,
     level::LevelQueue,
-    observation::VectorSensor,
-    panics::{EpisodeTrace, PanicReports},
-    policy::{ActivePolicy, Decision},
-    skill_prior::{ActiveSkill, SkillPrior},
-    state_hash::StateHash,
-    streams::{AgentStreams, EpisodeSeeds, PlaybotSeed},
-    vision::BlankEpisodes,
+    streams::{AgentStreams, PlaybotSeed},
 };
 
-/// What made the World.
+/// The function that builds the World.
 type Builder = Arc<dyn Fn() -> Result<World, Fault> + Send + Sync>;
-/// What was done to the World after that.
+/// Work that was done on the World after it was built.
 type Work = Arc<dyn Fn(&mut World) + Send + Sync>;
-type MoveResource = fn(&mut World, &mut World);
-type MoveComponent = fn(&mut World, &mut World, Entity);
 
-/// Lets [`tick_world`](crate::headless::tick_world) build the World anew before each episode but the first: a new one takes
-/// its place, with the same agents, and the game begins in it as it does when the program starts.
+/// Makes [`tick_world`](crate::headless::tick_world) rebuild the World before each episode but the
+/// first. A new World with the same agents takes its place, and the game begins in it as at the
+/// start of the program.
 ///
-/// What the plugin keeps goes over: the policy, the skill prior, the recorder and faults, and what agents carry of them.
-/// Whoever adds more to such a World does it with [`set_up`](Self::set_up), and names what he stores there with
-/// [`carry_resource`](Self::carry_resource) and [`carry_component`](Self::carry_component). Queries that are kept from
-/// one tick to the next do not fit the new World.
+/// State of the plugin is carried over: the policy, the skill prior, the recorder and faults, and their components on
+/// agents. Their types state it at their definition. Add more to such a World with [`set_up`](Self::set_up), and
+/// carry state over with [`carry_resource`](Self::carry_resource) and [`carry_component`](Self::carry_component).
+/// Queries that are kept from one tick to the next do not fit the new World.
 #[derive(Resource, Clone, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone)]
 pub struct Renewal {
     build: Builder,
     set_up: Vec<Work>,
-    resources: Vec<(TypeId, MoveResource)>,
-    components: Vec<(TypeId, MoveComponent)>,
+    carried: CarryOver,
     has_run: bool,
 }
 
-/// The World has not begun to run, and its first episode will be on this level: triggered before anything of the game
-/// runs, in Worlds with a [`Renewal`].
+/// The level of the first episode of a World that has not begun to run. Triggered before anything
+/// of the game runs, in Worlds with a [`Renewal`].
 #[derive(EntityEvent, Clone, Copy, Debug, Reflect)]
 pub struct EpisodeAhead {
     /// The agent.
@@ -88,38 +75,13 @@ pub struct EpisodeAhead {
 }
 
 impl Renewal {
-    /// For a World that `build` has made, and makes again: its agents must be the same entities each time.
+    /// Creates the renewal of a World that `build` has made, and makes again. Its agents must be
+    /// the same entities each time.
     pub fn new(build: impl Fn() -> Result<World, Fault> + Send + Sync + 'static) -> Self {
-        let (set_up, resources, components) = (Vec::new(), Vec::new(), Vec::new());
-        let mut renewal = Self { build: Arc::new(build), set_up, resources, components, has_run: false };
-        renewal
-            .resource::<ActivePolicy>()
-            .resource::<AgentOrder>()
-            .resource::<Faults>()
-            .resource::<PanicReports>()
-            .resource::<PlaybotSeed>()
-            .resource::<Recorder>()
-            .resource::<SkillPrior>();
-        renewal
-            .component::<Action>()
-            .component::<ActiveSkill>()
-            .component::<AgentStreams>()
-            .component::<BlankEpisodes>()
-            .component::<BlindBot>()
-            .component::<Control>()
-            .component::<Decision>()
-            .component::<EpisodeCount>()
-            .component::<EpisodeSeeds>()
-            .component::<EpisodeTrace>()
-            .component::<LevelQueue>()
-            .component::<Recording>()
-            .component::<Replay>()
-            .component::<StateHash>()
-            .component::<VectorSensor>();
-        renewal
+        Self { build: Arc::new(build), set_up: Vec::new(), carried: CarryOver::default(), has_run: false }
     }
 
-    /// Adds observers, systems and the like to a World, now, and to each one that takes its place.
+    /// Adds observers, systems and the like to a World now, and to each World that takes its place.
     pub fn set_up(world: &mut World, work: impl Fn(&mut World) + Send + Sync + 'static) {
         work(world);
         if let Some(mut renewal) = world.get_resource_mut::<Self>() {
@@ -127,59 +89,27 @@ impl Renewal {
         }
     }
 
-    /// This resource goes over into each World that takes the place of this one.
+    /// Carries this resource over into each World that takes the place of this one.
     pub fn carry_resource<R: Resource>(world: &mut World) {
         if let Some(mut renewal) = world.get_resource_mut::<Self>() {
-            renewal.resource::<R>();
+            renewal.carried.add_resource::<R>();
         }
     }
 
-    /// This component of agents goes over into each World that takes the place of this one.
+    /// Carries this component of agents over into each World that takes the place of this one.
     pub fn carry_component<C: Component>(world: &mut World) {
         if let Some(mut renewal) = world.get_resource_mut::<Self>() {
-            renewal.component::<C>();
+            renewal.carried.add_component::<C>();
         }
-    }
-
-    fn resource<R: Resource>(&mut self) -> &mut Self {
-        let id = TypeId::of::<R>();
-        if self.resources.iter().all(|(known, _)| *known != id) {
-            self.resources.push((id, move_resource::<R>));
-        }
-        self
-    }
-
-    fn component<C: Component>(&mut self) -> &mut Self {
-        let id = TypeId::of::<C>();
-        if self.components.iter().all(|(known, _)| *known != id) {
-            self.components.push((id, move_component::<C>));
-        }
-        self
     }
 }
 
-/// A resource that somebody has taken away is not there afterwards either.
-fn move_resource<R: Resource>(old: &mut World, new: &mut World) {
-    match old.remove_resource::<R>() {
-        Some(resource) => new.insert_resource(resource),
-        None => drop(new.remove_resource::<R>()),
-    }
-}
-
-fn move_component<C: Component>(old: &mut World, new: &mut World, agent: Entity) {
-    let carried = old.get_entity_mut(agent).ok().and_then(|mut agent| agent.take::<C>());
-    let Ok(mut agent) = new.get_entity_mut(agent) else { return };
-    match carried {
-        Some(component) => agent.insert(component),
-        None => agent.remove::<C>(),
-    };
-}
-
-/// Builds the World anew if it has run before and an episode is about to begin in it. Returns whether it was done.
+/// Rebuilds the World if it has run before and an episode is about to begin in it. Returns whether
+/// it did.
 ///
 /// # Errors
 ///
-/// The World cannot be built again. It stays as it was.
+/// The World cannot be built again. It stays unchanged.
 pub(crate) fn renew_if_due(world: &mut World) -> Result<bool, Fault> {
     let Some(has_run) = world.get_resource::<Renewal>().map(|renewal| renewal.has_run) else { return Ok(false) };
     let ahead = episodes_ahead(world);
@@ -196,7 +126,7 @@ pub(crate) fn renew_if_due(world: &mut World) -> Result<bool, Fault> {
     Ok(is_due)
 }
 
-/// The episodes that begin in the next tick; none while another one is being played.
+/// Returns the episodes that begin in the next tick; empty while another one is being played.
 fn episodes_ahead(world: &mut World) -> Vec<EpisodeAhead> {
     let seed = world.get_resource::<PlaybotSeed>().copied().unwrap_or_default();
     let mut agents = world.query::<(Entity, &Agent, &Control, &Episode, &LevelQueue, &AgentStreams)>();
@@ -205,7 +135,7 @@ fn episodes_ahead(world: &mut World) -> Vec<EpisodeAhead> {
         if episode.is_running() || episode.is_loading() {
             return Vec::new();
         }
-        // A copy is asked, so that the agent draws the same level.
+        // A copy is asked, so the agent draws the same level later.
         let mut streams = streams.clone();
         streams.seed(seed, agent.index);
         let level = queue.clone().next_level(&mut streams.level);
@@ -230,10 +160,9 @@ fn renew(world: &mut World) -> Result<(), Fault> {
     }
     fresh.insert_resource(renewal.clone());
     renewal.set_up.iter().for_each(|work| work(&mut fresh));
-    renewal.resources.iter().for_each(|(_, carry)| carry(world, &mut fresh));
-    for (agent, _) in agents {
-        renewal.components.iter().for_each(|(_, carry)| carry(world, &mut fresh, agent));
-    }
+    let mut carried = CarryOver::registered(world);
+    carried.extend(&renewal.carried);
+    carried.carry(world, &mut fresh, agents.into_iter().map(|(agent, _)| agent));
     *world = fresh;
     Ok(())
 }

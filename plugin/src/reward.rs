@@ -1,10 +1,10 @@
-//! What the game pays an agent.
+//! The reward of an agent.
 //!
 //! ```
 //! use bevy::prelude::*;
 //! use bevy_playbot::prelude::*;
 //!
-//! /// The game's own system: time costs a little, and a coin in the second tick is worth a point.
+//! /// A system of the game: time costs a little, and a coin in the second tick is worth a point.
 //! fn pay(mut agents: Query<(&Episode, &mut Reward)>) {
 //!     for (episode, mut reward) in &mut agents {
 //!         reward.add(-0.25);
@@ -26,21 +26,21 @@ use bevy::prelude::*;
 
 /// Reward of the current tick. The game adds to it in `FixedUpdate`; it is zero again at the start of the next tick.
 ///
-/// What is paid after the tick was judged, such as in `Update`, counts in the next tick. Once the episode has ended there is
-/// no next tick: that is a fault.
+/// Reward added after the tick was counted, such as in `Update`, counts in the next tick. After the
+/// end of the episode there is no next tick, so reward is a fault then.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component)]
 pub struct Reward {
     now: f32,
-    /// Paid after this tick was judged.
+    /// Reward added after this tick was counted.
     next: f32,
     is_judged: bool,
-    /// The last judged tick was the last of its episode.
+    /// True if the last counted tick was the last of its episode.
     is_over: bool,
 }
 
 impl Reward {
-    /// Pays `amount` on top of what was paid in this tick.
+    /// Adds `amount` to the reward of this tick.
     pub fn add(&mut self, amount: f32) {
         if self.is_judged {
             self.next += amount;
@@ -49,29 +49,29 @@ impl Reward {
         }
     }
 
-    /// What was paid in this tick.
+    /// Returns the reward of this tick.
     pub fn get(&self) -> f32 {
         self.now
     }
 
-    /// This tick is counted: whatever is paid now belongs to the next one.
+    /// Closes the count of this tick: later reward belongs to the next one.
     pub(crate) fn close(&mut self) {
         self.is_judged = true;
     }
 
-    /// The episode is over: whatever is paid now is too late.
+    /// Ends the episode: later reward is too late.
     pub(crate) fn end_episode(&mut self) {
         self.is_over = true;
     }
 
-    /// Begins an episode with nothing, and returns what came too late for the one before.
+    /// Begins an episode with zero, and returns reward that came too late for the episode before.
     pub(crate) fn start_episode(&mut self) -> f32 {
         let before = std::mem::take(self);
         if before.is_over { before.now } else { 0.0 }
     }
 }
 
-/// Begins a tick with what was paid since the last one was judged.
+/// Begins a tick with the reward that was added since the last tick was counted.
 pub(crate) fn clear_rewards(mut rewards: Query<&mut Reward>) {
     for mut reward in &mut rewards {
         *reward = Reward { now: reward.next, is_over: reward.is_over, ..default() };

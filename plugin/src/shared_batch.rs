@@ -1,10 +1,10 @@
-//! Several Worlds that decide together: one forward pass for the agents of all of them.
+//! Shared forward passes: one pass for the agents of several Worlds.
 //!
-//! A pass over a few rows takes a graphics card as long as one over thousands, and Worlds of a single agent spend more on
-//! passing than on computing. So each World gets a thread and a seat. It lays its rows on the table and waits; whoever
-//! completes a group computes for all of it. There are two groups: one simulates while the other is decided for.
+//! A pass over a few rows takes a GPU as long as one over thousands. Worlds of a single agent spend more time on the
+//! pass than on computing. So each World gets a thread and a seat. It submits its rows and waits; the last World of a
+//! group computes for the whole group. There are two groups: one simulates while the other is decided for.
 //!
-//! What becomes of a row does not depend on the rows beside it, so the games take the course that they take alone.
+//! The result of a row does not depend on the other rows, so the games run as they do alone.
 
 use std::sync::{
     Arc, Condvar, Mutex, MutexGuard, PoisonError,
@@ -16,7 +16,7 @@ use playbot_learner::{LearnError, Observations, Policy, PolicyOutput};
 
 use crate::policy_rows::PolicyRows;
 
-/// A World's place among those that decide together.
+/// A World's seat among those that share passes.
 #[derive(Resource, Clone, Debug, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone, Debug)]
@@ -25,14 +25,14 @@ pub struct SharedBatch {
     seat: usize,
 }
 
-/// Seats of even number make one group, those of odd number the other.
+/// Number of groups: seats of even number make one, those of odd number the other.
 const GROUPS: usize = 2;
 
 #[derive(Debug)]
 struct Table {
     policy: Policy,
     groups: [Mutex<Group>; GROUPS],
-    /// How many more Worlds may simulate: with too many they would take the cores from each other.
+    /// Number of further Worlds that may simulate. More would compete for the cores.
     free: Mutex<usize>,
     freed: Condvar,
 }
@@ -44,7 +44,7 @@ struct Group {
     waiting: Vec<Waiting>,
 }
 
-/// A World that has laid its rows on the table.
+/// A World that has submitted its rows.
 #[derive(Debug)]
 struct Waiting {
     seat: usize,
@@ -52,11 +52,12 @@ struct Waiting {
     answer: Sender<Answer>,
 }
 
-/// A World's own rows, and what the policy thinks of them.
+/// A World's own rows, and the policy's output for them.
 type Answer = (PolicyRows, Result<PolicyOutput, String>);
 
 impl SharedBatch {
-    /// Seats for as many Worlds, of which at most `threads` simulate at a time. Each plays on a thread of its own.
+    /// Creates seats for as many Worlds, of which at most `threads` simulate at a time. Each World
+    /// runs on its own thread.
     pub fn seats(policy: &Policy, worlds: usize, threads: usize) -> Vec<Self> {
         let group = |first| Mutex::new(Group { worlds: (first..worlds).step_by(GROUPS).count(), waiting: Vec::new() });
         let table = Arc::new(Table {
@@ -68,18 +69,19 @@ impl SharedBatch {
         (0..worlds).map(|seat| Self { table: table.clone(), seat }).collect()
     }
 
-    /// Waits until this World may simulate. It leaves the table when the guard goes, and nobody waits for it any more.
+    /// Waits until this World may simulate. When the guard is dropped the World leaves, and the
+    /// others no longer wait for it.
     pub fn play(&self) -> Playing<'_> {
         self.table.begin();
         Playing(self)
     }
 
-    /// What the policy thinks of the rows, which all Worlds of a group bring at the same time; on the thread that has
-    /// [begun to play](Self::play).
+    /// Returns the policy's output for the rows, which all Worlds of a group submit at the same
+    /// time. Call it on the thread that has [begun to play](Self::play).
     ///
     /// # Errors
     ///
-    /// Why nobody could compute it, in words.
+    /// The reason why the pass failed, as text.
     pub(crate) fn decide(&self, rows: &mut PolicyRows) -> Result<PolicyOutput, String> {
         let (answer, answered) = channel();
         let mine = Waiting { seat: self.seat, rows: std::mem::take(rows), answer };
@@ -96,7 +98,7 @@ impl SharedBatch {
         output
     }
 
-    /// Changes the group; if everybody waits then, this thread computes for all of them.
+    /// Changes the group. If all of its Worlds wait then, this thread computes for them.
     fn change(&self, change: impl FnOnce(&mut Group)) {
         let mut group = lock(&self.table.groups[self.seat % GROUPS]);
         change(&mut group);
@@ -133,14 +135,14 @@ impl Table {
     }
 }
 
-/// A World that has panicked leaves what it has locked as it was.
+/// Locks a mutex. A World that panicked leaves the locked data as it was.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Computes for all that wait, and wakes them.
+/// Computes for all waiting Worlds, and wakes them.
 fn compute(policy: &Policy, mut waiting: Vec<Waiting>) {
-    // The order in which they came is nobody's business.
+    // The result must not depend on the order in which they came.
     waiting.sort_by_key(|world| world.seat);
     let outputs = outputs(policy, &waiting).map_err(|error| error.to_string());
     let mut outputs = outputs.map(Vec::into_iter);
@@ -149,7 +151,7 @@ fn compute(policy: &Policy, mut waiting: Vec<Waiting>) {
             Ok(outputs) => outputs.next().ok_or_else(|| "the policy has left out some".to_owned()),
             Err(error) => Err(error.clone()),
         };
-        // Nobody is there any more if that World has panicked.
+        // The receiver is gone if that World has panicked.
         drop(answer.send((rows, output)));
     }
 }

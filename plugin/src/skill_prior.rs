@@ -1,4 +1,4 @@
-//! Skills: what the policy is asked to do for the next few ticks.
+//! Skills: the latent goals that a policy follows for several ticks.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -24,6 +24,7 @@ use playbot_learner::{ObsKind, Observations, Prior, SkillDraw, SkillSource};
 
 use crate::{
     agent::{Agent, AgentOrder},
+    carry_over::{ReflectCarryComponent, ReflectCarryResource},
     control::Control,
     episode::Episode,
     fault::Faults,
@@ -32,15 +33,15 @@ use crate::{
     vision::{ImageSensor, seen_as},
 };
 
-/// Draws a skill z from p(z | s) for each agent at the first tick of an episode and then every `horizon` fixed ticks
-/// (the paper's T), each agent on its own count.
+/// Draws a skill z from p(z | s) for each agent at the first tick of an episode and then every
+/// `horizon` fixed ticks (the paper's T). Each agent has its own count.
 #[derive(Resource, Clone, Reflect)]
 #[reflect(opaque)]
-#[reflect(Resource, Clone)]
+#[reflect(Resource, CarryResource, Clone)]
 pub struct SkillPrior {
     /// Distribution of skills: learned, or standard normal.
     pub prior: Prior,
-    /// Ticks for which a skill is held.
+    /// Ticks for which one skill is used.
     pub horizon: u32,
     /// A random draw, or the mean.
     pub draw: SkillDraw,
@@ -54,7 +55,7 @@ impl From<&SkillSource> for SkillPrior {
 
 /// The skill an agent is following.
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
-#[reflect(Component)]
+#[reflect(Component, CarryComponent)]
 pub struct ActiveSkill {
     /// The skill as the policy sees it; empty without a [`SkillPrior`].
     pub z: Vec<f32>,
@@ -63,8 +64,9 @@ pub struct ActiveSkill {
 }
 
 impl ActiveSkill {
-    /// The share of its ticks that is left, this one included, where skills are held for `horizon` ticks. One that has run out
-    /// makes room for a whole one.
+    /// Returns the remaining share of the skill's ticks, this one included, if skills are used for
+    /// `horizon` ticks. A skill that has run out counts as a whole one, because the next draw
+    /// replaces it.
     // Hidden: for rollouts.
     #[doc(hidden)]
     pub fn left(&self, horizon: u32) -> f32 {
@@ -72,12 +74,13 @@ impl ActiveSkill {
     }
 }
 
-/// What skills add to every agent.
+/// Adds the components of skills to every agent.
 pub(crate) fn plugin(app: &mut App) {
     app.register_required_components::<Agent, ActiveSkill>();
 }
 
-/// No skill outlives its episode: the first tick of the next one draws anew, whoever plays it.
+/// Ends skills with their episode: the first tick of the next episode draws anew, under any
+/// control.
 pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
     for (episode, mut skill) in &mut agents {
         if episode.is_running() && episode.tick == 0 && skill.ticks_left > 0 {
@@ -86,7 +89,7 @@ pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
     }
 }
 
-/// Draws for the agents whose skill has run out, in one batch.
+/// Draws skills in one batch for the agents whose skill has run out.
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub fn draw_skills(
@@ -96,7 +99,7 @@ pub fn draw_skills(
     sensors: Query<&ImageSensor>,
     mut faults: ResMut<Faults>,
 ) {
-    // A prior that ignores what is seen takes anything.
+    // A prior that ignores observations takes any kind.
     let kind = prior.prior.observation().unwrap_or(ObsKind::Vector(0));
     let (mut batch, mut drawing) = (Observations::empty(&kind), Vec::new());
     for &entity in order.entities() {
@@ -130,20 +133,20 @@ pub fn draw_skills(
     }
 }
 
-/// Why the prior cannot draw for this agent.
+/// Returns why the prior cannot draw for this agent.
 fn misfit(prior: &Prior, agent: &Agent, observation: &Observation, sensor: Option<&ImageSensor>) -> Option<String> {
     let wanted = prior.observation()?;
     let seen = seen_as(&wanted, observation, sensor);
     let (number, wanted_words, seen_words) = (agent.index, wanted.describe(), seen.describe());
     (wanted != seen).then(|| {
         format!(
-            "agent {number}: the skill prior was made for {wanted_words}, but the game gives {seen_words}; load the \
-             skills that belong to this game and to what the agent sees"
+            "agent {number}: the skill prior was made for {wanted_words}, but the game gives {seen_words}; load \
+             skills of this game and of the agent's observation"
         )
     })
 }
 
-/// One tick of every held skill is over.
+/// Counts one tick of every active skill.
 pub(crate) fn count_down_skills(mut agents: Query<(&Control, &Episode, &mut ActiveSkill)>) {
     for (control, episode, mut skill) in &mut agents {
         if control.is_active() && episode.is_running() && skill.ticks_left > 0 {

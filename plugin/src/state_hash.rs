@@ -1,4 +1,4 @@
-//! A fingerprint of the game's state, by which a replay proves that it is the same run.
+//! A hash of the game's state, by which a replay proves that it is the same run.
 //!
 //! ```
 //! use bevy_playbot::prelude::*;
@@ -11,11 +11,14 @@
 
 use bevy::prelude::*;
 
-/// Hash of everything that decides how the agent's arena goes on, written by the game after its own step.
+use crate::carry_over::ReflectCarryComponent;
+
+/// Hash of all state that decides how the agent's arena goes on, written by the game after its own
+/// step.
 ///
-/// A game that leaves it at zero can be recorded and replayed, but a replay then proves nothing.
+/// A game that leaves it at zero can be recorded and replayed, but then a replay proves nothing.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
-#[reflect(Component)]
+#[reflect(Component, CarryComponent)]
 pub struct StateHash(pub u64);
 
 /// Start value and factor of 64-bit FNV-1a.
@@ -23,12 +26,12 @@ const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
 const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;
 
 impl StateHash {
-    /// FNV-1a over words instead of bytes. The order of the words counts.
+    /// Returns FNV-1a over words instead of bytes. The order of the words counts.
     pub fn of(words: impl IntoIterator<Item = u64>) -> Self {
         Self(words.into_iter().fold(FNV_OFFSET, |hash, word| (hash ^ word).wrapping_mul(FNV_PRIME)))
     }
 
-    /// The 32 bits that recordings keep: both halves folded together.
+    /// Returns the 32 bits that recordings keep: both halves folded together.
     pub fn folded(&self) -> u32 {
         (self.0 ^ (self.0 >> 32)) as u32
     }

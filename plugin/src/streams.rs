@@ -1,4 +1,4 @@
-//! Random numbers: one seed for a World, streams of its own for each agent.
+//! Random streams: one seed for a World, and separate streams for each agent.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -23,22 +23,25 @@ use playbot_learner::Streams;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-use crate::agent::Agent;
+use crate::{
+    agent::Agent,
+    carry_over::{ReflectCarryComponent, ReflectCarryResource},
+};
 
 /// Gives every agent its streams.
 pub(crate) fn plugin(app: &mut App) {
     app.init_resource::<PlaybotSeed>().register_required_components::<Agent, AgentStreams>();
 }
 
-/// Seed from which all streams of random numbers of this World come.
+/// Seed from which all random streams of this World derive.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
-#[reflect(Resource)]
+#[reflect(Resource, CarryResource)]
 pub struct PlaybotSeed(pub u64);
 
-/// An agent's own streams of random numbers: which other agents share its World changes nothing for it.
+/// An agent's own random streams, independent of the other agents in its World.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque)]
-#[reflect(Component, Clone, Debug, PartialEq)]
+#[reflect(Component, CarryComponent, Clone, Debug, PartialEq)]
 pub struct AgentStreams {
     /// For the choice of levels.
     pub level: ChaCha8Rng,
@@ -57,31 +60,31 @@ impl Default for AgentStreams {
 }
 
 impl AgentStreams {
-    /// The streams of agent `index` under `seed`.
+    /// Returns the streams of agent `index` under `seed`.
     pub fn new(seed: u64, index: u32) -> Self {
         let streams = Streams::new(seed);
         let stream = |name| streams.stream(name, u64::from(index));
         Self { level: stream("level"), action: stream("action"), skill: stream("skill"), seeded: true }
     }
 
-    /// Begins the streams of agent `index`, unless they have been begun.
+    /// Begins the streams of agent `index`, unless they have begun.
     pub(crate) fn seed(&mut self, seed: PlaybotSeed, index: u32) {
         if !self.seeded {
             *self = Self::new(seed.0, index);
         }
     }
 
-    /// Streams in the middle of their run, as a checkpoint keeps them.
+    /// Restores streams in the middle of their run, from a checkpoint.
     pub fn restored(level: ChaCha8Rng, action: ChaCha8Rng, skill: ChaCha8Rng) -> Self {
         Self { level, action, skill, seeded: true }
     }
 }
 
-/// Seeds of an agent's next episodes, in their order: at the start of each, the agent's streams begin anew from the next
-/// seed. So no draw depends on the episodes before, nor on which agent of which World plays it. Once they are used up the
-/// streams run on.
+/// Seeds of an agent's next episodes, in order. At the start of each episode the agent's streams
+/// begin anew from the next seed. So no draw depends on earlier episodes, or on the agent and World
+/// that play it. After the last seed the streams run on.
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
-#[reflect(Component)]
+#[reflect(Component, CarryComponent)]
 // Hidden here and below: for playbot_lab; games need none of it.
 #[doc(hidden)]
 pub struct EpisodeSeeds {
@@ -90,17 +93,17 @@ pub struct EpisodeSeeds {
 }
 
 impl EpisodeSeeds {
-    /// These, the one of the next episode first.
+    /// Creates the list; the first seed is that of the next episode.
     pub fn new(seeds: impl Into<Vec<u64>>) -> Self {
         Self { seeds: seeds.into(), used: 0 }
     }
 
-    /// The streams that an episode with this seed begins with.
+    /// Returns the streams of an episode with this seed.
     pub fn streams(seed: u64) -> AgentStreams {
         AgentStreams::new(seed, 0)
     }
 
-    /// The streams of the episode that begins now.
+    /// Returns the streams of the episode that begins now.
     pub(crate) fn next_streams(&mut self) -> Option<AgentStreams> {
         let seed = self.seeds.get(self.used).copied()?;
         self.used += 1;
@@ -108,7 +111,7 @@ impl EpisodeSeeds {
     }
 }
 
-/// Gives agents their streams, unless they brought their own.
+/// Gives agents their streams, unless they have some already.
 pub(crate) fn seed_streams(seed: Res<PlaybotSeed>, mut added: Query<(&Agent, &mut AgentStreams), Added<Agent>>) {
     for (agent, mut streams) in &mut added {
         streams.seed(*seed, agent.index);

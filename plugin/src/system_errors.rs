@@ -1,7 +1,7 @@
-//! Systems that fail in a headless World: said in words instead of a panic.
+//! Errors of systems in a headless World: reported as text instead of a panic.
 //!
-//! Bevy hands errors to a plain function, which has no World. Headless Worlds run their systems on the thread that ticks
-//! them, so what the function hears is kept with the thread until the end of the frame.
+//! Bevy passes errors to a plain function without a World. Headless Worlds run their systems on the
+//! thread that ticks them, so the function stores errors per thread until the end of the frame.
 
 use std::cell::RefCell;
 
@@ -15,7 +15,8 @@ use bevy::{
 
 use crate::known_plugins::plugin_of;
 
-/// What Bevy says instead of a name when it is built without its feature `debug`, which this crate switches on.
+/// Bevy's text in place of a name when it is built without its feature `debug`, which this crate
+/// switches on.
 const NAMELESS: &str = "<Enable the debug feature";
 
 thread_local! {
@@ -28,7 +29,7 @@ pub fn listen(world: &mut World) {
     world.insert_resource(FallbackErrorHandler(keep));
 }
 
-/// Forgets what another World on this thread has left.
+/// Drops an error that another World on this thread has left.
 pub(crate) fn clear() {
     FIRST.with_borrow_mut(|first| *first = None);
 }
@@ -43,13 +44,13 @@ fn keep(error: BevyError, context: ErrorContext) {
     });
 }
 
-/// The first failure on this thread since the last call, in words.
+/// Takes the first failure on this thread since the last call, as text.
 pub fn take() -> Option<String> {
     FIRST.with_borrow_mut(Option::take)
 }
 
-/// Why a system (or whatever `context` names) could not run, with the name of what is missing and of the plugin that
-/// brings it.
+/// Explains why a system (or the `context`) could not run. Names the missing item and the plugin
+/// that adds it.
 pub fn explain(context: &str, error: &BevyError) -> String {
     match error.downcast_ref::<SystemParamValidationError>() {
         Some(invalid) => {
@@ -60,24 +61,24 @@ pub fn explain(context: &str, error: &BevyError) -> String {
     }
 }
 
-/// What is missing, and whose it is.
+/// Describes the missing item and the plugin that adds it.
 fn describe(context: &str, param: &str, message: &str) -> String {
     if param.contains(NAMELESS) {
-        return format!("{context} cannot run: {message}; Bevy's feature `debug` would say what it needs");
+        return format!("{context} cannot run: {message}; switch on Bevy's feature `debug` to see its name");
     }
     let inner = ["Res<", "ResMut<", "NonSend<", "NonSendMut<"].iter().find_map(|kind| param.strip_prefix(kind));
     let resource = inner.and_then(|inner| inner.strip_suffix('>'));
     if let Some(resource) = resource {
         let whose = match plugin_of(resource) {
-            Some(plugin) => format!("{plugin} brings it"),
-            None => "insert it, or add the plugin that brings it".to_owned(),
+            Some(plugin) => format!("{plugin} adds it"),
+            None => "insert it, or add the plugin that adds it".to_owned(),
         };
         return format!("{context} needs the resource `{resource}`, which does not exist: {whose}");
     }
     let of_messages = ["MessageReader<", "MessageWriter<"].iter().find_map(|kind| param.strip_prefix(kind));
     match of_messages.and_then(|rest| rest.split_once(">::")).map(|(kind, _)| kind) {
         Some(kind) => {
-            format!("{context} needs messages of the type `{kind}`, which nobody has added: `add_message` brings them")
+            format!("{context} needs messages of the type `{kind}`, which were never added: call `add_message`")
         }
         None => format!("{context} has a parameter `{param}` that does not work: {message}"),
     }
@@ -93,10 +94,10 @@ mod tests {
         assert_eq!(
             text,
             "system `setup` needs the resource `Assets<ColorMaterial>`, which does not exist: `SpriteRenderPlugin` \
-             (Bevy's feature `bevy_sprite_render`) brings it"
+             (Bevy's feature `bevy_sprite_render`) adds it"
         );
         let text = describe("system `score`", "Res<Score>", "Resource does not exist");
-        assert!(text.contains("`Score`") && text.ends_with("insert it, or add the plugin that brings it"), "{text}");
+        assert!(text.contains("`Score`") && text.ends_with("insert it, or add the plugin that adds it"), "{text}");
         let text = describe("system `hear`", "MessageReader<Bang>::messages", "Message not initialized");
         assert!(text.contains("`Bang`") && text.contains("`add_message`"), "{text}");
         let text = describe("system `x`", "Odd", "it is odd");
@@ -108,7 +109,7 @@ mod tests {
         let text = describe("system `aim`", "<Enable the debug feature to see the name>", "Resource does not exist");
         assert_eq!(
             text,
-            "system `aim` cannot run: Resource does not exist; Bevy's feature `debug` would say what it needs"
+            "system `aim` cannot run: Resource does not exist; switch on Bevy's feature `debug` to see its name"
         );
     }
 }

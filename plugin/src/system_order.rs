@@ -1,7 +1,8 @@
-//! The order of systems that nobody has put in order.
+//! A fixed order for systems whose order the game leaves open.
 //!
-//! Bevy leaves it to the rest of a schedule, so that a game with ambiguous systems does one thing headless and another in a
-//! window, where more plugins add theirs. Here such systems run in the order in which they were added.
+//! Bevy's order of such systems depends on the rest of the schedule. A game with ambiguous systems
+//! would run differently headless and in a window, where more plugins add systems. Here such
+//! systems run in the order in which they were added.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -14,22 +15,24 @@ use bevy::{
     prelude::*,
 };
 
-/// Gives the systems of each schedule one order: theirs where they have one, and else that in which they were added. To be
-/// done before the schedules run, with executors of a single thread.
+/// Gives the systems of each schedule one order: the game's constraints, and otherwise the order in
+/// which they were added. Call it before the schedules run, with single-threaded executors.
 pub fn put_in_order(world: &mut World) {
     for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
         schedule.add_build_pass(InOrderOfAddition);
     }
 }
 
-/// Leaves open what nobody has put in order, as in a game that runs by itself: for tests that look for such systems.
+/// Leaves the order open, as in a game that runs by itself: for tests that look for ambiguous
+/// systems.
 pub fn leave_open(world: &mut World) {
     for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
         schedule.remove_build_pass::<InOrderOfAddition>();
     }
 }
 
-/// Bevy adds its points of synchronisation in a pass before this one: they stay where they are needed.
+/// Bevy adds its synchronisation points in a pass before this one, so they stay where they are
+/// needed.
 #[derive(Debug)]
 struct InOrderOfAddition;
 
@@ -60,8 +63,8 @@ impl ScheduleBuildPass for InOrderOfAddition {
     }
 }
 
-/// The systems, each after those that it depends on, and else the earlier one first (Kahn's algorithm). Keys count up as
-/// systems are added.
+/// Sorts the systems: each after those that it depends on, otherwise the earlier one first (Kahn's
+/// algorithm). Keys count up as systems are added.
 fn order(dependencies: &DiGraph<SystemKey>) -> Vec<SystemKey> {
     let mut waits_for: HashMap<SystemKey, usize> = dependencies.nodes().map(|system| (system, 0)).collect();
     for (_, later) in dependencies.all_edges() {

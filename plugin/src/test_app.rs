@@ -1,5 +1,5 @@
-//! Helpers for tests of games that use the plugin. Plain functions and an extension trait, no macros: they work in any
-//! test harness.
+//! Helpers for tests of games that use the plugin: plain functions and an extension trait that work
+//! in any test harness.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -21,7 +21,7 @@
 //! assert_eq!(app.play_episodes(2, 100), Ok(6));
 //! let trace = app.hash_trace(6).expect("no agent broke its contract");
 //! assert_eq!(trace[..3], trace[3..], "each episode is the same");
-//! // Which systems are the game's: those of its crate, by name.
+//! // Systems of the game are those of its crate, by name.
 //! assert_eq!(app.ambiguous_orders(&[module_path!()]), [""; 0]);
 //! ```
 
@@ -42,10 +42,12 @@ use crate::{
     systems::ObserveSchedule,
 };
 
-/// A headless app whose fixed schedules refuse systems in an ambiguous order, since such a game is not reproducible.
+/// Creates a headless app whose fixed schedules refuse ambiguous systems, since such a game is not
+/// reproducible.
 ///
-/// Schedules that Bevy's own systems share, such as `PreUpdate` and `Last`, cannot refuse them, because those are in no
-/// certain order among themselves: ask [`ambiguous_orders`](PlaybotTestExt::ambiguous_orders) about yours.
+/// Schedules that Bevy's own systems share, such as `PreUpdate` and `Last`, cannot refuse
+/// ambiguity, because Bevy's own systems are ambiguous there. Check yours with
+/// [`ambiguous_orders`](PlaybotTestExt::ambiguous_orders).
 pub fn test_app() -> App {
     let mut app = headless_app();
     let strict = || ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() };
@@ -57,26 +59,28 @@ pub fn test_app() -> App {
     app
 }
 
-/// Questions that tests ask of an app or a World with agents.
+/// Methods for tests of an app or a World with agents.
 pub trait PlaybotTestExt {
     /// Ticks until every agent has finished at least `episodes` episodes or is idle.
     ///
     /// # Errors
     ///
-    /// A fault of the game, or `limit` ticks without getting there.
+    /// A fault of the game, or `limit` ticks without finishing.
     fn play_episodes(&mut self, episodes: u64, limit: u64) -> Result<u64, Fault>;
 
-    /// Plays `ticks` ticks and returns the state hash of each agent after each tick: equal lists, equal games.
+    /// Plays `ticks` ticks and returns the state hash of each agent after each tick. Equal lists
+    /// mean equal games.
     ///
     /// # Errors
     ///
     /// A fault of the game.
     fn hash_trace(&mut self, ticks: u64) -> Result<Vec<u64>, Fault>;
 
-    /// Pairs of systems that nobody has put in an order although one writes what the other uses, in every schedule that
-    /// has run: which schedule, which systems, and what they share. At least one of the two belongs to these crates, by
-    /// the path of its name; systems that have the whole World to themselves are compared with those of these crates only,
-    /// since they cannot say what they use.
+    /// Returns pairs of systems without an order although one writes data that the other uses, for
+    /// every schedule that has run. Each entry names the schedule, the systems and the shared data.
+    /// At least one of the two belongs to these crates, by the path of its name. Systems with
+    /// exclusive access to the World are compared only with those of these crates, since their
+    /// accesses are unknown.
     ///
     /// Systems have names if Bevy is built with its feature `debug`.
     fn ambiguous_orders(&self, crates: &[&str]) -> Vec<String>;
@@ -112,7 +116,7 @@ impl PlaybotTestExt for World {
         };
         let mut found = Vec::new();
         for (label, schedule) in self.resource::<Schedules>().iter() {
-            // What has not run is not built yet.
+            // A schedule that has not run is not built yet.
             let Ok(systems) = schedule.systems() else { continue };
             let names: BTreeMap<_, _> = systems.map(|(key, system)| (key, system.name().to_string())).collect();
             for (one, other, shared) in schedule.graph().conflicting_systems().iter() {

@@ -1,4 +1,4 @@
-//! Counting ticks.
+//! The count of ticks.
 //!
 //! ```
 //! use bevy_playbot::{prelude::*, tick::Tick};

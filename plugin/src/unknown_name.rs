@@ -1,4 +1,4 @@
-//! Names that do not exist, and the nearest that does.
+//! Errors about unknown names, with the nearest valid name.
 //!
 //! ```
 //! use bevy_playbot::unknown_name::UnknownName;
@@ -7,13 +7,14 @@
 //! assert_eq!(error.to_string(), "unknown mode `hrad` (did you mean `hard`?); valid: easy, hard");
 //! ```
 
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
-/// The name is none of those that exist.
+/// The error of a name that does not exist.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 #[error("unknown {what} `{name}`{}; {}", hint(.near), choice(.valid))]
 pub struct UnknownName {
-    /// What was named: `game`, `mode`, `bot`.
+    /// The kind of name: `game`, `mode`, `bot`.
     pub what: &'static str,
     /// The name that was given.
     pub name: String,
@@ -22,6 +23,8 @@ pub struct UnknownName {
     /// All valid names.
     pub valid: Vec<String>,
 }
+
+impl HasExitCode for UnknownName {}
 
 fn hint(near: &Option<String>) -> String {
     near.as_ref().map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
@@ -32,7 +35,7 @@ fn choice(valid: &[String]) -> String {
 }
 
 impl UnknownName {
-    /// The error for `name`, which is not among `valid`.
+    /// Returns the error for `name`, which is not among `valid`.
     pub fn new(what: &'static str, name: &str, valid: &[&str]) -> Self {
         Self {
             what,
@@ -43,10 +46,11 @@ impl UnknownName {
     }
 }
 
-/// Longest name, in bytes, that is compared with others: longer ones are no slips of a finger, and take long.
+/// Longest name, in bytes, that is compared with others. Longer names are no typing errors, and
+/// comparing them is slow.
 const LONGEST: usize = 256;
 
-/// The candidate most like `name`, if one is like it at all.
+/// Returns the candidate nearest to `name`, if one is similar at all.
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {

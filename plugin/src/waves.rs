@@ -1,19 +1,22 @@
-//! Places in finer detail, as sine and cosine.
+//! Positional encoding: sine and cosine features of a position.
 
 use std::f64::consts::TAU;
 
 use crate::observation::{Observation, ObservationSpace};
 
 impl Observation {
-    /// A place in waves: sin and cos of 2π `place` / length for each of `lengths`, in their order, two numbers between -1 and
-    /// 1 for each. Place and lengths are in the same unit, and lengths are not 0, of which there is no wave (NaN). The numbers
-    /// are the same on every machine. [`ObservationSpace::wave_names`] names them.
+    /// Returns the positional encoding of a position: sin and cos of 2π `place` / length for each
+    /// of `lengths`, in order. Each length gives two numbers between -1 and 1. Position and lengths
+    /// have the same unit. A length of 0 gives NaN. The numbers are the same on every machine.
+    /// [`ObservationSpace::wave_names`] names them.
     ///
-    /// This is for a bot that must tell half a metre from the next on a map of a hundred. A network is slow to learn what
-    /// changes within a small part of what a number varies by. Of waves that are as long as what has to be told apart, and of
-    /// some longer ones, it learns that quickly. They are Fourier features (Tancik et al., "Fourier Features Let Networks Learn
-    /// High Frequency Functions in Low Dimensional Domains", 2020), which Li and Pathak ("Functional Regularization for
-    /// Reinforcement Learning via Learned Fourier Features", 2021) bring to reinforcement learning; here they are fixed.
+    /// Use it for a bot that must distinguish half a metre on a map of a hundred. A network learns
+    /// slowly when the relevant change is tiny compared with an input's range. It learns quickly
+    /// from waves as long as the relevant distance, together with some longer ones. These are
+    /// Fourier features (Tancik et al., "Fourier Features Let Networks Learn High Frequency
+    /// Functions in Low Dimensional Domains", 2020). Li and Pathak ("Functional Regularization for
+    /// Reinforcement Learning via Learned Fourier Features", 2021) bring them to reinforcement
+    /// learning; here they are fixed.
     ///
     /// ```
     /// use bevy::prelude::*;
@@ -45,8 +48,8 @@ impl Observation {
 }
 
 impl ObservationSpace {
-    /// Names for [`Observation::waves`] along `axis`, in their order: `x sine of 8`, `x cosine of 8`, where 8 is the length in
-    /// its unit.
+    /// Returns names for [`Observation::waves`] along `axis`, in order: `x sine of 8`, `x cosine of
+    /// 8`, where 8 is the length in its unit.
     pub fn wave_names(axis: &str, lengths: impl IntoIterator<Item = f64>) -> impl Iterator<Item = String> {
         lengths.into_iter().flat_map(move |length| ["sine", "cosine"].map(|wave| format!("{axis} {wave} of {length}")))
     }

@@ -1,39 +1,39 @@
-//! Where updates run.
+//! Threads for updates: rayon's workers, kept awake for short loops.
 
 use rayon::{Yield, yield_now};
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Workers that stay awake, at most: small networks have no work for more, and others wake up when there is.
+/// Largest number of workers that stay awake: small networks have no work for more, and others wake up when there is.
 const AWAKE: usize = 3;
 
-/// After how long a wait a worker goes back to sleep. Whatever else it may have begun goes on then.
+/// Waiting time after which a worker goes back to sleep. Any other work that it has begun goes on then.
 const PATIENCE: Duration = Duration::from_millis(20);
 
 thread_local! {
-    /// Whether this thread does the work of an update, which must not wait for that of another.
+    /// True if this thread does the work of an update, which must not wait for that of another.
     static WORKS: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Updates that keep workers awake now.
+/// Number of updates that keep workers awake now.
 static UPDATES: AtomicUsize = AtomicUsize::new(0);
 
 /// Nanoseconds that workers have waited awake.
 static WAITED: AtomicU64 = AtomicU64::new(0);
 
-/// Does the work on one of rayon's threads.
+/// Runs the work on one of rayon's threads.
 ///
-/// Each loop that is shared out from any other thread puts that one to sleep and wakes two, which takes as long as a million
-/// products; among rayon's threads it takes one call.
+/// A parallel loop started outside rayon's pool puts its thread to sleep and wakes two, which takes as long as a
+/// million products. Inside the pool it takes one call.
 pub fn among_workers<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     rayon::scope(|_| work())
 }
 
-/// [`among_workers`], for work of many short loops: a few other workers wait for them awake, so that a loop of some
-/// microseconds can be shared.
+/// Runs the work as [`among_workers`] does, for many short loops. A few other workers wait for them awake, so that a
+/// loop of some microseconds can be shared.
 ///
-/// They give way to whatever else wants to run on their cores. How long they waited tells [`waited`].
+/// They yield to other work on their cores. [`waited`] returns how long they waited.
 pub fn among_awake_workers<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     let done = AtomicBool::new(false);
     rayon::scope(|scope| {
@@ -51,20 +51,21 @@ pub fn among_awake_workers<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     })
 }
 
-/// Time that workers have waited awake in this program so far, all together: they were busy for the system, but with nothing.
+/// Returns the time that workers have waited awake in this program so far, summed over workers. The system counts
+/// them as busy.
 pub fn waited() -> Duration {
     Duration::from_nanos(WAITED.load(Ordering::Relaxed))
 }
 
-/// Whether workers wait awake, so that even short loops can be shared.
+/// Returns whether workers wait awake, so that even short loops can be shared.
 pub(crate) fn are_awake() -> bool {
     UPDATES.load(Ordering::Relaxed) > 0
 }
 
-/// While it exists workers stay awake; a panic ends it, too.
+/// Keeps workers awake while it exists; a panic ends it, too.
 struct Update<'a> {
     done: &'a AtomicBool,
-    /// Whether it is part of another.
+    /// True if it is part of another.
     within: bool,
 }
 

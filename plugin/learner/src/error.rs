@@ -1,8 +1,10 @@
-//! What can go wrong while learning and while reading or writing its files.
+//! Errors of learning, and of reading and writing its files.
 
 use std::path::PathBuf;
 
-/// An error of a learner: a bad setting, data that do not fit or are not finite, or numbers that ran away.
+use crate::exit_code::{HasExitCode, io_exit_code};
+
+/// An error of a learner: a bad setting, data that do not fit or are not finite, or numbers that diverged.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum LearnError {
@@ -11,10 +13,10 @@ pub enum LearnError {
     NotFinite {
         /// Name of the first tensor that is not finite.
         tensor: String,
-        /// Optimizer steps done before; `None` where nothing is learned, as when a policy plays.
+        /// Optimizer steps done before; `None` outside of learning, as when a policy plays.
         steps: Option<u64>,
     },
-    /// Data that were given hold a number that is NaN or infinite.
+    /// Input data hold a number that is NaN or infinite.
     #[error("{what}: row {row} holds {value}: every number must be finite")]
     Input {
         /// The data.
@@ -34,28 +36,31 @@ pub enum LearnError {
         /// Optimizer steps done before.
         steps: u64,
     },
-    /// A configuration value that cannot work.
+    /// An impossible configuration value.
     #[error("config: {0}")]
     Config(String),
+    /// An impossible setting.
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// Data whose length or width does not fit.
     #[error("{what}: expected {expected}, found {found}")]
     Shape {
-        /// What was looked at.
+        /// Name of the checked data.
         what: String,
-        /// The length or width that fits.
+        /// The required length or width.
         expected: usize,
-        /// The length or width that was given.
+        /// The given length or width.
         found: usize,
     },
     /// Actions of the wrong kind, or a discrete action outside its range.
     #[error("action does not fit the action space: {0}")]
     Action(String),
-    /// No window of the wanted length fits into the demonstrations.
+    /// No window of the requested length fits into the demonstrations.
     #[error("no window of {window} steps fits into the demonstrations: the longest stretch to cut from has {longest}")]
     NoWindow {
         /// Window length in steps.
         window: usize,
-        /// Steps of the longest episode; where windows may cross the ends of episodes, of all together.
+        /// Steps of the longest episode; of all episodes together if windows may cross their ends.
         longest: usize,
     },
     /// A policy copied from the decoder does not act like the decoder.
@@ -67,31 +72,38 @@ pub enum LearnError {
     /// A value could not be read back from the device.
     #[error("reading a tensor from the device failed: {0}")]
     Device(String),
-    /// This program or this machine cannot compute there.
+    /// This program or this machine does not support the device.
     #[error("cannot compute on `{device}`: {reason}; the device `flex` computes on the CPU")]
     NoDevice {
-        /// Where.
+        /// Name of the device.
         device: String,
-        /// What is missing.
+        /// The missing part.
         reason: String,
     },
-    /// A graphics card was lost, or had no memory left.
+    /// A graphics card was lost, or ran out of memory.
     #[error(
-        "the graphics card failed: {reason}; what was saved is kept: smaller batches or the device `flex` can go on from it"
+        "the graphics card failed: {reason}; saved files are kept: continue with smaller batches or the device `flex`"
     )]
     DeviceFailed {
-        /// What its driver said.
+        /// The driver's message.
         reason: String,
     },
 }
 
+impl HasExitCode for LearnError {
+    fn exit_code(&self) -> u8 {
+        // A setting can be put right by the caller; a loss that is no number cannot.
+        if self.is_divergence() { 2 } else { 3 }
+    }
+}
+
 impl LearnError {
-    /// Whether numbers ran away, which no change of the call can cure, but other settings may.
+    /// Returns whether numbers diverged. No change of the call can prevent that, but other settings may.
     pub fn is_divergence(&self) -> bool {
         matches!(self, Self::NotFinite { .. } | Self::Exploded { .. })
     }
 
-    /// `Ok` if `found` equals `expected`, else [`LearnError::Shape`].
+    /// Checks that `found` equals `expected`, else returns [`LearnError::Shape`].
     pub(crate) fn check(what: &str, expected: usize, found: usize) -> Result<(), Self> {
         if expected == found {
             return Ok(());
@@ -99,7 +111,7 @@ impl LearnError {
         Err(Self::Shape { what: what.to_owned(), expected, found })
     }
 
-    /// `Ok` if all `values`, `width` to a row, are finite, else [`LearnError::Input`].
+    /// Checks that all `values`, `width` to a row, are finite, else returns [`LearnError::Input`].
     pub(crate) fn check_finite(what: &str, width: usize, values: &[f32]) -> Result<(), Self> {
         // x · 0 is 0 for finite numbers and NaN otherwise. Eight sums side by side can be vectorised.
         let (chunks, rest) = values.as_chunks::<8>();
@@ -117,12 +129,31 @@ impl LearnError {
     }
 }
 
-/// A number in a message, whose size takes no hundreds of zeros to say.
+/// An impossible setting.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("`{path}` {why}{}", value.as_ref().map_or_else(String::new, |value| format!(", but is {value}")))]
+pub struct SettingError {
+    /// Path of the setting in an experiment.
+    pub path: &'static str,
+    /// Its value, where that is wrong by itself.
+    pub value: Option<String>,
+    /// The requirement that it breaks.
+    pub why: String,
+}
+
+impl SettingError {
+    /// Creates the error of a setting that contradicts another one.
+    pub fn new(path: &'static str, why: impl Into<String>) -> Self {
+        Self { path, value: None, why: why.into() }
+    }
+}
+
+/// Returns a number for a message, without hundreds of zeros.
 pub fn brief_number(x: f64) -> String {
     if x == 0.0 || (1e-15..1e15).contains(&x.abs()) { x.to_string() } else { format!("{x:e}") }
 }
 
-/// The end of a message about numbers that ran away.
+/// Returns the end of a message about numbers that diverged.
 fn after(steps: Option<u64>) -> String {
     steps.map_or(String::new(), |steps| format!(" after {steps} optimizer steps"))
 }
@@ -134,19 +165,19 @@ pub enum FileError {
     /// Reading, writing, flushing or renaming failed.
     #[error("cannot {action} {path}: {source}")]
     Io {
-        /// What was tried: `read` or `write`.
+        /// The attempted action: `read` or `write`.
         action: &'static str,
         /// The file.
         path: PathBuf,
         /// The cause.
         source: std::io::Error,
     },
-    /// The file is none that this program has written, or nothing is left of what it was.
+    /// The file was not written by this program, or its contents are lost.
     #[error("{path}: {detail}: it is another file; name one that playbot has written")]
     Foreign {
         /// The file.
         path: PathBuf,
-        /// What it lacks.
+        /// The missing part.
         detail: String,
     },
     /// The description of the file cannot be used.
@@ -154,23 +185,23 @@ pub enum FileError {
     Format {
         /// The file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The problem.
         detail: String,
     },
-    /// The file ends before its end, or goes on behind it.
+    /// The file ends too early, or continues behind its end.
     #[error("{path}: the file is cut off{advice}")]
     CutOff {
         /// The file.
         path: PathBuf,
-        /// How it can be had again, if that is known, behind a colon.
+        /// Advice on recovering the file, after a colon; empty if there is none.
         advice: &'static str,
     },
-    /// The checksum in the file is not that of its contents.
-    #[error("{path}: the file is damaged: its checksum is not that of its contents{advice}")]
+    /// The checksum in the file differs from that of its contents.
+    #[error("{path}: the file is damaged: its checksum does not match its contents{advice}")]
     Damaged {
         /// The file.
         path: PathBuf,
-        /// How it can be had again, if that is known, behind a colon.
+        /// Advice on recovering the file, after a colon; empty if there is none.
         advice: &'static str,
     },
     /// The file was written by a newer version of this program.
@@ -181,7 +212,7 @@ pub enum FileError {
     Newer {
         /// The file.
         path: PathBuf,
-        /// What it is.
+        /// Kind of the file.
         kind: &'static str,
         /// Its format.
         found: u32,
@@ -197,7 +228,7 @@ pub enum FileError {
         name: String,
     },
     /// The file holds a tensor that the model does not have.
-    #[error("{path}: tensor `{name}` belongs to nothing in this model")]
+    #[error("{path}: tensor `{name}` does not belong to this model")]
     ExtraTensor {
         /// The file.
         path: PathBuf,
@@ -216,7 +247,7 @@ pub enum FileError {
         /// The file's shape.
         found: Vec<usize>,
     },
-    /// A policy does not say of an example what it said when the file was written.
+    /// A policy's output for a stored example differs from the output stored with it.
     #[error(
         "{path}: example {example}: {what} is {found}, but was {expected} when the file was written: the file is damaged, \
          or this program computes policies in another way; export the policy again"
@@ -226,11 +257,11 @@ pub enum FileError {
         path: PathBuf,
         /// Number of the example, from 0.
         example: usize,
-        /// Which output.
+        /// Name of the output.
         what: &'static str,
-        /// What the file says.
+        /// The stored value.
         expected: f32,
-        /// What came out.
+        /// The computed value.
         found: f32,
     },
     /// The description in the file does not make a valid learner.
@@ -243,8 +274,17 @@ pub enum FileError {
     },
 }
 
+impl HasExitCode for FileError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Io { source, .. } => io_exit_code(source),
+            _ => 3,
+        }
+    }
+}
+
 impl FileError {
-    /// This error, with how the file can be had again if it is cut off or damaged.
+    /// Adds advice on recovering the file, if it is cut off or damaged.
     pub(crate) fn or_again(self, advice: &'static str) -> Self {
         match self {
             Self::CutOff { path, .. } => Self::CutOff { path, advice },

@@ -2,17 +2,19 @@
 //!
 //! # Concepts
 //!
-//! - A [`SkillModel`] is learned from [`DemoEpisode`]s by a [`SkillTrainer`]: an encoder that names what a player did
-//!   for some steps by a latent skill z, a decoder π(a | s, z) that can do it again, and a [`Prior`] p(z | s) that says
-//!   which skills fit a state.
-//! - A [`Policy`] is a frozen snapshot that plays: [`Policy::forward`] gives action distributions and values for a
-//!   batch of observations. The decoder under the prior is one ([`SkillModel::policy`]): behaviour cloning.
-//! - A [`PpoLearner`] improves a policy from [`Rollout`]s by PPO. With a skill model it is SCORE-PPO: the policy sees
-//!   the skill z, starts as a copy of the decoder, and pays for leaving it where the decoder is sure ([`ScoreConfig`]).
-//! - A [`SacLearner`] does so by SAC, from the same rollouts and with the same ties to a skill model, but keeps what was
-//!   played and learns from it again and again.
-//! - A [`SpirlLearner`] learns by either which skills the decoder plays, instead of drawing them from the prior.
-//! - Training code needs to know none of them: all implement [`Learner`].
+//! - A [`SkillModel`] is learned from [`DemoEpisode`]s by a [`SkillTrainer`]. Its encoder describes several steps of
+//!   a demonstrator by a latent skill z. Its decoder π(a | s, z) repeats them. Its [`Prior`] p(z | s) says which
+//!   skills fit a state.
+//! - A [`Policy`] is a frozen snapshot that plays: [`Policy::forward`] returns action distributions and values for a
+//!   batch of observations. The decoder under the prior is such a policy ([`SkillModel::policy`]): behaviour cloning.
+//! - A [`PpoLearner`] improves a policy from [`Rollout`]s by PPO. With a skill model it is SCORE-PPO: the policy
+//!   reads the skill z, starts as a copy of the decoder, and is penalised for leaving it where the decoder is
+//!   confident ([`ScoreConfig`]).
+//! - A [`SacLearner`] does so by SAC, from the same rollouts and with the same ties to a skill model, but keeps
+//!   transitions and learns from them repeatedly.
+//! - A [`SpirlLearner`] learns, by either algorithm, which skills the decoder plays, instead of drawing them from the
+//!   prior.
+//! - Training code is independent of the algorithm: all implement [`Learner`].
 //!
 //! Observations are vectors or images ([`ObsKind`]); SAC alone reads only vectors. Rows are flat `f32` slices in host
 //! memory (bytes for pixels), row-major ([`ObsSlice`]). All randomness comes from generators that the caller owns or
@@ -38,6 +40,7 @@ mod among_workers;
 mod device;
 pub mod disk;
 mod error;
+mod exit_code;
 mod file;
 mod learner;
 pub mod nn;
@@ -51,6 +54,7 @@ mod rollout;
 pub mod sac;
 pub mod score;
 mod seen_levels;
+pub mod settings;
 pub mod skill;
 mod space;
 mod spec;
@@ -60,7 +64,8 @@ pub(crate) use among_workers::are_awake;
 pub use among_workers::{among_awake_workers, among_workers, waited};
 pub use device::{DeviceKind, UnknownDevice};
 pub use disk::{write_atomically, write_atomically_with};
-pub use error::{FileError, LearnError, brief_number};
+pub use error::{FileError, LearnError, SettingError, brief_number};
+pub use exit_code::{HasExitCode, io_exit_code};
 pub use file::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text};
 pub use learner::{Learner, LearnerBase, LearnerMetrics};
 pub use norm::RewardReset;
@@ -81,7 +86,7 @@ pub use space::{Action, ActionSpace, Actions};
 pub use spec::{PolicySpec, TimeLimit};
 pub use spirl::{SpirlConfig, SpirlLearner};
 
-/// What the README shows is compiled and run.
+/// Compiles and runs the examples of the README.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,7 +1,7 @@
 //! Owned randomness: one seed, many independent named streams.
 //!
-//! A stream's 256-bit ChaCha key is made from the seed, the FNV-1a hash (64 bit) of the stream's name and its index:
-//! the three are chained through SplitMix64, which then gives the key's four words. The recipe is fixed here and uses
+//! A stream's 256-bit ChaCha key is made from the seed, the FNV-1a hash (64 bit) of the stream's name and its index.
+//! The three are chained through SplitMix64, which then gives the key's four words. The recipe is fixed here and uses
 //! no hasher of the standard library, so a seed means the same stream in every build.
 
 use crate::LearnError;
@@ -9,7 +9,7 @@ use rand::{Rng, SeedableRng};
 pub use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
 
-/// Gives out the named generators of one seed.
+/// Source of the named generators of one seed.
 ///
 /// ```
 /// use playbot_learner::rng::{Streams, unit};
@@ -24,17 +24,17 @@ pub struct Streams {
 }
 
 impl Streams {
-    /// The streams of `seed`.
+    /// Returns the streams of `seed`.
     pub fn new(seed: u64) -> Self {
         Self { seed }
     }
 
-    /// The seed.
+    /// Returns the seed.
     pub fn seed(&self) -> u64 {
         self.seed
     }
 
-    /// The generator called `name`, number `index`, at its start.
+    /// Returns the generator called `name`, number `index`, at its start.
     pub fn stream(&self, name: &str, index: u64) -> ChaCha8Rng {
         let mut state = split_mix(self.seed);
         state = split_mix(state ^ fnv1a(name.as_bytes()));
@@ -48,7 +48,7 @@ impl Streams {
     }
 }
 
-/// The FNV-1a hash (64 bit) of `bytes`.
+/// Returns the FNV-1a hash (64 bit) of `bytes`.
 pub(crate) fn fnv1a(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xCBF2_9CE4_8422_2325, |hash, &byte| (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01B3))
 }
@@ -60,7 +60,7 @@ fn split_mix(seed: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Where a generator stands, in a form that files can hold.
+/// The state of a generator, in a form that files can hold.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RngState {
@@ -71,13 +71,13 @@ pub struct RngState {
 }
 
 impl RngState {
-    /// The state of `rng`.
+    /// Returns the state of `rng`.
     pub fn of(rng: &ChaCha8Rng) -> Self {
         let key = rng.get_seed().iter().map(|byte| format!("{byte:02x}")).collect();
         Self { key, word: rng.get_word_pos().to_string() }
     }
 
-    /// A generator that goes on exactly where the saved one stood.
+    /// Returns a generator that continues exactly where the saved one stopped.
     ///
     /// # Errors
     /// [`LearnError::Config`] if the key or the position cannot be read.
@@ -96,19 +96,19 @@ impl RngState {
     }
 }
 
-/// A uniform number in [0, 1) with 53 random bits.
+/// Returns a uniform number in [0, 1) with 53 random bits.
 pub fn unit<R: Rng + ?Sized>(rng: &mut R) -> f64 {
     (rng.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }
 
-/// A standard normal number (Box and Muller; always two 64-bit draws, so positions stay predictable).
+/// Returns a standard normal number (Box and Muller; always two 64-bit draws, so positions stay predictable).
 pub fn normal<R: Rng + ?Sized>(rng: &mut R) -> f32 {
     let radius = (-2.0 * (1.0 - unit(rng)).ln()).sqrt();
     let angle = std::f64::consts::TAU * unit(rng);
     (radius * angle.cos()) as f32
 }
 
-/// A uniform whole number below `bound`, without bias (Lemire's method).
+/// Returns a uniform whole number below `bound`, without bias (Lemire's method).
 ///
 /// `bound` 0 gives 0.
 pub fn below<R: Rng + ?Sized>(rng: &mut R, bound: u64) -> u64 {
@@ -121,7 +121,7 @@ pub fn below<R: Rng + ?Sized>(rng: &mut R, bound: u64) -> u64 {
     }
 }
 
-/// Puts `items` into a uniformly random order (Fisher and Yates).
+/// Shuffles `items` into a uniformly random order (Fisher and Yates).
 pub fn shuffle<T, R: Rng + ?Sized>(items: &mut [T], rng: &mut R) {
     for i in (1..items.len()).rev() {
         items.swap(i, below(rng, i as u64 + 1) as usize);

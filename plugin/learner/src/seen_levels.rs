@@ -1,13 +1,13 @@
-//! Which levels a training has seen.
+//! The levels that a run has seen.
 
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
-/// Most ranges that are named in words.
+/// Largest number of ranges that are printed.
 const NAMED: usize = 4;
 
-/// Levels that something has learned from, by playing them or from demonstrations that show them, for people and for checks: what it
-/// does there says nothing of unseen ones.
+/// Levels that a policy or model has learned from, by play or from demonstrations, for people and for checks. Results
+/// on them say nothing about unseen ones.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug, Default)]
 #[serde(deny_unknown_fields)]
 pub struct SeenLevels {
@@ -15,13 +15,13 @@ pub struct SeenLevels {
     pub game: String,
     /// The levels, as ranges with both ends, such as `hard:0..63`.
     pub levels: Vec<String>,
-    /// Hashes of those that are files.
+    /// Hashes of the level files among them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub level_files: Vec<u64>,
 }
 
 impl SeenLevels {
-    /// Adds those of `other` that are not among them yet.
+    /// Adds those of `other` that are missing.
     pub fn extend(&mut self, other: &Self) {
         let levels = other.levels.iter().filter(|range| !self.levels.contains(range));
         self.levels.extend(levels.cloned().collect::<Vec<_>>());
@@ -31,7 +31,7 @@ impl SeenLevels {
 }
 
 impl fmt::Display for SeenLevels {
-    /// Its levels: `hard:0..63, easy:5..5 and 2 level files`.
+    /// Writes its levels: `hard:0..63, easy:5..5 and 2 level files`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let mut parts: Vec<String> = self.levels.iter().take(NAMED).cloned().collect();
         let (more, files) = (self.levels.len().saturating_sub(NAMED), self.level_files.len());

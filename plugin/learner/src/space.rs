@@ -5,28 +5,28 @@ use std::fmt;
 use crate::LearnError;
 use serde::{Deserialize, Serialize};
 
-/// What an agent can do in one step.
+/// The actions that an agent can take in one step.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum ActionSpace {
     /// One of `n` choices, numbered from 0.
     Discrete(usize),
-    /// A vector of `n` real numbers, of which games take those in [-1, 1] and clip the others.
+    /// A vector of `n` real numbers. Games take those in [-1, 1] and clip the others.
     ///
-    /// Gaussian policies (PPO's, and the skill model's decoder) draw numbers beyond. To a learner clipping is part of the
-    /// game: it keeps an action as it was drawn, with the density of that draw, and the decoder's confidence in it is
-    /// measured there too. Squashed policies (SAC's) stay within.
+    /// Gaussian policies (PPO's, and the skill model's decoder) draw numbers beyond. To a learner clipping is part of
+    /// the game: it keeps an action as it was drawn, with the density of that draw, and measures the decoder's
+    /// confidence there too. Squashed policies (SAC's) stay within.
     Continuous(usize),
 }
 
 impl ActionSpace {
-    /// Number of outputs of a network that acts in this space: the choices, or the vector's length.
+    /// Returns the number of outputs of a network that acts in this space: the choices, or the vector's length.
     pub fn dim(&self) -> usize {
         match *self {
             Self::Discrete(n) | Self::Continuous(n) => n,
         }
     }
 
-    /// `Ok` if every action of `actions` lies in this space.
+    /// Checks that every action of `actions` lies in this space.
     ///
     /// # Errors
     /// [`LearnError::Action`] names the first action that does not fit.
@@ -50,7 +50,7 @@ impl ActionSpace {
     }
 }
 
-/// In words: `15 discrete actions`, `continuous actions of 2 numbers`.
+/// Writes it as `15 discrete actions`, `continuous actions of 2 numbers`.
 impl fmt::Display for ActionSpace {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let plural = if self.dim() == 1 { "" } else { "s" };
@@ -85,7 +85,7 @@ pub enum Actions {
 }
 
 impl Actions {
-    /// No actions yet, of the kind of `space`.
+    /// Creates an empty list of the kind of `space`.
     pub fn empty(space: &ActionSpace) -> Self {
         match *space {
             ActionSpace::Discrete(_) => Self::Discrete(Vec::new()),
@@ -93,7 +93,7 @@ impl Actions {
         }
     }
 
-    /// Number of actions.
+    /// Returns the number of actions.
     pub fn len(&self) -> usize {
         match self {
             Self::Discrete(values) => values.len(),
@@ -101,12 +101,12 @@ impl Actions {
         }
     }
 
-    /// Whether there are none.
+    /// Returns whether there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Forgets all actions and keeps the memory.
+    /// Removes all actions and keeps the memory.
     pub fn clear(&mut self) {
         match self {
             Self::Discrete(values) => values.clear(),
@@ -114,7 +114,7 @@ impl Actions {
         }
     }
 
-    /// The action of row `row`, if there is one.
+    /// Returns the action of row `row`, if there is one.
     pub fn get(&self, row: usize) -> Option<Action> {
         match self {
             Self::Discrete(values) => values.get(row).copied().map(Action::Discrete),
@@ -178,7 +178,7 @@ impl Actions {
         Ok(())
     }
 
-    /// The actions at `rows`, in that order.
+    /// Returns the actions at `rows`, in that order.
     pub(crate) fn gather(&self, rows: &[usize]) -> Self {
         match self {
             Self::Discrete(values) => Self::Discrete(rows.iter().map(|&r| values[r]).collect()),

@@ -1,27 +1,27 @@
-//! What a policy reads and does, and what the end of its time means to a learner.
+//! The inputs and outputs of a policy, and the meaning of a time limit to a learner.
 
 use crate::{ActionSpace, LearnError, ObsKind};
 use serde::{Deserialize, Serialize};
 
-/// What a policy reads and does.
+/// The inputs and outputs of a policy.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 #[serde(deny_unknown_fields)]
 pub struct PolicySpec {
-    /// What it observes.
+    /// The kind of its observations.
     // Checkpoints of vectors were written before there were images.
     #[serde(alias = "obs_dim")]
     pub obs: ObsKind,
-    /// Width of the skill before it; 0 for a policy that reads none.
+    /// Width of the skill before it; 0 for a policy without skills.
     pub latent: usize,
-    /// What it acts in.
+    /// Its action space.
     pub action_space: ActionSpace,
 }
 
 impl PolicySpec {
-    /// `Ok` if there is something to read and something to do.
+    /// Checks that it has at least one input and one action.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if there is not.
+    /// [`LearnError::Config`] if it has not.
     pub(crate) fn validate(&self) -> Result<(), LearnError> {
         if self.obs.numbers() == 0 || self.action_space.dim() == 0 {
             return Err(LearnError::Config("observations and actions must not be empty".to_owned()));
@@ -30,11 +30,11 @@ impl PolicySpec {
     }
 }
 
-/// What a step that ran into the time limit leads to.
+/// The value behind a step that reached the time limit.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TimeLimit {
     /// The value of the episode's last observation: the game would have gone on.
     Bootstrap,
-    /// Nothing, as if the episode had ended by itself (the released code).
+    /// Zero, as if the episode had ended by itself (the released code).
     Legacy,
 }

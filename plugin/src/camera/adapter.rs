@@ -1,4 +1,4 @@
-//! Finding a graphics adapter.
+//! Detection of a graphics adapter, and settings of the renderer.
 
 use bevy::{
     render::settings::{Backends, RenderCreation, WgpuSettings},
@@ -7,7 +7,8 @@ use bevy::{
 
 use crate::vision::VisionError;
 
-/// Settings of a renderer without a window. OpenGL is left out: it needs a display, and its drivers print.
+/// Returns the settings of a renderer without a window. OpenGL is left out: it needs a display, and its drivers
+/// print.
 fn settings() -> WgpuSettings {
     WgpuSettings { backends: Some(Backends::from_env().unwrap_or(Backends::PRIMARY)), ..WgpuSettings::default() }
 }
@@ -21,18 +22,17 @@ pub(crate) fn none() -> RenderCreation {
     WgpuSettings { backends: None, ..WgpuSettings::default() }.into()
 }
 
-/// Lets the C library keep the memory that drivers free after each picture, instead of giving it back to the kernel and
-/// asking for it again.
+/// Lets the C library keep the memory that drivers free after each picture, instead of returning it to the kernel.
 ///
-/// Software Vulkan builds each picture in several megabytes of small blocks. glibc returns them at the end of each,
-/// which costs a third of the time in page faults; the size from which it does so is twice that of the largest block of
-/// its own that was ever freed, up to 32 MiB.
+/// Software Vulkan builds each picture in several megabytes of small blocks. glibc returns them after each picture,
+/// and the page faults cost a third of the time. glibc does so from a size that is twice the largest separately
+/// mapped block ever freed, up to 32 MiB.
 pub(super) fn keep_memory() {
     const LARGE: usize = 31 << 20;
     drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGE)));
 }
 
-/// Bevy panics without an adapter, so that it must be looked for first.
+/// Checks for an adapter, because Bevy panics without one.
 pub(super) fn check() -> Result<(), VisionError> {
     let settings = settings();
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();

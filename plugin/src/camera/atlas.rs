@@ -21,7 +21,7 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Room for pictures of these sizes on a texture of at most `limit` pixels a side, about as high as wide.
+    /// Creates room for pictures of these sizes on a texture of at most `limit` pixels a side, about as high as wide.
     pub(super) fn new(sizes: &[UVec2], limit: u32) -> Result<Self, CameraError> {
         let area: u64 = sizes.iter().map(|size| u64::from(size.x) * u64::from(size.y)).sum();
         let widest = sizes.iter().map(|size| size.x).max().unwrap_or(1);
@@ -43,7 +43,7 @@ impl Layout {
     }
 }
 
-/// An image to draw on and to copy from. Its colours are stored as the bytes that image files hold.
+/// Returns an image to draw on and to copy from. Its colours are stored as the bytes that image files hold.
 pub(super) fn target_image(size: UVec2) -> Image {
     let mut image = Image::new_target_texture(size.x, size.y, TextureFormat::Rgba8UnormSrgb, None);
     image.data = None;
@@ -54,7 +54,7 @@ pub(super) fn target_image(size: UVec2) -> Image {
     image
 }
 
-/// A camera's target.
+/// Returns a camera's target.
 pub(super) fn render_target(image: Handle<Image>) -> bevy::camera::RenderTarget {
     bevy::camera::RenderTarget::Image(ImageRenderTarget { handle: image, scale_factor: 1.0 })
 }

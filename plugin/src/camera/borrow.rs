@@ -1,4 +1,4 @@
-//! Drawing through cameras of the game.
+//! Pictures through cameras of the game.
 
 use bevy::{
     camera::{CameraOutputMode, RenderTarget, RenderTargetInfo},
@@ -49,8 +49,8 @@ struct BorrowedCamera {
     target: RenderTarget,
 }
 
-/// The cameras of the game while sensors look: those that no sensor looks through are switched off, the others draw
-/// for sensors.
+/// The cameras of the game while sensors look. Cameras without a sensor are switched off; the others draw for
+/// sensors.
 #[derive(Default)]
 pub(super) struct BorrowedCameras {
     cameras: Vec<BorrowedCamera>,
@@ -58,7 +58,7 @@ pub(super) struct BorrowedCameras {
 }
 
 impl BorrowedCameras {
-    /// Switches the game's cameras off, and those on that sensors look through. To be done before visibility is found.
+    /// Switches the game's cameras off, and those with sensors on. Call it before visibility is computed.
     pub(super) fn select(world: &mut World, targets: &BorrowedTargets) -> Self {
         let mut borrowed = Self::default();
         let mut cameras =
@@ -82,7 +82,7 @@ impl BorrowedCameras {
         borrowed
     }
 
-    /// Points the cameras at their textures. To be done after visibility was found for what they see in the game.
+    /// Points the cameras at their textures. Call it after visibility was computed for what they see in the game.
     pub(super) fn point(&self, world: &mut World, targets: &BorrowedTargets) {
         for borrowed in &self.cameras {
             let Some(wanted) = targets.get(borrowed.camera) else { continue };
@@ -99,7 +99,7 @@ impl BorrowedCameras {
         }
     }
 
-    /// Gives the cameras back as they were.
+    /// Restores the cameras.
     pub(super) fn give_back(self, world: &mut World) {
         for borrowed in self.cameras {
             let mut entity = world.entity_mut(borrowed.camera);

@@ -1,4 +1,4 @@
-//! One look: all sensors fill their frames with the World as it is now.
+//! One pass of all sensors: it fills their frames with the World as it is now.
 
 use std::time::{Duration, Instant};
 
@@ -17,7 +17,7 @@ use super::{
 };
 use crate::{fault::Faults, tick::Tick, vision::Frame};
 
-/// How long shaders and images may take to load, in seconds.
+/// Longest time for shaders and images to load, in seconds.
 const PATIENCE: u64 = 60;
 
 /// Fills the frames of all agents with a [`CameraSensor`](super::CameraSensor).
@@ -48,7 +48,7 @@ fn fill_frames_with(world: &mut World, renderer: &mut Renderer, requests: &Reque
     Ok(())
 }
 
-/// Draws, again and again until every shader and image that is being loaded is there: the first time.
+/// Draws repeatedly until every shader and image has loaded: the first time.
 fn draw_until_ready(world: &mut World, renderer: &mut Renderer, requests: &Requests) -> Result<(), CameraError> {
     let begun = Instant::now();
     loop {
@@ -76,7 +76,7 @@ fn draw_until_ready(world: &mut World, renderer: &mut Renderer, requests: &Reque
     }
 }
 
-/// Draws the World as it is now, for sensors only.
+/// Draws the current World, for sensors only.
 fn draw(world: &mut World, renderer: &mut Renderer, requests: &Requests) {
     world.resource_scope(|world, targets: Mut<BorrowedTargets>| {
         let borrowed = BorrowedCameras::select(world, &targets);
@@ -100,7 +100,7 @@ fn switch(world: &mut World, on: bool) {
     }
 }
 
-/// Puts the views where their targets are.
+/// Moves the views to their targets.
 fn place_views(world: &mut World, requests: &Requests) {
     let cells = std::mem::take(&mut world.resource_mut::<Atlas>().layout.cells);
     let view = |(&cell, follow): (&URect, &FollowRequest)| {
@@ -114,7 +114,7 @@ fn place_views(world: &mut World, requests: &Requests) {
     world.run_system_cached(sensor_view::note_bounds).expect("its resources are the plugin's own");
 }
 
-/// Copies what was drawn, and waits for it.
+/// Copies the drawn pictures, and waits for the copy.
 fn read_back(world: &mut World, renderer: &mut Renderer, requests: &Requests) -> Result<MappedFrames, CameraError> {
     let render_world = renderer.world();
     let extracted = render_world.resource::<ExtractedStamp>().0;
@@ -137,7 +137,7 @@ fn read_back(world: &mut World, renderer: &mut Renderer, requests: &Requests) ->
     world.resource_mut::<Readback>().exchange(render_world, sources, pieces, delay)
 }
 
-/// Writes the frames that are of this look, and reports the others.
+/// Writes the frames of this pass, and reports the others.
 fn hand_out(world: &mut World, requests: &Requests, frames: &MappedFrames, now: Stamp) {
     let mut late = Vec::new();
     frames.hand_out(|agent, stamp, rows| {

@@ -1,4 +1,4 @@
-//! Things to be drawn whose images are not there.
+//! Drawn entities whose images are missing.
 
 use bevy::{
     asset::{AssetId, LoadState},
@@ -13,7 +13,7 @@ use crate::vision::{NO_IMAGE, TileLayer, lacks_image};
 #[reflect(Resource)]
 pub(super) struct MissingImages(Vec<Entity>);
 
-/// Looks at what has changed. All is looked at again once an image is removed.
+/// Checks entities that have changed. Checks all again once an image is removed.
 pub(super) fn note_missing_images(
     mut missing: ResMut<MissingImages>,
     mut events: MessageReader<AssetEvent<Image>>,
@@ -31,9 +31,9 @@ pub(super) fn note_missing_images(
 
 /// The image that something needs to be drawn.
 struct Wanted {
-    /// What needs it: `sprite` or `tile layer`.
+    /// The kind of entity: `sprite` or `tile layer`.
     by: &'static str,
-    /// `None` if nobody said which.
+    /// The image, or `None` if the entity names no image.
     image: Option<AssetId<Image>>,
 }
 
@@ -56,14 +56,14 @@ impl Wanted {
     }
 }
 
-/// Whether everything has its image.
+/// The state of all images.
 pub(super) enum Images {
     Ready,
     Loading,
     Missing(NoImage),
 }
 
-/// Looks again at those that lacked their image. What is hidden needs none.
+/// Checks entities that lacked their image again. Hidden entities need no image.
 pub(super) fn check(world: &mut World) -> Images {
     let mut missing = std::mem::take(&mut world.resource_mut::<MissingImages>().0);
     missing.sort_unstable();

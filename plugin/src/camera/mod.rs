@@ -1,23 +1,23 @@
 //! Pictures from Bevy's renderer, on a GPU or on software Vulkan.
 //!
-//! Give an agent a [`CameraSensor`] and add the [`CameraSensorPlugin`]; each tick its
-//! [`Frame`](crate::vision::Frame) holds what the World looks like in that tick, after
+//! Give an agent a [`CameraSensor`] and add the [`CameraSensorPlugin`]. In each tick its
+//! [`Frame`](crate::vision::Frame) then holds the World of that tick, after
 //! [`VisionSystems::Sync`](crate::vision::VisionSystems::Sync).
 //!
 //! # How it is drawn
 //!
 //! The renderer is taken out of Bevy's loop and run by hand, in
-//! [`VisionSystems::Render`](crate::vision::VisionSystems::Render): the scene is extracted, drawn, read back and handed out
-//! before anybody decides, so that no frame is ever late.
+//! [`VisionSystems::Render`](crate::vision::VisionSystems::Render). The scene is extracted, drawn and read back
+//! before any agent decides, so no frame is late.
 //!
 //! A Bevy camera costs about half a millisecond, however little it sees. Sensors that follow a target therefore share
-//! one camera, whose whole work on the CPU is done once; what it would draw is dealt out to one cell of a common
-//! texture for each agent, and each cell is drawn with a view of its own in the same render pass. One copy and one
-//! mapped buffer bring all cells back. Sensors that reuse a camera of the game draw it as it is, into a texture of its
-//! own, and come back in the same buffer.
+//! one camera, whose whole work on the CPU is done once. Its items are distributed to one cell of a common texture
+//! for each agent. Each cell is drawn with a view of its own in the same render pass. One copy and one mapped buffer
+//! bring all cells back. Sensors that reuse a camera of the game draw it unchanged into its own texture, and come
+//! back in the same buffer.
 //!
-//! Frames carry the number of the look they were extracted in through the render world. One that comes back with
-//! another number is reported in [`Faults`](crate::fault::Faults), with its agent and tick, and is not handed out.
+//! Frames carry the number of the pass in which they were extracted through the render world. A frame with another
+//! number is reported in [`Faults`](crate::fault::Faults), with its agent and tick, and is not used.
 //!
 //! ```no_run
 //! use bevy::prelude::*;

@@ -1,4 +1,4 @@
-//! The plugin.
+//! The plugin of [`CameraSensor`](super::CameraSensor)s.
 
 use bevy::{
     prelude::*,
@@ -25,22 +25,21 @@ use crate::{
 
 /// Adds [`CameraSensor`](super::CameraSensor)s to a game.
 ///
-/// In an app without a renderer, [`headless`](Self::headless) brings Bevy's along. In a game with a window, add the
-/// plugin, either way, after `DefaultPlugins`, whose `PipelinedRenderingPlugin` must be disabled where it exists (Bevy's
-/// feature `multi_threaded`): the plugin runs the renderer itself, for sensors in the middle of a tick and for windows in
-/// `Last`.
+/// In an app without a renderer, [`headless`](Self::headless) adds Bevy's. In a game with a window, add the plugin
+/// after `DefaultPlugins` and disable `PipelinedRenderingPlugin` if it exists (Bevy's feature `multi_threaded`). The
+/// plugin runs the renderer itself: for sensors in the middle of a tick, for windows in `Last`.
 #[derive(Clone, Debug, Default)]
 pub struct CameraSensorPlugin {
     headless: bool,
 }
 
-/// The app has a renderer of its own, and windows that it draws.
+/// Marks an app with its own renderer, which draws windows.
 #[derive(Resource, Reflect)]
 #[reflect(Resource)]
 struct ShowsWindows;
 
 impl CameraSensorPlugin {
-    /// For an app without a window: brings along what the renderer needs, as far as the app does not have it.
+    /// Creates the plugin for an app without a window. It adds the parts of the renderer that the app lacks.
     ///
     /// # Errors
     ///
@@ -50,7 +49,7 @@ impl CameraSensorPlugin {
         Ok(Self { headless: true })
     }
 
-    /// For an app with or without a window, whichever it is: only one without a renderer gets one.
+    /// Creates the plugin for an app with or without a window. It adds a renderer only if the app has none.
     ///
     /// # Errors
     ///
@@ -80,7 +79,7 @@ impl Plugin for CameraSensorPlugin {
             .init_resource::<Stamp>()
             .init_resource::<Readback>()
             .init_resource::<images::MissingImages>()
-            // It reads whatever can be drawn; what a game changes in `Sync` or before is seen.
+            // It reads everything that can be drawn; changes made in `Sync` or before are seen.
             .add_systems(ObserveSchedule, fill_frames.in_set(VisionSystems::Render).ambiguous_with_all());
     }
 

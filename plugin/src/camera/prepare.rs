@@ -1,4 +1,4 @@
-//! Textures for what is asked for.
+//! Preparation of textures for the requested pictures.
 
 use bevy::{prelude::*, render::renderer::RenderDevice};
 
@@ -10,17 +10,17 @@ use super::{
     sensor_view::{SensorViews, spawn_camera},
 };
 
-/// The common texture and how it is divided.
+/// The common texture and its division into cells.
 #[derive(Resource, Default, Reflect)]
 #[reflect(Resource)]
 pub(super) struct Atlas {
-    /// Sizes of the pictures it was made for.
+    /// Sizes of the pictures for which it was made.
     sizes: Vec<UVec2>,
     pub(super) layout: Layout,
     pub(super) image: Option<Handle<Image>>,
 }
 
-/// Makes room for all pictures. Nothing is done as long as their sizes stay as they are.
+/// Makes room for all pictures. Does nothing as long as their sizes are unchanged.
 pub(super) fn prepare(world: &mut World, requests: &Requests) -> Result<(), CameraError> {
     divide_atlas(world, requests)?;
     let mut cameras: Vec<(Entity, UVec2)> = Vec::new();
@@ -67,7 +67,7 @@ fn point_camera(world: &mut World, image: Handle<Image>) {
     }
 }
 
-/// Tile layers must reach as far as can be seen.
+/// Raises the border of tile layers to the largest visible distance.
 fn raise_border(world: &mut World, requests: &Requests) {
     let seen = |follow: &FollowRequest| {
         let size = follow.request.size.as_vec2();

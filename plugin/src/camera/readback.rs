@@ -1,4 +1,4 @@
-//! Bringing pictures back from the graphics adapter: one buffer and one wait for all agents.
+//! Readback of pictures from the graphics adapter: one buffer and one wait for all agents.
 
 use std::collections::VecDeque;
 
@@ -21,7 +21,7 @@ use super::{CameraError, sensor_view::Stamp};
 /// Rows of a picture in a buffer begin at multiples of this, in bytes: a rule of wgpu.
 const ROW: u32 = 256;
 
-/// Makes frames come back this many looks late, which must be reported: for tests. 0 by default.
+/// Delays frames by this many passes, which must be reported as a fault: for tests. 0 by default.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Resource)]
 pub struct ReadbackDelay(pub u32);
@@ -31,7 +31,7 @@ pub struct ReadbackDelay(pub u32);
 pub(super) struct Source {
     pub(super) image: AssetId<Image>,
     pub(super) size: UVec2,
-    /// What was drawn on it.
+    /// Stamp of the drawn picture.
     pub(super) stamp: Stamp,
 }
 
@@ -39,19 +39,19 @@ pub(super) struct Source {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
     pub(super) agent: Entity,
-    /// Which of the sources it is on.
+    /// Index of its source.
     pub(super) source: usize,
     pub(super) cell: URect,
 }
 
-/// A copy on its way.
+/// A copy in progress.
 struct Copied {
     buffer: Buffer,
     sources: Vec<(Source, u64)>,
     pieces: Vec<Piece>,
 }
 
-/// The buffers, of which there is one as long as nothing is delayed.
+/// The buffers: a single one as long as no frame is delayed.
 #[derive(Default, Resource, Reflect)]
 #[reflect(Resource)]
 pub(super) struct Readback {
@@ -61,7 +61,7 @@ pub(super) struct Readback {
     spare: Vec<Buffer>,
 }
 
-/// Pictures that came back, in a buffer that is mapped.
+/// Pictures in a mapped buffer.
 pub(super) struct MappedFrames {
     copied: Copied,
 }
@@ -143,7 +143,7 @@ impl Readback {
 fn wait(device: &RenderDevice, buffer: &Buffer) -> Result<(), CameraError> {
     let (sender, receiver) = std::sync::mpsc::channel();
     device.map_buffer(&buffer.slice(..), MapMode::Read, move |result| {
-        // Nobody listens any more if the wait failed.
+        // The receiver is gone if the wait failed.
         let _ = sender.send(result);
     });
     device.poll(PollType::wait_indefinitely()).map_err(|error| CameraError::Missing(error.to_string()))?;
@@ -155,7 +155,7 @@ fn wait(device: &RenderDevice, buffer: &Buffer) -> Result<(), CameraError> {
 }
 
 impl MappedFrames {
-    /// Hands each picture to `take`, with its stamp and its rows: 4 bytes a pixel, top row first.
+    /// Passes each picture to `take`, with its stamp and its rows: 4 bytes a pixel, top row first.
     pub(super) fn hand_out(&self, mut take: impl FnMut(Entity, Stamp, &mut dyn Iterator<Item = &[u8]>)) {
         let bytes = self.copied.buffer.slice(..).get_mapped_range();
         for piece in &self.copied.pieces {

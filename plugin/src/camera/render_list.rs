@@ -1,4 +1,4 @@
-//! Bevy's list of what a renderer has yet to hear of, in apps that have none.
+//! Bevy's list of changes for a renderer, in apps without one.
 
 use bevy::{
     app::SubApp,
@@ -7,14 +7,14 @@ use bevy::{
     render::{RenderApp, extract_plugin::ExtractPlugin},
 };
 
-/// Who would draw, and takes what is on the list.
+/// Empties the list in place of a renderer.
 #[derive(Resource, Reflect)]
 #[reflect(from_reflect = false)]
 #[reflect(Component)]
 struct NoRenderer(#[reflect(ignore)] SyncCell<SubApp>);
 
-/// Sprites, meshes and cameras are noted for the renderer as they come and go, and Bevy fails where nobody keeps the list.
-/// Keeps it and empties it.
+/// Bevy notes changes of sprites, meshes and cameras for the renderer, and fails if the list is not kept. The plugin
+/// keeps the list and empties it.
 pub(crate) struct RenderListPlugin;
 
 impl Plugin for RenderListPlugin {
@@ -23,9 +23,9 @@ impl Plugin for RenderListPlugin {
             return;
         }
         app.add_plugins(ExtractPlugin::default());
-        // Removed at once: plugins that find the sub-app would think that there is a renderer and add their systems to it.
+        // Removed at once: plugins that find the sub-app would assume a renderer and add their systems to it.
         if let Some(renderer) = app.remove_sub_app(RenderApp) {
-            // Nobody else looks at the list.
+            // Nothing else reads the list.
             app.insert_resource(NoRenderer(SyncCell::new(renderer))).add_systems(Last, empty_list.ambiguous_with_all());
         }
     }
@@ -33,7 +33,8 @@ impl Plugin for RenderListPlugin {
 
 fn empty_list(world: &mut World) {
     world.resource_scope(|world, mut renderer: Mut<NoRenderer>| {
-        // Each frame, as a renderer does: what is on the list changes entities, which must not depend on how old the World is.
+        // Each frame, as a renderer does. The list changes entities, and these changes must not depend on the World's
+        // age.
         renderer.0.get().extract(world);
     });
 }

@@ -19,7 +19,7 @@ pub(super) struct Renderer {
     app: SyncCell<SubApp>,
     #[reflect(ignore)]
     pub(super) scene: SceneSchedule,
-    /// Whether the app has windows to draw, besides what sensors see.
+    /// True if the app has windows to draw, besides the pictures of sensors.
     pub(super) shows_windows: bool,
 }
 
@@ -39,14 +39,14 @@ impl Renderer {
         self.app.get().world_mut()
     }
 
-    /// Draws the World as it is, with all cameras that are active.
+    /// Draws the current World, with all active cameras.
     pub(super) fn draw(&mut self, world: &mut World) {
         let app = self.app.get();
         app.extract(world);
         run(app.world_mut());
     }
 
-    /// Draws the World as it is, but no window.
+    /// Draws the current World, but no window.
     pub(super) fn draw_unseen(&mut self, world: &mut World) {
         let app = self.app.get();
         let shown = hide_windows(app.world_mut());
@@ -59,7 +59,7 @@ impl Renderer {
         windows.windows.retain(|window, _| open.windows.contains_key(window));
     }
 
-    /// Whether all pipelines of the last picture were there.
+    /// Returns whether all pipelines of the last picture were ready.
     pub(super) fn is_ready(&mut self) -> bool {
         self.world().resource::<PipelineCache>().waiting_pipelines().next().is_none()
     }

@@ -1,4 +1,4 @@
-//! What the agents ask to see.
+//! Requests of agents for pictures.
 
 use bevy::{camera::RenderTarget, prelude::*, render::renderer::RenderDevice};
 
@@ -35,11 +35,11 @@ pub(super) struct FollowRequest {
     pub(super) width: f32,
 }
 
-/// All that is asked for and possible, in the order of the agents' numbers.
+/// All possible requests, in the order of the agents' numbers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Requests {
     pub(super) following: Vec<FollowRequest>,
-    /// With the camera of the game.
+    /// Requests through a camera of the game.
     pub(super) through: Vec<(Request, Entity)>,
 }
 
@@ -62,7 +62,7 @@ pub(super) fn report<'a>(world: &mut World, requests: impl Iterator<Item = &'a R
     }
 }
 
-/// Gathers what is asked for by agents that are observed; what is impossible is reported.
+/// Collects the requests of observed agents, and reports impossible ones.
 pub(super) fn gather_requests(world: &mut World) -> Requests {
     let limit =
         world.get_resource::<RenderDevice>().map_or(u32::MAX, |device| device.limits().max_texture_dimension_2d);
@@ -102,14 +102,14 @@ pub(super) fn gather_requests(world: &mut World) -> Requests {
     requests
 }
 
-/// The game's own camera: of the active ones, the one that draws first.
+/// Returns the game's own camera: of the active ones, the one that draws first.
 fn own_camera(world: &World, cameras: &GameCameras) -> Option<Entity> {
     let active = cameras.iter_manual(world).filter(|(_, camera)| camera.is_active);
     active.min_by_key(|(entity, camera)| (camera.order, *entity)).map(|(entity, _)| entity)
 }
 
-/// The renderer makes a texture of each image that cameras draw on, whoever looks through them, and cannot go on after one
-/// without pixels.
+/// Reports cameras whose target has no pixels. The renderer makes a texture of each target, and cannot go on after
+/// such a one.
 fn check_targets(world: &World, cameras: &GameCameras) -> Result<(), CameraError> {
     let Some(images) = world.get_resource::<Assets<Image>>() else { return Ok(()) };
     let size = |camera| Some(images.get(world.get::<RenderTarget>(camera)?.as_image()?)?.size());

@@ -1,4 +1,4 @@
-//! What Bevy does after `Update` to bring a scene ready for drawing, to be done in the middle of a tick.
+//! Bevy's systems after `Update` that prepare a scene for drawing, to be run in the middle of a tick.
 
 use bevy::{
     app::TaskPoolPlugin,
@@ -20,7 +20,7 @@ use bevy::{
 
 use super::{TileLayerPlugin, adapter, images};
 
-/// Adds what the renderer consists of, as far as the app does not have it.
+/// Adds the parts of the renderer that the app lacks.
 pub(super) fn add_renderer(app: &mut App, render_creation: RenderCreation) {
     add(app, TaskPoolPlugin::default());
     add(app, FrameCountPlugin);
@@ -33,7 +33,7 @@ pub(super) fn add_renderer(app: &mut App, render_creation: RenderCreation) {
     add(app, MeshPlugin);
     add(app, CameraPlugin);
     add(app, CorePipelinePlugin);
-    // Sprites bring systems for text along, which need it.
+    // Sprites add systems for text, which need it.
     add(app, TextPlugin);
     add(app, SpritePlugin);
     add(app, SpriteRenderPlugin);
@@ -46,9 +46,9 @@ fn add<P: Plugin>(app: &mut App, plugin: P) {
     }
 }
 
-/// Bevy's own systems, in schedules that hold nothing of the game's.
+/// Bevy's own systems, in schedules without systems of the game.
 ///
-/// Most of them are private to Bevy. They are had by building an app that has nothing else.
+/// Most of them are private to Bevy. They are taken from an app that contains nothing else.
 pub(super) struct SceneSchedule {
     /// Loading of assets, from `PreUpdate`.
     pub(super) load: Schedule,
@@ -59,7 +59,7 @@ pub(super) struct SceneSchedule {
 impl SceneSchedule {
     pub(super) fn new() -> Self {
         let mut app = App::new();
-        // Bevy complains about plugins whose renderer is nowhere. This one never runs.
+        // Bevy complains about plugins without a renderer. This one never runs.
         app.add_plugins(ExtractPlugin::default());
         add_renderer(&mut app, adapter::none());
         app.add_systems(PostUpdate, images::note_missing_images.after(AssetEventSystems));

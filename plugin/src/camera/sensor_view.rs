@@ -1,4 +1,4 @@
-//! Where agents look, in the main World.
+//! Views of agents, in the main World.
 
 use bevy::{
     camera::{ScalingMode, primitives::Aabb, visibility::ViewVisibility},
@@ -9,19 +9,19 @@ use bevy::{
 
 use super::sensor_view_draw::DrawSensorViews;
 
-/// How far above and below the target things are seen, as with Bevy's own 2D camera.
+/// Depth above and below the target that is visible, as with Bevy's own 2D camera.
 const DEPTH: f32 = 1000.0;
 
-/// Marks the one camera that all sensors share which follow a target.
+/// Marks the camera that all sensors which follow a target share.
 ///
-/// A game that looks for its own camera with `Single<&Camera2d>` adds `Without<SensorCamera>`.
+/// A game that finds its own camera with `Single<&Camera2d>` adds `Without<SensorCamera>`.
 #[derive(Component, Clone, Copy, Debug, Default, Reflect)]
 #[reflect(Component)]
 pub struct SensorCamera;
 
-/// A camera that sees everything and draws nothing by itself: what it would draw is dealt out to the sensors' views.
+/// Spawns a camera that sees everything and draws nothing by itself: its items are distributed to the sensors' views.
 ///
-/// It neither tones nor dithers, so that colours are the bytes of the images they are from.
+/// It neither tones nor dithers, so colours are the bytes of the images they are from.
 pub(super) fn spawn_camera(world: &mut World) -> Entity {
     let everything = OrthographicProjection {
         scaling_mode: ScalingMode::Fixed { width: 1e9, height: 1e9 },
@@ -43,7 +43,7 @@ pub(super) fn spawn_camera(world: &mut World) -> Entity {
         .id()
 }
 
-/// Which picture this is: numbers are never used twice, though a tick may be looked at twice.
+/// Number of a picture. Numbers are never reused, though a tick may be drawn twice.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Resource)]
 pub(super) struct Stamp {
@@ -51,7 +51,7 @@ pub(super) struct Stamp {
     pub(super) tick: u64,
 }
 
-/// What one agent sees, and where it is drawn.
+/// The view of one agent, and the cell in which it is drawn.
 #[derive(Clone, Copy, Debug, Reflect)]
 pub(super) struct SensorView {
     /// Pixels of the common texture.
@@ -67,7 +67,7 @@ impl SensorView {
         Rect::from_center_size(self.centre, self.size)
     }
 
-    /// From the view's coordinates to the picture's.
+    /// Returns the projection from the view's coordinates to the picture's.
     pub(super) fn projection(&self) -> Mat4 {
         let half = self.size / 2.0;
         // Far and near are exchanged, as everywhere in Bevy.
@@ -75,17 +75,17 @@ impl SensorView {
     }
 }
 
-/// All views of this tick, and what there is to see.
+/// All views of this tick, and the visible entities.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
 pub(super) struct SensorViews {
     pub(super) camera: Option<Entity>,
     pub(super) views: Vec<SensorView>,
-    /// What is visible, with the rectangle that it lies in.
+    /// Visible entities, with their bounding rectangles.
     pub(super) bounds: Vec<(Entity, Rect)>,
 }
 
-/// Notes where everything is that may be drawn.
+/// Notes the position of everything that may be drawn.
 pub(super) fn note_bounds(
     mut views: ResMut<SensorViews>,
     drawn: Query<(Entity, &GlobalTransform, &Aabb, &ViewVisibility)>,

@@ -1,8 +1,8 @@
-//! Drawing the views of many sensors with the work of one camera, in the render World.
+//! Drawing of many sensors' views with the work of one camera, in the render World.
 //!
 //! Bevy prepares the shared camera as any other: it extracts, specialises, queues and sorts everything once. Before
-//! buffers are filled, the sorted items are dealt out to one phase for each view, by what lies in its sight. All views
-//! are then drawn in one pass, each with its own view uniform, viewport and scissor. Items that Bevy keeps in bins
+//! buffers are filled, the sorted items are distributed to one phase for each view that they intersect. All views are
+//! then drawn in one pass, each with its own view uniform, viewport and scissor. Items that Bevy keeps in bins
 //! (opaque 2D meshes) are few and are drawn for each view.
 
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -30,11 +30,11 @@ use bevy::{
 
 use super::sensor_view::{SensorViews, Stamp};
 
-/// What the shared camera does instead of Bevy's 2D rendering.
+/// Replaces Bevy's 2D rendering of the shared camera.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct DrawSensorViews;
 
-/// The views in the render World. Their phases and entities are used again and again.
+/// The views in the render World. Their phases and entities are reused.
 #[derive(Resource, Default, Reflect)]
 #[reflect(Resource)]
 struct RenderSensorViews {
@@ -42,10 +42,10 @@ struct RenderSensorViews {
     scene: SensorViews,
     #[reflect(ignore)]
     entities: Vec<Entity>,
-    /// Empty phases between two pictures.
+    /// Empty phases, kept between two pictures.
     #[reflect(ignore)]
     phases: Vec<SortedRenderPhase<Transparent2d>>,
-    /// The shared camera's own phase, while the views' ones stand in for it.
+    /// The shared camera's own phase, while the phases of the views replace it.
     #[reflect(ignore)]
     whole: Option<SortedRenderPhase<Transparent2d>>,
     #[reflect(ignore)]
@@ -112,12 +112,12 @@ fn extract_views(
     bounds.extend(main_views.bounds.iter().copied());
 }
 
-/// The view number `number`.
+/// Returns the view with this number.
 fn retained_view(camera: Entity, number: usize) -> RetainedViewEntity {
     RetainedViewEntity::new(MainEntity::from(camera), None, number as u32 + 1)
 }
 
-/// Makes each view and deals out what the shared camera would draw.
+/// Makes each view and distributes the items of the shared camera.
 fn make_views(world: &mut World) {
     world.resource_scope(|world, mut views: Mut<RenderSensorViews>| {
         let Some(camera) = views.scene.camera else { return };
@@ -158,7 +158,7 @@ fn deal_out(
     let areas: Vec<Rect> = views.scene.views.iter().map(|view| view.area()).collect();
     let mut seen: Vec<_> = areas.iter().map(|_| views.phases.pop().unwrap_or_default()).collect();
     for item in whole.items.values() {
-        // What has no bounds may be anywhere.
+        // An item without bounds may be anywhere.
         let bounds = views.bounds.get(&item.entity.1.id());
         for (area, phase) in areas.iter().zip(&mut seen) {
             if bounds.is_none_or(|bounds| touches(area, bounds)) {
@@ -188,8 +188,8 @@ fn copy(item: &Transparent2d) -> Transparent2d {
     }
 }
 
-/// Bevy makes bind groups only for views that name a tone mapping. The shared camera must name none while pipelines are
-/// chosen, so that nothing is toned.
+/// Switches the bind groups of tone mapping, which Bevy makes only for views that name one. The shared camera must
+/// name none while pipelines are selected, so that nothing is toned.
 fn tone(world: &mut World, camera: Entity, on: bool) {
     let mut views = world.query_filtered::<(Entity, &MainEntity), With<ExtractedView>>();
     let view = views.iter(world).find(|(_, main)| main.id() == camera).map(|(view, _)| view);
@@ -204,7 +204,7 @@ fn tone(world: &mut World, camera: Entity, on: bool) {
     }
 }
 
-/// All views share one buffer of uniforms, and so one bind group each for sprites and meshes.
+/// Shares the bind groups: all views use one buffer of uniforms, with one bind group each for sprites and meshes.
 fn lend_bind_groups(
     views: Res<RenderSensorViews>,
     shared: Query<(&MainEntity, &SpriteViewBindGroup, &Mesh2dViewBindGroup)>,
@@ -259,14 +259,14 @@ fn draw_views(
                     .map_or(Ok(()), |phase| phase.render(&mut pass, world, entity))
             });
         if let Err(error) = result {
-            // The stamp stays behind, so that the picture counts as missing.
+            // The stamp stays behind, so the picture counts as missing.
             return tracing::error!("the picture of a sensor could not be drawn: {error:?}");
         }
     }
     drawn.set(stamp.0);
 }
 
-/// Puts everything back as Bevy left it.
+/// Restores the phases to Bevy's state.
 fn restore_phases(world: &mut World) {
     world.resource_scope(|world, mut views: Mut<RenderSensorViews>| {
         let Some(camera) = views.scene.camera else { return };

@@ -12,17 +12,18 @@ use bevy::{
 
 use crate::{fault::Faults, vision::TileLayer};
 
-/// Draws [`TileLayer`]s, for windows and for sensors alike: each is one rectangle, and its pixels look their tile up.
+/// Draws [`TileLayer`]s, for windows and for sensors alike. Each layer is one rectangle, and its pixels look up their
+/// tile.
 ///
-/// Comes with [`CameraSensorPlugin`](super::CameraSensorPlugin). It needs Bevy's renderer for sprites.
+/// Added by [`CameraSensorPlugin`](super::CameraSensorPlugin). It needs Bevy's renderer for sprites.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TileLayerPlugin;
 
-/// World units that a [`TileLayer`] is drawn beyond its grid, with its `outside` tile. A grid without cells is drawn as
-/// far around its origin, and half a cell more.
+/// World units that a [`TileLayer`] is drawn beyond its grid, with its `outside` tile. A grid without cells is drawn
+/// as far around its origin, and half a cell more.
 ///
-/// Sensors raise it to half of what they see, which is as much as can come into view of an agent in the grid, and not
-/// so much that it would cover the arena next door.
+/// Sensors raise it to half of their width. This is the most that an agent in the grid can see of the outside, and
+/// does not cover a neighbouring arena.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Resource)]
 pub struct TileBorder(pub f32);
@@ -43,7 +44,7 @@ impl Plugin for TileLayerPlugin {
     }
 }
 
-/// What the shader needs to know of a layer.
+/// The data of a layer for the shader.
 #[derive(Asset, TypePath, AsBindGroup, Clone, Debug)]
 struct TileMaterial {
     /// Columns, rows, tile outside.
@@ -65,7 +66,7 @@ impl Material2d for TileMaterial {
     }
 
     fn alpha_mode(&self) -> AlphaMode2d {
-        // Among the sprites, by depth. Its pixels are drawn or not, never mixed.
+        // Among the sprites, by depth. Its pixels are opaque or absent, never mixed.
         AlphaMode2d::Blend
     }
 }
@@ -74,7 +75,7 @@ fn shader() -> ShaderRef {
     bevy::asset::AssetPath::from_path_buf(embedded_path!("tiles.wgsl")).with_source("embedded").into()
 }
 
-/// Brings the drawing of changed layers up to date.
+/// Updates the drawing of changed layers.
 fn update_tile_meshes(
     border: Res<TileBorder>,
     layers: Query<(Entity, Ref<TileLayer>, &Transform)>,
@@ -115,11 +116,11 @@ fn update_tile_meshes(
     }
 }
 
-/// The grid with its border, in cells.
+/// Returns the grid with its border, in cells.
 fn rectangle(layer: &TileLayer, border: f32) -> Mesh {
     let border = match layer.outside {
         TileLayer::EMPTY => 0.0,
-        // Nothing can be in it: what is seen is around a place half a cell from its origin at most.
+        // Without cells: the view's centre is at most half a cell from the origin.
         _ if layer.cells.is_empty() => border.ceil() + 1.0,
         _ => border.ceil(),
     };
@@ -132,7 +133,7 @@ fn rectangle(layer: &TileLayer, border: f32) -> Mesh {
 }
 
 fn cell_image(layer: &TileLayer) -> Image {
-    // No texture is empty: a grid without cells gets one that is never looked up.
+    // A texture cannot be empty: a grid without cells gets one that is never looked up.
     let (cells, width, height) = match &*layer.cells {
         [] => (&[TileLayer::EMPTY][..], 1, 1),
         cells => (cells, layer.columns, layer.rows),

@@ -1,4 +1,4 @@
-//! Demonstrations: recording what an agent does, and replaying it to the bit.
+//! Demonstrations: recording an agent's actions, and replaying them bit by bit.
 
 pub mod file;
 pub mod recorder;

@@ -1,4 +1,4 @@
-//! Writing down what agents do, whoever decides.
+//! The recorder of agents' episodes, under any control.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -27,6 +27,7 @@ use super::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoFileError, Dem
 use crate::{
     action::{Action, ActionSpace, ActionValue},
     agent::{Agent, AgentOrder},
+    carry_over::{ReflectCarryComponent, ReflectCarryResource},
     control::Control,
     episode::{Episode, EpisodeEnd},
     fault::Faults,
@@ -36,12 +37,12 @@ use crate::{
     state_hash::StateHash,
 };
 
-/// Where finished episodes go. Insert it, and add [`Recording`] to the agents that shall be recorded.
+/// The target of finished episodes. Insert it, and add [`Recording`] to the agents to be recorded.
 ///
 /// Each episode is on disk as soon as it has ended.
 #[derive(Resource, Reflect)]
 #[reflect(from_reflect = false)]
-#[reflect(Component)]
+#[reflect(Component, CarryResource)]
 pub struct Recorder {
     #[reflect(ignore)]
     writer: DemoWriter,
@@ -52,7 +53,7 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Records into `writer`; observations are kept if the file's header names them.
+    /// Creates a recorder into `writer`; observations are kept if the file's header names them.
     pub fn new(writer: DemoWriter) -> Self {
         let keep_observations = !writer.header().observation_names.is_empty();
         Self { writer, keep_observations, steps: 0, episodes: 0, limit: None }
@@ -74,7 +75,7 @@ impl Recorder {
         self.episodes
     }
 
-    /// Whether the step limit has been reached.
+    /// Returns whether the step limit has been reached.
     fn is_full(&self) -> bool {
         self.limit.is_some_and(|limit| self.steps >= limit)
     }
@@ -89,13 +90,13 @@ impl Recorder {
 
 /// The episode of this agent as recorded so far.
 #[derive(Component, Default, Debug, Reflect)]
-#[reflect(Component)]
+#[reflect(Component, CarryComponent)]
 pub struct Recording {
     #[reflect(ignore)]
     episode: Option<DemoEpisode>,
 }
 
-/// The kind of actions as a recording's header has it.
+/// Returns the kind of actions for a recording's header.
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub fn demo_actions(space: &ActionSpace) -> DemoActions {
@@ -146,7 +147,7 @@ pub fn record_ticks(
             continue;
         }
         if episode.tick == 1 {
-            // What is still pending was abandoned.
+            // A pending episode was abandoned.
             if let Some(pending) = recording.episode.take()
                 && let Err(error) = recorder.push(&pending)
             {
@@ -156,7 +157,7 @@ pub fn record_ticks(
             demo.level_file = files.as_ref().and_then(|files| files.of(episode.level)).cloned();
             recording.episode = Some(demo);
         }
-        // Without its first ticks an episode could not be replayed: recording waits for the next one.
+        // Without its first ticks an episode cannot be replayed, so recording waits for the next one.
         let Some(demo) = recording.episode.as_mut() else { continue };
         push_action(&mut demo.actions, &action.0);
         demo.rewards.push(reward.get());
@@ -180,7 +181,7 @@ pub fn record_ticks(
     }
 }
 
-/// Writes down the unfinished episodes of a World, as aborted: for the moment before a recording stops.
+/// Writes the unfinished episodes of a World, as aborted. Call it before a recording stops.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! Playing a recording back, and finding the first tick at which it is no longer the same game.
+//! Replay of a recording, and detection of the first tick that differs.
 //!
 //! ```
 //! use std::sync::Arc;
@@ -12,7 +12,7 @@
 //! #[derive(Resource, Default)]
 //! struct Heard(Vec<String>);
 //!
-//! // Three ticks of a game that paid nothing. A `DemoReader` gives out such episodes.
+//! // Three ticks of a game without reward. A `DemoReader` returns such episodes.
 //! let mut episode = DemoEpisode::new(7, DemoActions::Discrete(2));
 //! episode.actions = EpisodeActions::Discrete(vec![1, 0, 1]);
 //! (episode.rewards, episode.state_hashes, episode.deciders) = (vec![0.0; 3], vec![0; 3], vec![Decider::Human; 3]);
@@ -20,7 +20,7 @@
 //! let mut app = headless_app();
 //! app.init_resource::<Heard>()
 //!     .add_observer(|event: On<ReplayDiverged>, mut heard: ResMut<Heard>| heard.0.push(event.divergence.to_string()))
-//!     // Meanwhile the second tick pays a point.
+//!     // By now the second tick gives a point.
 //!     .add_systems(FixedUpdate, |mut agents: Query<(&Episode, &mut Reward)>| {
 //!         agents.iter_mut().filter(|(episode, _)| episode.tick == 1).for_each(|(_, mut reward)| reward.add(1.0));
 //!     });
@@ -28,7 +28,7 @@
 //! Replay::begin(Arc::new(episode), &mut app.world_mut().entity_mut(agent));
 //! app.ticks(3).expect("no agent broke its contract");
 //! assert!(app.world().get::<Replay>(agent).is_some_and(Replay::is_finished));
-//! assert_eq!(app.world().resource::<Heard>().0, ["level 7, tick 1: the reward is 1, recorded was 0"]);
+//! assert_eq!(app.world().resource::<Heard>().0, ["level 7, tick 1: the reward is 1, but 0 in the recording"]);
 //! ```
 
 use std::sync::Arc;
@@ -39,6 +39,7 @@ use thiserror::Error;
 use super::file::{DemoEnd, DemoEpisode, EpisodeActions};
 use crate::{
     action::{Action, ActionValue},
+    carry_over::ReflectCarryComponent,
     control::Control,
     episode::{Episode, EpisodeEnd},
     level::LevelQueue,
@@ -51,25 +52,25 @@ use crate::{
 /// The recorded episode that drives an agent under [`Control::Replay`].
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(opaque)]
-#[reflect(Component, Clone, Debug)]
+#[reflect(Component, CarryComponent, Clone, Debug)]
 pub struct Replay {
     episode: Arc<DemoEpisode>,
     divergence: Option<Divergence>,
     finished: bool,
-    /// Whether a reward that is not the recorded one is a divergence.
+    /// True if a reward other than the recorded one is a divergence.
     compares_rewards: bool,
 }
 
-/// A replay has stopped being the recorded game: triggered once in a replay, in the tick that differs.
+/// A replay has diverged from the recording. Triggered once in a replay, in the tick that differs.
 #[derive(EntityEvent, Clone, Debug, PartialEq, Reflect)]
 pub struct ReplayDiverged {
     /// The agent that replays.
     pub entity: Entity,
-    /// Where, and what differs.
+    /// The position and the kind of the difference.
     pub divergence: Divergence,
 }
 
-/// Where a replay stopped being the recorded game.
+/// The first difference of a replay from its recording.
 #[derive(Clone, Debug, Error, PartialEq, Reflect)]
 #[error("level {level}, tick {tick}: {what}")]
 pub struct Divergence {
@@ -77,18 +78,18 @@ pub struct Divergence {
     pub level: u64,
     /// The tick, from 0.
     pub tick: u32,
-    /// What differs.
+    /// The difference, as text.
     pub what: String,
 }
 
 impl Replay {
-    /// A replay of this episode. The agent's level queue must give the episode's level.
+    /// Creates a replay of this episode. The agent's level queue must give the episode's level.
     pub fn new(episode: Arc<DemoEpisode>) -> Self {
         Self { episode, divergence: None, finished: false, compares_rewards: true }
     }
 
-    /// A replay that takes what the game pays now, whatever was recorded, as long as the game is in the recorded states. If no
-    /// state was ever hashed, rewards are all that tells one game from another, and are compared all the same.
+    /// Accepts the game's current rewards in place of the recorded ones, as long as the game is in the recorded
+    /// states. If no state was ever hashed, rewards are the only evidence, and are compared all the same.
     // Hidden: for playbot_lab.
     #[doc(hidden)]
     #[must_use]
@@ -97,13 +98,13 @@ impl Replay {
         Self { compares_rewards, ..self }
     }
 
-    /// Hands an agent over to this recording, from its first tick on: whatever it was playing is left at once. Where levels
-    /// are files, the level is the one that the recorded file has now.
+    /// Hands an agent over to this recording, from its first tick on. The agent's running episode is abandoned. Where
+    /// levels are files, the level is the current number of the recorded file.
     pub fn begin(episode: Arc<DemoEpisode>, agent: &mut EntityWorldMut) {
         Self::new(episode).start(agent);
     }
 
-    /// [`begin`](Self::begin) with this replay.
+    /// Hands an agent over to this replay, as [`begin`](Self::begin) does.
     // Hidden: for playbot_lab.
     #[doc(hidden)]
     pub fn start(self, agent: &mut EntityWorldMut) {
@@ -117,23 +118,23 @@ impl Replay {
         agent.insert((Control::Replay, queue, self, AgentStreams::new(0, 0)));
     }
 
-    /// The first difference between the recording and the game, if one has been met. [`ReplayDiverged`] announces it.
+    /// Returns the first difference between the recording and the game so far. [`ReplayDiverged`] announces it.
     pub fn divergence(&self) -> Option<&Divergence> {
         self.divergence.as_ref()
     }
 
-    /// Whether the last recorded tick has been played, or the game ended before it.
+    /// Returns whether the last recorded tick has been played, or the game ended before it.
     pub fn is_finished(&self) -> bool {
         self.finished
     }
 
-    /// The recorded episode.
+    /// Returns the recorded episode.
     pub fn episode(&self) -> &DemoEpisode {
         &self.episode
     }
 }
 
-/// The action of one tick of a recording.
+/// Returns the action of one tick of a recording.
 // Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
 #[doc(hidden)]
 pub fn recorded_action(actions: &EpisodeActions, tick: usize) -> Option<ActionValue> {
@@ -166,10 +167,10 @@ pub(crate) fn check_replays(
         if *control != Control::Replay || !episode.is_running() || replay.finished {
             continue;
         }
-        // Judge has counted this tick already.
+        // This tick has been counted already.
         let tick = episode.tick.saturating_sub(1);
         let demo = &*replay.episode;
-        // Of another level nothing else needs to be said.
+        // On another level no other difference matters.
         let is_other = (tick == 0).then(|| other_level(demo, episode.level, files.as_deref())).flatten();
         let paid = replay.compares_rewards.then(|| reward.get());
         let what = is_other.or_else(|| difference(demo, tick as usize, paid, hash.folded(), episode.end()));
@@ -184,16 +185,16 @@ pub(crate) fn check_replays(
     }
 }
 
-/// Why the level is not the file that was recorded, if it is not.
+/// Returns why the level is not the recorded file, if it is not.
 fn other_level(demo: &DemoEpisode, level: u64, files: Option<&LevelFiles>) -> Option<String> {
     let recorded = demo.level_file.as_ref()?;
     match files {
         Some(files) => files.difference(level, recorded),
-        None => Some(format!("recorded was the level file {recorded}, but the levels played here are no files")),
+        None => Some(format!("the recorded level is the file {recorded}, but the levels here are not files")),
     }
 }
 
-/// What is not as recorded in this tick; the reward only if it is given.
+/// Returns the difference of this tick from the recording. The reward is compared only if it is given.
 fn difference(
     demo: &DemoEpisode,
     tick: usize,
@@ -208,16 +209,16 @@ fn difference(
         match demo.end {
             DemoEnd::Terminated { success } => Some(EpisodeEnd::Terminated { success }),
             DemoEnd::Truncated => Some(EpisodeEnd::Truncated),
-            // An aborted recording says nothing about how the game would have gone on.
+            // An aborted recording does not show how the game would have gone on.
             DemoEnd::Aborted => end,
         }
     };
     if recorded_hash != hash {
-        Some(format!("the state hash is {hash:08x}, recorded was {recorded_hash:08x}"))
+        Some(format!("the state hash is {hash:08x}, but {recorded_hash:08x} in the recording"))
     } else if let Some(reward) = reward.filter(|reward| reward.to_bits() != recorded_reward.to_bits()) {
-        Some(format!("the reward is {reward}, recorded was {recorded_reward}"))
+        Some(format!("the reward is {reward}, but {recorded_reward} in the recording"))
     } else if recorded_end != end {
-        Some(format!("the episode's end is {end:?}, recorded was {recorded_end:?}"))
+        Some(format!("the episode's end is {end:?}, but {recorded_end:?} in the recording"))
     } else {
         None
     }

@@ -1,4 +1,4 @@
-//! The pixels of a picture, and where on them things of the world lie.
+//! The pixels of a picture, and the position of the world's objects on them.
 
 use std::ops::Range;
 
@@ -6,7 +6,8 @@ use bevy::prelude::*;
 
 use super::{colour::Rgba, quad::Quad};
 
-/// What an eye sees of the world: the way from its coordinates to pixels, with y down and (0, 0) the top left corner.
+/// The view of a sensor: the map from coordinates of the world to pixels, with y down and (0, 0)
+/// the top left corner.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct View {
     centre: Vec2,
@@ -15,12 +16,13 @@ pub(super) struct View {
 }
 
 impl View {
-    /// `width` units of the world around `centre`, on a picture of this size in pixels.
+    /// Creates a view of `width` units of the world around `centre`, on a picture of this size in
+    /// pixels.
     pub fn new(centre: Vec2, width: f32, size: UVec2) -> Self {
         Self { centre, middle: size.as_vec2() / 2.0, pixels_per_unit: size.x as f32 / width }
     }
 
-    /// Where something lies on the picture.
+    /// Returns the position of an object on the picture.
     pub fn place(&self, quad: &Quad) -> Quad {
         let along = |way: Vec2| Vec2::new(way.x * self.pixels_per_unit, -way.y * self.pixels_per_unit);
         Quad { corner: along(quad.corner - self.centre) + self.middle, across: along(quad.across), up: along(quad.up) }
@@ -36,7 +38,7 @@ pub(super) struct Canvas<'a> {
 }
 
 impl Canvas<'_> {
-    /// Columns and rows of the pixels that a quad may cover.
+    /// Returns the columns and rows of the pixels that a quad may cover.
     pub fn cut(&self, quad: &Quad) -> (Range<usize>, Range<usize>) {
         let side = |corner: f32, a: f32, b: f32, limit| {
             let (least, most) = (a.min(0.0) + b.min(0.0), a.max(0.0) + b.max(0.0));
@@ -46,28 +48,28 @@ impl Canvas<'_> {
         (side(corner.x, across.x, up.x, self.width), side(corner.y, across.y, up.y, self.height))
     }
 
-    /// A part of a row.
+    /// Returns a part of a row.
     pub fn row(&mut self, y: usize, columns: &Range<usize>) -> &mut [Rgba] {
         let from = y * self.width;
         &mut self.pixels[from + columns.start..from + columns.end]
     }
 }
 
-/// Pixels whose centre lies between two edges, the first one included.
+/// Returns the pixels whose centre lies between two edges, the first edge included.
 pub(super) fn covered(from: f32, to: f32, limit: usize) -> Range<usize> {
-    // Negative numbers and what is not a number become 0.
+    // Negative numbers and NaN become 0.
     let edge = |edge: f32| ((edge - 0.5).ceil() as usize).min(limit);
     let (start, end) = (edge(from), edge(to));
     start..end.max(start)
 }
 
-/// The centre of a pixel.
+/// Returns the centre of a pixel.
 #[inline]
 pub(super) fn centre(pixel: usize) -> f32 {
     pixel as f32 + 0.5
 }
 
-/// The way back from a picture to a quad's own coordinates, 0 to 1 along its sides.
+/// The map from a picture to a quad's own coordinates, 0 to 1 along its sides.
 #[derive(Clone, Copy)]
 pub(super) struct Inverse {
     corner: Vec2,
@@ -76,7 +78,7 @@ pub(super) struct Inverse {
 }
 
 impl Inverse {
-    /// `None` for a quad without area.
+    /// Returns the map, or `None` for a quad without area.
     pub fn of(quad: &Quad) -> Option<Self> {
         let Quad { corner, across, up } = *quad;
         let area = across.x * up.y - across.y * up.x;
@@ -89,7 +91,7 @@ impl Inverse {
         })
     }
 
-    /// How far across and up the centre of a pixel lies.
+    /// Returns the position of a pixel's centre, across and up.
     pub fn at(&self, x: usize, y: usize) -> Vec2 {
         let way = Vec2::new(centre(x), centre(y)) - self.corner;
         Vec2::new(way.x * self.across.x + way.y * self.across.y, way.x * self.up.x + way.y * self.up.y)

@@ -1,4 +1,5 @@
-//! Colours as light: tints and half-transparent pixels are mixed in linear light, as in an sRGB render target.
+//! Colours as light: tints and half-transparent pixels are mixed in linear light, as in an sRGB
+//! render target.
 //!
 //! The curves are made of sums, products and divisions alone, so that they are the same on every machine.
 
@@ -25,7 +26,7 @@ pub(super) struct Curve {
 /// The one curve.
 pub(super) static SRGB: LazyLock<Curve> = LazyLock::new(Curve::new);
 
-/// What a sprite's colour does to its texels: factors in linear light, alpha last.
+/// The effect of a sprite's colour on its texels: factors in linear light, alpha last.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tint([f32; 4]);
 
@@ -33,7 +34,8 @@ impl Tint {
     /// Leaves texels as they are.
     pub const NONE: Self = Self([1.0; 4]);
 
-    /// The tint of a sprite's colour. Red, green and blue, linear or sRGB, give the same on every machine.
+    /// Returns the tint of a sprite's colour. Linear and sRGB colours give the same tint on every
+    /// machine.
     pub fn of(colour: Color) -> Self {
         if colour == Color::WHITE {
             return Self::NONE;
@@ -55,7 +57,7 @@ impl Curve {
         Self { light: std::array::from_fn(|i| byte(i as f64)), next, first }
     }
 
-    /// The byte nearest to the light.
+    /// Returns the byte nearest to the light.
     pub fn encode(&self, light: f32) -> u8 {
         let light = light.clamp(0.0, 1.0);
         let mut byte = self.first[(light * BINS as f32) as usize];
@@ -65,7 +67,7 @@ impl Curve {
         byte
     }
 
-    /// A colour of linear light as an opaque pixel.
+    /// Returns a colour of linear light as an opaque pixel.
     pub fn opaque(&self, Tint([red, green, blue, _]): Tint) -> Rgba {
         [self.encode(red), self.encode(green), self.encode(blue), 255]
     }
@@ -86,7 +88,7 @@ impl Curve {
     }
 }
 
-/// From sRGB to linear light: IEC 61966-2-1.
+/// Converts sRGB to linear light: IEC 61966-2-1.
 fn decode(encoded: f64) -> f64 {
     if encoded <= 0.04045 {
         return encoded / 12.92;
@@ -96,13 +98,14 @@ fn decode(encoded: f64) -> f64 {
     base * base * fifth_root(base * base)
 }
 
-/// By Newton's method from a start that is not below the root: each step brings it down, until rounding stops that.
+/// Returns the fifth root by Newton's method, from a start that is not below the root. Each step
+/// decreases the value until rounding stops it.
 fn fifth_root(x: f64) -> f64 {
     let mut root = x.max(1.0);
     loop {
         let fourth = root * root * root * root;
         let next = (4.0 * root + x / fourth) / 5.0;
-        // Not a number ends it as well.
+        // NaN ends the loop as well.
         if next < root { root = next } else { return root }
     }
 }

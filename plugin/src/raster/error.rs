@@ -1,18 +1,18 @@
-//! Why something cannot be drawn.
+//! Errors of drawing.
 
 use bevy::prelude::*;
 use thiserror::Error;
 
 use crate::vision::NO_IMAGE;
 
-/// Why a picture cannot be drawn. Entities are named where this is reported.
+/// The reason why a picture cannot be drawn. The report names the entity.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub(super) enum RasterError {
     #[error("the width of what the sensor sees is {0}; it must be a number above 0")]
     Width(f32),
     #[error("the sensor's target {0} is gone or has no Transform; remove the sensor with it, or give it another")]
     NoTarget(Entity),
-    #[error("the sensor's target stands at {0}; the game must not put it there")]
+    #[error("the sensor's target is at {0}; the game must give it a finite position")]
     LostTarget(Vec2),
     #[error("{0}")]
     Options(#[from] crate::vision::VisionError),
@@ -20,7 +20,7 @@ pub(super) enum RasterError {
     Thing(Entity, Undrawable),
 }
 
-/// Why an entity cannot be drawn.
+/// The reason why an entity cannot be drawn.
 #[derive(Clone, Debug, PartialEq, Error)]
 pub(super) enum Undrawable {
     #[error("the sprite has no image: {NO_IMAGE}")]
@@ -50,7 +50,7 @@ pub(super) enum Undrawable {
 }
 
 impl RasterError {
-    /// The entity that is to blame.
+    /// Returns the entity that causes the error.
     pub fn entity(&self) -> Option<Entity> {
         match self {
             Self::Thing(entity, _) => Some(*entity),

@@ -1,17 +1,21 @@
 //! Pictures of 2D sprites drawn on the CPU.
 //!
-//! A [`RasterSensor`] draws what Bevy's sprite renderer would show on a camera with nearest sampling, without
-//! multisampling and tonemapping, over Bevy's [`ClearColor`](bevy::prelude::ClearColor) if there is one and over black otherwise:
+//! A [`RasterSensor`] draws the picture of Bevy's sprite renderer on a camera with nearest
+//! sampling, without multisampling and tonemapping. The background is Bevy's
+//! [`ClearColor`](bevy::prelude::ClearColor), or black without one. It draws:
 //!
 //! - [`Sprite`](bevy::prelude::Sprite) with image or atlas, tint, flips, rectangle, `custom_size`, [`Anchor`](bevy::sprite::Anchor) and the image
 //!   modes `Auto` and `Scale`, and [`TileLayer`](crate::vision::TileLayer);
-//! - whatever [`Transform`](bevy::prelude::Transform) and [`Visibility`](bevy::prelude::Visibility) say, with those of the parents; the
-//!   [`GlobalTransform`](bevy::prelude::GlobalTransform) is not read and need not be kept;
-//! - the farthest z first. Things of equal z are drawn parents first and then in the order of their
-//!   [`Children`](bevy::prelude::Children). Bevy leaves that to the order in which its tables hold them, so give what overlaps different z.
+//! - with the [`Transform`](bevy::prelude::Transform) and [`Visibility`](bevy::prelude::Visibility)
+//!   of entities and their parents; the [`GlobalTransform`](bevy::prelude::GlobalTransform) is not
+//!   read and need not be kept;
+//! - the farthest z first. At equal z, parents come first and then the order of their
+//!   [`Children`](bevy::prelude::Children). Bevy leaves this open, so give overlapping entities
+//!   different z.
 //!
-//! Texels of half alpha are mixed in linear light. Where the centre of a pixel falls decides which texel it shows. All of
-//! it is sums, products and quotients in a fixed order, so a picture has the same bytes on every machine.
+//! Texels of half alpha are mixed in linear light. The centre of a pixel selects the texel that it
+//! shows. Only sums, products and quotients in a fixed order are used, so a picture has the same
+//! bytes on every machine.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -21,7 +25,7 @@
 //! app.add_plugins(RasterPlugin);
 //! let red = Sprite::from_color(Color::srgb(1.0, 0.0, 0.0), Vec2::splat(2.0));
 //! let player = app.world_mut().spawn((red, Transform::default())).id();
-//! // Four units of the world around the player, a pixel for each.
+//! // Four units of the world around the player, one pixel per unit.
 //! let sensor = RasterSensor::following(player, 4.0, ImageOptions { width: 4, height: 4, ..default() });
 //! let agent = app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human, sensor)).id();
 //! app.tick().expect("it can be drawn");

@@ -1,4 +1,4 @@
-//! The plugin.
+//! The plugin of [`RasterSensor`](super::RasterSensor)s.
 
 use bevy::prelude::*;
 

@@ -1,10 +1,10 @@
-//! Where things stand, in the coordinates of their stage.
+//! Poses of entities in the coordinates of their stage.
 
 use bevy::prelude::*;
 
-/// An affine map: three axes and the place of the origin.
+/// An affine map: three axes and the position of the origin.
 ///
-/// Nothing but sums and products in a fixed order, so that it comes out the same on every machine.
+/// Only sums and products in a fixed order, so the result is the same on every machine.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Pose {
     pub x: Vec3,
@@ -14,7 +14,7 @@ pub(super) struct Pose {
 }
 
 impl Pose {
-    /// The pose of a transform.
+    /// Returns the pose of a transform.
     pub fn of(transform: &Transform) -> Self {
         let Transform { translation: at, rotation, scale } = *transform;
         if rotation == Quat::IDENTITY {
@@ -33,13 +33,13 @@ impl Pose {
         }
     }
 
-    /// The pose of a child, or of whatever has no parent but the stage.
+    /// Returns the pose of a child, or of an entity whose only parent is the stage.
     pub fn child(parent: Option<&Pose>, transform: &Transform) -> Self {
         let own = Self::of(transform);
         parent.map_or(own, |parent| parent.then(&own))
     }
 
-    /// What stands at `inner` in the coordinates of what stands here.
+    /// Returns the pose at `inner` in the coordinates of this pose.
     pub fn then(&self, inner: &Pose) -> Self {
         Self { x: self.turn(inner.x), y: self.turn(inner.y), z: self.turn(inner.z), at: self.turn(inner.at) + self.at }
     }

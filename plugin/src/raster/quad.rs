@@ -1,4 +1,5 @@
-//! Where a sprite lies and which part of its image it shows, by the rules of Bevy's sprite renderer.
+//! The position of a sprite and the part of its image that it shows, by the rules of Bevy's sprite
+//! renderer.
 
 use bevy::{
     prelude::*,
@@ -18,15 +19,16 @@ pub(super) struct Quad {
     pub up: Vec2,
 }
 
-/// A region of an image, in texels from its top left: from `start`, which the bottom left corner of the sprite shows, to
-/// `start + size`, which the top right corner shows. So y falls, and a flip turns a size around.
+/// A region of an image, in texels from its top left. The bottom left corner of the sprite shows
+/// `start`, and the top right corner shows `start + size`. So y decreases upwards, and a flip
+/// negates a size.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct ImageRegion {
     pub start: Vec2,
     pub size: Vec2,
 }
 
-/// Lays a sprite out.
+/// Computes the quad and the image region of a sprite.
 pub(super) fn lay_out(
     sprite: &Sprite,
     anchor: &Anchor,
@@ -57,7 +59,8 @@ pub(super) fn lay_out(
     Ok((quad, region))
 }
 
-/// A rectangle counts from the top left of the atlas's section, if there is one.
+/// Returns the shown rectangle, which counts from the top left of the atlas's section, if there is
+/// one.
 fn shown_rect(sprite: &Sprite, image_size: Vec2, layouts: &Assets<TextureAtlasLayout>) -> Result<Rect, Undrawable> {
     let Some(atlas) = &sprite.texture_atlas else {
         return Ok(sprite.rect.unwrap_or(Rect { min: Vec2::ZERO, max: image_size }));
@@ -66,7 +69,7 @@ fn shown_rect(sprite: &Sprite, image_size: Vec2, layouts: &Assets<TextureAtlasLa
     Ok(sprite.rect.map_or(section, |rect| Rect { min: rect.min + section.min, max: rect.max + section.min }))
 }
 
-/// Which end of the longer axis is kept: of the image when it fills, of the space when it fits.
+/// The end of the longer axis that is kept: of the image when it fills, of the space when it fits.
 #[derive(Clone, Copy)]
 enum Keep {
     Start,
@@ -90,7 +93,7 @@ fn scale(mode: SpriteScalingMode, texture: Vec2, size: &mut Vec2, shift: &mut Ve
     if fills {
         let axis = usize::from(wider);
         let spare = region.size[axis] * (1.0 - share);
-        // Regions start at the bottom, but vertically it is the top that counts as the start.
+        // Regions start at the bottom, but vertically the top counts as the start.
         region.start[axis] += match (keep, axis) {
             (Keep::Centre, _) => spare * 0.5,
             (Keep::Start, 1) | (Keep::End, 0) => spare,

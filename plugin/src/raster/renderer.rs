@@ -1,4 +1,4 @@
-//! Filling the frames of all agents.
+//! The system that fills the frames of all agents.
 
 use bevy::prelude::*;
 
@@ -21,7 +21,7 @@ use crate::{
     vision::{Frame, ImageSensor, is_observed},
 };
 
-/// Converted images, and memory that is used again for every picture.
+/// Converted images, and memory that is reused for every picture.
 #[derive(Default)]
 pub(super) struct RasterRenderer {
     textures: Textures,
@@ -32,7 +32,7 @@ pub(super) struct RasterRenderer {
     tiles: TileBuffers,
 }
 
-/// An agent, and the place that its sensor looks at.
+/// An agent, and the position that its sensor looks at.
 #[derive(Debug)]
 struct Viewpoint {
     stage: Option<Entity>,
@@ -95,7 +95,7 @@ pub(super) fn fill_frames(
 }
 
 impl RasterRenderer {
-    /// Lists the agents that are observed, those of one stage together.
+    /// Lists the agents that are observed, grouped by stage.
     fn find_viewpoints(
         &mut self,
         order: &AgentOrder,
@@ -117,7 +117,8 @@ impl RasterRenderer {
         self.viewpoints.sort_unstable_by_key(|viewpoint| (viewpoint.stage, viewpoint.row));
     }
 
-    /// Paints what was gathered, the farthest first, and what is equally far in the order in which it was found.
+    /// Paints the gathered items, the farthest first. Equally far items keep the order in which
+    /// they were found.
     fn paint(
         &mut self,
         stages: &Stages,
@@ -163,7 +164,7 @@ impl RasterRenderer {
     }
 }
 
-/// The stage that a sensor sees, and the place it looks at.
+/// Returns the stage that a sensor sees, and the position it looks at.
 fn locate(sensor: &RasterSensor, image: &ImageSensor, stages: &Stages) -> Result<(Option<Entity>, Vec2), RasterError> {
     image.0.check()?;
     if !(sensor.width > 0.0 && sensor.width.is_finite()) {
@@ -173,9 +174,9 @@ fn locate(sensor: &RasterSensor, image: &ImageSensor, stages: &Stages) -> Result
     if centre.is_finite() { Ok((stage, centre)) } else { Err(RasterError::LostTarget(centre)) }
 }
 
-/// A number that grows with z.
+/// Returns a number that grows with z.
 fn rank(z: f32) -> u32 {
-    // There is only one zero.
+    // -0 becomes 0.
     let bits = (z + 0.0).to_bits();
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }

@@ -1,4 +1,4 @@
-//! Everything that is drawn on a stage.
+//! The items that are drawn on a stage.
 
 use bevy::{ecs::system::SystemParam, prelude::*, sprite::Anchor};
 
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::vision::{Stage, TileLayer, lacks_image};
 
-/// Something to draw, in the coordinates of its stage.
+/// An item to draw, in the coordinates of its stage.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Item {
     pub z: f32,
@@ -20,14 +20,14 @@ pub(super) struct Item {
     pub kind: ItemKind,
 }
 
-/// What an item draws.
+/// The kind of an item.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum ItemKind {
     Sprite { region: ImageRegion, colour: Color },
     Tiles(Entity),
 }
 
-/// Whatever may be on a stage or hold something that is.
+/// Entities that may be on a stage, or hold one that is.
 #[derive(SystemParam)]
 pub(super) struct Stages<'w, 's> {
     parents: Query<'w, 's, &'static ChildOf>,
@@ -53,7 +53,7 @@ pub(super) struct Stages<'w, 's> {
 }
 
 impl Stages<'_, '_> {
-    /// The stage of an entity, if it is beneath one, and its place there.
+    /// Returns the stage of an entity, if it is beneath one, and its position there.
     pub fn locate(&self, entity: Entity) -> Option<(Option<Entity>, Vec2)> {
         let mut pose = Pose::of(self.places.get(entity).ok()?);
         let mut lowest = entity;
@@ -69,7 +69,7 @@ impl Stages<'_, '_> {
         Some((None, pose.at.truncate()))
     }
 
-    /// Whether what inherits its visibility from this entity is seen.
+    /// Returns whether entities that inherit their visibility from this one are visible.
     fn is_visible(&self, mut entity: Entity) -> bool {
         loop {
             match self.visibilities.get(entity) {
@@ -84,8 +84,8 @@ impl Stages<'_, '_> {
         }
     }
 
-    /// Lists what is drawn on a stage, or outside of all stages, parents before their children and children in their
-    /// order.
+    /// Lists the items on a stage, or outside of all stages, parents before their children and
+    /// children in order.
     pub fn gather(
         &self,
         stage: Option<Entity>,

@@ -1,10 +1,11 @@
-//! The eye that draws on the CPU.
+//! The sensor that draws on the CPU.
 
 use bevy::prelude::*;
 
 use crate::vision::{ImageOptions, ImageSensor};
 
-/// Draws what lies around an entity, as a [`CameraSensor`](crate::camera) would show it, without a GPU.
+/// Draws the surroundings of an entity, as a [`CameraSensor`](crate::camera) would show them,
+/// without a GPU.
 #[derive(Component, Clone, Copy, Debug, Reflect)]
 #[reflect(Component)]
 #[require(ImageSensor)]
@@ -16,7 +17,7 @@ pub struct RasterSensor {
 }
 
 impl RasterSensor {
-    /// The components of an agent that sees `width` units of the world around `target`.
+    /// Returns the components of an agent that sees `width` units of the world around `target`.
     pub fn following(target: Entity, width: f32, image: ImageOptions) -> (Self, ImageSensor) {
         (Self { target, width }, ImageSensor(image))
     }

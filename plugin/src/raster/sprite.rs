@@ -9,7 +9,7 @@ use super::{
     texture::{Texture, Transparency},
 };
 
-/// A sprite that lies on a picture.
+/// A sprite positioned on a picture.
 pub(super) struct SpriteOn<'a> {
     /// In pixels.
     pub quad: Quad,
@@ -19,7 +19,8 @@ pub(super) struct SpriteOn<'a> {
 }
 
 impl SpriteOn<'_> {
-    /// Paints the sprite over these pixels, which [`Canvas::cut`] chose. `columns` is memory to work in.
+    /// Paints the sprite over the pixels that [`Canvas::cut`] returned. `columns` is working
+    /// memory.
     pub fn paint(&self, canvas: &mut Canvas, area: (Range<usize>, Range<usize>), columns: &mut Vec<u32>) {
         let painter = Painter::new(self.texture.transparency, self.tint);
         if self.quad.across.y == 0.0 && self.quad.up.x == 0.0 {
@@ -29,7 +30,8 @@ impl SpriteOn<'_> {
         }
     }
 
-    /// All pixels of a column show the same column of texels, and all of a row the same row.
+    /// Paints an upright sprite: all pixels of a column show one column of texels, and all of a row
+    /// one row.
     fn paint_upright(
         &self,
         canvas: &mut Canvas,
@@ -68,7 +70,7 @@ impl SpriteOn<'_> {
     }
 }
 
-/// From a coordinate of the picture to that of a texel, along one axis.
+/// A map from a coordinate of the picture to that of a texel, along one axis.
 struct Axis {
     from: f32,
     start: f32,
@@ -78,10 +80,11 @@ struct Axis {
 }
 
 impl Axis {
-    /// A side of length `length`, which may be negative, from `corner` on, shows `size` texels from `start` on.
+    /// Creates an axis: a side of length `length`, which may be negative, starts at `corner` and
+    /// shows `size` texels from `start` on.
     fn new(corner: f32, length: f32, start: f32, size: f32, texels: u32) -> Self {
         let (least, most) = (start.min(start + size), start.max(start + size));
-        // No rounding may reach for a neighbour on the sheet.
+        // Rounding must not select a neighbour on the sheet.
         let last = (most.ceil() as i32 - 1).clamp(0, texels as i32 - 1);
         Self { from: corner, start, texels_per_pixel: size / length, first: (least as i32).clamp(0, last), last }
     }
@@ -93,18 +96,18 @@ impl Axis {
 
     #[inline]
     fn texel_at(&self, at: f32) -> u32 {
-        // What is negative is before the first texel, however it is rounded.
+        // A negative position is before the first texel, however it is rounded.
         let texel = self.start + (at - self.from) * self.texels_per_pixel;
         (texel as i32).clamp(self.first, self.last) as u32
     }
 }
 
-/// How texels are laid over pixels.
+/// The blending of texels over pixels.
 struct Painter {
     way: Way,
     tint: Tint,
     curve: &'static Curve,
-    /// The last mixture: texel, pixel before, pixel after. Neighbours are often alike.
+    /// The last blend: texel, pixel before, pixel after. Neighbours are often alike.
     last: [Rgba; 3],
 }
 
@@ -122,7 +125,7 @@ impl Painter {
             Transparency::Cutout if tint == Tint::NONE => Way::Cut,
             _ => Way::Mix,
         };
-        // A texel that is not there leaves a pixel as it is.
+        // A transparent texel leaves a pixel as it is.
         Self { way, tint, curve: &SRGB, last: [[0; 4]; 3] }
     }
 

@@ -7,12 +7,12 @@ use super::{
     error::Undrawable,
 };
 
-/// How much of what lies behind an image shows through it.
+/// The transparency of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Transparency {
-    /// Nothing: all texels are opaque.
+    /// All texels are opaque.
     Opaque,
-    /// Each texel is there or not.
+    /// Each texel is opaque or absent.
     Cutout,
     /// Some texels are half transparent.
     Blended,
@@ -28,7 +28,7 @@ pub(super) struct Texture {
 }
 
 impl Texture {
-    /// A single white texel: the image of rectangles of one colour.
+    /// Creates a single white texel: the image of rectangles of one colour.
     fn white() -> Self {
         Self { width: 1, height: 1, texels: vec![[255; 4]], transparency: Transparency::Opaque }
     }
@@ -77,12 +77,12 @@ pub(super) type TextureId = usize;
 pub(super) struct Textures {
     known: HashMap<AssetId<Image>, TextureId>,
     all: Vec<Texture>,
-    /// What was asked for last, which is often asked for again.
+    /// The last result, which is often asked for again.
     last: Option<(AssetId<Image>, TextureId)>,
 }
 
 impl Textures {
-    /// Forgets everything if an image has changed, come or gone.
+    /// Drops everything if an image has changed, come or gone.
     pub fn refresh(&mut self, images: &Res<Assets<Image>>) {
         if images.is_changed() {
             self.known.clear();
@@ -91,7 +91,7 @@ impl Textures {
         }
     }
 
-    /// The texture of an image.
+    /// Returns the texture of an image.
     pub fn find(&mut self, handle: &Handle<Image>, images: &Assets<Image>) -> Result<TextureId, Undrawable> {
         let asset = handle.id();
         if let Some((last, id)) = self.last
@@ -110,7 +110,7 @@ impl Textures {
     fn add(&mut self, asset: AssetId<Image>, images: &Assets<Image>) -> Result<TextureId, Undrawable> {
         let texture = match images.get(asset) {
             Some(image) => Texture::of(image)?,
-            // Bevy's renderer brings this one along.
+            // Bevy's renderer adds this one.
             None if asset == AssetId::default() => Texture::white(),
             None => return Err(Undrawable::NotLoaded),
         };
@@ -119,7 +119,7 @@ impl Textures {
         Ok(self.all.len() - 1)
     }
 
-    /// A texture that was found.
+    /// Returns a texture that was found.
     pub fn get(&self, id: TextureId) -> &Texture {
         &self.all[id]
     }

@@ -11,10 +11,10 @@ use super::{
 };
 use crate::vision::TileLayer;
 
-/// Texels of at least this alpha are drawn, and the others are not.
+/// Smallest alpha of a texel that is drawn.
 const OPAQUE: u8 = 128;
 
-/// A grid of tiles that lies on a picture.
+/// A grid of tiles positioned on a picture.
 pub(super) struct TilesOn<'a> {
     /// The cell (0, 0), in pixels.
     pub cell: Quad,
@@ -22,7 +22,7 @@ pub(super) struct TilesOn<'a> {
     pub strip: &'a Texture,
 }
 
-/// Memory to work in.
+/// Working memory.
 #[derive(Debug, Default)]
 pub(super) struct TileBuffers {
     columns: Vec<Run>,
@@ -95,7 +95,7 @@ impl TilesOn<'_> {
         Ok(())
     }
 
-    /// Where the tile of a cell begins on the strip.
+    /// Returns the first texel of a cell's tile on the strip.
     fn first_texel(&self, column: i32, row: i32) -> Result<Option<u32>, Undrawable> {
         let tile = self.layer.tile(column, row);
         let side = self.strip.width;
@@ -108,13 +108,13 @@ impl TilesOn<'_> {
     }
 }
 
-/// A texel over a pixel.
+/// Draws a texel over a pixel.
 #[inline]
 fn over([red, green, blue, alpha]: Rgba, below: Rgba) -> Rgba {
     if alpha >= OPAQUE { [red, green, blue, 255] } else { below }
 }
 
-/// Cells and texels along one axis. `flip` counts texels from the far end of a cell.
+/// Finds cells and texels along one axis. `flip` counts texels from the far end of a cell.
 fn find_runs(
     corner: f32,
     length: f32,
@@ -142,12 +142,12 @@ fn find_runs(
     }
 }
 
-/// The texel at a place in a tile, 0 to 1.
+/// Returns the texel at a position in a tile, 0 to 1.
 fn texel_in(within: f32, side: usize) -> u32 {
     ((within * side as f32) as u32).min(side as u32 - 1)
 }
 
-/// The largest integer that is not larger.
+/// Rounds down to an integer.
 fn floor(x: f32) -> i32 {
     let cut = x as i32;
     cut - i32::from(x < cut as f32)

@@ -1,4 +1,4 @@
-//! Worlds that are only their rows, each on a thread.
+//! Tests with Worlds that consist of rows only, each on a thread.
 
 use super::*;
 use playbot_learner::{ActionSpace, DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearner};

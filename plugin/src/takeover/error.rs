@@ -1,4 +1,4 @@
-//! Why nobody could take over.
+//! Errors of taking over.
 
 use std::path::PathBuf;
 
@@ -8,13 +8,13 @@ use thiserror::Error;
 use super::request::RequestError;
 use crate::demo::file::DemoFileError;
 
-/// Why nobody could take over.
+/// The reason why a takeover failed.
 #[derive(Debug, Error)]
 pub enum TakeoverError {
     /// The request cannot be understood.
     #[error("PLAYBOT: {0}")]
     Request(#[from] RequestError),
-    /// The recording cannot be read, written or continued, or is of another game.
+    /// The recording cannot be read, written or continued, or belongs to another game.
     #[error(transparent)]
     Demo(#[from] DemoFileError),
     /// The policy cannot be read.
@@ -23,21 +23,21 @@ pub enum TakeoverError {
     /// The policy was made for another game, other actions or another observation.
     #[error("{}: {why}", path.display())]
     Misfit {
-        /// The policy.
+        /// Path of the policy.
         path: PathBuf,
-        /// What does not fit.
+        /// The difference.
         why: String,
     },
     /// The game records by itself.
     #[error("this game records already; it cannot record into {} as well", path.display())]
     Recording {
-        /// The file that was asked for.
+        /// Path of the file that was asked for.
         path: PathBuf,
     },
     /// There is no episode to play.
     #[error("{}: the recording holds no episode that could be played", path.display())]
     Empty {
-        /// The recording.
+        /// Path of the recording.
         path: PathBuf,
     },
 }

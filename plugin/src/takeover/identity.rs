@@ -1,8 +1,9 @@
-//! Which game this is, for recordings and policies.
+//! The identity of the game, for recordings and policies.
 
 use bevy::prelude::*;
 
-/// Which game this is: recordings carry it, and policies and recordings of another one are refused.
+/// The identity of this game. Recordings carry it, and policies and recordings of another game are
+/// refused.
 ///
 /// ```
 /// use bevy_playbot::takeover::GameIdentity;
@@ -22,12 +23,12 @@ pub struct GameIdentity {
 }
 
 impl GameIdentity {
-    /// A game in its only mode.
+    /// Creates a game in its only mode.
     pub fn new(name: &str, version: u32) -> Self {
         Self { name: name.to_owned(), version, mode: "default".to_owned() }
     }
 
-    /// The same game in another mode.
+    /// Returns the same game in another mode.
     pub fn with_mode(mut self, mode: &str) -> Self {
         self.mode = mode.to_owned();
         self

@@ -1,7 +1,7 @@
 //! Taking over a shipped build: recording testers, letting a policy play, replaying a recording, without another program.
 //!
-//! A game with [`PlaybotPlugins`](crate::plugins::PlaybotPlugins) looks at the environment variable `PLAYBOT` when it
-//! starts:
+//! A game with [`PlaybotPlugins`](crate::plugins::PlaybotPlugins) reads the environment variable
+//! `PLAYBOT` when it starts:
 //!
 //! ```text
 //! PLAYBOT=record:ada.demo ./game       record every episode of the agents that play
@@ -9,12 +9,13 @@
 //! PLAYBOT=replay:ada.demo ./game       a recording plays instead
 //! ```
 //!
-//! F9, or the key of [`TakeoverPlugin::key`], stops it and starts it again; without `PLAYBOT` it starts a recording named
-//! for the game. A recording that exists is continued, and those of many testers are joined by
-//! [`merge_demos`](crate::demo::file::merge_demos). `PLAYBOT_NAME` says who plays.
+//! F9, or the key of [`TakeoverPlugin::key`], stops and restarts it. Without `PLAYBOT` the key
+//! starts a recording named for the game. An existing recording is continued, and
+//! [`merge_demos`](crate::demo::file::merge_demos) joins those of many testers. `PLAYBOT_NAME`
+//! names the player.
 //!
-//! What cannot be done is a [`FaultOccurred`](crate::fault::FaultOccurred), and the game goes on as it was. Where somebody
-//! ticks the World by hand, as training does, nobody takes over.
+//! An impossible request triggers a [`FaultOccurred`](crate::fault::FaultOccurred), and the game
+//! goes on unchanged. A World that is ticked by hand, as in training, cannot be taken over.
 //!
 //! ```
 //! use bevy_playbot::takeover::TakeoverRequest;

@@ -1,4 +1,4 @@
-//! `policy:FILE`.
+//! The takeover `policy:FILE`.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ use crate::{
     policy_file::{GameCard, check_policy, install_policy},
 };
 
-/// Hands the agents that play over to a policy, and returns who played them.
+/// Hands the playing agents over to a policy, and returns the seats of their former players.
 pub(super) fn start(world: &mut World, path: &Path) -> Result<Vec<Seat>, TakeoverError> {
     let file = PolicyFile::load(path, DeviceKind::default())?;
     let agents = playing_agents(world);
@@ -43,8 +43,8 @@ pub(super) fn stop(world: &mut World, seats: Vec<Seat>) {
     }
 }
 
-/// What a policy must have been made for to play this agent. Nobody says here what actions are called, and whether there are
-/// pictures is seen when the policy first looks at one.
+/// Returns the metadata that a policy must match to play this agent. Names of actions are not known
+/// here, and pictures are checked when the policy first reads one.
 fn card(world: &World, agent: Entity) -> Option<GameCard<'_>> {
     let game = world.resource::<GameIdentity>();
     let names = world.get::<VectorSensor>(agent).map(|sensor| sensor.space().names.clone());

@@ -1,4 +1,4 @@
-//! `replay:FILE`.
+//! The takeover `replay:FILE`.
 
 use std::{
     collections::VecDeque,
@@ -31,7 +31,7 @@ pub(super) struct Playing {
     begun: usize,
 }
 
-/// Hands the first agent that plays over to a recording.
+/// Hands the first playing agent over to a recording.
 pub(super) fn start(world: &mut World, path: &Path) -> Result<Option<Playing>, TakeoverError> {
     let game = world.resource::<GameIdentity>();
     let reader = DemoReader::open_for_game(path, &game.name, game.version, Some(&game.mode))?;
@@ -49,7 +49,7 @@ pub(super) fn start(world: &mut World, path: &Path) -> Result<Option<Playing>, T
 }
 
 impl Playing {
-    /// Begins the next episode; false if there is none.
+    /// Begins the next episode. Returns false if there is no next one.
     fn next(&mut self, world: &mut World) -> bool {
         let Some(episode) = self.left.pop_front() else { return false };
         self.begun += 1;
@@ -58,7 +58,7 @@ impl Playing {
         true
     }
 
-    /// Goes on to the next episode when this one is over; false after the last one.
+    /// Goes on to the next episode when this one is over. Returns false after the last one.
     pub fn go_on(&mut self, world: &mut World) -> bool {
         let Some(replay) = world.get::<Replay>(self.seat.agent) else { return false };
         if !replay.is_finished() {
@@ -66,7 +66,7 @@ impl Playing {
         }
         if let Some(divergence) = replay.divergence() {
             let what = format!(
-                "{}: episode {} does not replay ({divergence}): it is another game than the one that was recorded",
+                "{}: episode {} does not replay ({divergence}): the game differs from the recorded one",
                 self.path.display(),
                 self.begun - 1
             );

@@ -1,4 +1,4 @@
-//! The plugin that listens.
+//! The plugin that lets a person take over.
 
 use bevy::{input::InputSystems, prelude::*};
 
@@ -17,28 +17,29 @@ use crate::{
     systems::PlaybotSystems,
 };
 
-/// The environment variable that is looked at.
+/// The environment variable that holds the request.
 const VARIABLE: &str = "PLAYBOT";
 
-/// Lets somebody take over by the environment variable `PLAYBOT` and a key: see [the module](super).
+/// Lets a person take over by the environment variable `PLAYBOT` and a key: see [the
+/// module](super).
 #[derive(Clone, Debug)]
 pub struct TakeoverPlugin {
-    /// Which game this is.
+    /// The identity of the game.
     pub game: GameIdentity,
-    /// The key that stops it and starts it again; `None` for none.
+    /// The key that stops and restarts it; `None` for no key.
     pub key: Option<KeyCode>,
-    /// What is done from the start. [`new`](Self::new) asks the environment.
+    /// The request at the start. [`new`](Self::new) reads it from the environment.
     pub request: Option<Result<TakeoverRequest, RequestError>>,
 }
 
 impl TakeoverPlugin {
-    /// The plugin for this game: with F9, and with what the environment says.
+    /// Creates the plugin for this game, with F9 and the request of the environment.
     pub fn new(game: GameIdentity) -> Self {
         let request = std::env::var_os(VARIABLE).filter(|text| !text.is_empty());
         Self { game, key: Some(KeyCode::F9), request: request.map(|text| text.to_string_lossy().parse()) }
     }
 
-    /// Does this from the start, whatever the environment says.
+    /// Sets the request at the start, in place of the environment's.
     pub fn with_request(mut self, request: TakeoverRequest) -> Self {
         self.request = Some(Ok(request));
         self
@@ -55,25 +56,26 @@ impl Plugin for TakeoverPlugin {
         };
         app.insert_resource(self.game.clone())
             .insert_resource(Takeover { request, key: self.key, is_wanted, error, running: Running::Nothing })
-            // Before keys are noted, so that in the frame in which somebody takes over the person's keys no longer act.
+            // Runs before keys are noted, so that the person's keys no longer act in the frame of
+            // the takeover.
             .add_systems(PreUpdate, (hear_key, take_over).chain().after(InputSystems).before(note_taps))
             .add_systems(
                 Last,
-                // What goes wrong with the last episode is still said.
+                // Errors of the last episode are still reported.
                 finish.after(PlaybotSystems::Reset).before(FaultSystems).run_if(on_message::<AppExit>),
             );
     }
 }
 
-/// Who has taken over.
+/// The state of a takeover.
 #[derive(Resource, Debug, Reflect)]
 #[reflect(Resource)]
 pub struct Takeover {
     request: TakeoverRequest,
     key: Option<KeyCode>,
-    /// Whether it shall be going on.
+    /// True if it is to go on.
     is_wanted: bool,
-    /// What is wrong with the request, until it was said.
+    /// The error of the request, until it is reported.
     #[reflect(ignore)]
     error: Option<RequestError>,
     #[reflect(ignore)]
@@ -90,17 +92,17 @@ enum Running {
 }
 
 impl Takeover {
-    /// What is done, or would be done at the press of the key.
+    /// Returns the request that is running, or that the key would start.
     pub fn request(&self) -> &TakeoverRequest {
         &self.request
     }
 
-    /// Whether it is being done.
+    /// Returns whether it is running.
     pub fn is_running(&self) -> bool {
         !matches!(self.running, Running::Nothing)
     }
 
-    /// Starts something, in place of what is going on, as soon as an agent plays.
+    /// Starts a request, in place of the running one, as soon as an agent plays.
     pub fn start(&mut self, request: TakeoverRequest) {
         self.is_wanted = true;
         self.request = request;
@@ -119,7 +121,7 @@ fn hear_key(keys: Option<Res<ButtonInput<KeyCode>>>, mut takeover: ResMut<Takeov
     }
 }
 
-/// Starts, goes on and stops, between two ticks.
+/// Starts, continues and stops, between two ticks.
 fn take_over(world: &mut World, mut doing: Local<Option<TakeoverRequest>>) {
     if world.resource::<Faults>().has_caller() {
         return;
@@ -134,7 +136,7 @@ fn take_over(world: &mut World, mut doing: Local<Option<TakeoverRequest>>) {
     }
     let takeover = world.resource::<Takeover>();
     if !takeover.is_running() && takeover.is_wanted {
-        // Before the first tick nobody plays.
+        // Before the first tick no agent plays.
         if !playing_agents(world).is_empty() {
             *doing = Some(takeover.request.clone());
             start(world);
@@ -193,7 +195,7 @@ fn stop(world: &mut World) {
     }
 }
 
-/// The game ends: a recording is finished.
+/// Finishes a recording when the game ends.
 fn finish(world: &mut World) {
     if matches!(world.resource::<Takeover>().running, Running::Recording) {
         world.resource_mut::<Takeover>().is_wanted = false;

@@ -1,4 +1,4 @@
-//! `record:FILE`.
+//! The takeover `record:FILE`.
 
 use std::path::Path;
 
@@ -14,10 +14,11 @@ use crate::{
     placement::{TickPlacement, TickSchedules},
 };
 
-/// Who plays, if the environment does not say.
+/// Name of the player, unless the environment names one.
 const SOMEBODY: &str = "player";
 
-/// Begins to record the agents that play. What they play right now began too early: their next episode is the first.
+/// Begins to record the playing agents. Their running episodes began too early: the recording
+/// starts with their next episode.
 pub(super) fn start(world: &mut World, path: &Path) -> Result<(), TakeoverError> {
     if world.contains_resource::<Recorder>() {
         return Err(TakeoverError::Recording { path: path.to_owned() });
@@ -42,7 +43,7 @@ pub(super) fn start(world: &mut World, path: &Path) -> Result<(), TakeoverError>
     Ok(())
 }
 
-/// Ends the recording: what was played of running episodes is kept, as aborted.
+/// Ends the recording. Unfinished episodes are kept as aborted.
 pub(super) fn stop(world: &mut World) -> Result<(), TakeoverError> {
     let flushed = flush_unfinished(world);
     world.remove_resource::<Recorder>();
@@ -53,7 +54,8 @@ pub(super) fn stop(world: &mut World) -> Result<(), TakeoverError> {
     Ok(flushed?)
 }
 
-/// Ticks per second of game time. A step has whole nanoseconds, so that its inverse is not quite what was asked for.
+/// Returns ticks per second of game time. A step has whole nanoseconds, so its inverse is not
+/// exactly the requested rate.
 fn tick_hz(world: &World) -> f64 {
     let is_frame = world.get_resource::<TickSchedules>().is_some_and(|ticks| ticks.placement == TickPlacement::Frame);
     let step = match world.get_resource::<TimeUpdateStrategy>() {

@@ -1,4 +1,4 @@
-//! What somebody wants who takes over.
+//! Requests of a takeover.
 
 use std::{fmt, path::PathBuf, str::FromStr};
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::unknown_name::nearest;
 
-/// What somebody wants who takes over; in text `record:FILE`, `policy:FILE` or `replay:FILE`.
+/// The request of a takeover; in text `record:FILE`, `policy:FILE` or `replay:FILE`.
 #[derive(Clone, Debug, PartialEq, Eq, Reflect)]
 pub enum TakeoverRequest {
     /// Record every episode of the agents that play, into this file.
@@ -18,24 +18,24 @@ pub enum TakeoverRequest {
     Replay(PathBuf),
 }
 
-/// The text is no way of taking over.
+/// The text is not a valid request.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 pub enum RequestError {
-    /// There is no such way.
+    /// The verb does not exist.
     #[error(
-        "`{text}` says nothing that can be done{}; valid: record:FILE, policy:FILE, replay:FILE",
+        "`{text}` is not a valid request{}; valid: record:FILE, policy:FILE, replay:FILE",
         .near.as_ref().map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
     )]
     Unknown {
         /// The text.
         text: String,
-        /// The nearest way.
+        /// The nearest verb.
         near: Option<String>,
     },
     /// The file is missing.
     #[error("`{way}:` names no file; write {way}:FILE")]
     NoFile {
-        /// The way.
+        /// The verb.
         way: &'static str,
     },
 }

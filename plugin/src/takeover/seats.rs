@@ -1,4 +1,4 @@
-//! Who played before, so that the seat can be given back.
+//! Former players of agents, so that the controls can be given back.
 
 use bevy::prelude::*;
 
@@ -7,7 +7,7 @@ use crate::{
     streams::AgentStreams,
 };
 
-/// What an agent had before somebody took over.
+/// The state of an agent before a takeover.
 #[derive(Clone, Debug)]
 pub(super) struct Seat {
     pub agent: Entity,
@@ -16,14 +16,14 @@ pub(super) struct Seat {
     streams: AgentStreams,
 }
 
-/// Agents that somebody plays, lowest number first.
+/// Returns the agents that are played, lowest number first.
 pub(super) fn playing_agents(world: &World) -> Vec<Entity> {
     let agents = world.resource::<AgentOrder>().entities().iter().copied();
     agents.filter(|&agent| Control::of(world, agent).is_active()).collect()
 }
 
 impl Seat {
-    /// Notes who plays an agent.
+    /// Notes the player of an agent.
     pub fn of(world: &World, agent: Entity) -> Option<Self> {
         let control = *world.get::<Control>(agent)?;
         let (levels, streams) = (world.get::<LevelQueue>(agent)?.clone(), world.get::<AgentStreams>(agent)?.clone());
@@ -37,7 +37,7 @@ impl Seat {
         }
     }
 
-    /// Gives the seat back with a new episode: what was played of the last one was not this player's.
+    /// Gives the seat back with a new episode: the former player did not play the last one.
     pub fn give_back_anew(self, world: &mut World) {
         let Ok(mut agent) = world.get_entity_mut(self.agent) else { return };
         if let Some(mut episode) = agent.get_mut::<Episode>() {
@@ -47,7 +47,7 @@ impl Seat {
     }
 }
 
-/// A skill that was drawn for another state says nothing about this one.
+/// Resets a skill: one that was drawn for another state does not fit this one.
 pub(super) fn forget_skill(world: &mut World, agent: Entity) {
     if let Some(mut skill) = world.get_mut::<ActiveSkill>(agent) {
         skill.ticks_left = 0;

@@ -1,4 +1,4 @@
-//! From the actions of this tick to what is held down.
+//! From the actions of this tick to the inputs that are held down.
 
 use bevy::{ecs::system::SystemParam, prelude::*};
 
@@ -24,7 +24,7 @@ pub(super) type Pads<'w, 's> = Query<'w, 's, (Entity, &'static VirtualGamepad)>;
 pub(super) type Players<'w, 's> =
     Query<'w, 's, (&'static VirtualInput, &'static Action, &'static Control, &'static Episode, Has<PressesForPeople>)>;
 
-/// What all agents want to hold and push in this tick. What a gamepad does waits until it is plugged in.
+/// Returns the inputs that all agents hold and push in this tick. Inputs of a gamepad wait until it is plugged in.
 pub(super) fn wanted(order: &AgentOrder, players: &Players, pads: &Pads, state: &InputState) -> Wanted {
     let mut wanted = Wanted::default();
     for &agent in order.entities() {
@@ -55,7 +55,7 @@ pub(super) fn wanted(order: &AgentOrder, players: &Players, pads: &Pads, state: 
     wanted
 }
 
-/// Route [`Messages`](InputRoute::Messages): Bevy's own systems do the rest in this frame.
+/// Sends messages on route [`Messages`](InputRoute::Messages); Bevy's own systems do the rest in this frame.
 pub(super) fn send_messages(
     order: Res<AgentOrder>,
     players: Players,
@@ -71,7 +71,7 @@ pub(super) fn send_messages(
     messages.send_motion(wanted.motion, wanted.wheel);
 }
 
-/// What is needed to release the inputs that an agent holds.
+/// The parameters for releasing an agent's inputs.
 #[derive(SystemParam)]
 pub(super) struct InputReleaser<'w, 's> {
     devices: ResMut<'w, VirtualDevices>,
@@ -81,8 +81,8 @@ pub(super) struct InputReleaser<'w, 's> {
 }
 
 impl InputReleaser<'_, '_> {
-    /// Lets go of what the agent holds, as if it had never been pressed: whether the episode before ended with a key down
-    /// must not be seen in the next one.
+    /// Releases the agent's inputs, as if they had never been pressed. A key that was down at the end of an episode
+    /// must not affect the next one.
     pub(super) fn release(&mut self, agent: Entity, route: InputRoute) {
         for change in self.devices.release_agent(agent) {
             let before = change.read(&self.state);

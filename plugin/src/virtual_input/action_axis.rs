@@ -4,10 +4,10 @@ use bevy::prelude::*;
 
 use super::{axis::VirtualAxis, button::VirtualButton, held::HeldInput};
 
-/// Values beyond this press their key, unless said otherwise.
+/// Default threshold beyond which values press their key.
 const THRESHOLD: f32 = 0.5;
 
-/// What one value of a continuous action does.
+/// The effect of one value of a continuous action.
 #[derive(Clone, Debug, PartialEq, Reflect)]
 pub enum ActionAxis {
     /// Keys or buttons for each sign, pressed while the value lies beyond the threshold.
@@ -16,12 +16,12 @@ pub enum ActionAxis {
         negative: Vec<VirtualButton>,
         /// Held above `threshold`.
         positive: Vec<VirtualButton>,
-        /// Size that a value must exceed.
+        /// Magnitude that a value must exceed.
         threshold: f32,
     },
     /// A motion or a stick, pushed by the value.
     Analog {
-        /// What is pushed.
+        /// The pushed axis.
         axis: VirtualAxis,
         /// Factor from the value to the axis, such as pixels per tick.
         scale: f32,
@@ -29,7 +29,8 @@ pub enum ActionAxis {
 }
 
 impl ActionAxis {
-    /// Keys or buttons for each sign of the value: left and right, brake and throttle. They are pressed beyond ±0.5.
+    /// Creates an axis with keys or buttons for each sign of the value: left and right, brake and throttle. They are
+    /// pressed beyond ±0.5.
     pub fn buttons<N: Into<VirtualButton>, P: Into<VirtualButton>>(
         negative: impl IntoIterator<Item = N>,
         positive: impl IntoIterator<Item = P>,
@@ -46,7 +47,7 @@ impl ActionAxis {
         Self::buttons(negative, positive)
     }
 
-    /// Presses its keys beyond another threshold. Has no meaning for sticks and motions.
+    /// Sets another threshold for the keys. Has no effect on sticks and motions.
     pub fn with_threshold(self, threshold: f32) -> Self {
         match self {
             Self::Buttons { negative, positive, .. } => Self::Buttons { negative, positive, threshold },
@@ -54,32 +55,32 @@ impl ActionAxis {
         }
     }
 
-    /// A stick of the gamepad: the value, limited to -1 to 1.
+    /// Creates a stick of the gamepad: the value, limited to -1 to 1.
     pub fn stick(axis: GamepadAxis) -> Self {
         Self::Analog { axis: VirtualAxis::Stick(axis), scale: 1.0 }
     }
 
-    /// A trigger of the gamepad: the value, limited to 0 to 1.
+    /// Creates a trigger of the gamepad: the value, limited to 0 to 1.
     pub fn trigger(button: GamepadButton) -> Self {
         Self::Analog { axis: VirtualAxis::Trigger(button), scale: 1.0 }
     }
 
-    /// Motion of the mouse to the right by `pixels` per tick for a value of 1.
+    /// Moves the mouse to the right by `pixels` per tick for a value of 1.
     pub fn mouse_x(pixels: f32) -> Self {
         Self::Analog { axis: VirtualAxis::MouseX, scale: pixels }
     }
 
-    /// Motion of the mouse downwards by `pixels` per tick for a value of 1.
+    /// Moves the mouse downwards by `pixels` per tick for a value of 1.
     pub fn mouse_y(pixels: f32) -> Self {
         Self::Analog { axis: VirtualAxis::MouseY, scale: pixels }
     }
 
-    /// The mouse wheel, by `lines` per tick for a value of 1.
+    /// Turns the mouse wheel by `lines` per tick for a value of 1.
     pub fn wheel(lines: f32) -> Self {
         Self::Analog { axis: VirtualAxis::WheelY, scale: lines }
     }
 
-    /// Adds what this value holds.
+    /// Adds the inputs that this value holds.
     pub(super) fn add_to(&self, held: HeldInput, value: f32) -> HeldInput {
         match self {
             Self::Buttons { positive, threshold, .. } if value > *threshold => held.hold(positive.iter().copied()),
@@ -95,7 +96,7 @@ impl ActionAxis {
         }
     }
 
-    /// Keys, buttons and axes that it may ever move.
+    /// Returns all keys, buttons and axes that it may move.
     pub(super) fn reach(&self) -> HeldInput {
         match self {
             Self::Buttons { negative, positive, .. } => HeldInput::new(negative.iter().chain(positive).copied()),

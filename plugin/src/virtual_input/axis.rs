@@ -1,4 +1,4 @@
-//! What can be pushed to a degree.
+//! Inputs with a continuous value.
 
 use bevy::prelude::*;
 
@@ -20,7 +20,7 @@ pub enum VirtualAxis {
 }
 
 impl VirtualAxis {
-    /// Whether it belongs to the gamepad, of which every agent has its own.
+    /// Returns whether it belongs to the gamepad. Every agent has its own.
     pub(super) fn is_gamepad(self) -> bool {
         matches!(self, Self::Stick(_) | Self::Trigger(_))
     }

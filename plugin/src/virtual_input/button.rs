@@ -1,4 +1,4 @@
-//! What can be held down.
+//! Inputs that can be held down.
 
 use std::{fmt, str::FromStr};
 
@@ -11,8 +11,8 @@ use crate::unknown_name::nearest;
 
 /// A key, a mouse button or a gamepad button.
 ///
-/// In text, keys have Bevy's names (`ArrowLeft`, `KeyW`, `Space`), and the others say where they are: `MouseLeft`,
-/// `GamepadSouth`.
+/// In text, keys have Bevy's names (`ArrowLeft`, `KeyW`, `Space`), and the names of others start with their device:
+/// `MouseLeft`, `GamepadSouth`.
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -26,7 +26,7 @@ use crate::unknown_name::nearest;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, Reflect)]
 #[serde(try_from = "String", into = "String")]
 pub enum VirtualButton {
-    /// A key of the keyboard, by its place.
+    /// A key of the keyboard, by its position on the keyboard.
     Key(KeyCode),
     /// A button of the mouse.
     Mouse(MouseButton),
@@ -37,8 +37,8 @@ pub enum VirtualButton {
 /// The text names no key or button.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 #[error(
-    "unknown key or button `{name}`{}; keys have Bevy's names, such as `ArrowLeft`, `KeyW` or `Space`, and others say \
-     where they are: `MouseLeft`, `GamepadSouth`",
+    "unknown key or button `{name}`{}; keys have Bevy's names, such as `ArrowLeft`, `KeyW` or `Space`, and other \
+     names start with their device: `MouseLeft`, `GamepadSouth`",
     .near.as_ref().map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
 )]
 pub struct UnknownInput {

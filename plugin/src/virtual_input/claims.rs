@@ -1,4 +1,4 @@
-//! One World, one keyboard, one mouse.
+//! Claims of agents to the one keyboard and the one mouse of a World.
 
 use bevy::prelude::*;
 
@@ -9,7 +9,7 @@ use crate::{
     fault::Faults,
 };
 
-/// Whether this is played by virtual input: `for_people` says whether people are.
+/// Returns whether virtual input plays under this control; `for_people` includes people.
 pub(super) fn is_virtual(control: Control, for_people: bool) -> bool {
     match control {
         Control::Bot | Control::Policy | Control::Replay => true,
@@ -18,7 +18,7 @@ pub(super) fn is_virtual(control: Control, for_people: bool) -> bool {
     }
 }
 
-/// What only one agent of a World can have.
+/// An input that only one agent of a World can have.
 #[derive(Clone, Copy, PartialEq)]
 pub(super) enum Claim {
     Button(VirtualButton),
@@ -34,7 +34,8 @@ impl Claim {
     }
 }
 
-/// Reports agents whose mapping does not fit their actions, and agents that want what another one has, and stops them.
+/// Reports agents whose mapping does not fit their actions, and agents that claim the inputs of another one, and
+/// stops them.
 pub(super) fn check_claims(
     order: Res<AgentOrder>,
     mut agents: Query<(&Agent, &VirtualInput, &mut Control, Has<PressesForPeople>)>,
@@ -57,7 +58,7 @@ pub(super) fn check_claims(
     }
 }
 
-/// Everything that a mapping may ever press or move, but for the agent's own gamepad.
+/// Returns all inputs that a mapping may press or move, except the agent's own gamepad.
 fn claims_of(input: &VirtualInput) -> Vec<Claim> {
     let reach = input.reach();
     let buttons = reach.buttons.iter().filter(|button| !matches!(button, VirtualButton::Gamepad(_)));
@@ -65,7 +66,7 @@ fn claims_of(input: &VirtualInput) -> Vec<Claim> {
     buttons.copied().map(Claim::Button).chain(axes.map(|(axis, _)| Claim::Axis(*axis))).collect()
 }
 
-/// Why a mapping does not fit the actions of its agent.
+/// Returns why a mapping does not fit the actions of its agent.
 fn misfit(agent: &Agent, input: &VirtualInput) -> Option<String> {
     let Agent { index, actions } = agent;
     if input.space() != *actions {
@@ -78,12 +79,12 @@ fn misfit(agent: &Agent, input: &VirtualInput) -> Option<String> {
     input.is_mixed().then(|| {
         format!(
             "agent {index}: its `VirtualInput` has sets of buttons for discrete actions, and it has {actions}: \
-             give the axis that shall press them `ActionAxis::buttons`"
+             press buttons with an axis made by `ActionAxis::buttons`"
         )
     })
 }
 
-/// Why an agent cannot have what it wants: an earlier one has claimed it.
+/// Returns why an agent cannot have its inputs: an earlier agent has claimed them.
 fn conflict(agent: &Agent, wanted: &[Claim], claims: &[(Claim, u32)]) -> Option<String> {
     let (claim, other) = wanted.iter().find_map(|claim| claims.iter().find(|(taken, _)| taken == claim))?;
     Some(format!(

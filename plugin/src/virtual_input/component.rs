@@ -1,12 +1,12 @@
-//! What each action of an agent holds down.
+//! The mapping from an agent's actions to the inputs that they hold down.
 
 use bevy::prelude::*;
 
 use super::{action_axis::ActionAxis, button::VirtualButton, held::HeldInput};
 use crate::action::{ActionSpace, ActionValue};
 
-/// What each action of an agent holds down: the way from its [`Action`](crate::action::Action) into a game that reads
-/// Bevy's input.
+/// The inputs that each action of an agent holds down. It maps the agent's [`Action`](crate::action::Action) to the
+/// input that a game reads from Bevy.
 ///
 /// Discrete actions name a set of keys each, continuous ones an [`ActionAxis`] for each value.
 ///
@@ -29,36 +29,36 @@ use crate::action::{ActionSpace, ActionValue};
 #[reflect(Component)]
 pub struct VirtualInput {
     mapping: Mapping,
-    /// Sets of buttons were added to continuous actions, where they mean nothing.
+    /// True if sets of buttons were added to continuous actions, where they have no meaning.
     is_mixed: bool,
 }
 
 #[derive(Clone, Debug, PartialEq, Reflect)]
 enum Mapping {
-    /// What each discrete action holds.
+    /// The inputs that each discrete action holds.
     Discrete(Vec<HeldInput>),
-    /// What each value of a continuous action moves.
+    /// The inputs that each value of a continuous action moves.
     Continuous(Vec<ActionAxis>),
 }
 
 impl VirtualInput {
-    /// A set of keys for each discrete action; an empty set presses nothing.
+    /// Creates a mapping with a set of keys for each discrete action; an empty set presses nothing.
     pub fn keys(sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>) -> Self {
         Self::discrete(sets.into_iter().map(HeldInput::new))
     }
 
-    /// What each discrete action holds, on any device.
+    /// Creates a mapping with inputs of any device for each discrete action.
     pub fn discrete(actions: impl IntoIterator<Item = HeldInput>) -> Self {
         Self { mapping: Mapping::Discrete(actions.into_iter().collect()), is_mixed: false }
     }
 
-    /// What each value of a continuous action moves.
+    /// Creates a mapping with an axis for each value of a continuous action.
     pub fn axes(axes: impl IntoIterator<Item = ActionAxis>) -> Self {
         Self { mapping: Mapping::Continuous(axes.into_iter().collect()), is_mixed: false }
     }
 
-    /// Adds a set of mouse buttons to each discrete action, in order. Continuous actions have [`ActionAxis::buttons`];
-    /// an agent that has sets besides is a fault.
+    /// Adds a set of mouse buttons to each discrete action, in order. For continuous actions use
+    /// [`ActionAxis::buttons`]; an agent with sets as well is a fault.
     pub fn mouse_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = MouseButton>>) -> Self {
         self.also(sets)
     }
@@ -82,7 +82,7 @@ impl VirtualInput {
         self
     }
 
-    /// The actions that it can express: as many as it names.
+    /// Returns the actions that it can express: as many as it names.
     pub fn space(&self) -> ActionSpace {
         match &self.mapping {
             Mapping::Discrete(actions) => ActionSpace::Discrete(actions.len()),
@@ -90,7 +90,7 @@ impl VirtualInput {
         }
     }
 
-    /// What this action holds down; nothing for an action that does not belong to [`space`](Self::space).
+    /// Returns the inputs that this action holds down; empty for an action outside [`space`](Self::space).
     pub fn held(&self, action: &ActionValue) -> HeldInput {
         match (&self.mapping, action) {
             (Mapping::Discrete(actions), ActionValue::Discrete(index)) => {
@@ -103,12 +103,12 @@ impl VirtualInput {
         }
     }
 
-    /// Whether sets of buttons were added to continuous actions.
+    /// Returns whether sets of buttons were added to continuous actions.
     pub(super) fn is_mixed(&self) -> bool {
         self.is_mixed
     }
 
-    /// Everything that any of its actions may hold or move.
+    /// Returns all inputs that any of its actions may hold or move.
     pub(super) fn reach(&self) -> HeldInput {
         let join = |all: HeldInput, part: HeldInput| {
             let all = all.hold(part.buttons);
@@ -120,7 +120,7 @@ impl VirtualInput {
         }
     }
 
-    /// Whether any of its actions uses the gamepad.
+    /// Returns whether any of its actions uses the gamepad.
     pub(super) fn uses_gamepad(&self) -> bool {
         let reach = self.reach();
         let is_pad_button = |button: &VirtualButton| matches!(button, VirtualButton::Gamepad(_));

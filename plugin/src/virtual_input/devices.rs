@@ -1,4 +1,4 @@
-//! What virtual input holds down, and what has to change.
+//! The inputs that virtual input holds down, and their changes.
 
 use bevy::prelude::*;
 
@@ -8,7 +8,7 @@ use super::{
     input_state::{InputState, Switch},
 };
 
-/// What virtual input holds down at the moment, for all agents of the World.
+/// The inputs that virtual input holds down now, for all agents of the World.
 ///
 /// ```
 /// use bevy::{input::InputPlugin, prelude::*};
@@ -26,7 +26,7 @@ pub struct VirtualDevices {
     pushed: Vec<Push>,
 }
 
-/// A stick or trigger of an agent's gamepad, and how far it is pushed.
+/// A stick or trigger of an agent's gamepad, with its value.
 #[derive(Clone, Copy, Debug, PartialEq, Reflect)]
 pub(super) struct Push {
     pub agent: Entity,
@@ -36,13 +36,13 @@ pub(super) struct Push {
 }
 
 impl Push {
-    /// Whether both push the same stick or trigger, however far.
+    /// Returns whether both push the same stick or trigger, however far.
     fn is_of_same(&self, other: &Self) -> bool {
         (self.agent, self.pad, self.axis) == (other.agent, other.pad, other.axis)
     }
 }
 
-/// What all agents want in this tick.
+/// The inputs that all agents hold in this tick.
 #[derive(Debug, Default)]
 pub(super) struct Wanted {
     pub switches: Vec<(Entity, Switch)>,
@@ -60,16 +60,16 @@ pub(super) enum Change {
     Axis { pad: Entity, axis: VirtualAxis, value: f32 },
 }
 
-/// What games see of the button or stick that a change moves. A trigger is both.
+/// The state of a button or stick as games see it. A trigger is both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Reading {
     pub is_down: bool,
-    /// How far it is pushed; 0 for keys and mouse buttons.
+    /// Value of a stick or trigger; 0 for keys and mouse buttons.
     pub value: f32,
 }
 
 impl Change {
-    /// What games see now.
+    /// Returns the state as games see it now.
     pub fn read(self, state: &InputState) -> Reading {
         match self {
             Self::Button { switch, .. } => Reading { is_down: state.is_down(switch), value: state.value(switch) },
@@ -87,13 +87,13 @@ impl Change {
 }
 
 impl VirtualDevices {
-    /// What is held: the agent, and its key or button.
+    /// Returns the held inputs: the agent, and its key or button.
     pub fn held(&self) -> impl Iterator<Item = (Entity, VirtualButton)> + '_ {
         self.held.iter().map(|(agent, switch)| (*agent, switch.button))
     }
 
-    /// Goes from what is held to what is wanted. Releases come first. What is wanted and was let go of by something else,
-    /// such as a window that lost the keyboard, is pressed again.
+    /// Changes the held inputs to the wanted ones. Releases come first. A wanted input that was released by something
+    /// else, such as a window that lost the keyboard, is pressed again.
     pub(super) fn change(&mut self, wanted: &Wanted, is_down: impl Fn(Switch) -> bool) -> Vec<Change> {
         let mut changes = self.release_unless(
             |held| wanted.switches.contains(held),
@@ -119,7 +119,7 @@ impl VirtualDevices {
         changes
     }
 
-    /// Lets go of everything that this agent holds.
+    /// Releases all inputs of this agent.
     pub(super) fn release_agent(&mut self, agent: Entity) -> Vec<Change> {
         self.release_unless(|(holder, _)| *holder != agent, |push| push.agent != agent)
     }

@@ -1,9 +1,9 @@
-//! Route Direct: what games read is written in the fixed tick itself.
+//! The route [`Direct`](super::InputRoute::Direct): the state that games read is written in the fixed tick itself.
 //!
-//! Bevy clears `just_pressed` once a frame. A frame may run several fixed ticks, or none, and each tick must see a press
-//! exactly once. So the marks of the tick before are taken away before each tick, and those of all ticks of the frame are
-//! put back after the last one, for systems in `Update`. Messages are sent as well, for games that read them; what Bevy's
-//! systems make of them in the next frame has happened already, and is taken back there.
+//! Bevy clears `just_pressed` once a frame. A frame may run several fixed ticks, or none, and each tick must see a
+//! press exactly once. So the marks of the tick before are removed before each tick. The marks of all ticks of the
+//! frame are restored after the last one, for systems in `Update`. Messages are sent as well, for games that read
+//! them. In the next frame, Bevy's systems process them a second time, and that effect is undone there.
 
 use bevy::prelude::*;
 
@@ -23,13 +23,13 @@ pub(super) struct DirectInput {
     frame: Marks,
     /// Ticks that this frame has run.
     ticks: u32,
-    /// Buttons about which messages are on their way to Bevy's systems.
+    /// Buttons with messages on their way to Bevy's systems.
     sent: Vec<(Switch, bool)>,
-    /// Motion about which messages are on their way.
+    /// Motion with messages on their way.
     sent_motion: Motion,
 }
 
-/// What happened in a span of time.
+/// The marks of a span of time.
 #[derive(Clone, Debug, Default, Reflect)]
 struct Marks {
     down: Vec<Switch>,
@@ -60,7 +60,7 @@ impl Marks {
 }
 
 impl DirectInput {
-    /// Drops the marks of a button that was let go of for good.
+    /// Drops the marks of a button that was released for good.
     pub fn forget(&mut self, switch: Switch) {
         for marks in [&mut self.tick, &mut self.frame] {
             marks.down.retain(|marked| *marked != switch);
@@ -78,7 +78,7 @@ impl DirectInput {
     }
 }
 
-/// In each fixed tick.
+/// Writes the state in each fixed tick.
 pub(super) fn write_directly(
     order: Res<AgentOrder>,
     players: Players,
@@ -119,7 +119,7 @@ pub(super) fn write_directly(
     direct.sent_motion.add(now);
 }
 
-/// After the last fixed tick of a frame: `Update` sees everything that happened in the frame.
+/// Shows `Update` everything that happened in the frame, after its last fixed tick.
 pub(super) fn show_frame(mut state: InputState, mut direct: ResMut<DirectInput>) {
     let frame = std::mem::take(&mut direct.frame);
     if std::mem::take(&mut direct.ticks) < 2 {
@@ -128,7 +128,7 @@ pub(super) fn show_frame(mut state: InputState, mut direct: ResMut<DirectInput>)
     for &switch in frame.down.iter().chain(frame.up.iter().filter(|switch| !frame.down.contains(switch))) {
         let (pressed, released) = (frame.down.contains(&switch), frame.up.contains(&switch));
         state.touch(switch, Touch::Flag { pressed, released });
-        // The next tick takes them away again, wherever it falls.
+        // The next tick removes them again, in whatever frame it falls.
         direct.tick.note(switch, pressed);
         direct.tick.note(switch, !released);
     }
@@ -138,7 +138,7 @@ pub(super) fn show_frame(mut state: InputState, mut direct: ResMut<DirectInput>)
     }
 }
 
-/// Among Bevy's own input systems: what they made of messages about the past is taken back.
+/// Undoes the effect of messages about past ticks. Runs among Bevy's own input systems.
 pub(super) fn settle(mut state: InputState, mut direct: ResMut<DirectInput>, devices: Res<VirtualDevices>) {
     for (switch, _) in std::mem::take(&mut direct.sent) {
         let is_held = devices.held().any(|(_, button)| button == switch.button);
@@ -149,11 +149,11 @@ pub(super) fn settle(mut state: InputState, mut direct: ResMut<DirectInput>, dev
     if sent != Motion::default() {
         move_by(&mut state, sent, Motion::default());
     }
-    // Bevy has forgotten the motion of the frame before.
+    // Bevy has reset the motion of the frame before.
     direct.tick.motion = Motion::default();
 }
 
-/// Replaces one motion by another in what games read.
+/// Replaces one motion by another in the state that games read.
 fn move_by(state: &mut InputState, from: Motion, to: Motion) {
     state.motion.delta = state.motion.delta - from.mouse + to.mouse;
     state.scroll.delta = state.scroll.delta - from.wheel + to.wheel;

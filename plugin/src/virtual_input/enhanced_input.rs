@@ -1,7 +1,7 @@
 //! Actions of `bevy_enhanced_input`, driven without any key.
 //!
-//! A [`VirtualInput`](super::VirtualInput) drives them through their bindings, and needs none of this. Use it where actions
-//! have no bindings that a bot can press, or where conditions such as `Hold` are not to be played out.
+//! A [`VirtualInput`](super::VirtualInput) drives them through their bindings, without this module. Use it where
+//! actions have no bindings that a bot can press, or to skip conditions such as `Hold`.
 
 use std::{any::type_name, marker::PhantomData, sync::Arc};
 
@@ -24,10 +24,10 @@ use crate::{
     systems::PlaybotSystems,
 };
 
-/// On an agent: what its action means for the input action `A` of the game.
+/// On an agent: the value that its action gives to the input action `A` of the game.
 ///
-/// The input action is the entity that [`on_entity`](Self::on_entity) names, or else the only one in the World. A value of
-/// zero, or `false`, does not fire. People keep their bindings: under `Human` and `Idle` nothing is touched.
+/// The input action is the entity that [`on_entity`](Self::on_entity) names, or else the only one in the World. A
+/// value of zero, or `false`, does not fire. People keep their bindings: under `Human` and `Idle` nothing is changed.
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -54,7 +54,7 @@ pub struct EnhancedAction<A: InputAction> {
     marker: PhantomData<fn() -> A>,
 }
 
-/// The path of the input action's type is not known to reflection: games need not derive it.
+/// The path of the input action's type is left out, because games need not derive reflection for it.
 impl<A: InputAction> TypePath for EnhancedAction<A> {
     fn type_path() -> &'static str {
         static PATHS: GenericTypePathCell = GenericTypePathCell::new();
@@ -70,15 +70,15 @@ impl<A: InputAction> TypePath for EnhancedAction<A> {
 }
 
 impl<A: InputAction> EnhancedAction<A> {
-    /// Any rule from the agent's action to the value of the input action.
+    /// Creates a rule from the agent's action to the value of the input action.
     pub fn new<V: Into<InputValue>>(value: impl Fn(&ActionValue) -> V + Send + Sync + 'static) -> Self {
         let value = Arc::new(move |action: &ActionValue| value(action).into());
         Self { value, target: None, is_mocked: false, marker: PhantomData }
     }
 
-    /// One value for each discrete action.
+    /// Creates a rule with one value for each discrete action.
     ///
-    /// The first one stands in for actions that have none; there must be one value at least, or nothing ever fires.
+    /// The first value stands in for actions without one. Without any value the action never fires.
     pub fn per_action<V: Into<InputValue>>(values: impl IntoIterator<Item = V>) -> Self {
         let values: Vec<InputValue> = values.into_iter().map(Into::into).collect();
         Self::new(move |action| {
@@ -97,19 +97,20 @@ impl<A: InputAction> EnhancedAction<A> {
     }
 }
 
-/// Drives the input action `A` of agents with an [`EnhancedAction`], in ticks that are frames or fixed, as the route says.
+/// Drives the input action `A` of agents with an [`EnhancedAction`], in ticks that are frames or fixed, as the route
+/// says.
 ///
-/// The game's context has to be evaluated in the same schedule as the tick: `PreUpdate` for frames, which is the default,
-/// and `add_input_context_to::<FixedPreUpdate, _>()` for fixed ticks.
+/// The game's context must be evaluated in the same schedule as the tick. For frames that is `PreUpdate`, the
+/// default; for fixed ticks use `add_input_context_to::<FixedPreUpdate, _>()`.
 #[derive(Clone, Copy, Debug)]
 pub struct EnhancedActionPlugin<A> {
-    /// As that of [`VirtualInputPlugin`](super::VirtualInputPlugin).
+    /// The route, as for [`VirtualInputPlugin`](super::VirtualInputPlugin).
     pub route: InputRoute,
     marker: PhantomData<fn() -> A>,
 }
 
 impl<A> EnhancedActionPlugin<A> {
-    /// The plugin for this route.
+    /// Returns the plugin for this route.
     pub fn new(route: InputRoute) -> Self {
         Self { route, marker: PhantomData }
     }
@@ -151,7 +152,7 @@ type Agents<'w, 's, A> = Query<
 type Mocks<'w, 's, A> =
     Query<'w, 's, (Entity, &'static mut ActionMock, &'static mut TriggerState), With<InputActionOf<A>>>;
 
-/// The entity of the input action that an agent drives.
+/// Returns the entity of the input action that an agent drives.
 fn action_of<A: InputAction>(target: Option<Entity>, mocks: &Mocks<A>) -> Option<Entity> {
     match target {
         Some(entity) => Some(entity).filter(|entity| mocks.contains(*entity)),
@@ -186,7 +187,7 @@ fn drive<A: InputAction>(mut agents: Agents<A>, mut mocks: Mocks<A>, mut faults:
     }
 }
 
-/// An episode begins with nothing fired, whatever came before it.
+/// Releases the action, so that an episode begins with nothing fired.
 fn let_go<A: InputAction>(agent: Entity, mut agents: Agents<A>, mut mocks: Mocks<A>) {
     let Ok((.., mut driven)) = agents.get_mut(agent) else { return };
     if !std::mem::take(&mut driven.is_mocked) {

@@ -1,11 +1,11 @@
-//! A gamepad for each agent that uses one.
+//! Gamepads of the agents that use one.
 
 use bevy::prelude::*;
 
 use super::{component::VirtualInput, messages::InputMessages};
 use crate::agent::Agent;
 
-/// A gamepad that an agent plays on. Games see it as one that is plugged in.
+/// The gamepad of an agent. Games see it as one that is plugged in.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Component)]
 pub struct VirtualGamepad {

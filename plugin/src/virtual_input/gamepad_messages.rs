@@ -1,4 +1,4 @@
-//! Messages about gamepads: those of a driver, and those that Bevy's own system makes of them.
+//! Messages about gamepads: those of a driver, and those that Bevy's own system derives from them.
 
 use bevy::{
     ecs::system::SystemParam,
@@ -20,7 +20,7 @@ use super::{
     input_state::Switch,
 };
 
-/// Where messages about gamepads go.
+/// The writers of messages about gamepads.
 #[derive(SystemParam)]
 pub(super) struct GamepadMessages<'w, 's> {
     connections: MessageWriter<'w, GamepadConnectionEvent>,
@@ -35,13 +35,13 @@ pub(super) struct GamepadMessages<'w, 's> {
 }
 
 impl GamepadMessages<'_, '_> {
-    /// As a driver: Bevy's own system reads it in its next run.
+    /// Sends a message as a driver would: Bevy's own system reads it in its next run.
     pub fn send(&mut self, event: RawGamepadEvent) {
         self.send_part(&event);
         self.raw.write(event);
     }
 
-    /// The part of [`send`](Self::send) that Bevy's own system for buttons and sticks does not read.
+    /// Sends the part of [`send`](Self::send) that Bevy's own system for buttons and sticks does not read.
     pub fn send_part(&mut self, event: &RawGamepadEvent) {
         match event {
             RawGamepadEvent::Connection(connection) => {
@@ -56,8 +56,8 @@ impl GamepadMessages<'_, '_> {
         }
     }
 
-    /// As Bevy's own system: what has become of it, with what games saw before and see after it. A change is told however
-    /// little it is: the state has it, too. A gamepad that is gone says nothing.
+    /// Sends the derived messages as Bevy's own system would, with the state before and after the change. Small
+    /// changes are sent too, because the state has them. A disconnected gamepad sends nothing.
     pub fn process(&mut self, event: &RawGamepadEvent, before: Reading, after: Reading) {
         match *event {
             RawGamepadEvent::Connection(_) => {}
@@ -83,7 +83,7 @@ impl GamepadMessages<'_, '_> {
     }
 }
 
-/// What a driver says of this change, if it is one of a gamepad.
+/// Returns the driver's message for this change, if it is one of a gamepad.
 pub(super) fn of_driver(change: Change) -> Option<RawGamepadEvent> {
     match change {
         Change::Button { switch: Switch { button: VirtualButton::Gamepad(button), pad: Some(pad) }, down } => {
@@ -100,7 +100,7 @@ pub(super) fn of_driver(change: Change) -> Option<RawGamepadEvent> {
     }
 }
 
-/// 0 to 1 between the two values at which a button counts as untouched and as all the way down.
+/// Scales a button's value to 0 to 1 between the values that count as untouched and fully pressed.
 fn scaled_button(settings: &ButtonAxisSettings, value: f32) -> f32 {
     if value <= settings.low {
         0.0
@@ -111,7 +111,7 @@ fn scaled_button(settings: &ButtonAxisSettings, value: f32) -> f32 {
     }
 }
 
-/// -1 to 1 between the dead zone of a stick and the values at which it counts as all the way there.
+/// Scales a stick's value to -1 to 1 between its dead zone and the values that count as fully pushed.
 fn scaled_axis(settings: &AxisSettings, value: f32) -> f32 {
     let value = settings.clamp(value);
     if value > 0.0 {

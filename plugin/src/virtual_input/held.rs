@@ -1,10 +1,10 @@
-//! What is held down at one moment.
+//! The set of inputs held at one time.
 
 use bevy::prelude::*;
 
 use super::{axis::VirtualAxis, button::VirtualButton};
 
-/// What is held down and pushed while one action lasts.
+/// The inputs that are held down and pushed while one action lasts.
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -23,12 +23,12 @@ pub struct HeldInput {
 }
 
 impl HeldInput {
-    /// These keys or buttons, and nothing else.
+    /// Creates a set of these keys or buttons only.
     pub fn new<B: Into<VirtualButton>>(buttons: impl IntoIterator<Item = B>) -> Self {
         Self::default().hold(buttons)
     }
 
-    /// Holds these keys or buttons as well.
+    /// Adds these keys or buttons.
     pub fn hold<B: Into<VirtualButton>>(mut self, buttons: impl IntoIterator<Item = B>) -> Self {
         for button in buttons {
             let button = button.into();
@@ -39,7 +39,7 @@ impl HeldInput {
         self
     }
 
-    /// Pushes a motion or stick as well; a second push of the same one is added to the first.
+    /// Adds a motion or stick; a second push of the same one is added to the first.
     pub fn push(mut self, axis: impl Into<VirtualAxis>, value: f32) -> Self {
         let axis = axis.into();
         match self.axes.iter_mut().find(|(pushed, _)| *pushed == axis) {

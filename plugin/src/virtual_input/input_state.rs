@@ -14,17 +14,18 @@ use bevy::{
 
 use super::{axis::VirtualAxis, button::VirtualButton, logical_key::logical_key};
 
-/// A gamepad's trigger counts as pressed above the first value, and as released below the second: Bevy's own defaults.
+/// Values at which a gamepad's trigger counts as pressed (above the first) and released (below the second): Bevy's
+/// defaults.
 const TRIGGER: (f32, f32) = (0.75, 0.65);
 
-/// A key or button of one device: `pad` says which gamepad, if it is a gamepad's.
+/// A key or button of one device; `pad` names the gamepad, if it is a gamepad's.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
 pub(super) struct Switch {
     pub button: VirtualButton,
     pub pad: Option<Entity>,
 }
 
-/// What is done to a button.
+/// A change of a button.
 #[derive(Clone, Copy)]
 pub(super) enum Touch {
     Press,
@@ -33,14 +34,14 @@ pub(super) enum Touch {
     Reset,
     /// Neither just pressed nor just released.
     Settle,
-    /// Just pressed, just released, or both, whatever it is now.
+    /// Just pressed, just released, or both, whatever its state is.
     Flag {
         pressed: bool,
         released: bool,
     },
 }
 
-/// What games read.
+/// The input state that games read.
 #[derive(SystemParam)]
 pub(super) struct InputState<'w, 's> {
     keys: ResMut<'w, ButtonInput<KeyCode>>,
@@ -52,7 +53,7 @@ pub(super) struct InputState<'w, 's> {
 }
 
 impl InputState<'_, '_> {
-    /// Whether the game sees it down.
+    /// Returns whether the game sees it down.
     pub fn is_down(&self, switch: Switch) -> bool {
         match switch.button {
             VirtualButton::Key(key) => self.keys.pressed(key),
@@ -63,7 +64,7 @@ impl InputState<'_, '_> {
         }
     }
 
-    /// How far a button of a gamepad is pushed; 0 for others.
+    /// Returns the value of a gamepad's button; 0 for others.
     pub fn value(&self, switch: Switch) -> f32 {
         match switch {
             Switch { button: VirtualButton::Gamepad(button), pad: Some(pad) } => self.analog(pad, button),
@@ -71,7 +72,7 @@ impl InputState<'_, '_> {
         }
     }
 
-    /// How far a stick is pushed.
+    /// Returns the value of a stick.
     pub fn stick(&self, pad: Entity, axis: GamepadAxis) -> f32 {
         self.analog(pad, axis)
     }
@@ -80,7 +81,7 @@ impl InputState<'_, '_> {
         self.pads.get(pad).ok().and_then(|pad| pad.get_unclamped(input)).unwrap_or(0.0)
     }
 
-    /// Whether this entity is a gamepad that is connected.
+    /// Returns whether this entity is a gamepad that is connected.
     pub fn is_connected(&self, pad: Entity) -> bool {
         self.pads.contains(pad)
     }
@@ -144,7 +145,7 @@ fn apply<T: Clone + Eq + Hash + Send + Sync + 'static>(input: &mut ButtonInput<T
             input.clear_just_released(button);
         }
         Touch::Flag { pressed, released } => {
-            // There is no other way to set the two marks than by moving the button there and back.
+            // The two marks can be set only by moving the button there and back.
             if input.pressed(button.clone()) {
                 input.release(button.clone());
                 input.press(button.clone());

@@ -1,7 +1,7 @@
 //! Actions of `leafwing-input-manager`, driven without any key.
 //!
-//! A [`VirtualInput`](super::VirtualInput) drives them through their keys, and needs none of this. Use it where actions have
-//! no keys, or where fixed ticks want an action in the very tick in which it is decided: an `ActionState` reads its keys
+//! A [`VirtualInput`](super::VirtualInput) drives them through their keys, without this module. Use it where actions
+//! have no keys, or where fixed ticks need an action in the tick that decides it: an `ActionState` reads its keys
 //! before the first fixed tick of a frame.
 
 use bevy::prelude::*;
@@ -23,10 +23,10 @@ use crate::{
     systems::PlaybotSystems,
 };
 
-/// On an agent: which actions of the game its own actions press and push.
+/// On an agent: the actions of the game that its own actions press and push.
 ///
-/// They belong to the `ActionState` on the agent itself, on the entity that [`on_entity`](Self::on_entity) names, or else
-/// to the only one in the World. People keep their keys: under `Human` and `Idle` nothing is touched.
+/// They belong to the `ActionState` on the agent itself, on the entity that [`on_entity`](Self::on_entity) names, or
+/// else to the only one in the World. People keep their keys: under `Human` and `Idle` nothing is changed.
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -107,13 +107,13 @@ impl<A: Actionlike> LeafwingActions<A> {
 /// Drives the actions `A` of agents with [`LeafwingActions`], in ticks that are frames or fixed, as the route says.
 #[derive(Clone, Copy, Debug)]
 pub struct LeafwingActionsPlugin<A> {
-    /// As that of [`VirtualInputPlugin`](super::VirtualInputPlugin).
+    /// The route, as for [`VirtualInputPlugin`](super::VirtualInputPlugin).
     pub route: InputRoute,
     marker: std::marker::PhantomData<fn() -> A>,
 }
 
 impl<A> LeafwingActionsPlugin<A> {
-    /// The plugin for this route.
+    /// Returns the plugin for this route.
     pub fn new(route: InputRoute) -> Self {
         Self { route, marker: std::marker::PhantomData }
     }
@@ -130,7 +130,7 @@ impl<A: Actionlike> Plugin for LeafwingActionsPlugin<A> {
         match self.route {
             InputRoute::Messages => {
                 let system = drive::<A>.in_set(InputManagerSystem::ManualControl).after(PlaybotSystems::Act);
-                // Whoever takes over after this tick's decisions decides in the next one.
+                // A takeover after this tick's decisions takes effect in the next one.
                 app.add_systems(PreUpdate, system.run_if(is_tick).ambiguous_with_all())
             }
             // Other managers have actions of their own.
@@ -156,7 +156,7 @@ type Agents<'w, 's, A> = Query<
 >;
 type States<'w, 's, A> = Query<'w, 's, (Entity, &'static mut ActionState<A>)>;
 
-/// The entity whose `ActionState` an agent drives.
+/// Returns the entity whose `ActionState` an agent drives.
 fn state_of<A: Actionlike>(agent: Entity, target: Option<Entity>, states: &States<A>) -> Option<Entity> {
     let named = target.unwrap_or(agent);
     if states.contains(named) {
@@ -198,7 +198,7 @@ fn drive<A: Actionlike>(mut agents: Agents<A>, mut states: States<A>, mut faults
     }
 }
 
-/// Sets the axes, and lists the buttons that are to be down.
+/// Sets the axes, and returns the buttons that are to be down.
 fn apply<A: Actionlike>(drives: &[(A, Drive)], value: &ActionValue, state: &mut ActionState<A>, pressed: &mut Vec<A>) {
     let number = |index: &usize| match value {
         ActionValue::Continuous(values) => values.get(*index).copied().unwrap_or(0.0),
@@ -219,7 +219,7 @@ fn apply<A: Actionlike>(drives: &[(A, Drive)], value: &ActionValue, state: &mut 
             (Drive::Pair(x, y), InputControlKind::DualAxis) => {
                 state.set_axis_pair(action, Vec2::new(number(x), number(y)));
             }
-            // An action of another kind than the drive: there is nothing that it could be set to.
+            // An action of another kind than the drive has no value to set.
             _ => {}
         }
     }
@@ -231,7 +231,7 @@ fn set_button<A: Actionlike>(state: &mut ActionState<A>, action: &A, button: But
     data.value = if button.pressed() { 1.0 } else { 0.0 };
 }
 
-/// An episode begins with nothing held, whatever came before it.
+/// Releases the actions, so that an episode begins with nothing held.
 fn let_go<A: Actionlike>(agent: Entity, mut agents: Agents<A>, mut states: States<A>) {
     let Ok((.., mut actions)) = agents.get_mut(agent) else { return };
     let held = std::mem::take(&mut actions.held);

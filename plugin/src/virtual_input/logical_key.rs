@@ -1,4 +1,4 @@
-//! What a key means on a US keyboard: messages about keys say so beside the key's place.
+//! Meanings of keys on a US keyboard, for messages that carry both the meaning and the position of a key.
 
 use bevy::{
     input::keyboard::{Key, NativeKey},
@@ -7,22 +7,22 @@ use bevy::{
 
 use super::names::unit_variant;
 
-/// Meaning of a key, and the text that it types.
+/// Returns the meaning of a key, and the text that it types.
 pub(super) fn logical_key(code: KeyCode) -> (Key, Option<String>) {
     let name = format!("{code:?}");
     if let Some(character) = typed(&name) {
-        // Bevy calls the space bar by its name, and it types a space all the same.
+        // Bevy names the space bar, although it types a space.
         let key = if character == " " { Key::Space } else { Key::Character(character.as_str().into()) };
         return (key, Some(character));
     }
     let plain = name.strip_prefix("Numpad").unwrap_or(&name);
     let plain = plain.strip_suffix("Left").or(plain.strip_suffix("Right")).unwrap_or(plain);
-    // Arrow keys are called the same in both enums, and have a side in their name.
+    // Arrow keys have the same name in both enums; other names include a side.
     let key = unit_variant(&name).or_else(|| unit_variant(plain));
     (key.unwrap_or(Key::Unidentified(NativeKey::Unidentified)), None)
 }
 
-/// What a key types without shift.
+/// Returns the text that a key types without shift.
 fn typed(name: &str) -> Option<String> {
     let text = match name {
         "Space" => " ",

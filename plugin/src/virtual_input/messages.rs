@@ -21,7 +21,7 @@ use super::{
     logical_key::logical_key,
 };
 
-/// Where messages go.
+/// The writers of messages.
 #[derive(SystemParam)]
 pub(super) struct InputMessages<'w, 's> {
     keys: MessageWriter<'w, KeyboardInput>,
@@ -33,12 +33,12 @@ pub(super) struct InputMessages<'w, 's> {
 }
 
 impl InputMessages<'_, '_> {
-    /// The window that messages say they come from; without a window, nobody.
+    /// Returns the window that messages come from; a placeholder without a window.
     fn window(&self) -> Entity {
         self.windows.single().unwrap_or(Entity::PLACEHOLDER)
     }
 
-    /// As a window and a gamepad driver: Bevy's own systems do the rest.
+    /// Sends a change as a window and a gamepad driver would. Bevy's own systems do the rest.
     pub fn send(&mut self, change: Change) {
         if let Some(event) = of_driver(change) {
             self.pads.send(event);
@@ -47,14 +47,14 @@ impl InputMessages<'_, '_> {
         }
     }
 
-    /// What the state says already, in the tick in which it happens, with what games saw before and see after it.
+    /// Sends the messages of a change that is already in the state, in its own tick, with the state before and after.
     ///
-    /// Bevy's system for gamepads would read a `RawGamepadEvent` in the next frame, when it may be over, and press and tell
-    /// everything once more: that one is not sent. Those for keys and mouse write nothing but the state, which
-    /// [`settle`](super::direct::settle) takes back.
+    /// Messages for keys and mouse affect only the state, which [`settle`](super::direct::settle) restores. A
+    /// `RawGamepadEvent` is left out: Bevy's system for gamepads would read it in the next frame, when it may be
+    /// outdated, and would press and announce everything again.
     pub fn tell(&mut self, change: Change, before: Reading, after: Reading) {
         match of_driver(change) {
-            // A driver says nothing of what stays as it is.
+            // A driver sends nothing about an unchanged value.
             Some(_) if before == after => {}
             Some(event) => {
                 self.pads.send_part(&event);
@@ -64,8 +64,8 @@ impl InputMessages<'_, '_> {
         }
     }
 
-    /// [`send`](Self::send) of what the state says already, where Bevy's own systems go on with it: that for gamepads finds
-    /// nothing changed and says nothing.
+    /// Sends the messages of a change that is already in the state, where Bevy's own systems run later: the one for
+    /// gamepads finds nothing changed.
     pub fn send_and_tell(&mut self, change: Change, before: Reading, after: Reading) {
         if let Some(event) = of_driver(change).filter(|_| before != after) {
             self.pads.process(&event, before, after);
@@ -84,12 +84,12 @@ impl InputMessages<'_, '_> {
             VirtualButton::Mouse(button) => {
                 self.mouse.write(MouseButtonInput { button, state, window });
             }
-            // Only one without a gamepad comes here.
+            // A call without a gamepad cannot reach this.
             VirtualButton::Gamepad(_) => {}
         }
     }
 
-    /// Pixels to the right and downwards; lines of the wheel.
+    /// Sends motion: pixels to the right and downwards, and lines of the wheel.
     pub fn send_motion(&mut self, delta: Vec2, wheel: Vec2) {
         if delta != Vec2::ZERO {
             self.motion.write(MouseMotion { delta });

@@ -1,15 +1,15 @@
 //! Virtual input: an agent's action presses keys, mouse buttons and gamepads, through Bevy's own input.
 //!
-//! A game that reads `ButtonInput<KeyCode>`, mouse, gamepad or an input manager needs no change to be played by a bot. Its
-//! agent carries a [`VirtualInput`]: what is held down while each action lasts. In
-//! [`PlaybotSystems::Act`](crate::systems::PlaybotSystems::Act) the plugin presses what the action of this tick newly
-//! wants, goes on holding what it still wants, and lets go of the rest, as a person would.
+//! A game that reads `ButtonInput<KeyCode>`, mouse, gamepad or an input manager needs no change to be played by a
+//! bot. Its agent carries a [`VirtualInput`]: the inputs that each action holds down. In
+//! [`PlaybotSystems::Act`](crate::systems::PlaybotSystems::Act) the plugin presses the new inputs of this tick's
+//! action, keeps holding those it still needs, and releases the rest.
 //!
 //! - It plays for [`Control::Policy`](crate::control::Control::Policy), [`Bot`](crate::control::Control::Bot) and
-//!   [`Replay`](crate::control::Control::Replay), never for people: under `Human` and `Idle` everything is let go. The
-//!   exception are agents with [`PressesForPeople`], whose people do not reach the game with devices of their own.
-//! - Everything is let go at the end of an episode and at the start of the next, so that an episode begins with nothing
-//!   held, whatever came before it, and replays the same alone.
+//!   [`Replay`](crate::control::Control::Replay), never for people: under `Human` and `Idle` everything is released.
+//!   The exception are agents with [`PressesForPeople`], for people whose own devices do not reach the game.
+//! - Everything is released at the end of an episode and at the start of the next. An episode begins with nothing
+//!   held, and replays the same alone.
 //! - A World has one keyboard and one mouse: two agents that claim the same key or motion are a fault. Every agent has a
 //!   gamepad of its own.
 //! - The route is a setting: see [`InputRoute`].
@@ -20,7 +20,7 @@
 //! use bevy::{input::InputPlugin, prelude::*};
 //! use bevy_playbot::{prelude::*, virtual_input::{VirtualInput, VirtualInputPlugin}};
 //!
-//! /// A game that knows nothing of agents.
+//! /// A game without any knowledge of agents.
 //! fn walk(keys: Res<ButtonInput<KeyCode>>, mut player: Single<&mut Transform, With<Agent>>) {
 //!     if keys.pressed(KeyCode::ArrowRight) {
 //!         player.translation.x += 1.0;

@@ -8,7 +8,7 @@ use bevy::{
     },
 };
 
-/// Names of the variants of an enum that hold nothing.
+/// Returns the names of an enum's unit variants.
 pub(super) fn unit_names<T: Typed>() -> Vec<&'static str> {
     match T::type_info() {
         TypeInfo::Enum(info) => info
@@ -20,7 +20,7 @@ pub(super) fn unit_names<T: Typed>() -> Vec<&'static str> {
     }
 }
 
-/// The variant of this name, if there is one and it holds nothing.
+/// Returns the unit variant of this name, if there is one.
 pub(super) fn unit_variant<T: Typed + FromReflect>(name: &str) -> Option<T> {
     unit_names::<T>().contains(&name).then(|| T::from_reflect(&DynamicEnum::new(name, DynamicVariant::Unit)))?
 }

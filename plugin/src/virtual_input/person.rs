@@ -3,8 +3,8 @@
 use bevy::prelude::*;
 
 /// Presses keys for the agent under [`Control::Human`](crate::control::Control::Human), too, by its
-/// [`Action`](crate::action::Action). For windows that keep a person's own devices from the game and make an action of
-/// them: the game then sees exactly what a recording of these actions presses when it is replayed.
+/// [`Action`](crate::action::Action). For windows that keep a person's own devices from the game and turn them into
+/// an action: the game then sees exactly the keys that a replay of these actions presses.
 #[derive(Component, Clone, Copy, Debug, Default, Reflect)]
 #[reflect(Component)]
 pub struct PressesForPeople;

@@ -37,7 +37,7 @@ use crate::{
 /// [`InputPlugin`], which is part of Bevy's `DefaultPlugins`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VirtualInputPlugin {
-    /// The way from an action to the game.
+    /// The route from an action to the game.
     pub route: InputRoute,
 }
 
@@ -47,7 +47,8 @@ impl Plugin for VirtualInputPlugin {
         add_what_is_written(app);
         app.init_resource::<VirtualDevices>()
             .init_resource::<DirectInput>()
-            // Lets go of everything at the end of an episode, and at the start of one, so that it begins with nothing held.
+            // Releases everything at the end of an episode, and at the start of one, so that it begins with nothing
+            // held.
             .add_observer(move |event: On<StartEpisode>, mut releaser: InputReleaser| {
                 releaser.release(event.entity, route)
             })
@@ -101,7 +102,8 @@ impl Plugin for VirtualInputPlugin {
     }
 }
 
-/// What the systems write, whether or not Bevy's plugin is there: whoever adds nothing else gets an error and no panic.
+/// Adds the resources that the systems write, even without Bevy's plugin: an app without it gets an error instead of
+/// a panic.
 fn add_what_is_written(app: &mut App) {
     app.add_message::<KeyboardInput>()
         .add_message::<MouseButtonInput>()

@@ -1,25 +1,25 @@
-//! Eyes that see nothing.
+//! Sensors whose pictures are blank.
 
 use bevy::prelude::*;
 
-use crate::{agent::Agent, episode::EpisodeEnded, fault::Faults};
+use crate::{agent::Agent, carry_over::ReflectCarryComponent, episode::EpisodeEnded, fault::Faults};
 
-/// Counts the episodes of an agent in which each picture was of a single colour: it saw nothing.
+/// Counts the episodes of an agent in which each picture was of a single colour.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
-#[reflect(Component)]
+#[reflect(Component, CarryComponent)]
 pub struct BlankEpisodes {
-    /// Finished episodes in which nothing was to be seen.
+    /// Finished episodes with blank pictures only.
     pub episodes: u64,
-    /// There was a picture in this episode, and each was of one colour.
+    /// True if this episode had a picture, and each was of one colour.
     blank: bool,
-    /// Something was to be seen in this episode.
+    /// True if a picture of this episode was not blank.
     sees: bool,
-    /// Something was to be seen in some episode.
+    /// True if a picture of any episode was not blank.
     has_seen: bool,
 }
 
 impl BlankEpisodes {
-    /// Looks at a picture of the episode. Once something was to be seen, this costs nothing.
+    /// Notes a picture of the episode. Costs nothing after the first one that is not blank.
     pub(super) fn note(&mut self, pixels: &[[u8; 4]], starts: bool) {
         if starts {
             self.sees = false;
@@ -32,8 +32,9 @@ impl BlankEpisodes {
     }
 }
 
-/// Reports an agent that saw nothing in its first episodes: its sensor looks at nothing that is drawn. For an agent that
-/// has seen something before, it may be the level, which is worth a warning, the first time.
+/// Reports an agent with only blank pictures in its first episodes: its sensor looks at nothing
+/// that is drawn. For an agent with earlier pictures the level may be the cause, so it gets one
+/// warning.
 pub(super) fn report_blank(
     event: On<EpisodeEnded>,
     mut eyes: Query<(&Agent, &mut BlankEpisodes)>,

@@ -1,39 +1,43 @@
-//! What files say of the pictures that their networks read.
+//! Metadata of the pictures that networks read, in their files.
 
-use playbot_learner::{ObsKind, PictureCard};
+use playbot_learner::{HasExitCode, ObsKind, PictureCard};
 use thiserror::Error;
 
 use super::{ImageOptions, ObservationConfig, ObservationKind};
 use crate::unknown_name::UnknownName;
 
-/// A file does not say how the pictures are made that its networks read, or not in a way that this version knows.
+/// A file does not state how the pictures for its networks are made, or this version does not
+/// understand it.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("the file does not say how the pictures that it reads are made ({why}): make it again with this version")]
+#[error("the file does not state how its pictures are made ({why}): create it again with this version")]
 pub struct UnknownObservation {
-    /// What is wrong.
+    /// The problem.
     pub why: String,
 }
 
+impl HasExitCode for UnknownObservation {}
+
 impl ObservationConfig {
-    /// What a file keeps of it; nothing for vectors, whose names are kept.
+    /// Returns the metadata for a file; `None` for vectors, whose names are kept.
     pub fn card(&self) -> Option<PictureCard> {
         let ImageOptions { stack, grayscale, paint_velocity, .. } = self.image;
         let card = PictureCard { sensor: self.kind.to_string(), stack: stack as usize, grayscale, paint_velocity };
         self.is_image().then_some(card)
     }
 
-    /// What a file says whose networks read `observation`.
+    /// Returns the observation of a file whose networks read `observation`.
     ///
     /// # Errors
     ///
-    /// [`UnknownObservation`] if the card is missing, not understood, or of pictures of another shape.
+    /// [`UnknownObservation`] if the metadata is missing, not understood, or of pictures of another
+    /// shape.
     pub fn from_card(card: Option<&PictureCard>, observation: &ObsKind) -> Result<Self, UnknownObservation> {
         let unknown = |why: String| Err(UnknownObservation { why });
         let (card, shape) = match (card, observation) {
             (None, ObsKind::Vector(_)) => return Ok(Self::default()),
             (Some(card), ObsKind::Image(shape)) => (card, shape),
-            (None, _) => return unknown(format!("it reads {observation} and has no card of them")),
-            (Some(_), _) => return unknown(format!("it reads {observation}, and has a card of pictures")),
+            (None, _) => return unknown(format!("it reads {observation}, but has no metadata of them")),
+            (Some(_), _) => return unknown(format!("it reads {observation}, but has metadata of pictures")),
         };
         let kind: ObservationKind =
             card.sensor.parse().map_err(|error: UnknownName| UnknownObservation { why: error.to_string() })?;
@@ -46,7 +50,7 @@ impl ObservationConfig {
         };
         let observation_config = Self { kind, image };
         if !observation_config.is_image() || image.check().is_err() || image.obs_kind() != *observation {
-            return unknown(format!("it reads {observation}, its card tells of {observation_config}"));
+            return unknown(format!("it reads {observation}, but its metadata describes {observation_config}"));
         }
         Ok(observation_config)
     }
@@ -68,11 +72,11 @@ mod tests {
         );
         let other = |sensor: &str| card.clone().map(|card| PictureCard { sensor: sensor.to_owned(), ..card });
         for (card, observation, words) in [
-            (None, image.obs_kind(), "has no card"),
+            (None, image.obs_kind(), "has no metadata"),
             (card.clone(), ObsKind::Vector(3), "vectors of 3"),
             (card.clone(), ImageOptions::default().obs_kind(), "64×64 grey pictures of the camera, 4 in a stack"),
             (other("sonar"), image.obs_kind(), "sonar"),
-            (other("vector"), image.obs_kind(), "tells of vectors"),
+            (other("vector"), image.obs_kind(), "describes vectors"),
         ] {
             let error =
                 ObservationConfig::from_card(card.as_ref(), &observation).expect_err("does not fit").to_string();

@@ -1,4 +1,4 @@
-//! Checking what sensors hand out.
+//! Checks of the images that sensors produce.
 
 use bevy::prelude::*;
 

@@ -1,4 +1,4 @@
-//! From frames to observations.
+//! Composition of observations from frames.
 
 use bevy::prelude::*;
 use thiserror::Error;
@@ -18,7 +18,7 @@ use crate::{
     tick::Tick,
 };
 
-/// Why a frame cannot become an observation.
+/// The reason why a frame cannot become an observation.
 #[derive(Debug, Error)]
 enum ComposeError {
     #[error("{0}")]
@@ -35,12 +35,13 @@ enum ComposeError {
     Velocity(Vec2),
 }
 
-/// Whether somebody looks at the agent's observation: a level is being played and somebody decides.
+/// Returns whether the agent's observation is used: a level is being played and the agent is
+/// controlled.
 pub(crate) fn is_observed(control: &Control, episode: &Episode) -> bool {
     control.is_active() && episode.is_running()
 }
 
-/// Makes the image of each agent's observation of its frame.
+/// Makes the image of each agent's observation from its frame.
 pub(super) fn compose(
     tick: Res<Tick>,
     order: Res<AgentOrder>,

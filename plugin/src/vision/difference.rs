@@ -1,8 +1,8 @@
-//! How far two pictures of the same moment are apart.
+//! The difference between two pictures of the same state.
 
 use serde::Serialize;
 
-/// A difference that a person does not see and a policy should not mind, out of 255.
+/// A difference, out of 255, that a person does not see and a policy should not mind.
 pub const CLOSE: u8 = 8;
 
 /// The difference between two pictures of the same size.
@@ -15,7 +15,8 @@ pub struct Difference {
 }
 
 impl Difference {
-    /// Compares pixel by pixel; the fourth byte of a pixel is not looked at. `None` if the sizes differ or are 0.
+    /// Compares pixel by pixel, ignoring the fourth byte. Returns `None` if the sizes differ or are
+    /// 0.
     pub fn between(a: &[[u8; 4]], b: &[[u8; 4]]) -> Option<Self> {
         if a.len() != b.len() || a.is_empty() {
             return None;

@@ -1,4 +1,4 @@
-//! Agents that see pictures.
+//! Image observations: sensors, frames and their options.
 //!
 //! | part | what it is |
 //! |---|---|
@@ -7,9 +7,9 @@
 //! | [`Stage`] | the root of an arena that is drawn by itself |
 //! | [`TileLayer`] | a grid of tiles, drawn at once |
 //!
-//! A sensor fills [`Frame`] in [`VisionSystems::Render`]; [`VisionSystems::Compose`] checks its tick and makes
-//! [`Observation::image`](crate::observation::Observation::image) of it. Agents that nobody decides for, and agents between
-//! two episodes, are not looked after.
+//! A sensor fills [`Frame`] in [`VisionSystems::Render`]. [`VisionSystems::Compose`] checks its
+//! tick and makes [`Observation::image`](crate::observation::Observation::image) from it. Idle
+//! agents and agents between two episodes are skipped.
 //!
 //! ```
 //! use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind};

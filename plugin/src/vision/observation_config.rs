@@ -1,4 +1,4 @@
-//! What the agents of an experiment see, and the sensors it takes.
+//! The kind of observation of an experiment's agents, and the sensors that it needs.
 
 use std::{fmt, str::FromStr};
 
@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::ImageOptions;
 use crate::unknown_name::UnknownName;
 
-/// What agents see. Written as its [`name`](Self::name) on the command line.
+/// The kind of an observation. Its [`name`](Self::name) is used on the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum ObservationKind {
     /// The game's vector of numbers.
@@ -20,10 +20,10 @@ pub enum ObservationKind {
 }
 
 impl ObservationKind {
-    /// All of them.
+    /// All kinds.
     pub const ALL: [Self; 3] = [Self::Vector, Self::Raster, Self::Camera];
 
-    /// Name on the command line and in messages.
+    /// Returns the name on the command line and in messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Vector => "vector",
@@ -48,9 +48,10 @@ impl FromStr for ObservationKind {
     }
 }
 
-/// What agents see, with the form of the pictures.
+/// The observation of agents, with the form of pictures.
 ///
-/// Policies and skill models from pictures carry it in their files: images of one shape can still show other things.
+/// Policies and skill models that read pictures carry it in their files: images of equal shape can
+/// show different things.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ObservationConfig {
@@ -60,18 +61,19 @@ pub struct ObservationConfig {
     pub image: ImageOptions,
 }
 
-/// How a game is drawn for agents that see pictures.
+/// The extent of the game's picture for agents that see pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picture {
-    /// World units from the left to the right edge of what an agent sees, centred on the agent.
+    /// World units from the left to the right edge of an agent's picture, which is centred on the
+    /// agent.
     pub width: f32,
-    /// World units from top to bottom that an agent must see as well: a picture that is too low for them shows more on both
-    /// sides. 0 where it may see as little as its picture is low.
+    /// Smallest height of a picture in world units. A picture that is too low for it shows more on
+    /// both sides. 0 for no limit.
     pub least_height: f32,
 }
 
 impl Picture {
-    /// World units from the left to the right edge of a picture of this size.
+    /// Returns the world units from the left to the right edge of a picture of this size.
     pub fn width_on(&self, image: &ImageOptions) -> f32 {
         self.width.max(self.least_height * image.width as f32 / image.height as f32)
     }
@@ -93,7 +95,7 @@ impl fmt::Display for ObservationConfig {
 }
 
 impl ObservationConfig {
-    /// Whether agents see pictures.
+    /// Returns whether agents see pictures.
     pub fn is_image(&self) -> bool {
         self.kind != ObservationKind::Vector
     }

@@ -1,4 +1,4 @@
-//! From the pixels of a frame to the bytes that a policy reads.
+//! Conversion of a frame's pixels to the bytes that a policy reads.
 
 use super::ImageOptions;
 
@@ -20,19 +20,21 @@ pub(super) fn write_planes(pixels: &[[u8; 4]], options: &ImageOptions, out: &mut
     }
 }
 
-/// Rounded to the nearest.
+/// Returns the brightness, rounded to the nearest.
 fn brightness([red, green, blue, _]: [u8; 4]) -> u8 {
     let [r, g, b] = BRIGHTNESS;
     ((r * u32::from(red) + g * u32::from(green) + b * u32::from(blue) + 0x8000) >> 16) as u8
 }
 
-/// Columns of so many squares beside each other: a pixel belongs to the square that its centre is in.
+/// Returns the columns of this many squares side by side. A pixel belongs to the square that
+/// contains its centre.
 pub(super) fn edge_of_squares(squares: usize, width: usize) -> usize {
     (2 * squares * width + 5) / 10
 }
 
-/// Paints two squares at the top left, a fifth of the width each, as grey as the velocity is large: black for -1, white
-/// for 1. Brightness keeps grey, so this comes to the same before and after.
+/// Paints two squares at the top left, each a fifth of the width, whose grey shows the velocity:
+/// black for -1, white for 1. Grey keeps its value when converted to brightness, so the order of
+/// the two steps is irrelevant.
 pub(super) fn paint_velocity(velocity: [f32; 2], options: &ImageOptions, planes: &mut [u8]) {
     let (width, height) = (options.width as usize, options.height as usize);
     let edge = |squares: usize| edge_of_squares(squares, width);

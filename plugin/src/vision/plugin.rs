@@ -1,11 +1,11 @@
-//! What all sensors that make pictures have in common.
+//! The plugin that all sensors of pictures share.
 
 use bevy::prelude::*;
 
 use super::{VisionSystems, blank, compose};
 use crate::systems::ObserveSchedule;
 
-/// Makes observations of frames, whichever sensor filled them. The sensors' plugins bring it along.
+/// Makes observations from the frames of any sensor. The sensors' plugins add it.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VisionPlugin;
 

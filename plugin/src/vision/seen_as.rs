@@ -1,11 +1,11 @@
-//! What readers of observations get from agents.
+//! Observations of agents as a reader expects them.
 
 use playbot_learner::ObsKind;
 
 use super::ImageSensor;
 use crate::observation::Observation;
 
-/// What a reader of observations like `wanted` gets from an agent, which may have sensors of both kinds.
+/// Returns an agent's observation in the kind of `wanted`; an agent may have sensors of both kinds.
 pub(crate) fn seen_as(wanted: &ObsKind, observation: &Observation, sensor: Option<&ImageSensor>) -> ObsKind {
     let image = sensor.map(|sensor| sensor.0.shape()).filter(|shape| shape.numbers() == observation.image.len());
     let vector = ObsKind::Vector(observation.vector.len());

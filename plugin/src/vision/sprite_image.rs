@@ -1,12 +1,12 @@
-//! Which sprites have something to show.
+//! Detection of sprites without an image.
 
 use bevy::{asset::AssetId, prelude::*};
 
-/// What to do about a sprite that [lacks an image](lacks_image).
+/// Advice for a sprite that [lacks an image](lacks_image).
 pub(crate) const NO_IMAGE: &str = "set `Sprite::image`, or `custom_size` for a rectangle of one colour";
 
-/// Whether a sprite shows nothing because nobody gave it an image. One with a size of its own is a rectangle of one
-/// colour, as [`Sprite::from_color`] makes them: it needs no image.
+/// Returns whether a sprite shows nothing because it has no image. A sprite with a size of its own
+/// is a rectangle of one colour, as [`Sprite::from_color`] makes them, and needs no image.
 ///
 /// Bevy keeps a white texel under the handle of no image, and so draws a sprite of neither kind as a white dot.
 pub(crate) fn lacks_image(sprite: &Sprite) -> bool {

@@ -13,7 +13,7 @@ pub(super) struct Moment {
     pub tick: u32,
 }
 
-/// The last pictures of an agent's episode, in a ring. A state that is looked at twice counts once.
+/// The last pictures of an agent's episode, in a ring. A state that is observed twice counts once.
 #[derive(Component, Clone, Debug, Default, Reflect)]
 #[reflect(Component)]
 pub(crate) struct PictureStack {
@@ -25,7 +25,7 @@ pub(crate) struct PictureStack {
 }
 
 impl PictureStack {
-    /// Takes the picture of a moment, which `paint` writes, and writes all, oldest first.
+    /// Adds the picture of a moment, which `paint` writes, and writes all pictures, oldest first.
     pub(super) fn push(&mut self, moment: Moment, count: usize, paint: impl FnOnce(&mut [u8]), out: &mut [u8]) {
         let size = out.len() / count;
         let goes_on = self.goes_on(moment) && (self.size, self.ring.len()) == (size, out.len());
@@ -48,7 +48,8 @@ impl PictureStack {
         out[first.len()..].copy_from_slice(wrapped);
     }
 
-    /// Whether the moment belongs to the episode of the last one. The first moment always starts anew.
+    /// Returns whether the moment belongs to the episode of the last one. The first moment always
+    /// starts anew.
     fn goes_on(&self, moment: Moment) -> bool {
         self.shown.is_some_and(|last| {
             (last.episode, last.level) == (moment.episode, moment.level) && moment.tick > 0 && moment.tick >= last.tick

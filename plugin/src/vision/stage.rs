@@ -1,15 +1,17 @@
-//! Arenas that are drawn by themselves.
+//! Arenas that are drawn separately.
 
 use bevy::prelude::*;
 
-/// The root of an arena whose inhabitants see only each other.
+/// The root of an arena whose agents see only its own contents.
 ///
-/// Everything that is drawn in the arena, and the agents that look at it, are descendants of this entity by `ChildOf`.
-/// A [`RasterSensor`](crate::raster::RasterSensor) draws only what is beneath the nearest stage above its target, in the
-/// stage's own coordinates, so that a picture does not depend on where the arena stands among others. For cameras the
-/// stage's `Transform` must keep arenas further apart than an agent sees.
+/// All drawn entities of the arena, and the agents that look at it, are descendants of this entity
+/// by `ChildOf`. A [`RasterSensor`](crate::raster::RasterSensor) draws only the descendants of the
+/// nearest stage above its target, in the stage's own coordinates. So a picture does not depend on
+/// the arena's position among others. For cameras the stage's `Transform` must keep arenas further
+/// apart than an agent sees.
 ///
-/// A target that is on no stage is drawn with everything else that is on none, in world coordinates.
+/// A target outside of all stages is drawn with all other entities outside of stages, in world
+/// coordinates.
 #[derive(Component, Clone, Copy, Debug, Default, Reflect)]
 #[reflect(Component)]
 #[require(Transform, Visibility)]

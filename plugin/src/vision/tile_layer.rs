@@ -1,16 +1,16 @@
-//! A grid of tiles that is drawn at once.
+//! A grid of tiles that is drawn as one.
 
 use bevy::prelude::*;
 
-/// A grid of square tiles with side 1 in its own coordinates; its `Transform` places and scales it. Cell (0, 0) has its
-/// bottom left corner at the origin.
+/// A grid of square tiles with side 1 in its own coordinates; its `Transform` positions and scales
+/// it. Cell (0, 0) has its bottom left corner at the origin.
 ///
-/// The tileset is a vertical strip of square tiles: tile `i` is rows `i * w..(i + 1) * w` of an image of width `w`.
-/// Pixels of a tile are drawn or not: an alpha of at least 128 is opaque.
+/// The tileset is a vertical strip of square tiles: tile `i` is rows `i * w..(i + 1) * w` of an
+/// image of width `w`. A pixel with an alpha of at least 128 is opaque, and others are not drawn.
 ///
-/// A grid without cells is a ground that is the same everywhere: its `outside`. Cameras draw what is outside as far as
-/// can be seen from the grid (see their `TileBorder`), so a game whose agents leave it must move the layer along, by whole
-/// cells.
+/// A grid without cells is a uniform ground of its `outside` tile. Cameras draw the outside as far
+/// as can be seen from the grid (see their `TileBorder`). A game whose agents leave the grid must
+/// move the layer along, by whole cells.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(Component)]
 #[require(Transform, Visibility)]
@@ -28,15 +28,15 @@ pub struct TileLayer {
 }
 
 impl TileLayer {
-    /// The number of no tile.
+    /// The number that stands for no tile.
     pub const EMPTY: u16 = u16::MAX;
 
-    /// Whether there is a tile number for every cell.
+    /// Returns whether there is a tile number for every cell.
     pub(crate) fn is_complete(&self) -> bool {
         self.cells.len() == self.columns as usize * self.rows as usize
     }
 
-    /// The tile at a cell, inside or outside the grid.
+    /// Returns the tile at a cell, inside or outside the grid.
     #[inline]
     pub fn tile(&self, column: i32, row: i32) -> u16 {
         let inside = (0..self.columns as i32).contains(&column) && (0..self.rows as i32).contains(&row);

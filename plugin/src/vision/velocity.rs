@@ -1,4 +1,4 @@
-//! Velocity as a part of the picture.
+//! Velocity painted into the picture.
 
 use bevy::prelude::*;
 

@@ -1,4 +1,4 @@
-//! What the cases learn from: numbers of the right shapes, always the same.
+//! Fixed random data of the right shapes for the cases.
 
 use std::time::Duration;
 
@@ -12,12 +12,12 @@ use playbot_learner::{
 
 /// The backend that is measured.
 pub const DEVICE: DeviceKind = DeviceKind::Flex;
-/// What agents see through a camera.
+/// Shape of a camera's images.
 pub const IMAGE: ImageShape = ImageShape { channels: 3, height: 64, width: 64 };
 /// Actions of CoinRun.
 pub const CHOICES: usize = 15;
 
-/// So many samples of a case, in a few seconds.
+/// Returns settings for this many samples of a case, in a few seconds.
 pub fn measured(samples: usize) -> Criterion {
     Criterion::default()
         .sample_size(samples)
@@ -25,32 +25,32 @@ pub fn measured(samples: usize) -> Criterion {
         .measurement_time(Duration::from_secs(4))
 }
 
-/// Random numbers of a case.
+/// Returns the random generator of a case.
 pub fn rng(case: &str) -> ChaCha8Rng {
     Streams::new(1).stream(case, 0)
 }
 
-/// Numbers around 0.
+/// Returns numbers around 0.
 pub fn normals(n: usize, rng: &mut ChaCha8Rng) -> Vec<f32> {
     (0..n).map(|_| normal(rng)).collect()
 }
 
-/// Mostly zeros and ones, like the grid of tiles around a character.
+/// Returns mostly zeros and ones, like the grid of tiles around a character.
 pub fn tiles(n: usize, rng: &mut ChaCha8Rng) -> Vec<f32> {
     (0..n).map(|_| if unit(rng) < 0.2 { 1.0 } else { 0.0 }).collect()
 }
 
-/// Actions of CoinRun.
+/// Returns random actions of CoinRun.
 pub fn choices(n: usize, rng: &mut ChaCha8Rng) -> Vec<u32> {
     (0..n).map(|_| below(rng, CHOICES as u64) as u32).collect()
 }
 
-/// Bytes of so many images.
+/// Returns the bytes of this many images.
 pub fn pixels(images: usize, rng: &mut ChaCha8Rng) -> Vec<u8> {
     (0..images * IMAGE.numbers()).map(|_| below(rng, 256) as u8).collect()
 }
 
-/// Images as a network takes them.
+/// Converts images to the input of a network.
 pub fn images(pixels: Vec<u8>) -> Tensor<4> {
     let shape = [pixels.len() / IMAGE.numbers(), IMAGE.channels, IMAGE.height, IMAGE.width];
     match ObsBatch::pixels(pixels, shape, &DEVICE.plain()) {
@@ -59,12 +59,12 @@ pub fn images(pixels: Vec<u8>) -> Tensor<4> {
     }
 }
 
-/// A tensor of numbers around 0.
+/// Returns a tensor of numbers around 0.
 pub fn matrix(rows: usize, columns: usize, rng: &mut ChaCha8Rng) -> Tensor<2> {
     Tensor::from_data(TensorData::new(normals(rows * columns, rng), [rows, columns]), &DEVICE.plain())
 }
 
-/// `rollout` with rewards, and episodes that end now and then.
+/// Returns `rollout` with rewards, and with ends of episodes now and then.
 pub fn lived(rollout: Rollout, envs: usize, rng: &mut ChaCha8Rng) -> Rollout {
     let rows = envs * rollout.steps;
     Rollout {
@@ -77,7 +77,7 @@ pub fn lived(rollout: Rollout, envs: usize, rng: &mut ChaCha8Rng) -> Rollout {
     }
 }
 
-/// Bytes as observations.
+/// Returns bytes as observations.
 pub fn seen(images: usize, rng: &mut ChaCha8Rng) -> Observations {
     pixels(images, rng).into()
 }

@@ -1,4 +1,4 @@
-//! The loops in which the time goes, one by one: forward, and forward with all gradients.
+//! The expensive loops one by one: forward, and forward with all gradients.
 
 use burn::tensor::Tensor;
 use criterion::Criterion;
@@ -9,7 +9,7 @@ use playbot_learner::{
 
 use crate::data::{DEVICE, IMAGE, images as image_tensor, matrix, pixels, rng};
 
-/// A case without a gradient graph, as agents decide, and one with.
+/// Measures a case without a gradient graph, as agents decide, and with one.
 fn both(criterion: &mut Criterion, name: &str, plain: impl Fn() -> Tensor<2>, graph: impl Fn() -> Tensor<2> + Sync) {
     criterion.bench_function(&format!("kernel/{name}/forward"), |bencher| bencher.iter(&plain));
     criterion.bench_function(&format!("kernel/{name}/gradients"), |bencher| {
@@ -65,7 +65,7 @@ pub fn convolutions(criterion: &mut Criterion) {
     }
 }
 
-/// What touches each number once: tanh, the norm of gradients, and Adam.
+/// Loops that touch each number once: tanh, the norm of gradients, and Adam.
 pub fn numbers(criterion: &mut Criterion) {
     let mut rng = rng("numbers");
     let (rows, columns) = (512, 512);

@@ -1,8 +1,8 @@
-//! How long learning takes, at the sizes of the paper and of the experiments: single kernels, one training step, and whole
-//! updates.
+//! Benchmarks of learning, at the sizes of the paper and of the experiments: single kernels, one training step, and
+//! whole updates.
 //!
-//! `cargo bench -p playbot_learner`; a word after it runs only the cases whose names have it (`-- impala`). That the
-//! numbers are the same on any number of threads is for tests.
+//! `cargo bench -p playbot_learner`; a word after it runs only the cases whose names contain it (`-- impala`). Tests
+//! check that the numbers are the same on any number of threads.
 
 mod data;
 mod kernels;

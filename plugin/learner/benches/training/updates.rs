@@ -1,4 +1,4 @@
-//! What a training run consists of: epochs of skills, the forward pass of a tick, and updates from a rollout.
+//! The parts of a training run: epochs of skills, the forward pass of a tick, and updates from a rollout.
 
 use std::cell::{LazyCell, RefCell};
 use std::ops::ControlFlow;
@@ -11,7 +11,7 @@ use playbot_learner::{
 
 use crate::data::{CHOICES, DEVICE, IMAGE, choices, lived, normals, rng, seen, tiles};
 
-/// Numbers that CoinRun's agents see.
+/// Width of CoinRun's observations.
 const OBS: usize = 563;
 const ENVS: usize = 64;
 const SPACE: ActionSpace = ActionSpace::Discrete(CHOICES);
@@ -75,8 +75,8 @@ fn image_skills(cnn: CnnKind) -> SkillModel {
     SkillTrainer::new(config, dataset, 1, DEVICE).expect("fits").into_model()
 }
 
-/// The forward pass of one tick, and the update from what was seen in so many. An observation has `width` numbers. What is
-/// learned from is made when the first of them runs.
+/// Measures the forward pass of one tick, and the update from a rollout of this many. An observation has `width`
+/// numbers. The data are made when the first of them runs.
 fn cases(criterion: &mut Criterion, name: &str, steps: usize, width: usize, make: impl Fn() -> (PpoLearner, Rollout)) {
     let made = LazyCell::new(|| {
         let (learner, rollout) = make();
@@ -95,7 +95,7 @@ fn cases(criterion: &mut Criterion, name: &str, steps: usize, width: usize, make
     });
 }
 
-/// `rollout` with skills and actions.
+/// Returns `rollout` with skills and actions.
 fn acted(rollout: Rollout, latent: usize, rng: &mut ChaCha8Rng) -> Rollout {
     let rows = ENVS * rollout.steps;
     Rollout {

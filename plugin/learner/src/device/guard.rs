@@ -1,4 +1,4 @@
-//! What a graphics card does to a program that it fails: an error, not a panic.
+//! Guards that turn the failure of a graphics card into an error instead of a panic.
 
 use super::is_host;
 use crate::{LearnError, among_awake_workers};
@@ -8,13 +8,13 @@ use std::panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook, take_h
 use std::sync::Once;
 
 thread_local! {
-    /// How many guards this thread is in.
+    /// Number of guards that this thread is in.
     static DEPTH: Cell<u32> = const { Cell::new(0) };
-    /// Where its last guarded panic happened.
+    /// Position of its last guarded panic.
     static PLACE: RefCell<String> = const { RefCell::new(String::new()) };
 }
 
-/// Does `work`, and gives what a panic of this thread said, and where, instead of printing it.
+/// Runs `work`, and returns the message and position of a panic in this thread instead of printing it.
 pub(super) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     listen();
     DEPTH.set(DEPTH.get() + 1);
@@ -28,7 +28,8 @@ pub(super) fn caught<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     })
 }
 
-/// Puts a hook before the one that is there, once: guards of several threads would else take each other's for it.
+/// Installs a panic hook before the present one, once: otherwise guards of several threads would restore each other's
+/// hooks.
 fn listen() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -37,14 +38,14 @@ fn listen() {
             if DEPTH.get() == 0 {
                 return before(info);
             }
-            let place = info.location().map_or_else(|| "an unknown place".to_owned(), ToString::to_string);
+            let place = info.location().map_or_else(|| "an unknown position".to_owned(), ToString::to_string);
             PLACE.replace(place);
         }));
     });
 }
 
-/// Does `work` on `device`. A graphics card that is lost, or has no memory left, is an error; what computes in host memory
-/// is left alone.
+/// Runs `work` on `device`. A graphics card that is lost, or out of memory, is an error. Work in host memory is
+/// unaffected.
 pub(crate) fn guarded<T>(device: &Device, work: impl FnOnce() -> Result<T, LearnError>) -> Result<T, LearnError> {
     if is_host(device) {
         return work();
@@ -52,7 +53,8 @@ pub(crate) fn guarded<T>(device: &Device, work: impl FnOnce() -> Result<T, Learn
     failures(work)
 }
 
-/// Does the work of an update on `device`: in host memory among workers that wait awake, on a graphics card as [`guarded`].
+/// Runs the work of an update on `device`: in host memory among workers that wait awake, on a graphics card as
+/// [`guarded`].
 pub(crate) fn update_on<T: Send>(
     device: &Device,
     work: impl FnOnce() -> Result<T, LearnError> + Send,
@@ -60,7 +62,7 @@ pub(crate) fn update_on<T: Send>(
     if is_host(device) { among_awake_workers(work) } else { failures(work) }
 }
 
-/// [`guarded`] on a graphics card.
+/// Runs `work` as [`guarded`] does on a graphics card.
 fn failures<T>(work: impl FnOnce() -> Result<T, LearnError>) -> Result<T, LearnError> {
     match caught(work) {
         Ok(Err(LearnError::Device(said))) => Err(LearnError::DeviceFailed { reason: first_cause(&said) }),
@@ -69,7 +71,7 @@ fn failures<T>(work: impl FnOnce() -> Result<T, LearnError>) -> Result<T, LearnE
     }
 }
 
-/// What it all came from: a driver that fails tells it last, after everything that could not be done any more.
+/// Returns the first cause: a failing driver prints it last, after all errors that follow from it.
 fn first_cause(said: &str) -> String {
     let is_filler = |line: &&str| {
         let fillers = ["Caused by:", "Asked at:", "No backtrace available", "skipped ", "("];

@@ -1,14 +1,13 @@
 //! The compute backends by name.
 
 use crate::LearnError;
-use burn::backend::DispatchDevice;
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::str::FromStr;
 
-/// The compute backends, by the name used on the command line and in files. Which of them a program has is decided when it
-/// is built: [`DeviceKind::BUILT`].
+/// The compute backends, by the name used on the command line and in files. The build decides which of them a program
+/// has: [`DeviceKind::BUILT`].
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 #[serde(rename_all = "lowercase")]
 pub enum DeviceKind {
@@ -27,10 +26,10 @@ impl DeviceKind {
     /// Every kind.
     pub const ALL: [Self; 4] = [Self::Flex, Self::Ndarray, Self::Wgpu, Self::Cuda];
 
-    /// Those that compute on the CPU, which are in every build.
+    /// Kinds that compute on the CPU, which are in every build.
     pub const CPU: [Self; 2] = [Self::Flex, Self::Ndarray];
 
-    /// Those of this build.
+    /// Kinds of this build.
     pub const BUILT: &[Self] = &[
         Self::Flex,
         Self::Ndarray,
@@ -40,7 +39,7 @@ impl DeviceKind {
         Self::Cuda,
     ];
 
-    /// Its name.
+    /// Returns the name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Flex => "flex",
@@ -50,18 +49,19 @@ impl DeviceKind {
         }
     }
 
-    /// `Ok` if it can compute: this build has it, and so has the machine. A graphics card is opened by the first call.
+    /// Checks that it can compute: this build has it, and so has the machine. A graphics card is opened by the first
+    /// call.
     ///
     /// # Errors
-    /// [`LearnError::NoDevice`] says what is missing.
+    /// [`LearnError::NoDevice`] names the missing part.
     pub fn check(self) -> Result<(), LearnError> {
         self.open().map_err(|reason| LearnError::NoDevice { device: self.to_string(), reason })
     }
 
-    /// The device for inference: operations on it record nothing.
+    /// Returns the device for inference: operations on it record no graph.
     ///
     /// # Panics
-    /// If this build does not have it; [`Self::check`] says so before.
+    /// If this build does not have it; [`Self::check`] reports that before.
     pub fn plain(self) -> Device {
         match self {
             Self::Flex => Device::flex(),
@@ -76,18 +76,13 @@ impl DeviceKind {
         }
     }
 
-    /// The device for training: operations on it can be differentiated.
+    /// Returns the device for training: operations on it can be differentiated.
     ///
     /// # Panics
     /// As [`Self::plain`].
     pub fn autodiff(self) -> Device {
         self.plain().autodiff()
     }
-}
-
-/// Whether the numbers of `device` lie in host memory, where reading them costs nothing.
-pub(crate) fn is_host(device: &Device) -> bool {
-    matches!(device.clone().inner().as_dispatch(), DispatchDevice::Flex(_) | DispatchDevice::NdArray(_))
 }
 
 impl fmt::Display for DeviceKind {
@@ -108,7 +103,7 @@ pub enum UnknownDevice {
     /// Only other builds have it.
     #[error("this program was built without `{kind}`; build it with `--features {kind}`, or take one of: {}", built())]
     NotBuilt {
-        /// Which one.
+        /// The kind.
         kind: DeviceKind,
     },
 }

@@ -1,4 +1,4 @@
-//! Where the numbers are computed: the CPU, or a graphics card in a build that has it.
+//! Compute devices: the CPU, or a graphics card in a build that supports it.
 
 mod guard;
 mod kind;
@@ -7,5 +7,5 @@ mod probe;
 #[cfg(any(feature = "wgpu", feature = "cuda"))]
 use guard::caught;
 pub(crate) use guard::{guarded, update_on};
-pub(crate) use kind::is_host;
+pub(crate) use crate::nn::is_host;
 pub use kind::{DeviceKind, UnknownDevice};

@@ -1,4 +1,4 @@
-//! Whether a graphics card is there.
+//! Detection of a graphics card.
 
 use super::DeviceKind;
 

@@ -1,23 +1,23 @@
-//! Files that are whole or not there.
+//! Atomic writes: files that are complete or absent.
 
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use super::{DiskFile, remove_file, rename, temporary_name};
 
-/// Puts `bytes` at `path` so that a reader sees the old contents or the new, never a part: under a temporary name first,
-/// flushed to the disk, then renamed.
+/// Writes `bytes` to `path` so that a reader sees the old contents or the new, never a part. The file gets a
+/// temporary name first, is flushed to the disk, then renamed.
 ///
 /// # Errors
-/// What the system says; the old contents are still there, and nothing else.
+/// The system's error; the old contents are still there, and nothing else.
 pub fn write_atomically(path: &Path, bytes: &[u8]) -> io::Result<()> {
     write_atomically_with(path, |file| file.write_all(bytes))
 }
 
-/// [`write_atomically`] for contents that are not in memory as a whole: `write` writes them piece by piece.
+/// Writes atomically, as [`write_atomically`], contents that `write` produces piece by piece.
 ///
 /// # Errors
-/// What the system or `write` says; the old contents are still there, and nothing else.
+/// The error of the system or of `write`; the old contents are still there, and nothing else.
 pub fn write_atomically_with(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<DiskFile>) -> io::Result<()>,

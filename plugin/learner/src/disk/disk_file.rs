@@ -1,4 +1,4 @@
-//! An open file.
+//! An open file that is written through [the recording layer](super).
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Read, Seek, SeekFrom, Write};
@@ -18,7 +18,7 @@ impl DiskFile {
     /// Opens a file.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system's error.
     pub fn open(path: &Path, options: &OpenOptions) -> io::Result<Self> {
         let length_before = is_recorded().then(|| fs::metadata(path).map(|metadata| metadata.len()).ok());
         let file = options.open(path)?;
@@ -32,49 +32,49 @@ impl DiskFile {
         Ok(Self { file, path: path.into() })
     }
 
-    /// Opens an empty file to write; what was in it is gone.
+    /// Opens an empty file to write; old contents are lost.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system's error.
     pub fn create(path: &Path) -> io::Result<Self> {
         Self::open(path, OpenOptions::new().write(true).create(true).truncate(true))
     }
 
-    /// Opens a file to write that is not there yet.
+    /// Opens a new file to write.
     ///
     /// # Errors
-    /// What the system says, also that the file is there.
+    /// The system's error, also if the file exists.
     pub fn create_new(path: &Path) -> io::Result<Self> {
         Self::open(path, OpenOptions::new().write(true).create_new(true))
     }
 
-    /// Opens a file to write behind what is in it, and makes it if it is not there.
+    /// Opens a file to append to, and creates it if it does not exist.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system's error.
     pub fn append(path: &Path) -> io::Result<Self> {
         Self::open(path, OpenOptions::new().create(true).append(true))
     }
 
-    /// To read it, to lock it, and to ask for its length.
+    /// Returns the file, to read it, to lock it, and to ask for its length.
     pub fn as_file(&self) -> &File {
         &self.file
     }
 
-    /// Cuts the file, or makes it longer with zeros.
+    /// Truncates the file, or extends it with zeros.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system's error.
     pub fn set_len(&self, length: u64) -> io::Result<()> {
         self.file.set_len(length)?;
         note(|| DiskOperation::SetLength { path: self.path.clone(), length });
         Ok(())
     }
 
-    /// Gives the file another name; a file that has it is replaced. See [`rename`](super::rename).
+    /// Renames the file; a file at the new name is replaced. See [`rename`](super::rename).
     ///
     /// # Errors
-    /// What the system says; the file has its old name then.
+    /// The system's error; the file has its old name then.
     pub fn rename_to(&mut self, path: &Path) -> io::Result<()> {
         super::rename(&self.path, path)?;
         self.path = path.into();
@@ -84,7 +84,7 @@ impl DiskFile {
     /// Waits until the contents are on the disk.
     ///
     /// # Errors
-    /// What the system says.
+    /// The system's error.
     pub fn sync(&self) -> io::Result<()> {
         self.file.sync_all()?;
         note(|| DiskOperation::Sync(self.path.clone()));
@@ -96,7 +96,7 @@ impl Write for DiskFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         let written = self.file.write(bytes)?;
         if is_recorded() {
-            // Files that are appended to stand at their end only afterwards.
+            // Files that are appended to are at their end only after the write.
             let at = self.file.stream_position()? - written as u64;
             note(|| DiskOperation::Write { path: self.path.clone(), at, bytes: bytes[..written].into() });
         }

@@ -1,4 +1,4 @@
-//! Names and folders. The errors are those of the system.
+//! Operations on names and folders. The errors are those of the system.
 
 use std::fs::{self, File};
 use std::io;
@@ -7,10 +7,10 @@ use std::path::Path;
 use super::DiskOperation;
 use super::recording::{is_recorded, note};
 
-/// Makes a folder and those above it that are not there.
+/// Creates a folder and its missing parents.
 ///
 /// # Errors
-/// What the system says.
+/// The system's error.
 pub fn create_dir_all(path: &Path) -> io::Result<()> {
     let mut missing: Vec<&Path> = Vec::new();
     if is_recorded() {
@@ -21,14 +21,14 @@ pub fn create_dir_all(path: &Path) -> io::Result<()> {
     Ok(())
 }
 
-/// Gives a file or folder another name; a file that has it is replaced. The new name is brought to the disk.
+/// Renames a file or folder; a file at the new name is replaced. The new name is flushed to the disk.
 ///
 /// # Errors
-/// What the system says.
+/// The system's error.
 pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
     fs::rename(from, to)?;
     note(|| DiskOperation::Rename { from: from.into(), to: to.into() });
-    // Where folders can be opened; elsewhere the rename is all there is.
+    // Only where folders can be opened; elsewhere the rename has to do.
     if let Some(Ok(folder)) = to.parent().map(File::open) {
         let _ = folder.sync_all();
     }
@@ -38,7 +38,7 @@ pub fn rename(from: &Path, to: &Path) -> io::Result<()> {
 /// Gives a file a second name.
 ///
 /// # Errors
-/// What the system says.
+/// The system's error.
 pub fn hard_link(from: &Path, to: &Path) -> io::Result<()> {
     fs::hard_link(from, to)?;
     note(|| DiskOperation::Link { from: from.into(), to: to.into() });
@@ -48,7 +48,7 @@ pub fn hard_link(from: &Path, to: &Path) -> io::Result<()> {
 /// Removes a file.
 ///
 /// # Errors
-/// What the system says.
+/// The system's error.
 pub fn remove_file(path: &Path) -> io::Result<()> {
     fs::remove_file(path)?;
     note(|| DiskOperation::Remove(path.into()));
@@ -58,7 +58,7 @@ pub fn remove_file(path: &Path) -> io::Result<()> {
 /// Removes an empty folder.
 ///
 /// # Errors
-/// What the system says.
+/// The system's error.
 pub fn remove_dir(path: &Path) -> io::Result<()> {
     fs::remove_dir(path)?;
     note(|| DiskOperation::Remove(path.into()));
@@ -68,12 +68,12 @@ pub fn remove_dir(path: &Path) -> io::Result<()> {
 /// Removes a folder and all that is in it.
 ///
 /// # Errors
-/// What the system says.
+/// The system's error.
 pub fn remove_dir_all(path: &Path) -> io::Result<()> {
     if !is_recorded() || path.is_symlink() {
         return fs::remove_dir_all(path);
     }
-    // As the system does it, so that each step is written down.
+    // In the order of the system's own function, so that each step is recorded.
     for entry in fs::read_dir(path)? {
         let entry = entry?;
         match entry.file_type()?.is_dir() {

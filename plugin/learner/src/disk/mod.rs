@@ -1,7 +1,7 @@
-//! All that is written to a disk goes through here: files, names and folders.
+//! The layer through which everything is written to a disk: files, names and folders.
 //!
-//! The functions are those of [`std::fs`]. What they did can be [recorded](DiskRecording), so that a test can put a disk into
-//! every state that a power cut would leave.
+//! The functions are those of [`std::fs`]. Their operations can be [recorded](DiskRecording), so that a test can put
+//! a disk into every state that a power cut would leave.
 
 mod atomic;
 mod disk_file;

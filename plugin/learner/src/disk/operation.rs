@@ -1,4 +1,4 @@
-//! What can be done to a disk.
+//! Operations on a disk.
 
 use std::path::{Path, PathBuf};
 
@@ -13,7 +13,7 @@ pub enum DiskOperation {
     Write {
         /// The file.
         path: PathBuf,
-        /// Where the first byte went.
+        /// Position of the first byte.
         at: u64,
         /// The bytes.
         bytes: Vec<u8>,
@@ -25,13 +25,13 @@ pub enum DiskOperation {
         /// Its length in bytes.
         length: u64,
     },
-    /// The contents of a file were brought to the disk: no power cut takes them back.
+    /// The contents of a file were flushed to the disk, so a power cut cannot undo them.
     Sync(PathBuf),
-    /// A file or folder has another name; a file that had it is gone.
+    /// A file or folder was renamed; a file at the new name is gone.
     Rename {
-        /// The name before.
+        /// The old name.
         from: PathBuf,
-        /// The name since.
+        /// The new name.
         to: PathBuf,
     },
     /// A file has a second name.
@@ -46,7 +46,7 @@ pub enum DiskOperation {
 }
 
 impl DiskOperation {
-    /// What is changed; the new name where there are two.
+    /// Returns the changed path; the new name where there are two.
     pub fn path(&self) -> &Path {
         match self {
             Self::CreateFolder(path) | Self::Create(path) | Self::Sync(path) | Self::Remove(path) => path,

@@ -1,4 +1,4 @@
-//! Writing down what is done to a disk.
+//! Recording of disk operations, for tests.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use super::DiskOperation;
 
-/// Recordings that go on. While there are none, looking here is all that recording costs.
+/// Number of active recordings. Without any, checking it is the only cost.
 static ACTIVE: AtomicUsize = AtomicUsize::new(0);
 static RECORDINGS: Mutex<Vec<Arc<Notes>>> = Mutex::new(Vec::new());
 
@@ -16,13 +16,13 @@ struct Notes {
     operations: Mutex<Vec<DiskOperation>>,
 }
 
-/// Writes down all that this process does below a folder through [this module](super), until it is dropped. It is for tests
-/// and changes nothing.
+/// Records the operations of this process below a folder through [this module](super), until it is dropped. It is for
+/// tests and changes nothing.
 #[derive(Debug)]
 pub struct DiskRecording(Arc<Notes>);
 
 impl DiskRecording {
-    /// Begins with the next operation whose path begins with that of `folder`.
+    /// Starts with the next operation whose path begins with that of `folder`.
     pub fn of(folder: &Path) -> Self {
         let notes = Arc::new(Notes { folder: folder.into(), operations: Mutex::default() });
         unpoisoned(&RECORDINGS).push(Arc::clone(&notes));
@@ -30,7 +30,7 @@ impl DiskRecording {
         Self(notes)
     }
 
-    /// The operations so far, in the order in which they were made.
+    /// Returns the operations so far, in the order in which they were made.
     pub fn operations(&self) -> Vec<DiskOperation> {
         unpoisoned(&self.0.operations).clone()
     }
@@ -43,12 +43,12 @@ impl Drop for DiskRecording {
     }
 }
 
-/// Whether anybody writes down what is done.
+/// Returns whether any recording is active.
 pub(super) fn is_recorded() -> bool {
     ACTIVE.load(Ordering::Relaxed) > 0
 }
 
-/// Tells the recordings of an operation, which is only made up if there are any.
+/// Adds an operation to all recordings; it is built only if there are any.
 pub(super) fn note(operation: impl FnOnce() -> DiskOperation) {
     if !is_recorded() {
         return;

@@ -1,4 +1,4 @@
-//! Names of files that are not whole yet, and what processes that were killed have left under them.
+//! Temporary names of unfinished files, and removal of the files that killed processes have left.
 
 use std::ffi::OsStr;
 use std::fs;
@@ -7,17 +7,17 @@ use std::path::{Path, PathBuf};
 
 use super::remove_file;
 
-/// Between the name of a file and the number of the process that writes it.
+/// Text between the name of a file and the number of the process that writes it.
 const MARK: &str = ".tmp";
 
-/// The name under which this process writes a file before it gets its own: in the same folder, so that it can be renamed.
+/// Returns the name under which this process writes a file before it is renamed, in the same folder.
 pub fn temporary_name(path: &Path) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(format!("{MARK}{}", std::process::id()));
     path.with_file_name(name)
 }
 
-/// Whether this is the name of a file that some process has not written to its end.
+/// Returns whether this is the name of a file that some process has not finished writing.
 fn is_temporary(name: &OsStr) -> bool {
     let name = name.to_string_lossy();
     let Some((file, process)) = name.rsplit_once(MARK) else { return false };
@@ -25,13 +25,13 @@ fn is_temporary(name: &OsStr) -> bool {
     !file.is_empty() && process.bytes().all(|byte| byte.is_ascii_digit()) && process.parse::<u32>().is_ok()
 }
 
-/// Removes the files of a folder, not those in folders below it, that processes which were killed have not written to their
-/// end. Returns which they were; a folder that is not there has none.
+/// Removes unfinished files of killed processes from a folder, without its subfolders. Returns their names; a missing
+/// folder has none.
 ///
-/// It is for who has the right to write there alone: a process that still writes could not finish.
+/// Only for a caller that alone may write there: a process that still writes could not finish.
 ///
 /// # Errors
-/// What the system says.
+/// The system's error.
 pub fn remove_temporaries(folder: &Path) -> io::Result<Vec<PathBuf>> {
     let entries = match fs::read_dir(folder) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),

@@ -1,4 +1,4 @@
-//! The JSON in the header of a file: what kind of file it is, its version, and what else its reader needs.
+//! The JSON in the header of a file: its kind, its version, and other data for its reader.
 
 use super::TensorFile;
 use super::tensor_file::SEAL;
@@ -15,51 +15,51 @@ pub(crate) struct FileKind {
     pub(crate) version: u32,
 }
 
-/// The part of every header that says how to read the rest.
+/// The part of every header that identifies the format of the rest.
 #[derive(Serialize, Deserialize)]
 struct Identity<'a> {
     kind: &'a str,
     version: u32,
 }
 
-/// A description that is no JSON.
-const NO_JSON: &str = "the description in its header is damaged, or something else has written it: take the file from a copy, \
-                       or make it again";
+/// The message about a description that is not JSON.
+const NO_JSON: &str = "the description in its header is damaged, or another program wrote it: restore the file \
+                       from a copy, or create it again";
 
 /// Most characters of an error that quotes the file.
 const QUOTED: usize = 200;
 
-/// A description that lacks something, or has what this version does not know.
+/// Returns the message about a description with missing or unknown entries.
 fn misfit(error: &str) -> String {
     let more = if error.chars().nth(QUOTED).is_some() { "…" } else { "" };
     let error: String = error.chars().take(QUOTED).collect();
     format!(
-        "the description in its header is not what this version of playbot writes ({error}{more}): make the file again \
-         with it"
+        "the description in its header does not match this version of playbot ({error}{more}): create the file again \
+         with this version"
     )
 }
 
 impl TensorFile {
-    /// An empty file for `path`, whose header holds the entries `kind` and `version`, then those of `header`.
+    /// Creates an empty file for `path`, whose header holds the entries `kind` and `version`, then those of `header`.
     pub(crate) fn new(path: &Path, kind: FileKind, header: &impl Serialize) -> Result<Self, FileError> {
         let json = |value: Result<String, serde_json::Error>| {
             value.map_err(|e| FileError::Format { path: path.to_owned(), detail: e.to_string() })
         };
         let identity = json(serde_json::to_string(&Identity { kind: kind.name, version: kind.version }))?;
         let header = json(serde_json::to_string(header))?;
-        // Two JSON objects become one.
+        // Merges two JSON objects into one.
         let description = format!("{},{}", identity.trim_end_matches('}'), header.trim_start_matches('{'));
         Ok(Self::empty(path, description))
     }
 
-    /// The header without `kind` and `version`, if the file calls itself of this kind. That is looked at first, so that
-    /// what a newer version added is not taken for a fault.
+    /// Returns the header without `kind` and `version`, if the file is of this kind. The version is checked first, so
+    /// that additions of a newer version are not reported as errors.
     pub(crate) fn header<T: DeserializeOwned>(&self, kind: FileKind) -> Result<T, FileError> {
-        // Where in the description it stops being JSON helps nobody: no person has written it.
+        // The position of a syntax error is omitted: people do not write this JSON.
         let mut header: serde_json::Map<String, Value> =
             serde_json::from_str(&self.description).map_err(|_| self.format(NO_JSON.to_owned()))?;
         let parse = |error: serde_json::Error| self.format(misfit(&error.to_string()));
-        // It was looked at when the file was read.
+        // It was checked when the file was read.
         header.remove(SEAL);
         let identity =
             Value::Object(["kind", "version"].into_iter().filter_map(|key| header.remove_entry(key)).collect());
@@ -109,7 +109,7 @@ mod tests {
         let damaged = said(r#"{kind:"thing","version":1,"a":1}"#);
         assert_eq!(damaged, format!("skills: {NO_JSON}"));
         let lacking = said(r#"{"kind":"thing","version":1}"#);
-        assert!(lacking.contains("(missing field `a`): make the file again with it"), "{lacking}");
+        assert!(lacking.contains("(missing field `a`): create the file again with this version"), "{lacking}");
         let long = "k".repeat(10_000_000);
         for description in [
             format!(r#"{{"kind":"thing","version":1,"a":1,"{long}":2}}"#),

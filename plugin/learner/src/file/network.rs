@@ -23,7 +23,7 @@ impl ParamSource for StoredParams<'_> {
 }
 
 impl TensorFile {
-    /// The file as a source of parameters on `device`.
+    /// Returns the file as a source of parameters on `device`.
     pub(crate) fn params<'a>(&'a mut self, device: &'a Device) -> StoredParams<'a> {
         StoredParams { file: self, device }
     }
@@ -46,7 +46,7 @@ impl TensorFile {
         Ok(())
     }
 
-    /// Takes out the moments of an optimizer that did `steps` steps on all parameters of `network`, called by `prefix`.
+    /// Takes out the moments of an optimizer after `steps` steps on all parameters of `network`, named by `prefix`.
     pub(crate) fn take_adam<M: Parameters>(
         &mut self,
         adam: &mut Adam,

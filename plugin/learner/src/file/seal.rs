@@ -1,16 +1,16 @@
-//! Checksums that a file carries in itself, so that damage to it is seen before it is used.
+//! Checksums inside files, which reveal damage before the contents are used.
 //!
-//! A seal stands at a fixed place near the start of a text: a prefix, the CRC-32 (the one of zip, ISO-HDLC) as eight
-//! hexadecimal digits, and a suffix. What almost looks like a seal is a damaged one; only what looks otherwise was written
-//! without, by an older version.
+//! A seal stands at a fixed position near the start of a text: a prefix, the CRC-32 (the one of zip, ISO-HDLC) as
+//! eight hexadecimal digits, and a suffix. A text that almost has a seal has a damaged one. A text without any was
+//! written by an older version.
 
 use thiserror::Error;
 
 /// Digits of a checksum.
 const DIGITS: usize = 8;
 
-/// In how many bytes prefix and suffix may differ from those of a seal to be taken for a damaged one. Texts without a seal
-/// differ in more.
+/// Bytes in which prefix and suffix may differ from those of a seal and still count as a damaged one. Texts without a
+/// seal differ in more.
 const ALMOST: usize = 3;
 
 /// The first entry of a JSON object.
@@ -19,21 +19,21 @@ const JSON: Form = Form { prefix: b"{\"crc32\":\"", suffix: b"\"," };
 /// The first line of a text whose comments begin with two slashes.
 const COMMENT: Form = Form { prefix: b"// crc32 ", suffix: b"\n" };
 
-/// The checksum of a text is not that of its contents.
+/// The checksum of a text differs from that of its contents.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
-#[error("the file is damaged: its checksum is not that of its contents")]
+#[error("the file is damaged: its checksum does not match its contents")]
 pub struct BrokenSeal;
 
-/// A text whose checksum was looked at.
+/// A text with a verified checksum.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Unsealed {
     /// The text without its checksum.
     pub text: String,
-    /// Whether it had one. Older versions wrote none.
+    /// True if it had a checksum. Older versions wrote none.
     pub had_seal: bool,
 }
 
-/// How a seal looks in some kind of text.
+/// The form of a seal in some kind of text.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Form {
     pub(super) prefix: &'static [u8],
@@ -41,7 +41,7 @@ pub(super) struct Form {
 }
 
 impl Form {
-    /// The digits at the start of `bytes`; `None` if no seal is there.
+    /// Returns the digits at the start of `bytes`; `None` without a seal.
     pub(super) fn digits(self, bytes: &[u8]) -> Result<Option<u32>, BrokenSeal> {
         let differences = |known: &[u8], found: &[u8]| {
             let missing = known.len().saturating_sub(found.len());
@@ -55,25 +55,25 @@ impl Form {
         }
     }
 
-    /// Where the digits stand.
+    /// Returns the position of the digits.
     pub(super) fn place(self) -> std::ops::Range<usize> {
         self.prefix.len()..self.prefix.len() + DIGITS
     }
 
-    /// Bytes of a whole seal.
+    /// Returns the length of a whole seal in bytes.
     fn len(self) -> usize {
         self.prefix.len() + DIGITS + self.suffix.len()
     }
 
-    /// Digits in lower case, as they are written: a bit that makes a small letter a capital is one that was flipped.
+    /// Parses digits in lower case only, as they are written: an upper-case digit is a flipped bit.
     fn number(digits: &[u8]) -> Option<u32> {
         let are_digits = digits.iter().all(|digit| matches!(digit, b'0'..=b'9' | b'a'..=b'f'));
         are_digits.then(|| u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok())?
     }
 }
 
-/// A JSON object with its checksum as the first entry, `crc32`. The checksum is over the bytes of `object`, which must have
-/// an entry.
+/// Returns a JSON object with its checksum as the first entry, `crc32`. The checksum is over the bytes of `object`,
+/// which must have an entry.
 ///
 /// ```
 /// # use playbot_learner::{seal_json, unseal_json};
@@ -87,7 +87,7 @@ pub fn seal_json(object: &str) -> String {
     format!("{{\"crc32\":\"{}\",{entries}", digits_of(object.as_bytes()))
 }
 
-/// The object that [`seal_json`] was given.
+/// Returns the object that [`seal_json`] was given.
 ///
 /// # Errors
 ///
@@ -96,12 +96,12 @@ pub fn unseal_json(text: &str) -> Result<Unsealed, BrokenSeal> {
     unseal(text, JSON, |rest| format!("{{{rest}"))
 }
 
-/// A text with its checksum in a comment on the first line.
+/// Returns a text with its checksum in a comment on the first line.
 pub fn seal_text(text: &str) -> String {
     format!("// crc32 {}\n{text}", digits_of(text.as_bytes()))
 }
 
-/// The text that [`seal_text`] was given.
+/// Returns the text that [`seal_text`] was given.
 ///
 /// # Errors
 ///
@@ -114,12 +114,12 @@ fn unseal(text: &str, form: Form, whole: impl FnOnce(&str) -> String) -> Result<
     let Some(sum) = form.digits(text.as_bytes())? else {
         return Ok(Unsealed { text: text.to_owned(), had_seal: false });
     };
-    // The suffix is ASCII, so that a character begins behind it.
+    // The suffix is ASCII, so a character begins behind it.
     let text = whole(&text[form.len()..]);
     if crc32fast::hash(text.as_bytes()) == sum { Ok(Unsealed { text, had_seal: true }) } else { Err(BrokenSeal) }
 }
 
-/// The checksum of `bytes` as it is written.
+/// Returns the checksum of `bytes` in its written form.
 pub(super) fn digits_of(bytes: &[u8]) -> String {
     format!("{:08x}", crc32fast::hash(bytes))
 }
@@ -133,7 +133,7 @@ mod tests {
         let flip = move |at: usize| {
             let mut bytes = bytes.clone();
             bytes[at / 8] ^= 1 << (at % 8);
-            // A file of text that is not UTF-8 is refused before anybody looks for a seal.
+            // A text that is not UTF-8 is refused before the seal is checked.
             String::from_utf8(bytes).ok()
         };
         (0..text.len() * 8).filter_map(flip)
@@ -150,7 +150,7 @@ mod tests {
     #[test]
     fn no_part_is_accepted() {
         let sealed = seal_json(r#"{"step":8}"#);
-        // Less than a seal is no JSON object.
+        // Less than a seal is not a JSON object.
         assert!((JSON.len() - ALMOST..sealed.len()).all(|length| unseal_json(&sealed[..length]).is_err()));
         let sealed = seal_text("(a: 1)\n");
         assert!((COMMENT.len() - ALMOST..sealed.len()).all(|length| unseal_text(&sealed[..length]).is_err()));

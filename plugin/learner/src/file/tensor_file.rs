@@ -11,16 +11,17 @@ use std::path::{Path, PathBuf};
 /// The header entry that holds the description.
 const DESCRIPTION: &str = "playbot";
 
-/// The entry of the description that holds the checksum of the whole file, where its digits are zeros.
+/// The entry of the description that holds the checksum of the whole file, computed with zeros in place of its
+/// digits.
 pub(super) const SEAL: &str = "crc32";
 
-/// A file with a checksum begins so, behind the eight bytes that say how long the header is.
+/// Start of a file with a checksum, behind the eight bytes with the length of the header.
 const FORM: Form = Form { prefix: br#"{"__metadata__":{"playbot":"{\"crc32\":\""#, suffix: br#"\","# };
 
-/// What stands for a checksum that is not known yet.
+/// Placeholder of a checksum that is not known yet.
 const NO_SUM: &[u8; 8] = b"00000000";
 
-/// Bytes that say how long the header is.
+/// Bytes that hold the length of the header.
 const LENGTH: usize = 8;
 
 /// A tensor in host memory.
@@ -40,7 +41,7 @@ pub(crate) struct TensorFile {
 }
 
 impl TensorFile {
-    /// An empty file for `path` with `description`, which is JSON, in its header.
+    /// Creates an empty file for `path` with `description`, which is JSON, in its header.
     pub(super) fn empty(path: &Path, description: String) -> Self {
         Self { path: path.to_owned(), description, tensors: BTreeMap::new() }
     }
@@ -86,7 +87,7 @@ impl TensorFile {
         })
     }
 
-    /// The file as it is written.
+    /// Returns the bytes of the file.
     pub(crate) fn to_bytes(&self) -> Result<Vec<u8>, FileError> {
         let views: Result<Vec<_>, _> = self
             .tensors
@@ -108,8 +109,8 @@ impl TensorFile {
         Self::parse(path, &bytes)
     }
 
-    /// Takes a whole file from memory; `path` is for messages. Its checksum is looked at before anything else, if it has one:
-    /// those that older versions wrote have none.
+    /// Parses a whole file from memory; `path` is for messages. Its checksum, if it has one, is verified first: older
+    /// versions wrote none.
     pub(crate) fn parse(path: &Path, bytes: &[u8]) -> Result<Self, FileError> {
         let is_whole = is_whole(bytes);
         let other = |detail: String| FileError::Foreign { path: path.to_owned(), detail };
@@ -117,7 +118,7 @@ impl TensorFile {
             SafeTensorError::HeaderTooSmall
             | SafeTensorError::InvalidHeaderLength
             | SafeTensorError::MetadataIncompleteBuffer => FileError::CutOff { path: path.to_owned(), advice: "" },
-            // What stands where the length of the header should be is of another kind of file, and says nothing.
+            // These bytes are no header length: the file is of another kind.
             SafeTensorError::HeaderTooLarge
             | SafeTensorError::InvalidHeader(_)
             | SafeTensorError::InvalidHeaderDeserialization(_) => {
@@ -195,17 +196,18 @@ impl TensorFile {
         }
     }
 
-    /// Whether this tensor has not been taken out yet.
+    /// Returns whether this tensor has not been taken out yet.
     pub(crate) fn has(&self, name: &str) -> bool {
         self.tensors.contains_key(name)
     }
 
-    /// The file's name.
+    /// Returns the file's name.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The product of `sizes`, each of which must be at least 1; an error that names `what` if it is beyond all files.
+    /// Returns the product of `sizes`, each at least 1, or an error that names `what` if the product exceeds any
+    /// file.
     pub(crate) fn product(&self, what: &str, sizes: &[usize]) -> Result<usize, FileError> {
         if sizes.contains(&0) {
             return Err(self.format(format!("`{what}` has a size of 0")));
@@ -215,7 +217,7 @@ impl TensorFile {
         product.ok_or_else(|| self.format(format!("`{what}` cannot be as large as its description says: {sizes:?}")))
     }
 
-    /// `Ok` if the tensor `name` is there and has `shape`.
+    /// Checks that the tensor `name` is there and has `shape`.
     fn expect(&self, name: &str, shape: &[usize]) -> Result<(), FileError> {
         let Some(stored) = self.tensors.get(name) else {
             return Err(FileError::MissingTensor { path: self.path.clone(), name: name.to_owned() });
@@ -231,12 +233,12 @@ impl TensorFile {
         })
     }
 
-    /// An error about this file's contents.
+    /// Returns an error about this file's contents.
     pub(crate) fn format(&self, detail: String) -> FileError {
         FileError::Format { path: self.path.clone(), detail }
     }
 
-    /// An error of what the contents describe.
+    /// Returns an error about the described learner.
     pub(crate) fn learner(&self, source: LearnError) -> FileError {
         FileError::Learner { path: self.path.clone(), source }
     }
@@ -256,7 +258,7 @@ impl TensorFile {
     }
 }
 
-/// Whether the checksum of a file is that of its bytes; `None` if it has none.
+/// Returns whether the checksum of a file matches its bytes; `None` without one.
 fn is_whole(bytes: &[u8]) -> Option<bool> {
     let header = bytes.get(LENGTH..).unwrap_or_default();
     match FORM.digits(header) {

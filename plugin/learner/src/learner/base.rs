@@ -1,4 +1,4 @@
-//! What every learner has beside its networks and their optimizers.
+//! The common part of all learners, besides networks and optimizers.
 
 use crate::norm::{ObsNormalizer, ObsStats, RewardNormalizer};
 use crate::policy::{Actor, Critic, Policy, StateBatch};
@@ -8,7 +8,7 @@ use crate::{DeviceKind, LearnError, PolicySpec};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// The common part of all learners: what the policy reads and does, the skill model that it is tied to, normalisers,
+/// The common part of all learners: the policy's inputs and outputs, the skill model that it is tied to, normalisers,
 /// random numbers, and the device.
 #[derive(Debug)]
 pub struct LearnerBase {
@@ -18,18 +18,18 @@ pub struct LearnerBase {
     pub(crate) rewards: Option<RewardNormalizer>,
     pub(crate) observations: Option<ObsNormalizer>,
     pub(crate) streams: Streams,
-    /// Rollouts learned from.
+    /// Number of rollouts learned from.
     pub(crate) updates: u64,
     pub(crate) device: DeviceKind,
-    /// Time spent putting minibatches together since this learner was made.
+    /// Time spent assembling minibatches since this learner was made.
     pub(crate) gathering: Duration,
 }
 
 impl LearnerBase {
-    /// A learner's base before its first update; `norm_obs`: it normalises observations itself.
+    /// Creates a learner's base before its first update; `norm_obs`: the learner normalises observations itself.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work.
+    /// [`LearnError::Config`] for impossible settings.
     pub(crate) fn new(
         spec: PolicySpec,
         teacher: Option<Teacher>,
@@ -56,39 +56,40 @@ impl LearnerBase {
         })
     }
 
-    /// The settings of SCORE, with a skill model.
+    /// Returns the settings of SCORE, with a skill model.
     pub(crate) fn score_config(&self) -> Option<&ScoreConfig> {
         self.teacher.as_ref().map(|teacher| &teacher.config)
     }
 
-    /// The skill model, if the policy starts as a copy of its decoder.
+    /// Returns the skill model, if the policy starts as a copy of its decoder.
     pub(crate) fn copied_teacher(&self) -> Option<&Teacher> {
         self.teacher.as_ref().filter(|teacher| teacher.is_copied())
     }
 
-    /// The prior, for a policy over skills that starts as it.
+    /// Returns the prior, for a policy over skills that starts as it.
     pub(crate) fn prior_origin(&self) -> Option<&Actor> {
         self.teacher.as_ref().filter(|teacher| !teacher.tied_to.is_decoder()).map(Teacher::origin)
     }
 
-    /// Width of the skills that a rollout must hold.
+    /// Returns the width of the skills that a rollout must hold.
     pub(crate) fn rollout_latent(&self) -> usize {
         self.teacher.as_ref().map_or(self.spec.latent, Teacher::rollout_latent)
     }
 
-    /// How the networks see observations now: through the frozen normaliser of the skill model if that has one, else
-    /// through the learner's own running one, else raw.
+    /// Returns the present normalisation of the networks' observations: the frozen normaliser of the skill model if
+    /// that has one, else the learner's own running one, else `None`.
     pub(crate) fn obs_stats(&self) -> Option<Arc<ObsStats>> {
         let frozen = self.teacher.as_ref().and_then(|teacher| teacher.stats.clone());
         frozen.or_else(|| self.observations.as_ref().map(|normalizer| Arc::new(normalizer.snapshot())))
     }
 
-    /// A snapshot of networks that sees observations as they do now.
+    /// Returns a snapshot of networks with the present normalisation of observations.
     pub(crate) fn snapshot(&self, actor: &Actor, critic: Option<&Critic>) -> Policy {
         Policy::new(actor, critic, self.obs_stats(), self.spec, self.device.plain())
     }
 
-    /// Mean divergence between decoder and `policy`, as [`Learner::initial_kl`](super::Learner::initial_kl) gives it.
+    /// Returns the mean divergence between decoder and `policy`, as
+    /// [`Learner::initial_kl`](super::Learner::initial_kl) does.
     pub(crate) fn initial_kl(
         &self,
         policy: &Policy,

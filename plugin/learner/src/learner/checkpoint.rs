@@ -31,11 +31,11 @@ struct Header<C, K> {
 }
 
 impl LearnerBase {
-    /// A checkpoint of this `kind`: settings, counters, what `put` adds of the algorithm's own (networks, moments,
-    /// ...), the frozen decoder and prior, and the normalisers.
+    /// Writes a checkpoint of this `kind`: settings, counters, the algorithm's own tensors from `put` (networks,
+    /// moments, ...), the frozen decoder and prior, and the normalisers.
     ///
     /// # Errors
-    /// [`FileError::Learner`] if a device does not give its numbers.
+    /// [`FileError::Learner`] if a device does not return its numbers.
     pub(crate) fn checkpoint(
         &self,
         path: &Path,
@@ -79,10 +79,10 @@ pub(crate) struct Checkpoint<C, K> {
 }
 
 impl<C: DeserializeOwned, K: DeserializeOwned> Checkpoint<C, K> {
-    /// A checkpoint of this `kind` in `file`; takes the frozen decoder and prior out of it.
+    /// Reads a checkpoint of this `kind` from `file`, and takes the frozen decoder and prior out of it.
     ///
     /// # Errors
-    /// [`FileError`] says what is wrong with the file, or names the tensor that is missing or misshapen.
+    /// [`FileError`] describes the problem of the file, or names the tensor that is missing or misshapen.
     pub(crate) fn of(mut file: TensorFile, kind: FileKind, device: DeviceKind) -> Result<Self, FileError> {
         device.check().map_err(|e| file.learner(e))?;
         let Header { config, spec, score, skill, tied_to, seed, updates, counters }: Header<C, K> =
@@ -94,7 +94,7 @@ impl<C: DeserializeOwned, K: DeserializeOwned> Checkpoint<C, K> {
         Ok(Self { file, config, counters, spec, teacher, seed, updates })
     }
 
-    /// Puts the common state back into a learner that has taken everything else.
+    /// Restores the common state of a learner that has taken out everything else.
     ///
     /// # Errors
     /// [`FileError`] names a tensor that is missing, misshapen or superfluous.

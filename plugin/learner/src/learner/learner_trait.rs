@@ -1,4 +1,4 @@
-//! A learner of any kind, as training needs it.
+//! The interface of every learner to training.
 
 use super::LearnerBase;
 use crate::policy::Policy;
@@ -26,83 +26,83 @@ use std::time::Duration;
 /// # Ok::<(), playbot_learner::LearnError>(())
 /// ```
 pub trait Learner: Debug + Send {
-    /// What it has in common with all learners.
+    /// Returns the common part of all learners.
     fn base(&self) -> &LearnerBase;
 
-    /// A snapshot of the policy that shall play now.
+    /// Returns a snapshot of the policy that plays next.
     fn policy(&self) -> Policy;
 
     /// Learns from a rollout.
     ///
     /// # Errors
-    /// [`LearnError`] if it does not fit, or names what ran away.
+    /// [`LearnError`] if it does not fit, or names the number that diverged.
     fn learn(&mut self, rollout: &Rollout) -> Result<LearnerMetrics, LearnError>;
 
-    /// Mean divergence between decoder and policy over `n` rows, in nats: exactly 0 for a policy that is still a copy of
-    /// the decoder. `None` without a skill model.
+    /// Returns the mean divergence between decoder and policy over `n` rows, in nats: exactly 0 for a policy that is
+    /// still a copy of the decoder. `None` without a skill model.
     ///
     /// # Errors
     /// [`LearnError::InitialKl`] if the policy should be a copy ([`ScoreConfig::init_from_decoder`], and it was not
     /// trained yet) and the divergence is not exactly 0; [`LearnError::Shape`].
     fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError>;
 
-    /// Writes everything that is needed to go on bit for bit. Under a temporary name first, so that a checkpoint is whole
-    /// or not there.
+    /// Writes the complete state, so that training continues bit for bit. The file gets a temporary name first, so a
+    /// checkpoint is complete or absent.
     ///
     /// # Errors
     /// [`FileError::Io`] if it cannot be written.
     fn save(&self, path: &Path) -> Result<(), FileError>;
 
-    /// Sets over how many updates a falling learning rate falls, for a training that shall go on for longer. Does nothing
-    /// for learners whose learning rate does not fall.
+    /// Sets the number of updates over which a decreasing learning rate decreases, for a run that is extended. Has no
+    /// effect on learners with a constant learning rate.
     fn set_total_updates(&mut self, _: Option<u64>) {}
 
-    /// What the policy reads and does. With a skill model rollouts need skills also where `latent` is 0
+    /// Returns the inputs and outputs of the policy. With a skill model rollouts need skills even if `latent` is 0
     /// ([`Self::rollout_latent`]).
     fn spec(&self) -> PolicySpec {
         self.base().spec
     }
 
-    /// Width of the skills that a rollout must hold.
+    /// Returns the width of the skills that a rollout must hold.
     fn rollout_latent(&self) -> usize {
         self.base().rollout_latent()
     }
 
-    /// Rollouts learned from.
+    /// Returns the number of rollouts learned from.
     fn updates(&self) -> u64 {
         self.base().updates
     }
 
-    /// The seed.
+    /// Returns the seed.
     fn seed(&self) -> u64 {
         self.base().streams.seed()
     }
 
-    /// Time spent putting minibatches together, out of rollouts or a replay buffer, since this learner was made. It is not
-    /// saved.
+    /// Returns the time spent assembling minibatches, out of rollouts or a replay buffer, since this learner was
+    /// made. It is not saved.
     fn gathering(&self) -> Duration {
         self.base().gathering
     }
 
-    /// The settings of SCORE, with a skill model.
+    /// Returns the settings of SCORE, with a skill model.
     fn score_config(&self) -> Option<&ScoreConfig> {
         self.base().score_config()
     }
 
-    /// Where skills come from, by [`ScoreConfig::prior`]; `None` without a skill model.
+    /// Returns the source of skills, by [`ScoreConfig::prior`]; `None` without a skill model.
     fn prior(&self) -> Option<Prior> {
         let base = self.base();
         base.teacher.as_ref().map(|teacher| teacher.prior(base.device))
     }
 
-    /// Where the policy's skills come from, and its decoder; `None` without a skill model.
+    /// Returns the source of the policy's skills, and its decoder; `None` without a skill model.
     fn skills(&self) -> Option<SkillSource> {
         let base = self.base();
         base.teacher.as_ref().map(|teacher| teacher.source(base.device))
     }
 }
 
-/// What an update of any learner reports: numbers by their TensorBoard tags.
+/// The metrics of an update of any learner: numbers by their TensorBoard tags.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LearnerMetrics {
     scalars: Vec<(&'static str, f64)>,
@@ -113,7 +113,7 @@ impl LearnerMetrics {
         Self { scalars }
     }
 
-    /// The numbers by their tags; what was not measured is left out.
+    /// Returns the numbers by their tags; unmeasured ones are left out.
     pub fn scalars(&self) -> impl Iterator<Item = (&'static str, f64)> {
         self.scalars.iter().copied()
     }

@@ -1,4 +1,4 @@
-//! What all learners have in common: the trait by which they are trained, and the frame that they are built on.
+//! The common interface and frame of all learners.
 
 mod base;
 mod checkpoint;

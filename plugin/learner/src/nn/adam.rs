@@ -42,8 +42,8 @@ impl Default for AdamConfig {
 
 /// Adam with one step counter for all parameters.
 ///
-/// The moments live on the host, by parameter name, so that a checkpoint holds all of the state; those of a network that is
-/// trained on a graphics card live there, and are read when a checkpoint is written.
+/// The moments live on the host, by parameter name, so that a checkpoint holds the whole state. For a network on a
+/// graphics card they live there, and are read when a checkpoint is written.
 #[derive(Clone, Debug)]
 pub struct Adam {
     pub(crate) config: AdamConfig,
@@ -54,22 +54,22 @@ pub struct Adam {
 }
 
 impl Adam {
-    /// An optimizer that has seen nothing.
+    /// Creates an optimizer without any state.
     pub fn new(config: AdamConfig) -> Self {
         Self { config, steps: 0, moments: BTreeMap::new(), flat: None }
     }
 
-    /// Steps done.
+    /// Returns the number of steps done.
     pub fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// First and second moment of the parameter called `name`, if it was ever updated.
+    /// Returns the first and second moment of the parameter called `name`, if it was ever updated.
     pub fn moments(&self, name: &str) -> Option<(&[f32], &[f32])> {
         self.moments.get(name).map(|moments| (moments.m.as_slice(), moments.v.as_slice()))
     }
 
-    /// First and second moments of each parameter by name, in host memory.
+    /// Returns first and second moments of each parameter by name, in host memory.
     ///
     /// # Errors
     /// [`LearnError::Device`] if they cannot be read from a graphics card.
@@ -80,14 +80,14 @@ impl Adam {
         }
     }
 
-    /// Puts back the moments of a parameter from a checkpoint.
+    /// Restores the moments of a parameter from a checkpoint.
     pub(crate) fn restore(&mut self, name: String, shape: Vec<usize>, m: Vec<f32>, v: Vec<f32>) {
         self.moments.insert(name, Moments { shape, m, v });
     }
 
-    /// One step with learning rate `lr` and all gradients times `scale` (see [`NamedGrads::clip_factor`]).
+    /// Does one step with learning rate `lr` and all gradients times `scale` (see [`NamedGrads::clip_factor`]).
     ///
-    /// The parameters stay tracked. Parameters without an entry in `grads` stay as they are.
+    /// The parameters stay tracked. Parameters without an entry in `grads` are unchanged.
     ///
     /// # Errors
     /// [`LearnError::NotFinite`] names the first weight that stopped being finite; [`LearnError::Config`] names the first
@@ -135,9 +135,9 @@ impl<'a, I: Iterator<Item = (&'a str, &'a [f32])>> ParamVisitor for Step<'a, I> 
         if self.error.is_some() {
             return;
         }
-        // Both come in the order of the network, so that the next gradient is this one's or that of a later parameter.
+        // Both come in the order of the network, so the next gradient is this one's or that of a later parameter.
         let Some((_, grad)) = self.grads.next_if(|(of, _)| *of == name) else { return };
-        // Taken out of the network, so that its numbers are changed in place if nobody shares them.
+        // Taken out of the network, so that its numbers are changed in place unless they are shared.
         let device = tensor.device().inner();
         let plain = std::mem::replace(tensor, Tensor::empty([0; D], &device)).inner();
         match plain.try_into_data_as::<f32>() {
@@ -183,9 +183,9 @@ struct Formula {
     /// 1 - β of each moment.
     gain: (f32, f32),
     eps: f32,
-    /// Of the gradient.
+    /// Factor of the gradient.
     scale: f32,
-    /// What is left of a weight after its decay.
+    /// Factor of a weight after its decay.
     decay: f32,
     /// The learning rate with the first moment's bias correction.
     rate: f32,
@@ -207,7 +207,7 @@ impl Formula {
         }
     }
 
-    /// Updates weights and moments, and says whether all weights are finite.
+    /// Updates weights and moments, and returns whether all weights are finite.
     fn apply(&self, weights: &mut [f32], grad: &[f32], m: &mut [f32], v: &mut [f32]) -> bool {
         // 0 for finite numbers, NaN otherwise.
         let mut witness = [0.0f32; LANES];
@@ -215,7 +215,7 @@ impl Formula {
         witness.iter().sum::<f32>() == 0.0
     }
 
-    /// Updates one weight and its moments, and gives 0 if it is finite.
+    /// Updates one weight and its moments, and returns 0 if it is finite.
     #[inline(always)]
     fn apply_to(&self, w: &mut f32, g: f32, m: &mut f32, v: &mut f32) -> f32 {
         let Self { beta, gain, eps, scale, decay, rate, correction } = *self;

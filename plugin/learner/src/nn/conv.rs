@@ -1,5 +1,7 @@
 //! Convolution and pooling over images `[n, channels, height, width]`.
 
+use super::cpu::trunk::Conv;
+pub use super::cpu::trunk::window_places;
 use super::params::{ParamVisitor, Parameters, path};
 use super::source::{Init, ParamSource, RandomInit};
 use burn::tensor::module::{conv2d, max_pool2d};
@@ -14,15 +16,15 @@ pub struct Conv2d {
     pub weight: Tensor<4>,
     /// `[outputs]`.
     pub bias: Tensor<1>,
-    /// Pixels from one place of the kernel to the next.
+    /// Pixels from one position of the kernel to the next.
     pub stride: usize,
     /// Zeros around the image.
     pub padding: usize,
 }
 
 impl Conv2d {
-    /// `inputs` to `outputs` channels, stride 1, no padding. Orthogonal weights times `gain` (one row of the matrix per
-    /// output channel), zero bias.
+    /// Creates a layer of `inputs` to `outputs` channels, stride 1, no padding. Orthogonal weights times `gain` (one
+    /// row of the matrix per output channel), zero bias.
     pub fn new<R: Rng + ?Sized>(
         inputs: usize,
         outputs: usize,
@@ -35,7 +37,7 @@ impl Conv2d {
         layer
     }
 
-    /// [`Self::new`] with parameters out of `source`.
+    /// Creates a layer as [`Self::new`], with parameters out of `source`.
     pub(crate) fn build<S: ParamSource>(
         source: &mut S,
         prefix: &str,
@@ -53,17 +55,22 @@ impl Conv2d {
         })
     }
 
-    /// The same layer with another stride.
+    /// Sets another stride.
     pub fn with_stride(self, stride: usize) -> Self {
         Self { stride, ..self }
     }
 
-    /// The same layer with zeros around the image.
+    /// Sets the zeros around the image.
     pub fn with_padding(self, padding: usize) -> Self {
         Self { padding, ..self }
     }
 
-    /// `[n, inputs, height, width]` to `[n, outputs, height', width']`, each side by [`window_places`].
+    /// Returns the layer as the kernels read it.
+    pub(super) fn view(&self) -> Conv<'_> {
+        Conv { weight: &self.weight, bias: &self.bias, stride: self.stride, padding: self.padding }
+    }
+
+    /// Maps `[n, inputs, height, width]` to `[n, outputs, height', width']`, each side by [`window_places`].
     pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
         let options = ConvOptions::new([self.stride; 2], [self.padding; 2], [1; 2], 1);
         conv2d(x, self.weight.clone(), Some(self.bias.clone()), options)
@@ -77,16 +84,10 @@ impl Parameters for Conv2d {
     }
 }
 
-/// The largest number in each square of `kernel` pixels; padding never wins.
+/// Returns the largest number in each square of `kernel` pixels; padding is never the largest.
 pub fn max_pool(x: Tensor<4>, kernel: usize, stride: usize, padding: usize) -> Tensor<4> {
     let options = MaxPoolOptions::new([kernel; 2]).with_stride([stride; 2]).with_padding([padding; 2]);
     max_pool2d(x, options)
-}
-
-/// How many places a kernel or pooling window takes along a side of `size` pixels; `None` if it does not fit once.
-pub fn window_places(size: usize, kernel: usize, stride: usize, padding: usize) -> Option<usize> {
-    let room = size.saturating_add(2 * padding).checked_sub(kernel)?;
-    Some(room / stride + 1)
 }
 
 #[cfg(test)]

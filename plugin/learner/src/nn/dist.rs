@@ -68,13 +68,13 @@ impl ActionBatch {
 }
 
 impl Dist {
-    /// The categorical distributions of `logits` `[n, choices]`.
+    /// Creates the categorical distributions of `logits` `[n, choices]`.
     pub fn categorical(logits: Tensor<2>) -> Self {
         let on_host = is_host(&logits.device()) && !logits.dims().contains(&0);
         Self::Categorical { log_probs: if on_host { kernels::log_softmax(logits) } else { log_softmax(logits, 1) } }
     }
 
-    /// Log-probability (or log-density, summed over dimensions) of one action per row, `[n]`.
+    /// Returns the log-probability (or log-density, summed over dimensions) of one action per row, `[n]`.
     ///
     /// # Errors
     /// [`LearnError::Action`] if the actions are of the other kind.
@@ -92,8 +92,8 @@ impl Dist {
         }
     }
 
-    /// Entropy in nats, `[n]` (or `[1]` if it is the same for all rows), summed over dimensions. That of a Gaussian is
-    /// Σ (ln σ + ½ ln 2πe), which may be negative.
+    /// Returns the entropy in nats, `[n]` (or `[1]` if it is the same for all rows), summed over dimensions. That of
+    /// a Gaussian is Σ (ln σ + ½ ln 2πe), which may be negative.
     pub fn entropy(&self) -> Tensor<1> {
         match self {
             Self::Categorical { log_probs } => {
@@ -104,7 +104,7 @@ impl Dist {
         }
     }
 
-    /// KL(self ‖ other) in nats per row, `[n]`, summed over dimensions. Exactly 0 for equal parameters.
+    /// Returns KL(self ‖ other) in nats per row, `[n]`, summed over dimensions. Exactly 0 for equal parameters.
     ///
     /// Categorical: Σ p (ln p - ln q). Gaussian, per dimension:
     /// ln σ_q - ln σ_p + (σ_p² / σ_q² + (μ_p - μ_q)² / σ_q² - 1) / 2.
@@ -127,7 +127,7 @@ impl Dist {
         }
     }
 
-    /// The same numbers, which no gradient goes through.
+    /// Returns the same numbers without gradients.
     #[must_use]
     pub(crate) fn detach(self) -> Self {
         match self {
@@ -136,7 +136,7 @@ impl Dist {
         }
     }
 
-    /// Some of the rows, which may repeat.
+    /// Returns some of the rows, which may repeat.
     pub(crate) fn select(&self, rows: &Tensor<1, Int>) -> Self {
         let of = |values: &Tensor<2>| values.clone().select(0, rows.clone());
         match self {
@@ -179,7 +179,7 @@ pub struct HostDist {
 }
 
 impl HostDist {
-    /// The distributions of `rows` as constants on `device`.
+    /// Returns the distributions of `rows` as constants on `device`.
     pub fn rows(&self, rows: &[usize], device: &Device) -> Dist {
         let gather = |values: &[f32]| {
             let mut out = vec![0.0; rows.len() * self.dim];

@@ -4,20 +4,20 @@ use super::HostDist;
 use super::cpu::fast_math::exp_of;
 use std::ops::Range;
 
-/// What a loss reads of a row; or the loss's derivatives by these.
+/// The terms of a row that a loss reads, or the loss's derivatives by these.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct RowTerms {
     /// Log-probability (or log-density) of the action.
     pub(crate) log_prob: f32,
     /// Entropy in nats.
     pub(crate) entropy: f32,
-    /// Divergence from another distribution in nats, or 0 if there is none.
+    /// Divergence from another distribution in nats; 0 without one.
     pub(crate) kl: f32,
 }
 
 /// Some rows of distributions, with an action each.
 pub(crate) trait DistRows {
-    /// Of one row.
+    /// Returns the terms of one row.
     fn terms(&self, row: usize) -> RowTerms;
 
     /// Writes the loss's derivatives by the row's log-probabilities or means into `head`, and adds those by its ln σ to
@@ -25,7 +25,7 @@ pub(crate) trait DistRows {
     fn gradient(&self, row: usize, by: RowTerms, head: &mut [f32], log_std: &mut [f32]);
 }
 
-/// Choices.
+/// Categorical distributions.
 #[derive(Debug)]
 pub(crate) struct CategoricalRows<'a> {
     choices: usize,
@@ -33,20 +33,20 @@ pub(crate) struct CategoricalRows<'a> {
     probs: Vec<f32>,
     actions: &'a [u32],
     other: Option<OtherChoices<'a>>,
-    /// Whether the divergence is KL(these ‖ other), and not KL(other ‖ these).
+    /// True if the divergence is KL(these ‖ other), and not KL(other ‖ these).
     from_these: bool,
 }
 
 #[derive(Debug)]
 struct OtherChoices<'a> {
     log_probs: &'a [f32],
-    /// Where the divergence is taken from these.
+    /// The probabilities by which the divergence is weighted.
     probs: Vec<f32>,
 }
 
 impl<'a> CategoricalRows<'a> {
-    /// Some `rows` of a distribution with an action in each row, and of the one that it is compared with, if any:
-    /// `from_these` as in KL(these ‖ other), and not KL(other ‖ these).
+    /// Creates `rows` of a distribution with an action in each row, and of the compared distribution, if any:
+    /// `from_these` for KL(these ‖ other), and not KL(other ‖ these).
     pub(crate) fn new(
         these: &'a HostDist,
         actions: &'a [u32],
@@ -97,7 +97,7 @@ impl DistRows for CategoricalRows<'_> {
     }
 }
 
-/// Independent normal numbers.
+/// Independent normal distributions.
 #[derive(Debug)]
 pub(crate) struct GaussianRows<'a> {
     dim: usize,
@@ -105,9 +105,9 @@ pub(crate) struct GaussianRows<'a> {
     these: (&'a [f32], &'a [f32]),
     /// `[n, dim]`.
     actions: &'a [f32],
-    /// As `these`.
+    /// Means and ln σ of the compared distribution, as `these`.
     other: Option<(&'a [f32], &'a [f32])>,
-    /// Whether the divergence is KL(these ‖ other), and not KL(other ‖ these).
+    /// True if the divergence is KL(these ‖ other), and not KL(other ‖ these).
     from_these: bool,
 }
 
@@ -115,7 +115,7 @@ pub(crate) struct GaussianRows<'a> {
 const HALF_LN_TAU: f32 = 0.918_938_5;
 
 impl<'a> GaussianRows<'a> {
-    /// As [`CategoricalRows::new`].
+    /// Creates the rows as [`CategoricalRows::new`] does.
     pub(crate) fn new(
         these: &'a HostDist,
         actions: &'a [f32],
@@ -131,7 +131,7 @@ impl<'a> GaussianRows<'a> {
         Self { dim, these: numbers(these), actions: &actions[at.clone()], other: other.map(numbers), from_these }
     }
 
-    /// The numbers of each dimension of a row: mean, ln σ and action, and the other's mean and ln σ.
+    /// Returns the numbers of each dimension of a row: mean, ln σ and action, and the other's mean and ln σ.
     fn dims(&self, row: usize) -> impl Iterator<Item = ([f32; 3], Option<[f32; 2]>)> {
         (row * self.dim..(row + 1) * self.dim).map(|at| {
             let other = self.other.map(|(means, stds)| [means[at], stds[at]]);

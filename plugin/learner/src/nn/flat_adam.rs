@@ -1,4 +1,4 @@
-//! Adam where the parameters are: on a graphics card, without reading anything back.
+//! Adam on the device of the parameters: on a graphics card, without reading anything back.
 
 use super::Adam;
 use super::moments::FlatMoments;
@@ -6,9 +6,10 @@ use super::params::{ParamVisitor, Parameters};
 use burn::tensor::{Gradients, Tensor};
 
 impl Adam {
-    /// As [`Adam::step`] after clipping by the global norm, which is returned, `[1]`. The moments stay on the network's device.
+    /// Does [`Adam::step`] after clipping by the global norm, which is returned, `[1]`. The moments stay on the
+    /// network's device.
     ///
-    /// The norm is not finite if a gradient is not; whoever reads it knows that the weights are lost then.
+    /// If a gradient is not finite, the returned norm is not finite, and the weights are lost.
     pub(crate) fn step_on_device<M: Parameters>(
         &mut self,
         network: &mut M,

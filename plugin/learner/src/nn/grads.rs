@@ -6,7 +6,7 @@ use crate::LearnError;
 use burn::tensor::{Gradients, Tensor, TensorData};
 use rayon::prelude::*;
 
-/// Numbers up to which a second thread costs more than it saves.
+/// Size up to which a second thread costs more than it saves.
 const FEW: usize = 1 << 17;
 
 /// The gradients of a network's parameters on the host, in the order of [`Parameters::visit`].
@@ -17,7 +17,7 @@ pub struct NamedGrads {
 
 impl Drop for NamedGrads {
     fn drop(&mut self) {
-        // The next step's gradients are written into the same memory.
+        // The next step's gradients reuse the memory.
         for (_, values) in self.entries.drain(..) {
             if let Ok(numbers) = values.try_into_vec::<f32>() {
                 KeptMemory::leave(numbers);
@@ -27,7 +27,7 @@ impl Drop for NamedGrads {
 }
 
 impl NamedGrads {
-    /// Reads the gradient of every parameter of `network`, zeros where the loss does not depend on it.
+    /// Reads the gradient of every parameter of `network`; zeros if the loss does not depend on it.
     ///
     /// # Errors
     /// [`LearnError::Device`] if a tensor cannot be read.
@@ -37,7 +37,7 @@ impl NamedGrads {
         reader.finish()
     }
 
-    /// As [`Self::read`], but takes the gradients away from `grads`, which saves a copy of each.
+    /// Reads the gradients as [`Self::read`], but takes them away from `grads`, which saves a copy of each.
     ///
     /// # Errors
     /// [`LearnError::Device`] if a tensor cannot be read.
@@ -47,7 +47,7 @@ impl NamedGrads {
         reader.finish()
     }
 
-    /// Adds those of the same network for other rows; to none yet, these are they.
+    /// Adds the gradients of the same network for other rows. Added to an empty set, they become the set.
     pub(crate) fn add(&mut self, more: Self) {
         if self.entries.is_empty() {
             *self = more;
@@ -59,17 +59,17 @@ impl NamedGrads {
         }
     }
 
-    /// The gradients, by name.
+    /// Returns the gradients, by name.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &[f32])> {
         self.entries.iter().map(|(name, values)| (name.as_str(), numbers(values)))
     }
 
-    /// The gradient of the parameter called `name`.
+    /// Returns the gradient of the parameter called `name`.
     pub fn get(&self, name: &str) -> Option<&[f32]> {
         self.iter().find(|(n, _)| *n == name).map(|(_, values)| values)
     }
 
-    /// The Euclidean norm over all gradients together.
+    /// Returns the Euclidean norm over all gradients together.
     pub fn norm(&self) -> f64 {
         let sum_of = |(_, values): &(String, TensorData)| square_sum(numbers(values));
         let all: usize = self.entries.iter().map(|(_, values)| values.num_elements()).sum();
@@ -82,7 +82,7 @@ impl NamedGrads {
         sums.iter().sum::<f64>().sqrt()
     }
 
-    /// The factor that brings a total norm down to `max_norm`: min(1, max_norm / (norm + 1e-6)).
+    /// Returns the factor that scales a total norm down to `max_norm`: min(1, max_norm / (norm + 1e-6)).
     ///
     /// # Errors
     /// [`LearnError::NotFinite`] names the first gradient that is not finite.
@@ -97,7 +97,7 @@ impl NamedGrads {
     }
 }
 
-/// Sum of squares in double precision, over eight lanes so that the compiler can vectorise it.
+/// Returns the sum of squares in double precision, over eight lanes so that the compiler can vectorise it.
 fn square_sum(values: &[f32]) -> f64 {
     let mut lanes = [0.0f64; 8];
     let chunks = values.chunks_exact(8);

@@ -32,7 +32,7 @@ pub struct Gru {
 }
 
 impl Gru {
-    /// Weights and biases uniform in ±1/√hidden.
+    /// Creates a stack with weights and biases uniform in ±1/√hidden.
     pub fn new<R: Rng + ?Sized>(
         inputs: usize,
         hidden: usize,
@@ -46,7 +46,7 @@ impl Gru {
         gru
     }
 
-    /// [`Self::new`] with parameters out of `source`.
+    /// Creates a stack as [`Self::new`], with parameters out of `source`.
     pub(crate) fn build<S: ParamSource>(
         source: &mut S,
         prefix: &str,
@@ -74,8 +74,8 @@ impl Gru {
     /// Runs over a sequence `[steps * B, inputs]`, time-major (row `t * B + b`), from `initial` states (one
     /// `[directions, B, hidden]` per layer) or zeros.
     ///
-    /// Gives the outputs of the last layer, `[steps * B, directions * hidden]` (forward features first), and the last
-    /// state of each layer, `[directions, B, hidden]`; the backward direction ends at the first time step.
+    /// Returns the outputs of the last layer, `[steps * B, directions * hidden]` (forward features first), and the
+    /// last state of each layer, `[directions, B, hidden]`; the backward direction ends at the first time step.
     pub fn forward(
         &self,
         sequence: Tensor<2>,
@@ -92,8 +92,8 @@ impl Gru {
         (sequence, last)
     }
 
-    /// `[B, directions * hidden]`: the last layer's forward output at the last step joined with its backward output
-    /// at the first step of the `sequence`, which is as in [`Self::forward`].
+    /// Returns `[B, directions * hidden]`: the last layer's forward output at the last step joined with its backward
+    /// output at the first step of the `sequence`, which is as in [`Self::forward`].
     pub fn summary(&self, sequence: Tensor<2>, steps: usize) -> Tensor<2> {
         let outputs = self.layers.iter().fold(sequence, |x, layer| layer.outputs(x, steps, None));
         match self.layers.last() {
@@ -104,7 +104,7 @@ impl Gru {
 }
 
 impl GruLayer {
-    /// The state after each step of `x` `[steps * B, inputs]`: `[steps * B, directions * hidden]`. The second
+    /// Returns the state after each step of `x` `[steps * B, inputs]`: `[steps * B, directions * hidden]`. The second
     /// direction reads the sequence backwards.
     fn outputs(&self, x: Tensor<2>, steps: usize, initial: Option<Tensor<3>>) -> Tensor<2> {
         let [directions, hidden, _] = self.weight_hh.dims();
@@ -122,7 +122,7 @@ impl GruLayer {
         })
     }
 
-    /// The last state of each direction, `[directions, B, hidden]`, taken from the outputs.
+    /// Returns the last state of each direction, `[directions, B, hidden]`, taken from the outputs.
     fn last_state(&self, outputs: &Tensor<2>, steps: usize) -> Tensor<3> {
         let [directions, hidden, _] = self.weight_hh.dims();
         let rows = outputs.dims()[0];
@@ -135,8 +135,8 @@ impl GruLayer {
     }
 }
 
-/// A layer in tensor operations, for devices without a kernel and as the kernel's yardstick:
-/// the same as [`kernels::gru`].
+/// Applies a layer in tensor operations, for devices without a kernel and as a reference for the kernel: the same as
+/// [`kernels::gru`].
 fn gru_steps(input: GruInput) -> Tensor<2> {
     let GruInput { x, weight_ih, weight_hh: weight, bias_ih, bias_hh, initial } = input;
     let [directions, batch, hidden] = initial.dims();
@@ -165,7 +165,7 @@ fn gru_steps(input: GruInput) -> Tensor<2> {
     Tensor::cat(parts.collect(), 1)
 }
 
-/// `[directions, B, hidden]` to `[B, directions * hidden]`.
+/// Maps `[directions, B, hidden]` to `[B, directions * hidden]`.
 fn join_directions(state: Tensor<3>) -> Tensor<2> {
     let [directions, batch, hidden] = state.dims();
     state.swap_dims(0, 1).reshape([batch, directions * hidden])
@@ -194,8 +194,8 @@ mod tests {
     const STEPS: usize = 4;
     const BATCH: usize = 3;
 
-    /// The outputs under `scan` and the gradients of everything that enters it, for a loss in which each output has
-    /// its own weight.
+    /// Returns the outputs under `scan` and the gradients of all its inputs, for a loss in which each output has its
+    /// own weight.
     fn run(
         scan: fn(GruInput) -> Tensor<2>,
         directions: usize,

@@ -3,6 +3,7 @@
 use super::params::{ParamVisitor, Parameters};
 use super::source::{ParamSource, RandomInit};
 use super::{Activation, Impala, Linear, Nature};
+use crate::settings::{Number, Numbers};
 use crate::{ImageShape, LearnError, ObsKind, among_workers};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
@@ -17,13 +18,13 @@ pub enum CnnKind {
         /// Channels of each stage.
         #[serde(default = "impala_channels")]
         channels: Vec<usize>,
-        /// Features.
+        /// Number of features.
         #[serde(default = "impala_feature")]
         feature: usize,
     },
     /// The three convolutions of the first deep Q-network; needs images of at least 36×36 pixels.
     Nature {
-        /// Features.
+        /// Number of features.
         #[serde(default = "nature_feature")]
         feature: usize,
     },
@@ -47,15 +48,21 @@ impl Default for CnnKind {
     }
 }
 
+impl Numbers for CnnKind {
+    fn numbers(&self) -> Vec<Number> {
+        vec![Number::Whole(self.smallest() as u64)]
+    }
+}
+
 impl CnnKind {
-    /// Numbers that an image becomes.
+    /// Returns the number of features of an image.
     pub fn features(&self) -> usize {
         match self {
             Self::Impala { feature, .. } | Self::Nature { feature } => *feature,
         }
     }
 
-    /// The smallest of the sizes, which must not be 0.
+    /// Returns the smallest of the sizes, which must not be 0.
     pub(crate) fn smallest(&self) -> usize {
         match self {
             Self::Impala { channels, feature } => channels.iter().copied().min().unwrap_or(1).min(*feature),
@@ -63,7 +70,7 @@ impl CnnKind {
         }
     }
 
-    /// `Ok` if such a network can read such images.
+    /// Checks that such a network can read such images.
     ///
     /// # Errors
     /// [`LearnError::Config`] if the image is too small for the architecture, or a size is 0.
@@ -79,7 +86,7 @@ impl CnnKind {
     }
 }
 
-/// Images to features.
+/// A network from images to features.
 #[derive(Clone, Debug)]
 pub enum ImageNet {
     /// The residual network of IMPALA.
@@ -89,7 +96,7 @@ pub enum ImageNet {
 }
 
 impl ImageNet {
-    /// Starting weights, orthogonal; for images of `image`.
+    /// Creates a network with orthogonal starting weights, for images of `image`.
     ///
     /// # Errors
     /// [`LearnError::Config`] if the image is too small for the architecture, or a size is 0.
@@ -104,8 +111,8 @@ impl ImageNet {
         Ok(net)
     }
 
-    /// [`Self::new`] with parameters out of `source`, for images that [`CnnKind::check_image`] allows or the source
-    /// refuses.
+    /// Creates a network as [`Self::new`], with parameters out of `source`, for images that [`CnnKind::check_image`]
+    /// allows or the source refuses.
     pub(crate) fn build<S: ParamSource>(
         source: &mut S,
         prefix: &str,
@@ -120,7 +127,7 @@ impl ImageNet {
         })
     }
 
-    /// Architecture and sizes.
+    /// Returns architecture and sizes.
     pub fn kind(&self) -> CnnKind {
         let feature = self.features();
         match self {
@@ -132,14 +139,14 @@ impl ImageNet {
         }
     }
 
-    /// Numbers that an image becomes.
+    /// Returns the number of features of an image.
     pub fn features(&self) -> usize {
         let [_, features] = self.fc().weight.dims();
         features
     }
 
-    /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, features]`. Gradients reach the parameters, not
-    /// the pixels.
+    /// Maps pixels in 0..1, `[n, channels, height, width]`, to features `[n, features]`. Gradients reach the
+    /// parameters, not the pixels.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
         among_workers(|| match self {
             Self::Impala(net) => net.forward(pixels),
@@ -147,8 +154,8 @@ impl ImageNet {
         })
     }
 
-    /// Images of 64×64 pixels that are learned from at a time: what is kept of them until their gradient is known stays below
-    /// a hundred megabytes.
+    /// Returns the number of 64×64 images per batch of learning: the activations kept for their gradient stay below a
+    /// hundred megabytes.
     pub(crate) fn images_at_a_time(&self) -> usize {
         match self {
             // 0.7 MB per image with 80 channels in all.
@@ -169,10 +176,10 @@ impl ImageNet {
     }
 }
 
-/// ReLU of `fc` over the channels, rows and columns of images, in this order.
+/// Returns the ReLU of `fc` over the channels, rows and columns of images, in this order.
 pub(super) fn last_layer(fc: &Linear, flat: Tensor<2>) -> Tensor<2> {
     let [n, _] = flat.dims();
-    // Matrix libraries sum a single row in another order than the rows of a matrix; an image's features shall not
+    // Matrix libraries sum a single row in another order than the rows of a matrix; an image's features must not
     // depend on the others in the batch.
     let flat = if n == 1 { flat.repeat_dim(0, 2) } else { flat };
     fc.activated(flat, Activation::Relu).narrow(0, 0, n)

@@ -40,8 +40,8 @@ pub struct ResidualBlock {
 }
 
 impl Impala {
-    /// One stage per entry of `channels`. Orthogonal weights with gain 1 in the convolutions (the residual blocks would
-    /// double the variance again and again with √2) and √2 in the last layer.
+    /// Creates one stage per entry of `channels`. Orthogonal weights with gain 1 in the convolutions (with √2 each
+    /// residual block would double the variance) and √2 in the last layer.
     pub fn new<R: Rng + ?Sized>(
         channels: &[usize],
         feature: usize,
@@ -53,7 +53,7 @@ impl Impala {
         net
     }
 
-    /// [`Self::new`] with parameters out of `source`.
+    /// Creates a network as [`Self::new`], with parameters out of `source`.
     pub(crate) fn build<S: ParamSource>(
         source: &mut S,
         prefix: &str,
@@ -63,7 +63,7 @@ impl Impala {
     ) -> Result<Self, S::Error> {
         let (mut inputs, mut height, mut width) = (image.channels, image.height, image.width);
         let mut stages = Vec::with_capacity(channels.len());
-        // A side of at least one pixel stays one.
+        // A side never becomes shorter than one pixel.
         let pooled = |side: usize| window_places(side, 3, 2, 1).unwrap_or(1);
         for (i, &outputs) in channels.iter().enumerate() {
             stages.push(ImpalaStage::build(source, &path(prefix, &format!("s{i}")), inputs, outputs)?);
@@ -73,7 +73,7 @@ impl Impala {
         Ok(Self { stages, fc: Linear::build(source, &path(prefix, "fc"), flat, feature, SQRT_2)? })
     }
 
-    /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
+    /// Maps pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
         let stages: Vec<Stage<'_>> = self.stages.iter().flat_map(ImpalaStage::of_trunk).collect();
         let flat = trunk::features(&pixels, &stages).unwrap_or_else(|| {
@@ -101,11 +101,11 @@ impl ImpalaStage {
 
     fn of_trunk(&self) -> [Stage<'_>; 3] {
         let [block0, block1] = &self.blocks;
-        let [second, third] = [block0, block1].map(|block| Stage::Residual(&block.conv0, &block.conv1));
-        [Stage::Pool(&self.conv), second, third]
+        let [second, third] = [block0, block1].map(|block| Stage::Residual(block.conv0.view(), block.conv1.view()));
+        [Stage::Pool(self.conv.view()), second, third]
     }
 
-    /// `[n, inputs, height, width]` to `[n, outputs, ⌈height/2⌉, ⌈width/2⌉]`.
+    /// Maps `[n, inputs, height, width]` to `[n, outputs, ⌈height/2⌉, ⌈width/2⌉]`.
     pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
         let pooled = max_pool(self.conv.forward(x), 3, 2, 1);
         self.blocks.iter().fold(pooled, |x, block| block.forward(x))

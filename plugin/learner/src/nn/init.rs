@@ -3,7 +3,8 @@
 use crate::rng::{normal, unit};
 use rand::Rng;
 
-/// A `[inputs, outputs]` matrix, row-major, with orthonormal rows or columns (whichever are fewer) times `gain`.
+/// Returns a `[inputs, outputs]` matrix, row-major, with orthonormal rows or columns (whichever are fewer) times
+/// `gain`.
 ///
 /// Saxe et al. 2013, "Exact solutions to the nonlinear dynamics of learning in deep linear neural networks".
 /// Made by Gram and Schmidt's process (applied twice for accuracy) on normal numbers in double precision.
@@ -34,12 +35,12 @@ pub fn orthogonal<R: Rng + ?Sized>(inputs: usize, outputs: usize, gain: f64, rng
     out
 }
 
-/// `len` numbers uniform in [-bound, bound).
+/// Returns `len` numbers uniform in [-bound, bound).
 pub(crate) fn uniform<R: Rng + ?Sized>(len: usize, bound: f64, rng: &mut R) -> Vec<f32> {
     (0..len).map(|_| ((2.0 * unit(rng) - 1.0) * bound) as f32).collect()
 }
 
-/// Over eight lanes, so that the compiler can vectorise it.
+/// Returns the dot product over eight lanes, so that the compiler can vectorise it.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; 8];
     let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));

@@ -25,7 +25,7 @@ impl LayerNorm {
         })
     }
 
-    /// `[n, width]` to `[n, width]`.
+    /// Maps `[n, width]` to `[n, width]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
         let centred = x.clone() - x.mean_dim(1);
         let deviation = (centred.clone().square().mean_dim(1) + EPS).sqrt();

@@ -17,13 +17,13 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// Orthogonal weights times `gain`, zero bias.
+    /// Creates a layer with orthogonal weights times `gain` and zero bias.
     pub fn new<R: Rng + ?Sized>(inputs: usize, outputs: usize, gain: f64, rng: &mut R, device: &Device) -> Self {
         let Ok(layer) = Self::build(&mut RandomInit { rng, device }, "", inputs, outputs, gain);
         layer
     }
 
-    /// [`Self::new`] with parameters out of `source`.
+    /// Creates a layer as [`Self::new`], with parameters out of `source`.
     pub(crate) fn build<S: ParamSource>(
         source: &mut S,
         prefix: &str,
@@ -37,17 +37,17 @@ impl Linear {
         })
     }
 
-    /// `[n, inputs]` to `[n, outputs]`.
+    /// Maps `[n, inputs]` to `[n, outputs]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
         Self::chain(x, &[(self, None)])
     }
 
-    /// The activation of [`Self::forward`].
+    /// Returns the activation of [`Self::forward`].
     pub fn activated(&self, x: Tensor<2>, activation: Activation) -> Tensor<2> {
         Self::chain(x, &[(self, Some(activation))])
     }
 
-    /// Layers, one after the other, with the activation of each.
+    /// Applies layers, one after the other, with the activation of each.
     pub(super) fn chain(x: Tensor<2>, layers: &[(&Self, Option<Activation>)]) -> Tensor<2> {
         let of_layers = layers.iter().map(|(layer, activation)| {
             let Self { weight, bias } = layer;
@@ -61,16 +61,16 @@ impl Linear {
         })
     }
 
-    /// By the backend's own operations.
+    /// Applies the layer by the backend's own operations.
     fn plain(&self, x: Tensor<2>) -> Tensor<2> {
         linear(x, self.weight.clone(), Some(self.bias.clone()))
     }
 
-    /// The layer applied to `[held, x]` without joining the two: `held` is `[B, H]`, `x` is `[steps * B, inputs - H]`,
-    /// and row `b` of `held` goes with the rows `t * B + b` of `x`.
+    /// Applies the layer to `[held, x]` without joining the two: `held` is `[B, H]`, `x` is `[steps * B, inputs -
+    /// H]`, and row `b` of `held` goes with the rows `t * B + b` of `x`.
     ///
-    /// Gives `[steps * B, outputs]`. No gradient is computed for a constant `x`, which saves the largest product
-    /// of the backward pass.
+    /// Returns `[steps * B, outputs]`. No gradient is computed for a constant `x`, which saves the largest product of
+    /// the backward pass.
     pub fn forward_held(&self, held: Tensor<2>, x: Tensor<2>, steps: usize) -> Tensor<2> {
         let [batch, width] = held.dims();
         let [inputs, outputs] = self.weight.dims();

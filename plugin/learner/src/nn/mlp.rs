@@ -19,7 +19,7 @@ pub struct Mlp {
 }
 
 impl Mlp {
-    /// Orthogonal weights: gain √2 in the hidden layers, `head_gain` in the head; biases 0.
+    /// Creates a network with orthogonal weights: gain √2 in the hidden layers, `head_gain` in the head; biases 0.
     pub fn new<R: Rng + ?Sized>(
         inputs: usize,
         hidden: &[usize],
@@ -34,7 +34,7 @@ impl Mlp {
         net
     }
 
-    /// [`Self::new`] with parameters out of `source`.
+    /// Creates a network as [`Self::new`], with parameters out of `source`.
     pub(crate) fn build<S: ParamSource>(
         source: &mut S,
         prefix: &str,
@@ -53,23 +53,23 @@ impl Mlp {
         Ok(Self { layers, head: Linear::build(source, &path(prefix, "head"), width, outputs, head_gain)?, activation })
     }
 
-    /// Input width.
+    /// Returns the input width.
     pub fn inputs(&self) -> usize {
         self.layers.first().unwrap_or(&self.head).weight.dims()[0]
     }
 
-    /// The last hidden layer's activations, `[n, inputs]` to `[n, hidden]`.
+    /// Returns the last hidden layer's activations, `[n, inputs]` to `[n, hidden]`.
     pub fn features(&self, x: Tensor<2>) -> Tensor<2> {
         Linear::chain(x, &self.hidden().collect::<Vec<_>>())
     }
 
-    /// The hidden layers with their activations.
+    /// Returns the hidden layers with their activations.
     fn hidden(&self) -> impl Iterator<Item = (&Linear, Option<Activation>)> {
         self.layers.iter().map(|layer| (layer, Some(self.activation)))
     }
 
-    /// [`Self::features`] of `[held, x]` joined, where row `b` of `held` `[B, H]` goes with the rows `t * B + b` of
-    /// `x` `[steps * B, inputs - H]`.
+    /// Returns [`Self::features`] of `[held, x]` joined, where row `b` of `held` `[B, H]` goes with the rows `t * B +
+    /// b` of `x` `[steps * B, inputs - H]`.
     pub fn features_held(&self, held: Tensor<2>, x: Tensor<2>, steps: usize) -> Tensor<2> {
         let Some(first) = self.layers.first() else {
             return Tensor::cat(vec![held.repeat_dim(0, steps), x], 1);
@@ -78,7 +78,7 @@ impl Mlp {
         Linear::chain(first, &self.hidden().skip(1).collect::<Vec<_>>())
     }
 
-    /// `[n, inputs]` to `[n, outputs]`.
+    /// Maps `[n, inputs]` to `[n, outputs]`.
     pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
         Linear::chain(x, &self.hidden().chain([(&self.head, None)]).collect::<Vec<_>>())
     }

@@ -1,8 +1,8 @@
 //! The building blocks of the networks: layers with named parameters, distributions, and the optimizer.
 //!
-//! Every network is a plain struct of tensors that implements [`Parameters`]. The names that it gives its tensors are
-//! those of the files (`actor.l0.weight`), of the optimizer's moments and of error messages. Weights start from
-//! generators that the caller owns; nothing here touches burn's global generator.
+//! Every network is a plain struct of tensors that implements [`Parameters`]. The names of its tensors are used in
+//! the files (`actor.l0.weight`), for the optimizer's moments and in error messages. Weights start from generators
+//! that the caller owns; burn's global generator is not used.
 
 mod activation;
 mod adam;
@@ -33,7 +33,7 @@ mod unsquash;
 pub use activation::Activation;
 pub use adam::{Adam, AdamConfig};
 pub use conv::{Conv2d, max_pool, window_places};
-pub(crate) use cpu::known_gradient;
+pub(crate) use cpu::{is_host, known_gradient};
 pub(crate) use cpu::share::{OF_A_MOVE, share, share_each};
 pub use dist::{ActionBatch, Dist, HostDist};
 pub(crate) use dist_rows::{CategoricalRows, DistRows, GaussianRows, RowTerms};

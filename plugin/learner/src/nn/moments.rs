@@ -1,4 +1,4 @@
-//! What Adam remembers of the gradients, in host memory or on a graphics card.
+//! The moments of Adam, in host memory or on a graphics card.
 
 use super::tensors::{host, vector};
 use crate::LearnError;
@@ -22,7 +22,7 @@ pub(super) struct FlatMoments {
 }
 
 impl FlatMoments {
-    /// Those of `moments` on `device`; zeros for parameters that have none.
+    /// Copies `moments` to `device`; zeros for parameters that have none.
     pub(super) fn send(
         moments: &BTreeMap<String, Moments>,
         layout: Vec<(String, Vec<usize>)>,
@@ -45,7 +45,7 @@ impl FlatMoments {
         Self { m: vector(m, device), v: vector(v, device), layout }
     }
 
-    /// In host memory, by the names of the parameters.
+    /// Returns the moments in host memory, by the names of the parameters.
     ///
     /// # Errors
     /// [`LearnError::Device`] if they cannot be read.

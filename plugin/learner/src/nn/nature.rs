@@ -37,7 +37,8 @@ pub struct Nature {
 }
 
 impl Nature {
-    /// Orthogonal weights with gain √2. `None` if the image is too small for the kernels: a side needs 36 pixels.
+    /// Creates a network with orthogonal weights with gain √2. Returns `None` if the image is too small for the
+    /// kernels: a side needs 36 pixels.
     pub fn new<R: Rng + ?Sized>(feature: usize, image: ImageShape, rng: &mut R, device: &Device) -> Option<Self> {
         if !Self::fits(image) {
             return None;
@@ -46,12 +47,13 @@ impl Nature {
         Some(net)
     }
 
-    /// Whether an image is large enough for the kernels.
+    /// Returns whether an image is large enough for the kernels.
     pub(crate) fn fits(image: ImageShape) -> bool {
         places(image.height).is_some() && places(image.width).is_some()
     }
 
-    /// [`Self::new`] with parameters out of `source`. For an image that is too small the last layer has no inputs.
+    /// Creates a network as [`Self::new`], with parameters out of `source`. For an image that is too small the last
+    /// layer has no inputs.
     pub(crate) fn build<S: ParamSource>(
         source: &mut S,
         prefix: &str,
@@ -70,9 +72,9 @@ impl Nature {
         Ok(Self { convs, fc })
     }
 
-    /// Pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
+    /// Maps pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
-        let stages: Vec<Stage<'_>> = self.convs.iter().map(Stage::Relu).collect();
+        let stages: Vec<Stage<'_>> = self.convs.iter().map(|conv| Stage::Relu(conv.view())).collect();
         let flat = trunk::features(&pixels, &stages).unwrap_or_else(|| {
             let x = self.convs.iter().fold(pixels, |x, conv| Activation::Relu.forward(conv.forward(x)));
             x.flatten(1, 3)
@@ -81,7 +83,7 @@ impl Nature {
     }
 }
 
-/// Places of the last convolution along a side of `size` pixels.
+/// Returns the positions of the last convolution along a side of `size` pixels.
 fn places(size: usize) -> Option<usize> {
     LAYERS.into_iter().try_fold(size, |size, layer| window_places(size, layer.kernel, layer.stride, 0))
 }

@@ -30,20 +30,20 @@ impl ObsBatch {
         }
     }
 
-    /// Images from their pixels, row-major in `shape` = `[n, channels, height, width]`.
+    /// Creates images from their pixels, row-major in `shape` = `[n, channels, height, width]`.
     ///
     /// # Panics
-    /// If the number of pixels is not that of the shape.
+    /// If the number of pixels does not match the shape.
     pub fn pixels(pixels: Vec<u8>, shape: [usize; 4], device: &Device) -> Self {
         let [rows, sides @ ..] = shape;
         Self::Image(Self::gather(&pixels, sides, &(0..rows).collect::<Vec<_>>(), device))
     }
 
-    /// The tensor of [`Self::pixels`] for some `rows` of many images of `sides` = `[channels, height, width]`: from the
-    /// bytes to the numbers in one pass.
+    /// Returns the tensor of [`Self::pixels`] for some `rows` of many images of `sides` = `[channels, height,
+    /// width]`: from the bytes to the numbers in one pass.
     ///
     /// # Panics
-    /// If a row is not there.
+    /// If a row does not exist.
     pub(crate) fn gather(pixels: &[u8], sides: [usize; 3], rows: &[usize], device: &Device) -> Tensor<4> {
         let [channels, height, width] = sides;
         let size = channels * height * width;
@@ -59,7 +59,7 @@ impl ObsBatch {
         Tensor::from_data(TensorData::new(numbers, [rows.len(), channels, height, width]), device)
     }
 
-    /// Number of observations.
+    /// Returns the number of observations.
     pub fn rows(&self) -> usize {
         match self {
             Self::Vector(x) => x.dims()[0],
@@ -67,7 +67,7 @@ impl ObsBatch {
         }
     }
 
-    /// The first `n`.
+    /// Returns the first `n` observations.
     pub fn first(&self, n: usize) -> Self {
         match self {
             Self::Vector(x) => Self::Vector(x.clone().narrow(0, 0, n)),

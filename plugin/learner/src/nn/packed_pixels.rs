@@ -1,14 +1,15 @@
-//! Pixels on a graphics card: as bytes, since that is what takes time to send, and as numbers when a network reads them.
+//! Pixels on a graphics card: sent as bytes, which saves transfer time, and converted to numbers when a network reads
+//! them.
 
 use burn::tensor::{Device, Int, Tensor, TensorData};
 
-/// Bytes in a word; cards that know no bytes know words of 32 bits.
+/// Bytes in a word; cards without a byte type have words of 32 bits.
 const BYTES: usize = 4;
 
 /// Images of bytes, four to a word.
 #[derive(Clone, Debug)]
 pub(crate) struct PackedPixels {
-    /// `[n, words]`; the last word of an image may have bytes to spare.
+    /// `[n, words]`; the last word of an image may have unused bytes.
     words: Tensor<2, Int>,
     sides: [usize; 3],
 }
@@ -27,12 +28,12 @@ impl PackedPixels {
         Self { words: Tensor::from_data(TensorData::new(words, shape), device), sides }
     }
 
-    /// Some of the images, which may repeat.
+    /// Returns some of the images, which may repeat.
     pub(crate) fn select(&self, rows: Tensor<1, Int>) -> Self {
         Self { words: self.words.clone().select(0, rows), sides: self.sides }
     }
 
-    /// Numbers in 0..1, `[n, channels, height, width]`.
+    /// Returns numbers in 0..1, `[n, channels, height, width]`.
     pub(crate) fn numbers(self) -> Tensor<4> {
         let ([n, words], [channels, height, width]) = (self.words.dims(), self.sides);
         let byte = |place: usize| -> Tensor<3, Int> {

@@ -1,11 +1,11 @@
-//! Named parameters: one way to walk over the tensors of a network.
+//! Named parameters: a visitor over the tensors of a network.
 
 use crate::LearnError;
 use burn::tensor::{Device, Tensor};
 
-/// Does something with each parameter of a network in turn.
+/// A function that is applied to each parameter of a network in turn.
 pub trait ParamVisitor {
-    /// Called once per parameter, always in the same order. `name` is unique in the network.
+    /// Visits a parameter. Called once per parameter, always in the same order. `name` is unique in the network.
     fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>);
 }
 
@@ -15,7 +15,7 @@ pub trait Parameters {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V);
 }
 
-/// `prefix.name`, or `name` without a prefix.
+/// Returns `prefix.name`, or `name` without a prefix.
 pub(crate) fn path(prefix: &str, name: &str) -> String {
     if prefix.is_empty() { name.to_owned() } else { format!("{prefix}.{name}") }
 }
@@ -36,14 +36,14 @@ impl ParamVisitor for Freeze {
     }
 }
 
-/// A copy of `network` whose parameters receive gradients. The numbers are shared, not copied.
+/// Returns a copy of `network` whose parameters receive gradients. The numbers are shared, not copied.
 pub fn tracked<M: Parameters + Clone>(network: &M) -> M {
     let mut copy = network.clone();
     copy.visit("", &mut Track);
     copy
 }
 
-/// A copy of `network` for inference, outside of any gradient graph. The numbers are shared, not copied.
+/// Returns a copy of `network` for inference, outside of any gradient graph. The numbers are shared, not copied.
 pub fn frozen<M: Parameters + Clone>(network: &M) -> M {
     let mut copy = network.clone();
     copy.visit("", &mut Freeze);
@@ -61,7 +61,7 @@ impl ParamVisitor for Move<'_> {
     }
 }
 
-/// A copy with the same weights on `device`, of which operations are not recorded.
+/// Returns a copy with the same weights on `device`, without gradients.
 ///
 /// # Errors
 /// [`LearnError::Device`] if they cannot be read.
@@ -80,7 +80,7 @@ impl ParamVisitor for Count {
     }
 }
 
-/// How many numbers the parameters of `network` hold.
+/// Returns how many numbers the parameters of `network` hold.
 pub fn parameter_count<M: Parameters + Clone>(network: &M) -> usize {
     let mut count = Count(0);
     network.clone().visit("", &mut count);

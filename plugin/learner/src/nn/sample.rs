@@ -1,4 +1,4 @@
-//! Drawing actions from plain numbers, row by row.
+//! Sampling of actions from plain numbers, row by row.
 
 use crate::rng::{normal, unit};
 use rand::Rng;
@@ -10,7 +10,7 @@ pub fn sample_categorical<R: Rng + ?Sized>(logits: &[f32], rng: &mut R) -> u32 {
     categorical_at(logits, unit(rng))
 }
 
-/// The index at which the cumulative distribution of softmax(`logits`) exceeds `draw` in 0..1.
+/// Returns the index at which the cumulative distribution of softmax(`logits`) exceeds `draw` in 0..1.
 pub(crate) fn categorical_at(logits: &[f32], draw: f64) -> u32 {
     let top = max(logits);
     let weight = |x: f32| (f64::from(x) - top).exp();
@@ -27,7 +27,7 @@ pub(crate) fn categorical_at(logits: &[f32], draw: f64) -> u32 {
     logits.iter().rposition(|&x| weight(x) > 0.0).unwrap_or(0) as u32
 }
 
-/// ln softmax(`logits`)\[`index`\].
+/// Returns ln softmax(`logits`)\[`index`\].
 ///
 /// # Panics
 /// If `index` is not below the number of logits.
@@ -37,7 +37,7 @@ pub fn categorical_log_prob(logits: &[f32], index: u32) -> f32 {
     (f64::from(logits[index as usize]) - top - total.ln()) as f32
 }
 
-/// The index of the largest number; the first of equals, 0 of none.
+/// Returns the index of the largest number; the first of equals, 0 of an empty slice.
 pub fn argmax(values: &[f32]) -> u32 {
     let mut best = 0;
     for (i, x) in values.iter().enumerate() {
@@ -53,7 +53,7 @@ pub fn sample_gaussian<R: Rng + ?Sized>(mean: &[f32], log_std: &[f32], rng: &mut
     mean.iter().zip(log_std).map(|(m, s)| m + normal(rng) * s.exp()).collect()
 }
 
-/// The log-density of `value`, summed over dimensions.
+/// Returns the log-density of `value`, summed over dimensions.
 pub fn gaussian_log_prob(mean: &[f32], log_std: &[f32], value: &[f32]) -> f32 {
     let terms = mean.iter().zip(log_std).zip(value).map(|((&m, &s), &x)| {
         let score = (f64::from(x) - f64::from(m)) * (-f64::from(s)).exp();
@@ -62,8 +62,8 @@ pub fn gaussian_log_prob(mean: &[f32], log_std: &[f32], value: &[f32]) -> f32 {
     terms.sum::<f64>() as f32
 }
 
-/// The log-density of tanh(`pre_tanh`) where `pre_tanh` is normal, summed over dimensions:
-/// ln N(x) - ln(1 - tanh² x), with ln(1 - tanh² x) = 2 (ln 2 - |x| - ln(1 + e^(-2|x|))).
+/// Returns the log-density of tanh(`pre_tanh`) where `pre_tanh` is normal, summed over dimensions: ln N(x) - ln(1 -
+/// tanh² x), with ln(1 - tanh² x) = 2 (ln 2 - |x| - ln(1 + e^(-2|x|))).
 pub fn squashed_log_prob(mean: &[f32], log_std: &[f32], pre_tanh: &[f32]) -> f32 {
     let slope = |x: f32| {
         let x = f64::from(x).abs();

@@ -1,11 +1,11 @@
-//! Where the numbers of a network come from when it is made: from a generator, or out of a file.
+//! Sources of a new network's parameters: a generator or a file.
 
 use super::init::{orthogonal, uniform};
 use burn::tensor::{Device, Tensor, TensorData};
 use rand::Rng;
 use std::convert::Infallible;
 
-/// What a parameter of a fresh network starts with.
+/// Starting values of a parameter.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Init {
     /// Zeros.
@@ -18,17 +18,16 @@ pub(crate) enum Init {
     Uniform(f64),
 }
 
-/// Gives a network its parameters while it is made.
+/// A source of a network's parameters while it is made.
 ///
-/// The function that makes a network is the only place that knows its sizes: from a generator it makes a fresh network,
-/// from a file the stored one, and a file that does not hold what its header describes is refused at the first tensor,
-/// before anything of a size that only the header knows is made. Sizes may come from such a header, so that sums and
-/// products of them saturate.
+/// Only the function that makes a network knows its sizes. From a generator it makes a fresh network, from a file the
+/// stored one. A file whose contents do not match its header is refused at the first tensor, before memory of a size
+/// from the header is allocated. Since sizes may come from such a header, sums and products of them saturate.
 pub(crate) trait ParamSource {
-    /// Why a parameter cannot be had.
+    /// The reason why a parameter is unavailable.
     type Error;
 
-    /// The parameter called `name`, of `shape`.
+    /// Returns the parameter called `name`, of `shape`.
     ///
     /// # Errors
     /// [`Self::Error`] if there is no such parameter.

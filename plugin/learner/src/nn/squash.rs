@@ -8,12 +8,12 @@ const HALF_LN_TAU: f64 = 0.918_938_533_204_672_8;
 /// Keeps the logarithm of [`LogProbForm::Eps`] finite.
 const EPS: f64 = 1e-6;
 
-/// ln σ = low + ½ (high - low) (tanh(raw) + 1): bounded, with a gradient everywhere.
+/// Returns ln σ = low + ½ (high - low) (tanh(raw) + 1): bounded, with a gradient everywhere.
 pub fn bounded_log_std<const D: usize>(raw: Tensor<D>, (low, high): (f64, f64)) -> Tensor<D> {
     (raw.tanh() + 1.0) * (0.5 * (high - low)) + low
 }
 
-/// How the change of volume under tanh enters a log-density.
+/// The form of the change of volume under tanh in a log-density.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum LogProbForm {
     /// ln(scale (1 - tanh² x) + 1e-6), as most implementations have it: flat where tanh saturates.
@@ -48,14 +48,14 @@ pub struct SquashedGaussian {
 }
 
 impl SquashedGaussian {
-    /// Over actions in [-1, 1].
+    /// Creates squashed Gaussians over actions in [-1, 1].
     pub fn unit(mean: Tensor<2>, log_std: Tensor<2>, device: &Device) -> Self {
         let [_, dim] = mean.dims();
         Self { mean, log_std, scale: Tensor::ones([1, dim], device), bias: Tensor::zeros([1, dim], device) }
     }
 
-    /// x = mean + σ · noise squashed into an action, differentiable in mean and σ (the reparameterisation trick).
-    /// `noise` is standard normal, `[n, dim]`.
+    /// Draws x = mean + σ · noise squashed into an action, differentiable in mean and σ (the reparameterisation
+    /// trick). `noise` is standard normal, `[n, dim]`.
     pub fn draw(&self, noise: Tensor<2>, form: LogProbForm) -> SquashedDraw {
         let x = self.mean.clone() + self.log_std.clone().exp() * noise.clone();
         let tanh = x.clone().tanh();

@@ -1,16 +1,16 @@
-//! A Gaussian decoder as a squashed Gaussian policy sees it.
+//! A Gaussian decoder in the coordinates of a squashed Gaussian policy.
 
 use super::HostDist;
 
-/// Actions are taken to lie within ± this before the inverse of tanh is applied.
+/// Bound within which actions are clamped before the inverse of tanh is applied.
 const EDGE: f64 = 0.999;
 
-/// A Gaussian over actions in [-1, 1] carried back through tanh, to be compared with a squashed policy before its tanh.
+/// Maps a Gaussian over actions in [-1, 1] back through tanh, to be compared with a squashed policy before its tanh.
 ///
-/// Nothing normal is squashed into a normal distribution, so this is an approximation. The inverse of tanh is monotone
-/// and maps quantiles to quantiles: the median m goes to atanh(m), and σ to half the distance of the images of m ± σ,
-/// with m and m ± σ held within ±0.999. For small σ this is the tangent's σ / (1 - m²); near the edges, where that
-/// explodes, it stays a width that a policy can have. Categorical distributions stay as they are.
+/// The inverse image is not normal, so this is an approximation. The inverse of tanh is monotone and maps quantiles
+/// to quantiles: the median m goes to atanh(m), and σ to half the distance of the images of m ± σ, with m and m ± σ
+/// clamped to ±0.999. For small σ this is the tangent's σ / (1 - m²). Near the edges, where that explodes, it stays a
+/// width that a policy can have. Categorical distributions are unchanged.
 pub fn unsquashed(decoder: &HostDist) -> HostDist {
     let Some(stds) = &decoder.log_std else { return decoder.clone() };
     let before = |action: f64| action.clamp(-EDGE, EDGE).atanh();
@@ -28,8 +28,8 @@ pub fn unsquashed(decoder: &HostDist) -> HostDist {
     out
 }
 
-/// The normal number whose tanh `action` is. One beyond ±(1 - 1e-6), where single precision cannot tell it any more, counts as
-/// lying there.
+/// Returns the normal number whose tanh is `action`. An action beyond ±(1 - 1e-6), which single precision cannot
+/// resolve, is clamped there.
 pub(crate) fn unsquashed_action(action: f32) -> f32 {
     let edge = 1.0 - 1e-6;
     f64::from(action).clamp(-edge, edge).atanh() as f32

@@ -4,12 +4,12 @@ use super::RunningStats;
 
 /// Added to the variance.
 const EPS: f64 = 1e-8;
-/// Normalised observations are clipped to ± this.
+/// Bound to which normalised observations are clipped.
 const CLIP: f64 = 10.0;
-/// A dimension that deviates by less than this counts as constant.
+/// Deviation below which a dimension counts as constant.
 const CONSTANT: f64 = 1e-3;
 
-/// Mean and scale per dimension, fixed at one moment.
+/// Mean and scale per dimension, fixed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObsStats {
     pub(crate) mean: Vec<f64>,
@@ -17,10 +17,10 @@ pub struct ObsStats {
 }
 
 impl ObsStats {
-    /// Mean and deviation of all `rows` of `dim` numbers, the same on any number of threads.
+    /// Computes mean and deviation of all `rows` of `dim` numbers, the same on any number of threads.
     ///
-    /// A dimension that deviates by less than 1e-3 counts as constant and is centred only, since what it would be
-    /// divided by is not known: a value that the rows do not hold stays as far from the mean as it is.
+    /// A dimension that deviates by less than 1e-3 counts as constant and is only centred, since its scale is
+    /// unknown. A value that the rows do not hold keeps its distance from the mean.
     pub(crate) fn of<'a>(rows: impl Iterator<Item = &'a [f32]> + Clone, dim: usize) -> Self {
         let sums = |add: &dyn Fn(usize, f64) -> f64| {
             let (mut sums, mut n) = (vec![0.0; dim], 0u64);
@@ -36,7 +36,7 @@ impl ObsStats {
         Self { mean, inv_std }
     }
 
-    /// All of `rows` normalised.
+    /// Returns all of `rows` normalised.
     pub(crate) fn normalize(&self, rows: &[f32]) -> Vec<f32> {
         let (mut out, width) = (vec![0.0; rows.len()], self.mean.len().max(1));
         let pairs = rows.chunks_exact(width).zip(out.chunks_exact_mut(width));
@@ -53,7 +53,7 @@ impl ObsStats {
     }
 }
 
-/// 1/√var, or 1 where that is next to constant.
+/// Returns 1/√var, or 1 for a nearly constant dimension.
 fn inverse_deviation(var: f64) -> f64 {
     let deviation = var.sqrt();
     if deviation < CONSTANT { 1.0 } else { 1.0 / deviation }
@@ -62,23 +62,23 @@ fn inverse_deviation(var: f64) -> f64 {
 /// Keeps the running mean and variance of observations.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ObsNormalizer {
-    /// Everything seen so far.
+    /// Statistics of all observations so far.
     pub stats: RunningStats,
 }
 
 impl ObsNormalizer {
-    /// Nothing seen yet.
+    /// Creates a normaliser without data.
     pub fn new(dim: usize) -> Self {
         Self { stats: RunningStats::new(dim) }
     }
 
-    /// Takes in rows of observations.
+    /// Adds rows of observations.
     pub fn update(&mut self, rows: &[f32]) {
         let n = rows.len() / self.stats.dim().max(1);
         self.stats.update(rows.iter().map(|&x| f64::from(x)), n);
     }
 
-    /// The present mean and scale 1/√(var + 1e-8).
+    /// Returns the present mean and scale 1/√(var + 1e-8).
     pub fn snapshot(&self) -> ObsStats {
         ObsStats {
             mean: self.stats.mean.clone(),

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 
 /// Added to the variance.
 const EPS: f64 = 1e-8;
-/// Scaled rewards are clipped to ± this.
+/// Bound to which scaled rewards are clipped.
 const CLIP: f64 = 10.0;
 
-/// When the end of an episode resets its discounted return.
+/// The time at which the end of an episode resets its discounted return.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum RewardReset {
     /// After the last step: G = γ G + r, then G = 0 where the episode ended.
@@ -22,13 +22,13 @@ pub enum RewardReset {
 
 /// Divides rewards by the running standard deviation of the discounted return. No mean is subtracted.
 ///
-/// Per step: G = γ G + r for every environment, the running variance takes in all G as one batch, the reward becomes
-/// clip(r/√(var + 1e-8), ±10), and G of the environments whose episode ended is reset ([`RewardReset`]).
+/// Per step: G = γ G + r for every environment. The running variance takes in all G as one batch, and the reward
+/// becomes clip(r/√(var + 1e-8), ±10). G of the environments whose episode ended is reset ([`RewardReset`]).
 #[derive(Clone, Debug, PartialEq)]
 pub struct RewardNormalizer {
     /// γ.
     pub gamma: f64,
-    /// When the end of an episode resets G.
+    /// The time at which the end of an episode resets G.
     pub reset: RewardReset,
     /// The running variance, one dimension.
     pub stats: RunningStats,
@@ -37,24 +37,24 @@ pub struct RewardNormalizer {
 }
 
 impl RewardNormalizer {
-    /// Nothing seen yet.
+    /// Creates a normaliser without data.
     pub fn new(gamma: f64) -> Self {
         Self { gamma, reset: RewardReset::AfterStep, stats: RunningStats::new(1), returns: Vec::new() }
     }
 
-    /// Takes in and scales rewards `[T, envs]`, row-major; `done` marks the steps that ended an episode in any way.
+    /// Adds and scales rewards `[T, envs]`, row-major; `done` marks the steps that ended an episode in any way.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] if `envs` is not what it was in earlier calls, or the lengths differ or are no multiple of
-    /// it; [`LearnError::Config`] if `envs` is 0. Nothing is taken in then.
+    /// [`LearnError::Shape`] if `envs` differs from earlier calls, or the lengths differ or are no multiple of it;
+    /// [`LearnError::Config`] if `envs` is 0. The state is unchanged then.
     pub fn normalize(&mut self, rewards: &[f32], done: &[bool], envs: usize) -> Result<Vec<f32>, LearnError> {
         let mut out = Vec::with_capacity(rewards.len());
         self.each_step(rewards, done, envs, |scaler, rewards| out.extend(rewards.iter().map(|&r| scaler.scale(r))))?;
         Ok(out)
     }
 
-    /// Only takes in what [`Self::normalize`] does: for learners that keep raw rewards and scale them when they read
-    /// them ([`Self::scale`]).
+    /// Adds rewards as [`Self::normalize`] does, without scaling them: for learners that keep raw rewards and scale
+    /// them when they read them ([`Self::scale`]).
     ///
     /// # Errors
     /// As [`Self::normalize`].
@@ -62,12 +62,12 @@ impl RewardNormalizer {
         self.each_step(rewards, done, envs, |_, _| {})
     }
 
-    /// [`Self::update`] with episodes of others, such as recordings: the returns of those that are played go on as they were, and
-    /// there may be another number of environments.
+    /// Does [`Self::update`] with separate episodes, such as recordings. The returns of the played episodes are
+    /// unaffected, and the number of environments may differ.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] if the lengths differ or are no multiple of `envs`; [`LearnError::Config`] if that is 0. Nothing is
-    /// taken in then.
+    /// [`LearnError::Shape`] if the lengths differ or are no multiple of `envs`; [`LearnError::Config`] if that is 0.
+    /// The state is unchanged then.
     pub fn update_apart(&mut self, rewards: &[f32], done: &[bool], envs: usize) -> Result<(), LearnError> {
         let mut others = Self { returns: Vec::new(), ..self.clone() };
         others.update(rewards, done, envs)?;
@@ -75,13 +75,13 @@ impl RewardNormalizer {
         Ok(())
     }
 
-    /// A reward by the present variance: clip(r/√(var + 1e-8), ±10).
+    /// Returns a reward scaled by the present variance: clip(r/√(var + 1e-8), ±10).
     pub fn scale(&self, reward: f32) -> f32 {
         let scale = 1.0 / (self.stats.var[0] + EPS).sqrt();
         (f64::from(reward) * scale).clamp(-CLIP, CLIP) as f32
     }
 
-    /// Takes in the rewards step by step and calls `seen` with each step's after it was taken in.
+    /// Adds the rewards step by step and calls `seen` with each step's rewards after it was added.
     fn each_step(
         &mut self,
         rewards: &[f32],

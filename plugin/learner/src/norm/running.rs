@@ -1,6 +1,6 @@
 //! Running mean and variance.
 
-/// Mean and variance of everything seen so far, per dimension (Chan et al.'s parallel update).
+/// Mean and variance of all rows so far, per dimension (Chan et al.'s parallel update).
 ///
 /// Starts at mean 0, variance 1 and a count of 1e-4, which the first batch outweighs.
 #[derive(Clone, Debug, PartialEq)]
@@ -14,17 +14,17 @@ pub struct RunningStats {
 }
 
 impl RunningStats {
-    /// Nothing seen yet.
+    /// Creates statistics without data.
     pub fn new(dim: usize) -> Self {
         Self { mean: vec![0.0; dim], var: vec![1.0; dim], count: 1e-4 }
     }
 
-    /// Number of dimensions.
+    /// Returns the number of dimensions.
     pub fn dim(&self) -> usize {
         self.mean.len()
     }
 
-    /// Takes in a batch of rows, row-major. Incomplete rows at the end are ignored.
+    /// Adds a batch of rows, row-major. Incomplete rows at the end are ignored.
     pub fn update(&mut self, rows: impl Iterator<Item = f64> + Clone, n: usize) {
         let dim = self.dim();
         if n == 0 || dim == 0 {

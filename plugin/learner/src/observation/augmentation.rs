@@ -1,7 +1,7 @@
-//! Random changes of pictures that change nothing for whoever plays: networks that shall not mind them see both.
+//! Image augmentations: random changes that do not matter to the task, so that networks become insensitive to them.
 
 use super::{ImageShape, ObsKind};
-use crate::LearnError;
+use crate::{LearnError, SettingError};
 use crate::rng::unit;
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -11,24 +11,24 @@ use serde::{Deserialize, Serialize};
 /// A random change of an image. All pictures of a stack are changed alike.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Debug)]
 pub enum Augmentation {
-    /// Moves it by up to so many pixels along each axis; the pixels of its edges fill the gap.
+    /// Moves it by up to this many pixels along each axis; the pixels of its edges fill the gap.
     Translate(usize),
     /// Multiplies contrast, brightness and each of three colours by factors within 1 ± this share.
     ColorJitter(f32),
     /// Covers a rectangle of up to this share of each side with one colour.
     Cutout(f32),
-    /// Puts so many rows and columns at the top left back as they were before all changes: what is written there, such as
-    /// painted velocity, is no part of the scene, and who plays must be able to read it.
+    /// Restores this many rows and columns at the top left after all changes. Values painted there, such as velocity,
+    /// are no part of the scene, and the policy must be able to read them.
     Keep(usize, usize),
 }
 
 impl Augmentation {
-    /// `Ok` if it can be done to such observations.
+    /// Checks that it applies to such observations.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if these are no images, or if `setting` has a number out of its range.
-    pub(crate) fn check(self, setting: &str, observation: &ObsKind) -> Result<(), LearnError> {
-        let bad = |why: String| Err(LearnError::Config(format!("{setting}: {self:?} {why}")));
+    /// [`LearnError::Setting`] if these are no images, or if `setting` has a number out of its range.
+    pub(crate) fn check(self, setting: &'static str, observation: &ObsKind) -> Result<(), LearnError> {
+        let bad = |why: String| Err(SettingError::new(setting, format!("{self:?} {why}")).into());
         let ObsKind::Image(shape) = observation else {
             return bad(format!("changes images, and observations are {observation}; leave it out"));
         };
@@ -60,7 +60,7 @@ impl Augmentation {
     }
 }
 
-/// The images in these `rows` of many, each after all `augmentations`; the same on any number of threads.
+/// Returns the images in these `rows` of many, each after all `augmentations`; the same on any number of threads.
 pub(crate) fn augmented(
     pixels: &[u8],
     shape: &ImageShape,
@@ -88,12 +88,12 @@ fn put_back(image: &mut [u8], original: &[u8], shape: &ImageShape, [rows, column
     }
 }
 
-/// Whole pixels in -most..=most.
+/// Returns a whole number of pixels in -most..=most.
 fn offset(most: usize, rng: &mut ChaCha8Rng) -> isize {
     (unit(rng) * (2 * most + 1) as f64) as isize - most as isize
 }
 
-/// A factor within 1 ± share.
+/// Returns a factor within 1 ± share.
 fn factor(share: f32, rng: &mut ChaCha8Rng) -> f32 {
     1.0 + share * (2.0 * unit(rng) as f32 - 1.0)
 }
@@ -111,7 +111,7 @@ fn translate(image: &mut [u8], shape: &ImageShape, [down, right]: [isize; 2]) {
     }
 }
 
-/// How many colours each picture of a stack has: three, or shades of grey.
+/// Returns the number of colours of each picture of a stack: three, or one of grey.
 fn colours(shape: &ImageShape) -> usize {
     if shape.channels.is_multiple_of(3) { 3 } else { 1 }
 }
@@ -233,16 +233,16 @@ mod tests {
     #[test]
     fn what_does_not_fit_is_told() {
         let error = |augmentation: Augmentation, kind: ObsKind| {
-            augmentation.check("ppo augment", &kind).expect_err("does not fit").to_string()
+            augmentation.check("ppo.augment", &kind).expect_err("does not fit").to_string()
         };
         let vectors = error(Augmentation::Cutout(0.3), ObsKind::Vector(5));
-        assert!(vectors.contains("ppo augment: Cutout(0.3) changes images") && vectors.contains("vectors of 5"));
+        assert!(vectors.contains("`ppo.augment` Cutout(0.3) changes images") && vectors.contains("vectors of 5"));
         assert!(error(Augmentation::Translate(7), SHAPE.into()).contains("1 to 6 pixels"));
         for share in [0.0, f32::NAN, 1.5] {
             assert!(error(Augmentation::ColorJitter(share), SHAPE.into()).contains("share"));
             assert!(error(Augmentation::Cutout(share), SHAPE.into()).contains("share"));
         }
         assert!(error(Augmentation::Keep(2, 8), SHAPE.into()).contains("1 to 9 rows and 1 to 7 columns"));
-        assert!(Augmentation::Translate(6).check("ppo augment", &SHAPE.into()).is_ok());
+        assert!(Augmentation::Translate(6).check("ppo.augment", &SHAPE.into()).is_ok());
     }
 }

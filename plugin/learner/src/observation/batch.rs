@@ -1,9 +1,9 @@
-//! Many observations in host memory: owned, and borrowed.
+//! Batches of observations in host memory: owned, and borrowed.
 
 use crate::{LearnError, ObsKind};
 use std::ops::Range;
 
-/// Many observations of one kind, one after the other. How many numbers make one is told by their [`ObsKind`].
+/// Many observations of one kind, one after the other. Their [`ObsKind`] gives the width of one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Observations {
     /// Numbers.
@@ -12,8 +12,8 @@ pub enum Observations {
     Image(Vec<u8>),
 }
 
-/// Borrowed [`Observations`], one or many. Whatever is played or learned from is handed over as this, so that a part of
-/// a rollout needs no copy.
+/// Borrowed [`Observations`], one or many. Play and learning take observations in this form, so that a part of a
+/// rollout needs no copy.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ObsSlice<'a> {
     /// Numbers.
@@ -23,12 +23,12 @@ pub enum ObsSlice<'a> {
 }
 
 impl Observations {
-    /// None yet.
+    /// Creates an empty batch.
     pub fn empty(kind: &ObsKind) -> Self {
         Self::with_capacity(kind, 0)
     }
 
-    /// None yet, with room for `rows` of the given kind.
+    /// Creates an empty batch with room for `rows` of the given kind.
     pub fn with_capacity(kind: &ObsKind, rows: usize) -> Self {
         let numbers = rows * kind.numbers();
         match kind {
@@ -37,7 +37,7 @@ impl Observations {
         }
     }
 
-    /// `rows` of the given kind, all 0.
+    /// Creates `rows` of the given kind, all 0.
     pub fn zeros(kind: &ObsKind, rows: usize) -> Self {
         let numbers = rows * kind.numbers();
         match kind {
@@ -46,7 +46,7 @@ impl Observations {
         }
     }
 
-    /// Forgets all observations and keeps the memory.
+    /// Removes all observations and keeps the memory.
     pub fn clear(&mut self) {
         match self {
             Self::Vector(values) => values.clear(),
@@ -54,17 +54,17 @@ impl Observations {
         }
     }
 
-    /// Numbers in all observations together.
+    /// Returns the number of values in all observations together.
     pub fn numbers(&self) -> usize {
         self.as_slice().numbers()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no observations.
     pub fn is_empty(&self) -> bool {
         self.numbers() == 0
     }
 
-    /// All of them, borrowed.
+    /// Returns all observations, borrowed.
     pub fn as_slice(&self) -> ObsSlice<'_> {
         match self {
             Self::Vector(values) => ObsSlice::Vector(values),
@@ -72,18 +72,18 @@ impl Observations {
         }
     }
 
-    /// Observation number `row`, of `width` numbers like all others.
+    /// Returns observation number `row`; all have `width` numbers.
     ///
     /// # Panics
-    /// If there are not as many.
+    /// If there are fewer.
     pub fn row(&self, row: usize, width: usize) -> ObsSlice<'_> {
         self.rows(row..row + 1, width)
     }
 
-    /// Several observations, of `width` numbers each.
+    /// Returns several observations, of `width` numbers each.
     ///
     /// # Panics
-    /// If there are not as many.
+    /// If there are fewer.
     pub fn rows(&self, rows: Range<usize>, width: usize) -> ObsSlice<'_> {
         self.as_slice().rows(rows, width)
     }
@@ -102,13 +102,13 @@ impl Observations {
         Ok(())
     }
 
-    /// Puts one observation in place of number `row`.
+    /// Replaces observation number `row`.
     ///
     /// # Errors
     /// [`LearnError::Config`] if it is of another kind.
     ///
     /// # Panics
-    /// If there are not as many.
+    /// If there are fewer.
     pub fn set_row<'a>(&mut self, row: usize, observation: impl Into<ObsSlice<'a>>) -> Result<(), LearnError> {
         let from = observation.into();
         let place = row * from.numbers()..(row + 1) * from.numbers();
@@ -122,11 +122,11 @@ impl Observations {
 }
 
 fn mixed(to: &Observations, from: ObsSlice<'_>) -> LearnError {
-    LearnError::Config(format!("{} were put among {}", from.what(), to.as_slice().what()))
+    LearnError::Config(format!("{} cannot be added to {}", from.what(), to.as_slice().what()))
 }
 
 impl<'a> ObsSlice<'a> {
-    /// Numbers in all observations together.
+    /// Returns the number of values in all observations together.
     pub fn numbers(self) -> usize {
         match self {
             Self::Vector(values) => values.len(),
@@ -134,10 +134,10 @@ impl<'a> ObsSlice<'a> {
         }
     }
 
-    /// Some of the observations, of `width` numbers each.
+    /// Returns some of the observations, of `width` numbers each.
     ///
     /// # Panics
-    /// If there are not as many.
+    /// If there are fewer.
     pub fn rows(self, rows: Range<usize>, width: usize) -> Self {
         let range = rows.start * width..rows.end * width;
         match self {
@@ -146,7 +146,7 @@ impl<'a> ObsSlice<'a> {
         }
     }
 
-    /// The numbers of vectors.
+    /// Returns the numbers of vectors.
     ///
     /// # Errors
     /// [`LearnError::Config`], which names `reader`, if observations are images.
@@ -157,7 +157,7 @@ impl<'a> ObsSlice<'a> {
         }
     }
 
-    /// `Ok` if these are `rows` observations of `kind`; `what` names them.
+    /// Checks that these are `rows` observations of `kind`; `what` names them.
     pub(crate) fn check_size(self, what: &str, kind: &ObsKind, rows: usize) -> Result<(), LearnError> {
         let same = matches!((self, kind), (Self::Vector(_), ObsKind::Vector(_)) | (Self::Image(_), ObsKind::Image(_)));
         if !same && self.numbers() > 0 {
@@ -166,13 +166,13 @@ impl<'a> ObsSlice<'a> {
         LearnError::check(what, rows * kind.numbers(), self.numbers())
     }
 
-    /// [`Self::check_size`], and all numbers are finite.
+    /// Checks as [`Self::check_size`], and that all numbers are finite.
     pub(crate) fn check(self, what: &str, kind: &ObsKind, rows: usize) -> Result<(), LearnError> {
         self.check_size(what, kind, rows)?;
         self.check_finite(what, kind.numbers())
     }
 
-    /// `Ok` if all numbers, `width` to a row, are finite; pixels always are.
+    /// Checks that all numbers, `width` to a row, are finite; pixels always are.
     pub(crate) fn check_finite(self, what: &str, width: usize) -> Result<(), LearnError> {
         match self {
             Self::Vector(values) => LearnError::check_finite(what, width, values),
@@ -267,8 +267,8 @@ mod tests {
     fn kinds_do_not_mix() {
         let mut images = Observations::zeros(&IMAGE, 1);
         let text = |error: Result<(), LearnError>| error.expect_err("mixed").to_string();
-        assert_eq!(text(images.push(&[1.0, 2.0])), "config: vectors were put among images");
-        assert_eq!(text(images.set_row(0, &[1.0, 2.0])), "config: vectors were put among images");
+        assert_eq!(text(images.push(&[1.0, 2.0])), "config: vectors cannot be added to images");
+        assert_eq!(text(images.set_row(0, &[1.0, 2.0])), "config: vectors cannot be added to images");
         let error = text(ObsSlice::Vector(&[0.0; 2]).check("rows", &IMAGE, 1));
         assert_eq!(error, "config: rows are vectors, not images of 1 channels, 1 rows and 2 columns");
         let nothing: &[f32] = &[];

@@ -1,4 +1,4 @@
-//! What an agent observes: a vector of numbers, or an image.
+//! Kinds of observations: a vector of numbers, or an image.
 
 use crate::LearnError;
 use serde::{Deserialize, Serialize};
@@ -24,7 +24,7 @@ impl ImageShape {
     }
 }
 
-/// What every observation of a game is. In files a bare number is the width of a vector.
+/// The kind of all observations of a game. In files a bare number is the width of a vector.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 #[serde(untagged)]
 pub enum ObsKind {
@@ -43,7 +43,7 @@ impl ObsKind {
         }
     }
 
-    /// It in a message: `26 observation values`, or the size of an image.
+    /// Describes it for a message: `26 observation values`, or the size of an image.
     pub fn describe(&self) -> String {
         match self {
             Self::Vector(values) => format!("{values} observation values"),
@@ -51,10 +51,10 @@ impl ObsKind {
         }
     }
 
-    /// `Ok` if `other`, what `who` observes, is the same.
+    /// Checks that `other`, the kind that `who` observes, is the same.
     ///
     /// # Errors
-    /// [`LearnError::Config`] names both.
+    /// [`LearnError::Config`] names both kinds.
     pub(crate) fn same_as(&self, other: &Self, who: &str) -> Result<(), LearnError> {
         if self == other {
             return Ok(());
@@ -62,7 +62,7 @@ impl ObsKind {
         Err(LearnError::Config(format!("observations must be {self}, but those of {who} are {other}")))
     }
 
-    /// The width of a vector.
+    /// Returns the width of a vector.
     ///
     /// # Errors
     /// [`LearnError::Config`], which names `reader`, if observations are images.

@@ -1,5 +1,4 @@
-//! What agents observe: the kinds of observations, many of them in host memory, how pictures are made, and how they are
-//! changed for learning.
+//! Observations: their kinds, batches in host memory, metadata of pictures, and augmentations.
 
 mod augmentation;
 mod batch;

@@ -1,21 +1,21 @@
-//! How the pictures that become observations are made.
+//! Metadata of the pictures that become observations.
 
 use super::ObsKind;
 use crate::LearnError;
 use serde::{Deserialize, Serialize};
 
-/// How the images that a policy or a skill model observes are made: images of one shape can be made in different ways.
+/// Metadata of the images that a policy or a skill model observes: images of one shape can be made in different ways.
 /// Their size is that of the policy's observation, and the network that reads them is part of the policy.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 #[serde(deny_unknown_fields)]
 pub struct PictureCard {
     /// Name of the sensor that made them.
     pub sensor: String,
-    /// How many successive pictures make an image, oldest first.
+    /// Number of successive pictures in an image, oldest first.
     pub stack: usize,
     /// One channel of brightness instead of red, green and blue.
     pub grayscale: bool,
-    /// Whether the agent's velocity is painted into them.
+    /// True if the agent's velocity is painted into them.
     pub paint_velocity: bool,
 }
 
@@ -25,12 +25,12 @@ impl PictureCard {
         self.stack * if self.grayscale { 1 } else { 3 }
     }
 
-    /// `Ok` if a policy of `observation` can have this on its card.
+    /// Checks that a policy of `observation` can have this metadata.
     pub(crate) fn check(&self, observation: ObsKind) -> Result<(), LearnError> {
         match observation {
             ObsKind::Image(image) if image.channels == self.channels() => Ok(()),
             _ => Err(LearnError::Config(format!(
-                "the card tells of {} pictures with {} channels together, but the policy observes {observation}",
+                "the metadata describes {} pictures with {} channels in total, but the policy observes {observation}",
                 self.stack,
                 self.channels()
             ))),

@@ -1,4 +1,4 @@
-//! The network that gives a distribution over actions.
+//! The network of a distribution over actions.
 
 use super::{NetInput, NetShape, StdShape};
 use crate::nn::{
@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// Bounds of a state-dependent log-std.
 const LOG_STD_RANGE: (f32, f32) = (-10.0, 2.0);
 
-/// How a Gaussian's standard deviation is made.
+/// The source of a Gaussian's standard deviation.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
 pub enum StdKind {
     /// One learned vector for all states (the SCORE paper's released form).
@@ -22,10 +22,10 @@ pub enum StdKind {
     State,
 }
 
-/// The part of a Gaussian actor that gives ln σ.
+/// The part of a Gaussian actor that computes ln σ.
 #[derive(Clone, Debug)]
 pub enum LogStd {
-    /// Discrete actions have none.
+    /// Absent, for discrete actions.
     None,
     /// The same for all states, `[dim]`.
     Vector(Tensor<1>),
@@ -34,18 +34,18 @@ pub enum LogStd {
     /// From the last hidden layer and bounded smoothly, for a squashed Gaussian: the action is the tanh of the normal
     /// number (Haarnoja et al. 2018, "Soft actor-critic algorithms and applications").
     Squashed {
-        /// Gives the raw number under [`bounded_log_std`].
+        /// Computes the raw number under [`bounded_log_std`].
         layer: Linear,
         /// Bounds of ln σ.
         range: (f64, f64),
     },
 }
 
-/// π(a | s, z): input `[z, s]`, hidden layers, and a head of logits or means. Images come in as the features that a
-/// trunk of convolutions makes of them.
+/// π(a | s, z): input `[z, s]`, hidden layers, and a head of logits or means. A trunk of convolutions turns images
+/// into features first.
 ///
-/// The skill decoder and the policy are this same type, so that a policy can start as an exact copy of the decoder.
-/// The prior over skills is one too: its action is the latent.
+/// The skill decoder and the policy are of this type, so that a policy can start as an exact copy of the decoder. The
+/// prior over skills is of it, too: its action is the latent.
 #[derive(Clone, Debug)]
 pub struct Actor {
     /// The trunk that reads images, `cnn` in names; `None` for vectors.
@@ -57,7 +57,7 @@ pub struct Actor {
 }
 
 impl Actor {
-    /// Orthogonal weights (gain √2 in the hidden layers, 0.01 in the head), ln σ = 0.
+    /// Creates an actor with orthogonal weights (gain √2 in the hidden layers, 0.01 in the head) and ln σ = 0.
     pub fn new<R: Rng + ?Sized>(
         shape: &NetShape,
         space: ActionSpace,
@@ -69,7 +69,8 @@ impl Actor {
         actor
     }
 
-    /// Logits, or a squashed Gaussian with ln σ within `log_std_range`. Orthogonal weights as in [`Self::new`].
+    /// Creates an actor of logits, or of a squashed Gaussian with ln σ within `log_std_range`. Orthogonal weights as
+    /// in [`Self::new`].
     pub fn squashed<R: Rng + ?Sized>(
         shape: &NetShape,
         space: ActionSpace,
@@ -82,7 +83,7 @@ impl Actor {
         actor
     }
 
-    /// An actor without a trunk, with parameters out of `source`.
+    /// Creates an actor without a trunk, with parameters out of `source`.
     pub(crate) fn build<S: ParamSource>(
         source: &mut S,
         prefix: &str,
@@ -107,17 +108,18 @@ impl Actor {
         Ok(Self { cnn: None, net, log_std })
     }
 
-    /// Width of the observation behind a skill of width `latent`: the numbers of a vector, or the features of an image.
+    /// Returns the width of the observation behind a skill of width `latent`: the numbers of a vector, or the
+    /// features of an image.
     pub(crate) fn obs_dim(&self, latent: usize) -> usize {
         self.net.inputs() - latent
     }
 
-    /// Whether its actions are the tanh of the normal numbers whose distribution [`Self::forward`] gives.
+    /// Returns whether its actions are the tanh of the normal numbers whose distribution [`Self::forward`] returns.
     pub fn is_squashed(&self) -> bool {
         matches!(self.log_std, LogStd::Squashed { .. })
     }
 
-    /// What the layers behind the trunk read of observations, `[n, obs_dim]`: vectors as they are, images as features.
+    /// Returns the input of the layers behind the trunk, `[n, obs_dim]`: vectors unchanged, images as features.
     ///
     /// # Errors
     /// [`LearnError::Config`] if the observations are of the other kind than the network.
@@ -130,7 +132,8 @@ impl Actor {
         }
     }
 
-    /// The rows `[z, s]`, `[n, latent + obs_dim]`, that the layers of actor and critic read: images become features first.
+    /// Returns the rows `[z, s]`, `[n, latent + obs_dim]`, that the layers of actor and critic read; images become
+    /// features first.
     ///
     /// # Errors
     /// As [`Self::observe`].
@@ -146,13 +149,14 @@ impl Actor {
         })
     }
 
-    /// The distributions for joined inputs `[z, s]`, `[n, latent + obs_dim]`, where s is what [`Self::observe`] gives.
+    /// Returns the distributions for joined inputs `[z, s]`, `[n, latent + obs_dim]`, where s is the result of
+    /// [`Self::observe`].
     pub fn forward(&self, x: Tensor<2>) -> Dist {
         self.head(self.net.features(x))
     }
 
-    /// The distributions for skills `z` `[B, latent]` that are each held for `steps` observations: row `t * B + b` of
-    /// `states` `[steps * B, obs_dim]`, which [`Self::observe`] gives, goes with row `b` of `z`.
+    /// Returns the distributions for skills `z` `[B, latent]` that are each used for `steps` observations. Row `t * B
+    /// + b` of `states` `[steps * B, obs_dim]`, the result of [`Self::observe`], goes with row `b` of `z`.
     pub fn forward_held(&self, z: Tensor<2>, states: Tensor<2>, steps: usize) -> Dist {
         self.head(self.net.features_held(z, states, steps))
     }

@@ -5,33 +5,33 @@ use crate::nn::{Init, Linear, Mlp, ParamSource, ParamVisitor, Parameters, Random
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
-/// V(s, z): the actor's input and hidden layers, one output. Of images it reads the features that the actor's trunk makes,
+/// V(s, z): the actor's input and hidden layers, one output. For images it reads the features of the actor's trunk,
 /// which is trained by the losses of both.
 ///
-/// A skill that is about to run out is worth something else than one that has just been drawn: with `clock` it is V(s, z) +
-/// c · C(s, z), where c is the [share of its ticks that is left](crate::Rollout::left).
+/// The value depends on the remaining ticks of the skill. With `clock` it is V(s, z) + c · C(s, z), where c is the
+/// [remaining share of its ticks](crate::Rollout::left).
 #[derive(Clone, Debug)]
 pub struct Critic {
     /// Hidden layers and the head.
     pub net: Mlp,
-    /// A second head, C; `None` where nobody counts ticks.
+    /// A second head, C; `None` if ticks are not counted.
     pub clock: Option<Linear>,
 }
 
 impl Critic {
-    /// Orthogonal weights, gain √2 in the hidden layers and 1 in the head.
+    /// Creates a critic with orthogonal weights, gain √2 in the hidden layers and 1 in the head.
     pub fn new<R: Rng + ?Sized>(shape: &NetShape, rng: &mut R, device: &Device) -> Self {
         let Ok(critic) = Self::build(&mut RandomInit { rng, device }, "", shape);
         critic
     }
 
-    /// [`Self::new`] with parameters out of `source`.
+    /// Creates a critic as [`Self::new`], with parameters out of `source`.
     pub(crate) fn build<S: ParamSource>(source: &mut S, prefix: &str, shape: &NetShape) -> Result<Self, S::Error> {
         let net = Mlp::build(source, prefix, shape.inputs(), &shape.hidden, 1, shape.activation, 1.0)?;
         Ok(Self { net, clock: None })
     }
 
-    /// It with a clock that does nothing yet, or the one of `source`.
+    /// Adds a clock that has no effect yet, or the one of `source`.
     pub(crate) fn with_clock<S: ParamSource>(self, source: &mut S, prefix: &str) -> Result<Self, S::Error> {
         let [width, _] = self.net.head.weight.dims();
         let name = path(prefix, CLOCK);
@@ -42,8 +42,8 @@ impl Critic {
         Ok(Self { clock: Some(clock), ..self })
     }
 
-    /// Values of joined inputs `[z, s]`: `[n, latent + obs_dim]` to `[n]`. `left`, `[n]`, is the share of each skill's ticks
-    /// that is left; without it all skills count as drawn just now.
+    /// Returns the values of joined inputs `[z, s]`: `[n, latent + obs_dim]` to `[n]`. `left`, `[n]`, is the
+    /// remaining share of each skill's ticks; without it all skills count as newly drawn.
     pub fn forward(&self, x: Tensor<2>, left: Option<Tensor<1>>) -> Tensor<1> {
         let features = self.net.features(x);
         let values = number(&self.net.head, features.clone());
@@ -55,10 +55,10 @@ impl Critic {
     }
 }
 
-/// What the second head is called behind the name of its critic.
+/// Name of the second head, behind the name of its critic.
 pub(crate) const CLOCK: &str = "clock";
 
-/// The one output of a layer, `[n]`.
+/// Returns the one output of a layer, `[n]`.
 fn number(layer: &Linear, features: Tensor<2>) -> Tensor<1> {
     let [width, _] = layer.weight.dims();
     // A product with a single column is summed in an order that depends on the number of rows; this is not.

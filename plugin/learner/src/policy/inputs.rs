@@ -1,4 +1,4 @@
-//! Joining skills and observations into what networks read.
+//! Inputs of networks: skills joined with observations.
 
 use crate::nn::{OF_A_MOVE, ObsBatch, matrix, share};
 use crate::norm::ObsStats;
@@ -8,13 +8,13 @@ use burn::tensor::{Device, Tensor};
 /// Rows that a thread joins at a time.
 const ROWS: usize = 64;
 
-/// What actor and critic read of many states, on a device.
+/// The input of actor and critic for many states, on a device.
 #[derive(Clone, Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one per batch, and it is never stored")]
 pub enum NetInput {
     /// Skills joined with vectors: `[z, s]`, `[n, latent + obs_dim]`.
     Joined(Tensor<2>),
-    /// Images, which the actor's trunk makes features of before the skills join them.
+    /// Images, which the actor's trunk turns into features before the skills join them.
     Images {
         /// Skills, `[n, latent]`, for networks that read any.
         z: Option<Tensor<2>>,
@@ -34,19 +34,19 @@ impl From<Tensor<2>> for NetInput {
 pub(crate) struct StateBatch<'a> {
     /// `n * latent`; not read by networks without skills.
     pub(crate) z: &'a [f32],
-    /// What is left of each skill, `n`, or empty, as in [`Rollout::left`](crate::Rollout::left).
+    /// Remaining share of each skill, `n`, or empty, as in [`Rollout::left`](crate::Rollout::left).
     pub(crate) left: &'a [f32],
     /// `n` observations.
     pub(crate) obs: ObsSlice<'a>,
     pub(crate) n: usize,
 }
 
-/// Makes what a network reads out of skills and raw observations in host memory.
+/// Builds a network's input out of skills and raw observations in host memory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct InputBuilder<'a> {
     /// `n * latent`.
     pub(crate) z: &'a [f32],
-    /// How many of a skill's numbers the network reads: all or none.
+    /// Number of the skill's values that the network reads: all or 0.
     pub(crate) latent: usize,
     /// `n` observations of `kind`.
     pub(crate) obs: ObsSlice<'a>,
@@ -56,7 +56,7 @@ pub(crate) struct InputBuilder<'a> {
 }
 
 impl InputBuilder<'_> {
-    /// The given rows on `device`. Of images only these become numbers.
+    /// Returns the given rows on `device`. Only these images are converted to numbers.
     pub(crate) fn input(&self, rows: &[usize], device: &Device) -> NetInput {
         let (n, width) = (rows.len(), self.kind.numbers());
         match (self.obs, self.kind) {
@@ -76,8 +76,8 @@ impl InputBuilder<'_> {
     }
 }
 
-/// Rows `[z, obs]` for the given row numbers: `latent` numbers of `z` (may be 0), then `obs_dim` of `obs`, which
-/// `stats` normalises if given.
+/// Returns rows `[z, obs]` for the given row numbers: `latent` numbers of `z` (may be 0), then `obs_dim` of `obs`,
+/// which `stats` normalises if given.
 pub(crate) fn joined_rows(
     z: &[f32],
     latent: usize,

@@ -1,4 +1,4 @@
-//! Networks that act and networks that estimate values, and the snapshot of both that plays.
+//! Policies: networks that act, networks that estimate values, and the frozen snapshot of both.
 
 mod actor;
 mod critic;

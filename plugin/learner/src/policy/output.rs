@@ -10,9 +10,9 @@ use rand::Rng;
 /// Action distributions and values, one row per observation, in host memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PolicyOutput {
-    /// What the rows act in.
+    /// The action space of the rows.
     pub space: ActionSpace,
-    /// Whether a continuous action is the tanh of a normal number, which `head` and `log_std` then describe.
+    /// True if a continuous action is the tanh of a normal number, which `head` and `log_std` then describe.
     pub squashed: bool,
     /// Normalised log-probabilities (discrete) or means (continuous), `n * dim`.
     pub head: Vec<f32>,
@@ -23,17 +23,17 @@ pub struct PolicyOutput {
 }
 
 impl PolicyOutput {
-    /// Number of rows.
+    /// Returns the number of rows.
     pub fn len(&self) -> usize {
         self.values.len()
     }
 
-    /// Whether there are no rows.
+    /// Returns whether there are no rows.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// Draws an action for `row` and gives its log-probability (or log-density).
+    /// Draws an action for `row` and returns it with its log-probability (or log-density).
     ///
     /// Takes one draw from `rng` for a discrete action, one per dimension for a continuous one.
     ///
@@ -58,8 +58,8 @@ impl PolicyOutput {
         }
     }
 
-    /// The most likely action of `row`: the first of the most likely choices, or the mean (squashed: its tanh, the
-    /// median).
+    /// Returns the most likely action of `row`: the first of the most likely choices, or the mean (squashed: its
+    /// tanh, the median).
     ///
     /// # Panics
     /// If `row` is not below [`Self::len`].
@@ -71,8 +71,8 @@ impl PolicyOutput {
         }
     }
 
-    /// Log-probability (or log-density) of `action` in `row`. A squashed action beyond ±(1 - 1e-6), where single
-    /// precision cannot tell the normal number any more, counts as lying there; one beyond ±1 has density 0.
+    /// Returns the log-probability (or log-density) of `action` in `row`. A squashed action beyond ±(1 - 1e-6), where
+    /// single precision cannot resolve the normal number, is clamped there; one beyond ±1 has density 0.
     ///
     /// # Errors
     /// [`LearnError::Action`] if the action is not in the space.
@@ -97,7 +97,7 @@ impl PolicyOutput {
         }
     }
 
-    /// The outputs of so many rows each, in their order.
+    /// Splits the outputs into these numbers of rows, in order.
     ///
     /// # Panics
     /// If there are more rows in `sizes` than [`Self::len`].
@@ -113,7 +113,7 @@ impl PolicyOutput {
         parts.collect()
     }
 
-    /// The distributions alone.
+    /// Returns the distributions alone.
     pub(crate) fn into_dist(self) -> HostDist {
         let log_std = (!self.log_std.is_empty()).then_some(self.log_std);
         HostDist { dim: self.space.dim(), head: self.head, log_std }

@@ -1,4 +1,4 @@
-//! The sizes of actors and critics: from a shape a fresh network is made, or a stored one is taken out of a file.
+//! The sizes of actors and critics, from which a fresh network is made or a stored one is read.
 
 use super::critic::CLOCK;
 use super::{Actor, Critic, LogStd, StdKind};
@@ -12,9 +12,9 @@ use serde::{Deserialize, Serialize};
 /// Sizes of an actor's layers behind its trunk, or of a critic.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 pub struct NetShape {
-    /// Width of the observation, or the number of features that an image becomes.
+    /// Width of the observation, or the number of features of an image.
     pub obs_dim: usize,
-    /// Width of the skill z that goes before the observation; 0 for none.
+    /// Width of the skill z before the observation; 0 without skills.
     pub latent: usize,
     /// Width of each hidden layer.
     pub hidden: Vec<usize>,
@@ -23,12 +23,12 @@ pub struct NetShape {
 }
 
 impl NetShape {
-    /// Width of `[z, s]`.
+    /// Returns the width of `[z, s]`.
     pub(crate) fn inputs(&self) -> usize {
         self.latent.saturating_add(self.obs_dim)
     }
 
-    /// The sizes of `net`, which reads observations of `obs_dim` behind its skills.
+    /// Returns the sizes of `net`, which reads observations of `obs_dim` behind its skills.
     fn of(net: &Mlp, obs_dim: usize) -> Self {
         Self {
             obs_dim,
@@ -38,7 +38,7 @@ impl NetShape {
         }
     }
 
-    /// The critic of this shape called `name`, out of a file.
+    /// Returns the critic of this shape called `name`, out of a file.
     pub(crate) fn stored_critic(
         &self,
         file: &mut TensorFile,
@@ -52,7 +52,7 @@ impl NetShape {
     }
 }
 
-/// How an actor's standard deviation is made; without meaning for discrete actions.
+/// The source of an actor's standard deviation; without meaning for discrete actions.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Debug)]
 pub(crate) enum StdShape {
     /// One learned vector for all states.
@@ -84,7 +84,7 @@ pub(crate) struct ActorShape {
 }
 
 impl ActorShape {
-    /// An actor of `spec` with these hidden layers, and the trunk `cnn` if it observes images.
+    /// Creates an actor of `spec` with these hidden layers, and the trunk `cnn` if it observes images.
     pub(crate) fn new(
         spec: &PolicySpec,
         cnn: &CnnKind,
@@ -99,7 +99,7 @@ impl ActorShape {
         Self { net: NetShape { obs_dim, latent: spec.latent, hidden: hidden.to_vec(), activation }, std, cnn }
     }
 
-    /// The shape of `actor`, which reads skills of width `latent`.
+    /// Returns the shape of `actor`, which reads skills of width `latent`.
     pub(crate) fn of(actor: &Actor, latent: usize) -> Self {
         let std = match actor.log_std {
             LogStd::None | LogStd::Vector(_) => StdShape::Vector,
@@ -109,12 +109,12 @@ impl ActorShape {
         Self { net: NetShape::of(&actor.net, actor.obs_dim(latent)), std, cnn: actor.cnn.as_ref().map(ImageNet::kind) }
     }
 
-    /// The shape of `critic`, which reads what an actor of this shape reads.
+    /// Returns the shape of `critic`, which reads the same inputs as an actor of this shape.
     pub(crate) fn critic(&self, critic: &Critic) -> NetShape {
         NetShape::of(&critic.net, self.net.obs_dim)
     }
 
-    /// An actor with starting weights from the stream `name`, and its trunk with some from `name.cnn`.
+    /// Creates an actor with starting weights from the stream `name`, and its trunk with some from `name.cnn`.
     ///
     /// # Errors
     /// [`LearnError::Config`] if images are too small for the trunk.
@@ -136,10 +136,11 @@ impl ActorShape {
         Ok(Actor { cnn, ..actor })
     }
 
-    /// The actor of this shape called `name`, out of a file.
+    /// Reads the actor of this shape called `name` out of a file.
     ///
     /// # Errors
-    /// [`FileError`] names the first tensor that is missing or misshapen, or says why the shape is not one of `spec`.
+    /// [`FileError`] names the first tensor that is missing or misshapen, or the reason why the shape does not fit
+    /// `spec`.
     pub(crate) fn stored(
         &self,
         spec: &PolicySpec,
@@ -169,7 +170,7 @@ impl ActorShape {
     }
 }
 
-/// What a network reads: observations (or features of images) and skills of these widths.
+/// The inputs of a network: observations (or features of images) and skills of these widths.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct InputWidths {
     pub(crate) obs_dim: usize,
@@ -177,7 +178,7 @@ pub(crate) struct InputWidths {
 }
 
 impl InputWidths {
-    /// `Ok` if the network `name` reads just this.
+    /// Checks that the network `name` reads exactly these widths.
     pub(crate) fn check(self, file: &TensorFile, name: &str, found: Self) -> Result<(), FileError> {
         if found == self {
             return Ok(());
@@ -188,7 +189,7 @@ impl InputWidths {
 }
 
 impl NetShape {
-    /// What it reads.
+    /// Returns the widths of its inputs.
     pub(crate) fn input_widths(&self) -> InputWidths {
         InputWidths { obs_dim: self.obs_dim, latent: self.latent }
     }

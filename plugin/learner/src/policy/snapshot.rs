@@ -1,4 +1,4 @@
-//! A frozen policy that plays.
+//! A frozen policy for play.
 
 use super::{Actor, Critic, InputBuilder, PolicyOutput, StateBatch};
 use crate::device::{guarded, is_host};
@@ -8,15 +8,15 @@ use crate::{ActionSpace, LearnError, ObsKind, ObsSlice, PolicySpec};
 use burn::tensor::{Device, Tensor};
 use std::sync::Arc;
 
-/// Rows that the networks read at a time. What becomes of a row does not depend on the others.
+/// Number of rows that the networks read at a time. The result of a row does not depend on the others.
 pub(crate) const VECTORS_AT_A_TIME: usize = 2048;
-/// Likewise; the insides of the convolutions are many times as large as an image.
+/// The same for images, whose activations are many times as large.
 const IMAGES_AT_A_TIME: usize = 256;
 
 /// An inference snapshot of an actor and, if there is one, its critic.
 ///
-/// Clones share the weights. A clone per thread needs no locks, and a row's numbers do not depend on which other rows
-/// are in the batch or on the number of threads.
+/// Clones share the weights. A clone per thread needs no locks. A row's numbers do not depend on the other rows of
+/// the batch or on the number of threads.
 #[derive(Clone, Debug)]
 pub struct Policy {
     pub(crate) actor: Actor,
@@ -27,7 +27,7 @@ pub struct Policy {
 }
 
 impl Policy {
-    /// A snapshot of `actor` and `critic`, which must read and do what `spec` says.
+    /// Creates a snapshot of `actor` and `critic`, which must match `spec`.
     pub(crate) fn new(
         actor: &Actor,
         critic: Option<&Critic>,
@@ -38,22 +38,22 @@ impl Policy {
         Self { actor: frozen(actor), critic: critic.map(frozen), stats, spec, device }
     }
 
-    /// What it reads and does.
+    /// Returns its inputs and outputs.
     pub fn spec(&self) -> PolicySpec {
         self.spec
     }
 
-    /// What it acts in.
+    /// Returns its action space.
     pub fn action_space(&self) -> ActionSpace {
         self.spec.action_space
     }
 
-    /// Width of the skill it reads; 0 if it ignores skills.
+    /// Returns the width of the skill it reads; 0 if it ignores skills.
     pub fn latent(&self) -> usize {
         self.spec.latent
     }
 
-    /// What it observes.
+    /// Returns the kind of its observations.
     pub fn observation(&self) -> ObsKind {
         self.spec.obs
     }
@@ -63,17 +63,17 @@ impl Policy {
         self.spec.obs.numbers()
     }
 
-    /// Whether its networks see normalised observations. It takes raw ones all the same.
+    /// Returns whether its networks see normalised observations. Its inputs are raw all the same.
     pub fn normalises(&self) -> bool {
         self.stats.is_some()
     }
 
-    /// Whether it computes on the CPU.
+    /// Returns whether it computes on the CPU.
     pub fn is_on_host(&self) -> bool {
         is_host(&self.device)
     }
 
-    /// The convolutions that read its images; `None` for vectors.
+    /// Returns the convolutions that read its images; `None` for vectors.
     pub fn cnn(&self) -> Option<CnnKind> {
         self.actor.cnn.as_ref().map(ImageNet::kind)
     }
@@ -83,17 +83,17 @@ impl Policy {
     /// `z` is `n * latent` (ignored if [`Self::latent`] is 0), `obs` is `n * obs_dim`.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] for inputs of the wrong length; [`LearnError::Config`] for vectors where it observes images,
+    /// [`LearnError::Shape`] for inputs of the wrong length; [`LearnError::Config`] for vectors in place of images,
     /// or the other way round; [`LearnError::NotFinite`] if an output is NaN or infinite.
     pub fn forward<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<PolicyOutput, LearnError> {
         self.forward_held(z, &[], obs, n)
     }
 
-    /// [`Self::forward`] where of each skill the share `left` is left, `n` or empty, as in
-    /// [`Rollout::left`](crate::Rollout::left): the critic counts.
+    /// Does [`Self::forward`] for skills with the remaining shares `left`, `n` or empty, as in
+    /// [`Rollout::left`](crate::Rollout::left), for critics that count ticks.
     ///
     /// # Errors
-    /// As there.
+    /// As [`Self::forward`].
     pub fn forward_held<'a>(
         &self,
         z: &[f32],
@@ -120,7 +120,7 @@ impl Policy {
         Ok(PolicyOutput { space: self.spec.action_space, squashed: self.actor.is_squashed(), head, log_std, values })
     }
 
-    /// Only the values of [`Self::forward`]; zeros if there is no critic.
+    /// Returns only the values of [`Self::forward`]; zeros if there is no critic.
     ///
     /// # Errors
     /// As [`Self::forward`].
@@ -128,7 +128,7 @@ impl Policy {
         self.values_held(z, &[], obs, n)
     }
 
-    /// Only the values of [`Self::forward_held`]; zeros if there is no critic.
+    /// Returns only the values of [`Self::forward_held`]; zeros if there is no critic.
     ///
     /// # Errors
     /// As [`Self::forward`].
@@ -163,11 +163,11 @@ impl Policy {
         Ok(())
     }
 
-    /// Calls `read` with the joined inputs of some states at a time, what is left of their skills, and their number, until all
-    /// were read.
+    /// Calls `read` with the joined inputs of some states at a time, the remaining shares of their skills, and their
+    /// number, until all were read.
     ///
-    /// The inputs have at least two rows: matrix libraries sum a single row in another order than the rows of a matrix,
-    /// and a lone agent shall act like one of many.
+    /// The inputs have at least two rows. Matrix libraries sum a single row in another order than the rows of a
+    /// matrix, and a lone agent must act like one of many.
     fn for_each_chunk(
         &self,
         states: StateBatch<'_>,
@@ -183,7 +183,7 @@ impl Policy {
             LearnError::check("skills", n * latent, z.len())?;
         }
         if !left.is_empty() {
-            LearnError::check("what is left of the skills", n, left.len())?;
+            LearnError::check("remaining shares of skills", n, left.len())?;
         }
         let inputs = InputBuilder { z, latent: *latent, obs, kind, stats: self.stats.as_deref() };
         let chunk = match kind {

@@ -1,9 +1,9 @@
-//! What a policy file says about itself to people.
+//! Metadata of a policy file, for people and for checks.
 
 use crate::{PictureCard, SeenLevels};
 use serde::{Deserialize, Serialize};
 
-/// What a policy was made for and by, for people and for checks.
+/// Metadata of a policy: its purpose and origin.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug, Default)]
 #[serde(deny_unknown_fields)]
 pub struct PolicyCard {
@@ -13,16 +13,16 @@ pub struct PolicyCard {
     pub game_version: u32,
     /// Names of the observation's values, in order; none for images.
     pub observations: Vec<String>,
-    /// How the images that it observes are made; `None` for vectors.
+    /// Metadata of the images that it observes; `None` for vectors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub picture: Option<PictureCard>,
     /// Names of the discrete choices or of the action vector's dimensions; may be empty.
     pub actions: Vec<String>,
     /// Name of the algorithm.
     pub algorithm: String,
-    /// What it was trained on, and for how long.
+    /// A description of the training and its length.
     pub training: String,
-    /// The levels that it has seen, those that its demonstrations show among them; `None` where nobody noted them.
+    /// The levels that it has seen, including those of its demonstrations; `None` if unknown.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seen: Option<SeenLevels>,
     /// Version and revision of the code that wrote the file.

@@ -1,4 +1,4 @@
-//! The examples by which the reader of a policy file checks that it computes what the writer computed.
+//! Examples in a policy file, by which its reader checks that it computes the same numbers as the writer.
 
 use super::PolicyFile;
 use crate::file::TensorFile;
@@ -9,10 +9,10 @@ use crate::{FileError, LearnError, ObsKind, ObsSlice, Observations};
 /// The examples' observations.
 const OBSERVATIONS: &str = "examples.obs";
 
-/// How far an example may be from what it was, absolutely and relatively: other processors round otherwise.
+/// Tolerance of an example, absolute and relative: results are not equal on other CPUs.
 const TOLERANCE: f32 = 1e-3;
 
-/// One kind of number that a policy says of each example.
+/// One kind of output of a policy for each example.
 struct Output {
     name: &'static str,
     /// Numbers of one example.
@@ -20,13 +20,13 @@ struct Output {
     numbers: Vec<f32>,
 }
 
-/// Everything that a policy, its decoder and its prior say of some states.
+/// All outputs of a policy, its decoder and its prior for some states.
 pub(super) struct Examples {
     outputs: Vec<Output>,
 }
 
 impl Examples {
-    /// What `file`'s networks say of `states`.
+    /// Returns the outputs of `file`'s networks for `states`.
     pub(super) fn of(file: &PolicyFile, states: StateBatch<'_>) -> Result<Self, LearnError> {
         let StateBatch { z, obs, n, .. } = states;
         let output = file.policy.forward(z, obs, n)?;
@@ -48,7 +48,7 @@ impl Examples {
         Ok(Self { outputs })
     }
 
-    /// Adds them to a file, with the `states` that they are of.
+    /// Adds the outputs to a file, with their `states`.
     pub(super) fn put(&self, file: &mut TensorFile, policy: &Policy, states: StateBatch<'_>) {
         let StateBatch { z, obs, n, .. } = states;
         let shape = [n, policy.obs_dim()];
@@ -63,7 +63,7 @@ impl Examples {
         }
     }
 
-    /// Compares what the networks that were `read` say of the `n` examples of their file with what the file holds.
+    /// Compares the outputs of the networks that were `read` for the `n` examples of their file with the stored ones.
     pub(super) fn check(read: &PolicyFile, file: &mut TensorFile, n: usize) -> Result<(), FileError> {
         let policy = &read.policy;
         let shape = [n, policy.obs_dim()];

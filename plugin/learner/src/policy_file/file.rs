@@ -13,16 +13,16 @@ use std::path::Path;
 
 const FILE: FileKind = FileKind { name: "policy", version: 1 };
 
-/// How a policy file that is cut off can be had again.
+/// Advice on recovering a policy file that is cut off.
 const AGAIN: &str = ": export the policy again";
 
 /// A policy with everything it needs to play.
 ///
-/// The file is safetensors: networks, normaliser and some rows of observations with what the policy said about them,
-/// and a description as JSON in the header. A reader that computes something else for those rows refuses the file.
+/// The file is safetensors: networks, normaliser, some rows of observations with the policy's outputs for them, and a
+/// description as JSON in the header. A reader with other results for those rows refuses the file.
 #[derive(Clone, Debug)]
 pub struct PolicyFile {
-    /// What it was made for and by.
+    /// Its metadata.
     pub card: PolicyCard,
     /// The policy.
     pub policy: Policy,
@@ -41,7 +41,7 @@ struct Header {
 
 impl PolicyFile {
     /// Writes the file, in one step. `obs` (`n`, raw) and `z` (`n * latent`) are the rows by which readers check
-    /// themselves; a few that the policy meets in play are enough.
+    /// themselves; a few observations from play are enough.
     ///
     /// # Errors
     /// [`FileError::Learner`] if the rows do not fit the policy, [`FileError::Io`] if the file cannot be written.
@@ -49,7 +49,7 @@ impl PolicyFile {
         let (policy, obs) = (&self.policy, obs.into());
         let learner = |source| FileError::Learner { path: path.to_owned(), source };
         if n == 0 {
-            let text = "a policy file needs at least one row by which its readers check themselves";
+            let text = "a policy file needs at least one example row for the checks of its readers";
             return Err(learner(LearnError::Config(text.to_owned())));
         }
         if let Some(picture) = &self.card.picture {
@@ -84,16 +84,16 @@ impl PolicyFile {
         file.write()
     }
 
-    /// Reads a file that [`Self::save`] wrote, and checks that it says of its examples what it said when it was written.
+    /// Reads a file that [`Self::save`] wrote, and checks that its outputs for the examples are the stored ones.
     ///
     /// # Errors
-    /// [`FileError`] says what is wrong with the file, names the tensor that is missing, superfluous or misshapen, or the
-    /// example that came out otherwise.
+    /// [`FileError`] describes the problem of the file, or names the tensor that is missing, superfluous or
+    /// misshapen, or the example with another result.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         Self::take(TensorFile::read(path).map_err(|error| error.or_again(AGAIN))?, device)
     }
 
-    /// [`Self::load`] for a file that is in memory already, such as an asset or `include_bytes!`; `name` is for messages.
+    /// Reads a file in memory as [`Self::load`] does, such as an asset or `include_bytes!`; `name` is for messages.
     ///
     /// # Errors
     /// As [`Self::load`].
@@ -111,7 +111,7 @@ impl PolicyFile {
             Some(skills) => Some(skills.take(&mut file, &spec, device)?),
         };
         if header.examples == 0 {
-            return Err(file.format("holds no examples by which it could be checked".to_owned()));
+            return Err(file.format("holds no examples for the checks of its readers".to_owned()));
         }
         if let Some(picture) = &header.card.picture {
             picture.check(spec.obs).map_err(|e| file.learner(e))?;

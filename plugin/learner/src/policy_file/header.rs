@@ -1,4 +1,4 @@
-//! What the header of a policy file says about its networks, and the networks that are taken out of the file by it.
+//! The header of a policy file: the shapes of its networks, by which they are read.
 
 use crate::file::TensorFile;
 use crate::nn::CnnKind;
@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 const NORMALISED_IMAGES: &str = "normalises images, whose pixels are divided by 255 instead";
-const NO_HORIZON: &str = "a skill must be held for at least 1 tick, not 0";
+const NO_HORIZON: &str = "the skill interval must be at least 1 tick, not 0";
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -34,13 +34,13 @@ pub(super) struct SkillsShape {
     decoder: ActorShape,
     horizon: usize,
     draw: SkillDraw,
-    /// Whether decoder and prior see normalised observations.
+    /// True if decoder and prior see normalised observations.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     normalised: bool,
 }
 
 impl PolicyShape {
-    /// The shape of `policy`.
+    /// Returns the shape of `policy`.
     pub(super) fn of(policy: &Policy) -> Self {
         let image = match policy.observation() {
             ObsKind::Vector(_) => None,
@@ -56,7 +56,7 @@ impl PolicyShape {
         }
     }
 
-    /// What the policy reads and does.
+    /// Returns the inputs and outputs of the policy.
     pub(super) fn spec(&self) -> PolicySpec {
         let net = &self.actor.net;
         PolicySpec {
@@ -66,7 +66,7 @@ impl PolicyShape {
         }
     }
 
-    /// The policy of this shape out of `file`, whose networks must go together.
+    /// Reads the policy of this shape out of `file` and checks that its networks fit each other.
     pub(super) fn take(&self, file: &mut TensorFile, device: DeviceKind) -> Result<Policy, FileError> {
         let (spec, plain) = (self.spec(), device.plain());
         let actor = self.actor.stored(&spec, file, "actor", &plain)?;
@@ -84,10 +84,10 @@ impl PolicyShape {
 }
 
 impl SkillsShape {
-    /// The shape of `skills`.
+    /// Returns the shape of `skills`.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if they are held for no time, or if prior and decoder do not see the same.
+    /// [`LearnError::Config`] if their skill interval is 0, or if prior and decoder have different observations.
     pub(super) fn of(skills: &SkillSource) -> Result<Self, LearnError> {
         if skills.horizon == 0 {
             return Err(LearnError::Config(NO_HORIZON.to_owned()));
@@ -108,7 +108,7 @@ impl SkillsShape {
         })
     }
 
-    /// The skills of this shape out of `file`, whose networks must go together and with a `policy`.
+    /// Reads the skills of this shape out of `file` and checks that their networks fit each other and the `policy`.
     pub(super) fn take(
         &self,
         file: &mut TensorFile,
@@ -156,7 +156,7 @@ fn check_normaliser(normalised: bool, spec: &PolicySpec, file: &TensorFile) -> R
     }
 }
 
-/// The frozen normaliser called `name` out of a file, if there is one.
+/// Reads the frozen normaliser called `name` out of a file, if there is one.
 fn take_stats(
     normalised: bool,
     file: &mut TensorFile,

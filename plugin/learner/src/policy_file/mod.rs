@@ -1,4 +1,4 @@
-//! A policy that a game ships with: one self-describing file.
+//! Policies that a game ships with, each in one self-describing file.
 
 mod card;
 mod examples;

@@ -1,6 +1,6 @@
-//! What keeps actor and critic from minding changed pictures (Raileanu et al. 2021, "Automatic data augmentation for
-//! generalization in reinforcement learning", DrAC): the more they differ on a changed picture from what they say of the
-//! original, the larger the loss. The rollout itself is never changed.
+//! The loss that makes actor and critic insensitive to image augmentations (Raileanu et al. 2021, "Automatic data
+//! augmentation for generalization in reinforcement learning", DrAC). It grows with the difference between their
+//! outputs for a changed picture and for the original. The rollout itself is never changed.
 
 use super::step::{Minibatch, Moment, outputs};
 use super::{PpoConfig, PpoNets};
@@ -8,9 +8,8 @@ use crate::LearnError;
 use crate::nn::Dist;
 use burn::tensor::Tensor;
 
-/// mean(KL(π(s) ‖ π(s'))) + mean((V(s') - V(s))²) for the changed pictures s' of a minibatch, `[1]`; `None` without any,
-/// and while the critic warms up.
-/// What is said of the originals, `dist` and `values`, is a constant.
+/// Returns mean(KL(π(s) ‖ π(s'))) + mean((V(s') - V(s))²) for the changed pictures s' of a minibatch, `[1]`; `None`
+/// without any, and while the critic warms up. The outputs for the originals, `dist` and `values`, are constants.
 ///
 /// # Errors
 /// [`LearnError::Config`] if the networks do not read such observations.
@@ -22,7 +21,7 @@ pub(super) fn augmentation_loss(
     config: &PpoConfig,
     moment: &Moment<'_>,
 ) -> Result<Option<Tensor<1>>, LearnError> {
-    // While only the critic learns the actor stays as it is.
+    // While only the critic learns the actor must not change.
     let Some(changed) = batch.augmented.as_ref().filter(|_| !moment.is_warming_up) else { return Ok(None) };
     let (dist_of_changed, values_of_changed) = outputs(nets, changed, batch, config, moment)?;
     let divergence = dist.clone().detach().kl(&dist_of_changed)?.mean();

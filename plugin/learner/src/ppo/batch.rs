@@ -1,4 +1,4 @@
-//! What an update learns from: a rollout with its advantages, and its minibatches in host memory.
+//! The data of an update: a rollout with its advantages, and its minibatches in host memory.
 
 use super::PpoConfig;
 use super::objective::{PpoBatch, normalize_advantages};
@@ -14,21 +14,21 @@ use burn::tensor::Device;
 use std::cell::{Cell, RefCell};
 use std::time::{Duration, Instant};
 
-/// A rollout with everything that an update reads beside it, one entry per row.
+/// A rollout with all other data that an update reads, one entry per row.
 #[derive(Debug)]
 pub(super) struct Batch<'a> {
     pub(super) rollout: &'a Rollout,
     pub(super) advantages: Vec<f32>,
     pub(super) returns: Vec<f32>,
     pub(super) teacher: Option<TeacherOutput>,
-    /// How many of the rollout's skill numbers the networks read: all or none.
+    /// Number of the rollout's skill values that the networks read: all or 0.
     pub(super) latent: usize,
-    /// What the networks read of vectors, joined and normalised once for all epochs.
+    /// Input rows of vectors, joined and normalised once for all epochs.
     pub(super) joined: Option<JoinedRows>,
     pub(super) norm_adv: bool,
-    /// Changes of images that the networks shall not mind, and what draws them.
+    /// Image augmentations, and their random generator.
     pub(super) augment: (Vec<Augmentation>, RefCell<ChaCha8Rng>),
-    /// Time spent putting minibatches together.
+    /// Time spent assembling minibatches.
     pub(super) gathering: Cell<Duration>,
 }
 
@@ -40,7 +40,7 @@ pub(super) struct JoinedRows {
 }
 
 impl JoinedRows {
-    /// Those of a rollout of vectors.
+    /// Builds the rows of a rollout of vectors.
     pub(super) fn of(rollout: &Rollout, latent: usize, stats: Option<&ObsStats>) -> Option<Self> {
         let Observations::Vector(values) = &rollout.obs else { return None };
         let (width, all) = (rollout.obs_kind.numbers(), (0..rollout.rows()).collect::<Vec<_>>());
@@ -53,8 +53,8 @@ impl JoinedRows {
     }
 }
 
-/// The rows of each minibatch of an update: those of the rollout in an order that each epoch draws anew, in equal parts. Only
-/// those of one epoch are in memory.
+/// Returns the rows of each minibatch of an update: those of the rollout in an order that each epoch draws anew, in
+/// equal parts. Only one epoch is in memory at a time.
 pub(super) fn minibatches<'a>(
     config: &PpoConfig,
     n: usize,
@@ -77,13 +77,13 @@ impl Batch<'_> {
         }
     }
 
-    /// Counts the time since `start` as spent putting minibatches together.
+    /// Counts the time since `start` as spent assembling minibatches.
     pub(super) fn gathered(&self, start: Instant) {
         self.gathering.set(self.gathering.get() + start.elapsed());
     }
 
-    /// A minibatch in parts, each with its share of the rows: what networks keep of images until they know the gradient
-    /// takes more memory than the rollout.
+    /// Returns a minibatch in parts, each with its share of the rows: the activations of images take more memory than
+    /// the rollout.
     pub(super) fn parts<'b>(
         &'b self,
         rows: &'b [usize],
@@ -110,7 +110,8 @@ impl Batch<'_> {
         })
     }
 
-    /// The images of these `rows` after changes, with the skills that `inputs` has for them; `None` without changes.
+    /// Returns the images of these `rows` after augmentation, with their skills from `inputs`; `None` without
+    /// augmentations.
     pub(super) fn augmented(&self, inputs: &NetInput, rows: &[usize], device: &Device) -> Option<NetInput> {
         let (augmentations, rng) = &self.augment;
         let (NetInput::Images { z, .. }, ObsSlice::Image(pixels), ObsKind::Image(shape)) =

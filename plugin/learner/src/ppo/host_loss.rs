@@ -1,11 +1,9 @@
-//! The loss of a minibatch with its gradient in host memory, row by row: the formulas of `objective.rs` and of the mean
-//! penalty. As a graph of small operations they would take longer than what they compute.
+//! The loss of a minibatch with its gradient in host memory, row by row: the formulas of `objective.rs` and of the
+//! mean penalty. A graph of small operations would be slower than this arithmetic.
 
 use super::step::{Minibatch, Moment};
 use super::{PpoConfig, StepMetrics};
-use crate::nn::{
-    CategoricalRows, Dist, DistRows, GaussianRows, HostDist, RowTerms, check_loss, host, known_gradient, share_each,
-};
+use crate::nn::{CategoricalRows, Dist, DistRows, GaussianRows, HostDist, RowTerms, host, known_gradient, share_each};
 use crate::score::{KlDirection, PenaltyForm};
 use crate::{Actions, LearnError};
 use burn::tensor::Tensor;
@@ -13,7 +11,7 @@ use std::ops::Range;
 
 /// Rows that a thread takes at a time.
 const ROWS: usize = 64;
-/// Products that take as long as what is done for each number of a distribution.
+/// Number of products that take as long as the work for each number of a distribution.
 const OF_A_NUMBER: usize = 64;
 
 /// A loss and its derivatives.
@@ -28,13 +26,13 @@ pub(super) struct HostLoss {
     of_values: Vec<f32>,
 }
 
-/// What the loss of each row depends on.
+/// The data that the loss of each row depends on.
 struct Rows<'a> {
     config: &'a PpoConfig,
     moment: &'a Moment<'a>,
     policy: HostDist,
     decoder: Option<HostDist>,
-    /// Of the decoder; empty without it.
+    /// Confidence of the decoder; empty without it.
     confidence: Vec<f32>,
     actions: Actions,
     values: Vec<f32>,
@@ -44,7 +42,7 @@ struct Rows<'a> {
     returns: Vec<f32>,
 }
 
-/// Some rows, and where their derivatives go.
+/// Some rows, and the memory for their derivatives.
 struct Piece<'a> {
     rows: Range<usize>,
     of_head: &'a mut [f32],
@@ -54,16 +52,16 @@ struct Piece<'a> {
 }
 
 impl HostLoss {
-    /// Whether the loss is a mean over rows, as it is but for the penalties of the released code.
+    /// Returns whether the loss is a mean over rows; it is, except for the penalties of the released code.
     pub(super) fn is_for(moment: &Moment<'_>) -> bool {
         moment.score.is_none_or(|score| score.penalty == PenaltyForm::Mean)
     }
 
-    /// Of what actor and critic gave for `batch`, by the mean penalty if there is one.
+    /// Computes the loss for the outputs of actor and critic on `batch`, with the mean penalty if there is one.
     ///
     /// # Errors
     /// [`LearnError::Action`] if policy, decoder and actions differ in kind; [`LearnError::NotFinite`] and
-    /// [`LearnError::Exploded`] name the first term that ran away after so many steps of the optimizer.
+    /// [`LearnError::Exploded`] name the first term that diverged after so many steps of the optimizer.
     pub(super) fn of(
         dist: &Dist,
         values: &Tensor<1>,
@@ -74,21 +72,11 @@ impl HostLoss {
     ) -> Result<Self, LearnError> {
         let rows = Rows::read(dist, values, batch, config, moment)?;
         let loss = rows.loss()?;
-        let StepMetrics { policy_loss, value_loss, entropy, decoder_kl, kl_penalty, total_loss, .. } = loss.metrics;
-        for (name, value) in [
-            ("policy_loss", policy_loss),
-            ("value_loss", value_loss),
-            ("entropy", entropy),
-            ("decoder_kl", decoder_kl),
-            ("kl_penalty", kl_penalty),
-            ("total_loss", total_loss),
-        ] {
-            check_loss(name, value as f32, steps)?;
-        }
+        loss.metrics.check_losses(steps)?;
         Ok(loss)
     }
 
-    /// The loss as the end of the graph that leads to `dist` and `values`.
+    /// Returns the loss as the end of the graph that leads to `dist` and `values`.
     pub(super) fn tensor(self, dist: &Dist, values: Tensor<1>) -> Tensor<1> {
         let total = known_gradient(values, self.metrics.total_loss as f32, self.of_values);
         match dist {
@@ -150,7 +138,7 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// With `stds` derivatives by ln σ in each row.
+    /// Computes the loss piece by piece; with `stds` derivatives by ln σ in each row.
     fn by_pieces<D: DistRows>(&self, stds: usize, dist_of: impl Fn(Range<usize>) -> D + Sync) -> HostLoss {
         let (n, dim) = (self.values.len(), self.policy.dim);
         let (mut of_head, mut of_log_std, mut of_values) = (vec![0.0; n * dim], vec![0.0; n * stds], vec![0.0; n]);
@@ -207,7 +195,7 @@ impl<'a> Rows<'a> {
         sums.approx_kl += moved - f64::from(log_ratio);
         sums.clip_fraction += f64::from(u8::from(moved.abs() > self.config.clip));
         let mut by = RowTerms {
-            // Where clipping makes it worse there is nothing to gain.
+            // Where clipping decides, the gradient is 0.
             log_prob: if free < clipped { 0.0 } else { free / n as f32 },
             entropy: (-self.config.ent_coef / n) as f32,
             kl: 0.0,

@@ -1,4 +1,4 @@
-//! The learner: PPO, and SCORE-PPO if it is given a skill model.
+//! The PPO learner, which is SCORE-PPO if it is given a skill model.
 
 use super::{PpoConfig, PpoNets};
 use crate::device::guarded;
@@ -33,18 +33,18 @@ struct Counters {
 }
 
 impl PpoLearner {
-    /// Plain PPO with starting weights from `seed`.
+    /// Creates plain PPO with starting weights from `seed`.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work.
+    /// [`LearnError::Config`] for impossible settings.
     pub fn new(config: PpoConfig, spec: PolicySpec, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         Self::fresh(config, spec, None, seed, device)
     }
 
-    /// SCORE-PPO: tied to `model`'s decoder as `score` says.
+    /// Creates SCORE-PPO: tied to `model`'s decoder by the settings of `score`.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work.
+    /// [`LearnError::Config`] for impossible settings.
     pub fn with_skill(
         config: PpoConfig,
         score: ScoreConfig,
@@ -56,7 +56,7 @@ impl PpoLearner {
         Self::fresh(config, teacher.policy_spec(), Some(teacher), seed, device)
     }
 
-    /// PPO with starting weights, tied to `teacher` if there is one.
+    /// Creates PPO with starting weights, tied to `teacher` if there is one.
     pub(crate) fn fresh(
         config: PpoConfig,
         spec: PolicySpec,
@@ -92,20 +92,21 @@ impl PpoLearner {
         Self { config, base, nets: tracked(nets), adam }
     }
 
-    /// The settings.
+    /// Returns the settings.
     pub fn config(&self) -> &PpoConfig {
         &self.config
     }
 
-    /// Reads a file that [`Learner::save`] wrote. The learner goes on exactly as the saved one would have.
+    /// Reads a file that [`Learner::save`] wrote. The learner continues exactly as the saved one would have.
     ///
     /// # Errors
-    /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
+    /// [`FileError`] describes the problem of the file, or names the tensor that is missing, superfluous or
+    /// misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         Self::stored(TensorFile::read(path)?, device)
     }
 
-    /// [`Self::load`] for a file in memory.
+    /// Reads a file in memory as [`Self::load`] does.
     pub(crate) fn stored(file: TensorFile, device: DeviceKind) -> Result<Self, FileError> {
         let mut saved = Checkpoint::<PpoConfig, Counters>::of(file, FILE, device)?;
         let base = Self::new_base(&saved.config, saved.spec, saved.teacher.take(), saved.seed, device);
@@ -117,7 +118,7 @@ impl PpoLearner {
         Ok(learner)
     }
 
-    /// What [`Learner::save`] writes.
+    /// Returns the file that [`Learner::save`] writes.
     pub(crate) fn checkpoint(&self, path: &Path) -> Result<TensorFile, FileError> {
         let counters = Counters { adam_steps: self.adam.steps };
         self.base.checkpoint(path, FILE, &self.config, &counters, |file| {
@@ -133,7 +134,7 @@ impl Learner for PpoLearner {
         &self.base
     }
 
-    /// The policy that plays, with its critic.
+    /// Returns the policy that plays, with its critic.
     fn policy(&self) -> Policy {
         self.base.snapshot(&self.nets.actor, Some(&self.nets.critic))
     }
@@ -146,7 +147,8 @@ impl Learner for PpoLearner {
         self.base.initial_kl(&self.policy(), self.base.updates == 0, StateBatch { z, left: &[], obs, n })
     }
 
-    /// Weights are called `actor.l0.weight` (`[inputs, outputs]`), moments `adam.m.actor.l0.weight`.
+    /// Saves the learner. Weights are called `actor.l0.weight` (`[inputs, outputs]`), moments
+    /// `adam.m.actor.l0.weight`.
     fn save(&self, path: &Path) -> Result<(), FileError> {
         self.checkpoint(path)?.write()
     }

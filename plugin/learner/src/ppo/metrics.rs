@@ -1,6 +1,9 @@
-//! What a gradient step and an update report.
+//! Metrics of a gradient step and of an update.
 
 use serde::{Deserialize, Serialize};
+
+use crate::LearnError;
+use crate::nn::check_loss;
 
 /// Means over all minibatches of an update.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq)]
@@ -9,8 +12,8 @@ pub struct UpdateMetrics {
     pub policy_loss: f32,
     /// Value loss, with its ½ and without its weight.
     pub value_loss: f32,
-    /// Entropy in nats. Of continuous actions it is that of the Gaussian before the game clips: Σ ln σ + 1.42 for each
-    /// dimension, which may be negative.
+    /// Entropy in nats. Of continuous actions it is that of the Gaussian before the game clips: Σ ln σ + 1.42 for
+    /// each dimension, which may be negative.
     pub entropy: f32,
     /// Estimate of KL(old ‖ new) in nats: mean(ratio - 1 - ln ratio).
     pub approx_kl: f32,
@@ -23,7 +26,7 @@ pub struct UpdateMetrics {
     /// Mean of the decoder's confidence, α in the paper; `None` without a penalty.
     #[serde(rename = "alpha_mean")]
     pub confidence: Option<f32>,
-    /// How much actor and critic mind changed pictures, not weighted; `None` without any.
+    /// Sensitivity of actor and critic to augmentations, not weighted; `None` without any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub augmentation_loss: Option<f32>,
     /// Norm of the gradient before clipping.
@@ -32,7 +35,7 @@ pub struct UpdateMetrics {
     pub lr: f32,
 }
 
-/// Which terms a loss has beside those of PPO.
+/// The optional terms of a loss beside those of PPO.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Has {
     pub(super) penalty: bool,
@@ -40,25 +43,25 @@ pub(super) struct Has {
 }
 
 impl UpdateMetrics {
-    /// The means over `steps` gradient steps whose metrics add up to `sum`.
+    /// Returns the means over `steps` gradient steps whose metrics add up to `sum`.
     pub(super) fn mean(sum: &StepMetrics, steps: usize, has: Has, explained_variance: f64, lr: f64) -> Self {
-        let mean = |total: f64| (total / steps as f64) as f32;
+        let mean = sum.map(|total| (total / steps as f64) as f32);
         Self {
-            policy_loss: mean(sum.policy_loss),
-            value_loss: mean(sum.value_loss),
-            entropy: mean(sum.entropy),
-            approx_kl: mean(sum.approx_kl),
-            clip_fraction: mean(sum.clip_fraction),
+            policy_loss: mean.policy_loss,
+            value_loss: mean.value_loss,
+            entropy: mean.entropy,
+            approx_kl: mean.approx_kl,
+            clip_fraction: mean.clip_fraction,
             explained_variance: explained_variance as f32,
-            decoder_kl: has.penalty.then(|| mean(sum.decoder_kl)),
-            confidence: has.penalty.then(|| mean(sum.confidence)),
-            augmentation_loss: has.augmentation.then(|| mean(sum.augmentation_loss)),
-            grad_norm: mean(sum.grad_norm),
+            decoder_kl: has.penalty.then_some(mean.decoder_kl),
+            confidence: has.penalty.then_some(mean.confidence),
+            augmentation_loss: has.augmentation.then_some(mean.augmentation_loss),
+            grad_norm: mean.grad_norm,
             lr: lr as f32,
         }
     }
 
-    /// The numbers by their TensorBoard tags; what was not measured is left out.
+    /// Returns the numbers by their TensorBoard tags; unmeasured ones are left out.
     pub fn scalars(&self) -> Vec<(&'static str, f64)> {
         let all = [
             ("charts/learning_rate", Some(self.lr)),
@@ -77,51 +80,78 @@ impl UpdateMetrics {
     }
 }
 
-/// What one gradient step looked like, before it was taken.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct StepMetrics {
-    /// Clipped surrogate loss.
-    pub policy_loss: f64,
-    /// Value loss, with its ½ and without its weight.
-    pub value_loss: f64,
-    /// Entropy in nats.
-    pub entropy: f64,
-    /// The loss that was minimised.
-    pub total_loss: f64,
-    /// mean(ratio - 1 - ln ratio).
-    pub approx_kl: f64,
-    /// Share of |ratio - 1| > clip.
-    pub clip_fraction: f64,
-    /// Mean divergence between decoder and policy, not weighted.
-    pub decoder_kl: f64,
-    /// mean(confidence · divergence), or the legacy form of it, without kl_coef.
-    pub kl_penalty: f64,
-    /// Mean of the decoder's confidence.
-    pub confidence: f64,
-    /// How much actor and critic mind changed pictures, not weighted.
-    pub augmentation_loss: f64,
-    /// Norm of the gradient before clipping.
-    pub grad_norm: f64,
+/// Defines [`StepMetrics`], the only list of the names of a gradient step's metrics.
+macro_rules! step_metrics {
+    (
+        losses { $($(#[$loss_doc:meta])* $loss:ident,)* }
+        others { $($(#[$doc:meta])* $other:ident,)* }
+    ) => {
+        /// Metrics of one gradient step, before it was taken.
+        #[derive(Clone, Copy, Debug, Default, PartialEq)]
+        pub struct StepMetrics<T = f64> {
+            $($(#[$loss_doc])* pub $loss: T,)*
+            $($(#[$doc])* pub $other: T,)*
+        }
+
+        impl<T> StepMetrics<T> {
+            /// Converts each metric, in the order of the fields.
+            pub(super) fn map<U>(self, mut convert: impl FnMut(T) -> U) -> StepMetrics<U> {
+                StepMetrics {
+                    $($loss: convert(self.$loss),)*
+                    $($other: convert(self.$other),)*
+                }
+            }
+        }
+
+        impl StepMetrics {
+            /// Adds each number times `share`.
+            pub(super) fn add(&mut self, other: &Self, share: f64) {
+                $(self.$loss += other.$loss * share;)*
+                $(self.$other += other.$other * share;)*
+            }
+
+            /// Checks the losses after so many steps of the optimizer, in the order of the fields.
+            ///
+            /// # Errors
+            /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name the first loss that diverged.
+            pub(super) fn check_losses(&self, steps: u64) -> Result<(), LearnError> {
+                $(check_loss(stringify!($loss), self.$loss as f32, steps)?;)*
+                Ok(())
+            }
+        }
+    };
 }
 
-impl StepMetrics {
-    /// Adds each number times `share`.
-    pub(super) fn add(&mut self, other: &Self, share: f64) {
-        self.policy_loss += other.policy_loss * share;
-        self.value_loss += other.value_loss * share;
-        self.entropy += other.entropy * share;
-        self.total_loss += other.total_loss * share;
-        self.approx_kl += other.approx_kl * share;
-        self.clip_fraction += other.clip_fraction * share;
-        self.decoder_kl += other.decoder_kl * share;
-        self.kl_penalty += other.kl_penalty * share;
-        self.confidence += other.confidence * share;
-        self.augmentation_loss += other.augmentation_loss * share;
-        self.grad_norm += other.grad_norm * share;
+step_metrics! {
+    losses {
+        /// Clipped surrogate loss.
+        policy_loss,
+        /// Value loss, with its ½ and without its weight.
+        value_loss,
+        /// Entropy in nats.
+        entropy,
+        /// Mean divergence between decoder and policy, not weighted.
+        decoder_kl,
+        /// mean(confidence · divergence), or the legacy form of it, without kl_coef.
+        kl_penalty,
+        /// The loss that was minimised.
+        total_loss,
+    }
+    others {
+        /// mean(ratio - 1 - ln ratio).
+        approx_kl,
+        /// Share of |ratio - 1| > clip.
+        clip_fraction,
+        /// Mean of the decoder's confidence.
+        confidence,
+        /// Divergence of actor and critic on augmented images, not weighted.
+        augmentation_loss,
+        /// Norm of the gradient before clipping.
+        grad_norm,
     }
 }
 
-/// How far a policy has moved from the one that played.
+/// Distance of a policy from the one that played.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RatioStats {
     /// mean(ratio - 1 - ln ratio).
@@ -132,7 +162,7 @@ pub struct RatioStats {
     pub clip_fraction: f64,
 }
 
-/// Statistics of `log_ratios` = ln(new probability / old probability).
+/// Returns statistics of `log_ratios` = ln(new probability / old probability).
 pub fn ratio_stats(log_ratios: &[f32], clip: f64) -> RatioStats {
     let n = log_ratios.len().max(1) as f64;
     let (mut kl, mut old, mut clipped) = (0.0, 0.0, 0.0);
@@ -148,7 +178,7 @@ pub fn ratio_stats(log_ratios: &[f32], clip: f64) -> RatioStats {
     RatioStats { approx_kl: kl / n, old_approx_kl: old / n, clip_fraction: clipped / n }
 }
 
-/// 1 - Var(returns - values) / Var(returns); NaN if the returns do not vary.
+/// Returns 1 - Var(returns - values) / Var(returns); NaN if the returns do not vary.
 pub fn explained_variance(values: &[f32], returns: &[f32]) -> f64 {
     let errors = values.iter().zip(returns).map(|(v, r)| f64::from(*r) - f64::from(*v));
     let spread = variance(returns.iter().map(|&r| f64::from(r)));

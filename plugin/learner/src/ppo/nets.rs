@@ -7,8 +7,8 @@ use crate::nn::{ParamVisitor, Parameters, RandomInit, path};
 use crate::policy::{Actor, ActorShape, Critic, NetShape, StdShape};
 use crate::{FileError, LearnError};
 
-/// What PPO trains: the parameters `actor.*` and `critic.*`, whose gradients are clipped together. The trunk of images,
-/// `actor.cnn.*`, is the critic's too.
+/// The networks of PPO: the parameters `actor.*` and `critic.*`, whose gradients are clipped together. The trunk of
+/// images, `actor.cnn.*`, is the critic's too.
 #[derive(Clone, Debug)]
 pub struct PpoNets {
     /// The policy.
@@ -18,7 +18,8 @@ pub struct PpoNets {
 }
 
 impl PpoNets {
-    /// A copy of the decoder, or starting weights from the stream `ppo.actor`, and a critic with some from `ppo.critic`.
+    /// Creates a copy of the decoder, or starting weights from the stream `ppo.actor`, and a critic with some from
+    /// `ppo.critic`.
     ///
     /// # Errors
     /// [`LearnError::Config`] if images are too small for the convolutions.
@@ -36,7 +37,7 @@ impl PpoNets {
         Ok(Self { actor, critic })
     }
 
-    /// Those of a checkpoint.
+    /// Reads the networks of a checkpoint.
     ///
     /// # Errors
     /// [`FileError`] names the first tensor that is missing or misshapen.
@@ -47,7 +48,7 @@ impl PpoNets {
     }
 }
 
-/// The layers of what it is a copy of, if it is one, else those of the settings.
+/// Returns the layers of the network that it copies, if it is a copy, else those of the settings.
 fn actor_shape(config: &PpoConfig, base: &LearnerBase) -> ActorShape {
     match base.copied_teacher() {
         Some(teacher) => teacher.shape(),
@@ -55,7 +56,7 @@ fn actor_shape(config: &PpoConfig, base: &LearnerBase) -> ActorShape {
     }
 }
 
-/// The critic reads what the actor's layers read, through layers of its own.
+/// Returns the shape of the critic, which reads the same inputs as the actor's layers, through layers of its own.
 fn critic_shape(config: &PpoConfig, actor: &ActorShape) -> NetShape {
     NetShape { hidden: config.hidden.clone(), activation: config.activation, ..actor.net }
 }

@@ -9,11 +9,12 @@ use burn::tensor::Tensor;
 pub struct Advantages {
     /// A.
     pub advantages: Vec<f32>,
-    /// A + V, what the critic should have said.
+    /// A + V, the target of the critic.
     pub returns: Vec<f32>,
 }
 
-/// Schulman et al. 2016, "High-dimensional continuous control using generalized advantage estimation":
+/// Computes generalised advantage estimates (Schulman et al. 2016, "High-dimensional continuous control using
+/// generalized advantage estimation"):
 ///
 /// δ = r + γ v' - V(s), A = δ + γ λ (1 - done) A'. v' is 0 after a termination; after a truncation it is the value of
 /// the episode's last observation (or 0 by [`TimeLimit::Legacy`]); else it is the next row's value. A step that is both
@@ -55,7 +56,7 @@ pub struct PpoBatch {
     pub actions: ActionBatch,
     /// Their log-probabilities when taken.
     pub old_log_probs: Tensor<1>,
-    /// Advantages, normalised if that is wanted.
+    /// Advantages, normalised if requested.
     pub advantages: Tensor<1>,
     /// Values when the observations were seen.
     pub old_values: Tensor<1>,
@@ -63,7 +64,7 @@ pub struct PpoBatch {
     pub returns: Tensor<1>,
 }
 
-/// The terms of the loss; `[1]` each but for the log-ratios.
+/// The terms of the loss; `[1]` each except for the log-ratios.
 #[derive(Clone, Debug)]
 pub struct PpoLoss {
     /// mean(max(-A ratio, -A clip(ratio))).
@@ -76,7 +77,7 @@ pub struct PpoLoss {
     pub log_ratio: Tensor<1>,
 }
 
-/// The clipped surrogate objective, the value loss (clipped if `clip_value`) and the entropy.
+/// Computes the clipped surrogate objective, the value loss (clipped if `clip_value`) and the entropy.
 ///
 /// The loss to minimise is policy_loss - ent_coef · entropy + vf_coef · value_loss.
 ///
@@ -107,7 +108,7 @@ pub fn ppo_loss(
     Ok(PpoLoss { policy_loss, value_loss, entropy: dist.entropy().mean(), log_ratio })
 }
 
-/// (A - mean) / (deviation + 1e-8) with the unbiased deviation. A single advantage becomes 0.
+/// Normalises advantages: (A - mean) / (deviation + 1e-8) with the unbiased deviation. A single advantage becomes 0.
 pub fn normalize_advantages(advantages: &mut [f32]) {
     let n = advantages.len() as f64;
     let mean = advantages.iter().map(|&a| f64::from(a)).sum::<f64>() / n;
@@ -123,7 +124,8 @@ mod tests {
     use super::*;
     use crate::{ActionSpace, Actions};
 
-    /// One environment, two steps, γ = ½, λ = ½, V = 2 and 4, r = 1 and 3, next value 8, final value 6.
+    /// Returns advantages for one environment, two steps, γ = ½, λ = ½, V = 2 and 4, r = 1 and 3, next value 8, final
+    /// value 6.
     fn advantages(terminated: bool, truncated: bool, limit: TimeLimit) -> Vec<f32> {
         let rollout = Rollout {
             steps: 2,
@@ -143,8 +145,7 @@ mod tests {
 
     #[test]
     fn by_hand() {
-        // Second step: 3 + 8/2 - 4 = 3.
-        // Going on: 1 + 4/2 - 2 + 3/4 = 1.75.
+        // Second step: 3 + 8/2 - 4 = 3. Going on: 1 + 4/2 - 2 + 3/4 = 1.75.
         assert_eq!(advantages(false, false, TimeLimit::Bootstrap), [1.75, 3.0]);
         // Terminated: 1 - 2 = -1.
         assert_eq!(advantages(true, false, TimeLimit::Bootstrap), [-1.0, 3.0]);

@@ -5,7 +5,7 @@ use super::batch::Batch;
 use super::objective::{PpoBatch, PpoLoss};
 use super::step::{Losses, Minibatch, Moment, outputs};
 use super::{PpoConfig, PpoNets, StepMetrics};
-use crate::nn::{ActionBatch, Adam, Dist, PackedPixels, check_loss, host, matrix, vector};
+use crate::nn::{ActionBatch, Adam, Dist, PackedPixels, host, matrix, vector};
 use crate::policy::NetInput;
 use crate::score::TeacherBatch;
 use crate::{LearnError, ObsKind, ObsSlice};
@@ -79,7 +79,7 @@ impl<'a> SentRollout<'a> {
     }
 }
 
-/// As [`super::normalize_advantages`].
+/// Normalises advantages as [`super::normalize_advantages`] does.
 fn normalized(advantages: Tensor<1>) -> Tensor<1> {
     let [n] = advantages.dims();
     let centred = advantages.clone() - advantages.mean();
@@ -115,18 +115,23 @@ impl States {
     }
 }
 
-/// What the steps of an update report, still on the device.
+/// Metrics of the steps of an update, still on the device.
 #[derive(Default)]
 pub(super) struct Reports {
+    /// For each step the metrics that are on the device, in the order of the fields.
     numbers: Vec<Tensor<1>>,
-    confidences: Vec<f64>,
+    /// For each step the metrics that are known without the device.
+    known: Vec<StepMetrics<Option<f64>>>,
 }
 
-/// Numbers of a step's report.
-const NUMBERS: usize = 10;
+/// A metric of a step.
+enum Metric {
+    OnDevice(Tensor<1>),
+    Known(f64),
+}
 
 impl Reports {
-    /// As [`super::gradient_step`], with everything left on the device.
+    /// Does [`super::gradient_step`] with all results left on the device.
     pub(super) fn step(
         &mut self,
         nets: &mut PpoNets,
@@ -135,68 +140,70 @@ impl Reports {
         config: &PpoConfig,
         moment: &Moment<'_>,
     ) -> Result<(), LearnError> {
+        use Metric::{Known, OnDevice};
         let (dist, values) = outputs(nets, &batch.inputs, batch, config, moment)?;
         let augmentation = augmentation_loss(nets, &dist, &values, batch, config, moment)?;
         let Losses { ppo, penalty, mut total } = Losses::of(&dist, values, batch, config, moment)?;
         let PpoLoss { policy_loss, value_loss, entropy, log_ratio } = ppo;
-        let zero = || Tensor::zeros([1], &log_ratio.device().inner());
-        let (kl, term) = match penalty {
-            Some(penalty) => (penalty.kl.mean().inner(), penalty.term.inner()),
-            None => (zero(), zero()),
+        let [policy_loss, value_loss, entropy] = [policy_loss, value_loss, entropy].map(Tensor::inner);
+        let (decoder_kl, kl_penalty) = match penalty {
+            Some(penalty) => (OnDevice(penalty.kl.mean().inner()), OnDevice(penalty.term.inner())),
+            None => (Known(0.0), Known(0.0)),
         };
-        let log_ratio = log_ratio.clone().inner();
+        let log_ratio = log_ratio.inner();
         let moved = log_ratio.clone().exp() - 1.0;
         let approx_kl = (moved.clone() - log_ratio).mean();
-        let clipped = moved.abs().greater_elem(config.clip).float().mean();
-        let losses = [policy_loss, value_loss, entropy].map(Tensor::inner);
-        let augmentation = match augmentation {
+        let clip_fraction = moved.abs().greater_elem(config.clip).float().mean();
+        let augmentation_loss = match augmentation {
             Some(loss) => {
                 total = total + loss.clone() * config.augment_coef;
-                loss.inner()
+                OnDevice(loss.inner())
             }
-            None => zero(),
+            None => Known(0.0),
         };
-        let whole = total.clone().inner();
-        let norm = adam.step_on_device(nets, total.backward(), moment.lr, config.max_grad_norm);
-        let [policy_loss, value_loss, entropy] = losses;
-        let all = vec![policy_loss, value_loss, entropy, kl, term, whole, approx_kl, clipped, norm, augmentation];
-        self.numbers.push(Tensor::cat(all, 0));
-        self.confidences.push(batch.teacher.as_ref().map_or(0.0, |teacher| teacher.mean_confidence));
+        let total_loss = total.clone().inner();
+        let grad_norm = adam.step_on_device(nets, total.backward(), moment.lr, config.max_grad_norm);
+        let metrics = StepMetrics {
+            policy_loss: OnDevice(policy_loss),
+            value_loss: OnDevice(value_loss),
+            entropy: OnDevice(entropy),
+            decoder_kl,
+            kl_penalty,
+            total_loss: OnDevice(total_loss),
+            approx_kl: OnDevice(approx_kl),
+            clip_fraction: OnDevice(clip_fraction),
+            confidence: Known(batch.teacher.as_ref().map_or(0.0, |teacher| teacher.mean_confidence)),
+            augmentation_loss,
+            grad_norm: OnDevice(grad_norm),
+        };
+        let mut numbers = Vec::new();
+        self.known.push(metrics.map(|metric| match metric {
+            OnDevice(number) => {
+                numbers.push(number);
+                None
+            }
+            Known(number) => Some(number),
+        }));
+        self.numbers.push(Tensor::cat(numbers, 0));
         Ok(())
     }
 
-    /// The sum over all steps, read at once; `before` optimizer steps were made before the first.
+    /// Returns the sum over all steps, read at once; `before` optimizer steps were made before the first.
     ///
     /// # Errors
-    /// [`LearnError::NotFinite`] or [`LearnError::Exploded`] for the first step whose losses or gradient ran away; which
-    /// parameter it was is not known here. Weights that the last step spoils show in the next update.
+    /// [`LearnError::NotFinite`] or [`LearnError::Exploded`] for the first step whose losses or gradient diverged;
+    /// the parameter is not known here. Weights that the last step spoils show in the next update.
     pub(super) fn sum(self, before: u64) -> Result<StepMetrics, LearnError> {
         let mut sum = StepMetrics::default();
-        let numbers = host(Tensor::cat(self.numbers, 0))?;
-        for (step, (row, confidence)) in numbers.chunks_exact(NUMBERS).zip(self.confidences).enumerate() {
+        let mut numbers = host(Tensor::cat(self.numbers, 0))?.into_iter().map(f64::from);
+        for (step, known) in self.known.into_iter().enumerate() {
             let steps = before + step as u64;
-            let names = ["policy_loss", "value_loss", "entropy", "decoder_kl", "kl_penalty", "total_loss"];
-            for (name, value) in names.into_iter().zip(row) {
-                check_loss(name, *value, steps)?;
-            }
-            let number = |at: usize| f64::from(row[at]);
-            if !number(8).is_finite() {
+            let metrics = known.map(|known| known.or_else(|| numbers.next()).unwrap_or(f64::NAN));
+            metrics.check_losses(steps)?;
+            if !metrics.grad_norm.is_finite() {
                 return Err(LearnError::NotFinite { tensor: "gradient".to_owned(), steps: Some(steps) });
             }
-            let step = StepMetrics {
-                policy_loss: number(0),
-                value_loss: number(1),
-                entropy: number(2),
-                decoder_kl: number(3),
-                kl_penalty: number(4),
-                total_loss: number(5),
-                approx_kl: number(6),
-                clip_fraction: number(7),
-                grad_norm: number(8),
-                augmentation_loss: number(9),
-                confidence,
-            };
-            sum.add(&step, 1.0);
+            sum.add(&metrics, 1.0);
         }
         Ok(sum)
     }

@@ -6,7 +6,7 @@ use super::objective::{PpoBatch, PpoLoss, ppo_loss};
 use super::{PpoConfig, PpoNets, StepMetrics, ratio_stats};
 use crate::LearnError;
 use crate::device::is_host;
-use crate::nn::{Adam, Dist, NamedGrads, finite, host};
+use crate::nn::{Adam, Dist, NamedGrads, finite, host, scalar};
 use crate::policy::NetInput;
 use crate::score::{Penalty, ScoreConfig, TeacherBatch, penalty};
 use burn::tensor::Tensor;
@@ -14,11 +14,11 @@ use burn::tensor::Tensor;
 /// One minibatch on the device.
 #[derive(Clone, Debug)]
 pub struct Minibatch {
-    /// What actor and critic read.
+    /// Inputs of actor and critic.
     pub inputs: NetInput,
-    /// The same after the changes that they shall not mind; `None` without any.
+    /// The same after augmentation; `None` without any.
     pub augmented: Option<NetInput>,
-    /// What is left of each skill, `[n]`, if somebody has counted.
+    /// Remaining share of each skill, `[n]`, if ticks are counted.
     pub left: Option<Tensor<1>>,
     /// Constants of the PPO loss.
     pub ppo: PpoBatch,
@@ -31,13 +31,13 @@ pub struct Minibatch {
 pub(super) struct Losses {
     pub(super) ppo: PpoLoss,
     pub(super) penalty: Option<Penalty>,
-    /// What is minimised.
+    /// The minimised total.
     pub(super) total: Tensor<1>,
 }
 
 impl Losses {
-    /// Of what actor and critic gave for `batch`. With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added. While the
-    /// critic warms up its loss is all that is minimised.
+    /// Computes the terms from the outputs of actor and critic for `batch`. With a decoder in `batch` and settings of
+    /// SCORE, kl_coef times the [`penalty`] is added. While the critic warms up only its loss is minimised.
     ///
     /// # Errors
     /// [`LearnError::Action`] if policy, decoder and actions differ in kind.
@@ -65,34 +65,36 @@ impl Losses {
         Ok(Self { ppo, penalty: penalised, total })
     }
 
-    /// In plain numbers, but for the norm of the gradient; all are checked.
+    /// Returns the terms as plain numbers, except for the norm of the gradient; all are checked.
     pub(super) fn metrics(&self, batch: &Minibatch, config: &PpoConfig, steps: u64) -> Result<StepMetrics, LearnError> {
+        let number = |tensor: &Tensor<1>| scalar(tensor.clone().inner()).map(f64::from);
+        let ratios = ratio_stats(&host(self.ppo.log_ratio.clone().inner())?, config.clip);
         let mut metrics = StepMetrics {
-            policy_loss: finite("policy_loss", &self.ppo.policy_loss, steps)?,
-            value_loss: finite("value_loss", &self.ppo.value_loss, steps)?,
-            entropy: finite("entropy", &self.ppo.entropy, steps)?,
+            policy_loss: number(&self.ppo.policy_loss)?,
+            value_loss: number(&self.ppo.value_loss)?,
+            entropy: number(&self.ppo.entropy)?,
+            approx_kl: ratios.approx_kl,
+            clip_fraction: ratios.clip_fraction,
+            total_loss: number(&self.total)?,
             ..StepMetrics::default()
         };
         if let (Some(teacher), Some(Penalty { kl, term })) = (&batch.teacher, &self.penalty) {
-            metrics.decoder_kl = finite("decoder_kl", &kl.clone().mean(), steps)?;
-            metrics.kl_penalty = finite("kl_penalty", term, steps)?;
+            metrics.decoder_kl = number(&kl.clone().mean())?;
+            metrics.kl_penalty = number(term)?;
             metrics.confidence = teacher.mean_confidence;
         }
-        let ratios = ratio_stats(&host(self.ppo.log_ratio.clone().inner())?, config.clip);
-        metrics.approx_kl = ratios.approx_kl;
-        metrics.clip_fraction = ratios.clip_fraction;
-        metrics.total_loss = finite("total_loss", &self.total, steps)?;
+        metrics.check_losses(steps)?;
         Ok(metrics)
     }
 }
 
-/// Loss, gradient, clipping by the global norm, one step of Adam on tracked `nets`.
+/// Computes loss and gradient, clips by the global norm, and does one step of Adam on tracked `nets`.
 ///
 /// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added to the loss.
 ///
 /// # Errors
-/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`] the
-/// first loss beyond all bounds; [`LearnError::Config`] if the networks do not read such observations.
+/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`]
+/// the first loss beyond all bounds; [`LearnError::Config`] if the networks do not read such observations.
 pub fn gradient_step(
     nets: &mut PpoNets,
     adam: &mut Adam,
@@ -105,18 +107,18 @@ pub fn gradient_step(
     step_in_parts(nets, adam, part, config, &Moment { lr, score, is_warming_up: false })
 }
 
-/// What changes from update to update.
+/// Settings that change from update to update.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moment<'a> {
     /// Learning rate.
     pub(super) lr: f64,
-    /// Settings of SCORE, with the weight that the penalty has come to.
+    /// Settings of SCORE, with the present weight of the penalty.
     pub(super) score: Option<&'a ScoreConfig>,
-    /// Whether only the critic learns.
+    /// True if only the critic learns.
     pub(super) is_warming_up: bool,
 }
 
-/// What is minimised, with what a step reports of it.
+/// Returns the minimised loss, with its metrics.
 fn loss(
     nets: &PpoNets,
     batch: &Minibatch,
@@ -141,7 +143,7 @@ fn loss(
     Ok((total + augmentation * config.augment_coef, StepMetrics { augmentation_loss, total_loss, ..metrics }))
 }
 
-/// What actor and critic say to `inputs`: those of `batch`, or changed ones.
+/// Returns the outputs of actor and critic for `inputs`: those of `batch`, or augmented ones.
 pub(super) fn outputs(
     nets: &PpoNets,
     inputs: &NetInput,
@@ -155,7 +157,7 @@ pub(super) fn outputs(
     Ok((dist, nets.critic.forward(if is_apart { inputs.detach() } else { inputs }, batch.left.clone())))
 }
 
-/// [`gradient_step`] on a minibatch that comes in parts, each with its share of the rows.
+/// Does [`gradient_step`] on a minibatch that comes in parts, each with its share of the rows.
 pub(super) fn step_in_parts(
     nets: &mut PpoNets,
     adam: &mut Adam,

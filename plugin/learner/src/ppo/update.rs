@@ -21,8 +21,8 @@ impl PpoLearner {
     ///
     /// # Errors
     /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, and
-    /// [`LearnError::Input`] if it holds numbers that are not finite, before anything is changed;
-    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
+    /// [`LearnError::Input`] if it holds numbers that are not finite, before anything is changed.
+    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name the number that diverged; the learner is unusable
     /// then, as after [`LearnError::DeviceFailed`].
     pub fn update(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
         update_on(&self.base.device.plain(), || self.update_here(rollout))
@@ -73,9 +73,9 @@ impl PpoLearner {
         Ok(UpdateMetrics::mean(&sum, steps, has, explained_variance, lr))
     }
 
-    /// While the critic warms up the policy's gradients are zero: its moments stay nothing while their bias correction wears
-    /// off, so that its first steps would be several times as long as they should be. So Adam begins anew with the policy,
-    /// and nothing decays before.
+    /// Restarts Adam when the policy begins to learn. While the critic warms up the policy's gradients are zero: the
+    /// moments stay 0 while their bias correction wears off, so its first steps would be several times too long.
+    /// Before that there is no weight decay, either.
     fn prepare_adam(&mut self, is_warming_up: bool) {
         let PpoConfig { critic_warmup, weight_decay, .. } = self.config;
         let config = AdamConfig { weight_decay: if is_warming_up { 0.0 } else { weight_decay }, ..self.adam.config };
@@ -118,7 +118,7 @@ impl PpoLearner {
         reports.sum(before)
     }
 
-    /// What the decoder says about the whole rollout: it is frozen, so once per update is enough.
+    /// Returns the decoder's outputs for the whole rollout: it is frozen, so once per update is enough.
     fn teacher_output(&self, rollout: &Rollout) -> Result<Option<TeacherOutput>, LearnError> {
         let Some(teacher) = &self.base.teacher else { return Ok(None) };
         let mut rng = self.base.streams.stream("score.own_samples", self.base.updates);

@@ -1,11 +1,11 @@
-//! The values of the states in which episodes were cut off and the rollout stopped.
+//! Values of the last states: where episodes were cut off and where the rollout stopped.
 
 use super::Rollout;
 use crate::{LearnError, Policy};
 
 impl Rollout {
-    /// Fills [`Self::final_values`] and [`Self::next_values`] with what `policy` says of the [`Self::ends`], all in one
-    /// batch: the alternative to asking it tick by tick. Values that are never read become 0.
+    /// Fills [`Self::final_values`] and [`Self::next_values`] with `policy`'s values of the [`Self::ends`], all in
+    /// one batch, as an alternative to one call per tick. Values that are never read become 0.
     ///
     /// # Errors
     /// As [`Self::check`]; [`LearnError::Shape`] or [`LearnError::Config`] if the states do not fit the policy.

@@ -1,10 +1,11 @@
-//! Whether a rollout fits together, and fits a learner.
+//! Checks that a rollout is consistent and fits a learner.
 
 use super::Rollout;
 use crate::{LearnError, PolicySpec};
 
 impl Rollout {
-    /// `Ok` if all lengths fit T and B, and [`EndStates::cut_rows`](super::EndStates::cut_rows) ascend and are rows of this rollout.
+    /// Checks that all lengths fit T and B, and that [`EndStates::cut_rows`](super::EndStates::cut_rows) ascend and
+    /// are rows of this rollout.
     ///
     /// # Errors
     /// [`LearnError::Shape`] names the first length that does not; [`LearnError::Config`] names a row.
@@ -13,7 +14,7 @@ impl Rollout {
         self.check_beside_obs()
     }
 
-    /// [`Self::check`] for a rollout whose observations are kept elsewhere.
+    /// Does [`Self::check`] for a rollout whose observations are kept elsewhere.
     pub(super) fn check_beside_obs(&self) -> Result<(), LearnError> {
         let (rows, cuts) = (self.rows(), self.ends.cut_rows.len());
         self.ends.cut_obs.as_slice().check_size("rollout ends cut_obs", &self.obs_kind, cuts)?;
@@ -51,8 +52,8 @@ impl Rollout {
         Ok(())
     }
 
-    /// `Ok` if a learner of `spec` can learn from this rollout with skills of width `latent`: it fits, it is not empty,
-    /// and every observation, skill and number that is learned from is finite.
+    /// Checks that a learner of `spec` can learn from this rollout with skills of width `latent`. It must fit and not
+    /// be empty, and every observation, skill and number that is learned from must be finite.
     ///
     /// # Errors
     /// As [`Self::check`]; [`LearnError::Action`] if the actions do not fit; [`LearnError::Input`] names the first row

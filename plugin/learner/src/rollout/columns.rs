@@ -1,11 +1,11 @@
-//! One piece of memory for the observations of all Worlds, each of which fills its own part of every tick.
+//! Shared memory for the observations of all Worlds, each of which fills its own part of every tick.
 
 use crate::{LearnError, ObsKind, ObsSlice, Observations};
 
 /// The observations of some environments in a rollout of more, tick by tick.
 #[derive(Debug)]
 pub struct ObsColumns<'a> {
-    /// The ticks that are left, the next one last.
+    /// The remaining ticks, the next one last.
     ticks: Vec<Tick<'a>>,
 }
 
@@ -19,8 +19,8 @@ impl ObsColumns<'_> {
     /// Writes the observations of the next tick.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] if there are not as many as environments, or the rollout is full; [`LearnError::Config`] if they
-    /// are of another kind.
+    /// [`LearnError::Shape`] if their number differs from that of environments, or the rollout is full;
+    /// [`LearnError::Config`] if they are of another kind.
     pub fn fill_next(&mut self, obs: ObsSlice<'_>) -> Result<(), LearnError> {
         let what = "observations of a tick";
         match (self.ticks.pop(), obs) {
@@ -40,8 +40,8 @@ impl ObsColumns<'_> {
 }
 
 impl Observations {
-    /// Room for `steps` ticks of as many environments as `shares` has together, if it is not there yet, and the columns of
-    /// each share.
+    /// Makes room for `steps` ticks of the environments of all `shares`, if needed, and returns the columns of each
+    /// share.
     pub fn columns(&mut self, kind: &ObsKind, steps: usize, shares: &[usize]) -> Vec<ObsColumns<'_>> {
         let rows = steps * shares.iter().sum::<usize>();
         if self.as_slice().check_size("rollout obs", kind, rows).is_err() {
@@ -56,7 +56,7 @@ impl Observations {
     }
 }
 
-/// The parts of each tick, for each share from the last tick to the first.
+/// Splits each tick into the parts of all shares, from the last tick to the first.
 fn split<'a, T>(
     mut rest: &'a mut [T],
     steps: usize,

@@ -11,18 +11,18 @@ pub struct EndStates {
     pub cut_obs: Observations,
     /// The skill under which that observation is valued, `cut_rows * latent`.
     pub cut_z: Vec<f32>,
-    /// What is left of it, as in [`Rollout::left`](crate::Rollout::left).
+    /// Remaining share of that skill, as in [`Rollout::left`](crate::Rollout::left).
     pub cut_left: Vec<f32>,
     /// Observation after the last row of each environment, `B`; zeros where that row ended an episode.
     pub next_obs: Observations,
     /// The skill active there, `B * latent`.
     pub next_z: Vec<f32>,
-    /// What is left of it, `B`, or empty.
+    /// Remaining share of that skill, `B`, or empty.
     pub next_left: Vec<f32>,
 }
 
 impl EndStates {
-    /// No states yet.
+    /// Creates a value without states.
     pub fn new(kind: &ObsKind) -> Self {
         let none = || Observations::empty(kind);
         let empty = Vec::new;
@@ -37,7 +37,7 @@ impl EndStates {
         }
     }
 
-    /// Forgets all states and keeps the memory.
+    /// Removes all states and keeps the memory.
     pub(super) fn clear(&mut self) {
         self.cut_rows.clear();
         self.cut_obs.clear();

@@ -5,11 +5,11 @@ use crate::{ActionSpace, LearnError, ObsKind, Observations};
 
 impl Rollout {
     /// Puts rollouts of the same length side by side: the environments of the first, then those of the second, ... A
-    /// single one stays as it is.
+    /// single one is returned unchanged.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for no parts; [`LearnError::Shape`], [`LearnError::Config`] or [`LearnError::Action`] if they
-    /// do not fit together.
+    /// [`LearnError::Config`] for no parts; [`LearnError::Shape`], [`LearnError::Config`] or [`LearnError::Action`]
+    /// if they do not fit together.
     pub fn join(mut parts: Vec<Self>) -> Result<Self, LearnError> {
         parts.iter().try_for_each(Self::check)?;
         if parts.len() == 1 {
@@ -20,8 +20,8 @@ impl Rollout {
         Ok(all)
     }
 
-    /// [`Self::join`], of parts whose observations lie in `obs` already, each in its
-    /// [columns](Observations::columns); what the parts hold themselves is not looked at.
+    /// Joins parts as [`Self::join`] does, with observations that are in `obs` already, each in its
+    /// [columns](Observations::columns); observations in the parts are ignored.
     ///
     /// # Errors
     /// As [`Self::join`].
@@ -73,7 +73,7 @@ impl Rollout {
         Ok(all)
     }
 
-    /// The cut episodes of all parts, in ascending order of their joined rows.
+    /// Returns the cut episodes of all parts, in ascending order of their joined rows.
     fn join_cuts(&mut self, parts: &[Self]) -> Result<(), LearnError> {
         let mut cuts = Vec::new();
         let mut offset = 0;
@@ -95,7 +95,7 @@ impl Rollout {
     }
 }
 
-/// The observations of parts that fit together, tick by tick.
+/// Returns the observations of parts that fit together, tick by tick.
 fn side_by_side(parts: &[Rollout], kind: &ObsKind) -> Result<Observations, LearnError> {
     let mut obs = Observations::with_capacity(kind, parts.iter().map(Rollout::rows).sum());
     for t in 0..parts.first().map_or(0, |part| part.steps) {

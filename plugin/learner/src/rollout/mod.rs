@@ -1,4 +1,4 @@
-//! What was played since the last update.
+//! Rollouts: the steps played since the last update.
 
 mod bootstrap;
 mod check;

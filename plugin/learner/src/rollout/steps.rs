@@ -1,4 +1,4 @@
-//! What was played since the last update.
+//! The steps of a rollout, tick by tick.
 
 use super::EndStates;
 use crate::{ActionSpace, Actions, LearnError, ObsKind, ObsSlice, Observations};
@@ -10,7 +10,7 @@ pub struct Rollout {
     pub steps: usize,
     /// B.
     pub envs: usize,
-    /// What an observation is.
+    /// The kind of observations.
     pub obs_kind: ObsKind,
     /// Width of a skill; may be 0.
     pub latent: usize,
@@ -18,8 +18,8 @@ pub struct Rollout {
     pub obs: Observations,
     /// The skill active at each step, `T * B * latent`.
     pub z: Vec<f32>,
-    /// The share of that skill's ticks that was left, this one included, above 0 and up to 1, `T * B`; empty if nobody has
-    /// counted, and all count as drawn just then.
+    /// The remaining share of that skill's ticks, this one included, above 0 and up to 1, `T * B`. Empty if ticks are
+    /// not counted: all skills count as newly drawn then.
     pub left: Vec<f32>,
     /// The actions taken, `T * B`.
     pub actions: Actions,
@@ -29,9 +29,9 @@ pub struct Rollout {
     pub values: Vec<f32>,
     /// Raw rewards of the actions.
     pub rewards: Vec<f32>,
-    /// Whether the action ended the episode by the game's own rules.
+    /// True where the action ended the episode by the game's own rules.
     pub terminated: Vec<bool>,
-    /// Whether the episode was cut off after the action.
+    /// True where the episode was cut off after the action.
     pub truncated: Vec<bool>,
     /// Value of the last observation of an episode that was cut off after this step; not read elsewhere.
     pub final_values: Vec<f32>,
@@ -65,7 +65,7 @@ pub struct RolloutStep<'a> {
 }
 
 impl Rollout {
-    /// No steps yet.
+    /// Creates a rollout without steps.
     pub fn new(envs: usize, obs: impl Into<ObsKind>, latent: usize, space: &ActionSpace) -> Self {
         let obs_kind = obs.into();
         Self {
@@ -88,17 +88,17 @@ impl Rollout {
         }
     }
 
-    /// Number of rows, T · B.
+    /// Returns the number of rows, T · B.
     pub fn rows(&self) -> usize {
         self.steps * self.envs
     }
 
-    /// Whether any step was rewarded, well or badly: there is nothing to learn of rewards elsewhere.
+    /// Returns whether any reward is not 0: otherwise there is nothing to learn from rewards.
     pub fn is_rewarded(&self) -> bool {
         self.rewards.iter().any(|&reward| reward != 0.0)
     }
 
-    /// Forgets all steps and keeps the memory.
+    /// Removes all steps and keeps the memory.
     pub fn clear(&mut self) {
         self.steps = 0;
         self.obs.clear();
@@ -134,7 +134,7 @@ impl Rollout {
         Ok(())
     }
 
-    /// What is left of the skills of the newest step, `B`.
+    /// Adds the remaining shares of the skills of the newest step, `B`.
     pub fn push_left(&mut self, left: &[f32]) {
         self.left.extend_from_slice(left);
     }
@@ -158,7 +158,7 @@ impl Rollout {
         Ok(())
     }
 
-    /// Whether an episode ended at each row, in either way.
+    /// Returns whether an episode ended at each row, in either way.
     pub fn done(&self) -> Vec<bool> {
         self.terminated.iter().zip(&self.truncated).map(|(a, b)| *a || *b).collect()
     }

@@ -1,4 +1,4 @@
-//! Rollouts that are joined, and rollouts that do not fit.
+//! Tests of rollouts that are joined, and of rollouts that do not fit.
 
 use super::*;
 use crate::{ActionSpace, Actions, ObsKind};

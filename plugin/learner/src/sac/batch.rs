@@ -1,4 +1,4 @@
-//! Transitions from the replay buffer, made ready for a gradient step.
+//! Batches of transitions from the replay buffer, prepared for a gradient step.
 
 use super::SacLearner;
 use super::buffer::ReplayBuffer;
@@ -11,34 +11,36 @@ use burn::tensor::Tensor;
 /// One batch of transitions on the device.
 #[derive(Clone, Debug)]
 pub struct SacBatch {
-    /// What the actor reads, `[n, latent + obs_dim]`.
+    /// Input of the actor, `[n, latent + obs_dim]`.
     pub inputs: Tensor<2>,
     /// The actions taken.
     pub actions: ActionBatch,
-    /// What they earned, `[n]`.
+    /// Their rewards, `[n]`.
     pub rewards: Tensor<1>,
-    /// The share of the skills' ticks that is left, and what is left in the next states, `[n, 1]`: only if the critics count.
+    /// The remaining shares of the skills' ticks, in the states and in the next states, `[n, 1]`: only if the critics
+    /// count ticks.
     pub left: Option<(Tensor<2>, Tensor<2>)>,
-    /// 1 where the value of the next state counts, or its weight where that differs, and 0 where the episode was over, `[n]`.
+    /// Weight of the next state's value, usually 1, and 0 where the episode was over, `[n]`.
     pub continues: Tensor<1>,
-    /// The next states as the actor reads them, `[n, latent + obs_dim]`; any numbers where they do not count.
+    /// The next states as the actor reads them, `[n, latent + obs_dim]`; unspecified where they do not count.
     pub next_inputs: Tensor<2>,
     /// Constants of the penalty, if there is one.
     pub teacher: Option<TeacherBatch>,
-    /// Numbers of the critics that the target is the least of; none for all of them.
+    /// Numbers of the critics whose least value is the target; empty for all of them.
     pub seen_by_target: Vec<usize>,
-    /// What the prior says of states and next states, for a policy over skills: leaving it costs what else the lack of
-    /// entropy would.
+    /// The prior's distributions for states and next states, for a policy over skills: the divergence from it takes
+    /// the place of the entropy.
     pub prior: Option<(Dist, Dist)>,
 }
 
 impl SacBatch {
-    /// What critics read beside an action, `[n, latent + obs_dim]` or one more: [`Self::inputs`], and what is left.
+    /// Returns the input of critics beside an action, `[n, latent + obs_dim]` or one more: [`Self::inputs`], and the
+    /// remaining share.
     pub(super) fn of_critics(&self) -> Tensor<2> {
         with_clock(&self.inputs, self.left.as_ref().map(|(left, _)| left))
     }
 
-    /// The same of the next states.
+    /// Returns the same for the next states.
     pub(super) fn next_of_critics(&self) -> Tensor<2> {
         with_clock(&self.next_inputs, self.left.as_ref().map(|(_, next)| next))
     }
@@ -52,7 +54,7 @@ impl SacBatch {
     }
 }
 
-/// What the actor reads, and behind it the column of what is left, if critics count.
+/// Returns the actor's input, and behind it the column of the remaining share, if critics count ticks.
 fn with_clock(inputs: &Tensor<2>, left: Option<&Tensor<2>>) -> Tensor<2> {
     match left {
         Some(left) => Tensor::cat(vec![inputs.clone(), left.clone()], 1),
@@ -61,13 +63,13 @@ fn with_clock(inputs: &Tensor<2>, left: Option<&Tensor<2>>) -> Tensor<2> {
 }
 
 impl SacLearner {
-    /// Width of what the actor reads.
+    /// Returns the width of the actor's input.
     pub(super) fn inputs(&self) -> usize {
         self.base.spec.latent + self.buffer.widths.obs
     }
 
-    /// `buffer`, which is a batch of transitions, on the device, normalised; with the teacher's side of them if the actor needs
-    /// it.
+    /// Moves `buffer`, which is a batch of transitions, to the device, normalised; adds the teacher's data if the
+    /// actor needs them.
     pub(super) fn batch(
         &self,
         buffer: &ReplayBuffer,
@@ -121,8 +123,8 @@ mod tests {
     use super::*;
     use crate::DeviceKind;
 
-    /// Observations, next observations that count, and rewards of a batch of one whole episode, which sees 1, 2, 3, 4 and earns 1
-    /// with its last action.
+    /// Returns observations, next observations that count, and rewards of a batch of one whole episode, with
+    /// observations 1, 2, 3, 4 and a reward of 1 for its last action.
     fn seen(norm_obs: bool, norm_reward: bool) -> [Vec<f32>; 3] {
         let config = SacConfig {
             norm_obs,

@@ -5,36 +5,36 @@ use crate::rng::below;
 use crate::{ActionSpace, Actions, LearnError, Rollout, TimeLimit};
 use rand::Rng;
 
-/// How many numbers of each kind a transition has.
+/// Number of values of each kind in a transition.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Widths {
-    /// Of an observation.
+    /// Width of an observation.
     pub(super) obs: usize,
-    /// Of a skill.
+    /// Width of a skill.
     pub(super) latent: usize,
-    /// 1 if the share of a skill's ticks that is left is kept, else 0.
+    /// 1 if the remaining share of a skill's ticks is kept, else 0.
     pub(super) clock: usize,
-    /// 1 if the value of what comes after has a weight of its own, else 0.
+    /// 1 if the value of the next state has a weight of its own, else 0.
     pub(super) weight: usize,
 }
 
-/// The newest transitions, raw as they were played: a ring of `capacity` slots in flat memory, which grows as it fills.
+/// The newest transitions, raw: a ring of `capacity` slots in flat memory, which grows as it fills.
 ///
 /// Normalisation happens when transitions are read, so that old ones are seen with the present statistics.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ReplayBuffer {
     capacity: usize,
     pub(super) widths: Widths,
-    /// Transitions taken in so far, kept or not.
+    /// Transitions added so far, kept or not.
     pub(super) seen: u64,
     pub(super) obs: Vec<f32>,
     pub(super) z: Vec<f32>,
     pub(super) next_obs: Vec<f32>,
     pub(super) next_z: Vec<f32>,
-    /// Shares of the skills' ticks that are left in the states, and in those that came after.
+    /// Remaining shares of the skills' ticks, in the states and in the next states.
     pub(super) left: Vec<f32>,
     pub(super) next_left: Vec<f32>,
-    /// What the value of the next state counts, beside the discount: not 1 for a skill that was cut off early.
+    /// Weights of the next states' values, beside the discount: not 1 for a skill that was cut off early.
     pub(super) weights: Vec<f32>,
     pub(super) actions: Actions,
     pub(super) rewards: Vec<f32>,
@@ -43,7 +43,7 @@ pub(super) struct ReplayBuffer {
 }
 
 impl ReplayBuffer {
-    /// Empty.
+    /// Creates an empty buffer.
     pub(super) fn new(capacity: usize, widths: Widths, space: &ActionSpace) -> Self {
         Self::empty(capacity, widths, Actions::empty(space))
     }
@@ -72,10 +72,10 @@ impl ReplayBuffer {
         self.seen.min(self.capacity as u64) as usize
     }
 
-    /// `Ok` if a rollout says how much of the skills was left, or that is not kept.
+    /// Checks that a rollout has the remaining shares of the skills, if they are kept.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] names what is missing.
+    /// [`LearnError::Shape`] names the missing part.
     pub(super) fn check_clock(&self, rollout: &Rollout) -> Result<(), LearnError> {
         if self.widths.clock == 0 {
             return Ok(());
@@ -86,8 +86,8 @@ impl ReplayBuffer {
         LearnError::check("rollout ends next_left", rollout.envs, ends.next_left.len())
     }
 
-    /// Takes in all transitions of a checked rollout, in order; the oldest give way. The next state after a
-    /// termination is stored as zeros. `weights` are one per row if the buffer keeps them, else none.
+    /// Adds all transitions of a checked rollout, in order, and replaces the oldest. The next state after a
+    /// termination is stored as zeros. `weights` has one entry per row if the buffer keeps them, else none.
     ///
     /// # Errors
     /// [`LearnError::Config`] if the observations are images, [`LearnError::Shape`] as [`Self::check_clock`] or for another number
@@ -116,13 +116,13 @@ impl ReplayBuffer {
         Ok(())
     }
 
-    /// `n` slots, each drawn from all that are filled. There must be one.
+    /// Draws `n` slots uniformly from all that are filled. At least one must be.
     pub(super) fn draw<R: Rng + ?Sized>(&self, n: usize, rng: &mut R) -> Vec<usize> {
         let len = self.len() as u64;
         (0..n).map(|_| below(rng, len) as usize).collect()
     }
 
-    /// Copies of the transitions in these slots, in their order, and behind them of those in some slots of `more`.
+    /// Returns copies of the transitions in these slots, in order, and behind them of those in some slots of `more`.
     ///
     /// # Errors
     /// [`LearnError::Action`] if the two act in different kinds of spaces.
@@ -151,8 +151,8 @@ impl ReplayBuffer {
         Ok(all)
     }
 
-    /// What the value of the slot's next state counts beside the discount: 1, or its weight; 0 if the episode was over, which
-    /// it is after a termination, and by [`TimeLimit::Legacy`] after a truncation too.
+    /// Returns the weight of the value of the slot's next state beside the discount: 1, or its own weight. It is 0 if
+    /// the episode was over: after a termination, and by [`TimeLimit::Legacy`] after a truncation too.
     pub(super) fn continues(&self, slot: usize, limit: TimeLimit) -> f32 {
         let over = self.terminated[slot] || (self.truncated[slot] && limit == TimeLimit::Legacy);
         if over { 0.0 } else { self.weights.get(slot).copied().unwrap_or(1.0) }

@@ -29,7 +29,7 @@ impl ReplayBuffer {
         file.put_flags(&path(prefix, "truncated"), &self.truncated);
     }
 
-    /// Takes all transitions out of a file, of which `seen` were ever taken in.
+    /// Takes all transitions out of a file, of which `seen` were ever added.
     pub(super) fn take(&mut self, file: &mut TensorFile, prefix: &str, seen: u64) -> Result<(), FileError> {
         self.seen = seen;
         let (n, Widths { obs, latent, clock, weight }) = (self.len(), self.widths);

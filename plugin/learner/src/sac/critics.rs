@@ -6,16 +6,16 @@ use crate::policy::NetShape;
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
-/// What critics there are.
+/// The shape of an ensemble of critics.
 #[derive(Clone, Debug)]
 pub(super) struct EnsembleShape {
-    /// What each reads beside a continuous action, and its hidden layers.
+    /// Input of each critic beside a continuous action, and its hidden layers.
     pub(super) net: NetShape,
-    /// What is acted in.
+    /// The action space.
     pub(super) space: ActionSpace,
-    /// How many there are.
+    /// Number of critics.
     pub(super) critics: usize,
-    /// Whether hidden layers are normalised.
+    /// True if hidden layers are normalised.
     pub(super) layer_norm: bool,
 }
 
@@ -26,7 +26,7 @@ pub(super) struct EnsembleShape {
 pub struct QNet {
     /// The layers.
     pub net: Mlp,
-    /// What normalises each hidden layer before its activation; empty if nothing does.
+    /// Normalisation of each hidden layer before its activation; empty without it.
     pub norms: Vec<LayerNorm>,
 }
 
@@ -62,14 +62,14 @@ pub struct Critics {
 }
 
 impl Critics {
-    /// Two of them, with orthogonal weights, gain √2 in the hidden layers and 1 in the heads.
+    /// Creates two critics, with orthogonal weights, gain √2 in the hidden layers and 1 in the heads.
     pub fn new<R: Rng + ?Sized>(net: &NetShape, space: ActionSpace, rng: &mut R, device: &Device) -> Self {
         let twins = EnsembleShape { net: net.clone(), space, critics: 2, layer_norm: false };
         let Ok(critics) = Self::build(&mut RandomInit { rng, device }, "", &twins);
         critics
     }
 
-    /// Critics with parameters out of `source`.
+    /// Creates critics with parameters out of `source`.
     pub(super) fn build<S: ParamSource>(source: &mut S, prefix: &str, shape: &EnsembleShape) -> Result<Self, S::Error> {
         let NetShape { hidden, activation, .. } = &shape.net;
         let (inputs, outputs) = match shape.space {
@@ -87,7 +87,7 @@ impl Critics {
         Ok(Self { nets })
     }
 
-    /// Those with the given numbers, from 0; all of them for none.
+    /// Returns the critics with the given numbers, from 0; all of them for an empty list.
     #[must_use]
     pub fn some(&self, numbers: &[usize]) -> Self {
         match numbers {
@@ -96,18 +96,18 @@ impl Critics {
         }
     }
 
-    /// Q of all choices in each state `[z, s]` by each critic, `[n, choices]` each.
+    /// Returns Q of all choices in each state `[z, s]` by each critic, `[n, choices]` each.
     pub fn of_choices(&self, inputs: Tensor<2>) -> Vec<Tensor<2>> {
         self.nets.iter().map(|q| q.forward(inputs.clone())).collect()
     }
 
-    /// Q of one vector `[n, dim]` in each state `[z, s]` by each critic, `[n]` each.
+    /// Returns Q of one vector `[n, dim]` in each state `[z, s]` by each critic, `[n]` each.
     pub fn of_vectors(&self, inputs: Tensor<2>, actions: Tensor<2>) -> Vec<Tensor<1>> {
         let joined = Tensor::cat(vec![inputs, actions], 1);
         self.nets.iter().map(|q| q.forward(joined.clone()).squeeze_dim(1)).collect()
     }
 
-    /// Q of the actions taken by each critic, `[n]` each.
+    /// Returns Q of the actions taken by each critic, `[n]` each.
     pub fn of_actions(&self, inputs: Tensor<2>, actions: &ActionBatch) -> Vec<Tensor<1>> {
         match actions {
             ActionBatch::Continuous(vectors) => self.of_vectors(inputs, vectors.clone()),
@@ -127,7 +127,7 @@ impl Parameters for Critics {
     }
 }
 
-/// How the numbers of several critics become one.
+/// The reduction of several critics' values to one.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Pool {
     /// The least, which is no overestimate (Fujimoto et al. 2018).
@@ -137,7 +137,7 @@ pub(super) enum Pool {
 }
 
 impl Pool {
-    /// One number for those of each critic, of which there is at least one.
+    /// Reduces the values of each critic, of which there is at least one, to one.
     pub(super) fn of<const D: usize>(self, values: Vec<Tensor<D>>) -> Tensor<D> {
         let count = values.len() as f64;
         let pooled = values.into_iter().reduce(|a, b| match self {

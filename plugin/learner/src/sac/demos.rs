@@ -5,7 +5,7 @@ use super::buffer::{ReplayBuffer, Widths};
 use crate::file::TensorFile;
 use crate::{ActionSpace, Actions, FileError, LearnError, PolicySpec, Rollout};
 
-/// Recorded transitions, and how much of each batch comes from them.
+/// Recorded transitions, and their share of each batch.
 #[derive(Debug)]
 pub(super) struct Demos {
     pub(super) buffer: ReplayBuffer,
@@ -13,7 +13,8 @@ pub(super) struct Demos {
 }
 
 impl Demos {
-    /// All transitions of `episodes`, each a rollout of one environment. Actions are held within [-1, 1], as the actor's are.
+    /// Creates the buffer from all transitions of `episodes`, each a rollout of one environment. Actions are clamped
+    /// to [-1, 1], as the actor's are.
     ///
     /// # Errors
     /// [`LearnError::Config`] if there is nothing to learn from; else as [`Rollout::check`].
@@ -28,8 +29,8 @@ impl Demos {
             return Err(LearnError::Config("the recordings hold no steps to learn from".to_owned()));
         }
         if !episodes.iter().any(Rollout::is_rewarded) {
-            let text = "nothing in the recordings was ever rewarded, and this algorithm learns from their rewards; learn \
-                        skills from them instead";
+            let text = "the recordings hold no reward, but this algorithm learns from rewards: learn skills from them \
+                        instead";
             return Err(LearnError::Config(text.to_owned()));
         }
         let mut buffer = ReplayBuffer::new(rows, Widths { obs: obs_dim, ..Widths::default() }, space);
@@ -42,7 +43,7 @@ impl Demos {
         Ok(Self { buffer, share })
     }
 
-    /// Those of a checkpoint.
+    /// Reads the recordings of a checkpoint.
     ///
     /// # Errors
     /// [`FileError`] names the first tensor that is missing or misshapen.
@@ -57,7 +58,7 @@ impl Demos {
         Ok(Self { buffer, share })
     }
 
-    /// How many of a batch's transitions are recorded ones.
+    /// Returns the number of recorded transitions in a batch.
     pub(super) fn of_batch(&self, config: &SacConfig) -> usize {
         (self.share * config.batch as f64).round() as usize
     }
@@ -72,7 +73,7 @@ pub(super) mod tests {
     pub const SPEC: PolicySpec =
         PolicySpec { obs: ObsKind::Vector(1), latent: 0, action_space: ActionSpace::Discrete(2) };
 
-    /// Episodes of so many environments, which see `sign` times 1, 2, 3, ... and end together.
+    /// Returns episodes of this many environments, with observations `sign` times 1, 2, 3, ..., which end together.
     pub fn episodes(envs: usize, sign: f32, action: u32, rewards: &[f32]) -> Rollout {
         let rows = rewards.len();
         let zeros = || vec![0.0; rows];
@@ -92,7 +93,7 @@ pub(super) mod tests {
         }
     }
 
-    /// A learner that only looks on, with these recordings.
+    /// Returns a learner that only observes, with these recordings.
     fn looking_on(config: SacConfig, demo_share: f64, demos: &[Rollout]) -> SacLearner {
         let config = SacConfig { hidden: vec![4], learning_starts: 1000, ..config };
         let rlpd = RlpdConfig { demo_share, critics: 2, ..RlpdConfig::default() };
@@ -111,7 +112,7 @@ pub(super) mod tests {
                 let Actions::Discrete(actions) = &drawn.actions else { panic!("choices") };
                 let recorded = |row: &usize| drawn.obs[*row] > 0.0;
                 assert_eq!((drawn.len(), (0..batch).filter(recorded).count()), (batch, expected));
-                // What was seen, done and earned go together.
+                // Observation, action and reward belong together.
                 for (row, paid) in actions.iter().zip(&drawn.rewards).enumerate() {
                     let whole = if recorded(&row) { (&1, &5.0) } else { (&0, &0.0) };
                     assert_eq!(paid, whole);

@@ -1,4 +1,4 @@
-//! What plays before anything was learned.
+//! The policy of play before the first gradient step: random actions.
 
 use crate::ActionSpace;
 use crate::nn::{Activation, Linear, Mlp, matrix, vector};
@@ -9,7 +9,8 @@ use burn::tensor::Device;
 /// uniform, π/(2√3). The density in [-0.98, 0.98] lies between 0.44 and 0.62 instead of at 0.5.
 const NEARLY_UNIFORM: f64 = 0.906_899_682_117_108_9;
 
-/// A policy that ignores the `inputs` numbers it sees: uniform over choices, nearly uniform over vectors in [-1, 1].
+/// Returns a policy that ignores the `inputs` numbers of its observation: uniform over choices, nearly uniform over
+/// vectors in [-1, 1].
 pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Actor {
     let dim = space.dim();
     let zeros = || Linear {
@@ -19,7 +20,7 @@ pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Ac
     let log_std = match space {
         ActionSpace::Discrete(_) => LogStd::None,
         ActionSpace::Continuous(_) => {
-            // In the middle of the range, where the zeros lead.
+            // In the middle of the range, to which the zeros lead.
             let middle = NEARLY_UNIFORM.ln();
             LogStd::Squashed { layer: zeros(), range: (middle - 1.0, middle + 1.0) }
         }
@@ -34,7 +35,7 @@ mod tests {
     use crate::rng::Streams;
     use crate::{Action, DeviceKind, PolicySpec};
 
-    /// How 20,000 actions fall into five bins.
+    /// Counts how 20,000 actions fall into five bins.
     fn counts(space: ActionSpace) -> [usize; 5] {
         let device = DeviceKind::Flex.plain();
         let spec = PolicySpec { obs: 2.into(), latent: 1, action_space: space };

@@ -1,4 +1,4 @@
-//! The learner: SAC, and SCORE-SAC if it is given a skill model.
+//! The SAC learner, which is SCORE-SAC if it is given a skill model.
 
 use super::buffer::{ReplayBuffer, Widths};
 use super::demos::Demos;
@@ -30,10 +30,10 @@ pub struct SacLearner {
     pub(crate) nets: SacNets,
     pub(super) optimizers: Optimizers,
     pub(super) buffer: ReplayBuffer,
-    /// Recordings that are learned from beside it (RLPD).
+    /// Recordings that are learned from as well (RLPD).
     pub(super) demos: Option<Demos>,
     pub(super) gradient_steps: u64,
-    /// The part of a gradient step that is still owed.
+    /// The fraction of a gradient step that is carried over.
     pub(super) carry: f64,
 }
 
@@ -75,20 +75,20 @@ struct Counters {
 }
 
 impl SacLearner {
-    /// Plain SAC with starting weights from `seed`.
+    /// Creates plain SAC with starting weights from `seed`.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work, or observations that are images.
+    /// [`LearnError::Config`] for impossible settings, or observations that are images.
     pub fn new(config: SacConfig, spec: PolicySpec, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         Self::fresh(config, spec, None, seed, device)
     }
 
-    /// RLPD: SAC with recordings, each a rollout of one environment with its rewards and ends, in a share of each batch. Both
-    /// normalisers begin with what was recorded: play may long earn nothing, and would make all of a recorded reward.
+    /// Creates RLPD: SAC with recordings, each a rollout of one environment with its rewards and ends, in a share of
+    /// each batch. Both normalisers begin with the recordings. Play may long earn nothing, and would give a recorded
+    /// reward a huge scale.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work, or recordings that were never rewarded; else as
-    /// [`Rollout::check`].
+    /// [`LearnError::Config`] for impossible settings, or recordings without any reward; else as [`Rollout::check`].
     pub fn with_demos(
         config: SacConfig,
         rlpd: &RlpdConfig,
@@ -113,15 +113,15 @@ impl SacLearner {
         Ok(learner)
     }
 
-    /// SCORE-SAC: tied to `model`'s decoder as `score` says.
+    /// Creates SCORE-SAC: tied to `model`'s decoder by the settings of `score`.
     ///
-    /// Discrete actions: the actor can be an exact copy of the decoder, and the divergence is exact. Continuous
-    /// actions: the actor squashes what the decoder does not, so it cannot be a copy
-    /// ([`ScoreConfig::init_from_decoder`] must be false), and the two are compared before the tanh, the decoder as
-    /// [`crate::nn::unsquashed`] makes it.
+    /// For discrete actions the actor can be an exact copy of the decoder, and the divergence is exact. For
+    /// continuous actions the actor squashes and the decoder does not, so it cannot be a copy
+    /// ([`ScoreConfig::init_from_decoder`] must be false). The two are then compared before the tanh, with the
+    /// decoder mapped by [`crate::nn::unsquashed`].
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work, or a skill model of images.
+    /// [`LearnError::Config`] for impossible settings, or a skill model of images.
     pub fn with_skill(
         config: SacConfig,
         score: ScoreConfig,
@@ -133,7 +133,7 @@ impl SacLearner {
         Self::fresh(config, teacher.policy_spec(), Some(teacher), seed, device)
     }
 
-    /// SAC with starting weights, tied to `teacher` if there is one.
+    /// Creates SAC with starting weights, tied to `teacher` if there is one.
     pub(crate) fn fresh(
         config: SacConfig,
         spec: PolicySpec,
@@ -185,30 +185,31 @@ impl SacLearner {
         }
     }
 
-    /// The settings.
+    /// Returns the settings.
     pub fn config(&self) -> &SacConfig {
         &self.config
     }
 
-    /// Gradient steps of the critics done.
+    /// Returns the number of gradient steps of the critics.
     pub fn gradient_steps(&self) -> u64 {
         self.gradient_steps
     }
 
-    /// Transitions taken in.
+    /// Returns the number of transitions added.
     pub fn transitions(&self) -> u64 {
         self.buffer.seen
     }
 
-    /// Reads a file that [`Learner::save`] wrote. The learner goes on exactly as the saved one would have.
+    /// Reads a file that [`Learner::save`] wrote. The learner continues exactly as the saved one would have.
     ///
     /// # Errors
-    /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
+    /// [`FileError`] describes the problem of the file, or names the tensor that is missing, superfluous or
+    /// misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         Self::stored(TensorFile::read(path)?, device)
     }
 
-    /// [`Self::load`] for a file in memory.
+    /// Reads a file in memory as [`Self::load`] does.
     pub(crate) fn stored(file: TensorFile, device: DeviceKind) -> Result<Self, FileError> {
         let mut saved = Checkpoint::<SacConfig, Counters>::of(file, FILE, device)?;
         let base = Self::new_base(&saved.config, saved.spec, saved.teacher.take(), saved.seed, device);
@@ -234,7 +235,7 @@ impl Learner for SacLearner {
         &self.base
     }
 
-    /// The actor, or random actions as [`SacConfig::random_start`] says. It has no critic; its values are zeros.
+    /// Returns the actor, or random actions by [`SacConfig::random_start`]. It has no critic; its values are zeros.
     fn policy(&self) -> Policy {
         let copied = self.base.copied_teacher().is_some();
         let warming_up = self.buffer.seen < self.config.learning_starts;
@@ -249,21 +250,21 @@ impl Learner for SacLearner {
         Ok(LearnerMetrics::new(self.update(rollout)?.scalars()))
     }
 
-    /// Of the actor, also while random actions are played.
+    /// Returns the divergence of the actor, also while random actions are played.
     fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
         let actor = self.base.snapshot(&self.nets.actor, None);
         self.base.initial_kl(&actor, self.gradient_steps == 0, StateBatch { z, left: &[], obs, n })
     }
 
-    /// Weights are called `actor.l0.weight`, `q1.l0.weight`, `target.q1.l0.weight` and `log_alpha` (that of the
-    /// temperature), moments `adam.m.actor.l0.weight`, the replay buffer `buffer.obs` and so on.
+    /// Saves the learner. Weights are called `actor.l0.weight`, `q1.l0.weight`, `target.q1.l0.weight` and `log_alpha`
+    /// (that of the temperature), moments `adam.m.actor.l0.weight`, the replay buffer `buffer.obs` and so on.
     fn save(&self, path: &Path) -> Result<(), FileError> {
         self.checkpoint(path)?.write()
     }
 }
 
 impl SacLearner {
-    /// What [`Learner::save`] writes.
+    /// Returns the file that [`Learner::save`] writes.
     pub(crate) fn checkpoint(&self, path: &Path) -> Result<TensorFile, FileError> {
         let (nets, adams) = (&self.nets, &self.optimizers);
         let counters = Counters {

@@ -1,12 +1,12 @@
-//! What an update reports.
+//! Metrics of an update.
 
 use super::{ActorStep, CriticStep, TemperatureStep};
 use serde::{Deserialize, Serialize};
 
-/// Means over all gradient steps of an update; `None` for what was not done or not measured.
+/// Means over all gradient steps of an update; `None` if not done or not measured.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq)]
 pub struct SacMetrics {
-    /// Transitions taken in so far.
+    /// Transitions added so far.
     pub transitions: u64,
     /// Gradient steps of the critics so far.
     pub gradient_steps: u64,
@@ -18,11 +18,11 @@ pub struct SacMetrics {
     pub critic_grad_norm: Option<f32>,
     /// -mean(V) of the actor, without SCORE's penalty.
     pub actor_loss: Option<f32>,
-    /// Estimated entropy of the policy in nats (differential if continuous, so that it may be negative).
+    /// Estimated entropy of the policy in nats (differential if continuous, so it may be negative).
     pub entropy: Option<f32>,
     /// Norm of the actor's gradient.
     pub actor_grad_norm: Option<f32>,
-    /// Loss of the temperature; `None` where it is fixed.
+    /// Loss of the temperature; `None` if that is fixed.
     #[serde(rename = "alpha_loss")]
     pub temperature_loss: Option<f32>,
     /// The temperature at the end of the update; `None` without a gradient step.
@@ -35,7 +35,7 @@ pub struct SacMetrics {
 }
 
 impl SacMetrics {
-    /// The numbers by their TensorBoard tags; what was not measured is left out.
+    /// Returns the numbers by their TensorBoard tags; unmeasured ones are left out.
     pub fn scalars(&self) -> Vec<(&'static str, f64)> {
         let counters =
             [("charts/transitions", self.transitions as f64), ("charts/gradient_steps", self.gradient_steps as f64)];
@@ -90,7 +90,7 @@ impl MetricSums {
         *count += 1;
     }
 
-    /// The means; counters and the temperature are left to the caller.
+    /// Returns the means; counters and the temperature are left to the caller.
     pub(super) fn means(&self, penalised: bool) -> SacMetrics {
         let mean = |total: f64, count: u64| (count > 0).then(|| (total / count as f64) as f32);
         let (critics, n) = &self.critics;

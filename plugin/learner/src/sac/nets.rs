@@ -19,7 +19,7 @@ impl Parameters for LogTemperature {
     }
 }
 
-/// Everything that SAC trains.
+/// All networks that SAC trains.
 #[derive(Clone, Debug)]
 pub struct SacNets {
     /// The policy, tracked.
@@ -28,15 +28,16 @@ pub struct SacNets {
     pub critics: Critics,
     /// Their slow copies, not tracked.
     pub targets: Critics,
-    /// The logarithm of the temperature, tracked; does nothing where that is fixed.
+    /// The logarithm of the temperature, tracked; unused if that is fixed.
     pub log_temperature: LogTemperature,
 }
 
 impl SacNets {
-    /// A copy of the decoder, or starting weights from the stream `sac.actor`, and critics with some from `sac.critics`.
+    /// Creates a copy of the decoder, or starting weights from the stream `sac.actor`, and critics with some from
+    /// `sac.critics`.
     ///
     /// # Errors
-    /// None, as long as observations are vectors.
+    /// Does not fail as long as observations are vectors.
     pub(super) fn fresh(config: &SacConfig, base: &LearnerBase) -> Result<Self, LearnError> {
         let (shape, device) = (actor_shape(config, base), base.device.plain());
         let actor = match base.copied_teacher() {
@@ -54,7 +55,7 @@ impl SacNets {
         Ok(Self::tracked(&actor, &critics, &critics, &log_temperature))
     }
 
-    /// Those of a checkpoint.
+    /// Reads the networks of a checkpoint.
     ///
     /// # Errors
     /// [`FileError`] names the first tensor that is missing or misshapen.
@@ -77,7 +78,7 @@ impl SacNets {
         }
     }
 
-    /// How much entropy is worth now.
+    /// Returns the present weight of entropy.
     ///
     /// # Errors
     /// [`LearnError::Device`] if it cannot be read.
@@ -86,7 +87,7 @@ impl SacNets {
     }
 }
 
-/// The layers of what it is a copy of, if it is one, else those of the settings.
+/// Returns the layers of the network that it copies, if it is a copy, else those of the settings.
 fn actor_shape(config: &SacConfig, base: &LearnerBase) -> ActorShape {
     let (low, high) = config.log_std;
     match base.copied_teacher() {
@@ -95,20 +96,20 @@ fn actor_shape(config: &SacConfig, base: &LearnerBase) -> ActorShape {
     }
 }
 
-/// The critics that the settings describe.
+/// Returns the critics that the settings describe.
 fn ensemble(config: &SacConfig, base: &LearnerBase) -> EnsembleShape {
     let (shape, space) = (actors_net(config, base), base.spec.action_space);
-    // Critics that count read one number more.
+    // Critics that count ticks read one number more.
     let net = NetShape { obs_dim: shape.obs_dim.saturating_add(clock_width(base)), ..shape };
     EnsembleShape { net, space, critics: config.critics, layer_norm: config.layer_norm }
 }
 
-/// 1 if the critics read how much of a skill's ticks is left, else 0.
+/// Returns 1 if the critics read the remaining share of a skill's ticks, else 0.
 pub(super) fn clock_width(base: &LearnerBase) -> usize {
     usize::from(base.score_config().is_some_and(|score| score.critic_clock))
 }
 
-/// What the actor reads, and the hidden layers of all networks.
+/// Returns the input of the actor, and the hidden layers of all networks.
 fn actors_net(config: &SacConfig, base: &LearnerBase) -> NetShape {
     NetShape {
         obs_dim: base.spec.obs.numbers(),

@@ -1,47 +1,39 @@
 //! Settings of RLPD.
 
 use super::SacConfig;
-use crate::LearnError;
-use crate::error::brief_number;
-use serde::{Deserialize, Serialize};
+use super::config::check_target_critics;
+use crate::settings::{Range, Reader, Settings};
+use crate::{LearnError, settings};
 
-/// What RLPD adds to SAC (Ball et al. 2023, "Efficient online reinforcement learning with offline data"): recordings in each
-/// batch, an ensemble of normalised critics, of which a target sees a few. Everything else is that of [`SacConfig`]; the paper
-/// has 20 gradient steps per step, which [`SacConfig::updates_per_step`] says here.
-#[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
-#[serde(deny_unknown_fields, default)]
-pub struct RlpdConfig {
+settings! {
+    /// Settings that RLPD adds to SAC (Ball et al. 2023, "Efficient online reinforcement learning with offline
+    /// data"): recordings in each batch, and an ensemble of normalised critics, some of which make a target.
+    /// Everything else is in [`SacConfig`]; the paper's 20 gradient steps per step are
+    /// [`SacConfig::updates_per_step`] here.
+    #[derive(Clone, PartialEq, Debug)]
+    pub struct RlpdConfig in "rlpd", read by &[Reader::RLPD];
+
     /// Share of each batch that comes from the recordings.
-    pub demo_share: f64,
-    /// Takes the place of [`SacConfig::critics`].
-    pub critics: usize,
-    /// Takes the place of [`SacConfig::target_critics`].
-    pub target_critics: usize,
-    /// Takes the place of [`SacConfig::layer_norm`].
-    pub layer_norm: bool,
-}
-
-impl Default for RlpdConfig {
-    fn default() -> Self {
-        Self { demo_share: 0.5, critics: 10, target_critics: 2, layer_norm: true }
-    }
+    demo_share: f64 = 0.5, in Range::Between(0.0, 1.0);
+    /// Replaces `sac.critics`.
+    critics: usize = 10, in Range::COUNT;
+    /// Replaces `sac.target_critics`.
+    target_critics: usize = 2, in Range::COUNT;
+    /// Replaces `sac.layer_norm`.
+    layer_norm: bool = true;
 }
 
 impl RlpdConfig {
-    /// `Ok` if these settings can work.
+    /// Checks that these settings are possible.
     ///
     /// # Errors
-    /// [`LearnError::Config`] names the first setting that cannot.
+    /// [`LearnError::Setting`] names the first impossible setting.
     pub fn validate(&self) -> Result<(), LearnError> {
-        if !(self.demo_share > 0.0 && self.demo_share < 1.0) {
-            let text = format!("rlpd demo_share must lie between 0 and 1, not {}", brief_number(self.demo_share));
-            return Err(LearnError::Config(text));
-        }
-        let with = self.over(SacConfig::default()).validate();
-        with.map_err(|error| LearnError::Config(error.to_string().replacen("config: sac ", "rlpd ", 1)))
+        self.check_ranges()?;
+        Ok(check_target_critics("rlpd.target_critics", self.target_critics, self.critics)?)
     }
 
-    /// The settings of SAC with these laid over them.
+    /// Returns the settings of SAC with these in place of its own.
     #[must_use]
     pub fn over(&self, sac: SacConfig) -> SacConfig {
         let Self { critics, target_critics, layer_norm, .. } = *self;
@@ -56,9 +48,9 @@ mod tests {
     #[test]
     fn settings_that_cannot_work_are_named() {
         let error = |config: RlpdConfig| config.validate().expect_err("cannot work").to_string();
-        let usual = RlpdConfig::default();
-        assert!(usual.validate().is_ok());
-        assert!(error(RlpdConfig { demo_share: 1.0, ..usual.clone() }).contains("rlpd demo_share"));
-        assert!(error(RlpdConfig { target_critics: 11, ..usual }).contains("rlpd target_critics must be at most"));
+        let default = RlpdConfig::default();
+        assert!(default.validate().is_ok());
+        assert!(error(RlpdConfig { demo_share: 1.0, ..default.clone() }).contains("rlpd.demo_share"));
+        assert!(error(RlpdConfig { target_critics: 11, ..default }).contains("`rlpd.target_critics` must be at most"));
     }
 }

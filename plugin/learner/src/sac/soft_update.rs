@@ -4,7 +4,8 @@ use crate::nn::{ParamVisitor, Parameters};
 use burn::tensor::Tensor;
 use std::vec::IntoIter;
 
-/// target = tau · source + (1 - tau) · target, parameter by parameter (Polyak averaging; a plain copy for tau = 1).
+/// Sets target = tau · source + (1 - tau) · target, parameter by parameter (Polyak averaging; a plain copy for tau =
+/// 1).
 ///
 /// `target` stays untracked. Both must be of one architecture.
 pub fn soft_update<M: Parameters + Clone>(target: &mut M, source: &M, tau: f64) {

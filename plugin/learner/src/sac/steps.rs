@@ -7,7 +7,7 @@ use crate::nn::{Adam, Dist, LogProbForm, NamedGrads, Parameters, SquashedDraw, S
 use crate::score::{Penalty, ScoreConfig, penalty};
 use burn::tensor::{Gradients, Tensor};
 
-/// What a step of the critics looked like, before it was taken.
+/// Metrics of a step of the critics, before it was taken.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CriticStep {
     /// Mean squared error of each critic.
@@ -18,7 +18,7 @@ pub struct CriticStep {
     pub grad_norm: f64,
 }
 
-/// What a step of the actor looked like, before it was taken.
+/// Metrics of a step of the actor, before it was taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ActorStep {
     /// -mean(V), without the penalty.
@@ -35,7 +35,7 @@ pub struct ActorStep {
     pub grad_norm: f64,
 }
 
-/// What a step of the temperature looked like, before it was taken.
+/// Metrics of a step of the temperature, before it was taken.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TemperatureStep {
     /// mean(-α (ln π + target entropy)), where α is the temperature.
@@ -49,7 +49,8 @@ pub struct TemperatureStep {
 enum PolicyActions {
     /// All choices, by their ln π, `[n, choices]`.
     All(Tensor<2>),
-    /// One draw, and what the temperature prices of its distribution: ln π of the draw, or the divergence from a prior.
+    /// One draw, and the cost of its distribution that the temperature weighs: ln π of the draw, or the divergence
+    /// from a prior.
     Sample { draw: SquashedDraw, cost: Tensor<1> },
 }
 
@@ -69,7 +70,7 @@ impl PolicyActions {
         }
     }
 
-    /// V under `critics`, `[n]`.
+    /// Returns V under `critics`, `[n]`.
     fn soft_value(&self, critics: &Critics, pool: Pool, inputs: Tensor<2>, temperature: f64) -> Tensor<1> {
         match self {
             Self::All(log_probs) => {
@@ -82,7 +83,7 @@ impl PolicyActions {
         }
     }
 
-    /// ln π of the draw, or E\[ln π\], `[n]`.
+    /// Returns ln π of the draw, or E\[ln π\], `[n]`.
     fn log_prob(&self) -> Tensor<1> {
         match self {
             Self::All(log_probs) => (log_probs.clone().exp() * log_probs.clone()).sum_dim(1).squeeze_dim(1),
@@ -90,7 +91,7 @@ impl PolicyActions {
         }
     }
 
-    /// What the temperature prices, `[n]`: [`Self::log_prob`], or the divergence from a prior.
+    /// Returns the cost that the temperature weighs, `[n]`: [`Self::log_prob`], or the divergence from a prior.
     fn cost(&self) -> Tensor<1> {
         match self {
             Self::All(_) => self.log_prob(),
@@ -99,7 +100,8 @@ impl PolicyActions {
     }
 }
 
-/// y = r + γ V' of each row, V' being the target critics' soft value (by those of [`SacBatch::seen_by_target`]) of the actor's actions in the next state.
+/// Returns y = r + γ V' of each row. V' is the target critics' soft value (by those of [`SacBatch::seen_by_target`])
+/// of the actor's actions in the next state.
 ///
 /// `noise` is standard normal, `[n, dim]`, and needed for continuous actions only (here and below).
 ///
@@ -119,7 +121,7 @@ pub fn target_of(
     Ok(q_target(batch.rewards.clone(), batch.continues.clone(), next, gamma))
 }
 
-/// One step of Adam on all critics.
+/// Does one step of Adam on all critics.
 ///
 /// # Errors
 /// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`] the
@@ -146,7 +148,7 @@ pub fn critic_step(
     Ok(CriticStep { losses: numbers, q_values, grad_norm })
 }
 
-/// One step of Adam on the actor, under the present critics.
+/// Does one step of Adam on the actor, under the present critics.
 ///
 /// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added to the loss. A squashed policy is compared before its tanh (see [`crate::nn::unsquashed`]).
 ///
@@ -163,7 +165,7 @@ pub fn actor_step(
 ) -> Result<ActorStep, LearnError> {
     let dist = nets.actor.forward(batch.inputs.clone());
     let actions = PolicyActions::new(dist.clone(), batch.prior_of_states(), noise)?;
-    // Where a target sees only some critics, the mean of all is what the actor follows.
+    // If a target uses only some critics, the actor follows the mean of all.
     let pool = if batch.seen_by_target.is_empty() { Pool::Least } else { Pool::Mean };
     let loss = actions.soft_value(&frozen(&nets.critics), pool, batch.of_critics(), temperature).mean().neg();
     let steps = adam.steps();
@@ -187,8 +189,8 @@ pub fn actor_step(
     Ok(metrics)
 }
 
-/// One step of Adam on the logarithm of the temperature, under the present actor. Where the batch has a prior, the divergence
-/// from it takes the place of ln π, and -target_entropy is the divergence that is aimed at.
+/// Does one step of Adam on the logarithm of the temperature, under the present actor. If the batch has a prior, the
+/// divergence from it replaces ln π, and -target_entropy is the target divergence.
 ///
 /// # Errors
 /// As [`critic_step`].
@@ -213,7 +215,7 @@ pub fn temperature_step(
     Ok(metrics)
 }
 
-/// One step of Adam without clipping; gives the gradient's norm.
+/// Does one step of Adam without clipping, and returns the gradient's norm.
 fn descend<M: Parameters>(
     network: &mut M,
     prefix: &str,

@@ -1,8 +1,8 @@
-//! From rollouts to transitions.
+//! Conversion of rollouts to transitions.
 
 use crate::{LearnError, Observations, Rollout};
 
-/// One step of one environment: row `row` of a rollout and the state it led to.
+/// One step of one environment: row `row` of a rollout and its next state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Transition<'a> {
     /// The rollout's row, for everything but the next state.
@@ -11,11 +11,11 @@ pub(super) struct Transition<'a> {
     pub(super) next_obs: Option<&'a [f32]>,
     /// The skill under which that observation is valued; `None` likewise.
     pub(super) next_z: Option<&'a [f32]>,
-    /// The share of that skill's ticks that is left; `None` likewise, and where the rollout does not tell.
+    /// The remaining share of that skill's ticks; `None` likewise, and if the rollout does not have it.
     pub(super) next_left: Option<f32>,
 }
 
-/// `Ok` if a checked rollout holds the states where episodes were cut off and where it stops.
+/// Checks that a checked rollout holds the states where episodes were cut off and where it stops.
 ///
 /// # Errors
 /// [`LearnError::Shape`] names the first length that does not fit; [`LearnError::Config`] names a row.
@@ -24,7 +24,7 @@ pub(crate) fn check_ends(rollout: &Rollout) -> Result<(), LearnError> {
     let mut listed = ends.cut_rows.iter().copied();
     for row in (0..rollout.rows()).filter(|&row| is_cut(rollout, row)) {
         if listed.next() != Some(row) {
-            let text = format!("rollout ends: row {row} cuts an episode off, and its last observation is not there");
+            let text = format!("rollout ends: row {row} cuts an episode off, but its last observation is missing");
             return Err(LearnError::Config(text));
         }
     }
@@ -35,10 +35,10 @@ pub(crate) fn check_ends(rollout: &Rollout) -> Result<(), LearnError> {
     LearnError::check("rollout ends next_z", rollout.envs * rollout.latent, ends.next_z.len())
 }
 
-/// The transitions of a checked rollout, in order of its rows.
+/// Returns the transitions of a checked rollout, in order of its rows.
 ///
-/// The next state is the same environment's next row; where the episode was cut off it is the episode's own last
-/// state, and behind the last row where the rollout stopped. A row with both flags terminated.
+/// The next state is the same environment's next row. Where the episode was cut off it is the episode's own last
+/// state, and behind the last row the state where the rollout stopped. A row with both flags terminated.
 ///
 /// # Errors
 /// [`LearnError::Config`] if the observations are images.
@@ -76,7 +76,7 @@ fn vectors(observations: &Observations) -> Result<&[f32], LearnError> {
     observations.as_slice().vectors("SAC")
 }
 
-/// Row `at` of a flat matrix.
+/// Returns row `at` of a flat matrix.
 pub(super) fn slice(values: &[f32], width: usize, at: usize) -> &[f32] {
     &values[at * width..(at + 1) * width]
 }
@@ -86,8 +86,8 @@ pub(super) mod tests {
     use super::*;
     use crate::{ActionSpace, Actions, EndStates};
 
-    /// Two environments, three steps, observations 0 to 5 and skills 10 to 15. Environment 0 is cut off at step 0 (its
-    /// last observation is 50), environment 1 terminates at step 1 with both flags set.
+    /// Returns a rollout of two environments, three steps, observations 0 to 5 and skills 10 to 15. Environment 0 is
+    /// cut off at step 0 (its last observation is 50), environment 1 terminates at step 1 with both flags set.
     pub(in crate::sac) fn rollout() -> Rollout {
         let numbers = |base: f32| (0..6u8).map(|i| base + f32::from(i)).collect::<Vec<f32>>();
         let at = |rows: &[usize]| (0..6).map(|row| rows.contains(&row)).collect::<Vec<bool>>();

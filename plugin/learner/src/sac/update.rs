@@ -15,14 +15,14 @@ use burn::tensor::Tensor;
 use std::time::Instant;
 
 impl SacLearner {
-    /// Takes in a rollout (with its [`Rollout::ends`]; log-probabilities and values are not read) and, once there are
-    /// [`SacConfig::learning_starts`](super::SacConfig::learning_starts) transitions, does the gradient steps that are
-    /// due.
+    /// Adds a rollout (with its [`Rollout::ends`]; log-probabilities and values are not read) and, once there are
+    /// [`SacConfig::learning_starts`](super::SacConfig::learning_starts) transitions, does the gradient steps that
+    /// are due.
     ///
     /// # Errors
     /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, and
-    /// [`LearnError::Input`] if it holds numbers that are not finite, before anything is changed;
-    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away, and the learner is of no further use
+    /// [`LearnError::Input`] if it holds numbers that are not finite, before anything is changed.
+    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name the number that diverged; the learner is unusable
     /// then.
     pub fn update(&mut self, rollout: &Rollout) -> Result<SacMetrics, LearnError> {
         update_on(&self.base.device.plain(), || {
@@ -34,8 +34,8 @@ impl SacLearner {
         })
     }
 
-    /// [`Self::update`] of a policy over skills. The spread of its rewards is known already: they were taken in tick by tick.
-    /// The value of what comes after each row counts as much as `weights` say beside the discount.
+    /// Does [`Self::update`] for a policy over skills. The scale of its rewards is known already: they were added
+    /// tick by tick. `weights` scales the next state's value of each row, beside the discount.
     pub(crate) fn update_of_skills(&mut self, rollout: &Rollout, weights: &[f32]) -> Result<SacMetrics, LearnError> {
         update_on(&self.base.device.plain(), || {
             self.check_rollout(rollout)?;
@@ -67,7 +67,7 @@ impl SacLearner {
         Ok(SacMetrics { transitions, gradient_steps, entropy_coef, ..sums.means(penalised) })
     }
 
-    /// Whole gradient steps for `rows` new transitions.
+    /// Returns the whole gradient steps for `rows` new transitions.
     fn steps_due(&mut self, rows: usize) -> u64 {
         if self.buffer.seen < self.config.learning_starts {
             return 0;
@@ -77,7 +77,7 @@ impl SacLearner {
         owed as u64
     }
 
-    /// The critics' step, the actor's and the temperature's where they are due, and the targets'.
+    /// Does the critics' step, the actor's and the temperature's where they are due, and the targets'.
     fn gradient_step(&mut self, sums: &mut MetricSums) -> Result<(), LearnError> {
         let number = self.gradient_steps;
         let drawn = self.draw(number)?;
@@ -112,7 +112,7 @@ impl SacLearner {
         Ok(())
     }
 
-    /// The transitions of gradient step `number`: of what was played, and of what was recorded if there is anything.
+    /// Returns the transitions of gradient step `number`: from play, and from recordings if there are any.
     pub(super) fn draw(&self, number: u64) -> Result<ReplayBuffer, LearnError> {
         let recorded = self.demos.as_ref().map_or(0, |demos| demos.of_batch(&self.config));
         let mut rng = self.base.streams.stream("sac.batch", number);
@@ -126,7 +126,7 @@ impl SacLearner {
         }
     }
 
-    /// Which critics the target of gradient step `number` is the least of; none for all.
+    /// Returns the critics whose least value is the target of gradient step `number`; empty for all.
     fn critics_of_target(&self, number: u64) -> Vec<usize> {
         let SacConfig { critics, target_critics, .. } = self.config;
         if target_critics >= critics {
@@ -138,7 +138,7 @@ impl SacLearner {
         all
     }
 
-    /// A step of the actor and, if it is tuned, one of the temperature.
+    /// Does a step of the actor and, if it is tuned, one of the temperature.
     fn actor_update(
         &mut self,
         batch: &SacBatch,
@@ -157,7 +157,7 @@ impl SacLearner {
         Ok(())
     }
 
-    /// What the transitions' entropy is worth now.
+    /// Returns the present weight of entropy.
     pub(crate) fn temperature(&self) -> Result<f64, LearnError> {
         match self.config.entropy {
             EntropyCoef::Auto { .. } => self.nets.temperature(),
@@ -165,7 +165,7 @@ impl SacLearner {
         }
     }
 
-    /// Standard normal numbers for a batch of draws; discrete actions need none.
+    /// Returns standard normal numbers for a batch of draws; discrete actions need none.
     fn noise(&self, rng: &mut ChaCha8Rng) -> Option<Tensor<2>> {
         let ActionSpace::Continuous(dim) = self.base.spec.action_space else { return None };
         let n = self.config.batch;

@@ -1,4 +1,4 @@
-//! The decoder's confidence in each row, α in the paper: how much the divergence of the row counts.
+//! The decoder's confidence in each row, α in the paper: the weight of the row's divergence.
 
 use super::{ConfidenceKind, PenaltyForm, ScoreConfig, marginal_densities};
 use crate::nn::{HostDist, argmax, categorical_at, categorical_log_prob, gaussian_log_prob, sample_gaussian};
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 /// Rows that a thread takes at a time.
 const ROWS: usize = 1024;
 
-/// One action per row, drawn from the decoder.
+/// Returns one action per row, drawn from the decoder.
 pub fn own_samples<R: Rng + ?Sized>(decoder: &HostDist, rng: &mut R) -> Actions {
     let rows = decoder.head.chunks_exact(decoder.dim);
     match &decoder.log_std {
@@ -27,8 +27,8 @@ pub fn own_samples<R: Rng + ?Sized>(decoder: &HostDist, rng: &mut R) -> Actions 
     }
 }
 
-/// The weight of each row of a rollout with these `actions`, by the form of the penalty and the kind of confidence. `rng` gives the
-/// decoder's own samples where those are wanted.
+/// Returns the weight of each row of a rollout with these `actions`, by the form of the penalty and the kind of
+/// confidence. `rng` draws the decoder's own samples where those are needed.
 ///
 /// # Errors
 /// [`LearnError::Action`] or [`LearnError::Shape`] if the actions do not fit the decoder.
@@ -48,12 +48,13 @@ pub fn penalty_weights<R: Rng + ?Sized>(
     }
 }
 
-/// The confidence in each row for the given actions (of the decoder for [`ConfidenceKind::OwnSample`], else of the rollout).
+/// Returns the confidence in each row for the given actions (of the decoder for [`ConfidenceKind::OwnSample`], else
+/// of the rollout).
 ///
-/// Discrete: the decoder's probability of the action, which [`ConfidenceKind::BoundedDensity`] divides by the largest of the
-/// row. Continuous: exp(-½ · mean over dimensions of the squared z-score), in (0, 1]; for [`ConfidenceKind::Density`] the
-/// density, the product over dimensions; for [`ConfidenceKind::BoundedDensity`] the density relative to the mean's, exp(-½ ·
-/// sum of the squared z-scores).
+/// Discrete: the decoder's probability of the action, which [`ConfidenceKind::BoundedDensity`] divides by the largest
+/// of the row. Continuous: exp(-½ · mean over dimensions of the squared z-score), in (0, 1]. For
+/// [`ConfidenceKind::Density`] the density, the product over dimensions. For [`ConfidenceKind::BoundedDensity`] the
+/// density relative to the mean's, exp(-½ · sum of the squared z-scores).
 ///
 /// # Errors
 /// [`LearnError::Action`] or [`LearnError::Shape`] if the actions do not fit the decoder.
@@ -90,7 +91,7 @@ pub fn confidences(kind: ConfidenceKind, decoder: &HostDist, actions: &Actions) 
     }
 }
 
-/// Σ ((a - μ) / σ)².
+/// Returns Σ ((a - μ) / σ)².
 fn square_sum(mean: &[f32], log_std: &[f32], action: &[f32]) -> f64 {
     let scores = mean.iter().zip(log_std).zip(action);
     scores.map(|((&m, &s), &a)| ((f64::from(a) - f64::from(m)) * (-f64::from(s)).exp()).powi(2)).sum()

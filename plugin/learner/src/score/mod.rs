@@ -1,7 +1,7 @@
-//! SCORE: what ties an online policy to the skill decoder.
+//! SCORE: the ties of an online policy to the skill decoder.
 //!
-//! Three switches over PPO or SAC: the policy reads the skill z ([`ScoreConfig::condition`]), starts as a copy of the
-//! decoder ([`ScoreConfig::init_from_decoder`]; not where SAC squashes actions), and its loss gains kl_coef times a
+//! Three switches over PPO or SAC. The policy reads the skill z ([`ScoreConfig::condition`]). It starts as a copy of
+//! the decoder ([`ScoreConfig::init_from_decoder`]; not where SAC squashes actions). Its loss gains kl_coef times a
 //! penalty ([`ScoreConfig::kl`]). The penalty is mean(α KL(decoder ‖ policy)) (the SCORE paper's Eq. 3 as a loss to
 //! minimise), where α is the decoder's confidence in the row, or one of the other forms of [`PenaltyForm`].
 

@@ -1,7 +1,7 @@
-//! The penalty for leaving the decoder: the paper's, and for comparison only those of its released code.
+//! The penalty for leaving the decoder: the paper's, and for comparison those of its released code.
 //!
-//! The latter measure KL(policy ‖ decoder) and weigh it by what the decoder thinks of the rollout's action. The one for
-//! mazes rewards the divergence, since it is subtracted from a loss that is minimised, until the clamp ends the gradient.
+//! The latter measure KL(policy ‖ decoder) and weigh it by the decoder's density at the rollout's action. The one for
+//! mazes is subtracted from the minimised loss, so it rewards the divergence until the clamp ends the gradient.
 
 use super::{KlDirection, PenaltyForm, ScoreConfig};
 use crate::nn::{Dist, HostDist, gaussian_log_prob};
@@ -11,8 +11,8 @@ use burn::tensor::Tensor;
 /// Bound of a divergence in the released code's penalties; there is no gradient beyond.
 const BOUND: f32 = 100.0;
 
-/// The divergence of each row in the chosen direction, in nats, `[n]`. Exactly 0 where the two are equal. `decoder` is
-/// constant.
+/// Returns the divergence of each row in the configured direction, in nats, `[n]`. Exactly 0 where the two are equal.
+/// `decoder` is constant.
 ///
 /// # Errors
 /// [`LearnError::Action`] if the two act in different kinds of spaces.
@@ -28,12 +28,12 @@ pub fn decoder_kl(decoder: &Dist, policy: &Dist, direction: KlDirection) -> Resu
 pub struct Penalty {
     /// The divergence of each row, not weighted, in nats, `[n]`.
     pub kl: Tensor<1>,
-    /// What times kl_coef is added to a loss that is minimised, `[1]`.
+    /// The term that, times kl_coef, is added to the minimised loss, `[1]`.
     pub term: Tensor<1>,
 }
 
-/// The penalty by [`ScoreConfig::penalty`], from the constant `decoder`, the `policy`, and the `weight` of each row `[n]`
-/// that [`penalty_weights`](super::penalty_weights) gives.
+/// Returns the penalty by [`ScoreConfig::penalty`], from the constant `decoder`, the `policy`, and the `weight` of
+/// each row `[n]` from [`penalty_weights`](super::penalty_weights).
 ///
 /// # Errors
 /// [`LearnError::Action`] if decoder and policy act in different kinds of spaces.
@@ -47,19 +47,19 @@ pub fn penalty(config: &ScoreConfig, decoder: &Dist, policy: &Dist, weight: Tens
     Ok(Penalty { kl, term })
 }
 
-/// -w · clamp(Σᵢ KLᵢ, ±100), `[1]`, with w = Σᵢ weightᵢ: `kl` `[n]` is KL(policy ‖ decoder), `weight` `[n]` is
-/// [`marginal_densities`], a constant.
+/// Returns -w · clamp(Σᵢ KLᵢ, ±100), `[1]`, with w = Σᵢ weightᵢ: `kl` `[n]` is KL(policy ‖ decoder), `weight` `[n]`
+/// is [`marginal_densities`], a constant.
 pub fn legacy_d4rl(kl: Tensor<1>, weight: Tensor<1>) -> Tensor<1> {
     weight.sum().neg() * kl.sum().clamp(-BOUND, BOUND)
 }
 
-/// Σᵢ clamp(KLᵢ, ±100) · weightᵢ, `[1]`: `kl` `[n]` is KL(policy ‖ decoder), `weight` `[n]` is the decoder's probability
-/// of the rollout's action, a constant.
+/// Returns Σᵢ clamp(KLᵢ, ±100) · weightᵢ, `[1]`: `kl` `[n]` is KL(policy ‖ decoder), `weight` `[n]` is the decoder's
+/// probability of the rollout's action, a constant.
 pub fn legacy_coinrun(kl: Tensor<1>, weight: Tensor<1>) -> Tensor<1> {
     (kl.clamp(-BOUND, BOUND) * weight).sum()
 }
 
-/// The sum over dimensions of the decoder's one-dimensional densities at the action of each row.
+/// Returns the sum over dimensions of the decoder's one-dimensional densities at the action of each row.
 ///
 /// # Errors
 /// [`LearnError::Shape`] or [`LearnError::Action`] if the actions do not fit a decoder of continuous actions.

@@ -1,9 +1,9 @@
-//! How the encoder sees actions.
+//! The encoder's representation of actions.
 
 use crate::{ActionSpace, Actions, LearnError};
 use serde::{Deserialize, Serialize};
 
-/// How the encoder reads a discrete action. Continuous ones are read as they are.
+/// The encoder's representation of a discrete action. Continuous ones are read unchanged.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum ActionInput {
     /// One number per choice: 1 for the one taken, else 0.
@@ -14,7 +14,7 @@ pub enum ActionInput {
 }
 
 impl ActionInput {
-    /// Numbers that an action of `space` becomes.
+    /// Returns the width of an action of `space`.
     pub fn width(self, space: ActionSpace) -> usize {
         match (self, space) {
             (Self::ScaledIndex, ActionSpace::Discrete(_)) => 1,
@@ -22,7 +22,7 @@ impl ActionInput {
         }
     }
 
-    /// `actions` of `space` as the encoder reads them, row-major, `[n, width]`.
+    /// Returns `actions` of `space` as the encoder reads them, row-major, `[n, width]`.
     ///
     /// # Errors
     /// [`LearnError::Action`] names the first action that is not in `space`.

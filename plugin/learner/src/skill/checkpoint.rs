@@ -29,14 +29,14 @@ struct Header {
     /// A hash of the demonstrations; the first checkpoints had none.
     #[serde(default)]
     demo_hash: Option<u64>,
-    /// The epoch that was best on demonstrations kept apart, and the NLL there; the first checkpoints had the whole loss.
+    /// The best epoch on the held-out demonstrations, and the NLL there; the first checkpoints had the whole loss.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     best: Option<(u64, f32)>,
 }
 
 impl SkillTrainer {
-    /// Writes everything but the demonstrations that is needed to go on bit for bit. Under a temporary name first, so
-    /// that a checkpoint is whole or not there.
+    /// Writes the complete state except the demonstrations, so that training continues bit for bit. The file gets a
+    /// temporary name first, so a checkpoint is complete or absent.
     ///
     /// # Errors
     /// [`FileError::Io`] if it cannot be written.
@@ -66,10 +66,10 @@ impl SkillTrainer {
         file.write()
     }
 
-    /// Reads a file that [`Self::save`] wrote; `dataset` must be the one of that training.
+    /// Reads a file that [`Self::save`] wrote; `dataset` must be the one of that run.
     ///
     /// # Errors
-    /// [`FileError`] says what is wrong with the file or does not fit the demonstrations.
+    /// [`FileError`] describes the problem of the file, or does not fit the demonstrations.
     pub fn load(path: &Path, dataset: Dataset, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
         let header: Header = file.header(FILE)?;
@@ -108,7 +108,7 @@ impl SkillTrainer {
         let trainer = Self::with_nets(skill.config, dataset, &nets, header.seed, device);
         let mut trainer = trainer.map_err(|e| file.learner(e))?;
         if header.demo_hash.is_some_and(|hash| hash != trainer.fingerprint) {
-            let text = "the demonstrations are not those of this training: as many episodes and steps, but other ones";
+            let text = "the demonstrations are not those of this run: their episodes differ in content";
             return Err(file.format(text.to_owned()));
         }
         file.take_adam(&mut trainer.adam, "", &mut trainer.nets, header.adam_steps)?;
@@ -124,7 +124,7 @@ impl SkillTrainer {
         let windows = trainer.cut_windows(header.epoch);
         trainer.windows = windows.map_err(|e| file.learner(e))?;
         if header.windows_done >= trainer.windows.len() {
-            return Err(file.format("stands behind the end of its epoch".to_owned()));
+            return Err(file.format("is behind the end of its epoch".to_owned()));
         }
         trainer.next = header.windows_done;
         file.finish()?;

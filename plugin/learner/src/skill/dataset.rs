@@ -1,4 +1,4 @@
-//! Demonstrations.
+//! Demonstrations for a skill model.
 
 use super::Window;
 use crate::norm::ObsStats;
@@ -16,7 +16,7 @@ pub struct DemoEpisode {
     pub actions: Actions,
 }
 
-/// Demonstrations of one game. Clones and subsets share the memory, of which images need much.
+/// Demonstrations of one game. Clones and subsets share the memory, because images need much.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dataset {
     pub(super) observation: ObsKind,
@@ -26,7 +26,7 @@ pub struct Dataset {
     pub(super) levels: Arc<[usize]>,
     /// The same episodes as vectors of the game's state, if they are known.
     pub(super) states: Option<Arc<Self>>,
-    /// Which levels they show, if somebody noted it.
+    /// The levels that they show, if known.
     pub(super) seen: Option<Arc<SeenLevels>>,
 }
 
@@ -56,9 +56,9 @@ impl Dataset {
         Ok(Self { observation, space, episodes, levels, states: None, seen: None })
     }
 
-    /// Says which episodes were played on the same level, by any number that is the same for them: what
-    /// [`SkillConfig::held_out`](super::SkillConfig::held_out) keeps apart are whole levels then. Without it each episode counts
-    /// as a level.
+    /// Assigns a level to each episode, by any number that is equal for episodes on the same level.
+    /// [`SkillConfig::held_out`](super::SkillConfig::held_out) then holds out whole levels. Without it each episode
+    /// counts as a level.
     ///
     /// # Errors
     /// [`LearnError::Shape`] unless there is a number for each episode.
@@ -67,12 +67,13 @@ impl Dataset {
         Ok(Self { levels: levels.into(), ..self })
     }
 
-    /// Notes which levels they show: skill models that are learned from them [say so](super::SkillModel::demos).
+    /// Notes the levels that they show: skill models that are learned from them [keep
+    /// this](super::SkillModel::demos).
     pub fn with_seen(self, seen: SeenLevels) -> Self {
         Self { seen: Some(Arc::new(seen)), ..self }
     }
 
-    /// What an observation is.
+    /// Returns the kind of observations.
     pub fn observation(&self) -> ObsKind {
         self.observation
     }
@@ -82,12 +83,12 @@ impl Dataset {
         self.observation.numbers()
     }
 
-    /// The space of the actions.
+    /// Returns the space of the actions.
     pub fn action_space(&self) -> ActionSpace {
         self.space
     }
 
-    /// Number of episodes.
+    /// Returns the number of episodes.
     pub fn episodes(&self) -> usize {
         self.episodes.len()
     }
@@ -97,7 +98,7 @@ impl Dataset {
         self.episodes.iter().map(|episode| episode.actions.len()).sum()
     }
 
-    /// The episodes of these numbers.
+    /// Returns the episodes of these numbers.
     pub(super) fn subset(&self, numbers: &[usize]) -> Self {
         Self {
             observation: self.observation,
@@ -109,7 +110,7 @@ impl Dataset {
         }
     }
 
-    /// Mean and deviation of each number of the observations over all steps; `None` for images.
+    /// Returns the mean and deviation of each number of the observations over all steps; `None` for images.
     pub(super) fn stats(&self) -> Option<ObsStats> {
         let ObsKind::Vector(width) = self.observation else { return None };
         let rows = self.episodes.iter().flat_map(|episode| match &episode.observations {
@@ -119,7 +120,7 @@ impl Dataset {
         Some(ObsStats::of(rows, width))
     }
 
-    /// A hash of all observations, actions and states, the same on any number of threads.
+    /// Returns a hash of all observations, actions and states, the same on any number of threads.
     pub(super) fn fingerprint(&self) -> u64 {
         let mut hashes: Vec<[u64; 2]> = self
             .episodes
@@ -140,7 +141,7 @@ impl Dataset {
         fnv1a(bytemuck::cast_slice(&hashes))
     }
 
-    /// Observations and actions of `windows`, time-major: row `t * windows + b`.
+    /// Returns observations and actions of `windows`, time-major: row `t * windows + b`.
     pub(super) fn gather(&self, windows: &[Window], steps: usize) -> Result<(Observations, Actions), LearnError> {
         let width = self.observation.numbers();
         let mut observations = Observations::with_capacity(&self.observation, windows.len() * steps);
@@ -162,7 +163,7 @@ pub(super) mod tests {
     use super::*;
     use crate::ImageShape;
 
-    /// Episodes whose one-number observations count their steps.
+    /// Returns episodes whose one-number observations count their steps.
     pub(in super::super) fn dataset(lengths: &[usize]) -> Dataset {
         let episodes = lengths
             .iter()

@@ -1,4 +1,4 @@
-//! What a skill model's weights need to be understood, and the architecture that follows from it.
+//! The description of a skill model's weights, and the architecture that follows from it.
 
 use super::SkillConfig;
 use crate::file::TensorFile;
@@ -9,7 +9,7 @@ use crate::{ActionSpace, FileError, ObsKind, PolicySpec};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// The settings of a skill model, and what it observes and acts in.
+/// The settings of a skill model, and its observation and action space.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SkillDescription {
@@ -21,22 +21,22 @@ pub(crate) struct SkillDescription {
 }
 
 impl SkillDescription {
-    /// What the decoder reads and does.
+    /// Returns the inputs and outputs of the decoder.
     pub(crate) fn decoder_spec(&self) -> PolicySpec {
         PolicySpec { obs: self.observation, latent: self.config.latent, action_space: self.action_space }
     }
 
-    /// What the prior reads and does: its action is the skill.
+    /// Returns the inputs and outputs of the prior: its action is the skill.
     pub(crate) fn prior_spec(&self) -> PolicySpec {
         PolicySpec { obs: self.observation, latent: 0, action_space: ActionSpace::Continuous(self.config.latent) }
     }
 
-    /// The decoder's layers.
+    /// Returns the decoder's layers.
     pub(crate) fn decoder_shape(&self) -> ActorShape {
         self.actor(&self.decoder_spec(), self.config.decoder_std)
     }
 
-    /// The prior's layers.
+    /// Returns the prior's layers.
     pub(crate) fn prior_shape(&self) -> ActorShape {
         self.actor(&self.prior_spec(), self.config.prior_std)
     }
@@ -45,7 +45,7 @@ impl SkillDescription {
         ActorShape::new(spec, &self.config.cnn, &self.config.hidden, Activation::Relu, std.into())
     }
 
-    /// The frozen normaliser called `name` out of a file, if the networks read through one.
+    /// Takes the frozen normaliser called `name` out of a file, if the networks use one.
     pub(crate) fn take_stats(&self, file: &mut TensorFile, name: &str) -> Result<Option<Arc<ObsStats>>, FileError> {
         if !self.config.norm_obs {
             return Ok(None);

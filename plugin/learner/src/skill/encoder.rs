@@ -1,4 +1,4 @@
-//! q(z | τ): from a window of states and actions to a latent skill.
+//! The encoder q(z | τ): from a window of states and actions to a latent skill.
 
 use super::SkillConfig;
 use crate::nn::{
@@ -8,7 +8,7 @@ use crate::{LearnError, ObsKind};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
-/// What the encoder makes of each step's observation.
+/// The network over each step's observation.
 #[derive(Clone, Debug)]
 pub enum StateNet {
     /// Three layers over a vector, ReLU between them; `state` in names.
@@ -32,8 +32,8 @@ pub struct Encoder {
 }
 
 impl Encoder {
-    /// Starting weights: orthogonal, recurrent layers uniform. `action_width` is that of an action as the encoder reads
-    /// it.
+    /// Creates starting weights: orthogonal, recurrent layers uniform. `action_width` is that of an action as the
+    /// encoder reads it.
     ///
     /// # Errors
     /// [`LearnError::Config`] if images are too small for the convolutions.
@@ -51,7 +51,7 @@ impl Encoder {
         Ok(encoder)
     }
 
-    /// [`Self::new`] with parameters out of `source`.
+    /// Creates an encoder as [`Self::new`], with parameters out of `source`.
     pub(crate) fn build<S: ParamSource>(
         source: &mut S,
         prefix: &str,
@@ -81,7 +81,7 @@ impl Encoder {
         })
     }
 
-    /// The Gaussian over z, before any squashing, for each of B windows of `steps` steps.
+    /// Returns the Gaussian over z, before any squashing, for each of B windows of `steps` steps.
     ///
     /// `states`, `steps * B` rows, and `actions` `[steps * B, action_width]`
     /// ([`ActionInput`](super::ActionInput)) are time-major: row `t * B + b`.
@@ -93,7 +93,8 @@ impl Encoder {
         Ok(Dist::Gaussian { mean: self.mean.forward(summary.clone()), log_std: self.log_std.forward(summary) })
     }
 
-    /// What the recurrent layers make of each window, `[B, 2 * gru_hidden]`; inputs and errors as [`Self::forward`].
+    /// Returns the recurrent layers' summary of each window, `[B, 2 * gru_hidden]`; inputs and errors as
+    /// [`Self::forward`].
     pub fn summary(&self, states: &ObsBatch, actions: Tensor<2>, steps: usize) -> Result<Tensor<2>, LearnError> {
         let joined = Tensor::cat(vec![self.state.forward(states)?, actions], 1);
         Ok(self.gru.summary(joined, steps))
@@ -101,7 +102,7 @@ impl Encoder {
 }
 
 impl StateNet {
-    /// The features of each observation, `[n, features]`.
+    /// Returns the features of each observation, `[n, features]`.
     ///
     /// # Errors
     /// [`LearnError::Config`] if the observations are of the other kind than the network.

@@ -1,4 +1,4 @@
-//! Demonstrations that are kept apart, to see when a skill model begins to know the others by heart.
+//! Held-out demonstrations, which show when a skill model begins to overfit.
 
 use super::{Dataset, SkillConfig, SkillMetrics, SkillNets, SkillTrainer, Window, skill_loss};
 use crate::LearnError;
@@ -7,7 +7,7 @@ use crate::rng::{Streams, shuffle};
 use burn::tensor::Tensor;
 use std::collections::BTreeSet;
 
-/// What a skill model makes of demonstrations that it has not learned from: means over their windows.
+/// Metrics of a skill model on held-out demonstrations: means over their windows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct HeldOutMetrics {
     /// The whole loss.
@@ -20,14 +20,14 @@ pub struct HeldOutMetrics {
     pub state_error: Option<f32>,
 }
 
-/// Demonstrations that are not learned from, with the windows that are always cut from them.
+/// Held-out demonstrations, with a fixed set of windows.
 #[derive(Debug)]
 pub(super) struct HeldOut {
     dataset: Dataset,
     windows: Vec<Window>,
 }
 
-/// The networks after the epoch that was best on the demonstrations kept apart.
+/// The networks after the best epoch on the held-out demonstrations.
 #[derive(Clone, Debug)]
 pub(super) struct Best {
     /// Epochs done by then.
@@ -38,11 +38,11 @@ pub(super) struct Best {
 }
 
 impl Dataset {
-    /// The episodes to learn from and those to keep apart: all episodes of a share of the levels, which is drawn from `streams`,
-    /// at least one. Episodes of the same level know much of each other, so that one learned from would tell of one kept apart.
+    /// Returns the episodes to learn from and the held-out ones: all episodes of a share of the levels, which is
+    /// drawn from `streams`, at least one. Whole levels are held out because episodes of the same level are alike.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if none would be left to learn from.
+    /// [`LearnError::Config`] if no episode would be left to learn from.
     pub(super) fn without_held_out(
         self,
         config: &SkillConfig,
@@ -52,14 +52,14 @@ impl Dataset {
             return Ok((self, None));
         }
         let distinct: BTreeSet<usize> = self.levels.iter().copied().collect();
-        // Of a single level, episodes are all there is to choose from.
+        // With a single level there are only episodes to choose from.
         let groups = if distinct.len() > 1 { self.levels.to_vec() } else { (0..self.episodes.len()).collect() };
         let mut order: Vec<usize> = groups.iter().copied().collect::<BTreeSet<_>>().into_iter().collect();
         let (all, what) = (order.len(), if distinct.len() > 1 { "levels" } else { "episodes" });
         let count = ((config.held_out * all as f64).round() as usize).max(1);
         if count >= all {
             let text = format!(
-                "skill held_out keeps {count} of {all} {what} apart, so that none is left to learn from: record more, or set \
+                "skill held_out takes {count} of {all} {what}, which leaves none to learn from: record more, or set \
                  it to 0"
             );
             return Err(LearnError::Config(text));
@@ -77,9 +77,9 @@ impl Dataset {
 }
 
 impl SkillTrainer {
-    /// What the networks make of the demonstrations kept apart, if there are any; remembers the networks if their NLL was never
-    /// lower. The rest of the loss does not count: it says how skills are told apart, not how well they are played. The draws of
-    /// skills are the same each time.
+    /// Measures the networks on the held-out demonstrations, if there are any, and keeps the networks if their NLL is
+    /// the lowest so far. The rest of the loss does not count: it measures how skills are told apart, not how well
+    /// they are played. The draws of skills are the same each time.
     pub(super) fn measure_held_out(&mut self) -> Result<Option<HeldOutMetrics>, LearnError> {
         let Some(held_out) = &self.held_out else { return Ok(None) };
         let mut sums = [0.0f64; 4];
@@ -107,30 +107,31 @@ impl SkillTrainer {
         Ok(Some(HeldOutMetrics { loss, nll, kl, state_error }))
     }
 
-    /// Whether [`SkillConfig::patience`] is over: more epochs make it worse where it matters.
+    /// Returns whether [`SkillConfig::patience`] is exhausted: more epochs would overfit.
     pub fn is_over(&self) -> bool {
         let best = self.best.as_ref().zip(self.config.patience);
         best.is_some_and(|(best, patience)| self.epoch >= best.epoch + patience as u64)
     }
 
-    /// After which epoch the networks had the least NLL on the demonstrations kept apart; `None` where nobody looks.
+    /// Returns the epoch after which the networks had the least NLL on the held-out demonstrations; `None` without
+    /// any.
     pub fn best_epoch(&self) -> Option<u64> {
         self.best.as_ref().map(|best| best.epoch)
     }
 
-    /// The NLL on the demonstrations kept apart after [`Self::best_epoch`].
+    /// Returns the NLL on the held-out demonstrations after [`Self::best_epoch`].
     pub fn best_nll(&self) -> Option<f32> {
         self.best.as_ref().map(|best| best.nll)
     }
 
-    /// The networks that the model gets: the best ones, or those there are now.
+    /// Returns the networks of the model: the best ones, or the present ones.
     pub(super) fn nets_of_model(&self) -> SkillNets {
         self.best.as_ref().map_or_else(|| self.nets.clone(), |best| tracked(&best.nets))
     }
 }
 
 impl SkillMetrics {
-    /// The NLL on demonstrations kept apart, if there are any.
+    /// Returns the NLL on held-out demonstrations, if there are any.
     pub fn held_out_nll(&self) -> Option<f32> {
         self.held_out.map(|held_out| held_out.nll)
     }

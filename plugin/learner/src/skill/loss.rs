@@ -1,4 +1,4 @@
-//! J = NLL + β KL(q ‖ p), the loss of the skill model.
+//! The loss of the skill model, J = NLL + β KL(q ‖ p).
 
 use super::{Reduction, SkillConfig, SkillForward};
 use crate::nn::Dist;
@@ -39,9 +39,9 @@ pub fn skill_loss(forward: &SkillForward, config: &SkillConfig) -> SkillLoss {
     SkillLoss { nll, kl, latent_norm, total }
 }
 
-/// Negative log-likelihood of each recorded action when a share ε of discrete actions was replaced by uniformly random
-/// ones: −ln((1 − ε) π(a) + ε / K) for K actions. The decoder then learns what was meant, not the noise. Continuous
-/// actions, which were not replaced, count as they are.
+/// Returns the negative log-likelihood of each recorded action if a share ε of discrete actions was replaced by
+/// uniformly random ones: −ln((1 − ε) π(a) + ε / K) for K actions. The decoder then learns the intended action, not
+/// the noise. Continuous actions are not corrected.
 fn nll_under_noise(forward: &SkillForward, noise: f64) -> Tensor<1> {
     let nll = forward.nll_per_step.clone();
     match &forward.decoded {

@@ -1,10 +1,10 @@
-//! What learning a skill model looks like.
+//! Metrics of a skill model's training.
 
 use super::HeldOutMetrics;
 use crate::nn::{Dist, argmax, host};
 use crate::{Actions, LearnError};
 
-/// What one batch, or the mean over an epoch's batches, looked like.
+/// Metrics of one batch, or their mean over an epoch's batches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SkillMetrics {
     /// The whole loss.
@@ -19,14 +19,14 @@ pub struct SkillMetrics {
     pub accuracy: Option<f32>,
     /// Norm of the gradient before clipping.
     pub grad_norm: f32,
-    /// Squared error with which the state is told, the mean over its numbers and summed over a window, with
-    /// [`state_weight`](super::SkillConfig::state_weight); it begins at about as many as a window has steps, and 1.
+    /// Squared error of the predicted state, the mean over its numbers and summed over a window, with
+    /// [`state_weight`](super::SkillConfig::state_weight); it starts near the number of steps of a window plus 1.
     pub state_error: Option<f32>,
-    /// What an epoch's networks make of demonstrations kept apart; `None` for a single batch, and where there are none.
+    /// Metrics of an epoch's networks on held-out demonstrations; `None` for a single batch, and without any.
     pub held_out: Option<HeldOutMetrics>,
 }
 
-/// What the running epoch's batches add up to.
+/// Sums over the running epoch's batches.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct MetricSums {
     pub(super) count: usize,
@@ -41,7 +41,7 @@ impl MetricSums {
         self.total.iter_mut().zip(values).for_each(|(sum, x)| *sum += f64::from(x));
     }
 
-    /// The means; those that `last`, the last batch, has.
+    /// Returns the means over those metrics that `last`, the last batch, has.
     pub(super) fn mean(self, last: &SkillMetrics) -> SkillMetrics {
         let [loss, nll, kl, latent_norm, hits, grad_norm, state_error] =
             self.total.map(|sum| (sum / self.count.max(1) as f64) as f32);
@@ -50,7 +50,7 @@ impl MetricSums {
     }
 }
 
-/// Share of the actions that are the most likely ones; `None` for continuous actions.
+/// Returns the share of the actions that are the most likely ones; `None` for continuous actions.
 pub(super) fn accuracy(decoded: &Dist, actions: &Actions) -> Result<Option<f32>, LearnError> {
     let (Dist::Categorical { log_probs }, Actions::Discrete(actions)) = (decoded, actions) else {
         return Ok(None);

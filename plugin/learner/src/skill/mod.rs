@@ -1,15 +1,15 @@
 //! The skill model: an autoencoder of action sequences.
 //!
-//! An encoder q(z | τ) turns a window τ of states and actions into a latent skill z, a decoder π(a | s, z) acts it out
-//! again, and a prior p(z | s₀) says which skills a player would choose in a state. Training minimises
-//! J = NLL + β KL(q ‖ p) (the SCORE paper's Eq. 2 with its sign put right; OPAL, Ajay et al. 2021).
+//! An encoder q(z | τ) turns a window τ of states and actions into a latent skill z. A decoder π(a | s, z) turns z
+//! back into actions. A prior p(z | s₀) says which skills a demonstrator would choose in a state. Training minimises
+//! J = NLL + β KL(q ‖ p) (the SCORE paper's Eq. 2 with its sign corrected; OPAL, Ajay et al. 2021).
 //!
-//! Observations are vectors or images ([`crate::ObsKind`]). For images each of the three networks has a trunk of
-//! convolutions of its own ([`SkillConfig::cnn`]), which comes before the layers that would read a vector.
+//! Observations are vectors or images ([`crate::ObsKind`]). For images each of the three networks has its own trunk
+//! of convolutions ([`SkillConfig::cnn`]), before the layers that would read a vector.
 //!
-//! There is one pipeline everywhere: the networks see observations raw (pixels divided by 255) or through one frozen
-//! normaliser ([`SkillConfig::norm_obs`]), and the decoder sees tanh(z) (or z, by [`SkillConfig::tanh_latent`]), in
-//! training, in use, and in the policies that are tied to it.
+//! There is one pipeline everywhere. The networks see observations raw (pixels divided by 255) or through one frozen
+//! normaliser ([`SkillConfig::norm_obs`]). The decoder sees tanh(z) (or z, by [`SkillConfig::tanh_latent`]). This
+//! holds in training, in use, and in the policies that are tied to it.
 
 mod action_input;
 mod checkpoint;

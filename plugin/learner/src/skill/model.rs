@@ -25,9 +25,9 @@ const FILE: FileKind = FileKind { name: "skill model", version: 1 };
 
 /// Encoder, decoder and prior after training, with the settings they were trained with.
 ///
-/// The file is safetensors with names such as `decoder.l0.weight` (`[inputs, outputs]`) or `decoder.cnn.s0.conv.weight`
-/// (`[outputs, inputs, rows, columns]`), the frozen normaliser (`obs_norm.mean`, `obs_norm.inv_std`) by
-/// [`SkillConfig::norm_obs`], and the settings as JSON in its header, so that one file is all there is.
+/// The file is safetensors with names such as `decoder.l0.weight` (`[inputs, outputs]`) or
+/// `decoder.cnn.s0.conv.weight` (`[outputs, inputs, rows, columns]`). It also holds the frozen normaliser
+/// (`obs_norm.mean`, `obs_norm.inv_std`) by [`SkillConfig::norm_obs`], and the settings as JSON in its header.
 #[derive(Clone, Debug)]
 pub struct SkillModel {
     pub(crate) description: SkillDescription,
@@ -49,32 +49,33 @@ impl SkillModel {
         Self { description, nets, stats, device, picture: None, demos: None }
     }
 
-    /// The model with a note on how the images that it observes are made; `None` for vectors.
+    /// Adds metadata of the images that the model observes; `None` for vectors.
     pub fn with_picture(self, picture: Option<PictureCard>) -> Self {
         Self { picture, ..self }
     }
 
-    /// How the images that it observes are made, if somebody noted it.
+    /// Returns the metadata of the images that it observes, if known.
     pub fn picture(&self) -> Option<&PictureCard> {
         self.picture.as_ref()
     }
 
-    /// The model with a note on what it was learned from.
+    /// Adds metadata of its demonstrations.
     pub(super) fn with_demos(self, demos: Option<SeenLevels>) -> Self {
         Self { demos, ..self }
     }
 
-    /// What it was learned from, if [that was noted](super::Dataset::with_seen): not in files of older versions.
+    /// Returns the metadata of its demonstrations, if [noted](super::Dataset::with_seen): files of older versions
+    /// have none.
     pub fn demos(&self) -> Option<&SeenLevels> {
         self.demos.as_ref()
     }
 
-    /// The settings it was trained with.
+    /// Returns the settings it was trained with.
     pub fn config(&self) -> &SkillConfig {
         &self.description.config
     }
 
-    /// What it observes.
+    /// Returns the kind of its observations.
     pub fn observation(&self) -> ObsKind {
         self.description.observation
     }
@@ -84,38 +85,39 @@ impl SkillModel {
         self.observation().numbers()
     }
 
-    /// What the decoder acts in.
+    /// Returns the action space of the decoder.
     pub fn action_space(&self) -> ActionSpace {
         self.description.action_space
     }
 
-    /// Width of z.
+    /// Returns the width of z.
     pub fn latent(&self) -> usize {
         self.description.config.latent
     }
 
-    /// How its networks see observations, by [`SkillConfig::norm_obs`]; `None` for raw ones.
+    /// Returns the normalisation of its networks' observations, by [`SkillConfig::norm_obs`]; `None` for raw ones.
     pub fn obs_stats(&self) -> Option<&ObsStats> {
         self.stats.as_deref()
     }
 
-    /// The networks, for inference. They read observations as [`Self::obs_stats`] makes them.
+    /// Returns the networks, for inference. They read observations normalised by [`Self::obs_stats`].
     pub fn nets(&self) -> &SkillNets {
         &self.nets
     }
 
-    /// The decoder π(a | s, z), which reads observations as [`Self::obs_stats`] makes them.
+    /// Returns the decoder π(a | s, z), which reads observations normalised by [`Self::obs_stats`].
     pub fn decoder(&self) -> &Actor {
         &self.nets.decoder
     }
 
-    /// The prior p(z | s) of raw observations, giving skills as the decoder takes them.
+    /// Returns the prior p(z | s) of raw observations, with skills in the decoder's form.
     pub fn prior(&self) -> Prior {
         let (config, stats, device) = (self.config(), self.stats.clone(), self.device.plain());
         Prior::learned(&self.nets.prior, stats, self.observation(), config.latent, config.tanh_latent, device)
     }
 
-    /// The decoder as a policy of raw observations without a critic. Under the prior this is behaviour cloning.
+    /// Returns the decoder as a policy of raw observations without a critic. Under the prior this is behaviour
+    /// cloning.
     pub fn policy(&self) -> Policy {
         let spec = self.description.decoder_spec();
         Policy::new(self.decoder(), None, self.stats.clone(), spec, self.device.plain())
@@ -124,7 +126,8 @@ impl SkillModel {
     /// Writes the file, in one step: under a temporary name first.
     ///
     /// # Errors
-    /// [`FileError::Io`] if it cannot be written, [`FileError::Learner`] if the note on its images is not of their shape.
+    /// [`FileError::Io`] if it cannot be written, [`FileError::Learner`] if the metadata of its images does not fit
+    /// their shape.
     pub fn save(&self, path: &Path) -> Result<(), FileError> {
         let (skill, picture, demos) = (self.description.clone(), self.picture.clone(), self.demos.clone());
         if let Some(picture) = &picture {
@@ -142,7 +145,8 @@ impl SkillModel {
     /// Reads a file that [`Self::save`] wrote.
     ///
     /// # Errors
-    /// [`FileError`] says what is wrong with the file, or names the tensor that is missing, superfluous or misshapen.
+    /// [`FileError`] describes the problem of the file, or names the tensor that is missing, superfluous or
+    /// misshapen.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path).map_err(|error| error.or_again(": learn the skills again"))?;
         let header: Header = file.header(FILE)?;

@@ -17,13 +17,14 @@ pub struct SkillNets {
     pub decoder: Actor,
     /// p(z | s₀): an actor whose action is z, before squashing.
     pub prior: Actor,
-    /// Whether the decoder sees tanh(z) and not z.
+    /// True if the decoder sees tanh(z) and not z.
     pub tanh_latent: bool,
-    /// What tells the state, while a model is learned with [`SkillConfig::state_weight`]; never in a finished model.
+    /// Heads that predict the state, while a model is trained with [`SkillConfig::state_weight`]; never in a finished
+    /// model.
     pub state_heads: Option<StateHeads>,
 }
 
-/// What the networks say about a batch of windows.
+/// The networks' outputs for a batch of windows.
 #[derive(Clone, Debug)]
 pub struct SkillForward {
     /// -ln π(a | s, z) of each step, summed over action dimensions, `[steps * B]`, time-major.
@@ -34,15 +35,15 @@ pub struct SkillForward {
     pub decoder_latent: Tensor<2>,
     /// The decoder's distributions, time-major.
     pub decoded: Dist,
-    /// What the decoder's trunk made of each step, `[steps * B, features]`, time-major; vectors as they are.
+    /// Features of the decoder's trunk for each step, `[steps * B, features]`, time-major; vectors unchanged.
     pub decoder_features: Tensor<2>,
-    /// What the prior's trunk made of each window's first step, `[B, features]`.
+    /// Features of the prior's trunk for each window's first step, `[B, features]`.
     pub prior_features: Tensor<2>,
 }
 
 impl SkillNets {
-    /// Starting weights from the streams `skill.encoder`, `skill.decoder` and `skill.prior`, and `skill.decoder.cnn` and
-    /// `skill.prior.cnn` for images, of which each of the three networks has a trunk of its own.
+    /// Creates starting weights from the streams `skill.encoder`, `skill.decoder` and `skill.prior`, and
+    /// `skill.decoder.cnn` and `skill.prior.cnn` for images: each of the three networks has its own trunk.
     ///
     /// # Errors
     /// [`LearnError::Config`] if images are too small for the convolutions.
@@ -60,7 +61,7 @@ impl SkillNets {
         Ok(Self { encoder, decoder, prior, tanh_latent: config.tanh_latent, state_heads: None })
     }
 
-    /// The networks of a skill model out of a file.
+    /// Reads the networks of a skill model out of a file.
     ///
     /// # Errors
     /// [`FileError`] names the first tensor that is missing or misshapen.
@@ -110,7 +111,7 @@ impl SkillNets {
     }
 }
 
-/// Decoder and prior alone, which is all that is needed when a skill model is used.
+/// Decoder and prior alone, which suffice to use a skill model.
 #[derive(Clone, Debug)]
 pub(crate) struct Actors {
     pub(crate) decoder: Actor,
@@ -118,7 +119,7 @@ pub(crate) struct Actors {
 }
 
 impl Actors {
-    /// Starting weights, from the streams that [`SkillNets::new`] names.
+    /// Creates starting weights, from the streams that [`SkillNets::new`] names.
     fn fresh(description: &SkillDescription, streams: &Streams, device: &Device) -> Result<Self, LearnError> {
         let (decoder, prior) = (description.decoder_spec(), description.prior_spec());
         Ok(Self {
@@ -127,10 +128,10 @@ impl Actors {
         })
     }
 
-    /// Those of a file.
+    /// Reads the weights of a file.
     ///
     /// # Errors
-    /// [`FileError::Learner`] for settings that cannot work; else as [`SkillNets::stored`].
+    /// [`FileError::Learner`] for impossible settings; else as [`SkillNets::stored`].
     pub(crate) fn stored(
         description: &SkillDescription,
         file: &mut TensorFile,

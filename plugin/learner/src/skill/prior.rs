@@ -1,4 +1,4 @@
-//! p(z | s₀) in use.
+//! The prior p(z | s₀) in use.
 
 use crate::device::guarded;
 use crate::nn::frozen;
@@ -9,7 +9,7 @@ use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// How z is taken from the prior.
+/// The choice of z from the prior.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum SkillDraw {
     /// A random draw (the paper's text).
@@ -27,7 +27,7 @@ pub struct Prior {
     pub(crate) tanh: bool,
 }
 
-/// The network of a learned prior, and how it sees observations.
+/// The network of a learned prior, and its normalisation of observations.
 #[derive(Clone, Debug)]
 pub(crate) struct PriorNet {
     pub(crate) actor: Actor,
@@ -37,8 +37,8 @@ pub(crate) struct PriorNet {
 }
 
 impl Prior {
-    /// The learned prior `actor`, which reads the given observations, normalised by `stats` if given; its skills are
-    /// squashed by tanh if `tanh`.
+    /// Creates the learned prior `actor`, which reads the given observations, normalised by `stats` if given; its
+    /// skills are squashed by tanh if `tanh`.
     pub(crate) fn learned(
         actor: &Actor,
         stats: Option<Arc<ObsStats>>,
@@ -50,24 +50,24 @@ impl Prior {
         Self { net: Some(PriorNet { actor: frozen(actor), observation, stats, device }), latent, tanh }
     }
 
-    /// A prior that ignores the state: standard normal, then tanh if `tanh`.
+    /// Creates a prior that ignores the state: standard normal, then tanh if `tanh`.
     pub fn standard_normal(latent: usize, tanh: bool) -> Self {
         Self { net: None, latent, tanh }
     }
 
-    /// What it observes; nothing if it ignores the state.
+    /// Returns the kind of its observations; `None` if it ignores the state.
     pub fn observation(&self) -> Option<ObsKind> {
         self.net.as_ref().map(|net| net.observation)
     }
 
-    /// Width of z.
+    /// Returns the width of z.
     pub fn latent(&self) -> usize {
         self.latent
     }
 
     /// Skills for `n` raw observations, as the decoder and the policy take them: `n * latent`.
     ///
-    /// `normal(row)` must give the next standard normal number of that row's own generator; it is called `latent`
+    /// `normal(row)` must return the next standard normal number of that row's own generator. It is called `latent`
     /// times per row, in order of rows, and not at all for [`SkillDraw::Mean`].
     ///
     /// # Errors

@@ -17,7 +17,7 @@ use burn::tensor::Tensor;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Where training stands, after each batch.
+/// Progress of training, after each batch.
 #[derive(Clone, Copy, Debug)]
 pub struct SkillProgress {
     /// Number of the running epoch, from 0.
@@ -34,7 +34,7 @@ pub struct SkillProgress {
 #[derive(Debug)]
 pub struct SkillTrainer {
     pub(super) config: SkillConfig,
-    /// What is learned from.
+    /// The demonstrations to learn from.
     pub(super) dataset: Dataset,
     pub(super) held_out: Option<HeldOut>,
     pub(super) best: Option<Best>,
@@ -42,9 +42,9 @@ pub struct SkillTrainer {
     pub(super) fingerprint: u64,
     /// Episodes and steps of all demonstrations.
     pub(super) extent: (usize, usize),
-    /// How the networks see observations, if not raw.
+    /// Normalisation of the networks' observations, if any.
     pub(super) stats: Option<Arc<ObsStats>>,
-    /// How they tell states, if they do.
+    /// Normalisation of the predicted states, if any.
     pub(super) state_stats: Option<ObsStats>,
     pub(super) nets: SkillNets,
     pub(super) adam: Adam,
@@ -58,10 +58,10 @@ pub struct SkillTrainer {
 }
 
 impl SkillTrainer {
-    /// A trainer with starting weights from `seed`.
+    /// Creates a trainer with starting weights from `seed`.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work or images too small for them, [`LearnError::NoWindow`] if no
+    /// [`LearnError::Config`] for impossible settings or images too small for them, [`LearnError::NoWindow`] if no
     /// episode is long enough.
     pub fn new(config: SkillConfig, dataset: Dataset, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
         Self::check(&config, &dataset)?;
@@ -74,7 +74,7 @@ impl SkillTrainer {
         Self::with_nets(config, dataset, &nets, seed, device)
     }
 
-    /// `Ok` if a model of these settings can be learned from `dataset`.
+    /// Checks that a model of these settings can be learned from `dataset`.
     fn check(config: &SkillConfig, dataset: &Dataset) -> Result<(), LearnError> {
         config.validate()?;
         config.check_observation(dataset.observation)?;
@@ -86,7 +86,7 @@ impl SkillTrainer {
         Ok(())
     }
 
-    /// A trainer of `nets`, which has not trained them yet.
+    /// Creates a trainer of `nets`, which has not trained them yet.
     pub(super) fn with_nets(
         config: SkillConfig,
         dataset: Dataset,
@@ -120,22 +120,22 @@ impl SkillTrainer {
         })
     }
 
-    /// The settings.
+    /// Returns the settings.
     pub fn config(&self) -> &SkillConfig {
         &self.config
     }
 
-    /// The seed.
+    /// Returns the seed.
     pub fn seed(&self) -> u64 {
         self.streams.seed()
     }
 
-    /// Complete passes over the demonstrations.
+    /// Returns the number of complete passes over the demonstrations.
     pub fn epochs_done(&self) -> u64 {
         self.epoch
     }
 
-    /// Batches in the running epoch; it varies a little with where the episodes are cut.
+    /// Returns the number of batches in the running epoch; it varies a little with the cuts of the episodes.
     pub fn batches_per_epoch(&self) -> usize {
         self.windows.len().div_ceil(self.config.batch)
     }
@@ -148,7 +148,8 @@ impl SkillTrainer {
     /// Trains on the next batch; the last one of an epoch may be smaller.
     ///
     /// # Errors
-    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name what ran away; the trainer is of no further use then.
+    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name the number that diverged; the trainer is unusable
+    /// then.
     pub fn train_batch(&mut self) -> Result<SkillMetrics, LearnError> {
         let end = (self.next + self.config.batch).min(self.windows.len());
         let windows = self.windows[self.next..end].to_vec();
@@ -165,8 +166,8 @@ impl SkillTrainer {
         Ok(metrics)
     }
 
-    /// Trains to the end of the running epoch and gives the means over its batches, or `None` if `progress`, which is
-    /// called after each batch, stopped it. A later call goes on from there.
+    /// Trains to the end of the running epoch and returns the means over its batches, or `None` if `progress`, which
+    /// is called after each batch, stopped it. A later call continues from there.
     ///
     /// # Errors
     /// As [`Self::train_batch`].
@@ -189,7 +190,7 @@ impl SkillTrainer {
         }
     }
 
-    /// The model as it is now; with [`SkillConfig::patience`] as it was best.
+    /// Returns the present model; with [`SkillConfig::patience`] the best one.
     pub fn model(&self) -> SkillModel {
         SkillModel::new(self.description(), &self.nets_of_model(), self.stats.clone(), self.device)
             .with_demos(self.dataset.seen.as_deref().cloned())
@@ -207,7 +208,7 @@ impl SkillTrainer {
         }
     }
 
-    /// The trained model.
+    /// Returns the trained model.
     pub fn into_model(self) -> SkillModel {
         self.model()
     }
@@ -225,7 +226,7 @@ impl SkillTrainer {
         };
         let mut parts = vec![&objective, &loss.nll, &loss.kl, &loss.latent_norm];
         parts.extend(&state_error);
-        // One piece of memory, and one wait for a graphics card.
+        // One allocation, and one wait for a graphics card.
         let numbers = host(Tensor::cat(parts.into_iter().map(|part| part.clone().inner()).collect(), 0))?;
         let [total, nll, kl, latent_norm, ref rest @ ..] = numbers[..] else {
             return Err(LearnError::Device(format!("{} losses instead of 4", numbers.len())));
@@ -239,12 +240,12 @@ impl SkillTrainer {
         Ok(SkillMetrics { loss: total, nll, kl, latent_norm, accuracy, grad_norm, state_error, held_out: None })
     }
 
-    /// The learning rate of the next batch.
+    /// Returns the learning rate of the next batch.
     fn lr(&self) -> f64 {
         self.config.lr_at(self.epoch as f64 + self.next as f64 / self.windows.len() as f64)
     }
 
-    /// Gradient, clipping, one step of Adam; gives the norm before clipping.
+    /// Computes the gradient, clips it, and does one step of Adam; returns the norm before clipping.
     fn descend(&mut self, loss: Tensor<1>) -> Result<f32, LearnError> {
         let (lr, max_norm, steps) = (self.lr(), self.config.max_grad_norm, self.adam.steps());
         if is_host(&self.device.plain()) {
@@ -258,7 +259,8 @@ impl SkillTrainer {
         norm.is_finite().then_some(norm).ok_or_else(lost)
     }
 
-    /// The networks on windows of `dataset`, with draws of skills from `noise`; images are changed if `changes` are given.
+    /// Runs the networks on windows of `dataset`, with draws of skills from `noise`; images are augmented if
+    /// `changes` are given.
     pub(super) fn forward_of(
         &self,
         dataset: &Dataset,
@@ -287,5 +289,27 @@ impl SkillTrainer {
         let rows = ActionBatch::new(&actions, &device);
         let forward = self.nets.forward(&states, &rows, encoded, noise, steps)?;
         Ok((forward, actions))
+    }
+}
+
+impl SkillTrainer {
+    /// Returns the squared error of the predicted state of `windows` of `dataset`, `[1]`, if it is predicted.
+    pub(super) fn state_error(
+        &self,
+        dataset: &Dataset,
+        windows: &[Window],
+        forward: &SkillForward,
+    ) -> Result<Option<Tensor<1>>, LearnError> {
+        let (Some(heads), Some(states), Some(stats)) = (&self.nets.state_heads, &dataset.states, &self.state_stats)
+        else {
+            return Ok(None);
+        };
+        let steps = self.config.window;
+        let (Observations::Vector(values), _) = states.gather(windows, steps)? else {
+            return Err(LearnError::Config("states are vectors".to_owned()));
+        };
+        let rows = steps * windows.len();
+        let states = matrix(stats.normalize(&values), rows, states.obs_dim(), &self.device.plain());
+        Ok(Some(heads.error(forward, &states)))
     }
 }

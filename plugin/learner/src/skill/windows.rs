@@ -1,11 +1,11 @@
-//! The windows that are cut from demonstrations.
+//! Windows cut from demonstrations.
 
 use super::Dataset;
 use crate::LearnError;
 use crate::rng::{Streams, below, shuffle};
 use serde::{Deserialize, Serialize};
 
-/// Where windows are cut.
+/// The rule by which windows are cut.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum WindowRule {
     /// Each episode is cut into consecutive windows from a random first step, anew and in a new order in every epoch,
@@ -13,12 +13,12 @@ pub enum WindowRule {
     #[default]
     WithinEpisodes,
     /// The released code's: as many windows as fit side by side, but from starts drawn once, uniformly with
-    /// replacement over all steps, regardless of the ends of episodes; the same in the same order in every epoch. For
-    /// comparison only.
+    /// replacement over all steps, regardless of the ends of episodes. They are the same in the same order in every
+    /// epoch. For comparison only.
     Legacy,
 }
 
-/// A stretch of one episode; by [`WindowRule::Legacy`] it may go on in those that follow.
+/// A stretch of one episode; with [`WindowRule::Legacy`] it may continue in those that follow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
     /// Number of the episode.
@@ -28,10 +28,11 @@ pub struct Window {
 }
 
 impl Dataset {
-    /// The windows of one epoch, in the order in which they are learned from.
+    /// Returns the windows of one epoch, in the order in which they are learned from.
     ///
     /// # Errors
-    /// [`LearnError::NoWindow`] if every episode (or by [`WindowRule::Legacy`] all together) is shorter than `window`.
+    /// [`LearnError::NoWindow`] if every episode (or with [`WindowRule::Legacy`] all together) is shorter than
+    /// `window`.
     pub fn windows(
         &self,
         window: usize,
@@ -80,14 +81,14 @@ impl Dataset {
         let starts = (0..steps / window).map(|_| below(&mut rng, slack as u64 + 1) as usize);
         starts
             .map(|start| {
-                // The last episode that begins there or before is the one that holds the step: empty ones come first.
+                // The last episode that begins there or before holds the step: empty ones come first.
                 let episode = begins.partition_point(|&begin| begin <= start) - 1;
                 Window { episode, start: start - begins[episode] }
             })
             .collect()
     }
 
-    /// Where step `step` of `window` lies: episode and step in it.
+    /// Returns the position of step `step` of `window`: the episode and the step in it.
     pub(super) fn step_of(&self, window: &Window, step: usize) -> (usize, usize) {
         let (mut episode, mut row) = (window.episode, window.start + step);
         while row >= self.episodes[episode].actions.len() {

@@ -20,10 +20,11 @@ struct Header {
 }
 
 impl SpirlLearner {
-    /// Reads a file that [`Learner::save`](crate::Learner::save) wrote. The learner goes on exactly as the saved one would have.
+    /// Reads a file that [`Learner::save`](crate::Learner::save) wrote. The learner continues exactly as the saved
+    /// one would have.
     ///
     /// # Errors
-    /// [`FileError`] says what is wrong with the file.
+    /// [`FileError`] describes the problem of the file.
     pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         let mut file = TensorFile::read(path)?;
         let Header { spirl, is_sac, over_skills, below } = file.header(FILE)?;
@@ -45,7 +46,7 @@ impl SpirlLearner {
         Ok(Self { config: spirl, over_skills, below })
     }
 
-    /// What [`Learner::save`](crate::Learner::save) writes.
+    /// Returns the file that [`Learner::save`](crate::Learner::save) writes.
     pub(super) fn checkpoint(&self, path: &Path) -> Result<TensorFile, FileError> {
         let over_skills = self.over_skills.checkpoint(path)?.to_bytes()?;
         let below = self.below.as_ref().map(|below| below.checkpoint(path)?.to_bytes()).transpose()?;

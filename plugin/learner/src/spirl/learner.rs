@@ -1,4 +1,4 @@
-//! The learner: a policy over skills, and the decoder that plays them.
+//! The SPiRL learner: a policy over skills, and the decoder that plays them.
 
 use super::SpirlConfig;
 use super::over_skills::{OverSkills, of_prior, tag_of_skills};
@@ -14,22 +14,24 @@ use std::time::Duration;
 
 /// Learns which skills to play.
 ///
-/// [`crate::spirl`] says how. The numbers depend only on the settings, the seed and the rollouts, which must be at least twice
-/// as long as skills are held, and say when skills were drawn ([`Rollout::left`]) and what came after ([`Rollout::ends`]).
+/// See [`crate::spirl`]. The numbers depend only on the settings, the seed and the rollouts. These must be at least
+/// twice as long as the skill interval, and hold the remaining shares of skills ([`Rollout::left`]) and the last
+/// states ([`Rollout::ends`]).
 #[derive(Debug)]
 pub struct SpirlLearner {
     pub(super) config: SpirlConfig,
     pub(super) over_skills: OverSkills,
-    /// What goes on learning below the skills; `None` where the decoder is frozen.
+    /// The learner below the skills; `None` if the decoder is frozen.
     pub(super) below: Option<PpoLearner>,
 }
 
 impl SpirlLearner {
-    /// Learns skills of `model` by PPO. Of `score` counts how long they are held; `ppo.gamma` is per tick, and so is the discount
-    /// of the return by which rewards are scaled, whatever `ppo.reward_gamma` says. There is no bonus for entropy.
+    /// Creates a learner of `model`'s skills by PPO. Of `score` only the skill interval counts. `ppo.gamma` is per
+    /// tick, and so is the discount of the return by which rewards are scaled, whatever `ppo.reward_gamma` is. There
+    /// is no bonus for entropy.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work.
+    /// [`LearnError::Config`] for impossible settings.
     pub fn ppo(
         config: SpirlConfig,
         ppo: PpoConfig,
@@ -47,12 +49,12 @@ impl SpirlLearner {
         Ok(Self { config, over_skills: OverSkills::Ppo(learner), below })
     }
 
-    /// Learns skills of `model` by SAC, from every rollout once it is whole. Of `score` counts how long skills are held;
-    /// `sac.gamma` is per tick, and the temperature, which prices the divergence from the prior, is that of `config`.
-    /// `ppo` is what the decoder learns by, if it does.
+    /// Creates a learner of `model`'s skills by SAC, which learns from every whole rollout. Of `score` only the skill
+    /// interval counts. `sac.gamma` is per tick. The temperature, which weighs the divergence from the prior, is that
+    /// of `config`. `ppo` holds the settings of the decoder's learner, if it has one.
     ///
     /// # Errors
-    /// [`LearnError::Config`] for settings that cannot work, or skills that do not lie in -1..1.
+    /// [`LearnError::Config`] for impossible settings, or skills outside -1..1.
     pub fn sac(
         config: SpirlConfig,
         sac: SacConfig,
@@ -76,18 +78,18 @@ impl SpirlLearner {
             None => EntropyCoef::Fixed(config.kl_coef),
         };
         let sac = SacConfig { gamma: sac.gamma.powi(score.horizon as i32), entropy, random_start: false, ..sac };
-        // What ties it to the prior is the price of the divergence, not a penalty beside it.
+        // It is tied to the prior by the cost of the divergence, without a penalty beside it.
         let teacher = Teacher::new(of_prior(&config, score, false), TiedTo::Prior, model, device)?;
         let learner = SacLearner::fresh(sac, teacher.policy_spec(), Some(teacher), seed, device)?;
         Ok(Self { config, over_skills: OverSkills::Sac(learner), below })
     }
 
-    /// The settings.
+    /// Returns the settings.
     pub fn config(&self) -> &SpirlConfig {
         &self.config
     }
 
-    /// What the divergence from the prior costs now, per nat.
+    /// Returns the present cost of the divergence from the prior, per nat.
     ///
     /// # Errors
     /// [`LearnError::Device`] if it cannot be read.
@@ -100,7 +102,7 @@ impl SpirlLearner {
 }
 
 impl PpoLearner {
-    /// The learner of a decoder that goes on learning; `None` if it shall not.
+    /// Returns the learner of a decoder that continues to learn; `None` if the decoder is frozen.
     fn below(
         config: &SpirlConfig,
         ppo: &PpoConfig,
@@ -114,7 +116,7 @@ impl PpoLearner {
     }
 }
 
-/// `Ok` if a policy over skills can be learned with these settings.
+/// Checks that a policy over skills can be learned with these settings.
 fn check(config: &SpirlConfig, score: &ScoreConfig, limit: TimeLimit) -> Result<(), LearnError> {
     let bad = |text: &str| Err(LearnError::Config(text.to_owned()));
     config.validate()?;
@@ -126,18 +128,18 @@ fn check(config: &SpirlConfig, score: &ScoreConfig, limit: TimeLimit) -> Result<
         return bad("spirl learns from skills that are drawn: score skill_draw must be Sample");
     }
     if limit != TimeLimit::Bootstrap {
-        return bad("spirl cuts what it learns from: time_limit must be Bootstrap");
+        return bad("spirl cuts episodes off between skills: time_limit must be Bootstrap");
     }
     Ok(())
 }
 
 impl Learner for SpirlLearner {
-    /// That of the policy over skills.
+    /// Returns that of the policy over skills.
     fn base(&self) -> &LearnerBase {
         self.over_skills.learner().base()
     }
 
-    /// What acts: the decoder, or what it has become.
+    /// Returns the acting policy: the decoder, or its trained successor.
     fn policy(&self) -> Policy {
         match &self.below {
             Some(below) => below.policy(),
@@ -158,12 +160,12 @@ impl Learner for SpirlLearner {
         Ok(LearnerMetrics::new(scalars))
     }
 
-    /// Between the prior and the policy over skills.
+    /// Returns the divergence between the prior and the policy over skills.
     fn initial_kl(&self, _: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
         self.over_skills.learner().initial_kl(&[], obs, n)
     }
 
-    /// The checkpoints of its learners are in it whole, as bytes `over_skills` and `below`.
+    /// Saves the learner. The checkpoints of its learners are in it whole, as bytes `over_skills` and `below`.
     fn save(&self, path: &Path) -> Result<(), FileError> {
         self.checkpoint(path)?.write()
     }
@@ -177,7 +179,7 @@ impl Learner for SpirlLearner {
         }
     }
 
-    /// Of what acts.
+    /// Returns the inputs and outputs of the acting policy.
     fn spec(&self) -> PolicySpec {
         match &self.below {
             Some(below) => below.spec(),

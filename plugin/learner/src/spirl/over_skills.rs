@@ -1,4 +1,4 @@
-//! What learns π(z | s): PPO or SAC, tied to the prior.
+//! The learner of π(z | s): PPO or SAC, tied to the prior.
 
 use super::SpirlConfig;
 use super::skill_steps::{SkillRollout, skill_rollout};
@@ -12,7 +12,7 @@ use crate::skill::{Prior, SkillDraw};
 use crate::{Action, Actions, FileError, LearnError, PpoLearner, Rollout, SacLearner};
 use std::path::Path;
 
-/// What learns π(z | s).
+/// The learner of π(z | s).
 #[derive(Debug)]
 #[expect(clippy::large_enum_variant, reason = "there is one per training")]
 pub(super) enum OverSkills {
@@ -32,7 +32,7 @@ impl OverSkills {
         self.learner().base().teacher.as_ref().expect("a policy over skills starts as a prior")
     }
 
-    /// π(z | s) as a source of skills.
+    /// Returns π(z | s) as a source of skills.
     pub(super) fn prior(&self) -> Prior {
         let (actor, device) = match self {
             Self::Ppo(learner) => (&learner.nets.actor, learner.base.device),
@@ -48,7 +48,7 @@ impl OverSkills {
         }
     }
 
-    /// How much later a skill is than its predecessor is worth, per tick.
+    /// Returns the discount per tick, from that of a skill.
     pub(super) fn discount_of_tick(&self) -> f64 {
         let gamma = match self {
             Self::Ppo(learner) => learner.config().gamma,
@@ -57,7 +57,8 @@ impl OverSkills {
         gamma.powf(1.0 / self.teacher().config.horizon as f64)
     }
 
-    /// Learns π(z | s) from a rollout of ticks; gives what there is to report, by other names than what acts reports.
+    /// Learns π(z | s) from a rollout of ticks, and returns the metrics under names that differ from those of the
+    /// acting policy.
     pub(super) fn learn(
         &mut self,
         config: &SpirlConfig,
@@ -67,7 +68,7 @@ impl OverSkills {
         let tanh = self.teacher().description.config.tanh_latent;
         match self {
             Self::Sac(learner) => {
-                // Its buffer keeps rewards as they were: they are scaled when they are read.
+                // Its buffer keeps raw rewards: they are scaled when they are read.
                 scaled(learner.base.rewards.as_mut(), gamma, rollout)?;
                 let skills = skill_rollout(rollout, &rollout.rewards, gamma, horizon)?;
                 let of_whole = learner.config().gamma;
@@ -78,7 +79,7 @@ impl OverSkills {
                 let rewards = scaled(learner.base.rewards.as_mut(), gamma, rollout)?;
                 let SkillRollout { rows: mut skills, discounts } = skill_rollout(rollout, &rewards, gamma, horizon)?;
                 if let (true, Actions::Continuous { values, .. }) = (tanh, &mut skills.actions) {
-                    // PPO knows no squashing: its actions are the normal numbers whose tanh the decoder reads.
+                    // PPO does not squash: its actions are the normal numbers whose tanh the decoder reads.
                     values.iter_mut().for_each(|z| *z = unsquashed_action(*z));
                 }
                 score_rows(&mut skills, &learner.policy())?;
@@ -88,7 +89,7 @@ impl OverSkills {
                 let metrics = learner.update(&skills);
                 learner.base.rewards = normalizer;
                 let metrics = metrics?;
-                // While only the critic learns, the policy stays where it is whatever that costs.
+                // While only the critic learns, the policy stays the same whatever that costs.
                 if let (Some(kl), Some(teacher), false) = (metrics.decoder_kl, &mut learner.base.teacher, is_warming_up)
                 {
                     teacher.config.kl_coef = config.tuned(teacher.config.kl_coef, f64::from(kl));
@@ -99,8 +100,8 @@ impl OverSkills {
     }
 }
 
-/// The rewards of all ticks by the spread of the return, whose discount is per tick: that of an environment goes on from rollout
-/// to rollout. As they are without a normaliser.
+/// Returns the rewards of all ticks, scaled by the spread of the return, whose discount is per tick. The return of an
+/// environment continues from rollout to rollout. Without a normaliser the rewards are unchanged.
 fn scaled(normalizer: Option<&mut RewardNormalizer>, gamma: f64, rollout: &Rollout) -> Result<Vec<f32>, LearnError> {
     match normalizer {
         Some(normalizer) => {
@@ -111,8 +112,8 @@ fn scaled(normalizer: Option<&mut RewardNormalizer>, gamma: f64, rollout: &Rollo
     }
 }
 
-/// Makes up for a discount that is the same for every skill: what comes behind one that was cut off after k ticks is discounted
-/// by γᵏ, not by `gamma`, that of a whole one.
+/// Corrects a discount that is the same for every skill: the value behind a skill that was cut off after k ticks is
+/// discounted by γᵏ, not by `gamma`, that of a whole one.
 fn discount_cuts(skills: &mut Rollout, discounts: &[f64], gamma: f64) {
     for &row in &skills.ends.cut_rows {
         let value = f64::from(skills.final_values[row]);
@@ -120,7 +121,7 @@ fn discount_cuts(skills: &mut Rollout, discounts: &[f64], gamma: f64) {
     }
 }
 
-/// How a policy over skills is tied to the prior.
+/// Returns the settings that tie a policy over skills to the prior.
 pub(super) fn of_prior(config: &SpirlConfig, score: &ScoreConfig, kl: bool) -> ScoreConfig {
     ScoreConfig {
         condition: true,
@@ -138,7 +139,7 @@ pub(super) fn of_prior(config: &SpirlConfig, score: &ScoreConfig, kl: bool) -> S
     }
 }
 
-/// Fills in how likely each action of a rollout was under the policy that played it, and what that expected.
+/// Fills in the log-probability of each action of a rollout under the policy that played it, and the policy's value.
 fn score_rows(rollout: &mut Rollout, policy: &Policy) -> Result<(), LearnError> {
     let output = policy.forward(&[], &rollout.obs, rollout.rows())?;
     let Actions::Continuous { dim, values } = &rollout.actions else {
@@ -150,7 +151,7 @@ fn score_rows(rollout: &mut Rollout, policy: &Policy) -> Result<(), LearnError> 
     rollout.bootstrap(policy)
 }
 
-/// What a learner of skills reports, by names of its own.
+/// Returns the tag of a learner of skills, which has names of its own.
 pub(super) fn tag_of_skills(tag: &'static str) -> Option<&'static str> {
     Some(match tag {
         "charts/learning_rate" => "spirl/learning_rate",
@@ -190,7 +191,7 @@ mod tests {
         // As if both had been one.
         let mut whole = RewardNormalizer::new(0.9);
         whole.normalize(&rollout.rewards.repeat(2), &rollout.done().repeat(2), 2).expect("it fits");
-        // Whatever discount the learner of skills has made it with.
+        // Independent of the discount that the learner of skills has made it with.
         let mut normalizer = RewardNormalizer::new(0.9f64.powi(8));
         for _ in 0..2 {
             scaled(Some(&mut normalizer), 0.9, &rollout).expect("it fits");

@@ -1,4 +1,4 @@
-//! From ticks to skills: what a policy over skills learns from.
+//! Conversion of a rollout of ticks to one of skills.
 
 use crate::sac::check_ends;
 use crate::{ActionSpace, Actions, EndStates, LearnError, Rollout};
@@ -6,49 +6,50 @@ use crate::{ActionSpace, Actions, EndStates, LearnError, Rollout};
 /// The state after a skill.
 #[derive(Clone, Copy, PartialEq, Debug)]
 enum After {
-    /// There is none: the game was over.
+    /// No state: the game was over.
     Nothing,
     /// A row in which the next skill was drawn.
     Row(usize),
-    /// The last state of an episode that was cut off, by its place among [`EndStates::cut_rows`].
+    /// The last state of an episode that was cut off, by its index among [`EndStates::cut_rows`].
     Cut(usize),
-    /// Where the rollout of this environment stopped.
+    /// The state in which the rollout of this environment stopped.
     End(usize),
 }
 
 /// A skill that was drawn and played to its end within the rollout.
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct SkillStep {
-    /// Where it was drawn.
+    /// The row in which it was drawn.
     row: usize,
     /// Σ γᵗ r over its ticks.
     reward: f64,
-    /// γᵏ with k the ticks that it was played: what the state behind it is worth less.
+    /// γᵏ with k the ticks that it was played: the discount of the next state.
     discount: f64,
     after: After,
 }
 
-/// What a policy over skills learns from.
+/// The rollout that a policy over skills learns from.
 #[derive(Debug)]
 pub(super) struct SkillRollout {
     /// Each row is a skill.
     pub(super) rows: Rollout,
-    /// γᵏ of each row with k the ticks that the skill was played: fewer than it is held where an episode ended.
+    /// γᵏ of each row with k the ticks that the skill was played: fewer than the skill interval if an episode ended.
     pub(super) discounts: Vec<f64>,
 }
 
-/// The rollout as skills see it, in one environment: each row is a state in which a skill was drawn, the action is that skill
-/// (`Actions::Continuous`, as the decoder read it), and its reward what its ticks earned of `rewards`, discounted by `gamma`.
+/// Returns the rollout in terms of skills, in one environment: each row is a state in which a skill was drawn. The
+/// action is that skill (`Actions::Continuous`, as the decoder read it), and its reward is the sum of `rewards` over
+/// its ticks, discounted by `gamma`.
 ///
-/// The skills of an environment follow one another; behind its last one, and wherever an episode was cut off, the row counts as
-/// truncated with the state that came after among the ends. What was drawn fewer than `horizon` ticks before the end of the
-/// rollout is left out however it ended, or else skills that end an episode would be learned from more often than those that do
-/// not: the state in which the first of them was drawn is the one after its predecessor. Log-probabilities and values are left
-/// at 0.
+/// The skills of an environment follow one another. Behind its last one, and wherever an episode was cut off, the row
+/// counts as truncated, with the next state among the ends. Skills drawn fewer than `horizon` ticks before the end of
+/// the rollout are left out however they ended: otherwise skills that end an episode would be learned from more often
+/// than others. The state in which the first of them was drawn is the next state of its predecessor.
+/// Log-probabilities and values stay 0.
 ///
 /// # Errors
-/// [`LearnError::Shape`] or [`LearnError::Config`] if the rollout does not say when skills were drawn, or in none of its environments one was drawn and
-/// played to its end.
+/// [`LearnError::Shape`] or [`LearnError::Config`] if the rollout does not hold the remaining shares of skills, or no
+/// environment drew a skill and played it to its end.
 pub(super) fn skill_rollout(
     rollout: &Rollout,
     rewards: &[f32],
@@ -72,7 +73,7 @@ pub(super) fn skill_rollout(
         }
     }
     if skills.steps == 0 {
-        let text = "no skill was played to its end: rollouts must be at least twice as long as skills are held";
+        let text = "no skill was played to its end: rollouts must be at least twice as long as the skill interval";
         return Err(LearnError::Config(text.to_owned()));
     }
     let n = skills.steps;
@@ -83,14 +84,14 @@ pub(super) fn skill_rollout(
     Ok(SkillRollout { rows: skills, discounts })
 }
 
-/// The skills that an environment has played to their ends, of those that had the time for it.
+/// Returns the skills that an environment has played to their ends, among those with enough time for it.
 fn skill_steps(rollout: &Rollout, rewards: &[f32], env: usize, gamma: f64, horizon: usize) -> Vec<SkillStep> {
     let (mut steps, mut open): (Vec<SkillStep>, Option<SkillStep>) = (Vec::new(), None);
     let mut close = |open: &mut Option<SkillStep>, after| {
         steps.extend(open.take().map(|step| SkillStep { after, ..step }));
     };
     for (tick, row) in (env..rollout.rows()).step_by(rollout.envs).enumerate() {
-        // A skill that was drawn just now has all of its ticks left.
+        // A newly drawn skill has all of its ticks left.
         if rollout.left[row] >= 1.0 {
             close(&mut open, After::Row(row));
             if tick + horizon > rollout.steps {
@@ -140,8 +141,9 @@ fn push(skills: &mut Rollout, rollout: &Rollout, step: &SkillStep, next: Option<
 mod tests {
     use super::*;
 
-    /// One environment of nine ticks, skills held for two: the first tick ends a skill of before, an episode terminates after
-    /// one tick of its skill, another is cut off, and the last skill has only begun.
+    /// Returns a rollout of one environment of nine ticks, with skills of two ticks. The first tick ends an earlier
+    /// skill, an episode terminates after one tick of its skill, another is cut off, and the last skill has only
+    /// begun.
     fn rollout(next_left: f32) -> Rollout {
         let n = 9;
         let mut rollout = Rollout {
@@ -200,7 +202,7 @@ mod tests {
     #[test]
     fn skills_that_end_early_are_not_counted_more_often() {
         let mut rollout = rollout(0.5);
-        // The last skill is drawn a tick before the end; a termination is all that could have ended it.
+        // The last skill is drawn a tick before the end, so only a termination could have ended it.
         rollout.left = vec![0.5, 1.0, 0.5, 1.0, 1.0, 0.5, 1.0, 0.5, 1.0];
         (rollout.truncated[6], rollout.ends.cut_rows) = (false, Vec::new());
         rollout.ends.cut_obs.clear();

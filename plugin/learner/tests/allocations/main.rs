@@ -1,5 +1,5 @@
-//! Steps compute in memory that the steps before them have left. What is left waits for whoever asks first in the whole
-//! program, so that these tests are a program of their own and take turns.
+//! Tests that steps reuse the memory of the steps before them. Free memory goes to the first caller in the whole
+//! program, so these tests are a program of their own and take turns.
 
 use std::sync::{Mutex, PoisonError};
 
@@ -12,7 +12,7 @@ use playbot_learner::{
 };
 use rayon::ThreadPoolBuilder;
 
-/// What the third step asks for, on one thread.
+/// Returns the allocations of the third step, on one thread.
 fn of_a_step(mut step: impl FnMut() + Send) -> AllocationInfo {
     static TURN: Mutex<()> = Mutex::new(());
     let _turn = TURN.lock().unwrap_or_else(PoisonError::into_inner);
@@ -47,9 +47,9 @@ fn a_step_of_a_dense_network_asks_for_less_than_half_of_what_it_computes() {
         })
     };
     let (few, many) = (of_batch(16), of_batch(64));
-    // The gradients alone are 196 kB, what the hidden layers give for 64 rows is 102 kB.
+    // The gradients alone are 196 kB, the hidden layers' outputs for 64 rows are 102 kB.
     assert!(many.bytes_total < 100_000, "{many:?}");
-    // Outputs and places of a row, and not what the hidden layers give, which is 1,600 bytes.
+    // Outputs and positions of a row, and not the hidden layers' outputs, which are 1,600 bytes.
     assert!(many.bytes_total < few.bytes_total + 48 * 400, "{few:?}, {many:?}");
     assert!(many.count_total < 600, "{many:?}");
 }
@@ -73,7 +73,7 @@ fn another_image_costs_a_step_little_more_than_its_features() {
             })
         };
         let (few, many) = (of_batch(16), of_batch(48));
-        // What the layers give for an image, and its gradients, are 590 kB and more in the larger one.
+        // The layers' outputs for an image, and its gradients, are 590 kB and more in the larger one.
         assert!(many.bytes_total < few.bytes_total + 32 * 64_000, "{kind:?}: {few:?}, {many:?}");
         assert!(many.count_total < few.count_total + 32, "{kind:?}: {few:?}, {many:?}");
     }

@@ -51,7 +51,7 @@ fn golden_adam_steps() {
             case.check(&format!("out.{variant}.v"), &v);
         }
     }
-    // The corrected moments are nowhere to be seen: the parameter shows whether they are right.
+    // The corrected moments are not visible: the parameter shows whether they are right.
     let hidden = |variant: &String| [format!("out.{variant}.m_hat"), format!("out.{variant}.v_hat")];
     let hidden: Vec<String> = variants.keys().flat_map(hidden).chain(["bias_correction".to_owned()]).collect();
     case.finish(&hidden.iter().map(String::as_str).collect::<Vec<_>>());

@@ -25,7 +25,7 @@ impl Case {
         Self::read(&folder, name)
     }
 
-    /// A case of the script `tests/fixtures/sac_variants/generate.py`, which no other folder has.
+    /// Creates a case of the script `tests/fixtures/sac_variants/generate.py`, which no other folder has.
     pub fn of_sac_variants(name: &str) -> Self {
         Self::read(&fixtures("sac_variants"), name)
     }
@@ -73,12 +73,13 @@ impl Case {
         &self.json["expected"][name]
     }
 
-    /// Whether there is an expected number `name`.
+    /// Returns whether there is an expected number `name`.
     pub fn expects(&self, name: &str) -> bool {
         self.json["expected"].get(name).is_some()
     }
 
-    /// The widths of the hidden layers of the network whose weights are `prefix.l0.weight`, `prefix.l1.weight`, ...
+    /// Returns the widths of the hidden layers of the network whose weights are `prefix.l0.weight`,
+    /// `prefix.l1.weight`, ...
     pub fn hidden_layers(&self, prefix: &str) -> Vec<usize> {
         let layers = (0..).map_while(|i| self.tensors.get(&format!("{prefix}.l{i}.weight")));
         layers.map(|(shape, _)| shape[0]).collect()
@@ -125,7 +126,7 @@ impl Case {
         self.f64s(name).iter().map(|&x| x as usize).collect()
     }
 
-    /// Discrete if stored as whole numbers, else continuous.
+    /// Returns actions: discrete if stored as whole numbers, else continuous.
     pub fn actions(&self, name: &str) -> Actions {
         let values = self.f64s(name);
         match self.shape(name) {
@@ -176,7 +177,7 @@ impl Case {
         }
     }
 
-    /// Asserts that every expected tensor and number was compared, but for those that start with one of `skipped`.
+    /// Asserts that every expected tensor and number was compared, except for those that start with one of `skipped`.
     pub fn finish(&self, skipped: &[&str]) {
         let checked = self.checked.borrow();
         let tensors = self.tensors.keys().filter(|name| {
@@ -189,7 +190,7 @@ impl Case {
         }
     }
 
-    /// The names of what makes up our parameter `name`: both directions of a recurrent layer, or one tensor.
+    /// Returns the names of the parts of our parameter `name`: both directions of a recurrent layer, or one tensor.
     fn names(&self, group: &str, name: &str) -> Vec<String> {
         let head = if self.has("param.dec.logits.weight") { "dec.logits" } else { "dec.mean" };
         let theirs = format!("{group}{}", their_name(name, head));
@@ -204,7 +205,7 @@ impl Case {
         }
     }
 
-    /// [`Self::names`] with their numbers in our layout, `None` where the case does not hold them.
+    /// Returns [`Self::names`] with their numbers in our layout, `None` where the case does not hold them.
     fn parts(&self, group: &str, name: &str) -> Vec<(String, Option<Vec<f64>>)> {
         let numbers = |name: String| {
             let values = self.has(&name).then(|| self.transposed(&name));
@@ -213,7 +214,7 @@ impl Case {
         self.names(group, name).into_iter().map(numbers).collect()
     }
 
-    /// `[out, in]` to `[in, out]`; anything else as it is.
+    /// Transposes `[out, in]` to `[in, out]`; returns anything else unchanged.
     fn transposed(&self, name: &str) -> Vec<f64> {
         let (shape, values) = self.get(name);
         let [rows, columns] = shape[..] else { return values.clone() };
@@ -225,7 +226,7 @@ impl Case {
         network.visit(prefix, &mut Fill { case: self, group, device: device.plain() });
     }
 
-    /// Compares a parameter-like tensor of ours (a gradient, a weight, a moment) with what the case holds of it.
+    /// Compares a parameter-like tensor of ours (a gradient, a weight, a moment) with its parts in the case.
     pub fn check_parameter(&self, group: &str, name: &str, got: &[f32]) {
         let parts = self.parts(group, name);
         let length = got.len() / parts.len();
@@ -271,17 +272,17 @@ impl ParamVisitor for Fill<'_> {
     }
 }
 
-/// All numbers of a tensor.
+/// Returns all numbers of a tensor.
 pub fn host<const D: usize>(tensor: Tensor<D>) -> Vec<f32> {
     tensor.try_into_vec_as::<f32>().expect("readable")
 }
 
-/// The Euclidean norm.
+/// Returns the Euclidean norm.
 pub fn norm(values: &[f32]) -> f64 {
     values.iter().map(|&x| f64::from(x).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The number of a tensor of one element.
+/// Returns the number of a tensor of one element.
 pub fn number(tensor: Tensor<1>) -> f64 {
     f64::from(host(tensor)[0])
 }

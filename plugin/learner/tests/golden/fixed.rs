@@ -4,8 +4,8 @@ use crate::case::Case;
 use serde_json::Value;
 
 impl Case {
-    /// Asserts that the setting `name`, if the case has it, is what the library does and cannot be told to do otherwise.
-    /// Of texts the beginning counts.
+    /// Asserts that the setting `name`, if the case has it, is the fixed behaviour of the library. Of texts the
+    /// beginning counts.
     pub fn assert_fixed(&self, name: &str, library: impl Into<Value>) {
         let (found, library) = (self.hyper(name), library.into());
         let same = found.is_null() || is_same(found, &library);

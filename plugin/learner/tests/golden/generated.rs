@@ -1,8 +1,8 @@
-//! Tensors that a case makes by rule instead of storing them.
+//! Tensors that a case generates by rule instead of storing them.
 
 use serde_json::Value;
 
-/// A tensor that is made by rule instead of stored (SplitMix64 over the element numbers).
+/// Returns a tensor that is made by rule instead of stored (SplitMix64 over the element numbers).
 pub fn generate(rule: &Value) -> (String, (Vec<usize>, Vec<f64>)) {
     let shape: Vec<usize> =
         rule["shape"].as_array().into_iter().flatten().map(|n| n.as_u64().expect("size") as usize).collect();

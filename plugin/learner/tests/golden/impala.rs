@@ -7,7 +7,7 @@ use playbot_learner::policy::{Actor, NetShape};
 use playbot_learner::rng::Streams;
 use playbot_learner::{ActionSpace, DeviceKind, ImageShape, StdKind};
 
-/// The decoder of the case, with its image encoder.
+/// Returns the decoder of the case, with its image encoder.
 fn actor(case: &Case, device: DeviceKind) -> Actor {
     let [channels, height, width] = case.sizes("image")[..] else { panic!("an image has three sizes") };
     let kind = CnnKind::Impala { channels: case.sizes("channels"), feature: case.dim("feat") };
@@ -93,7 +93,7 @@ fn check_gradients(case: &Case, loss: &str, grads: &NamedGrads) {
     }
 }
 
-/// Only on flex: the other backend is there as a second opinion, and the small case is enough for that.
+/// Runs only on flex: the small case is enough for the other backend, which is a second opinion.
 #[test]
 fn golden_impala_paper_size() {
     let case = Case::load("impala_paper_size");

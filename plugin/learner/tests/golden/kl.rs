@@ -70,7 +70,7 @@ fn check_gradients(case: &Case, name: &str, leaves: &Leaves, loss: Tensor<1>) {
     }
 }
 
-/// The penalty of a legacy form, and its weights, as PPO computes them.
+/// Returns the penalty of a legacy form, and its weights, as PPO computes them.
 fn legacy(case: &Case, form: PenaltyForm, device: DeviceKind) -> (Tensor<1>, Vec<f32>, Leaves) {
     let config = ScoreConfig { penalty: form, ..ScoreConfig::default() };
     let decoder = decoder(case, device);

@@ -1,6 +1,6 @@
-//! What the cases call our parameters.
+//! Names of our parameters in the cases.
 
-/// The case's name of our parameter `name`, where the decoder's last layer is called `decoder_head`.
+/// Returns the case's name of our parameter `name`, where the decoder's last layer is called `decoder_head`.
 pub fn their_name(name: &str, decoder_head: &str) -> String {
     let name = name
         .replace("encoder.state.head", "enc.state.l2")

@@ -14,7 +14,7 @@ fn f32s(values: &[f64]) -> Vec<f32> {
     values.iter().map(|&x| x as f32).collect()
 }
 
-/// Statistics that have seen nothing, as the case has them.
+/// Returns statistics without data, as the case has them.
 fn fresh(case: &Case, dim: usize) -> RunningStats {
     case.assert_fixed("clip", 10.0);
     case.assert_fixed("eps", 1e-8);
@@ -64,7 +64,7 @@ fn check_rewards(case: &Case, fresh: RewardNormalizer, variant: &str) {
     let (rewards, dones) = (case.f32s("in.rewards"), case.bools("in.dones"));
     let (mut scaled, mut mean, mut var, mut returns) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
     for (rewards, dones) in rewards.chunks_exact(envs).zip(dones.chunks_exact(envs)) {
-        // What the variance takes in: with the ends of episodes hidden where these reset afterwards.
+        // The variance's input: with the ends of episodes hidden where these reset afterwards.
         let mut before = normalizer.clone();
         let shown = if fresh.reset == RewardReset::AfterStep { &vec![false; envs] } else { dones };
         before.normalize(rewards, shown, envs).expect("they fit");

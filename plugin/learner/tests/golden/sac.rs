@@ -113,7 +113,7 @@ impl Continuous {
         self.case.tensor(name, &self.kind.plain())
     }
 
-    /// What the policy says about the next states, and the critics about the batch, before anything is trained.
+    /// Checks the policy's outputs for the next states, and the critics' for the batch, before anything is trained.
     fn check_values(&self, nets: &SacNets, batch: &SacBatch, alpha: f64) {
         let (case, device) = (&self.case, self.kind.plain());
         let Dist::Gaussian { mean, log_std } = nets.actor.forward(batch.next_inputs.clone()) else {

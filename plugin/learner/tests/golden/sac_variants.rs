@@ -54,7 +54,7 @@ impl Variant<'_> {
         critics
     }
 
-    /// Of hidden layers of these widths, if the case has any.
+    /// Returns the norms of hidden layers of these widths, if the case has any.
     fn norms(&self, widths: &[usize]) -> Vec<LayerNorm> {
         let device = self.kind.plain();
         let normalised = widths.iter().filter(|_| self.case.has("param.q1.l0.norm.scale"));
@@ -122,7 +122,7 @@ impl Variant<'_> {
     }
 }
 
-/// Leaves the gradient in the first moment.
+/// Returns an Adam that leaves the gradient in the first moment.
 fn still() -> Adam {
     Adam::new(AdamConfig { beta1: 0.0, beta2: 0.0, ..AdamConfig::default() })
 }

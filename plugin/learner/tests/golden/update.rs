@@ -190,7 +190,7 @@ impl<'a> Update<'a> {
         }
     }
 
-    /// A step with learning rate 0 and β = 0 leaves the unclipped gradient in Adam's first moment.
+    /// Checks gradients: a step with learning rate 0 and β = 0 leaves the unclipped gradient in Adam's first moment.
     fn check_first_gradients(&self, batch: &Minibatch) {
         let mut nets = self.nets.clone();
         let mut adam = Adam::new(AdamConfig { beta1: 0.0, beta2: 0.0, ..AdamConfig::default() });
@@ -201,8 +201,8 @@ impl<'a> Update<'a> {
     }
 }
 
-/// Compares the gradients that a step with learning rate 0 and β = 0 left in Adam's first moment. What begins with the first
-/// of two names in `network` begins with the second in the case.
+/// Compares the gradients that a step with learning rate 0 and β = 0 left in Adam's first moment. Names that begin
+/// with the first of two prefixes in `network` begin with the second in the case.
 pub fn check_gradients<M: Parameters>(
     case: &Case,
     group: &str,

@@ -21,7 +21,7 @@ fn observation(case: &Case) -> ObsKind {
     ObsKind::Image(ImageShape { channels, height, width })
 }
 
-/// What the skill model does whatever its settings are.
+/// Checks the fixed behaviour of the skill model.
 fn check_fixed(case: &Case) {
     if !case.hyper("activation").is_null() {
         assert_eq!(case.activation(), Activation::Relu, "{}: the library's skill model knows only ReLU", case.name);
@@ -68,14 +68,14 @@ fn config(case: &Case) -> SkillConfig {
     }
 }
 
-/// `[B, T, width]` to time-major `[T * B, width]`.
+/// Maps `[B, T, width]` to time-major `[T * B, width]`.
 fn time_major<T: Copy>(values: &[T], batch: usize, steps: usize) -> Vec<T> {
     let width = values.len() / (batch * steps);
     let row = |t: usize, b: usize| &values[(b * steps + t) * width..(b * steps + t + 1) * width];
     (0..steps * batch).flat_map(|i| row(i / batch, i % batch).to_vec()).collect()
 }
 
-/// Time-major `[T * B, width]` back to `[B, T, width]`.
+/// Maps time-major `[T * B, width]` back to `[B, T, width]`.
 fn batch_major(values: &[f32], batch: usize, steps: usize) -> Vec<f32> {
     time_major(values, steps, batch)
 }
@@ -121,7 +121,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The actions, time-major.
+    /// Returns the actions, time-major.
     fn actions(&self) -> Actions {
         match self.space {
             ActionSpace::Discrete(_) => {
@@ -159,7 +159,7 @@ impl<'a> Run<'a> {
         self.check_gradients(&grads);
     }
 
-    /// What the networks compute on their way.
+    /// Checks the intermediate results of the networks.
     fn check_inner(&self, states: &ObsBatch, encoded: &Tensor<2>, noise: &Tensor<2>) {
         let (case, nets) = (self.case, &self.nets);
         if case.has("out.enc_feature") {
@@ -197,7 +197,7 @@ impl<'a> Run<'a> {
             case.check("out.dec_log_std", &batch_major(&log_std));
             return;
         }
-        // The decoder normalises its logits at once; here is what it normalises.
+        // The decoder normalises its logits at once; these are the logits.
         let (net, seen) = (&self.nets.decoder.net, self.nets.decoder.observe(states).expect("they fit"));
         let hidden = net.features_held(forward.decoder_latent.clone(), seen, self.steps);
         case.check("out.logits", &batch_major(&host(net.head.forward(hidden))));
@@ -220,7 +220,7 @@ impl<'a> Run<'a> {
     }
 }
 
-/// Whether the case gives sizes and norms of each network, and not of every tensor.
+/// Returns whether the case gives sizes and norms of each network, and not of every tensor.
 fn is_paper_size(case: &Case) -> bool {
     case.expects("param_count.enc")
 }

@@ -1,4 +1,4 @@
-//! Changed pictures: what networks learn not to mind, and what cannot be changed.
+//! Image augmentations: networks become insensitive to them, and unsuitable inputs are errors.
 
 use crate::image_task::{Driver, SHAPE, config, model};
 use crate::pixels::{SPEC, ppo, score};

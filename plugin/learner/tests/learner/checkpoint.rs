@@ -1,4 +1,4 @@
-//! A saved learner goes on bit for bit.
+//! A saved learner continues bit for bit.
 
 use crate::corridor::config;
 use crate::score::model;

@@ -1,4 +1,4 @@
-//! A critic that counts the ticks that are left of a skill.
+//! Critics that count the remaining ticks of a skill.
 
 use crate::corridor;
 use crate::score::model;
@@ -7,7 +7,7 @@ use playbot_learner::{
     DeviceKind, Learner, PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillModel,
 };
 
-/// Rows that end at once and pay as much as is left of their skills.
+/// Returns rows that end at once with a reward equal to the remaining share of their skills.
 fn paid_by_the_clock(model: &SkillModel) -> Rollout {
     let mut rollout = rollout(model);
     let rows = rollout.rows();
@@ -59,7 +59,7 @@ fn the_clock_learns_what_skills_that_run_out_are_worth() {
         (0..3).map(|_| learner.update(&rollout).expect("finite").value_loss).last().expect("three")
     };
     let (with, without) = (error(true), error(false));
-    // Without it there are only states and skills to tell the rows apart by.
+    // Without it only states and skills distinguish the rows.
     assert!(with < 0.001 && without > 0.01, "{with} with a clock, {without} without");
 }
 

@@ -15,11 +15,11 @@ pub fn config() -> PpoConfig {
     }
 }
 
-/// What a training has changed.
+/// The results of a run.
 struct Training {
     /// Mean length of an episode under the first policy.
     steps_before: f64,
-    /// Under the last ones.
+    /// Mean length of an episode under the last policies.
     steps_after: f64,
     /// Entropy in the last update as a share of that in the first.
     entropy_left: f32,

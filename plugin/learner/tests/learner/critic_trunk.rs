@@ -1,11 +1,11 @@
-//! Whether the critic teaches the trunk through which the policy sees pictures (`critic_trains_cnn`).
+//! The critic's influence on the trunk through which the policy sees pictures (`critic_trains_cnn`).
 
 use crate::image_task::{Driver, config};
 use crate::pixels::ppo;
 use playbot_learner::{Learner, PolicyOutput, PpoConfig, PpoLearner};
 
-/// What the policy and its critic say before and after an update in which the critic has very much to learn and the policy
-/// nothing: each step earned what had been expected, so that no action was better than another.
+/// Returns the outputs of the policy and its critic before and after an update with much to learn for the critic and
+/// nothing for the policy: each step earned the expected reward, so that no action was better than another.
 fn before_and_after(changes: PpoConfig) -> [PolicyOutput; 2] {
     let still =
         PpoConfig { gamma: 0.0, ent_coef: 0.0, vf_coef: 1e3, norm_reward: false, clip_value_loss: false, ..changes };

@@ -1,4 +1,4 @@
-//! One flipped bit, and a file cut anywhere, are noticed in every kind of file of a learner.
+//! Detection of one flipped bit, and of a cut at any position, in every kind of file of a learner.
 
 use crate::files::{Contents, Load, files};
 use crate::toy::OBS;
@@ -8,7 +8,7 @@ use playbot_learner::{
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// All kinds: those of [`files`], a policy to ship, and SAC's learner with its replay buffer.
+/// Returns all kinds: those of [`files`], a policy to ship, and SAC's learner with its replay buffer.
 fn all_kinds(folder: &Path) -> Vec<(PathBuf, Load)> {
     let mut kinds: Vec<(PathBuf, Load)> = files(folder).into_iter().map(|(path, load, _)| (path, load)).collect();
     let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: ActionSpace::Discrete(2) };
@@ -24,7 +24,7 @@ fn all_kinds(folder: &Path) -> Vec<(PathBuf, Load)> {
     kinds
 }
 
-/// Numbers that look random, of a fixed seed: a linear congruential generator (Knuth's MMIX).
+/// Returns pseudo-random numbers of a fixed seed: a linear congruential generator (Knuth's MMIX).
 fn dice() -> impl FnMut(usize) -> usize {
     let mut state = 7u64;
     move |sides| {

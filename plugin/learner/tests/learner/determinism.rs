@@ -1,4 +1,4 @@
-//! The same seed gives the same bits, whatever the number of threads and the size of the batch.
+//! Tests that the same seed gives the same bits, whatever the number of threads and the size of the batch.
 
 use crate::corridor::config;
 use crate::field::{Field, HURRY};
@@ -43,7 +43,7 @@ fn two_runs_are_equal() {
     assert_eq!(run(), run());
 }
 
-/// Sizes at which matrix products are split over threads and blocks.
+/// Returns a policy of sizes at which matrix products are split over threads and blocks.
 fn wide_policy(device: DeviceKind) -> Policy {
     let spec = PolicySpec { obs: 530.into(), latent: 8, action_space: ActionSpace::Discrete(15) };
     PpoLearner::new(PpoConfig::default(), spec, 1, device).expect("good settings").policy()
@@ -162,7 +162,7 @@ fn continuous_sac_does_not_depend_on_the_number_of_threads() {
     });
 }
 
-/// What a policy says after a few gradient steps with networks wide enough to be split.
+/// Returns a policy's output after a few gradient steps with networks wide enough to be split.
 fn sac(config: SacConfig, spec: PolicySpec, mut rollout: impl FnMut(&SacLearner) -> Rollout) -> u64 {
     let config = SacConfig { hidden: vec![256, 256], batch: 128, learning_starts: 1, updates_per_step: 0.05, ..config };
     let mut learner = SacLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");

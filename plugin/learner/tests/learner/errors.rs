@@ -1,4 +1,4 @@
-//! Bad data and numbers that run away are errors with names, never panics.
+//! Errors with names, instead of panics, for bad data and numbers that diverge.
 
 use crate::corridor::config;
 use crate::toy::{Driver, OBS, SPACE};
@@ -11,7 +11,7 @@ fn learner(config: PpoConfig) -> PpoLearner {
     PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings")
 }
 
-/// The numbers of a rollout's vectors, to be changed.
+/// Returns the numbers of a rollout's vectors, to be changed.
 pub fn vectors(observations: &mut Observations) -> &mut [f32] {
     let Observations::Vector(values) = observations else { panic!("the corridor is seen as vectors") };
     values
@@ -28,7 +28,7 @@ fn after(change: impl Fn(&mut Rollout)) -> LearnError {
 fn numbers_that_run_away_are_named() {
     let error = after(|rollout| rollout.values[3] = f32::NAN);
     assert!(matches!(&error, LearnError::NotFinite { tensor, .. } if tensor == "policy_loss"), "{error}");
-    let mut learner = learner(PpoConfig { lr: 1e38, ..config() });
+    let mut learner = learner(PpoConfig { lr: 1e30, ..config() });
     let mut driver = Driver::new(4, 1);
     let rollout = driver.rollout(&learner, 16);
     let result = (0..5).try_for_each(|_| learner.update(&rollout).map(|_| ()));

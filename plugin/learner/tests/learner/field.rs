@@ -7,12 +7,12 @@ use playbot_learner::{Action, ActionSpace, Learner, Rollout, SkillSource};
 pub const OBS: usize = 4;
 pub const SPACE: ActionSpace = ActionSpace::Continuous(2);
 
-/// How points move, when they have arrived, and what pays.
+/// Rules of motion, arrival and reward.
 #[derive(Debug)]
 pub struct Rules {
-    /// How far a full action moves a point.
+    /// Distance of a full action.
     pub speed: f32,
-    /// How near the goal is there.
+    /// Distance from the goal that counts as arrived.
     pub near: f32,
     /// Steps until an episode is cut off.
     pub limit: usize,
@@ -20,9 +20,9 @@ pub struct Rules {
     pub reward: fn(f32, f32) -> f32,
 }
 
-/// Each step costs the distance that is left.
+/// Each step costs the remaining distance.
 pub static HURRY: Rules = Rules { speed: 0.2, near: 0.15, limit: 30, reward: |_, after| -after };
-/// Coming nearer pays.
+/// Coming nearer is rewarded.
 pub static WALK: Rules = Rules { speed: 0.1, near: 0.25, limit: 40, reward: |before, after| before - after };
 
 /// A point at (x, y) in [-1, 1]² and its goal; the action is a velocity.
@@ -47,7 +47,7 @@ impl Point {
         (self.place[0] - self.goal[0]).hypot(self.place[1] - self.goal[1])
     }
 
-    /// Reward, terminated, truncated.
+    /// Steps the point and returns reward, terminated, truncated.
     pub fn step(&mut self, rules: &Rules, velocity: &[f32]) -> (f32, bool, bool) {
         self.time += 1;
         let before = self.distance();
@@ -59,20 +59,20 @@ impl Point {
     }
 }
 
-/// The skill that a point plays; empty where there are none.
+/// The skill that a point plays; empty without skills.
 #[derive(Clone, Default)]
 struct Held {
     z: Vec<f32>,
     left: usize,
 }
 
-/// Several points at once, each with a skill of its own if there are any, and how their episodes ended.
+/// Several points at once, each with a skill of its own if there are any, and the results of their episodes.
 pub struct Field {
     rules: &'static Rules,
     points: Vec<Point>,
     rngs: Vec<ChaCha8Rng>,
     skills: Vec<Held>,
-    /// Whether each finished episode reached its goal.
+    /// For each finished episode, true if it reached its goal.
     pub reached: Vec<bool>,
 }
 
@@ -92,7 +92,7 @@ impl Field {
         self.skills.iter().flat_map(|held| held.z.iter().copied()).collect()
     }
 
-    /// New skills for those whose have run out.
+    /// Draws new skills in place of those that have run out.
     fn draw(&mut self, source: &SkillSource) {
         for ((held, point), rng) in self.skills.iter_mut().zip(&self.points).zip(&mut self.rngs) {
             if held.left == 0 {
@@ -103,7 +103,7 @@ impl Field {
         }
     }
 
-    /// Which share of its skill each has before it.
+    /// Returns the remaining share of each skill.
     fn shares_left(&self, source: &SkillSource) -> Vec<f32> {
         let share = |held: &Held| if held.left == 0 { 1.0 } else { held.left as f32 / source.horizon as f32 };
         self.skills.iter().map(share).collect()
@@ -149,7 +149,7 @@ impl Field {
         rollout
     }
 
-    /// Share of the episodes of `ticks` ticks of play that reach their goals.
+    /// Returns the share of the episodes of `ticks` ticks of play that reach their goals.
     pub fn success(mut self, learner: &impl Learner, ticks: usize) -> f64 {
         self.rollout(learner, ticks);
         self.reached.iter().filter(|reached| **reached).count() as f64 / self.reached.len() as f64

@@ -1,4 +1,4 @@
-//! Files that do not fit say what is wrong with them, by name.
+//! Errors of files that do not fit, which name the problem.
 
 use crate::corridor::config as ppo_config;
 use crate::score::model;
@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 
 pub type Load = fn(&Path) -> Result<(), FileError>;
 
-/// A file of each kind, what reads it, and the name of a tensor in it.
+/// Returns a file of each kind, the function that reads it, and the name of a tensor in it.
 pub fn files(folder: &Path) -> Vec<(PathBuf, Load, &'static str)> {
     let paths = ["skill", "trainer", "ppo"].map(|name| folder.join(name));
     let model = model(1);
@@ -75,7 +75,7 @@ pub fn describe(contents: &mut Contents, pointer: &str, value: Value) {
     contents.description = json.to_string();
 }
 
-/// What reading the file says after `change`.
+/// Returns the error of reading the file after `change`.
 pub fn after(path: &Path, load: Load, change: impl Fn(&mut Contents)) -> FileError {
     let mut contents = Contents::read(path);
     change(&mut contents);
@@ -107,7 +107,7 @@ fn a_file_of_a_newer_version_or_another_kind_says_so() {
     let folder = tempfile::tempdir().expect("a folder");
     for (path, load, _) in files(folder.path()) {
         let newer = |c: &mut Contents| {
-            // What a newer version has added must not be what is complained about.
+            // The error must not be about additions of a newer version.
             c.description = c.description.replacen(r#""version":1"#, r#""version":2,"colour":"red""#, 1);
         };
         let error = after(&path, load, newer).to_string();
@@ -160,7 +160,7 @@ fn a_training_does_not_go_on_with_other_demonstrations() {
     trainer.save(&path).expect("written");
     SkillTrainer::load(&path, demos(0, 0.0), DeviceKind::Flex).expect("the same");
     let error = SkillTrainer::load(&path, demos(39, 0.5), DeviceKind::Flex).expect_err("one number differs");
-    assert!(error.to_string().contains("not those of this training"), "{error}");
+    assert!(error.to_string().contains("not those of this run"), "{error}");
     let mut contents = Contents::read(&path);
     let start = contents.description.find(r#","demo_hash""#).expect("a hash");
     let end = start + contents.description[start..].find('}').expect("the last entry");

@@ -1,4 +1,5 @@
-//! A graphics card learns what the CPU learns, within tolerance, from the same rollouts. A software renderer will do.
+//! Learning on a graphics card: the same as on the CPU, within tolerance, from the same rollouts. A software renderer
+//! suffices.
 
 use crate::{corridor, image_task, score, toy};
 use playbot_learner::{
@@ -22,7 +23,7 @@ fn assert_alike(found: &UpdateMetrics, want: &UpdateMetrics) {
     }
 }
 
-/// Two learners of the same settings, one on each device, learn from what the first plays.
+/// Two learners of the same settings, one on each device, learn from the first one's rollouts.
 fn learn_alike(make: impl Fn(DeviceKind) -> PpoLearner, mut play: impl FnMut(&PpoLearner) -> Rollout) {
     let (mut cpu, mut card) = (make(DeviceKind::Flex), make(CARD));
     for _ in 0..2 {
@@ -40,7 +41,7 @@ fn learn_alike(make: impl Fn(DeviceKind) -> PpoLearner, mut play: impl FnMut(&Pp
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("learner.safetensors");
     card.save(&path).expect("writable");
-    // What a card has learned goes on anywhere, and the other way round.
+    // A learner from a card continues on the CPU, and the other way round.
     let mut on_cpu = PpoLearner::load(&path, DeviceKind::Flex).expect("readable");
     let mut on_card = PpoLearner::load(&path, CARD).expect("readable");
     let rollout = play(&cpu);

@@ -1,4 +1,4 @@
-//! Demonstrations that are kept apart while a skill model is learned.
+//! Held-out demonstrations in the training of a skill model.
 
 use crate::skill::corridor_demos;
 use playbot_learner::rng::{Streams, below, normal};
@@ -11,7 +11,7 @@ fn config() -> SkillConfig {
     SkillConfig { held_out: 0.2, lr: 1e-2, hidden: vec![64, 64], ..crate::skill::config() }
 }
 
-/// Actions that have nothing to do with what is seen: all that can be learned of them is to know them by heart.
+/// Returns actions that are independent of the observations: a model can only memorise them.
 fn coins() -> Dataset {
     let mut rng = Streams::new(3).stream("coins", 0);
     let episode = |_| DemoEpisode {
@@ -47,7 +47,8 @@ fn what_is_kept_apart_tells_learning_from_knowing_by_heart() {
 
 #[test]
 fn whole_levels_are_kept_apart() {
-    // Each level is played ten times over, with the same random actions: whoever has seen one episode knows the others.
+    // Each level is played ten times over, with the same random actions, so one of its episodes gives away the
+    // others.
     let mut rng = Streams::new(3).stream("coins", 0);
     let mut once = || DemoEpisode {
         observations: (0..30 * 6).map(|_| normal(&mut rng)).collect::<Vec<f32>>().into(),
@@ -92,7 +93,7 @@ fn learning_stops_in_time_and_the_best_model_is_kept() {
 
 #[test]
 fn the_best_epoch_is_that_of_the_least_nll_whatever_the_loss_says() {
-    // The divergence weighs so much that the loss still falls where the decoder begins to know the actions by heart.
+    // The divergence weighs so much that the loss still decreases when the decoder begins to memorise the actions.
     let mut trainer = trainer(SkillConfig { beta: 100.0, patience: Some(4), ..config() }, coins());
     let (mut nlls, mut losses) = (Vec::new(), Vec::new());
     while !trainer.is_over() {
@@ -134,13 +135,13 @@ fn what_cannot_be_kept_apart_is_refused() {
     let error = |config: SkillConfig, demos| {
         SkillTrainer::new(config, demos, 1, DeviceKind::Flex).expect_err("cannot work").to_string()
     };
-    assert!(error(config(), corridor_demos(1)).contains("none is left"));
+    assert!(error(config(), corridor_demos(1)).contains("leaves none"));
     assert!(error(SkillConfig { held_out: 1.0, ..config() }, corridor_demos(9)).contains("held_out"));
     let blind = SkillConfig { held_out: 0.0, patience: Some(3), ..config() };
-    assert!(error(blind, corridor_demos(9)).contains("patience needs"));
+    assert!(error(blind, corridor_demos(9)).contains("`skills.patience` needs"));
     assert!(matches!(
         SkillTrainer::new(SkillConfig { patience: Some(0), ..config() }, corridor_demos(9), 1, DeviceKind::Flex),
-        Err(LearnError::Config(text)) if text.contains("at least 1")
+        Err(LearnError::Setting(error)) if error.why.contains("at least 1")
     ));
     assert_eq!(epoch(&mut trainer(crate::skill::config(), corridor_demos(9))).held_out, None);
 }

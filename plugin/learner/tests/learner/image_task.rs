@@ -38,7 +38,7 @@ pub fn config() -> PpoConfig {
     }
 }
 
-/// A small skill model of such pictures, which learns within a dozen epochs.
+/// Returns the settings of a small skill model of such pictures, which learns within a dozen epochs.
 pub fn skill_config() -> SkillConfig {
     SkillConfig {
         latent: 2,
@@ -52,7 +52,8 @@ pub fn skill_config() -> SkillConfig {
     }
 }
 
-/// A dark image with a bright spot of 3×3 pixels in one of its quarters: top left, top right, bottom left, bottom right.
+/// Returns a dark image with a bright spot of 3×3 pixels in one of its quarters: top left, top right, bottom left,
+/// bottom right.
 pub fn image(quarter: u32, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut pixels: Vec<u8> = (0..SHAPE.numbers()).map(|_| below(rng, 40) as u8).collect();
     let mut corner = |far: bool| below(rng, SIDE as u64 / 2 - 2) as usize + if far { SIDE / 2 } else { 0 };
@@ -63,7 +64,8 @@ pub fn image(quarter: u32, rng: &mut ChaCha8Rng) -> Vec<u8> {
     pixels
 }
 
-/// Players who look at the picture six times in ten, and guess otherwise; with settings to learn from them.
+/// Returns demonstrations that follow the picture six times in ten, and guess otherwise, with settings to learn from
+/// them.
 pub fn demonstrations(seed: u64) -> (SkillConfig, Dataset) {
     let config = SkillConfig { beta: 0.5, window: 3, hidden: vec![16], gru_hidden: 8, cnn: cnn(), ..skill_config() };
     let mut rng = Streams::new(seed).stream("demos", 0);
@@ -77,7 +79,7 @@ pub fn demonstrations(seed: u64) -> (SkillConfig, Dataset) {
     (config, Dataset::new(SHAPE, SPACE, episodes.collect()).expect("consistent"))
 }
 
-/// A skill model of these [`demonstrations`]. Not trained at all for 0 epochs.
+/// Returns a skill model of these [`demonstrations`]. Not trained at all for 0 epochs.
 pub fn model(epochs: usize, seed: u64) -> SkillModel {
     let (config, dataset) = demonstrations(seed);
     let mut trainer = SkillTrainer::new(config, dataset, seed, DeviceKind::Flex).expect("windows fit");
@@ -87,12 +89,12 @@ pub fn model(epochs: usize, seed: u64) -> SkillModel {
     trainer.into_model()
 }
 
-/// Several players who earn 1 for each step on which they name the quarter of a spot that jumps about; a wrong name ends
-/// the episode.
+/// Several players who earn 1 for each step on which they name the quarter of a spot that jumps about; a wrong name
+/// ends the episode.
 pub struct Driver {
     players: Vec<Player>,
     skills: Vec<f32>,
-    /// Whether each answer was right.
+    /// For each answer, true if it was right.
     pub hits: Vec<bool>,
 }
 
@@ -128,7 +130,7 @@ impl Driver {
         all
     }
 
-    /// Draws new skills where the time has come (or for all).
+    /// Draws new skills in place of those that have run out (or for all).
     fn draw(&mut self, learner: &impl Learner, obs: &Observations) {
         let Some(prior) = learner.prior() else { return };
         let (n, all) = (self.players.len(), self.skills.is_empty());
@@ -179,7 +181,7 @@ impl Driver {
         rollout
     }
 
-    /// Share of right answers among the last `n`.
+    /// Returns the share of right answers among the last `n`.
     pub fn recent(&self, n: usize) -> f64 {
         let last = &self.hits[self.hits.len().saturating_sub(n)..];
         last.iter().filter(|hit| **hit).count() as f64 / last.len() as f64

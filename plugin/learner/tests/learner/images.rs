@@ -1,4 +1,4 @@
-//! The skill model on images: it learns what is to be seen, keeps apart who acted, and survives its file.
+//! The skill model on images: it learns from the picture, keeps demonstrators apart, and survives its file.
 
 use crate::image_task::{SHAPE, SIDE, WINDOW, skill_config};
 use playbot_learner::nn::CnnKind;
@@ -13,7 +13,7 @@ use std::path::Path;
 const SPACE: ActionSpace = ActionSpace::Discrete(4);
 const EPOCHS: usize = 12;
 
-/// A dark image with a bright spot of 3×3 pixels in the left or the right half.
+/// Returns a dark image with a bright spot of 3×3 pixels in the left or the right half.
 fn image(right: bool, rng: &mut ChaCha8Rng) -> Vec<u8> {
     let mut pixels: Vec<u8> = (0..SHAPE.numbers()).map(|_| below(rng, 40) as u8).collect();
     let column = below(rng, SIDE as u64 / 2 - 2) as usize + if right { SIDE / 2 } else { 0 };
@@ -24,8 +24,8 @@ fn image(right: bool, rng: &mut ChaCha8Rng) -> Vec<u8> {
     pixels
 }
 
-/// Players of two kinds, who press a key for the half in which the spot is. Which half, only the image tells; which kind,
-/// only the skill.
+/// Returns episodes of two kinds of demonstrators, who press a key for the half with the spot. Only the image tells
+/// the half, and only the skill tells the kind.
 fn episodes(count: u64, act: impl Fn(bool, &[bool]) -> Actions) -> Vec<DemoEpisode> {
     let streams = Streams::new(4);
     let episode = |i: u64| {
@@ -37,7 +37,7 @@ fn episodes(count: u64, act: impl Fn(bool, &[bool]) -> Actions) -> Vec<DemoEpiso
     (0..count).map(episode).collect()
 }
 
-/// The first kind presses 0 for left and 1 for right, the second 2 and 3.
+/// Returns the keys: the first kind presses 0 for left and 1 for right, the second 2 and 3.
 fn press(second: bool, rights: &[bool]) -> Actions {
     Actions::Discrete(rights.iter().map(|&right| 2 * u32::from(second) + u32::from(right)).collect())
 }

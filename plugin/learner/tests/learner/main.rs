@@ -1,4 +1,4 @@
-//! The learner as a whole: does it learn, is it exact, does it survive a restart.
+//! Tests of the learner as a whole: learning, exactness, restarts.
 
 mod augmentation;
 mod checkpoint;

@@ -1,4 +1,4 @@
-//! Continuous actions with Gaussian noise: what the decoder makes of it, and what a copy of the decoder starts with.
+//! Continuous actions with Gaussian noise: their effect on the decoder, and the start of a copy of it.
 
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
@@ -8,10 +8,10 @@ use playbot_learner::{
 use std::ops::ControlFlow;
 
 const PLANE: ActionSpace = ActionSpace::Continuous(2);
-/// Deviation of the players' noise in each dimension.
+/// Deviation of the demonstrators' noise in each dimension.
 const NOISE: [f32; 2] = [0.2, 0.5];
 
-/// Players who mean (x, -x / 2) and are noisy, in windows of the mazes' length.
+/// Returns demonstrations that mean (x, -x / 2) with noise, in windows of the mazes' length.
 fn demos() -> Dataset {
     let episodes = (0..60).map(|i| {
         let mut rng = Streams::new(6).stream("demo", i);
@@ -91,5 +91,5 @@ fn the_decoder_is_as_noisy_as_the_players_and_so_is_its_copy() {
 fn a_share_of_continuous_actions_cannot_have_been_replaced() {
     let config = SkillConfig { action_noise: 0.2, ..config(StdKind::Vector) };
     let error = SkillTrainer::new(config, demos(), 1, DeviceKind::Flex).expect_err("no share");
-    assert!(matches!(&error, LearnError::Config(text) if text.contains("must be 0 for continuous")), "{error}");
+    assert!(matches!(&error, LearnError::Setting(error) if error.why.contains("must be 0 for continuous")), "{error}");
 }

@@ -1,5 +1,5 @@
-//! Observations whose numbers differ in scale, seen through the skill model's frozen normaliser by everything that is
-//! tied to it.
+//! Observations of differing scale, through the skill model's frozen normaliser, for all networks that are tied to
+//! it.
 
 use playbot_learner::rng::{Streams, normal, unit};
 use playbot_learner::{
@@ -12,22 +12,23 @@ use std::ops::ControlFlow;
 const OBS: usize = 4;
 pub const PLANE: ActionSpace = ActionSpace::Continuous(2);
 pub const CHOICE: ActionSpace = ActionSpace::Discrete(2);
-/// Deviation of the noise on the players' continuous actions.
+/// Deviation of the noise on the demonstrators' continuous actions.
 const NOISE: f32 = 0.1;
 
-/// Observations of players in a hall: a place up to 50 m, an angle around 0.1, and a number that never changes.
+/// Returns observations of demonstrators in a hall: a position up to 50 m, an angle around 0.1, and a number that
+/// never changes.
 pub fn hall(n: usize, stream: u64) -> Vec<f32> {
     let mut rng = Streams::new(3).stream("hall", stream);
     let mut row = || [50.0 * unit(&mut rng) as f32, 50.0 * unit(&mut rng) as f32, 0.1 * normal(&mut rng), 1.25];
     (0..n).flat_map(|_| row()).collect()
 }
 
-/// What the players mean to do: turn against the angle, and move to the middle of the hall.
+/// Returns the intended action: turn against the angle, and move to the middle of the hall.
 fn meant(row: &[f32]) -> [f32; 2] {
     [-6.0 * row[2], 1.0 - row[0] / 25.0]
 }
 
-/// Their recordings: vectors with noise, or the sign of the turn.
+/// Returns their recordings: vectors with noise, or the sign of the turn.
 pub fn demos(space: ActionSpace) -> Dataset {
     let episodes = (0..60).map(|i| {
         let mut rng = Streams::new(4).stream("noise", i);
@@ -53,7 +54,7 @@ pub fn trainer(config: SkillConfig, space: ActionSpace) -> SkillTrainer {
     SkillTrainer::new(config, demos(space), 1, DeviceKind::Flex).expect("windows fit")
 }
 
-/// The metrics of the last of some epochs.
+/// Returns the metrics of the last of some epochs.
 pub fn train(trainer: &mut SkillTrainer, epochs: usize) -> SkillMetrics {
     let epochs = (0..epochs).map(|_| trainer.train_epoch(&mut |_| ControlFlow::Continue(())).expect("finite"));
     epochs.last().flatten().expect("not stopped")
@@ -136,7 +137,7 @@ fn the_first_policy_is_the_decoder_exactly() {
     assert_eq!(tied.initial_kl(&skills(&model, &obs), (&obs).into(), 33).expect("a copy"), Some(0.0));
 }
 
-/// A rollout of states that have nothing to do with one another, where turning right is rewarded.
+/// Returns a rollout of independent states in which turning right is rewarded.
 pub fn rollout(learner: &impl Learner, space: ActionSpace, number: u64) -> Rollout {
     let (steps, envs) = (8, 4);
     let rows = steps * envs;
@@ -188,5 +189,5 @@ fn what_cannot_be_normalised_is_refused() {
     let episode = DemoEpisode { observations: vec![0u8; 8 * 144].into(), actions: Actions::Discrete(vec![0; 8]) };
     let data = Dataset::new(ObsKind::Image(image), CHOICE, vec![episode]).expect("consistent");
     let error = SkillTrainer::new(config(true), data, 1, DeviceKind::Flex).expect_err("pixels");
-    assert!(matches!(&error, LearnError::Config(text) if text.contains("norm_obs is for vectors")), "{error}");
+    assert!(matches!(&error, LearnError::Setting(error) if error.why.contains("is for vectors")), "{error}");
 }

@@ -1,4 +1,4 @@
-//! Files of everything that sees observations through the skill model's frozen normaliser.
+//! Files of all networks that see observations through the skill model's frozen normaliser.
 
 use crate::files::{Contents, after, describe};
 use crate::norm_obs::{CHOICE, PLANE, config, demos, hall, model, ppo, rollout, sac, score, skills, train, trainer};
@@ -8,7 +8,8 @@ use playbot_learner::{
 };
 use std::path::Path;
 
-/// A learner goes on bit for bit from the file that `save` writes; `update` reports something of an update.
+/// Checks that a learner continues bit for bit from the file that `save` writes; `update` returns metrics of an
+/// update.
 fn goes_on<L: Learner, M: PartialEq + std::fmt::Debug>(
     mut learner: L,
     space: ActionSpace,

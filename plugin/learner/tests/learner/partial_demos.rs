@@ -1,4 +1,4 @@
-//! Skills from demonstrations of half a task make the whole task quicker to learn.
+//! Skills from demonstrations of half a task, which make the whole task quicker to learn.
 
 use crate::corridor;
 use crate::skill::demos_until;
@@ -9,14 +9,14 @@ use playbot_learner::{
 use std::ops::ControlFlow;
 
 const ENVS: usize = 4;
-/// Updates after which nobody waits any longer.
+/// Largest number of updates.
 const PATIENCE: usize = 200;
 
 fn config() -> PpoConfig {
     PpoConfig { num_steps: 16, minibatches: 2, ..corridor::config() }
 }
 
-/// Skills of players who were recorded in the first half of the corridor only.
+/// Returns skills of demonstrators who were recorded in the first half of the corridor only.
 fn half_the_task(seed: u64) -> SkillModel {
     let config = SkillConfig { window: 3, ..crate::skill::config() };
     let demos = demos_until(BEST as usize / 2, 100);
@@ -27,7 +27,7 @@ fn half_the_task(seed: u64) -> SkillModel {
     trainer.into_model()
 }
 
-/// Updates until the last 20 episodes took hardly longer than the shortest one.
+/// Returns the updates until the last 20 episodes took hardly longer than the shortest one.
 fn updates_to_solve(mut learner: PpoLearner, seed: u64) -> usize {
     let mut driver = Driver::new(ENVS, seed);
     for update in 1..=PATIENCE {

@@ -1,4 +1,4 @@
-//! PPO and SCORE-PPO from pixels: they learn, exactly, what a shared trunk must see.
+//! PPO and SCORE-PPO from pixels: they learn the features of a shared trunk, exactly.
 
 use crate::image_task::{self, Driver, SHAPE, SPACE, config, image, model};
 use crate::toy;
@@ -16,7 +16,7 @@ use playbot_learner::{
 
 pub const SPEC: PolicySpec = PolicySpec { obs: ObsKind::Image(SHAPE), latent: 0, action_space: SPACE };
 const ENVS: usize = 16;
-/// Updates after which nobody waits any longer.
+/// Largest number of updates.
 const PATIENCE: usize = 30;
 
 pub fn ppo(config: PpoConfig, seed: u64) -> PpoLearner {
@@ -27,8 +27,8 @@ pub fn score(config: PpoConfig, model: &SkillModel, seed: u64) -> PpoLearner {
     PpoLearner::with_skill(config, ScoreConfig::default(), model, seed, DeviceKind::Flex).expect("good settings")
 }
 
-/// Updates until nearly all answers of the last two rollouts were right. Features that the trunk does not learn take more
-/// than [`PATIENCE`].
+/// Returns the updates until nearly all answers of the last two rollouts were right. Without learned features of the
+/// trunk it takes more than [`PATIENCE`].
 fn updates_to_solve(mut learner: PpoLearner, seed: u64) -> usize {
     let mut driver = Driver::new(ENVS, seed);
     for update in 1..=PATIENCE {
@@ -193,7 +193,7 @@ fn images_of_another_kind_are_refused() {
     assert!(text.contains("must be vectors of 8"), "{text}");
 }
 
-/// A minibatch whose policy loss, entropy and value loss all depend on what is seen.
+/// Returns a minibatch whose policy loss, entropy and value loss all depend on the observation.
 fn minibatch(rows: usize) -> Minibatch {
     let device = DeviceKind::Flex.plain();
     let mut rng = Streams::new(3).stream("batch", 0);
@@ -229,12 +229,12 @@ fn nets() -> PpoNets {
     let cnn = ImageNet::new(&image_task::cnn(), SHAPE, &mut rng, &device).expect("it fits");
     let critic = Critic::new(&shape, &mut rng, &device);
     let mut nets = PpoNets { actor: Actor { cnn: Some(cnn), ..actor }, critic };
-    // The head is small at the start, and so is what it tells the trunk.
+    // The head is small at the start, and so is its gradient for the trunk.
     nets.actor.net.head.weight = nets.actor.net.head.weight.clone() * 50.0;
     tracked(&nets)
 }
 
-/// The loss of `nets` and its gradients, by name, in the optimizer's first moments.
+/// Returns the loss of `nets` and its gradients, by name, in the optimizer's first moments.
 fn loss(nets: &PpoNets, batch: &Minibatch, config: &PpoConfig) -> (f64, Adam) {
     let mut adam = Adam::new(AdamConfig { beta1: 0.0, beta2: 0.0, ..AdamConfig::default() });
     let step = gradient_step(&mut nets.clone(), &mut adam, batch, config, None, 0.0).expect("finite");

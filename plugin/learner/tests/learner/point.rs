@@ -1,4 +1,4 @@
-//! PPO and SAC bring a point to a goal in the plane.
+//! PPO and SAC on points with goals in the plane.
 
 use crate::field::{Field, HURRY, OBS, Point, SPACE};
 use crate::tick::Tick;
@@ -9,7 +9,7 @@ use playbot_learner::{
 };
 
 pub const SPEC: PolicySpec = PolicySpec { obs: ObsKind::Vector(OBS), latent: 0, action_space: SPACE };
-/// Episodes of points that go straight to their goals, as rollouts of one environment each.
+/// Returns episodes of points that go straight to their goals, as rollouts of one environment each.
 pub fn recordings(episodes: u64) -> Vec<Rollout> {
     let streams = Streams::new(21);
     let episode = |i| {
@@ -32,7 +32,7 @@ pub fn recordings(episodes: u64) -> Vec<Rollout> {
     (0..episodes).map(episode).filter(|rollout| rollout.terminated.last() == Some(&true)).collect()
 }
 
-/// Share of the episodes of `ticks` ticks of play that reach their goals.
+/// Returns the share of the episodes of `ticks` ticks of play that reach their goals.
 pub fn success(learner: &impl Learner, ticks: usize) -> f64 {
     Field::new(&HURRY, 32, 99).success(learner, ticks)
 }
@@ -55,7 +55,7 @@ pub fn sac_config() -> SacConfig {
     }
 }
 
-/// Success after 2000 steps.
+/// Returns the success after 2000 steps.
 fn sac(config: SacConfig, seed: u64, device: DeviceKind) -> f64 {
     let steps = config.num_steps;
     let mut learner = SacLearner::new(config, SPEC, seed, device).expect("good settings");

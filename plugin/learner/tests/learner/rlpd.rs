@@ -17,7 +17,7 @@ fn small() -> RlpdConfig {
     RlpdConfig { critics: 4, ..RlpdConfig::default() }
 }
 
-/// Success after so many steps of play.
+/// Returns the success after this many steps of play.
 fn success(mut learner: SacLearner, steps: u64) -> f64 {
     let mut field = Field::new(&HURRY, 8, 1);
     while learner.transitions() < steps {
@@ -74,7 +74,7 @@ fn what_cannot_work_is_refused() {
     assert!(learner(&small(), &[]).to_string().contains("no steps"));
     let mut unpaid = recordings(3);
     unpaid.iter_mut().for_each(|episode| episode.rewards.fill(0.0));
-    assert!(learner(&small(), &unpaid).to_string().contains("ever rewarded"));
+    assert!(learner(&small(), &unpaid).to_string().contains("hold no reward"));
     let mut broken = recordings(3);
     broken[1].rewards[0] = f32::NAN;
     assert!(matches!(learner(&small(), &broken), LearnError::Input { .. }));

@@ -1,4 +1,4 @@
-//! SAC: discrete actions, the numbers of an update by hand, restarts, and what goes wrong.
+//! SAC: discrete actions, the numbers of an update by hand, restarts, and errors.
 
 use crate::errors::vectors;
 use crate::field::{Field, HURRY};
@@ -42,7 +42,7 @@ fn discrete_sac_solves_the_corridor() {
     }
 }
 
-/// One environment, one step from observation 1 to observation 2 with reward 3.
+/// Returns a rollout of one environment, one step from observation 1 to observation 2 with reward 3.
 fn step(terminated: bool, truncated: bool) -> Rollout {
     let cut = truncated && !terminated;
     Rollout {
@@ -59,7 +59,7 @@ fn step(terminated: bool, truncated: bool) -> Rollout {
         ends: EndStates {
             cut_rows: if cut { vec![0] } else { Vec::new() },
             cut_obs: if cut { vec![2.0] } else { Vec::new() }.into(),
-            // Where the episode was cut off, the next one begins at a place whose value is huge.
+            // Where the episode was cut off, the next one begins in a state of huge value.
             next_obs: vec![if terminated || truncated { 1e6 } else { 2.0 }].into(),
             ..EndStates::new(&ObsKind::Vector(1))
         },
@@ -67,7 +67,7 @@ fn step(terminated: bool, truncated: bool) -> Rollout {
     }
 }
 
-/// √loss of the first step of the critics. With one choice the entropy is 0, so that y = 3 + ½ min Q(2) or 3.
+/// Returns √loss of the first step of the critics. With one choice the entropy is 0, so that y = 3 + ½ min Q(2) or 3.
 fn errors(terminated: bool, truncated: bool, time_limit: TimeLimit) -> f64 {
     let config = SacConfig {
         time_limit,
@@ -150,7 +150,7 @@ fn while_the_critics_warm_up_the_actor_stays_where_it_is() {
     assert!(head(&learner) != start && second.entropy_coef != first.entropy_coef, "and then all do");
 }
 
-/// Plays on and compares every report and the whole states.
+/// Checks that a restored learner continues alike, by every report and the whole states.
 fn goes_on(mut learner: SacLearner, mut rollout: impl FnMut(&SacLearner) -> Rollout) {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("checkpoint.safetensors");
@@ -223,7 +223,7 @@ fn settings_that_cannot_work_are_named() {
         ("gamma", SacConfig { gamma: -0.1, ..config() }),
         ("log_std", SacConfig { log_std: (2.0, -5.0), ..config() }),
         ("updates_per_step", SacConfig { updates_per_step: 0.0, ..config() }),
-        ("entropy initial", SacConfig { entropy: EntropyCoef::Auto { initial: 0.0, target_scale: None }, ..config() }),
+        ("`sac.entropy` initial", SacConfig { entropy: EntropyCoef::Auto { initial: 0.0, target_scale: None }, ..config() }),
         ("entropy", SacConfig { entropy: EntropyCoef::Fixed(-1.0), ..config() }),
     ] {
         let error = SacLearner::new(config, SPEC, 1, DeviceKind::Flex).expect_err("bad settings");

@@ -1,4 +1,4 @@
-//! SCORE-PPO: the policy starts as the decoder, and stays near it if it must.
+//! SCORE-PPO: the policy starts as the decoder, and stays near it under the penalty.
 
 use crate::corridor;
 use crate::skill::{continuous_demos, corridor_demos};
@@ -42,7 +42,7 @@ fn the_first_policy_is_the_decoder_exactly() {
     }
 }
 
-/// The unweighted divergence in the last of five updates with a given weight of the penalty.
+/// Returns the unweighted divergence in the last of five updates with a given weight of the penalty.
 fn divergence(model: &SkillModel, kl_coef: f64) -> f32 {
     let score = ScoreConfig { kl_coef, ..ScoreConfig::default() };
     let mut learner = learner(corridor::config(), score, model);
@@ -69,7 +69,7 @@ fn the_penalty_holds_the_policy_back() {
     assert!(held < 0.3 * free, "with one it stays: {held} of {free}");
 }
 
-/// Actions of the policy for random observations and skills, with rewards that mean nothing.
+/// Returns actions of the policy for random observations and skills, with meaningless rewards.
 fn aimless_rollout(learner: &PpoLearner, update: u64) -> Rollout {
     let (steps, envs) = (32, 4);
     let rows = steps * envs;

@@ -34,7 +34,7 @@ fn a_discrete_actor_starts_as_the_decoder_exactly() {
     assert!(free.initial_kl(&z, (&obs).into(), 33).expect("no copy") > Some(0.0));
 }
 
-/// After 1000 transitions with a given penalty: the divergence between decoder and actor.
+/// Returns the divergence between decoder and actor after 1000 transitions with a given penalty.
 fn divergence(model: &SkillModel, score: ScoreConfig) -> f32 {
     let mut learner = learner(config(), score.clone(), model);
     let mut driver = Driver::new(8, 1);
@@ -60,7 +60,7 @@ fn the_penalty_keeps_a_discrete_actor_near() {
     }
 }
 
-/// Players that move by (0.5 x, -x).
+/// Returns a model of demonstrators that move by (0.5 x, -x).
 fn continuous_model() -> SkillModel {
     let streams = Streams::new(5);
     let episodes = (0..60).map(|i| {
@@ -77,7 +77,7 @@ fn continuous_model() -> SkillModel {
     trainer.into_model()
 }
 
-/// Rows of random skills, observations and actions; action (1, 1) is best.
+/// Returns rows of random skills, observations and actions; action (1, 1) is best.
 fn random_rollout(seed: u64, n: usize) -> Rollout {
     let mut rng = Streams::new(seed).stream("rollout", 0);
     let mut draw = |len: usize| (0..len).map(|_| normal(&mut rng).tanh()).collect::<Vec<f32>>();
@@ -103,7 +103,8 @@ fn random_rollout(seed: u64, n: usize) -> Rollout {
     }
 }
 
-/// Mean distance of the actor's median action from the decoder's mean, and the divergence, after training.
+/// Returns the mean distance of the actor's median action from the decoder's mean, and the divergence, after
+/// training.
 fn distance(model: &SkillModel, score: ScoreConfig) -> (f32, f32) {
     let config = SacConfig { learning_starts: 1, entropy: EntropyCoef::Fixed(0.05), updates_per_step: 2.0, ..config() };
     let mut learner = learner(config, score, model);

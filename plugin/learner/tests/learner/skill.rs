@@ -1,4 +1,4 @@
-//! The skill model learns what scripted players do, keeps apart who did it, and survives its file.
+//! The skill model on vectors: it learns from scripted demonstrators, keeps them apart, and survives its file.
 
 use crate::toy::{Corridor, OBS, SPACE};
 use playbot_learner::rng::{Streams, normal, unit};
@@ -21,12 +21,12 @@ pub fn config() -> SkillConfig {
     }
 }
 
-/// Players that walk to the goal but dawdle in one step of ten.
+/// Returns demonstrations that walk to the goal but dawdle in one step of ten.
 pub fn corridor_demos(episodes: u64) -> Dataset {
     demos_until(usize::MAX, episodes)
 }
 
-/// Those players' recordings, which break off at a place.
+/// Returns the same demonstrations, which break off at a position.
 pub fn demos_until(place: usize, episodes: u64) -> Dataset {
     let streams = Streams::new(11);
     let demos = (0..episodes).map(|i| {
@@ -67,7 +67,7 @@ fn the_decoder_does_what_the_players_did() {
     }
 }
 
-/// How often the most likely action under the prior's mean is the one that leads to the goal.
+/// Returns how often the most likely action under the prior's mean is the one that leads to the goal.
 fn walks(model: &SkillModel) -> f64 {
     let (prior, policy) = (model.prior(), model.policy());
     let (mut right, mut steps) = (0, 0);
@@ -91,7 +91,7 @@ fn walks(model: &SkillModel) -> f64 {
     right as f64 / steps as f64
 }
 
-/// Two kinds of players, who always press 0 or always 1 whatever they see: only z can tell them apart.
+/// Two kinds of demonstrators, who always press 0 or always 1: only z can distinguish them.
 #[test]
 fn skills_keep_players_apart() {
     let episodes = (0..60)
@@ -112,7 +112,7 @@ fn skills_keep_players_apart() {
     assert!((n / 5..4 * n / 5).contains(&ones), "{ones} of {n} skills press 1");
 }
 
-/// Players whose two actions are half of and minus what they see.
+/// Returns demonstrations whose two actions are half of and minus the observation.
 pub fn continuous_demos() -> Dataset {
     let streams = Streams::new(5);
     let episodes = (0..60).map(|i| {

@@ -9,7 +9,7 @@ use playbot_learner::{
 };
 use std::sync::LazyLock;
 
-/// Ticks for which a skill is held.
+/// Ticks for which one skill is used.
 const HORIZON: usize = 4;
 
 static MODEL: LazyLock<SkillModel> = LazyLock::new(skills_of_directions);
@@ -43,7 +43,7 @@ fn sac(config: SpirlConfig) -> SpirlLearner {
         .expect("good settings")
 }
 
-/// What the last of so many updates reported.
+/// Returns the metrics of the last of this many updates.
 fn train(learner: &mut SpirlLearner, updates: usize, ticks: usize) -> Vec<(&'static str, f64)> {
     let mut walkers = Field::new(&WALK, 16, 1);
     let mut last = Vec::new();

@@ -1,4 +1,4 @@
-//! Trunks that learn to tell the game's state of pictures while a skill model is learned.
+//! Trunks that learn to predict the game's state from pictures while a skill model is trained.
 
 use crate::image_task::{SHAPE, SIDE, WINDOW, skill_config};
 use playbot_learner::rng::{Streams, below};
@@ -14,7 +14,8 @@ fn config(state_weight: f64) -> SkillConfig {
     SkillConfig { held_out: 0.2, state_weight, ..skill_config() }
 }
 
-/// Pictures of a bright spot, as vectors its row and column, and players who press a key for the half in which it is.
+/// Returns pictures of a bright spot, as vectors its row and column, with demonstrators who press a key for the half
+/// with the spot.
 fn demos(count: u64) -> (Dataset, Dataset) {
     let streams = Streams::new(4);
     let (mut pictures, mut vectors) = (Vec::new(), Vec::new());
@@ -59,7 +60,7 @@ fn trunks_learn_to_tell_the_state_of_pictures_they_were_not_shown() {
         let apart = metrics.held_out.and_then(|apart| apart.state_error).expect("it is measured");
         (metrics.state_error.expect("it is told"), apart)
     };
-    // Always telling the mean costs one per step, and one for the prior.
+    // Predicting the mean costs one per step, and one for the prior.
     let (told, told_apart) = error(1.0);
     assert!(told < 1.5 && told_apart < 1.5, "{told}, {told_apart}");
     // With next to no weight only the layers over the trunks learn, and the row is not needed to press a key.
@@ -106,8 +107,8 @@ fn what_cannot_be_told_is_refused() {
     };
     let (pictures, states) = demos(12);
     assert!(error(config(1.0), pictures.clone()).contains("needs demonstrations with states"));
-    assert!(error(config(-1.0), pictures.clone()).contains("state_weight must not be negative"));
-    assert!(error(config(1.0), states).contains("state_weight is for pictures"));
+    assert!(error(config(-1.0), pictures.clone()).contains("`skills.state_weight` must not be negative"));
+    assert!(error(config(1.0), states).contains("`skills.state_weight` is for pictures"));
     let shape = |error: Result<Dataset, LearnError>| matches!(error, Err(LearnError::Shape { .. }));
     assert!(shape(pictures.clone().with_states(demos(11).1)), "other episodes");
     assert!(matches!(pictures.clone().with_states(pictures), Err(LearnError::Config(_))), "pictures are no states");

@@ -1,4 +1,4 @@
-//! Each switch of SCORE changes what it says, under PPO and under SAC.
+//! Each switch of SCORE and its effect, under PPO and under SAC.
 
 use crate::corridor;
 use crate::score::model;
@@ -10,7 +10,8 @@ use playbot_learner::{
 
 const CHOICES: u32 = 3;
 
-/// One gradient step over all rows in each update, and a long one: the policy leaves the decoder at once.
+/// Returns a learner with one gradient step over all rows in each update, and a long one: the policy leaves the
+/// decoder at once.
 pub fn ppo(score: ScoreConfig, model: &SkillModel) -> PpoLearner {
     let config = PpoConfig { epochs: 1, minibatches: 1, lr: 0.05, ..corridor::config() };
     PpoLearner::with_skill(config, score, model, 1, DeviceKind::Flex).expect("good settings")
@@ -21,7 +22,7 @@ fn sac(score: ScoreConfig, model: &SkillModel) -> SacLearner {
     SacLearner::with_skill(config, score, model, 1, DeviceKind::Flex).expect("good settings")
 }
 
-/// What the decoder does, which is where each policy starts.
+/// Returns a rollout of the decoder, which each policy starts as.
 pub fn rollout(model: &SkillModel) -> Rollout {
     Driver::new(4, 1).rollout(&ppo(ScoreConfig::default(), model), 16)
 }
@@ -38,7 +39,7 @@ fn mean(numbers: impl ExactSizeIterator<Item = f64>) -> f64 {
     numbers.sum::<f64>() / n
 }
 
-/// The mean of KL(p ‖ q) over all rows.
+/// Returns the mean of KL(p ‖ q) over all rows.
 fn kl(p: &[Vec<f64>], q: &[Vec<f64>]) -> f64 {
     mean(p.iter().zip(q).map(|(p, q)| p.iter().zip(q).map(|(p, q)| p * (p / q).ln()).sum()))
 }
@@ -163,7 +164,7 @@ fn the_confidence_is_that_of_its_kind() {
     let own = by_ppo(ConfidenceKind::OwnSample);
     assert!((0.3..1.0).contains(&own) && own != by_policy, "p of the decoder's own choices: {own}, {by_policy}");
 
-    // Whatever rows SAC draws from its buffer, it draws the same ones.
+    // SAC draws the same rows from its buffer each time.
     let by_sac = |confidence| {
         let score = ScoreConfig { confidence, ..ScoreConfig::default() };
         sac_update(score, &model, &rollout).confidence.expect("penalised")
@@ -201,13 +202,13 @@ fn switches_that_do_not_go_together_are_refused() {
     let base = ScoreConfig::default;
     let refused = |config: PpoConfig, score| {
         let error = PpoLearner::with_skill(config, score, &model, 1, DeviceKind::Flex).expect_err("it cannot work");
-        assert!(matches!(error, LearnError::Config(_)), "{error:?}");
+        assert!(matches!(error, LearnError::Config(_) | LearnError::Setting(_)), "{error:?}");
         error.to_string()
     };
     let text = refused(corridor::config(), ScoreConfig { penalty: PenaltyForm::LegacyD4rl, ..base() });
     assert!(text.contains("LegacyD4rl is for continuous actions"), "{text}");
     let text = refused(corridor::config(), ScoreConfig { condition: false, ..base() });
-    assert!(text.contains("init_from_decoder needs condition"), "{text}");
+    assert!(text.contains("`score.init_from_decoder` needs `score.condition`"), "{text}");
     let text = refused(PpoConfig { norm_obs: true, ..corridor::config() }, base());
     assert!(text.contains("norm_obs"), "{text}");
     let bad = SacConfig { norm_obs: true, ..crate::sac::config() };
@@ -215,7 +216,7 @@ fn switches_that_do_not_go_together_are_refused() {
     assert!(error.to_string().contains("norm_obs"), "{error}");
 }
 
-/// Where each policy is after so many updates.
+/// Returns the heads of each policy after this many updates.
 fn heads(learner: &PpoLearner, rollout: &Rollout) -> (Vec<f32>, Vec<f32>) {
     let output = learner.policy().forward(&rollout.z, &rollout.obs, rollout.rows()).expect("finite");
     (output.head, output.values)
@@ -243,8 +244,8 @@ fn while_the_critic_warms_up_the_policy_stays_where_it_is() {
 fn a_policy_that_has_waited_for_the_critic_takes_no_longer_steps_for_it() {
     let model = model(1);
     let rollout = rollout(&model);
-    // How far the policy goes in the first update in which it learns. Nothing is clipped, since a critic that knows more has
-    // smaller gradients, and rewards are as they are, since their scale changes: that is another matter.
+    // The length of the policy's first step. Nothing is clipped, since a trained critic has smaller gradients.
+    // Rewards are not normalised, since their scale changes.
     let plain = PpoConfig { max_grad_norm: 1e9, adam_eps: 1e-12, norm_reward: false, ..corridor::config() };
     let moved = |critic_warmup| {
         let config = PpoConfig { critic_warmup, minibatches: 1, ..plain.clone() };

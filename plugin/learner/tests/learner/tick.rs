@@ -2,7 +2,7 @@
 
 use playbot_learner::{Action, ActionSpace, Actions, ObsSlice, Rollout, RolloutStep};
 
-/// What every row has done so far, and what came of it.
+/// The results of every row so far.
 pub struct Tick {
     actions: Actions,
     log_probs: Vec<f32>,
@@ -42,7 +42,7 @@ impl Tick {
         rollout.push_step(step).expect("actions and observations of the rollout's kinds");
     }
 
-    /// Whether the episode of a row goes on no more.
+    /// Returns whether the episode of a row is over.
     pub fn is_done(&self, row: usize) -> bool {
         self.terminated[row] || self.truncated[row]
     }

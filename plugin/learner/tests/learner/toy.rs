@@ -5,7 +5,7 @@ use playbot_learner::{Action, ActionSpace, Actions, Learner, PolicyOutput, Rollo
 
 /// Steps until an episode is cut off.
 const LIMIT: usize = 40;
-/// The goal's place; 0 is the start.
+/// Position of the goal; 0 is the start.
 const GOAL: usize = 6;
 /// Steps between two draws of a skill.
 const HORIZON: usize = 4;
@@ -13,8 +13,8 @@ const HORIZON: usize = 4;
 pub const OBS: usize = GOAL + 2;
 pub const SPACE: ActionSpace = ActionSpace::Discrete(3);
 
-/// One walker in a corridor. Action 1 leads forward, 0 back, 2 nowhere; at odd places 0 and 1 change roles. Each step
-/// costs 0.01, the goal gives 1.
+/// One walker in a corridor. Action 1 leads forward, 0 back, 2 nowhere; at odd positions 0 and 1 change roles. Each
+/// step costs 0.01, the goal gives 1.
 #[derive(Clone, Default)]
 pub struct Corridor {
     place: usize,
@@ -22,23 +22,23 @@ pub struct Corridor {
 }
 
 impl Corridor {
-    /// One-hot place, and a constant.
+    /// Writes the one-hot position, and a constant.
     pub fn observe(&self, out: &mut Vec<f32>) {
         out.extend((0..=GOAL).map(|p| if p == self.place { 1.0 } else { 0.0 }));
         out.push(1.0);
     }
 
-    /// How far along it is; [`BEST`] is the goal.
+    /// Returns its position; [`BEST`] is the goal.
     pub fn place(&self) -> usize {
         self.place
     }
 
-    /// The action that leads to the goal.
+    /// Returns the action that leads to the goal.
     pub fn best(&self) -> u32 {
         if self.place % 2 == 1 { 0 } else { 1 }
     }
 
-    /// Reward, terminated, truncated.
+    /// Steps the walker and returns reward, terminated, truncated.
     pub fn step(&mut self, action: u32) -> (f32, bool, bool) {
         self.time += 1;
         if action == self.best() {
@@ -76,7 +76,7 @@ impl Driver {
         obs
     }
 
-    /// Draws new skills where the time has come (or for all).
+    /// Draws new skills in place of those that have run out (or for all).
     fn draw(&mut self, learner: &impl Learner, obs: &[f32], all: bool) {
         let Some(prior) = learner.prior() else { return };
         let rngs = &mut self.rngs;
@@ -155,7 +155,7 @@ impl Driver {
         .unzip()
     }
 
-    /// Mean length of the last `n` episodes.
+    /// Returns the mean length of the last `n` episodes.
     pub fn recent(&self, n: usize) -> f64 {
         let last = &self.lengths[self.lengths.len().saturating_sub(n)..];
         last.iter().sum::<usize>() as f64 / last.len() as f64

@@ -1,4 +1,4 @@
-//! Skills of walking straight on, that know of no goal.
+//! Skills of walking straight ahead, without knowledge of a goal.
 
 use crate::field::{OBS, Point, SPACE, WALK};
 use playbot_learner::rng::{Streams, normal, unit};
@@ -6,7 +6,7 @@ use playbot_learner::{Actions, Dataset, DemoEpisode, DeviceKind, SkillConfig, Sk
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
-/// A skill model of walks in directions that change every ten ticks and have nothing to do with the goal.
+/// Returns a skill model of walks in directions that change every ten ticks and are independent of the goal.
 pub fn skills_of_directions() -> SkillModel {
     let mut rng = Streams::new(5).stream("walks", 0);
     let episodes = (0..60).map(|_| {
@@ -19,7 +19,7 @@ pub fn skills_of_directions() -> SkillModel {
             }
             let mut noisy = |x: f32| 0.8 * x + 0.1 * normal(&mut rng);
             let action = [noisy(walker.goal[0]), noisy(walker.goal[1])];
-            // What it heads for is not in what it sees.
+            // Its direction is not part of its observation.
             let [x, y, ..] = walker.observe();
             obs.extend([x, y, 2.0 * unit(&mut rng) as f32 - 1.0, 2.0 * unit(&mut rng) as f32 - 1.0]);
             walker.step(&WALK, &action);

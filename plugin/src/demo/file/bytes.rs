@@ -2,7 +2,7 @@
 
 use super::episode_fault::EpisodeFault;
 
-/// Which way a list is stored: the shorter of the two is chosen.
+/// Encodings of a list; the shorter one is used.
 const PLAIN: u8 = 0;
 const RUNS: u8 = 1;
 
@@ -15,9 +15,9 @@ pub(super) trait Scalar: Copy {
     /// Size in bytes.
     const SIZE: usize;
     fn put(self, out: &mut Vec<u8>);
-    /// `bytes` has exactly `SIZE` bytes.
+    /// Reads the value from exactly `SIZE` bytes.
     fn get(bytes: &[u8]) -> Self;
-    /// Equality of the bits: runs must give back -0.0 as -0.0.
+    /// Compares the bits: runs must return -0.0 as -0.0.
     fn same(self, other: Self) -> bool;
 }
 
@@ -64,7 +64,7 @@ pub(super) fn put_list<T: Scalar>(values: &[T], out: &mut Vec<u8>) {
     }
 }
 
-/// Seven bits a byte, lowest first.
+/// Writes a number with seven bits a byte, lowest first.
 fn put_varint(mut value: u64, out: &mut Vec<u8>) {
     while value >= 0x80 {
         out.push(value as u8 | 0x80);
@@ -73,7 +73,7 @@ fn put_varint(mut value: u64, out: &mut Vec<u8>) {
     out.push(value as u8);
 }
 
-/// Reads values from the front of a slice. Nothing is allocated before its size is known to be sound.
+/// Reads values from the front of a slice. Sizes are checked before memory is allocated.
 pub(super) struct Cursor<'a>(pub(super) &'a [u8]);
 
 impl<'a> Cursor<'a> {
@@ -94,7 +94,7 @@ impl<'a> Cursor<'a> {
         Ok(self.take(size, what)?.chunks_exact(T::SIZE).map(T::get).collect())
     }
 
-    /// Reads `count` values written by [`put_list`]. The caller knows that `count` is a sound number.
+    /// Reads `count` values written by [`put_list`]. The caller must have checked `count`.
     pub(super) fn list<T: Scalar>(&mut self, count: usize, what: &str) -> Result<Vec<T>, EpisodeFault> {
         match self.scalar::<u8>(what)? {
             PLAIN => self.plain(count, what),

@@ -8,7 +8,7 @@ use super::episode_fault::EpisodeFault;
 use super::header::{DemoActions, DemoHeader};
 use crate::level_files::LevelFile;
 
-/// Who decided the action of a tick.
+/// The source of a tick's action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Decider {
     /// A person at the keyboard or gamepad.
@@ -19,7 +19,7 @@ pub enum Decider {
     Policy,
     /// A recording that was played back.
     Replay,
-    /// Nobody: the agent did nothing.
+    /// No source: the agent did nothing.
     Idle,
 }
 
@@ -35,12 +35,12 @@ impl std::fmt::Display for Decider {
     }
 }
 
-/// How an episode ended. Termination and truncation are never merged.
+/// The end of an episode. Termination and truncation are never merged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 pub enum DemoEnd {
     /// The rules of the game ended the episode.
     Terminated {
-        /// Whether the goal was reached.
+        /// True if the goal was reached.
         success: bool,
     },
     /// The time limit ended the episode.
@@ -63,14 +63,14 @@ pub enum EpisodeActions {
     },
 }
 
-/// One recorded episode: what is needed to run it again, and what it should then lead to.
+/// One recorded episode: the data to run it again, and the expected outcome.
 ///
 /// All lists run over the ticks of the episode; `steps` is their common length.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DemoEpisode {
     /// Seed of the level: with the game, its version and its mode it gives the layout.
     pub level_seed: u64,
-    /// The file of the level, where levels are files; its number may be another one by now.
+    /// The file of the level, where levels are files. Its level number may have changed since.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub level_file: Option<LevelFile>,
     /// The action of each tick.
@@ -79,9 +79,9 @@ pub struct DemoEpisode {
     pub rewards: Vec<f32>,
     /// Hash of the game's state after each tick, `[steps]`.
     pub state_hashes: Vec<u32>,
-    /// Who decided each tick, `[steps]`.
+    /// The source of each tick's action, `[steps]`.
     pub deciders: Vec<Decider>,
-    /// How the episode ended.
+    /// The end of the episode.
     pub end: DemoEnd,
     /// The observation before each action, `[steps, names]` with the names of the header;
     /// empty when the header has no names.
@@ -89,7 +89,7 @@ pub struct DemoEpisode {
 }
 
 impl DemoEpisode {
-    /// An episode without ticks, to be filled by a recorder.
+    /// Creates an episode without ticks, to be filled by a recorder.
     pub fn new(level_seed: u64, actions: DemoActions) -> Self {
         Self {
             level_seed,
@@ -106,22 +106,22 @@ impl DemoEpisode {
         }
     }
 
-    /// Number of ticks.
+    /// Returns the number of ticks.
     pub fn len(&self) -> usize {
         self.state_hashes.len()
     }
 
-    /// Whether the episode has no ticks.
+    /// Returns whether the episode has no ticks.
     pub fn is_empty(&self) -> bool {
         self.state_hashes.is_empty()
     }
 
-    /// Sum of the rewards (undiscounted return).
+    /// Returns the sum of the rewards (undiscounted return).
     pub fn episode_return(&self) -> f64 {
         self.rewards.iter().map(|&r| f64::from(r)).sum()
     }
 
-    /// Ticks that each decider decided; those that decided none are left out.
+    /// Returns the ticks of each decider; deciders without ticks are left out.
     pub fn steps_by_decider(&self) -> BTreeMap<Decider, usize> {
         let mut steps = BTreeMap::new();
         for decider in &self.deciders {
@@ -130,7 +130,7 @@ impl DemoEpisode {
         steps
     }
 
-    /// Whether the episode terminated with the goal reached.
+    /// Returns whether the episode terminated with the goal reached.
     pub fn is_success(&self) -> bool {
         self.end == DemoEnd::Terminated { success: true }
     }

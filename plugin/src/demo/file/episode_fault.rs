@@ -1,8 +1,8 @@
-//! What can be wrong with one episode of a demonstration file, and how it is said.
+//! Faults of a single episode of a recording, and their messages.
 
 use thiserror::Error;
 
-/// The ways one episode can be wrong.
+/// The fault of an episode.
 ///
 /// `step` counts the ticks of the episode from 0.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -10,7 +10,7 @@ pub enum EpisodeFault {
     /// Two per-tick lists have different lengths.
     #[error("{found} {what} for {steps} steps (expected {expected})")]
     Length {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// Entries found.
         found: usize,
@@ -22,9 +22,9 @@ pub enum EpisodeFault {
     /// Discrete actions in a file of continuous ones, or another number of dimensions.
     #[error("the actions are {found}, but the header says {expected}")]
     ActionKind {
-        /// What the episode holds.
+        /// Kind of the episode's actions.
         found: String,
-        /// What the header announces.
+        /// Kind of the header's actions.
         expected: String,
     },
     /// A discrete action the game does not have.
@@ -40,7 +40,7 @@ pub enum EpisodeFault {
     /// A value that is not a finite number.
     #[error("{what} at step {step} is {value}, not a finite number")]
     NotFinite {
-        /// Which list.
+        /// Name of the list.
         what: &'static str,
         /// The step.
         step: usize,

@@ -1,19 +1,30 @@
-//! What can be wrong with a demonstration file, and how it is said.
+//! Errors of recordings, and their messages.
 
 use std::path::{Path, PathBuf};
 
+use playbot_learner::{HasExitCode, io_exit_code};
 use thiserror::Error;
 
 use super::EpisodeFault;
 
-/// A problem with one demonstration file: which file, and what is wrong with it.
+/// A problem with one recording: its path and the fault.
 #[derive(Debug, Error)]
 #[error("{}: {}", path.display(), advised(fault, path))]
 pub struct DemoFileError {
-    /// The file (or folder) the problem is about.
+    /// The file (or folder) with the problem.
     pub path: PathBuf,
-    /// What is wrong.
+    /// The fault.
     pub fault: DemoFault,
+}
+
+impl HasExitCode for DemoFileError {
+    fn exit_code(&self) -> u8 {
+        match &self.fault {
+            DemoFault::Io { source, .. } => io_exit_code(source),
+            DemoFault::PushFailed { .. } | DemoFault::PushTorn { .. } | DemoFault::Torn => 2,
+            _ => 3,
+        }
+    }
 }
 
 impl DemoFileError {
@@ -21,7 +32,7 @@ impl DemoFileError {
         Self { path: path.to_owned(), fault: fault.into() }
     }
 
-    /// Whether `playbot demo repair` can do something about it: the header is sound and frames are not.
+    /// Returns whether `playbot demo repair` can help: the header is valid and some frames are not.
     #[cfg(test)]
     pub(super) fn is_repairable(&self) -> bool {
         matches!(
@@ -34,14 +45,14 @@ impl DemoFileError {
     }
 }
 
-/// A fault in words, whose command to repair `FILE` names this file.
+/// Returns the message of a fault, with `FILE` in the repair command replaced by this file.
 fn advised(fault: &DemoFault, path: &Path) -> String {
     let name = path.display().to_string();
     let word = if name.contains(char::is_whitespace) { format!("'{name}'") } else { name };
     fault.to_string().replace("`playbot demo repair FILE", &format!("`playbot demo repair {word}"))
 }
 
-/// The ways a demonstration file can be wrong.
+/// The fault of a recording.
 ///
 /// `offset` is a byte offset from the start of the file, `episode` counts from 0.
 #[derive(Debug, Error)]
@@ -49,15 +60,16 @@ pub enum DemoFault {
     /// The operating system refused.
     #[error("cannot {action}: {source}")]
     Io {
-        /// What was tried, as a verb phrase: "open the file", "write the header".
+        /// The attempted action, as a verb phrase: "open the file", "write the header".
         action: &'static str,
-        /// The answer of the operating system.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// The file does not begin like a demonstration file.
+    /// The file does not begin like a recording.
     #[error(
-        "not a demonstration file: it begins with \"{found}\" instead of \"playbot-demo\"; run `playbot demo repair \
-         FILE` if it was one, which takes the copy of its header, or with --header-from that of another recording"
+        "not a recording: it begins with \"{found}\" instead of \"playbot-demo\"; if it was one, \
+         run `playbot demo repair FILE`, which restores its header from the copy, or with --header-from from another \
+         recording"
     )]
     NotADemo {
         /// The first bytes of the file, with unprintable ones escaped.
@@ -72,40 +84,40 @@ pub enum DemoFault {
     /// The first line is damaged.
     #[error(
         "the first line of the file is damaged (\"{found}\"): {why}; \
-         run `playbot demo repair FILE`, which takes its copy, or with --header-from that of another recording"
+         run `playbot demo repair FILE`, which restores it from its copy, or with --header-from from another recording"
     )]
     HeaderLine {
         /// The line, with unprintable characters escaped.
         found: String,
-        /// What is wrong with it.
+        /// The problem.
         why: &'static str,
     },
     /// The header is not the RON text that is expected.
     #[error(
         "the header does not parse at line {line}, column {column}: {message}; \
-         run `playbot demo repair FILE`, which takes its copy, or with --header-from that of another recording"
+         run `playbot demo repair FILE`, which restores it from its copy, or with --header-from from another recording"
     )]
     HeaderSyntax {
         /// Line in the file, from 1 (line 1 is the `playbot-demo` line).
         line: usize,
         /// Column, from 1.
         column: usize,
-        /// The parser's words.
+        /// The parser's message.
         message: String,
     },
-    /// The header parses, but it is not the header that was written.
+    /// The header parses, but differs from the header that was written.
     #[error(
         "the header does not match its checksum: it was damaged or edited by hand; \
-         run `playbot demo repair FILE`, which takes its copy, or with --header-from that of another recording"
+         run `playbot demo repair FILE`, which restores it from its copy, or with --header-from from another recording"
     )]
     HeaderChecksum,
-    /// The header is damaged, and so is its copy, so that nothing in the file says what its episodes are of.
+    /// The header and its copy are damaged, so the file no longer identifies its episodes.
     #[error(
-        "{what}; no copy of its header is sound either: take that of another recording of the same game, mode and version with \
-         `playbot demo repair FILE --header-from OTHER`"
+        "{what}; the copy of its header is damaged, too: take the header of another recording of the same game, mode \
+         and version with `playbot demo repair FILE --header-from OTHER`"
     )]
     HeaderLost {
-        /// What is wrong with the header, in words.
+        /// The problem of the header, as text.
         what: String,
     },
     /// A value in the header makes no sense.
@@ -113,7 +125,7 @@ pub enum DemoFault {
     HeaderValue {
         /// Name of the field.
         field: &'static str,
-        /// Why the value is refused.
+        /// The reason why the value is refused.
         why: String,
     },
     /// The file was written by a later version of this crate.
@@ -124,13 +136,13 @@ pub enum DemoFault {
         /// Newest format this program reads.
         newest: u32,
     },
-    /// There is something else than a frame where a frame must begin.
+    /// No frame begins where one must begin.
     #[error(
         "episode {episode}: no frame begins at byte {offset} (the bytes there are damaged); \
          run `playbot demo repair FILE`"
     )]
     BadFrameMagic {
-        /// Where the frame had to begin.
+        /// Byte offset at which the frame had to begin.
         offset: u64,
         /// Index of the episode.
         episode: usize,
@@ -141,11 +153,11 @@ pub enum DemoFault {
          run `playbot demo repair FILE`"
     )]
     TruncatedFrame {
-        /// Where the frame begins.
+        /// Byte offset of the frame.
         offset: u64,
         /// Index of the episode.
         episode: usize,
-        /// How many bytes the frame announces beyond the end of the file.
+        /// Bytes that the frame announces beyond the end of the file.
         missing: u64,
     },
     /// A frame does not match its checksum.
@@ -154,25 +166,25 @@ pub enum DemoFault {
          run `playbot demo repair FILE`"
     )]
     FrameChecksum {
-        /// Where the frame begins.
+        /// Byte offset of the frame.
         offset: u64,
         /// Index of the episode.
         episode: usize,
     },
-    /// A frame is what was written, but not a valid episode of this file.
+    /// A frame is intact, but not a valid episode of this file.
     #[error("episode {episode} (frame at byte {offset}): {fault}")]
     BadEpisode {
-        /// Where the frame begins.
+        /// Byte offset of the frame.
         offset: u64,
         /// Index of the episode.
         episode: usize,
-        /// What is wrong with the episode.
+        /// The fault of the episode.
         fault: EpisodeFault,
     },
     /// An episode was refused before anything was written.
     #[error("the episode was not written: {0}")]
     RefusedEpisode(EpisodeFault),
-    /// The recording is of another game.
+    /// The recording belongs to another game.
     #[error("a recording of the game `{found}`, not of `{expected}`: choose recordings of `{expected}`")]
     ForeignGame {
         /// Game of the file.
@@ -180,7 +192,7 @@ pub enum DemoFault {
         /// Game that was asked for.
         expected: String,
     },
-    /// The recording is of another version of the game, whose rules may differ.
+    /// The recording belongs to another version of the game, whose rules may differ.
     #[error(
         "recorded with version {found} of `{game}`, but this is version {expected}: \
          the recording would not replay; record it again"
@@ -193,7 +205,7 @@ pub enum DemoFault {
         /// Version that was asked for.
         expected: u32,
     },
-    /// The recording is of another mode of the game.
+    /// The recording belongs to another mode of the game.
     #[error("recorded in mode `{found}` of `{game}`, not in mode `{expected}`")]
     ForeignMode {
         /// The game.
@@ -225,11 +237,11 @@ pub enum DemoFault {
         /// The first file.
         first: PathBuf,
     },
-    /// The file was named before among those to merge.
+    /// The file appears twice among those to merge.
     #[error("named twice: its episodes would be in the merged file twice")]
     NamedTwice,
     /// No recording was named.
-    #[error("there is nothing to merge: name the recordings that shall be in it")]
+    #[error("there is nothing to merge: name the recordings to merge")]
     NothingToMerge,
     /// The file exists already.
     #[error("exists already; nothing was written")]
@@ -242,7 +254,7 @@ pub enum DemoFault {
     PushFailed {
         /// Index of the episode that is lost.
         episode: usize,
-        /// The answer of the operating system.
+        /// The error of the operating system.
         source: std::io::Error,
     },
     /// An episode could not be written, and part of it could not be removed again.
@@ -253,21 +265,21 @@ pub enum DemoFault {
     PushTorn {
         /// Index of the episode that is lost.
         episode: usize,
-        /// Why the episode was not written.
+        /// The reason why the episode was not written.
         source: std::io::Error,
-        /// Why the remains were not removed.
+        /// The reason why the rest was not removed.
         cleanup: std::io::Error,
     },
     /// The writer gave up after [`DemoFault::PushTorn`].
     #[error("an earlier episode was written in part, so no more can follow it; run `playbot demo repair FILE`")]
     Torn,
-    /// A folder holds no demonstration file.
+    /// A folder holds no recording.
     #[error("no *.demo file in this folder or below it")]
     NoDemos,
 }
 
 impl DemoFault {
-    /// This fault where it is known that the copy of the header is no help.
+    /// Returns this fault for a file whose header's copy is known to be unusable.
     pub(super) fn without_copy(self) -> Self {
         match self {
             Self::NotADemo { .. } | Self::HeaderLine { .. } | Self::HeaderSyntax { .. } | Self::HeaderChecksum => {
@@ -279,7 +291,7 @@ impl DemoFault {
         }
     }
 
-    /// For `map_err`: what was tried when the operating system refused.
+    /// Returns a function for `map_err` that names the attempted action.
     pub(super) fn io(action: &'static str) -> impl FnOnce(std::io::Error) -> Self {
         move |source| Self::Io { action, source }
     }

@@ -1,12 +1,12 @@
-//! Finding demonstration files.
+//! Search for recordings.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::error::{DemoFault, DemoFileError};
 
-/// The demonstration files at `path`: the file itself, or all `*.demo` files in a folder and the
-/// folders below it, sorted by path. Links to folders are not followed.
+/// Returns the recordings at `path`: the file itself, or all `*.demo` files in a folder and its subfolders,
+/// sorted by path. Links to folders are not followed.
 ///
 /// # Errors
 ///

@@ -1,4 +1,4 @@
-//! Frames: one episode each, found and checked without knowing the frames before it.
+//! Frames: one episode each, found and checked without knowledge of the frames before it.
 //!
 //! ```text
 //! magic (4 bytes) | payload length (u32) | payload | CRC-32 of length and payload (u32)
@@ -9,7 +9,7 @@ use super::episode_fault::EpisodeFault;
 use super::header::DemoHeader;
 use super::payload;
 
-/// How a frame begins. The first byte is not ASCII and not valid UTF-8, so no header contains it.
+/// First bytes of a frame. The first byte is not ASCII and not valid UTF-8, so no header contains it.
 pub(super) const FRAME_MAGIC: [u8; 4] = [0xfe, b'E', b'P', 0xff];
 /// Bytes before the payload.
 pub(super) const FRAME_HEAD: usize = 8;
@@ -18,7 +18,7 @@ pub(super) const FRAME_EXTRA: usize = FRAME_HEAD + 4;
 /// Largest payload, in bytes: about four days of ticks at 60 Hz with two observation values.
 pub(super) const MAX_PAYLOAD: usize = 1 << 28;
 
-/// The whole frame of an episode.
+/// Returns the whole frame of an episode.
 pub(super) fn encode(episode: &DemoEpisode, header: &DemoHeader) -> Result<Vec<u8>, EpisodeFault> {
     let mut bytes = FRAME_MAGIC.to_vec();
     bytes.extend_from_slice(&[0; 4]);
@@ -33,13 +33,13 @@ pub(super) fn encode(episode: &DemoEpisode, header: &DemoHeader) -> Result<Vec<u
     Ok(bytes)
 }
 
-/// The payload length that a frame head announces; `None` when no frame begins here.
+/// Returns the payload length that a frame head announces; `None` when no frame begins here.
 pub(super) fn payload_length(head: &[u8]) -> Option<usize> {
     let rest = head.strip_prefix(&FRAME_MAGIC)?.first_chunk::<4>()?;
     Some(u32::from_le_bytes(*rest) as usize)
 }
 
-/// The payload of a whole frame; `None` when its checksum does not hold.
+/// Returns the payload of a whole frame; `None` when its checksum does not hold.
 pub(super) fn payload(frame: &[u8]) -> Option<&[u8]> {
     let (body, crc) = frame.split_last_chunk::<4>()?;
     let intact = crc32fast::hash(body.get(4..)?) == u32::from_le_bytes(*crc);

@@ -1,4 +1,4 @@
-//! The header of a demonstration file: what was recorded, under which conditions.
+//! The header of a recording: its contents and conditions.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,9 +6,9 @@ use super::error::DemoFault;
 
 /// Newest format that this version of the crate reads and writes.
 pub const DEMO_FORMAT: u32 = LEVEL_FILES_FORMAT;
-/// Format of recordings that name no level files. Written wherever it will do, since older programs read it too.
+/// Format of recordings that name no level files. Written where possible, since older programs read it too.
 const PLAIN_FORMAT: u32 = 1;
-/// First format in which every episode says which level file it was played on.
+/// First format in which every episode names its level file.
 pub(super) const LEVEL_FILES_FORMAT: u32 = 2;
 
 /// The kind and number of actions of a recording.
@@ -21,7 +21,7 @@ pub enum DemoActions {
 }
 
 impl DemoActions {
-    /// Number of actions (discrete) or of dimensions (continuous).
+    /// Returns the number of actions (discrete) or of dimensions (continuous).
     pub fn count(self) -> usize {
         match self {
             Self::Discrete(n) | Self::Continuous(n) => n,
@@ -38,7 +38,7 @@ impl std::fmt::Display for DemoActions {
     }
 }
 
-/// What was recorded, under which conditions. Written as RON text at the top of the file.
+/// Contents and conditions of a recording. Written as RON text at the top of the file.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DemoHeader {
@@ -56,17 +56,17 @@ pub struct DemoHeader {
     pub actions: DemoActions,
     /// Names of the observation values kept for each tick; empty when observations are not kept.
     pub observation_names: Vec<String>,
-    /// Who played: a person's nickname, or the name of a bot.
+    /// The player: a person's nickname, or the name of a bot.
     pub demonstrator: String,
-    /// Noise that was added to the demonstrator's actions: the share of random actions (discrete),
-    /// or the standard deviation (continuous); 0 for none.
+    /// Noise added to the demonstrator's actions: the share of random actions (discrete), or the standard deviation
+    /// (continuous); 0 for no noise.
     pub action_noise: f64,
-    /// Anything worth knowing, for people.
+    /// A note for people.
     pub note: String,
 }
 
 impl DemoHeader {
-    /// A header in the oldest format that will do, without observations, noise or a note.
+    /// Creates a header in the oldest sufficient format, without observations, noise or a note.
     pub fn new(game: &str, game_version: u32, mode: &str, tick_hz: f64, actions: DemoActions) -> Self {
         Self {
             format: PLAIN_FORMAT,
@@ -82,7 +82,7 @@ impl DemoHeader {
         }
     }
 
-    /// The same for a recording of levels that are files, which the episodes name.
+    /// Changes the format to that of level files, which the episodes name.
     // For playbot_lab; games need none of it.
     #[doc(hidden)]
     pub fn with_level_files(self) -> Self {

@@ -1,4 +1,4 @@
-//! Joining the recordings of many testers.
+//! Merging of the recordings of many testers.
 
 use std::path::{Path, PathBuf};
 
@@ -7,12 +7,12 @@ use super::header::DemoHeader;
 use super::reader::DemoReader;
 use super::writer::DemoWriter;
 
-/// What was merged.
+/// The result of a merge.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MergeReport {
     /// Header of the new file.
     pub header: DemoHeader,
-    /// Each file that went into it, with its number of episodes, in order.
+    /// Each merged file with its number of episodes, in order.
     pub files: Vec<(PathBuf, usize)>,
     /// Ticks over all episodes.
     pub steps: usize,
@@ -27,8 +27,8 @@ impl MergeReport {
 
 /// Writes the episodes of several recordings of one game into a new file, in the order of `files`.
 ///
-/// They must agree in everything that decides whether they replay together: game, version, mode, tick rate, actions, names
-/// of kept observations and noise. Testers may differ: the new file names all of them. The files themselves are left alone.
+/// They must agree in everything that a replay depends on: game, version, mode, tick rate, actions, names of kept
+/// observations and noise. Testers may differ: the new file names all of them. The input files stay unchanged.
 ///
 /// ```no_run
 /// use bevy_playbot::demo::file::merge_demos;
@@ -40,9 +40,9 @@ impl MergeReport {
 ///
 /// # Errors
 ///
-/// The first file that is of another game, version or mode ([`DemoFault::ForeignGame`] and its kin) or differs otherwise
-/// ([`DemoFault::MergeDiffers`]), is damaged, or is named twice; [`DemoFault::Exists`] when there is a file at `out`, and
-/// [`DemoFault::NothingToMerge`] without files. Nothing is left at `out` then.
+/// The first file that belongs to another game, version or mode ([`DemoFault::ForeignGame`] and its kin), differs
+/// otherwise ([`DemoFault::MergeDiffers`]), is damaged, or is named twice. [`DemoFault::Exists`] when there is a file
+/// at `out`, and [`DemoFault::NothingToMerge`] without files. After an error there is no file at `out`.
 pub fn merge_demos(files: &[impl AsRef<Path>], out: impl AsRef<Path>) -> Result<MergeReport, DemoFileError> {
     let out = out.as_ref();
     let Some(first) = files.first() else { return Err(DemoFileError::new(out, DemoFault::NothingToMerge)) };
@@ -68,14 +68,14 @@ pub fn merge_demos(files: &[impl AsRef<Path>], out: impl AsRef<Path>) -> Result<
     });
     if let Err(error) = copied {
         drop(writer);
-        // Half a merge looks like a whole one.
+        // An unfinished merge would look like a whole one.
         let _ = playbot_learner::disk::remove_file(out);
         return Err(error);
     }
     Ok(report)
 }
 
-/// Whether two paths lead to one file.
+/// Returns whether two paths lead to one file.
 fn is_same(one: &Path, other: &Path) -> bool {
     match (one.canonicalize(), other.canonicalize()) {
         (Ok(one), Ok(other)) => one == other,
@@ -83,7 +83,7 @@ fn is_same(one: &Path, other: &Path) -> bool {
     }
 }
 
-/// The header of all these recordings.
+/// Returns the common header of all these recordings.
 fn common_header(first: &Path, readers: &[DemoReader]) -> Result<DemoHeader, DemoFileError> {
     let mut common = readers[0].header().clone();
     let mut names: Vec<String> = Vec::new();

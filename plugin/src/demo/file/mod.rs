@@ -1,6 +1,6 @@
-//! The demonstration file: recorded episodes on disk.
+//! Recordings: files of recorded episodes.
 //!
-//! A file begins as text, so `head` shows what it holds, and goes on with one frame per episode:
+//! A file begins as text, so `head` shows its contents, and goes on with one frame per episode:
 //!
 //! ```text
 //! playbot-demo header=00000214 crc32=5d3a90c1     magic line: length and checksum of the header
@@ -15,13 +15,13 @@
 //! FE 45 50 FF | length | payload | CRC-32
 //! ```
 //!
-//! - Files only grow. [`DemoWriter::push`] writes one frame with a single write and waits for the disk:
-//!   whatever happens, the episodes before it stay.
-//! - Nothing is believed unchecked. [`DemoReader`] gives an episode out only when its checksum holds,
-//!   its lists agree in length, its actions are in range and its numbers are finite.
-//! - The header is there twice: if one copy is damaged, the other one says what was recorded.
-//! - A damaged file is an error that says where. [`repair`](repair()) recovers every sound episode, also behind
-//!   the damage.
+//! - Files only grow. [`DemoWriter::push`] writes one frame with a single write and waits for the disk: after a
+//!   crash, the episodes before it are still there.
+//! - Everything is checked. [`DemoReader`] returns an episode only when its checksum holds, its lists agree in
+//!   length, its actions are in range and its numbers are finite.
+//! - The header is stored twice: if one copy is damaged, the other one identifies the recording.
+//! - A damaged file is an error with a position. [`repair`](repair()) recovers every intact episode, also behind the
+//!   damage.
 //! - A tick of a game with at most 256 actions takes about 5 bytes: the action and the state hash.
 //!   Rewards and deciders are stored as runs.
 

@@ -71,7 +71,7 @@ fn put_level_file(file: Option<&LevelFile>, header: &DemoHeader, out: &mut Vec<u
         (None, false) => put_plain(&[0u32], out),
         (Some(LevelFile { path, hash }), false) => {
             let length = u32::try_from(path.len()).ok().filter(|&length| length > 0);
-            put_plain(&[length.ok_or_else(|| malformed("the path of the level file is empty or endless"))?], out);
+            put_plain(&[length.ok_or_else(|| malformed("the path of the level file is empty or too long"))?], out);
             out.extend_from_slice(path.as_bytes());
             put_plain(&[*hash], out);
         }

@@ -12,9 +12,9 @@
 //! …
 //! ```
 //!
-//! The text ends with a [copy](super::second_header) of itself in comments. The magic line gives the length of the RON text
-//! in bytes and its CRC-32. It stays the same in all
-//! formats, so that an older program can say that a file is too new for it.
+//! The text ends with a [copy](super::second_header) of itself in comments. The magic line gives the length of the
+//! RON text in bytes and its CRC-32. It is the same in all formats, so that an older program can report that a file
+//! is too new for it.
 
 use std::io::Read;
 
@@ -24,11 +24,11 @@ use super::error::DemoFault;
 use super::header::{DEMO_FORMAT, DemoHeader};
 use super::second_header;
 
-/// How every demonstration file begins.
+/// First bytes of every recording.
 pub const DEMO_MAGIC: &str = "playbot-demo ";
 /// Length of the magic line in bytes, with its line feed.
 const LINE_LENGTH: usize = "playbot-demo header=00000000 crc32=00000000\n".len();
-/// Longest header that is read, in bytes; it guards the memory against a damaged length.
+/// Longest header that is read, in bytes, to guard the memory against a damaged length.
 const MAX_HEADER: usize = 1 << 20;
 
 /// The only field that is read before the format is known.
@@ -41,7 +41,7 @@ fn magic_line(length: usize, crc: u32) -> String {
     format!("{DEMO_MAGIC}header={length:08} crc32={crc:08x}\n")
 }
 
-/// The bytes at the top of a file with this header.
+/// Returns the bytes at the top of a file with this header.
 pub(super) fn encode(header: &DemoHeader) -> Result<Vec<u8>, DemoFault> {
     header.check()?;
     let pretty = ron::ser::PrettyConfig::new().new_line("\n");
@@ -76,7 +76,7 @@ pub(super) fn decode(mut input: impl Read) -> Result<(DemoHeader, u64), DemoFaul
     }
     let intact = crc32fast::hash(&text) == crc;
     let parsed = parse_text(&text, intact);
-    // A damaged header that still parses must not be taken at its word.
+    // A damaged header that still parses must not be trusted.
     if parsed.is_ok() && !intact {
         return Err(DemoFault::HeaderChecksum);
     }

@@ -1,4 +1,4 @@
-//! Reading demonstration files.
+//! The reader of recordings.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
@@ -10,10 +10,10 @@ use super::frame::{self, FRAME_EXTRA, FRAME_HEAD, MAX_PAYLOAD};
 use super::header::DemoHeader;
 use super::{payload, preamble};
 
-/// Reads the episodes of a demonstration file one after the other.
+/// Reads the episodes of a recording one after the other.
 ///
-/// It is an iterator. Episodes are given out only after their checksum and their values were checked;
-/// after the first error it ends.
+/// It is an iterator. Episodes are returned only after their checksum and their values were checked. It ends after
+/// the first error.
 ///
 /// ```no_run
 /// # use bevy_playbot::demo::file::{DemoFileError, DemoReader};
@@ -32,9 +32,9 @@ pub struct DemoReader {
     path: PathBuf,
     header: DemoHeader,
     input: BufReader<File>,
-    /// Where the next frame begins.
+    /// Byte offset of the next frame.
     offset: u64,
-    /// Length of the file when it was opened; no frame is believed beyond it.
+    /// Length of the file when it was opened; frames beyond it are invalid.
     length: u64,
     episodes: usize,
     done: bool,
@@ -45,7 +45,7 @@ impl DemoReader {
     ///
     /// # Errors
     ///
-    /// When the file cannot be read, or its header is not sound: see [`DemoFault`].
+    /// The file cannot be read, or its header is invalid: see [`DemoFault`].
     pub fn open(path: impl AsRef<Path>) -> Result<Self, DemoFileError> {
         let path = path.as_ref();
         File::open(path)
@@ -60,7 +60,7 @@ impl DemoReader {
         let length = metadata.map_err(DemoFault::io("open the file"))?.len();
         let mut input = BufReader::new(file);
         let (header, offset) = preamble::decode(&mut input)?;
-        // The preamble was read exactly; the seek makes that independent of how.
+        // The preamble was read exactly; the seek makes that independent of buffering.
         input.seek(SeekFrom::Start(offset)).map_err(DemoFault::io("read the first frame"))?;
         Ok(Self { path: path.to_owned(), header, input, offset, length, episodes: 0, done: false })
     }
@@ -83,32 +83,32 @@ impl DemoReader {
         }
     }
 
-    /// The header of the file.
+    /// Returns the header of the file.
     pub fn header(&self) -> &DemoHeader {
         &self.header
     }
 
-    /// The path the file was opened with.
+    /// Returns the path the file was opened with.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Byte offset of the next frame: everything before it was read and is sound.
+    /// Returns the byte offset of the next frame: everything before it was read and is intact.
     pub fn offset(&self) -> u64 {
         self.offset
     }
 
-    /// Length of the file in bytes, when it was opened.
+    /// Returns the length of the file in bytes, when it was opened.
     pub fn file_length(&self) -> u64 {
         self.length
     }
 
-    /// Number of episodes read so far.
+    /// Returns the number of episodes read so far.
     pub fn episodes_read(&self) -> usize {
         self.episodes
     }
 
-    /// Reads all episodes that are left.
+    /// Reads all remaining episodes.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! Recovering what is sound in a damaged demonstration file.
+//! Recovery of the intact parts of a damaged recording.
 
 use std::fs::{self, File};
 use std::io::{Read, Write};
@@ -13,16 +13,16 @@ use super::header::DemoHeader;
 use super::reader::DemoReader;
 use super::{payload, preamble, second_header, store};
 
-/// A stretch of the input that holds no sound frame.
+/// A stretch of the input without an intact frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct DroppedRegion {
-    /// Where it begins, in bytes from the start of the input.
+    /// Byte offset from the start of the input.
     pub offset: u64,
     /// Its length in bytes.
     pub bytes: u64,
 }
 
-/// What [`repair`] kept and what it dropped.
+/// The result of [`repair`].
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct RepairReport {
     /// Episodes in the repaired file.
@@ -31,29 +31,28 @@ pub struct RepairReport {
     pub kept_steps: usize,
     /// Bytes of the input that were dropped: the sum over the regions.
     pub dropped_bytes: u64,
-    /// Where bytes were dropped, in the order of the file.
+    /// The dropped regions, in the order of the file.
     pub dropped_regions: Vec<DroppedRegion>,
-    /// Where the damaged file was kept, when it was repaired in place.
+    /// Path of the damaged file, when it was repaired in place.
     pub backup: Option<PathBuf>,
-    /// Where the header was found, if the one at the top is damaged.
+    /// The file that the header was taken from, if the one at the top is damaged.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub header_from: Option<PathBuf>,
 }
 
-/// Copies the header and every sound episode of `path` to `out`. A damaged header is taken from its copy in the file, and if
-/// that is damaged too from `header_from`, another recording of the same game; what does not fit that header is dropped.
+/// Copies the header and every intact episode of `path` to `out`. A damaged header is taken from its copy in the
+/// file. If that is damaged too, it is taken from `header_from`, another recording of the same game. Episodes that do
+/// not fit that header are dropped.
 ///
-/// A frame is sound when its checksum holds and its episode fits the header. After a damaged frame the
-/// search goes on at the next frame magic, so episodes behind the damage are kept too.
-/// The result is written under a temporary name and then renamed. The input is not modified, unless
-/// `out` is the same file: then the damaged file is kept beside it as `FILE.bak` (or `FILE.bak2`, … if
-/// that exists), and a file without damage is left alone.
+/// A frame is intact when its checksum holds and its episode fits the header. After a damaged frame the search
+/// continues at the next frame magic, so episodes behind the damage are kept too. The result is written under a
+/// temporary name and then renamed. The input is not modified, unless `out` is the same file. Then the damaged file
+/// is kept beside it as `FILE.bak` (or `FILE.bak2`, … if that exists), and a file without damage stays unchanged.
 ///
 /// # Errors
 ///
-/// When no header is sound, when `out` is another file that exists
-/// ([`DemoFault::Exists`]), while another program records to the file that is repaired in place
-/// ([`DemoFault::Locked`]), or when reading or writing fails.
+/// No header is valid, `out` is another file that exists ([`DemoFault::Exists`]), another program records to the file
+/// that is repaired in place ([`DemoFault::Locked`]), or reading or writing fails.
 pub fn repair(
     path: impl AsRef<Path>,
     out: impl AsRef<Path>,
@@ -96,11 +95,11 @@ struct Loaded {
     /// All of its bytes.
     input: Vec<u8>,
     header: DemoHeader,
-    /// How the repaired file begins.
+    /// The top of the repaired file.
     top: Vec<u8>,
-    /// Where frames begin.
+    /// Byte offset of the first frame.
     start: usize,
-    /// The file that the header is from, if it is not from the top of this one.
+    /// The file that the header is from, if it is not the top of this one.
     header_from: Option<PathBuf>,
 }
 
@@ -124,7 +123,7 @@ fn load(mut file: &File, path: &Path, header_from: Option<&Path>) -> Result<Load
     Ok(Loaded { input, header, top, start, header_from: Some(from) })
 }
 
-/// Appends every sound frame from `start` on to `output`.
+/// Appends every intact frame from `start` on to `output`.
 pub(super) fn salvage(input: &[u8], start: usize, header: &DemoHeader, output: &mut Vec<u8>) -> RepairReport {
     let mut report = RepairReport::default();
     let mut drop_region = |from: usize, to: usize| {
@@ -157,7 +156,7 @@ fn find_magic(bytes: &[u8]) -> Option<usize> {
     bytes.windows(FRAME_MAGIC.len()).position(|w| w == FRAME_MAGIC)
 }
 
-/// The frame at the start of `bytes` and the steps of its episode, if all of it is sound.
+/// Returns the frame at the start of `bytes` and the steps of its episode, if it is intact.
 fn sound_frame<'a>(bytes: &'a [u8], header: &DemoHeader) -> Option<(&'a [u8], usize)> {
     let length = frame::payload_length(bytes).filter(|&n| n <= MAX_PAYLOAD)?;
     let frame = bytes.get(..length + FRAME_EXTRA)?;
@@ -187,7 +186,7 @@ fn keep_backup(path: &Path, content: &[u8]) -> std::io::Result<PathBuf> {
     }
 }
 
-/// The path with something added to its file name.
+/// Returns the path with a suffix added to its file name.
 fn beside(path: &Path, suffix: &str) -> PathBuf {
     let mut name = path.as_os_str().to_owned();
     name.push(suffix);

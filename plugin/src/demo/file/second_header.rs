@@ -1,22 +1,22 @@
-//! The second copy of a header, so that damage to one of the two loses no episode.
+//! The second copy of a header, so that damage to one copy loses no episode.
 //!
-//! It stands at the end of the header, as comments of RON: the magic line and the text once more. The magic line at the top
-//! of the file gives length and checksum of both together, so that older programs read over the copy.
+//! The copy follows the header as comments of RON: the magic line and the text once more. The magic line at the top
+//! of the file gives length and checksum of both together, so older programs skip the copy.
 
 use super::frame::FRAME_MAGIC;
 use super::header::DemoHeader;
 use super::preamble;
 
-/// What makes a line a comment.
+/// Start of a comment line.
 const COMMENT: &str = "// ";
 
-/// The copy of what stands at the top of a file.
+/// Returns the copy of the text at the top of a file.
 pub(super) fn copy_of(top: &str) -> String {
     top.lines().flat_map(|line| [COMMENT, line, "\n"]).collect()
 }
 
-/// The header of a file whose header is damaged in one place, and where to look for frames; `None` if neither copy is sound, or
-/// no frame follows.
+/// Returns the header of a file whose header is damaged in one copy, and the offset at which to search for frames.
+/// `None` if neither copy is valid, or no frame follows.
 pub(super) fn recover(input: &[u8]) -> Option<(DemoHeader, usize)> {
     let frames = input.windows(FRAME_MAGIC.len()).position(|bytes| bytes == FRAME_MAGIC)?;
     let top = &input[..frames];
@@ -24,17 +24,17 @@ pub(super) fn recover(input: &[u8]) -> Option<(DemoHeader, usize)> {
     Some((header, frames))
 }
 
-/// The header that the copy gives.
+/// Returns the header of the copy.
 fn second(top: &[u8]) -> Option<DemoHeader> {
     let begin = [COMMENT, preamble::DEMO_MAGIC].concat();
-    // Bytes that are no text are another line's damage.
+    // Bytes that are no text belong to the damage of another line.
     let text = String::from_utf8_lossy(top);
     let lines = text.lines().skip(1).skip_while(|line| !line.starts_with(&begin));
     let copy: String = lines.map_while(|line| line.strip_prefix(COMMENT)).flat_map(|line| [line, "\n"]).collect();
     preamble::decode(copy.as_bytes()).ok().map(|(header, _)| header)
 }
 
-/// The header above a damaged copy: written once more, it is what the magic line at the top speaks of.
+/// Returns the header above a damaged copy, if it matches the magic line at the top once it is written again.
 fn first(top: &[u8]) -> Option<DemoHeader> {
     let text = String::from_utf8_lossy(top);
     let (line, rest) = text.split_once('\n')?;
@@ -81,7 +81,7 @@ mod tests {
         let out = folder.path().join("mended.demo");
         let error = repair(&path, &out, None).expect_err("nothing says what it is").to_string();
         let advice = format!("`playbot demo repair {} --header-from OTHER`", path.display());
-        assert!(error.contains("not a demonstration file: ") && error.contains(&advice), "{error}");
+        assert!(error.contains("not a recording: ") && error.contains(&advice), "{error}");
         assert_eq!(error.matches("demo repair").count(), 1, "what was tried is not advised again: {error}");
         assert_eq!(repair(&path, &out, Some(&other)).expect("it fits").kept_episodes, 1);
         let read = DemoReader::open(&out).and_then(DemoReader::read_all).expect("sound");

@@ -1,4 +1,4 @@
-//! What the writer needs of a file: writing, synchronising, cutting back, locking.
+//! The file operations of the writer: writing, synchronising, truncating, locking.
 
 use std::fs::{File, TryLockError};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -7,7 +7,7 @@ use playbot_learner::disk::DiskFile;
 
 use super::error::DemoFault;
 
-/// What the writer needs of a file; the tests stand in a disk that fills up.
+/// The file operations of the writer; tests substitute a disk that fills up.
 pub(super) trait Store: Write + Send + Sync {
     fn sync(&mut self) -> io::Result<()>;
     fn cut(&mut self, length: u64) -> io::Result<()>;
@@ -43,7 +43,7 @@ pub(super) mod tests {
 
     use super::*;
 
-    /// A disk with room for so many bytes more.
+    /// A disk with limited room.
     #[derive(Clone)]
     pub(in super::super) struct SmallDisk {
         pub bytes: Arc<Mutex<Vec<u8>>>,

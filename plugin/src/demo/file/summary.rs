@@ -1,4 +1,4 @@
-//! What a demonstration file holds, in a few numbers.
+//! A summary of a recording in a few numbers.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -10,9 +10,9 @@ use super::error::DemoFileError;
 use super::header::DemoHeader;
 use super::reader::DemoReader;
 
-/// What a demonstration file holds, in a few numbers.
+/// A summary of a recording in a few numbers.
 ///
-/// Means and shares are `None` where there are no episodes to take them from: they are not 0.
+/// Means and shares are `None` without episodes, not 0.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DemoSummary {
     /// The file.
@@ -33,8 +33,8 @@ pub struct DemoSummary {
     pub truncated: usize,
     /// Episodes whose recording stopped before their end.
     pub aborted: usize,
-    /// Share that terminated with success of the episodes that were recorded to their end, 0 to 1: those that are
-    /// `aborted` neither reached anything nor failed.
+    /// Share of episodes that terminated with success, 0 to 1, among those recorded to their end: `aborted` ones
+    /// count neither as successes nor as failures.
     pub success_share: Option<f64>,
     /// Mean of the undiscounted returns.
     pub return_mean: Option<f64>,
@@ -46,7 +46,7 @@ pub struct DemoSummary {
     pub level_seed_max: Option<u64>,
     /// Number of different level seeds.
     pub levels: usize,
-    /// Ticks that each decider decided; those that decided none are left out.
+    /// Ticks of each decider; deciders without ticks are left out.
     pub steps_by_decider: BTreeMap<Decider, usize>,
 }
 

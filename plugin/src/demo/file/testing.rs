@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoWriter, EpisodeActions};
 
-/// A small header with two observation values.
+/// Returns a small header with two observation values.
 pub(super) fn header() -> DemoHeader {
     DemoHeader {
         observation_names: vec!["x".into(), "y".into()],
@@ -13,7 +13,7 @@ pub(super) fn header() -> DemoHeader {
     }
 }
 
-/// An episode of `steps` ticks that fits [`header`], another one for each seed.
+/// Creates an episode of `steps` ticks that fits [`header`], different for each seed.
 pub(super) fn episode(level_seed: u64, steps: usize) -> DemoEpisode {
     let value = |t: usize| (level_seed.wrapping_mul(0x9e37_79b9) as usize).wrapping_add(t * 7919);
     DemoEpisode {

@@ -1,4 +1,4 @@
-//! Whole files: round trips, cuts at every byte, flips of every bit, hostile lengths.
+//! Tests of whole files: round trips, cuts at every byte, flips of every bit, hostile lengths.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -27,7 +27,7 @@ fn put(path: &Path, bytes: &[u8]) {
     fs::write(path, bytes).expect("written");
 }
 
-/// What `repair` writes and reports, without waiting for the disk.
+/// Returns the output and report of `repair`, without waiting for the disk.
 fn repair_in_memory(bytes: &[u8]) -> (Vec<u8>, RepairReport) {
     let (header, start) = super::preamble::decode(bytes).expect("the header is sound");
     let mut output = bytes[..start as usize].to_vec();
@@ -35,7 +35,7 @@ fn repair_in_memory(bytes: &[u8]) -> (Vec<u8>, RepairReport) {
     (output, report)
 }
 
-/// All whole episodes and, if there is one, the error behind them.
+/// Returns all whole episodes and, if there is one, the error behind them.
 fn read_lenient(path: &Path) -> Result<(Vec<DemoEpisode>, Option<DemoFileError>), DemoFileError> {
     let (mut episodes, mut error) = (Vec::new(), None);
     for item in DemoReader::open(path)? {
@@ -69,7 +69,7 @@ fn a_cut_at_any_byte_costs_at_most_the_last_episode() {
             None => assert_eq!(torn, 0),
             Some(DemoFault::TruncatedFrame { offset, episode, missing }) => {
                 assert_eq!((offset, episode), (boundaries[whole - 1], whole - 1));
-                // Until the length is on the disk, the file can only promise the smallest frame.
+                // Until the length is written, the file implies only the smallest frame.
                 let expected = if torn < 8 { 12 - torn } else { boundaries[whole] - cut as u64 };
                 assert_eq!(missing, expected);
             }
@@ -117,7 +117,7 @@ fn a_flipped_bit_is_never_believed() {
     }
 }
 
-/// A frame with a sound checksum around any payload.
+/// Returns a frame with a valid checksum around any payload.
 fn sealed(payload: &[u8]) -> Vec<u8> {
     let mut bytes = frame::FRAME_MAGIC.to_vec();
     bytes.extend_from_slice(&(payload.len() as u32).to_le_bytes());

@@ -1,4 +1,4 @@
-//! Writing demonstration files, one whole episode at a time.
+//! The writer of recordings, one whole episode at a time.
 
 use std::fs::{self, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -13,11 +13,10 @@ use super::reader::DemoReader;
 use super::store::{Store, lock};
 use super::{frame, preamble};
 
-/// Appends episodes to a demonstration file.
+/// Appends episodes to a recording.
 ///
-/// Each [`push`](Self::push) writes one frame with a single write and waits until it is on the disk: a
-/// crash costs at most the episode that is being written. While a writer lives, the file is locked
-/// against other writers.
+/// Each [`push`](Self::push) writes one frame with a single write and waits until it is on the disk. A crash loses at
+/// most the episode that is being written. While a writer lives, the file is locked against other writers.
 pub struct DemoWriter {
     path: PathBuf,
     header: DemoHeader,
@@ -43,20 +42,20 @@ impl DemoWriter {
     ///
     /// # Errors
     ///
-    /// [`DemoFault::Exists`] when there is a file already (it is left alone), [`DemoFault::HeaderValue`]
-    /// for a header that could not be read back, or [`DemoFault::Io`].
+    /// [`DemoFault::Exists`] when there is a file already (it stays unchanged), [`DemoFault::HeaderValue`] for a
+    /// header that could not be read back, or [`DemoFault::Io`].
     pub fn create(path: impl AsRef<Path>, header: DemoHeader) -> Result<Self, DemoFileError> {
         let path = path.as_ref();
         Self::start(path, header, OpenOptions::new().write(true).create_new(true)).inspect_err(|error| {
-            // A file without a header would be in the way of the next attempt.
+            // A file without a header would block the next attempt.
             if matches!(error.fault, DemoFault::Io { action: "write the header", .. }) {
                 let _ = remove_file(path);
             }
         })
     }
 
-    /// Like [`create`](Self::create), but replaces a file that exists: its episodes are lost. It is there until the header of the
-    /// new one is on the disk.
+    /// Replaces a file that exists, and loses its episodes; otherwise like [`create`](Self::create). The old file
+    /// stays until the header of the new one is on the disk.
     ///
     /// # Errors
     ///
@@ -65,15 +64,15 @@ impl DemoWriter {
     pub fn replace(path: impl AsRef<Path>, header: DemoHeader) -> Result<Self, DemoFileError> {
         let path = path.as_ref();
         match fs::canonicalize(path) {
-            // A link stays one: what it leads to is replaced.
+            // A link stays a link: its target is replaced.
             Ok(old) if old.is_file() => Self::start_in_place_of(&old, path, header),
-            // Devices and pipes hold nothing that could be lost.
+            // Devices and pipes hold no data to lose.
             _ => Self::start(path, header, OpenOptions::new().write(true).create(true).truncate(false)),
         }
     }
 
-    /// Starts under a temporary name, and takes that of the old file when the header is on the disk: whatever happens, one
-    /// of the two is there.
+    /// Starts under a temporary name, and takes that of the old file when the header is on the disk. So one of the
+    /// two files always exists.
     fn start_in_place_of(old: &Path, path: &Path, header: DemoHeader) -> Result<Self, DemoFileError> {
         let fresh = temporary_name(old);
         let attempt = || {
@@ -121,7 +120,7 @@ impl DemoWriter {
     /// # Errors
     ///
     /// [`DemoFault::HeaderDiffers`] when `header` is not that of the file (only the note may differ),
-    /// [`DemoFault::Locked`], or what [`DemoReader`] finds: a damaged file is repaired first, see
+    /// [`DemoFault::Locked`], or an error of [`DemoReader`]: repair a damaged file first, see
     /// [`repair`](super::repair::repair).
     pub fn append(path: impl AsRef<Path>, header: &DemoHeader) -> Result<Self, DemoFileError> {
         let path = path.as_ref();
@@ -154,10 +153,9 @@ impl DemoWriter {
     ///
     /// # Errors
     ///
-    /// [`DemoFault::RefusedEpisode`] when [`DemoEpisode::check`] fails (nothing is written);
-    /// [`DemoFault::PushFailed`] when the disk is full or fails: the file then ends with the episode
-    /// before this one, and `push` may be tried again; [`DemoFault::PushTorn`] when not even that could
-    /// be restored, and [`DemoFault::Torn`] from then on.
+    /// [`DemoFault::RefusedEpisode`] when [`DemoEpisode::check`] fails: nothing is written. [`DemoFault::PushFailed`]
+    /// when the disk is full or fails: the file then ends with the episode before this one, and `push` may be tried
+    /// again. [`DemoFault::PushTorn`] when the file could not be restored, and [`DemoFault::Torn`] from then on.
     pub fn push(&mut self, episode: &DemoEpisode) -> Result<(), DemoFileError> {
         self.push_inner(episode).map_err(|fault| DemoFileError::new(&self.path, fault))
     }
@@ -183,22 +181,22 @@ impl DemoWriter {
         }
     }
 
-    /// The header of the file.
+    /// Returns the header of the file.
     pub fn header(&self) -> &DemoHeader {
         &self.header
     }
 
-    /// The path of the file.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Number of episodes in the file.
+    /// Returns the number of episodes in the file.
     pub fn episodes(&self) -> usize {
         self.episodes
     }
 
-    /// Length of the file in bytes.
+    /// Returns the length of the file in bytes.
     pub fn bytes(&self) -> u64 {
         self.length
     }

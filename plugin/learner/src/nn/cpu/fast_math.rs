@@ -1,8 +1,8 @@
 //! tanh and the logistic function over slices, in a form that compilers turn into vector instructions.
 //!
-//! Only sums, products, quotients and bit operations are used, in an order that is fixed for each element: a number
-//! has the same result wherever it stands in a slice, on any number of threads, and with any vector instructions.
-//! The coefficients are minimax fits in relative error, by reweighted least squares.
+//! Only sums, products, quotients and bit operations are used, in a fixed order for each element. A number has the
+//! same result at any index of a slice, on any number of threads, and with any vector instructions. The coefficients
+//! are minimax fits in relative error, by reweighted least squares.
 
 use macerator::{AutoArch, Simd, WithSimd};
 use rayon::prelude::*;
@@ -10,9 +10,9 @@ use rayon::prelude::*;
 /// Numbers that one thread takes at a time.
 const CHUNK: usize = 1 << 14;
 
-/// Where [`tanh`] changes from its polynomial to the exponential form.
+/// Value at which [`tanh`] changes from its polynomial to the exponential form.
 const TANH_SMALL: f32 = 0.625;
-/// From here on tanh rounds to 1.
+/// Value from which on tanh rounds to 1.
 const TANH_ONE: f32 = 9.1;
 /// tanh(x) = x + x³ P(x²) up to [`TANH_SMALL`]; from the constant term up.
 const TANH_P: [f32; 5] = [-0.333_332_8, 0.133_314_42, -0.053_739_715, 0.020_639_088, -0.005_704_987_3];
@@ -24,42 +24,42 @@ const LN_2: (f32, f32) = (0.693_359_4, -0.000_212_194_44);
 /// Adding this rounds a small number to an integer, which is then in the low bits.
 const ROUND: f32 = 12_582_912.0;
 
-/// tanh(x), within 2 units in the last place; NaN stays NaN.
+/// Returns tanh(x), within 2 units in the last place; NaN stays NaN.
 #[inline(always)]
 pub(super) fn tanh(x: f32) -> f32 {
     let a = x.abs();
     let square = x * x;
     let small = a + a * square * horner(&TANH_P, square);
-    // The comparison is false for NaN, so that it is kept.
+    // The comparison is false for NaN, so NaN is kept.
     let bounded = if a > TANH_ONE { TANH_ONE } else { a };
     let large = 1.0 - 2.0 / (exp(2.0 * bounded) + 1.0);
     (if a < TANH_SMALL { small } else { large }).copysign(x)
 }
 
-/// 1 / (1 + exp(-x)), within 4 units in the last place above -87 and below 1e-37 under it; NaN stays NaN.
+/// Returns 1 / (1 + exp(-x)), within 4 units in the last place above -87 and below 1e-37 under it; NaN stays NaN.
 #[inline(always)]
 pub(super) fn sigmoid(x: f32) -> f32 {
-    // The comparisons are false for NaN, so that it is kept.
+    // The comparisons are false for NaN, so NaN is kept.
     let y = if x < -87.0 { 87.0 } else { -x };
     let y = if y < -87.0 { -87.0 } else { y };
     1.0 / (1.0 + exp(y))
 }
 
-/// exp of each number up to 88; below -87 it stays e^-87. NaN stays NaN.
+/// Writes exp of each number up to 88; below -87 the result stays e^-87. NaN stays NaN.
 #[inline(always)]
 pub(super) fn exp_into(values: &[f32], to: &mut [f32]) {
-    // The comparison is false for NaN, so that it is kept.
+    // The comparison is false for NaN, so NaN is kept.
     to.iter_mut().zip(values).for_each(|(to, &x)| *to = exp(if x < -87.0 { -87.0 } else { x }));
 }
 
-/// exp of each number, as [`exp_into`] gives it.
+/// Returns exp of each number, as [`exp_into`] does.
 pub(in crate::nn) fn exp_of(values: &[f32]) -> Vec<f32> {
     let mut exps = vec![0.0; values.len()];
     vectorized(|| exp_into(values, &mut exps));
     exps
 }
 
-/// exp(x) for |x| ≤ 88.
+/// Returns exp(x) for |x| ≤ 88.
 #[inline(always)]
 fn exp(x: f32) -> f32 {
     let shifted = x * std::f32::consts::LOG2_E + ROUND;
@@ -109,12 +109,12 @@ pub(super) fn tanh_backward(grad: &mut [f32], tanh: &[f32]) {
 mod tests {
     use super::*;
 
-    /// Every 37th finite f32, both signs.
+    /// Returns every 37th finite f32, both signs.
     fn floats() -> impl Iterator<Item = f32> {
         (0..f32::INFINITY.to_bits()).step_by(37).flat_map(|bits| [f32::from_bits(bits), -f32::from_bits(bits)])
     }
 
-    /// The distance between `got` and `want` in units in the last place of `want`.
+    /// Returns the distance between `got` and `want` in units in the last place of `want`.
     fn ulps(got: f32, want: f64) -> f64 {
         let near = (want as f32).abs().max(f32::MIN_POSITIVE);
         (f64::from(got) - want).abs() / f64::from(near.next_up() - near)

@@ -1,15 +1,20 @@
-//! Between tensors and numbers in host memory.
+//! Conversion between tensors and numbers in host memory.
 
 #![allow(deprecated, reason = "ndarray is kept as a second opinion on flex")]
 
 use burn::backend::tensor::FloatTensor;
-use burn::backend::{Backend, Flex, NdArray};
-use burn::tensor::{Shape, TensorData, read_sync};
+use burn::backend::{Backend, DispatchDevice, Flex, NdArray};
+use burn::tensor::{Device, Shape, TensorData, read_sync};
 use std::borrow::Cow;
 
-/// A backend whose numbers can be read; without a copy, if it can.
+/// Returns whether the numbers of `device` lie in host memory, where reading them costs nothing.
+pub(crate) fn is_host(device: &Device) -> bool {
+    matches!(device.clone().inner().as_dispatch(), DispatchDevice::Flex(_) | DispatchDevice::NdArray(_))
+}
+
+/// A backend whose numbers can be read, without a copy if possible.
 pub(super) trait HostNumbers: Backend {
-    /// The numbers, row-major.
+    /// Returns the numbers, row-major.
     fn numbers(tensor: &FloatTensor<Self>) -> Cow<'_, [f32]>;
 }
 
@@ -28,12 +33,12 @@ impl HostNumbers for NdArray {
     }
 }
 
-/// The numbers of a tensor in host memory; a copy only if they are shared.
+/// Returns the numbers of a tensor in host memory; copies only if they are shared.
 pub(super) fn data<B: Backend>(tensor: FloatTensor<B>) -> TensorData {
     read_sync(B::float_into_data(tensor)).expect("a backend with kernels has its numbers in host memory")
 }
 
-/// A tensor of `values`.
+/// Creates a tensor of `values`.
 pub(super) fn tensor<B: Backend>(values: Vec<f32>, shape: impl Into<Shape>, device: &B::Device) -> FloatTensor<B> {
     B::float_from_data(TensorData::new(values, shape), device)
 }

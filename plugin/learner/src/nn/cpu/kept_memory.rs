@@ -1,24 +1,24 @@
-//! Memory that one pass leaves to the next: pages that are new to the system cost as much as the sums that fill them.
+//! Memory that one pass hands to the next: new pages from the system cost as much as the sums that fill them.
 
 use std::ops::{Deref, DerefMut};
 use std::sync::{Mutex, PoisonError};
 
-/// Most pieces that wait to be taken.
+/// Largest number of waiting pieces.
 const MOST: usize = 128;
-/// Numbers below which memory is not worth keeping.
+/// Size below which memory is not worth keeping.
 const LEAST: usize = 1 << 10;
 
 static WAITING: Mutex<Vec<Vec<f32>>> = Mutex::new(Vec::new());
 
-/// Numbers of which nothing is known before they are written. They are left to others when it is dropped.
+/// Numbers with unspecified initial values. Their memory is reused after they are dropped.
 #[derive(Debug)]
 pub(in crate::nn) struct KeptMemory(Vec<f32>);
 
 impl KeptMemory {
-    /// So many numbers.
+    /// Takes memory for this many numbers.
     pub(super) fn take(len: usize) -> Self {
         let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
-        // The smallest that is large enough; what is much larger waits for others.
+        // The smallest sufficient piece; a much larger one waits for other uses.
         let fits = |numbers: &Vec<f32>| (len.max(LEAST)..=2 * len).contains(&numbers.capacity());
         let places = (0..waiting.len()).filter(|place| fits(&waiting[*place]));
         let place = places.min_by_key(|place| waiting[*place].capacity());
@@ -29,19 +29,19 @@ impl KeptMemory {
         Self(numbers)
     }
 
-    /// So many zeros.
+    /// Takes memory for this many zeros.
     pub(super) fn zeros(len: usize) -> Self {
         let mut memory = Self::take(len);
         memory.fill(0.0);
         memory
     }
 
-    /// The numbers, for a tensor. [`Self::leave`] brings them back.
+    /// Returns the numbers, for a tensor. [`Self::leave`] brings the memory back.
     pub(super) fn into_vec(mut self) -> Vec<f32> {
         std::mem::take(&mut self.0)
     }
 
-    /// Leaves numbers that nobody needs any more to others.
+    /// Gives memory back for reuse.
     pub(in crate::nn) fn leave(numbers: Vec<f32>) {
         drop(Self(numbers));
     }
@@ -54,7 +54,7 @@ impl Drop for KeptMemory {
         }
         let mut waiting = WAITING.lock().unwrap_or_else(PoisonError::into_inner);
         waiting.push(std::mem::take(&mut self.0));
-        // The one that has waited longest: nobody asks for its size any more.
+        // The piece that has waited longest: its size is no longer in use.
         let unwanted = (waiting.len() > MOST).then(|| waiting.remove(0));
         drop(waiting);
         drop(unwanted);

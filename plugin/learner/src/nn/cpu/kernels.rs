@@ -1,33 +1,45 @@
-//! Operations with loops of our own, for the backends whose numbers are in host memory.
+//! Custom operations for the backends whose numbers are in host memory.
 //!
-//! Each has its backward pass beside it and enters the gradient graph as one node. Devices without a kernel
-//! (see [`is_host`](crate::device::is_host)) take the path of plain tensor operations instead.
+//! Each has its backward pass beside it and enters the gradient graph as one node. Devices without a kernel (see
+//! [`is_host`]) use plain tensor operations instead.
 
 #![allow(deprecated, reason = "ndarray is kept as a second opinion on flex")]
 
+use super::super::activation::Activation;
 use super::fast_math;
 use super::gru_scan::{self, Scan, ScanGrads, ScanInput, Sizes, Wanted};
-use super::host_numbers::{HostNumbers, data, tensor};
+use super::host_numbers::{HostNumbers, data, is_host, tensor};
 use super::log_softmax::{log_softmax_backward, log_softmax_in_place};
 use burn::backend::autodiff::checkpoint::{base::Checkpointer, strategy::CheckpointStrategy};
 use burn::backend::autodiff::grads::Gradients;
 use burn::backend::autodiff::ops::{Backward, Ops, OpsKind, unary};
 use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, Flex, NdArray, TensorMetadata, backend_extension};
-use burn::tensor::{Shape, Tensor};
+use burn::tensor::{Shape, Tensor, activation};
 use std::sync::Arc;
 
-/// tanh of every element, on a device with kernels.
+/// Returns tanh of every element, on a device with kernels.
 pub(in crate::nn) fn tanh<const D: usize>(x: Tensor<D>) -> Tensor<D> {
     Tensor::from_dispatch(Dispatch::kernel_tanh(x.into_dispatch()))
 }
 
-/// Logarithms of the probabilities whose logits are the rows of `x`, on a device with kernels.
+impl Activation {
+    /// Applies the function to every element.
+    pub fn forward<const D: usize>(self, x: Tensor<D>) -> Tensor<D> {
+        match self {
+            Self::Relu => activation::relu(x),
+            Self::Tanh if is_host(&x.device()) => tanh(x),
+            Self::Tanh => x.tanh(),
+        }
+    }
+}
+
+/// Returns log-probabilities for the logits in the rows of `x`, on a device with kernels.
 pub(in crate::nn) fn log_softmax(x: Tensor<2>) -> Tensor<2> {
     Tensor::from_dispatch(Dispatch::kernel_log_softmax(x.into_dispatch()))
 }
 
-/// What a recurrent layer of T steps works on.
+/// The inputs of a recurrent layer of T steps.
 #[derive(Clone, Debug)]
 pub(in crate::nn) struct GruInput {
     /// Time-major, `[T * B, inputs]`.
@@ -44,7 +56,7 @@ pub(in crate::nn) struct GruInput {
     pub(in crate::nn) initial: Tensor<3>,
 }
 
-/// A layer on a device with kernels: `[T * B, directions * hidden]`.
+/// Applies a layer on a device with kernels: `[T * B, directions * hidden]`.
 pub(in crate::nn) fn gru(input: GruInput) -> Tensor<2> {
     let GruInput { x, weight_ih, weight_hh, bias_ih, bias_hh, initial } = input;
     Tensor::from_dispatch(Dispatch::kernel_gru(
@@ -57,16 +69,16 @@ pub(in crate::nn) fn gru(input: GruInput) -> Tensor<2> {
     ))
 }
 
-/// What a backend with kernels can do.
+/// A backend with kernels.
 #[backend_extension(Flex, NdArray, Autodiff)]
 pub(super) trait Kernels: Backend {
-    /// tanh of every element.
+    /// Returns tanh of every element.
     fn kernel_tanh(x: FloatTensor<Self>) -> FloatTensor<Self>;
 
-    /// ln softmax of each row.
+    /// Returns ln softmax of each row.
     fn kernel_log_softmax(x: FloatTensor<Self>) -> FloatTensor<Self>;
 
-    /// A recurrent layer, with the tensors of [`GruInput`]. Gives `[T * B, directions * hidden]`.
+    /// Applies a recurrent layer, with the tensors of [`GruInput`]. Returns `[T * B, directions * hidden]`.
     fn kernel_gru(
         x: FloatTensor<Self>,
         weight_ih: FloatTensor<Self>,
@@ -143,7 +155,7 @@ impl<B: Kernels + HostNumbers, C: CheckpointStrategy> Kernels for Autodiff<B, C>
     }
 }
 
-/// The forward pass of a recurrent layer.
+/// Does the forward pass of a recurrent layer.
 fn scanned<B: HostNumbers>(
     x: &FloatTensor<B>,
     [weight_ih, weight_hh]: [&FloatTensor<B>; 2],
@@ -193,7 +205,7 @@ impl<B: Kernels + HostNumbers> Backward<B, 1> for LogSoftmax {
 struct GruScan;
 
 impl<B: Kernels + HostNumbers> Backward<B, 6> for GruScan {
-    /// What the forward pass left, x, W_ih and W_hh.
+    /// The intermediate results of the forward pass, x, W_ih and W_hh.
     type State = (Arc<Scan>, FloatTensor<B>, FloatTensor<B>, FloatTensor<B>);
 
     fn backward(self, ops: Ops<Self::State, 6>, grads: &mut Gradients, _: &mut Checkpointer) {
@@ -222,10 +234,38 @@ impl<B: Kernels + HostNumbers> Backward<B, 6> for GruScan {
     }
 }
 
-/// The tensor after `edit`; a copy only if it is shared.
+/// Returns the tensor after `edit`; copies only if it is shared.
 fn edited<B: Backend>(tensor: FloatTensor<B>, edit: impl FnOnce(&mut [f32])) -> FloatTensor<B> {
     let device = tensor.device();
     let mut data = data::<B>(tensor);
     edit(data.as_mut_slice().expect("tensors are made of f32"));
     B::float_from_data(data, &device)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::{host, vector};
+
+    #[test]
+    fn tanh_and_its_gradient_agree_with_tensor_operations() {
+        let x: Vec<f32> = (-400..=400).map(|i| i as f32 / 40.0).collect();
+        for kind in DeviceKind::CPU {
+            let both = |function: fn(Tensor<1>) -> Tensor<1>| {
+                let x = vector(x.clone(), &kind.plain()).autodiff().require_grad();
+                let y = function(x.clone());
+                // Twice, so that gradients of two uses are added up.
+                let grads = (y.clone() * 2.0 + y.clone().square()).sum().backward();
+                [y.inner(), x.grad(&grads).expect("tracked")].map(|tensor| host(tensor).expect("readable"))
+            };
+            let want = both(|x| x.tanh());
+            let got = both(|x| Activation::Tanh.forward(x));
+            for (want, got) in want.iter().flatten().zip(got.iter().flatten()) {
+                assert!((want - got).abs() <= 1e-6, "{got} is not {want} on {kind}");
+            }
+            let nan = host(Activation::Tanh.forward(vector(vec![f32::NAN], &kind.plain()))).expect("readable");
+            assert!(nan[0].is_nan());
+        }
+    }
 }

@@ -10,15 +10,16 @@ use burn::backend::tensor::FloatTensor;
 use burn::backend::{Autodiff, Backend, Dispatch, Flex, NdArray, TensorMetadata, backend_extension};
 use burn::tensor::Tensor;
 
-/// The number `value`, `[1]`, which changes by `gradient`, of the shape of `x`, where `x` does. On a device with kernels.
+/// Returns the number `value`, `[1]`, whose gradient by `x` is `gradient`, of the shape of `x`. On a device with
+/// kernels.
 pub(crate) fn known_gradient<const D: usize>(x: Tensor<D>, value: f32, gradient: Vec<f32>) -> Tensor<1> {
     Tensor::from_dispatch(Dispatch::known_gradient(x.into_dispatch(), value, gradient))
 }
 
-/// What a backend with numbers in host memory can do.
+/// A backend with numbers in host memory.
 #[backend_extension(Flex, NdArray, Autodiff)]
 pub(super) trait KnownGradient: Backend {
-    /// As [`known_gradient`].
+    /// Adds the node as [`known_gradient`] does.
     fn known_gradient(x: FloatTensor<Self>, value: f32, gradient: Vec<f32>) -> FloatTensor<Self>;
 }
 

@@ -1,11 +1,11 @@
-//! Logarithms of the probabilities of choices, from logits.
+//! Log-probabilities of choices, from logits.
 
 use super::fast_math::{exp_into, vectorized};
 use super::share::share;
 
 /// Rows that a thread takes at a time.
 const ROWS: usize = 64;
-/// Products that take as long as an exponential.
+/// Number of products that take as long as an exponential.
 const OF_AN_EXP: usize = 20;
 
 /// Turns rows of logits into ln softmax: x - max - ln Σ exp(x - max).
@@ -15,7 +15,7 @@ pub(super) fn log_softmax_in_place(logits: &mut [f32], choices: usize) {
         let mut exps = vec![0.0; rows.len()];
         vectorized(|| {
             for row in rows.chunks_exact_mut(choices) {
-                // A NaN is no maximum, and stays in its place.
+                // A NaN is no maximum, and stays at its index.
                 let max = row.iter().copied().fold(f32::NEG_INFINITY, f32::max);
                 row.iter_mut().for_each(|x| *x -= max);
             }
@@ -28,7 +28,7 @@ pub(super) fn log_softmax_in_place(logits: &mut [f32], choices: usize) {
     });
 }
 
-/// From the gradient by the log-probabilities to that by the logits: g - p Σ g.
+/// Converts the gradient by the log-probabilities to that by the logits: g - p Σ g.
 pub(super) fn log_softmax_backward(grad: &mut [f32], log_probs: &[f32], choices: usize) {
     let products = grad.len() * OF_AN_EXP;
     share(grad, ROWS * choices, products, |piece, rows| {

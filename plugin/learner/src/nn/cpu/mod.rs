@@ -1,5 +1,5 @@
-//! Loops of our own for the backends whose numbers are in host memory: tanh, probabilities of choices and recurrent layers; and, for flex alone, dense
-//! layers and the convolutions of an image encoder.
+//! Kernels for the backends whose numbers are in host memory: tanh, probabilities of choices and recurrent layers;
+//! and, for flex alone, dense layers and the convolutions of an image encoder.
 
 pub(in crate::nn) mod dense;
 pub(in crate::nn) mod fast_math;
@@ -17,4 +17,5 @@ mod tile;
 pub(in crate::nn) mod trunk;
 
 pub(in crate::nn) use kept_memory::KeptMemory;
+pub(crate) use host_numbers::is_host;
 pub(crate) use known_gradient::known_gradient;

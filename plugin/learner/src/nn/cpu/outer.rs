@@ -89,7 +89,7 @@ impl Pairs<'_> {
         }
     }
 
-    /// As [`Self::add`], for two blocks at once.
+    /// Does [`Self::add`] for two blocks at once.
     #[inline(always)]
     fn add_pair<S: Simd, const P: usize>(&self, first: usize, y: &[f32], one: &mut [Lanes], other: &mut [Lanes]) {
         let (mut tile0, mut tile1) = ([[0.0; LANES]; P], [[0.0; LANES]; P]);

@@ -1,13 +1,14 @@
-//! How work is shared among threads.
+//! Distribution of work among threads.
 
 use crate::are_awake;
 use rayon::prelude::*;
 
-/// Products below which a second thread costs more than it saves: waking one takes as long as a million of them.
+/// Number of products below which a second thread costs more than it saves: waking one takes as long as a million of
+/// them.
 const FEW: usize = 1 << 22;
-/// The same where other threads are awake.
+/// The same limit where other threads are awake.
 const FEW_AWAKE: usize = 1 << 18;
-/// Products that take as long as a number that is put elsewhere.
+/// Number of products that take as long as moving a number.
 pub(crate) const OF_A_MOVE: usize = 8;
 
 /// Calls `work` with each piece of `len` items and its number, on all threads if there are many products in all.
@@ -19,7 +20,7 @@ pub(crate) fn share<T: Send>(items: &mut [T], len: usize, products: usize, work:
     }
 }
 
-/// [`share`] for items that are pieces already.
+/// Does [`share`] for items that are pieces already.
 pub(crate) fn share_each<T: Send>(items: &mut [T], products: usize, work: impl Fn(usize, &mut T) + Sync) {
     share(items, 1, products, |piece, items| items.iter_mut().for_each(|item| work(piece, item)));
 }

@@ -1,26 +1,26 @@
-//! What becomes of the sums of a convolution.
+//! Destinations for the sums of a convolution.
 //!
-//! These are no closures, since only what is inlined for certain is compiled for the vectors of the loops around it.
+//! These are no closures: only code that is certainly inlined is compiled for the vectors of the loops around it.
 
 use super::relu::{relu, relu_backward};
 use super::tile::{LANES, Lanes};
 
 /// Gets the sums of a pixel's channels, up to 16 at a time.
 pub(super) trait Store {
-    /// The place of the first of them in the image, how many channels there are from it on, and the sums.
+    /// Stores sums: the position of the first channel in the image, the number of channels from it on, and the sums.
     fn store(&mut self, at: usize, count: usize, sums: &Lanes);
 }
 
-/// Writes them.
+/// Writes the sums.
 pub(super) struct Write<'a>(pub(super) &'a mut [f32]);
 
-/// Writes what a ReLU makes of them.
+/// Writes the ReLU of the sums.
 pub(super) struct WriteRelu<'a>(pub(super) &'a mut [f32]);
 
-/// Adds them.
+/// Adds the sums.
 pub(super) struct Add<'a>(pub(super) &'a mut [f32]);
 
-/// Adds them to the first as gradients of a ReLU that gave the second.
+/// Adds the sums to the first slice as gradients of a ReLU whose output was the second.
 pub(super) struct AddWhere<'a>(pub(super) &'a mut [f32], pub(super) &'a [f32]);
 
 impl Store for Write<'_> {

@@ -1,22 +1,23 @@
-//! Sums of products for a few pixels and 16 channels at once, so that the sums stay in registers: where most of the time
-//! goes.
+//! Sums of products for a few pixels and 16 channels at once, so that the sums stay in registers. Most of the time
+//! goes here.
 //!
-//! Each sum is made by fused multiply-adds in an order of its own: it does not depend on what else is in the tile, on
-//! the width of vectors, or on threads. A machine without such instructions rounds twice, and gets other last bits.
+//! Each sum is made by fused multiply-adds in a fixed order: it does not depend on the rest of the tile, on the width
+//! of vectors, or on threads. A machine without such instructions rounds twice, and its last bits differ.
 
 use macerator::{Scalar, Simd, VFma};
 
-/// Channels at a time.
+/// Number of channels at a time.
 pub(super) const LANES: usize = 16;
-/// Rows at a time: with two vectors of 8 lanes each, the sums take 12 of 16 registers.
+/// Number of rows at a time: with two vectors of 8 lanes each, the sums take 12 of 16 registers.
 pub(super) const ROWS: usize = 6;
-/// Rows at a time where a vector has all lanes and there are 32 registers; more leave too few for their addresses.
+/// Number of rows at a time where a vector has all lanes and there are 32 registers; more leave too few for their
+/// addresses.
 pub(super) const WIDE_ROWS: usize = 8;
 
 /// A number for each of [`LANES`] channels.
 pub(super) type Lanes = [f32; LANES];
 
-/// What a window sees: `count` pieces of `len` numbers, from one to the next `step`.
+/// The extent of a window: `count` pieces of `len` numbers, at a distance of `step`.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Window {
     pub(super) count: usize,
@@ -24,11 +25,11 @@ pub(super) struct Window {
     pub(super) len: usize,
 }
 
-/// The sums of a window's numbers times `weights`, for the windows of `x` that begin at `starts`.
+/// Computes the sums of a window's numbers times `weights`, for the windows of `x` that begin at `starts`.
 ///
-/// `weights` has `count * len` rows for each block of 16 channels, `first` what the sums of each block start from.
-/// `store` gets the number of the window, the block and the sums: for each block all windows in their order, or, where it
-/// may be so, those of two blocks in turn, which is faster.
+/// `weights` has `count * len` rows for each block of 16 channels, and the sums of each block start from `first`.
+/// `store` gets the number of the window, the block and the sums. For each block it gets all windows in order, or,
+/// where allowed, those of two blocks in turn, which is faster.
 #[macerator::with_simd]
 pub(super) fn correlate<S: Simd, F: Fn(usize) -> Lanes, G: FnMut(usize, usize, &Lanes)>(
     x: &[f32],
@@ -69,20 +70,20 @@ pub(super) fn correlate<S: Simd, F: Fn(usize) -> Lanes, G: FnMut(usize, usize, &
     }
 }
 
-/// Whether a vector has room for all lanes; then there are 32 of them.
+/// Returns whether a vector has room for all lanes; then there are 32 of them.
 #[inline(always)]
 pub(super) fn is_wide<S: Simd>() -> bool {
     f32::lanes::<S>() >= LANES
 }
 
-/// The channels that begin at a place.
+/// Returns the channels that begin at a position.
 #[inline(always)]
 pub(super) fn lanes_at(x: &[f32], at: usize) -> &Lanes {
     let Some(lanes) = x[at..].first_chunk::<LANES>() else { unreachable!("images have slack behind their last pixel") };
     lanes
 }
 
-/// The sums of all windows for a block, tile by tile.
+/// Computes the sums of all windows for a block, tile by tile.
 #[inline(always)]
 fn strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
     x: &[f32],
@@ -105,9 +106,10 @@ fn strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
     }
 }
 
-/// As [`strip`], for two blocks at once: what is read of the windows serves both.
+/// Does [`strip`] for two blocks at once, and reads the windows only once.
 ///
-/// It stands beside it, since the sums of several blocks in one array do not stay in registers, which takes twice as long.
+/// It is separate from [`strip`], since the sums of several blocks in one array do not stay in registers, which takes
+/// twice as long.
 #[inline(always)]
 fn pair_strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
     x: &[f32],
@@ -131,7 +133,7 @@ fn pair_strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
     }
 }
 
-/// x y + z, rounded once where the machine can.
+/// Returns x y + z, rounded once where the machine can.
 #[inline(always)]
 pub(super) fn fused<S: Simd>(x: f32, y: f32, z: f32) -> f32 {
     if f32::is_accelerated::<S>() { x.mul_add(y, z) } else { x * y + z }

@@ -1,4 +1,4 @@
-//! Against the loss as a graph of tensors.
+//! Tests against the loss as a graph of tensors.
 
 use super::*;
 use crate::DeviceKind;
@@ -15,7 +15,7 @@ fn numbers(rng: &mut ChaCha8Rng, n: usize, scale: f32) -> Vec<f32> {
     (0..n).map(|_| normal(rng) * scale).collect()
 }
 
-/// A policy or decoder: choices, or a Gaussian with ln σ for all rows or for each.
+/// Returns a policy or decoder: choices, or a Gaussian with ln σ for all rows or for each.
 fn dist(rng: &mut ChaCha8Rng, kind: u8, n: usize, dim: usize, device: &Device) -> Dist {
     let head = matrix(numbers(rng, n * dim, 0.7), n, dim, device);
     let std_rows = if kind == 1 { 1 } else { n };
@@ -34,7 +34,7 @@ fn tracked(dist: Dist) -> Dist {
     }
 }
 
-/// Gradients by all numbers of the distribution and by the values, where there are any.
+/// Returns the gradients by all numbers of the distribution and by the values, where there are any.
 fn gradients(loss: Tensor<1>, dist: &Dist, values: &Tensor<1>) -> Vec<Option<Vec<f32>>> {
     let grads = loss.backward();
     let of = |grad: Option<Tensor<2>>| grad.map(|grad| host(grad).expect("readable"));

@@ -8,10 +8,10 @@ use crate::{Actions, DeviceKind, LearnError};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
 
-/// What the decoder says about many rows, in host memory.
+/// The decoder's outputs for many rows, in host memory.
 #[derive(Clone, Debug)]
 pub(crate) struct TeacherOutput {
-    /// The decoder's distributions, as the policy's are compared with them.
+    /// The decoder's distributions, in the form that is compared with the policy's.
     pub(crate) dist: HostDist,
     /// The weight of each row: the decoder's confidence.
     pub(crate) confidence: Vec<f32>,
@@ -29,7 +29,7 @@ pub struct TeacherBatch {
 }
 
 impl TeacherOutput {
-    /// The given rows as constants on `device`.
+    /// Returns the given rows as constants on `device`.
     pub(crate) fn batch(&self, rows: &[usize], device: &Device) -> TeacherBatch {
         TeacherBatch {
             dist: self.dist.rows(rows, device),
@@ -38,7 +38,7 @@ impl TeacherOutput {
         }
     }
 
-    /// Mean confidence of some rows.
+    /// Returns the mean confidence of some rows.
     pub(crate) fn mean_confidence(&self, rows: &[usize]) -> f64 {
         let sum: f64 = rows.iter().map(|&r| f64::from(self.confidence[r])).sum();
         sum / rows.len() as f64
@@ -46,8 +46,8 @@ impl TeacherOutput {
 }
 
 impl Teacher {
-    /// The distributions of what the policy is tied to, and its confidence, in `states` where `actions` were taken; `None` if there is no penalty.
-    /// `squashed`: the policy is a squashed Gaussian.
+    /// Returns the distributions of the network that the policy is tied to, and its confidence, in `states` where
+    /// `actions` were taken; `None` if there is no penalty. `squashed`: the policy is a squashed Gaussian.
     pub(crate) fn output<R: Rng + ?Sized>(
         &self,
         states: StateBatch<'_>,

@@ -17,7 +17,7 @@ impl Teacher {
         file.put_network("prior", &self.actors.prior)
     }
 
-    /// What [`Self::put`] has added to `file`, the checkpoint of a policy of `spec`.
+    /// Takes the teacher that [`Self::put`] has added out of `file`, the checkpoint of a policy of `spec`.
     pub(crate) fn take(
         (config, tied_to): (ScoreConfig, TiedTo),
         description: SkillDescription,

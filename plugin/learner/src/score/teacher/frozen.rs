@@ -1,4 +1,4 @@
-//! A frozen skill model, and what a learner that is tied to it takes from it.
+//! A frozen skill model in the form that a tied learner needs.
 
 use crate::nn::moved;
 use crate::norm::ObsStats;
@@ -9,7 +9,7 @@ use crate::{DeviceKind, LearnError, PolicySpec};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// Which network of a skill model a policy starts as and stays close to.
+/// The network of a skill model that a policy starts as and stays close to.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum TiedTo {
     /// The decoder π(a | s, z), for a policy that acts.
@@ -25,19 +25,19 @@ impl TiedTo {
     }
 }
 
-/// The decoder and the prior of a skill model, and how a learner uses them.
+/// The decoder and the prior of a skill model, and the settings for their use.
 #[derive(Clone, Debug)]
 pub(crate) struct Teacher {
     pub(crate) config: ScoreConfig,
     pub(crate) tied_to: TiedTo,
     pub(crate) description: SkillDescription,
     pub(super) actors: Actors,
-    /// How decoder and prior see observations, and the policy that is tied to them.
+    /// Frozen normalisation of observations for decoder, prior and the policy that is tied to them.
     pub(crate) stats: Option<Arc<ObsStats>>,
 }
 
 impl Teacher {
-    /// `model`, used as `config` says.
+    /// Creates a teacher of `model`, used by the settings of `config`.
     pub(crate) fn new(
         config: ScoreConfig,
         tied_to: TiedTo,
@@ -54,7 +54,7 @@ impl Teacher {
         Ok(Self { config, tied_to, description, actors, stats })
     }
 
-    /// What a policy tied to this skill model reads and does.
+    /// Returns the inputs and outputs of a policy that is tied to this skill model.
     pub(crate) fn policy_spec(&self) -> PolicySpec {
         let latent = if self.config.condition { self.latent() } else { 0 };
         match self.tied_to {
@@ -63,7 +63,7 @@ impl Teacher {
         }
     }
 
-    /// The layers of a policy that is a copy.
+    /// Returns the layers of a policy that is a copy.
     pub(crate) fn shape(&self) -> ActorShape {
         match self.tied_to {
             TiedTo::Decoder => self.description.decoder_shape(),
@@ -71,7 +71,7 @@ impl Teacher {
         }
     }
 
-    /// Width of the skills that a rollout of the policy must hold.
+    /// Returns the width of the skills that a rollout of the policy must hold.
     pub(crate) fn rollout_latent(&self) -> usize {
         match self.tied_to {
             TiedTo::Decoder => self.latent(),
@@ -79,17 +79,18 @@ impl Teacher {
         }
     }
 
-    /// Width of a skill.
+    /// Returns the width of a skill.
     pub(crate) fn latent(&self) -> usize {
         self.description.config.latent
     }
 
-    /// Whether the policy's layers are those of the network that it is tied to, and not those that the learner's settings describe.
+    /// Returns whether the policy's layers are those of the network that it is tied to, and not those of the
+    /// learner's settings.
     pub(crate) fn is_copied(&self) -> bool {
         self.config.init_from_decoder
     }
 
-    /// What a policy that is a copy starts as.
+    /// Returns the network that a copying policy starts as.
     pub(crate) fn origin(&self) -> &Actor {
         match self.tied_to {
             TiedTo::Decoder => &self.actors.decoder,
@@ -97,30 +98,30 @@ impl Teacher {
         }
     }
 
-    /// `Ok` if these settings can work. `norm_obs`: the learner would normalise observations itself.
+    /// Checks that these settings are possible. `norm_obs`: the learner would normalise observations itself.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if they cannot.
+    /// [`LearnError::Config`] if they are not.
     pub(crate) fn check(&self, norm_obs: bool) -> Result<(), LearnError> {
         self.config.validate()?;
         self.config.check_space(self.policy_spec().action_space)?;
         let bad = |text: &str| Err(LearnError::Config(text.to_owned()));
         if norm_obs && self.description.config.norm_obs {
             return bad(
-                "norm_obs does not go with a skill model that normalises observations: the policy sees them through \
-                 the same frozen normaliser, not through a running one of its own",
+                "norm_obs cannot be combined with a skill model that normalises observations: the policy uses the same \
+                 frozen normaliser",
             );
         }
         if norm_obs && self.is_copied() {
             return bad(
-                "norm_obs does not go with score init_from_decoder: the decoder reads raw observations; a skill model \
-                 with norm_obs of its own normalises for both",
+                "norm_obs cannot be combined with score init_from_decoder: the decoder reads raw observations; set \
+                 norm_obs of the skill model, which then normalises for both",
             );
         }
         Ok(())
     }
 
-    /// Where skills come from, by [`ScoreConfig::prior`].
+    /// Returns the source of skills, by [`ScoreConfig::prior`].
     pub(crate) fn prior(&self, device: DeviceKind) -> Prior {
         match self.config.prior {
             PriorKind::StandardNormal => Prior::standard_normal(self.latent(), self.description.config.tanh_latent),
@@ -128,24 +129,24 @@ impl Teacher {
         }
     }
 
-    /// Skills from `actor`, which has the prior's layers.
+    /// Returns skills from `actor`, which has the prior's layers.
     pub(crate) fn prior_of(&self, actor: &Actor, device: DeviceKind) -> Prior {
         let (latent, tanh) = (self.latent(), self.description.config.tanh_latent);
         Prior::learned(actor, self.stats.clone(), self.description.observation, latent, tanh, device.plain())
     }
 
-    /// Prior and decoder with the horizon and the draw, as a policy needs them in play.
+    /// Returns prior and decoder with the skill interval and the draw, as a policy needs them in play.
     pub(crate) fn source(&self, device: DeviceKind) -> SkillSource {
         self.source_of(self.prior(device), device)
     }
 
-    /// The same with skills from `prior`.
+    /// Does [`Self::source`] with skills from `prior`.
     pub(crate) fn source_of(&self, prior: Prior, device: DeviceKind) -> SkillSource {
         let (horizon, draw) = (self.config.horizon, self.config.skill_draw);
         SkillSource { prior, decoder: self.decoder_policy(device), horizon, draw }
     }
 
-    /// The network that the policy is tied to, as a policy.
+    /// Returns the network that the policy is tied to, as a policy.
     pub(super) fn origin_policy(&self, device: DeviceKind) -> Policy {
         match self.tied_to {
             TiedTo::Decoder => self.decoder_policy(device),
@@ -153,7 +154,7 @@ impl Teacher {
         }
     }
 
-    /// The decoder as a policy.
+    /// Returns the decoder as a policy.
     pub(crate) fn decoder_policy(&self, device: DeviceKind) -> Policy {
         self.policy_of(&self.actors.decoder, self.description.decoder_spec(), device)
     }

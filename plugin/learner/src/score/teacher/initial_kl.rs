@@ -1,4 +1,4 @@
-//! How far a policy is from its teacher, which must be nothing where it starts as a copy.
+//! The divergence of a policy from its teacher, which must be 0 if it starts as a copy.
 
 use super::Teacher;
 use crate::nn::{HostDist, scalar, unsquashed};
@@ -7,8 +7,8 @@ use crate::score::decoder_kl;
 use crate::{DeviceKind, LearnError};
 
 impl Teacher {
-    /// Mean divergence between decoder and `policy` over `states`, in nats, which must be exactly 0 for a copy that is
-    /// `untrained`.
+    /// Returns the mean divergence between decoder and `policy` over `states`, in nats, which must be exactly 0 for a
+    /// copy that is `untrained`.
     pub(crate) fn initial_kl(
         &self,
         policy: &Policy,

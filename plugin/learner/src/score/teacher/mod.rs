@@ -1,4 +1,4 @@
-//! The teacher: the decoder and the prior of a skill model, which do not learn any more.
+//! The teacher: the frozen decoder and prior of a skill model.
 
 mod batch;
 mod checkpoint;

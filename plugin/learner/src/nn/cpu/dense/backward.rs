@@ -1,4 +1,4 @@
-//! From the gradient of the last layer's output to those of all parameters and the input.
+//! The backward pass: from the gradient of the last layer's output to those of all parameters and the input.
 
 use super::forward::{Layer, MOST_LAYERS, ROWS, pieces, products, rows_product};
 use super::packed::Packed;
@@ -6,18 +6,19 @@ use super::params::{LayerSums, ParamGrads, param_grads};
 use super::sum_grads::{SumGrads, through_activation};
 use crate::nn::cpu::share::share_each;
 
-/// What is asked for.
+/// The requested gradients.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Wanted {
-    /// Otherwise the gradient of the input is empty, which saves a product.
+    /// False if the gradient of the input may stay empty, which saves a product.
     pub(super) x: bool,
-    /// Otherwise those of the parameters are.
+    /// False if the gradients of the parameters may stay empty.
     pub(super) params: bool,
 }
 
-/// The gradients of the input `[n, inputs]` and of each layer's parameters, for `grad`, that of the last layer's output.
+/// Returns the gradients of the input `[n, inputs]` and of each layer's parameters, for `grad`, the gradient of the
+/// last layer's output.
 ///
-/// `outputs` are those of all layers.
+/// `outputs` holds the outputs of all layers.
 pub(super) fn backward(
     grad: &[f32],
     x: &[f32],
@@ -38,9 +39,9 @@ pub(super) fn backward(
     (of_x, param_grads(&of_layers.collect::<Vec<_>>()))
 }
 
-/// The gradients of all layers' sums, and that of the input unless it is empty.
+/// Computes the gradients of all layers' sums, and that of the input unless it is empty.
 fn to_sums(grad: &[f32], layers: &[Layer<'_>], outputs: &[&[f32]], sums: &mut [SumGrads], of_x: &mut [f32]) {
-    // The layers whose inputs have gradients; the first one's only if it is asked for.
+    // The layers whose inputs have gradients; the first one only on request.
     let first = usize::from(of_x.is_empty());
     let turned = Packed::all(&layers.iter().skip(first).map(Layer::turned).collect::<Vec<_>>());
     let strides: Vec<usize> = sums.iter().map(SumGrads::stride).collect();

@@ -1,4 +1,4 @@
-//! Rows through layers.
+//! The forward pass of rows through layers.
 
 use super::packed::{Matrix, Packed, block_of};
 use crate::nn::Activation;
@@ -11,7 +11,7 @@ use crate::nn::cpu::tile::{LANES, Window, correlate};
 
 /// Rows that a thread takes at a time.
 pub(super) const ROWS: usize = 32;
-/// Layers of one operation, at most.
+/// Largest number of layers of one operation.
 pub(super) const MOST_LAYERS: usize = 3;
 
 /// The activation of x W + b.
@@ -19,7 +19,7 @@ pub(super) const MOST_LAYERS: usize = 3;
 pub(super) struct Layer<'a> {
     /// W, `[inputs, outputs]`.
     pub(super) weights: &'a [f32],
-    /// b, `[outputs]`, of which there is one at least.
+    /// b, `[outputs]`; at least one.
     pub(super) bias: &'a [f32],
     pub(super) activation: Option<Activation>,
 }
@@ -37,13 +37,14 @@ impl<'a> Layer<'a> {
         Matrix { numbers: self.weights, rows: self.inputs(), columns: self.outputs(), is_turned: false }
     }
 
-    /// What takes the gradient of the sums to that of the input.
+    /// Returns the matrix from the gradient of the sums to that of the input.
     pub(super) fn turned(&self) -> Matrix<'a> {
         Matrix { numbers: self.weights, rows: self.outputs(), columns: self.inputs(), is_turned: true }
     }
 }
 
-/// The outputs of all layers but the last, and those of the last, for rows `[n, inputs]`; there is one layer at least.
+/// Returns the outputs of all layers but the last, and those of the last, for rows `[n, inputs]`. Needs at least one
+/// layer.
 pub(super) fn forward(x: &[f32], layers: &[Layer<'_>]) -> (Vec<KeptMemory>, Vec<f32>) {
     let (inputs, last) = (layers[0].inputs(), &layers[layers.len() - 1]);
     let n = x.len() / inputs;
@@ -69,12 +70,12 @@ pub(super) fn forward(x: &[f32], layers: &[Layer<'_>]) -> (Vec<KeptMemory>, Vec<
     (hidden, out)
 }
 
-/// The products that a row takes.
+/// Returns the number of products for a row.
 pub(super) fn products(layers: &[Layer<'_>]) -> usize {
     layers.iter().map(|layer| layer.weights.len()).sum()
 }
 
-/// The numbers of each few of `n` rows, one list for each of the given numbers, which have so many for a row.
+/// Splits lists of `n` rows into pieces of a few rows each. Each list has its own number of values per row.
 pub(super) fn pieces<'a>(
     numbers: impl Iterator<Item = (&'a mut [f32], usize)>,
     n: usize,
@@ -84,8 +85,8 @@ pub(super) fn pieces<'a>(
     (0..n.div_ceil(ROWS)).map(|_| std::array::from_fn(&mut next)).collect()
 }
 
-/// x W + b, `[n, columns]` for the rows `[n, rows of W]`, which begin every `stride` numbers of `x`, in memory that is there
-/// already; nothing of what it held is left. Without `bias` sums start from 0.
+/// Writes x W + b, `[n, columns]`, to existing memory, overwriting all of it. The rows `[n, rows of W]` begin every
+/// `stride` numbers of `x`. Without `bias` sums start from 0.
 pub(in crate::nn::cpu) fn product_into(out: &mut [f32], x: &[f32], stride: usize, weights: &Packed, bias: &[f32]) {
     let columns = weights.columns;
     let products = out.len() * weights.rows;
@@ -94,7 +95,7 @@ pub(in crate::nn::cpu) fn product_into(out: &mut [f32], x: &[f32], stride: usize
     });
 }
 
-/// [`product_into`] for at most [`ROWS`] rows, which begin every `out_stride` numbers of `out`.
+/// Does [`product_into`] for at most [`ROWS`] rows, which begin every `out_stride` numbers of `out`.
 pub(super) fn rows_product(
     out: &mut [f32],
     out_stride: usize,

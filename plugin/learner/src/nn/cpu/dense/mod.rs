@@ -1,12 +1,12 @@
 //! Dense layers with their activations, one after the other, as one operation for the flex backend.
 //!
-//! burn writes what a product gives, reads it to add the bias, and reads it again for the activation; each of these is a
-//! node of the gradient graph of its own. Here a few rows at a time go through all layers while they are in the cache, and
-//! back again; one node gives the gradients of all weights and biases and of the input. Threads meet five times in all,
-//! however many layers there are, so that small networks can be shared, too.
+//! burn writes a product's result, reads it to add the bias, and reads it again for the activation. Each of these is
+//! a node of the gradient graph. Here a few rows at a time go through all layers while they are in the cache, and
+//! back again; one node gives all gradients. Threads synchronise five times in total, however many layers there are,
+//! so small networks can be shared, too.
 //!
-//! A row of the output does not depend on the rest of the batch, every sum is made by one thread in an order of its own, and
-//! so nothing depends on the number of threads.
+//! A row of the output does not depend on the rest of the batch. Every sum is made by one thread in a fixed order, so
+//! nothing depends on the number of threads.
 
 mod backward;
 mod forward;

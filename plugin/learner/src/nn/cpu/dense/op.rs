@@ -23,10 +23,12 @@ pub(in crate::nn) struct Dense<'a> {
     pub(in crate::nn) weight: &'a Tensor<2>,
     /// b, `[outputs]`.
     pub(in crate::nn) bias: &'a Tensor<1>,
+    /// Applied to every output; none for a linear layer.
     pub(in crate::nn) activation: Option<Activation>,
 }
 
-/// The layers, one after the other: `[n, outputs of the last]` for x `[n, inputs]`. `None` if this is not on flex.
+/// Applies the layers, one after the other: `[n, outputs of the last]` for x `[n, inputs]`. Returns `None` if this is
+/// not on flex.
 pub(in crate::nn) fn dense(x: &Tensor<2>, layers: &[Dense<'_>]) -> Option<Tensor<2>> {
     let is_flex = matches!(x.device().inner().as_dispatch(), DispatchDevice::Flex(_));
     if !is_flex || x.dims().contains(&0) || layers.iter().any(|layer| layer.weight.dims().contains(&0)) {
@@ -60,10 +62,10 @@ impl Params<Dispatch> {
     }
 }
 
-/// What a backend with dense layers can do.
+/// A backend with dense layers.
 #[backend_extension(Flex, Autodiff)]
 pub(super) trait DenseLayers: Backend {
-    /// As [`dense`], with the activation of each layer.
+    /// Applies the layers as [`dense`] does, with the activation of each layer.
     fn dense(
         x: FloatTensor<Self>,
         #[extension_type] params: Params<Self>,
@@ -92,7 +94,7 @@ impl<B: DenseLayers + HostNumbers, C: CheckpointStrategy> DenseLayers for Autodi
     }
 }
 
-/// The operation on x and the parameters as a node of the gradient graph.
+/// Records the operation on x and the parameters as a node of the gradient graph.
 fn recorded<B: DenseLayers + HostNumbers, C: CheckpointStrategy, const N: usize>(
     tensors: [FloatTensor<Autodiff<B, C>>; N],
     activations: Vec<Option<Activation>>,
@@ -112,7 +114,7 @@ fn recorded<B: DenseLayers + HostNumbers, C: CheckpointStrategy, const N: usize>
     }
 }
 
-/// The numbers of weights and biases.
+/// Returns the numbers of weights and biases.
 fn numbers<B: HostNumbers>(params: &[FloatTensor<B>]) -> Vec<Cow<'_, [f32]>> {
     params.iter().map(B::numbers).collect()
 }
@@ -122,7 +124,7 @@ fn layers<'a>(params: &'a [Cow<'_, [f32]>], activations: &[Option<Activation>]) 
     pairs.map(|([weights, bias], &activation)| Layer { weights, bias, activation }).collect()
 }
 
-/// The outputs of all layers but the last, and that of the last.
+/// Returns the outputs of all layers but the last, and that of the last.
 fn forwards<B: HostNumbers>(
     x: &FloatTensor<B>,
     params: &[FloatTensor<B>],
@@ -138,14 +140,14 @@ fn forwards<B: HostNumbers>(
 #[derive(Debug)]
 struct DenseBackward;
 
-/// What the forward pass leaves to the backward pass.
+/// The data that the forward pass keeps for the backward pass.
 #[derive(Clone, Debug)]
 struct Pass<B: Backend> {
     /// x, then W and b of each layer.
     tensors: Vec<FloatTensor<B>>,
     /// The outputs of all layers but the last.
     hidden: Arc<Vec<KeptMemory>>,
-    /// That of the last.
+    /// The output of the last layer.
     y: FloatTensor<B>,
     activations: Vec<Option<Activation>>,
 }

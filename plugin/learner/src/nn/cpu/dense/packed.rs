@@ -8,11 +8,11 @@ use crate::nn::cpu::tile::{LANES, Lanes};
 #[derive(Clone, Copy, Debug)]
 pub(in crate::nn::cpu) struct Matrix<'a> {
     pub(in crate::nn::cpu) numbers: &'a [f32],
-    /// Numbers that the product takes of each row.
+    /// Numbers of each row that the product reads.
     pub(in crate::nn::cpu) rows: usize,
-    /// Numbers that it gives for each.
+    /// Numbers of each row that it writes.
     pub(in crate::nn::cpu) columns: usize,
-    /// Whether the numbers are those of the transpose, `[columns, rows]`.
+    /// True if the numbers are those of the transpose, `[columns, rows]`.
     pub(in crate::nn::cpu) is_turned: bool,
 }
 
@@ -46,19 +46,19 @@ pub(in crate::nn::cpu) struct Packed {
 }
 
 impl Packed {
-    /// The blocks.
+    /// Returns the blocks.
     pub(super) fn lanes(&self) -> &[Lanes] {
         self.numbers.as_chunks().0
     }
 
-    /// Of one matrix.
+    /// Packs one matrix.
     pub(in crate::nn::cpu) fn new(matrix: Matrix<'_>) -> Self {
         let mut packed = Self::unwritten(&matrix);
         Self::write(std::slice::from_mut(&mut packed), &[matrix]);
         packed
     }
 
-    /// Of each matrix.
+    /// Packs each matrix.
     pub(super) fn all(matrices: &[Matrix<'_>]) -> Vec<Self> {
         let mut all: Vec<Self> = matrices.iter().map(Self::unwritten).collect();
         Self::write(&mut all, matrices);
@@ -80,7 +80,7 @@ impl Packed {
     }
 }
 
-/// The numbers of a block of 16; zeros beyond the last one.
+/// Returns the numbers of a block of 16; zeros beyond the last one.
 #[inline(always)]
 pub(super) fn block_of(numbers: &[f32], block: usize) -> Lanes {
     let rest = numbers.get(block * LANES..).unwrap_or(&[]);

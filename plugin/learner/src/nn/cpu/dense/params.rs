@@ -10,13 +10,13 @@ use crate::nn::cpu::tile::{LANES, Lanes, WIDE_ROWS, Window};
 /// Rows of weights that a thread takes at a time.
 const PART: usize = 32;
 
-/// What the gradients of a layer's parameters are made from.
+/// The inputs of the gradients of a layer's parameters.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::nn::cpu) struct LayerSums<'a> {
-    /// What came in, `[n, inputs]`.
+    /// Input of the layer, `[n, inputs]`.
     pub(in crate::nn::cpu) x: &'a [f32],
     pub(in crate::nn::cpu) inputs: usize,
-    /// The gradients of what x W + b gave.
+    /// The gradients of x W + b.
     pub(in crate::nn::cpu) sums: &'a SumGrads,
 }
 
@@ -27,7 +27,7 @@ pub(in crate::nn::cpu) struct ParamGrads {
     pub(in crate::nn::cpu) bias: Vec<f32>,
 }
 
-/// The gradients of each layer's parameters.
+/// Returns the gradients of each layer's parameters.
 pub(in crate::nn::cpu) fn param_grads(layers: &[LayerSums<'_>]) -> Vec<ParamGrads> {
     let empty = layers.iter().map(|LayerSums { inputs, sums, .. }| ParamGrads {
         weights: KeptMemory::take(inputs * sums.columns).into_vec(),
@@ -45,7 +45,7 @@ pub(in crate::nn::cpu) fn param_grads(layers: &[LayerSums<'_>]) -> Vec<ParamGrad
     found
 }
 
-/// Where rows begin.
+/// Positions at which rows begin.
 struct Places {
     x: Vec<usize>,
     sums: Vec<usize>,
@@ -65,7 +65,7 @@ struct Part<'a> {
     /// The first of them.
     first: usize,
     weights: &'a mut [f32],
-    /// The first part has the biases, too.
+    /// The biases, in the first part only.
     bias: Option<&'a mut [f32]>,
 }
 

@@ -14,34 +14,34 @@ pub(in crate::nn::cpu) struct SumGrads {
 }
 
 impl SumGrads {
-    /// Numbers that are yet to be written.
+    /// Allocates numbers that are yet to be written.
     pub(in crate::nn::cpu) fn unwritten(n: usize, columns: usize) -> Self {
         Self { columns, values: KeptMemory::take(n * stride(columns)) }
     }
 
-    /// From one row to the next.
+    /// Returns the distance from one row to the next.
     pub(in crate::nn::cpu) fn stride(&self) -> usize {
         stride(self.columns)
     }
 
-    /// All rows.
+    /// Returns all rows.
     pub(in crate::nn::cpu) fn values(&self) -> &[f32] {
         &self.values
     }
 
-    /// All rows, to be written; what fills them up does not matter.
+    /// Returns all rows, to be written; their padding does not matter.
     pub(in crate::nn::cpu) fn values_mut(&mut self) -> &mut [f32] {
         &mut self.values
     }
 }
 
-/// From one row to the next, for so many columns.
+/// Returns the distance from one row to the next, for this many columns.
 fn stride(columns: usize) -> usize {
     columns.next_multiple_of(LANES)
 }
 
-/// Takes rows of a gradient of outputs, in the layout of [`SumGrads`], to that of the sums; `y` is what the activation gave,
-/// `[n, columns]`.
+/// Converts rows of a gradient of outputs, in the layout of [`SumGrads`], to that of the sums; `y` is the
+/// activation's output, `[n, columns]`.
 pub(super) fn through_activation(sums: &mut [f32], y: &[f32], columns: usize, activation: Option<Activation>) {
     let rows = sums.chunks_exact_mut(stride(columns)).zip(y.chunks_exact(columns));
     match activation {

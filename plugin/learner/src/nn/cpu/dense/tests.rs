@@ -1,4 +1,4 @@
-//! The operation against plain tensor operations.
+//! Tests of the operation against plain tensor operations.
 
 use super::{Dense, dense};
 use crate::nn::{Activation, host, matrix, vector};
@@ -23,7 +23,7 @@ fn plain(x: &Tensor<2>, layers: &[Dense<'_>]) -> Tensor<2> {
     })
 }
 
-/// What goes in.
+/// A chain of layers with its input.
 #[derive(Clone)]
 struct Case {
     n: usize,
@@ -48,7 +48,7 @@ impl Case {
         Self { n, widths: widths.to_vec(), activations: activations.to_vec(), x, params, wanted }
     }
 
-    /// The output, and the gradients of the input and of each layer's weights and biases.
+    /// Returns the output, and the gradients of the input and of each layer's weights and biases.
     fn run(&self, chain: Chain) -> Vec<Vec<f32>> {
         let device: Device = DeviceKind::Flex.plain();
         let (inputs, outputs) = (self.widths[0], self.widths[self.widths.len() - 1]);
@@ -75,8 +75,8 @@ fn read<const D: usize>(grad: Option<Tensor<D>>) -> Vec<f32> {
     host(grad.expect("tracked")).expect("readable")
 }
 
-/// Single layers and chains of them, in shapes that fit nothing. The seed is one for which no sum is so close to the kink of
-/// a ReLU that another order of adding takes it to the other side.
+/// Returns single layers and chains of them, in odd shapes. With this seed no sum is so close to the kink of a ReLU
+/// that another order of adding moves it across.
 fn cases() -> impl Iterator<Item = Case> {
     let mut rng = Streams::new(6).stream("dense", 0);
     let mut shapes = vec![

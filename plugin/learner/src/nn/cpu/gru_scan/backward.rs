@@ -1,4 +1,4 @@
-//! The gradients of the inputs from those of the states.
+//! The backward pass: the gradients of the inputs from those of the states.
 
 use super::scan::of_direction;
 use super::{Direction, Scan, ScanInput, Sizes};
@@ -7,7 +7,7 @@ use crate::nn::cpu::fast_math::vectorized;
 use crate::nn::cpu::kept_memory::KeptMemory;
 use rayon::prelude::*;
 
-/// Gradients of all that enters [`super::forward`], in its shapes.
+/// Gradients of all inputs of [`super::forward`], in their shapes.
 pub(in crate::nn) struct ScanGrads {
     pub(in crate::nn) x: Vec<f32>,
     pub(in crate::nn) weight_ih: Vec<f32>,
@@ -17,15 +17,15 @@ pub(in crate::nn) struct ScanGrads {
     pub(in crate::nn) initial: Vec<f32>,
 }
 
-/// What of [`ScanGrads`] costs a product of its own and is asked for.
+/// The parts of [`ScanGrads`] that are requested and cost a product of their own.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::nn) struct Wanted {
     pub(in crate::nn) x: bool,
-    /// Else that of the initial states lacks its recurrent part.
+    /// False if the gradient of the initial states may lack its recurrent part.
     pub(in crate::nn) initial: bool,
 }
 
-/// The gradients for `output`, that of the outputs.
+/// Returns the gradients for `output`, the gradient of the outputs.
 pub(in crate::nn) fn backward(output: &[f32], input: ScanInput<'_>, scan: &Scan, wanted: Wanted) -> ScanGrads {
     let sizes = scan.sizes;
     let parts = scan.directions.par_iter().enumerate().map(|(d, run)| {
@@ -56,7 +56,7 @@ pub(in crate::nn) fn backward(output: &[f32], input: ScanInput<'_>, scan: &Scan,
     all
 }
 
-/// A direction's part of [`backward`], with its weights of input and state.
+/// Returns a direction's part of [`backward`], with its weights of input and state.
 fn of_one_direction(
     output: &[f32],
     x: &[f32],
@@ -99,14 +99,14 @@ fn of_one_direction(
 
 /// The gradients of a direction's sums, for T * B rows.
 struct GateGrads {
-    /// Of a.
+    /// Gradients of a.
     input: SumGrads,
-    /// Of c.
+    /// Gradients of c.
     recurrent: SumGrads,
 }
 
-/// One step for all rows of the batch: from the gradient of the state after it to those of a, c and, but for the part
-/// that goes through c, of the state before it.
+/// Does one step for all rows of the batch: from the gradient of the state after it to those of a, c and the state
+/// before it, except for the part that goes through c.
 #[inline(always)]
 fn step_backward(
     grads: &mut GateGrads,

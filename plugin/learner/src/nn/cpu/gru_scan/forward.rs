@@ -1,4 +1,4 @@
-//! The states from the inputs.
+//! The forward pass: the states from the inputs.
 
 use super::scan::of_direction;
 use super::{Direction, Scan, ScanInput, Sizes};
@@ -7,8 +7,8 @@ use crate::nn::cpu::fast_math::{sigmoid, tanh, vectorized};
 use crate::nn::cpu::kept_memory::KeptMemory;
 use rayon::prelude::*;
 
-/// The outputs `[T * B, directions * hidden]`, with the biases of input and state, `[directions, 3 * hidden]` each, and the
-/// states before the first step, `[directions, B, hidden]`.
+/// Returns the outputs `[T * B, directions * hidden]`, with the biases of input and state, `[directions, 3 * hidden]`
+/// each, and the states before the first step, `[directions, B, hidden]`.
 pub(in crate::nn) fn forward(
     input: ScanInput<'_>,
     (bias_ih, bias_hh): (&[f32], &[f32]),
@@ -28,7 +28,7 @@ pub(in crate::nn) fn forward(
     (joined(&runs, sizes), Scan { sizes, directions: runs })
 }
 
-/// One direction, for its sums x W_ih + b_ih.
+/// Scans one direction, for its sums x W_ih + b_ih.
 fn scan(sums: &[f32], weights: &Packed, bias: &[f32], initial: &[f32], backwards: bool, sizes: Sizes) -> Direction {
     let (block, gates) = (sizes.block(), sizes.batch * sizes.gates());
     let numbers = || KeptMemory::take(sizes.steps * block);
@@ -47,7 +47,7 @@ fn scan(sums: &[f32], weights: &Packed, bias: &[f32], initial: &[f32], backwards
     run
 }
 
-/// One step for all rows of the batch; `a` is x W_ih + b_ih, `c` is h W_hh + b_hh.
+/// Does one step for all rows of the batch; `a` is x W_ih + b_ih, `c` is h W_hh + b_hh.
 #[inline(always)]
 fn step(run: &mut Direction, t: usize, a: &[f32], c: &[f32], sizes: Sizes) {
     let (hidden, gates) = (sizes.hidden, sizes.gates());
@@ -78,7 +78,7 @@ fn step(run: &mut Direction, t: usize, a: &[f32], c: &[f32], sizes: Sizes) {
     }
 }
 
-/// The states after each step of all directions, `[T * B, directions * hidden]`.
+/// Returns the states after each step of all directions, `[T * B, directions * hidden]`.
 fn joined(runs: &[Direction], sizes: Sizes) -> Vec<f32> {
     let mut out = Vec::with_capacity(runs.len() * sizes.steps * sizes.block());
     for t in 0..sizes.steps {

@@ -1,4 +1,4 @@
-//! Sizes of a recurrent layer's sequence, what enters it, and what its forward pass leaves for the backward pass.
+//! Sizes, inputs and intermediate results of a recurrent layer's sequence.
 
 use crate::nn::cpu::kept_memory::KeptMemory;
 
@@ -12,7 +12,7 @@ pub(in crate::nn) struct Sizes {
     pub(in crate::nn) directions: usize,
 }
 
-/// What enters a layer, in host memory: see [`crate::nn::cpu::kernels::GruInput`].
+/// The inputs of a layer, in host memory: see [`crate::nn::cpu::kernels::GruInput`].
 #[derive(Clone, Copy, Debug)]
 pub(in crate::nn) struct ScanInput<'a> {
     pub(in crate::nn) x: &'a [f32],
@@ -20,7 +20,7 @@ pub(in crate::nn) struct ScanInput<'a> {
     pub(in crate::nn) weight_hh: &'a [f32],
 }
 
-/// What a forward pass leaves for the backward pass.
+/// The data that a forward pass keeps for the backward pass.
 #[derive(Debug)]
 pub(in crate::nn) struct Scan {
     pub(in crate::nn) sizes: Sizes,
@@ -48,25 +48,25 @@ impl Sizes {
         3 * self.hidden
     }
 
-    /// Numbers in one step of states.
+    /// Returns the numbers in one step of states.
     pub(super) fn block(self) -> usize {
         self.batch * self.hidden
     }
 
-    /// The time steps in the order in which a direction reads them.
+    /// Returns the time steps in the order in which a direction reads them.
     pub(super) fn order(self, backwards: bool) -> impl Iterator<Item = usize> {
         (0..self.steps).map(move |s| if backwards { self.steps - 1 - s } else { s })
     }
 }
 
 impl Direction {
-    /// Where in `states` the state before and after the step at time `t` begin, in blocks.
+    /// Returns the positions in `states` of the state before and after the step at time `t`, in blocks.
     pub(super) fn around(&self, t: usize) -> (usize, usize) {
         if self.backwards { (t + 1, t) } else { (t, t + 1) }
     }
 }
 
-/// A direction's share of what all directions have together.
+/// Returns a direction's part of data that all directions share.
 pub(super) fn of_direction(all: &[f32], d: usize, directions: usize) -> &[f32] {
     let len = all.len() / directions;
     &all[d * len..(d + 1) * len]

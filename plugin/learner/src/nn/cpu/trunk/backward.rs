@@ -1,4 +1,4 @@
-//! From the gradient of the features to those of the parameters.
+//! The backward pass: from the gradient of the features to those of the parameters.
 
 use super::forward::SavedActivations;
 use super::group::{self, Group};
@@ -13,14 +13,14 @@ use crate::nn::cpu::store::{AddWhere, Write};
 use crate::nn::cpu::tile::{LANES, Lanes};
 use rayon::prelude::*;
 
-/// Into how many parts a batch is split, each with its own sums of gradients.
+/// Number of parts into which a batch is split, each with its own sums of gradients.
 const PARTS: usize = 32;
-/// Images of a part, at least.
+/// Smallest number of images of a part.
 const IMAGES: usize = 8;
 
-/// The gradients of all parameters, layer by layer, for the gradient `[n, Plan::features]` of the features.
+/// Returns the gradients of all parameters, layer by layer, for the gradient `[n, Plan::features]` of the features.
 ///
-/// The parts depend on the batch alone and are added in order: the sums are the same on any number of threads.
+/// The parts depend on the batch alone and are added in order, so the sums are the same on any number of threads.
 pub(super) fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivations, grad: &[f32]) -> Vec<f32> {
     let n = grad.len() / plan.features();
     let part = n.div_ceil(PARTS).max(IMAGES);
@@ -70,20 +70,20 @@ pub(super) fn gradients(plan: &Plan, weights: &[Weights], saved: &SavedActivatio
     params
 }
 
-/// `all` in pieces, one for each layer, which have so many of them.
+/// Splits `all` into pieces, one for each layer, of that layer's length.
 fn by_layer<'a, T>(plan: &Plan, mut all: &'a mut [T], count: fn(&Layer) -> usize) -> Vec<&'a mut [T]> {
     let of_layer = |layer| all.split_off_mut(..count(layer)).expect("there is some for each layer");
     plan.layers.iter().map(of_layer).collect()
 }
 
-/// From the gradients of what a ReLU gave to those of what it got.
+/// Converts the gradients of a ReLU's output to those of its input.
 fn mask(grads: &mut [f32], values: &[f32]) {
     vectorized(|| grads.iter_mut().zip(values).for_each(|(grad, &value)| *grad = relu_backward(value, *grad)));
 }
 
-/// All steps for one image, from the last; the gradient of the image itself is not needed. `grads` is laid out as
-/// [`Plan::lean`], with zeros in the borders. Weights of a convolution before a ReLU get no gradients if a [`Group`] sees to
-/// them.
+/// Does all steps for one image, from the last; the gradient of the image itself is not needed. `grads` is laid out
+/// as [`Plan::lean`], with zeros in the borders. Weights of a convolution before a ReLU get no gradients if a
+/// [`Group`] computes them.
 fn backward(
     plan: &Plan,
     weights: &[Weights],

@@ -1,4 +1,4 @@
-//! From images to features.
+//! The forward pass: from images to features.
 
 use super::layer::Weights;
 use super::plan::{Layout, Plan, Step};
@@ -10,10 +10,10 @@ use crate::nn::cpu::relu::relu;
 use crate::nn::cpu::store::{Add, Write, WriteRelu};
 use rayon::prelude::*;
 
-/// Images that a thread takes at a time, at least.
+/// Smallest number of images that a thread takes at a time.
 const IMAGES: usize = 4;
 
-/// What the backward pass needs of all images.
+/// The activations of all images for the backward pass.
 #[derive(Debug)]
 pub(super) struct SavedActivations {
     /// [`Plan::kept`] of each image.
@@ -22,7 +22,7 @@ pub(super) struct SavedActivations {
     pub(super) marks: Vec<u8>,
 }
 
-/// Features `[n, Plan::features]` of the images `[n, channels, height, width]`, and nothing else.
+/// Returns only the features `[n, Plan::features]` of the images `[n, channels, height, width]`.
 pub(super) fn features(plan: &Plan, weights: &[Weights], images: &[f32]) -> Vec<f32> {
     let mut out = vec![0.0; images.len() / image_len(plan) * plan.features()];
     let work = out.par_chunks_mut(plan.features()).zip(images.par_chunks(image_len(plan))).with_min_len(IMAGES);
@@ -34,7 +34,7 @@ pub(super) fn features(plan: &Plan, weights: &[Weights], images: &[f32]) -> Vec<
     out
 }
 
-/// As [`features`], and keeps what the backward pass needs.
+/// Does [`features`], and keeps the data for the backward pass.
 pub(super) fn features_and_saved(plan: &Plan, weights: &[Weights], images: &[f32]) -> (Vec<f32>, SavedActivations) {
     let n = images.len() / image_len(plan);
     let mut out = vec![0.0; n * plan.features()];
@@ -63,7 +63,7 @@ fn write(plan: &Plan, layout: &Layout, values: &[f32], out: &mut [f32]) {
     plan.slots[plan.last].write(layout.read(plan.last, values), out, relu);
 }
 
-/// All steps for one image. `values` has zeros in the borders.
+/// Does all steps for one image. `values` has zeros in the borders.
 fn forward(
     plan: &Plan,
     layout: &Layout,

@@ -1,6 +1,6 @@
-//! How the pixels of one image lie in memory.
+//! The layout of one image's pixels in memory.
 
-/// Numbers that every image has after its last: vectors and tiles may read, never use, what follows a row.
+/// Unused numbers after the last one of every image: vectors and tiles may read, but never use, numbers behind a row.
 const SLACK: usize = 16;
 
 /// An image with its channels last, in a border of zeros.
@@ -18,7 +18,7 @@ impl Grid {
         (self.width + 2 * self.border) * self.channels
     }
 
-    /// Numbers of the image with its border and what may be read behind it.
+    /// Returns the numbers of the image with its border and the readable numbers behind it.
     pub(super) fn len(self) -> usize {
         (self.height + 2 * self.border) * self.row() + SLACK
     }
@@ -28,12 +28,12 @@ impl Grid {
         self.channels * self.height * self.width
     }
 
-    /// Where a pixel begins.
+    /// Returns the position at which a pixel begins.
     pub(super) fn at(self, y: usize, x: usize) -> usize {
         (y + self.border) * self.row() + (x + self.border) * self.channels
     }
 
-    /// Where each pixel begins, row by row.
+    /// Returns the position at which each pixel begins, row by row.
     pub(super) fn places(self) -> Vec<usize> {
         (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.at(y, x))).collect()
     }
@@ -50,19 +50,19 @@ impl Grid {
         }
     }
 
-    /// The rows without the border.
+    /// Returns the rows without the border.
     pub(super) fn rows(self, values: &[f32]) -> impl Iterator<Item = &[f32]> {
         (0..self.height).map(move |y| &values[self.at(y, 0)..][..self.width * self.channels])
     }
 
-    /// The rows without the border.
+    /// Returns the rows without the border.
     pub(super) fn rows_mut(self, values: &mut [f32]) -> impl Iterator<Item = &mut [f32]> {
         let from = self.border * (self.row() + self.channels);
         let rows = values[from..].chunks_mut(self.row().max(1)).take(self.height);
         rows.map(move |row| &mut row[..self.width * self.channels])
     }
 
-    /// Reads an image `[channels, height, width]`; the border is left alone.
+    /// Reads an image `[channels, height, width]`; the border is unchanged.
     pub(super) fn read(self, image: &[f32], values: &mut [f32]) {
         for (y, row) in self.rows_mut(values).enumerate() {
             for c in 0..self.channels {
@@ -72,7 +72,7 @@ impl Grid {
         }
     }
 
-    /// The image as `[channels, height, width]`, each number after `change`.
+    /// Writes the image as `[channels, height, width]`, each number after `change`.
     pub(super) fn write(self, values: &[f32], image: &mut [f32], change: impl Fn(f32) -> f32) {
         for (y, row) in self.rows(values).enumerate() {
             for c in 0..self.channels {

@@ -1,16 +1,17 @@
 //! The gradients of weights over several images at once.
 //!
-//! A layer with many weights and few pixels takes longer to fetch its sums than to add to them. Where nothing in the memory
-//! of an image is written twice, the gradients of several images wait for each other. Sums are made in the same order.
+//! A layer with many weights and few pixels takes longer to fetch its sums than to add to them. If no memory of an
+//! image is written twice, the gradients of several images are collected and added together. The order of the sums
+//! stays the same.
 
 use super::layer::Layer;
 use super::plan::{Plan, Step};
 use crate::nn::cpu::tile::Lanes;
 
-/// Images that are taken together.
+/// Number of images that are taken together.
 pub(super) const IMAGES: usize = 4;
 
-/// Where the pixels of several images are, layer by layer.
+/// Positions of the pixels of several images, layer by layer.
 #[derive(Clone, Debug)]
 pub(super) struct Group {
     layers: Vec<Places>,
@@ -18,14 +19,14 @@ pub(super) struct Group {
 
 #[derive(Clone, Debug)]
 struct Places {
-    /// Where the windows of all images begin.
+    /// Positions at which the windows of all images begin.
     starts: Vec<usize>,
-    /// The outputs that go with them.
+    /// Positions of their outputs.
     outputs: Vec<usize>,
 }
 
 impl Group {
-    /// `None` if a stage writes something twice, or has products of its own.
+    /// Returns `None` if a stage writes memory twice, or has products of its own.
     pub(super) fn new(plan: &Plan) -> Option<Self> {
         let places = |step: &Step| match *step {
             Step::Relu { layer, input, output } if !plan.layers[layer].has_points => {

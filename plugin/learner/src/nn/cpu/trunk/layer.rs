@@ -1,25 +1,24 @@
 //! One convolution of one image.
 
 use super::grid::Grid;
-use super::shape::ConvShape;
+use super::shape::{ConvShape, window_places};
 use super::winograd::{self, PointBuffers};
 use crate::nn::cpu::outer::{column_sums, outer};
 use crate::nn::cpu::store::{Add, Store, Write};
 use crate::nn::cpu::tile::{LANES, Lanes, Window, correlate};
-use crate::nn::window_places;
 
 /// A convolution between two grids.
 #[derive(Clone, Debug)]
 pub(super) struct Layer {
     shape: ConvShape,
-    /// Whether it is made with fewer products: see [`winograd`].
+    /// True if it is computed with fewer products: see [`winograd`].
     pub(super) has_points: bool,
     pub(super) input: Grid,
     pub(super) output: Grid,
-    /// Where the window of each output pixel begins.
+    /// Position at which the window of each output pixel begins.
     pub(super) starts: Vec<usize>,
     pub(super) outputs: Vec<usize>,
-    /// For a gradient that is a convolution: where the window of each input pixel begins in the output.
+    /// For a gradient that is a convolution: position at which the window of each input pixel begins in the output.
     back: Vec<usize>,
     inputs: Vec<usize>,
 }
@@ -30,13 +29,13 @@ pub(super) struct Weights {
     /// For each block of 16 outputs: row, column and input channel of the kernel. Or their [`points`](winograd::points).
     forward: Vec<Lanes>,
     bias: Vec<Lanes>,
-    /// If the sizes are the same, as `forward` with inputs and outputs exchanged and the kernel turned around.
-    /// Otherwise for each row and 16 numbers of it: the outputs. Or their points.
+    /// If the sizes are the same, as `forward` with inputs and outputs exchanged and the kernel rotated. Otherwise
+    /// for each row and 16 numbers of it: the outputs. Or their points.
     backward: Vec<Lanes>,
 }
 
 impl Layer {
-    /// `None` if the kernel does not fit, or has padding without keeping the size.
+    /// Returns `None` if the kernel does not fit, or has padding without keeping the size.
     pub(super) fn new(shape: ConvShape, height: usize, width: usize) -> Option<Self> {
         if !shape.same() && shape.padding > 0 {
             return None;
@@ -66,8 +65,8 @@ impl Layer {
         Window { count: kernel, step: self.input.row(), len: kernel * inputs }
     }
 
-    /// The layer's weights from its parameters: `[outputs, inputs, kernel, kernel]`, then the biases. Without the
-    /// order for the gradient of the input if it is not needed.
+    /// Returns the layer's weights from its parameters: `[outputs, inputs, kernel, kernel]`, then the biases. The
+    /// order for the gradient of the input is left out if it is not needed.
     pub(super) fn weights(&self, params: &[f32], backward: bool) -> Weights {
         let shape = self.shape;
         let (weights, biases) = params.split_at(params.len() - shape.outputs);
@@ -90,7 +89,7 @@ impl Layer {
         Weights { forward: packed, bias, backward: turned }
     }
 
-    /// Rows of sums that [`Self::add_gradients`] adds to.
+    /// Returns the rows of sums that [`Self::add_gradients`] adds to.
     pub(super) fn sums(&self) -> usize {
         self.weight_sums() + self.shape.outputs.div_ceil(LANES)
     }
@@ -100,12 +99,12 @@ impl Layer {
         if self.has_points { winograd::rows(inputs, outputs) } else { self.shape.forward_rows() }
     }
 
-    /// Parameters as in [`Self::weights`].
+    /// Returns the number of parameters, as in [`Self::weights`].
     pub(super) fn params(&self) -> usize {
         self.shape.params()
     }
 
-    /// `store` gets the sums of products, with the bias, by places in the output.
+    /// Computes the convolution: `store` gets the sums of products, with the bias, by positions in the output.
     pub(super) fn forward(&self, x: &[f32], weights: &Weights, buffers: &mut PointBuffers, mut store: impl Store) {
         let channels = self.shape.outputs;
         if self.has_points {
@@ -136,7 +135,7 @@ impl Layer {
         column_sums(grad, &self.outputs, bias);
     }
 
-    /// As [`Self::add_gradients`], for windows and outputs at these places.
+    /// Does [`Self::add_gradients`] for windows and outputs at these positions.
     pub(super) fn add_gradients_at(
         &self,
         x: &[f32],
@@ -150,7 +149,7 @@ impl Layer {
         column_sums(grad, outputs, bias);
     }
 
-    /// The gradients of the parameters, in their order, from sums over all images.
+    /// Returns the gradients of the parameters, in their order, from sums over all images.
     pub(super) fn gradients(&self, sums: &[Lanes], params: &mut [f32]) {
         let (sums, bias) = sums.split_at(self.weight_sums());
         let (weights, biases) = params.split_at_mut(params.len() - self.shape.outputs);
@@ -162,7 +161,8 @@ impl Layer {
         biases.iter_mut().zip(bias.iter().flatten()).for_each(|(to, sum)| *to = *sum);
     }
 
-    /// The gradient of the input for one of the output, which has zeros in its border; the input's is left alone.
+    /// Computes the gradient of the input from one of the output, which has zeros in its border; the input's border
+    /// is unchanged.
     pub(super) fn backward(&self, grad: &[f32], weights: &Weights, buffers: &mut PointBuffers, to: &mut [f32]) {
         if self.shape.same() {
             self.backward_same(grad, weights, buffers, Write(to));
@@ -171,7 +171,8 @@ impl Layer {
         }
     }
 
-    /// As [`Self::backward`], where input and output are of the same size. `store` gets the gradients, by places in the input.
+    /// Does [`Self::backward`] where input and output are of the same size. `store` gets the gradients, by positions
+    /// in the input.
     pub(super) fn backward_same(
         &self,
         grad: &[f32],
@@ -199,7 +200,7 @@ impl Layer {
         );
     }
 
-    /// As [`Self::backward`], without padding.
+    /// Does [`Self::backward`] without padding.
     fn backward_scatter(&self, grad: &[f32], weights: &Weights, to: &mut [f32]) {
         to.fill(0.0);
         let Window { step, len, .. } = self.window();
@@ -211,8 +212,8 @@ impl Layer {
             pixel,
             &weights.backward,
             |_| [0.0; LANES],
-            // Windows overlap: the order in which they are added must be the same on every machine. It is, if the two blocks
-            // are other channels.
+            // Windows overlap, so they must be added in the same order on every machine. This holds if the two blocks
+            // are different channels.
             self.shape.inputs.is_multiple_of(2 * LANES),
             |pixel, tile, sums| {
                 let first = tile % tiles * LANES;

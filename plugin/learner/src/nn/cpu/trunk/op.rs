@@ -14,20 +14,20 @@ use burn::tensor::{Device, Tensor};
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Whether `device` has this operation.
+/// Returns whether `device` has this operation.
 pub(super) fn is_flex(device: &Device) -> bool {
     matches!(device.clone().inner().as_dispatch(), DispatchDevice::Flex(_))
 }
 
-/// Features of `pixels`, on flex; `params` has the parameters of all layers, one after the other.
+/// Returns the features of `pixels`, on flex; `params` has the parameters of all layers, one after the other.
 pub(super) fn trunk(pixels: Tensor<4>, params: Tensor<1>, plan: Arc<Plan>) -> Tensor<2> {
     Tensor::from_dispatch(Dispatch::trunk(pixels.into_dispatch(), params.into_dispatch(), plan))
 }
 
-/// What a backend with trunks can do.
+/// A backend with trunks.
 #[backend_extension(Flex, Autodiff)]
 pub(super) trait Trunks: Backend {
-    /// As [`trunk`].
+    /// Returns the features as [`trunk`] does.
     fn trunk(pixels: FloatTensor<Self>, params: FloatTensor<Self>, plan: Arc<Plan>) -> FloatTensor<Self>;
 }
 
@@ -54,7 +54,7 @@ impl<B: Trunks + HostNumbers, C: CheckpointStrategy> Trunks for Autodiff<B, C> {
     }
 }
 
-/// What a forward pass leaves for the backward pass.
+/// The data that a forward pass keeps for the backward pass.
 #[derive(Debug)]
 struct Run {
     plan: Arc<Plan>,

@@ -1,4 +1,4 @@
-//! What is computed for each image, and where in memory it is.
+//! The computation for each image, and its layout in memory.
 
 use super::grid::Grid;
 use super::layer::Layer;
@@ -24,7 +24,7 @@ pub(super) enum Step {
     Residual { layers: [usize; 2], x: usize, relu: usize, inner: usize },
 }
 
-/// Where the slots are in the memory of one image: what a step writes is always behind what it reads.
+/// Positions of the slots in the memory of one image: a step always writes behind the slot that it reads.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Layout {
     slots: Vec<(usize, usize)>,
@@ -36,15 +36,15 @@ pub(super) struct Layout {
 pub(super) struct Plan {
     pub(super) layers: Vec<Layer>,
     pub(super) steps: Vec<Step>,
-    /// What is computed; slot 0 is the image.
+    /// The computed slots; slot 0 is the image.
     pub(super) slots: Vec<Grid>,
     /// The slot of the result, before the last ReLU.
     pub(super) last: usize,
-    /// Stages before their pooling, which are needed only for a moment.
+    /// Stages before their pooling, which are needed only briefly.
     pub(super) wides: Vec<Grid>,
-    /// A place for every slot: the backward pass needs them all.
+    /// A layout with room for every slot: the backward pass needs them all.
     pub(super) kept: Layout,
-    /// The insides of a stage's later blocks take the place of the first block's.
+    /// A layout in which a stage's later blocks share the room of the first block.
     pub(super) lean: Layout,
     /// Marks of the poolings of an image; not 0, so that those of all images can be split.
     pub(super) marks: usize,
@@ -60,24 +60,24 @@ impl Layout {
         self.slots.push(self.slots[slot]);
     }
 
-    /// Where a slot begins.
+    /// Returns the position at which a slot begins.
     pub(super) fn start(&self, slot: usize) -> usize {
         self.slots[slot].0
     }
 
-    /// A slot's numbers.
+    /// Returns a slot's numbers.
     pub(super) fn read<'a>(&self, slot: usize, values: &'a [f32]) -> &'a [f32] {
         let (start, len) = self.slots[slot];
         &values[start..start + len]
     }
 
-    /// A slot's numbers.
+    /// Returns a slot's numbers, mutably.
     pub(super) fn write<'a>(&self, slot: usize, values: &'a mut [f32]) -> &'a mut [f32] {
         let (start, len) = self.slots[slot];
         &mut values[start..start + len]
     }
 
-    /// The numbers of two slots, of which the second is behind the first.
+    /// Returns the numbers of two slots, of which the second is behind the first.
     pub(super) fn two<'a>(&self, first: usize, second: usize, values: &'a mut [f32]) -> (&'a mut [f32], &'a mut [f32]) {
         let ((start, len), (split, second)) = (self.slots[first], self.slots[second]);
         let (before, after) = values.split_at_mut(split);
@@ -86,7 +86,8 @@ impl Layout {
 }
 
 impl Plan {
-    /// `None` without stages, or if they do not fit each other or an image `[channels, height, width]`.
+    /// Creates the plan. Returns `None` without stages, or if they do not fit each other or an image `[channels,
+    /// height, width]`.
     pub(super) fn new(stages: &[StageShape], [channels, height, width]: [usize; 3]) -> Option<Self> {
         let (StageShape::Relu(first) | StageShape::Pool(first) | StageShape::Residual([first, _])) = stages.first()?;
         let mut plan = Self {
@@ -108,7 +109,7 @@ impl Plan {
         Some(plan)
     }
 
-    /// Numbers that an image becomes.
+    /// Returns the number of features of an image.
     pub(super) fn features(&self) -> usize {
         self.slots[self.last].numbers()
     }
@@ -136,7 +137,7 @@ impl Plan {
                 Some(Step::Pool { layer, input, output: self.last, wide: self.wides.len() - 1, marks })
             }
             StageShape::Residual([shape0, shape1]) => {
-                // It changes its input in place, of which the backward pass of a ReLU needs to know what it was.
+                // It changes its input in place, but the backward pass of a ReLU needs that input.
                 if matches!(self.steps.last(), Some(Step::Relu { .. })) {
                     return None;
                 }
@@ -154,7 +155,7 @@ impl Plan {
         }
     }
 
-    /// Adds a layer that reads `input`; gives its number and what it writes.
+    /// Adds a layer that reads `input`; returns its number and its output.
     fn layer(&mut self, shape: ConvShape, input: Grid) -> Option<(usize, Grid)> {
         let layer = Layer::new(shape, input.height, input.width).filter(|layer| layer.input == input)?;
         let output = layer.output;
@@ -162,7 +163,7 @@ impl Plan {
         Some((self.layers.len() - 1, output))
     }
 
-    /// Adds a slot; in the lean layout it may have the place of an older one.
+    /// Adds a slot; in the lean layout it may share the room of an older one.
     fn slot(&mut self, grid: Grid, shared: Option<usize>) -> usize {
         self.slots.push(grid);
         self.kept.add(grid);

@@ -9,7 +9,7 @@ use std::ops::Range;
 
 /// Numbers of a transformed tile: 4×4 points.
 pub(super) const POINTS: usize = 16;
-/// A side of it.
+/// Side of a transformed tile.
 const SIDE: usize = 4;
 
 /// Some rows of the tiles of an image.
@@ -20,19 +20,20 @@ pub(super) struct Strip {
     across: usize,
 }
 
-/// Numbers of a point in a strip, about: the points of a strip stay in the cache.
+/// Approximate numbers of a point in a strip: the points of a strip stay in the cache.
 const NUMBERS: usize = 1024;
 
 impl Strip {
-    /// The strips of an image; all but the last have the same size. `channels` are those of what has more of them.
+    /// Returns the strips of an image; all but the last have the same size. `channels` is the larger of the two
+    /// numbers of channels.
     pub(super) fn of(grid: Grid, channels: usize) -> impl Iterator<Item = Self> {
         let (down, across) = (grid.height / 2, grid.width / 2);
         let most = (NUMBERS / (across * channels).max(1)).clamp(1, down.max(1));
         (0..down).step_by(most).map(move |first| Self { first, count: most.min(down - first), across })
     }
 
-    /// The points of its tiles: a matrix for each, which has a block more than it needs, or the points of a tile would fall on
-    /// the same lines of the cache.
+    /// Returns the layout of its points: a matrix for each point. It has one unneeded block, without which the points
+    /// of a tile would share lines of the cache.
     pub(super) fn matrices(self, channels: usize) -> Matrices {
         let rows = self.count * self.across;
         Matrices { rows, columns: channels, step: rows * channels + LANES }
@@ -61,21 +62,21 @@ fn minus(one: &Lanes, other: &Lanes) -> Lanes {
     to
 }
 
-/// Bᵀd of a column: (d₀ − d₂, d₁ + d₂, d₂ − d₁, d₁ − d₃).
+/// Returns Bᵀd of a column: (d₀ − d₂, d₁ + d₂, d₂ − d₁, d₁ − d₃).
 #[inline(always)]
 fn seen([d0, d1, d2, d3]: [&Lanes; SIDE]) -> [Lanes; SIDE] {
     [minus(d0, d2), plus(d1, d2), minus(d2, d1), minus(d1, d3)]
 }
 
-/// [`seen`] of the column of pixels below the one at a place.
+/// Returns [`seen`] of the column of pixels below a position.
 #[inline(always)]
 fn column(x: &[f32], at: usize, row: usize) -> [Lanes; SIDE] {
     let x = &x[at..];
     seen([lanes_at(x, 0), lanes_at(x, row), lanes_at(x, 2 * row), lanes_at(x, 3 * row)])
 }
 
-/// Bᵀ d B of the 4×4 pixels that each 2×2 pixels of a convolution see: `v` gets, point by point, tile by tile, the channels.
-/// `x` lies in `grid`, with its border.
+/// Computes Bᵀ d B of the 4×4 input pixels of each 2×2 output pixels of a convolution: `v` gets, point by point, tile
+/// by tile, the channels. `x` lies in `grid`, with its border.
 #[macerator::with_simd]
 #[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
 pub(super) fn transform_seen<S: Simd>(x: &[f32], grid: Grid, strip: Strip, v: &mut [f32]) {
@@ -104,13 +105,14 @@ pub(super) fn transform_seen<S: Simd>(x: &[f32], grid: Grid, strip: Strip, v: &m
     }
 }
 
-/// A y of a column: (y₀, y₀ + y₁, y₀ − y₁, −y₁).
+/// Returns A y of a column: (y₀, y₀ + y₁, y₀ − y₁, −y₁).
 #[inline(always)]
 fn spread(y0: &Lanes, y1: &Lanes) -> [Lanes; SIDE] {
     [*y0, plus(y0, y1), minus(y0, y1), minus(&[0.0; LANES], y1)]
 }
 
-/// A g Aᵀ of each 2×2 pixels of a gradient: `v` gets, point by point, tile by tile, the channels. `grad` lies in `grid`.
+/// Computes A g Aᵀ of each 2×2 pixels of a gradient: `v` gets, point by point, tile by tile, the channels. `grad`
+/// lies in `grid`.
 #[macerator::with_simd]
 #[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
 pub(super) fn transform_gradient<S: Simd>(grad: &[f32], grid: Grid, strip: Strip, v: &mut [f32]) {
@@ -136,7 +138,7 @@ pub(super) fn transform_gradient<S: Simd>(grad: &[f32], grid: Grid, strip: Strip
     }
 }
 
-/// Aᵀm of a column: (m₀ + m₁ + m₂, m₁ − m₂ − m₃).
+/// Returns Aᵀm of a column: (m₀ + m₁ + m₂, m₁ − m₂ − m₃).
 #[inline(always)]
 fn gathered([m0, m1, m2, m3]: [&Lanes; SIDE]) -> [Lanes; 2] {
     let (mut top, mut bottom) = ([0.0; LANES], [0.0; LANES]);
@@ -149,7 +151,7 @@ fn gathered([m0, m1, m2, m3]: [&Lanes; SIDE]) -> [Lanes; 2] {
     [top, bottom]
 }
 
-/// [`gathered`] of a column of a tile's points.
+/// Returns [`gathered`] of a column of a tile's points.
 #[inline(always)]
 fn gathered_column(m: &[f32], j: usize, step: usize) -> [Lanes; 2] {
     let point = [j, SIDE + j, 2 * SIDE + j, 3 * SIDE + j];
@@ -161,7 +163,7 @@ fn gathered_column(m: &[f32], j: usize, step: usize) -> [Lanes; 2] {
     ])
 }
 
-/// Aᵀ m A of each tile, with the bias of its block: `store` gets the sums by places in `grid`.
+/// Computes Aᵀ m A of each tile, with the bias of its block: `store` gets the sums by positions in `grid`.
 #[macerator::with_simd]
 #[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
 pub(super) fn transform_back<S: Simd, F: Fn(usize) -> Lanes, T: Store>(

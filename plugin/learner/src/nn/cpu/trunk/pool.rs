@@ -1,27 +1,28 @@
-//! The largest of 3×3 pixels, at every second pixel.
+//! Max-pooling of 3×3 pixels, at every second pixel.
 
 use super::grid::Grid;
 use crate::nn::cpu::tile::{LANES, Lanes};
-use crate::nn::window_places;
+use super::shape::window_places;
 use macerator::Simd;
 use std::ops::Range;
 
-/// A side of the window.
+/// Side of the window.
 const SIDE: usize = 3;
 
-/// Sides of the pooled image.
+/// Returns the side of the pooled image.
 pub(super) fn pooled(side: usize) -> usize {
     window_places(side, SIDE, 2, 1).unwrap_or(0)
 }
 
-/// The rows or columns of a window that are inside an image of `side`: numbers in the window, from the one at `start`.
+/// Returns the rows or columns of a window that are inside an image of `side`: numbers in the window, from the one at
+/// `start`.
 #[inline(always)]
 fn inside(place: usize, side: usize) -> Range<usize> {
     let first = usize::from(place == 0);
     first..SIDE.min(side + 1 - 2 * place)
 }
 
-/// Pools `x`; `marks` gets for each channel of each pixel which of the nine was the (first) largest.
+/// Pools `x`; `marks` gets, for each channel of each pixel, the index of the (first) largest of the nine.
 #[macerator::with_simd]
 #[allow(clippy::extra_unused_type_parameters, reason = "S says which instructions the loop is compiled for")]
 pub(super) fn forward<S: Simd>(x: &[f32], from: Grid, y: &mut [f32], to: Grid, marks: &mut [u8]) {
@@ -57,7 +58,7 @@ fn largest(x: &[f32], from: Grid, row: usize, column: usize) -> (Lanes, [u32; LA
             };
             let number = (dy * SIDE + dx) as u32;
             for j in 0..LANES {
-                // A number that is none wins, so that it is not hidden.
+                // NaN wins, so that it is not hidden.
                 let wins = x[j] > best[j] || x[j].is_nan();
                 best[j] = if wins { x[j] } else { best[j] };
                 which[j] = if wins { number } else { which[j] };
@@ -67,7 +68,7 @@ fn largest(x: &[f32], from: Grid, row: usize, column: usize) -> (Lanes, [u32; LA
     (best, which)
 }
 
-/// The gradient of the pooled image's input; all of `to` inside the border is written.
+/// Computes the gradient of the pooled image's input; writes all of `to` inside the border.
 pub(super) fn backward(grad: &[f32], of: Grid, marks: &[u8], to: &mut [f32], grid: Grid) {
     to.fill(0.0);
     let channels = grid.channels;

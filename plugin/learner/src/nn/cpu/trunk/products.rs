@@ -1,28 +1,30 @@
 //! Products of small matrices, for [`winograd`](super::winograd).
 //!
-//! As in [`tile`](super::tile), each sum is made by fused multiply-adds in an order of its own, whatever the width of
+//! As in [`tile`](super::tile), each sum is made by fused multiply-adds in a fixed order, whatever the width of
 //! vectors.
 
 use crate::nn::cpu::tile::{LANES, Lanes, fused, is_wide, lanes_at};
 use macerator::Simd;
 
-/// Rows at a time where a vector has all lanes: with two blocks of channels the sums take 16 of 32 registers.
+/// Number of rows at a time where a vector has all lanes: with two blocks of channels the sums take 16 of 32
+/// registers.
 const WIDE_ROWS: usize = 8;
-/// Rows at a time otherwise: with two vectors for each, the sums take 8 of 16 registers.
+/// Number of rows at a time otherwise: with two vectors for each, the sums take 8 of 16 registers.
 const ROWS: usize = 4;
 
-/// Matrices of which each has a row for each tile, one for each point of a transformed tile.
+/// The layout of matrices with a row for each tile: one matrix for each point of a transformed tile.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Matrices {
-    /// Rows.
+    /// Number of rows.
     pub(super) rows: usize,
     /// Numbers of a row, in blocks of 16.
     pub(super) columns: usize,
-    /// From the first number of one matrix to that of the next.
+    /// Distance from the first number of one matrix to that of the next.
     pub(super) step: usize,
 }
 
-/// For each point the product of its matrix in `v` and its `weights`, which lie in blocks of 16 columns: into `m`.
+/// Computes into `m`, for each point, the product of its matrix in `v` and its `weights`, which lie in blocks of 16
+/// columns.
 #[macerator::with_simd]
 pub(super) fn products<S: Simd>(v: &[f32], from: Matrices, weights: &[Lanes], m: &mut [f32], to: Matrices) {
     {
@@ -49,7 +51,7 @@ pub(super) fn products<S: Simd>(v: &[f32], from: Matrices, weights: &[Lanes], m:
     }
 }
 
-/// `P` rows from `first` on; those behind the last are the last one again.
+/// Returns `P` rows from `first` on; the last row stands in for those behind it.
 #[inline(always)]
 fn rows_of<const P: usize>(v: &[f32], width: usize, first: usize) -> [(usize, &[f32]); P] {
     let last = v.len() / width - 1;
@@ -61,7 +63,7 @@ fn rows_of<const P: usize>(v: &[f32], width: usize, first: usize) -> [(usize, &[
     rows
 }
 
-/// A block of 16 numbers of each row.
+/// Returns a block of 16 numbers of each row.
 #[inline(always)]
 fn blocks_of<'a, const P: usize>(rows: &[(usize, &'a [f32]); P], block: usize) -> [&'a [f32]; P] {
     let mut blocks = [rows[0].1; P];
@@ -93,7 +95,7 @@ fn product_of_block<S: Simd, const P: usize>(v: &[f32], weights: &[Lanes], to: &
     }
 }
 
-/// As [`product_of_block`], for two blocks at once: what is read of the rows serves both. The sums of both in one array
+/// Does [`product_of_block`] for two blocks at once, and reads the rows only once. The sums of both in one array
 /// would not stay in registers.
 #[inline(always)]
 fn product_of_pair<S: Simd, const P: usize>(v: &[f32], one: &[Lanes], other: &[Lanes], to: &mut [f32], outputs: usize) {
@@ -123,8 +125,8 @@ fn product_of_pair<S: Simd, const P: usize>(v: &[f32], one: &[Lanes], other: &[L
     }
 }
 
-/// For each point, adds the product of its matrix in `v`, with rows and columns exchanged, and of that in `grad` to its
-/// `sums`, which lie as the weights of [`products`].
+/// For each point, adds the product of its transposed matrix in `v` and that in `grad` to its `sums`, which lie as
+/// the weights of [`products`].
 #[macerator::with_simd]
 pub(super) fn add_products<S: Simd>(v: &[f32], from: Matrices, grad: &[f32], to: Matrices, sums: &mut [Lanes]) {
     {
@@ -172,7 +174,7 @@ fn add_to_block<S: Simd, const P: usize>(v: &[f32], grad: &[f32], outputs: usize
     }
 }
 
-/// As [`add_to_block`], for two blocks at once.
+/// Does [`add_to_block`] for two blocks at once.
 #[inline(always)]
 fn add_to_pair<S: Simd, const P: usize>(
     v: &[f32],

@@ -1,6 +1,13 @@
-//! Sizes of a convolution, and the orders in which its weights lie.
+//! Sizes of a convolution, and the orders of its weights.
 
 use crate::nn::cpu::tile::LANES;
+
+/// Returns the number of positions of a kernel or pooling window along a side of `size` pixels; `None` if it does not
+/// fit.
+pub fn window_places(size: usize, kernel: usize, stride: usize, padding: usize) -> Option<usize> {
+    let room = size.saturating_add(2 * padding).checked_sub(kernel)?;
+    Some(room / stride + 1)
+}
 
 /// Sizes of a convolution with a square kernel.
 #[derive(Clone, Copy, Debug)]
@@ -13,17 +20,17 @@ pub(super) struct ConvShape {
 }
 
 impl ConvShape {
-    /// Weights and biases.
+    /// Returns the number of weights and biases.
     pub(super) fn params(self) -> usize {
         self.outputs * (self.inputs * self.kernel * self.kernel + 1)
     }
 
-    /// Whether the output is as large as the input: the gradient of the input is then a convolution of its own.
+    /// Returns whether the output is as large as the input: the gradient of the input is then a convolution, too.
     pub(super) fn same(self) -> bool {
         self.stride == 1 && 2 * self.padding + 1 == self.kernel
     }
 
-    /// Shows each weight's number and place, in the order `[outputs, inputs, kernel, kernel]`.
+    /// Visits each weight's number and position, in the order `[outputs, inputs, kernel, kernel]`.
     pub(super) fn each_weight(self, mut visit: impl FnMut(usize, Place)) {
         let side = self.kernel;
         let mut number = 0;
@@ -39,18 +46,18 @@ impl ConvShape {
         }
     }
 
-    /// Row and lane of a weight in the order for [`correlate`](crate::nn::cpu::tile::correlate).
+    /// Returns row and lane of a weight in the order for [`correlate`](crate::nn::cpu::tile::correlate).
     pub(super) fn forward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
         let rows = self.kernel * self.kernel * self.inputs;
         (o / LANES * rows + (y * self.kernel + x) * self.inputs + i, o % LANES)
     }
 
-    /// Rows in the order for [`correlate`](crate::nn::cpu::tile::correlate).
+    /// Returns the rows in the order for [`correlate`](crate::nn::cpu::tile::correlate).
     pub(super) fn forward_rows(self) -> usize {
         self.outputs.div_ceil(LANES) * self.kernel * self.kernel * self.inputs
     }
 
-    /// Row and lane of a weight in the order for the gradient of the input.
+    /// Returns row and lane of a weight in the order for the gradient of the input.
     pub(super) fn backward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
         if self.same() {
             let rows = self.kernel * self.kernel * self.outputs;
@@ -62,7 +69,7 @@ impl ConvShape {
         }
     }
 
-    /// Rows in the order for the gradient of the input.
+    /// Returns the rows in the order for the gradient of the input.
     pub(super) fn backward_rows(self) -> usize {
         if self.same() {
             self.inputs.div_ceil(LANES) * self.kernel * self.kernel * self.outputs

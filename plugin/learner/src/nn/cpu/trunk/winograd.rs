@@ -1,10 +1,10 @@
 //! 3×3 convolutions with 2.25 times fewer products: Winograd's F(2×2, 3×3) (Lavin and Gray 2016, "Fast algorithms for
 //! convolutional neural networks").
 //!
-//! The 4×4 pixels d that 2×2 pixels of the output see, and the 3×3 weights g, become 4×4 points each; the output is
-//! Aᵀ[Σ (G g Gᵀ) ⊙ (Bᵀ d B)]A, where the sum over the input channels makes a product of matrices for each point. The gradient
-//! of the input is such a convolution again; that of the weights is Gᵀ[Σ (Bᵀ d B) ⊙ (A y Aᵀ)]G for the gradient y of the
-//! output.
+//! The 4×4 input pixels d of 2×2 output pixels, and the 3×3 weights g, become 4×4 points each. The output is Aᵀ[Σ (G
+//! g Gᵀ) ⊙ (Bᵀ d B)]A, where the sum over the input channels makes a product of matrices for each point. The gradient
+//! of the input is such a convolution again; that of the weights is Gᵀ[Σ (Bᵀ d B) ⊙ (A y Aᵀ)]G for the gradient y of
+//! the output.
 
 use super::grid::Grid;
 use super::points::{POINTS, Strip, transform_back, transform_gradient, transform_seen};
@@ -13,24 +13,24 @@ use super::shape::{ConvShape, Place};
 use crate::nn::cpu::store::Store;
 use crate::nn::cpu::tile::{LANES, Lanes};
 
-/// G, by which weights become points.
+/// G, which converts weights to points.
 const G: [[f64; 3]; 4] = [[1.0, 0.0, 0.0], [0.5, 0.5, 0.5], [0.5, -0.5, 0.5], [0.0, 0.0, 1.0]];
 
-/// Whether a convolution of images of this size can be made so.
+/// Returns whether the method applies to a convolution of images of this size.
 pub(super) fn fits(shape: ConvShape, height: usize, width: usize) -> bool {
     let is_even = height.is_multiple_of(2) && width.is_multiple_of(2);
     let has_blocks = shape.inputs.is_multiple_of(LANES) && shape.outputs.is_multiple_of(LANES);
     shape.same() && shape.kernel == 3 && is_even && has_blocks
 }
 
-/// Rows of the points of so many inputs and outputs.
+/// Returns the rows of the points for this many inputs and outputs.
 pub(super) fn rows(inputs: usize, outputs: usize) -> usize {
     POINTS * inputs * outputs / LANES
 }
 
-/// G g Gᵀ of all weights of a shape, which lie in the order `[outputs, inputs, 3, 3]`: point by point, for each block of 16
-/// outputs, the inputs. `turned` exchanges inputs and outputs and turns the kernel around, as the gradient of the input
-/// needs it.
+/// Returns G g Gᵀ of all weights of a shape, which lie in the order `[outputs, inputs, 3, 3]`: point by point, for
+/// each block of 16 outputs, the inputs. `turned` exchanges inputs and outputs and rotates the kernel, for the
+/// gradient of the input.
 pub(super) fn points(shape: ConvShape, weights: &[f32], turned: bool) -> Vec<Lanes> {
     let (inputs, outputs) = if turned { (shape.outputs, shape.inputs) } else { (shape.inputs, shape.outputs) };
     let mut points = vec![[0.0; LANES]; rows(inputs, outputs)];
@@ -47,7 +47,7 @@ pub(super) fn points(shape: ConvShape, weights: &[f32], turned: bool) -> Vec<Lan
     points
 }
 
-/// The gradient of a weight from sums of [`add_gradients`]: Gᵀ S G at its place in the kernel.
+/// Returns the gradient of a weight from sums of [`add_gradients`]: Gᵀ S G at its position in the kernel.
 pub(super) fn gradient(shape: ConvShape, sums: &[Lanes], place: Place) -> f32 {
     let Place { o, i, y, x } = place;
     let rows = shape.inputs * shape.outputs / LANES;
@@ -64,7 +64,7 @@ pub(super) struct PointBuffers {
 }
 
 impl PointBuffers {
-    /// The first numbers of both, as many as are needed.
+    /// Returns the needed first numbers of both.
     fn of(&mut self, before: usize, after: usize) -> (&mut [f32], &mut [f32]) {
         let grow = |buffer: &mut Vec<f32>, len: usize| buffer.resize(buffer.len().max(len), 0.0);
         grow(&mut self.before, before);
@@ -73,8 +73,8 @@ impl PointBuffers {
     }
 }
 
-/// The convolution of `x`, which lies in `from`, with these [`points`]: `store` gets the sums of products, with the
-/// bias, by places in `to`.
+/// Computes the convolution of `x`, which lies in `from`, with these [`points`]: `store` gets the sums of products,
+/// with the bias, by positions in `to`.
 pub(super) fn convolve(
     x: &[f32],
     (from, to): (Grid, Grid),

@@ -1,9 +1,9 @@
-//! Memory in which a thread computes.
+//! Working memory of a thread.
 
 use super::plan::Plan;
 use super::winograd::PointBuffers;
 
-/// What is needed only for a moment, for one image at a time.
+/// Buffers that are needed only briefly, for one image at a time.
 #[derive(Debug)]
 pub(super) struct Workspace {
     /// Stages before their pooling.
