@@ -1,4 +1,4 @@
-//! How long a tick takes in one World of each game: simulation and observation of its arenas, under random actions.
+//! Duration of a tick in one World of each game: simulation and observation of its arenas, under random actions.
 //!
 //! `cargo bench -p playbot_games`. `playbot bench` measures whole machines, with pictures and learning.
 
@@ -25,7 +25,7 @@ fn ticks(criterion: &mut Criterion) {
     }
 }
 
-/// A World whose agents play at random.
+/// Returns a World whose agents play at random.
 fn world(game: &dyn Game, mode: &str, arenas: u32) -> World {
     let (mut world, agents) = build_world(game, mode, 1, 0, arenas);
     for agent in agents {

@@ -1,21 +1,21 @@
-//! Where the arenas of one World stand.
+//! Positions of the arenas of one World.
 
 use bevy::prelude::*;
 
 /// Arenas in a row.
 const COLUMNS: u32 = 8;
 
-/// Places for arenas side by side, so that no agent sees the arena of another. The first is at the origin.
+/// Positions for arenas side by side, so that no agent sees the arena of another. The first is at the origin.
 #[derive(Resource, Debug, Default, Reflect)]
 #[reflect(Resource)]
 pub(crate) struct ArenaGrid {
-    /// Places that have been given away. Not reflected: an arena is the same, however many others there are.
+    /// Number of used positions. Not reflected: an arena is the same, however many others there are.
     #[reflect(ignore)]
     taken: u32,
 }
 
 impl ArenaGrid {
-    /// The next free place, of squares that are `spacing` wide.
+    /// Returns the next free position, of squares that are `spacing` wide.
     pub(crate) fn next(&mut self, spacing: f32) -> Transform {
         let (column, row) = (self.taken % COLUMNS, self.taken / COLUMNS);
         self.taken += 1;

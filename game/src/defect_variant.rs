@@ -1,19 +1,19 @@
-//! What the variants of a defect are: places along the way first, so that who gets further finds more, and then strengths.
+//! Variants of a defect: places along the path first, so that testers that get further find more, and then strengths.
 
 /// Places: at the start, further on and late.
 pub(crate) const PLACES: u32 = 3;
 
-/// The place of a variant, from 0.
+/// Returns the place of a variant, from 0.
 pub(crate) fn place(variant: u32) -> usize {
     (variant % PLACES) as usize
 }
 
-/// The strength of a variant.
+/// Returns the strength of a variant.
 pub(crate) fn pick<T: Copy>(strengths: &[T], variant: u32) -> T {
     strengths[(variant / PLACES) as usize % strengths.len()]
 }
 
-/// The variants of a defect that comes in so many strengths.
+/// Returns the number of variants of a defect with so many strengths.
 pub(crate) const fn variants(strengths: usize) -> u32 {
     PLACES * strengths as u32
 }

@@ -1,11 +1,11 @@
 //! The games that come with `bevy_playbot`: CoinRun, mazes and ants.
 //!
 //! - [`ant`]: the quadruped, and the open floor on which it learns to walk.
-//! - [`coinrun`]: the platformer, level for level and tick for tick the one that the literature measures on.
-//! - [`maze`]: mazes on a grid, fixed ones and endless ones, and the way through them.
+//! - [`coinrun`]: the platformer, level for level and tick for tick the one of the literature.
+//! - [`maze`]: mazes on a grid, fixed ones and generated ones, and paths through them.
 //! - [`maze2d`]: the ball in a maze, step for step D4RL's.
 //! - [`antmaze`]: a quadruped walks through a maze to a goal it does not see.
-//! - [`senses`]: the mazes for agents that see walls and goal, and for those that know the map.
+//! - [`senses`]: the mazes with more observations: rays and goal, a map, or positional encoding.
 //! - [`registry`]: all of them, for the program `playbot`.
 
 pub mod ant;

@@ -10,17 +10,19 @@ use playbot_lab::{
     prelude::*,
 };
 
-/// The defect of the rules that a game has under this name.
+/// Returns a game's defect of the rules with this name.
 pub(crate) fn planted(game: &dyn Game, class: &str) -> Arc<ChangeRules> {
-    let kind = game.defects().into_iter().find(|kind| kind.class == class).expect("there is such a defect");
+    let kind =
+        game.tools().tests.defects().into_iter().find(|kind| kind.class == class).expect("there is such a defect");
     match kind.plant {
         Plant::Rules { plant, .. } => plant,
         Plant::Level(_) => panic!("`{class}` is a defect of levels"),
     }
 }
 
-/// What a detector finds first in an episode of the demonstrator, in so many ticks at most: the tick, and what is wrong.
-/// `noise` is the standard deviation of what is added to its actions, and `plant` a defect of the rules with its variant.
+/// Returns the first finding of a detector in an episode of the demonstrator, in at most `ticks` ticks: the tick, and
+/// its message. `noise` is the standard deviation of the noise on its actions, and `plant` a defect of the rules with
+/// its variant.
 pub(crate) fn first_finding(
     game: &dyn Game,
     mode: &str,
@@ -37,8 +39,8 @@ pub(crate) fn first_finding(
     }
     let agent = game.spawn_agent(app.world_mut(), 0);
     app.world_mut().entity_mut(agent).insert((Control::Bot, LevelQueue::list([level])));
-    game.attach_demonstrator(app.world_mut(), agent, noise);
-    let plan = game.floor_plan(mode, level);
+    game.tools().bots.attach_demonstrator(app.world_mut(), agent, noise);
+    let plan = game.tools().levels.floor_plan(mode, level);
     let mut watch = detector.watch(&LevelAhead { level, plan }).expect("it looks at every level");
     for tick in 0..ticks {
         app.tick().expect("sound");
@@ -53,7 +55,7 @@ pub(crate) fn first_finding(
             observation: &[],
             state_hash: 0,
             reward: world.get::<Reward>(agent)?.get(),
-            place: game.whereabouts(world, agent),
+            place: game.tools().state.position(world, agent),
             is_success: false,
             proofs: &NoProofs,
         };

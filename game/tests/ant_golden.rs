@@ -1,4 +1,4 @@
-//! The ant beside MuJoCo 3.1.6 with D4RL's model: `fixtures/ant_reference.json` has what was measured there.
+//! Tests of the ant against MuJoCo 3.1.6 with D4RL's model: `fixtures/ant_reference.json` has the measurements.
 
 #[path = "shared/golden.rs"]
 mod golden;
@@ -18,9 +18,9 @@ const STILL: [f32; JOINTS] = [0.0; JOINTS];
 const JOINT_NAMES: [&str; JOINTS] = ["hip1", "ankle1", "hip2", "ankle2", "hip3", "ankle3", "hip4", "ankle4"];
 /// Sign of each leg's ankle angle.
 const ANKLE_SIGNS: [f32; LEGS] = [1.0, -1.0, -1.0, 1.0];
-/// Height of the torso and angle of the ankles when a test without gravity starts. The file says it in words only.
+/// Height of the torso and angle of the ankles at the start of a test without gravity. The file has it in words only.
 const FLOATING: (f32, f32) = (5.0, 0.87);
-/// Control steps in which the ankles of the jump are driven. The file says it in words only.
+/// Control steps in which the ankles of the jump are driven. The file has it in words only.
 const JUMP_STEPS: usize = 3;
 
 fn reference() -> Value {
@@ -52,19 +52,19 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// The number in the column of this name.
+    /// Returns the number in the column of this name.
     fn at(&self, name: &str) -> f32 {
         let place = self.columns.iter().position(|column| column.as_str() == Some(name));
         number(&self.cells[place.unwrap_or_else(|| panic!("no column {name}"))])
     }
 }
 
-/// The rows of a table with these columns.
+/// Returns the rows of a table with these columns.
 fn table<'a>(columns: &'a Value, rows: &'a Value) -> Vec<Row<'a>> {
     list(rows).iter().map(|row| Row { columns: list(columns), cells: list(row) }).collect()
 }
 
-/// Upright and at rest, with the torso at this height and the joints at these angles, by their names.
+/// Returns an ant upright and at rest, with the torso at this height and the joints at these angles, by their names.
 fn standing(height: f32, angle: impl Fn(&str) -> f32) -> AntState {
     let mut state = AntState::nominal();
     state.qpos[2] = height;
@@ -74,7 +74,7 @@ fn standing(height: f32, angle: impl Fn(&str) -> f32) -> AntState {
     state
 }
 
-/// Where pulses and the jump start.
+/// Returns the start of pulses and of the jump.
 fn resting(reference: &Value) -> AntState {
     let rest = &reference["rest_state"];
     let mut state = standing(number(&rest["z"]), |name| number(&rest["joints"][name]));
@@ -84,7 +84,7 @@ fn resting(reference: &Value) -> AntState {
     state
 }
 
-/// Where tests without gravity start.
+/// Returns the start of tests without gravity.
 fn floating() -> AntState {
     let mut state = standing(FLOATING.0, |_| 0.0);
     for (leg, sign) in ANKLE_SIGNS.iter().enumerate() {
@@ -93,7 +93,7 @@ fn floating() -> AntState {
     state
 }
 
-/// The number of an action that drives a joint.
+/// Returns the number of an action that drives a joint.
 fn actuator(joint: usize) -> usize {
     ACTUATED.iter().position(|&driven| driven == joint).expect("every joint is driven")
 }
@@ -110,8 +110,8 @@ fn close(mine: f32, theirs: f32, tolerance: f32, what: &str) {
     assert!((mine - theirs).abs() <= tolerance, "{what}: {mine}, in MuJoCo {theirs}");
 }
 
-/// Compares a mean of ours over this many runs with that of as chaotic runs in MuJoCo: within four standard errors of the
-/// difference.
+/// Compares a mean of ours over this many runs with that of equally chaotic runs in MuJoCo: within four standard errors
+/// of the difference.
 fn close_mean(mine: f32, runs: usize, theirs: &Value, of: usize, what: &str) {
     let error = float(&theirs["sd"]) * (1.0 / runs as f64 + 1.0 / of as f64).sqrt();
     close(mine, number(&theirs["mean"]), 4.0 * error as f32, what);

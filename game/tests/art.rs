@@ -1,4 +1,4 @@
-//! The drawings in `assets` are those of their sources.
+//! Tests that the drawings in `assets` match their sources.
 
 #[path = "../examples/draw_coinrun/art/mod.rs"]
 mod art;
@@ -7,7 +7,7 @@ mod maze2d_art;
 
 use std::{fs::File, io::BufReader, path::Path};
 
-/// Width, height and RGBA bytes of a PNG.
+/// Returns the width, height and RGBA bytes of a PNG.
 fn read(path: &Path) -> (usize, usize, Vec<u8>) {
     let file = File::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     let mut decoder = png::Decoder::new(BufReader::new(file));
@@ -26,7 +26,7 @@ fn pngs_in(folder: &Path) -> usize {
 
 #[test]
 fn every_png_is_as_its_source_says() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/coinrun");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/coinrun");
     let pictures = art::pictures().expect("the drawings can be read");
     for (name, picture) in &pictures {
         let (width, height, bytes) = read(&folder.join(name));
@@ -41,7 +41,7 @@ fn every_png_is_as_its_source_says() {
 
 #[test]
 fn every_png_of_maze2d_is_as_its_source_says() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/maze2d");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/maze2d");
     let pictures = maze2d_art::pictures();
     for (name, texels) in &pictures {
         let size = (maze2d_art::SIDE, texels.len() / maze2d_art::SIDE);

@@ -1,4 +1,4 @@
-//! Compares the generator, the rules and whole episodes with numbers measured on Procgen.
+//! Tests of the generator, the rules and whole episodes against numbers measured on Procgen.
 
 #[path = "shared/golden.rs"]
 mod golden;
@@ -11,7 +11,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-/// The objects of a file of JSON lines, at least one.
+/// Returns the objects of a file of JSON lines, at least one.
 fn golden_lines<T: DeserializeOwned>(fixture: &str) -> Vec<T> {
     let parse = |line| serde_json::from_str(line).unwrap_or_else(|error| panic!("{fixture}: {error}"));
     let all: Vec<T> = golden::text(fixture).lines().map(parse).collect();
@@ -48,7 +48,7 @@ impl Trace {
         }
     }
 
-    /// The recorded agent state, reward and end after step `k`, if there is one.
+    /// Returns the recorded agent state, reward and end after step `k`, if there is one.
     fn recorded(&self, k: usize) -> Option<[f32; 6]> {
         let last = if k + 1 == self.n { self.r#final } else { None };
         self.steps.get(k).copied().or(last)
@@ -135,7 +135,7 @@ struct Score {
     mode: Mode,
     levels: [u32; 2],
     policy: String,
-    /// How often the original played each level.
+    /// Number of plays of each level by the original.
     passes: u32,
     mean_return: f64,
     se_policy_noise_only: Option<f64>,
@@ -156,7 +156,8 @@ fn scores() -> Scores {
 }
 
 impl Score {
-    /// The actions of its policy, each as likely as the others in every step: `hold8`, `uniform15` (0 to 14), `mix_7_8`.
+    /// Returns the actions of its policy, each as likely as the others in every step: `hold8`, `uniform15` (0 to 14),
+    /// `mix_7_8`.
     fn actions(&self) -> Vec<u8> {
         let action = |text: &str| text.parse::<u8>().unwrap_or_else(|_| panic!("unknown policy {}", self.policy));
         if let Some(held) = self.policy.strip_prefix("hold") {
@@ -169,7 +170,7 @@ impl Score {
     }
 }
 
-/// Return and length of an episode.
+/// Plays an episode; returns its return and length.
 fn play(mut sim: Sim, mut policy: impl FnMut() -> u8) -> (Sim, f64) {
     loop {
         let result = sim.step(policy());
@@ -252,12 +253,12 @@ fn random_policies_have_the_same_mean_return() {
         if actions.len() == 1 {
             continue;
         }
-        // One pass says nothing of its own error: it is then judged from a few of ours.
+        // One pass has no error of its own: it is then judged from a few of ours.
         let passes = expected.passes.max(12);
         let own = Means::over(&expected, passes, || actions[(draws.next_u32() >> 8) as usize % actions.len()]);
         let of_as_many = own.error * f64::from(passes).sqrt() / f64::from(expected.passes).sqrt();
         let reference = expected.se_policy_noise_only.unwrap_or(of_as_many);
-        // Four standard errors, so that of many means of a right game none is outside by chance.
+        // Four standard errors: of many means of a right game none is outside by chance.
         let limit = 4.0 * reference.hypot(own.error);
         let difference = (own.paid - expected.mean_return).abs();
         assert!(

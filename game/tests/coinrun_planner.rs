@@ -1,4 +1,4 @@
-//! The planner wins every level of the usual sets, and its demonstrations survive noise.
+//! Tests of the planner: it wins every level of the default sets, and its demonstrations survive noise.
 
 use std::sync::Arc;
 
@@ -57,7 +57,7 @@ fn an_episode_that_is_over_has_no_plan() {
     assert_eq!(plan(&sim, &PlannerConfig::default()), Plan::GaveUp { expansions: 0 });
 }
 
-/// Whether the demonstrator wins while each action is replaced by a random one with probability 1/5.
+/// Returns true if the demonstrator wins while each action is replaced by a random one with probability 1/5.
 fn wins_with_noise(mut sim: Sim, draws: &mut Mt) -> bool {
     let mut demonstrator = Demonstrator::default();
     while sim.end().is_none() {

@@ -1,4 +1,4 @@
-//! `playbot doctor` as its users call it.
+//! Tests of `playbot doctor` through its command line.
 
 #[path = "shared/program.rs"]
 mod program;
@@ -8,7 +8,7 @@ use std::path::Path;
 use program::ended;
 use serde_json::Value;
 
-/// What the doctor says, and tells, with this exit code.
+/// Returns the doctor's data and messages, with this exit code.
 fn doctor(args: &[&str], code: i32) -> (String, String) {
     ended(Path::new("."), &[&["doctor"], args].concat(), code)
 }
@@ -23,13 +23,26 @@ fn a_healthy_game_passes_and_its_report_is_for_people() {
 
 #[test]
 fn the_report_is_one_line_of_json_for_programs() {
-    let (text, _) = doctor(&["coinrun", "--ticks", "20", "--seed", "7", "--json"], 0);
+    let (text, _) = doctor(&["coinrun", "--ticks", "20", "--level", "7", "--json"], 0);
     let report: Value = serde_json::from_str(text.trim_end()).expect("one line of JSON");
-    assert_eq!((&report["game"], &report["mode"], &report["seed"]), (&"coinrun".into(), &"hard".into(), &7.into()));
+    assert_eq!((&report["game"], &report["mode"], &report["level"]), (&"coinrun".into(), &"hard".into(), &7.into()));
+    assert_eq!(report["seed"], 0);
     assert_eq!(report["comparisons"].as_array().map(Vec::len), Some(6));
     assert_eq!(report["safety"]["recording"]["safe"], true);
     assert_eq!(report["findings"].as_array().map(Vec::len), Some(0));
     assert!(report["ticks_per_second"].as_f64().is_some_and(|speed| speed > 0.0));
+}
+
+#[test]
+fn a_seed_alone_is_the_level_too_for_one_more_version() {
+    let (text, warning) = doctor(&["coinrun", "--ticks", "2", "--seed", "7", "--json"], 0);
+    let report: Value = serde_json::from_str(text.trim_end()).expect("one line of JSON");
+    assert_eq!((&report["level"], &report["seed"]), (&7.into(), &7.into()));
+    assert!(warning.contains("for a level use --level 7"), "{warning}");
+    let (text, words) = doctor(&["coinrun", "--ticks", "2", "--level", "7", "--seed", "8", "--json"], 0);
+    let report: Value = serde_json::from_str(text.trim_end()).expect("one line of JSON");
+    assert_eq!((&report["level"], &report["seed"]), (&7.into(), &8.into()));
+    assert!(!words.contains("warning"), "{words}");
 }
 
 #[test]
@@ -38,7 +51,7 @@ fn wrong_names_and_numbers_are_usage_errors() {
         (&["coinrunn"][..], "did you mean `coinrun`?"),
         (&["coinrun", "--mode", "hrad"], "did you mean `hard`?"),
         (&["coinrun", "--ticks", "0"], "it must be at least 1"),
-        (&["coinrun", "--seed", "4294967296"], "does not exist: choose one up to 4294967295"),
+        (&["coinrun", "--level", "4294967296"], "does not exist: choose one up to 4294967295"),
     ] {
         let (_, errors) = doctor(args, 3);
         assert!(errors.contains(words), "{errors}");

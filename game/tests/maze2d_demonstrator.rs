@@ -1,4 +1,4 @@
-//! The demonstrator of Maze2D reaches its goals on every map, with the noise of its recordings and without.
+//! Tests of Maze2D's demonstrator: it reaches its goals on every map, with and without the noise of its recordings.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use playbot_games::maze2d::{
 };
 use playbot_learner::{Streams, rng::unit};
 
-/// What came of one episode.
+/// The result of one episode.
 struct Outcome {
     reached: bool,
     total_reward: f64,
@@ -61,13 +61,13 @@ fn every_goal_is_reached() {
     }
 }
 
-/// The mean return over some levels.
+/// Returns the mean return over some levels.
 fn mean_return(map: &str, play: impl Fn(&Maze2dMode, u64) -> f64) -> f64 {
     let mode: Maze2dMode = map.parse().expect("a mode");
     (0..LEVELS).map(|seed| play(&mode, seed)).sum::<f64>() / LEVELS as f64
 }
 
-/// The return of uniformly random pushes.
+/// Plays uniformly random pushes, and returns the episode's return.
 fn play_at_random(mode: &Maze2dMode, seed: u64) -> f64 {
     let level = Maze2dLevel::new(mode, seed).expect("a level");
     let (mut sim, mut rng) = (BallSim::new(mode, &level), Streams::new(seed).stream("test", 0));

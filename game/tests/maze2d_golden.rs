@@ -1,4 +1,4 @@
-//! Compares the ball of Maze2D with numbers measured on MuJoCo 3.1.6 and D4RL's model.
+//! Tests of Maze2D's ball against numbers measured on MuJoCo 3.1.6 and D4RL's model.
 
 #[path = "shared/golden.rs"]
 mod golden;
@@ -40,7 +40,7 @@ struct Impact {
 /// x, y, vx, vy.
 type State = [f64; 4];
 
-/// A recorded run, whichever list it came from.
+/// A recorded run, of any list.
 struct Run {
     map: String,
     pushes: Vec<[f64; 2]>,
@@ -60,7 +60,7 @@ impl Run {
         self.pushes.len()
     }
 
-    /// A ball in the recorded state after `step` steps.
+    /// Returns a ball in the recorded state after `step` steps.
     fn sim(&self, contact: Contact, step: usize) -> BallSim {
         let mode = Maze2dMode { contact, ..self.map.parse().expect("a map") };
         let [x, y, vx, vy] = self.states[step];
@@ -68,7 +68,8 @@ impl Run {
         BallSim::new(&mode, &Maze2dLevel { start: Ball { position: [x, y], velocity: [vx, vy] }, ..level })
     }
 
-    /// Largest difference to the recording, of places and of velocities, over `steps` steps from the state after `from`.
+    /// Returns the largest difference to the recording, of positions and of velocities, over `steps` steps from the
+    /// state after `from`.
     fn deviation(&self, contact: Contact, from: usize, steps: usize) -> (f64, f64) {
         let mut sim = self.sim(contact, from);
         let mut worst = (0.0_f64, 0.0_f64);
@@ -82,7 +83,7 @@ impl Run {
         worst
     }
 
-    /// The push of a step as the game takes it: an action of 32-bit numbers, clipped.
+    /// Returns the push of a step in the game's form: an action of 32-bit numbers, clipped.
     fn push(&self, step: usize) -> [f64; 2] {
         clip_action(self.pushes[step].map(|axis| axis as f32)).0
     }
@@ -92,7 +93,7 @@ fn recorded() -> Golden {
     golden::json("maze2d/maze2d_traces.json")
 }
 
-/// Each with the number of steps before the one in which it first touches a wall.
+/// Returns the long runs, each with the number of steps before its first contact.
 fn long_runs() -> Vec<(Run, usize)> {
     let run = |trace: Trace| {
         let free = trace.first_contact_step.map_or(usize::MAX, |step| step - 1).min(trace.states.len());
@@ -175,7 +176,7 @@ fn rapier_s_contact_stays_near_the_original() {
     assert!(median <= 0.01 && worst <= 0.35, "median {median} m, worst {worst} m");
 }
 
-/// How deep the ball is in a wall, m; 0 or less if it is in none.
+/// Returns the depth of the ball in a wall, m; 0 or less if it is in none.
 fn depth(level: &Maze2dLevel, ball: &Ball) -> f64 {
     let touches = level.walls.touches(ball.position, 0.01);
     touches.as_slice().iter().map(|touch| -touch.gap).fold(f64::NEG_INFINITY, f64::max)
@@ -208,7 +209,7 @@ fn the_ball_never_leaves_the_free_cells_nor_sinks_into_walls() {
 /// Gap between the surfaces of wall and ball at which the original's contact holds a full push, m.
 const REST_GAP: f64 = 0.00137;
 
-/// Where a full push along an axis ends at the wall of cell `cell` of that axis.
+/// Returns the end of a full push along an axis at the wall of cell `cell` of that axis.
 fn rest(mode: &Maze2dMode, cell: f64, push: f64) -> f64 {
     cell - mode.wall_offset() - push * (HALF + RADIUS + REST_GAP)
 }

@@ -1,5 +1,6 @@
-//! Recordings, skill models, checkpoints and policy files of an older program load, and come to what they came to then, up to
-//! roundings: networks make their sums in another order since. `fixtures/older/README.md` says how they were made.
+//! Tests that recordings, skill models, checkpoints and policy files of an older program load and give the same
+//! results, up to roundings: networks make their sums in another order since. `fixtures/older/README.md` describes
+//! their origin.
 
 #[path = "shared/program.rs"]
 mod program;
@@ -12,7 +13,7 @@ use serde_json::Value;
 const OLDER: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/fixtures/older");
 const FILES: [&str; 6] = ["bot.policy", "few.demo", "policy.json", "run.json", "skills.safetensors", "small.ron"];
 
-/// A folder with copies, which may be written to.
+/// Returns a folder with copies, which may be written to.
 fn older() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     for file in FILES {
@@ -38,8 +39,8 @@ fn read(folder: &Path, file: &str) -> String {
     fs::read_to_string(folder.join(file)).expect("a text")
 }
 
-/// That what `eval --json` said then is what it says now, but for the standard error, which was over episodes then and is
-/// over levels now.
+/// Checks that `eval --json` prints the same now as then, but for the standard error, which was over episodes then and
+/// is over levels now.
 fn measures_as_then(args: &[&str], then: &str) {
     let folder = older();
     let (said, _) = done(folder.path(), &[&["eval", "--json"], args].concat());
@@ -53,7 +54,7 @@ fn measures_as_then(args: &[&str], then: &str) {
     }
 }
 
-/// Whether two values are the same up to roundings.
+/// Returns true if two values are the same up to roundings.
 fn is_near(now: &Value, then: &Value) -> bool {
     match (now.as_f64(), then.as_f64()) {
         (Some(now), Some(then)) => (now - then).abs() <= 1e-5 + 1e-3 * then.abs(),
@@ -61,7 +62,7 @@ fn is_near(now: &Value, then: &Value) -> bool {
     }
 }
 
-/// That a run has trained as the older one did.
+/// Checks that a run has trained as the older one did.
 fn trained_as_then(folder: &Path, run: &str, then: &str) {
     let (now, then) = (json_lines(&unsealed(&read(folder, &format!("{run}/metrics.jsonl")))), json_lines(then));
     assert_eq!(now.len(), then.len());
@@ -105,7 +106,7 @@ fn a_training_goes_on_from_its_checkpoint_as_it_went_on_then() {
 fn a_training_starts_from_a_skill_model() {
     let folder = older();
     let args = ["train", "--experiment", "small.ron", "--skills", "skills.safetensors", "--run", "again"];
-    // The weight of the penalty that was usual then.
+    // The former default weight of the penalty.
     done(folder.path(), &[&args[..], &["--set", "score.alpha=OwnSample"]].concat());
     trained_as_then(folder.path(), "again", &read(folder.path(), "run/metrics.jsonl"));
 }

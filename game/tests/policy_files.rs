@@ -1,4 +1,4 @@
-//! Policy files: exported by the program, read back by a game, and refused where they do not fit.
+//! Tests of policy files: exported by the program, read back by a game, and refused where they do not fit.
 
 #[path = "shared/program.rs"]
 mod program;
@@ -29,7 +29,7 @@ fn provenance() -> Provenance {
     Provenance { algorithm: "ppo".to_owned(), training: "nothing".to_owned(), seen: None, code: "test".to_owned() }
 }
 
-/// A policy file of an untrained policy, written into `folder`.
+/// Writes a policy file of an untrained policy into `folder`, and returns its path.
 fn exported(folder: &Path) -> std::path::PathBuf {
     let game = CoinRun::default();
     let about = provenance();
@@ -39,8 +39,8 @@ fn exported(folder: &Path) -> std::path::PathBuf {
     path
 }
 
-/// Changes the header of a safetensors file, whose length stands in its first eight bytes. The file is then one of an older
-/// version, which has no checksum.
+/// Changes the header of a safetensors file, whose length stands in its first eight bytes. The file is then one of an
+/// older version, which has no checksum.
 fn edit_header(path: &Path, edit: impl FnOnce(&mut Value)) -> Vec<u8> {
     let bytes = std::fs::read(path).expect("readable");
     let length = u64::from_le_bytes(bytes[..8].try_into().expect("eight bytes")) as usize;
@@ -188,7 +188,7 @@ fn the_program_exports_shows_and_measures() {
     done(&["learn-skills", "--experiment", "maze.ron", "--out", "sk.safetensors"]);
     done(&["train", "--algorithm", "ppo", "--experiment", "maze.ron", "--run", "maze"]);
     let (_, told) = done(&["policy", "export", "--run", "maze", "--out", "maze.policy"]);
-    // The words of the advice, as one copies them.
+    // The command in the advice, as it would be copied.
     let advice = told.split('`').nth(1).expect("a command");
     assert_eq!(advice, "playbot eval --policy maze.policy --levels medium:4..5");
     let words: Vec<&str> = advice.split(' ').skip(1).chain(["--episodes-per-level", "1", "--json"]).collect();
@@ -218,7 +218,7 @@ fn the_program_exports_shows_and_measures() {
 #[test]
 fn a_policy_of_a_game_that_the_program_does_not_have_can_be_looked_at_and_not_played() {
     let folder = tempfile::tempdir().expect("a folder");
-    let lander = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/models/lander.policy");
+    let lander = concat!(env!("CARGO_MANIFEST_DIR"), "/../plugin/examples/lander.policy");
     std::fs::copy(lander, folder.path().join("lander.policy")).expect("part of the repository");
     let (shown, _) = program::done(folder.path(), &["policy", "show", "lander.policy"]);
     for words in [

@@ -1,4 +1,4 @@
-//! `playbot train` and `playbot runs` as their users call them: what a run writes down, and how it is looked at.
+//! Tests of `playbot train` and `playbot runs` through the command line: the files of a run, and their display.
 
 #[path = "shared/program.rs"]
 mod program;
@@ -109,7 +109,7 @@ fn a_run_stands_where_it_goes_on_and_is_in_training_while_somebody_has_its_lock(
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     three_runs(folder);
-    // As if it had been killed after another update of a longer training.
+    // The state after a kill behind another update of a longer training.
     let (experiment, metrics) = (folder.join("runs/b/experiment.ron"), folder.join("runs/b/metrics.jsonl"));
     let text = unsealed(&fs::read_to_string(&experiment).expect("written"));
     assert!(text.contains(" steps: 512,"), "{text}");
@@ -167,7 +167,7 @@ fn damaged_runs_are_named() {
     let (_, nothing) = ended(folder, &["runs", "ls"], 3);
     assert!(nothing.contains("no runs in runs"), "{nothing}");
     let (_, foreign) = ended(folder, &["runs", "show", "runs/empty"], 3);
-    assert!(foreign.contains("no run at runs/empty: the folder is there"), "{foreign}");
+    assert!(foreign.contains("no run at runs/empty: the folder exists"), "{foreign}");
 
     three_runs(folder);
     for verb in [&["runs", "show"][..], &["runs", "compare", "runs/b"], &["train", "--resume", "--run"]] {
@@ -208,7 +208,7 @@ fn damaged_runs_are_named() {
     assert!(early.contains("runs/a/1 has no metrics yet"), "{early}");
 }
 
-/// Framed records: 12 bytes, the content, 4 bytes.
+/// Returns the framed records: 12 bytes, the content, 4 bytes.
 fn records(bytes: &[u8]) -> Vec<&[u8]> {
     let (mut records, mut rest) = (Vec::new(), bytes);
     while let Some((length, tail)) = rest.split_first_chunk() {
@@ -232,7 +232,7 @@ fn a_resumed_run_shows_each_update_once_in_tensorboard() {
     };
     let before = events("runs/b");
     assert_eq!(before.len(), 2 + 4, "version, start, four updates");
-    // The whole command again: there is nothing left to do.
+    // The whole command again: nothing is left to do.
     let begun = ["train", "--algorithm", "ppo", "--experiment", "b.ron", "--seed", "1", "--run", "runs/b", "--resume"];
     let (_, finished) = ended(folder, &begun, 0);
     for words in ["runs/b is finished: it was trained for 512 steps", "--resume --steps N`, where N is more than 512"] {
@@ -262,7 +262,7 @@ fn what_a_run_has_lost_and_what_is_left_of_another_is_said() {
     fs::copy(path("b/run.json"), path("b.replaced-7/run.json")).expect("copied");
 
     let (listed, _) = ended(folder, &["runs", "ls"], 0);
-    let words = "left over: runs/b.replaced-7 holds what runs/b was before it was to be replaced, which was stopped: \
+    let words = "left over: runs/b.replaced-7 holds old files of runs/b, whose replacement was stopped: \
                  `playbot train --run runs/b --resume` brings";
     assert!(listed.contains(words), "{listed}");
     let rows = json_lines(&ended(folder, &["runs", "ls", "--json"], 0).0);
@@ -272,8 +272,8 @@ fn what_a_run_has_lost_and_what_is_left_of_another_is_said() {
     for words in [
         "runs/b/metrics.jsonl: nothing is left of 2 updates, those of the steps 384 to 512",
         "runs/b/timing.jsonl: nothing is left of 4 updates, those of the steps 128 to 512",
-        "runs/b/run.json.tmp7 was not finished",
-        "runs/b.replaced-7 is what runs/b was before it was replaced, and is removed",
+        "runs/b/run.json.tmp7 is unfinished",
+        "runs/b.replaced-7 holds the replaced files of runs/b, and is removed",
     ] {
         assert!(told.contains(words), "{words}: {told}");
     }

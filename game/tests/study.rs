@@ -1,4 +1,5 @@
-//! `playbot study` as its users call it: the same files in one go, after a kill, and when nothing is left to do.
+//! Tests of `playbot study` through its command line: the same files in one go, after a kill, and when nothing is left
+//! to do.
 
 #[path = "shared/program.rs"]
 mod program;
@@ -49,7 +50,7 @@ fn refused(output: &Output, words: &str) {
     assert!(errors.contains(words), "{errors}");
 }
 
-/// A folder with the tiny experiment and a few recordings.
+/// Returns a folder with the tiny experiment and a few recordings.
 fn prepared() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("tiny.ron"), TINY).expect("writable");
@@ -59,7 +60,7 @@ fn prepared() -> tempfile::TempDir {
     folder
 }
 
-/// Everything a study writes for its readers.
+/// Returns all files that a study writes for its readers.
 fn written(folder: &Path) -> Vec<String> {
     let read = |name| fs::read_to_string(folder.join("out").join(name)).expect("written");
     ["table.md", "curves.svg", "results.json"].map(read).into()
@@ -234,7 +235,7 @@ fn the_table_follows_from_the_results() {
     let rewrite = || playbot(folder, &["study", "--out", "out", "--rewrite"]);
     ok(rewrite());
     assert!(fs::read(&table).expect("written again") == written);
-    // Nothing is trained in behaviour cloning: whoever asks for its policy is told where it is.
+    // Behaviour cloning trains nothing: an error names the file of its policy.
     let cloned = playbot(folder, &["eval", "--run", "runs/cloned-seed1"]);
     let words = errors(&cloned);
     let skills = words.split("--skills ").nth(1).and_then(|rest| rest.split('`').next()).expect("a file");
@@ -249,7 +250,7 @@ fn the_table_follows_from_the_results() {
         "was learned from demonstrations of easy:0..7, and the held-out levels easy:4..5",
     );
     assert!(!folder.join("runs/seen-seed1/result.json").exists());
-    // What a variant sets itself stays as it is, and somebody who sets it is told.
+    // A setting of the variant itself stays as it is, and a `--set` of it is reported.
     let set = study(
         folder,
         "others",

@@ -1,4 +1,4 @@
-//! Trainings that are killed, run out of disk or run away: nothing that was saved is lost.
+//! Tests of trainings that are killed, run out of disk or diverge: no saved file is lost.
 
 #[path = "shared/program.rs"]
 mod program;
@@ -13,7 +13,7 @@ use program::{code, command, done, ended, errors, playbot};
 
 const UPDATES: usize = 120;
 
-/// A small training; `more` is added to its settings of PPO.
+/// Writes a small training; `more` is added to its settings of PPO.
 fn write_experiment(folder: &Path, more: &str) {
     let text = format!(
         r#"(
@@ -63,7 +63,7 @@ fn one_process_at_a_time_trains_in_a_folder() {
     let mut child = at_work(endless.stderr(Stdio::null()), || logged(&run) >= 3);
     let before = ["experiment.ron", "run.json"].map(|name| std::fs::read(run.join(name)).expect("written"));
     let second = [resume(folder.path(), "busy"), train(folder.path(), &["--run", "busy", "--force"])];
-    // Who looks needs no lock.
+    // Reading needs no lock.
     done(folder.path(), &["runs", "ls", "."]);
     assert!(child.try_wait().expect("a child").is_none(), "the first one goes on");
     for refused in second {
@@ -73,7 +73,7 @@ fn one_process_at_a_time_trains_in_a_folder() {
     let after = ["experiment.ron", "run.json"].map(|name| std::fs::read(run.join(name)).expect("still there"));
     assert!(before == after && !steps(&run).is_empty(), "the refused ones touched the run");
     kill(child);
-    // Nothing is left of the lock, and the old run makes way as a whole.
+    // Nothing is left of the lock, and the old run is replaced as a whole.
     let forced = train(folder.path(), &["--run", "busy", "--force", "--steps", "256"]);
     assert!(forced.status.success(), "{}", errors(&forced));
     assert_eq!((logged(&run), steps(&run).len()), (1, 2));
@@ -93,7 +93,7 @@ fn what_is_no_run_is_never_replaced() {
     assert_eq!(code(&forced), 3, "{}", errors(&forced));
     assert!(errors(&forced).contains("demos is not the folder of a run"), "{}", errors(&forced));
     let (_, errors) = ended(folder.path(), &["quickstart", "--experiment", "small.ron", "--run", "demos"], 3);
-    assert!(errors.contains("demos holds something else"), "{errors}");
+    assert!(errors.contains("demos is not the folder of a quickstart"), "{errors}");
     let left: Vec<_> = std::fs::read_dir(folder.path().join("demos")).expect("there").flatten().collect();
     assert!(left.len() == 1 && precious.exists(), "{left:?}");
 }

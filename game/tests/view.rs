@@ -1,4 +1,4 @@
-//! Pictures from the command line.
+//! Tests of pictures from the command line.
 
 #[path = "shared/program.rs"]
 mod program;
@@ -8,7 +8,7 @@ use std::{fs::File, io::BufReader, path::Path};
 use program::{done, ended};
 use serde_json::Value;
 
-/// What `playbot ARGS --json` says of the picture that it has written.
+/// Returns the JSON that `playbot ARGS --json` prints about its picture.
 fn written(folder: &Path, args: &[&str]) -> Value {
     let (line, _) = done(folder, &[args, &["--json"]].concat());
     serde_json::from_str(&line).expect("a line of JSON")
@@ -37,7 +37,7 @@ fn read(path: &Path) -> Pictures {
     Pictures { size, frames, delay }
 }
 
-/// The colours of every `scale`-th pixel, after a look at the squares between them.
+/// Returns the colours of every `scale`-th pixel, and checks the squares between them.
 fn reduced(pictures: &Pictures, frame: usize, side: usize, scale: usize) -> Vec<[u8; 3]> {
     let (width, pixels) = (pictures.size.0, &pictures.frames[frame]);
     let square = |x: usize, y: usize| {
@@ -52,7 +52,7 @@ fn reduced(pictures: &Pictures, frame: usize, side: usize, scale: usize) -> Vec<
 #[test]
 fn one_observation_is_what_the_bot_sees_enlarged() {
     let folder = tempfile::tempdir().expect("a folder");
-    let view = |args: &[&str]| written(folder.path(), &[&["view", "coinrun", "--seed", "5"], args].concat());
+    let view = |args: &[&str]| written(folder.path(), &[&["view", "coinrun", "--level", "5"], args].concat());
     let said = view(&["--tick", "20"]);
     assert_eq!((&said["width"], &said["frames"], &said["ticks"]), (&512.into(), &1.into(), &21.into()));
     let picture = read(&folder.path().join("view.png"));
@@ -63,7 +63,7 @@ fn one_observation_is_what_the_bot_sees_enlarged() {
     colours.dedup();
     assert!(colours.len() > 8, "a level has some colours: {colours:?}");
 
-    let (_, words) = done(folder.path(), &["view", "coinrun", "--seed", "5", "--tick", "20", "--out", "again.png"]);
+    let (_, words) = done(folder.path(), &["view", "coinrun", "--level", "5", "--tick", "20", "--out", "again.png"]);
     let sentence = "again.png shows tick 20 of level 5 of coinrun in mode hard (no --mode was named; the game has easy, \
                     hard), played by search, on 512 × 512 pixels; after 21 ticks the episode was still running";
     assert!(words.contains(sentence), "{words}");
@@ -79,11 +79,11 @@ fn one_observation_is_what_the_bot_sees_enlarged() {
     assert!(grey.frames[0].iter().all(|[r, g, b]| r == g && g == b));
 }
 
-#[cfg(feature = "camera")]
+#[cfg(feature = "screen")]
 #[test]
 fn a_camera_sees_what_the_raster_sees() {
     let folder = tempfile::tempdir().expect("a folder");
-    for game in [&["coinrun", "--seed", "5"][..], &["maze2d"], &["antmaze"], &["ant", "--mode", "goal"]] {
+    for game in [&["coinrun", "--level", "5"][..], &["maze2d"], &["antmaze"], &["ant", "--mode", "goal"]] {
         let [raster, camera] = [&["--out", "raster.png"][..], &["--camera", "--out", "camera.png"]].map(|args| {
             written(folder.path(), &[&["view"], game, &["--tick", "3", "--scale", "1"], args].concat());
             read(&folder.path().join(args[args.len() - 1])).frames.swap_remove(0)
@@ -95,15 +95,26 @@ fn a_camera_sees_what_the_raster_sees() {
     }
 }
 
-/// `playbot eyes` says where its worst frame is to be found.
 #[cfg(feature = "camera")]
+#[test]
+fn without_a_driver_a_camera_is_refused_and_the_raster_is_offered() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut command = program::command(folder.path(), &["view", "coinrun", "--camera"]);
+    command.envs([("VK_DRIVER_FILES", "none"), ("VK_ICD_FILENAMES", "none"), ("WGPU_BACKEND", "vulkan")]);
+    let (_, errors) = playbot_shell::ended(command, 3);
+    assert!(errors.contains("mesa-vulkan-drivers") && errors.contains("observation: Raster"), "{errors}");
+    assert!(!folder.path().join("view.png").exists());
+}
+
+/// `playbot eyes` prints the position of its worst frame.
+#[cfg(feature = "screen")]
 #[test]
 fn the_worst_frame_is_of_the_moment_that_is_named() {
     let folder = tempfile::tempdir().expect("a folder");
     let eyes = ["eyes", "coinrun", "--levels", "hard:3..7", "--frames", "5", "--out", "."];
     let worst = &written(folder.path(), &eyes)["worst"];
     let [level, tick] = ["level", "tick"].map(|key| worst[key].to_string());
-    written(folder.path(), &["view", "coinrun", "--seed", &level, "--tick", &tick, "--scale", "1"]);
+    written(folder.path(), &["view", "coinrun", "--level", &level, "--tick", &tick, "--scale", "1"]);
     let seen = &read(&folder.path().join("view.png")).frames[0];
     // The raster's picture is the left one, enlarged five times.
     assert!(reduced(&read(&folder.path().join("worst.png")), 0, 64, 5) == *seen, "level {level}, tick {tick}");
@@ -117,7 +128,7 @@ fn a_maze_is_seen_as_a_whole_whatever_the_shape_of_the_picture() {
         let sizes = ["--image", &columns, "--image", &rows, "--scale", "1"];
         written(
             folder.path(),
-            &[&["view", "maze2d", "--mode", mode, "--seed", "3", "--tick", "4"][..], &sizes].concat(),
+            &[&["view", "maze2d", "--mode", mode, "--level", "3", "--tick", "4"][..], &sizes].concat(),
         );
         let mut picture = read(&folder.path().join("view.png"));
         assert_eq!(picture.size, (width, height));
@@ -137,7 +148,7 @@ fn a_maze_is_seen_as_a_whole_whatever_the_shape_of_the_picture() {
 #[test]
 fn an_episode_becomes_a_moving_picture() {
     let folder = tempfile::tempdir().expect("a folder");
-    let args = ["view", "coinrun", "--seed", "0", "--bot", "right-jump", "--episode", "--scale", "3"];
+    let args = ["view", "coinrun", "--level", "0", "--bot", "right-jump", "--episode", "--scale", "3"];
     let said = written(folder.path(), &args);
     assert_eq!((&said["frames"], &said["ticks"], &said["level"]), (&63.into(), &63.into(), &0.into()));
     assert_eq!(said["end"]["Terminated"]["success"], true);
@@ -150,7 +161,7 @@ fn an_episode_becomes_a_moving_picture() {
     assert_eq!(again["bytes"], said["bytes"]);
     let bytes = |name: &str| std::fs::read(folder.path().join(name)).expect("written");
     assert!(bytes("view.png") == bytes("again.png"), "the same bytes each time");
-    written(folder.path(), &["view", "coinrun", "--seed", "0", "--scale", "1", "--out", "first.png"]);
+    written(folder.path(), &["view", "coinrun", "--level", "0", "--scale", "1", "--out", "first.png"]);
     assert!(read(&folder.path().join("first.png")).frames[0] == first, "the first frame is the first observation");
 }
 
@@ -177,7 +188,7 @@ fn recordings_and_policies_can_be_watched() {
     let policy = ["view", "coinrun", "--policy", "clone.policy", "--tick", "3", "--scale", "1"];
     let still = written(folder.path(), &policy);
     assert_eq!((&still["height"], &still["player"]), (&64.into(), &"bc".into()));
-    let easy = ["view", "coinrun", "--mode", "easy", "--seed", "3", "--policy", "clone.policy", "--episode"];
+    let easy = ["view", "coinrun", "--mode", "easy", "--level", "3", "--policy", "clone.policy", "--episode"];
     let said = written(folder.path(), &[&easy[..], &["--scale", "1"]].concat());
     let film = read(&folder.path().join("view.png"));
     assert!(film.size.1 > plain.size.1, "bars of the skill stand under the words");
@@ -190,7 +201,7 @@ fn recordings_and_policies_can_be_watched() {
 #[test]
 fn a_level_can_be_drawn_as_a_whole() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (text, _) = done(folder.path(), &["level", "coinrun", "--seed", "2", "--png", "level.png"]);
+    let (text, _) = done(folder.path(), &["level", "coinrun", "--level", "2", "--png", "level.png"]);
     let rows: Vec<&str> = text.lines().filter(|line| line.starts_with(['#', '='])).collect();
     let picture = read(&folder.path().join("level.png"));
     assert_eq!(picture.size, (16 * rows[0].len(), 16 * rows.len()), "{text}");
@@ -211,7 +222,7 @@ fn bad_wishes_are_refused_in_words() {
     let large = ["--image", "width=1024", "--image", "height=1024", "--image", "stack=16"];
     for (args, code, words) in [
         (&["--mode", "hrad"][..], 3, "did you mean `hard`?"),
-        (&["--seed", "5000000000"], 3, "level 5000000000 of `hard` does not exist: choose one up to 4294967295"),
+        (&["--level", "5000000000"], 3, "level 5000000000 of `hard` does not exist: choose one up to 4294967295"),
         (&["--run", "none"], 3, "none: there is no such folder"),
         (&["--bot", "serch"], 3, "did you mean `search`?"),
         (&["--policy", "none.policy"], 3, "policy export --run RUN --out none.policy"),

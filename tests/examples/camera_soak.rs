@@ -1,4 +1,4 @@
-//! Runs many agents with cameras for many ticks and says how fast, how many frames were stale, and what memory it took.
+//! Soak test of many agents with cameras: speed, stale frames and memory over many ticks.
 //!
 //! `camera_soak [ticks] [agents]`
 

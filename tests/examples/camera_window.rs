@@ -1,6 +1,6 @@
-//! A game with a window, whose agent looks through a sensor of its own: the two must not disturb each other.
+//! A game with a window, whose agent has a camera sensor of its own: the two must not disturb each other.
 //!
-//! `camera_window [seconds]`; the window shows a walker, and every second the program says what the agent sees.
+//! `camera_window [seconds]`; the window shows a walker, and every second the program prints the agent's view.
 
 #![allow(clippy::print_stdout)]
 
@@ -54,7 +54,7 @@ fn walk(mut walkers: Query<&mut Transform, With<Walker>>) {
     }
 }
 
-/// The agent is in the middle of its own picture, on every tick.
+/// Checks that the agent is in the middle of its own picture, on every tick.
 fn check(frames: Query<&Frame>, tick: Res<Tick>, mut faults: ResMut<bevy_playbot::fault::Faults>) {
     let Ok(frame) = frames.single() else { return };
     let seen = frame.pixels.get(32 * 64 + 32);

@@ -1,12 +1,12 @@
-//! Reads changed files of all kinds for a given time, as the tests do for seconds:
+//! Fuzzer of file readers: reads changed files of all kinds for a given time, as the tests do for seconds:
 //!
 //! ```sh
 //! cargo run --release -p playbot_tests --example fuzz -- --seconds 3600 --seed 1
 //! ```
 //!
-//! A file that makes its reader panic, takes it longer than five seconds, or makes it ask for much memory is kept in the
-//! folder `fuzz`, or the one that `--out` names; the exit code is 1 then. A file of which the whole program dies lies in
-//! `current` there. `--kind NAME` reads files of one kind alone.
+//! A file that makes its reader panic, takes it longer than five seconds, or makes it ask for much memory is kept in
+//! the folder `fuzz`, or the one that `--out` names; the exit code is 1 then. If the whole program dies of a file, that
+//! file is `current` in the folder. `--kind NAME` reads files of one kind alone.
 #![allow(clippy::print_stdout, reason = "it tells what it does")]
 
 use std::{
@@ -19,7 +19,7 @@ use std::{
 
 use playbot_tests::hostile::{FileKind, HostileFault, all_kinds, read_mutants};
 
-/// Mutants that are read before the clock is looked at; of kinds that are read into a World fewer.
+/// Mutants between two looks at the clock; fewer for kinds that are read into a World.
 const AT_ONCE: u64 = 200;
 const SLOW_AT_ONCE: u64 = 20;
 /// Seeds of mutants of one seed of the command line.
@@ -50,7 +50,7 @@ impl Options {
         Ok(options)
     }
 
-    /// The kinds that are asked for.
+    /// Returns the requested kinds.
     fn kinds(&self) -> Result<Vec<FileKind>, String> {
         let all = all_kinds();
         let names: Vec<&str> = all.iter().map(|kind| kind.name).collect();
@@ -61,7 +61,7 @@ impl Options {
         Ok(all.iter().filter(|kind| is_wanted(kind)).cloned().collect())
     }
 
-    /// Keeps a file, and says so.
+    /// Keeps a file, and prints its path.
     fn keep(&self, fault: &HostileFault) -> Result<(), String> {
         let path = self.out.join(format!("{}-{}", fault.kind.replace(' ', "-"), fault.seed));
         fs::write(&path, &fault.bytes).map_err(|error| format!("cannot write {}: {error}", path.display()))?;
@@ -70,7 +70,7 @@ impl Options {
     }
 }
 
-/// What became of the mutants of a kind.
+/// Counts of the mutants of a kind.
 #[derive(Default)]
 struct Count {
     whole: u64,
@@ -82,7 +82,7 @@ fn measure(work: &mut dyn FnMut()) -> u64 {
     allocation_counter::measure(work).bytes_max
 }
 
-/// Whether no file was too much for its reader.
+/// Returns true if every file was read without a fault.
 fn run(options: &Options) -> Result<bool, String> {
     let kinds = options.kinds()?;
     fs::create_dir_all(&options.out).map_err(|error| format!("cannot create {}: {error}", options.out.display()))?;

@@ -1,5 +1,5 @@
-//! Plays CoinRun before the raster sensors of many agents for many ticks and says how fast, how many frames were stale or
-//! missing, and what memory it took. Levels come and go.
+//! Soak test of CoinRun with the raster sensors of many agents: speed, stale or missing frames, and memory over many
+//! ticks. Levels come and go.
 //!
 //! `raster_soak [ticks] [agents]`
 

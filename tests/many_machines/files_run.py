@@ -1,7 +1,7 @@
-"""The workflow, the Jobs and the array of docs/how-to/many-machines join to what one process writes.
+"""Test of docs/how-to/many-machines: the workflow, the Jobs and the array join to the results of one process.
 
-Called by run.sh with the program `playbot`. Nothing of GitHub, Kubernetes or Slurm is here: what they would start is started
-with the variables that they would set. `gh` and `sbatch` are scripts that do what the real ones are asked for.
+Called by run.sh with the program `playbot`. GitHub, Kubernetes and Slurm are not needed: their commands are started
+with the variables that they would set. `gh` and `sbatch` are scripts in place of the real ones.
 """
 
 import copy
@@ -21,7 +21,7 @@ from kubernetes_fields import mistakes
 FILES = pathlib.Path(__file__).parents[2] / "docs/how-to/many-machines"
 GAME, LEVELS, TESTERS = "coinrun", "hard:0..39", "--bot right-jump,random --episodes 2"
 FINDINGS = 1
-# Seconds that nothing here takes.
+# Seconds after which a command has failed.
 LONGEST = 120
 REPORTS = ["results.json", "report.html", "junit.xml", "summary.md"]
 
@@ -66,7 +66,7 @@ def github(folder, playbot, whole):
         for key, value in steps[name].get("env", {}).items():
             expression = re.fullmatch(r"\$\{\{ (.*) \}\}", value)
             words[key] = more[expression[1]] if expression else value
-        # What GitHub calls a script with.
+        # The shell of a script on GitHub.
         return run(["bash", "-e", "-c", steps[name]["run"]], at, {**variables, **more.get("env", {}), **words})
 
     (folder / "bin").mkdir(parents=True)
@@ -86,7 +86,7 @@ def github(folder, playbot, whole):
     check("the summary of the run is summary.md", summary.read_bytes() == (whole / "summary.md").read_bytes())
     check("and the step passes", done.returncode == 0)
 
-    # `gh` knows two runs of main: the last one has left nothing, the one before has.
+    # `gh` has two runs of main: the last one without an artifact, the one before with one.
     gh = """#!/bin/sh
     case "$1 $2" in
         "run list") printf '12\\n11\\n' ;;
@@ -161,7 +161,7 @@ def kubernetes(folder, playbot, whole):
 
     def command(container):
         words = container["command"] + container["args"]
-        # The folder of the volume, not what is called so within it.
+        # The folder of the volume, not one of the same name within it.
         return [word.replace("/results/$RUN", f"{results}/$RUN") for word in words]
 
     [test] = pods[0]["containers"]
@@ -193,7 +193,7 @@ def kubernetes(folder, playbot, whole):
 def slurm(folder, playbot, whole):
     script = FILES / "slurm.sh"
     check("the script is one", run(["bash", "-n", str(script)], None, {}).returncode == 0)
-    # Plays what is asked for at once, and keeps the exit codes.
+    # Runs the job at once, and keeps the exit codes.
     sbatch = """#!/usr/bin/env bash
     echo "$*" >>calls
     for option; do case "$option" in --array=*) last=${option##*-} ;; --dependency=*) dependency=$option ;; esac; done

@@ -1,12 +1,12 @@
-"""What Kubernetes asks of the documents in kubernetes.yaml.
+"""Rules of Kubernetes for the documents in kubernetes.yaml.
 
-Kubernetes itself is not here. Names, types and rules are those of its API reference, for v1 ConfigMap, v1
+Kubernetes itself is not needed. Names, types and rules are those of its API reference, for v1 ConfigMap, v1
 PersistentVolumeClaim and batch/v1 Job, as far as the documents use them: another field is a mistake until it is added.
 """
 
 import re
 
-# A `!` marks fields that must be there, a tuple has all values that are allowed, and a list says what its items are.
+# A `!` marks fields that must be there, a tuple has all allowed values, and a list has the form of its items.
 NAME = re.compile(r"[a-z0-9]([-a-z0-9]{0,61}[a-z0-9])?")
 QUANTITY = re.compile(r"[1-9]\d*(m|[kMGT]|[KMGT]i)?")
 PATH = re.compile(r"/[^:]*")
@@ -57,7 +57,7 @@ KINDS = {
 
 
 def of_fields(value, wanted, at):
-    """What is wrong with names and types."""
+    """Returns mistakes in names and types."""
     if isinstance(wanted, dict):
         if not isinstance(value, dict):
             return [f"{at} has no fields"]
@@ -84,7 +84,7 @@ def of_fields(value, wanted, at):
 
 
 def of_rules(spec, names, at):
-    """What is wrong with how failures of pods are taken."""
+    """Returns mistakes in the handling of failed pods."""
     policy = spec.get("podFailurePolicy")
     wrong = []
     never = spec["template"]["spec"]["restartPolicy"] == "Never"
@@ -107,7 +107,7 @@ def of_rules(spec, names, at):
 
 
 def of_job(spec, settings, claims, at):
-    """What does not fit within a Job, or to the documents beside it."""
+    """Returns mismatches within a Job, or with the documents beside it."""
     pod = spec["template"]["spec"]
     containers = pod.get("initContainers", []) + pod["containers"]
     names = [container["name"] for container in containers]
@@ -138,7 +138,7 @@ def of_job(spec, settings, claims, at):
 
 
 def mistakes(documents):
-    """What Kubernetes would refuse, or take in another way than it is meant, in words."""
+    """Returns descriptions of all parts that Kubernetes would refuse or misread."""
     wrong = []
     for document in documents:
         kind = document.get("kind")

@@ -1,9 +1,9 @@
-"""A test on Ray whose workers are killed half-way loses nothing and plays nothing twice.
+"""Test of Ray with workers that are killed half-way: no level is lost, and none is played twice.
 
 Called by run.sh with the program `playbot`. It runs docs/how-to/many-machines/playbot_ray.py with three workers. Of one
 shard it kills the worker and the program together, as a machine that goes down does; of a second one only the program; of a
-third one only the worker. The joined results must be those of one process, byte for byte. Works on Linux, which says in /proc
-who runs what.
+third one only the worker. The joined results must be those of one process, byte for byte. Works on Linux, which has the processes in
+/proc.
 """
 
 import json
@@ -18,18 +18,18 @@ import time
 
 LEVELS, FIRST_TO_LAST, SHARDS, WORKERS = 140, "hard:0..139", 7, 3
 TEST = ["--bot", "random,right-jump"]
-# What the bot that leaves nothing to chance did not solve becomes files that are joined, too.
+# Failures of the deterministic bot become files that are joined, too.
 MORE = ["--episodes", "4", "--seed", "3", "--keep-failures"]
 # A shard is killed when this many of its levels are whole.
 AT_WORK = 4
-# What is killed of which shard.
+# The killed processes of each shard.
 KILLS = {0: "worker and program", 1: "program", 2: "worker"}
 LONGEST = 300.0
 SCRIPT = pathlib.Path(__file__).parents[2] / "docs/how-to/many-machines/playbot_ray.py"
 
 
 def whole_lines(journal):
-    """The levels that are whole in a shard's journal."""
+    """Returns the levels that are whole in a shard's journal."""
     try:
         text = journal.read_bytes()
     except OSError:
@@ -38,7 +38,7 @@ def whole_lines(journal):
 
 
 def processes(shard):
-    """The program that tests a shard, and the worker of Ray that started it."""
+    """Returns the program that tests a shard, and the worker of Ray that started it."""
     for entry in pathlib.Path("/proc").iterdir():
         if not entry.name.isdigit():
             continue
@@ -97,7 +97,7 @@ def check(what, is_so):
 
 
 def files(folder):
-    """All that people read of a test, but for the shards and the journal, whose order is that of the threads."""
+    """Returns all results of a test, but for the shards and the journal, whose order is that of the threads."""
     paths = (path for path in folder.rglob("*") if path.is_file())
     names = {str(path.relative_to(folder)): path for path in paths}
     own = {"levels.jsonl", "test.json"}

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Runs what docs/how-to/many-machines has, on this machine: the steps of the workflow, the containers of the Jobs and the array
-# of Slurm, and the script for Ray on real workers, some of which are killed half-way. What they join is compared with the
-# results of one process. Takes about two minutes.
+# Runs the files of docs/how-to/many-machines on this machine: the steps of the workflow, the containers of the Jobs and the array
+# of Slurm, and the script for Ray on real workers, some of which are killed half-way. The joined results are compared with
+# those of one process. Takes about two minutes.
 # Called with the program `playbot` and a folder for Python packages that stays between calls:
 #   tests/many_machines/run.sh target/release/playbot target/python
 set -euo pipefail
@@ -24,6 +24,6 @@ if ! [ -e "$packages/complete-$version" ]; then
     touch "$packages/complete-$version"
 fi
 "$packages/bin/python" tests/many_machines/files_run.py "$playbot"
-# Nothing is sent, and no secret is made, for workers of this machine alone.
+# Workers of this machine alone need no messages and no secret.
 export RAY_USAGE_STATS_ENABLED=0 RAY_AUTH_MODE=disabled
 "$packages/bin/python" tests/many_machines/ray_run.py "$playbot"

@@ -1,4 +1,4 @@
-"""Times learning steps of this project and of PyTorch in turn, on the same cores.
+"""Benchmark of learning steps of this project and of PyTorch in turn, on the same cores.
 
 The networks, sizes and losses are the same; ours also make a step of Adam. PyTorch has its best settings: channels last,
 one thread per core, and an allocator that keeps its memory (set by `run`).
@@ -133,7 +133,7 @@ def main():
 
 
 def markdown(times):
-    """The medians, and what they are of."""
+    """Returns the medians, and their case."""
     rounds = len(next(iter(times.values()))["ours"])
     rows = []
     for case, found in times.items():

@@ -1,23 +1,23 @@
-"""Tables in Markdown, and the places in a document that they belong in."""
+"""Tables in Markdown, and their insertion into a document."""
 
 import re
 from pathlib import Path
 
 
 def number(x):
-    """Three digits."""
+    """Formats three digits."""
     return f"{x:.2f}" if x < 10 else f"{x:.1f}" if x < 100 else f"{x:,.0f}"
 
 
 def table(header, rows):
-    """Lines of a table whose first column is words."""
+    """Returns the lines of a table whose first column is words."""
     line = lambda cells: "| " + " | ".join(cells) + " |"
     rule = "|---|" + "---:|" * (len(header) - 1)
     return "\n".join([line(header), rule, *map(line, rows)])
 
 
 def put(document, name, text):
-    """Replaces what is between `<!-- name -->` and `<!-- /name -->` in the document."""
+    """Replaces the text between `<!-- name -->` and `<!-- /name -->` in the document."""
     path, begin, end = Path(document), f"<!-- {name} -->", f"<!-- /{name} -->"
     old = path.read_text()
     if begin not in old or end not in old:

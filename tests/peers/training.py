@@ -1,4 +1,4 @@
-"""Times PPO from end to end, ours and PyTorch with EnvPool in turn: playing and learning, in steps per second.
+"""Benchmark of PPO from end to end, ours and PyTorch with EnvPool in turn: playing and learning, in steps per second.
 
 Both play 64 arenas of CoinRun, or 16 ants, with the same networks, rollouts, epochs and minibatches on the same cores.
 EnvPool plays the official Procgen and MuJoCo; its ant has no maze. Ours also normalises rewards.
@@ -88,7 +88,7 @@ def entropy(dist):
 
 
 class Ppo:
-    """PPO in the usual form, with all tensors made once."""
+    """PPO in its common form, with all tensors made once."""
 
     def __init__(self, case):
         threads = torch.get_num_threads()
@@ -203,7 +203,7 @@ PARTS = ["simulate", "observe", "infer", "record", "gather", "learn"]
 
 
 def markdown(found):
-    """The medians, and where our time went."""
+    """Returns the medians, and the shares of our time."""
     rows, parts = [], []
     for name, measured in found.items():
         middle = lambda who, key: statistics.median(one[key] for one in measured[who])

@@ -1,8 +1,8 @@
-//! Games that play like the corridor, but for what their tests are about.
+//! Variants of the corridor game for tests.
 
-/// What [`Game`](playbot_lab::prelude::Game) asks of every game, answered as the [`Corridor`](crate::Corridor) does: for
-/// the `impl Game` of a game that adds something to it. `but build` leaves out [`Game::build`](playbot_lab::prelude::Game::build),
-/// and a list has those alone that it names.
+/// Implements the methods of [`Game`](playbot_lab::prelude::Game) as the [`Corridor`](crate::Corridor) does, for the
+/// `impl Game` of a variant of it. `but build` leaves out [`Game::build`](playbot_lab::prelude::Game::build), and a
+/// list has only the named ones.
 #[macro_export]
 macro_rules! as_corridor {
     () => {

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use playbot_lab::prelude::*;
 
-/// A corridor of 7 cells. The agent starts in the middle, action 1 goes right, action 0 left, action 2 stays. The right
+/// A corridor of 7 cells. The agent starts in the middle. Action 1 goes right, action 0 left, action 2 stays. The right
 /// end wins 1 point, the left end loses, and after 20 ticks time is up. Even levels start one cell further right.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Corridor;
@@ -16,7 +16,7 @@ pub struct Cell(pub i32);
 #[derive(Resource, Clone, Copy, Debug)]
 pub struct PoisonAt(pub u32);
 
-/// Adds a number that differs from run to run to the state: what a replay must notice.
+/// Adds a number that differs from run to run to the state. A replay must notice it.
 #[derive(Resource, Clone, Copy, Debug)]
 pub struct Drift(pub u64);
 

@@ -1,4 +1,4 @@
-//! A small game with reflected state, healthy or with one fault planted in it: what the doctor must find.
+//! A small game with reflected state, healthy or with one planted fault, for tests of the doctor.
 //!
 //! A gardener walks along a bed of plants and waters the one it stands at. Every gardener has plants of its own.
 
@@ -10,14 +10,14 @@ use std::{
 use bevy::{prelude::*, time::Real};
 use playbot_lab::prelude::*;
 
-/// What is wrong with a copy of the game.
+/// The fault of a copy of the game.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// Nothing.
+    /// No fault.
     None,
-    /// The [`Wind`] comes from a generator that nobody seeds.
+    /// The [`Wind`] comes from an unseeded generator.
     UnseededRandomness,
-    /// What a gardener [`Smells`] depends on the order of a `HashMap`.
+    /// The gardener's [`Smells`] depends on the order of a `HashMap`.
     HashOrder,
     /// The [`Sun`] moves at the pace of `Time<Real>`.
     WallClock,
@@ -27,7 +27,7 @@ pub enum Fault {
     Survivor,
     /// The plants of an episode stay when it is over.
     LeftOvers,
-    /// A [`Record`] that nobody reads lasts for ever.
+    /// An unread [`Record`] lasts for ever.
     LastingRecord,
     /// The [`Secret`] of the plant is drawn without a seed, and reflection cannot see it.
     Hidden,
@@ -35,11 +35,11 @@ pub enum Fault {
     NotFinite,
     /// The game panics at tick 5.
     Panic,
-    /// Nothing that agents see ever changes.
+    /// The observation never changes.
     Blind,
 }
 
-/// Where a gardener is, and what it has earned.
+/// Position and earnings of a gardener.
 #[derive(Component, Clone, Debug, Default, Reflect)]
 #[reflect(Component)]
 pub struct Gardener {
@@ -47,7 +47,7 @@ pub struct Gardener {
     earned: u32,
 }
 
-/// What a gardener smells.
+/// Smell of a gardener's position.
 #[derive(Component, Clone, Debug, Default, Reflect)]
 #[reflect(Component)]
 pub struct Smells {
@@ -81,19 +81,19 @@ pub struct Herbs {
     strengths: HashMap<u64, u32>,
 }
 
-/// How fast the sun moves.
+/// Speed of the sun.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
 pub struct Sun {
     pace: f32,
 }
 
-/// Plants watered, by whomever.
+/// Plants watered, by all gardeners.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
 pub struct Score(u32);
 
-/// How wet the soil is.
+/// Wetness of the soil.
 #[derive(Resource, Clone, Debug, Reflect)]
 #[reflect(Resource)]
 pub struct Soil {
@@ -138,7 +138,7 @@ fn random() -> u64 {
     RandomState::new().build_hasher().finish()
 }
 
-/// What all gardeners live with.
+/// Applies the weather, shared by all gardeners.
 fn weather(
     planted: Res<Planted>,
     real: Res<Time<Real>>,

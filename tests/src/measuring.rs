@@ -1,9 +1,9 @@
-//! How players are measured in tests.
+//! Measurement of players in tests.
 
 use bevy_playbot::vision::ObservationConfig;
 use playbot_lab::eval::EvalPlan;
 
-/// One episode on each of these levels, by four arenas in two Worlds on two threads.
+/// Returns a plan of one episode on each of these levels, by four arenas in two Worlds on two threads.
 pub fn plan(levels: &str) -> EvalPlan {
     EvalPlan {
         split: levels.parse().expect("a split"),

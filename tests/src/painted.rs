@@ -7,12 +7,13 @@ use bevy::{
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
 };
 use bevy_playbot::vision::{Picture, Stage, VisionSystems};
-use playbot_lab::prelude::*;
+use playbot_lab::{game::PictureTools, prelude::*};
 
 use crate::corridor::Cell;
 
-/// [`Corridor`](crate::Corridor), which is drawn: a green agent that its eye follows, a white exit at the right end and a
-/// red pit at the left one, a unit for each cell. The pictures say no more than the first number of the vector.
+/// [`Corridor`](crate::Corridor) with pictures: a green agent with a camera, a white exit at the right end and a red
+/// pit at the left one, a unit for each cell. The pictures carry the same information as the first number of the
+/// vector.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PaintedCorridor;
 
@@ -34,7 +35,7 @@ impl FromWorld for Paints {
     }
 }
 
-/// Gives new agents a stage of their own with all that is seen on it.
+/// Gives new agents a stage of their own with all its sprites.
 fn spawn_pictures(
     new: Query<(Entity, &Agent), (With<Cell>, Without<Sprite>)>,
     paints: Res<Paints>,
@@ -59,6 +60,12 @@ fn follow(mut agents: Query<(&Cell, &mut Transform)>) {
 impl Game for PaintedCorridor {
     crate::as_corridor!();
 
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { pictures: self, ..GameTools::default() }
+    }
+}
+
+impl PictureTools for PaintedCorridor {
     fn picture(&self) -> Option<Picture> {
         Some(Picture { width: 8.0, least_height: 0.0 })
     }

@@ -1,8 +1,8 @@
-//! Disks as a power cut leaves them, made from what a program [did to one](playbot_learner::disk::DiskRecording).
+//! Disks after a power cut, made from a program's [operations](playbot_learner::disk::DiskRecording).
 //!
-//! The model is that of today's file systems with a journal: names and folders change in the order in which the program
-//! changed them; the bytes of a file are sure only once they were brought to the disk, and until then may be there, be gone,
-//! or be there in part.
+//! The model is that of today's file systems with a journal. Names and folders change in the order in which the program
+//! changed them. The bytes of a file are sure only once they were brought to the disk. Until then they may be there, be
+//! gone, or be there in part.
 
 use std::{
     collections::BTreeMap,
@@ -12,7 +12,7 @@ use std::{
 
 use playbot_learner::disk::DiskOperation;
 
-/// What becomes of bytes that the program had written and not brought to the disk.
+/// The fate of bytes that the program had written and not brought to the disk.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unsynced {
     /// They are all there: as after a kill.
@@ -25,25 +25,25 @@ pub enum Unsynced {
 
 const WAYS: [Unsynced; 3] = [Unsynced::Kept, Unsynced::Lost, Unsynced::Halved];
 
-/// Where the power fails.
+/// The time of the power cut.
 #[derive(Clone, Copy, Debug)]
 pub struct PowerCut {
     /// Operations that were begun.
     pub operations: usize,
     /// Eighths of the bytes of the last one that were written, if it is one that writes.
     pub eighths: usize,
-    /// What becomes of bytes that were not brought to the disk.
+    /// The fate of bytes that were not brought to the disk.
     pub unsynced: Unsynced,
 }
 
-/// Every place at which the power can fail: after each operation, and in the middle of each that writes.
+/// Returns every time of a power cut: after each operation, and in the middle of each that writes.
 pub fn power_cuts(operations: &[DiskOperation]) -> Vec<PowerCut> {
     let all = (0..=operations.len()).flat_map(|count| {
         let torn: &[usize] = match count.checked_sub(1).map(|last| &operations[last]) {
             Some(DiskOperation::Write { .. }) => &[0, 1, 4, 7, 8],
             _ => &[8],
         };
-        // Where the last bytes are torn, those before are there; all else is another place.
+        // Where the last bytes are torn, those before are there; any other state is another cut.
         torn.iter().flat_map(move |&eighths| {
             let ways = if eighths < 8 { &WAYS[..1] } else { &WAYS[..] };
             ways.iter().map(move |&unsynced| PowerCut { operations: count, eighths, unsynced })
@@ -58,7 +58,7 @@ struct Contents {
     synced: Vec<u8>,
 }
 
-/// A disk that is not there.
+/// A simulated disk.
 #[derive(Clone, Debug, Default)]
 pub struct PaperDisk {
     /// The contents of each file by their place in the list; `None` for folders.
@@ -67,7 +67,7 @@ pub struct PaperDisk {
 }
 
 impl PaperDisk {
-    /// What is in a folder, all of it on the disk for good.
+    /// Returns the contents of a folder, all of it on the disk for good.
     pub fn of(folder: &Path) -> Self {
         let mut disk = Self::default();
         disk.add(folder);
@@ -142,7 +142,7 @@ impl PaperDisk {
         }
     }
 
-    /// Whether there is such a file or folder.
+    /// Returns true if there is such a file or folder.
     pub fn has(&self, path: &Path) -> bool {
         self.names.contains_key(path)
     }
@@ -167,7 +167,7 @@ impl Contents {
             Unsynced::Halved if self.now.starts_with(&self.synced) => {
                 self.now.truncate(self.synced.len().midpoint(self.now.len()));
             }
-            // What was written over is half new.
+            // A file that was written over is half new.
             Unsynced::Halved => {
                 let half = self.now.len() / 2;
                 let rest = self.synced.get(half..).unwrap_or_default();
@@ -185,7 +185,7 @@ mod tests {
 
     use super::*;
 
-    /// A folder with all that can be done to one, and what was done.
+    /// Does all kinds of operations in a folder, and returns them.
     fn worked_on(folder: &Path) -> Vec<DiskOperation> {
         let recording = DiskRecording::of(folder);
         let below = folder.join("a/b");

@@ -22,7 +22,7 @@ pub fn record_demonstrator(
     levels: impl IntoIterator<Item = u64>,
 ) {
     let (mut world, agents) = build_world(game, mode, 5, 0, 1);
-    game.attach_demonstrator(&mut world, agents[0], noise);
+    game.tools().bots.attach_demonstrator(&mut world, agents[0], noise);
     record(world, agents[0], game.demo_header(mode), path, levels);
 }
 

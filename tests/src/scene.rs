@@ -8,7 +8,7 @@ use bevy_playbot::{
 };
 use playbot_lab::prelude::*;
 
-/// An image of `width` columns from its pixels, top row first.
+/// Returns an image of `width` columns from its pixels, top row first.
 pub fn image(width: u32, pixels: &[[u8; 4]]) -> Image {
     let size = wgpu::Extent3d { width, height: pixels.len() as u32 / width, depth_or_array_layers: 1 };
     let mut image = Image::new(
@@ -22,11 +22,11 @@ pub fn image(width: u32, pixels: &[[u8; 4]]) -> Image {
     image
 }
 
-/// A World with the camera's plugin, ready to be ticked.
+/// Returns a World with the camera's plugin, ready to be ticked.
 ///
 /// # Panics
 ///
-/// Without a graphics adapter: such a machine cannot say whether the camera works.
+/// Without a graphics adapter: such a machine cannot test the camera.
 pub fn camera_world(build: impl FnOnce(&mut App)) -> World {
     let mut app = headless_app();
     let plugin = CameraSensorPlugin::headless().unwrap_or_else(|error| {
@@ -37,18 +37,18 @@ pub fn camera_world(build: impl FnOnce(&mut App)) -> World {
     into_world(app)
 }
 
-/// An agent for whom a person decides, who does nothing.
+/// Returns an agent whose decider is a person without input.
 pub fn player(index: u32) -> impl Bundle {
     (Agent::new(index, ActionSpace::Discrete(2)), Control::Human, LevelQueue::Always(0))
 }
 
-/// An agent that sees `width` world units around an entity in a picture of `size` pixels.
+/// Spawns an agent that sees `width` world units around an entity in a picture of `size` pixels.
 pub fn spawn_eye(world: &mut World, index: u32, target: Entity, width: f32, size: [u32; 2]) -> Entity {
     let options = ImageOptions { width: size[0], height: size[1], ..default() };
     world.spawn((player(index), CameraSensor::following(target, width, options))).id()
 }
 
-/// The pixel of an agent's frame in column `x` from the left and row `y` from the top.
+/// Returns the pixel of an agent's frame in column `x` from the left and row `y` from the top.
 pub fn pixel(world: &World, agent: Entity, x: u32, y: u32) -> [u8; 3] {
     let width = world.get::<ImageSensor>(agent).expect("a sensor").0.width;
     let frame = world.get::<Frame>(agent).expect("a frame");
@@ -56,18 +56,18 @@ pub fn pixel(world: &World, agent: Entity, x: u32, y: u32) -> [u8; 3] {
     [red, green, blue]
 }
 
-/// Rounds of a generator of numbers that look random.
+/// Draws from a generator of pseudo-random numbers.
 pub fn draw(state: &mut u64, below: u64) -> u64 {
     *state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
     (*state >> 33) % below
 }
 
-/// Things of [`spawn_large_scene`] that move.
+/// Marks moving entities of [`spawn_large_scene`].
 #[derive(Component, Clone, Copy, Debug)]
 pub struct Mover;
 
-/// Arenas like CoinRun's, one for each of `agents`: a grid of 64×64 tiles, a background, 25 sprites and an agent in the
-/// middle that sees 13 tiles at 64×64 pixels.
+/// Spawns arenas like CoinRun's, one for each of `agents`: a grid of 64×64 tiles, a background, 25 sprites and an agent
+/// in the middle that sees 13 tiles at 64×64 pixels.
 pub fn spawn_large_scene(world: &mut World, agents: u32) -> Vec<Entity> {
     let mut state = 7;
     let mut noise = |width: u32, height: u32, hole: u64| {

@@ -1,4 +1,4 @@
-//! Trainings of the corridor that are over in a moment.
+//! Very short trainings of the corridor.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use playbot_learner::{ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, Sk
 
 use crate::Corridor;
 
-/// Steps of a demonstration.
+/// Steps of a recorded episode.
 const STEPS: u16 = 12;
 
 const EXPERIMENT: &str = r#"(
@@ -19,13 +19,13 @@ const EXPERIMENT: &str = r#"(
     checkpoints: (keep: 2),
 )"#;
 
-/// An experiment with this algorithm.
+/// Returns an experiment with this algorithm.
 pub fn experiment(algorithm: Algorithm) -> Experiment {
     let experiment = parse_experiment(EXPERIMENT, Path::new("small.ron")).expect("valid");
     Experiment { algorithm, ..experiment }
 }
 
-/// Demonstrations, as nobody has played them.
+/// Returns made-up recordings.
 pub fn dataset() -> Dataset {
     let episode = |number: u16| DemoEpisode {
         observations: (0..2 * STEPS).map(|at| f32::from((at * 5 + number) % 7) / 7.0).collect::<Vec<f32>>().into(),
@@ -34,20 +34,20 @@ pub fn dataset() -> Dataset {
     Dataset::new(2, ActionSpace::Discrete(3), (0..4).map(episode).collect()).expect("good episodes")
 }
 
-/// A trainer of skills at its start.
+/// Returns a trainer of skills at its start.
 pub fn fresh_skills() -> SkillTrainer {
     let config = experiment(Algorithm::ScorePpo).skills;
     SkillTrainer::new(config, dataset(), 1, DeviceKind::Flex).expect("windows fit")
 }
 
-/// A trainer of skills that has learned for a batch.
+/// Returns a trainer of skills that has learned for a batch.
 pub fn skills() -> SkillTrainer {
     let mut trainer = fresh_skills();
     trainer.train_batch().expect("finite");
     trainer
 }
 
-/// A trainer at its start.
+/// Returns a trainer at its start.
 pub fn trainer(algorithm: Algorithm) -> Trainer {
     let model = algorithm.needs_skills().then(|| skills().into_model());
     Trainer::new(&Corridor, &experiment(algorithm), model.as_ref(), DeviceKind::Flex, 1).expect("fits")

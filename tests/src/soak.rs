@@ -1,4 +1,4 @@
-//! Many ticks before many eyes: how fast, how many frames were stale or missing, and what memory it took.
+//! Soak test of many sensors over many ticks: speed, stale or missing frames, and memory.
 #![allow(clippy::print_stdout, reason = "it is what a soak is for")]
 
 use std::time::Instant;

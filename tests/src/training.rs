@@ -1,4 +1,4 @@
-//! Training, and what it writes, for tests that compare one run with another.
+//! Training and its files, for tests that compare one run with another.
 
 use std::path::Path;
 
@@ -8,12 +8,23 @@ use playbot_lab::{
     train::{
         Experiment, Trainer,
         checkpoint::CheckpointChoice,
+        learn_skills::learn,
+        recordings::read_dataset,
         run_dir::{OpenedRun, RunDir, RunInfo},
+        run_observer::Unobserved,
     },
 };
-use playbot_learner::{DeviceKind, Learner as _, Policy, PolicySpec, PpoConfig, PpoLearner};
+use playbot_learner::{DeviceKind, Learner as _, Policy, PolicySpec, PpoConfig, PpoLearner, SkillModel};
 
-/// What a run of this experiment says of itself.
+/// Learns the skill model of an experiment from its recordings, without a file.
+pub fn learn_skills(game: &dyn Game, experiment: &Experiment, threads: usize) -> SkillModel {
+    let path = experiment.recordings().expect("recordings are named");
+    let dataset = read_dataset(game, experiment, path, threads, &mut Unobserved).expect("readable");
+    let learned = learn(experiment, dataset, DeviceKind::Flex, None, &mut Unobserved).expect("learns");
+    learned.expect("nobody stops it")
+}
+
+/// Returns the metadata of a run of this experiment.
 pub fn run_info(experiment: &Experiment) -> RunInfo {
     RunInfo {
         algorithm: experiment.algorithm,
@@ -27,7 +38,7 @@ pub fn run_info(experiment: &Experiment) -> RunInfo {
     }
 }
 
-/// Trains to the end, or until so many updates are done, and saves. What is in the folder already is gone on with.
+/// Trains to the end, or until so many updates are done, and saves. Existing work in the folder is resumed.
 pub fn train(folder: &Path, mut trainer: Trainer, stop_after: Option<u64>) -> Trainer {
     let run = match folder.exists() {
         true => RunDir::open(folder).expect("a run").run,
@@ -50,15 +61,15 @@ pub fn last_success_rate(mut trainer: Trainer) -> Option<f64> {
     last
 }
 
-/// What a run has written: its metrics, and learner and arenas of its last checkpoint.
+/// Returns the files of a run: its metrics, and learner and arenas of its last checkpoint.
 pub fn written(folder: &Path) -> [Vec<u8>; 3] {
     let last = RunDir::open(folder).expect("a run").run.checkpoint(CheckpointChoice::Last).expect("saved");
     [folder.join("metrics.jsonl"), last.learner_file(), last.arenas_file()]
         .map(|path| std::fs::read(path).expect("written"))
 }
 
-/// Trains a game to its end, once in one go and once stopped after so many updates and resumed: both must write the same
-/// bytes. `fresh` makes a trainer for a number of threads.
+/// Trains a game to its end, once in one go and once stopped after so many updates and resumed: both must write the
+/// same bytes. `fresh` makes a trainer for a number of threads.
 pub fn check_resuming(game: &dyn Game, fresh: impl Fn(usize) -> Trainer, stop_after: u64) {
     let folder = tempfile::tempdir().expect("a folder");
     let (whole, halved) = (folder.path().join("whole"), folder.path().join("halved"));
@@ -72,7 +83,7 @@ pub fn check_resuming(game: &dyn Game, fresh: impl Fn(usize) -> Trainer, stop_af
     assert!(is_same, "{}, {}: stopping in the middle changed the result", game.name(), experiment.algorithm);
 }
 
-/// A policy that has learned nothing, with a critic that has an opinion all the same.
+/// Returns an untrained policy, whose critic has values all the same.
 pub fn untrained(game: &dyn Game, observation_config: &ObservationConfig, config: PpoConfig) -> Policy {
     let spec = PolicySpec { obs: observation_config.obs_kind(game), latent: 0, action_space: game.actions() };
     PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("valid").policy()

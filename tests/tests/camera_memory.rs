@@ -1,4 +1,5 @@
-//! Memory stays flat while levels and agents come and go. Alone in its program, whose memory is what is measured.
+//! Tests that memory stays flat while levels and agents come and go. Alone in its program, whose memory is measured.
+#![cfg(feature = "screen")]
 
 use bevy::prelude::*;
 use bevy_playbot::vision::{Stage, TileLayer};

@@ -1,4 +1,4 @@
-//! A picture takes no memory that the one before did not.
+//! Test that a picture takes no more memory than the one before.
 
 #![allow(unsafe_code, reason = "an allocator that counts can be written in no other way")]
 
@@ -40,7 +40,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static ALLOCATOR: Counting = Counting;
 
-/// An arena with tiles and sprites of all kinds, and its agent.
+/// Spawns an arena with tiles and sprites of all kinds, and its agent.
 fn spawn_arena(world: &mut World, index: u32, paint: &Handle<Image>) {
     let stage = world.spawn(Stage).id();
     let layer = TileLayer { tileset: paint.clone(), columns: 8, rows: 8, cells: vec![0; 64], outside: 1 };

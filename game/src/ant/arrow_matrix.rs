@@ -1,7 +1,7 @@
 //! Symmetric matrices in the shape of an arrow: the torso is coupled with every leg, the legs with the torso only.
 //!
-//! The mass matrix has this shape, and so has it with contacts added, as each touches one leg. Eliminating the legs
-//! first leaves a 6×6 system.
+//! The mass matrix has this shape. It keeps it with contacts added, as each contact touches one leg. Eliminating the
+//! legs first leaves a 6×6 system.
 
 use bevy::reflect::Reflect;
 
@@ -20,7 +20,7 @@ pub struct Coordinates {
 }
 
 impl Coordinates {
-    /// `self + factor · other`.
+    /// Returns `self + factor · other`.
     pub fn plus(&self, factor: f64, other: &Self) -> Self {
         let mut sum = *self;
         for (s, o) in sum.base.iter_mut().zip(&other.base) {
@@ -33,7 +33,7 @@ impl Coordinates {
         sum
     }
 
-    /// Scalar product.
+    /// Returns the scalar product.
     pub fn dot(&self, other: &Self) -> f64 {
         let base: f64 = self.base.iter().zip(&other.base).map(|(a, b)| a * b).sum();
         let legs: f64 = self.legs.iter().zip(&other.legs).map(|(a, b)| a[0] * b[0] + a[1] * b[1]).sum();
@@ -53,7 +53,7 @@ pub struct ArrowMatrix {
 }
 
 impl ArrowMatrix {
-    /// The product with a vector.
+    /// Returns the product with a vector.
     pub fn times(&self, x: &Coordinates) -> Coordinates {
         let mut out = Coordinates::default();
         for i in 0..BASE {
@@ -109,7 +109,7 @@ pub struct Factored {
 }
 
 impl Factored {
-    /// The solution x of A·x = b.
+    /// Returns the solution x of A·x = b.
     pub fn solve(&self, b: &Coordinates) -> Coordinates {
         let mut x = *b;
         for leg in 0..LEGS {
@@ -176,7 +176,7 @@ impl Cholesky {
 mod tests {
     use super::*;
 
-    /// A matrix that is positive definite because its diagonal outweighs the rest.
+    /// Returns a matrix that is positive definite because its diagonal outweighs the rest.
     fn some_matrix() -> ArrowMatrix {
         let mut matrix = ArrowMatrix::default();
         for i in 0..BASE {

@@ -1,4 +1,4 @@
-//! The ant as a body that moves: Runge-Kutta's method of fourth order over the accelerations of mass, hinges and contacts.
+//! The ant as a moving body: Runge-Kutta's method of fourth order over the accelerations of mass, hinges and contacts.
 
 use bevy::{
     math::{DQuat, DVec3, Quat, Vec3},
@@ -26,7 +26,7 @@ pub const SUBSTEPS: usize = 5;
 /// Torques or angles of all hinges, by leg.
 type Hinges = [[f64; 2]; LEGS];
 
-/// What velocities are integrated to.
+/// Positions: the integrals of velocities.
 #[derive(Clone, Copy, Debug, Reflect)]
 struct Place {
     position: DVec3,
@@ -44,7 +44,7 @@ impl Place {
     }
 }
 
-/// The rotation whose axis and angle are a vector's direction and length.
+/// Returns the rotation whose axis and angle are a vector's direction and length.
 fn spun(turned: DVec3) -> DQuat {
     let angle = turned.length();
     if angle > 0.0 { turn(turned / angle, angle) } else { DQuat::IDENTITY }
@@ -77,8 +77,8 @@ const WEIGHTS: [f64; 4] = [1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0];
 
 /// The quadruped among walls.
 ///
-/// Reflection sees its whole state. Left out is what never changes, such as the walls, since rapier's types are not
-/// reflected, and what each step computes anew.
+/// Reflection sees its whole state. It leaves out constant parts, such as the walls, since rapier's types are not
+/// reflected, and values that each step computes anew.
 #[derive(Reflect)]
 #[reflect(from_reflect = false)]
 pub struct AntBody {
@@ -91,7 +91,7 @@ pub struct AntBody {
     gravity: f64,
     place: Place,
     rates: Rates,
-    /// Accelerations of the last solution, from which the next is looked for.
+    /// Accelerations of the last solution, the first guess of the next.
     warm: Coordinates,
     #[reflect(ignore)]
     near: Vec<WallBox>,
@@ -104,7 +104,7 @@ pub struct AntBody {
 }
 
 impl AntBody {
-    /// An ant in the nominal pose on a floor at height 0 with these walls.
+    /// Returns an ant in the nominal pose on a floor at height 0 with these walls.
     pub fn new(walls: &[WallBox]) -> Self {
         let solids = Solids::default();
         let mut body = Self {
@@ -124,13 +124,13 @@ impl AntBody {
         body
     }
 
-    /// The same without gravity, for comparisons with other engines.
+    /// Returns the same without gravity, for comparisons with other engines.
     pub fn weightless(mut self) -> Self {
         self.gravity = 0.0;
         self
     }
 
-    /// Puts the ant somewhere and forgets what was before.
+    /// Sets the ant's state and forgets earlier steps.
     pub fn set_state(&mut self, state: &AntState) {
         let (q, v) = (state.qpos.map(f64::from), state.qvel.map(f64::from));
         self.place = Place {
@@ -146,12 +146,12 @@ impl AntBody {
         self.warm = Coordinates::default();
     }
 
-    /// Takes over where another ant is and how it moves, to the last digit: among the same walls both go on alike.
+    /// Copies the position and motion of another ant, to the last digit: among the same walls both go on alike.
     pub fn follow(&mut self, other: &Self) {
         (self.place, self.rates, self.warm) = (other.place, other.rates, other.warm);
     }
 
-    /// Where the ant is and how it moves.
+    /// Returns the ant's positions and velocities.
     pub fn state(&self) -> AntState {
         let (p, o) = (self.place.position, self.place.orientation);
         let (v, w) = (self.rates.centre, self.rates.spin);
@@ -165,28 +165,28 @@ impl AntBody {
         state
     }
 
-    /// Mass of the ant, in kg.
+    /// Returns the mass of the ant, in kg.
     pub fn mass(&self) -> f64 {
         self.solids.mass()
     }
 
-    /// The walls around it.
+    /// Returns the walls around it.
     pub fn walls(&self) -> &Walls {
         &self.walls
     }
 
-    /// Ball and limbs in the world.
+    /// Returns the ball and the limbs in the world.
     pub fn parts(&self) -> [Part; PARTS] {
         parts(&self.pose(&self.place))
     }
 
-    /// Where the torso's centre is and how it is turned.
+    /// Returns the position of the torso's centre and its rotation.
     pub fn torso(&self) -> (Vec3, Quat) {
         (self.place.position.as_vec3(), self.place.orientation.as_quat())
     }
 
-    /// One control step of [`CONTROL_STEP`]: torques of 30 N·m times an action in -1..1, which is clipped, in the order of
-    /// [`ACTUATED`].
+    /// Makes one control step of [`CONTROL_STEP`]. The torques are 30 N·m times an action in -1..1, which is clipped,
+    /// in the order of [`ACTUATED`].
     pub fn step(&mut self, action: &[f32; JOINTS]) {
         let mut torques = Hinges::default();
         for (&share, joint) in action.iter().zip(ACTUATED) {
@@ -267,7 +267,7 @@ mod tests {
         assert_ne!(one.state(), other.state(), "rounded numbers are not enough");
     }
 
-    /// So that `playbot doctor` can name what differs.
+    /// Lets `playbot doctor` name differences.
     #[test]
     fn reflection_sees_where_the_ant_is() {
         let mut body = AntBody::new(&[]);

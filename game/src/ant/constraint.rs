@@ -1,8 +1,8 @@
 //! MuJoCo's soft constraints: joint limits and contacts with friction as one-sided springs in acceleration.
 //!
-//! A row J asks that J·a be no less than a reference acceleration -b·(J·v) - k·d·r, where r is by how far the constraint
-//! is violated; it pulls with weight 1/R. Stiffness k, damping b and impedance d follow from MuJoCo's `solref` and
-//! `solimp`, R from the impedance and from how heavy the row is in the nominal pose.
+//! A row J asks for J·a no less than a reference acceleration -b·(J·v) - k·d·r, where r is the violation of the
+//! constraint. It pulls with weight 1/R. Stiffness k, damping b and impedance d follow from MuJoCo's `solref` and
+//! `solimp`. R follows from the impedance and from the weight of the row in the nominal pose.
 
 use bevy::math::DVec3;
 
@@ -48,13 +48,13 @@ impl Row {
     }
 }
 
-/// Stiffness and damping for a largest impedance.
+/// Returns the stiffness and damping for a largest impedance.
 fn spring(largest_impedance: f64) -> (f64, f64) {
     let scale = 1.0 / (largest_impedance * TIME_CONSTANT);
     (scale * scale, 2.0 * scale)
 }
 
-/// How readily limbs and hinges move in the nominal pose: MuJoCo's `invweight0`.
+/// Mobility of limbs and hinges in the nominal pose: MuJoCo's `invweight0`.
 #[derive(Clone, Copy, Debug)]
 pub struct Mobility {
     torso: f64,
@@ -65,7 +65,7 @@ pub struct Mobility {
 }
 
 impl Mobility {
-    /// Of an ant with all joints at 0.
+    /// Computes it for an ant with all joints at 0.
     pub fn new(solids: &Solids) -> Self {
         let pose = Pose::new(DVec3::ZERO, bevy::math::DQuat::IDENTITY, &[[0.0; 2]; LEGS]);
         let inverse = mass_matrix(solids, &pose.legs.map(|leg| solids.leg(&leg))).factor();
@@ -102,7 +102,8 @@ fn mobility(inverse: &Factored, row: &Coordinates) -> f64 {
     row.dot(&inverse.solve(row))
 }
 
-/// Velocity of a point of a limb along a direction, as a row over the coordinates. Both are in the torso's frame.
+/// Returns the velocity of a point of a limb along a direction, as a row over the coordinates. Both are in the torso's
+/// frame.
 fn jacobian(pose: &Pose, limb: Limb, leg: usize, point: DVec3, direction: DVec3) -> Coordinates {
     let turn = point.cross(direction);
     let mut row =
@@ -176,7 +177,7 @@ pub fn contact(touch: &Contact, pose: &Pose, velocity: &Coordinates, mobility: &
     }
 }
 
-/// Two directions across a normal, the first as near as can be to `along`.
+/// Returns two directions across a normal, the first as near as can be to `along`.
 fn tangents(normal: DVec3, along: DVec3) -> [DVec3; 2] {
     let across = along - normal * normal.dot(along);
     let first = across.try_normalize().unwrap_or_else(|| normal.any_orthonormal_vector());

@@ -1,7 +1,7 @@
-//! The accelerations that obey mass, forces and one-sided constraints: Newton's method on a convex cost, as in MuJoCo.
+//! Accelerations that obey mass, forces and one-sided constraints: Newton's method on a convex cost, as in MuJoCo.
 //!
-//! The cost is ½(a - a₀)·M·(a - a₀) + ½ Σ w·min(0, J·a - reference)²; a₀ are the accelerations without constraints. It is
-//! quadratic as long as the same rows push, so few iterations reach the exact minimum.
+//! The cost is ½(a - a₀)·M·(a - a₀) + ½ Σ w·min(0, J·a - reference)², where a₀ are the accelerations without
+//! constraints. It is quadratic as long as the same rows push, so few iterations reach the exact minimum.
 
 use super::{
     arrow_matrix::{ArrowMatrix, BASE, Coordinates},
@@ -29,7 +29,7 @@ impl ConstraintSolver {
             let gradient = self.gradient(&pull, rows);
             let hessian = self.hessian(mass, rows);
             let step = hessian.factor().solve(&gradient);
-            // The step is the way down, taken with a minus sign.
+            // The step is a descent direction, taken with a minus sign.
             self.slopes.clear();
             self.slopes.extend(rows.iter().map(|row| -row.dot(&step)));
             let (length, settled) = self.search(-pull.dot(&step), step.dot(&mass.times(&step)), rows);
@@ -79,8 +79,8 @@ impl ConstraintSolver {
         hessian
     }
 
-    /// How far to go: where the slope of the cost along the step vanishes. Also tells whether the same rows push all the
-    /// way and the step is whole: then the minimum is reached.
+    /// Returns the step length at which the slope of the cost along the step vanishes. Also tells whether the step is
+    /// whole with the same rows pushing throughout: then the minimum is reached.
     fn search(&self, start_slope: f64, curvature: f64, rows: &[Row]) -> (f64, bool) {
         let along = |length: f64| {
             let (mut slope, mut bend, mut same) = (start_slope + length * curvature, curvature, true);
@@ -155,7 +155,7 @@ mod tests {
     fn rows_that_are_content_do_nothing() {
         let free = Coordinates { base: [0.0, 0.0, 0.0, 0.0, 0.0, 3.0], ..Coordinates::default() };
         let rows = [push(5, 1.0, -1.0, 50.0), push(5, -1.0, -8.0, 50.0)];
-        // Started where the second row pushes.
+        // The guess is where the second row pushes.
         let guess = Coordinates { base: [0.0, 0.0, 0.0, 0.0, 0.0, 90.0], ..Coordinates::default() };
         let a = ConstraintSolver::default().solve(&unit_mass(), &free, &rows, &guess);
         assert!((a.base[5] - 3.0).abs() < 1e-9, "{a:?}");

@@ -1,6 +1,7 @@
-//! Where the ant touches the floor and walls: balls and capsules against a plane and upright boxes.
+//! Contacts of the ant with the floor and walls: balls and capsules against a plane and upright boxes.
 //!
-//! As in MuJoCo a capsule touches with the balls at its two ends, and a wall's edge also with the nearest point between.
+//! As in MuJoCo a capsule touches with the balls at its two ends, and a wall's edge also with the nearest point
+//! between.
 
 use bevy::math::DVec3;
 
@@ -12,7 +13,7 @@ use super::{
 /// Contacts begin this far before surfaces touch, in metres.
 pub const MARGIN: f64 = 0.01;
 
-/// An upright box that stands still.
+/// A fixed upright box.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WallBox {
     /// Centre, in metres.
@@ -21,7 +22,7 @@ pub struct WallBox {
     pub half: [f32; 3],
 }
 
-/// Which part of the ant something touches.
+/// The part of the ant in a contact.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limb {
     /// The ball in the middle.
@@ -34,7 +35,7 @@ pub enum Limb {
     Lower,
 }
 
-/// A place where two surfaces are less than [`MARGIN`] apart.
+/// A point at which two surfaces are less than [`MARGIN`] apart.
 #[derive(Clone, Copy, Debug)]
 pub struct Contact {
     /// The part that touches.
@@ -109,7 +110,7 @@ impl Finder<'_> {
     }
 }
 
-/// Direction out of a box to a point and their distance, which is negative inside.
+/// Returns the direction out of a box to a point and their distance, which is negative inside.
 fn towards(point: DVec3, wall: &WallBox) -> (DVec3, f64) {
     let (centre, half): (DVec3, DVec3) = (wall.centre.map(f64::from).into(), wall.half.map(f64::from).into());
     let offset: DVec3 = point - centre;
@@ -118,12 +119,12 @@ fn towards(point: DVec3, wall: &WallBox) -> (DVec3, f64) {
     if distance > 1e-9 {
         return (outside / distance, distance);
     }
-    // Inside: out through the nearest side, but never up or down.
+    // Inside, the direction is out through the nearest side, but never up or down.
     let depth = half - offset.abs();
     if depth.x < depth.y { (DVec3::X * offset.x.signum(), -depth.x) } else { (DVec3::Y * offset.y.signum(), -depth.y) }
 }
 
-/// The place between the ends of a segment, if there is one, that is nearest to a box: 0 is `from`, 1 is `to`.
+/// Returns the point between the ends of a segment that is nearest to a box, if there is one: 0 is `from`, 1 is `to`.
 fn nearest_between(from: DVec3, to: DVec3, wall: &WallBox) -> Option<f64> {
     let (centre, half): (DVec3, DVec3) = (wall.centre.map(f64::from).into(), wall.half.map(f64::from).into());
     let reach = DVec3::splat(LIMB_RADIUS + MARGIN) + half;

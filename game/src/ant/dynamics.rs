@@ -16,7 +16,7 @@ use super::{
 /// Gravity, in m/s².
 pub const GRAVITY: f64 = 9.81;
 
-/// Mass matrix of a pose, rotors included.
+/// Returns the mass matrix of a pose, rotors included.
 pub fn mass_matrix(solids: &Solids, legs: &[Leg; LEGS]) -> ArrowMatrix {
     let mut matrix = ArrowMatrix::default();
     let mut whole = solids.trunk;
@@ -48,7 +48,8 @@ fn dense(inertia: &Inertia) -> [[f64; BASE]; BASE] {
 pub fn bias(pose: &Pose, solids: &Solids, legs: &[Leg; LEGS], velocity: &Coordinates, gravity: f64) -> Coordinates {
     let base = Spatial::from_array(velocity.base);
     let up = pose.rotation.transpose() * DVec3::Z;
-    // The centre's coordinates are accelerations of a point, which spatial accelerations are not: the difference is ω×v.
+    // The centre's coordinates are accelerations of a point, which spatial accelerations are not: the difference is
+    // ω×v.
     let start = Spatial { angular: DVec3::ZERO, linear: up * gravity - base.angular.cross(base.linear) };
     let mut total = solids.trunk.times(start) + base.carry_force(solids.trunk.times(base));
     let mut forces = Coordinates::default();

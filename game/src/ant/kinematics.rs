@@ -1,4 +1,4 @@
-//! Where the legs are, in the torso's frame.
+//! Poses of the legs, in the torso's frame.
 
 use bevy::math::{DMat3, DQuat, DVec3};
 
@@ -7,7 +7,7 @@ use super::{
     spatial::{Inertia, Spatial},
 };
 
-/// The rotation by an angle, in radians, about an axis of length 1, with the same bits on every machine.
+/// Returns the rotation by an angle, in radians, about an axis of length 1, with the same bits on every machine.
 pub fn turn(axis: DVec3, angle: f64) -> DQuat {
     let (sin, cos) = libm::sincos(angle / 2.0);
     let imaginary = axis * sin;
@@ -17,7 +17,7 @@ pub fn turn(axis: DVec3, angle: f64) -> DQuat {
 /// Position and orientation of one leg's moving limbs in the torso's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct LegPose {
-    /// The hip, from which the upper limb goes to the knee where the ankle's hinge sits.
+    /// The hip, from which the upper limb goes to the ankle's hinge.
     pub hip: DVec3,
     /// The ankle's hinge.
     pub ankle: DVec3,
@@ -32,7 +32,7 @@ pub struct LegPose {
 }
 
 impl LegPose {
-    /// The pose of a leg with these joint angles, in radians.
+    /// Returns the pose of a leg with these joint angles, in radians.
     pub fn new(leg: usize, [hip_angle, ankle_angle]: [f64; 2]) -> Self {
         let hip = short_limb(leg);
         let upper = DMat3::from_quat(turn(HIP_AXIS, hip_angle));
@@ -79,7 +79,7 @@ impl Default for Solids {
 }
 
 impl Solids {
-    /// What a leg's dynamics ask of its pose.
+    /// Returns the quantities of a leg's pose that its dynamics need.
     pub fn leg(&self, pose: &LegPose) -> Leg {
         Leg {
             upper: limb(&self.short, pose.hip, pose.ankle),
@@ -89,7 +89,7 @@ impl Solids {
         }
     }
 
-    /// Mass of the whole ant, in kg.
+    /// Returns the mass of the whole ant, in kg.
     pub fn mass(&self) -> f64 {
         self.trunk.mass + LEGS as f64 * (self.short.mass + self.long.mass)
     }
@@ -99,7 +99,7 @@ fn limb(solid: &Solid, from: DVec3, to: DVec3) -> Inertia {
     Inertia::of(solid.mass, (from + to) / 2.0, solid.inertia((to - from).normalize()))
 }
 
-/// Everything that follows from the joint angles and the orientation.
+/// All quantities that follow from the joint angles and the orientation.
 #[derive(Clone, Copy, Debug)]
 pub struct Pose {
     /// The torso's centre in the world.
@@ -111,13 +111,13 @@ pub struct Pose {
 }
 
 impl Pose {
-    /// The pose with these positions: torso in the world, orientation, and joint angles by leg.
+    /// Computes the pose for these positions: torso in the world, orientation, and joint angles by leg.
     pub fn new(position: DVec3, orientation: DQuat, joints: &[[f64; 2]; LEGS]) -> Self {
         let legs = std::array::from_fn(|leg| LegPose::new(leg, joints[leg]));
         Self { position, rotation: DMat3::from_quat(orientation), legs }
     }
 
-    /// A point of the torso's frame in the world.
+    /// Returns a point of the torso's frame in the world.
     pub fn to_world(&self, point: DVec3) -> DVec3 {
         self.position + self.rotation * point
     }

@@ -1,16 +1,15 @@
 //! The quadruped of AntMaze, and the game `ant` in which it learns to walk.
 //!
 //! [`AntBody`] moves exactly as D4RL's ant does in MuJoCo: free flight to the last printed digit, and contacts too, as
-//! `tests/ant_golden.rs` shows. Its dynamics are written here, over joint coordinates, for want of an engine that has
-//! them: a hinge of this ant carries a rotor of 1 kg·m² while a limb has 0.01 kg·m². rapier's impulse joints with a motor
-//! in the rotor's place reach 40 % of the right joint speed at 4 solver iterations and 75 % at 16; its multibody joints,
-//! which know rotors, let the ant rest at 0.49 m instead of 0.37 m and take ten times as long. What rapier does here is
-//! to hold floor and walls, find those nearby, and answer rays ([`walls`]).
+//! `tests/ant_golden.rs` shows. Its dynamics are written here, over joint coordinates, for lack of an engine that has
+//! them: a hinge of this ant carries a rotor of 1 kg·m² while a limb has 0.01 kg·m². rapier's impulse joints with a
+//! motor in the rotor's place reach 40 % of the right joint speed at 4 solver iterations and 75 % at 16. Its multibody
+//! joints, which support rotors, let the ant rest at 0.49 m instead of 0.37 m and take ten times as long. rapier is
+//! used here to hold floor and walls, find those nearby, and answer rays ([`walls`]).
 //!
 //! The parts, from the bottom: [`skeleton`] has the measures, [`kinematics`] the pose, [`dynamics`] the mass matrix and
-//! the forces without contacts, [`contact`] finds where it touches, [`constraint`] and [`constraint_solver`] turn joint
-//! limits and contacts into accelerations, [`body`] integrates. [`pilot`] is what the game has taught, [`view`] what ants
-//! look like.
+//! the forces without contacts. [`contact`] finds contacts, [`constraint`] and [`constraint_solver`] turn joint limits
+//! and contacts into accelerations, [`body`] integrates. [`pilot`] is the shipped walking policy, [`view`] draws ants.
 
 pub mod arrow_matrix;
 pub mod body;

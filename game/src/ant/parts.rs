@@ -1,4 +1,4 @@
-//! The ant's shapes in the world, for those who draw it.
+//! The ant's shapes in the world, for drawing.
 
 use bevy::math::{DVec3, Quat, Vec3};
 
@@ -23,7 +23,7 @@ pub struct Part {
     pub half_length: f32,
 }
 
-/// The torso, then fixed, upper and lower limb of each leg.
+/// Returns the torso, then fixed, upper and lower limb of each leg.
 pub fn parts(pose: &Pose) -> [Part; PARTS] {
     std::array::from_fn(|part| {
         let Some(limb) = part.checked_sub(1) else {

@@ -1,4 +1,4 @@
-//! What the open floor looks like.
+//! The picture of the open floor.
 
 use bevy::prelude::*;
 use playbot_lab::prelude::*;
@@ -6,8 +6,8 @@ use playbot_lab::prelude::*;
 use super::walk::{GOAL_RADIUS, Walker};
 use crate::ant::view::{AntPose, AntViewPlugin, AntViewSystems, GoalMark, Ground, OnGround};
 
-/// Adds what is drawn to [`AntPlugin`](super::AntPlugin). Add it after the plugins that bring images, such as Bevy's own or
-/// a sensor's.
+/// Adds sprites to [`AntPlugin`](super::AntPlugin). Add it after the plugins that bring images, such as Bevy's own or a
+/// sensor's.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AntPicturePlugin;
 

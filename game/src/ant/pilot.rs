@@ -1,8 +1,9 @@
-//! The walker that comes with the program: a policy that the game `ant` has taught to walk where it is told.
+//! The walker that comes with the program: a policy, trained in the game `ant`, that walks in a commanded direction.
 
 use std::{path::Path, sync::LazyLock};
 
 use bevy::math::Vec2;
+use playbot_assets::ANT_WALKER;
 use playbot_learner::{Action, DeviceKind, FileError, LearnError, Policy, PolicyFile};
 use thiserror::Error;
 
@@ -13,11 +14,10 @@ use super::{
 };
 
 const NAME: &str = "assets/models/ant-walker.safetensors";
-const FILE: &[u8] = include_bytes!("../../assets/models/ant-walker.safetensors");
 
-static SHIPPED: LazyLock<Result<Pilot, PilotError>> = LazyLock::new(|| Pilot::from_bytes(NAME, FILE));
+static SHIPPED: LazyLock<Result<Pilot, PilotError>> = LazyLock::new(|| Pilot::from_bytes(NAME, ANT_WALKER));
 
-/// The walker that comes with the program cannot walk.
+/// The walker that comes with the program does not work.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("the ant's walker cannot walk: {0}")]
 pub struct PilotError(String);
@@ -34,11 +34,11 @@ impl From<LearnError> for PilotError {
     }
 }
 
-/// A policy that walks towards any place.
+/// A policy that walks towards any position.
 #[derive(Clone, Debug)]
 pub struct Pilot(Policy);
 
-/// What pilots sense: a row of [`SENSES`] numbers to an ant.
+/// Observations of pilots: a row of [`SENSES`] numbers to an ant.
 #[derive(Clone, Debug, Default)]
 pub struct PilotInput(Vec<f32>);
 
@@ -48,7 +48,7 @@ impl PilotInput {
         self.0.clear();
     }
 
-    /// Adds an ant that should go to this place, `[x, y]` in metres.
+    /// Adds an ant with its goal, `[x, y]` in metres.
     pub fn push(&mut self, state: &AntState, goal: [f32; 2]) {
         self.0.extend(senses(state, Vec2::from(goal)));
     }
@@ -59,20 +59,20 @@ impl PilotInput {
 }
 
 impl Pilot {
-    /// The walker that comes with the program.
+    /// Returns the walker that comes with the program.
     ///
     /// # Errors
     ///
-    /// This machine computes something else than the one that made the file.
+    /// This machine computes other numbers than the one that made the file.
     pub fn shipped() -> Result<&'static Self, PilotError> {
         SHIPPED.as_ref().map_err(Clone::clone)
     }
 
-    /// The walker in a policy file for the game `ant`; `name` is for messages.
+    /// Reads the walker in a policy file for the game `ant`; `name` is for messages.
     ///
     /// # Errors
     ///
-    /// It is no policy file, or its policy senses something else.
+    /// It is no policy file, or its policy has other observations.
     pub fn from_bytes(name: &str, bytes: &[u8]) -> Result<Self, PilotError> {
         let policy = PolicyFile::from_bytes(Path::new(name), bytes, DeviceKind::default())?.policy;
         if policy.obs_dim() != SENSES {
@@ -82,11 +82,11 @@ impl Pilot {
         Ok(Self(policy))
     }
 
-    /// The torques for each ant, in one pass: the most probable ones.
+    /// Returns the torques for each ant, computed in one pass: the most probable ones.
     ///
     /// # Errors
     ///
-    /// The policy says something that is no number, or acts with another number of torques.
+    /// The policy returns a value that is no number, or another number of torques.
     pub fn act(&self, input: &PilotInput) -> Result<Vec<[f32; JOINTS]>, PilotError> {
         let output = self.0.forward(&[], &input.0[..], input.len())?;
         let row = |row| match output.greedy(row) {

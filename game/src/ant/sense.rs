@@ -1,5 +1,5 @@
-//! What the walker senses: its body and the direction of its goal, both as seen from the torso's heading, so that a gait
-//! learned in one direction is known in all.
+//! Observation of the walker: its body and the direction of its goal, both as seen from the torso's heading, so a gait
+//! learned in one direction works in all.
 
 use bevy::math::{Quat, Vec2, Vec3};
 
@@ -8,7 +8,7 @@ use super::{skeleton::JOINTS, state::AntState};
 /// Number of values.
 pub const SENSES: usize = 28;
 
-/// Names of the values, in order.
+/// Returns the names of the values, in order.
 pub fn names() -> Vec<String> {
     let mut names: Vec<String> = ["height", "up x", "up y", "up z"].map(String::from).into();
     names.extend(joint_names().map(|joint| format!("{joint} angle")));
@@ -19,16 +19,16 @@ pub fn names() -> Vec<String> {
     names
 }
 
-/// `hip 1`, `ankle 1`, `hip 2` and so on.
+/// Returns `hip 1`, `ankle 1`, `hip 2` and so on.
 pub fn joint_names() -> [String; JOINTS] {
     std::array::from_fn(|joint| format!("{} {}", ["hip", "ankle"][joint % 2], joint / 2 + 1))
 }
 
-/// The senses of an ant that wants to get to `goal`, in metres in the world.
+/// Returns the observation of an ant on its way to `goal`, in metres in the world.
 ///
-/// Height in metres; the world's upwards direction along the torso's axes; joint angles in radians; velocity in m/s along
-/// the heading, to its left and upwards; angular velocity along the torso's axes in rad/s; joint velocities in rad/s;
-/// the direction of the goal, of length 1, along the heading and to its left.
+/// Height in metres; the world's upwards direction along the torso's axes; joint angles in radians; velocity in m/s
+/// along the heading, to its left and upwards; angular velocity along the torso's axes in rad/s; joint velocities in
+/// rad/s; the direction of the goal, of length 1, along the heading and to its left.
 pub fn senses(state: &AntState, goal: Vec2) -> [f32; SENSES] {
     let (q, v) = (&state.qpos, &state.qvel);
     let rotation = Quat::from_xyzw(q[4], q[5], q[6], q[3]);

@@ -1,7 +1,7 @@
 //! The quadruped's measures, as D4RL's ant has them.
 //!
-//! Four legs around a ball. A leg is a short limb fixed to the torso, a second short limb that swings about a vertical
-//! axis at the hip, and a long limb that swings about a level axis at the ankle.
+//! Four legs around a ball. Each leg has three limbs: a short limb fixed to the torso, a second short limb, and a long
+//! limb. The second swings about a vertical axis at the hip, the long one about a level axis at the ankle.
 
 use bevy::math::{DMat3, DVec3};
 
@@ -27,12 +27,12 @@ pub const TORQUE: f64 = 30.0;
 /// Sides of a leg along x and y.
 const SIDES: [[f64; 2]; LEGS] = [[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
 
-/// From the torso's centre to the hip, and from the hip to the ankle of a straight leg, in metres.
+/// Returns the vector from the torso's centre to the hip, and from the hip to the ankle of a straight leg, in metres.
 pub fn short_limb(leg: usize) -> DVec3 {
     DVec3::new(0.2 * SIDES[leg][0], 0.2 * SIDES[leg][1], 0.0)
 }
 
-/// From the ankle to the foot of a straight leg, in metres.
+/// Returns the vector from the ankle to the foot of a straight leg, in metres.
 pub fn long_limb(leg: usize) -> DVec3 {
     2.0 * short_limb(leg)
 }
@@ -40,13 +40,13 @@ pub fn long_limb(leg: usize) -> DVec3 {
 /// Axis about which a hip turns.
 pub const HIP_AXIS: DVec3 = DVec3::Z;
 
-/// Axis about which an ankle turns, in the frame of the limb above it.
+/// Returns the axis about which an ankle turns, in the frame of the limb above it.
 pub fn ankle_axis(leg: usize) -> DVec3 {
     let x = if leg.is_multiple_of(2) { -1.0 } else { 1.0 };
     DVec3::new(x, 1.0, 0.0) * std::f64::consts::FRAC_1_SQRT_2
 }
 
-/// Lowest and highest angle of a joint, in radians.
+/// Returns the lowest and highest angle of a joint, in radians.
 pub fn joint_range(joint: usize) -> [f64; 2] {
     let degrees: [f64; 2] = match (joint % 2, joint / 2) {
         (0, _) => [-30.0, 30.0],
@@ -71,14 +71,14 @@ pub struct Solid {
 }
 
 impl Solid {
-    /// The torso's ball.
+    /// Returns the torso's ball.
     pub fn torso() -> Self {
         let mass = DENSITY * 4.0 / 3.0 * std::f64::consts::PI * TORSO_RADIUS.powi(3);
         let inertia = 0.4 * mass * TORSO_RADIUS * TORSO_RADIUS;
         Self { mass, along: inertia, across: inertia }
     }
 
-    /// A limb: a cylinder of this length with half a ball at each end.
+    /// Returns a limb: a cylinder of this length with half a ball at each end.
     pub fn limb(length: f64) -> Self {
         let r = LIMB_RADIUS;
         let cylinder = DENSITY * std::f64::consts::PI * r * r * length;
@@ -90,7 +90,7 @@ impl Solid {
         Self { mass: cylinder + ball, along, across }
     }
 
-    /// Inertia tensor about the centre, with the long axis in this direction (of length 1).
+    /// Returns the inertia tensor about the centre, with the long axis in this direction (of length 1).
     pub fn inertia(&self, axis: DVec3) -> DMat3 {
         let outer = DMat3::from_cols(axis * axis.x, axis * axis.y, axis * axis.z);
         DMat3::from_diagonal(DVec3::splat(self.across)) + outer * (self.along - self.across)

@@ -15,17 +15,17 @@ pub struct Spatial {
 }
 
 impl Spatial {
-    /// The motion of a turn about an axis through a point.
+    /// Returns the motion of a turn about an axis through a point.
     pub fn turn(axis: DVec3, through: DVec3) -> Self {
         Self { angular: axis, linear: through.cross(axis) }
     }
 
-    /// Power of a force along a motion.
+    /// Returns the power of a force along a motion.
     pub fn dot(self, other: Self) -> f64 {
         self.angular.dot(other.angular) + self.linear.dot(other.linear)
     }
 
-    /// Rate of change of a motion that is carried along by this motion.
+    /// Returns the rate of change of a motion that is carried along by this motion.
     pub fn carry_motion(self, motion: Self) -> Self {
         Self {
             angular: self.angular.cross(motion.angular),
@@ -33,7 +33,7 @@ impl Spatial {
         }
     }
 
-    /// Rate of change of a momentum that is carried along by this motion.
+    /// Returns the rate of change of a momentum that is carried along by this motion.
     pub fn carry_force(self, force: Self) -> Self {
         Self {
             angular: self.angular.cross(force.angular) + self.linear.cross(force.linear),
@@ -41,13 +41,13 @@ impl Spatial {
         }
     }
 
-    /// The six numbers, angular first.
+    /// Returns the six numbers, angular first.
     pub fn to_array(self) -> [f64; 6] {
         let (a, l) = (self.angular, self.linear);
         [a.x, a.y, a.z, l.x, l.y, l.z]
     }
 
-    /// The vector with these numbers.
+    /// Returns the vector with these numbers.
     pub fn from_array(v: [f64; 6]) -> Self {
         Self { angular: DVec3::new(v[0], v[1], v[2]), linear: DVec3::new(v[3], v[4], v[5]) }
     }
@@ -85,14 +85,14 @@ pub struct Inertia {
 }
 
 impl Inertia {
-    /// Of a body with this mass and inertia about its centre of mass.
+    /// Takes a body with this mass and inertia about its centre of mass.
     pub fn of(mass: f64, centre: DVec3, about_centre: DMat3) -> Self {
         let outer = DMat3::from_cols(centre * centre.x, centre * centre.y, centre * centre.z);
         let steiner = (DMat3::from_diagonal(DVec3::splat(centre.length_squared())) - outer) * mass;
         Self { mass, moment: centre * mass, tensor: about_centre + steiner }
     }
 
-    /// Momentum of a motion.
+    /// Returns the momentum of a motion.
     pub fn times(&self, motion: Spatial) -> Spatial {
         Spatial {
             angular: self.tensor * motion.angular + self.moment.cross(motion.linear),

@@ -22,7 +22,7 @@ pub struct AntState {
 }
 
 impl AntState {
-    /// The pose that episodes start around: upright in the air, legs straight, at rest.
+    /// Returns the pose that episodes start around: upright in the air, legs straight, at rest.
     pub fn nominal() -> Self {
         let mut qpos = [0.0; POSITIONS];
         qpos[2] = NOMINAL_HEIGHT as f32;
@@ -30,8 +30,8 @@ impl AntState {
         Self { qpos, qvel: [0.0; VELOCITIES] }
     }
 
-    /// The start of an episode: every position of the nominal pose shifted by up to 0.1 either way, velocities drawn from
-    /// a normal distribution with standard deviation 0.1.
+    /// Returns the start of an episode: every position of the nominal pose shifted by up to 0.1 either way, velocities
+    /// drawn from a normal distribution with standard deviation 0.1.
     pub fn reset(rng: &mut impl Rng) -> Self {
         let mut state = Self::nominal();
         for position in &mut state.qpos {
@@ -47,17 +47,17 @@ impl AntState {
         state
     }
 
-    /// Height of the torso's own upwards direction along the world's: 1 upright, -1 upside down.
+    /// Returns the height of the torso's own upwards direction along the world's: 1 upright, -1 upside down.
     pub fn upright(&self) -> f32 {
         1.0 - 2.0 * (self.qpos[4] * self.qpos[4] + self.qpos[5] * self.qpos[5])
     }
 
-    /// A hash of every bit, to compare a replay with.
+    /// Returns a hash of every bit, to compare a replay with.
     pub fn hash(&self) -> StateHash {
         StateHash::of(self.qpos.iter().chain(&self.qvel).map(|value| u64::from(value.to_bits())))
     }
 
-    /// Whether every number is finite.
+    /// Returns true if every number is finite.
     pub fn is_finite(&self) -> bool {
         self.qpos.iter().chain(&self.qvel).all(|value| value.is_finite())
     }

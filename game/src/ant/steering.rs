@@ -1,4 +1,4 @@
-//! People: keys say which way, and the walker walks.
+//! Steering for people: keys give a direction, and the walker walks.
 
 use bevy::prelude::*;
 use bevy_playbot::{agent::AgentOrder, fault::Faults};
@@ -10,29 +10,28 @@ use super::{
     state::AntState,
 };
 
-/// Keys for one way along an axis.
+/// Keys for one direction along an axis.
 type Keys = [KeyCode; 2];
 const LEFT: Keys = [KeyCode::ArrowLeft, KeyCode::KeyA];
 const RIGHT: Keys = [KeyCode::ArrowRight, KeyCode::KeyD];
 const DOWN: Keys = [KeyCode::ArrowDown, KeyCode::KeyS];
 const UP: Keys = [KeyCode::ArrowUp, KeyCode::KeyW];
 
-/// What the keyboard does. No person can turn eight hinges at once, so an action cannot come from the keys alone: the
-/// keys of this map do nothing, and [`steer`] writes the action.
+/// Returns bindings without effect. No person can turn eight hinges at once, so an action cannot come from the keys
+/// alone: [`steer`] writes it.
 pub fn key_bindings() -> KeyBindings {
-    let help =
-        "arrow keys or W, A, S and D tell the ant's walker where to go; without a key the ant lets go of its legs";
+    let help = "arrow keys or W, A, S and D steer the ant's walker; without a key the ant lets go of its legs";
     KeyBindings::new(Vec::new(), |_| ActionValue::Continuous(vec![0.0; JOINTS]), help)
 }
 
 /// A component that holds an agent's ant.
 pub trait AntComponent: Component {
-    /// Where the ant is and how it moves.
+    /// Returns the ant's positions and velocities.
     fn state(&self) -> AntState;
 }
 
-/// Walks for people in the direction of their keys. Runs after [`PlaybotSystems::Decide`], when the keyboard has written an
-/// action that does nothing, in apps with a keyboard.
+/// Walks for people in the direction of their keys. Runs after [`PlaybotSystems::Decide`], when the keyboard has
+/// written an action that does nothing, in apps with a keyboard.
 pub fn steer<C: AntComponent>(
     keys: Res<ButtonInput<KeyCode>>,
     order: Res<AgentOrder>,

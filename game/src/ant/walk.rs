@@ -9,27 +9,27 @@ use rand_chacha::ChaCha8Rng;
 
 use super::{body::AntBody, sense::senses, skeleton::JOINTS, state::AntState, steering::AntComponent};
 
-/// How near a goal is near enough, in metres.
+/// Distance at which a goal counts as reached, in metres.
 pub const GOAL_RADIUS: f32 = 0.5;
-/// How far away the goal of [`Task::Goal`] is, in metres.
+/// Distance of the goal of [`Task::Goal`], in metres.
 const GOAL_DISTANCE: f32 = 8.0;
-/// Reward for each metre that the goal comes nearer. A control step at 1 m/s gives 1.
+/// Reward for each metre of progress to the goal. A control step at 1 m/s gives 1.
 const PROGRESS_REWARD: f32 = 10.0;
 /// Reward for each step on the feet.
 const UPRIGHT_REWARD: f32 = 0.1;
-/// Price of the square of each number of an action, as it was asked for: asking for more than there is costs too, so
-/// that the gait stays within the range and can be imitated.
+/// Price of the square of each number of an action, before clipping. Requests beyond the range also cost, so the gait
+/// stays within the range and can be imitated.
 const EFFORT_PRICE: f32 = 0.05;
 /// Most that the square of a number costs.
 const MOST_EFFORT: f32 = 9.0;
 
-/// What is asked of the ant.
+/// The task of the ant.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Resource)]
 pub enum Task {
     /// One goal, 8 m away in any direction. Reaching it ends the episode with success.
     Goal,
-    /// One goal after another, 2 m to 10 m from the last, as long as time lasts: what the walker trains on.
+    /// One goal after another, 2 m to 10 m from the last, until time is up. The walker trains on it.
     Chase,
 }
 
@@ -37,7 +37,7 @@ impl Task {
     /// The names of the tasks.
     pub const NAMES: [&str; 2] = ["goal", "chase"];
 
-    /// The task with this name.
+    /// Returns the task with this name.
     pub fn named(name: &str) -> Option<Self> {
         match name {
             "goal" => Some(Self::Goal),
@@ -46,7 +46,7 @@ impl Task {
         }
     }
 
-    /// Control steps until time is up.
+    /// Returns the control steps until time is up.
     fn limit(self) -> u32 {
         match self {
             Self::Goal => 200,
@@ -54,14 +54,14 @@ impl Task {
         }
     }
 
-    /// The level from above: the first goal, and the floor around. `None` where there are more goals to come.
+    /// Returns the level from above: the first goal, and the floor around. `None` where there are more goals to come.
     pub(super) fn floor_plan(self, level: u64) -> Option<FloorPlan> {
         let bounds = Rect::from_center_size(Vec2::ZERO, Vec2::splat(2.0 * GOAL_DISTANCE + 4.0));
         let plan = |goal| FloorPlan { bounds, start: Vec2::ZERO, goal, ..FloorPlan::default() };
         (self == Self::Goal).then(|| plan(self.begin(level).goal))
     }
 
-    /// An ant at the beginning of a level.
+    /// Returns an ant at the beginning of a level.
     fn begin(self, level: u64) -> Beginning {
         let mut draws = ChaCha8Rng::seed_from_u64(level);
         let state = AntState::reset(&mut draws);
@@ -78,14 +78,14 @@ impl Task {
     }
 }
 
-/// How a level begins, and what draws its later goals.
+/// The start of a level, and the stream of its later goals.
 struct Beginning {
     state: AntState,
     goal: Vec2,
     draws: ChaCha8Rng,
 }
 
-/// An ant and the goal it is to reach.
+/// An ant and its goal.
 #[derive(Component, Reflect)]
 #[reflect(from_reflect = false)]
 #[reflect(Component)]
@@ -106,7 +106,7 @@ impl Default for Walker {
 }
 
 impl Walker {
-    /// Where the ant is, in metres.
+    /// Returns the position of the ant, in metres.
     pub(super) fn place(&self) -> Vec2 {
         self.body.torso().0.truncate()
     }
@@ -165,7 +165,7 @@ pub(super) fn walk(
     }
 }
 
-/// The action within -1..=1, and a note if it was not.
+/// Returns the action within -1..=1, and notes it on the episode if it was not.
 pub(crate) fn torques(action: &Action, episode: &mut Episode) -> [f32; JOINTS] {
     let torques = within_reach(action.continuous().unwrap_or_default());
     if action.continuous() != Some(&torques[..]) {
@@ -174,7 +174,7 @@ pub(crate) fn torques(action: &Action, episode: &mut Episode) -> [f32; JOINTS] {
     torques
 }
 
-/// What is asked of the joints, each within -1..=1.
+/// Returns the requested torques, each clipped to -1..=1.
 pub(crate) fn within_reach(asked: &[f32]) -> [f32; JOINTS] {
     let mut torques = [0.0; JOINTS];
     for (torque, asked) in torques.iter_mut().zip(asked) {

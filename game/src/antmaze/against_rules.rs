@@ -1,4 +1,4 @@
-//! Ants that do not move as the rules say, or that are not paid what the rules say.
+//! Detector of ants whose motion or reward breaks the rules.
 
 use playbot_lab::{
     detector::{Detector, LevelAhead, Moment, Setting, Watch},
@@ -18,10 +18,10 @@ use crate::{
     maze::paid_otherwise,
 };
 
-/// Ticks are computed once more, from the ant before them, the action and the map of the level, and have to come to the same.
+/// Computes ticks once more, from the ant before them, the action and the map of the level, and compares the results.
 ///
-/// The walls are those of the map, whatever the physics has. Dynamics are most of what a tick costs, so only some ticks are
-/// looked at, and what they pay in all of them.
+/// The walls are those of the map, whatever the physics has. Dynamics are most of a tick's cost, so only some ticks are
+/// computed. Rewards are checked in all of them.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct AgainstRules {
     every: f64,
@@ -33,15 +33,15 @@ impl Default for AgainstRules {
     }
 }
 
-/// How far two results of the same tick may be apart in any number, in metres, radians and seconds.
+/// Largest allowed difference of two results of the same tick in any number, in metres, radians and seconds.
 const SLACK: f32 = 1e-4;
 
-/// Follows one ant.
+/// Watches one ant.
 struct Following {
     every: u32,
     /// Another ant, among the walls of the map.
     body: Option<Box<AntBody>>,
-    /// Whether it is where the ant was before the next tick.
+    /// The body is at the ant's state before the next tick.
     is_ready: bool,
 }
 
@@ -55,7 +55,7 @@ impl Detector for AgainstRules {
     }
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
-        let what = "how it moves is looked at in every so many-th tick";
+        let what = "ticks between two checks of the motion";
         vec![Setting::new("every", &mut self.every, what).at_least(1.0)]
     }
 
@@ -84,7 +84,7 @@ impl Watch for Following {
     }
 }
 
-/// An ant where the level puts it.
+/// Returns an ant at the start of the level.
 fn at_start(level: &AntMazeLevel) -> Box<AntBody> {
     let mut body = AntBody::new(&wall_boxes(&level.maze));
     body.set_state(&level.reset);
@@ -92,18 +92,18 @@ fn at_start(level: &AntMazeLevel) -> Box<AntBody> {
 }
 
 fn moved_otherwise(after: &AntState, by_rules: &AntState) -> Option<String> {
-    // What is no number is not near to anything.
+    // NaN is not near to anything.
     let differs = |(_, (is, should)): &(usize, (f32, f32))| {
         let is_same = (is - should).abs() <= SLACK;
         !is_same
     };
     let (at, (is, should)) = view::values(after).zip(view::values(by_rules)).enumerate().find(differs)?;
-    // Names are made where there is something to tell.
+    // Names are made only for reports.
     let name = &view::names()[at];
     Some(format!("the ant's `{name}` is {is:.4}; by the rules it is {should:.4}"))
 }
 
-/// What a tick pays that ends so.
+/// Returns the reward of a tick that ends in this state.
 fn paid_by_rules(state: &AntState, level: &AntMazeLevel) -> f32 {
     let [x, y, ..] = state.qpos;
     pay(level.pay, distance([x, y], level.goal_at))

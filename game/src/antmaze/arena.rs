@@ -14,7 +14,7 @@ use super::{
 };
 use crate::ant::AntBody;
 
-/// Makes the level an episode asks for and puts the agent's ant into it.
+/// Makes the level of an episode and puts the agent's ant into it.
 pub(super) fn start_episode(
     event: On<StartEpisode>,
     levels: Levels,
@@ -32,8 +32,8 @@ pub(super) fn start_episode(
     }
 }
 
-/// Puts an agent with a new ant into a level. The physics begins anew with every episode: what happened in the last one
-/// changes nothing, not even the order in which contacts are solved.
+/// Puts an agent with a new ant into a level. The physics begins anew with every episode, so earlier episodes change
+/// nothing, not even the order in which contacts are solved.
 fn build(commands: &mut Commands, agent: Entity, level: Arc<AntMazeLevel>) {
     let mut body = AntBody::new(&wall_boxes(&level.maze));
     body.set_state(&level.reset);

@@ -7,19 +7,19 @@ use bevy::prelude::*;
 use super::{level::AntMazeLevel, mode::AntMazeMode};
 use crate::ant::{AntBody, AntState, steering::AntComponent};
 
-/// Mode in which levels are made where none are drawn.
+/// Mode of the generated levels.
 #[derive(Resource, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone, Debug, PartialEq)]
 pub struct AntMazeRules(pub AntMazeMode);
 
-/// The level that an agent plays. Comes with its first episode.
+/// The level of an agent, inserted with its first episode.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug)]
 pub struct InMaze(pub Arc<AntMazeLevel>);
 
-/// An agent's ant with the floor and the walls around it: a physics world of its own. Comes with the first episode.
+/// An agent's ant with the floor and the walls around it: a physics world of its own. Inserted with the first episode.
 #[derive(Component, Reflect)]
 #[reflect(from_reflect = false)]
 #[reflect(Component)]
@@ -31,7 +31,7 @@ impl AntComponent for MazeAnt {
     }
 }
 
-/// The arena of an agent: what is drawn around it belongs to this entity.
+/// The arena of an agent: the drawings around it belong to this entity.
 #[derive(Component, Clone, Copy, Debug, Reflect)]
 #[reflect(Component)]
 pub struct PlaysIn(pub Entity);

@@ -1,4 +1,4 @@
-//! The pilot on its way from waypoint to waypoint, as a bot of the game.
+//! The pilot, walking from waypoint to waypoint, as a bot of the game.
 
 use std::sync::Arc;
 
@@ -24,12 +24,12 @@ pub struct DemonstratorBot {
 }
 
 impl DemonstratorBot {
-    /// A bot to whose torques normal noise with this standard deviation is added. The original's demonstrations have 0.2.
+    /// Takes the standard deviation of normal noise on its torques. The original's demonstrations have 0.2.
     pub fn new(noise: f64) -> Self {
         Self { noise, way: None }
     }
 
-    /// The way through this level.
+    /// Returns the path through this level.
     fn way(&mut self, level: &Arc<AntMazeLevel>) -> &mut Waypoints {
         let known = self.way.take().filter(|(known, _)| Arc::ptr_eq(known, level));
         let way = known.unwrap_or_else(|| (level.clone(), Waypoints::new(level)));

@@ -1,4 +1,4 @@
-//! From cells to metres and back.
+//! Conversion between cells and metres.
 
 use crate::maze::{Cell, Maze};
 
@@ -7,14 +7,14 @@ pub const CELL: f32 = 4.0;
 /// Height of the walls, metres.
 pub const WALL_HEIGHT: f32 = 2.0;
 
-/// Where the middle of a cell is, `[x, y]` in metres: the maze's start cell is at the origin, columns go along x and rows
-/// along y.
+/// Returns the middle of a cell, `[x, y]` in metres. The maze's start cell is at the origin, columns go along x and
+/// rows along y.
 pub fn centre_of(maze: &Maze, cell: Cell) -> [f32; 2] {
     let along = |index: usize, origin: usize| CELL * (index as f32 - origin as f32);
     [along(cell.col, maze.start().col), along(cell.row, maze.start().row)]
 }
 
-/// The cell around a place `[x, y]`, wall or free; `None` outside the maze.
+/// Returns the cell around a position `[x, y]`, wall or free; `None` outside the maze.
 ///
 /// A cell is the square around its centre. The original rounds down instead, which counts half of each cell as its
 /// neighbour.
@@ -26,7 +26,7 @@ pub fn cell_at(maze: &Maze, [x, y]: [f32; 2]) -> Option<Cell> {
     Some(Cell { row: index(y, maze.start().row, maze.rows())?, col: index(x, maze.start().col, maze.columns())? })
 }
 
-/// How far two places are apart, metres.
+/// Returns the distance of two positions, metres.
 pub fn distance(a: [f32; 2], b: [f32; 2]) -> f32 {
     let [dx, dy] = [a[0] - b[0], a[1] - b[1]];
     (dx * dx + dy * dy).sqrt()

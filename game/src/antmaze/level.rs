@@ -1,4 +1,4 @@
-//! A level: the maze, where the ant is put into it, and where it should go.
+//! A level: the maze, the ant's start, and its goal.
 
 use playbot_learner::rng::{ChaCha8Rng, Streams, below, unit};
 
@@ -11,7 +11,7 @@ use crate::{
     maze::{Cell, Maze, MazeError},
 };
 
-/// A level, as its mode and seed make it or as somebody drew it, with the rules by which it is played.
+/// A level, from a mode and seed or from a file, with its rules.
 #[derive(Clone, Debug)]
 pub struct AntMazeLevel {
     /// The walls. Its start cell is the origin of all coordinates, wherever the ant starts.
@@ -24,14 +24,14 @@ pub struct AntMazeLevel {
     pub goal_at: [f32; 2],
     /// The ant at the start.
     pub reset: AntState,
-    /// What the ant is paid.
+    /// The reward rule.
     pub pay: Pay,
     /// Ticks after which an episode is truncated.
     pub limit: u32,
 }
 
-/// Makes a level. Everything is drawn from the seed, each thing from a stream of its own: an option changes what it says
-/// and nothing else.
+/// Makes a level. All random choices come from the seed, each from a stream of its own: an option changes its own
+/// choice and nothing else.
 ///
 /// # Errors
 ///
@@ -66,7 +66,7 @@ fn goal_cell(mode: &AntMazeMode, maze: &Maze, rng: &mut ChaCha8Rng) -> Cell {
     }
 }
 
-/// A free cell that is none of these; `None` if there is none.
+/// Returns a random free cell outside this list; `None` if there is none.
 fn other_cell(maze: &Maze, not: &[Cell], rng: &mut ChaCha8Rng) -> Option<Cell> {
     let cells: Vec<_> = maze.free_cells().filter(|cell| !not.contains(cell)).collect();
     one_of(&cells, rng)
@@ -76,7 +76,7 @@ fn one_of(cells: &[Cell], rng: &mut ChaCha8Rng) -> Option<Cell> {
     cells.get(below(rng, cells.len() as u64) as usize).copied()
 }
 
-/// The centre of the cell, or D4RL's place near it: U(0, 1) + U(0, 0.5) metres further along each axis.
+/// Returns the centre of the cell, or D4RL's position near it: U(0, 1) + U(0, 0.5) metres further along each axis.
 fn goal_place(noise: GoalNoise, centre: [f32; 2], rng: &mut ChaCha8Rng) -> [f32; 2] {
     match noise {
         GoalNoise::None => centre,

@@ -1,4 +1,4 @@
-//! Levels as JSON: what `playbot level antmaze --json` prints of a whole mode, and what level files hold.
+//! Levels as JSON: the output of `playbot level antmaze --json` for a whole mode, and level files.
 
 use bevy_playbot::unknown_name::UnknownName;
 use playbot_lab::level_files::{JsonStep::Key, LevelDesign, LevelTextError, read_json_object};
@@ -17,16 +17,16 @@ use crate::{
     maze::{Cell, Map, MazeModeError, MazeSpec, read_maze},
 };
 
-/// The options of a mode that a drawn level may have. Where it starts and ends is drawn, so no option says it.
+/// The options of a mode that a level file may have. Its start and goal are drawn, so they are no options.
 const RULES: [&str; 3] = ["sparse", "dense=exp", "limit=1000"];
-/// How far the length of a quaternion may be from 1.
+/// Largest difference of a quaternion's length from 1.
 const NEARLY: f32 = 1e-3;
 
-/// A level as a file has it. Cells are `[row, column]`; start and goal may be letters in the rows instead.
+/// A level in a file. Cells are `[row, column]`; start and goal may be letters in the rows instead.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(
     deny_unknown_fields,
-    expecting = "a level, which is an object with `rows` and, where they do not say it, `start` and `goal`"
+    expecting = "a level: an object with `rows`, and with `start` and `goal` if the rows do not mark them"
 )]
 pub(super) struct LevelText {
     rows: Vec<String>,
@@ -34,7 +34,7 @@ pub(super) struct LevelText {
     start: Option<Cell>,
     #[serde(default)]
     goal: Option<Cell>,
-    /// For people: it is not read.
+    /// For readers; not parsed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     shortest_path_length: Option<usize>,
     /// The cell whose middle is at (0, 0); the start if it is left out.
@@ -43,7 +43,7 @@ pub(super) struct LevelText {
     /// The goal in metres, `[x, y]`; the middle of its cell if it is left out.
     #[serde(default)]
     goal_at: Option<[f32; 2]>,
-    /// The ant at the start; in its usual pose in the middle of the start if it is left out.
+    /// The ant at the start (default: its default pose in the middle of the start).
     #[serde(default)]
     ant: Option<AntText>,
     /// Options of a mode, joined by `+`.
@@ -60,7 +60,7 @@ struct AntText {
 }
 
 impl LevelText {
-    /// A level with everything that play asks for.
+    /// Converts a level with all fields that play needs.
     pub fn of(level: &AntMazeLevel) -> Self {
         let AntMazeLevel { maze, start, goal, goal_at, reset, pay, limit } = level;
         let drawn = maze.clone().with_any_ends(*start, *goal).unwrap_or_else(|_| maze.clone());
@@ -122,7 +122,7 @@ impl LevelText {
     }
 }
 
-/// The rules that generated mazes have.
+/// Returns the rules of generated mazes.
 fn usual() -> AntMazeMode {
     AntMazeMode::on(Map::Random(MazeSpec::default()))
 }
@@ -140,11 +140,11 @@ fn rules(text: &str) -> Result<AntMazeMode, MazeModeError> {
     Ok(mode)
 }
 
-/// Reads a level file.
+/// Parses a level file.
 ///
 /// # Errors
 ///
-/// What is wrong with it, and on which line.
+/// The mistake, with its line.
 pub(super) fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
     let level = read_json_object::<LevelText>(text)?.into_level(text)?;
     let content = serde_json::json!(LevelText::of(&level)).to_string();

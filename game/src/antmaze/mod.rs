@@ -1,9 +1,9 @@
 //! AntMaze: a quadruped walks through a maze to a goal that it does not see.
 //!
-//! The task is D4RL's, on its maps and on generated ones; the body is [`ant`](crate::ant)'s. A mode ([`AntMazeMode`]) and a
-//! seed make a level ([`generate`]); each agent has a physics world of its own. Episodes end at the goal or at the time
-//! limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game for agents that see walls and goal,
-//! [`AntMazeWithMap`] for those that know the map, and [`AntMazeWithWaves`] for those that tell places better apart.
+//! The task is D4RL's, on its maps and on generated ones; the body is [`ant`](crate::ant)'s. A mode ([`AntMazeMode`])
+//! and a seed make a level ([`generate`]); each agent has a physics world of its own. Episodes end at the goal or at
+//! the time limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game with rays to the walls
+//! and the direction of the goal, [`AntMazeWithMap`] with a map, and [`AntMazeWithWaves`] with positional encoding.
 
 mod against_rules;
 mod arena;

@@ -1,29 +1,29 @@
-//! Modes of the game: a map and what is to be done on it, as text.
+//! Modes of the game: a map and its options, as text.
 
 use std::{fmt, str::FromStr};
 
 use crate::maze::{Cell, Map, MazeModeError, OptionError, fixed::antmaze};
 
-/// What a level of AntMaze is made of. Written as the map and its options, `large+sparse+limit=500`; what is left out is as
-/// in [`AntMazeMode::on`].
+/// The ingredients of a level of AntMaze. Written as the map and its options, `large+sparse+limit=500`; the defaults of
+/// options are those of [`AntMazeMode::on`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct AntMazeMode {
     /// The maze.
     pub map: Map,
-    /// What the ant is paid.
+    /// The reward rule.
     pub pay: Pay,
     /// The cell of the goal.
     pub goals: Goals,
-    /// Where in its cell the goal is.
+    /// Offset of the goal within its cell.
     pub goal_noise: GoalNoise,
-    /// Whether the ant starts in a random free cell, U(0, 1) metre beyond its centre along each axis, instead of the
-    /// maze's start. Written `random-start`.
+    /// The ant starts in a random free cell, U(0, 1) metre beyond its centre along each axis, instead of the maze's
+    /// start. Written `random-start`.
     pub random_start: bool,
     /// Ticks of 0.1 s after which an episode is truncated, at least 1. Written `limit=500`.
     pub limit: u32,
 }
 
-/// What the ant is paid for each tick, by its distance to the goal after the tick.
+/// Reward of each tick, by the distance to the goal after the tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Pay {
     /// Minus the distance in metres, as in D4RL.
@@ -35,7 +35,7 @@ pub enum Pay {
     Sparse,
 }
 
-/// Which cell the goal is in.
+/// Choice of the goal's cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Goals {
     /// The maze's goal.
@@ -47,10 +47,10 @@ pub enum Goals {
     Random,
 }
 
-/// Where in its cell the goal is.
+/// Offset of the goal within its cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum GoalNoise {
-    /// In the middle.
+    /// In the middle of the cell.
     #[default]
     None,
     /// U(0, 1) + U(0, 0.5) metres beyond the middle along each axis, drawn from the level's seed. Written
@@ -65,14 +65,14 @@ const OPTIONS: [&str; 7] =
     ["sparse", "dense=exp", "goals=demo", "goals=random", "goal-noise=d4rl", "random-start", "limit=1000"];
 
 impl AntMazeMode {
-    /// The mode in which results are compared: dense reward, fixed start and goal, and time for 1000 ticks, on the smallest
-    /// map for 700.
+    /// Returns the default mode on a map, for comparisons: dense reward, fixed start and goal, and time for 1000 ticks,
+    /// on the smallest map for 700.
     pub fn on(map: Map) -> Self {
         let (pay, goals, goal_noise) = (Pay::default(), Goals::default(), GoalNoise::default());
         Self { limit: usual_limit(&map), map, pay, goals, goal_noise, random_start: false }
     }
 
-    /// The goals that demonstrations on this map have; none on a generated one.
+    /// Returns the goals of the demonstrations on this map; empty on a generated one.
     pub fn demo_goals(&self) -> &'static [Cell] {
         match self.map {
             Map::Umaze => &antmaze::UMAZE_DEMO_GOALS,
@@ -119,7 +119,7 @@ fn usual_limit(map: &Map) -> u32 {
     if *map == Map::Umaze { 700 } else { 1000 }
 }
 
-/// What an option is about, so that it is said only once.
+/// Returns the subject of an option, which may occur only once.
 pub(super) fn subject(option: &str) -> &str {
     match option.split_once('=').map_or(option, |(key, _)| key) {
         "dense" => "sparse",

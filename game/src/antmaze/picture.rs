@@ -1,4 +1,4 @@
-//! What AntMaze looks like.
+//! The picture of AntMaze.
 
 use bevy::prelude::*;
 use playbot_lab::prelude::*;
@@ -14,8 +14,8 @@ use crate::{
     maze::{Cell, Maze},
 };
 
-/// Adds what is drawn to [`AntMazePlugin`](super::AntMazePlugin). Add it after the plugins that bring images, such as
-/// Bevy's own or a sensor's.
+/// Adds sprites to [`AntMazePlugin`](super::AntMazePlugin). Add it after the plugins that bring images, such as Bevy's
+/// own or a sensor's.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AntMazePicturePlugin;
 

@@ -13,12 +13,12 @@ use super::{
 };
 use crate::ant::{AntState, walk::torques};
 
-/// An ant this near to the goal has reached it, metres.
+/// Distance at which an ant has reached the goal, metres.
 pub const GOAL_RADIUS: f32 = 0.5;
-/// Heights at which the middle of a torso can be, metres: between the floor and what no jump reaches.
+/// Possible heights of the middle of a torso, metres: between the floor and the reach of a jump.
 const HEIGHTS: std::ops::Range<f32> = 0.0..20.0;
 
-/// Physics, reward and end of every ant whose agent plays.
+/// Computes physics, reward and end for every ant whose agent plays.
 pub(super) fn play(
     mut ants: Query<(&Agent, &mut Control, &Action, &InMaze, &mut MazeAnt, &mut Episode, &mut Reward, &mut StateHash)>,
     mut faults: ResMut<Faults>,
@@ -39,7 +39,7 @@ pub(super) fn play(
         reward.add(pay(level.0.pay, away));
         if away <= GOAL_RADIUS {
             match level.0.pay {
-                // Nobody would end what pays for every tick.
+                // An episode that pays for every tick would never be ended.
                 Pay::Exponential => episode.reach(),
                 Pay::Distance | Pay::Sparse => episode.terminate(true),
             }
@@ -50,7 +50,7 @@ pub(super) fn play(
     }
 }
 
-/// What a tick pays that ends so far from the goal, in metres.
+/// Returns the reward of a tick that ends at this distance from the goal, in metres.
 pub(super) fn pay(pay: Pay, away: f32) -> f32 {
     match pay {
         Pay::Distance => -away,
@@ -59,7 +59,7 @@ pub(super) fn pay(pay: Pay, away: f32) -> f32 {
     }
 }
 
-/// Why an ant is where none can be.
+/// Explains why an ant's position is impossible, if it is.
 fn astray(state: &AntState, level: &AntMazeLevel) -> Option<String> {
     if !state.is_finite() {
         let mut named = view::names().into_iter().zip(view::values(state));
@@ -71,7 +71,7 @@ fn astray(state: &AntState, level: &AntMazeLevel) -> Option<String> {
     (!inside).then(|| format!("the ant is at ({x}, {y}, {z}), outside the maze: its physics has failed"))
 }
 
-/// Fills the vector of every agent that plays and reads one.
+/// Fills the vector of every playing agent that reads one.
 pub(super) fn observe(mut ants: Query<(&Episode, &MazeAnt, &mut Observation), With<VectorSensor>>) {
     for (episode, ant, mut observation) in &mut ants {
         if episode.is_running() {

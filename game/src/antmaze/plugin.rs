@@ -20,7 +20,7 @@ pub struct AntMazeSystems;
 /// Adds the rules of AntMaze. Agents are made by [`spawn_agent`](super::game::spawn_agent).
 #[derive(Clone, Debug)]
 pub struct AntMazePlugin {
-    /// What levels are made of.
+    /// Mode of the levels.
     pub mode: AntMazeMode,
 }
 

@@ -1,4 +1,4 @@
-//! AntMaze for ants that are told where the goal and the walls are, which cells around are walls, or better where they are.
+//! AntMaze with more observations: goal and rays, a map, or positional encoding.
 
 use bevy::{math::Vec3, prelude::*};
 use bevy_playbot::vision::VisionSystems;
@@ -16,9 +16,9 @@ use crate::{
     senses::{Mapped, Placed, Senses, Sighted, WithSenses, mapped::push_map, placed::push_waves, sighted::push_rays},
 };
 
-/// How far a ray reaches, in metres: two cells.
+/// Length of a ray, in metres: two cells.
 pub const RAY_LENGTH: f32 = 8.0;
-/// Rays go between the floor and the top of the walls, in metres.
+/// Heights of rays, in metres, between the floor and the top of the walls.
 const RAY_HEIGHTS: std::ops::RangeInclusive<f32> = 0.1..=1.9;
 
 /// AntMaze with rays, under its name `antmaze-sighted`. East is x and north is y.
@@ -27,7 +27,7 @@ pub type AntMazeWithRays = WithSenses<AntMaze, Sighted>;
 /// AntMaze with rays and a map, under its name `antmaze-mapped`.
 pub type AntMazeWithMap = WithSenses<AntMaze, Mapped>;
 
-/// AntMaze with waves of the ant's place, under its name `antmaze-placed`.
+/// AntMaze with positional encoding, under its name `antmaze-placed`.
 pub type AntMazeWithWaves = WithSenses<AntMaze, Placed>;
 
 impl Senses<AntMaze> for Sighted {
@@ -71,7 +71,7 @@ fn sense_map(mut ants: Query<(&Episode, &MazeAnt, &InMaze, &mut Observation), Wi
         if episode.is_running() {
             let maze = &level.0.maze;
             let here = cell_at(maze, ant.0.torso().0.truncate().to_array());
-            // Who has left the maze, which no legal play brings about, sees nothing but walls.
+            // Outside the maze, where no legal play leads, all is wall.
             push_map(&mut observation, |[east, north]| {
                 here.and_then(|cell| cell.moved(north, east)).is_none_or(|cell| !maze.is_free(cell))
             });
@@ -152,7 +152,7 @@ mod tests {
                 world.tick().expect("sound");
             }
             let seen = &world.get::<Observation>(agents[0]).expect("an observation").vector;
-            // The shortest waves of x and y are as long as a cell, the longest of x as eight.
+            // The shortest wavelength of x and y is a cell, the longest of x eight cells.
             let turn = |metres: f32, length: f32| (metres / length * std::f32::consts::TAU).sin_cos();
             let told = [(seen[35], seen[36]), (seen[43], seen[44]), (seen[29], seen[30])];
             let wanted = [turn(seen[0], 4.0), turn(seen[1], 4.0), turn(seen[0], 32.0)];

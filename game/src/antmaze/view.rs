@@ -1,8 +1,8 @@
-//! What an agent sees: the ant's own state, in the order of the original. Neither goal nor walls are among it.
+//! Observation of an agent: the ant's own state, in the order of the original, without goal and walls.
 
 use crate::ant::{AntState, sense::joint_names};
 
-/// Names of the values.
+/// Returns the names of the values.
 pub fn names() -> Vec<String> {
     let axes = |of: &'static str, axes: &[&'static str]| axes.iter().map(move |axis| format!("{of} {axis}")).collect();
     let joints = |what: &'static str| joint_names().iter().map(|joint| format!("{joint} {what}")).collect();
@@ -17,8 +17,8 @@ pub fn names() -> Vec<String> {
     groups.concat()
 }
 
-/// The values in the order of [`names`]: metres, a unit quaternion, radians, metres and radians per second. The velocity is
-/// along the world's axes, the spin along the torso's.
+/// Returns the values in the order of [`names`]: metres, a unit quaternion, radians, metres and radians per second. The
+/// velocity is along the world's axes, the spin along the torso's.
 pub fn values(state: &AntState) -> impl Iterator<Item = f32> {
     state.qpos.into_iter().chain(state.qvel)
 }

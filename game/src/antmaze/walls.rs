@@ -9,14 +9,14 @@ use crate::{
 /// First and last cell of a straight piece of wall.
 type Run = (Cell, Cell);
 
-/// The walls that anybody can touch, as boxes that do not overlap.
+/// Returns the walls within reach, as boxes that do not overlap.
 ///
-/// Along rows, and then along columns, neighbouring cells become one box: less to look through, and fewer of the seams at
-/// which the original's boxes, one to a cell, meet. There are none where the original has none.
+/// Along rows, and then along columns, neighbouring cells become one box. That makes fewer boxes, and fewer of the
+/// seams at which the original's boxes, one to a cell, meet. There are none where the original has none.
 pub fn wall_boxes(maze: &Maze) -> Vec<WallBox> {
     let (rows, columns) = (maze.rows(), maze.columns());
     let in_rows = (0..rows).flat_map(|row| runs(columns, |col| Cell { row, col }, |cell| !maze.is_free(cell)));
-    // What stands alone in its row may go on along its column.
+    // A cell without neighbours in its row may be part of a column.
     let (alone, mut found): (Vec<Run>, Vec<Run>) = in_rows.partition(|run| run.0 == run.1);
     let mut is_alone = vec![false; rows * columns];
     alone.iter().for_each(|(cell, _)| is_alone[cell.row * columns + cell.col] = true);
@@ -27,7 +27,7 @@ pub fn wall_boxes(maze: &Maze) -> Vec<WallBox> {
     found.into_iter().map(|run| wall_box(maze, run)).collect()
 }
 
-/// The longest runs of cells in a line that belong.
+/// Returns the longest runs of marked cells in a line.
 fn runs(length: usize, cell: impl Fn(usize) -> Cell, belongs: impl Fn(Cell) -> bool) -> Vec<Run> {
     let mut runs = Vec::new();
     let mut first = None;
@@ -62,7 +62,7 @@ mod tests {
     use super::*;
     use crate::maze::{MazeSpec, fixed::antmaze, generate};
 
-    /// How many boxes are at a place.
+    /// Returns the number of boxes at a position.
     fn boxes_at(walls: &[WallBox], [x, y]: [f32; 2]) -> usize {
         let near =
             |wall: &&WallBox| (x - wall.centre[0]).abs() < wall.half[0] && (y - wall.centre[1]).abs() < wall.half[1];

@@ -1,4 +1,4 @@
-//! From cell to cell to the goal.
+//! Waypoints from cell to cell to the goal.
 
 use playbot_learner::rng::{ChaCha8Rng, unit};
 
@@ -8,32 +8,31 @@ use super::{
 };
 use crate::maze::{Cell, Planner};
 
-/// A waypoint counts as reached at this distance, metres: about where its cell begins, as in the original. An ant that goes
-/// nearer comes nearer to walls too, and falls over more often.
+/// Distance at which a waypoint counts as reached, metres: about the edge of its cell, as in the original. An ant that
+/// goes nearer comes nearer to walls too, and falls over more often.
 const REACHED: f32 = 2.0;
 
-/// The places that lead to a level's goal, one after the other: the next cell's centre + U(0, 1) metre along each axis,
-/// and at last the goal itself.
+/// The path to a level's goal: the next cell's centre + U(0, 1) metre along each axis, and at last the goal itself.
 #[derive(Clone, Debug)]
 pub struct Waypoints {
     planner: Planner,
     goal_at: [f32; 2],
-    /// The cell that the ant is on its way to, and the place in it.
+    /// The next cell of the ant, and the target position in it.
     next: Option<(Cell, [f32; 2])>,
 }
 
 impl Waypoints {
-    /// The way to the goal of a level, from everywhere.
+    /// Plans the path to the goal of a level, from everywhere.
     pub fn new(level: &AntMazeLevel) -> Self {
         Self { planner: Planner::new(&level.maze, level.goal), goal_at: level.goal_at, next: None }
     }
 
-    /// Where an ant at this place `[x, y]` should go.
+    /// Returns the target of an ant at this position `[x, y]`.
     ///
-    /// It keeps to a waypoint until it is there, or until it has been pushed to where another cell is next.
+    /// It keeps to a waypoint until the ant is there, or has been pushed to a cell with another next cell.
     pub fn next(&mut self, level: &AntMazeLevel, at: [f32; 2], rng: &mut ChaCha8Rng) -> [f32; 2] {
         let Some(here) = cell_at(&level.maze, at).filter(|&cell| level.maze.is_free(cell)) else {
-            // Its middle is over a wall, which it cannot stay on.
+            // Its middle is over a wall, where it cannot stay.
             return self.next.map_or(self.goal_at, |(_, place)| place);
         };
         let from = match self.next {
@@ -59,7 +58,7 @@ mod tests {
     use super::*;
     use crate::antmaze::generate;
 
-    /// Walks straight from waypoint to waypoint, some centimetres at a time, and returns where it was.
+    /// Walks straight from waypoint to waypoint, some centimetres at a time, and returns the positions.
     fn walk(mode: &str, seed: u64) -> (AntMazeLevel, Vec<[f32; 2]>) {
         let level = generate(&mode.parse().expect("a mode"), seed).expect("a level");
         let mut rng = Streams::new(seed).stream("walk", 0);

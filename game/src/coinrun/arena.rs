@@ -13,7 +13,7 @@ use super::{
     rules::Body,
 };
 
-/// Makes the level an episode asks for, or takes the one that was drawn, and puts it into the player's arena.
+/// Makes the level of an episode, or takes the one of a file, and puts it into the player's arena.
 pub(super) fn start_episode(
     event: On<StartEpisode>,
     levels: Levels,

@@ -1,4 +1,4 @@
-//! Shares of the cells of a view that squares fill.
+//! Coverage of the cells of a view by squares.
 
 use super::{
     tile::SIZE,
@@ -17,16 +17,16 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// The cells around the centre of a player.
+    /// Returns the cells around the centre of a player.
     pub fn around(x: f32, y: f32) -> Self {
         let reach = REACH as f32 + 0.5;
         Self { left: x - reach, bottom: y - reach }
     }
 
-    /// Fills an empty plane, `[SIDE × SIDE]`, from the tiles whose bits are set in `rows`. `outside` is what is set beyond
-    /// the rows: all bits or none.
+    /// Fills an empty plane, `[SIDE × SIDE]`, from the tiles whose bits are set in `rows`. `outside` gives the bits
+    /// beyond the rows: all set or all clear.
     ///
-    /// It adds up for each cell what [`cover`](Self::cover) would add for each tile, in the same order.
+    /// It adds for each cell the sums of [`cover`](Self::cover) for each tile, in the same order.
     pub fn fill(&self, rows: &[u64; SIZE as usize], outside: u64, plane: &mut [f32]) {
         let (left, bottom) = (self.left.floor(), self.bottom.floor());
         let (across, up) = (shares(left, self.left), shares(bottom, self.bottom));
@@ -66,7 +66,7 @@ impl Cells {
     }
 }
 
-/// For each cell of a row or a column: how much of it the tile of its own number covers, and how much the next tile.
+/// Coverage of each cell of a row or a column by the tile of its own number, and by the next tile.
 struct Shares {
     own: [f32; WIDE],
     next: [f32; WIDE],
@@ -84,14 +84,15 @@ fn shares(first: f32, edge: f32) -> Shares {
     Shares { own, next: std::array::from_fn(|cell| before[cell + 1]) }
 }
 
-/// The bits of the tiles from column `left` on, the first lowest.
+/// Returns the bits of the tiles from column `left` on, the first lowest.
 fn window(bits: u64, outside: u64, left: i32) -> u32 {
     let beyond = u128::from(outside);
     let wide = (beyond << 64 | u128::from(bits)).rotate_right(left.clamp(-SIZE, SIZE).rem_euclid(128) as u32);
     wide as u32 & ((1 << (SIDE + 1)) - 1)
 }
 
-/// The sum of what the tiles of two rows cover of a row of cells, from left to right and from the low row to the high one.
+/// Sums the coverage of a row of cells by the tiles of two rows, from left to right and from the low row to the high
+/// one.
 fn fill_row(rows: [(u32, f32); 2], across: &Shares, cells: &mut [f32]) {
     let mut sums = [0.0_f32; WIDE];
     for (bits, height) in rows {
@@ -116,7 +117,7 @@ mod tests {
 
     use super::*;
 
-    /// What [`Cells::fill`] has to equal to the bit.
+    /// Fills tile by tile: the reference of [`Cells::fill`], which must equal it to the bit.
     fn fill_tile_by_tile(cells: &Cells, rows: &[u64; SIZE as usize], outside: u64) -> Vec<f32> {
         let mut plane = vec![0.0; SIDE * SIDE];
         for row in 0..=SIDE as i32 {

@@ -1,8 +1,8 @@
-//! The game as entities: an arena, its player and what lives in it.
+//! The game as entities: an arena, its player and its inhabitants.
 //!
 //! Every arena is an entity with its [`Tiles`]. The player and all saws, enemies, crates and the coin are entities with
-//! a [`PlayerBody`] or an [`ArenaBody`]; the rules read them anew in each tick, so that a game built
-//! on top may add, move or remove them.
+//! a [`PlayerBody`] or an [`ArenaBody`]. The rules read them anew in each tick, so a game built on top may add, move or
+//! remove them.
 
 use std::sync::Arc;
 
@@ -35,20 +35,19 @@ pub struct Arena {
 #[reflect(Component, Clone, Debug, PartialEq)]
 pub struct Tiles(pub TileGrid);
 
-/// The arena something is in, the player excepted: it stays when the level changes.
+/// The arena of an entity of its level. Players are not marked: they stay when the level changes.
 #[derive(Component, Debug, Reflect)]
 #[reflect(Component)]
 #[relationship(relationship_target = ArenaEntities)]
 pub struct InArena(pub Entity);
 
-/// Everything in an arena that goes with its level, in the order in which it was made.
+/// All entities of an arena's level, in creation order.
 #[derive(Component, Debug, Default, Reflect)]
 #[reflect(Component)]
 #[relationship_target(relationship = InArena, linked_spawn)]
 pub struct ArenaEntities(Vec<Entity>);
 
-/// The agent's body and what it remembers between steps. Belongs to the entity with the
-/// [`Agent`](bevy_playbot::agent::Agent).
+/// The agent's body and its memory between steps. Belongs to the entity with the [`Agent`](bevy_playbot::agent::Agent).
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]
@@ -83,7 +82,7 @@ pub struct Saw;
 #[reflect(Component)]
 #[require(ArenaBody)]
 pub struct Enemy {
-    /// Which of the 9 pictures it has.
+    /// Its picture, 0 to 8.
     pub sprite: u8,
 }
 
@@ -92,17 +91,17 @@ pub struct Enemy {
 #[reflect(Component)]
 #[require(ArenaBody)]
 pub struct Crate {
-    /// Which of the 4 pictures it has.
+    /// Its picture, 0 to 3.
     pub sprite: u8,
 }
 
-/// The goal. The rules look at its tile; the entity is there to be seen and sensed.
+/// The goal. The rules look at its tile; the entity is only drawn and sensed.
 #[derive(Component, Clone, Copy, Debug, Default, Reflect)]
 #[reflect(Component)]
 #[require(ArenaBody)]
 pub struct Coin;
 
-/// Why the last episode of this player ended.
+/// The outcome of this player's last episode.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]

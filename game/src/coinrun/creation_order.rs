@@ -1,7 +1,7 @@
-//! The order in which the bodies of a level are made, as text.
+//! Creation order of the bodies of a level, as text.
 //!
-//! Files list saws, crates and enemies apart. Which of two bodies in one place is in front depends on the order in which all
-//! of them are made.
+//! Files list saws, crates and enemies apart. The creation order of all of them decides which of two overlapping bodies
+//! is in front.
 
 use super::spawn::Spawn;
 
@@ -13,14 +13,15 @@ fn letter(spawn: &Spawn) -> char {
     }
 }
 
-/// A letter for each body: `s`, `c` or `e`. `None` for all saws before all crates before all enemies.
+/// Returns a letter for each body: `s`, `c` or `e`. `None` for all saws before all crates before all enemies.
 pub(super) fn to_text(spawns: &[Spawn]) -> Option<String> {
     let order: String = spawns.iter().map(letter).collect();
     let kinds = ["s", "c", "e"].map(|kind| kind.repeat(order.matches(kind).count()));
     (order != kinds.concat()).then_some(order)
 }
 
-/// The bodies in the order of the letters; `None` if these are not one for each body. Bodies of one kind stay in their order.
+/// Arranges the bodies in the order of the letters; `None` unless there is one letter for each body. Bodies of one kind
+/// stay in their order.
 pub(super) fn arrange(order: &str, spawns: &[Spawn]) -> Option<Vec<Spawn>> {
     let mut kinds = ['s', 'c', 'e'].map(|kind| (kind, spawns.iter().filter(move |spawn| letter(spawn) == kind)));
     let mut arranged = Vec::with_capacity(spawns.len());

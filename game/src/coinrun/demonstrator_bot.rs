@@ -8,8 +8,8 @@ use super::{Sim, levels::Levels, planner::Demonstrator, play::NOTHING};
 
 /// Plays by planning ahead with the exact rules.
 ///
-/// It plans in a copy of its level, which it steps along with the game; the state hashes of the two are compared each
-/// tick, so a game that adds to CoinRun's rules is told that this bot does not know them.
+/// It plans in a copy of its level, which it steps along with the game. The state hashes of the two are compared each
+/// tick, so a game that adds to CoinRun's rules gets an error about it.
 #[derive(Component, Reflect)]
 #[reflect(Component)]
 pub struct DemonstratorBot {
@@ -21,7 +21,7 @@ pub struct DemonstratorBot {
 }
 
 impl DemonstratorBot {
-    /// A bot whose actions are replaced by uniformly random ones with probability `noise`.
+    /// Takes the probability with which its actions are replaced by uniformly random ones.
     pub fn new(noise: f64) -> Self {
         Self { noise, planner: Demonstrator::default(), sim: None }
     }
@@ -59,7 +59,7 @@ pub(super) fn decide(
     }
 }
 
-/// Steps the copies along, whoever has decided.
+/// Steps the copies along, under any decider.
 pub(super) fn follow(mut bots: Query<(&Control, &Episode, &Action, &mut DemonstratorBot)>) {
     for (control, episode, action, mut bot) in &mut bots {
         if !control.is_active() || !episode.is_running() {

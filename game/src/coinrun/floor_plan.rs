@@ -1,4 +1,4 @@
-//! A level as the plan that trajectories are drawn on.
+//! Floor plan of a level, for drawing trajectories.
 
 use bevy::math::{Rect, Vec2};
 use playbot_lab::floor_plan::{FloorPlan, joined_tiles};
@@ -6,8 +6,8 @@ use playbot_lab::floor_plan::{FloorPlan, joined_tiles};
 use super::{Level, Spawn, rules::Body};
 
 impl Level {
-    /// The used part of the level, from the side, in tiles: ground, lava and saws, crates. Enemies walk about, so they are
-    /// not in it.
+    /// Returns the used part of the level, from the side, in tiles: ground, lava and saws, crates. Enemies walk about,
+    /// so they are left out.
     pub fn floor_plan(&self) -> FloorPlan {
         let [columns, rows] = self.used_size().map(|tiles| tiles.unsigned_abs() as usize);
         let square = |row: usize, column: usize| {

@@ -1,4 +1,4 @@
-//! A level: tiles, where the bodies start, and the few random numbers that play needs later.
+//! A level: tiles, starts of the bodies, and the few random numbers that play needs later.
 
 use std::fmt;
 use std::str::FromStr;
@@ -13,12 +13,12 @@ use super::{near::NearBodies, rules::Body, spawn::Spawn, tile::TileGrid};
 pub enum Mode {
     /// No walking enemies outside pits, one set of pictures.
     Easy,
-    /// Everything.
+    /// All obstacles.
     Hard,
 }
 
 impl Mode {
-    /// The name of this mode, as `FromStr` reads it.
+    /// Returns the name of this mode, as `FromStr` reads it.
     pub const fn name(self) -> &'static str {
         match self {
             Mode::Easy => "easy",
@@ -100,12 +100,12 @@ impl Level {
         Self { parts, saws: NearBodies::new(&saws), crates: NearBodies::new(&crates) }
     }
 
-    /// The parts, to build a changed level from.
+    /// Returns the parts, to build a changed level from.
     pub fn parts(&self) -> &LevelParts {
         &self.parts
     }
 
-    /// The enemies at the start, in creation order.
+    /// Returns the enemies at the start, in creation order.
     pub fn enemies(&self) -> Vec<Body> {
         self.spawns.iter().filter_map(Spawn::enemy).collect()
     }
@@ -122,14 +122,14 @@ impl Level {
         self.saws.near(x)
     }
 
-    /// Whether x moves first in step `step` (from 0) when both speeds are equal.
+    /// Returns true if x moves first in step `step` (from 0) when both speeds are equal.
     #[inline]
     pub fn x_wins_tie(&self, step: u32) -> bool {
         let step = step as usize % 1024;
         self.tie_breaks[step / 64] >> (step % 64) & 1 == 1
     }
 
-    /// The level as the JSON objects of the reference data have it.
+    /// Returns the level in the form of the reference data's JSON objects.
     pub fn to_golden_json(&self) -> GoldenLevel {
         let mut golden = GoldenLevel {
             mode: self.mode,

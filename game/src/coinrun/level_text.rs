@@ -1,4 +1,4 @@
-//! Levels as JSON: what `playbot level coinrun --json` prints and level files hold.
+//! Levels as JSON: the output of `playbot level coinrun --json`, and level files.
 
 use playbot_lab::level_files::{
     JsonStep::{Index, Key},
@@ -16,9 +16,9 @@ use super::{
     tile::SIZE,
 };
 
-/// A level as a file has it. Cells are `[x, y]` from the bottom left; only the rows have to be there.
+/// A level in a file. Cells are `[x, y]` from the bottom left; only the rows are required.
 #[derive(Clone, Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, expecting = "a level, which is an object with `rows`")]
+#[serde(deny_unknown_fields, expecting = "a level: an object with `rows`")]
 pub(super) struct LevelText {
     rows: Vec<String>,
     #[serde(default)]
@@ -46,7 +46,7 @@ pub(super) struct LevelText {
     ground_theme: u8,
     #[serde(default)]
     tie_breaks: Option<String>,
-    /// Where a generated level is from. Play asks for neither.
+    /// Origin of a generated level. Play does not need it.
     #[serde(default = "hard")]
     mode: Mode,
     #[serde(default)]
@@ -58,7 +58,7 @@ fn hard() -> Mode {
 }
 
 impl Level {
-    /// The level as a file has it, with everything that play and pictures ask for.
+    /// Converts the level to a file's form, with all fields that play and pictures need.
     pub(super) fn to_level_text(&self) -> LevelText {
         let GoldenLevel {
             mode,
@@ -94,14 +94,14 @@ impl Level {
     }
 }
 
-/// Reads a level file.
+/// Parses a level file.
 ///
 /// # Errors
 ///
-/// What is wrong with it, and on which line.
+/// The mistake, with its line.
 pub(super) fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
     let level = read_json_object::<LevelText>(text)?.into_level(text)?;
-    // A level is the same one wherever it is from.
+    // The origin of a level is no part of its content.
     let content = LevelText { mode: Mode::Hard, seed: 0, ..level.to_level_text() };
     Ok(LevelDesign::new(level, &serde_json::json!(content).to_string()))
 }
@@ -169,7 +169,7 @@ impl LevelText {
         Ok(())
     }
 
-    /// Checks that everything that lives in the level is inside it, and that enemies have a direction.
+    /// Checks that all inhabitants are inside the level, and that enemies have a direction.
     fn check_cells(&self, text: &str) -> Result<(), LevelTextError> {
         let enemies: Vec<[i32; 2]> = self.enemies.iter().map(|&[x, y, _]| [x, y]).collect();
         for (key, what, cells) in
@@ -195,7 +195,7 @@ impl LevelText {
     }
 }
 
-/// The pictures of the bodies of one kind: the first one for all if none are named.
+/// Returns the pictures of the bodies of one kind: the first one for all if none are named.
 fn sprites(
     named: Option<Vec<u8>>,
     kind: &str,

@@ -10,7 +10,7 @@ use super::{
     tile::{SIZE, Tile, TileGrid},
 };
 
-/// The letter that may stand where the player starts.
+/// The letter for the player's start.
 const START: char = 'A';
 
 /// Tiles, with the coin in its cell.
@@ -20,14 +20,14 @@ pub(super) struct LevelTiles {
 }
 
 impl LevelTiles {
-    /// Reads rows, the bottom one first, and puts the coin where it is said to be.
+    /// Reads rows, the bottom one first, and puts the coin into its cell.
     ///
-    /// Rows may be fewer and shorter than a level is large: what lies right of them becomes rock. Above them, a column that
-    /// ends in `#` goes on as rock, and every other column is free up to the border.
+    /// Rows may be fewer and shorter than a level is large. The part right of them becomes rock. Above them, a column
+    /// that ends in `#` goes on as rock, and every other column is free up to the border.
     ///
     /// # Errors
     ///
-    /// What is wrong, with the line of the row.
+    /// The mistake, with the line of the row.
     pub fn read(rows: &[String], coin: Option<[i32; 2]>, text: &str) -> Result<Self, LevelTextError> {
         let at_row = |row: usize, what: String| Err(LevelTextError::at(text, &[Key("rows"), Index(row)], what));
         let width = rows.first().map_or(0, |row| row.chars().count());
@@ -97,7 +97,7 @@ impl LevelTiles {
     }
 }
 
-/// What is around the rows.
+/// Returns the tiles around the rows.
 fn surroundings(rows: &[String], width: i32) -> TileGrid {
     let mut tiles = TileGrid::default();
     tiles.fill(width, 0, SIZE - width, SIZE, Tile::Wall);
@@ -113,7 +113,7 @@ fn surroundings(rows: &[String], width: i32) -> TileGrid {
     tiles
 }
 
-/// The cell of the only coin, which is drawn into the rows, or named, or both.
+/// Returns the cell of the only coin, which is drawn into the rows, or named, or both.
 fn place_of_coin(
     drawn: &[[i32; 2]],
     named: Option<[i32; 2]>,

@@ -1,4 +1,4 @@
-//! Where the levels of a mode come from: a seed, or a file that somebody drew.
+//! Levels of a mode: from a seed, or from a file.
 
 use std::sync::Arc;
 
@@ -18,7 +18,7 @@ pub(super) struct Levels<'w> {
 }
 
 impl Levels<'_> {
-    /// A level, or in words why there is none.
+    /// Returns a level, or an explanation why there is none.
     pub fn get(&self, level: u64) -> Result<Arc<Level>, String> {
         match &self.designs {
             Some(designs) => designs.get(level),
@@ -27,7 +27,7 @@ impl Levels<'_> {
     }
 }
 
-/// A level of a mode that has been checked, or in words why there is none.
+/// Returns a level of a mode that has been checked, or an explanation why there is none.
 pub(super) fn level_of(game: &dyn Game, mode: &str, level: u64) -> Result<Arc<Level>, String> {
     if is_level_files(mode) {
         let designs = level_designs(game, mode);

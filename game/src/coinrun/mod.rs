@@ -1,8 +1,8 @@
 //! CoinRun: run, jump, avoid saws, enemies and lava, reach the coin.
 //!
-//! The rules and the level generator reproduce Procgen's CoinRun exactly and do not depend on an
-//! engine. [`generate`] makes a [`Level`] from a mode and a seed, [`Sim`] plays it, and the
-//! functions in [`rules`] are the single steps of play for those who keep the state elsewhere.
+//! The rules and the level generator reproduce Procgen's CoinRun exactly and do not depend on an engine. [`generate`]
+//! makes a [`Level`] from a mode and a seed, [`Sim`] plays it. The functions in [`rules`] are the single steps of play,
+//! for callers that keep the state elsewhere.
 
 pub mod arena;
 mod cells;

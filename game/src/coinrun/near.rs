@@ -28,7 +28,7 @@ impl NearBodies {
         sorted
     }
 
-    /// The bodies that something centred at `x` (tiles) can touch before it has moved one tile.
+    /// Returns the bodies that something centred at `x` (tiles) can touch before it has moved one tile.
     #[inline]
     pub fn near(&self, x: f32) -> &[Body] {
         // `as` saturates: a position left of the level counts as column 0.

@@ -1,7 +1,7 @@
-//! rapier2d colliders for everything that has a body, so that ray sensors and physics of a game's own work.
+//! rapier2d colliders for all bodies, for ray sensors and physics of a game's own.
 //!
-//! The rules of CoinRun move the bodies; rapier follows them. Each arena has a physics context of its own: arenas lie on
-//! top of each other and must not meet.
+//! The rules of CoinRun move the bodies; rapier follows them. Each arena has a physics context of its own, since arenas
+//! lie on top of each other and must not meet.
 
 use bevy::{prelude::*, transform::TransformPlugin};
 use bevy_rapier2d::prelude::*;
@@ -15,7 +15,7 @@ use super::{
 
 /// Adds rapier to CoinRun.
 ///
-/// Left out of headless training, where nothing asks for it: see the benchmark for what it costs.
+/// Left out of headless training, which does not need it: see the benchmark for its cost.
 #[derive(Default, Debug, Clone, Copy)]
 pub struct CoinRunPhysicsPlugin;
 
@@ -46,7 +46,7 @@ impl Plugin for CoinRunPhysicsPlugin {
     }
 }
 
-/// A context without gravity for each new arena: nothing falls but by the rules.
+/// Adds a context without gravity to each new arena: only the rules move bodies.
 fn add_contexts(
     arenas: Query<Entity, Added<Arena>>,
     known: Query<(), With<RapierContextSimulation>>,
@@ -60,7 +60,7 @@ fn add_contexts(
     }
 }
 
-/// One collider for all ground of a new level.
+/// Adds one collider for all ground of a new level.
 fn add_ground(arenas: Query<(Entity, &Tiles), Changed<Tiles>>, mut commands: Commands) {
     for (arena, tiles) in &arenas {
         let cells: Vec<IVec2> = (0..SIZE * SIZE)
@@ -89,7 +89,7 @@ fn add_bodies(
     for (entity, body, in_arena, is_enemy, is_saw, is_crate) in &bodies {
         let kind = if is_enemy { RigidBody::KinematicPositionBased } else { RigidBody::Fixed };
         commands.entity(entity).insert(collider(&body.0, in_arena.0, kind));
-        // Whatever does not stop the player is sensed, not bumped into.
+        // Bodies that do not stop the player are sensors.
         if !is_saw && !is_crate {
             commands.entity(entity).insert(Sensor);
         }

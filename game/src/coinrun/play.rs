@@ -15,7 +15,7 @@ use super::{
 /// The action that does nothing.
 pub const NOTHING: u8 = 4;
 
-/// Everything that lives in arenas, and how to find it.
+/// All inhabitants of arenas, with their queries.
 #[derive(SystemParam)]
 pub(super) struct Arenas<'w, 's> {
     arenas: Query<'w, 's, (&'static Arena, &'static Tiles, &'static ArenaEntities)>,
@@ -61,7 +61,7 @@ impl Arenas<'_, '_> {
     }
 }
 
-/// Enemies, player, touch, in the order of the rules, for every arena whose agent plays.
+/// Moves enemies and player and applies contacts, in the order of the rules, for every arena whose agent plays.
 pub(super) fn play(
     mut players: Query<(
         &Control,
@@ -112,7 +112,7 @@ fn finish(outcome: Option<Outcome>, episode: &mut Episode, reward: &mut Reward) 
     }
 }
 
-/// Fills the vector of every agent that plays and reads one.
+/// Fills the vector of every playing agent that reads one.
 pub(super) fn observe(
     mut players: Query<(&Episode, &PlaysIn, &PlayerBody, &PlayerMemory, &mut Observation), With<VectorSensor>>,
     arenas: Arenas,

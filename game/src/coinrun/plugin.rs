@@ -14,7 +14,7 @@ use super::{
 pub struct CoinRunPlugin {
     /// Difficulty of the generated levels.
     pub mode: Mode,
-    /// Whether bodies get rapier colliders; see [`CoinRunPhysicsPlugin`].
+    /// Adds rapier colliders to bodies; see [`CoinRunPhysicsPlugin`].
     pub physics: bool,
 }
 
@@ -33,7 +33,7 @@ impl Plugin for CoinRunPlugin {
             .add_systems(
                 FixedPreUpdate,
                 (
-                    // An agent is decided for by one alone, so it does not matter who decides for which agent first.
+                    // Each agent has one decider, so the order of deciders of different agents does not matter.
                     demonstrator_bot::decide.in_set(PlaybotSystems::Decide).ambiguous_with(PlaybotSystems::Decide),
                     demonstrator_bot::follow.after(PlaybotSystems::Act),
                 ),

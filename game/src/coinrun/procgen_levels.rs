@@ -1,4 +1,4 @@
-//! Which level comes next: Procgen's level picking.
+//! Procgen's choice of the next level.
 
 use bevy_playbot::level::LevelSource;
 use rand_mt::Mt;
@@ -35,12 +35,12 @@ pub struct ProcgenLevels {
 }
 
 impl ProcgenLevels {
-    /// A sequence whose own generator starts from `seed`.
+    /// Returns a sequence whose own generator starts from `seed`.
     pub fn new(levels: LevelSet, seed: u32) -> Self {
         Self { levels, generator: Mt::new(seed) }
     }
 
-    /// The seed of the next level.
+    /// Returns the seed of the next level.
     pub fn next_level(&mut self) -> u32 {
         let offset = self.generator.next_u32() % self.levels.len();
         self.levels.first().wrapping_add(offset)

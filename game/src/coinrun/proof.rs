@@ -1,4 +1,4 @@
-//! Whether a level of CoinRun can be won at all.
+//! Proofs that a level of CoinRun can or cannot be won.
 
 use std::sync::Arc;
 
@@ -15,32 +15,31 @@ use super::{
     spawn::Spawn,
 };
 
-/// Unsolvable where [`coin_is_unreachable`] says so of the level's start: a search that allows all that the rules do, and
-/// more, has ended without the coin. Nothing is proved of other levels, since that search knows neither enemies nor time.
+/// Proves a level unsolvable if [`coin_is_unreachable`] is true at its start: a search over more than the rules allow
+/// has ended without the coin. Nothing is proved of other levels, since that search includes neither enemies nor time.
 pub(super) fn prove(level: Arc<Level>) -> LevelProof {
     if !coin_is_unreachable(&Sim::new(level)) {
         return LevelProof::Unknown;
     }
-    let why = "the coin cannot be reached: a search through all that the rules allow, in which enemies do no harm and time is \
-               never up, ended without it"
+    let why = "the coin cannot be reached: a search over all moves of the rules, with harmless enemies and \
+               without a time limit, ended without it"
         .to_owned();
     LevelProof::Unsolvable { why }
 }
 
-/// The same from where a player of a World is now.
+/// Proves the same from the present state of a player of a World.
 pub(super) fn prove_from(world: &World, agent: Entity) -> LevelProof {
     if !resumed(world, agent).is_some_and(|sim| coin_is_unreachable(&sim)) {
         return LevelProof::Unknown;
     }
-    let why =
-        "the coin cannot be reached any more: a search through all that the rules allow from where the player was, in \
-               which enemies do no harm and time is never up, ended without it"
-            .to_owned();
+    let why = "the coin cannot be reached any more: a search over all moves of the rules from the player's position, \
+         with harmless enemies and without a time limit, ended without it"
+        .to_owned();
     LevelProof::Unsolvable { why }
 }
 
-/// The episode of a player as it goes on without an engine. `None` if nobody plays, or if something stands where no level
-/// can have it.
+/// Returns the episode of a player as it goes on without an engine. `None` without a player, or if a body stands where
+/// no level can have it.
 fn resumed(world: &World, agent: Entity) -> Option<Sim> {
     let (player, memory) = (world.get::<PlayerBody>(agent)?.0, world.get::<PlayerMemory>(agent)?.0);
     let arena = world.get::<PlaysIn>(agent)?.0;
@@ -60,7 +59,7 @@ fn resumed(world: &World, agent: Entity) -> Option<Sim> {
     Some(Sim::resume(with_changes(level, tiles, standing), player, memory, enemies, steps))
 }
 
-/// The level with what stands in it now, should somebody have moved it.
+/// Returns the level with the bodies that stand in it now, in case they were moved.
 fn with_changes(level: &Arc<Level>, tiles: &super::TileGrid, standing: Vec<Spawn>) -> Arc<Level> {
     let is_enemy = |spawn: &Spawn| matches!(spawn, Spawn::Enemy { .. });
     let is_same = level.spawns.iter().filter(|spawn| !is_enemy(spawn)).eq(&standing);
@@ -71,7 +70,7 @@ fn with_changes(level: &Arc<Level>, tiles: &super::TileGrid, standing: Vec<Spawn
     Arc::new(Level::new(LevelParts { tiles: tiles.clone(), spawns, ..level.parts().clone() }))
 }
 
-/// The cell that a saw or a crate fills; `None` if it stands between cells.
+/// Returns the cell that a saw or a crate fills; `None` if it stands between cells.
 fn cell_of(body: &Body) -> Option<[i32; 2]> {
     let cell = [body.x, body.y].map(|along| along.floor() as i32);
     (*body == Body::block(cell)).then_some(cell)
@@ -97,7 +96,7 @@ mod tests {
         assert!(prove(Arc::new(level)).why_unsolvable().is_some_and(|why| why.contains("coin")));
     }
 
-    /// A World in which a level is played, and the player.
+    /// Returns a World in which a level is played, and the player.
     fn played(level: Level) -> (World, Entity) {
         let mut world = World::new();
         let arena = world.spawn_empty().id();
@@ -113,7 +112,7 @@ mod tests {
         }
     }
 
-    /// The coin beside the start, and behind a tower a place from which nobody comes back.
+    /// Returns a level with the coin beside the start, and a trap behind a tower.
     fn one_way() -> Level {
         let tower = "#...#.....#\n".repeat(29);
         Level::from_text(&format!("#.........#\n{tower}#AC.#.....#\n#=========#\n")).expect("a valid picture")

@@ -1,4 +1,4 @@
-//! A level of CoinRun for people, for programs, and as a picture of the whole of it.
+//! A level of CoinRun as text, as JSON, and as a picture of the whole of it.
 
 use std::sync::Arc;
 
@@ -17,12 +17,12 @@ use playbot_lab::{
 use super::{Level, components::PlaysIn, levels::level_of};
 
 const LEGEND: &str =
-    "A start  C coin  # = ground  ~ ^ lava  S saw  < > enemy and where it goes  x crate  | enemies turn here";
+    "A start  C coin  # = ground  ~ ^ lava  S saw  < > enemy and its direction  x crate  | enemies turn here";
 
 /// Shows a level.
 pub fn show(game: &dyn Game, request: &LevelRequest) -> Result<LevelView, InspectError> {
     if request.map.is_some() {
-        return Err(InspectError::Usage("CoinRun has no maps: name a --mode and a --seed".to_owned()));
+        return Err(InspectError::Usage("CoinRun has no maps: name a --mode and a --level".to_owned()));
     }
     let level = match request.file {
         Some(path) => {
@@ -32,7 +32,7 @@ pub fn show(game: &dyn Game, request: &LevelRequest) -> Result<LevelView, Inspec
         None => {
             let mode = request.mode.unwrap_or("hard");
             game.check_mode(mode)?;
-            level_of(game, mode, request.seed.unwrap_or(0))
+            level_of(game, mode, request.level.unwrap_or(0))
         }
     };
     let level = level.map_err(InspectError::Usage)?;
@@ -46,7 +46,7 @@ pub fn show(game: &dyn Game, request: &LevelRequest) -> Result<LevelView, Inspec
 /// Pixels of a tile in the picture of a level.
 const TILE: u32 = 16;
 
-/// The used part of a level: what an agent would see that sees all of it.
+/// Draws the used part of a level, as an agent with a view of all of it would see it.
 fn draw(game: &dyn Game, level: Arc<Level>) -> Result<LevelPicture, InspectError> {
     let [columns, rows] = level.used_size().map(i32::unsigned_abs);
     let image = ImageOptions { width: columns * TILE, height: rows * TILE, ..ImageOptions::default() };

@@ -7,12 +7,12 @@ use super::rules::{
     ACTIONS, Body, COIN_REWARD, Outcome, PlayerState, begin_step, hash_state, move_player, patrol, touch,
 };
 
-/// What one step brought.
+/// The result of one step.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct StepResult {
     /// 10 in the step that reaches the coin, otherwise 0.
     pub reward: f32,
-    /// How the episode ended, once it has.
+    /// The end of the episode, once it has ended.
     pub end: Option<Outcome>,
 }
 
@@ -28,14 +28,14 @@ pub struct Sim {
 }
 
 impl Sim {
-    /// The start of an episode.
+    /// Returns the start of an episode.
     pub fn new(level: Arc<Level>) -> Self {
         let enemies = level.enemies();
         Self { level, player: Body::player(), state: PlayerState::default(), enemies, steps: 0, end: None }
     }
 
-    /// An episode that continues from the given state: the player, what it remembers, the enemies
-    /// in creation order, and the number of steps already made.
+    /// Continues an episode from the given state: the player, its memory, the enemies in creation order, and the number
+    /// of steps already made.
     pub fn resume(level: Arc<Level>, player: Body, state: PlayerState, enemies: Vec<Body>, steps: u32) -> Self {
         Self { level, player, state, enemies, steps, end: None }
     }
@@ -68,57 +68,57 @@ impl Sim {
         move_player(player, &mut self.state, &level.tiles, crates, &step, x_wins_tie);
     }
 
-    /// The level.
+    /// Returns the level.
     pub fn level(&self) -> &Arc<Level> {
         &self.level
     }
 
-    /// The player's body.
+    /// Returns the player's body.
     pub fn player(&self) -> &Body {
         &self.player
     }
 
-    /// What the player remembers from step to step.
+    /// Returns the player's memory from step to step.
     pub fn player_state(&self) -> PlayerState {
         self.state
     }
 
-    /// The enemies in creation order.
+    /// Returns the enemies in creation order.
     pub fn enemies(&self) -> &[Body] {
         &self.enemies
     }
 
-    /// The player's centre, tiles from the left.
+    /// Returns the player's centre, tiles from the left.
     pub fn x(&self) -> f32 {
         self.player.x
     }
 
-    /// The player's centre, tiles from the bottom.
+    /// Returns the player's centre, tiles from the bottom.
     pub fn y(&self) -> f32 {
         self.player.y
     }
 
-    /// The player's horizontal velocity, tiles per step.
+    /// Returns the player's horizontal velocity, tiles per step.
     pub fn vx(&self) -> f32 {
         self.player.vx
     }
 
-    /// The player's vertical velocity, tiles per step, upwards.
+    /// Returns the player's vertical velocity, tiles per step, upwards.
     pub fn vy(&self) -> f32 {
         self.player.vy
     }
 
-    /// Number of steps made so far.
+    /// Returns the number of steps made so far.
     pub fn steps(&self) -> u32 {
         self.steps
     }
 
-    /// How the episode ended, once it has.
+    /// Returns the end of the episode, once it has ended.
     pub fn end(&self) -> Option<Outcome> {
         self.end
     }
 
-    /// A fingerprint of the state; see [`hash_state`].
+    /// Returns a fingerprint of the state; see [`hash_state`].
     pub fn state_hash(&self) -> u64 {
         hash_state(&self.player, &self.enemies, self.steps)
     }

@@ -1,4 +1,4 @@
-//! What lives in a level, and where it starts.
+//! Inhabitants of a level, and their starts.
 
 use super::rules::Body;
 

@@ -1,7 +1,7 @@
-//! When a tick of CoinRun is played.
+//! System set of a tick of CoinRun.
 
 use bevy::prelude::*;
 
-/// The tick of CoinRun, in `FixedUpdate`. Add what your game adds before or after it.
+/// The tick of CoinRun, in `FixedUpdate`. Systems of your game go before or after it.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct CoinRunSystems;

@@ -35,8 +35,8 @@ pub enum PictureError {
 }
 
 impl Level {
-    /// A picture of the used part of the level: all columns up to the rock behind the coin, and
-    /// the rows up to a little above the highest thing.
+    /// Returns a picture of the used part of the level: all columns up to the rock behind the coin, and the rows up to
+    /// a little above the highest thing.
     pub fn to_text(&self) -> String {
         let [width, height] = self.used_size();
         let mut rows: Vec<Vec<char>> =
@@ -55,17 +55,17 @@ impl Level {
         text
     }
 
-    /// Columns and rows of the part of the level that is used.
+    /// Returns the columns and rows of the part of the level that is used.
     pub fn used_size(&self) -> [i32; 2] {
-        // Nothing but rock is behind the coin, unless somebody drew more.
+        // Only rock is behind the coin, except in hand-made levels.
         let is_rock = |x: i32| (0..SIZE).all(|y| self.tiles.get(x, y) == Tile::Wall);
         let last = (self.coin[0]..SIZE).rev().find(|&x| !is_rock(x)).unwrap_or(self.coin[0]);
         let width = (last + 3).min(SIZE);
         [width, self.used_height(width)]
     }
 
-    /// What goes on as it is up to the border is left out, but for a little: rock and free columns, as [`Level::from_text`]
-    /// puts them there again.
+    /// Returns the height without the part that repeats up to the border: rock and free columns, which
+    /// [`Level::from_text`] restores.
     fn used_height(&self, width: i32) -> i32 {
         let columns = || 1..width - 2;
         let top = SIZE - 2;
@@ -82,9 +82,8 @@ impl Level {
         (same_from.max(above_bodies) + shown).min(SIZE)
     }
 
-    /// Reads a picture. What lies right of it becomes rock. Above it, a column that ends in `#`
-    /// goes on as rock and every other column is free up to the border. All sprites are 0, the
-    /// seed is 0 and the mode is hard.
+    /// Reads a picture. The part right of it becomes rock. Above it, a column that ends in `#` goes on as rock and
+    /// every other column is free up to the border. All sprites are 0, the seed is 0 and the mode is hard.
     ///
     /// # Errors
     /// See [`PictureError`].
@@ -107,7 +106,7 @@ impl Level {
 }
 
 impl Spawn {
-    /// The cell of this body.
+    /// Returns the cell of this body.
     pub fn cell(&self) -> [i32; 2] {
         match *self {
             Spawn::Saw(cell) | Spawn::Enemy { cell, .. } | Spawn::Crate { cell, .. } => cell,

@@ -1,4 +1,4 @@
-//! The random numbers of a level that play needs, as text.
+//! The tie-breaking random numbers of a level, as text.
 
 /// One bit for each of the first 1024 steps, as [`LevelParts`](super::LevelParts) has them.
 type TieBreaks = [u64; 16];
@@ -6,12 +6,12 @@ type TieBreaks = [u64; 16];
 /// Digits to a word.
 const DIGITS: usize = 16;
 
-/// Sixteen hexadecimal digits to a word, the first word first.
+/// Writes sixteen hexadecimal digits to a word, the first word first.
 pub(super) fn to_text(tie_breaks: &TieBreaks) -> String {
     tie_breaks.iter().map(|word| format!("{word:016x}")).collect()
 }
 
-/// Reads what [`to_text`] writes.
+/// Parses the output of [`to_text`].
 pub(super) fn from_text(text: &str) -> Option<TieBreaks> {
     let mut tie_breaks = TieBreaks::default();
     if text.len() != DIGITS * tie_breaks.len() || !text.bytes().all(|byte| byte.is_ascii_hexdigit()) {

@@ -7,13 +7,13 @@ pub const SIZE: i32 = 64;
 
 const CELLS: usize = (SIZE * SIZE) as usize;
 
-/// What one cell of the grid is made of.
+/// The material of one cell of the grid.
 #[repr(u8)]
 #[derive(Clone, Copy, Eq, PartialEq, Debug)]
 pub enum Tile {
     /// Free space.
     Empty,
-    /// Inner ground. It is also what lies outside the grid, so it blocks every moving body.
+    /// Inner ground, which also fills the outside of the grid, so it blocks every moving body.
     Wall,
     /// Ground surface. Blocks the player and turns enemies.
     WallTop,
@@ -31,25 +31,25 @@ impl Tile {
     const ALL: [Tile; 7] =
         [Tile::Empty, Tile::Wall, Tile::WallTop, Tile::Lava, Tile::LavaTop, Tile::Coin, Tile::Barrier];
 
-    /// Whether this is ground, inner or surface.
+    /// Returns true if this is ground, inner or surface.
     #[inline]
     pub const fn is_wall(self) -> bool {
         matches!(self, Tile::Wall | Tile::WallTop)
     }
 
-    /// Whether this is lava, inner or surface.
+    /// Returns true if this is lava, inner or surface.
     #[inline]
     pub const fn is_lava(self) -> bool {
         matches!(self, Tile::Lava | Tile::LavaTop)
     }
 
-    /// Whether enemies turn around at this tile.
+    /// Returns true if enemies turn around at this tile.
     #[inline]
     pub const fn turns_enemies(self) -> bool {
         self.is_wall() || matches!(self, Tile::Barrier)
     }
 
-    /// The letter of this tile in level pictures: one of `.#=~^C|`, in the order of the variants.
+    /// Returns the letter of this tile in level pictures: one of `.#=~^C|`, in the order of the variants.
     pub const fn to_char(self) -> char {
         match self {
             Tile::Empty => '.',
@@ -62,7 +62,7 @@ impl Tile {
         }
     }
 
-    /// The tile with this letter, or `None` for any other letter.
+    /// Returns the tile with this letter, or `None` for any other letter.
     pub fn from_char(letter: char) -> Option<Tile> {
         Self::ALL.into_iter().find(|tile| tile.to_char() == letter)
     }
@@ -92,7 +92,7 @@ impl fmt::Debug for TileGrid {
 }
 
 impl Default for TileGrid {
-    /// An empty grid.
+    /// Returns an empty grid.
     fn default() -> Self {
         Self {
             tiles: Box::new([Tile::Empty; CELLS]),
@@ -124,7 +124,7 @@ impl Corners {
         self.left >= 0.0 && self.low >= 0.0 && self.right < size && self.high < size
     }
 
-    /// Whether a corner is in a cell whose bit is set. The outside counts as set.
+    /// Returns true if a corner is in a cell whose bit is set. The outside counts as set.
     #[inline]
     fn hit(&self, rows: &[u64; SIZE as usize]) -> bool {
         if !self.is_inside() {
@@ -134,7 +134,7 @@ impl Corners {
         (rows[self.low as usize & 63] | rows[self.high as usize & 63]) & columns != 0
     }
 
-    /// Whether the rectangle lies inside and no cell that it reaches into has its bit set.
+    /// Returns true if the rectangle lies inside and no cell that it reaches into has its bit set.
     #[inline]
     fn misses(&self, rows: &[u64; SIZE as usize]) -> bool {
         if !self.is_inside() {
@@ -147,7 +147,7 @@ impl Corners {
         (few | more) & self.columns() == 0
     }
 
-    /// The columns from left to right of a rectangle inside.
+    /// Returns the columns from left to right of a rectangle inside.
     #[inline]
     fn columns(&self) -> u64 {
         (u64::MAX << (self.left as u32 & 63)) & (u64::MAX >> (63 - (self.right as u32 & 63)))
@@ -161,13 +161,13 @@ impl TileGrid {
         ((x as u32) < SIZE as u32 && (y as u32) < SIZE as u32).then_some((y * SIZE + x) as usize)
     }
 
-    /// The tile in column `x`, row `y`; [`Tile::Wall`] outside the grid.
+    /// Returns the tile in column `x`, row `y`; [`Tile::Wall`] outside the grid.
     #[inline]
     pub fn get(&self, x: i32, y: i32) -> Tile {
         Self::index(x, y).map_or(Tile::Wall, |i| self.tiles[i])
     }
 
-    /// The tile that covers the point (`x`, `y`), in tiles; [`Tile::Wall`] outside the grid.
+    /// Returns the tile that covers the point (`x`, `y`), in tiles; [`Tile::Wall`] outside the grid.
     #[inline]
     pub fn at(&self, x: f32, y: f32) -> Tile {
         if x < 0.0 || y < 0.0 {
@@ -177,41 +177,41 @@ impl TileGrid {
         self.get(x as i32, y as i32)
     }
 
-    /// Whether one of the corners lies in a wall.
+    /// Returns true if one of the corners lies in a wall.
     #[inline]
     pub fn blocks_player(&self, corners: &Corners) -> bool {
         corners.hit(&self.walls)
     }
 
-    /// Whether enemies turn around at one of the corners.
+    /// Returns true if enemies turn around at one of the corners.
     #[inline]
     pub fn turns_enemy(&self, corners: &Corners) -> bool {
         corners.hit(&self.turns)
     }
 
-    /// Whether the rectangle lies inside and nowhere in a wall.
+    /// Returns true if the rectangle lies inside and nowhere in a wall.
     #[inline]
     pub fn is_clear(&self, rectangle: &Corners) -> bool {
         rectangle.misses(&self.walls)
     }
 
-    /// Whether the rectangle lies inside and touches neither lava nor the coin.
+    /// Returns true if the rectangle lies inside and touches neither lava nor the coin.
     #[inline]
     pub fn has_no_ends(&self, rectangle: &Corners) -> bool {
         rectangle.misses(&self.ends)
     }
 
-    /// For each row, bit `x` is set where ground is.
+    /// Returns the ground of each row: bit `x` is set where ground is.
     pub fn wall_rows(&self) -> &[u64; SIZE as usize] {
         &self.walls
     }
 
-    /// For each row, bit `x` is set where lava is.
+    /// Returns the lava of each row: bit `x` is set where lava is.
     pub fn lava_rows(&self) -> &[u64; SIZE as usize] {
         &self.lava
     }
 
-    /// Whether one of the corners lies in a tile of the same kind as the outside: inner ground.
+    /// Returns true if one of the corners lies in a tile of the same kind as the outside: inner ground.
     #[inline]
     pub fn is_outside(&self, corners: &Corners) -> bool {
         let Corners { left, right, low, high } = *corners;
@@ -240,12 +240,12 @@ impl TileGrid {
         }
     }
 
-    /// All tiles, bottom row first, each from left to right.
+    /// Returns all tiles, bottom row first, each from left to right.
     pub fn iter(&self) -> impl Iterator<Item = Tile> {
         self.tiles.iter().copied()
     }
 
-    /// The grid as 64 strings of 64 letters. The first string is the bottom row.
+    /// Returns the grid as 64 strings of 64 letters. The first string is the bottom row.
     pub fn rows(&self) -> Vec<String> {
         self.tiles.chunks(SIZE as usize).map(|row| row.iter().map(|tile| tile.to_char()).collect()).collect()
     }

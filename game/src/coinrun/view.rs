@@ -1,4 +1,4 @@
-//! What a player sees, as numbers: the 13 × 13 tiles around the player, the player's own motion, and where it leads.
+//! A player's observation: the 13 × 13 tiles around it, its motion, and its possible paths.
 //!
 //! | values | name | meaning |
 //! |---|---|---|
@@ -10,10 +10,10 @@
 //! | 8 | `vx`, `vy`, `cell_x`, `cell_y`, `supported`, `rising`, `on_crate`, `faces_left` | the player |
 //! | 36 | `hold_a_dies`, `_coin`, `_lands`, `_steps`, `_dx`, `_dy` | six curved rays: see [`paths`] |
 //!
-//! The cells are centred on the player and so lie across the tiles of the level: a picture with one pixel per tile, with
-//! soft edges. Rows (r) go up from 0 at the bottom to 12, columns (c) from 0 at the left to 12; the player is in the
-//! middle of cell (6, 6). Velocities are divided by their largest value, `cell_x` and `cell_y` place the player in its
-//! tile, from -0.5 to 0.5, and `a` is the number of the action that is held.
+//! The cells are centred on the player and so lie across the tiles of the level: a picture with one pixel per tile,
+//! with soft edges. Rows (r) go up from 0 at the bottom to 12, columns (c) from 0 at the left to 12; the player is in
+//! the middle of cell (6, 6). Velocities are divided by their largest value. `cell_x` and `cell_y` are the player's
+//! position in its tile, from -0.5 to 0.5, and `a` is the number of the held action.
 
 pub use super::view_size::{REACH, SIDE};
 use super::{
@@ -32,13 +32,13 @@ const MOTION: usize = 8;
 /// Number of values.
 pub const LENGTH: usize = 3 * CELLS + 3 + 3 * LISTED_ENEMIES + MOTION + paths::HELD.len() * paths::VALUES;
 
-/// An arena at one moment.
+/// An arena in one tick.
 pub struct Scene<'a> {
     /// Ground, lava, coin.
     pub tiles: &'a TileGrid,
     /// The player.
     pub player: &'a Body,
-    /// What the player remembers.
+    /// The player's memory.
     pub memory: PlayerState,
     /// Cell of the coin.
     pub coin: [i32; 2],
@@ -50,7 +50,7 @@ pub struct Scene<'a> {
     pub enemies: &'a [Body],
 }
 
-/// Names of the values, in order.
+/// Returns the names of the values, in order.
 pub fn names() -> Vec<String> {
     let mut names = Vec::with_capacity(LENGTH);
     for plane in ["wall", "crate", "danger"] {
@@ -69,7 +69,7 @@ pub fn names() -> Vec<String> {
 }
 
 impl Scene<'_> {
-    /// Writes the observation, `[LENGTH]`, over whatever was in `out`. The surroundings are room to work in.
+    /// Writes the observation, `[LENGTH]`, over the contents of `out`. The surroundings are scratch space.
     pub fn fill(&self, surroundings: &mut paths::Surroundings, out: &mut Vec<f32>) {
         out.clear();
         out.resize(LENGTH, 0.0);
@@ -98,7 +98,7 @@ impl Scene<'_> {
         }
     }
 
-    /// Offset from the player in half views, if it is in view.
+    /// Returns the offset from the player in half views, if it is in view.
     fn in_view(&self, x: f32, y: f32) -> Option<(f32, f32)> {
         let reach = REACH as f32 + 0.5;
         let (dx, dy) = ((x - self.player.x) / reach, (y - self.player.y) / reach);
@@ -118,7 +118,7 @@ impl Scene<'_> {
             let mut seen = (dx * dx + dy * dy, [dx, dy, enemy.vx / ENEMY_SPEED]);
             let mut is_in_front = false;
             for place in &mut nearest {
-                // Of two as near as each other, the first stays in front. All behind move on by one place.
+                // Of two equally near enemies, the first stays in front. All behind move on by one index.
                 is_in_front |= seen.0 < place.0;
                 if is_in_front {
                     std::mem::swap(place, &mut seen);
@@ -151,7 +151,7 @@ mod tests {
     use super::*;
     use crate::coinrun::{Level, Mode, generate};
 
-    /// A level with a player and nobody else.
+    /// Returns a level with a player and no other body.
     fn empty<'a>(level: &'a Level, player: &'a Body) -> Scene<'a> {
         let (tiles, coin, memory) = (&level.tiles, level.coin, PlayerState::default());
         Scene { tiles, player, memory, coin, crates: &[], saws: &[], enemies: &[] }

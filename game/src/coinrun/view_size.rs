@@ -1,4 +1,4 @@
-//! How far a player sees, in tiles.
+//! Range of a player's view, in tiles.
 
 /// Tiles from the player's cell to the edge of the view.
 pub const REACH: i32 = 6;

@@ -1,4 +1,4 @@
-//! A place in a maze.
+//! Cells of a maze.
 
 use std::fmt;
 
@@ -15,12 +15,12 @@ pub struct Cell {
 }
 
 impl Cell {
-    /// The cell in this row and column.
+    /// Returns the cell in this row and column.
     pub const fn new(row: usize, col: usize) -> Self {
         Self { row, col }
     }
 
-    /// The cell so many rows and columns further on; `None` where rows or columns have not begun.
+    /// Returns the cell that many rows and columns further on; `None` before the first row or column.
     pub fn moved(self, rows: i32, columns: i32) -> Option<Self> {
         let along = |index: usize, by: i32| index.checked_add_signed(by as isize);
         Some(Self { row: along(self.row, rows)?, col: along(self.col, columns)? })

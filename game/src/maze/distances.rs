@@ -1,4 +1,4 @@
-//! How far it is, breadth first.
+//! Distances in a maze, breadth first.
 
 use std::collections::VecDeque;
 
@@ -42,12 +42,13 @@ impl Distances {
         self.moves.get(index).copied().flatten().map(|moves| moves as usize)
     }
 
-    /// The cell from which it is farthest, and its moves. Of several, the one that a breadth-first search meets first.
+    /// Returns the cell from which it is farthest, and its moves. Of several, the one that a breadth-first search meets
+    /// first.
     pub fn farthest(&self) -> (Cell, usize) {
         (self.farthest.0, self.farthest.1 as usize)
     }
 
-    /// Number of cells from which there is a way, the cell itself included.
+    /// Returns the number of cells with a path to it, the cell itself included.
     pub fn reached(&self) -> usize {
         self.moves.iter().flatten().count()
     }

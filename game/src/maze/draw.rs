@@ -10,12 +10,13 @@ impl Draw {
         Self(Mt64::new(seed))
     }
 
-    /// Uniform in `0..high`, with a modulo bias that no maze is large enough to show. `high` is at least 1.
+    /// Returns a uniform number in `0..high`, with a modulo bias that no maze is large enough to show. `high` is at
+    /// least 1.
     pub(super) fn below(&mut self, high: usize) -> usize {
         (self.0.next_u64() % high as u64) as usize
     }
 
-    /// One of them; `None` if there is none.
+    /// Returns one of them; `None` if there is none.
     pub(super) fn pick<T: Copy>(&mut self, from: &[T]) -> Option<T> {
         (!from.is_empty()).then(|| from[self.below(from.len())])
     }

@@ -1,4 +1,4 @@
-//! Where a generated maze starts and ends: the difficulty.
+//! Start and goal of a generated maze: the difficulty.
 
 use std::ops::RangeInclusive;
 
@@ -38,8 +38,9 @@ pub(super) fn choose_ends(
     Err(longest)
 }
 
-/// Two cells far apart and the moves between them: walks to the farthest cell, turns around, and goes on as long as that
-/// makes the way longer. Without loops no two cells are farther apart; with loops no cell is farther from either.
+/// Returns two cells far apart and the moves between them: walks to the farthest cell, turns around, and goes on as
+/// long as that makes the path longer. Without loops no two cells are farther apart; with loops no cell is farther from
+/// either.
 fn far_apart(walls: &Walls, from: Cell) -> (Cell, Cell, usize) {
     let (mut one, _) = Distances::to(walls, from).farthest();
     let (mut other, mut longest) = Distances::to(walls, one).farthest();

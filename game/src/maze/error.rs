@@ -1,4 +1,4 @@
-//! What can be wrong with a maze.
+//! Errors of mazes.
 
 use thiserror::Error;
 
@@ -18,9 +18,9 @@ pub enum MazeError {
         "a maze of {rows} x {columns} cells is too large: at most {MAX_SIDE} cells to the side and {MAX_CELLS} in all"
     )]
     TooLarge {
-        /// Rows asked for.
+        /// Requested rows.
         rows: usize,
-        /// Columns asked for.
+        /// Requested columns.
         columns: usize,
     },
     /// The rows differ in length.
@@ -33,7 +33,7 @@ pub enum MazeError {
         /// Length of the first row.
         expected: usize,
     },
-    /// A character that means nothing.
+    /// An unknown character.
     #[error(
         "row {row}, column {column}: `{character}` means nothing; write # or 1 for a wall, O, 0, a blank or a point for a free cell, S or r for the start, G or g for the goal"
     )]
@@ -61,14 +61,14 @@ pub enum MazeError {
         /// The other.
         second: Cell,
     },
-    /// Nothing keeps the player inside.
+    /// The border has a gap.
     #[error("the border is open at {0}: close it with walls")]
     Open(Cell),
     /// A start or goal inside a wall or outside the maze.
     #[error("{0} is not a free cell of the maze")]
     NotFree(Cell),
-    /// Nobody can get there.
-    #[error("the goal {goal} cannot be reached from the start {start}: open a way between them")]
+    /// There is no path to the goal.
+    #[error("the goal {goal} cannot be reached from the start {start}: open a path between them")]
     Unreachable {
         /// The start.
         start: Cell,
@@ -78,9 +78,9 @@ pub enum MazeError {
     /// Too small to hold two free cells.
     #[error("`size={rows}x{columns}` has no room for corridors {corridor} wide: each side needs {least} cells or more")]
     TooSmall {
-        /// Rows asked for.
+        /// Requested rows.
         rows: usize,
-        /// Columns asked for.
+        /// Requested columns.
         columns: usize,
         /// Width of the corridors, cells.
         corridor: usize,
@@ -90,17 +90,17 @@ pub enum MazeError {
     /// Corridors without width.
     #[error("corridors are at least 1 cell wide")]
     NoCorridor,
-    /// The share of removed walls is not one.
+    /// The share of removed walls is outside 0 to 1.
     #[error("loops = {0}: it is a share of the walls and lies between 0 and 1")]
     Loops(String),
-    /// No path can be meant.
+    /// The range of moves is empty.
     #[error(
         "difficulty = {least}..{most}: write the fewest and the most moves of a shortest path, the most at least 1"
     )]
     NoDifficulty {
-        /// Fewest moves asked for.
+        /// Fewest requested moves.
         least: usize,
-        /// Most moves asked for.
+        /// Most requested moves.
         most: usize,
     },
     /// No pair of cells is so far apart.
@@ -109,9 +109,9 @@ pub enum MazeError {
          larger maze"
     )]
     Difficulty {
-        /// Fewest moves asked for.
+        /// Fewest requested moves.
         least: usize,
-        /// Most moves asked for.
+        /// Most requested moves.
         most: usize,
         /// Moves of the longest shortest path.
         longest: usize,

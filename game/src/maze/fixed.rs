@@ -1,7 +1,7 @@
-//! The maps that the literature measures on: D4RL's, and the extra large one of the SCORE paper.
+//! The maps of the literature: D4RL's, and the extra large one of the SCORE paper.
 //!
-//! Maze2D and AntMaze share their walls from medium on. The original Maze2D draws its start at random; where a fixed one
-//! is asked for it is the `S` of these maps, in the corner where AntMaze starts.
+//! Maze2D and AntMaze share their walls from medium on. The original Maze2D draws its start at random. The option for a
+//! fixed start takes the `S` of these maps, in the corner where AntMaze starts.
 
 use std::sync::LazyLock;
 
@@ -60,47 +60,47 @@ static XL: LazyLock<Maze> = LazyLock::new(|| {
 pub mod maze2d {
     use super::*;
 
-    /// D4RL's `U`: 5 x 5 cells. The fixed start is the far end.
+    /// Returns D4RL's `U`: 5 x 5 cells. The fixed start is the far end.
     pub fn umaze() -> Maze {
         UMAZE.clone()
     }
 
-    /// 8 x 8 cells.
+    /// Returns the map of 8 x 8 cells.
     pub fn medium() -> Maze {
         MEDIUM.clone()
     }
 
-    /// 9 x 12 cells.
+    /// Returns the map of 9 x 12 cells.
     pub fn large() -> Maze {
         LARGE.clone()
     }
 
-    /// 16 x 22 cells: the walls of AntMaze's. D4RL has no Maze2D of this size.
+    /// Returns the map of 16 x 22 cells: the walls of AntMaze's. D4RL has no Maze2D of this size.
     pub fn xl() -> Maze {
         XL.clone()
     }
 }
 
-/// The maps of AntMaze, with the start and goal on which a player is measured.
+/// The maps of AntMaze, with the start and goal of the measurements.
 pub mod antmaze {
     use super::*;
 
-    /// D4RL's `U`: 5 x 5 cells.
+    /// Returns D4RL's `U`: 5 x 5 cells.
     pub fn umaze() -> Maze {
         with_ends(&UMAZE, Cell::new(1, 1), Cell::new(3, 1))
     }
 
-    /// 8 x 8 cells.
+    /// Returns the map of 8 x 8 cells.
     pub fn medium() -> Maze {
         MEDIUM.clone()
     }
 
-    /// 9 x 12 cells.
+    /// Returns the map of 9 x 12 cells.
     pub fn large() -> Maze {
         LARGE.clone()
     }
 
-    /// The extra large map of the SCORE paper: 16 x 22 cells.
+    /// Returns the extra large map of the SCORE paper: 16 x 22 cells.
     pub fn xl() -> Maze {
         XL.clone()
     }

@@ -1,4 +1,4 @@
-//! A maze as the plan that trajectories are drawn on.
+//! Floor plan of a maze, for drawing trajectories.
 
 use bevy::math::{Rect, Vec2};
 use playbot_lab::floor_plan::FloorPlan;
@@ -6,8 +6,8 @@ use playbot_lab::floor_plan::FloorPlan;
 use super::{cell::Cell, layout::Maze};
 
 impl Maze {
-    /// The maze from above. The game says what a cell covers and where agents stand who are at a cell, both in its own
-    /// coordinates; they differ where walls are shifted against places, as in the original Maze2D.
+    /// Returns the maze from above. `square` gives the area of a cell and `place` the position of agents in it, both in
+    /// the game's coordinates. They differ where walls are shifted against positions, as in the original Maze2D.
     pub fn floor_plan(&self, square: impl Fn(Cell) -> Rect, place: impl Fn(Cell) -> Vec2) -> FloorPlan {
         FloorPlan::of_tiles(
             [self.rows(), self.columns()],

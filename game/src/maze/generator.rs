@@ -2,18 +2,18 @@
 
 use super::{draw::Draw, ends::choose_ends, error::MazeError, layout::Maze, rooms::Rooms, spec::MazeSpec};
 
-/// Mazes that are made and thrown away before a wanted difficulty is given up.
+/// Mazes that are made and discarded before a requested difficulty is given up.
 const ATTEMPTS: usize = 64;
 
 /// Makes the maze with this seed: the same spec and seed give the same maze everywhere.
 ///
-/// A randomised depth-first search over a grid of rooms joins all of them in exactly one way; then a share
-/// [`loops`](MazeSpec::loops) of the walls left between rooms goes. Every free cell can be reached. Where a difficulty is
-/// wanted, mazes are made until one has a start and a goal that far apart.
+/// A randomised depth-first search over a grid of rooms joins all of them in exactly one way. Then a share
+/// [`loops`](MazeSpec::loops) of the remaining walls between rooms is removed. Every free cell can be reached. For a
+/// requested difficulty, mazes are made until one has a start and a goal that far apart.
 ///
 /// # Errors
 ///
-/// [`MazeError`] if the spec makes no sense, or none of 64 mazes has a path of the wanted difficulty.
+/// [`MazeError`] if the spec makes no sense, or none of 64 mazes has a path of the requested difficulty.
 pub fn generate(spec: &MazeSpec, seed: u64) -> Result<Maze, MazeError> {
     spec.check()?;
     let mut draw = Draw::new(seed);

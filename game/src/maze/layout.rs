@@ -6,7 +6,7 @@ use super::{cell::Cell, distances::Distances, error::MazeError, walls::Walls};
 
 /// Walls and free cells in rows, closed all around, with a start and a goal.
 ///
-/// The goal can be reached from the start, unless somebody drew the maze otherwise: see [`parse_drawn`](Self::parse_drawn).
+/// The goal can be reached from the start, except in mazes from files: see [`parse_drawn`](Self::parse_drawn).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Maze {
     walls: Walls,
@@ -19,7 +19,7 @@ impl Maze {
         Self::drawn(walls, start, goal)?.with_ends(start, goal)
     }
 
-    /// A maze as somebody drew it: whether the goal can be reached is for the players to find out.
+    /// Takes a maze as drawn: its goal may be unreachable.
     pub(super) fn drawn(walls: Walls, start: Cell, goal: Cell) -> Result<Self, MazeError> {
         let on_border =
             |cell: &Cell| [0, walls.rows - 1].contains(&cell.row) || [0, walls.columns - 1].contains(&cell.col);
@@ -29,7 +29,7 @@ impl Maze {
         Self { walls, start, goal }.with_any_ends(start, goal)
     }
 
-    /// The same walls with another start and goal, whether there is a way between them or not.
+    /// Returns the same walls with another start and goal, with or without a path between them.
     ///
     /// # Errors
     ///
@@ -41,75 +41,75 @@ impl Maze {
         }
     }
 
-    /// The same walls with another start and goal.
+    /// Returns the same walls with another start and goal.
     ///
     /// # Errors
     ///
-    /// One of them is no free cell, or there is no way between them.
+    /// One of them is no free cell, or there is no path between them.
     pub fn with_ends(self, start: Cell, goal: Cell) -> Result<Self, MazeError> {
         let maze = self.with_any_ends(start, goal)?;
         maze.distances_to(goal).get(start).ok_or(MazeError::Unreachable { start, goal })?;
         Ok(maze)
     }
 
-    /// Where the player starts, unless the game draws another cell.
+    /// Returns the start cell, unless the game draws another one.
     pub fn start(&self) -> Cell {
         self.start
     }
 
-    /// Where the player should go.
+    /// Returns the goal cell.
     pub fn goal(&self) -> Cell {
         self.goal
     }
 
-    /// Number of rows, the border included.
+    /// Returns the number of rows, the border included.
     pub fn rows(&self) -> usize {
         self.walls.rows
     }
 
-    /// Number of columns, the border included.
+    /// Returns the number of columns, the border included.
     pub fn columns(&self) -> usize {
         self.walls.columns
     }
 
-    /// A hash of the walls, whatever start and goal are.
+    /// Returns a hash of the walls, whatever start and goal are.
     pub fn fingerprint(&self) -> u64 {
         let size = [self.walls.rows as u64, self.walls.columns as u64];
         StateHash::of(size.into_iter().chain(self.walls.cells().map(|cell| self.is_free(cell).into()))).0
     }
 
-    /// Whether a cell is no wall; false outside the maze.
+    /// Returns true if a cell is no wall; false outside the maze.
     pub fn is_free(&self, cell: Cell) -> bool {
         self.walls.is_free(cell)
     }
 
-    /// Every cell that is no wall, start and goal included, row by row.
+    /// Returns every cell that is no wall, start and goal included, row by row.
     pub fn free_cells(&self) -> impl Iterator<Item = Cell> + '_ {
         self.walls.free_cells()
     }
 
-    /// Every cell that is a wall, row by row.
+    /// Returns every cell that is a wall, row by row.
     pub fn wall_cells(&self) -> impl Iterator<Item = Cell> + '_ {
         self.walls.cells().filter(|&cell| !self.is_free(cell))
     }
 
-    /// The free cells that share a side with this one: above, below, left, right.
+    /// Returns the free cells that share a side with this one: above, below, left, right.
     pub fn neighbours(&self, cell: Cell) -> impl Iterator<Item = Cell> + '_ {
         self.walls.neighbours(cell)
     }
 
-    /// The number of moves between side by side cells that each free cell is away from `cell`: breadth first.
+    /// Returns the number of moves between side by side cells that each free cell is away from `cell`: breadth first.
     pub fn distances_to(&self, cell: Cell) -> Distances {
         Distances::to(&self.walls, cell)
     }
 
-    /// A shortest path from the start to the goal, both included; empty if there is none.
+    /// Returns a shortest path from the start to the goal, both included; empty if there is none.
     pub fn shortest_path(&self) -> Vec<Cell> {
         self.shortest_path_between(self.start, self.goal).unwrap_or_default()
     }
 
-    /// A shortest path between two free cells, both included; `None` if there is none. Where several are equally short,
-    /// it goes up rather than down, down rather than left, and left rather than right.
+    /// Returns a shortest path between two free cells, both included; `None` if there is none. Where several are
+    /// equally short, it goes up rather than down, down rather than left, and left rather than right.
     pub fn shortest_path_between(&self, from: Cell, to: Cell) -> Option<Vec<Cell>> {
         let away = self.distances_to(to);
         let mut left = away.get(from)?;
@@ -123,7 +123,7 @@ impl Maze {
         Some(path)
     }
 
-    /// Number of moves on a shortest path from the start to the goal; 0 if there is none.
+    /// Returns the number of moves on a shortest path from the start to the goal; 0 if there is none.
     pub fn difficulty(&self) -> usize {
         self.shortest_path().len().saturating_sub(1)
     }

@@ -1,4 +1,4 @@
-//! How large a maze may be.
+//! Limits of the size of a maze.
 
 /// Most cells to a side.
 pub const MAX_SIDE: usize = 4096;

@@ -9,7 +9,7 @@ use super::{
     spec_text::OptionError,
 };
 
-/// Where the mazes of a mode come from.
+/// The source of a mode's mazes.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Map {
     /// D4RL's `U`, 5 x 5 cells.
@@ -28,7 +28,7 @@ impl Map {
     /// Names of the maps; each is a mode of the maze games.
     pub const NAMES: [&'static str; 5] = ["umaze", "medium", "large", "xl", "random"];
 
-    /// The map with this name; `random` has the usual spec.
+    /// Returns the map with this name; `random` has the default spec.
     ///
     /// # Errors
     ///
@@ -55,7 +55,7 @@ impl Map {
         }
     }
 
-    /// Takes one option `key=value` of a mode; false if this map has no such option. Only generated mazes have any.
+    /// Takes one option `key=value` of a mode; false if this map has no such option. Only generated mazes have options.
     ///
     /// # Errors
     ///
@@ -67,7 +67,7 @@ impl Map {
         }
     }
 
-    /// The options that differ from the default, each `key=value`.
+    /// Returns the options that differ from the default, each `key=value`.
     pub fn options(&self) -> Vec<String> {
         match self {
             Self::Random(spec) => spec.options(),
@@ -75,13 +75,13 @@ impl Map {
         }
     }
 
-    /// What the mazes of all specs have in common: one seed draws related ones.
+    /// Returns the shared family of all specs: one seed draws related mazes.
     pub fn family(&self) -> Option<String> {
         matches!(self, Self::Random(_)).then(|| self.name().to_owned())
     }
 
-    /// A hash of a generated maze's walls; `None` for a fixed map, for a spec that gives no maze, and for mazes of so many
-    /// rooms that no two are alike.
+    /// Returns a hash of a generated maze's walls; `None` for a fixed map, for an impossible spec, and for mazes of so
+    /// many rooms that no two are alike.
     pub fn fingerprint(&self, seed: u64) -> Option<u64> {
         match self {
             Self::Random(spec) if spec.may_repeat() => Some(generate(spec, seed).ok()?.fingerprint()),
@@ -97,16 +97,16 @@ impl Map {
         }
     }
 
-    /// An option that neither this map nor the game on it takes, which has these options of its own.
+    /// Returns the error of an option that neither this map nor the game takes; `of_game` lists the game's.
     pub fn unknown_option(&self, option: &str, of_game: &[&str]) -> UnknownName {
         UnknownName::new("option", option, &[of_game, self.valid_options()].concat())
     }
 
-    /// Checks that there can be such a maze: call it when all options have been taken.
+    /// Checks that such a maze is possible, after all options have been taken.
     ///
     /// # Errors
     ///
-    /// [`MazeError`] names the value that cannot be.
+    /// [`MazeError`] names the impossible value.
     pub fn check(&self) -> Result<(), MazeError> {
         match self {
             Self::Random(spec) => spec.check(),
@@ -114,7 +114,7 @@ impl Map {
         }
     }
 
-    /// The maze as Maze2D has it. Only a generated one depends on the seed.
+    /// Returns the maze for Maze2D. Only a generated one depends on the seed.
     ///
     /// # Errors
     ///
@@ -129,7 +129,7 @@ impl Map {
         })
     }
 
-    /// The maze as AntMaze has it. Only a generated one depends on the seed.
+    /// Returns the maze for AntMaze. Only a generated one depends on the seed.
     ///
     /// # Errors
     ///
@@ -148,7 +148,7 @@ impl Map {
 impl FromStr for Map {
     type Err = MazeModeError;
 
-    /// Reads a name with the map's options behind it: `medium`, `random+size=9x9+loops=0.2`.
+    /// Parses a name with the map's options behind it: `medium`, `random+size=9x9+loops=0.2`.
     fn from_str(text: &str) -> Result<Self, MazeModeError> {
         let mut words = text.split('+');
         let mut map = Self::named(words.next().unwrap_or_default())?;

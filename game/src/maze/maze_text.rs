@@ -1,4 +1,4 @@
-//! What level files of all maze games have in common.
+//! Shared parts of the level files of maze games.
 
 use playbot_lab::level_files::{
     JsonStep::{Index, Key},
@@ -7,16 +7,17 @@ use playbot_lab::level_files::{
 
 use super::{cell::Cell, error::MazeError, layout::Maze};
 
-/// The maze of a level file: rows, the first one at the top, with start and goal as letters in them, as cells, or both.
+/// Reads the maze of a level file: rows, the first one at the top, with start and goal as letters in them, as cells, or
+/// both.
 ///
 /// # Errors
 ///
-/// What is wrong with it, and on which line.
+/// The mistake, with its line.
 pub fn read_maze(text: &str, rows: &[String], start: Option<Cell>, goal: Option<Cell>) -> Result<Maze, LevelTextError> {
     Maze::parse_drawn(rows, start, goal).map_err(|error| at_maze(text, &error))
 }
 
-/// A mistake in a maze, on the line where it is.
+/// Returns a mistake in a maze, on the line where it is.
 fn at_maze(text: &str, error: &MazeError) -> LevelTextError {
     let row = match *error {
         MazeError::Ragged { row, .. } | MazeError::UnknownCharacter { row, .. } => Some(row),

@@ -1,8 +1,8 @@
 //! Mazes on a grid, without an engine: fixed maps, a generator and a planner, for every game that is played in one.
 //!
-//! A [`Maze`] is rows of wall and free [`Cell`]s with a start and a goal that can be reached from it. What a cell measures
-//! and where its axes point is the game's own affair. [`fixed`] has the maps of the literature, [`generate`] makes mazes
-//! without end from a [`MazeSpec`] and a seed, and [`Planner`] knows the way to a goal from everywhere.
+//! A [`Maze`] is rows of wall and free [`Cell`]s with a start and a reachable goal. The size of a cell and the
+//! direction of its axes belong to the game. [`fixed`] has the maps of the literature, [`generate`] makes mazes from a
+//! [`MazeSpec`] and a seed, and [`Planner`] finds paths to a goal from everywhere.
 
 mod cell;
 pub(crate) mod defects;

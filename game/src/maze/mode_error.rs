@@ -1,4 +1,4 @@
-//! What can be wrong with a map and with the mode of a game that is played on it.
+//! Errors of maps, and of the modes of maze games.
 
 use std::str::FromStr;
 
@@ -14,16 +14,16 @@ pub enum MazeModeError {
     /// An unknown map or option.
     #[error(transparent)]
     Name(#[from] UnknownName),
-    /// The value of an option cannot be.
+    /// The value of an option is impossible.
     #[error(transparent)]
     Option(#[from] OptionError),
-    /// There can be no such maze.
+    /// Such a maze is impossible.
     #[error(transparent)]
     Maze(#[from] MazeError),
     /// An option is given twice, or with its opposite.
     #[error("`{0}` repeats or contradicts another option of the mode: leave one of them")]
     Twice(String),
-    /// Two options that cannot be together: which, and what to do.
+    /// Two options that exclude each other, with advice.
     #[error("{0}")]
     Together(&'static str),
 }
@@ -45,7 +45,7 @@ impl MazeModeError {
     }
 }
 
-/// Reads a mode of a game, with the error as games give it.
+/// Parses a mode of a game, with the error type of games.
 ///
 /// # Errors
 ///

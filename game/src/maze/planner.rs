@@ -1,8 +1,8 @@
-//! The way to a goal from everywhere, by the values of moves.
+//! Best moves to a goal from everywhere, by the values of moves.
 
 use super::{cell::Cell, distances::Distances, layout::Maze};
 
-/// What the planner can do in a cell.
+/// The planner's actions in a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GridMove {
     /// Stay.
@@ -21,7 +21,7 @@ impl GridMove {
     /// All moves, in the order in which ties are resolved.
     pub const ALL: [Self; 5] = [Self::Stay, Self::Up, Self::Down, Self::Left, Self::Right];
 
-    /// The cell this leads to: whoever walks into a wall stays.
+    /// Returns the cell this leads to; a wall leaves it at the same cell.
     pub fn from(self, maze: &Maze, cell: Cell) -> Cell {
         let Cell { row, col } = cell;
         let to = match self {
@@ -36,12 +36,12 @@ impl GridMove {
 }
 
 /// The best moves to a goal as D4RL's demonstrator plans them: Q-values of five deterministic moves, with reward 1 for
-/// whatever is done in the goal cell and discount 0.99.
+/// any move in the goal cell and discount 0.99.
 ///
-/// The original sweeps 50 times over all cells, with which a goal is not known farther than 50 moves away. What its sweeps
-/// converge to needs none: the value of a cell that is d moves away is 0.99^d / (1 - 0.99), and the move of the highest
-/// Q-value is the one to the least d. So the cells are visited once, nearest first, and mazes of any size are planned in the
-/// time it takes to read them.
+/// The original sweeps 50 times over all cells, so its goal is unknown farther than 50 moves away. The limit of its
+/// sweeps needs none: the value of a cell that is d moves away is 0.99^d / (1 - 0.99), and the move of the highest
+/// Q-value is the one to the least d. So the cells are visited once, nearest first, and mazes of any size are planned
+/// in the time it takes to read them.
 #[derive(Clone, Debug)]
 pub struct Planner {
     maze: Maze,
@@ -50,23 +50,24 @@ pub struct Planner {
 }
 
 impl Planner {
-    /// Plans ways to `goal`. If it is a wall, there are none.
+    /// Plans paths to `goal`. If it is a wall, there are none.
     pub fn new(maze: &Maze, goal: Cell) -> Self {
         Self { maze: maze.clone(), goal, moves: maze.distances_to(goal) }
     }
 
-    /// The best move from a free cell; the first of equals. Staying, at the goal and where no way leads there.
+    /// Returns the best move from a free cell; the first of equals. Stays at the goal and where no path leads there.
     pub fn best_move(&self, cell: Cell) -> GridMove {
         let away = |step: &GridMove| self.moves.get(step.from(&self.maze, cell)).unwrap_or(usize::MAX);
         GridMove::ALL.into_iter().min_by_key(away).unwrap_or(GridMove::Stay)
     }
 
-    /// Where the best move leads; the cell itself at the goal.
+    /// Returns the cell of the best move; the cell itself at the goal.
     pub fn next_cell(&self, cell: Cell) -> Cell {
         self.best_move(cell).from(&self.maze, cell)
     }
 
-    /// The cells of the best way, from `from` to the goal, both included. `None` if `from` is a wall or has no way there.
+    /// Returns the cells of the best path, from `from` to the goal, both included. `None` if `from` is a wall or has no
+    /// path there.
     pub fn path(&self, from: Cell) -> Option<Vec<Cell>> {
         if !self.maze.is_free(from) {
             return None;
@@ -84,7 +85,7 @@ impl Planner {
         Some(path)
     }
 
-    /// The goal.
+    /// Returns the goal.
     pub fn goal(&self) -> Cell {
         self.goal
     }

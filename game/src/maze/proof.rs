@@ -1,4 +1,4 @@
-//! Whether there is a way through a maze.
+//! Proofs of a path through a maze.
 
 use std::collections::VecDeque;
 
@@ -6,11 +6,11 @@ use playbot_lab::proof::LevelProof;
 
 use super::{cell::Cell, layout::Maze};
 
-/// Whether somebody can get from one cell to another.
+/// Proves whether a player can get from one cell to another.
 ///
-/// Solvable: there is a way over free cells that lie side by side. Unsolvable: there is none even if one could slip through
-/// where two free cells touch at a corner only, which no body of any size can; so the proof holds whatever the bodies, the
-/// walls and the goal's radius are, as long as that is smaller than a wall. Between the two nothing is proved.
+/// Solvable: there is a path over free cells that lie side by side. Unsolvable: there is none even over two free cells
+/// that touch at a corner only, which no body of any size can use. The proof therefore holds for any bodies, walls and
+/// radius of the goal, as long as that is smaller than a wall. Between the two nothing is proved.
 pub fn prove(maze: &Maze, start: Cell, goal: Cell) -> LevelProof {
     if !maze.is_free(start) || !maze.is_free(goal) {
         return LevelProof::Unknown;
@@ -22,7 +22,7 @@ pub fn prove(maze: &Maze, start: Cell, goal: Cell) -> LevelProof {
         return LevelProof::Unknown;
     }
     let why = format!(
-        "no way leads from the start {start} to the goal {goal}: a search over all free cells, corners included, ended \
+        "no path leads from the start {start} to the goal {goal}: a search over all free cells, corners included, ended \
          without reaching it"
     );
     LevelProof::Unsolvable { why }

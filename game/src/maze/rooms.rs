@@ -1,4 +1,4 @@
-//! Rooms in a grid, and the walls between them that fall.
+//! Rooms in a grid, and the removal of walls between them.
 
 use super::{cell::Cell, draw::Draw, error::MazeError, spec::MazeSpec, walls::Walls};
 
@@ -14,13 +14,13 @@ pub(super) struct Rooms {
 type Room = (usize, usize);
 
 impl Rooms {
-    /// As many rooms as the maze has room for.
+    /// Returns as many rooms as fit into the maze.
     pub(super) fn of(spec: &MazeSpec) -> Self {
         let fit = |cells: usize| (cells - 1) / (spec.corridor + 1);
         Self { rows: fit(spec.rows), columns: fit(spec.columns), width: spec.corridor }
     }
 
-    /// The walls of a maze: a spanning tree of the rooms, and a share of what separates them on top.
+    /// Makes the walls of a maze: a spanning tree of the rooms, and a share of further openings.
     pub(super) fn carve(&self, spec: &MazeSpec, draw: &mut Draw) -> Result<Walls, MazeError> {
         let mut walls = Walls::solid(spec.rows, spec.columns)?;
         for room in (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| (row, column))) {
@@ -36,7 +36,7 @@ impl Rooms {
         Ok(walls)
     }
 
-    /// Depth first from a random room: goes on to a random room that was not seen, and back where there is none.
+    /// Walks depth first from a random room: on to a random unseen room, and back where there is none.
     fn grow_tree(&self, walls: &mut Walls, draw: &mut Draw) {
         let mut seen = vec![false; self.rows * self.columns];
         let first = (draw.below(self.rows), draw.below(self.columns));
@@ -71,18 +71,18 @@ impl Rooms {
         [up, down, left, right].into_iter().flatten()
     }
 
-    /// All pairs of rooms with one wall between them.
+    /// Returns all pairs of rooms with one wall between them.
     fn doors(&self) -> impl Iterator<Item = (Room, Room)> + '_ {
         let rooms = (0..self.rows).flat_map(|row| (0..self.columns).map(move |column| (row, column)));
         rooms.flat_map(|room| self.around(room).filter(move |&next| next > room).map(move |next| (room, next)))
     }
 
-    /// The first cell of a room.
+    /// Returns the first cell of a room.
     fn corner(&self, (row, column): Room) -> Cell {
         Cell::new(1 + row * (self.width + 1), 1 + column * (self.width + 1))
     }
 
-    /// The first cell of the wall between a room and the next one below or to the right.
+    /// Returns the first cell of the wall between a room and the next one below or to the right.
     fn door(&self, from: Room, to: Room) -> Cell {
         let Cell { row, col } = self.corner(from.max(to));
         if from.0 == to.0 { Cell::new(row, col - 1) } else { Cell::new(row - 1, col) }

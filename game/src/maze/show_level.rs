@@ -1,4 +1,4 @@
-//! A maze for people, for programs, and as a drawing.
+//! A maze as text, as JSON, and as a drawing.
 
 use std::{
     fs::File,
@@ -20,28 +20,28 @@ use super::{Cell, MAX_CELLS, Map, Maze, MazeError, MazeModeError};
 /// Most bytes that a file of rows may have: two line ends for each cell of the largest maze.
 const MAX_BYTES: u64 = 3 * MAX_CELLS as u64;
 
-/// Where the mazes of a game come from.
+/// The sources of a game's mazes.
 pub struct MazeSource {
     /// A map and a seed, with the start and the goal of the map.
     pub map: fn(&Map, u64) -> Result<Maze, MazeError>,
-    /// A whole mode and a seed, as that level is played.
+    /// A whole mode and a seed: the maze of that level.
     pub level: fn(&dyn Game, &str, u64) -> Result<ShownMaze, InspectError>,
-    /// The first of these drawn levels, as it is played.
+    /// The first of these level files, as it is played.
     pub drawn: fn(&LevelDesigns) -> Result<ShownMaze, InspectError>,
-    /// Where x and y go in the rows, and how plots lie beside them.
+    /// Directions of x and y in the rows, and in plots.
     pub axes: &'static str,
 }
 
-/// A maze, and what programs are told of it.
+/// A maze and its metadata.
 pub struct ShownMaze {
     /// The maze, with start and goal.
     pub maze: Maze,
-    /// What can be read back as a level file.
+    /// JSON that can be read back as a level file.
     pub json: Value,
 }
 
 impl ShownMaze {
-    /// A maze of which nothing else is known.
+    /// Takes a maze without further metadata.
     fn plain(maze: Maze) -> Self {
         let mut json = json!({ "rows": maze.to_rows(), "start": maze.start(), "goal": maze.goal() });
         if let Some(moves) = moves(&maze) {
@@ -56,7 +56,7 @@ fn moves(maze: &Maze) -> Option<usize> {
     maze.shortest_path().len().checked_sub(1)
 }
 
-/// A maze that cannot be, as something that was asked for.
+/// Turns an impossible maze into the error of a request.
 pub fn unfit(error: MazeError) -> InspectError {
     InspectError::Usage(error.to_string())
 }
@@ -66,9 +66,9 @@ pub fn show(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Res
     let ShownMaze { maze, json } = shown(game, request, source)?;
     let way = match moves(&maze) {
         Some(moves) => format!(". shortest path: {moves} moves"),
-        None => "there is no way from the start to the goal".to_owned(),
+        None => "there is no path from the start to the goal".to_owned(),
     };
-    // The empty line ends the rows for whoever reads this as a file.
+    // The empty line ends the rows, so that the output can be read as a file.
     let legend = format!("S start  G goal  # wall  {way}\n{}", source.axes);
     Ok(LevelView {
         text: format!("{}\n\n{legend}", picture(&maze).join("\n")),
@@ -78,39 +78,39 @@ pub fn show(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Res
 }
 
 fn shown(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Result<ShownMaze, InspectError> {
-    let seed = request.seed.unwrap_or(0);
+    let level = request.level.unwrap_or(0);
     if let Some(path) = request.file {
         let designs = LevelDesigns::of_file(&path.to_string_lossy(), &|text| game.parse_level(text));
         return (source.drawn)(&designs.map_err(|error| InspectError::Usage(error.to_string()))?);
     }
     if let Some(mode) = request.mode {
-        return (source.level)(game, mode, seed);
+        return (source.level)(game, mode, level);
     }
     let text = request.map.unwrap_or("random");
     if is_level_files(text) {
-        return (source.level)(game, text, seed);
+        return (source.level)(game, text, level);
     }
     let map: Map = match text.parse() {
         Ok(map) => map,
         Err(MazeModeError::Name(error)) if error.what == "map" => {
             return from_file(Path::new(text), request, &error.to_string()).map(ShownMaze::plain);
         }
-        // Not an option of the map: one of the game's.
-        Err(_) => return (source.level)(game, text, seed),
+        // An option of the game, not of the map.
+        Err(_) => return (source.level)(game, text, level),
     };
-    if request.seed.is_some() && !matches!(map, Map::Random(_)) {
-        return Err(no_seed(&map.to_string()));
+    if request.level.is_some() && !matches!(map, Map::Random(_)) {
+        return Err(no_levels(&map.to_string()));
     }
-    (source.map)(&map, seed).map(ShownMaze::plain).map_err(unfit)
+    (source.map)(&map, level).map(ShownMaze::plain).map_err(unfit)
 }
 
-fn no_seed(map: &str) -> InspectError {
+fn no_levels(map: &str) -> InspectError {
     InspectError::Usage(format!(
-        "`{map}` has no seed: leave --seed out for the map itself, or take --mode {map} for a level as it is played"
+        "`{map}` is a single map: leave --level out for the map itself, or take --mode {map} for a level as it is played"
     ))
 }
 
-/// Why what was named is no file either.
+/// Explains that the name is no file either.
 fn no_file(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::NotFound => "and there is no file of that name".to_owned(),
@@ -118,12 +118,12 @@ fn no_file(error: &io::Error) -> String {
     }
 }
 
-/// The maze in a file of rows; `unknown` says that the text names no map either.
+/// Reads the maze in a file of rows; `unknown` explains that the text names no map.
 fn from_file(path: &Path, request: &LevelRequest, unknown: &str) -> Result<Maze, InspectError> {
     let shown = path.display();
     let file = File::open(path).map_err(|error| InspectError::Usage(format!("{unknown}; {}", no_file(&error))))?;
-    if request.seed.is_some() {
-        return Err(no_seed(&shown.to_string()));
+    if request.level.is_some() {
+        return Err(no_levels(&shown.to_string()));
     }
     let mut text = String::new();
     let read = file.take(MAX_BYTES + 1).read_to_string(&mut text);
@@ -133,13 +133,13 @@ fn from_file(path: &Path, request: &LevelRequest, unknown: &str) -> Result<Maze,
             "{shown}: more than {MAX_CELLS} cells are no maze that fits into memory"
         )));
     }
-    // Some editors put a mark in front of all they write.
+    // Some editors put a byte order mark in front.
     let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim_end);
     let rows: Vec<&str> = lines.skip_while(|row| row.is_empty()).take_while(|row| !row.is_empty()).collect();
     Maze::parse(&rows).map_err(|error| InspectError::Usage(format!("{shown}: {error}")))
 }
 
-/// The rows for people, with the shortest path.
+/// Returns the rows as text, with the shortest path.
 fn picture(maze: &Maze) -> Vec<String> {
     let mut rows: Vec<Vec<char>> = maze.to_rows().iter().map(|row| row.replace('O', " ").chars().collect()).collect();
     let path = maze.shortest_path();
@@ -158,7 +158,7 @@ const WALL: Rgb = [190, 195, 201];
 const PATH: Rgb = [0, 114, 178];
 const INK: Rgb = [31, 35, 40];
 
-/// The maze with its shortest path, the first row at the top.
+/// Returns the maze with its shortest path, the first row at the top.
 fn draw(maze: &Maze) -> Result<Drawing, InspectError> {
     if maze.rows().max(maze.columns()) > MOST_DRAWN {
         return Err(InspectError::Usage(format!(

@@ -12,14 +12,14 @@ use super::spec::MazeSpec;
 pub struct OptionError {
     /// The option.
     pub key: String,
-    /// What was given.
+    /// The given value.
     pub value: String,
-    /// What is wanted.
+    /// The expected form.
     pub wanted: &'static str,
 }
 
 impl OptionError {
-    /// For this option, with what is wanted instead.
+    /// Takes an option with the expected form.
     pub fn new(key: &str, value: &str, wanted: &'static str) -> Self {
         Self { key: key.to_owned(), value: value.to_owned(), wanted }
     }
@@ -33,7 +33,7 @@ impl MazeSpec {
     ///
     /// # Errors
     ///
-    /// The value cannot be read. Whether it makes sense is [`check`](Self::check)ed apart.
+    /// The value cannot be read. Its meaning is [`check`](Self::check)ed apart.
     pub fn set_option(&mut self, key: &str, value: &str) -> Result<bool, OptionError> {
         let wrong = |wanted| OptionError::new(key, value, wanted);
         match key {
@@ -55,7 +55,7 @@ impl MazeSpec {
         Ok(true)
     }
 
-    /// The options that differ from the default, as [`set_option`](Self::set_option) takes them: `key=value`.
+    /// Returns the options that differ from the default, as [`set_option`](Self::set_option) takes them: `key=value`.
     pub fn options(&self) -> Vec<String> {
         let usual = Self::default();
         let mut options = Vec::new();
@@ -80,7 +80,7 @@ fn pair<T: FromStr>(text: &str, between: &str) -> Option<(T, T)> {
     Some((left.parse().ok()?, right.parse().ok()?))
 }
 
-/// `10..20`, both ends included, or one number.
+/// Parses `10..20`, both ends included, or one number.
 fn range(text: &str) -> Option<RangeInclusive<usize>> {
     if let Ok(one) = text.parse() {
         return Some(one..=one);

@@ -3,23 +3,23 @@
 use super::{cell::Cell, error::MazeError, layout::Maze, walls::Walls};
 
 impl Maze {
-    /// Reads a maze from its rows: `#` or `1` is a wall, `O`, `0`, a blank or `.` a free cell, `S` or `r` the start and `G` or `g` the
-    /// goal.
+    /// Reads a maze from its rows: `#` or `1` is a wall, `O`, `0`, a blank or `.` a free cell, `S` or `r` the start and
+    /// `G` or `g` the goal.
     ///
     /// # Errors
     ///
-    /// [`MazeError`] says what is wrong and in which row and column.
+    /// [`MazeError`] with the mistake, its row and its column.
     pub fn parse<Row: AsRef<str>>(rows: &[Row]) -> Result<Self, MazeError> {
         let (walls, start, goal) = read(rows)?;
         Self::new(walls, start.ok_or(MazeError::NoStart)?, goal.ok_or(MazeError::NoGoal)?)
     }
 
-    /// Reads a maze that somebody drew: like [`parse`](Self::parse), but start and goal may be named besides or instead of
-    /// being drawn, and there need not be a way between them.
+    /// Reads a maze of a level file: like [`parse`](Self::parse), but start and goal may also be given as cells, and
+    /// there need not be a path between them.
     ///
     /// # Errors
     ///
-    /// [`MazeError`] says what is wrong and in which row and column.
+    /// [`MazeError`] with the mistake, its row and its column.
     pub fn parse_drawn<Row: AsRef<str>>(
         rows: &[Row],
         start: Option<Cell>,
@@ -31,7 +31,7 @@ impl Maze {
         Self::drawn(walls, start, goal)
     }
 
-    /// The rows as [`parse`](Self::parse) reads them, with the letters `#`, `O`, `S` and `G`.
+    /// Returns the rows for [`parse`](Self::parse), with the letters `#`, `O`, `S` and `G`.
     ///
     /// A maze whose start is its goal is written with `G` alone.
     pub fn to_rows(&self) -> Vec<String> {
@@ -45,7 +45,7 @@ impl Maze {
     }
 }
 
-/// Walls, start and goal as they are drawn.
+/// Reads walls, start and goal as they are drawn.
 fn read<Row: AsRef<str>>(rows: &[Row]) -> Result<(Walls, Option<Cell>, Option<Cell>), MazeError> {
     let expected = rows.first().map_or(0, |row| row.as_ref().chars().count());
     let mut walls = Walls::solid(rows.len(), expected)?;
@@ -70,7 +70,7 @@ fn read<Row: AsRef<str>>(rows: &[Row]) -> Result<(Walls, Option<Cell>, Option<Ce
     Ok((walls, start, goal))
 }
 
-/// A place that is drawn, or named, or both.
+/// Returns a cell that is drawn, or named, or both.
 fn only(drawn: Option<Cell>, named: Option<Cell>, what: &'static str) -> Result<Option<Cell>, MazeError> {
     match (drawn, named) {
         (Some(first), Some(second)) if first != second => Err(MazeError::Twice { what, first, second }),

@@ -15,13 +15,13 @@ pub(super) struct Walls {
 }
 
 impl Walls {
-    /// Nothing but walls.
+    /// Returns walls only.
     pub(super) fn solid(rows: usize, columns: usize) -> Result<Self, MazeError> {
         check_size(rows, columns)?;
         Ok(Self { rows, columns, free: vec![false; rows * columns] })
     }
 
-    /// The place of a cell in row-major lists.
+    /// Returns the index of a cell in row-major lists.
     pub(super) fn index(&self, cell: Cell) -> usize {
         cell.row * self.columns + cell.col
     }
@@ -53,7 +53,7 @@ impl Walls {
     }
 }
 
-/// Refuses sizes that are nothing or too much.
+/// Refuses sizes of zero, and sizes that are too large.
 pub(super) fn check_size(rows: usize, columns: usize) -> Result<(), MazeError> {
     if rows == 0 || columns == 0 {
         return Err(MazeError::Empty);

@@ -1,4 +1,4 @@
-//! Balls that do not move as the rules say, or that are not paid what the rules say.
+//! Detector of balls whose motion or reward breaks the rules.
 
 use playbot_lab::{
     detector::{Detector, LevelAhead, Moment, Watch},
@@ -14,24 +14,24 @@ use super::{
 };
 use crate::maze::paid_otherwise;
 
-/// Each tick is computed once more from the place of the ball before it, the action and the map of the level, and has to
-/// come to the same.
+/// Computes each tick once more from the position of the ball before it, the action and the map of the level, and
+/// compares the results.
 ///
-/// The walls are those of the map, whatever the arena has. Under [`Contact::Rapier`] balls near walls are left alone: what a
-/// solver does there depends on what it remembers.
+/// The walls are those of the map, whatever the arena has. Under [`Contact::Rapier`] balls near walls are left out: a
+/// solver's result there depends on its memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AgainstRules;
 
-/// How far two results of the same tick may be apart, m and m/s.
+/// Largest allowed difference of two results of the same tick, m and m/s.
 const SLACK: f64 = 1e-6;
 /// The same for rapier, which computes in single precision.
 const SLACK_OF_SOLVER: f64 = 1e-3;
 /// A ball this far from all walls, surface to surface, is in free flight, m.
 const CLEAR: f64 = 2.0 * RADIUS;
-/// How far two rewards of the same tick may be apart.
+/// Largest allowed difference of two rewards of the same tick.
 const SLACK_OF_REWARD: f32 = 1e-5;
 
-/// Follows one ball.
+/// Watches one ball.
 #[derive(Default)]
 struct Following {
     walls: Option<Walls>,
@@ -82,7 +82,7 @@ fn moved_otherwise(before: &Ball, after: &Ball, push: Vec2d, walls: &Walls, rule
         Contact::Rapier => return None,
     };
     let apart = length(sub(after.position, by_rules.position)).max(length(sub(after.velocity, by_rules.velocity)));
-    // What is no number is not near to anything.
+    // NaN is not near to anything.
     let is_same = apart <= slack;
     let told = |ball: &Ball| {
         let Ball { position: [x, y], velocity: [vx, vy] } = ball;
@@ -117,7 +117,7 @@ mod tests {
     fn pushes_winds_and_walls_that_the_rules_do_not_know_are_found() {
         for class in ["weak-push", "drift", "runaway", "invisible-wall"] {
             for mode in [MODES[0], MODES[2]] {
-                // A solver is asked where no wall is near, and stops nobody there.
+                // The solver is compared only away from walls, where it stops no ball.
                 if class == "invisible-wall" && mode == MODES[2] {
                     continue;
                 }

@@ -11,12 +11,12 @@ use super::{
     physics::MazePhysics,
 };
 
-/// Whether every arena has a physics context, even if the contact is not rapier's.
+/// Every arena has a physics context, even if the contact is not rapier's.
 #[derive(Resource, Clone, Copy, Debug, Reflect)]
 #[reflect(Resource)]
 pub(super) struct WithPhysics(pub bool);
 
-/// Makes the level that an episode asks for and puts it into the agent's arena.
+/// Makes the level of an episode and puts it into the agent's arena.
 pub(super) fn start_episode(
     event: On<StartEpisode>,
     levels: Levels,
@@ -36,7 +36,7 @@ pub(super) fn start_episode(
     } else if with_physics.0 {
         arena.insert(MazePhysics::following(&level.walls, &level.start));
     } else {
-        // The last level may have been a drawn one with other rules.
+        // The last level may have come from a file with other rules.
         arena.remove::<MazePhysics>();
     }
     let ball = MazeBall(level.start);

@@ -1,12 +1,12 @@
 //! The ball: mass, drive, damping and free flight, as MuJoCo computes them for D4RL's point mass.
 //!
 //! Lengths in metres, velocities in metres per second, forces in newtons. The first axis, x, runs along the rows of the
-//! map and the second, y, along its columns. Everything is `f64` and made of the four operations and square roots, which
-//! are the same on every machine.
+//! map and the second, y, along its columns. All numbers are `f64`, computed with the four operations and square roots,
+//! which are the same on every machine.
 
 use std::f64::consts::PI;
 
-/// A place, a velocity or a force: along the rows, along the columns.
+/// A position, a velocity or a force: along the rows, along the columns.
 pub type Vec2d = [f64; 2];
 
 /// Seconds of one step.
@@ -19,26 +19,26 @@ pub const MASS: f64 = 1000.0 * 4.0 / 3.0 * PI * RADIUS * RADIUS * RADIUS;
 pub const FORCE: f64 = 100.0;
 /// Damping of each axis, N s/m.
 pub const DAMPING: f64 = 1.0;
-/// The velocity along each axis is cut to this before each step, so that more can be observed after it.
+/// Limit of the velocity along each axis before each step; after the step it can be larger.
 pub const MAX_SPEED: f64 = 5.0;
 
-/// Where the ball is and how it moves.
+/// Position and velocity of the ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Ball {
-    /// Place of the centre, m.
+    /// Position of the centre, m.
     pub position: Vec2d,
     /// Velocity, m/s.
     pub velocity: Vec2d,
 }
 
-/// The push that an action asks for, each axis within -1..=1, and whether it had to be clipped.
+/// Returns the push of an action, each axis clipped to -1..=1, and whether it was clipped.
 pub fn clip_action(action: [f32; 2]) -> (Vec2d, bool) {
     let push = action.map(|value| f64::from(value.clamp(-1.0, 1.0)));
     (push, action.iter().any(|value| value.abs() > 1.0))
 }
 
 impl Ball {
-    /// A ball at rest.
+    /// Returns a ball at rest.
     pub fn at(position: Vec2d) -> Self {
         Self { position, velocity: [0.0; 2] }
     }
@@ -48,40 +48,40 @@ impl Ball {
         self.velocity = self.velocity.map(|speed| speed.clamp(-MAX_SPEED, MAX_SPEED));
     }
 
-    /// Velocity after one step under a force: Euler's method with the damping taken implicitly.
+    /// Returns the velocity after one step under a force: Euler's method with the damping taken implicitly.
     pub fn velocity_under(&self, force: Vec2d) -> Vec2d {
         let next = |axis: usize| (MASS * self.velocity[axis] + STEP * force[axis]) / (MASS + STEP * DAMPING);
         [next(0), next(1)]
     }
 
-    /// One step under a force, with nothing in the way.
+    /// Makes one step under a force, with nothing in the way.
     pub fn fly(&mut self, force: Vec2d) {
         self.velocity = self.velocity_under(force);
         self.position = add(self.position, scale(self.velocity, STEP));
     }
 }
 
-/// Sum of two vectors.
+/// Returns the sum of two vectors.
 pub(super) fn add(a: Vec2d, b: Vec2d) -> Vec2d {
     [a[0] + b[0], a[1] + b[1]]
 }
 
-/// Difference of two vectors.
+/// Returns the difference of two vectors.
 pub(super) fn sub(a: Vec2d, b: Vec2d) -> Vec2d {
     [a[0] - b[0], a[1] - b[1]]
 }
 
-/// A vector times a number.
+/// Returns a vector times a number.
 pub(super) fn scale(a: Vec2d, by: f64) -> Vec2d {
     [a[0] * by, a[1] * by]
 }
 
-/// The scalar product.
+/// Returns the scalar product.
 pub(super) fn dot(a: Vec2d, b: Vec2d) -> f64 {
     a[0] * b[0] + a[1] * b[1]
 }
 
-/// The length of a vector.
+/// Returns the length of a vector.
 pub(super) fn length(a: Vec2d) -> f64 {
     dot(a, a).sqrt()
 }

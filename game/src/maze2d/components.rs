@@ -20,7 +20,7 @@ pub struct MazeArena {
     /// The level.
     #[reflect(ignore)]
     pub level: Arc<Maze2dLevel>,
-    /// The rules by which it is played: those of the mode, unless the level brings its own.
+    /// The rules of the level: those of the mode, unless the level brings its own.
     #[reflect(ignore)]
     pub rules: Maze2dMode,
     /// Its agent.

@@ -1,4 +1,4 @@
-//! D4RL's demonstrator: plans a way over the cells and steers from one to the next.
+//! D4RL's demonstrator: plans a path over the cells and steers from one to the next.
 
 use std::{collections::VecDeque, sync::Arc};
 
@@ -12,11 +12,12 @@ use super::{
 };
 use crate::maze::{Cell, Planner};
 
-/// The pull of the next waypoint, per metre, and the brake, per metre and second: pushes of 1 are full.
+/// Gain of the distance to the next waypoint, per metre, and of the velocity, per metre and second. A push of 1 is
+/// full.
 const PULL: f64 = 10.0;
 const BRAKE: f64 = 1.0;
-/// A waypoint is passed, and a target reached, within this distance, m. The original also asks for less than 0.1 m in
-/// the last step; no ball moves faster.
+/// Distance at which a waypoint is passed, and a target reached, m. The original also requires less than 0.1 m in the
+/// last step; no ball moves faster.
 const NEAR: f64 = 0.1;
 
 /// Walks to the goal of a level and stays there, or from one random cell to the next.
@@ -26,24 +27,24 @@ pub struct Demonstrator {
     retarget: bool,
     target: Cell,
     planner: Planner,
-    /// Where it goes, the next waypoint first, each with the cell it stands for.
+    /// The waypoints, the next one first, each with its cell.
     way: VecDeque<(Cell, Vec2d)>,
 }
 
 impl Demonstrator {
-    /// A demonstrator for a level. `retarget`: it goes to a random cell, and to another when it is there.
+    /// Makes a demonstrator for a level. With `retarget` it goes to a random cell, and then to another.
     pub fn new(level: Arc<Maze2dLevel>, retarget: bool, rng: &mut impl Rng) -> Self {
         let target = if retarget { any_cell(&level.maze, rng) } else { level.goal_cell };
         let planner = Planner::new(&level.maze, target);
         Self { level, retarget, target, planner, way: VecDeque::new() }
     }
 
-    /// The cell it goes to.
+    /// Returns its target cell.
     pub fn target(&self) -> Cell {
         self.target
     }
 
-    /// The push it wants, each axis clipped to -1..=1, with normal noise of this standard deviation.
+    /// Returns its push, each axis clipped to -1..=1, with normal noise of this standard deviation.
     pub fn act(&mut self, ball: &Ball, noise: f64, rng: &mut impl Rng) -> Vec2d {
         if self.retarget && length(sub(ball.position, centre(self.target))) < NEAR {
             self.target = any_cell(&self.level.maze, rng);
@@ -56,7 +57,7 @@ impl Demonstrator {
         add(wanted, noise).map(|push| push.clamp(-1.0, 1.0))
     }
 
-    /// The next waypoint that has not been passed.
+    /// Returns the next waypoint that has not been passed.
     fn waypoint(&mut self, ball: &Ball, rng: &mut impl Rng) -> Vec2d {
         while self.way.len() > 1 && length(sub(ball.position, self.way[0].1)) < NEAR {
             self.way.pop_front();
@@ -68,7 +69,7 @@ impl Demonstrator {
         self.way.front().map_or_else(|| centre(self.target), |(_, place)| *place)
     }
 
-    /// A new way from a cell. Without one, as from inside a wall, it is left empty.
+    /// Plans a new path from a cell. Without one, as from inside a wall, it is left empty.
     fn plan(&mut self, from: Cell, rng: &mut impl Rng) {
         let path = self.planner.path(from).unwrap_or_default();
         let offset = self.level.walls.offset();
@@ -77,25 +78,25 @@ impl Demonstrator {
             let place = if cell == self.target {
                 centre(cell)
             } else {
-                // Somewhere between where the cell is said to be and where it is.
+                // Between the cell's nominal position and its actual one.
                 centre(cell).map(|along| along - offset * unit(rng))
             };
             self.way.push_back((cell, place));
         }
-        // The cell it stands in is where it comes from, unless it is the target.
+        // The cell it stands in is the start of the path, unless it is the target.
         if self.way.len() > 1 {
             self.way.pop_front();
         }
     }
 
-    /// The cell that a ball is in; the nearest one inside the map if it were outside.
+    /// Returns the cell of a ball; outside the map, the nearest one inside.
     fn cell_of(&self, ball: &Ball) -> Cell {
         let (row, col) = self.level.walls.cell_at(ball.position);
         Cell::new(usize::try_from(row).unwrap_or(0), usize::try_from(col).unwrap_or(0))
     }
 }
 
-/// Moves between two cells if there were no walls.
+/// Returns the moves between two cells without walls.
 fn moves_between(a: Cell, b: Cell) -> usize {
     a.row.abs_diff(b.row) + a.col.abs_diff(b.col)
 }

@@ -20,7 +20,7 @@ pub struct DemonstratorBot {
 }
 
 impl DemonstratorBot {
-    /// A bot with normal noise of this standard deviation on each axis of its actions.
+    /// Takes the standard deviation of normal noise on each axis of its actions.
     pub fn new(noise: f64) -> Self {
         Self { noise, walker: None }
     }

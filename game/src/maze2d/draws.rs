@@ -3,7 +3,7 @@
 use playbot_learner::rng::unit;
 use rand::Rng;
 
-/// A standard normal number, by Marsaglia's polar method.
+/// Returns a standard normal number, by Marsaglia's polar method.
 pub(super) fn normal(rng: &mut impl Rng) -> f64 {
     loop {
         let [u, v] = [uniform(rng, 1.0), uniform(rng, 1.0)];
@@ -14,7 +14,7 @@ pub(super) fn normal(rng: &mut impl Rng) -> f64 {
     }
 }
 
-/// A number between `-half` and `half`.
+/// Returns a number between `-half` and `half`.
 pub(super) fn uniform(rng: &mut impl Rng, half: f64) -> f64 {
     half * (2.0 * unit(rng) - 1.0)
 }

@@ -11,12 +11,12 @@ use super::{
 };
 use crate::maze::{Cell, Maze, MazeError};
 
-/// The start lies at most this far from the middle of its cell, along each axis, m.
+/// Largest distance of the start from the middle of its cell, along each axis, m.
 const START_NOISE: f64 = 0.1;
 /// Standard deviation of the velocity at the start, along each axis, m/s.
 const START_SPEED: f64 = 0.1;
 
-/// Everything that an episode begins with.
+/// The initial state of an episode.
 #[derive(Clone, Debug)]
 pub struct Maze2dLevel {
     /// The maze.
@@ -32,8 +32,8 @@ pub struct Maze2dLevel {
 }
 
 impl Maze2dLevel {
-    /// The level with this seed. On the fixed maps the seed decides where the ball starts, on generated ones also on the
-    /// maze.
+    /// Makes the level with this seed. On the fixed maps the seed decides the start of the ball, on generated ones also
+    /// the maze.
     ///
     /// # Errors
     ///
@@ -44,7 +44,7 @@ impl Maze2dLevel {
         let mut goal_cell = if mode.random_goal { any_cell(&maze, &mut rng) } else { maze.goal() };
         let mut start_cell = if mode.fixed_start { maze.start() } else { any_cell(&maze, &mut rng) };
         while mode.end_at_goal && start_cell == goal_cell {
-            // Nothing would be left to play. What may be anywhere is drawn again: one of two free cells is another one.
+            // Nothing would be left to play. A free choice is drawn again: one of two free cells is another one.
             *(if mode.fixed_start { &mut goal_cell } else { &mut start_cell }) = any_cell(&maze, &mut rng);
         }
         let position = centre(start_cell).map(|along| along + uniform(&mut rng, START_NOISE));
@@ -53,18 +53,18 @@ impl Maze2dLevel {
         Ok(Self { maze, walls, start_cell, start: Ball { position, velocity }, goal_cell })
     }
 
-    /// Place of the goal.
+    /// Returns the position of the goal.
     pub fn goal(&self) -> Vec2d {
         centre(self.goal_cell)
     }
 }
 
-/// Place of a cell, whatever the offset of the walls: x is its row, y its column.
+/// Returns the position of a cell, whatever the offset of the walls: x is its row, y its column.
 pub fn centre(cell: Cell) -> Vec2d {
     [cell.row as f64, cell.col as f64]
 }
 
-/// A free cell, each with the same chance.
+/// Returns a free cell, each with the same chance.
 pub(super) fn any_cell(maze: &Maze, rng: &mut impl Rng) -> Cell {
     let count = maze.free_cells().count() as u64;
     let nth = below(rng, count) as usize;

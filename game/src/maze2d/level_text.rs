@@ -1,4 +1,4 @@
-//! Levels as JSON: what `playbot level maze2d --json` prints of a whole mode, and what level files hold.
+//! Levels as JSON: the output of `playbot level maze2d --json` for a whole mode, and level files.
 
 use playbot_lab::level_files::{JsonStep::Key, LevelDesign, LevelTextError, read_json_object};
 use serde::{Deserialize, Serialize};
@@ -12,11 +12,11 @@ use super::{
 };
 use crate::maze::{Cell, read_maze};
 
-/// A level as a file has it. Cells are `[row, column]`; start and goal may be letters in the rows instead.
+/// A level in a file. Cells are `[row, column]`; start and goal may be letters in the rows instead.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(
     deny_unknown_fields,
-    expecting = "a level, which is an object with `rows` and, where they do not say it, `start` and `goal`"
+    expecting = "a level: an object with `rows`, and with `start` and `goal` if the rows do not mark them"
 )]
 pub(super) struct LevelText {
     rows: Vec<String>,
@@ -24,18 +24,18 @@ pub(super) struct LevelText {
     start: Option<Cell>,
     #[serde(default)]
     goal: Option<Cell>,
-    /// For people: it is not read.
+    /// For readers; not parsed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     shortest_path_length: Option<usize>,
-    /// The ball at the start, `[x, y, vx, vy]`; at rest in the middle of its cell if it is left out.
+    /// The ball at the start, `[x, y, vx, vy]` (default: at rest in the middle of its cell).
     #[serde(default)]
     ball: Option<[f64; 4]>,
-    /// Options of a mode, joined by `+`; the rules of generated mazes if they are left out.
+    /// Options of a mode, joined by `+` (default: the rules of generated mazes).
     #[serde(default)]
     rules: String,
 }
 
-/// A level that somebody drew, with its rules.
+/// A level from a file, with its rules.
 #[derive(Clone, Debug)]
 pub(super) struct DrawnLevel {
     pub level: Maze2dLevel,
@@ -43,7 +43,7 @@ pub(super) struct DrawnLevel {
 }
 
 impl LevelText {
-    /// A level with everything that play asks for.
+    /// Converts a level with all fields that play needs.
     pub fn of(level: &Maze2dLevel, rules: &Maze2dMode) -> Self {
         let Maze2dLevel { maze, start_cell, goal_cell, start, .. } = level;
         let maze = maze.clone().with_any_ends(*start_cell, *goal_cell).unwrap_or_else(|_| maze.clone());
@@ -85,11 +85,11 @@ impl LevelText {
     }
 }
 
-/// Reads a level file.
+/// Parses a level file.
 ///
 /// # Errors
 ///
-/// What is wrong with it, and on which line.
+/// The mistake, with its line.
 pub(super) fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
     let drawn = read_json_object::<LevelText>(text)?.into_drawn(text)?;
     let content = serde_json::json!(LevelText::of(&drawn.level, &drawn.rules)).to_string();

@@ -1,4 +1,4 @@
-//! Where the levels of a mode come from: a seed, or a file that somebody drew.
+//! Levels of a mode: from a seed, or from a file.
 
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ pub(super) struct Levels<'w> {
 }
 
 impl Levels<'_> {
-    /// A level and its rules, or in words why there is none.
+    /// Returns a level and its rules, or an explanation why there is none.
     pub fn get(&self, level: u64) -> Result<(Arc<Maze2dLevel>, Maze2dMode), String> {
         match &self.designs {
             Some(designs) => drawn(designs, level),
@@ -28,7 +28,7 @@ impl Levels<'_> {
     }
 }
 
-/// A level of a mode that has been checked, and its rules, or in words why there is none.
+/// Returns a level of a mode that has been checked, and its rules, or an explanation why there is none.
 pub(super) fn level_of(game: &dyn Game, mode: &str, level: u64) -> Result<(Arc<Maze2dLevel>, Maze2dMode), String> {
     if is_level_files(mode) {
         let designs = level_designs(game, mode);

@@ -5,37 +5,37 @@ use std::{fmt, str::FromStr};
 use super::walls::D4RL_OFFSET;
 use crate::maze::{Map, Maze, MazeError, MazeModeError, OptionError};
 
-/// What the walls do to the ball.
+/// The contact model of walls and ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Contact {
-    /// MuJoCo's soft contact in closed form: the game that the literature measures on.
+    /// MuJoCo's soft contact in closed form: the game of the literature.
     #[default]
     Soft,
     /// rapier2d's solver: hard and inelastic. Free flight is the same.
     Rapier,
 }
 
-/// Map and rules. Written as the map's name and what differs from its defaults, joined by `+`.
+/// Map and rules. Written as the map's name and the differences from its defaults, joined by `+`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Maze2dMode {
     /// The map.
     pub map: Map,
     /// Reward 1 within the goal radius and else 0, instead of exp(-distance).
     pub sparse: bool,
-    /// Episodes start in the map's start cell, as the paper says, instead of in any free cell, as D4RL has it.
+    /// Episodes start in the map's start cell, as in the paper, instead of in any free cell, as in D4RL.
     pub fixed_start: bool,
     /// Each level has a goal of its own in a random free cell, instead of the map's.
     pub random_goal: bool,
     /// Steps after which an episode is truncated.
     pub limit: u32,
-    /// Reaching the goal terminates the episode. D4RL's never terminate. Better with `sparse`: the dense reward is never
-    /// negative, so that whoever keeps away from the goal until time is up earns more than who reaches it.
+    /// Reaching the goal terminates the episode. D4RL's never terminate. Better with `sparse`: the dense reward is
+    /// never negative, so staying away from the goal until time is up earns more than reaching it.
     pub end_at_goal: bool,
     /// The walls stand 0.2 aside, as D4RL's do.
     pub offset: bool,
-    /// What the walls do.
+    /// The contact model.
     pub contact: Contact,
-    /// The demonstrator walks to one random cell after the other, as in D4RL's data. Changes nothing in the game.
+    /// The demonstrator walks to one random cell after the other, as in D4RL's data. The game itself stays the same.
     pub retarget: bool,
 }
 
@@ -58,7 +58,7 @@ impl Maze2dMode {
     /// The modes without options.
     pub const NAMES: [&'static str; 5] = Map::NAMES;
 
-    /// D4RL's rules on a map: random start, dense reward, its time limit (version 1).
+    /// Returns D4RL's rules on a map: random start, dense reward, its time limit (version 1).
     pub fn new(map: Map) -> Self {
         let limit = usual_limit(&map);
         Self {
@@ -74,12 +74,12 @@ impl Maze2dMode {
         }
     }
 
-    /// How far the walls stand aside, along both axes.
+    /// Returns the offset of the walls, along both axes.
     pub fn wall_offset(&self) -> f64 {
         if self.offset { D4RL_OFFSET } else { 0.0 }
     }
 
-    /// The maze of a level.
+    /// Returns the maze of a level.
     ///
     /// # Errors
     ///
@@ -122,7 +122,7 @@ impl Maze2dMode {
         Ok(())
     }
 
-    /// What differs from the map's defaults besides its own options, in the order in which it is written.
+    /// Returns the differences from the map's defaults besides its own options, in their written order.
     pub(super) fn options(&self) -> Vec<String> {
         let usual = Self::new(self.map.clone());
         let mut options = Vec::new();
@@ -143,7 +143,7 @@ impl Maze2dMode {
     }
 }
 
-/// D4RL's limits, version 1; for other maps, time for the longest ways at the demonstrator's pace.
+/// Returns D4RL's limits, version 1; for other maps, time for the longest paths at the demonstrator's pace.
 fn usual_limit(map: &Map) -> u32 {
     match map {
         Map::Umaze => 300,
@@ -154,12 +154,12 @@ fn usual_limit(map: &Map) -> u32 {
     }
 }
 
-/// Time for a generated maze with so many cells.
+/// Returns the time limit of a generated maze with so many cells.
 fn steps_for(cells: u32) -> u32 {
     cells.saturating_mul(15).max(300)
 }
 
-/// What an option is about, so that it is said only once.
+/// Returns the subject of an option, which may occur only once.
 pub(super) fn subject(option: &str) -> &str {
     let key = option.split_once('=').map_or(option, |(key, _)| key);
     key.strip_prefix("no-").unwrap_or(key)
@@ -173,7 +173,7 @@ impl FromStr for Maze2dMode {
         let mut map = Map::named(parts.next().unwrap_or_default())?;
         let options: Vec<&str> = parts.collect();
         MazeModeError::check_once(&options, subject)?;
-        // The size of a generated maze decides on the usual limit.
+        // The size of a generated maze decides the default limit.
         for (key, value) in options.iter().filter_map(|option| option.split_once('=')) {
             map.set_option(key, value)?;
         }

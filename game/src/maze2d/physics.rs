@@ -1,8 +1,8 @@
 //! A rapier2d context of an arena's own: the walls as colliders, the ball as a body.
 //!
-//! It stands by itself and is stepped by whoever owns it, so that arenas are independent and can be stepped on any
-//! thread. Under [`Contact::Rapier`](super::mode::Contact) it decides what the walls do to the ball; under
-//! [`Contact::Soft`](super::mode::Contact) the ball only shows it where it is, for sensors and rays of a game's own.
+//! The owner of the context steps it, so arenas are independent and can be stepped on any thread. Under
+//! [`Contact::Rapier`](super::mode::Contact) it computes the contacts of the ball. Under
+//! [`Contact::Soft`](super::mode::Contact) it only follows the ball, for sensors and rays of a game's own.
 
 use bevy::prelude::{Component, Reflect};
 use bevy_rapier2d::rapier::prelude::{
@@ -15,16 +15,16 @@ use super::{
     walls::{HALF, Walls},
 };
 
-/// How far ahead of a fast ball contacts are looked for, m: more than it can move in a step.
+/// Distance ahead of a fast ball at which contacts are looked for, m: more than it can move in a step.
 const AHEAD: Real = 0.06;
 
 /// The context. Coordinates are those of the observation.
-// Without `#[reflect(Component)]`: rapier's types are not reflected, so nothing of it could be compared, and
-// `playbot doctor` must not count it as compared. The ball itself is in `MazeBall`, which is.
+// Without `#[reflect(Component)]`: rapier's types are not reflected, so nothing of it could be compared, and `playbot
+// doctor` must not count it as compared. The ball itself is in `MazeBall`, which is.
 #[derive(Component, Reflect)]
 #[reflect(from_reflect = false)]
 pub struct MazePhysics {
-    /// Everything that rapier knows. Add bodies and sensors as you like; stepping is done by the game.
+    /// The contents of the context. Add bodies and sensors as you like; the game makes the steps.
     #[reflect(ignore)]
     pub world: PhysicsWorld,
     #[reflect(ignore)]
@@ -34,13 +34,13 @@ pub struct MazePhysics {
 }
 
 impl MazePhysics {
-    /// Walls, and a ball that they stop.
+    /// Makes walls, and a ball that they stop.
     pub fn solving(walls: &Walls, ball: &Ball) -> Self {
         let body = RigidBodyBuilder::dynamic().can_sleep(false).lock_rotations().soft_ccd_prediction(AHEAD);
         Self::new(walls, ball, body)
     }
 
-    /// Walls, and a ball that goes where it is put.
+    /// Makes walls, and a ball that follows the game's.
     pub fn following(walls: &Walls, ball: &Ball) -> Self {
         Self::new(walls, ball, RigidBodyBuilder::kinematic_position_based().can_sleep(false))
     }
@@ -65,17 +65,17 @@ impl MazePhysics {
         Self { world, ball, walls }
     }
 
-    /// The body of the ball.
+    /// Returns the body of the ball.
     pub fn ball(&self) -> RigidBodyHandle {
         self.ball
     }
 
-    /// The collider of all walls.
+    /// Returns the collider of all walls.
     pub fn walls(&self) -> ColliderHandle {
         self.walls
     }
 
-    /// One step of a ball under a force. Its flight is the original's; the walls are rapier's affair.
+    /// Makes one step of a ball under a force. Its flight is the original's; rapier solves the contacts.
     pub(super) fn step(&mut self, ball: &mut Ball, force: Vec2d) {
         let body = &mut self.world.bodies[self.ball];
         body.set_translation(vector(ball.position), true);
@@ -89,7 +89,7 @@ impl MazePhysics {
         };
     }
 
-    /// Shows the context where the ball is now.
+    /// Sets the context's ball to the game's.
     pub(super) fn follow(&mut self, ball: &Ball) {
         self.world.bodies[self.ball].set_next_kinematic_translation(vector(ball.position));
         self.world.step();

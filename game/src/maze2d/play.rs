@@ -11,7 +11,7 @@ use super::{
     sim::{hash_state, is_at_goal, reward, step_rapier, step_soft},
 };
 
-/// Moves every ball whose agent plays, and pays for where it comes to lie.
+/// Moves every ball whose agent plays, and pays for its new position.
 pub(super) fn play(
     mut players: Query<(&Control, &Action, &PlaysIn, &mut Episode, &mut MazeBall, &mut Reward, &mut StateHash)>,
     mut arenas: Query<(&MazeArena, Option<&mut MazePhysics>)>,
@@ -56,10 +56,10 @@ fn end_if_over(mode: &Maze2dMode, at_goal: bool, steps: u32, episode: &mut Episo
     }
 }
 
-/// Names of the values that an agent observes: place, m, and velocity, m/s, along the rows (x) and columns (y).
+/// Names of the observed values: position, m, and velocity, m/s, along the rows (x) and columns (y).
 pub(super) const OBSERVED: [&str; 4] = ["x", "y", "vx", "vy"];
 
-/// Fills the vector of every agent that plays and reads one.
+/// Fills the vector of every playing agent that reads one.
 pub(super) fn observe(mut players: Query<(&Episode, &MazeBall, &mut Observation), With<VectorSensor>>) {
     for (episode, ball, mut observation) in &mut players {
         if episode.is_running() {

@@ -21,13 +21,13 @@ pub struct Maze2dSystems;
 pub struct Maze2dPlugin {
     /// Map and rules.
     pub mode: Maze2dMode,
-    /// Whether arenas have a rapier context even where the contact does not need it; see
+    /// Adds a rapier context to arenas even where the contact does not need it; see
     /// [`MazePhysics`](super::physics::MazePhysics).
     pub physics: bool,
 }
 
 impl Maze2dPlugin {
-    /// A mode, with a physics context in every arena.
+    /// Takes a mode, and adds a physics context to every arena.
     pub fn new(mode: Maze2dMode) -> Self {
         Self { mode, physics: true }
     }
@@ -39,7 +39,7 @@ impl Plugin for Maze2dPlugin {
             .insert_resource(WithPhysics(self.physics))
             .add_observer(arena::start_episode)
             .add_systems(ObserveSchedule, play::observe.before(VisionSystems::Sync))
-            // An agent is decided for by one alone, so it does not matter who decides for which agent first.
+            // Each agent has one decider, so the order of deciders of different agents does not matter.
             .add_systems(
                 FixedPreUpdate,
                 demonstrator_bot::decide.in_set(PlaybotSystems::Decide).ambiguous_with(PlaybotSystems::Decide),

@@ -1,4 +1,4 @@
-//! How far it is to the next wall.
+//! Distance to the next wall.
 
 use super::{
     ball::Vec2d,
@@ -6,10 +6,11 @@ use super::{
 };
 
 impl Walls {
-    /// Distance from a place to the nearest wall in a direction of length 1, m; at most `most`. 0 inside a wall.
+    /// Returns the distance from a position to the nearest wall in a direction of length 1, m; at most `most`. 0 inside
+    /// a wall.
     ///
-    /// Walks from cell to cell through the sides that the ray leaves by, each of which is computed from the place itself,
-    /// so that no error adds up. Every maze is closed, and so the walk ends.
+    /// Walks from cell to cell through the sides that the ray leaves by. Each is computed from the position itself, so
+    /// no error adds up. Every maze is closed, so the walk ends.
     pub fn ray(&self, place: Vec2d, way: Vec2d, most: f64) -> f64 {
         let (row, column) = self.cell_at(place);
         let mut cell = [row, column];
@@ -20,7 +21,7 @@ impl Walls {
                 0.0 => f64::INFINITY,
                 along => (middle[axis] + HALF.copysign(along) - place[axis]) / along,
             });
-            // Through a corner it goes by way of the first axis, and so never between two walls that touch there.
+            // Through a corner it takes the first axis, so it never passes between two walls that touch there.
             let axis = usize::from(until_side[1] < until_side[0]);
             gone = until_side[axis];
             if gone >= most {
@@ -28,7 +29,7 @@ impl Walls {
             }
             cell[axis] += if way[axis] > 0.0 { 1 } else { -1 };
         }
-        // Rounding can put a place that is on a side beyond it.
+        // Rounding can put a position on a side beyond it.
         gone.max(0.0)
     }
 }

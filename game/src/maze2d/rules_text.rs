@@ -1,4 +1,4 @@
-//! The rules of a drawn level, as text: options of a mode without its map.
+//! The rules of a level file, as text: options of a mode without its map.
 
 use playbot_lab::level_files::{JsonStep::Key, LevelTextError};
 
@@ -7,11 +7,11 @@ use bevy_playbot::unknown_name::UnknownName;
 use super::mode::{Maze2dMode, subject};
 use crate::maze::{Map, Maze, MazeModeError, MazeSpec};
 
-/// The options that a drawn level may have. Where it starts and ends is drawn, so no option says it.
+/// The options that a level file may have. Its start and goal are drawn, so they are no options.
 const RULES: [&str; 6] = ["sparse", "limit=1000", "end-at-goal", "no-offset", "contact=rapier", "retarget"];
 
 impl Maze2dMode {
-    /// The rules of a drawn maze: those of generated mazes of its size, with these options.
+    /// Returns the rules of a drawn maze: those of generated mazes of its size, with these options.
     fn of_drawn(maze: &Maze, options: &str) -> Result<Self, MazeModeError> {
         let mut mode = Self::new(drawn_map(maze));
         let options: Vec<&str> = options.split('+').filter(|option| !option.is_empty()).collect();
@@ -26,23 +26,23 @@ impl Maze2dMode {
         Ok(mode)
     }
 
-    /// What makes a drawn level with this maze play by the rules of this mode.
+    /// Returns the options with which a level file of this maze has the rules of this mode.
     pub(super) fn rules_of_drawn(&self, maze: &Maze) -> String {
         let drawn = Self { map: drawn_map(maze), fixed_start: false, random_goal: false, ..self.clone() };
         drawn.options().join("+")
     }
 }
 
-/// What a maze would have been generated as, which decides on the usual limit.
+/// Returns the map of a generated maze of this size, which decides the default limit.
 fn drawn_map(maze: &Maze) -> Map {
     Map::Random(MazeSpec { rows: maze.rows(), columns: maze.columns(), ..MazeSpec::default() })
 }
 
-/// Reads the rules of a level file.
+/// Parses the rules of a level file.
 ///
 /// # Errors
 ///
-/// What is wrong with them, on their line.
+/// The mistake, with its line.
 pub(super) fn read_rules(text: &str, maze: &Maze, options: &str) -> Result<Maze2dMode, LevelTextError> {
     Maze2dMode::of_drawn(maze, options)
         .map_err(|error| LevelTextError::at(text, &[Key("rules")], format!("`rules`: {error}")))

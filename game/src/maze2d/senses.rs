@@ -1,4 +1,4 @@
-//! Maze2D for balls that are told where the goal and the walls are, which cells around are walls, or better where they are.
+//! Maze2D with more observations: goal and rays, a map, or positional encoding.
 
 use bevy::prelude::*;
 use bevy_playbot::vision::VisionSystems;
@@ -14,17 +14,17 @@ use crate::senses::{
     Mapped, Placed, Senses, Sighted, WithSenses, mapped::push_map, placed::push_waves, sighted::push_rays,
 };
 
-/// How far a ray reaches from the centre of a ball, in metres: four cells.
+/// Length of a ray from the centre of a ball, in metres: four cells.
 pub const RAY_LENGTH: f64 = 4.0;
 
-/// Maze2D with rays, under its name `maze2d-sighted`. As in the picture, east is along the columns, y, and north is up the
-/// rows, against x.
+/// Maze2D with rays, under its name `maze2d-sighted`. As in the picture, east is along the columns, y, and north is up
+/// the rows, against x.
 pub type Maze2dWithRays = WithSenses<Maze2d, Sighted>;
 
 /// Maze2D with rays and a map, under its name `maze2d-mapped`.
 pub type Maze2dWithMap = WithSenses<Maze2d, Mapped>;
 
-/// Maze2D with waves of the ball's place, under its name `maze2d-placed`.
+/// Maze2D with positional encoding, under its name `maze2d-placed`.
 pub type Maze2dWithWaves = WithSenses<Maze2d, Placed>;
 
 impl Senses<Maze2d> for Sighted {
@@ -52,8 +52,8 @@ impl Senses<Maze2d> for Placed {
     }
 }
 
-/// The walls are squares on a grid, and arenas have no rapier context in training: rays walk the grid, which is exact and
-/// takes no more than a few steps.
+/// Adds goal and rays to observations. The walls are squares on a grid, and arenas have no rapier context in training:
+/// rays walk the grid, which is exact and takes no more than a few steps.
 fn sense_rays(
     mut balls: Query<(&Episode, &MazeBall, &PlaysIn, &mut Observation), With<VectorSensor>>,
     arenas: Query<&MazeArena>,
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
     use crate::maze2d::Ball;
 
-    /// What a ball at rest in this place observes.
+    /// Returns the observation of a ball at rest at this position.
     fn seen(game: &dyn Game, mode: &str, place: [f64; 2]) -> Vec<f32> {
         let (mut world, agents) = build_world(game, mode, 0, 0, 1);
         let still = Action(ActionValue::Continuous(vec![0.0; 2]));
@@ -139,7 +139,8 @@ mod tests {
             &seen(&Maze2dWithRays::default(), "medium+no-offset", place),
             &walls([0.45, 0.45, 1.6, 1.55, 1.55, 0.55, 2.4, 1.4]),
         );
-        // With D4RL's offset they stand 0.2 nearer in the east and south, and farther in the west and north; the goal stays.
+        // With D4RL's offset they stand 0.2 nearer in the east and south, and farther in the west and north; the goal
+        // stays.
         assert_near(
             &seen(&Maze2dWithRays::default(), "medium", place),
             &walls([0.25, 0.25, 1.8, 1.75, 1.75, 0.75, 2.2, 1.2]),
@@ -175,7 +176,8 @@ mod tests {
             "###########",
         ];
         assert_eq!(rows("medium+no-offset", [2.1, 2.05]), wanted);
-        // With D4RL's offset the same place is in cell (2, 2), and 0.3 further down in (3, 2): the map moves by a row.
+        // With D4RL's offset the same position is in cell (2, 2), and 0.3 further down in (3, 2): the map moves by a
+        // row.
         assert_eq!(rows("medium", [2.1, 2.05]), wanted);
         assert_eq!(rows("medium", [2.35, 2.05])[..10], wanted[1..]);
         assert_eq!(rows("medium+no-offset", [2.35, 2.05]), wanted);
@@ -183,7 +185,7 @@ mod tests {
 
     #[test]
     fn waves_are_of_the_place_in_cells() {
-        // A whole wave of a cell along x and a quarter of one along y.
+        // A whole wavelength of a cell along x and a quarter of one along y.
         let seen = seen(&Maze2dWithWaves::default(), "medium+no-offset", [2.0, 2.25]);
         assert_near(&seen[..4], &[2.0, 2.25, 0.0, 0.0]);
         assert_near(&[seen[10], seen[11], seen[18], seen[19]], &[0.0, 1.0, 1.0, 0.0]);

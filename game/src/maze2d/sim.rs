@@ -1,4 +1,4 @@
-//! A Maze2D episode without an engine: what one step does, and what it pays.
+//! A Maze2D episode without an engine: one step and its reward.
 
 use super::{
     ball::{Ball, FORCE, Vec2d, length, scale, sub},
@@ -12,7 +12,7 @@ use super::{
 /// The goal is reached within this distance of its centre, m.
 pub const GOAL_RADIUS: f64 = 0.5;
 
-/// One step of the ball under a push (each axis within -1..=1), with MuJoCo's contact in closed form.
+/// Makes one step of the ball under a push (each axis within -1..=1), with MuJoCo's contact in closed form.
 pub fn step_soft(ball: &mut Ball, push: Vec2d, walls: &Walls) {
     ball.limit_speed();
     let drive = scale(push, FORCE);
@@ -20,24 +20,25 @@ pub fn step_soft(ball: &mut Ball, push: Vec2d, walls: &Walls) {
     ball.fly([drive[0] + walls_push[0], drive[1] + walls_push[1]]);
 }
 
-/// One step of the ball under a push, with rapier's contact.
+/// Makes one step of the ball under a push, with rapier's contact.
 pub fn step_rapier(ball: &mut Ball, push: Vec2d, physics: &mut MazePhysics) {
     ball.limit_speed();
     physics.step(ball, scale(push, FORCE));
 }
 
-/// What a place pays: exp(-distance to the goal), or with sparse rewards 1 within [`GOAL_RADIUS`] and else 0.
+/// Returns the reward of a position: exp(-distance to the goal), or with sparse rewards 1 within [`GOAL_RADIUS`] and
+/// else 0.
 pub fn reward(position: Vec2d, goal: Vec2d, sparse: bool) -> f32 {
     let distance = length(sub(position, goal));
     if sparse { f32::from(u8::from(distance <= GOAL_RADIUS)) } else { libm::exp(-distance) as f32 }
 }
 
-/// Whether the goal is reached.
+/// Returns true if the goal is reached.
 pub fn is_at_goal(position: Vec2d, goal: Vec2d) -> bool {
     length(sub(position, goal)) <= GOAL_RADIUS
 }
 
-/// A ball among walls: what `playbot trace` and tests step, with the arithmetic of the game.
+/// A ball among walls, with the arithmetic of the game, for `playbot trace` and tests.
 pub struct BallSim {
     /// The ball now.
     pub ball: Ball,
@@ -46,7 +47,7 @@ pub struct BallSim {
 }
 
 impl BallSim {
-    /// The ball of a level.
+    /// Returns the ball of a level.
     pub fn new(mode: &Maze2dMode, level: &Maze2dLevel) -> Self {
         let mut sim = Self { ball: level.start, walls: level.walls.clone(), physics: None };
         if mode.contact == Contact::Rapier {
@@ -64,7 +65,7 @@ impl BallSim {
     }
 }
 
-/// A fingerprint of a running episode: FNV-1a over 64-bit words, the number of steps made and the ball.
+/// Returns a fingerprint of a running episode: FNV-1a over 64-bit words, the number of steps made and the ball.
 pub fn hash_state(ball: &Ball, steps: u32) -> u64 {
     let words = ball.position.iter().chain(&ball.velocity).map(|value| (value + 0.0).to_bits());
     std::iter::once(u64::from(steps))

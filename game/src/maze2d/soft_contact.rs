@@ -1,9 +1,9 @@
 //! Contact as MuJoCo 3.1.6 solves it for D4RL's ball and walls, in closed form.
 //!
-//! MuJoCo's contacts are soft constraints: each has a reference acceleration that brings the surfaces apart like a damped
-//! spring, and a weight. The acceleration is the one with the least cost, that is, with the smallest deviation from the
-//! free one and from the references that it falls short of. With MuJoCo's defaults (`solref` 0.02 1, `solimp` 0.9 0.95
-//! 0.001, margin 0.002) and two dimensions there is little left to solve.
+//! MuJoCo's contacts are soft constraints: each has a reference acceleration that brings the surfaces apart like a
+//! damped spring, and a weight. The acceleration is the one with the least cost: the smallest deviation from the free
+//! acceleration and from the references that it falls short of. With MuJoCo's defaults (`solref` 0.02 1, `solimp` 0.9
+//! 0.95 0.001, margin 0.002) and two dimensions there is little left to solve.
 
 use super::{
     ball::{Ball, DAMPING, MASS, Vec2d, add, dot, scale, sub},
@@ -22,16 +22,16 @@ const TIME: f64 = 0.02;
 #[derive(Clone, Copy, Default)]
 struct Contact {
     normal: Vec2d,
-    /// Acceleration along the normal that the contact asks for.
+    /// Requested acceleration along the normal.
     target: f64,
     /// Cost of falling short of it.
     weight: f64,
 }
 
-/// Contacts at once, at the most: more walls than these cannot be within the margin of a ball that is outside of all.
+/// Most contacts at once: more walls than these cannot be within the margin of a ball that is outside of all.
 const MOST: usize = 4;
 
-/// The force of the walls on a ball that is driven by `drive`, N.
+/// Returns the force of the walls on a ball that is driven by `drive`, N.
 pub fn contact_force(ball: &Ball, drive: Vec2d, walls: &Walls) -> Vec2d {
     let touches = walls.touches(ball.position, MARGIN);
     if touches.as_slice().is_empty() {
@@ -65,7 +65,7 @@ fn contacts(ball: &Ball, touches: &Touches) -> ([Contact; MOST], usize) {
     (contacts, count)
 }
 
-/// Impedance at a depth in units of [`DEPTH`]: from least to most along two parabolas.
+/// Returns the impedance at a depth in units of [`DEPTH`]: from least to most along two parabolas.
 fn impedance(depth: f64) -> f64 {
     let rise = match depth {
         ..=0.5 => 2.0 * depth * depth,
@@ -75,7 +75,7 @@ fn impedance(depth: f64) -> f64 {
     IMPEDANCE[0] + (IMPEDANCE[1] - IMPEDANCE[0]) * rise
 }
 
-/// The acceleration with the least cost.
+/// Returns the acceleration with the least cost.
 ///
 /// The cost is convex and, for each choice of contacts that push, quadratic: the choice that is consistent with its own
 /// minimum is the right one.
@@ -95,7 +95,7 @@ fn least_cost(free: Vec2d, contacts: &[Contact]) -> Vec2d {
     best
 }
 
-/// Minimum of the cost if exactly these contacts push: two linear equations.
+/// Returns the minimum of the cost if exactly these contacts push: two linear equations.
 fn minimum(free: Vec2d, contacts: &[Contact], pushes: impl Fn(usize) -> bool) -> Vec2d {
     let (mut xx, mut xy, mut yy) = (MASS, 0.0, MASS);
     let mut right = scale(free, MASS);

@@ -14,7 +14,7 @@ use super::{
     sim::BallSim,
 };
 
-/// Plays the pushes of a file and prints the ball after each; says how many of them had to be clipped.
+/// Plays the pushes of a file and prints the ball after each. Reports the number of clipped pushes.
 pub(super) fn run(game: &dyn Game, request: &TraceRequest, print: Print) -> Result<Option<String>, InspectError> {
     let Some(path) = request.file else {
         return Err(InspectError::Usage(
@@ -25,7 +25,7 @@ pub(super) fn run(game: &dyn Game, request: &TraceRequest, print: Print) -> Resu
     };
     let mode = request.mode.unwrap_or("medium");
     game.check_mode(mode)?;
-    let (level, rules) = level_of(game, mode, request.seed).map_err(InspectError::Usage)?;
+    let (level, rules) = level_of(game, mode, request.level).map_err(InspectError::Usage)?;
     let mut level = Arc::unwrap_or_clone(level);
     if !request.start.is_empty() {
         level.start = start(request.start, &level)?;
@@ -50,7 +50,7 @@ pub(super) fn run(game: &dyn Game, request: &TraceRequest, print: Print) -> Resu
     Ok((clipped > 0).then_some(note))
 }
 
-/// The ball as `--start` has it.
+/// Returns the ball of `--start`.
 fn start(values: &[f64], level: &Maze2dLevel) -> Result<Ball, InspectError> {
     let &[x, y, vx, vy] = values else {
         return Err(InspectError::Usage(format!("--start has {} numbers: write four, x,y,vx,vy", values.len())));
@@ -66,7 +66,7 @@ fn start(values: &[f64], level: &Maze2dLevel) -> Result<Ball, InspectError> {
     Ok(Ball { position: [x, y], velocity: [vx, vy] })
 }
 
-/// The pushes in a file, clipped, and how many of them had to be.
+/// Returns the pushes in a file, clipped, and the number of clipped ones.
 fn pushes(text: &str, path: &Path) -> Result<(Vec<Vec2d>, usize), InspectError> {
     let mut clipped = 0;
     let mut pushes = Vec::new();

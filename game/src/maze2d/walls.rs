@@ -1,17 +1,17 @@
-//! The walls as the ball meets them: squares of side 1, one for each wall cell.
+//! The walls of the ball: squares of side 1, one for each wall cell.
 
 use crate::maze::{Cell, Maze};
 
 use super::ball::{RADIUS, Vec2d, add, length, sub};
 
-/// How far D4RL's walls stand from where the coordinates say, along both axes: a cell (i, j) is centred at
-/// (i - 0.2, j - 0.2). Starts, goals and rewards use (i, j).
+/// Offset of D4RL's walls from their coordinates, along both axes: a cell (i, j) is centred at (i - 0.2, j - 0.2).
+/// Starts, goals and rewards use (i, j).
 pub const D4RL_OFFSET: f64 = 0.2;
 
 /// Half the side of a wall.
 pub const HALF: f64 = 0.5;
 
-/// The walls of a maze in the coordinates that are observed.
+/// The walls of a maze in the coordinates of the observation.
 #[derive(Clone, Debug)]
 pub struct Walls {
     rows: usize,
@@ -40,14 +40,14 @@ pub struct Touches {
 }
 
 impl Touches {
-    /// The walls, in the order of their rows and columns.
+    /// Returns the walls, in the order of their rows and columns.
     pub fn as_slice(&self) -> &[Touch] {
         &self.list[..self.len]
     }
 }
 
 impl Walls {
-    /// The walls of a maze, moved by `-offset` along both axes.
+    /// Returns the walls of a maze, moved by `-offset` along both axes.
     pub fn new(maze: &Maze, offset: f64) -> Self {
         let (rows, columns) = (maze.rows(), maze.columns());
         let cells = (0..rows).flat_map(|row| (0..columns).map(move |col| Cell::new(row, col)));
@@ -55,7 +55,7 @@ impl Walls {
         Self { rows, columns, solid, offset }
     }
 
-    /// Whether a cell is a wall; everything outside the maze is.
+    /// Returns true if a cell is a wall; everything outside the maze is.
     pub(super) fn is_solid(&self, row: i32, column: i32) -> bool {
         match (usize::try_from(row), usize::try_from(column)) {
             (Ok(row), Ok(column)) if row < self.rows && column < self.columns => {
@@ -65,35 +65,35 @@ impl Walls {
         }
     }
 
-    /// How far the walls stand aside, along both axes.
+    /// Returns the offset of the walls, along both axes.
     pub fn offset(&self) -> f64 {
         self.offset
     }
 
-    /// Centre of a cell.
+    /// Returns the centre of a cell.
     pub fn centre(&self, row: i32, column: i32) -> Vec2d {
         [f64::from(row) - self.offset, f64::from(column) - self.offset]
     }
 
-    /// The cell around a place, as row and column; it may lie outside the maze.
+    /// Returns the cell around a position, as row and column; it may lie outside the maze.
     pub fn cell_at(&self, place: Vec2d) -> (i32, i32) {
         let [row, column] = place.map(|along| (along + self.offset).round() as i32);
         (row, column)
     }
 
-    /// Whether a place lies in a free cell.
+    /// Returns true if a position lies in a free cell.
     pub fn is_free(&self, place: Vec2d) -> bool {
         let (row, column) = self.cell_at(place);
         !self.is_solid(row, column)
     }
 
-    /// Row and column of every wall, in this order.
+    /// Returns row and column of every wall, in this order.
     pub fn cells(&self) -> impl Iterator<Item = (i32, i32)> {
         let cells = (0..self.rows as i32).flat_map(|row| (0..self.columns as i32).map(move |column| (row, column)));
         cells.filter(|&(row, column)| self.is_solid(row, column))
     }
 
-    /// The walls whose surface is closer than `margin` to that of a ball.
+    /// Returns the walls whose surface is closer than `margin` to that of a ball.
     pub fn touches(&self, place: Vec2d, margin: f64) -> Touches {
         let mut found = Touches { list: [Touch { normal: [0.0; 2], gap: 0.0 }; MOST], len: 0 };
         let (row, column) = self.cell_at(place);
@@ -115,14 +115,14 @@ impl Walls {
         found
     }
 
-    /// Whether a place is so far within its free cell that no wall can be near: most are.
+    /// Returns true if a position is so far within its free cell that no wall can be near: most are.
     fn is_clear(&self, place: Vec2d, row: i32, column: i32, margin: f64) -> bool {
         let [x, y] = sub(place, self.centre(row, column));
         x.abs().max(y.abs()) <= HALF - RADIUS - margin && !self.is_solid(row, column)
     }
 }
 
-/// How a ball lies to a wall.
+/// Returns the contact of a ball and a wall.
 fn touch(centre: Vec2d, place: Vec2d) -> Touch {
     let from = sub(place, centre);
     let nearest = add(centre, from.map(|along| along.clamp(-HALF, HALF)));
@@ -131,7 +131,7 @@ fn touch(centre: Vec2d, place: Vec2d) -> Touch {
     if distance > 0.0 {
         return Touch { normal: out.map(|along| along / distance), gap: distance - RADIUS };
     }
-    // The centre is inside the wall, which no legal play brings about: the nearest side is the way out.
+    // The centre is inside the wall, where no legal play leads: the direction is out through the nearest side.
     let axis = usize::from(from[1].abs() > from[0].abs());
     let mut normal = [0.0; 2];
     normal[axis] = if from[axis] < 0.0 { -1.0 } else { 1.0 };

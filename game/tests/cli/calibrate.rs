@@ -1,4 +1,4 @@
-//! Results beside recordings of people.
+//! Tests of the comparison of results with recordings of people.
 
 use std::{fs, path::Path};
 
@@ -8,7 +8,7 @@ use playbot_lab::game::Game;
 
 use crate::program::{code, done, ended, errors, json_lines, playbot};
 
-/// A recording of somebody who wins levels 0 to 11, each in so many ticks.
+/// Writes a recording of a person who wins levels 0 to 11, each in so many ticks.
 fn people(path: &Path, header: DemoHeader, ticks: &[usize]) {
     let mut writer = DemoWriter::create(path, header).expect("a fresh file");
     for (level, &ticks) in (0..).zip(ticks) {
@@ -83,7 +83,7 @@ fn level_files_are_known_by_what_is_in_them() {
     let folder = temporary.path();
     fs::create_dir(folder.join("levels")).expect("writable");
     let draw = |name: &str, seed: &str| {
-        let (json, _) = done(folder, &["level", "coinrun", "--mode", "easy", "--seed", seed, "--json"]);
+        let (json, _) = done(folder, &["level", "coinrun", "--mode", "easy", "--level", seed, "--json"]);
         fs::write(folder.join("levels").join(name), json).expect("writable");
     };
     draw("a.json", "1");
@@ -111,5 +111,5 @@ fn level_files_are_known_by_what_is_in_them() {
     assert!(words.contains("With 1 level, too few are shared"), "{words}");
     draw("b.json", "9");
     let (_, words) = ended(folder, &calibrate, 3);
-    assert!(words.contains("are not those that were tested"), "{words}");
+    assert!(words.contains("changed since the test"), "{words}");
 }

@@ -1,4 +1,4 @@
-//! Detectors as the command line names them.
+//! Tests of detectors on the command line.
 
 use std::fs;
 

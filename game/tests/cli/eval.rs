@@ -1,4 +1,4 @@
-//! Measurements and what is drawn of them.
+//! Tests of measurements and their plots.
 
 use crate::program::{code, errors, lines, playbot};
 
@@ -50,14 +50,14 @@ fn a_measurement_outlives_its_plot() {
     let line = svg.split("<polyline points=\"").find(|line| line.contains("stroke-width=\"1.8\"")).expect("a trail");
     let (x, y) = line.split(' ').next().and_then(|point| point.split_once(',')).expect("a point");
     assert!(svg.contains(&format!("<circle cx=\"{x}\" cy=\"{y}\" r=\"6\"")), "it begins at {x}, {y}, not at the start");
-    // A name so long that the temporary one, with the number of the process behind it, is too long for a file: that is found
-    // out only when it is written.
+    // A name so long that the temporary one, with the number of the process behind it, is too long for a file. That
+    // shows only when it is written.
     let late = eval(&format!("{}.svg", "x".repeat(245)));
     assert_eq!(code(&late), 2, "{}", errors(&late));
     assert!(String::from_utf8_lossy(&late.stdout).contains("right-jump"), "the table is there all the same");
 }
 
-#[cfg(all(target_os = "linux", feature = "camera"))]
+#[cfg(all(target_os = "linux", feature = "screen"))]
 #[test]
 fn cameras_work_silently_without_a_desktop() {
     let folder = tempfile::tempdir().expect("a folder");

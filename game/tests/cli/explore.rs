@@ -1,4 +1,4 @@
-//! Exploring a level from the shell.
+//! Tests of exploring a level from the shell.
 
 use std::fs;
 
@@ -69,7 +69,7 @@ fn mistakes_are_told_before_anything_is_explored() {
             "cell 900,4 lies outside of the level: its cells go from 0,0",
         ),
         (&["coinrun", "--level", "hard:0", "--cell", "4"], "theirs is 2, such as"),
-        (&["coinrun", "--sticky", "2"], "it lies between 0 and 1"),
+        (&["coinrun", "--sticky", "2"], "write a number from 0 to 1"),
         (&["coinrun", "--cell-size", "0"], "the size of a cell is 0"),
         (&["coinrun", "--steps", "0"], "--steps"),
         (&["coinrun", "--until", "solvd"], "did you mean `solved`?"),
@@ -78,7 +78,7 @@ fn mistakes_are_told_before_anything_is_explored() {
         (&["coinrun", "--png", "x.svg"], "written as .png"),
         (&["ant", "--level", "chase:0", "--png", "x.png"], "has no floor plan of level chase:0"),
         (&["coinrun", "--force"], "--out <FILE>"),
-        (&["coinrun", "--cell", "a", "--out", "a.demo"], "`a` is no cell"),
+        (&["coinrun", "--cell", "a", "--out", "a.demo"], "`a` is not a cell"),
         (&["coinrn"], "did you mean `coinrun`?"),
     ] {
         let output = playbot(folder, &[&["explore"], args].concat());

@@ -1,4 +1,4 @@
-//! Findings of tests, replayed and looked for again.
+//! Tests of findings, replayed and tested again.
 
 use std::{fs, path::Path};
 
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::program::{code, done, ended, errors, json_lines, playbot};
 
-/// The files of findings of a test, by name.
+/// Returns the files of findings of a test, by name.
 fn findings(folder: &Path, out: &str) -> Vec<(String, Vec<u8>)> {
     let entries = fs::read_dir(folder.join(out).join("findings")).expect("findings");
     let mut found: Vec<_> = entries
@@ -88,7 +88,7 @@ fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires
     done(folder, &["level", "maze2d", "--file", "sealed.json", "--png", "b.png"]);
     let [seen, level] = ["a.png", "b.png"].map(|name| fs::read(folder.join(name)).expect("drawn"));
     assert!(seen == level, "both are the level");
-    // As reports name it, from the folder of the results: the level file is in a folder above.
+    // Named as in reports, from the folder of the results: the level file is in a folder above.
     let (results, below) = (folder.join("out"), format!("findings/{name}"));
     let shorter = ["replay", &below, "--minimise", "--out", "short.finding"];
     assert!(done(&results, &shorter).0.contains("it happens again"), "{name}");
@@ -109,11 +109,11 @@ fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires
     assert!(table.contains("until 2027-01-31: new level is drawn"), "{table}");
     assert!(words.contains("there is no finding none, though it is pinned"), "{words}");
     assert!(regress(&["--today", "2027-02-01"], 1).1.contains("has expired on 2027-01-31"));
-    assert!(regress(&["--today", "soon"], 3).1.contains("is no day"));
+    assert!(regress(&["--today", "soon"], 3).1.contains("is not a date"));
 
     write(&open);
     let (_, words) = ended(folder, &["replay", &file], 3);
-    assert!(words.contains("it was changed since") && words.contains("remove the finding"), "{words}");
+    assert!(words.contains("it has changed") && words.contains("remove the finding"), "{words}");
     fs::remove_file(folder.join("sealed.json")).expect("it is there");
     let (_, words) = ended(folder, &["replay", &file], 3);
     assert!(
@@ -135,11 +135,11 @@ fn what_is_no_finding_is_told() {
     fs::create_dir(folder.join("empty")).expect("writable");
     for (args, words) in [
         (&["replay", "none.finding"][..], "none.finding: there is no such file"),
-        (&["replay", "a.demo"], "a recording, but of no finding"),
+        (&["replay", "a.demo"], "a recording, but not a finding"),
         (&["replay", "a.demo", "--minimise"], "--out"),
         (&["replay", "a.demo", "--apng", "a.gif"], ".png"),
         (&["test", "--regress", "empty"], "empty has no findings"),
-        (&["test", "--regress", "none"], "none is no folder"),
+        (&["test", "--regress", "none"], "none is not a folder"),
         (&["replay", "empty"], "empty has no findings"),
         (&["test", "coinrun", "--regress", "empty"], "--regress"),
         (&["test", "--today", "2027-01-31"], "--regress"),

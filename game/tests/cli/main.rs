@@ -1,4 +1,4 @@
-//! The program as its users call it.
+//! Tests of the program through its command line.
 
 mod calibrate;
 mod detectors;

@@ -1,4 +1,4 @@
-//! Joining shards takes nothing away, whatever is asked for.
+//! Tests of joining shards: no option of it loses data.
 
 use std::fs;
 

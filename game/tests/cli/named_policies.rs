@@ -1,4 +1,4 @@
-//! Policies that are tested under names of their own.
+//! Tests of policies with names of their own.
 
 use std::{fs, path::Path};
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::program::{code, done, ended, errors, playbot};
 
-/// Writes a policy that was hardly trained.
+/// Writes a policy with hardly any training.
 fn write_policy(folder: &Path, name: &str) {
     let text = r#"(game: "coinrun", train: "easy:0..3", test: "easy:4..5", steps: 128, arenas: 8, worlds: 2,
         algorithm: "ppo", ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8]))"#;
@@ -15,14 +15,14 @@ fn write_policy(folder: &Path, name: &str) {
     done(folder, &["policy", "export", "--run", "run", "--out", name]);
 }
 
-/// The testers, as results have them.
+/// Returns the testers in the results.
 fn tested(folder: &Path, out: &str) -> Value {
     let text = fs::read_to_string(folder.join(out).join("results.json")).expect("results");
     let results: Value = serde_json::from_str(&text).expect("JSON");
     results["testers"].clone()
 }
 
-/// Their names and files.
+/// Returns their names and files.
 fn testers(folder: &Path, out: &str) -> Vec<(String, Option<String>)> {
     let text = |value: &Value| value.as_str().map(str::to_owned);
     let testers = tested(folder, out);

@@ -1,10 +1,10 @@
-//! Paths on the command line: what is not here is not taken from elsewhere, and advice can be followed.
+//! Tests of paths on the command line: a missing file is not taken from elsewhere, and advice can be followed.
 
 use std::{fs, path::Path};
 
 use crate::program::{done, ended};
 
-/// One update of PPO.
+/// Writes an experiment with one update of PPO.
 fn write_experiment(folder: &Path) {
     let text = r#"(game: "coinrun", train: "easy:0..3", test: "easy:4..5", steps: 128, arenas: 8, worlds: 2,
         algorithm: "ppo", ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8]))"#;

@@ -1,4 +1,4 @@
-//! Planting defects from the shell.
+//! Tests of planting defects from the shell.
 
 use std::{fs, path::Path};
 
@@ -6,7 +6,7 @@ use crate::program::{code, done, errors, json_lines, playbot};
 
 const SMALL: [&str; 9] = ["bugs", "make", "coinrun", "--per-kind", "1", "--sound", "6", "--seed", "3"];
 
-/// Names and bytes of the files of a set.
+/// Returns the names and bytes of the files of a set.
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let mut found = Vec::new();
     for folder in [folder.to_owned(), folder.join("levels")] {

@@ -1,4 +1,4 @@
-//! A change that breaks levels is told from noise.
+//! Tests that a change which breaks levels is distinguished from noise.
 
 use std::{collections::BTreeSet, fs, path::Path};
 
@@ -14,12 +14,12 @@ fn name(seed: u64) -> String {
     format!("levels/{seed:03}.json")
 }
 
-/// Draws sound levels into files, as `playbot level --json` prints them.
+/// Writes unmutated levels into files, as `playbot level --json` prints them.
 fn draw(folder: &Path, seeds: impl IntoIterator<Item = u64>) {
     fs::create_dir_all(folder.join("levels")).expect("writable");
     let game = CoinRun::default();
     for seed in seeds {
-        let request = LevelRequest { mode: Some("hard"), seed: Some(seed), ..LevelRequest::default() };
+        let request = LevelRequest { mode: Some("hard"), level: Some(seed), ..LevelRequest::default() };
         let shown = game.show_level(&request).unwrap_or_else(|error| panic!("{seed}: {error}"));
         fs::write(folder.join(name(seed)), shown.json).expect("writable");
     }
@@ -49,7 +49,7 @@ fn wall_in(level: &mut Value) {
     paint(level, |x, _, letter| if x.abs_diff(at) == 2 { '#' } else { letter });
 }
 
-/// Hangs the coin far higher than anybody jumps.
+/// Hangs the coin out of reach of every jump.
 fn lift(level: &mut Value) {
     let (at, up) = coin(level);
     paint(level, |x, y, letter| match (x, y) {
@@ -60,7 +60,7 @@ fn lift(level: &mut Value) {
     level["coin"] = json!([at, 60]);
 }
 
-/// Floods all that is between the start and the coin.
+/// Floods everything between the start and the coin.
 fn flood(level: &mut Value) {
     let (at, _) = coin(level);
     paint(level, |x, y, letter| match (x, y) {
@@ -74,7 +74,7 @@ fn flood(level: &mut Value) {
     level["order"] = "".into();
 }
 
-/// The levels in lists of a comparison.
+/// Returns the levels in lists of a comparison.
 fn named(folder: &Path, out: &str, lists: &[&str]) -> BTreeSet<String> {
     let text = fs::read_to_string(folder.join(out).join("against.json")).expect("a comparison");
     let comparison: Value = serde_json::from_str(&text).expect("JSON");
@@ -122,7 +122,7 @@ fn the_same_code_raises_no_alarm_with_twenty_other_seeds() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     draw(folder, 0..25);
-    // Fewer episodes could not be told from noise in so many levels, and would prove nothing here.
+    // Fewer episodes would leave noise in so many levels, and would prove nothing here.
     let plan = [
         "test",
         "coinrun",

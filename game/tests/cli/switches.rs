@@ -1,4 +1,4 @@
-//! Each switch changes what it says: the file, the number, or who plays.
+//! Tests of switches: each changes the file, the number or the player that it names.
 
 use std::{fs, path::Path, time::Instant};
 
@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::program::{code, command, done, errors, json_lines, lines, playbot};
 
-/// Standard output, line by line as JSON, of a call that passes.
+/// Returns the standard output of a call that passes, line by line as JSON.
 fn rows(folder: &Path, args: &[&str]) -> Vec<Value> {
     json_lines(&done(folder, args).0)
 }
@@ -15,7 +15,7 @@ fn bytes(folder: &Path, file: &str) -> Vec<u8> {
     fs::read(folder.join(file)).unwrap_or_else(|error| panic!("{file}: {error}"))
 }
 
-/// PPO on two levels, updates of 128 steps, and skills that are learned in no time.
+/// Writes an experiment: PPO on two levels, updates of 128 steps, and skills that are learned very fast.
 fn write_experiment(folder: &Path) {
     let text = r#"(
         game: "coinrun", train: "easy:0..3", test: "easy:64..65", demos: "few.demo", steps: 256, arenas: 8, worlds: 2,
@@ -247,31 +247,35 @@ fn levels_and_traces_are_those_of_the_mode_and_the_seed() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     let level = |more: &[&str]| done(folder, &[&["level", "coinrun"], more].concat()).0;
-    let plain = level(&["--seed", "3"]);
-    assert_ne!(level(&["--seed", "4"]), plain);
-    assert_ne!(level(&["--seed", "3", "--mode", "easy"]), plain);
-    assert_eq!(level(&["--seed", "3", "--mode", "hard"]), plain, "that is the default");
+    let plain = level(&["--level", "3"]);
+    assert_ne!(level(&["--level", "4"]), plain);
+    assert_ne!(level(&["--level", "3", "--mode", "easy"]), plain);
+    assert_eq!(level(&["--level", "3", "--mode", "hard"]), plain, "that is the default");
     let told = |args: &[&str]| done(folder, args).1;
     assert!(
-        told(&["level", "coinrun", "--seed", "3"]).contains("no --mode is named: hard, which is trained in, level 3")
+        told(&["level", "coinrun", "--level", "3"]).contains("no --mode is named: hard, which is trained in, level 3")
     );
-    assert!(told(&["level", "maze2d", "--seed", "3"]).contains("no --mode is named: medium, which is trained in"));
+    assert!(told(&["level", "maze2d", "--level", "3"]).contains("no --mode is named: medium, which is trained in"));
     assert_eq!(level(&["--levels", "hard:3..9"]), plain);
+    let (old, warning) = done(folder, &["level", "coinrun", "--seed", "3"]);
+    assert_eq!(old, plain, "--seed names the level for one more version");
+    assert!(warning.contains("warning: --seed 3") && warning.contains("for a level use --level 3"), "{warning}");
+    assert!(!told(&["level", "coinrun", "--level", "3"]).contains("warning"));
     let recorded = told(&["record", "coinrun", "--steps", "20", "--out", "usual.demo"]);
     assert!(recorded.contains("recording hard:0..499, but for the held-out levels hard:64..1087"), "{recorded}");
     let seen = told(&["record", "coinrun", "--levels", "hard:60..70", "--steps", "20", "--out", "seen.demo"]);
     assert!(seen.contains("level 64 is, or looks like, one") && seen.contains("--hold-out hard:64..1087"), "{seen}");
-    let described: Value = serde_json::from_str(&level(&["--seed", "3", "--json"])).expect("one line of JSON");
+    let described: Value = serde_json::from_str(&level(&["--level", "3", "--json"])).expect("one line of JSON");
     assert!(described.is_object(), "{described}");
 
-    // Long enough to meet what levels differ in.
+    // Long enough to meet the differences between levels.
     let actions = ["8"; 60].join(",");
     let trace = |more: &[&str]| done(folder, &[&["trace", "coinrun", "--actions", &actions], more].concat()).0;
-    let here = trace(&["--mode", "hard", "--seed", "2", "--json"]);
+    let here = trace(&["--mode", "hard", "--level", "2", "--json"]);
     assert!(here.lines().all(|step| serde_json::from_str::<Value>(step).is_ok_and(|step| step.is_array())), "{here}");
-    assert_eq!(trace(&["--seed", "2", "--json"]), here, "hard is the default");
-    assert_ne!(trace(&["--mode", "easy", "--seed", "2", "--json"]), here);
-    let table = trace(&["--seed", "2"]);
+    assert_eq!(trace(&["--level", "2", "--json"]), here, "hard is the default");
+    assert_ne!(trace(&["--mode", "easy", "--level", "2", "--json"]), here);
+    let table = trace(&["--level", "2"]);
     assert!(table.lines().count() > here.lines().count(), "a head, and a line for each step: {table}");
     assert!(table.lines().all(|line| serde_json::from_str::<Value>(line).is_err()), "{table}");
 }
@@ -280,12 +284,13 @@ fn levels_and_traces_are_those_of_the_mode_and_the_seed() {
 fn what_happens_inside_is_told_to_those_who_ask() {
     let temporary = tempfile::tempdir().expect("a folder");
     let told = |more: &[&str]| {
-        let doctor = ["doctor", "maze2d", "--ticks", "2", "--seed", "6", "--json"];
+        let doctor = ["doctor", "maze2d", "--ticks", "2", "--level", "6", "--seed", "5", "--json"];
         let mut command = command(temporary.path(), &[&doctor[..], more].concat());
         let output = command.env_remove("RUST_LOG").output().expect("the program starts");
         assert_eq!(code(&output), 0, "{}", errors(&output));
         let report = lines(&output).remove(0);
-        assert_eq!((&report["ticks"], &report["seed"], &report["mode"]), (&json!(2), &json!(6), &json!("medium")));
+        assert_eq!((&report["ticks"], &report["mode"]), (&json!(2), &json!("medium")));
+        assert_eq!((&report["level"], &report["seed"]), (&json!(6), &json!(5)));
         errors(&output)
     };
     assert!(!told(&[]).contains("DEBUG"));

@@ -1,4 +1,4 @@
-//! Verdicts about levels.
+//! Tests of verdicts about levels.
 
 use std::{fs, path::Path, process::Output};
 
@@ -62,7 +62,7 @@ fn the_demonstrator_solves_levels_that_a_blind_bot_does_not() {
         "{junit}"
     );
     let summary = read(folder, "blind/summary.md");
-    assert!(summary.contains("| random |") && summary.contains("of the open places were visited"), "{summary}");
+    assert!(summary.contains("| random |") && summary.contains("of the open squares were visited"), "{summary}");
 }
 
 #[test]
@@ -101,7 +101,7 @@ fn results_say_where_bots_went_and_what_killed_them() {
     assert!(page.contains("<figure><svg") && !page.contains("<form id=\"maps\""));
 }
 
-/// A line of results as it was before there were maps.
+/// Returns a line of results as it was before there were maps.
 fn without_maps(line: &str) -> String {
     let line = line.replace("\"maps\":\"all\",", "");
     if !line.starts_with("{\"level\":") {
@@ -139,7 +139,7 @@ fn threads_shards_and_a_kill_change_no_byte() {
         done(folder, &merge);
         assert_same(folder, "whole", &joined);
     }
-    // What a kill leaves: some levels, half a line, no results.
+    // The state after a kill: some levels, half a line, no results.
     fs::create_dir(folder.join("killed")).expect("writable");
     let journal = read(folder, "whole/levels.jsonl");
     let torn: String = journal.lines().take(5).map(|line| format!("{line}\n")).chain(["{\"level\":".into()]).collect();
@@ -147,7 +147,7 @@ fn threads_shards_and_a_kill_change_no_byte() {
     fs::copy(folder.join("whole/test.json"), folder.join("killed/test.json")).expect("writable");
     let output = test(folder, "killed", &[&plan[..], &["--resume"]].concat());
     assert_eq!(code(&output), 0, "{}", errors(&output));
-    assert!(errors(&output).contains("the last 9 bytes are no whole level"), "{}", errors(&output));
+    assert!(errors(&output).contains("the last 9 bytes are an incomplete level"), "{}", errors(&output));
     assert_same(folder, "whole", "killed");
     let other = test(folder, "killed", &["--levels", "easy:3..16", "--bot", "random", "--resume"]);
     assert_eq!(code(&other), 3);
@@ -200,8 +200,7 @@ fn a_level_that_no_longer_exists_as_it_was_is_named_and_the_same_code_raises_no_
     // The file stands for its folder.
     let words = run("same", &["--seed", "2", "--against", "before/results.json"], 0);
     assert!(words.contains("nothing has changed by more than chance in 30 levels"), "{words}");
-    // Earlier results in which level 7 was not solved by the one that leaves nothing to chance, and level 3 was proved
-    // unsolvable.
+    // Earlier results in which level 7 was not solved by the deterministic tester, and level 3 was proved unsolvable.
     let before = unsealed(&read(folder, "before/results.json"));
     let changed: Vec<String> = before.lines().map(|line| changed(line, "7", "3")).collect();
     fs::create_dir(folder.join("other")).expect("writable");
@@ -221,7 +220,7 @@ fn a_level_that_no_longer_exists_as_it_was_is_named_and_the_same_code_raises_no_
     }
 }
 
-/// A line of results in which `search` failed on one level, and another level was proved unsolvable.
+/// Returns a line of results in which `search` failed on one level, and another level was proved unsolvable.
 fn changed(line: &str, failed: &str, unsolvable: &str) -> String {
     let is_level = |number: &str| line.contains(&format!("\"level\":\"hard:{number}\""));
     if !is_level(failed) && !is_level(unsolvable) {
@@ -249,7 +248,7 @@ fn the_page_has_pictures_of_the_levels_and_is_made_again_to_the_byte() {
     assert!(read(folder, "pages/again.html") == page);
     let (_, words) = ended(folder, &["report", "html", "none"], 3);
     assert!(words.contains("none has no results.json"), "{words}");
-    // Of another version of the game there are numbers, and no pictures.
+    // For another version of the game there are numbers, and no pictures.
     let results = unsealed(&read(folder, "out/results.json")).replace("\"game_version\":1", "\"game_version\":0");
     fs::write(folder.join("out/results.json"), results).expect("writable");
     done(folder, &["report", "html", "out"]);

@@ -1,4 +1,4 @@
-//! Traces.
+//! Tests of traces.
 
 use serde_json::Value;
 
@@ -8,15 +8,17 @@ use crate::program::{code, errors, lines, playbot};
 fn traces_stop_at_the_end_and_read_back_exactly() {
     let folder = tempfile::tempdir().expect("a folder");
     let actions = vec!["8"; 200].join(",");
-    let output =
-        playbot(folder.path(), &["trace", "coinrun", "--mode", "hard", "--seed", "0", "--actions", &actions, "--json"]);
+    let output = playbot(
+        folder.path(),
+        &["trace", "coinrun", "--mode", "hard", "--level", "0", "--actions", &actions, "--json"],
+    );
     let steps = lines(&output);
     assert_eq!(steps.len(), 63);
     assert_eq!(steps[0], serde_json::json!([1.5999999, 3.0787, 0.1, 1.5, 0, 0]));
     assert_eq!((&steps[62][4], &steps[62][5]), (&Value::from(10), &Value::from(1)));
     std::fs::write(folder.path().join("actions.txt"), actions.replace(',', "\n")).expect("writable");
     let from_file =
-        playbot(folder.path(), &["trace", "coinrun", "--seed", "0", "--actions-file", "actions.txt", "--json"]);
+        playbot(folder.path(), &["trace", "coinrun", "--level", "0", "--actions-file", "actions.txt", "--json"]);
     assert_eq!(output.stdout, from_file.stdout);
     let wrong = playbot(folder.path(), &["trace", "coinrun", "--actions", "99", "--json"]);
     assert_eq!(code(&wrong), 3);

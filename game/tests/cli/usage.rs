@@ -1,5 +1,7 @@
-//! Mistakes on the command line and in experiments.
+//! Tests of mistakes on the command line and in experiments.
 
+#[cfg(feature = "window")]
+use crate::program::command;
 use crate::program::{code, errors, lines, playbot};
 
 #[test]
@@ -11,7 +13,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["trace", "coinrun", "--mode", "medium", "--actions", "7"], "valid: easy, hard"),
         (&["trace", "coinrun"], "<--actions <ACTIONS>|--actions-file <FILE>>"),
         (&["trace", "coinrun", "--actions", "1", "--actions-file", "f"], "cannot be used with"),
-        (&["trace", "coinrun", "--actions-file", "f"], "name actions with --actions 0,1,2, or with --actions-file"),
+        (&["trace", "coinrun", "--actions-file", "f"], "give actions with --actions 0,1,2, or with --actions-file"),
         (&["trace", "ant", "--actions", "1"], "`playbot view ant --episode`"),
         (&["demo", "ls", "none"], "playbot record GAME --out none/my.demo"),
         (&["demo", "show", "none.demo"], "playbot record GAME --out none.demo"),
@@ -19,7 +21,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["policy", "show", "none.policy"], "playbot policy export --run RUN --out none.policy"),
         (&["policy", "export", "--run", "none", "--out", "o"], "`playbot train --run none`"),
         (&["eval", "--bot", "serch"], "did you mean `search`?"),
-        (&["eval"], "nobody to measure"),
+        (&["eval"], "no player to measure"),
         (&["eval", "--bot", "random", "--levels", "hard"], "mode:first..last"),
         (&["bench", "--case", "nonsense"], "sim/coinrun/vector"),
         (&["bench", "--threads", "3"], "try `--arenas 66`"),
@@ -91,7 +93,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["config", "show", "--set", "arenas=0"], "`arenas=0`: must be at least 1"),
         (&["config", "show", "--set", "ppo.lr=NaN"], "`ppo.lr=NaN`: `ppo.lr` must be"),
         (&["config", "show", "--set", "game=conrun"], "did you mean `coinrun`?"),
-        // A game without a picture is refused in the tests of games that are not ours.
+        // The refusal of a game without a picture is in the tests of foreign games.
         #[cfg(not(feature = "camera"))]
         (&["config", "show", "--set", "observation=Camera"], "this program was built without cameras"),
         (
@@ -116,6 +118,36 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         assert!(errors(&output).contains(words), "{args:?}: {}", errors(&output));
     }
     assert!(!folder.path().join("q.demo").exists(), "nothing was recorded");
+}
+
+/// Refusals of `play` that need no display to be seen.
+#[cfg(feature = "window")]
+#[test]
+fn a_window_that_cannot_open_is_refused_before_anything_is_recorded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let refuse = |display: Option<&str>, args: &[&str], words: &[&str]| {
+        let mut command = command(folder.path(), &[&["play", "coinrun", "--record", "a.demo"], args].concat());
+        command.env_remove("DISPLAY").envs(display.map(|display| ("DISPLAY", display)));
+        let (_, errors) = playbot_shell::ended(command, 3);
+        assert!(words.iter().any(|words| errors.contains(words)), "{args:?}: {errors}");
+        assert!(!folder.path().join("a.demo").exists(), "no recording without a window");
+    };
+    for (args, words) in [
+        (&["--mode", "hrad"][..], "did you mean `hard`?"),
+        (&["--bot", "serch"], "did you mean `search`?"),
+        (&["--mode", "easy", "--levels", "hard:0..3"], "different modes"),
+        (&["--levels", "0..3", "--level", "4"], "none of the levels hard:0..3"),
+        (&["--policy", "not-there"], "not-there"),
+        (&["--run", "not-there"], "not-there"),
+        (&["--bot", "search", "--policy", "b"], "cannot be used with"),
+    ] {
+        refuse(None, args, &[words]);
+    }
+    if cfg!(target_os = "linux") {
+        refuse(None, &[], &["DISPLAY is not set"]);
+        // The second where the machine does not even have the library.
+        refuse(Some(":9999"), &[], &["no X server answers at DISPLAY=:9999", "install libx11-6"]);
+    }
 }
 
 #[test]

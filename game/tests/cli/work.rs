@@ -1,4 +1,4 @@
-//! From recordings to reports.
+//! Tests of the path from recordings to reports.
 
 use std::process::Output;
 
@@ -14,7 +14,7 @@ const TINY: &str = r#"(
     eval: (episodes_per_level: 1),
 )"#;
 
-/// A folder with the tiny experiment, and one in it for its recordings.
+/// Returns a folder with the tiny experiment, and one in it for its recordings.
 fn prepared() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("tiny.ron"), TINY).expect("writable");
@@ -168,14 +168,14 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
         "{exported}"
     );
 
-    // A run knows what its skills have seen, though it was trained on other levels.
+    // The metadata of a run has the levels of its skills, though it was trained on other levels.
     let train = [&skills[..], &["--run", "runs/b"]].concat();
     assert_eq!(with("train", &train).0, 0);
     let (refused, words) = with("eval", &["--run", "runs/b", "--set", "test=hard:11..12"]);
     assert!(refused == 3 && words.contains("runs/b has learned from hard:8..11, among others,"), "{words}");
     assert_eq!(with("eval", &["--run", "runs/b"]).0, 0);
 
-    // A policy file knows what both have.
+    // The metadata of a policy file has both.
     let exported = run(&["policy", "export", "--run", "runs/b", "--out", "b.policy"]);
     assert!(errors(&exported).contains("eval --policy b.policy --levels hard:64..65`"), "{}", errors(&exported));
     let card = run(&["policy", "show", "b.policy"]);
@@ -190,12 +190,12 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     let (refused, words) = with("eval", &["--policy", "bc.policy", "--set", "test=hard:11..12"]);
     assert!(refused == 3 && words.contains("bc.policy has learned from hard:8..11,"), "{words}");
 
-    // So does what is recorded of it, of which nobody takes note: whoever records is told.
+    // Recordings of it have seen them too, which is not noted: `record` warns of it.
     let recorded = run(&["record", "coinrun", "--run", "runs/b", "--levels", "hard:200..201", "--out", "pupil.demo"]);
     let told = "the player has learned from hard:0..3 and hard:8..11: hold none of these out";
     assert!(code(&recorded) == 0 && errors(&recorded).contains(told), "{}", errors(&recorded));
 
-    // A run whose last checkpoint is not of its end is told from one that is.
+    // A run whose last checkpoint is not of its end is distinguished from one that is.
     let told = "runs/b is not trained to its end: it has ";
     assert!(!errors(&run(&["eval", "--run", "runs/b"])).contains(told));
     let mut checkpoints: Vec<_> = std::fs::read_dir(folder.path().join("runs/b/checkpoints"))
@@ -208,20 +208,20 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     let (measured, words) = with("eval", &["--run", "runs/b"]);
     assert!(measured == 0 && words.contains(told), "{words}");
 
-    // Settings of algorithms that are not trained are told.
+    // Settings of algorithms that are not trained are reported.
     let (trained, words) = with("train", &[&train[..], &["--force", "--set", "rlpd.critics=3"]].concat());
     assert!(
         trained == 0 && words.contains("--set rlpd.critics=3 changes nothing: score-ppo does not read `rlpd.critics`"),
         "{words}"
     );
 
-    // What differs from what the skills were learned with is refused; the same may be asked for again.
+    // Differences from the settings of the skills are refused; the same settings may be given again.
     let (refused, words) = with("train", &[&skills[..], &["--set", "skills.latent=4", "--run", "runs/c"]].concat());
     let told = "`--set skills.latent=4` asks for skills.latent=4, and the skill model has 2; drop the option";
     assert!(refused == 3 && words.contains(told), "{words}");
     assert_eq!(with("train", &[&skills[..], &["--set", "skills.latent=2", "--run", "runs/c"]].concat()).0, 0);
 
-    // Skills of another game are named before anything else is found wrong.
+    // Skills of another game are reported before any other mistake.
     let (refused, words) = with(
         "train",
         &[

@@ -1,10 +1,10 @@
-//! What is compared is comparable: the variants of an experiment differ in what their names say.
+//! Tests of fair comparisons: the variants of an experiment differ only as their names say.
 
 use playbot_lab::train::{Experiment, LearnerKind, study::study_runs};
 
 use crate::{MAZES, names, read};
 
-/// Experiments and their variants that are told to differ: one is named for another worth of entropy, one counts its steps in
+/// Known differences between variants of experiments: one is named for another entropy weight, one counts its steps in
 /// skills, and two have the schedule that suits them better.
 const TOLD: [(&str, &str, Aspect); 4] = [
     ("coinrun-sac", "sac-explore", Aspect::Entropy),
@@ -13,16 +13,16 @@ const TOLD: [(&str, &str, Aspect); 4] = [
     ("maze2d-mapped", "ppo", Aspect::Schedule),
 ];
 
-/// What is compared of a variant.
+/// The compared aspect of a variant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Aspect {
-    /// How much entropy is worth.
+    /// The entropy weight.
     Entropy,
-    /// How fast its learner learns and how often it goes over what was played.
+    /// The learning rate and the number of passes over a rollout.
     Schedule,
 }
 
-/// A variant's worth of entropy, and its schedule.
+/// Returns a variant's entropy weight, and its schedule.
 fn effort(experiment: &Experiment) -> [(Aspect, String); 2] {
     let of = |entropy, schedule| [(Aspect::Entropy, entropy), (Aspect::Schedule, schedule)];
     match experiment.algorithm.learner() {
@@ -70,8 +70,8 @@ fn variants_that_are_compared_have_the_same_entropy_and_schedule() {
     assert!(compared >= 50, "only {compared} runs are compared with others");
 }
 
-/// How a trained variant of a maze sees and values what comes: whether observations and rewards are normalised, and the
-/// discount of a tick.
+/// Returns the observation and value settings of a trained variant of a maze: normalisation of observations and
+/// rewards, and the discount of a tick.
 fn senses(experiment: &Experiment) -> (bool, bool, f64) {
     let (ppo, sac) = (&experiment.ppo, &experiment.sac);
     let (norm_obs, norm_reward, gamma) = match experiment.algorithm.learner() {
@@ -81,12 +81,12 @@ fn senses(experiment: &Experiment) -> (bool, bool, f64) {
     (norm_obs || (experiment.algorithm.needs_skills() && experiment.skills.norm_obs), norm_reward, gamma)
 }
 
-/// Told in the paper's tables: SAC and RLPD look 100 ticks ahead there. That is enough for balls to reach the goal, and ants of
-/// RLPD that look further do worse.
+/// Noted in the paper's tables: SAC and RLPD look 100 ticks ahead there. That is enough for balls to reach the goal,
+/// and ants of RLPD with a longer view do worse.
 const SHORT_SIGHTED: [&str; 4] =
     ["maze2d-medium-hour", "maze2d-large-hour", "antmaze-medium-hour", "antmaze-medium-placed"];
 
-/// Experiments of mazes whose agents are told more than in the paper's.
+/// Experiments of mazes with more observations than the paper's.
 const TOLD_MORE: [&str; 4] = ["maze2d-mapped", "antmaze-medium-placed", "antmaze-large-placed", "antmaze-xl-placed"];
 
 #[test]
@@ -102,7 +102,7 @@ fn every_method_of_a_maze_sees_normalised_numbers_and_looks_as_far_ahead() {
             assert_eq!(senses(&run.experiment), (true, true, gamma), "{name}, {}", run.variant);
         }
     }
-    // Each of the three is looked at.
+    // Each of the three is checked.
     let runs = study_runs(&read("antmaze-large-hour")).expect("valid");
     for variant in ["sac", "ppo"] {
         let run = &runs.iter().find(|run| run.variant == variant).expect("a variant").experiment;

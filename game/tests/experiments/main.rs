@@ -1,4 +1,4 @@
-//! The experiments that come with the program can be run: names, modes, levels and values fit.
+//! Tests that the shipped experiments can be run: names, modes, levels and values fit.
 
 mod fair;
 #[path = "../shared/program.rs"]
@@ -26,7 +26,7 @@ fn game(name: &str) -> &'static dyn Game {
 }
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/experiments")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../assets/experiments")
 }
 
 fn read(name: &str) -> Experiment {
@@ -78,7 +78,7 @@ fn what_is_held_out_is_not_trained_on_by_another_name() {
     assert_eq!(check("maze2d", "medium+fixed-start:0..9", "medium:9..9"), Ok(()), "another start");
 }
 
-/// Mazes of the paper's tables and figures, with the methods that are compared there.
+/// Mazes of the paper's tables and figures, with the compared methods.
 const MAZES: [(&str, &[&str]); 10] = [
     ("antmaze-medium", &["score-ppo", "sac", "ppo", "spirl-ppo", "rlpd"]),
     ("antmaze-large", &["score-ppo", "sac", "ppo", "spirl-ppo", "rlpd"]),
@@ -155,10 +155,11 @@ fn what_is_measured_elsewhere_was_learned_where_the_variant_says() {
 
 #[test]
 fn what_a_game_is_trained_with_by_itself_comes_with_the_program() {
-    let own: Vec<_> = GAMES.iter().filter_map(|game| Some((game.name(), game.experiment()?))).collect();
+    let own: Vec<_> =
+        GAMES.iter().filter_map(|game| Some((game.name(), game.tools().training.experiment()?))).collect();
     assert_eq!(own.iter().map(|(name, _)| *name).collect::<Vec<_>>(), ["coinrun", "maze2d", "antmaze"]);
     for (name, own) in own {
-        // Whoever has added the crate has no other files to build upon.
+        // A user of the crate has no other files to build upon.
         let experiment =
             parse_experiment(&own.text, Path::new("nowhere/own.ron")).unwrap_or_else(|e| panic!("{name}: {e}"));
         assert_eq!((own.origin.to_string(), &*experiment.game), (format!("assets/experiments/{name}.ron"), name));
@@ -167,14 +168,14 @@ fn what_a_game_is_trained_with_by_itself_comes_with_the_program() {
     }
 }
 
-/// The command with which an experiment's demonstrations are made, as its file says; none if it says none.
+/// Returns the command that makes an experiment's recordings, from its file, if it is there.
 fn recorded(name: &str) -> Option<Vec<String>> {
     let text = std::fs::read_to_string(folder().join(format!("{name}.ron"))).expect("readable");
     let line = text.lines().find_map(|line| line.trim_start_matches("//").trim().strip_prefix("playbot record "))?;
     Some(line.split_whitespace().map(str::to_owned).collect())
 }
 
-/// The value of an option of a command.
+/// Returns the value of an option of a command.
 fn value<'a>(args: &'a [String], option: &str) -> &'a str {
     let at = args.iter().position(|arg| arg == option).unwrap_or_else(|| panic!("{args:?} has no {option}"));
     &args[at + 1]

@@ -1,4 +1,4 @@
-//! Experiments with wrong values, lines in the wrong place and bytes that nobody wrote.
+//! Tests of experiments with wrong values, lines in the wrong position and random bytes.
 
 use std::{
     ops::Range,
@@ -14,20 +14,20 @@ use playbot_lab::{
 
 use crate::dice::Dice;
 
-/// Longest that reading and checking may take.
+/// Longest allowed time of reading and checking.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Experiments of every game and of all ways to learn.
+/// Experiments of every game and of all algorithms.
 const EXPERIMENTS: [&str; 5] = ["coinrun", "coinrun-pixels", "coinrun-sac", "maze2d-medium", "antmaze-medium"];
 
-/// An experiment with every key written out, a line each.
+/// Returns an experiment with every key written out, a line each.
 fn whole(name: &str) -> Vec<String> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("assets/experiments/{name}.ron"));
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("../assets/experiments/{name}.ron"));
     let text = read_experiment(&path).map(|experiment| experiment.to_ron()).expect("sound").expect("RON");
     text.lines().map(str::to_owned).collect()
 }
 
-/// What reading and checking says before any work is done.
+/// Returns the error of reading and checking, before any work is done.
 fn complaint(text: &str) -> Option<String> {
     let path = Path::new("x.ron");
     let begun = Instant::now();
@@ -43,21 +43,21 @@ fn complaint(text: &str) -> Option<String> {
     said
 }
 
-/// Whether an error says the line, and does so without pages of text.
+/// Returns true if an error names the line, and does so without pages of text.
 fn is_placed(error: &str) -> bool {
     let line = error.strip_prefix("x.ron:").and_then(|rest| rest.split(':').next());
     line.is_some_and(|line| line.parse::<usize>().is_ok()) && error.len() < 2000
 }
 
-/// The share of errors that say where, in percent.
+/// Returns the share of errors with a position, in percent.
 fn placed(errors: &[String]) -> usize {
     100 * errors.iter().filter(|error| is_placed(error)).count() / errors.len().max(1)
 }
 
-/// Numbers at which something ends.
+/// Extreme numbers.
 const EXTREMES: [&str; 6] = ["0", "-1", "NaN", "1e308", "18446744073709551615", "4294967295"];
 
-/// What is written only if it does something, with a number.
+/// Settings that are written only if they have an effect, with a number.
 const UNWRITTEN: [&str; 5] = [
     "weight_decay: 0.1,",
     "held_out: 0.1,",
@@ -66,7 +66,7 @@ const UNWRITTEN: [&str; 5] = [
     "augment: [Translate(1), Cutout(2)],",
 ];
 
-/// Where numbers stand in a text, also those in lists and brackets, but for those in quotes.
+/// Returns the ranges of numbers in a text, also those in lists and brackets, but for those in quotes.
 fn numbers(text: &str) -> Vec<Range<usize>> {
     let is_part = |byte: u8| byte.is_ascii_alphanumeric() || b"_.+-".contains(&byte);
     let (bytes, mut found, mut at) = (text.as_bytes(), Vec::new(), 0);
@@ -84,15 +84,15 @@ fn numbers(text: &str) -> Vec<Range<usize>> {
     found
 }
 
-/// Lines of a text, and where those of them stand that are to be changed.
+/// Joins lines of a text, and returns the range of the lines to change.
 fn joined(lines: &[String], chosen: Range<usize>) -> (String, Range<usize>) {
     let length = |lines: &[String]| lines.iter().map(|line| line.len() + 1).sum::<usize>();
     let start = length(&lines[..chosen.start]);
     (lines.join("\n"), start..start + length(&lines[chosen]))
 }
 
-/// The experiment with its numbers, and with one wherever there may be one: where there is none, or the list is empty, or the
-/// key is left out. Each text comes with the place of those of its numbers that are in no text before it.
+/// Returns the experiment with its numbers, and with one wherever there may be one: where there is none, or the list is
+/// empty, or the key is left out. Each text comes with the range of those of its numbers that are in no text before it.
 fn with_numbers(lines: &[String]) -> Vec<(String, Range<usize>)> {
     let mut texts = vec![joined(lines, 0..lines.len())];
     for (at, line) in lines.iter().enumerate() {
@@ -135,7 +135,7 @@ fn numbers_are_found_in_lists_and_brackets() {
     assert_eq!(found, ["1", "-4.5e-6", "7", "8", "9"]);
 }
 
-/// A text that was changed in one way.
+/// Returns a text that was changed in one way.
 fn mutant(lines: &[String], dice: &mut Dice) -> String {
     const VALUES: [&str; 16] = [
         "None",

@@ -1,4 +1,5 @@
-//! What an adversary, a bad disk or a slip of the keyboard does to files: nothing is accepted silently, and nothing panics.
+//! Tests of files damaged by an adversary, a bad disk or a slip of the keyboard: nothing is accepted silently, and
+//! nothing panics.
 
 mod dice;
 mod experiments;

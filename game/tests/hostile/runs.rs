@@ -1,4 +1,4 @@
-//! The files of a run with one flipped bit: said, passed over or left out, and never taken for what was written.
+//! Tests of the files of a run with one flipped bit: reported, skipped or left out, and never taken for the original.
 
 use std::{
     collections::BTreeSet,
@@ -26,7 +26,7 @@ fn experiment() -> Experiment {
     parse_experiment(text, Path::new("x.ron")).expect("sound")
 }
 
-/// A run that has ended, in a folder of its own.
+/// Trains a run to its end, in a folder of its own.
 fn trained(path: &Path) {
     let (game, experiment) = (CoinRun::default(), experiment());
     let mut trainer = Trainer::new(&game, &experiment, None, DeviceKind::Flex, 1).expect("it fits");
@@ -48,7 +48,7 @@ fn trained(path: &Path) {
     }
 }
 
-/// All files in a folder, by their path in it, without the event files, which are written and not read.
+/// Returns all files in a folder, by their path in it, without the event files, which are written and not read.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let (mut files, mut folders) = (Vec::new(), vec![folder.to_owned()]);
     while let Some(next) = folders.pop() {
@@ -70,12 +70,12 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// The lines of the metrics.
+/// Returns the lines of the metrics.
 fn lines(run: &Path, file: &str) -> BTreeSet<String> {
     fs::read_to_string(run.join(file)).expect("text").lines().map(str::to_owned).collect()
 }
 
-/// Steps of the checkpoint from which a run goes on.
+/// Returns the steps of the checkpoint from which a run is resumed.
 fn resumed(run: &Path) -> Result<u64, String> {
     let opened = RunDir::open_to_write(run).map_err(|error| error.to_string())?;
     let trainer = opened.run.resume(&CoinRun::default(), &opened.experiment, DeviceKind::Flex, 1);
@@ -117,7 +117,7 @@ fn one_flipped_bit_is_never_taken_for_what_was_written() {
                 _ if name.contains(&format!("step-{last:012}")) => {
                     assert!(went_on.is_ok_and(|step| step < last), "{where_}");
                 }
-                // An earlier checkpoint is not looked at while the last one is sound.
+                // An earlier checkpoint is not used while the last one is whole.
                 _ => assert_eq!(went_on, Ok(last), "{where_}"),
             }
         }

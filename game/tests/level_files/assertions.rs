@@ -1,4 +1,4 @@
-//! Assertions about level files, as a game's own tests make them.
+//! Tests of assertions about level files, as in a game's own tests.
 
 use std::{
     fs,
@@ -9,7 +9,7 @@ use std::{
 use playbot_games::coinrun::CoinRun;
 use playbot_lab::{level_files::level_files_mode, prelude::*};
 
-/// Draws a level of these rows, the first of which is the bottom one.
+/// Writes a level with these rows, the first of which is the bottom one.
 fn draw(folder: &Path, name: &str, rows: &[&str]) {
     let path = folder.join(name);
     fs::create_dir_all(path.parent().expect("below the folder")).expect("writable");
@@ -46,10 +46,10 @@ fn sound_files_pass_and_a_walled_coin_is_told_with_its_proof() {
     let found = message(|| test.assert_solvable());
     assert!(found.starts_with("1 of 2 levels was not solved by any tester (`coinrun`, files:"), "{found}");
     assert!(found.contains("broken/walled.json: proved-unsolvable\n  search: solved 0 of 1"), "{found}");
-    assert!(found.contains("\n  unreachable-goal: the coin cannot be reached: a search through all"), "{found}");
+    assert!(found.contains("\n  unreachable-goal: the coin cannot be reached: a search over all moves"), "{found}");
     assert!(found.contains("\n  an episode that failed:\n    playbot replay "), "{found}");
     assert!(found.contains("playbot test coinrun --levels ") && found.contains("files of levels are seen from "));
-    // Each file that is named replays.
+    // Each named file replays.
     let named: Vec<&str> = found.lines().filter_map(|line| line.strip_prefix("    playbot replay ")).collect();
     assert_eq!(named.len(), 2, "{found}");
     named.iter().for_each(|file| assert_replays(&game, file.trim_matches('\'')));

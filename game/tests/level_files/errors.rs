@@ -1,4 +1,4 @@
-//! What is wrong with a level file is told with its line.
+//! Tests that mistakes in a level file are reported with their line.
 
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
 use playbot_lab::{level_files::level_files_mode, prelude::*};

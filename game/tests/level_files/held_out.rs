@@ -1,4 +1,4 @@
-//! Held-out levels that are files.
+//! Tests of held-out levels that are files.
 
 use playbot_games::{coinrun::CoinRun, maze2d::Maze2d};
 use playbot_lab::{
@@ -33,7 +33,7 @@ fn a_copy_of_a_held_out_level_is_found_under_any_name() {
     assert!(!hidden.contains(&train.mode, 0) && hidden.contains(&train.mode, 1) && !hidden.contains(&train.mode, 2));
     assert!(!hidden.contains("hard", 0));
 
-    // What was trained on files has seen what was in them then, whatever becomes of them.
+    // A policy that was trained on files has seen their contents of that time, even if they change.
     let seen = seen_by_training(&game, &train);
     assert!(seen.levels.is_empty() && seen.level_files.len() == 3, "{seen:?}");
     std::fs::remove_dir_all(folder.path().join("train")).expect("removable");
@@ -62,13 +62,13 @@ fn what_a_file_says_that_it_has_seen_is_not_believed_beyond_reason() {
     assert_eq!(shown(&["hard:0..63"]), None);
     assert_eq!(shown(&["hard:127..130"]).as_deref(), Some("hard:127..130"));
     assert_eq!(shown(&["hard:0..63", "hard:90..90"]).as_deref(), Some("hard:90..90, among others"));
-    // No pattern is looked for on the disk, and no mode or range that there is not is taken for one.
+    // No pattern is looked for on the disk, and no missing mode or range is taken for one.
     assert_eq!(shown(&["files:/**", "files:/**/*.json:0..3", "no-such-mode:64..70", "hard", "", "hard:9..3"]), None);
     let other_game =
         SeenLevels { game: "maze2d".to_owned(), levels: vec!["hard:64..127".to_owned()], ..SeenLevels::default() };
     assert_eq!((hidden.shown_by(Some(&other_game)), hidden.shown_by(None)), (None, None));
 
-    // Small mazes are found by what they look like, too, but not among millions.
+    // Small mazes are also found by their walls, but not among millions.
     let game = Maze2d::default();
     let mazes = |first, last| LevelSplit { mode: "random+size=5x5".to_owned(), first, last };
     let test = mazes(0, 63);

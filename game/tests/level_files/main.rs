@@ -1,4 +1,4 @@
-//! Levels that are files: what games read, and what the program does with them.
+//! Tests of levels that are files, in games and in the program.
 
 mod assertions;
 mod errors;

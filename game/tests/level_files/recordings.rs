@@ -1,4 +1,4 @@
-//! Recordings of level files say which level they are of.
+//! Tests of recordings of level files, which name their level.
 
 use std::{fs, path::Path};
 
@@ -7,7 +7,7 @@ use serde_json::Value;
 use crate::program::{code, done, errors, playbot, said};
 
 fn draw(folder: &Path, name: &str, seed: &str) {
-    let (json, _) = done(folder, &["level", "coinrun", "--mode", "easy", "--seed", seed, "--json"]);
+    let (json, _) = done(folder, &["level", "coinrun", "--mode", "easy", "--level", seed, "--json"]);
     fs::create_dir_all(folder.join("levels")).expect("writable");
     fs::write(folder.join("levels").join(name), json).expect("writable");
 }
@@ -42,18 +42,18 @@ fn a_recording_refuses_another_level_of_the_same_name_and_follows_its_own_to_ano
     let (verified, words) = verify(folder);
     assert_eq!(verified, 1, "{words}");
     assert!(
-        words.contains("the level file levels/b.json has the hash ") && words.contains(", recorded was "),
+        words.contains("the level file levels/b.json has the hash ") && words.contains(" in the recording: "),
         "{words}"
     );
     let output = playbot(folder, &["view", "coinrun", "--demo", "a.demo", "--episode"]);
     assert_eq!(code(&output), 1);
     assert!(errors(&output).contains("levels/b.json has the hash"), "{}", errors(&output));
 
-    // So is a level that is gone.
+    // So is a missing level.
     fs::remove_file(folder.join("levels/b.json")).expect("removed");
     let (verified, words) = verify(folder);
     assert_ne!(verified, 0, "{words}");
-    assert!(words.contains("levels/b.json") && words.contains("not there any more"), "{words}");
+    assert!(words.contains("levels/b.json") && words.contains("is missing"), "{words}");
 }
 
 #[test]

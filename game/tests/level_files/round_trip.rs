@@ -1,4 +1,4 @@
-//! What is shown of a level reads back as a file and plays the same.
+//! Tests that the printed form of a level reads back as a file and plays the same.
 
 use std::path::Path;
 
@@ -19,7 +19,8 @@ use serde_json::json;
 const COINRUN: CoinRun = CoinRun { physics: false };
 const MAZE2D: Maze2d = Maze2d { physics: false };
 
-/// State hash, bits of the reward and bits of what is seen, tick by tick under random actions, to the end of the episode.
+/// Returns state hash, bits of the reward and bits of the observation, tick by tick under random actions, to the end of
+/// the episode.
 fn trace(game: &dyn Game, mode: &str, level: u64, seed: u64, ticks: usize) -> Vec<(u64, u32, Vec<u32>)> {
     game.check_mode(mode).expect("a mode");
     let (mut world, agents) = build_world(game, mode, seed, 0, 1);
@@ -43,9 +44,9 @@ fn show(game: &dyn Game, request: &LevelRequest) -> LevelView {
     game.show_level(request).unwrap_or_else(|error| panic!("{request:?}: {error}"))
 }
 
-/// Shows a level, reads it back, and compares what is shown and what is played.
+/// Prints a level, reads it back, and compares both prints and both episodes.
 fn assert_reads_back(game: &dyn Game, mode: &str, request: &LevelRequest, folder: &Path, seed: u64, ticks: usize) {
-    let level = request.seed.unwrap_or(0);
+    let level = request.level.unwrap_or(0);
     let path = folder.join(format!("level {level}.json"));
     let shown = show(game, request);
     std::fs::write(&path, &shown.json).expect("writable");
@@ -54,16 +55,16 @@ fn assert_reads_back(game: &dyn Game, mode: &str, request: &LevelRequest, folder
     let files = level_files_mode(&path.to_string_lossy());
     assert_eq!(trace(game, &files, 0, seed, ticks), trace(game, mode, level, seed, ticks), "{mode}, level {level}");
     assert_eq!(
-        format!("{:?}", game.floor_plan(&files, 0)),
-        format!("{:?}", game.floor_plan(mode, level)),
+        format!("{:?}", game.tools().levels.floor_plan(&files, 0)),
+        format!("{:?}", game.tools().levels.floor_plan(mode, level)),
         "{mode}, level {level}"
     );
 }
 
-/// As [`assert_reads_back`] for a game of mazes and for agents that are told more, each with so many ticks.
+/// As [`assert_reads_back`] for a game of mazes and its variants with more observations, each with so many ticks.
 fn assert_mazes_read_back(games: [(&dyn Game, usize); 4], mode: &str, level: u64, seed: u64) {
     let folder = tempfile::tempdir().expect("a folder");
-    let request = LevelRequest { map: Some(mode), seed: Some(level), ..LevelRequest::default() };
+    let request = LevelRequest { map: Some(mode), level: Some(level), ..LevelRequest::default() };
     for (game, ticks) in games {
         assert_reads_back(game, mode, &request, folder.path(), seed, ticks);
     }
@@ -76,7 +77,7 @@ proptest! {
     fn levels_of_coinrun_play_as_their_files(level in any::<u32>(), hard in any::<bool>(), seed in 0u64..1000) {
         let folder = tempfile::tempdir().expect("a folder");
         let mode = if hard { "hard" } else { "easy" };
-        let request = LevelRequest { mode: Some(mode), seed: Some(level.into()), ..LevelRequest::default() };
+        let request = LevelRequest { mode: Some(mode), level: Some(level.into()), ..LevelRequest::default() };
         assert_reads_back(&COINRUN, mode, &request, folder.path(), seed, 300);
     }
 
@@ -113,7 +114,7 @@ proptest! {
 
 #[test]
 fn a_level_has_one_hash_however_its_file_is_laid_out_and_another_one_after_any_change() {
-    let shown = show(&COINRUN, &LevelRequest { mode: Some("hard"), seed: Some(3), ..LevelRequest::default() }).json;
+    let shown = show(&COINRUN, &LevelRequest { mode: Some("hard"), level: Some(3), ..LevelRequest::default() }).json;
     let hash = |text: &str| COINRUN.parse_level(text).expect("a level").hash();
     let value: serde_json::Value = serde_json::from_str(&shown).expect("JSON");
     assert_eq!(hash(&serde_json::to_string_pretty(&value).expect("text")), hash(&shown));

@@ -1,4 +1,4 @@
-//! Every verb that takes levels takes files.
+//! Tests that every verb with levels accepts files.
 
 use std::{fs, path::Path};
 
@@ -37,7 +37,7 @@ fn the_search_bot_solves_sound_files_and_no_walled_coin() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     for seed in ["1", "2", "3"] {
-        let mut drawn = level(folder, &["coinrun", "--mode", "easy", "--seed", seed]);
+        let mut drawn = level(folder, &["coinrun", "--mode", "easy", "--level", seed]);
         write(folder, &format!("sound/inner/{seed}.json"), &drawn);
         wall_in(&mut drawn);
         write(folder, &format!("walled/{seed}.json"), &drawn);
@@ -61,7 +61,7 @@ fn the_waypoint_bot_solves_sound_mazes_and_no_sealed_one() {
     let of_maze2d = |file: &str| success(folder, &["--set", "game=maze2d", "--bot", "waypoints", "--levels", file]);
     assert_eq!((of_maze2d("files:open.json"), of_maze2d("files:sealed.json")), (1.0, 0.0));
     let shown = done(folder, &["level", "maze2d", "--file", "sealed.json"]).0;
-    assert!(shown.contains("no way from the start to the goal"), "{shown}");
+    assert!(shown.contains("no path from the start to the goal"), "{shown}");
     assert!(level(folder, &["maze2d", "--file", "sealed.json"]).get("shortest_path_length").is_none());
     write(folder, "plain.json", &json!({ "rows": sealed }));
     done(folder, &["level", "antmaze", "--file", "plain.json", "--png", "sealed.svg"]);
@@ -72,34 +72,34 @@ fn levels_are_shown_traced_and_viewed_from_files() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     for seed in ["4", "5"] {
-        write(folder, &format!("levels/{seed}.json"), &level(folder, &["coinrun", "--seed", seed]));
+        write(folder, &format!("levels/{seed}.json"), &level(folder, &["coinrun", "--level", seed]));
     }
-    let plain = done(folder, &["level", "coinrun", "--seed", "5", "--png", "a.png"]).0;
+    let plain = done(folder, &["level", "coinrun", "--level", "5", "--png", "a.png"]).0;
     assert_eq!(done(folder, &["level", "coinrun", "--file", "levels/5.json", "--png", "b.png"]).0, plain);
-    assert_eq!(done(folder, &["level", "coinrun", "--mode", "files:levels/*.json", "--seed", "1"]).0, plain);
+    assert_eq!(done(folder, &["level", "coinrun", "--mode", "files:levels/*.json", "--level", "1"]).0, plain);
     assert_eq!(fs::read(folder.join("a.png")).expect("drawn"), fs::read(folder.join("b.png")).expect("drawn"));
 
     let actions = ["8"; 40].join(",");
     let trace =
         |more: &[&str]| done(folder, &[&["trace", "coinrun", "--actions", &actions, "--json"], more].concat()).0;
-    let fifth = trace(&["--seed", "5"]);
+    let fifth = trace(&["--level", "5"]);
     assert_eq!(trace(&["--levels", "files:levels/5.json"]), fifth);
-    assert_eq!(trace(&["--levels", "files:levels/*.json", "--seed", "1"]), fifth);
-    assert_eq!(trace(&["--levels", "files:levels/*.json"]), trace(&["--seed", "4"]));
-    assert_eq!(trace(&["--mode", "files:levels/*.json", "--seed", "1"]), fifth);
+    assert_eq!(trace(&["--levels", "files:levels/*.json", "--level", "1"]), fifth);
+    assert_eq!(trace(&["--levels", "files:levels/*.json"]), trace(&["--level", "4"]));
+    assert_eq!(trace(&["--mode", "files:levels/*.json", "--level", "1"]), fifth);
 
     let view = |more: &[&str]| {
         done(folder, &[&["view", "coinrun", "--tick", "9", "--out", "view.png"], more].concat());
         fs::read(folder.join("view.png")).expect("drawn")
     };
-    assert_eq!(view(&["--levels", "files:levels/*.json", "--seed", "1"]), view(&["--seed", "5"]));
+    assert_eq!(view(&["--levels", "files:levels/*.json", "--level", "1"]), view(&["--level", "5"]));
 
     fs::write(folder.join("pushes.txt"), "1 0\n0 1\n").expect("writable");
-    write(folder, "maze.json", &level(folder, &["maze2d", "--map", "medium+sparse", "--seed", "3"]));
+    write(folder, "maze.json", &level(folder, &["maze2d", "--map", "medium+sparse", "--level", "3"]));
     let pushes = |more: &[&str]| {
         done(folder, &[&["trace", "maze2d", "--actions-file", "pushes.txt", "--json"], more].concat()).0
     };
-    assert_eq!(pushes(&["--levels", "files:maze.json"]), pushes(&["--map", "medium+sparse", "--seed", "3"]));
+    assert_eq!(pushes(&["--levels", "files:maze.json"]), pushes(&["--map", "medium+sparse", "--level", "3"]));
 }
 
 #[test]
@@ -107,7 +107,7 @@ fn training_takes_files_too() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     for seed in ["1", "2", "3"] {
-        let drawn = level(folder, &["coinrun", "--mode", "easy", "--seed", seed]);
+        let drawn = level(folder, &["coinrun", "--mode", "easy", "--level", seed]);
         let part = if seed == "3" { "test" } else { "train" };
         write(folder, &format!("{part}/{seed}.json"), &drawn);
     }
@@ -139,9 +139,9 @@ fn what_is_wrong_with_files_is_said() {
         (&["record", "coinrun", "--levels", "files:bad.json", "--out", "a.demo"], "bad.json, line 4"),
         (&["level", "coinrun", "--file", "bad.json"], "bad.json, line 4"),
         (&["level", "coinrun", "--file", "none.json"], "cannot read none.json"),
-        (&["level", "coinrun", "--file", "good.json", "--seed", "1"], "--seed"),
+        (&["level", "coinrun", "--file", "good.json", "--level", "1"], "--level"),
         (&["view", "coinrun", "--levels", "files:bad.json"], "bad.json, line 4"),
-        (&["view", "coinrun", "--levels", "files:good.json", "--seed", "1"], "--seed 1 is none of the levels"),
+        (&["view", "coinrun", "--levels", "files:good.json", "--level", "1"], "--level 1 is none of the levels"),
         (&["view", "coinrun", "--levels", "files:good.json", "--mode", "easy"], "--mode"),
         (&["trace", "coinrun", "--levels", "files:bad.json", "--actions", "1"], "bad.json, line 4"),
         (&["record", "ant", "--levels", "files:good.json", "--out", "a.demo"], "`ant` has no level files"),

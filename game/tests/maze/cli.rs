@@ -1,4 +1,4 @@
-//! `playbot level` and `playbot eval --plot` as their users call them.
+//! Tests of `playbot level` and `playbot eval --plot` through the command line.
 
 use playbot_games::maze::{MazeSpec, generate};
 use serde_json::{Value, json};
@@ -29,11 +29,11 @@ fn a_level_is_rows_start_goal_and_the_length_of_its_path() {
 #[test]
 fn a_seed_makes_a_maze_and_options_shape_it() {
     let usual = generate(&MazeSpec::default(), 7).expect("a maze");
-    assert_eq!(level(&["maze2d", "--map", "random", "--seed", "7"])["rows"], json!(usual.to_rows()));
+    assert_eq!(level(&["maze2d", "--map", "random", "--level", "7"])["rows"], json!(usual.to_rows()));
     let wide = MazeSpec { rows: 9, columns: 13, corridor: 2, ..MazeSpec::default() };
     let map = "random+size=9x13+corridor=2";
     let rows = json!(generate(&wide, 64).expect("a maze").to_rows());
-    assert_eq!(level(&["antmaze", "--map", map, "--seed", "64"])["rows"], rows);
+    assert_eq!(level(&["antmaze", "--map", map, "--level", "64"])["rows"], rows);
 }
 
 #[test]
@@ -72,12 +72,12 @@ fn a_whole_mode_names_the_level_that_is_played() {
     let played = antmaze::generate(&mode, 3).expect("a level");
     assert_ne!(played.goal, played.maze.goal(), "the mode draws another goal than the map's");
     for game in ["antmaze", "antmaze-sighted", "antmaze-mapped", "antmaze-placed"] {
-        let shown = level(&[game, "--map", text, "--seed", "3"]);
+        let shown = level(&[game, "--map", text, "--level", "3"]);
         assert_eq!((&shown["start"], &shown["goal"]), (&json!(played.start), &json!(played.goal)));
     }
     let mode: maze2d::Maze2dMode = "medium+sparse".parse().expect("a mode");
     let played = maze2d::Maze2dLevel::new(&mode, 5).expect("a level");
-    let shown = level(&["maze2d", "--map", "medium+sparse", "--seed", "5"]);
+    let shown = level(&["maze2d", "--map", "medium+sparse", "--level", "5"]);
     assert_eq!((&shown["start"], &shown["goal"]), (&json!(played.start_cell), &json!(played.goal_cell)));
     assert_eq!(level(&["antmaze-sighted", "--map", "xl"]), level(&["antmaze", "--map", "xl"]));
 }
@@ -105,13 +105,13 @@ fn what_is_wrong_with_a_map_is_said() {
         (&["--map", "open"], &["(1, 3)", "border"]),
         (&["--map", "empty"], &["empty"]),
         (&["--map", "medum"], &["did you mean `medium`?", "no file"]),
-        (&["--map", "medium", "--seed", "1"], &["no seed", "take --mode medium"]),
+        (&["--map", "medium", "--level", "1"], &["is a single map", "take --mode medium"]),
         (&["--map", "random+size=5000x5000"], &["too large"]),
         (&["--map", "random+size=0x0"], &["`size=0x0`"]),
         (&["--map", "medium+sprse"], &["did you mean `sparse`?", "valid: sparse, fixed-start"]),
         (&["--map", "random+lops=1"], &["did you mean `loops"]),
         (&["--mode", "medum"], &["did you mean `medium`?"]),
-        (&["--levels", "medium:3..4", "--seed", "5"], &["--seed 5 is none of the levels medium:3..4"]),
+        (&["--levels", "medium:3..4", "--level", "5"], &["--level 5 is none of the levels medium:3..4"]),
         (&["--map", "medium", "--png", "a.gif"], &[".png or .svg"]),
     ] {
         let (_, errors) = ended(folder.path(), &[&["level", "maze2d"], args].concat(), 3);

@@ -1,4 +1,4 @@
-//! The fixed maps against the ones read from the original sources.
+//! Tests of the fixed maps against the original sources.
 
 use playbot_games::maze::{Cell, Map, Maze, fixed};
 use serde::Deserialize;
@@ -32,7 +32,7 @@ pub fn golden() -> Golden {
     crate::golden::json("maze/maze_maps.json")
 }
 
-/// The map with a golden id such as `antmaze-medium`.
+/// Returns the map with a golden id such as `antmaze-medium`.
 pub fn by_id(id: &str) -> Maze {
     let (game, name) = id.split_once('-').expect("game and name");
     let map = Map::named(name).expect("a map");

@@ -1,11 +1,11 @@
-//! What the generator promises, for any spec and seed.
+//! Tests of the generator's promises, for any spec and seed.
 
 use std::collections::BTreeSet;
 
 use playbot_games::maze::{Cell, HELD_OUT_SEEDS, Maze, MazeError, MazeSpec, TRAIN_SEEDS, generate};
 use proptest::prelude::*;
 
-/// Pairs of free cells side by side.
+/// Returns the number of pairs of free cells side by side.
 fn edges(maze: &Maze) -> usize {
     maze.free_cells().map(|cell| maze.neighbours(cell).count()).sum::<usize>() / 2
 }
@@ -69,7 +69,7 @@ proptest! {
         let side = 4 * (corridor + 1) + 1;
         let spec = MazeSpec { rows: side, columns: side, loops, corridor, difficulty: None };
         let maze = generate(&spec, seed).expect("a maze");
-        // Whatever is free is free as a whole: rooms, and the doors between them.
+        // Free areas are free as a whole: rooms, and the doors between them.
         let block = |cell: Cell| (cell.row.saturating_sub(1) / (corridor + 1), cell.col.saturating_sub(1) / (corridor + 1));
         let is_post = |at: usize| at.is_multiple_of(corridor + 1);
         for cell in maze.free_cells() {

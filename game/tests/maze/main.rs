@@ -1,4 +1,4 @@
-//! Mazes: the fixed maps against golden data, the generator's promises, and the planner on both.
+//! Tests of mazes: the fixed maps against golden data, the generator's promises, and the planner on both.
 
 mod cli;
 mod fixed;

@@ -1,4 +1,4 @@
-//! The planner finds a way wherever there is one, and none that is longer than need be.
+//! Tests of the planner: it finds a path wherever there is one, and always a shortest one.
 
 use std::collections::BTreeMap;
 
@@ -32,7 +32,7 @@ fn golden_shortest_paths() {
     }
 }
 
-/// 1,000 random pairs of cells: every one is solved, in as few moves as breadth first.
+/// Plans 1,000 random pairs of cells: every one is solved, in as few moves as breadth first.
 fn solve_random_pairs(maze: &Maze, seed: u64) {
     let cells: Vec<_> = maze.free_cells().collect();
     let planners: Vec<_> = cells.iter().map(|&goal| Planner::new(maze, goal)).collect();
@@ -63,7 +63,8 @@ fn a_thousand_random_pairs_on_generated_mazes() {
     }
 }
 
-/// Q-value iteration as the original makes it: reward 1 in the goal cell, discount 0.99, 50 sweeps over all cells.
+/// Returns the values of Q-value iteration as in the original: reward 1 in the goal cell, discount 0.99, 50 sweeps over
+/// all cells.
 fn swept(maze: &Maze, goal: Cell) -> impl Fn(Cell, GridMove) -> f64 {
     let cells: Vec<_> = maze.free_cells().collect();
     let mut values: BTreeMap<_, f64> = cells.iter().map(|&cell| (cell, 0.0)).collect();

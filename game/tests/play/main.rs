@@ -1,10 +1,10 @@
-//! `playbot play` as a person uses it: a window, a keyboard, and what is left on disk.
-#![cfg(feature = "window")]
+//! Tests of `playbot play` with a window, a keyboard, and files.
+#![cfg(feature = "screen")]
 
 #[path = "../shared/program.rs"]
 mod program;
 
-use std::{collections::BTreeSet, path::Path, process::Command};
+use std::{collections::BTreeSet, path::Path};
 
 use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoReader, EpisodeActions};
 use playbot_shell::Desk;
@@ -21,7 +21,7 @@ fn episodes(folder: &Path, file: &str) -> Vec<DemoEpisode> {
     DemoReader::open(folder.join(file)).and_then(DemoReader::read_all).expect("a sound recording")
 }
 
-/// Replays a recording without a display, and returns what `demo ls` says of it.
+/// Replays a recording without a display, and returns its row of `demo ls`.
 fn verified(folder: &Path, file: &str) -> String {
     let playbot = |verb: &str| {
         let mut command = command(folder, &["demo", verb, file]);
@@ -86,10 +86,8 @@ fn a_person_wins_hands_over_and_takes_over() {
 fn an_ant_on_the_open_floor_is_played_with_keys() {
     let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
     let mut seat = desk.open(folder.path(), &["play", "ant", "--mode", "goal", "--record", "a.demo"]);
-    if cfg!(feature = "view3d") {
-        // From above, as the bots see it.
-        seat.tap("v");
-    }
+    // From above, as in the bots' pictures.
+    seat.tap("v");
     seat.hold(&["Left"]);
     seat.pass_ticks(25);
     let picture = desk.pixels(SIDE);
@@ -113,10 +111,10 @@ fn an_ant_on_the_open_floor_is_played_with_keys() {
 #[test]
 fn a_crash_costs_the_running_episode_only() {
     let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
-    let args = ["play", "coinrun", "--seed", "0", "--record", "a.demo"];
+    let args = ["play", "coinrun", "--level", "0", "--record", "a.demo"];
     let mut seat = desk.open(folder.path(), &args);
     seat.tap("Tab");
-    seat.read("nobody to hand over to");
+    seat.read("no autopilot to hand over to");
     seat.hold(&["Right", "Up"]);
     seat.read("level 0 won");
     seat.read("coinrun hard 1 · tick 1");
@@ -145,34 +143,21 @@ fn a_crash_costs_the_running_episode_only() {
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn a_missing_server_and_a_missing_driver_are_named() {
     let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
-    let play = ["play", "coinrun", "--record", "a.demo"];
-    let refuse = |command: &mut Command, words: &str| {
-        let output = command.output().expect("the program starts");
-        assert_eq!(code(&output), 3, "{}", errors(&output));
-        assert!(errors(&output).contains(words), "{}", errors(&output));
+    let refuse = |vars: &[(&str, &str)], words: &str| {
+        let mut command = desk.command(folder.path(), &["play", "coinrun", "--record", "a.demo"]);
+        command.envs(vars.iter().copied());
+        let (_, errors) = playbot_shell::ended(command, 3);
+        assert!(errors.contains(words), "{errors}");
         assert!(!folder.path().join("a.demo").exists(), "no recording without a window");
     };
-    refuse(desk.command(folder.path(), &play).env_remove("DISPLAY"), "DISPLAY is not set");
-    refuse(desk.command(folder.path(), &play).env("DISPLAY", ":9999"), "no X server answers at DISPLAY=:9999");
+    refuse(&[("DISPLAY", ":9999")], "no X server answers at DISPLAY=:9999");
     let no_driver = [("VK_DRIVER_FILES", "none"), ("VK_ICD_FILENAMES", "none"), ("WGPU_BACKEND", "vulkan")];
-    refuse(desk.command(folder.path(), &play).envs(no_driver), "mesa-vulkan-drivers");
-    for (args, words) in [
-        (&["--mode", "hrad"][..], "did you mean `hard`?"),
-        (&["--bot", "serch"], "did you mean `search`?"),
-        (&["--mode", "easy", "--levels", "hard:0..3"], "different modes"),
-        (&["--levels", "0..3", "--seed", "4"], "none of the levels hard:0..3"),
-        (&["--policy", "not-there"], "not-there"),
-        (&["--run", "not-there"], "not-there"),
-        (&["--bot", "search", "--policy", "b"], "cannot be used with"),
-    ] {
-        refuse(&mut desk.command(folder.path(), &[&play[..], args].concat()), words);
-    }
+    refuse(&no_driver, "mesa-vulkan-drivers");
 }
 
 /// In space there is light and shadow; from above every surface has one colour.
-#[cfg(feature = "view3d")]
 #[test]
 fn an_ant_is_seen_in_space_and_from_above() {
     let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));

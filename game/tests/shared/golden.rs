@@ -1,13 +1,13 @@
 //! Reference numbers, measured on the original games.
 //!
-//! They lie in `tests/fixtures`, or all in one folder that the environment variable `PLAYBOT_GOLDEN_GAMES` names. Another
-//! set may have other levels, runs and counts under the same names.
+//! They lie in `tests/fixtures`, or all in one folder that the environment variable `PLAYBOT_GOLDEN_GAMES` names.
+//! Another set may have other levels, runs and counts under the same names.
 
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
 
-/// The text of a file, which is given by its path below `tests/fixtures`.
+/// Returns the text of a file, by its path below `tests/fixtures`.
 pub fn text(fixture: &str) -> String {
     let path = match std::env::var_os("PLAYBOT_GOLDEN_GAMES") {
         Some(folder) => Path::new(&folder).join(Path::new(fixture).file_name().expect("the path of a file")),
@@ -16,7 +16,7 @@ pub fn text(fixture: &str) -> String {
     std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-/// What a JSON file says.
+/// Parses a JSON file.
 pub fn json<T: DeserializeOwned>(fixture: &str) -> T {
     serde_json::from_str(&text(fixture)).unwrap_or_else(|error| panic!("{fixture}: {error}"))
 }

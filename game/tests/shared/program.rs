@@ -1,4 +1,4 @@
-//! Starting the program, and reading what it says.
+//! Starting of the program, and its output.
 
 #![allow(dead_code, unused_imports, reason = "no test needs all of it")]
 
@@ -19,19 +19,19 @@ pub fn playbot(folder: &Path, args: &[&str]) -> Output {
     playbot_shell::output(&mut command(folder, args)).unwrap_or_else(|error| panic!("{args:?}: {error}"))
 }
 
-/// The program with a limit on the size of its files, in blocks of 512 bytes: a full disk.
+/// Returns the program with a limit on the size of its files, in blocks of 512 bytes: a full disk.
 #[cfg(unix)]
 pub fn on_full_disk(folder: &Path, blocks: u32, args: &str) -> Output {
     let line = format!("trap '' XFSZ; ulimit -f {blocks}; exec {} {args}", env!("CARGO_BIN_EXE_playbot"));
     Command::new("sh").args(["-c", &line]).current_dir(folder).output().expect("a shell")
 }
 
-/// What a call says that works: data and messages.
+/// Returns the data and messages of a call that works.
 pub fn done(folder: &Path, args: &[&str]) -> (String, String) {
     ended(folder, args, 0)
 }
 
-/// What a call says that ends with this exit code: data and messages.
+/// Returns the data and messages of a call that ends with this exit code.
 pub fn ended(folder: &Path, args: &[&str], wanted: i32) -> (String, String) {
     playbot_shell::ended(command(folder, args), wanted)
 }

@@ -1,4 +1,4 @@
-//! Text from files of strangers steers no terminal, breaks no line of JSON and is no markup in a page.
+//! Tests that text from files of strangers steers no terminal, breaks no line of JSON and is no markup in a page.
 
 use std::{fs, path::Path};
 
@@ -12,11 +12,11 @@ use playbot_learner::{ActionSpace, DeviceKind, Learner, PolicySpec, PpoConfig, P
 
 use crate::program::{done, errors, json_lines, playbot, said, unsealed};
 
-/// Clears the screen, turns the direction of writing around, colours what follows with one character of control, rings, and is
+/// Clears the screen, turns the direction of writing around, colours the rest with one control character, rings, and is
 /// markup.
 const EVIL: &str = "x\u{1b}[2J\u{202e}\u{2066}\u{9b}31m\u{7}\u{7f}<script>alert(1)</script>";
 
-/// What steers a terminal.
+/// Returns true if a character steers a terminal.
 fn steers(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\t')) || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
@@ -43,7 +43,7 @@ fn assert_json(folder: &Path, line: &str) {
     assert!(whole, "{line}: the text is not there: {data}");
 }
 
-/// A policy of random weights that says such things of itself.
+/// Writes a policy of random weights with such texts in its metadata.
 fn write_policy(path: &Path) {
     let game = CoinRun::default();
     let spec = PolicySpec { obs: 563_usize.into(), latent: 0, action_space: ActionSpace::Discrete(15) };
@@ -57,7 +57,7 @@ fn write_policy(path: &Path) {
     export_policy(&game, &file, &"hard:0..3".parse().expect("a split"), 1, path).expect("writable");
 }
 
-/// A recording with other words in its header.
+/// Writes a recording with other words in its header.
 fn write_recording(folder: &Path, name: &str, change: impl FnOnce(DemoHeader) -> DemoHeader) {
     let reader = DemoReader::open(folder.join("few.demo")).expect("recorded");
     let header = change(reader.header().clone());
@@ -67,7 +67,7 @@ fn write_recording(folder: &Path, name: &str, change: impl FnOnce(DemoHeader) ->
     }
 }
 
-/// A policy, recordings, a run and results of a test whose texts are evil.
+/// Writes a policy, recordings, a run and results of a test whose texts are evil.
 fn strangers(folder: &Path) {
     let evil = || EVIL.to_owned();
     write_policy(&folder.join("evil.policy"));

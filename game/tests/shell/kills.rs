@@ -1,4 +1,4 @@
-//! Work of every kind that is killed at random moments and gone on with comes to the same bytes as undisturbed work.
+//! Tests that work of every kind, killed at random times and resumed, comes to the same bytes as undisturbed work.
 //! `tests/soak/kills` does the same a hundred times, with longer work.
 
 use std::{
@@ -17,7 +17,7 @@ use crate::{
     program::{code, command, done, errors, playbot},
 };
 
-/// So many kills are enough, and so many works have to be enough for them: some are done before they are killed.
+/// Number of kills, and largest number of works for them: some are done before they are killed.
 const KILLS: usize = 12;
 const MOST_WORKS: usize = 40;
 /// Levels of a recording.
@@ -36,9 +36,9 @@ const EXPERIMENT: &str = r#"(
 /// A kind of work.
 struct Work {
     begin: String,
-    /// What goes on with it; empty if it is begun again.
+    /// The command that resumes it; empty if it is begun again.
     go_on: String,
-    /// The beginning and the end of the path of a file that is there as soon as something is saved.
+    /// The beginning and the end of the path of a file that appears with the first save.
     saved: (&'static str, &'static str),
 }
 
@@ -65,7 +65,7 @@ fn works() -> Vec<Work> {
     trainings.into_iter().map(training).chain(others).collect()
 }
 
-/// Every file below a folder with its bytes, but for those that hold times or locks, and temporary ones.
+/// Returns every file below a folder with its bytes, but for those that hold times or locks, and temporary ones.
 fn contents(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     const TIMES: [&str; 5] = ["timing.jsonl", "run.lock", "cost.json", "cost.md", ".tmp"];
     let (mut found, mut folders) = (BTreeMap::new(), vec![folder.to_owned()]);
@@ -95,7 +95,7 @@ fn words(line: &str) -> Vec<&str> {
     line.split(' ').collect()
 }
 
-/// The command that goes on with killed work, as a person would choose it.
+/// Returns the command that resumes killed work, as a person would choose it.
 fn next_command(folder: &Path, work: &Work) -> String {
     if work.begin.starts_with("record") {
         return rest_of_recording(folder, &work.begin);
@@ -123,7 +123,7 @@ fn rest_of_recording(folder: &Path, begin: &str) -> String {
     }
 }
 
-/// Starts a command and kills it after a while. Says whether it was at work still.
+/// Starts a command and kills it after a while. Returns whether it was still at work.
 fn kill_after(folder: &Path, line: &str, moment: Duration) -> bool {
     let mut begun = command(folder, &words(line));
     let mut child = begun.stdout(Stdio::null()).stderr(Stdio::null()).spawn().expect("the program starts");

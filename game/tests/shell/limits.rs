@@ -1,4 +1,5 @@
-//! Little memory and settings that ask for more than there is: refused before any work, with the setting's name.
+//! Tests of little memory and of settings that need more than there is: refused before any work, with the setting's
+//! name.
 
 use std::{
     fs,
@@ -15,7 +16,7 @@ const LIMITS: [u64; 3] = [400_000_000, 600_000_000, 1_000_000_000];
 /// Programs that run at a time.
 const AT_ONCE: usize = 2;
 
-/// Settings of experiments, and the key that is to blame. Several settings stand beside one another.
+/// Settings of experiments, and the faulty key. Several settings stand beside one another.
 const SETTINGS: [(&str, &str); 57] = [
     ("ppo.hidden=[18446744073709551615]", "ppo.hidden"),
     ("ppo.hidden=[4294967295]", "ppo.hidden"),
@@ -76,7 +77,7 @@ const SETTINGS: [(&str, &str); 57] = [
     ("train=hard:0..18446744073709551615", "train"),
 ];
 
-/// Whole commands, and what the error names.
+/// Whole commands, and the name in the error.
 const COMMANDS: [(&str, &str); 6] = [
     ("eval --bot random --levels hard:0..16777215 --episodes-per-level 4294967295", "eval.episodes_per_level"),
     ("eval --bot random --levels hard:0..9 --episodes-per-level 4294967295", "eval.episodes_per_level"),
@@ -86,7 +87,8 @@ const COMMANDS: [(&str, &str); 6] = [
     ("view coinrun --image width=1024 --image height=1024 --image stack=16 --episode --scale 32", "--scale"),
 ];
 
-/// All of it as command lines. Settings are shown as often as they are trained with, and are refused both times.
+/// Returns all of it as command lines. Settings are printed as often as they are trained with, and are refused both
+/// times.
 fn calls() -> Vec<(String, &'static str)> {
     let settings = SETTINGS.iter().enumerate().map(|(index, (sets, key))| {
         let verb = if index % 2 == 0 { "config show" } else { "train --run run" };
@@ -111,7 +113,7 @@ fn for_all_calls(each: impl Fn(&str, &str) + Sync) {
 /// Runs the program behind another command of the shell, and checks that it refuses in plain words.
 fn assert_refused(before: &str, line: &str, name: &str) {
     let folder = tempfile::tempdir().expect("a folder");
-    // Words are handed over and not written into the shell's line, where brackets mean something.
+    // Words are passed as arguments and not written into the shell's line, where brackets have a meaning.
     let script = format!("{before} && exec \"$@\"");
     let mut shell = Command::new("sh");
     shell.args(["-c", &script, "sh", env!("CARGO_BIN_EXE_playbot")]).args(line.split(' ')).current_dir(folder.path());
@@ -138,18 +140,20 @@ fn settings_that_ask_for_more_than_a_limit_leaves_are_refused_by_name() {
     }
 }
 
-/// A control group below the one that `PLAYBOT_CGROUP` names; it goes with this.
+/// A control group below the one that `PLAYBOT_CGROUP` names, removed on drop.
 struct Group(PathBuf);
 
 impl Group {
-    /// A group with a limit, if there may be one.
+    /// Makes a group with a limit, if permitted.
     fn new(limit: u64) -> Result<Self, String> {
         let above = std::env::var_os("PLAYBOT_CGROUP").ok_or("PLAYBOT_CGROUP names no control group for children")?;
         let path = Path::new(&above).join(format!("playbot-test-{}", std::process::id()));
         fs::create_dir(&path).map_err(|error| format!("{}: {error}", path.display()))?;
         let group = Self(path);
-        let file = ["memory.max", "memory.limit_in_bytes"].map(|name| group.0.join(name));
-        let file = file.into_iter().find(|file| file.exists()).ok_or("it does not limit memory")?;
+        let file = group.0.join("memory.max");
+        if !file.exists() {
+            return Err("it does not limit memory".to_owned());
+        }
         fs::write(&file, limit.to_string()).map_err(|error| format!("{}: {error}", file.display()))?;
         Ok(group)
     }

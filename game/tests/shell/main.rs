@@ -1,4 +1,4 @@
-//! What the program says to a shell: exit codes, and words about what cannot be done or was not done.
+//! Tests of the program in a shell: exit codes, and messages about failed and unfinished work.
 
 #[path = "../hostile/dice.rs"]
 mod dice;

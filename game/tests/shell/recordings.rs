@@ -1,4 +1,4 @@
-//! Recordings that are whole, torn, empty, or cannot be made.
+//! Tests of recordings that are whole, torn, empty, or cannot be made.
 
 use std::{fs, path::Path};
 

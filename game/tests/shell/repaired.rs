@@ -1,4 +1,4 @@
-//! Recordings whose header is damaged, as people repair them.
+//! Tests of recordings whose header is damaged, repaired from the command line.
 
 use std::fs;
 
@@ -21,7 +21,7 @@ fn a_recording_without_a_header_is_repaired_with_that_of_another_one() {
 
     let repair = ["demo", "repair", "damaged.demo", "--out", "mended.demo"];
     let (_, helpless) = ended(folder, &repair, 3);
-    assert!(helpless.contains("not a demonstration file"), "{helpless}");
+    assert!(helpless.contains("not a recording"), "{helpless}");
     assert!(helpless.contains("`playbot demo repair damaged.demo --header-from OTHER`"), "{helpless}");
     let (_, missing) = ended(folder, &[&repair[..], &["--header-from", "none.demo"]].concat(), 3);
     assert!(missing.contains("none.demo"), "{missing}");
@@ -34,7 +34,7 @@ fn a_recording_without_a_header_is_repaired_with_that_of_another_one() {
     assert!(fs::read(folder.join("mended.demo")).expect("written") == whole, "the same recording as before");
     done(folder, &["demo", "verify", "mended.demo"]);
 
-    // In place, in words, and with the damaged file kept.
+    // In place, with a text report, and with the damaged file kept.
     let (words, _) = done(folder, &["demo", "repair", "damaged.demo", "--header-from", "other.demo"]);
     assert!(words.contains("its header was damaged, and is taken from other.demo"), "{words}");
     assert!(fs::read(folder.join("damaged.demo")).expect("repaired") == whole);

@@ -1,4 +1,4 @@
-//! One signal is enough: whatever is being done, the program ends within two seconds and says what is kept.
+//! Tests that one signal is enough: during any work, the program ends within two seconds and reports the kept files.
 
 use std::{
     fs::{self, File},
@@ -16,25 +16,25 @@ use crate::{
     program::{command, done},
 };
 
-/// The longest that anybody waits, from the signal to the end.
+/// Longest allowed time from the signal to the end.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// What has not ended by then is killed.
+/// Time after which the program is killed.
 const HOPELESS: Duration = Duration::from_secs(20);
-/// Work is stopped at a random moment of so many milliseconds after it has begun.
+/// Work is stopped at a random time of so many milliseconds after it has begun.
 const MOMENTS: usize = 1000;
 
-/// How often work is stopped where `PLAYBOT_STOPS` does not say: each kind twice.
+/// Default number of stops, without `PLAYBOT_STOPS`: each kind twice.
 const USUAL_STOPS: usize = 18;
 /// Programs that run at a time.
 const AT_ONCE: usize = 2;
 
 const SIGNALS: [&str; 3] = ["INT", "TERM", "HUP"];
 
-/// Something that takes minutes.
+/// Work that takes minutes.
 struct Work {
     /// The command; NAME is another name each time.
     line: &'static str,
-    /// A file, and the bytes that it has at least when the work has begun.
+    /// A file, and its least number of bytes once the work has begun.
     sign: (&'static str, u64),
     /// One of these is in the last line.
     kept: &'static [&'static str],
@@ -51,7 +51,7 @@ const WORKS: [Work; 9] = [
         sign: ("NAME.checkpoint", 1),
         kept: &["stopped and saved; no skill model is written yet: go on with", "NAME.checkpoint is kept, after "],
     },
-    // It replays first, and says so before it does.
+    // It replays first, and reports that before it does.
     Work {
         line: "learn-skills --experiment replayed.ron --threads 1 --out NAME",
         sign: ("NAME.err", 1),
@@ -65,7 +65,7 @@ const WORKS: [Work; 9] = [
     Work {
         line: "eval --bot random --levels hard:63..63 --levels hard:64..100000 --json",
         sign: ("NAME.out", 1),
-        kept: &["what is printed was measured to its end, and nothing else is kept"],
+        kept: &["the printed rows are complete, and nothing else is kept"],
     },
     Work {
         line: "record coinrun --levels easy:0..100000 --noise 0.2 --out NAME",
@@ -93,7 +93,7 @@ const WORKS: [Work; 9] = [
     },
 ];
 
-/// A small experiment that trains for so many steps, with other numbers of epochs and test levels.
+/// Writes a small experiment that trains for so many steps, with other numbers of epochs and test levels.
 fn write_experiment(folder: &Path, name: &str, (steps, skill_epochs, epochs, last_test): (u64, u64, u64, u64)) {
     let text = format!(
         r#"(
@@ -105,7 +105,7 @@ fn write_experiment(folder: &Path, name: &str, (steps, skill_epochs, epochs, las
     fs::write(folder.join(name), text).expect("writable");
 }
 
-/// What the commands need.
+/// Makes the files that the commands need.
 fn prepare(folder: &Path) {
     const ENDLESS: u64 = 1_000_000_000;
     write_experiment(folder, "update.ron", (ENDLESS, 1, 100_000, 71));
@@ -133,7 +133,7 @@ fn pass(time: Duration) {
     }
 }
 
-/// How the program ends, if it does.
+/// Returns the exit status of the program, if it ends in time.
 fn end(child: &mut Child) -> Option<ExitStatus> {
     let begun = Instant::now();
     while begun.elapsed() < HOPELESS {
@@ -147,7 +147,7 @@ fn end(child: &mut Child) -> Option<ExitStatus> {
     None
 }
 
-/// Begins work, stops it at a random moment, and returns how long it took to end.
+/// Begins work, stops it at a random time, and returns how long it took to end.
 fn stop(folder: &Path, index: usize) -> Duration {
     let (kind, round) = (index % WORKS.len(), index / WORKS.len());
     let (work, signal) = (&WORKS[kind], SIGNALS[(kind + round) % SIGNALS.len()]);

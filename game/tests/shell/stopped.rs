@@ -1,4 +1,4 @@
-//! Ctrl-C: what was stopped is not done, and says how to go on.
+//! Tests of Ctrl-C: stopped work is not done, and the message has the command that resumes it.
 
 use std::{
     fs,
@@ -39,7 +39,7 @@ fn a_stopped_recording_says_how_the_rest_is_added() {
     let rest = (ENDLESS - recorded).to_string();
     assert!(advice.ends_with(&format!("..4000 --steps {rest} --seed 2")), "{recorded} steps: {words}");
 
-    // As it says, but for the number of steps.
+    // As printed, but for the number of steps.
     let advice = advice.replace(&rest, "100");
     let output = playbot(folder, &base.into_iter().chain(advice.split(' ')).collect::<Vec<_>>());
     assert_eq!(code(&output), 0, "{}", errors(&output));

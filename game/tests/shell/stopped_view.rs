@@ -1,4 +1,4 @@
-//! Ctrl-C while an episode is played for a picture.
+//! Tests of Ctrl-C while an episode is played for a picture.
 
 use std::{
     fs,
@@ -10,7 +10,7 @@ use std::{
 
 use crate::program::{code, command, errors};
 
-/// Whether a process has said what is to be done on Ctrl-C, which is signal 2.
+/// Returns true if a process handles Ctrl-C, which is signal 2.
 fn listens(child: &Child) -> bool {
     let status = fs::read_to_string(format!("/proc/{}/status", child.id())).unwrap_or_default();
     let caught = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
@@ -18,7 +18,7 @@ fn listens(child: &Child) -> bool {
     caught.is_some_and(|mask| mask & 0b10 != 0)
 }
 
-/// Plays an episode that takes minutes, and presses Ctrl-C a moment after it has begun.
+/// Plays an episode that takes minutes, and presses Ctrl-C shortly after it has begun.
 fn stopped(folder: &Path, more: &[&str], moment: Duration) -> Output {
     let endless = ["view", "maze2d", "--mode", "medium+limit=100000000", "--bot", "random"];
     let mut begun = command(folder, &[&endless[..], more].concat());

@@ -1,5 +1,5 @@
-//! What files from strangers make the program do, seen by the operating system: it opens no connection, starts no other
-//! program, and writes nothing outside of the folder that it is in. Read-only verbs write nothing at all.
+//! Tests of files from strangers, with the system calls of the program: it opens no connection, starts no other
+//! program, and writes nothing outside of its folder. Read-only verbs write nothing at all.
 
 use std::{
     fs,
@@ -22,14 +22,14 @@ const CHANGES: [&str; 14] = [
 const WRITES: [&str; 5] = ["O_WRONLY", "O_RDWR", "O_CREAT", "O_TRUNC", "O_APPEND"];
 const CONNECTIONS: [&str; 7] = ["socket", "connect", "bind", "listen", "accept", "send", "recv"];
 
-/// Whether processes can be watched here.
+/// Returns true if processes can be traced here.
 fn can_watch(folder: &Path) -> bool {
     let mut watched = Command::new("strace");
     watched.args(TRACE).arg("true").current_dir(folder).stderr(Stdio::null());
     watched.status().is_ok_and(|status| status.success())
 }
 
-/// What the program asked of the system, a line each: the number of the process, the call, and its arguments.
+/// Returns the system calls of the program, a line each: the number of the process, the call, and its arguments.
 fn calls(folder: &Path, line: &str) -> Vec<String> {
     let mut watched = Command::new("strace");
     watched.args(TRACE).arg(PROGRAM).args(line.split(' ')).current_dir(folder);
@@ -40,13 +40,13 @@ fn calls(folder: &Path, line: &str) -> Vec<String> {
     text.lines().map(str::to_owned).collect()
 }
 
-/// Name and arguments of a call.
+/// Returns the name and arguments of a call.
 fn split(call: &str) -> Option<(&str, &str)> {
     let (_, call) = call.split_once(' ')?;
     call.trim_start().split_once('(')
 }
 
-/// The texts between quotes.
+/// Returns the texts between quotes.
 fn paths(arguments: &str) -> impl Iterator<Item = &str> {
     arguments.split('"').skip(1).step_by(2)
 }
@@ -57,27 +57,27 @@ fn is_change(name: &str, arguments: &str) -> bool {
     opens || CHANGES.contains(&plain) || plain.strip_suffix("at").is_some_and(|plain| CHANGES.contains(&plain))
 }
 
-/// Whether it is the program itself that is started.
+/// Returns true if the started program is the program itself.
 fn is_program(arguments: &str) -> bool {
     let name = |path: &str| Path::new(path).file_name().map(ToOwned::to_owned);
     paths(arguments).next().and_then(name) == name(PROGRAM)
 }
 
-/// Whether a path can only lie in the folder.
+/// Returns true if a path can only lie in the folder.
 fn is_inside(path: &str) -> bool {
     !Path::new(path).is_absolute() && !path.split('/').any(|part| part == "..")
 }
 
-/// Recordings, a policy, an experiment and a level, as if they had been sent.
+/// Makes recordings, a policy, an experiment and a level, as if they had been sent.
 fn strangers(folder: &Path) {
     done(folder, &["record", "coinrun", "--levels", "easy:0..3", "--noise", "0.2", "--out", "strange.demo"]);
     let bytes = fs::read(folder.join("strange.demo")).expect("recorded");
     fs::write(folder.join("torn.demo"), &bytes[..bytes.len() - 5]).expect("writable");
-    let lander = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets/models/lander.policy");
+    let lander = concat!(env!("CARGO_MANIFEST_DIR"), "/../plugin/examples/lander.policy");
     fs::copy(lander, folder.join("strange.policy")).expect("part of the repository");
     let (experiment, _) = done(folder, &["config", "show", "--set", "demos=strange.demo"]);
     fs::write(folder.join("strange.ron"), experiment).expect("writable");
-    let (level, _) = done(folder, &["level", "coinrun", "--seed", "3", "--json"]);
+    let (level, _) = done(folder, &["level", "coinrun", "--level", "3", "--json"]);
     fs::write(folder.join("strange.json"), level).expect("writable");
 }
 

@@ -1,4 +1,4 @@
-//! Recordings that are trained on: they earn what the game pays now, and have to be of the game as it is now.
+//! Tests of recordings that are trained on: they earn the game's present rewards, and must be of the present game.
 
 use std::{fs, path::Path};
 
@@ -16,7 +16,7 @@ const TINY: &str = r#"(
     checkpoints: (every: 2),
 )"#;
 
-/// A folder with the tiny experiment and a recording of a few levels, `played/a.demo`.
+/// Returns a folder with the tiny experiment and a recording of a few levels, `played/a.demo`.
 fn prepared() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("tiny.ron"), TINY).expect("writable");
@@ -36,7 +36,7 @@ fn alter(folder: &Path, name: &str, change: impl Fn(usize, &mut DemoEpisode)) {
     }
 }
 
-/// The arguments that train on the recordings in a folder, into a run of the same name.
+/// Returns the arguments that train on the recordings in a folder, into a run of the same name.
 fn training<'a>(demos: &'a str, run: &'a str) -> [&'a str; 9] {
     ["train", "--experiment", "tiny.ron", "--algorithm", "rlpd", "--set", demos, "--run", run]
 }
@@ -103,7 +103,9 @@ fn recordings_of_another_task_are_told() {
     let train: Vec<_> = training("demos=played", "runs/maze").into_iter().chain(sets).collect();
     let (_, words) = ended(folder, &train, 0);
     assert!(
-        words.contains("some recordings are of umaze+retarget, and umaze is trained: they earn what their own"),
+        words.contains(
+            "some recordings are of umaze+retarget, and the training is of umaze: their rewards are those of "
+        ),
         "{words}"
     );
 }

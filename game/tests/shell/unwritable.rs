@@ -1,4 +1,4 @@
-//! A standard output that takes nothing: data that is lost is an error, help included.
+//! Tests of a standard output that cannot be written: lost data is an error, help included.
 
 use std::{fs::OpenOptions, process::Output};
 

@@ -1,4 +1,4 @@
-//! Files that are to be written are tried before the work.
+//! Tests that output files are tested before the work.
 
 use std::fs;
 

@@ -1,5 +1,5 @@
-// Stand-ins for the sound, with which Bevy is not built here: it needs headers of the system. The build script puts them
-// below the game's file.
+// Stand-ins for the sound, without which Bevy is built here, since it needs headers of the system. The build script
+// puts them below the game's file.
 
 use silence::{AssetServer, AudioPlayer, AudioSource, PlaybackSettings, stand_ins};
 
@@ -13,8 +13,8 @@ mod silence {
         app.init_resource::<AssetServer>();
     }
 
-    // The game loads its sound and nothing else. Bevy's server would look for the file and for somebody who can read it, and
-    // there is neither: the `bevy` package has no assets.
+    // The game loads its sound and nothing else. Bevy's server would look for the file and for a loader, and there is
+    // neither: the `bevy` package has no assets.
     #[derive(Resource, Default)]
     pub struct AssetServer;
 

@@ -19,7 +19,7 @@ pub fn at_work(command: &mut Command, is_at_work: impl Fn() -> bool) -> Child {
     child
 }
 
-/// SIGKILL, as a power cut would be: no handler runs, whatever was being written stays as it is.
+/// Sends SIGKILL, as in a power cut: no handler runs, and files being written stay as they are.
 pub fn kill(mut child: Child) {
     child.kill().expect("it runs");
     child.wait().expect("a child");

@@ -1,4 +1,4 @@
-//! A display of a test's own, with hands and eyes.
+//! A display of a test's own, with simulated input and screenshots.
 #![allow(clippy::disallowed_methods, reason = "a window lives by the clock")]
 
 use std::{
@@ -48,7 +48,7 @@ impl Desk {
         desk
     }
 
-    /// The program with these arguments, on this display.
+    /// Returns the program with these arguments, on this display.
     pub fn command(&self, folder: &Path, args: &[&str]) -> Command {
         let mut command = Command::new(self.program);
         command.args(args).current_dir(folder).env("DISPLAY", &self.display);
@@ -64,7 +64,7 @@ impl Desk {
         let errors = Heard::of(program.stderr.take().expect("piped"));
         let mut seat = Seat { desk: self, program, errors, window: String::new() };
         seat.wait("a window", |seat| {
-            // Only the words for people begin like this: the window has started to play.
+            // Only the title of a running game begins like this: the window has started to play.
             let found = seat.desk.xdotool(&["search", "--name", &format!("^{} .* tick", args[1])]);
             seat.window = String::from_utf8_lossy(&found.stdout).trim().to_owned();
             !seat.window.is_empty()
@@ -86,7 +86,7 @@ impl Desk {
         output(&mut command).unwrap_or_else(|error| panic!("xdotool {args:?}: {error}; {NEEDS}"))
     }
 
-    /// The pixels of the screen's upper left square, `side` × `side`.
+    /// Returns the pixels of the screen's upper left square, `side` × `side`.
     pub fn pixels(&self, side: usize) -> Vec<u32> {
         let bytes = std::fs::read(self.folder.path().join("Xvfb_screen0")).expect("Xvfb keeps its screen there");
         // An X window dump: a header of big-endian numbers, colours of 12 bytes, rows.
@@ -101,11 +101,11 @@ impl Desk {
     }
 }
 
-/// A running program, seen from the chair.
+/// A running program, from the player's seat.
 pub struct Seat<'a> {
     desk: &'a Desk,
     program: Child,
-    /// Its words for people.
+    /// Its messages.
     errors: Heard,
     window: String,
 }
@@ -138,19 +138,19 @@ impl Seat<'_> {
         keys.iter().for_each(|key| self.xdotool(&["keyup", key]));
     }
 
-    /// The title of the window.
+    /// Returns the title of the window.
     pub fn title(&self) -> String {
         let output = self.desk.xdotool(&["getwindowname", &self.window]);
         String::from_utf8_lossy(&output.stdout).trim().to_owned()
     }
 
-    /// Waits until the title says this.
+    /// Waits until the title contains this.
     pub fn read(&mut self, words: &str) -> String {
         self.wait(words, |seat| seat.title().contains(words));
         self.title()
     }
 
-    /// Waits until the game has played a number of ticks; a busy machine takes longer than the clock says.
+    /// Waits until the game has played a number of ticks; a busy machine takes longer than by the clock.
     pub fn pass_ticks(&mut self, ticks: u32) {
         let until = self.tick() + ticks;
         self.wait("ticks", |seat| seat.tick() >= until);
@@ -161,14 +161,14 @@ impl Seat<'_> {
         sleep(Duration::from_secs(1) * ticks / 15);
     }
 
-    /// The tick in the window's title.
+    /// Returns the tick in the window's title.
     fn tick(&self) -> u32 {
         let title = self.title();
         let tick = title.split(" · ").find_map(|part| part.strip_prefix("tick "));
         tick.and_then(|tick| tick.parse().ok()).unwrap_or_else(|| panic!("no tick in the title `{title}`"))
     }
 
-    /// Waits until something is so, and fails if it takes too long.
+    /// Waits until a condition holds, and fails if it takes too long.
     pub fn wait(&mut self, what: &str, mut done: impl FnMut(&mut Self) -> bool) {
         let start = Instant::now();
         while !done(self) {
@@ -179,7 +179,7 @@ impl Seat<'_> {
         }
     }
 
-    /// Waits for the program's own end, and returns its exit status and what it said to people.
+    /// Waits for the program's own end, and returns its exit status and its messages.
     pub fn leave(mut self) -> (ExitStatus, String) {
         let start = Instant::now();
         while start.elapsed() < PATIENCE {
@@ -197,7 +197,7 @@ impl Seat<'_> {
         self.program.wait().expect("it has ended");
     }
 
-    /// What is known of a program that does not do what it should.
+    /// Describes a program that does not behave as expected.
     fn state(&self) -> String {
         format!("the title is `{}`, and it said so far: {}", self.title(), self.errors.text())
     }

@@ -1,4 +1,4 @@
-//! `doctor`.
+//! Tests of `doctor`.
 
 use crate::{game_program::GameProgram, shell::Shell};
 

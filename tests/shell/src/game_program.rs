@@ -1,11 +1,11 @@
-//! The program of a game that is not ours.
+//! The program of a foreign game.
 
 use std::fs;
 
 use crate::shell::Shell;
 
-/// A program with one game that is not ours, and what tests of its verbs must know of it. Each of its other functions is
-/// a test, and says what is wrong by panicking.
+/// A program with one foreign game, and the facts that tests of its verbs need. Each of its other functions is a test,
+/// and fails by panicking.
 #[derive(Clone, Copy, Debug)]
 pub struct GameProgram {
     /// The program: `env!("CARGO_BIN_EXE_…")`.
@@ -16,18 +16,18 @@ pub struct GameProgram {
     pub game: &'static str,
     /// Name of its demonstrator.
     pub demonstrator: &'static str,
-    /// A key of the game, as xdotool calls it.
+    /// A key of the game, by its name in xdotool.
     pub key: &'static str,
 }
 
-/// Levels that are recorded: those that its experiment's demonstrations begin with.
+/// Recorded levels: the first ones of its experiment's recordings.
 const DEMO_LEVELS: &str = "default:1000..1002";
 /// Updates of a training.
 pub(crate) const UPDATES: usize = 40;
 /// Levels that policies are measured on.
 pub(crate) const TEST_LEVELS: &str = "default:100000..100001";
 
-/// What makes an experiment a matter of seconds.
+/// Settings that shorten an experiment to seconds.
 const SMALL: [&str; 11] = [
     "demos=few.demo",
     "arenas=2",
@@ -43,7 +43,7 @@ const SMALL: [&str; 11] = [
 ];
 
 impl GameProgram {
-    /// A shell in whose folder lies `few.demo`, of three levels.
+    /// Returns a shell in whose folder lies `few.demo`, of three levels.
     pub(crate) fn with_recording(&self) -> Shell {
         let shell = Shell::new(self.program);
         let record = ["record", self.game, "--levels", DEMO_LEVELS, "--noise", "0.1", "--out", "few.demo"];
@@ -51,8 +51,8 @@ impl GameProgram {
         shell
     }
 
-    /// A shell in whose folder lie `few.demo`, `small.ron`, the game's own experiment made small, and what is learned from
-    /// both, `skills.safetensors`.
+    /// Returns a shell with `few.demo`, `small.ron`, the game's own experiment made small, and the model learned from
+    /// both, `skills.safetensors`, in its folder.
     pub(crate) fn with_skills(&self) -> Shell {
         let shell = self.with_recording();
         let own = format!("{}/experiment.ron", self.folder);

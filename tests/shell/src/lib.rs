@@ -1,5 +1,5 @@
-//! For tests: programs as people start them, from a shell and on a display of their own. Knows nothing of Bevy or of the
-//! plugin, only what a user sees: words, numbers, exit codes, files and windows.
+//! For tests: programs started from a shell and on a display of their own. The crate does not depend on Bevy or the
+//! plugin. It sees only a user's view: words, numbers, exit codes, files and windows.
 
 mod at_work;
 mod desk;

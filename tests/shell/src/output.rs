@@ -1,4 +1,4 @@
-//! What a program said, and how it ended.
+//! Output of a program, and its end.
 
 use std::process::{Command, Output};
 
@@ -28,7 +28,7 @@ pub fn lines(output: &Output) -> Vec<Value> {
     json_lines(&said(output))
 }
 
-/// A text of which every line is JSON.
+/// Returns a text of which every line is JSON.
 #[track_caller]
 pub fn json_lines(text: &str) -> Vec<Value> {
     text.lines().map(|line| serde_json::from_str(line).unwrap_or_else(|_| panic!("no JSON: {line}"))).collect()

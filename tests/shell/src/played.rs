@@ -1,4 +1,4 @@
-//! `play`: a window, in which each frame is a tick of the game.
+//! Tests of `play`: a window, in which each frame is a tick of the game.
 
 use std::collections::BTreeSet;
 
@@ -8,8 +8,8 @@ use crate::{desk::Desk, game_program::GameProgram, shell::Shell};
 const TICKS: u32 = 40;
 
 impl GameProgram {
-    /// `play --record`, and `demo verify` of it without a display: what a person and the demonstrator play in a window, on
-    /// several levels in one World, is to the bit what the same actions come to elsewhere.
+    /// `play --record`, and `demo verify` of it without a display. A person and the demonstrator play in a window, on
+    /// several levels in one World, and the same actions give the same bits elsewhere.
     pub fn what_a_window_records_replays(&self) {
         let (desk, shell) = (Desk::new(self.program), Shell::new(self.program));
         let args = ["play", self.game, "--levels", "0..1", "--bot", self.demonstrator, "--record", "seen.demo"];

@@ -1,8 +1,8 @@
-//! Verbs around recordings.
+//! Tests of the verbs around recordings.
 
 use crate::{game_program::GameProgram, shell::Shell};
 
-/// Width and height of a PNG, and how many colours its first frame has, at most 100.
+/// Returns width and height of a PNG, and the number of colours of its first frame, at most 100.
 fn looked_at(shell: &Shell, name: &str) -> (u64, u64, usize) {
     let bytes = shell.read(name);
     let mut reader = png::Decoder::new(std::io::Cursor::new(bytes)).read_info().expect("a PNG");
@@ -20,8 +20,8 @@ fn looked_at(shell: &Shell, name: &str) -> (u64, u64, usize) {
 }
 
 impl GameProgram {
-    /// `record`, `demo ls`, `demo show` and `demo verify`: what the demonstrator plays, with noise, replays; and recording
-    /// it again makes the same file.
+    /// `record`, `demo ls`, `demo show` and `demo verify`: episodes of the demonstrator, with noise, replay, and
+    /// recording them again makes the same file.
     pub fn recordings_replay(&self) {
         let shell = self.with_recording();
         let summary = shell.answer(&["demo", "ls", "few.demo", "--json"]);
@@ -39,10 +39,10 @@ impl GameProgram {
         assert!(shell.read("few.demo") == self.with_recording().read("few.demo"), "the same seed, the same file");
     }
 
-    /// `view`: a moment of the demonstrator's play, and one of a recording, as pictures.
+    /// `view`: a tick of the demonstrator's play, and one of a recording, as pictures.
     pub fn moments_are_drawn(&self) {
         let shell = self.with_recording();
-        let bot = ["view", self.game, "--seed", "3", "--tick", "20", "--out", "bot.png", "--json"];
+        let bot = ["view", self.game, "--level", "3", "--tick", "20", "--out", "bot.png", "--json"];
         let recording = ["view", self.game, "--demo", "few.demo", "--episode-number", "1", "--tick", "20"];
         let recording = [&recording[..], &["--out", "demo.png", "--json"]].concat();
         for (args, name, player, level) in

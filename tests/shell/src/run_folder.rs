@@ -1,13 +1,13 @@
-//! What a training has written into its folder.
+//! Files that a training has written into its folder.
 
 use std::{fs, path::Path};
 
-/// Updates that it has logged.
+/// Returns the number of logged updates.
 pub fn logged(run: &Path) -> usize {
     fs::read_to_string(run.join("metrics.jsonl")).unwrap_or_default().lines().count()
 }
 
-/// Names of its checkpoints, in order.
+/// Returns the names of its checkpoints, in order.
 pub fn steps(run: &Path) -> Vec<String> {
     let entries = fs::read_dir(run.join("checkpoints")).expect("a run");
     let names = entries.map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned());

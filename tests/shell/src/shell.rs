@@ -1,4 +1,4 @@
-//! A program as a shell starts it.
+//! A program, started as by a shell.
 
 use std::{
     fs,
@@ -17,41 +17,41 @@ pub struct Shell {
 }
 
 impl Shell {
-    /// A shell for the program at this path.
+    /// Returns a shell for the program at this path.
     pub fn new(program: &'static str) -> Self {
         Self { program, folder: tempfile::tempdir().expect("a folder") }
     }
 
-    /// The folder.
+    /// Returns the folder.
     pub fn folder(&self) -> &Path {
         self.folder.path()
     }
 
-    /// A path in the folder.
+    /// Returns a path in the folder.
     pub fn path(&self, name: &str) -> PathBuf {
         self.folder().join(name)
     }
 
-    /// The program with these arguments, without a display.
+    /// Returns the program with these arguments, without a display.
     pub fn command(&self, args: &[&str]) -> Command {
         let mut command = Command::new(self.program);
         command.args(args).current_dir(self.folder()).env_remove("DISPLAY").stdin(Stdio::null());
         command
     }
 
-    /// Runs the program, which must find that all is well, and returns its standard output.
+    /// Runs the program, which must end with exit code 0, and returns its standard output.
     #[track_caller]
     pub fn done(&self, args: &[&str]) -> String {
         ended(self.command(args), 0).0
     }
 
-    /// Runs the program, which must find that all is well, and returns its lines of JSON.
+    /// Runs the program, which must end with exit code 0, and returns its lines of JSON.
     #[track_caller]
     pub fn answers(&self, args: &[&str]) -> Vec<Value> {
         json_lines(&self.done(args))
     }
 
-    /// Runs the program, which must find that all is well, and returns its only line of JSON.
+    /// Runs the program, which must end with exit code 0, and returns its only line of JSON.
     #[track_caller]
     pub fn answer(&self, args: &[&str]) -> Value {
         let mut answers = self.answers(args);
@@ -59,7 +59,7 @@ impl Shell {
         answers.remove(0)
     }
 
-    /// What a file in the folder holds.
+    /// Returns the contents of a file in the folder.
     #[track_caller]
     pub fn read(&self, name: &str) -> Vec<u8> {
         fs::read(self.path(name)).unwrap_or_else(|error| panic!("cannot read {name}: {error}"))

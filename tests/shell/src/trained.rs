@@ -1,4 +1,4 @@
-//! Verbs around policies.
+//! Tests of the verbs around policies.
 
 use std::process::Stdio;
 
@@ -18,7 +18,7 @@ fn train(shell: &Shell, run: &str) {
     shell.done(&[&TRAIN[..], &["--run", run]].concat());
 }
 
-/// What `eval --json` says of one player.
+/// Returns the JSON of `eval --json` for one player.
 fn measured(shell: &Shell, who: &[&str]) -> Value {
     let row = shell.answer(&[&["eval", "--json"], who].concat());
     assert_eq!((&row["split"], &row["episodes"]), (&TEST_LEVELS.into(), &2.into()), "{row}");
@@ -30,8 +30,8 @@ fn measured(shell: &Shell, who: &[&str]) -> Value {
 }
 
 impl GameProgram {
-    /// `record`, `learn-skills`, `train`, and `train --resume` after a kill, which comes to the same bytes as a training
-    /// that nobody disturbed.
+    /// `record`, `learn-skills`, `train`, and `train --resume` after a kill, which comes to the same bytes as an
+    /// undisturbed training.
     pub fn a_killed_training_goes_on_bit_for_bit(&self) {
         let shell = self.with_skills();
         train(&shell, "whole");
@@ -48,7 +48,8 @@ impl GameProgram {
         assert!(arenas == resumed[2], "killing it changed what its arenas do");
     }
 
-    /// `eval` of the demonstrator, of a run and of the policy file that `policy export` makes of it, which plays the same.
+    /// `eval` of the demonstrator, of a run and of the policy file that `policy export` makes of it, which plays the
+    /// same.
     pub fn a_policy_file_plays_as_its_run(&self) {
         let shell = self.with_skills();
         train(&shell, "run");

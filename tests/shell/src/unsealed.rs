@@ -1,6 +1,7 @@
 //! Files as older versions wrote them, without checksums.
 
-/// A text of a run or a test without its checksums, so that it can be changed and is read like one of an older version.
+/// Returns a text of a run or a test without its checksums. It can then be changed and is read like one of an older
+/// version.
 pub fn unsealed(text: &str) -> String {
     const ENTRY: &str = "\"crc32\":\"";
     const DIGITS: usize = "00000000\"".len();

@@ -1,4 +1,4 @@
-//! Waiting for programs, but not for ever.
+//! Waiting for programs, with a limit.
 
 use std::{
     io::{self, ErrorKind, Read},
@@ -8,17 +8,17 @@ use std::{
     time::{Duration, Instant},
 };
 
-/// Nothing takes longer, not even on a machine that draws in software and has other things to do.
+/// Longest wait, also on a slow machine that draws in software.
 pub(crate) const PATIENCE: Duration = Duration::from_secs(180);
-/// How long the last words of a program that has ended may be on their way.
+/// Longest wait for the last output of a program that has ended.
 const LAST_WORDS: Duration = Duration::from_secs(5);
 
-/// Runs a program to its end, with nothing to read, and returns what it said.
+/// Runs a program to its end, without input, and returns its output.
 ///
 /// # Errors
 ///
-/// It does not start, or does not end in three minutes: then it is killed with everything that it has started, and the
-/// error says what it said until then.
+/// It does not start, or does not end in three minutes: then it is killed with all its child processes, and the error
+/// has its output until then.
 pub fn output(command: &mut Command) -> io::Result<Output> {
     output_within(PATIENCE, command)
 }
@@ -39,7 +39,7 @@ fn output_within(limit: Duration, command: &mut Command) -> io::Result<Output> {
     Err(io::Error::new(ErrorKind::TimedOut, words))
 }
 
-/// Waits until something is so, and says whether that came in time.
+/// Waits until a condition holds, and returns whether it did in time.
 pub(crate) fn comes(limit: Duration, mut is_so: impl FnMut() -> bool) -> bool {
     let start = Instant::now();
     while !is_so() {
@@ -51,7 +51,7 @@ pub(crate) fn comes(limit: Duration, mut is_so: impl FnMut() -> bool) -> bool {
     true
 }
 
-/// Makes the program the head of a group of processes, which what it starts belongs to.
+/// Makes the program the head of a group of its child processes.
 fn lead_group(command: &mut Command) {
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(command, 0);
@@ -59,7 +59,7 @@ fn lead_group(command: &mut Command) {
     let _ = command;
 }
 
-/// Kills a program that leads its group, with what it has started.
+/// Kills a program that leads its group, with its child processes.
 fn kill_group(child: &mut Child) {
     if cfg!(unix) {
         let group = format!("-{}", child.id());
@@ -74,14 +74,14 @@ fn kill_alone(child: &mut Child) {
     let _ = child.wait();
 }
 
-/// Kills a program, unless it has ended, and returns what it has said into its pipes, if it has any.
+/// Kills a program, unless it has ended, and returns the contents of its pipes, if it has any.
 pub(crate) fn last_words(mut child: Child) -> String {
     let pipes = [child.stdout.take().map(Heard::of), child.stderr.take().map(Heard::of)];
     kill_alone(&mut child);
     pipes.iter().flatten().map(Heard::to_end).collect()
 }
 
-/// What a program has written into a pipe so far. It is read all the time: a program whose pipe is full would wait.
+/// The output of a program into a pipe so far. It is read all the time: a program with a full pipe would wait.
 pub(crate) struct Heard {
     bytes: Arc<Mutex<Vec<u8>>>,
     reader: JoinHandle<()>,
@@ -106,7 +106,7 @@ impl Heard {
         Self { bytes, reader }
     }
 
-    /// Whether nobody can write into the pipe any more.
+    /// Returns true if the pipe is closed.
     pub(crate) fn is_over(&self) -> bool {
         self.reader.is_finished()
     }
@@ -115,12 +115,12 @@ impl Heard {
         lock(&self.bytes).clone()
     }
 
-    /// What was written so far.
+    /// Returns the output so far.
     pub(crate) fn text(&self) -> String {
         String::from_utf8_lossy(&lock(&self.bytes)).into_owned()
     }
 
-    /// What a program that has ended has written.
+    /// Returns the whole output of a program that has ended.
     pub(crate) fn to_end(&self) -> String {
         comes(LAST_WORDS, || self.is_over());
         self.text()

@@ -1,4 +1,4 @@
-//! A program whose games all have one name: as many as the variable `GAMES` says.
+//! A program with several games of one name: their number is in the variable `GAMES`.
 
 use std::process::ExitCode;
 

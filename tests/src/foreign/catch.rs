@@ -1,4 +1,4 @@
-//! Catch what falls: a game in `Update`, spawned in `Startup`, with a global score.
+//! A game of catching in `Update`, spawned in `Startup`, with a global score.
 
 use bevy::prelude::*;
 use playbot_lab::{
@@ -10,7 +10,7 @@ use playbot_lab::{
 #[derive(Component)]
 pub struct Paddle;
 
-/// What falls.
+/// A falling apple.
 #[derive(Component)]
 pub struct Apple {
     /// Rows per second.
@@ -72,12 +72,12 @@ fn catch(
     }
 }
 
-/// The game with its adapter.
+/// Returns the game with its adapter.
 pub fn catch_game() -> ForeignGame {
     adapted(game)
 }
 
-/// The adapter, of the game or of a copy with something wrong in it.
+/// Returns the adapter, of the game or of a faulty copy.
 pub fn adapted(game: impl Fn(&mut App) + Send + Sync + 'static) -> ForeignGame {
     ForeignGame::new("catch", 1, game)
         .keys([vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]])

@@ -1,4 +1,4 @@
-//! The game of catching with a fault planted in it, of which its adapter knows nothing: what the doctor must find.
+//! The game of catching with a planted fault that its adapter does not know, for tests of the doctor.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 
@@ -7,22 +7,22 @@ use playbot_lab::foreign::ForeignGame;
 
 use super::catch::{Apple, adapted, game};
 
-/// What is wrong with a copy of the game.
+/// The fault of a copy of the game.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum CatchFault {
-    /// The [`Wind`], which nobody seeds, blows the apple aside.
+    /// The unseeded [`Wind`] blows the apple aside.
     UnseededWind,
-    /// So does a gust that is written down nowhere.
+    /// A gust does the same that is stored nowhere.
     UnseededGust,
     /// Apples fall faster and faster with the [`Season`], which goes on from episode to episode.
     EndlessSeason,
-    /// So they do with a number of frames that lies in a `Local`.
+    /// A number of frames in a `Local` does the same.
     EndlessLocal,
     /// Apples sink at the pace of `Time<Real>`.
     WallClock,
     /// Two [`Gale`]s of different archetypes are there, and the first that a query finds blows apples aside.
     FirstGale,
-    /// A [`Mood`] is drawn without a seed. Reflection cannot see it, and nothing that is seen depends on it.
+    /// A [`Mood`] is drawn without a seed. Reflection cannot see it, and no observation depends on it.
     HiddenMood,
 }
 
@@ -33,7 +33,7 @@ pub struct Wind {
     force: f32,
 }
 
-/// How long apples have been ripening.
+/// Time for which apples have been ripening.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
 pub struct Season {
@@ -52,16 +52,16 @@ pub struct Gale {
 #[reflect(Component)]
 pub struct Cold;
 
-/// What the gardener feels.
+/// Mood of the gardener.
 #[derive(Resource, Default)]
 pub struct Mood(pub u32);
 
-/// Something between 0 and 1 that no seed decides.
+/// Returns an unseeded number between 0 and 1.
 fn unseeded() -> f32 {
     f32::from(RandomState::new().build_hasher().finish() as u16) / f32::from(u16::MAX)
 }
 
-/// The game with this fault, and its usual adapter.
+/// Returns the game with this fault, and its default adapter.
 pub fn faulty_catch(fault: CatchFault) -> ForeignGame {
     adapted(move |app: &mut App| {
         game(app);
@@ -69,7 +69,7 @@ pub fn faulty_catch(fault: CatchFault) -> ForeignGame {
     })
 }
 
-/// What is wrong happens before the game's own systems, so that no order is left open.
+/// Adds the fault before the game's own systems, so that no order is left open.
 fn plant(app: &mut App, fault: CatchFault) {
     match fault {
         CatchFault::UnseededWind => app.init_resource::<Wind>().add_systems(PreUpdate, blow),

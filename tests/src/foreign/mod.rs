@@ -1,4 +1,4 @@
-//! Games that know nothing of the plugin, for tests of the adapter. Each is small and complete.
+//! Games without any code for the plugin, for tests of the adapter. Each is small and complete.
 
 pub mod catch;
 pub mod faulty_catch;

@@ -1,4 +1,5 @@
-//! Three rooms: a game of states, whose level takes a few frames to load, with physics in `FixedUpdate` at its own rate.
+//! Three rooms: a game of states, whose level takes a few frames to load, with physics in `FixedUpdate` at its own
+//! rate.
 
 use bevy::prelude::*;
 use playbot_lab::{
@@ -6,21 +7,21 @@ use playbot_lab::{
     prelude::*,
 };
 
-/// Where the game is.
+/// State of the game.
 #[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Stage {
-    /// A menu that waits for somebody.
+    /// A menu that waits for input.
     #[default]
     Menu,
     /// A level is being loaded: seven frames.
     Loading,
-    /// Somebody plays.
+    /// A level is being played.
     Playing,
     /// Lost.
     Over,
 }
 
-/// Who walks, at 20 steps a second.
+/// The walker, at 20 steps a second.
 #[derive(Component, Default)]
 pub struct Walker {
     /// Steps walked, either way.
@@ -71,7 +72,7 @@ fn walk(
     }
 }
 
-/// The adapter.
+/// Returns the adapter.
 pub fn rooms_game() -> ForeignGame {
     ForeignGame::new("rooms", 1, game)
         .keys([vec![], vec![KeyCode::KeyD]])

@@ -1,4 +1,4 @@
-//! A ball in the wind, which remembers: a game that begins no episode as it began the first one.
+//! A ball in the wind, with a memory: a game whose later episodes do not begin like the first one.
 
 use bevy::prelude::*;
 use playbot_lab::{
@@ -10,7 +10,7 @@ use playbot_lab::{
 #[derive(Component)]
 pub struct Ball;
 
-/// Gusts since the program began: never set back.
+/// Gusts since the program began, never reset.
 #[derive(Resource, Default)]
 pub struct Gusts(pub u32);
 
@@ -34,7 +34,7 @@ fn roll(keys: Res<ButtonInput<KeyCode>>, mut ball: Single<&mut Transform, With<B
     ball.translation.x += 0.3 * (right - left);
 }
 
-/// Every fifth frame of the program brings a gust, each of another strength.
+/// Brings a gust in every fifth frame of the program, each of another strength.
 fn blow(mut frames: Local<u32>, mut gusts: ResMut<Gusts>, mut ball: Single<&mut Transform, With<Ball>>) {
     *frames += 1;
     if frames.is_multiple_of(5) {
@@ -43,7 +43,7 @@ fn blow(mut frames: Local<u32>, mut gusts: ResMut<Gusts>, mut ball: Single<&mut 
     }
 }
 
-/// The adapter: ball and level begin anew, frames and gusts only if the World does.
+/// Returns the adapter: ball and level begin anew, frames and gusts only if the World does.
 pub fn stubborn_game(restart: Restart) -> ForeignGame {
     ForeignGame::new("stubborn", 1, game)
         .keys([vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]])

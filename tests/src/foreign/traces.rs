@@ -1,8 +1,9 @@
-//! What a game's episodes leave behind.
+//! Traces of a game's episodes.
 
 use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_world};
 
-/// State hashes of the episodes of one agent that always does the same, on one level after the other in one World.
+/// Returns the state hashes of the episodes of one agent with a constant action, on one level after the other in one
+/// World.
 pub fn traces(game: &ForeignGame, action: u32, levels: &[u64]) -> Vec<Vec<u64>> {
     let (mut world, agents) = build_world(game, "default", 0, 0, 1);
     let bot = BlindBot::Constant(ActionValue::Discrete(action));

@@ -1,14 +1,14 @@
-//! Changed bytes, whatever they mean.
+//! Changes of bytes, regardless of their meaning.
 
 use super::dice::Dice;
 
-/// Lengths at which something ends.
+/// Extreme lengths.
 pub(super) const EXTREME_WORDS: [u64; 9] = [0, 1, 7, 255, 1 << 16, u32::MAX as u64, 1 << 40, i64::MAX as u64, u64::MAX];
 
 /// Most bytes that are put in or taken out at once.
 const PART: usize = 64;
 
-/// Bytes with one thing about them changed: a bit, a byte, a part that is gone, there twice or new, or the end.
+/// Changes one place of some bytes: a bit, a byte, a part that is removed, doubled or new, or the end.
 pub(super) fn change_bytes(bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     if bytes.is_empty() {

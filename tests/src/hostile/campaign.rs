@@ -1,4 +1,4 @@
-//! Reading mutants: nothing may panic, take long, or ask for much memory.
+//! Reading of mutants, which must not panic, take long, or ask for much memory.
 
 use std::{
     ops::Range,
@@ -12,42 +12,42 @@ use bevy_playbot::panics::hear;
 
 use super::kind::{FileKind, Reading};
 
-/// Longest that reading one file may take.
+/// Longest allowed time of reading one file.
 pub const PATIENCE: Duration = Duration::from_secs(5);
-/// Most bytes that reading one file may have at once. Files here have some thousand.
+/// Most bytes in use while reading one file. Files here have some thousand.
 pub const MOST_BYTES: u64 = 256 << 20;
 
-/// Does some work, and says how many bytes it had at once at most.
+/// Does some work, and returns the most bytes that it had at once.
 pub type Measure = fn(&mut dyn FnMut()) -> u64;
 
-/// A mutant that a reader could not cope with.
+/// A mutant on which a reader failed.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct HostileFault {
     /// Kind of the file.
     pub kind: &'static str,
     /// Seed of the mutant.
     pub seed: u64,
-    /// What happened.
+    /// The failure.
     pub what: String,
     /// The file.
     pub bytes: Vec<u8>,
 }
 
-/// What became of some mutants.
+/// Counts of some mutants.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Those that were read as whole files.
+    /// Mutants that were read as whole files.
     pub whole: u64,
-    /// Those that were refused, or read with a warning.
+    /// Mutants that were refused, or read with a warning.
     pub told: u64,
-    /// Those that were neither.
+    /// Mutants on which a reader failed.
     pub faults: Vec<HostileFault>,
-    /// Whether the last one took too long, so that those behind it were not read.
+    /// The last one took too long, so the ones behind it were not read.
     pub is_stuck: bool,
 }
 
-/// Reads the mutants of these seeds in a folder of their own, which is emptied for each. The one that is read lies there, so
-/// that it is still there if the process dies of it. After one that takes too long no other is read.
+/// Reads the mutants of these seeds in a folder of their own, which is emptied for each. The present one stays there if
+/// the process dies of it. After one that takes too long no other is read.
 pub fn read_mutants(kind: &FileKind, seeds: Range<u64>, folder: &Path, measure: Measure) -> Tally {
     let (sender, receiver) = channel();
     let reader = Reader { kind: kind.clone(), folder: folder.to_owned(), measure };
@@ -87,14 +87,14 @@ struct Reader {
 impl Reader {
     fn read_all(&self, seeds: Range<u64>, sender: &Sender<Result<Reading, String>>) {
         for seed in seeds {
-            // Nobody waits for the others if this one took too long.
+            // The others are not needed if this one took too long.
             if sender.send(self.read(seed)).is_err() {
                 return;
             }
         }
     }
 
-    /// What became of a mutant, or why that is a fault.
+    /// Returns the result of a mutant, or the failure.
     fn read(&self, seed: u64) -> Result<Reading, String> {
         self.kind.put(&self.folder, &self.kind.mutant(seed));
         let mut became = Err(String::new());

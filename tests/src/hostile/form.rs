@@ -1,4 +1,4 @@
-//! How files are built, and how they are changed so that they still look like files of their kind.
+//! Structure of files, and changes that keep it.
 
 use super::{
     bytes::change_bytes,
@@ -13,7 +13,7 @@ use super::{
 /// Most changes of one mutant.
 const MOST_CHANGES: usize = 3;
 
-/// What a file is made of.
+/// The structure of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Form {
     /// A header in text, and a frame for each episode, all with checksums.
@@ -33,8 +33,8 @@ pub enum Form {
 }
 
 impl Form {
-    /// A file that was changed in one to three places. In half of them the checksums fit what stands there now, so that what
-    /// is behind them is read.
+    /// Returns a file that was changed in one to three places. In half of them the checksums fit the new contents, so
+    /// that the parts behind them are read.
     pub fn mutate(self, bytes: &[u8], dice: &mut Dice) -> Vec<u8> {
         let mut changed = bytes.to_vec();
         for _ in 0..=dice.roll(MOST_CHANGES) {
@@ -44,7 +44,7 @@ impl Form {
         if dice.roll(2) == 0 { self.reseal(&changed) } else { changed }
     }
 
-    /// One change that knows what the bytes mean; `None` if they mean nothing.
+    /// Makes one change that uses the meaning of the bytes; `None` if they have none.
     fn change(self, bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
         let text = || std::str::from_utf8(bytes).ok();
         Some(match self {
@@ -62,7 +62,7 @@ impl Form {
         })
     }
 
-    /// The file with the checksums that its parts have now; as it is where it is no text or has none.
+    /// Returns the file with new checksums of its parts, unchanged where it is no text or has none.
     pub fn reseal(self, bytes: &[u8]) -> Vec<u8> {
         let of_text = |reseal: fn(&str) -> String| match std::str::from_utf8(bytes) {
             Ok(text) => reseal(text).into_bytes(),

@@ -1,4 +1,4 @@
-//! What the program warns of while it works.
+//! Warnings of the program while it works.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -9,7 +9,7 @@ use tracing::{
     span,
 };
 
-/// Does some work on this thread, and returns what this workspace warned of meanwhile.
+/// Does some work on this thread, and returns the warnings of this workspace meanwhile.
 pub(super) fn heard<T>(work: impl FnOnce() -> T) -> (T, Vec<String>) {
     let listener = Listener::default();
     let done = dispatcher::with_default(&Dispatch::new(listener.clone()), work);
@@ -20,7 +20,7 @@ pub(super) fn heard<T>(work: impl FnOnce() -> T) -> (T, Vec<String>) {
 #[derive(Clone, Default)]
 struct Listener(Arc<Mutex<Vec<String>>>);
 
-/// The words of an event.
+/// The text of an event.
 #[derive(Default)]
 struct Message(String);
 

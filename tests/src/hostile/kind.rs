@@ -9,28 +9,28 @@ use std::{
 
 use super::{dice::Dice, form::Form, heard::heard};
 
-/// What a reader says of a file: what is in it, part by part, or why it does not take it.
+/// The report of a reader on a file: its contents, part by part, or the refusal.
 pub(super) type Read = Result<Vec<String>, String>;
 
-/// What became of a file.
+/// The result of reading a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Reading {
-    /// It was read as a whole one, and this is in it, part by part.
+    /// Read as a whole one, with these contents, part by part.
     Whole(Vec<String>),
-    /// It was refused, or read with a warning.
+    /// Refused, or read with a warning.
     Told(String),
 }
 
-/// A kind of file, with a whole one and the files beside it without which nobody reads it.
+/// A kind of file, with a whole one and the files beside it that reading needs.
 #[derive(Clone)]
 pub struct FileKind {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
-    /// What it is made of.
+    /// Its structure.
     pub form: Form,
-    /// Whether it grows part by part, so that it is whole after any of them: who goes on with it adds the rest.
+    /// The file grows part by part, so it is whole after any of them; a resumption adds the rest.
     pub grows: bool,
-    /// Whether reading it takes a World.
+    /// Reading needs a World.
     pub is_slow: bool,
     file: PathBuf,
     files: BTreeMap<PathBuf, Vec<u8>>,
@@ -39,7 +39,8 @@ pub struct FileKind {
 }
 
 impl FileKind {
-    /// The kind of `file` in a folder, whose other files are needed to read it. `read` is given a copy of the folder.
+    /// Takes the kind of `file` in a folder, whose other files are needed to read it. `read` is given a copy of the
+    /// folder.
     pub(super) fn new(name: &'static str, form: Form, folder: &Path, file: &str, read: fn(&Path) -> Read) -> Self {
         let mut files = BTreeMap::new();
         gather(folder, folder, &mut files);
@@ -48,32 +49,32 @@ impl FileKind {
         Self { name, form, grows: false, is_slow: false, file, files, read, handle: |_| {} }
     }
 
-    /// A kind that grows part by part.
+    /// Returns a kind that grows part by part.
     pub(super) fn growing(self) -> Self {
         Self { grows: true, ..self }
     }
 
-    /// A kind that is read into a World.
+    /// Returns a kind that is read into a World.
     pub(super) fn slow(self) -> Self {
         Self { is_slow: true, ..self }
     }
 
-    /// A kind with which more is done than reading it.
+    /// Adds work to do with such a file besides reading it.
     pub(super) fn handled(self, handle: fn(&Path)) -> Self {
         Self { handle, ..self }
     }
 
-    /// The whole file.
+    /// Returns the whole file.
     pub fn bytes(&self) -> &[u8] {
         &self.files[&self.file]
     }
 
-    /// Whether it has checksums. What people write by hand has none.
+    /// Returns true if it has checksums. Files written by hand have none.
     pub fn is_sealed(&self) -> bool {
         self.form != Form::Text
     }
 
-    /// The mutant of a seed, always the same.
+    /// Returns the mutant of a seed, always the same.
     pub fn mutant(&self, seed: u64) -> Vec<u8> {
         self.form.mutate(self.bytes(), &mut Dice::new(seed))
     }
@@ -90,7 +91,7 @@ impl FileKind {
         }
     }
 
-    /// Reads what [`put`](Self::put) has put there.
+    /// Reads the file of [`put`](Self::put).
     pub fn read(&self, folder: &Path) -> Reading {
         let (read, warnings) = heard(|| (self.read)(folder));
         match (read, warnings.into_iter().next()) {
@@ -99,7 +100,7 @@ impl FileKind {
         }
     }
 
-    /// Does whatever else is done with such a file.
+    /// Does the further work with such a file.
     pub fn handle(&self, folder: &Path) {
         (self.handle)(folder);
     }
@@ -117,7 +118,7 @@ fn gather(root: &Path, folder: &Path, files: &mut BTreeMap<PathBuf, Vec<u8>>) {
     }
 }
 
-/// An error in words.
+/// Formats an error.
 pub(super) fn words(error: impl Display) -> String {
     error.to_string()
 }

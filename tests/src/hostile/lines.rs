@@ -1,4 +1,4 @@
-//! Changed files whose lines mean something each.
+//! Changes of files whose lines have a meaning each.
 
 use super::{
     bytes::change_bytes,
@@ -7,7 +7,7 @@ use super::{
     texts::mutate_text,
 };
 
-/// A file with one of its lines changed, gone, there twice or elsewhere.
+/// Returns a file with one of its lines changed, gone, there twice or elsewhere.
 pub(super) fn mutate_lines(text: &str, dice: &mut Dice) -> Vec<u8> {
     let mut lines: Vec<Vec<u8>> = text.split('\n').map(|line| line.as_bytes().to_vec()).collect();
     let (at, other) = (dice.roll(lines.len()), dice.roll(lines.len()));
@@ -22,7 +22,7 @@ pub(super) fn mutate_lines(text: &str, dice: &mut Dice) -> Vec<u8> {
     lines.join(&b'\n')
 }
 
-/// A JSON object that is changed behind its checksum, if it has one.
+/// Returns a JSON object that is changed behind its checksum, if it has one.
 pub(super) fn mutate_object(text: &str, dice: &mut Dice) -> String {
     let (object, had_seal) = unsealed_object(text);
     let changed = mutate_text(&object, dice);

@@ -1,8 +1,8 @@
-//! Files as an adversary, a bad disk or a slip of the keyboard makes them, of every kind that the program reads back.
+//! Files damaged by an adversary, a bad disk or a slip of the keyboard, of every kind that the program reads back.
 //!
-//! - [`all_kinds`] makes a whole file of each kind, and knows how it is read.
-//! - [`Form`] changes such files so that they still look like what they were: frames, tensors, lines and entries that are gone,
-//!   there twice or elsewhere, lengths and numbers at their extremes, and in half of the cases checksums that fit again.
+//! - [`all_kinds`] makes a whole file of each kind, with its reader.
+//! - [`Form`] changes such files and keeps their structure: frames, tensors, lines and entries that are removed,
+//!   doubled or moved, lengths and numbers at their extremes, and in half of the cases checksums that fit again.
 //! - [`read_mutants`] reads them: none may panic, take long or ask for much memory.
 
 mod bytes;

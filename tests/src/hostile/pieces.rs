@@ -1,8 +1,9 @@
-//! Texts of JSON and RON in pieces, and the values that these make up.
+//! Texts of JSON and RON in pieces, and their values.
 
 use std::ops::Range;
 
-/// A text in pieces: a string in its quotes, a number, a word, blanks, or a single other character. Joined they are the text.
+/// Splits a text into pieces: a string in its quotes, a number, a word, blanks, or a single other character. Joined
+/// they are the text.
 pub(super) fn pieces(text: &str) -> Vec<String> {
     let (mut found, mut rest) = (Vec::new(), text);
     while let Some(first) = rest.chars().next() {
@@ -19,7 +20,7 @@ pub(super) fn pieces(text: &str) -> Vec<String> {
     found
 }
 
-/// Bytes of the string in quotes with which a text begins.
+/// Returns the bytes of the string in quotes with which a text begins.
 pub(super) fn string_length(text: &str) -> usize {
     let mut is_escaped = false;
     for (at, letter) in text.char_indices().skip(1) {
@@ -37,23 +38,24 @@ fn run(text: &str, belongs: impl Fn(char) -> bool) -> usize {
     text.find(|letter: char| !belongs(letter)).unwrap_or(text.len())
 }
 
-/// Whether a letter is one of a number or a word.
+/// Returns true if a letter is one of a number or a word.
 fn is_part(letter: char) -> bool {
     letter.is_alphanumeric() || "_.+-".contains(letter)
 }
 
-/// Whether a piece is a number.
+/// Returns true if a piece is a number.
 pub(super) fn is_number(piece: &str) -> bool {
     let digits = piece.strip_prefix('-').unwrap_or(piece);
     digits.starts_with(|first: char| first.is_ascii_digit()) && piece.parse::<f64>().is_ok()
 }
 
-/// Whether a value begins with a piece.
+/// Returns true if a value begins with a piece.
 pub(super) fn is_value(piece: &str) -> bool {
     piece.starts_with(|first: char| "\"[({".contains(first) || is_part(first))
 }
 
-/// The value that begins with a piece, up to its closing bracket if it has one. If it is a key, what it stands for belongs to it.
+/// Returns the value that begins with a piece, up to its closing bracket if it has one. The value of a key belongs to
+/// it.
 pub(super) fn entry(pieces: &[String], at: usize) -> Range<usize> {
     let end = end_of_value(pieces, at);
     let colon = behind_blanks(pieces, end);

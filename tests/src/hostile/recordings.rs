@@ -1,4 +1,4 @@
-//! Changed recordings.
+//! Changes of recordings.
 
 use super::{
     bytes::{EXTREME_WORDS, change_bytes},
@@ -7,13 +7,13 @@ use super::{
     texts::mutate_text,
 };
 
-/// How a frame begins.
+/// The beginning of a frame.
 const MAGIC: [u8; 4] = [0xfe, b'E', b'P', 0xff];
 /// Bytes of a frame before its payload: magic and length.
 const HEAD: usize = 8;
 /// Bytes of its checksum.
 const SUM: usize = 4;
-/// How the second copy of the header begins.
+/// The beginning of the second copy of the header.
 const COPY: &str = "\n// playbot-demo ";
 
 /// A recording in its parts, with the checksums that stand in it.
@@ -21,7 +21,7 @@ struct Recording {
     header: String,
     header_sum: String,
     frames: Vec<Frame>,
-    /// What follows the last whole frame.
+    /// The rest behind the last whole frame.
     rest: Vec<u8>,
 }
 
@@ -57,7 +57,7 @@ impl Recording {
         bytes
     }
 
-    /// Where a frame begins.
+    /// Returns the position at which a frame begins.
     fn place(&self, frame: usize) -> usize {
         let all: usize = self.frames[frame..].iter().map(|frame| HEAD + frame.payload.len() + SUM).sum();
         self.to_bytes().len() - self.rest.len() - all
@@ -74,7 +74,7 @@ impl Frame {
     }
 }
 
-/// A recording with one thing about it changed: its header, the order or number of its episodes, a length, or something in an
+/// Changes one thing about a recording: its header, the order or number of its episodes, a length, or something in an
 /// episode. `None` if it is no recording any more.
 pub(super) fn mutate_recording(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     let mut recording = Recording::parse(bytes)?;
@@ -115,7 +115,7 @@ pub(super) fn mutate_recording(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>>
     Some(recording.to_bytes())
 }
 
-/// The first copy of the header alone is changed, or both are.
+/// Changes the first copy of the header alone, or both.
 fn mutate_header(header: &str, dice: &mut Dice) -> String {
     match header.find(COPY) {
         Some(end) if dice.roll(3) > 0 => mutate_text(&header[..end], dice) + &header[end..],
@@ -123,7 +123,7 @@ fn mutate_header(header: &str, dice: &mut Dice) -> String {
     }
 }
 
-/// The recording with the checksums that its parts have now.
+/// Returns the recording with new checksums of its parts.
 pub(super) fn reseal_recording(bytes: &[u8]) -> Vec<u8> {
     let Some(mut recording) = Recording::parse(bytes) else { return bytes.to_vec() };
     recording.header_sum = digits(recording.header.as_bytes());

@@ -1,20 +1,20 @@
-//! Checksums as files have them, computed anew: what is behind them is read only if they fit.
+//! Checksums of files, computed anew: the parts behind them are read only if they fit.
 
 use playbot_learner::{seal_json, seal_text};
 
-/// How a JSON object with a checksum begins.
+/// The beginning of a JSON object with a checksum.
 pub(super) const JSON_SEAL: &str = "{\"crc32\":\"";
-/// Bytes of the checksum with all that is around it.
+/// Bytes of the checksum and its surroundings.
 pub(super) const JSON_SEAL_LENGTH: usize = "{\"crc32\":\"00000000\",".len();
-/// How the first line of a text with a checksum begins.
+/// The beginning of the first line of a text with a checksum.
 const TEXT_SEAL: &str = "// crc32 ";
 
-/// CRC-32 of bytes, as files have it.
+/// Returns the CRC-32 of bytes, in the form of files.
 pub(super) fn digits(bytes: &[u8]) -> String {
     format!("{:08x}", crc32fast::hash(bytes))
 }
 
-/// A JSON object without its checksum, and whether it had one.
+/// Returns a JSON object without its checksum, and whether it had one.
 pub(super) fn unsealed_object(text: &str) -> (String, bool) {
     match text.get(JSON_SEAL_LENGTH..) {
         Some(rest) if text.starts_with(JSON_SEAL) => (format!("{{{rest}"), true),
@@ -22,7 +22,7 @@ pub(super) fn unsealed_object(text: &str) -> (String, bool) {
     }
 }
 
-/// What follows the first line of a text, if that is its checksum.
+/// Returns the text behind the first line, if that is its checksum.
 pub(super) fn unsealed_text(text: &str) -> &str {
     match text.split_once('\n') {
         Some((first, rest)) if first.starts_with(TEXT_SEAL) => rest,
@@ -30,7 +30,7 @@ pub(super) fn unsealed_text(text: &str) -> &str {
     }
 }
 
-/// The object with the checksum that it has now, if it has one.
+/// Returns the object with a new checksum, if it has one.
 pub(super) fn reseal_object(text: &str) -> String {
     match unsealed_object(text) {
         (object, true) => seal_json(&object),
@@ -38,18 +38,18 @@ pub(super) fn reseal_object(text: &str) -> String {
     }
 }
 
-/// The text with the checksum that it has now, if it has one.
+/// Returns the text with a new checksum, if it has one.
 pub(super) fn reseal_text(text: &str) -> String {
     let rest = unsealed_text(text);
     if rest.len() < text.len() { seal_text(rest) } else { text.to_owned() }
 }
 
-/// The lines with the checksums that they have now, where they have one.
+/// Returns the lines with new checksums, where they have one.
 pub(super) fn reseal_lines(text: &str) -> String {
     text.split('\n').map(reseal_object).collect::<Vec<_>>().join("\n")
 }
 
-/// Results with the checksum of all lines before the last one, where they end with one.
+/// Returns results with the checksum of all lines before the last one, where they end with one.
 pub(super) fn reseal_results(text: &str) -> String {
     match text.rfind("\n]") {
         Some(at) => format!("{}],\"crc32\":\"{}\"}}\n", &text[..=at], digits(&text.as_bytes()[..=at])),

@@ -1,4 +1,4 @@
-//! Changed files of tensors: models, checkpoints and policies.
+//! Changes of files of tensors: models, checkpoints and policies.
 
 use super::{
     bytes::{EXTREME_WORDS, change_bytes},
@@ -8,19 +8,19 @@ use super::{
     texts::mutate_text,
 };
 
-/// Bytes that say how long the header is.
+/// Bytes of the header's length.
 const LENGTH: usize = 8;
-/// What stands in the header before the description, which is JSON in a string.
+/// The text in the header before the description, which is JSON in a string.
 const DESCRIPTION: &str = "\"playbot\":";
-/// How a header with a checksum begins.
+/// The beginning of a header with a checksum.
 const SEALED: &[u8] = br#"{"__metadata__":{"playbot":"{\"crc32\":\""#;
 /// Digits of a checksum.
 const DIGITS: usize = 8;
 
-/// Numbers that are none, or at the end of those that there are.
+/// Floats that are no numbers, or extreme ones.
 const FLOATS: [f32; 6] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN_POSITIVE, -0.0];
 
-/// A file with one thing about it changed: its description, its list of tensors, its lengths or its numbers. `None` if it is no
+/// Changes one thing about a file: its description, its list of tensors, its lengths or its numbers. `None` if it is no
 /// file of tensors any more.
 pub(super) fn mutate_tensors(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     let (header, data) = parts(bytes)?;
@@ -36,7 +36,7 @@ pub(super) fn mutate_tensors(bytes: &[u8], dice: &mut Dice) -> Option<Vec<u8>> {
     })
 }
 
-/// The header and what follows it.
+/// Returns the header and what follows it.
 fn parts(bytes: &[u8]) -> Option<(String, &[u8])> {
     let length = usize::try_from(u64::from_le_bytes(*bytes.first_chunk()?)).ok()?;
     let end = length.checked_add(LENGTH)?;
@@ -48,7 +48,7 @@ fn joined(header: &str, data: &[u8]) -> Vec<u8> {
     [&(header.len() as u64).to_le_bytes()[..], header.as_bytes(), data].concat()
 }
 
-/// The header with another description behind the checksum in it.
+/// Returns the header with another description behind the checksum in it.
 fn with_description(header: &str, change: impl FnOnce(&str) -> String) -> Option<String> {
     let start = header.find(DESCRIPTION)? + DESCRIPTION.len();
     let end = start + string_length(&header[start..]);
@@ -72,7 +72,7 @@ fn with_float(data: &[u8], dice: &mut Dice) -> Vec<u8> {
     data
 }
 
-/// The file with the checksum that its bytes have now, if it has one.
+/// Returns the file with a new checksum, if it has one.
 pub(super) fn reseal_tensors(bytes: &[u8]) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let place = LENGTH + SEALED.len()..LENGTH + SEALED.len() + DIGITS;

@@ -1,11 +1,11 @@
-//! Changed texts of JSON and RON.
+//! Changes of texts of JSON and RON.
 
 use super::{
     dice::Dice,
     pieces::{entry, is_number, is_value, pieces},
 };
 
-/// Numbers at which something ends.
+/// Extreme numbers.
 const EXTREMES: [&str; 20] = [
     "0",
     "1",
@@ -33,7 +33,7 @@ const EXTREMES: [&str; 20] = [
 const VALUES: [&str; 14] =
     ["null", "None", "true", "[]", "{}", "()", "\"\"", "[[]]", "[null]", "Some(1)", "(a: 1)", "{\"a\":1}", "'x'", "-"];
 
-/// Texts that say more than they seem to.
+/// Texts with a hidden meaning.
 const STRINGS: [&str; 9] = [
     "\"\\u001b[2J\"",
     "\"\\u0000\"",
@@ -53,7 +53,7 @@ const DEEP: usize = 3000;
 /// Letters of a long word.
 const LONG: usize = 20_000;
 
-/// A text with one thing about it changed: a number, a word, an entry that is gone, there twice or elsewhere.
+/// Changes one thing about a text: a number, a word, an entry that is removed, doubled or moved.
 pub fn mutate_text(text: &str, dice: &mut Dice) -> String {
     let mut pieces = pieces(text);
     let values: Vec<usize> = (0..pieces.len()).filter(|&at| is_value(&pieces[at])).collect();
@@ -83,7 +83,7 @@ pub fn mutate_text(text: &str, dice: &mut Dice) -> String {
     pieces.concat()
 }
 
-/// Another string, maybe one that stands elsewhere.
+/// Returns another string, maybe one that stands elsewhere.
 fn string(text: &str, strings: &[usize], dice: &mut Dice) -> String {
     match dice.roll(3) {
         0 => format!("\"{}\"", "x".repeat(LONG)),
@@ -99,7 +99,7 @@ fn value(dice: &mut Dice) -> String {
     }
 }
 
-/// A string with one of its letters replaced by another that may stand there.
+/// Returns a string with one of its letters replaced by another that may stand there.
 fn with_another_letter(string: &str, dice: &mut Dice) -> String {
     const LETTERS: [char; 12] = ['0', '9', 'a', 'Z', ' ', '.', '/', ':', '-', '\u{e9}', '\u{7f}', '\u{1f600}'];
     let mut letters: Vec<char> = string.chars().collect();
@@ -127,7 +127,7 @@ fn repeat(pieces: &mut Vec<String>, at: usize, times: usize) {
 
 fn swap(pieces: &mut Vec<String>, one: usize, other: usize) {
     let (first, second) = (entry(pieces, one.min(other)), entry(pieces, one.max(other)));
-    // One within the other has no place to go to.
+    // One within the other has no position to go to.
     if first.end > second.start {
         return;
     }

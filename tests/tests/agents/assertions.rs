@@ -1,4 +1,4 @@
-//! Assertions about levels, recordings and findings: those that hold, and what the others say.
+//! Tests of assertions about levels, recordings and findings: those that hold, and the messages of the others.
 
 use std::{
     fs,
@@ -9,17 +9,23 @@ use std::{
 
 use bevy::prelude::*;
 use bevy_playbot::demo::file::DemoWriter;
-use playbot_lab::{eval::Player, findings::list_findings, prelude::*, proof::LevelProof};
+use playbot_lab::{
+    eval::Player,
+    findings::list_findings,
+    game::{BotTools, LevelTools},
+    prelude::*,
+    proof::LevelProof,
+};
 use playbot_tests::{Cell, Corridor, Drift, as_corridor, corridor_plugin, recording::record_random};
 
-/// The corridor with bots that walk to the right and to the left, and perhaps with something wrong.
+/// The corridor with bots that walk to the right and to the left, and perhaps with a fault.
 enum Lane {
     Sound,
-    /// It panics on level 3 when somebody stands at its last cell but one.
+    /// It panics on level 3 when the agent stands at its last cell but one.
     Burning,
-    /// Each World is another one.
+    /// Each World differs.
     Drifting,
-    /// It says that it is the corridor, and has other states.
+    /// It has the corridor's name, and other states.
     Impostor,
 }
 
@@ -66,24 +72,32 @@ impl Game for Lane {
         }
     }
 
-    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
-        let walks = |action| BlindBot::Constant(ActionValue::Discrete(action));
-        vec![("right", walks(1)), ("left", walks(0))]
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { levels: self, bots: self, ..GameTools::default() }
     }
+}
 
+impl LevelTools for Lane {
     fn prove(&self, _mode: &str, level: u64) -> LevelProof {
         let why = "walled in".to_owned();
         if level == 4 { LevelProof::Unsolvable { why } } else { LevelProof::Unknown }
     }
 }
 
-/// What an assertion says that does not hold.
+impl BotTools for Lane {
+    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
+        let walks = |action| BlindBot::Constant(ActionValue::Discrete(action));
+        vec![("right", walks(1)), ("left", walks(0))]
+    }
+}
+
+/// Returns the message of a failing assertion.
 fn message(assertion: impl FnOnce()) -> String {
     let panic = catch_unwind(AssertUnwindSafe(assertion)).expect_err("it must not hold");
     *panic.downcast::<String>().expect("words")
 }
 
-/// The file in a folder of findings whose name begins so.
+/// Returns the file in a folder of findings whose name begins so.
 fn file(folder: &Path, begin: &str) -> PathBuf {
     let found = list_findings(folder).expect("findings");
     found.into_iter().find(|(name, _)| name.starts_with(begin)).unwrap_or_else(|| panic!("no {begin}")).1
@@ -136,7 +150,7 @@ fn a_failure_names_each_level_with_its_proof_and_the_commands_that_show_it() {
     ];
     assert_eq!(found, expected.join("\n"));
     assert_replays(&Lane::Sound, folder.path());
-    // The first levels are told in full, all others by name.
+    // The first levels are reported in full, all others by name.
     let many = message(|| test("plain:10..21").assert_solvable());
     assert!(many.starts_with("12 of 12 levels ") && many.ends_with("\nand plain:20, plain:21"), "{many}");
     let mixed = message(|| test("plain:5..6").bot("right").assert_solved());
@@ -171,7 +185,7 @@ fn a_finding_is_told_and_stays_told_until_it_is_mended() {
 fn a_game_that_does_not_play_the_same_is_told_with_the_tick() {
     let found = message(|| assert_deterministic(&Lane::Drifting, "plain:1..2"));
     assert!(found.starts_with("2 of 2 levels did not play the same again (`lane`, plain:1..2, right + left + "));
-    assert!(found.contains("\n  determinism (right, episode 0, tick 0): the episode was another one"), "{found}");
+    assert!(found.contains("\n  determinism (right, episode 0, tick 0): the episode differed"), "{found}");
     let options = "--detect determinism --no-detect all --detector determinism.every=1";
     assert!(found.contains(options), "{found}");
 }

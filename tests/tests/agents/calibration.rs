@@ -1,4 +1,4 @@
-//! Results beside recordings of people, both made by hand, so that every number is known.
+//! Tests of results beside recordings of people, both made by hand, so every number is known.
 
 use std::{
     fs,
@@ -54,7 +54,7 @@ fn episode(level: u64, ticks: usize, end: DemoEnd, decider: Decider) -> DemoEpis
     }
 }
 
-/// A recording of these tries of a person: level, ticks and end.
+/// Writes a recording of these tries of a person: level, ticks and end.
 fn recorded(path: &Path, header: DemoHeader, tries: &[(u64, usize, DemoEnd)]) -> PathBuf {
     let mut writer = DemoWriter::create(path, header).expect("a fresh file");
     for (level, ticks, end) in tries {
@@ -71,7 +71,7 @@ fn agreement(found: &Calibration, measure: Measure) -> &Agreement {
 fn the_rank_correlation_with_several_people_is_known() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = |name: &str| folder.path().join(name);
-    // The bot is slower from level to level, and solves all of them; the last one was recorded by nobody.
+    // The bot is slower from level to level, and solves all of them; the last one has no recording.
     let levels: Vec<(u64, u64)> = (1..=13).map(|level| (10, 10 * level)).collect();
     results(&path("out"), &levels);
     // Alice too, but for two pairs of neighbours that change places.
@@ -133,7 +133,7 @@ fn few_levels_are_called_too_few() {
     let completion = agreement(&found, Measure::Completion);
     assert_eq!(completion.spearman, Some(RankCorrelation { value: 1.0, interval: None }));
     assert_eq!(completion.note.as_deref(), Some("too few levels for an interval"));
-    // Nobody completed the last one.
+    // The last one was completed by no person.
     assert_eq!(agreement(&found, Measure::Time).levels, 2);
     assert_eq!(found.levels[2].people.ticks, None);
 }

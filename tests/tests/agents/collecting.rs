@@ -1,4 +1,4 @@
-//! What becomes of a rollout when a game breaks its contract in the middle of it.
+//! Tests of a rollout in which a game breaks its contract.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ use playbot_lab::{
 use playbot_learner::{DeviceKind, PpoConfig};
 use playbot_tests::{as_corridor, corridor_plugin, training::untrained};
 
-/// A corridor that once puts an action of another kind in the place of the one that was decided.
+/// A corridor that once replaces a decided action by one of another kind.
 struct Meddling;
 
 impl Game for Meddling {

@@ -1,4 +1,4 @@
-//! A corridor with planted defects, and tests of it, for tests of detectors.
+//! A corridor with planted defects, for tests of detectors.
 
 use std::collections::BTreeSet;
 
@@ -9,27 +9,28 @@ use playbot_lab::{
     detectors::{DetectorChoice, Detectors},
     eval::Player,
     floor_plan::FloorPlan,
+    game::{LevelTools, StateTools, TestTools},
     prelude::*,
     verdict::{Finding, LevelVerdict, TestError, TestPlan, TestWatch, Tester, TesterRecord, run_tests},
 };
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
 
-/// What is wrong with a copy of the corridor.
+/// The defect of a copy of the corridor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Resource)]
 pub enum Defect {
-    /// Nothing.
+    /// No defect.
     None,
     /// In the second tick of level 2 a body flies away.
     FlyingBody,
     /// An error is logged in the second tick of level 2.
     LoggedError,
-    /// Whoever stays where it is is paid for it.
+    /// Staying is paid.
     PaidRest,
-    /// Whoever still plays after five ticks has lost.
+    /// After five ticks every running episode is lost.
     LostByClock,
-    /// For whoever rests then, time is up after five ticks.
+    /// For an agent that rests then, time is up after five ticks.
     ShortTime,
-    /// The plan of the level goes on where nobody can walk.
+    /// The plan of the level goes on where walking is impossible.
     ClosedWing,
 }
 
@@ -66,10 +67,12 @@ impl Game for Defect {
         app.world_mut().spawn((Body, Name::new("Crate"), Transform::default()));
     }
 
-    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        world.get::<Cell>(agent).map(|cell| Vec2::new(cell.0 as f32 + 0.5, 1.5))
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { levels: self, state: self, tests: self, ..GameTools::default() }
     }
+}
 
+impl LevelTools for Defect {
     fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
         let columns = if *self == Self::ClosedWing { 17 } else { 7 };
         let square = |row: usize, column: usize| {
@@ -79,7 +82,15 @@ impl Game for Defect {
         let ends = [Vec2::new(3.5, 1.5), Vec2::new(6.5, 1.5)];
         Some(FloorPlan::of_tiles([3, columns], |row, _| row != 1, square, ends))
     }
+}
 
+impl StateTools for Defect {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<Cell>(agent).map(|cell| Vec2::new(cell.0 as f32 + 0.5, 1.5))
+    }
+}
+
+impl TestTools for Defect {
     fn detectors(&self) -> Vec<Box<dyn Detector>> {
         vec![Box::new(EachTick::new("late", "somebody is still there after ten ticks", |moment: &Moment<'_>| {
             (moment.tick == 10).then(|| "it takes too long".to_owned())
@@ -101,7 +112,7 @@ pub fn always(action: u32) -> Tester {
     tester(&name, Player::Blind(BlindBot::Constant(ActionValue::Discrete(action))))
 }
 
-/// Only these detectors, with these settings.
+/// Returns only these detectors, with these settings.
 pub fn only(game: &dyn Game, names: &[&str], settings: &[&str]) -> Detectors {
     let words = |list: &[&str]| list.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
     let choice = DetectorChoice { with: words(names), without: words(&["all"]), settings: words(settings) };
@@ -128,7 +139,7 @@ pub fn verdicts(
     found
 }
 
-/// All findings, with the places of their levels.
+/// Returns all findings, with the positions of their levels.
 pub fn findings(game: &dyn Game, levels: &str, testers: Vec<Tester>, detectors: Detectors) -> Vec<(u64, Finding)> {
     let of_level = |verdict: LevelVerdict| {
         let index = verdict.index;

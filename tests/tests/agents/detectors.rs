@@ -1,4 +1,4 @@
-//! Detectors in tests of games with planted defects, and of sound ones.
+//! Tests of detectors on games with planted defects, and on unmutated ones.
 
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
 use playbot_lab::{
@@ -72,7 +72,7 @@ fn what_a_world_keeps_from_one_episode_to_the_next_is_a_breach_of_determinism() 
     };
     for (variant, episode) in [(0, 2), (1, 2), (2, 3)] {
         let message = seen(&Mutant::new(&Corridor as &dyn Game, leak, variant), &[]).expect("it is found");
-        assert!(message.starts_with(&format!("episode {episode} of a World was another one")), "{variant}: {message}");
+        assert!(message.starts_with(&format!("episode {episode} of a World differed")), "{variant}: {message}");
     }
     let late = Mutant::new(&Corridor as &dyn Game, leak, 2);
     assert_eq!(seen(&late, &["determinism.episodes=2"]), None, "that is too soon for it");
@@ -87,7 +87,7 @@ fn a_level_that_is_solved_too_fast_has_a_shortcut() {
     assert!(found[0].1.message.contains("solved in 3 ticks"), "{found:?}");
     assert_eq!(found[0].1.tick, Some(2));
     assert_silent(&solve("shortcut.par=5"));
-    // Nobody demonstrates the corridor.
+    // The corridor has no demonstrator.
     assert_silent(&solve("shortcut.factor=0.9"));
 }
 
@@ -97,7 +97,7 @@ fn rewards_for_doing_nothing_are_found() {
     let testers = || vec![always(1), always(2)];
     let found = findings(&Defect::PaidRest, "plain:1", testers(), only(&Defect::PaidRest, &names, &[]));
     let who: Vec<_> = found.iter().map(|(_, finding)| (finding.detector.as_str(), finding.tick)).collect();
-    // Who stays is paid for the tenth time in tick 10; time is up after 20 ticks.
+    // Staying is paid for the tenth time in tick 10; time is up after 20 ticks.
     assert_eq!(who, [("reward-loop", Some(10)), ("reward-farm", Some(19))], "{found:?}");
     assert_silent(&findings(&Defect::None, "plain:1", testers(), only(&Defect::None, &names, &[])));
 }

@@ -1,4 +1,4 @@
-//! Episodes: start, end, counting, and who decides.
+//! Tests of episodes: start, end, counting, and deciders.
 
 use bevy::prelude::*;
 use bevy_playbot::test_app::{PlaybotTestExt, test_app};
@@ -37,7 +37,7 @@ fn termination_and_truncation_are_told_apart() {
     }
 }
 
-/// Says at tick 5 that the aim is reached, and from then on that actions are clipped.
+/// Reports at tick 5 that the goal is reached, and from then on that actions are clipped.
 fn reach(mut episodes: Query<&mut Episode>) {
     for mut episode in &mut episodes {
         if episode.tick == 5 {

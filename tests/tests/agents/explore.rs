@@ -1,4 +1,4 @@
-//! Exploring levels without training.
+//! Tests of exploring levels without training.
 
 use std::{
     ops::ControlFlow,
@@ -18,6 +18,7 @@ use playbot_lab::{
         record_route,
     },
     foreign::Restart,
+    game::StateTools,
     games::Games,
     prelude::*,
 };
@@ -27,18 +28,24 @@ use playbot_tests::{
     training::untrained,
 };
 
-/// The corridor, which tells the explorer its cells.
+/// The corridor, which gives the explorer its cells.
 struct Cells;
 
 impl Game for Cells {
     as_corridor!();
 
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { state: self, ..GameTools::default() }
+    }
+}
+
+impl StateTools for Cells {
     fn explore_cell(&self, world: &World, agent: Entity) -> Option<Vec<i32>> {
         world.get::<Cell>(agent).map(|cell| vec![cell.0])
     }
 }
 
-/// The corridor, whose state depends on how long the program has been running.
+/// The corridor, whose state depends on the age of the program.
 struct Drifting;
 
 fn drift(mut drift: ResMut<Drift>) {
@@ -84,7 +91,7 @@ fn refused(game: &dyn Game, plan: &ExplorePlan) -> ExploreError {
     }
 }
 
-/// All that was found, with every way.
+/// Returns the whole result, with every path.
 fn everything(game: &dyn Game, plan: &ExplorePlan) -> String {
     let found = found(game, plan);
     let ways: Vec<_> = found.cells().iter().map(|(cell, reached)| (cell, reached, found.route_to(cell))).collect();
@@ -111,7 +118,7 @@ fn every_cell_of_the_corridor_is_reached_by_its_shortest_way() {
 fn observations_are_cells_where_nothing_else_is_known() {
     let found = found(&Corridor, &plan("plain", 1, 5000));
     assert_eq!(found.solution_ticks(), Some(3));
-    // What is seen before the first action is the start.
+    // The observation before the first action is the start.
     let start = found.cells().values().find(|reached| reached.ticks() == 0);
     assert!(start.is_some(), "the start is seen, too");
     assert!(found.cells().keys().all(|cell| cell.0.len() == 2), "place and time");
@@ -146,7 +153,7 @@ fn a_game_that_does_not_replay_is_told_so_at_the_first_tick_that_differs() {
     let error = refused(&Drifting, &plan("plain", 1, 5000));
     assert!(matches!(&error, ExploreError::Diverged { divergence, .. } if divergence.tick == 0), "{error}");
     let text = error.to_string();
-    for words in ["level 1, tick 0", "the state hash is", "`playbot doctor corridor --mode plain --seed 1`"] {
+    for words in ["level 1, tick 0", "the state hash is", "`playbot doctor corridor --mode plain --level 1`"] {
         assert!(text.contains(words), "`{words}` is missing in: {text}");
     }
 }
@@ -156,7 +163,7 @@ fn games_that_are_built_anew_for_each_episode_can_be_explored() {
     let plan = ExplorePlan { arenas: 2, until: Until::Solved, ..plan("default", 1, 1500) };
     let found = found(&stubborn_game(Restart::Rebuild), &plan);
     assert_eq!(found.stop, Stop::Solved);
-    // It takes more when it is begun anew without being built anew: then it does not replay.
+    // A new episode without a new World takes more: then it does not replay.
     let plan = ExplorePlan { until: Until::Spent, ..plan };
     let error = refused(&stubborn_game(Restart::Startup), &plan);
     assert!(matches!(error, ExploreError::Diverged { .. }), "{error}");
@@ -196,7 +203,7 @@ fn a_small_maze_is_reached_as_a_whole() {
     assert_eq!(grid.size, 1.0);
     let solution = found.solution().expect("a goal in reach");
     let places = follow_route(maze, "random+size=7x7", 3, &solution.actions).expect("sound");
-    let goal = maze.floor_plan("random+size=7x7", 3).expect("a plan").goal;
+    let goal = maze.tools().levels.floor_plan("random+size=7x7", 3).expect("a plan").goal;
     assert_eq!(places.len(), solution.len());
     assert!(places.last().is_some_and(|place| place.distance(goal) < 0.51), "{:?} is not {goal}", places.last());
 }
@@ -226,7 +233,7 @@ fn plans_that_make_no_sense_are_refused() {
         (plan("plain", 1, 0), "at least one step"),
         (ExplorePlan { explore_ticks: 0, ..sound() }, "a visit one tick"),
         (ExplorePlan { batch: 0, ..sound() }, "a round one visit"),
-        (ExplorePlan { sticky: 1.5, ..sound() }, "is repeated is 1.5: it lies between 0 and 1"),
+        (ExplorePlan { sticky: 1.5, ..sound() }, "is repeated is 1.5: write a number from 0 to 1"),
         (ExplorePlan { cell_size: Some(0.0), ..sound() }, "the size of a cell is 0"),
         (ExplorePlan { cell_size: Some(f32::NAN), ..sound() }, "the size of a cell is NaN"),
     ] {

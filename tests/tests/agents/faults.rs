@@ -1,4 +1,4 @@
-//! Faults are heard: as errors by whoever ticks the World, as events in an app that runs by itself.
+//! Tests of faults: errors for the caller that ticks the World, events in an app that runs by itself.
 
 use bevy::{
     prelude::*,

@@ -1,4 +1,4 @@
-//! Findings as files: replayed, made shorter, and looked for again.
+//! Tests of findings as files: replayed, shortened, and tested again.
 
 use std::{
     collections::BTreeSet,
@@ -25,7 +25,7 @@ use playbot_lab::{
 };
 use playbot_tests::{Cell, Corridor, as_corridor, corridor_plugin};
 
-/// The corridor, which panics on level 3 when somebody stands at its last cell but one, unless that is mended.
+/// The corridor, which panics on level 3 when the agent stands at its last cell but one, unless that is mended.
 struct Burning {
     is_mended: bool,
 }
@@ -66,13 +66,13 @@ impl Game for Burning {
 
 const BURNING: Burning = Burning { is_mended: false };
 
-/// To and fro so many times, and then these.
+/// Returns so many steps to and fro, and then these.
 fn after_wandering(times: usize, last: &[u32]) -> Vec<ActionValue> {
     let wander = [1, 0].repeat(times);
     wander.into_iter().chain(last.iter().copied()).map(ActionValue::Discrete).collect()
 }
 
-/// A finding on level 3, which begins at cell 3.
+/// Returns a finding on level 3, which begins at cell 3.
 fn stored(game: &dyn Game, detector: &str, message: &str, actions: &[ActionValue], checks: &Checks) -> StoredFinding {
     let head = FindingHead::new("plain:3", detector, message);
     StoredFinding::of_actions(game, "plain", 3, head, actions, checks).expect("it happens")
@@ -82,7 +82,7 @@ fn shortened(game: &dyn Game, finding: &StoredFinding, checks: &Checks) -> Minim
     minimise(game, finding, checks, Budget::default(), &|_| {}, &|| false).expect("it happens")
 }
 
-/// Checks that a finding is there, and that of its shorter form so many ticks are left: at most 30 %.
+/// Checks that a finding replays, and that its shorter form has so many ticks: at most 30 %.
 fn is_shortened_to(game: &dyn Game, finding: &StoredFinding, checks: &Checks, ticks: usize) {
     assert!(recheck(game, finding, checks).expect("playable").is_same(finding));
     let Minimised { finding: short, is_minimal, .. } = shortened(game, finding, checks);
@@ -154,7 +154,7 @@ fn test(game: &dyn Game, testers: Vec<Tester>, folder: &Path, threads: usize) ->
     found
 }
 
-/// Names and bytes of the findings in a folder.
+/// Returns the names and bytes of the findings in a folder.
 fn files(folder: &Path) -> Vec<(String, Vec<u8>)> {
     let found = list_findings(folder).expect("findings");
     found.into_iter().map(|(name, path)| (name, fs::read(path).expect("readable"))).collect()
@@ -170,7 +170,7 @@ fn a_test_writes_its_findings_as_files_which_are_the_same_on_any_number_of_threa
     assert!(file.starts_with(&format!("{FINDINGS}/plain-3.panic.right-")), "{file}");
     assert!(one.join(file).is_file() && files(&one).len() == 1);
     assert_eq!(files(&one), files(&two));
-    // Nobody wins who goes left, and who always goes left leaves nothing to chance.
+    // An agent that goes left never wins, and a constant tester is deterministic.
     let left = folder.path().join("left");
     let verdicts = test(&Corridor, vec![tester("left", 0)], &left, 2);
     assert!(verdicts.iter().all(|verdict| verdict.findings.is_empty()), "a lost episode is no finding");

@@ -1,4 +1,5 @@
-//! The example `lander` goes the whole road, and what it ships plays in an app of `bevy_playbot` alone.
+//! Tests of the example `lander`, from recording to policy file. The policy file plays in an app of `bevy_playbot`
+//! alone.
 #![allow(clippy::duplicate_mod, reason = "two examples share the rules of their game")]
 
 #[path = "../../../plugin/lab/examples/lander.rs"]
@@ -50,7 +51,7 @@ fn the_lander_goes_the_whole_road() {
     assert_eq!(count.finished, 2, "both levels are over after 401 ticks at most");
 }
 
-/// The game of `lander_window` without its window: the policy that is part of the program plays.
+/// Returns the game of `lander_window` without its window: the policy that is part of the program plays.
 fn shipped() -> App {
     let mut app = headless_app();
     set_tick_rate(&mut app, TICK_HZ);
@@ -84,13 +85,13 @@ fn f9_gives_the_controls_and_takes_them_back() {
     let capsule = lander_window::lander_rules::rules::capsule(0);
     let agent = app.world_mut().spawn((capsule, Control::Policy, LevelQueue::Always(64))).id();
     for wanted in [Control::Human, Control::Policy] {
-        // Nobody clears the keys here: it is pressed anew in every tick.
+        // The keys are not cleared here: it is pressed anew in every tick.
         app.tick().expect("sound");
         assert_eq!(app.world().get::<Control>(agent), Some(&wanted));
     }
 }
 
-/// The recordings that are learned from are worth it.
+/// The recordings of the experiment are good enough.
 #[test]
 fn the_pilot_lands_softly() {
     use playbot_lab::{eval::Player, pipeline, train::config_file::parse_experiment};

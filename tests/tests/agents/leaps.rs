@@ -1,4 +1,4 @@
-//! Agents that leap over cells between two ticks.
+//! Tests of agents that leap over cells between two ticks.
 
 use std::ops::ControlFlow;
 
@@ -6,6 +6,7 @@ use bevy::prelude::*;
 use playbot_lab::{
     explore::{Cell as ExploredCell, ExploreError, ExplorePlan, Stop, Until, check_cell, explore},
     floor_plan::FloorPlan,
+    game::{LevelTools, StateTools},
     prelude::*,
 };
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
@@ -20,6 +21,12 @@ impl Game for Leaps {
         corridor_plugin(app);
     }
 
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { levels: self, state: self, ..GameTools::default() }
+    }
+}
+
+impl LevelTools for Leaps {
     fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
         Some(FloorPlan {
             bounds: Rect::new(0.0, 0.0, 13.0, 2.0),
@@ -29,8 +36,10 @@ impl Game for Leaps {
             ..FloorPlan::default()
         })
     }
+}
 
-    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
+impl StateTools for Leaps {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
         world.get::<Cell>(agent).map(|cell| Vec2::new(2.0 * cell.0 as f32 + 0.5, 0.5))
     }
 }

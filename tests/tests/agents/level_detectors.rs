@@ -1,4 +1,4 @@
-//! Detectors that look at whole levels and at what is logged, and whether what they find is found again.
+//! Tests of detectors of whole levels and of logs, and of the replay of their findings.
 
 use playbot_lab::{
     eval::Player,
@@ -10,7 +10,7 @@ use playbot_tests::{Corridor, faulty::Fault as Garden};
 
 use crate::corridor_defects::{Defect, always, assert_silent, findings, only, tester};
 
-/// Who rests, and some who do anything.
+/// Returns a tester that rests, and some random ones.
 fn crowd() -> Vec<Tester> {
     let anybody = ["one", "two", "three", "four"].map(|name| tester(name, Player::Blind(BlindBot::Uniform)));
     std::iter::once(always(2)).chain(anybody).collect()

@@ -1,4 +1,4 @@
-//! Agents in apps of their own: episodes, rewards, recordings, skills, policies and training.
+//! Tests of agents in apps of their own: episodes, rewards, recordings, skills, policies and training.
 
 mod assertions;
 mod calibration;

@@ -1,4 +1,4 @@
-//! Agents that share a World learn what agents with a World each learn: nothing passes between them but what the game has.
+//! Tests that agents in a shared World learn the same as agents with a World each.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use playbot_tests::Corridor;
 
 const SEEDS: u64 = 6;
 
-/// The mean success rate over a training, which tells how fast it learned, and that of its end.
+/// Returns the mean success rate over a training, which measures the speed of learning, and that of its end.
 fn learned(worlds: u32, seed: u64) -> [f64; 2] {
     let text = r#"(
         game: "corridor", train: "plain:0..7", test: "plain:8..15", algorithm: "ppo", steps: 32768, arenas: 64,
@@ -23,7 +23,7 @@ fn learned(worlds: u32, seed: u64) -> [f64; 2] {
     [rates.iter().sum::<f64>() / rates.len() as f64, *rates.last().expect("updates")]
 }
 
-/// Mean and squared standard error over the seeds.
+/// Returns the mean and squared standard error over the seeds.
 fn mean(values: &[f64]) -> (f64, f64) {
     let n = values.len() as f64;
     let mean = values.iter().sum::<f64>() / n;

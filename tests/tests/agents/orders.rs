@@ -1,5 +1,5 @@
-//! In no schedule are our systems in an ambiguous order: neither in those that Bevy's own systems share, nor where a tick
-//! is a frame.
+//! Tests that no schedule has our systems in an ambiguous order: neither those of Bevy's own systems, nor those in
+//! which a tick is a frame.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -25,12 +25,12 @@ use playbot_tests::{
     spawn_walker,
 };
 
-/// Whose systems are looked at.
+/// Crates whose systems are checked.
 const OURS: [&str; 3] = ["bevy_playbot", "playbot_lab", "playbot_games"];
 
 const NONE: [&str; 0] = [];
 
-/// An app with everything that a game can ship with, after some ticks.
+/// Returns an app with all shipped parts, after some ticks.
 fn shipped(placement: TickPlacement, more: impl FnOnce(&mut App)) -> App {
     let plugins = PlaybotPlugins::new("corridor", 3);
     let mut app = App::new();
@@ -86,7 +86,7 @@ fn with_input_managers() {
     }
 }
 
-/// What is open in a World after some ticks of random play.
+/// Returns the ambiguities in a World after some ticks of random play.
 fn open_after(ticks: u64, (mut world, agents): (World, Vec<Entity>)) -> Vec<String> {
     leave_open(&mut world);
     world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform));

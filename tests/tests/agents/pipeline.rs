@@ -1,4 +1,4 @@
-//! The whole road as functions: each step works on what the one before has made, and says what it cannot do.
+//! Tests of the pipeline as functions: each step uses the result of the one before, and explains its failures.
 
 #![allow(clippy::result_large_err, reason = "errors are looked at here, not handed on")]
 
@@ -10,8 +10,15 @@ use playbot_lab::prelude::*;
 use playbot_lab::{
     demo::demonstration::DemonstrationPlan,
     eval::Player,
+    game::BotTools,
     pipeline::{self, PipelineError},
-    train::{Algorithm, Experiment, config_file::parse_experiment},
+    train::{
+        Algorithm, Experiment, UpdateReport,
+        config_file::parse_experiment,
+        recordings::RecordingsError,
+        run_observer::{AfterUpdate, RunEvent, RunObserver, Unobserved},
+        train_run::TrainingSetup,
+    },
 };
 use playbot_learner::{DeviceKind, PolicyFile};
 use playbot_tests::{Corridor, as_corridor};
@@ -26,12 +33,18 @@ const EXPERIMENT: &str = r#"(
     score: (horizon: 2),
 )"#;
 
-/// The corridor with somebody who shows the way to the exit.
+/// The corridor with a demonstrator that walks to the exit.
 struct Shown;
 
 impl Game for Shown {
     as_corridor!();
 
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { bots: self, ..GameTools::default() }
+    }
+}
+
+impl BotTools for Shown {
     fn demonstrator(&self) -> Option<&'static str> {
         Some("right")
     }
@@ -50,7 +63,11 @@ fn experiment(demos: &Path) -> Experiment {
     Experiment { demos: Some(demos.to_owned()), ..experiment }
 }
 
-/// The levels that a policy file says it has seen.
+fn setup() -> TrainingSetup<'static> {
+    TrainingSetup::new(DeviceKind::Flex, 2)
+}
+
+/// Returns the seen levels in a policy file.
 fn seen(file: &PolicyFile) -> &[String] {
     &file.card.seen.as_ref().expect("noted").levels
 }
@@ -66,11 +83,12 @@ fn the_whole_road_leads_from_a_demonstrator_to_a_policy_file() {
     assert_eq!(recorded, (16..=35).collect::<Vec<u64>>());
 
     let experiment = experiment(&demos);
-    let skills = pipeline::learn_skills(&Shown, &experiment, DeviceKind::Flex, 2).expect("learned");
+    let file = folder.path().join("skills.safetensors");
+    let skills = pipeline::learn_skills(&Shown, &experiment, &file, &setup(), &mut Unobserved).expect("learned");
     let mut steps = Vec::new();
-    let trainer = pipeline::train(&Shown, &experiment, Some(&skills), DeviceKind::Flex, 2, |report| {
-        steps.push(report.step);
-    });
+    let mut observer = AfterUpdate(|report: &UpdateReport| steps.push(report.step));
+    let (run, with_file) = (folder.path().join("run"), Some((file.as_path(), &skills)));
+    let trainer = pipeline::train(&Shown, &experiment, with_file, &run, &setup(), &mut observer);
     let trainer = trainer.expect("trained");
     assert_eq!((trainer.is_done(), steps), (true, vec![128, 256, 384, 512]), "one report for each update");
 
@@ -100,10 +118,12 @@ fn what_chooses_skills_is_shipped_with_what_it_has_learned_of_them() {
     pipeline::record(&Shown, &levels("plain:16..35"), 0.1, &demos).expect("recorded");
     for algorithm in [Algorithm::SpirlPpo, Algorithm::Rlpd] {
         let experiment = Experiment { algorithm, ..experiment(&demos) };
-        let skills = algorithm
-            .needs_skills()
-            .then(|| pipeline::learn_skills(&Shown, &experiment, DeviceKind::Flex, 2).expect("learned"));
-        let trainer = pipeline::train(&Shown, &experiment, skills.as_ref(), DeviceKind::Flex, 2, |_| {});
+        let at = folder.path().join("skills.safetensors");
+        let learn = || pipeline::learn_skills(&Shown, &experiment, &at, &setup(), &mut Unobserved).expect("learned");
+        let skills = algorithm.needs_skills().then(learn);
+        let (run, with_file) =
+            (folder.path().join(format!("run-{algorithm}")), skills.as_ref().map(|skills| (at.as_path(), skills)));
+        let trainer = pipeline::train(&Shown, &experiment, with_file, &run, &setup(), &mut Unobserved);
         let file = pipeline::policy(&Shown, &trainer.expect("trained"));
         assert_eq!((file.card.algorithm.as_str(), file.skills.is_some()), (algorithm.name(), skills.is_some()));
         assert_eq!(seen(&file), ["plain:0..7", "plain:16..35"], "{algorithm}");
@@ -142,7 +162,8 @@ fn a_number_of_steps_is_recorded_over_the_levels_again_and_again() {
 fn without_skills_plain_ppo_is_trained() {
     let folder = tempfile::tempdir().expect("a folder");
     let experiment = Experiment { algorithm: Algorithm::Ppo, ..experiment(folder.path()) };
-    let trainer = pipeline::train(&Corridor, &experiment, None, DeviceKind::Flex, 1, |_| {}).expect("trained");
+    let run = folder.path().join("run");
+    let trainer = pipeline::train(&Corridor, &experiment, None, &run, &setup(), &mut Unobserved).expect("trained");
     let file = pipeline::policy(&Corridor, &trainer);
     assert!(file.skills.is_none());
     assert_eq!(seen(&file), ["plain:0..7"]);
@@ -162,9 +183,13 @@ fn each_step_says_what_it_cannot_do() {
     let error = record(&Shown, "plain:0..1").expect_err("it exists");
     assert!(matches!(&error, PipelineError::Demo(error) if matches!(error.fault, DemoFault::Exists)), "{error}");
 
-    let learn = |experiment: &Experiment| pipeline::learn_skills(&Shown, experiment, DeviceKind::Flex, 1).map(|_| ());
+    let file = folder.path().join("skills.safetensors");
+    let learn = |experiment: &Experiment| {
+        pipeline::learn_skills(&Shown, experiment, &file, &setup(), &mut Unobserved).map(|_| ())
+    };
     let error = learn(&experiment(&path)).expect_err("these levels are held out");
-    assert!(matches!(error, PipelineError::Verify(_)) && error.to_string().contains("plain:8..15"), "{error}");
+    let is_verify = matches!(&error, PipelineError::Recordings(error) if matches!(**error, RecordingsError::Verify(_)));
+    assert!(is_verify && error.to_string().contains("plain:8..15"), "{error}");
     let error = learn(&Experiment { demos: None, ..experiment(&path) }).expect_err("no recordings are named");
     assert!(matches!(error, PipelineError::Experiment(_)), "{error}");
 
@@ -172,4 +197,49 @@ fn each_step_says_what_it_cannot_do() {
     let player = Player::Blind(BlindBot::Uniform);
     let error = pipeline::evaluate(&Shown, &elsewhere, "random", &player, 1).expect_err("no such mode");
     assert!(matches!(error, PipelineError::Experiment(_)) && error.to_string().contains("plain"), "{error}");
+}
+
+/// Stops the work after a number of batches of skills or updates of training.
+struct StopAfter(u32);
+
+impl RunObserver for StopAfter {
+    fn stopped(&self) -> bool {
+        self.0 == 0
+    }
+
+    fn observe(&mut self, event: RunEvent<'_>) {
+        if matches!(event, RunEvent::SkillBatch | RunEvent::Updated { .. }) {
+            self.0 = self.0.saturating_sub(1);
+        }
+    }
+}
+
+#[test]
+fn stopped_steps_are_resumed_bit_for_bit() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let demos = folder.path().join("right.demo");
+    pipeline::record(&Shown, &levels("plain:16..35"), 0.1, &demos).expect("recorded");
+    let experiment = experiment(&demos);
+    let learn = |name: &str, observer: &mut dyn RunObserver| {
+        pipeline::learn_skills(&Shown, &experiment, &folder.path().join(name), &setup(), observer)
+    };
+    let skills = learn("whole.safetensors", &mut Unobserved).expect("learned");
+    let error = learn("again.safetensors", &mut StopAfter(3)).err().expect("stopped");
+    assert!(matches!(error, PipelineError::Stopped(_)), "{error}");
+    learn("again.safetensors", &mut Unobserved).expect("resumed");
+    let read = |name: &str| std::fs::read(folder.path().join(name)).expect("written");
+    assert!(read("whole.safetensors") == read("again.safetensors"), "the same model");
+
+    let train = |name: &str, experiment: &Experiment, observer: &mut dyn RunObserver| {
+        let (run, file) = (folder.path().join(name), folder.path().join("whole.safetensors"));
+        pipeline::train(&Shown, experiment, Some((&file, &skills)), &run, &setup(), observer)
+    };
+    train("whole", &experiment, &mut Unobserved).expect("trained");
+    let error = train("again", &experiment, &mut StopAfter(2)).err().expect("stopped");
+    assert!(matches!(error, PipelineError::Stopped(_)), "{error}");
+    assert_eq!(train("again", &experiment, &mut Unobserved).expect("resumed").steps(), 512);
+    assert!(read("whole/metrics.jsonl") == read("again/metrics.jsonl"), "the same metrics");
+    let other = Experiment { seed: 7, ..experiment.clone() };
+    let error = train("again", &other, &mut Unobserved).err().expect("another seed").to_string();
+    assert!(error.contains("seed=7 instead of 1"), "{error}");
 }

@@ -1,4 +1,4 @@
-//! Not only a game's demonstrator can be recorded, and whoever plays can be disturbed.
+//! Tests of recordings of any player, with noise.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use playbot_lab::{
 };
 use playbot_tests::Corridor;
 
-/// A bot that always does `action` on forty levels, recorded with this noise.
+/// Records a bot that always does `action` on forty levels, with this noise.
 fn recorded(path: &Path, action: u32, noise: f64, seed: u64) -> Vec<DemoEpisode> {
     let levels = (0..40).collect();
     let plan =
@@ -30,7 +30,7 @@ fn recorded(path: &Path, action: u32, noise: f64, seed: u64) -> Vec<DemoEpisode>
     episodes.collect()
 }
 
-/// How many of the actions were another one than this.
+/// Returns the share of other actions than this.
 fn others(episodes: &[DemoEpisode], action: u32) -> f64 {
     let actions = episodes.iter().flat_map(|episode| match &episode.actions {
         EpisodeActions::Discrete(list) => list.clone(),

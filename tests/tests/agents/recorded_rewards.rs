@@ -1,4 +1,4 @@
-//! What recordings earn where an algorithm is trained on them: what the game pays now, if it still is the recorded game.
+//! Tests of rewards of recordings that are trained on: the game's present rewards, if it still is the recorded game.
 
 use std::{path::Path, sync::Arc};
 
@@ -30,7 +30,7 @@ fn recorded(path: &Path, change: impl Fn(usize, &mut DemoEpisode)) {
     }
 }
 
-/// What is trained on where the recording was changed like this, with the name of its file.
+/// Returns the rollouts of a recording with this change, with the name of its file.
 fn rollouts(change: impl Fn(usize, &mut DemoEpisode)) -> Result<Vec<Rollout>, VerifyError> {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("walk.demo");
@@ -71,7 +71,7 @@ fn recordings_of_other_states_or_ends_are_refused_by_name() {
     );
 }
 
-/// The divergence of three ticks that paid nothing when they were recorded, and of which the second pays a point now, in a
+/// Returns the divergence of three ticks without rewards in the recording, of which the second now pays a point, in a
 /// game that hashes its states or does not.
 fn divergence(hash: u32, replay: fn(Replay) -> Replay) -> Option<Divergence> {
     let mut episode = DemoEpisode::new(7, DemoActions::Discrete(2));
@@ -93,7 +93,7 @@ fn divergence(hash: u32, replay: fn(Replay) -> Replay) -> Option<Divergence> {
 #[test]
 fn rewards_count_where_nothing_else_tells_games_apart() {
     let what = |divergence: Option<Divergence>| divergence.map(|divergence| divergence.to_string());
-    let reward = Some("level 7, tick 1: the reward is 1, recorded was 0".to_owned());
+    let reward = Some("level 7, tick 1: the reward is 1, but 0 in the recording".to_owned());
     assert_eq!(what(divergence(5, |replay| replay)), reward);
     assert_eq!(what(divergence(5, Replay::paid_anew)), None, "the states are the recorded ones");
     assert_eq!(what(divergence(0, Replay::paid_anew)), reward, "no state was hashed");

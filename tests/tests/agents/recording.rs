@@ -1,4 +1,4 @@
-//! Recording, replaying, and recordings that do not fit.
+//! Tests of recording, replaying, and recordings that do not fit.
 
 use std::{path::Path, sync::Arc};
 

@@ -1,11 +1,11 @@
-//! Rewards are counted once, whenever they are paid.
+//! Tests that rewards are counted once, whenever they are paid.
 
 use std::time::Duration;
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
 use bevy_playbot::{headless::set_fixed_step, prelude::*, test_app::test_app};
 
-/// What was counted in each tick.
+/// Counted rewards of each tick.
 #[derive(Resource, Default)]
 struct Counted(Vec<f32>);
 

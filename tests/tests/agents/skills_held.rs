@@ -1,4 +1,4 @@
-//! Skills are drawn at the first tick of an episode and then every T ticks, by each agent for itself.
+//! Tests that skills are drawn at the first tick of an episode and then every T ticks, by each agent for itself.
 
 use bevy::prelude::*;
 use bevy_playbot::{streams::AgentStreams, vision::ObservationConfig};
@@ -9,12 +9,12 @@ use playbot_tests::{Corridor, training::untrained};
 /// Seed of the Worlds.
 const SEED: u64 = 7;
 
-/// Normally distributed skills of two numbers.
+/// Returns normally distributed skills of two numbers.
 fn prior(horizon: u32) -> SkillPrior {
     SkillPrior { prior: Prior::standard_normal(2, false), horizon, draw: SkillDraw::Sample }
 }
 
-/// What an agent's stream gives, draw after draw.
+/// Returns the draws of an agent's stream.
 fn draws(agent: u32, count: usize) -> Vec<Vec<f32>> {
     let mut stream = AgentStreams::new(SEED, agent).skill;
     (0..count).map(|_| vec![normal(&mut stream), normal(&mut stream)]).collect()
@@ -24,16 +24,16 @@ fn draws(agent: u32, count: usize) -> Vec<Vec<f32>> {
 fn a_skill_is_held_for_its_ticks_and_ends_with_its_episode() {
     let (mut world, agents) = build_world(&Corridor, "plain", SEED, 0, 3);
     world.insert_resource(prior(8));
-    // Without a policy each agent keeps the action that it is given here. Agent 0 stays until time is up after 20 ticks,
-    // agent 1 walks from cell 3 to the exit at cell 6 in 3 ticks, and agent 2 is nobody's pupil.
+    // Without a policy each agent keeps its action from here. Agent 0 stays until time is up after 20 ticks. Agent 1
+    // walks from cell 3 to the exit at cell 6 in 3 ticks. Agent 2 has no skills.
     for (agent, action) in [(0, 2), (1, 1), (2, 2)] {
         let (control, bot) = if agent == 2 { (Control::Bot, 2) } else { (Control::Policy, action) };
         let bot = BlindBot::Constant(ActionValue::Discrete(bot));
         let action = Action(ActionValue::Discrete(action));
         world.entity_mut(agents[agent]).insert((control, bot, action, LevelQueue::Always(1)));
     }
-    // Worked out by hand: the draw that agent 0 follows in each of 44 ticks, and how many ticks are left to it afterwards.
-    // The third skill of an episode is cut off with 4 ticks to go.
+    // Worked out by hand: the draw of agent 0 in each of 44 ticks, and its ticks left afterwards. The third skill of an
+    // episode is cut off with 4 ticks to go.
     let stays = |episode: usize| {
         let first = (0..8).map(move |tick| (3 * episode, 7 - tick));
         let second = (0..8).map(move |tick| (3 * episode + 1, 7 - tick));

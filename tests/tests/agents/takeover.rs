@@ -1,4 +1,4 @@
-//! Taking over a shipped build: testers record, policies and recordings play, and the seat is given back.
+//! Tests of taking over a shipped build: testers record, policies and recordings play, and control is given back.
 
 use std::{path::Path, time::Duration};
 
@@ -24,7 +24,7 @@ use playbot_tests::{Cell, Drift, corridor_plugin, spawn_walker};
 #[derive(Resource, Default)]
 struct Heard(Vec<String>);
 
-/// A build of the corridor in which somebody holds the key that goes right.
+/// Returns a build of the corridor in which the key that goes right is held.
 fn build(plugin: TakeoverPlugin) -> (App, Entity) {
     let mut app = App::new();
     app.add_plugins((TimePlugin, InputPlugin, PlaybotPlugin::default(), plugin))
@@ -70,7 +70,7 @@ fn heard(app: &App) -> &[String] {
     &app.world().resource::<Heard>().0
 }
 
-/// Levels and ends of a recording.
+/// Returns the levels and ends of a recording.
 fn recorded(path: &Path) -> Vec<(u64, usize, DemoEnd)> {
     let episodes = DemoReader::open(path).and_then(DemoReader::read_all).expect("whole");
     assert!(episodes.iter().flat_map(|episode| &episode.deciders).all(|who| *who == Decider::Human));
@@ -84,7 +84,7 @@ fn a_tester_records_and_what_was_begun_is_kept_when_the_game_ends() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("ada.demo");
     let (mut app, _) = build(plugin(Some(TakeoverRequest::Record(path.clone()))));
-    // The first episode, 3 ticks, began before anybody could record it; the next ones take 2 and 3.
+    // The first episode, 3 ticks, began before the recording could begin; the next ones take 2 and 3.
     frames(&mut app, 1 + 3 + 2 + 3 + 1);
     assert!(app.world().resource::<Takeover>().is_running());
     assert_eq!(recorded(&path), [(2, 2, WON), (3, 3, WON)]);
@@ -160,7 +160,7 @@ fn a_recording_plays_and_the_seat_is_given_back() {
     }
 }
 
-/// A policy that nobody has trained.
+/// Writes an untrained policy.
 fn policy(folder: &Path, card: PolicyCard, values: usize) -> std::path::PathBuf {
     let spec = PolicySpec { obs: ObsKind::Vector(values), latent: 0, action_space: ActionSpace::Discrete(3) };
     let learner = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex).expect("good settings");
@@ -200,7 +200,7 @@ fn what_cannot_be_done_is_said_and_the_game_goes_on() {
     let missing = folder.path().join("missing");
     for (request, words) in [
         (of(PolicyCard { game: "maze".into(), ..card() }), "for the game `maze`, not for `corridor`"),
-        (TakeoverRequest::Replay(path.clone()), "not a demonstration file"),
+        (TakeoverRequest::Replay(path.clone()), "not a recording"),
         (TakeoverRequest::Policy(missing.clone()), "missing"),
         (TakeoverRequest::Record(missing.join("ada.demo")), "cannot create the file"),
     ] {

@@ -1,4 +1,4 @@
-//! Where agents went, as the evaluation notes it and the picture shows it.
+//! Tests of trails of agents, in the evaluation and in the picture.
 
 use bevy::math::{Rect, Vec2};
 use playbot_games::{
@@ -20,7 +20,7 @@ fn game(name: &str) -> &'static dyn Game {
 }
 
 fn right_jump() -> Player {
-    let bots = game("coinrun").blind_bots();
+    let bots = game("coinrun").tools().bots.blind_bots();
     Player::Blind(bots.into_iter().find(|(name, _)| *name == "right-jump").expect("CoinRun's bot").1)
 }
 
@@ -35,9 +35,9 @@ fn a_trail_has_the_place_after_every_tick_of_its_own_episode() {
     assert_eq!(levels, [0, 1, 2, 3, 4, 5]);
     let mut reached = 0;
     for trail in &trails {
-        let plan = game("coinrun").floor_plan("hard", trail.result.level).expect("a plan");
+        let plan = game("coinrun").tools().levels.floor_plan("hard", trail.result.level).expect("a plan");
         assert_eq!(trail.places.len() as u32, trail.result.ticks);
-        // A jump begins with 1.5 tiles a tick; the place of another episode would be farther away.
+        // A jump begins with 1.5 tiles a tick; the position in another episode would be farther away.
         assert!(trail.places[0].distance(plan.start) < 1.7, "level {}", trail.result.level);
         assert!(trail.places.windows(2).all(|pair| pair[0].distance(pair[1]) < 1.7), "level {}", trail.result.level);
         let end = trail.places[trail.places.len() - 1];
@@ -58,7 +58,7 @@ fn following_changes_no_result_and_threads_change_nothing() {
     assert_eq!(alone, followed);
 }
 
-/// The cells in which a ball was, one after the other. D4RL's walls stand 0.2 aside.
+/// Returns the cells of a ball, one after the other. D4RL's walls stand 0.2 aside.
 fn cells(trail: &Trail) -> Vec<Cell> {
     let cell = |place: &Vec2| Cell::new((place.x + 0.2).round() as usize, (place.y + 0.2).round() as usize);
     let mut cells: Vec<Cell> = trail.places.iter().map(cell).collect();
@@ -81,7 +81,7 @@ fn the_planners_ball_is_seen_in_every_cell_of_its_way_and_in_no_wall() {
 
 #[test]
 fn the_ants_plan_has_its_start_at_the_origin_and_the_goal_of_the_original() {
-    let plan = game("antmaze").floor_plan("large", 0).expect("a plan");
+    let plan = game("antmaze").tools().levels.floor_plan("large", 0).expect("a plan");
     assert_eq!((plan.start, plan.goal), (Vec2::ZERO, Vec2::new(32.0, 24.0)));
     assert_eq!((plan.bounds.min, plan.bounds.max), (Vec2::splat(-6.0), Vec2::new(42.0, 30.0)));
     let in_wall = |place: Vec2| plan.walls.iter().any(|wall| wall.contains(place));
@@ -101,7 +101,7 @@ fn an_ants_trail_begins_at_its_start() {
 
 #[test]
 fn the_plan_of_coinrun_has_what_kills_and_what_carries() {
-    let plan = |level| game("coinrun").floor_plan("hard", level).expect("a plan");
+    let plan = |level| game("coinrun").tools().levels.floor_plan("hard", level).expect("a plan");
     // Saws on the ground and in pits, and crates, of the original's levels.
     for (level, saws, crates) in [(0, 0, 4), (1, 1, 4), (6, 5, 9), (7, 10, 4), (8, 1, 11)] {
         let plan = plan(level);
@@ -117,7 +117,7 @@ fn the_plan_of_coinrun_has_what_kills_and_what_carries() {
 #[test]
 fn every_tick_is_counted_in_the_square_where_it_was() {
     let trails = trails("coinrun", &right_jump(), "hard:0..0");
-    let plan = game("coinrun").floor_plan("hard", 0).expect("a plan");
+    let plan = game("coinrun").tools().levels.floor_plan("hard", 0).expect("a plan");
     let visits = Visits::count(plan.bounds, &trails);
     let inside = trails[0].places.iter().filter(|&&place| plan.bounds.contains(place));
     assert!(inside.clone().count() > 40 && visits.total() == inside.clone().count() as u64);
@@ -140,7 +140,7 @@ fn floor(plan: FloorPlan, walkers: Vec<Walker>) -> Floor {
 #[test]
 fn the_picture_has_a_line_for_each_episode_and_everything_on_the_paper() {
     let trails = trails("coinrun", &right_jump(), "hard:0..0");
-    let plan = game("coinrun").floor_plan("hard", 0).expect("a plan");
+    let plan = game("coinrun").tools().levels.floor_plan("hard", 0).expect("a plan");
     for (names, copies) in [(&["right-jump"][..], 3_usize), (&["one", "two", "<three>"], 40)] {
         let copied: Vec<Trail> = (0..copies).flat_map(|_| trails.clone()).collect();
         let chart =

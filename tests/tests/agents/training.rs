@@ -1,4 +1,4 @@
-//! Training: the same bytes for the same seed, on any number of threads, in one go or in two.
+//! Tests of training: the same bytes for the same seed, on any number of threads, in one go or in two.
 
 use std::path::Path;
 
@@ -6,7 +6,6 @@ use playbot_games::coinrun::CoinRun;
 use playbot_lab::prelude::*;
 use playbot_lab::{
     demo::dataset::Demonstrations,
-    pipeline::learn_skills,
     train::{
         Algorithm, Experiment, TrainError, Trainer,
         config_file::parse_experiment,
@@ -18,7 +17,7 @@ use playbot_learner::{DeviceKind, Rollout, SkillModel};
 use playbot_tests::{
     Corridor,
     recording::record_random,
-    training::{check_resuming, last_success_rate, run_info, train, written},
+    training::{check_resuming, last_success_rate, learn_skills, run_info, train, written},
 };
 
 const EXPERIMENT: &str = r#"(
@@ -45,7 +44,7 @@ impl Given {
         let path = folder.join("walk.demo");
         record_random(&Corridor, "plain", 5, &path, 16..76);
         let experiment = Experiment { demos: Some(path.clone()), ..experiment() };
-        let skills = learn_skills(&Corridor, &experiment, DeviceKind::Flex, 2).expect("learns");
+        let skills = learn_skills(&Corridor, &experiment, 2);
         let demos = Demonstrations::of(&Corridor, &experiment, &path).expect("readable");
         Self { skills, demos: demos.rollouts(&Corridor, 2, |_| {}).expect("they replay") }
     }
@@ -111,7 +110,7 @@ fn a_resumed_training_goes_on_as_if_it_had_never_stopped() {
 fn the_first_policy_of_score_is_the_decoder() {
     let folder = tempfile::tempdir().expect("a folder");
     let given = Given::new(folder.path());
-    // Of a policy over skills it is the prior.
+    // For a policy over skills it is the prior.
     for algorithm in [Algorithm::ScorePpo, Algorithm::SpirlPpo, Algorithm::SpirlSac] {
         let mut trainer = given.trainer(algorithm, 1);
         assert_eq!(trainer.update().expect("learns").initial_kl, Some(0.0));

@@ -1,4 +1,5 @@
-//! Where time is up, a rollout keeps the state that came after, with its value and the skill under which it is valued.
+//! Tests of truncation: at the time limit, a rollout keeps the next state, with its value and the skill under which it
+//! is valued.
 
 use bevy_playbot::vision::ObservationConfig;
 use playbot_lab::{prelude::*, train::collect::Collector};
@@ -13,7 +14,7 @@ fn policy() -> Policy {
     untrained(&Corridor, &ObservationConfig::default(), config)
 }
 
-/// A rollout in which nobody knows the way, so that time is up for some. Skills are held for `horizon` ticks.
+/// Returns a rollout of untrained agents, so that time is up for some. Skills are held for `horizon` ticks.
 fn rollout(policy: &Policy, horizon: u32) -> Rollout {
     let split: LevelSplit = "plain:0..7".parse().expect("a split");
     let prior = SkillPrior { prior: Prior::standard_normal(2, false), horizon, draw: SkillDraw::Sample };
@@ -30,7 +31,7 @@ fn numbers(observations: &Observations) -> &[f32] {
     }
 }
 
-/// The cell of an agent and the ticks that it has played, as it saw them.
+/// Returns the observed cell of an agent and the ticks that it has played.
 fn cell_and_tick(seen: &[f32]) -> (i32, i32) {
     (((seen[0] + 1.0) * 3.0).round() as i32, (seen[1] * 20.0).round() as i32)
 }
@@ -81,9 +82,9 @@ fn the_state_is_valued_under_the_skill_that_is_held_or_one_that_is_drawn() {
         assert_eq!(held.ends.cut_z[i * 2..i * 2 + 2], held.z[row * 2..row * 2 + 2], "row {row}");
         assert_eq!((held.left[row], held.ends.cut_left[i]), (5.0 / 8.0, 4.0 / 8.0), "row {row}");
     }
-    // Skills of 5 ticks are drawn in ticks 0, 5, 10 and 15: after tick 19 the fourth has run out, and another one is drawn from
-    // a copy of the agent's stream. The next episode gets what the stream gives next, so that both rollouts see the same
-    // stream; and since this prior does not look at the state, it is the same skill.
+    // Skills of 5 ticks are drawn in ticks 0, 5, 10 and 15. After tick 19 the fourth has run out, and another one is
+    // drawn from a copy of the agent's stream. The next episode gets the next draws of the stream, so both rollouts see
+    // the same stream. This prior does not depend on the state, so it is the same skill.
     let run_out = rollout(&policy, 5);
     assert_eq!(run_out.ends.cut_rows, held.ends.cut_rows, "the policy ignores skills");
     for (i, &row) in run_out.ends.cut_rows.iter().enumerate() {

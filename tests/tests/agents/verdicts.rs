@@ -1,4 +1,4 @@
-//! What tests say of games that break, and of games that are built anew for each episode.
+//! Tests of verdicts on games that break, and on games that are built anew for each episode.
 
 use std::collections::BTreeSet;
 
@@ -21,7 +21,7 @@ fn tester(name: &str, bot: BlindBot) -> Tester {
     }
 }
 
-/// Who goes right, and who goes anywhere.
+/// Returns a tester that goes right, and a random one.
 fn testers() -> Vec<Tester> {
     let right = BlindBot::Constant(ActionValue::Discrete(1));
     vec![tester("right", right), tester("random", BlindBot::Uniform)]
@@ -32,7 +32,7 @@ fn plan(levels: &str, testers: Vec<Tester>, threads: usize) -> TestPlan {
     TestPlan { split, testers, episodes: 3, seed: 2, detectors, shard: None, threads }
 }
 
-/// All verdicts, in the order of the levels.
+/// Returns all verdicts, in the order of the levels.
 fn verdicts(game: &dyn Game, plan: &TestPlan) -> Vec<LevelVerdict> {
     let mut found = Vec::new();
     let mut keep = |verdict: LevelVerdict| -> Result<(), TestError> {
@@ -46,7 +46,8 @@ fn verdicts(game: &dyn Game, plan: &TestPlan) -> Vec<LevelVerdict> {
     found
 }
 
-/// The corridor, which panics on level 3 when somebody stands at its last cell but one, and breaks its contract on level 6.
+/// The corridor, which panics on level 3 when the agent stands at its last cell but one, and breaks its contract on
+/// level 6.
 struct Cursed;
 
 fn curse(mut agents: Query<(&Episode, &playbot_tests::Cell, &mut Reward)>) {
@@ -132,7 +133,7 @@ fn draws_depend_on_seed_tester_and_level_alone() {
     assert!(all.iter().all(|level| level.testers[0].exact && !level.testers[1].exact));
 }
 
-/// The stubborn game keeps what outlives its levels, so its Worlds are built anew.
+/// The stubborn game keeps state beyond its levels, so its Worlds are built anew.
 #[test]
 fn a_game_that_is_built_anew_has_the_same_verdicts_whatever_was_played_before() {
     let game = stubborn_game(Restart::Rebuild);

@@ -1,4 +1,4 @@
-//! From frames to observations.
+//! Tests of the path from frames to observations.
 
 use bevy::{
     ecs::schedule::{LogLevel, ScheduleBuildSettings},
@@ -17,7 +17,7 @@ use playbot_lab::prelude::*;
 use playbot_lab::{parallel::on_threads, worlds::build_observing_world};
 use playbot_tests::{Cell, corridor_plugin, spawn_walker};
 
-/// What is wrong with the test's sensor.
+/// The fault of the test's sensor.
 #[derive(Resource, Clone, Copy, Default, PartialEq)]
 enum Wrong {
     #[default]
@@ -28,7 +28,7 @@ enum Wrong {
     Away,
 }
 
-/// A sensor whose pictures of two pixels tell the tick of the episode, the cell and the level.
+/// Fills pictures of two pixels with the tick of the episode, the cell and the level.
 fn sense(mut eyes: Query<(&Cell, &Episode, &mut Frame)>, tick: Res<Tick>, wrong: Res<Wrong>) {
     for (cell, episode, mut frame) in &mut eyes {
         let seen = [episode.tick as u8, cell.0 as u8, episode.level as u8, 255];
@@ -46,7 +46,7 @@ fn sense(mut eyes: Query<(&Cell, &Episode, &mut Frame)>, tick: Res<Tick>, wrong:
     }
 }
 
-/// A corridor in which one agent does `action` and sees pictures.
+/// Returns a corridor in which one agent does `action` and sees pictures.
 fn seeing(options: ImageOptions, action: u32, wrong: Wrong) -> (World, Entity) {
     let mut app = headless_app();
     app.edit_schedule(ObserveSchedule, |schedule| {
@@ -229,7 +229,7 @@ fn coinrun(agents: &[(u32, u32)]) -> Vec<(World, Vec<Entity>)> {
     worlds
 }
 
-/// All pictures of all agents over some ticks, `[agent, tick]`.
+/// Returns all pictures of all agents over some ticks, `[agent, tick]`.
 fn watch(mut worlds: Vec<(World, Vec<Entity>)>, threads: usize) -> Vec<Vec<Vec<u8>>> {
     let parts = on_threads(&mut worlds, threads, |(world, agents)| {
         let mut seen = vec![Vec::new(); agents.len()];

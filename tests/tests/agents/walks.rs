@@ -1,4 +1,4 @@
-//! What tests say of where agents went, why their episodes ended, and under which skills.
+//! Tests of positions, causes of ends and skills in results.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,6 +7,7 @@ use playbot_lab::{
     detectors::Detectors,
     eval::Player,
     floor_plan::FloorPlan,
+    game::{LevelTools, StateTools},
     prelude::*,
     verdict::{
         EndPlace, FailureWay, LevelMaps, LevelVerdict, Places, TestError, TestPlan, TestWatch, Tester, run_tests,
@@ -17,8 +18,8 @@ use playbot_tests::{Cell, as_corridor, corridor_plugin};
 
 use crate::corridor_defects::tester;
 
-/// The corridor with a plan: seven squares of side 1 below a wall. Agents start in square 3 or 4 and are through in square 6;
-/// in square 0 is an abyss.
+/// The corridor with a plan: seven squares of side 1 below a wall. Agents start in square 3 or 4 and are through in
+/// square 6; in square 0 is an abyss.
 struct Charted;
 
 impl Game for Charted {
@@ -34,7 +35,7 @@ impl Game for Charted {
         &["plain"]
     }
 
-    /// Eight ticks without a new square are two seconds.
+    /// Returns a rate at which eight ticks without a new square are two seconds.
     fn tick_hz(&self) -> f64 {
         4.0
     }
@@ -49,6 +50,12 @@ impl Game for Charted {
         corridor_plugin(app);
     }
 
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { levels: self, state: self, ..GameTools::default() }
+    }
+}
+
+impl LevelTools for Charted {
     fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
         Some(FloorPlan {
             bounds: Rect::new(0.0, 0.0, 7.0, 2.0),
@@ -58,8 +65,10 @@ impl Game for Charted {
             ..FloorPlan::default()
         })
     }
+}
 
-    fn whereabouts(&self, world: &World, agent: Entity) -> Option<Vec2> {
+impl StateTools for Charted {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
         world.get::<Cell>(agent).map(|cell| Vec2::new(cell.0 as f32 + 0.5, 0.5))
     }
 
@@ -68,7 +77,7 @@ impl Game for Charted {
     }
 }
 
-/// Who always does the same: 0 goes left, 1 goes right, 2 rests.
+/// Returns a tester with a constant action: 0 goes left, 1 goes right, 2 rests.
 fn constant(name: &str, action: u32) -> Tester {
     tester(name, Player::Blind(BlindBot::Constant(ActionValue::Discrete(action))))
 }
@@ -78,7 +87,7 @@ fn plan(levels: &str, testers: Vec<Tester>, episodes: u32, threads: usize) -> Te
     TestPlan { split, testers, episodes, seed: 2, detectors, shard: None, threads }
 }
 
-/// All verdicts, in the order of the levels.
+/// Returns all verdicts, in the order of the levels.
 fn verdicts(plan: &TestPlan) -> Vec<LevelVerdict> {
     let mut found = Vec::new();
     let mut keep = |verdict: LevelVerdict| -> Result<(), TestError> {

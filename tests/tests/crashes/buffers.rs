@@ -1,4 +1,4 @@
-//! Trainings that keep what was played: SAC's replay buffer is in its checkpoints.
+//! Tests of trainings with a replay buffer: SAC's is in its checkpoints.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use playbot_tests::{
 
 use super::{runs::train_on, tree::tree};
 
-/// A training in which most updates learn from what earlier ones played.
+/// Returns a training in which most updates learn from earlier episodes.
 fn experiment() -> Experiment {
     Experiment { steps: 64, ..small::experiment(Algorithm::Sac) }
 }
@@ -32,7 +32,7 @@ fn begin(folder: &Path, force: bool, cut: &PowerCut) {
     train_on(folder, fresh());
 }
 
-/// Goes on with what a power cut has left, to the end. Whether there was a checkpoint.
+/// Resumes the training after a power cut, to the end. Returns whether there was a checkpoint.
 fn go_on(folder: &Path, cut: &PowerCut) -> bool {
     match RunDir::open_to_write(folder) {
         Ok(OpenedRun { run, experiment, .. }) => match run.resume(&Corridor, &experiment, DeviceKind::Flex, 1) {

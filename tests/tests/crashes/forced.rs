@@ -1,4 +1,4 @@
-//! Recordings that take the place of others.
+//! Tests of recordings that replace others.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Tests of levels.
+//! Tests of interrupted tests of levels.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ fn plan(seed: u64) -> TestPlan {
     }
 }
 
-/// Tests what is not tested yet, to the end.
+/// Tests the untested levels, to the end.
 fn test(folder: &Path, seed: u64, earlier: Earlier) -> Result<Vec<u8>, TestError> {
     let plan = plan(seed);
     let (mut opened, _) = TestFolder::open(folder, &plan.record(&Corridor), earlier)?;

@@ -1,4 +1,4 @@
-//! Power cuts at every place where something is written: what lies on the disk then is opened and gone on with.
+//! Tests of power cuts at every write: the files on the disk then are opened, and the work is resumed.
 
 mod buffers;
 mod forced;

@@ -1,4 +1,4 @@
-//! Policies that are exported.
+//! Tests of exported policies.
 
 use std::{fs, path::Path};
 

@@ -1,4 +1,4 @@
-//! Recordings: made, gone on with, repaired.
+//! Tests of recordings: made, continued, repaired.
 
 use std::path::{Path, PathBuf};
 
@@ -13,14 +13,14 @@ use playbot_tests::{
 
 use super::tree::tree;
 
-/// Episodes that are recorded, some of them in a second go.
+/// Recorded episodes, some of them by a second program.
 const EPISODES: u64 = 24;
 
 fn episodes(path: &Path) -> Vec<DemoEpisode> {
     DemoReader::open(path).and_then(DemoReader::read_all).expect("whole")
 }
 
-/// Records to a file, with a second program that goes on with it.
+/// Records to a file, with a second program that continues it.
 fn record(path: &Path, given: &[DemoEpisode]) {
     let header = Corridor.demo_header("plain");
     let (first, second) = given.split_at(given.len() / 2);
@@ -31,13 +31,13 @@ fn record(path: &Path, given: &[DemoEpisode]) {
     second.iter().for_each(|episode| writer.push(episode).expect("writable"));
 }
 
-/// Writes what a power cut has left, and returns where the recording would be.
+/// Writes the files after a power cut, and returns the path of the recording.
 fn left_by(before: &PaperDisk, operations: &[DiskOperation], cut: &PowerCut, from: &Path, to: &Path) -> PathBuf {
     before.clone().after(operations, cut).write(from, to);
     to.join("a.demo")
 }
 
-/// Beside a recording lie at most the damaged files that it was before each repair.
+/// Checks that at most the damaged files of each repair lie beside a recording.
 fn check_left(folder: &Path, cut: &PowerCut) {
     let known = ["a.demo", "a.demo.bak", "a.demo.bak2"];
     let unknown: Vec<PathBuf> =

@@ -1,4 +1,4 @@
-//! Trainings that take the place of another one.
+//! Tests of trainings that replace another one.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use super::{
     tree::tree,
 };
 
-/// Replaces what is there by a run with this seed.
+/// Replaces an existing run by one with this seed.
 fn replace(run: &Path, seed: u64) {
     let experiment = experiment(seed);
     drop(RunDir::create(run, &experiment, &run_info(&experiment), true).expect("replaceable"));

@@ -1,4 +1,4 @@
-//! Trainings.
+//! Tests of trainings.
 
 use std::path::{Path, PathBuf};
 
@@ -46,7 +46,7 @@ pub fn train_on(folder: &Path, mut trainer: Trainer) {
     }
 }
 
-/// The name under which the last checkpoint was put into its place by then, if one was.
+/// Returns the name of the last checkpoint that was in its place by then, if one was.
 fn last_checkpoint(operations: &[DiskOperation]) -> Option<PathBuf> {
     operations.iter().rev().find_map(|operation| match operation {
         DiskOperation::Rename { from, to } if from.ends_with("unfinished") && to.starts_with(from.parent()?) => {
@@ -57,7 +57,7 @@ fn last_checkpoint(operations: &[DiskOperation]) -> Option<PathBuf> {
     })
 }
 
-/// Goes on with what a power cut has left, to the end.
+/// Resumes the training after a power cut, to the end.
 fn go_on(folder: &Path, operations: &[DiskOperation], cut: &PowerCut) {
     let begun = last_checkpoint(&operations[..cut.operations]);
     let opened = match RunDir::open_to_write(folder) {

@@ -1,4 +1,4 @@
-//! Skill models while they are learned.
+//! Tests of skill models while they are learned.
 
 use std::{
     fs,
@@ -17,15 +17,15 @@ use playbot_tests::{
 
 use super::tree::tree;
 
-/// Passes over the demonstrations.
+/// Passes over the recordings.
 const EPOCHS: u64 = 5;
 
-/// Where an unfinished training is kept.
+/// Returns the path of an unfinished training.
 fn checkpoint_of(model: &Path) -> PathBuf {
     model.with_extension("checkpoint")
 }
 
-/// Learns a model, or goes on with that, as `playbot learn-skills` does: with a checkpoint after each epoch, which is removed
+/// Learns a model, or resumes it, as `playbot learn-skills` does: with a checkpoint after each epoch, which is removed
 /// once the model is there.
 pub fn learn(model: &Path) {
     let checkpoint = checkpoint_of(model);

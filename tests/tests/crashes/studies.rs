@@ -1,15 +1,15 @@
-//! A run of a study, with the skills that are learned for it and what comes of it.
+//! Tests of a run of a study, with its skills and its result.
 
 use std::{fs, path::Path};
 
 use playbot_lab::{
     report::{StudyResult, TestResult, TrainingResult},
+    sealed_file::{read_sealed, write_sealed},
     train::{
         Algorithm, Experiment, Trainer,
         checkpoint::CheckpointChoice,
         run_dir::{RunDir, end_replacement, is_unstarted},
         run_lock::RunLock,
-        sealed_file::{read_sealed, write_sealed},
     },
 };
 use playbot_learner::{
@@ -33,7 +33,7 @@ fn experiment() -> Experiment {
     Experiment { steps: 96, ..small::experiment(Algorithm::ScorePpo) }
 }
 
-/// Brings the run to its end, whatever is there already, in the order in which `playbot study` does.
+/// Brings the run to its end from any state, in the order of `playbot study`.
 fn study(folder: &Path) {
     let (run, skills, experiment) = (folder.join(RUN), folder.join(SKILLS), experiment());
     end_replacement(&run).expect("writable");
@@ -66,7 +66,7 @@ fn study(folder: &Path) {
     write_sealed(&run.join(RESULT), &result(&trainer)).expect("writable");
 }
 
-/// What the policy does in a state stands for what it reaches.
+/// Returns the result of a run, for which the policy's action in a state stands.
 fn result(trainer: &Trainer) -> StudyResult {
     let policy = trainer.policy();
     let output = policy.forward(&vec![0.25; policy.latent()], &[0.5, 0.25], 1).expect("finite");
@@ -92,7 +92,7 @@ fn result(trainer: &Trainer) -> StudyResult {
     }
 }
 
-/// What a study has written that must be the same.
+/// Returns the files of a study that must be the same.
 fn files_of(folder: &Path) -> Vec<Vec<u8>> {
     let read = |path: &Path| fs::read(path).expect("written");
     let own = [folder.join(SKILLS), folder.join(RUN).join(RESULT)].map(|path| read(&path));

@@ -1,4 +1,4 @@
-//! What lies in a folder.
+//! Contents of a folder.
 
 use std::{
     collections::BTreeSet,
@@ -6,8 +6,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// All files and folders below a folder, by their paths in it. Event files, which are called by the time of day, are called
-/// `events`, and what is in a whole checkpoint is left out, since one more of them may be left.
+/// Returns all files and folders below a folder, by their paths in it. Event files, whose names have the time of day,
+/// are called `events`. Contents of a whole checkpoint are left out, since one more of them may be left.
 pub fn tree(folder: &Path) -> BTreeSet<PathBuf> {
     let (mut found, mut folders) = (BTreeSet::new(), vec![folder.to_owned()]);
     while let Some(next) = folders.pop() {

@@ -1,4 +1,4 @@
-//! The doctor and games that know nothing of the plugin: each planted fault is found and named as well as it can be.
+//! Tests of the doctor on foreign games: each planted fault is found and named as precisely as possible.
 
 use bevy::prelude::*;
 use playbot_lab::{
@@ -15,7 +15,7 @@ fn examined(game: &ForeignGame) -> DoctorReport {
     examine(game, &options, |_| {}).expect("the game has this mode")
 }
 
-/// What this comparison finds in a copy with this fault, and whether it is all that is found.
+/// Returns the finding of this comparison in a copy with this fault, after a check that it is the only one.
 fn found(fault: CatchFault, comparison: Comparison) -> (Finding, Difference, DoctorReport) {
     let report = examined(&faulty_catch(fault));
     let finding = report.findings.iter().find(|finding| finding.comparison == Some(comparison));
@@ -24,7 +24,7 @@ fn found(fault: CatchFault, comparison: Comparison) -> (Finding, Difference, Doc
     (finding, difference, report)
 }
 
-/// Where apples are is reflected, whatever moves them.
+/// Positions of apples are reflected, whatever moves them.
 fn check_that_the_apple_is_named(difference: &Difference, report: &DoctorReport) {
     assert_eq!(difference.kind, DifferenceKind::Component, "{report}");
     assert!(difference.name.ends_with("Transform"), "{report}");

@@ -1,4 +1,4 @@
-//! The doctor and games with planted faults.
+//! Tests of the doctor on games with planted faults.
 
 mod foreign;
 mod planted;

@@ -1,4 +1,4 @@
-//! The doctor finds each planted fault and names it, and finds nothing in healthy games.
+//! Tests of the doctor: it finds and names each planted fault, and finds nothing in healthy games.
 
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
 use playbot_lab::{
@@ -19,14 +19,14 @@ fn examined(game: &dyn Game, ticks: u32, ignored: &[&str]) -> DoctorReport {
     examine(game, &options, |_| {}).expect("the game has this mode")
 }
 
-/// The only finding in a copy with this fault.
+/// Returns the only finding in a copy with this fault.
 fn finding(fault: Fault) -> (Finding, DoctorReport) {
     let report = examined(&fault, 60, &[]);
     assert_eq!(report.findings.len(), 1, "{fault:?}:\n{report}");
     (report.findings[0].clone(), report)
 }
 
-/// The only finding, which must be a difference of this kind of thing in this comparison.
+/// Returns the only finding, which must be a difference of this kind of thing in this comparison.
 fn named(
     fault: Fault,
     comparison: Comparison,
@@ -44,10 +44,10 @@ fn named(
 }
 
 fn likeliest(finding: &Finding) -> CauseKind {
-    finding.causes.first().expect("every difference has usual causes").kind
+    finding.causes.first().expect("every difference has common causes").kind
 }
 
-/// Names of the observed values that never changed.
+/// Returns the names of the observed values that never changed.
 fn constant(report: &DoctorReport) -> Vec<&str> {
     report.observation.constant.iter().map(|it| it.name.as_str()).collect()
 }
@@ -171,7 +171,7 @@ fn the_report_names_the_cause_and_what_to_do() {
         "again after a restart",
         "DIFFERS at tick 0",
         "second episode",
-        "usual cause: state that survives a restart: a resource, a Local, a static",
+        "common cause: state that survives a restart: a resource, a Local, a static",
         "what to do: set it back when an episode starts",
         "`Restart::Rebuild`, which builds the World anew",
         "a field with #[reflect(ignore)]",
@@ -191,7 +191,7 @@ fn the_report_says_how_much_was_compared_and_how_to_compare_more() {
         "no difference in 60 ticks, ",
         "yes (compared: twice in one thread, on two threads)",
         "no difference was found in 60 ticks of this one level",
-        "`--ticks 600` plays longer, `--seed 1` another level",
+        "`--ticks 600` plays longer, `--level 1` another level",
         "No findings: the same actions played the same game for 60 ticks.",
     ] {
         assert!(text.contains(words), "`{words}` is missing in:\n{text}");

@@ -1,11 +1,11 @@
-//! Ways from an action into a game that are no keys.
+//! Tests of actions that reach a game without keys.
 
 use bevy::{input::mouse::AccumulatedMouseMotion, prelude::*};
 use bevy_playbot::virtual_input::ActionAxis;
 use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_world};
 use playbot_tests::foreign::catch::{Paddle, game};
 
-/// Where the paddle is after three ticks in which the agent does this.
+/// Returns the position of the paddle after three ticks of this action.
 fn paddle_after(game: &ForeignGame, control: Control, action: ActionValue) -> Vec2 {
     assert_eq!(game.problem(), None);
     let (mut world, agents) = build_world(game, "default", 0, 0, 1);

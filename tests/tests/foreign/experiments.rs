@@ -1,4 +1,4 @@
-//! Experiments of games that are not ours can be read, and the commands in them can be called.
+//! Tests that experiments of foreign games can be read, and that the commands in them can be called.
 
 use std::{
     fs,
@@ -7,7 +7,7 @@ use std::{
 
 use playbot_lab::{split::LevelSplit, train::config_file::read_experiment};
 
-/// Every `experiment.ron` below `foreign`, with the name of its folder.
+/// Returns every `experiment.ron` below `foreign`, with the name of its folder.
 fn experiments() -> Vec<(String, PathBuf)> {
     let entries = fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("foreign")).expect("it is there");
     let folders = entries.map(|entry| entry.expect("readable"));
@@ -18,7 +18,7 @@ fn experiments() -> Vec<(String, PathBuf)> {
     found
 }
 
-/// What is written in comments, after `//`.
+/// Returns the text of comments, after `//`.
 fn comments(text: &str) -> impl Iterator<Item = &str> {
     text.lines().filter_map(|line| line.trim().strip_prefix("//")).map(str::trim)
 }

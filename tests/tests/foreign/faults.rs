@@ -1,4 +1,4 @@
-//! What is wrong with a foreign game is said, with the game's own names.
+//! Tests of errors about foreign games, which use the game's own names.
 
 use bevy::{
     diagnostic::{FrameCount, FrameCountPlugin},
@@ -19,7 +19,7 @@ use playbot_tests::{
     measuring::plan,
 };
 
-/// Plays until something is wrong, for at most this many ticks.
+/// Plays until the first fault, for at most this many ticks.
 fn fault(game: &ForeignGame, ticks: u64) -> String {
     let (mut world, agents) = build_world(game, "default", 0, 0, 1);
     let bot = BlindBot::Constant(ActionValue::Discrete(1));
@@ -27,7 +27,7 @@ fn fault(game: &ForeignGame, ticks: u64) -> String {
     world.ticks(ticks).expect_err("something is wrong").to_string()
 }
 
-/// The game with something more.
+/// Returns the game with something more.
 fn catch_game_with(more: fn(&mut App)) -> ForeignGame {
     let broken = ForeignGame::new("broken", 1, move |app: &mut App| {
         game(app);
@@ -57,7 +57,7 @@ fn a_game_of_which_nothing_is_seen_is_refused() {
     assert!(text.contains("nothing of the game `dark` is seen") && text.contains("`.observe`"), "{text}");
 }
 
-/// What everybody has in the `main` of a game.
+/// The plugins in the `main` of most games.
 #[test]
 fn bevys_plugins_that_a_game_adds_again_are_named_with_what_to_do() {
     let text = fault(&catch_game_with(|app| _ = app.add_plugins(DefaultPlugins)), 1);
@@ -124,7 +124,7 @@ fn a_missing_resource_is_named_with_what_brings_it() {
     });
     let text = fault(&broken, 2);
     assert!(!text.contains("panicked"), "{text}");
-    for part in ["count` needs the resource `Lives`", "insert it, or add the plugin that brings it"] {
+    for part in ["count` needs the resource `Lives`", "insert it, or add the plugin that adds it"] {
         assert!(text.contains(part), "`{part}` is missing in: {text}");
     }
     let text = fault(&catch_game().reward(|lives: Res<Lives>| lives.0 as f32), 2);
@@ -148,7 +148,7 @@ fn what_headless_plugins_lack_is_named_with_its_plugin() {
     });
     let broken = broken.headless(|usual| usual.build().disable::<FrameCountPlugin>());
     let text = fault(&broken, 2);
-    assert!(text.contains("count` needs the resource `FrameCount`") && text.contains("`FrameCountPlugin` brings it"));
+    assert!(text.contains("count` needs the resource `FrameCount`") && text.contains("`FrameCountPlugin` adds it"));
 }
 
 #[test]
@@ -186,7 +186,7 @@ fn a_panic_is_an_error_with_a_recording_that_leads_to_it() {
     let error = verify_file(&bomb(), std::path::Path::new(path), |_| {}).expect_err("panics again").to_string();
     assert!(error.contains("tick 4") && error.contains("the paddle has left the field"), "{error}");
     std::fs::remove_file(path).expect("it was there");
-    // Measuring gets the error too, from whichever thread.
+    // Measuring gets the error too, from any thread.
     let player = Player::Blind(BlindBot::Constant(ActionValue::Discrete(1)));
     let error = evaluate(&bomb(), &player, &plan("default:0..3"), |_| {}).expect_err("panics").to_string();
     assert!(error.contains("the paddle has left the field"), "{error}");
@@ -199,7 +199,7 @@ fn a_game_may_call_its_types_what_the_plugin_calls_its_own() {
     struct Frame {
         width: f32,
     }
-    /// Not reflected, so that only its name is known.
+    /// Not reflected, so only its name is known.
     #[derive(Component)]
     struct Decision;
     let named = ForeignGame::new("named", 1, |app: &mut App| {

@@ -1,4 +1,4 @@
-//! A game that uses what windows are for, without one: a picture from the disk, states, text, a mesh and a material.
+//! Tests of a game without its window: a picture from the disk, states, text, a mesh and a material.
 
 use bevy::prelude::*;
 use playbot_lab::{
@@ -57,13 +57,13 @@ fn roll(keys: Res<ButtonInput<KeyCode>>, mut ball: Single<&mut Transform, With<B
     text.0 = format!("{} m", ball.translation.x);
 }
 
-/// The ball's way, and how wide its picture is.
+/// Returns the ball's displacement, and the width of its picture.
 fn see(ball: Single<(&Transform, &Sprite), With<Ball>>, images: Res<Assets<Image>>) -> [f32; 2] {
     let (place, sprite) = *ball;
     [place.translation.x, images.get(&sprite.image).map_or(0.0, |image| image.width() as f32)]
 }
 
-/// The adapter.
+/// Returns the adapter.
 fn ball_game() -> ForeignGame {
     ForeignGame::new("ball", 1, game)
         .keys([vec![], vec![KeyCode::ArrowRight]])

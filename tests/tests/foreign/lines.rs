@@ -1,11 +1,11 @@
-//! What it takes to make a game playable that is not ours: at most 20 lines, and none in the game itself.
+//! Tests of the length of an adapter of a foreign game: at most 20 lines, and none in the game itself.
 
 use std::{
     fs,
     path::{Path, PathBuf},
 };
 
-/// Games that are not ours.
+/// Foreign games.
 const GAMES: [&str; 3] = ["alien_cake_addict", "breakout", "gem_hop"];
 
 fn crate_of(game: &str) -> PathBuf {
@@ -16,24 +16,23 @@ fn read(path: &Path) -> String {
     fs::read_to_string(path).unwrap_or_else(|error| panic!("cannot read {}: {error}", path.display()))
 }
 
-/// Files below a folder, without those that only a link leads to.
+/// Returns the files below a folder.
 fn files(folder: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("cannot read {}: {error}", folder.display()));
     let paths = entries.map(|entry| entry.expect("a folder of the repository can be listed").path());
-    paths
-        .filter(|path| !path.is_symlink())
-        .flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] })
-        .collect()
+    paths.flat_map(|path| if path.is_dir() { files(&path) } else { vec![path] }).collect()
 }
 
-/// Modules that take no part in playing: what the benchmark of testers plants into a game, and a detector that knows its rules.
+/// Modules without a part in playing: the planted defects of the benchmark of testers, and a detector of the game's
+/// rules.
 const APART: [&str; 2] = ["defects", "rules"];
 
 fn is_named_apart(path: &Path) -> bool {
     APART.iter().any(|name| path.ends_with(format!("src/{name}.rs")))
 }
 
-/// Lines that say something: not blank, no comment, no import, not closing brackets only, not the name of one of [`APART`].
+/// Returns the lines that count: not blank, no comment, no import, not closing brackets only, not the name of one of
+/// [`APART`].
 fn lines_that_count(source: &str) -> Vec<&str> {
     let mut in_use = false;
     let mut counted = Vec::new();

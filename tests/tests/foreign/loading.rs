@@ -1,4 +1,4 @@
-//! However long a level takes to load, its first tick finds the same clock.
+//! Tests that the first tick of a level finds the same clock, however long it takes to load.
 
 use std::time::Duration;
 
@@ -9,7 +9,8 @@ use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_world};
 #[derive(Resource)]
 struct Left(u32);
 
-/// A game whose level takes this many frames, with fixed steps that take three, and an agent that sees the clocks.
+/// Returns a game whose level takes this many frames, with fixed steps that take three, and an agent that sees the
+/// clocks.
 fn slow(frames: u32) -> ForeignGame {
     let game = move |app: &mut App| {
         app.insert_resource(Left(frames))
@@ -26,7 +27,7 @@ fn slow(frames: u32) -> ForeignGame {
         .ready(|left: Res<Left>| left.0 == 0)
 }
 
-/// What is seen in each tick of two episodes.
+/// Returns the observations of each tick of two episodes.
 fn clocks(frames: u32) -> Vec<Vec<f32>> {
     let (mut world, agents) = build_world(&slow(frames), "default", 0, 0, 1);
     let bot = BlindBot::Constant(ActionValue::Discrete(0));

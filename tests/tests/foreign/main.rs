@@ -1,4 +1,4 @@
-//! Games that know nothing of the plugin, and their adapters.
+//! Tests of foreign games and their adapters.
 
 mod actions;
 mod experiments;

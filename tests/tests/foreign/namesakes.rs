@@ -1,8 +1,8 @@
-//! A program that hands over two games of one name, or none, is told so, whatever it is asked for.
+//! Tests of a program with two games of one name, or without games: every verb reports it.
 
 use playbot_shell::{Shell, ended};
 
-/// What a program with so many games of one name tells people when it ends with this exit code.
+/// Returns the messages of a program with so many games of one name, which ends with this exit code.
 fn told(games: &str, args: &[&str], code: i32) -> String {
     let shell = Shell::new(env!("CARGO_BIN_EXE_namesakes"));
     let mut command = shell.command(args);
@@ -24,7 +24,7 @@ fn two_games_of_one_name_are_refused() {
 #[test]
 fn a_program_without_games_is_told_so() {
     let words = told("0", &["config", "presets"], 3);
-    assert!(words.contains("error: the program has no game: hand it at least one"), "{words}");
+    assert!(words.contains("error: the program has no game: give it at least one"), "{words}");
 }
 
 #[test]

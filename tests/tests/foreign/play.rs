@@ -1,4 +1,4 @@
-//! Games that know nothing of the plugin: played, recorded, measured and trained like any other.
+//! Tests of foreign games: played, recorded, measured and trained like any other.
 
 use std::path::Path;
 
@@ -80,8 +80,9 @@ fn states_and_loading_screens_pass_before_the_first_tick() {
             count = 0;
         }
     }
-    // Three fixed steps of 50 ms to lose, in frames of 16.7 ms. The fixed clock begins with the frame in which the level is
-    // entered, one before the first tick, so that the steps fall into ticks 2, 5 and 8, whatever the episode before has left.
+    // Three fixed steps of 50 ms to lose, in frames of 16.7 ms. The fixed clock begins with the frame in which the
+    // level is entered, one before the first tick. So the steps fall into ticks 2, 5 and 8, whatever state the episode
+    // before has left.
     assert_eq!(lengths, [8, 8, 8], "no ghosts, and no loading in an episode");
     assert_eq!(world.resource::<Tick>().0, 25, "loading frames are no ticks; the last one has nobody to play");
     assert_eq!(*world.resource::<State<Stage>>(), Stage::Over);
@@ -122,7 +123,7 @@ fn training_that_was_killed_in_the_middle_of_episodes_goes_on_bit_for_bit() {
 fn a_game_with_hidden_state_says_at_resume_what_it_may_be() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path().join("run");
-    // Where the apple is depends on how often the game was begun in this World.
+    // The apple's position depends on the number of starts of the game in this World.
     fn hang(mut begun: Local<u32>, mut apple: Single<&mut Transform, With<Apple>>) {
         *begun += 1;
         apple.translation.x = (*begun % 9) as f32;

@@ -1,4 +1,4 @@
-//! `Restart::Rebuild`: episodes of a game that cannot be set back otherwise, each in a World of its own.
+//! Tests of `Restart::Rebuild`: episodes of a game that cannot be reset otherwise, each in a World of its own.
 
 use std::{path::Path, sync::Arc};
 
@@ -143,7 +143,7 @@ fn a_training_that_was_stopped_in_the_middle_of_episodes_goes_on_bit_for_bit() {
 #[test]
 fn a_world_that_cannot_be_built_anew_names_the_other_restarts() {
     let (mut world, agents) = build_world(&stubborn_game(Restart::Rebuild), "default", 0, 0, 1);
-    // What a window's World lacks.
+    // A resource that a window's World lacks.
     world.remove_resource::<Renewal>();
     world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Always(3)));
     let text = world.tick().expect_err("a fault").to_string();

@@ -1,4 +1,4 @@
-//! AntMaze as a game: what is seen, paid and ended, and that it is the same every time.
+//! Tests of AntMaze as a game: observations, rewards, ends, and determinism.
 
 mod actions;
 mod arena;

@@ -1,4 +1,4 @@
-//! CoinRun as a Bevy game: the same as its rules, open to additions, with colliders for rays.
+//! Tests of CoinRun as a Bevy game: the same as its rules, open to additions, with colliders for rays.
 
 use std::sync::Arc;
 
@@ -65,7 +65,7 @@ fn a_game_may_add_a_saw_and_a_crate() {
     world.spawn((Saw, ArenaBody(Body::block([1, 3])), InArena(arena)));
     world.tick().expect("sound");
     assert_eq!(world.get::<LastOutcome>(agent).expect("a player").0, Some(Outcome::Saw));
-    assert_eq!(CoinRun::default().end_cause(&world, agent), Some("saw"));
+    assert_eq!(CoinRun::default().tools().state.end_cause(&world, agent), Some("saw"));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! CoinRun's picture: sprites and tiles follow the game, and nothing else changes.
+//! Tests of CoinRun's picture: sprites and tiles follow the game, and nothing else changes.
 
 mod arena;
 mod arenas;

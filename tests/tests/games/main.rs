@@ -1,4 +1,4 @@
-//! CoinRun, the mazes and the ants as games of Bevy.
+//! Tests of CoinRun, the mazes and the ants as games of Bevy.
 
 mod antmaze;
 mod coinrun;

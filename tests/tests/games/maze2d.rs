@@ -1,5 +1,5 @@
-//! Maze2D as a Bevy game: the same as its rules, reproducible on any number of threads, open to rays, and clear about
-//! bad input.
+//! Tests of Maze2D as a Bevy game: the same as its rules, reproducible on any number of threads, open to rays, and
+//! clear about bad input.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -34,7 +34,7 @@ fn push(x: f32, y: f32) -> Action {
     Action(ActionValue::Continuous(vec![x, y]))
 }
 
-/// A World with one agent that does what the test says.
+/// Returns a World with one agent whose actions the test sets.
 fn one_agent(mode: &str, level: u64) -> (World, Entity) {
     let (mut world, agents) = build_world(&GAME, mode, 0, 0, 1);
     world.entity_mut(agents[0]).insert((Control::Human, LevelQueue::Always(level), push(0.0, 0.0)));
@@ -73,7 +73,7 @@ fn its_systems_have_one_order() {
     app.play_episodes(1, 700).expect("600 ticks are an episode");
 }
 
-/// Hashes of all agents after every tick, World by World.
+/// Returns the hashes of all agents after every tick, World by World.
 fn traces(mode: &str, threads: usize) -> Vec<Vec<u64>> {
     const AGENTS: u32 = 8;
     // 4 Worlds, 8 agents, 3200 ticks: more than 100,000 steps of physics.
@@ -108,7 +108,7 @@ fn a_hundred_thousand_steps_are_the_same_on_one_and_on_two_threads() {
     }
 }
 
-/// The ends of the first `episodes` episodes of the demonstrator.
+/// Returns the ends of the first `episodes` episodes of the demonstrator.
 fn evaluated(text: &str, player: &Player, levels: u64) -> Vec<playbot_lab::eval::EpisodeResult> {
     let plan = EvalPlan { arenas: 8, ..plan(&format!("{text}:0..{}", levels - 1)) };
     evaluate(&GAME, player, &plan, |_| {}).expect("sound")
@@ -128,7 +128,7 @@ fn only_the_clock_ends_d4rl_s_episodes_and_success_is_known_all_the_same() {
     }
 }
 
-/// Or nobody would learn to get there.
+/// Otherwise no policy would learn to get there.
 #[test]
 fn the_way_to_the_goal_is_what_pays() {
     for text in ["umaze", "medium", "large", "random", "random+sparse", "random+sparse+end-at-goal"] {

@@ -1,4 +1,4 @@
-//! Maze2D's picture: everything that matters can be told apart on 64 × 64 pixels, where the game says it is.
+//! Tests of Maze2D's picture: everything that matters is distinct on 64 × 64 pixels, at the game's positions.
 
 use bevy::{
     ecs::schedule::{LogLevel, ScheduleBuildSettings},
@@ -16,7 +16,7 @@ const FLOOR: [u8; 3] = [0xec, 0xef, 0xf4];
 const BALL: [u8; 3] = [0xd7, 0x26, 0x3d];
 const GOAL: [u8; 3] = [0xf5, 0xb7, 0x00];
 
-/// A World whose agent sees pictures and pushes as the test says.
+/// Returns a World whose agent sees pictures and pushes as the test sets.
 fn seeing(mode: &str, level: u64) -> (World, Entity) {
     let observation_config = ObservationConfig { kind: ObservationKind::Raster, image: ImageOptions::default() };
     let (mut world, agents) = build_observing_world(&GAME, mode, &observation_config, 0, 0, 2).expect("can be drawn");
@@ -27,7 +27,7 @@ fn seeing(mode: &str, level: u64) -> (World, Entity) {
     (world, agents[0])
 }
 
-/// Columns and rows of the pixels with a colour, from the top left.
+/// Returns the columns and rows of the pixels with a colour, from the top left.
 fn pixels(world: &World, agent: Entity, colour: [u8; 3]) -> Vec<(usize, usize)> {
     let image = &world.get::<Observation>(agent).expect("an agent").image;
     assert_eq!(image.len(), 3 * SIDE * SIDE);
@@ -35,13 +35,13 @@ fn pixels(world: &World, agent: Entity, colour: [u8; 3]) -> Vec<(usize, usize)> 
     (0..SIDE * SIDE).filter(has).map(|at| (at % SIDE, at / SIDE)).collect()
 }
 
-/// Mean column and row of some pixels.
+/// Returns the mean column and row of some pixels.
 fn middle(pixels: &[(usize, usize)]) -> Vec2 {
     let sum = pixels.iter().fold(Vec2::ZERO, |sum, &(x, y)| sum + Vec2::new(x as f32 + 0.5, y as f32 + 0.5));
     sum / pixels.len() as f32
 }
 
-/// Where a place of the maze is in the picture, pixels from the top left.
+/// Returns the position in the picture of a position in the maze, pixels from the top left.
 fn in_picture(level: &Maze2dLevel, [x, y]: [f64; 2]) -> Vec2 {
     let (rows, columns, offset) = (level.maze.rows() as f64, level.maze.columns() as f64, level.walls.offset());
     let cell = SIDE as f64 / rows.max(columns);
@@ -75,7 +75,7 @@ fn walls_floor_ball_and_goal_are_where_they_are() {
 
 #[test]
 fn the_ball_goes_where_the_keys_push_it() {
-    let keys = GAME.key_bindings().expect("people can play");
+    let keys = GAME.tools().input.key_bindings().expect("people can play");
     // From a cell of the medium map that is open to this side.
     for (key, way, cell) in [
         (KeyCode::ArrowUp, Vec2::new(0.0, -1.0), (3, 4)),
@@ -104,7 +104,7 @@ fn drawing_changes_nothing_in_the_game_and_has_one_order() {
         schedule.set_build_settings(ScheduleBuildSettings { ambiguity_detection: LogLevel::Error, ..default() });
     });
     GAME.build(&mut app, "medium");
-    GAME.build_picture(&mut app);
+    GAME.tools().pictures.build_picture(&mut app);
     let drawn = GAME.spawn_agent(app.world_mut(), 0);
     let (mut plain, agents) = playbot_lab::worlds::build_world(&GAME, "medium", 0, 0, 1);
     for (world, agent) in [(app.world_mut(), drawn), (&mut plain, agents[0])] {

@@ -1,4 +1,4 @@
-//! The games of a program are told apart by their names.
+//! Tests of the names of a program's games.
 
 use std::path::Path;
 

@@ -1,4 +1,4 @@
-//! Games with senses: the same games, to the bit, whose agents are told more.
+//! Tests of games with more observations: the same games, to the bit.
 
 use std::sync::Arc;
 
@@ -17,10 +17,10 @@ use playbot_lab::{
     worlds::{add_game, build_observing_world, build_world, spawn_agents},
 };
 
-/// Ticks that an episode may take in the modes of [`games`].
+/// Longest episode, in ticks, in the modes of [`games`].
 const LIMIT: u64 = 60;
 
-/// Every game with senses, how many numbers they tell, the same game without, and a mode.
+/// Returns every game with more observations, their number of values, the same game without, and a mode.
 fn games() -> [(Arc<dyn Game>, usize, Arc<dyn Game>, &'static str); 6] {
     let (ball, ant) = ("random+goal=random+limit=60", "random+goals=random+random-start+limit=60");
     [
@@ -33,7 +33,7 @@ fn games() -> [(Arc<dyn Game>, usize, Arc<dyn Game>, &'static str); 6] {
     ]
 }
 
-/// Two agents that push at random.
+/// Returns two agents that push at random.
 fn build(game: &dyn Game, mode: &str, observation_config: &ObservationConfig, first: u32) -> (World, Vec<Entity>) {
     let (mut world, agents) = build_observing_world(game, mode, observation_config, 3, first, 2).expect("can be drawn");
     for &agent in &agents {
@@ -95,7 +95,7 @@ fn systems_are_in_one_order_with_pictures_and_without() {
             let observation_config = ObservationConfig { kind, ..ObservationConfig::default() };
             add_game(&*game, &mut app, mode, &observation_config, 1).expect("can be drawn");
             let agent = spawn_agents(&*game, app.world_mut(), &observation_config, 0, 1)[0];
-            game.attach_demonstrator(app.world_mut(), agent, 0.2);
+            game.tools().bots.attach_demonstrator(app.world_mut(), agent, 0.2);
             app.world_mut().entity_mut(agent).insert(Control::Bot);
             app.play_episodes(2, 2 * LIMIT + 10).expect("sound");
             let vector = &app.world().get::<Observation>(agent).expect("an agent").vector;
@@ -106,13 +106,13 @@ fn systems_are_in_one_order_with_pictures_and_without() {
 
 #[test]
 fn who_stands_at_the_goal_sees_no_way_left() {
-    // Nobody but the demonstrator gets there: the way is the same that episodes are judged by.
+    // Only the demonstrator gets there: the offset of the goal is the same by which episodes are judged.
     let goal = |game: &dyn Game| game.observation().names.iter().position(|name| name == "goal x");
     let who_see: Vec<_> = games().into_iter().filter_map(|(game, ..)| Some((goal(&*game)?, game))).collect();
     assert_eq!(who_see.len(), 4);
     for (at, game) in who_see {
         let (mut world, agents) = build_world(&*game, "umaze", 0, 0, 1);
-        game.attach_demonstrator(&mut world, agents[0], 0.0);
+        game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.0);
         world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(0)));
         let mut left = f32::INFINITY;
         while world.get::<EpisodeCount>(agents[0]).expect("an agent").finished == 0 {

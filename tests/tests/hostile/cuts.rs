@@ -1,4 +1,4 @@
-//! Any file that ends too early.
+//! Tests of files that end too early.
 
 use std::collections::BTreeSet;
 
@@ -6,7 +6,7 @@ use playbot_tests::hostile::{FileKind, Form, Reading};
 
 use crate::{KINDS, whole};
 
-/// Places at which a file is cut off that is read into a World, beside the ends of its lines.
+/// Lengths at which a file is cut off that is read into a World, beside the ends of its lines.
 const SLOW_CUTS: usize = 100;
 
 /// Cuts the files of some kinds at every byte.
@@ -20,7 +20,7 @@ fn cut_all(wanted: impl Fn(&&FileKind) -> bool) {
             kind.put(&place, &kind.bytes()[..length]);
             let Reading::Whole(found) = kind.read(&place) else { continue };
             if found == parts {
-                // What is missing says nothing, such as the last line feed.
+                // The missing part has no meaning, such as the last line feed.
                 continue;
             }
             let is_start = kind.grows && parts.starts_with(&found);
@@ -33,7 +33,7 @@ fn cut_all(wanted: impl Fn(&&FileKind) -> bool) {
     }
 }
 
-/// Where a file is cut off.
+/// Returns the lengths at which a file is cut off.
 fn lengths(kind: &FileKind) -> Vec<usize> {
     let bytes = kind.bytes();
     if !kind.is_slow {

@@ -1,4 +1,4 @@
-//! One flipped bit anywhere in any file that has a checksum.
+//! Tests of one flipped bit anywhere in any file that has a checksum.
 
 use playbot_tests::hostile::{Dice, Reading};
 

@@ -1,4 +1,5 @@
-//! Every kind of file that is read back, with a flipped bit, cut off anywhere, and changed by somebody who knows how it is built.
+//! Tests of every kind of file that is read back, with a flipped bit, cut off anywhere, and changed by an adversary who
+//! knows its structure.
 
 mod cuts;
 mod flips;
@@ -11,7 +12,7 @@ use playbot_tests::hostile::{FileKind, Reading, all_kinds};
 /// All kinds.
 static KINDS: LazyLock<Vec<FileKind>> = LazyLock::new(all_kinds);
 
-/// What is in a whole file of a kind.
+/// Returns the contents of a whole file of a kind.
 fn whole(kind: &FileKind, folder: &std::path::Path) -> Vec<String> {
     kind.put(folder, kind.bytes());
     match kind.read(folder) {

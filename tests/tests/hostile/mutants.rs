@@ -1,10 +1,10 @@
-//! Files that somebody has changed who knows how they are built, checksums and all.
+//! Tests of files changed by an adversary who knows their structure, checksums and all.
 
 use playbot_tests::hostile::{Reading, read_mutants};
 
 use crate::KINDS;
 
-/// Mutants of each kind; of those that are read into a World fewer.
+/// Mutants of each kind; fewer of kinds that are read into a World.
 const MUTANTS: u64 = 300;
 const SLOW_MUTANTS: u64 = 60;
 

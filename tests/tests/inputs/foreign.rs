@@ -1,4 +1,4 @@
-//! What is said of a foreign game's input, in whatever order.
+//! Tests of errors in a foreign game's input, in any order.
 
 use bevy::prelude::*;
 use bevy_playbot::virtual_input::{ActionAxis, VirtualInput};
@@ -24,7 +24,7 @@ fn pads(game: ForeignGame) -> ForeignGame {
     game.gamepad_buttons(PADS.map(<[_]>::to_vec))
 }
 
-/// What the game's agent presses.
+/// Returns the input that the game's agent presses.
 fn pressed(game: &ForeignGame) -> VirtualInput {
     assert_eq!(game.problem(), None);
     let (world, agents) = build_world(game, "default", 0, 0, 1);
@@ -57,13 +57,13 @@ fn keys_and_buttons_come_in_any_order() {
 fn keys_can_be_said_by_name() {
     let named = bare().keys_by_name([vec![], vec!["Space"]]);
     assert_eq!(pressed(&named), VirtualInput::keys(KEYS.map(<[_]>::to_vec)));
-    assert_eq!(Game::action_names(&named), ["nothing", "Space"]);
-    assert!(named.key_bindings().is_some(), "a person plays with these keys");
+    assert_eq!(named.tools().input.action_names(), ["nothing", "Space"]);
+    assert!(named.tools().input.key_bindings().is_some(), "a person plays with these keys");
     let mixed = bare().keys_by_name([vec!["KeyA".to_owned(), "MouseLeft".to_owned()]]);
     let both = VirtualInput::keys([vec![KeyCode::KeyA]]).mouse_buttons([vec![MouseButton::Left]]);
     assert_eq!(pressed(&mixed), both);
-    assert_eq!(Game::action_names(&mixed), ["KeyA+MouseLeft"]);
-    assert!(mixed.key_bindings().is_none(), "keys alone do not play it");
+    assert_eq!(mixed.tools().input.action_names(), ["KeyA+MouseLeft"]);
+    assert!(mixed.tools().input.key_bindings().is_none(), "keys alone do not play it");
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn a_key_that_does_not_exist_is_told_with_its_action_and_the_nearest_name() {
     for part in ["the game `bare`", "in action 1", "`ArowLeft`", "did you mean `ArrowLeft`?"] {
         assert!(text.contains(part), "`{part}` is missing in: {text}");
     }
-    // Whoever plays it hears of it.
+    // Playing it gives the same error.
     let (mut world, _) = build_world(&wrong, "default", 0, 0, 1);
     assert!(world.tick().expect_err("a problem").to_string().contains("`ArowLeft`"));
     assert_eq!(keys(wrong).problem(), None, "what was said last counts");
@@ -101,7 +101,7 @@ fn what_does_not_go_together_is_told() {
         let text = problem(game);
         assert!(text.contains("has `.keys` and `.axes`") && text.contains("choose one"), "{text}");
     }
-    // Whoever plays it hears of it.
+    // Playing it gives the same error.
     let (mut world, _) = build_world(&keys(bare()).axes(steer()), "default", 0, 0, 1);
     assert!(world.tick().expect_err("a problem").to_string().contains("`.keys` and `.axes`"));
 }

@@ -1,4 +1,4 @@
-//! Foreign games whose agents drive the actions of an input manager, to which no key is bound.
+//! Tests of foreign games whose agents drive the actions of an input manager, to which no key is bound.
 
 use bevy::prelude::*;
 use bevy_playbot::virtual_input::{
@@ -12,11 +12,11 @@ use playbot_lab::{
     worlds::build_world,
 };
 
-/// Who walks.
+/// The walker.
 #[derive(Component)]
 struct Hero;
 
-/// What both games have in common: they are won at 3, and time is up after 9 ticks.
+/// Adds the shared rules of both games: they are won at 3, and time is up after 9 ticks.
 fn adapted(game: ForeignGame, restart: Restart) -> ForeignGame {
     game.actions(ActionSpace::Discrete(2), || {})
         .observe(["x"], |hero: Single<&Transform, With<Hero>>| [hero.translation.x])
@@ -25,7 +25,7 @@ fn adapted(game: ForeignGame, restart: Restart) -> ForeignGame {
         .restart(restart)
 }
 
-/// Lengths of two episodes in which the agent does this.
+/// Returns the lengths of two episodes with this action.
 fn lengths(game: &ForeignGame, action: u32) -> Vec<u32> {
     let (mut world, agents) = build_world(game, "default", 0, 0, 1);
     let bot = BlindBot::Constant(ActionValue::Discrete(action));
@@ -41,7 +41,7 @@ fn lengths(game: &ForeignGame, action: u32) -> Vec<u32> {
     lengths
 }
 
-/// Both ways to begin anew: with the same agent, and with one that is spawned again.
+/// Checks both restarts: with the same agent, and with one that is spawned again.
 fn check(game: impl Fn(Restart) -> ForeignGame) {
     for restart in [Restart::Startup, Restart::Rebuild] {
         let game = game(restart);

@@ -1,4 +1,4 @@
-//! Keys become actions in ticks, however the frames fall.
+//! Tests that keys become actions in ticks, at any frame rate.
 
 use bevy::{
     input::{
@@ -15,7 +15,7 @@ use playbot_tests::{Cell, corridor_plugin, spawn_walker};
 /// Actions of the corridor.
 const STAY: u32 = 2;
 
-/// A corridor with a person in it, and this many frames to a tick.
+/// Returns a corridor with a person in it, and this many frames to a tick.
 fn corridor(frames: u32) -> (App, Entity) {
     let mut app = headless_app();
     app.add_plugins((InputPlugin, KeyboardPlugin)).add_plugins(corridor_plugin);

@@ -1,4 +1,4 @@
-//! What an agent's action presses, and what a person's keys become.
+//! Tests of the input of agents' actions, and of the actions of people's keys.
 
 mod foreign;
 mod foreign_managers;

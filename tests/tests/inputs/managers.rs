@@ -1,4 +1,4 @@
-//! Input managers are driven by virtual input: through their keys, and by action.
+//! Tests of input managers, driven by virtual input: through their keys, and by action.
 
 use bevy::{input::InputPlugin, prelude::*};
 use bevy_playbot::{
@@ -26,7 +26,7 @@ fn decide(next: Res<Next>, mut agents: Query<(&Control, &mut Action)>) {
     }
 }
 
-/// An app with an agent that jumps with action 1.
+/// Returns an app with an agent that jumps with action 1.
 fn app_with(route: InputRoute) -> (App, Entity) {
     let mut app = headless_app();
     app.add_plugins((InputPlugin, VirtualInputPlugin { route }))
@@ -37,7 +37,7 @@ fn app_with(route: InputRoute) -> (App, Entity) {
     (app, agent)
 }
 
-/// Plays these actions, a tick each, and gives what was seen of them.
+/// Plays these actions, a tick each, and returns the game's view of them.
 fn play(app: &mut App, actions: &[u32]) -> Vec<(bool, bool)> {
     app.world_mut().resource_mut::<Jumps>().0.clear();
     for &action in actions {

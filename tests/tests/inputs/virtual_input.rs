@@ -1,4 +1,5 @@
-//! An agent's action presses keys: when games see it, on both routes, however ticks and frames fall.
+//! Tests of keys pressed by an agent's action: the time at which games see them, on both routes, at any rate of ticks
+//! and frames.
 
 mod gamepad;
 mod keys;

@@ -1,4 +1,4 @@
-//! Learning from pictures, from recordings to policy files.
+//! Tests of learning from pictures, from recordings to policy files.
 
 mod corridor;
 mod eyes;

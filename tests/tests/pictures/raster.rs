@@ -1,4 +1,4 @@
-//! Exact pixels of a raster sensor.
+//! Tests of exact pixels of a raster sensor.
 
 mod eye;
 mod faults;

@@ -1,4 +1,4 @@
-//! The raster draws what Bevy's renderer draws.
+//! Tests of the raster against Bevy's renderer.
 
 use bevy::{
     prelude::*,
@@ -16,7 +16,7 @@ use playbot_games::{
 use playbot_lab::prelude::*;
 use playbot_tests::scene::{camera_world, draw, image, spawn_eye};
 
-/// A World with a camera and a raster that see the same, each an agent.
+/// Returns a World with a camera and a raster with the same view, each an agent.
 fn both_eyes(width: f32, size: [u32; 2]) -> (World, [Entity; 2]) {
     let mut world = camera_world(|app| {
         app.add_plugins(RasterPlugin);
@@ -29,7 +29,7 @@ fn both_eyes(width: f32, size: [u32; 2]) -> (World, [Entity; 2]) {
     (world, [camera, raster])
 }
 
-/// How far the frames of two agents are apart.
+/// Returns the difference between the frames of two agents.
 fn difference(world: &World, one: Entity, other: Entity) -> Difference {
     let [one, other] = [one, other].map(|agent| &world.get::<Frame>(agent).expect("an eye").pixels);
     Difference::between(one, other).expect("they have one size")
@@ -73,7 +73,7 @@ impl Dice {
     }
 }
 
-/// Everything that a sprite may say of itself.
+/// Returns a sprite with random values of all fields.
 fn sprite(dice: &mut Dice, images: &[Handle<Image>], layout: &Handle<TextureAtlasLayout>) -> impl Bundle {
     let mut sprite = Sprite::from_image(images[draw(&mut dice.0, images.len() as u64) as usize].clone());
     (sprite.flip_x, sprite.flip_y) = (dice.often(2), dice.often(2));
@@ -155,7 +155,7 @@ fn sprites_of_all_kinds_look_the_same() {
 #[test]
 fn tiles_look_the_same() {
     let (mut world, [camera, raster]) = both_eyes(13.0, [64, 64]);
-    // The raster draws the outside as far as it is seen.
+    // The raster draws the outside as far as its view reaches.
     world.insert_resource(TileBorder(40.0));
     let dice = &mut Dice(2);
     let tiles = noise(dice, |dice| draw(&mut dice.0, 256) as u8);
@@ -212,7 +212,7 @@ fn a_grid_without_cells_is_its_outside() {
     assert!(difference(&world, camera, raster).close > 0.98);
 }
 
-/// Plays an ant on the open floor before both eyes, for a number of ticks, and returns how far it got.
+/// Plays an ant on the open floor before both sensors, for a number of ticks, and returns its distance.
 fn ant_walks(world: &mut World, player: Entity, watcher: Entity, ticks: u32) -> f32 {
     let mut farthest = 0.0f32;
     let mut total = Total::default();
@@ -234,10 +234,10 @@ fn the_open_floor_of_the_ant_looks_the_same_and_has_no_edge() {
     let mut world = camera_world(|app| {
         game.build(app, "goal");
         app.add_plugins(RasterPlugin);
-        game.build_picture(app);
+        game.tools().pictures.build_picture(app);
     });
     let [player, other] = [0, 1].map(|index| game.spawn_agent(&mut world, index));
-    let width = game.picture().expect("it is drawn").width;
+    let width = game.tools().pictures.picture().expect("it is drawn").width;
     let options = ImageOptions::default();
     for agent in [player, other] {
         let still = Action(ActionValue::Continuous(vec![0.0; 8]));
@@ -247,7 +247,7 @@ fn the_open_floor_of_the_ant_looks_the_same_and_has_no_edge() {
     let sensor = RasterSensor::following(player, width, options);
     let watcher = world.spawn((Agent::new(2, ActionSpace::Discrete(2)), Control::Human, sensor)).id();
     assert!(ant_walks(&mut world, player, watcher, 5) < 2.0);
-    // Far from where it began.
+    // Far from its start.
     let mut walker = world.get_mut::<Walker>(player).expect("an ant");
     let mut state = walker.body.state();
     state.qpos[0] += 37.3;
@@ -262,7 +262,7 @@ fn coinrun_looks_the_same() {
     let mut world = camera_world(|app| {
         game.build(app, "hard");
         app.add_plugins(RasterPlugin);
-        game.build_picture(app);
+        game.tools().pictures.build_picture(app);
     });
     let player = game.spawn_agent(&mut world, 0);
     let options = ImageOptions::default();

@@ -7,7 +7,6 @@ use crate::{
     doctests::without_example,
     imports::needs,
     modules::Modules,
-    public::Public,
 };
 
 /// A crate of these files below `src`.
@@ -99,28 +98,4 @@ fn public_modules_without_an_example_are_found() {
         ("e.rs", "pub struct Hidden;"),
     ]);
     assert_eq!(without_example(&modules), ["b", "c::bare", "f"]);
-}
-
-#[test]
-fn public_items_are_those_that_can_be_named() {
-    let (_folder, modules) = modules(&[
-        (
-            "lib.rs",
-            "mod a; pub mod b; mod c; pub use a::A; pub use c::*; #[doc(hidden)] pub use a::Hidden; pub use other::X;
-                pub use another; #[macro_export] macro_rules! m { () => {} }",
-        ),
-        ("a.rs", "pub struct A; pub struct Unseen; pub struct Hidden; impl A { pub fn method() {} }"),
-        (
-            "b.rs",
-            "pub use super::a::A; pub fn f() {} pub(crate) fn g() {} #[doc(hidden)] pub fn h() {} pub mod d { pub const E: u8 = 1; }",
-        ),
-        (
-            "c.rs",
-            "pub trait T { fn t(); } struct Private; pub use plan::plan; mod plan { pub fn plan() {} pub fn other() {} }",
-        ),
-    ]);
-    let public = Public::of(&modules);
-    let items: Vec<&str> = public.items.iter().map(String::as_str).collect();
-    assert_eq!(items, ["a::A", "b::d::E", "b::f", "c::T", "c::plan::plan", "m!", "other::X"]);
-    assert_eq!(public.boundless.into_iter().collect::<Vec<_>>(), ["another"]);
 }

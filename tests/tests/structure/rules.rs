@@ -12,17 +12,22 @@ use crate::{
     doctests::without_example,
     files::{files, shown},
     imports::needs,
-    items::items,
+    items::{Visibility, items},
     modules::Modules,
     packages::{Package, packages, workspace},
-    public::Public,
     tokens::tokens,
 };
 
-/// A file with more lines holds more than one concept.
-const MAX_LINES: usize = 300;
-/// Public items of `bevy_playbot`: what a game developer may have to look at.
-const MAX_PUBLIC: usize = 120;
+/// Lines of a product file without its tests, at most: what is longer is no longer read from top to bottom.
+const MAX_LINES: usize = 800;
+/// A product file with fewer lines is a splinter, unless it is the door of a folder.
+const SMALL: usize = 40;
+/// Product files with fewer lines than [`SMALL`], at most.
+const MAX_SMALL: usize = 40;
+/// Product files of the workspace, at most.
+const MAX_FILES: usize = 500;
+/// Public items that the documentation hides, at most.
+const MAX_HIDDEN: usize = 5;
 
 fn fail_if_any(faults: &[String], advice: &str) {
     assert!(faults.is_empty(), "{} to mend\n{}\n{advice}\n", faults.len(), faults.join("\n"));
@@ -34,18 +39,21 @@ fn crates() -> Vec<(Package, Modules)> {
     with_root.map(|(root, package)| (package, Modules::read(&root))).collect()
 }
 
-/// Circles of the folders that are asked for, by package and path: how the way leads round and where it is written.
-fn describe_circles(wanted: impl Fn(&str, &[String]) -> bool) -> Vec<String> {
+/// A module may name another, or be named by it, not both, whether directly or through others. `use` declarations and
+/// paths with `crate::`, `self::` and `super::` count, by the module in which the item is defined; tests do not. A folder's
+/// door is above its files: it may name them, and they may name it.
+#[test]
+fn files_of_a_folder_need_one_another_in_no_circle() {
     let mut faults = Vec::new();
     for (package, modules) in crates() {
         let needs = needs(&modules);
-        for (folder, edges) in folders(&needs).into_iter().filter(|(folder, _)| wanted(&package.name, folder)) {
+        for (folder, edges) in folders(&needs) {
             for circle in circles(&edges) {
                 let depth = folder.len();
                 let names = circle.iter().map(|need| need.from[depth].as_str());
-                let way = names.chain([circle[0].from[depth].as_str()]).collect::<Vec<_>>().join(" -> ");
+                let path = names.chain([circle[0].from[depth].as_str()]).collect::<Vec<_>>().join(" -> ");
                 let place = [slice::from_ref(&package.name), folder].concat().join("::");
-                faults.push(format!("{place}: {way}"));
+                faults.push(format!("{place}: {path}"));
                 for need in circle {
                     let file = shown(&workspace(), &need.file);
                     faults.push(format!("    {file}:{} names {}", need.line, need.path));
@@ -53,85 +61,79 @@ fn describe_circles(wanted: impl Fn(&str, &[String]) -> bool) -> Vec<String> {
             }
         }
     }
-    faults
-}
-
-/// A module may name another, or that one it, not both, whether directly or through others. `use` declarations and paths
-/// with `crate::`, `self::` and `super::` count, by the module in which the item is defined; tests do not.
-#[test]
-fn top_level_modules_need_one_another_in_no_circle() {
-    let faults = describe_circles(|_, folder| folder.is_empty());
-    fail_if_any(&faults, "Move what both sides need into a module of its own, or turn one import round.");
-}
-
-/// The same for the files of each folder of the games, which others read to write theirs.
-#[test]
-fn modules_of_a_folder_need_one_another_in_no_circle() {
-    let faults = describe_circles(|package, folder| package == "playbot_games" && !folder.is_empty());
     fail_if_any(&faults, "Move what both sides need into a file of its own, or turn one import round.");
 }
 
-/// Every `*.rs`, whether source, test or example.
-#[test]
-fn files_are_short() {
-    let mut faults = Vec::new();
-    for file in files(&workspace(), ".rs") {
-        let lines = fs::read_to_string(&file).expect("readable").lines().count();
-        if lines > MAX_LINES {
-            faults.push(format!("{}:{MAX_LINES}: {lines} lines", shown(&workspace(), &file)));
+/// Product sources with their lines, tests left out: all modules of published crates that are files.
+fn product_files() -> Vec<(PathBuf, usize)> {
+    let mut found = BTreeMap::new();
+    for (package, modules) in crates().into_iter().filter(|(package, _)| package.is_published) {
+        for module in modules.0.into_values().filter(|module| module.file.starts_with(&package.folder)) {
+            found.entry(module.file.clone()).or_insert_with(|| {
+                let source = fs::read_to_string(&module.file).expect("readable");
+                source.lines().count() - lines_of_tests(&source)
+            });
         }
     }
-    fail_if_any(&faults, &format!("At most {MAX_LINES} lines: find the second concept and give it a file of its own."));
+    found.into_iter().collect()
 }
 
-/// `mod.rs` and `lib.rs` have documentation and attributes, `mod name;`, `use`, `extern crate`, modules in braces that keep
-/// to the same rule, and items for documentation tests (`#[cfg(doctest)]`); nothing else, not even for tests.
+/// Lines of a source that are compiled for tests alone.
+fn lines_of_tests(source: &str) -> usize {
+    let all = tokens(source);
+    let of_tests = items(&all).into_iter().filter(|item| item.is_for_tests());
+    of_tests.map(|item| item.body.last().map_or(1, |last| last.line + 1 - item.line)).sum()
+}
+
 #[test]
-fn mod_rs_and_lib_rs_only_declare() {
-    let mut faults = Vec::new();
-    for file in files(&workspace(), ".rs") {
-        if file.file_name().is_some_and(|name| name == "mod.rs" || name == "lib.rs") {
-            let source = fs::read_to_string(&file).expect("readable");
-            let mut queue = items(&tokens(&source));
-            while let Some(item) = queue.pop() {
-                let is_doctest = item.attributes.iter().any(|attribute| attribute == "cfg(doctest)");
-                match item.inline_module() {
-                    Some(tokens) => queue.extend(items(tokens)),
-                    None if is_doctest || matches!(item.keyword.as_str(), "mod" | "use" | "extern") => {}
-                    None => {
-                        let file = shown(&workspace(), &file);
-                        faults.push(format!("{file}:{}: {} {}", item.line, item.keyword, item.name));
-                    }
-                }
-            }
+fn files_are_neither_long_nor_splinters() {
+    let files = product_files();
+    let line = |(file, lines): &(PathBuf, usize)| format!("{}: {lines} lines", shown(&workspace(), file));
+    let long: Vec<String> = files.iter().filter(|(_, lines)| *lines > MAX_LINES).map(line).collect();
+    fail_if_any(&long, &format!("At most {MAX_LINES} lines without tests: find the second concept, give it a file."));
+    let small: Vec<String> = files.iter().filter(|(_, lines)| *lines < SMALL).map(line).collect();
+    assert!(small.len() <= MAX_SMALL, "{} files of less than {SMALL} lines:\n{}", small.len(), small.join("\n"));
+    assert!(files.len() <= MAX_FILES, "{} product files, at most {MAX_FILES}: merge what is read together", files.len());
+    assert!(files.len() > 300, "only {} product files are seen: does the reader still find them?", files.len());
+}
+
+/// A folder's door is the file beside it that has its name.
+#[test]
+fn modules_have_one_style() {
+    let found: Vec<String> = files(&workspace(), "mod.rs")
+        .iter()
+        .filter(|file| file.file_name().is_some_and(|name| name == "mod.rs"))
+        .map(|file| shown(&workspace(), file).to_string())
+        .collect();
+    fail_if_any(&found, "Call `folder/mod.rs` `folder.rs`.");
+}
+
+/// What trainers need of `bevy_playbot` is documented in its module `engine`, and not hidden.
+#[test]
+fn hardly_anything_public_is_hidden() {
+    let mut hidden = Vec::new();
+    for (package, modules) in crates().into_iter().filter(|(package, _)| package.is_published) {
+        for (path, module) in &modules.0 {
+            let items = module.items.iter().filter(|item| item.is_hidden() && item.visibility == Visibility::Public);
+            hidden.extend(items.map(|item| format!("{} {}: {}", package.name, path.join("::"), item.name)));
         }
     }
-    faults.sort();
-    fail_if_any(&faults, "Move these into files that are named for what they hold; re-export what others need.");
+    assert!(hidden.len() <= MAX_HIDDEN, "{} hidden items:\n{}", hidden.len(), hidden.join("\n"));
 }
 
-/// Structs, enums, unions, traits, functions, types, constants, statics and exported macros that can be named from outside:
-/// `pub` in a module that is `pub` up to the root, or re-exported from one, each once, whatever features it needs. Neither
-/// methods, fields and variants count, nor what is `#[doc(hidden)]`. A named re-export from another crate counts as one;
-/// one of a whole crate, or with `*`, is a fault.
+/// The first line of a module's documentation names what is in it.
 #[test]
-fn a_game_developer_meets_few_items() {
-    let (_, modules) = crates().into_iter().find(|(package, _)| package.name == "bevy_playbot").expect("it is there");
-    let public = Public::of(&modules);
-    let mut by_module: BTreeMap<&str, Vec<&str>> = BTreeMap::new();
-    for item in &public.items {
-        let (module, name) = item.split_once("::").unwrap_or(("", item));
-        by_module.entry(module).or_default().push(name);
+fn modules_begin_with_a_noun() {
+    const QUESTIONS: [&str; 8] = ["What", "Who", "Whoever", "Where", "How", "Which", "Whether", "Why"];
+    let mut faults = Vec::new();
+    for file in files(&workspace(), ".rs") {
+        let source = fs::read_to_string(&file).expect("readable");
+        let Some(first) = source.lines().next().and_then(|line| line.strip_prefix("//! ")) else { continue };
+        if QUESTIONS.iter().any(|word| first.split(' ').next() == Some(word)) {
+            faults.push(format!("{}: {first}", shown(&workspace(), &file)));
+        }
     }
-    let boundless = public.boundless.iter().map(|path| format!("plugin/src: re-exports all of {path}"));
-    let mut faults: Vec<String> = boundless.collect();
-    if public.items.len() > MAX_PUBLIC {
-        faults.push(format!("bevy_playbot has {} public items, at most {MAX_PUBLIC}:", public.items.len()));
-        faults.extend(
-            by_module.iter().map(|(module, names)| format!("    {module} {}: {}", names.len(), names.join(" "))),
-        );
-    }
-    fail_if_any(&faults, "Make what games do not need pub(crate) or #[doc(hidden)], or move it to playbot_lab.");
+    fail_if_any(&faults, "Say what is in it with a noun phrase: \"Wilson intervals\".");
 }
 
 /// One short example at least, compiled as a documentation test, in every module of `bevy_playbot` that can be named from
@@ -144,8 +146,8 @@ fn every_concept_has_an_example() {
     fail_if_any(&faults, "Show in ten to twenty lines of the module's documentation how it is used.");
 }
 
-/// What `include_str!`, `include_bytes!` and `include!` read lies in the package, or is linked into it: otherwise it is
-/// missing from what `cargo package` packs. Paths in `concat!` are read up to the first piece that is no literal.
+/// What `include_str!`, `include_bytes!` and `include!` read lies in the package: otherwise it is missing from what
+/// `cargo package` packs. Paths in `concat!` are read up to the first piece that is no literal.
 #[test]
 fn included_files_lie_in_their_package() {
     let mut faults = Vec::new();
@@ -166,10 +168,10 @@ fn included_files_lie_in_their_package() {
             }
         }
     }
-    fail_if_any(&faults, "Link the folder into the package (ln -s ../assets assets) and include through the link.");
+    fail_if_any(&faults, "Move the file into the package, or embed it in playbot_assets (assets/src/lib.rs).");
 }
 
-/// A path without `..`, links not followed.
+/// A path without `..`.
 fn plain(path: &Path) -> PathBuf {
     let mut plain = PathBuf::new();
     for part in path.components() {

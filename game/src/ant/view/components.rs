@@ -1,4 +1,4 @@
-//! What there is to be seen.
+//! Components that are drawn.
 
 use bevy::prelude::*;
 
@@ -14,13 +14,13 @@ use crate::ant::{
 #[reflect(Component, Clone, Debug, PartialEq)]
 pub struct AntPose(pub [Part; PARTS]);
 
-/// Where an agent's ant should go.
+/// The goal of an agent's ant.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component)]
 pub struct GoalMark {
     /// `[x, y]` in metres.
     pub at: [f32; 2],
-    /// How near it must come, metres.
+    /// Distance at which it counts as reached, metres.
     pub radius: f32,
 }
 
@@ -38,18 +38,18 @@ pub struct Ground {
     pub cell: f32,
     /// The corner of the first cell, `[x, y]` in metres: cells go from there along x, and rows of them along y.
     pub corner: [f32; 2],
-    /// Cells in a row; none for an open floor.
+    /// Cells in a row; 0 for an open floor.
     pub columns: u32,
-    /// Which cells are walls, row by row.
+    /// Marks walls among the cells, row by row.
     pub is_wall: Vec<bool>,
-    /// Whether everything outside the cells is wall, instead of floor.
+    /// Everything outside the cells is wall, instead of floor.
     pub walled: bool,
     /// The walls.
     pub boxes: Vec<WallBox>,
 }
 
 impl Ground {
-    /// A floor without walls.
+    /// Returns a floor without walls.
     pub fn open() -> Self {
         Self { cell: 4.0, corner: [0.0; 2], columns: 0, is_wall: Vec::new(), walled: false, boxes: Vec::new() }
     }

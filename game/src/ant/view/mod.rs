@@ -1,7 +1,7 @@
-//! What ants and the ground they walk on look like, for every game with ants.
+//! The look of ants and of the ground they walk on, for every game with ants.
 //!
-//! A game says what there is to be seen with [`AntPose`], [`GoalMark`] and [`OnGround`] on its agents and [`Ground`] on
-//! their arenas, in [`AntViewSystems::Show`]. It is drawn from above with sprites, for sensors and windows, and with the
+//! A game describes its scene with [`AntPose`], [`GoalMark`] and [`OnGround`] on its agents and [`Ground`] on their
+//! arenas, in [`AntViewSystems::Show`]. It is drawn from above with sprites, for sensors and windows, and with the
 //! feature `view3d` also in space with meshes, for windows.
 
 mod components;

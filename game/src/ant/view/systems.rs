@@ -1,12 +1,12 @@
-//! When ants are drawn.
+//! System sets of drawing ants.
 
 use bevy::prelude::*;
 
 /// Parts of [`VisionSystems::Sync`](bevy_playbot::vision::VisionSystems::Sync) for games with ants, in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AntViewSystems {
-    /// The game brings poses, goals and grounds up to date.
+    /// The game updates poses, goals and grounds.
     Show,
-    /// They become what is drawn.
+    /// Sprites and meshes follow them.
     Draw,
 }

@@ -5,7 +5,7 @@ use playbot_lab::defect::DefectKind;
 use super::{goal, motion, walls};
 use crate::{antmaze::level_text, maze::defects::of_levels};
 
-/// The defects of the game, those of levels first.
+/// Returns the defects of the game, those of levels first.
 pub(in crate::antmaze) fn defects() -> Vec<DefectKind> {
     let levels = of_levels(|text| level_text::parse(text).is_ok());
     [levels, goal::defects(), walls::defects(), motion::defects()].concat()
@@ -24,11 +24,12 @@ mod tests {
     use super::*;
     use crate::antmaze::{AntMaze, DemonstratorBot, game::spawn_agent, generate, level_text::LevelText};
 
-    /// Levels of which the game's bot solves nine in ten in a few hundred ticks.
+    /// Mode of the levels. The game's bot solves nine in ten of them in a few hundred ticks.
     const MODE: &str = "umaze+sparse";
     const TICKS: u64 = 600;
 
-    /// The state hashes of the game's bot, how many episodes it has won, and the fault that stopped it, if one did.
+    /// Returns the state hashes of the game's bot, the number of its won episodes, and the fault that stopped it, if
+    /// one did.
     fn trace(level: u64, plant: Option<(&ChangeRules, u32)>) -> (Result<Vec<u64>, String>, u64) {
         let mut app = test_app();
         AntMaze.build(&mut app, MODE);
@@ -69,7 +70,7 @@ mod tests {
             let Plant::Rules { variants, plant } = &kind.plant else { continue };
             assert!(*variants >= 3, "{}", kind.class);
             for variant in 0..*variants {
-                // The bot keeps away from walls, also from those that are not there.
+                // The bot keeps away from walls, also from missing ones.
                 if kind.class != "missing-collider" {
                     assert_ne!(trace(level, Some((&**plant, variant))), sound, "{} {variant}", kind.class);
                 }

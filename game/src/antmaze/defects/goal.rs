@@ -1,4 +1,4 @@
-//! Goals that are not noticed, and goals that are noticed from afar.
+//! Defects of the goal: unnoticed, or reached from afar.
 
 use bevy::prelude::*;
 use playbot_lab::{defect::DefectKind, prelude::*};
@@ -12,14 +12,14 @@ use crate::{
     maze::defects::take_back,
 };
 
-/// Within this distance of the goal it is noticed, m: never, and hardly. It should be 0.5.
+/// Distance within which the goal is noticed, m: never, and hardly. It should be 0.5.
 const NEAR: [f32; 3] = [-1.0, 0.05, 0.2];
-/// From this distance on the goal counts as reached, m, also through walls.
+/// Distance at which the goal counts as reached, m, also through walls.
 const FAR: [f32; 3] = [2.0, 5.0, 9.0];
 
 pub(super) fn defects() -> Vec<DefectKind> {
     vec![
-        DefectKind::rules("goal-does-not-end", "who is at the goal has not reached it", 3, |app, variant| {
+        DefectKind::rules("goal-does-not-end", "a player at the goal has not reached it", 3, |app, variant| {
             let near = NEAR[variant as usize % NEAR.len()];
             look_at_goal(app, move |episode, away| {
                 if away > near {
@@ -43,7 +43,7 @@ pub(super) fn defects() -> Vec<DefectKind> {
     ]
 }
 
-/// Looks at each episode after the rules have: how far the ant is from the goal, m.
+/// Calls `look` on each episode after the rules, with the distance from the ant to the goal, m.
 fn look_at_goal(app: &mut App, look: impl Fn(&mut Episode, f32) + Send + Sync + 'static) {
     app.add_systems(
         FixedUpdate,

@@ -1,4 +1,4 @@
-//! Defects that can be planted into AntMaze, to measure which testers notice: see [`bugs`](playbot_lab::bugs).
+//! Defects that can be planted into AntMaze, to measure testers: see [`bugs`](playbot_lab::bugs).
 
 mod catalogue;
 mod goal;

@@ -1,4 +1,4 @@
-//! Ants that move otherwise than they should.
+//! Defects of the ant's motion.
 
 use bevy::prelude::*;
 use playbot_lab::{defect::DefectKind, prelude::*};
@@ -19,7 +19,7 @@ const LIFT: [f32; 2] = [0.6, -1.5];
 const WIND: [f32; 2] = [0.1, 0.4];
 /// Factor on the torso's speed in each tick.
 const GROWTH: [f32; 2] = [1.2, 1.6];
-/// What is left of an action. Powers of two, so that it can be put back to the bit for recordings.
+/// Factor on an action. Powers of two, so that it can be undone to the bit for recordings.
 const WEAK: [f32; 3] = [0.5, 0.25, 0.125];
 /// Distance from the start at which a defect begins to act, m, by place.
 const BEGINS: [f32; 3] = [0.0, 2.0, 4.0];
@@ -63,7 +63,7 @@ fn scale_actions(mut agents: Query<(&Control, &Episode, &mut Action)>, factor: f
     }
 }
 
-/// Changes the state of each ant that plays and is far enough from its start, after each tick.
+/// Changes the state of each playing ant that is far enough from its start, after each tick.
 fn after_each_tick(app: &mut App, variant: u32, change: impl Fn(&mut AntState) + Send + Sync + 'static) {
     let begins = BEGINS[place(variant)];
     app.add_systems(

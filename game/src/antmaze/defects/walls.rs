@@ -1,4 +1,4 @@
-//! Walls that the physics knows and pictures do not, and the other way round.
+//! Defects of walls in which the physics and the pictures differ.
 
 use bevy::prelude::*;
 use playbot_lab::defect::DefectKind;
@@ -45,7 +45,7 @@ mod tests {
         maze::Maze,
     };
 
-    /// The level of an agent and the walls around its ant, where this defect is planted.
+    /// Returns the level of an agent and the walls around its ant, with this defect planted.
     fn planted(class: &str, variant: u32) -> (Maze, Vec<WallBox>) {
         let mut app = test_app();
         AntMaze.build(&mut app, "medium");

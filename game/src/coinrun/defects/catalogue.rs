@@ -4,7 +4,7 @@ use playbot_lab::defect::DefectKind;
 
 use super::{cells, hazards, motion, out_of_reach, pits, trap, walls};
 
-/// The defects of the game, those of levels first.
+/// Returns the defects of the game, those of levels first.
 pub(in crate::coinrun) fn defects() -> Vec<DefectKind> {
     [
         walls::defects(),
@@ -62,7 +62,7 @@ mod tests {
         rules.collect()
     }
 
-    /// The game in an app, with one agent that runs and hops in this level.
+    /// Returns the game in an app, with one agent that runs and hops in this level.
     fn app(level: u64, plant: Option<(&ChangeRules, u32)>) -> App {
         let mut app = bevy_playbot::test_app::test_app();
         CoinRun::default().build(&mut app, "hard");

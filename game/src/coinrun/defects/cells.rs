@@ -1,4 +1,4 @@
-//! Cells that are something else to the rules than what is drawn and observed.
+//! Defects of cells that the rules see differently from the pictures and observations.
 
 use bevy::prelude::*;
 use playbot_lab::defect::DefectKind;
@@ -15,32 +15,27 @@ use crate::{
     defect_variant::{PLACES, pick, variants},
 };
 
-/// Height of an invisible wall, rows above the ground: as high as the level, and what a jump clears.
+/// Height of an invisible wall, rows above the ground: as high as the level, and low enough for a jump.
 const HEIGHTS: [i32; 2] = [SIZE, 4];
 /// Columns of ground that do not hold.
 const HOLES: [i32; 2] = [2, 4];
-/// Speed along the way from which on somebody runs, tiles per tick.
+/// Speed along the path from which on a player runs, tiles per tick.
 const RUNS: f32 = 0.3;
 
-/// A cell and what it is to the rules.
+/// A cell and its tile in the rules.
 type Cell = ([i32; 2], Tile);
 
 pub(super) fn defects() -> Vec<DefectKind> {
     vec![
-        DefectKind::rules(
-            "invisible-wall",
-            "nobody gets past where nothing is",
-            variants(HEIGHTS.len()),
-            |app, variant| {
-                let height = pick(&HEIGHTS, variant);
-                while_played(app, move |level, _| invisible_wall(level, column(level, variant), height));
-            },
-        ),
+        DefectKind::rules("invisible-wall", "an empty cell blocks players", variants(HEIGHTS.len()), |app, variant| {
+            let height = pick(&HEIGHTS, variant);
+            while_played(app, move |level, _| invisible_wall(level, column(level, variant), height));
+        }),
         DefectKind::rules("missing-collider", "ground does not hold", variants(HOLES.len()), |app, variant| {
             let width = pick(&HOLES, variant);
             while_played(app, move |level, _| missing_ground(level, column(level, variant), width));
         }),
-        // Its places are all the same, the coin: variants differ in who does not get it.
+        // Its place is always the same, the coin: variants differ in the players that do not get it.
         DefectKind::rules("goal-does-not-end", "the coin can be touched and is not taken", PLACES, |app, variant| {
             while_played(app, move |level, player| {
                 let is_missed = match variant {
@@ -54,7 +49,8 @@ pub(super) fn defects() -> Vec<DefectKind> {
     ]
 }
 
-/// Changes cells of each level before a tick of the rules, by its player as it was, and puts back what is drawn after it.
+/// Changes cells of each level before a tick of the rules, depending on its player, and restores the drawn cells after
+/// it.
 pub(super) fn while_played(app: &mut App, cells: impl Fn(&Level, &Body) -> Vec<Cell> + Send + Sync + 'static) {
     app.add_systems(
         FixedUpdate,
@@ -86,7 +82,7 @@ fn invisible_wall(level: &Level, x: i32, height: i32) -> Vec<Cell> {
 }
 
 fn missing_ground(level: &Level, left: i32, width: i32) -> Vec<Cell> {
-    // Pits hold nobody anyway.
+    // Pits hold no player anyway.
     let is_ground = |x: &i32| surface(level, *x) > 0 && !level.tiles.get(*x, surface(level, *x)).is_lava();
     let columns = (left..level.coin[0]).filter(is_ground).take(width as usize);
     columns.flat_map(|x| (0..surface(level, x)).map(move |y| ([x, y], Tile::Empty))).collect()

@@ -1,4 +1,4 @@
-//! What kills and should not, and what does not and should.
+//! Defects of hazards: harmless ones, and deaths without one.
 
 use bevy::prelude::*;
 use playbot_lab::{defect::DefectKind, prelude::*};
@@ -14,9 +14,9 @@ use crate::{
     defect_variant::{PLACES, pick, variants},
 };
 
-/// How far from a hazard one dies, tiles.
+/// Distance from a hazard at which a player dies, tiles.
 const FAR: [f32; 2] = [0.75, 2.0];
-/// How far an enemy leaves its lane in each tick, tiles upwards.
+/// Distance by which an enemy leaves its lane in each tick, tiles upwards.
 const STRAY: [f32; 2] = [0.05, -0.05];
 
 pub(super) fn defects() -> Vec<DefectKind> {
@@ -40,8 +40,8 @@ pub(super) fn defects() -> Vec<DefectKind> {
 
 type Hazard = Or<(With<Saw>, With<Enemy>)>;
 
-/// While the rules look, bodies have a half width of minus that of a player: no player overlaps them. Enemies walk as ever,
-/// since their corners are in the same two columns.
+/// Makes hazards harmless. While the rules look, bodies have a half width of minus that of a player, so no player
+/// overlaps them. Enemies walk as ever, since their corners are in the same two columns.
 fn harmless(app: &mut App, variant: u32) {
     let shrink = move |mut bodies: Query<(&mut ArenaBody, &InArena), Hazard>, arenas: Query<&Arena>| {
         for (mut body, in_arena) in &mut bodies {
@@ -64,7 +64,7 @@ fn harmless(app: &mut App, variant: u32) {
     });
 }
 
-/// Ends the episode of who comes near.
+/// Ends the episode of a player that comes near.
 fn far(app: &mut App, variant: u32, reach: f32) {
     let kill = move |mut players: Query<(&Control, &mut Episode, &PlaysIn, &PlayerBody)>,
                      arenas: Query<(&Arena, &Tiles, &ArenaEntities)>,
@@ -90,7 +90,7 @@ fn is_near_lava(tiles: &TileGrid, player: &Body, reach: f32) -> bool {
     cells(player.x, player.rx).any(|x| cells(player.y, player.ry).any(|y| tiles.get(x, y).is_lava()))
 }
 
-/// Lifts or sinks enemies while somebody plays.
+/// Lifts or sinks enemies during play.
 fn stray(app: &mut App, variant: u32, by: f32) {
     let lift = move |mut enemies: Query<(&mut ArenaBody, &InArena), With<Enemy>>,
                      arenas: Query<&Arena>,

@@ -1,7 +1,7 @@
-//! Defects that can be planted into CoinRun, to measure which testers notice: see [`bugs`](playbot_lab::bugs).
+//! Defects that can be planted into CoinRun, to measure testers: see [`bugs`](playbot_lab::bugs).
 //!
-//! Those of levels change the text of a level so that it is broken by construction; those of rules are systems around
-//! [`CoinRunSystems`](super::CoinRunSystems) that change what the rules read and write.
+//! Defects of levels change the text of a level, which makes it broken by construction. Defects of rules are systems
+//! around [`CoinRunSystems`](super::CoinRunSystems) that change the data which the rules read and write.
 
 mod catalogue;
 mod cells;

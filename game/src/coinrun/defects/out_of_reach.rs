@@ -1,4 +1,4 @@
-//! Levels whose coin nobody gets to, without any rock.
+//! Levels with an unreachable coin, without any rock.
 
 use playbot_lab::defect::DefectKind;
 use playbot_learner::rng::{ChaCha8Rng, below};
@@ -10,14 +10,14 @@ use crate::coinrun::{
     tile::{SIZE, Tile},
 };
 
-/// Rows above the highest place at which nobody can touch anything any more: a jump lifts by less than seven, and what is
-/// touched with the head lies two higher at the most.
+/// Rows above the highest ground at which nothing can be touched any more: a jump lifts by less than seven, and the
+/// head reaches two higher at the most.
 const SKY: i32 = 10;
 
 pub(super) fn defects() -> Vec<DefectKind> {
     vec![
         of_levels("goal-in-the-sky", "the coin hangs higher than any jump leads", goal_in_the_sky),
-        of_levels("hazard-wall", "saws or lava fill the way from the ground to the sky", hazard_wall),
+        of_levels("hazard-wall", "saws or lava fill a column from the ground to the sky", hazard_wall),
     ]
 }
 
@@ -31,7 +31,7 @@ fn goal_in_the_sky(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
     Some(())
 }
 
-/// A column that kills whoever touches it, at any height. A tick moves a player by half a tile, so nobody gets past a
+/// Puts up a column that kills on touch, at any height. A tick moves a player by half a tile, so no player passes a
 /// column without touching it.
 fn hazard_wall(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
     let x = between(rng, 6, parts.coin[0] - 4)?;

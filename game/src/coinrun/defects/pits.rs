@@ -1,4 +1,4 @@
-//! Levels whose ground ends.
+//! Levels with missing ground.
 
 use playbot_lab::defect::DefectKind;
 use playbot_learner::rng::{ChaCha8Rng, below};
@@ -8,14 +8,14 @@ use crate::coinrun::{level::LevelParts, tile::Tile};
 
 pub(super) fn defects() -> Vec<DefectKind> {
     vec![
-        of_levels("wide-pit", "a pit on the only way is wider than any jump", wide_pit),
-        of_levels("missing-floor", "the ground of the start or of the way's end is missing", missing_floor),
+        of_levels("wide-pit", "a pit on the only path is wider than any jump", wide_pit),
+        of_levels("missing-floor", "the ground of the start or of the path's end is missing", missing_floor),
     ]
 }
 
-/// Columns that no jump crosses. It is back at its height after 16 ticks; from there it falls by 1.5 tiles in each, and by
-/// no more than the highest place there is. A tick moves half a tile. Half a player hangs over on either side, and the rest
-/// is to spare.
+/// Returns the width of a pit that no jump crosses. A jump is back at its height after 16 ticks; from there it falls by
+/// 1.5 tiles in each, and by no more than the highest ground. A tick moves half a tile. Half a player hangs over on
+/// either side, and the rest is spare.
 fn too_wide(parts: &LevelParts) -> i32 {
     8 + summit(parts) / 3 + 5
 }
@@ -27,8 +27,8 @@ fn wide_pit(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
     Some(())
 }
 
-/// Under the start, where the first tick ends in the lava; or from somewhere on up to the coin, which then hangs farther
-/// away than a jump leads.
+/// Removes the floor, in one of two places. Under the start, the first tick then ends in the lava. From some column up
+/// to the coin, the coin then hangs farther away than a jump leads.
 fn missing_floor(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
     let [x, y] = parts.coin;
     let wanted = below(rng, 2);

@@ -1,4 +1,4 @@
-//! What is done to players between two ticks of the rules.
+//! Changes to players between two ticks of the rules.
 
 use bevy::prelude::*;
 use playbot_lab::prelude::*;
@@ -10,7 +10,7 @@ use crate::coinrun::{
     rules::{Body, PlayerState},
 };
 
-/// Changes each player who plays and is far enough along its level, after each tick.
+/// Changes each playing player that is far enough along its level, after each tick.
 pub(super) fn after_each_tick(
     app: &mut App,
     variant: u32,

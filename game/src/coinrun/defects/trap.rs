@@ -1,4 +1,4 @@
-//! A place that one falls into and never leaves.
+//! A trap: a pit without a path out.
 
 use playbot_lab::defect::DefectKind;
 use playbot_learner::rng::{ChaCha8Rng, below};
@@ -20,11 +20,11 @@ const GAP: i32 = 3;
 const WIDTH: i32 = 4 * WIDE + GAP;
 
 pub(super) fn defects() -> Vec<DefectKind> {
-    vec![of_levels("one-way-trap", "who falls between two towers never gets out", one_way_trap)]
+    vec![of_levels("one-way-trap", "a player that falls between two towers never gets out", one_way_trap)]
 }
 
-/// Two towers with steps on their outer sides only. They are climbed and jumped over; between them nothing kills, and no
-/// jump leads out.
+/// Builds two towers with steps on their outer sides only. Players can climb and jump over them. Between them nothing
+/// kills, and no jump leads out.
 fn one_way_trap(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
     let places: Vec<i32> = (6..parts.coin[0] - WIDTH - 1).filter(|&x| is_place(parts, x)).collect();
     let left = *places.get(below(rng, places.len().max(1) as u64) as usize)?;
@@ -38,7 +38,7 @@ fn one_way_trap(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
     Some(())
 }
 
-/// Whether there is ground on both sides, the far one not too high, and nothing that kills at its edges.
+/// Returns true if there is ground on both sides, the far one not too high, and no hazard at its edges.
 fn is_place(parts: &LevelParts, left: i32) -> bool {
     let right = left + WIDTH;
     let (near, far) = (surface(parts, left - 1), surface(parts, right));
@@ -55,7 +55,7 @@ fn is_place(parts: &LevelParts, left: i32) -> bool {
         && near + TOWER < SIZE - 12
 }
 
-/// Ground up to a height, and nothing above.
+/// Builds ground up to a height, and nothing above.
 fn block(parts: &mut LevelParts, x: i32, width: i32, height: i32) {
     fill(parts, [x, 0], [width, height - 1], Tile::Wall);
     fill(parts, [x, height - 1], [width, 1], Tile::WallTop);

@@ -1,4 +1,4 @@
-//! Levels with rock where the way should be.
+//! Levels with rock across the path.
 
 use playbot_lab::defect::DefectKind;
 use playbot_learner::rng::{ChaCha8Rng, below};
@@ -9,7 +9,7 @@ use crate::coinrun::{
     tile::{SIZE, Tile},
 };
 
-/// How far the rock around a coin reaches. Upwards a player may slip through a single layer, never through two.
+/// Thickness of the rock around a coin. Upwards a player may slip through a single layer, never through two.
 const THICK: i32 = 3;
 
 pub(super) fn defects() -> Vec<DefectKind> {
@@ -19,7 +19,7 @@ pub(super) fn defects() -> Vec<DefectKind> {
     ]
 }
 
-/// A wall over the full height of the level, two columns thick, or rock on all sides of the coin.
+/// Builds a wall over the full height of the level, two columns thick, or rock on all sides of the coin.
 fn walled_goal(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
     let [x, y] = parts.coin;
     if below(rng, 2) == 0 {
@@ -34,7 +34,7 @@ fn walled_goal(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
     Some(())
 }
 
-/// A wall over the full height of the level, right after the start. Left of the start the level ends.
+/// Builds a wall over the full height of the level, right after the start. Left of the start the level ends.
 fn sealed_start(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
     let at = between(rng, 3, (parts.coin[0] - 4).min(8))?;
     wall_off(parts, at);

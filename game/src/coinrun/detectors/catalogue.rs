@@ -4,7 +4,7 @@ use playbot_lab::detector::Detector;
 
 use super::{coin, inside::inside_ground, lanes::StrayEnemy, lethal};
 
-/// The detectors of the game.
+/// Returns the detectors of the game.
 pub(in crate::coinrun) fn detectors() -> Vec<Box<dyn Detector>> {
     vec![
         Box::new(lethal::harmless_hazard()),

@@ -1,11 +1,11 @@
-//! Coins that are touched and not taken.
+//! Detector of coins that are touched and not taken.
 
 use playbot_lab::detector::{Detector, EachTick, Moment};
 
 use super::contact::{goes_on, place, touched};
 use crate::coinrun::Outcome;
 
-/// A player touches the coin, and the episode goes on.
+/// Finds a player that touches the coin in an episode that goes on.
 pub(super) fn goal_ignored() -> impl Detector {
     EachTick::new("goal-ignored", "the coin is touched and the episode goes on", |moment: &Moment<'_>| {
         let is_ignored = goes_on(moment) && touched(moment) == Some(Outcome::Coin);

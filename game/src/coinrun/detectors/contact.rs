@@ -1,4 +1,4 @@
-//! What a player touches.
+//! Contacts of a player.
 
 use bevy::prelude::*;
 use playbot_lab::{detector::Moment, prelude::*};
@@ -9,8 +9,8 @@ use crate::coinrun::{
     rules::{BLOCK_HALF, Body, touch},
 };
 
-/// What the player touches by the rules, besides the clock; `None` too where nobody plays CoinRun. Saws are those of the
-/// level and those that were added; every hazard fills a tile, whatever its body says.
+/// Returns the contact of the player by the rules, without the clock; `None` too without a player of CoinRun. Saws are
+/// those of the level and added ones; every hazard fills a tile, whatever its body.
 pub(super) fn touched(moment: &Moment<'_>) -> Option<Outcome> {
     let world = moment.world;
     let player = world.get::<PlayerBody>(moment.agent)?.0;
@@ -29,13 +29,13 @@ pub(super) fn touched(moment: &Moment<'_>) -> Option<Outcome> {
     touch(&player, tiles, &saws, &enemies, 0)
 }
 
-/// Whether the episode goes on after this tick.
+/// Returns true if the episode goes on after this tick.
 pub(super) fn goes_on(moment: &Moment<'_>) -> bool {
     let episode = moment.world.get::<Episode>(moment.agent);
     episode.is_some_and(|episode| episode.is_running() && episode.end().is_none())
 }
 
-/// Where the player is, for messages.
+/// Describes the position of the player, for messages.
 pub(super) fn place(moment: &Moment<'_>) -> String {
     let body = moment.world.get::<PlayerBody>(moment.agent).map(|body| body.0).unwrap_or_default();
     format!("({:.1}, {:.1})", body.x, body.y)

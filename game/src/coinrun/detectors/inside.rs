@@ -1,12 +1,12 @@
-//! Players who are in the ground.
+//! Detector of players in the ground.
 
 use playbot_lab::detector::{Detector, EachTick, Moment};
 
 use super::contact::place;
 use crate::coinrun::components::{Arena, PlayerBody, PlaysIn};
 
-/// A player's middle is in ground that has more ground below it. By the rules a player's corners stay out of walls, and nobody
-/// can be further in one than across a ledge one tile thick.
+/// Finds a player whose middle is in ground with more ground below it. By the rules a player's corners stay out of
+/// walls, and it can be in one only across a ledge one tile thick.
 pub(super) fn inside_ground() -> impl Detector {
     EachTick::new("inside-ground", "a player is inside of ground", |moment: &Moment<'_>| {
         let body = moment.world.get::<PlayerBody>(moment.agent)?.0;

@@ -1,4 +1,4 @@
-//! Enemies that are where they never walk.
+//! Detector of enemies outside their lanes.
 
 use bevy::prelude::*;
 use playbot_lab::detector::{Detector, LevelAhead, Moment, Watch};
@@ -10,17 +10,17 @@ use crate::coinrun::{
     spawn::Spawn,
 };
 
-/// How far an enemy may be outside of its lane, tiles: it turns within its own width.
+/// Largest allowed distance of an enemy from its lane, tiles: it turns within its own width.
 const SLACK: f32 = 0.5;
 
-/// An enemy leaves its row, or the cells between the walls and barriers around the place where it started.
+/// An enemy leaves its row, or the cells between the walls and barriers around its start.
 pub(super) struct StrayEnemy;
 
-/// The lanes of a level, once they are known.
+/// The lanes of a level, once computed.
 #[derive(Default)]
 struct Looking(Option<Vec<Lane>>);
 
-/// Where an enemy walks: the middle of its row, and the ends of its free cells.
+/// The lane of an enemy: the middle of its row, and the ends of its free cells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Lane {
     y: f32,
@@ -51,7 +51,7 @@ impl Watch for Looking {
         let enemies = world.get::<ArenaEntities>(arena)?.iter().filter(|&entity| world.get::<Enemy>(entity).is_some());
         let mut bodies = enemies.filter_map(|entity| world.get::<ArenaBody>(entity).map(|body| body.0));
         let stray = bodies.find(|body| !lanes.iter().any(|lane| lane.holds(body)))?;
-        Some(format!("an enemy is at ({:.1}, {:.1}), where none of the level walks", stray.x, stray.y))
+        Some(format!("an enemy is at ({:.1}, {:.1}), outside of every lane of the level", stray.x, stray.y))
     }
 }
 

@@ -1,4 +1,4 @@
-//! Hazards that do not kill, and deaths without one.
+//! Detectors of harmless hazards, and of deaths without one.
 
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
 use playbot_lab::detector::{Detector, EachTick, LevelAhead, Moment, Watch};
@@ -6,7 +6,7 @@ use playbot_lab::detector::{Detector, EachTick, LevelAhead, Moment, Watch};
 use super::contact::{goes_on, place, touched};
 use crate::coinrun::Outcome;
 
-/// A player touches what kills, and the episode goes on.
+/// Finds a player that touches a hazard in an episode that goes on.
 pub(super) fn harmless_hazard() -> impl Detector {
     EachTick::new(
         "harmless-hazard",
@@ -26,7 +26,7 @@ pub(super) fn harmless_hazard() -> impl Detector {
     )
 }
 
-/// A player dies where nothing is that kills.
+/// A player dies away from every hazard.
 pub(super) struct FarHazard;
 
 struct Looking;
@@ -37,7 +37,7 @@ impl Detector for FarHazard {
     }
 
     fn describe(&self) -> &'static str {
-        "an episode is lost although nothing deadly is touched"
+        "an episode is lost without touching a hazard"
     }
 
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
@@ -52,7 +52,7 @@ impl Watch for Looking {
 
     fn end(&mut self, moment: &Moment<'_>, result: &EpisodeResult) -> Option<String> {
         let is_unfounded = result.end == EpisodeEnd::LOST && touched(moment).is_none_or(Outcome::is_success);
-        is_unfounded.then(|| format!("lost at {}, where nothing deadly is touched", place(moment)))
+        is_unfounded.then(|| format!("lost at {} without touching a hazard", place(moment)))
     }
 }
 

@@ -1,7 +1,6 @@
-//! Detectors of CoinRun's own: whether what its rules say about hazards, coin, enemies and ground is what
-//! happens.
+//! CoinRun's own detectors, which compare episodes with its rules for hazards, coin, enemies and ground.
 //!
-//! They look with the rules' own geometry at every tick, whoever plays.
+//! They apply the rules' own geometry to every tick, for any player.
 
 mod catalogue;
 mod coin;

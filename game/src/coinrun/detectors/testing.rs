@@ -19,7 +19,7 @@ use crate::{
     watched,
 };
 
-/// Who plays.
+/// A player of the tests.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Bot {
     Search,
@@ -27,20 +27,20 @@ pub(super) enum Bot {
     RightJump,
 }
 
-/// What is wrong with the rules, if anything.
+/// A defect of the rules, if any.
 pub(super) type Rules = Option<(Arc<ChangeRules>, u32)>;
 
-/// The game as it is.
+/// Returns the unchanged rules.
 pub(super) fn sound() -> Rules {
     None
 }
 
-/// A variant of a defect of the rules.
+/// Returns a variant of a defect of the rules.
 pub(super) fn planted(class: &str, variant: u32) -> Rules {
     Some((watched::planted(&CoinRun::default(), class), variant))
 }
 
-/// What is found in the first episode on a hard level, or in its first ticks: names of detectors and ticks.
+/// Returns the findings in the first episode on a hard level, or in its first ticks: names of detectors and ticks.
 pub(super) fn findings(rules: &Rules, level: u64, bot: Bot, ticks: u32) -> Vec<(&'static str, u32)> {
     let mut app = bevy_playbot::prelude::headless_app();
     CoinRun::default().build(&mut app, "hard");
@@ -91,7 +91,7 @@ pub(super) fn findings(rules: &Rules, level: u64, bot: Bot, ticks: u32) -> Vec<(
     found
 }
 
-/// The first of these levels on which a detector finds something.
+/// Returns the first of these levels with a finding.
 pub(super) fn first_named(name: &str, rules: &Rules, bot: Bot, levels: Range<u64>) -> Option<u64> {
     levels.into_iter().find(|&level| findings(rules, level, bot, 200).iter().any(|(found, _)| *found == name))
 }

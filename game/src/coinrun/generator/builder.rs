@@ -19,7 +19,7 @@ const SECTION_ROOM: i32 = 15;
 /// From this height on, sections only go down.
 const CEILING: i32 = 20;
 
-/// What fills the pits of a level. Each level has one kind.
+/// The danger in the pits of a level. Each level has one kind.
 #[derive(Clone, Copy)]
 enum Danger {
     Lava,
@@ -27,12 +27,12 @@ enum Danger {
     Enemies,
 }
 
-/// What the sections of a level have come to.
+/// The result of a level's sections.
 pub(super) struct Built {
     pub(super) tiles: TileGrid,
     /// The cell of the coin.
     pub(super) coin: [i32; 2],
-    /// What lives in the level.
+    /// Inhabitants of the level.
     pub(super) spawns: Vec<Spawn>,
 }
 
@@ -73,7 +73,7 @@ impl<'a> Builder<'a> {
         Built { tiles: self.tiles, coin: [self.x, self.y], spawns: self.spawns }
     }
 
-    /// One section: a change of height, then a pit or a ground block, then barriers at both ends.
+    /// Builds one section: a change of height, then a pit or a ground block, then barriers at both ends.
     fn section(&mut self) {
         let hardest = self.difficulty / 3;
         let mut climb = (self.draw.below(4) + 1 + hardest).min(MAX_CLIMB);
@@ -97,7 +97,7 @@ impl<'a> Builder<'a> {
         self.tiles.set(self.x, self.y, Tile::Barrier);
     }
 
-    /// The coin on its column, and solid rock behind it.
+    /// Puts the coin on its column, and solid rock behind it.
     fn finish(&mut self) {
         // Replaces the barrier at the end of the last section.
         self.tiles.set(self.x, self.y, Tile::Coin);
@@ -106,7 +106,7 @@ impl<'a> Builder<'a> {
         self.tiles.fill(behind, 0, SIZE - behind, SIZE, Tile::Wall);
     }
 
-    /// Two banks with a dangerous gap between them, and a platform over a wide gap.
+    /// Builds two banks with a dangerous gap between them, and a platform over a wide gap.
     fn pit(&mut self, width: i32) {
         let left = self.draw.below(3) + 1;
         let mut right = self.draw.below(3) + 1;
@@ -145,7 +145,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Offset from the left bank and length of the platform over a gap, in tiles.
+    /// Returns the offset from the left bank and length of the platform over a gap, in tiles.
     fn platform(&mut self, gap: i32) -> Option<(i32, i32)> {
         match gap {
             ..=4 => None,
@@ -159,7 +159,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The saw, the enemy and the crates of a ground section.
+    /// Adds the saw, the enemy and the crates of a ground section.
     fn obstacles(&mut self, width: i32) {
         let mut taken = [None; 2];
         if self.draw.below(10) < 2 * self.difficulty && width > 3 {
@@ -180,7 +180,7 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// A column of the section that is neither its first nor its last.
+    /// Returns a column of the section that is neither its first nor its last.
     fn inner_column(&mut self, width: i32) -> i32 {
         self.x + self.draw.below(width - 2) + 1
     }
@@ -200,14 +200,14 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Solid ground under the cursor height, `width` columns from column `x` on.
+    /// Fills solid ground under the cursor height, `width` columns from column `x` on.
     fn ground(&mut self, x: i32, width: i32) {
         self.tiles.fill(x, 0, width, self.y - 1, Tile::Wall);
         self.tiles.fill(x, self.y - 1, width, 1, Tile::WallTop);
     }
 }
 
-/// The floor and the border. The sides and the top are drawn after the floor, so they own its corners.
+/// Returns the floor and the border. The sides and the top are drawn after the floor, so they own its corners.
 fn empty_room() -> TileGrid {
     let mut tiles = TileGrid::default();
     tiles.fill(0, 0, SIZE, 1, Tile::WallTop);

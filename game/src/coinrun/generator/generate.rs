@@ -7,7 +7,7 @@ use super::{
 };
 use crate::coinrun::level::{Level, LevelParts, Mode};
 
-/// The level of this mode and seed. Equal arguments give equal levels.
+/// Returns the level of this mode and seed. Equal arguments give equal levels.
 pub fn generate(mode: Mode, seed: u32) -> Level {
     let mut draw = Draw::new(seed);
     let background_offset = draw.unit();

@@ -1,4 +1,4 @@
-//! How many pictures the original draws from.
+//! Numbers of pictures in the original.
 
 /// Number of background pictures that the original draws from.
 pub const BACKGROUNDS: u32 = 62;

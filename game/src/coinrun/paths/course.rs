@@ -1,4 +1,4 @@
-//! The course of a path, whatever kills on the way.
+//! The course of a path, regardless of hazards.
 
 use super::{ground::Ground, held::STEPS, swept::Swept, walker::Walker};
 use crate::coinrun::view_size::REACH;
@@ -6,7 +6,7 @@ use crate::coinrun::view_size::REACH;
 /// Half the width and height of the view, in tiles.
 pub(super) const HALF_VIEW: f32 = REACH as f32 + 0.5;
 
-/// Where a player is after each step, until it lands or leaves the view.
+/// Positions of a player after each step, until it lands or leaves the view.
 #[derive(Clone, Debug)]
 pub(super) struct Course {
     walker: Walker,
@@ -19,7 +19,7 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// A course of no steps.
+    /// Returns a course of no steps.
     pub fn new(walker: Walker) -> Self {
         let none = [0.0; STEPS as usize];
         Self { walker, start: [walker.x, walker.y], x: none, y: none, steps: 0, flew: false, lands: false }
@@ -46,7 +46,7 @@ impl Course {
                 break;
             }
             self.flew |= !walker.supported && walker.vy.abs() > 0.5;
-            // What a step leaves as it was, every further step does too.
+            // State that one step leaves unchanged stays unchanged in every further step.
             if walker == before {
                 self.x[self.steps..].fill(walker.x);
                 self.y[self.steps..].fill(walker.y);
@@ -56,12 +56,12 @@ impl Course {
         self.walker = walker;
     }
 
-    /// The places after each step.
+    /// Returns the positions after each step.
     pub fn places(&self) -> (&[f32], &[f32]) {
         (&self.x[..self.steps], &self.y[..self.steps])
     }
 
-    /// The span of these places.
+    /// Returns the span of these positions.
     pub fn swept(&self) -> Swept {
         let (xs, ys) = self.places();
         let mut swept = Swept::between([xs[0], ys[0]], [xs[0], ys[0]]);
@@ -71,12 +71,12 @@ impl Course {
         swept
     }
 
-    /// Where the path began.
+    /// Returns the start of the path.
     pub fn start(&self) -> [f32; 2] {
         self.start
     }
 
-    /// Whether the last step ended a flight on firm ground.
+    /// Returns true if the last step ended a flight on firm ground.
     pub fn lands(&self) -> bool {
         self.lands
     }

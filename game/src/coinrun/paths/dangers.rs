@@ -1,4 +1,4 @@
-//! What ends a path: saws, enemies, lava, the coin.
+//! Ends of a path: saws, enemies, lava, the coin.
 
 use super::{course::Course, swept::Swept};
 use crate::coinrun::{
@@ -11,7 +11,7 @@ use crate::coinrun::{
 pub(super) struct End {
     /// Steps that were made.
     pub steps: usize,
-    /// Whether it is the coin.
+    /// The end is the coin.
     pub is_coin: bool,
 }
 
@@ -22,12 +22,12 @@ struct Killer {
     vx: f32,
     y: f32,
     reach: [f32; 2],
-    /// Where it can be in the steps of a path: smallest and largest x.
+    /// Range of its x during the steps of a path: smallest and largest.
     span: [f32; 2],
 }
 
 impl Killer {
-    /// The number of steps before the first one in which it is touched.
+    /// Returns the number of steps before the first one in which it is touched.
     fn first_touch(&self, (xs, ys): (&[f32], &[f32])) -> Option<usize> {
         let mut at = self.x;
         xs.iter().zip(ys).position(|(x, y)| {
@@ -44,7 +44,7 @@ pub(super) struct Dangers {
 }
 
 impl Dangers {
-    /// Replaces what was there: for this player, and paths of up to `steps` steps.
+    /// Replaces the dangers, for this player and paths of up to `steps` steps.
     pub fn replace<'a>(
         &mut self,
         player: &Body,
@@ -66,11 +66,11 @@ impl Dangers {
         }));
     }
 
-    /// Where a course of a player of this size ends at something.
+    /// Returns the end of a course of a player of this size, if it has one.
     pub fn end(&self, course: &Course, player: &Body, tiles: &TileGrid) -> Option<End> {
         let (xs, ys) = course.places();
         let swept = course.swept();
-        // How many steps nobody kills.
+        // The number of steps before a death.
         let mut survived = xs.len();
         for killer in &self.killers {
             if swept.comes_near(killer.span, killer.y, killer.reach)
@@ -89,12 +89,12 @@ impl Dangers {
             let end = touch(&there, tiles, [], [], 0)?;
             Some(End { steps: step + 1, is_coin: end == Outcome::Coin })
         });
-        // The rest of what is touched in the same step changes nothing: the coin wins, and all others kill.
+        // Other contacts in the same step change nothing: the coin wins, and all others kill.
         at_tiles.or(death)
     }
 }
 
-/// The corners of the rectangle that touches tiles, for all these centres.
+/// Returns the corners of the rectangle that touches tiles, for all these centres.
 fn touched(body: &Body, swept: &Swept) -> Corners {
     let (rx, ry) = (body.rx + OVERLAP_MARGIN, body.ry + OVERLAP_MARGIN);
     Corners { left: swept.x[0] - rx, right: swept.x[1] + rx, low: swept.y[0] - ry, high: swept.y[1] + ry }

@@ -1,4 +1,4 @@
-//! What a player walks on and runs into.
+//! Ground and obstacles around a player.
 
 use super::{near_crates::NearCrates, swept::Swept};
 use crate::coinrun::{
@@ -13,7 +13,7 @@ pub(super) struct Ground<'a> {
     /// Half width and half height of the player.
     pub rx: f32,
     pub ry: f32,
-    /// How far from its centre the corners are that are tested against tiles.
+    /// Distance from its centre to the corners that are tested against tiles.
     pub corner_x: f32,
     pub corner_y: f32,
 }
@@ -24,7 +24,7 @@ impl<'a> Ground<'a> {
         Self { tiles, crates, rx, ry, corner_x: rx * CORNER, corner_y: ry * CORNER }
     }
 
-    /// The corners that are tested against tiles, for all these centres.
+    /// Returns the corners that are tested against tiles, for all these centres.
     #[inline]
     pub fn corners(&self, swept: &Swept) -> Corners {
         Corners {

@@ -1,4 +1,4 @@
-//! Which buttons are tried, and what is told about each.
+//! The buttons of paths, and the values of each path.
 
 /// Buttons that are tried: right and jump, right, jump, nothing, left, left and jump.
 pub const HELD: [u8; 6] = [8, 7, 5, 4, 1, 2];

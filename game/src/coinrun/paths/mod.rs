@@ -1,17 +1,17 @@
-//! Curved rays: where the player would go if a button were held.
+//! Curved rays: the player's paths under held buttons.
 //!
-//! A person sees in which arc the figure will fly. A straight ray does not tell, so these sensors follow the player's
-//! own motion through what is in view: tiles, crates and saws as they stand, enemies at their present speed. A path ends
-//! at the edge of the view.
+//! A person foresees the arc of a jump, which a straight ray does not show. These sensors therefore follow the player's
+//! own motion through the view: tiles, crates and saws as they stand, enemies at their present speed. A path ends at
+//! the edge of the view.
 //!
 //! Six paths of up to 20 steps are followed at every tick, so they take short cuts, each of which gives the numbers of
 //! the rules to the bit:
 //!
 //! - with and without the jump button, a path is one path until a jump would work;
-//! - a step through free space only adds, and so does one beside a straight wall or on level ground until it is blocked;
-//!   only other steps ask the rules about each of their parts;
-//! - what a step leaves as it was, no further step changes;
-//! - what kills moves nobody, so it is looked for when the course is known, and only near it.
+//! - a step through free space only adds, and so does one beside a straight wall or on level ground until it is
+//!   blocked; only other steps apply the rules to each of their parts;
+//! - state that one step leaves unchanged stays unchanged in every further step;
+//! - hazards do not move the player, so they are tested once the course is known, and only near it.
 
 mod course;
 mod dangers;

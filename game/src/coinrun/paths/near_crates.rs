@@ -3,7 +3,7 @@
 use super::swept::Swept;
 use crate::coinrun::rules::{Body, OVERLAP_MARGIN};
 
-/// A crate, with what decides whether it holds the player.
+/// A crate, with the quantities that decide whether it holds the player.
 #[derive(Clone, Copy, Debug)]
 struct Holder {
     x: f32,
@@ -21,7 +21,7 @@ pub(super) struct NearCrates {
 }
 
 impl NearCrates {
-    /// Replaces what was there by `crates`, for this player.
+    /// Replaces the crates, for this player.
     pub fn replace<'a>(&mut self, player: &Body, crates: impl Iterator<Item = &'a Body>) {
         self.bodies.clear();
         self.holders.clear();
@@ -36,13 +36,13 @@ impl NearCrates {
         }
     }
 
-    /// Whether one may hold a player who falls from height `from` through these places.
+    /// Returns true if one may hold a player who falls from height `from` through these places.
     #[inline]
     pub fn may_hold(&self, from: f32, swept: &Swept) -> bool {
         self.holders.iter().any(|block| from >= block.top && swept.comes_near([block.x; 2], block.y, block.reach))
     }
 
-    /// The crates in creation order, or none if none can hold a player who falls from height `from`.
+    /// Returns the crates in creation order; empty if no crate can hold a player who falls from height `from`.
     #[inline]
     pub fn below(&self, from: f32) -> &[Body] {
         if self.holders.iter().any(|block| from >= block.top) { &self.bodies } else { &[] }

@@ -1,4 +1,5 @@
-//! The paths without short cuts, step by step by the rules: what the quick ones have to equal to the bit.
+//! The paths without short cuts, step by step by the rules: the reference of the fast ones, which must equal it to the
+//! bit.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -68,7 +69,7 @@ impl Scene {
     }
 }
 
-/// The scene at the present state of an episode.
+/// Returns the scene at the present state of an episode.
 fn scene(sim: &Sim) -> Scene {
     let level = sim.level();
     Scene {
@@ -106,7 +107,7 @@ fn paths_of_played_episodes_are_those_of_the_rules() {
     assert!(ends.iter().all(|&count| count > 100), "every end occurs: {ends:?}");
 }
 
-/// A number, often one that bodies come to rest at, or next to it.
+/// Returns a number, often one at which bodies come to rest, or next to it.
 fn coordinate(draw: &mut ChaCha8Rng, range: [f32; 2], half: f32) -> f32 {
     let value: f32 = draw.random_range(range[0]..range[1]);
     match draw.random_range(0..8) {
@@ -130,7 +131,7 @@ fn speed(draw: &mut ChaCha8Rng, usual: f32) -> f32 {
     }
 }
 
-/// Bodies anywhere around a place, some as large as tiles and some not.
+/// Returns bodies around a position, some as large as tiles and some not.
 fn bodies(draw: &mut ChaCha8Rng, player: &Body) -> Vec<Body> {
     let count = draw.random_range(0..6);
     let one = |_| {
@@ -142,7 +143,7 @@ fn bodies(draw: &mut ChaCha8Rng, player: &Body) -> Vec<Body> {
     (0..count).map(one).collect()
 }
 
-/// A level, some of it replaced at random, and a player anywhere in it: in walls, on edges, outside.
+/// Returns a level, some of it replaced at random, and a player anywhere in it: in walls, on edges, outside.
 fn odd_scene(draw: &mut ChaCha8Rng, level: &Level) -> Scene {
     let mut tiles = level.tiles.clone();
     let is_usual = draw.random_bool(0.8);

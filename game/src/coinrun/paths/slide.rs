@@ -3,33 +3,33 @@
 use super::{ground::Ground, sweep::Sweep, swept::Swept, walker::Walker};
 use crate::coinrun::tile::SIZE;
 
-/// One axis of a step: where the corners begin, and which way they go.
+/// One axis of a step: the corners' start and direction.
 #[derive(Clone, Copy, Debug)]
 struct Axis {
-    /// Where the centre is.
+    /// Position of the centre.
     at: f32,
-    /// How far it goes in each part of the step.
+    /// Displacement in each part of the step.
     by: f32,
     /// Half size of the player.
     half: f32,
-    /// How far from its centre the corners are.
+    /// Distance of the corners from its centre.
     corner: f32,
     /// Cells of the low and the high corners.
     cells: [i32; 2],
     /// The last cell of the corners in front if nothing blocks them.
     last: i32,
-    /// Whether no corner reaches into another cell if nothing blocks it.
+    /// No corner reaches into another cell if nothing blocks it.
     stays: bool,
 }
 
-/// The column or the row of a coordinate. `None` outside the level.
+/// Returns the column or the row of a coordinate. `None` outside the level.
 #[inline(always)]
 fn cell_of(at: f32) -> Option<i32> {
     (0.0..SIZE as f32).contains(&at).then_some(at as i32)
 }
 
 impl Axis {
-    /// `None` outside the level.
+    /// Prepares an axis; `None` outside the level.
     #[inline(always)]
     fn new(at: f32, by: f32, end: f32, half: f32, corner: f32) -> Option<Self> {
         let cells = [cell_of(at - corner)?, cell_of(at + corner)?];
@@ -38,32 +38,32 @@ impl Axis {
         Some(Self { at, by, half, corner, cells, last, stays: cells == ends })
     }
 
-    /// The cell that the corners in front are in.
+    /// Returns the cell of the corners in front.
     #[inline(always)]
     fn front(&self) -> i32 {
         self.cells[usize::from(self.by >= 0.0)]
     }
 
-    /// The cell after `cell` in the direction of the movement.
+    /// Returns the cell after `cell` in the direction of the movement.
     #[inline(always)]
     fn next(&self, cell: i32) -> i32 {
         if self.by < 0.0 { cell - 1 } else { cell + 1 }
     }
 
-    /// Where the centre is set back to at a cell that blocks.
+    /// Returns the position to which the centre is set back at a cell that blocks.
     #[inline(always)]
     fn flush(&self, cell: i32) -> f32 {
         if self.by < 0.0 { (cell + 1) as f32 + self.half } else { cell as f32 - self.half }
     }
 
-    /// The cell that the corners behind are in if the centre is set back to `flush`. `None` outside the level.
+    /// Returns the cell of the corners behind if the centre is set back to `flush`. `None` outside the level.
     #[inline(always)]
     fn behind(&self, flush: f32) -> Option<i32> {
         cell_of(if self.by < 0.0 { flush + self.corner } else { flush - self.corner })
     }
 
-    /// Goes on by one part, towards a cell that blocks. Tells whether it did, and whether the rules would set the centre
-    /// back to its edge then.
+    /// Goes on by one part, towards a cell that blocks. Returns whether it did, and whether the rules would set the
+    /// centre back to its edge then.
     #[inline(always)]
     fn blocked(&self, at: f32, cell: i32) -> (bool, bool) {
         let (near, far) = (cell as f32, (cell + 1) as f32);
@@ -77,11 +77,11 @@ impl Axis {
     }
 }
 
-/// The step of a player who is in free space, and meets at most one straight edge along each axis; `None` if it may be
-/// anything else.
+/// Computes the step of a player in free space that meets at most one straight edge along each axis; `None` if it may
+/// be any other step.
 ///
-/// As long as the wall beside is solid over all rows that are passed, and the ground over all columns, each axis is blocked
-/// or not whatever the other one does. No crate may be near.
+/// Let the wall beside be solid over all passed rows, and the ground over all passed columns. Then each axis is blocked
+/// or not regardless of the other one. No crate may be near.
 #[inline]
 pub(super) fn slide(walker: &Walker, ground: &Ground, sweep: &Sweep) -> Option<Walker> {
     let Sweep { parts, by: [dx, dy], end: [end_x, end_y] } = *sweep;
@@ -108,7 +108,7 @@ pub(super) fn slide(walker: &Walker, ground: &Ground, sweep: &Sweep) -> Option<W
     Some(Walker { x: at_x, y: at_y, vx, vy, ..*walker })
 }
 
-/// One part of a step along one axis: where it leads, and whether it was blocked.
+/// Computes one part of a step along one axis: its end, and whether it was blocked.
 #[inline(always)]
 fn part(axis: &Axis, at: f32, edge: Option<i32>) -> Option<(f32, bool)> {
     let at = at + axis.by;
@@ -120,7 +120,7 @@ fn part(axis: &Axis, at: f32, edge: Option<i32>) -> Option<(f32, bool)> {
     is_flush.then_some((axis.flush(cell), true))
 }
 
-/// The column and the row that block. `None` if these are not straight edges.
+/// Returns the column and the row that block. `None` if these are not straight edges.
 #[inline(always)]
 fn edges(x: &Axis, y: &Axis, ground: &Ground, swept: &mut Swept) -> Option<(Option<i32>, Option<i32>)> {
     let rows = ground.tiles.wall_rows();
@@ -146,8 +146,8 @@ fn edges(x: &Axis, y: &Axis, ground: &Ground, swept: &mut Swept) -> Option<(Opti
             (left, right) = (left.min(behind), right.max(behind));
         }
     }
-    // What must be free, and what must be a wall, in each row that is passed. Corners whose rows stay the same are blocked by
-    // one of them.
+    // Columns that must be free, and columns that must be wall, in each passed row. Corners whose rows stay the same
+    // are blocked by one of them.
     let mut free = (u64::MAX << left) & (u64::MAX >> (63 - right));
     let mut wall = 0;
     match x_edge {

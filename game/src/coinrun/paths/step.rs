@@ -4,7 +4,7 @@ use super::{ground::Ground, slide::slide, sweep::Sweep, swept::Swept, walker::Wa
 use crate::coinrun::rules::{PlayerState, PlayerStep, fall, is_supported, move_player, walk};
 
 impl Walker {
-    /// After one step with a direction held (-1, 0 or 1), and perhaps the jump button.
+    /// Returns the player after one step with a direction held (-1, 0 or 1), and perhaps the jump button.
     #[inline(always)]
     pub fn step(self, ground: &Ground, ax: i8, jumps: bool) -> Self {
         let ay = i8::from(jumps && self.supported);
@@ -25,7 +25,7 @@ impl Walker {
         begun.obey(ground, ax, ay)
     }
 
-    /// A step that nothing blocks; `None` if something may be in the way.
+    /// Computes a step that nothing blocks; `None` if something may be in the way.
     ///
     /// Unblocked parts of a step only add to x and y, in any order of the axes, and leave the velocity as it is.
     #[inline(always)]
@@ -36,7 +36,7 @@ impl Walker {
         (is_free && (self.vy >= 0.0 || !ground.crates.may_hold(self.y, &swept))).then_some(Self { x, y, ..self })
     }
 
-    /// The step as the rules make it.
+    /// Computes the step by the rules.
     fn obey(self, ground: &Ground, ax: i8, ay: i8) -> Self {
         let (mut body, mut memory) = (self.body(ground), PlayerState::default());
         let step = PlayerStep { ax, ay, vy: self.vy, y: self.y, ry: ground.ry };

@@ -1,4 +1,4 @@
-//! What the paths lead through, and the values that they become.
+//! Surroundings of the paths, and their values.
 
 use super::{
     course::{Course, HALF_VIEW},
@@ -13,10 +13,10 @@ use crate::coinrun::{
     tile::TileGrid,
 };
 
-/// Bodies farther away than this (tiles, along x) cannot be met on a path: half a view, and what an enemy can walk.
+/// Bodies farther away than this (tiles, along x) cannot be met on a path: half a view, and an enemy's walk.
 const FAR: f32 = 10.0;
 
-/// A direction, and where the actions with and without a jump that hold it are in [`HELD`](super::HELD).
+/// A direction, and the indices in [`HELD`](super::HELD) of its actions with and without a jump.
 const PAIRS: [(i8, usize, usize); 3] = [(1, 0, 1), (0, 2, 3), (-1, 5, 4)];
 
 /// The bodies near a player. Made once and used again, since it holds memory.
@@ -27,8 +27,8 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Follows the path of every held action, in the order of [`HELD`](super::HELD), and writes for each `[dies, coin, lands,
-    /// steps, dx, dy]`: three flags, the share of [`STEPS`] that was made, and the displacement in half views.
+    /// Follows the path of every held action, in the order of [`HELD`](super::HELD), and writes for each `[dies, coin,
+    /// lands, steps, dx, dy]`: three flags, the share of [`STEPS`] that was made, and the displacement in half views.
     ///
     /// A path ends with death, with the coin, where a flight ends on firm ground, and at the edge of the view.
     pub fn follow(
@@ -63,7 +63,7 @@ impl Surroundings {
         let (xs, ys) = course.places();
         let [start_x, start_y] = course.start();
         if xs.is_empty() {
-            // Only a player whose place is no number makes no step.
+            // Only a player whose position is NaN makes no step.
             return [0.0, 0.0, 0.0, 0.0, f32::NAN, f32::NAN];
         }
         let end = self.dangers.end(course, player, tiles);

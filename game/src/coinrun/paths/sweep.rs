@@ -10,19 +10,19 @@ const FIVE: f32 = f32::from_bits(0x3fc7_ffff);
 const SIX: f32 = 2.25;
 const SEVEN: f32 = 3.0625;
 
-/// How a step is divided, and where it leads if nothing blocks it.
+/// The parts of a step, and its end if nothing blocks it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Sweep {
     /// Number of equal parts.
     pub parts: u32,
-    /// Way of one part.
+    /// Displacement of one part.
     pub by: [f32; 2],
-    /// Where all parts lead: each is added for itself, and rounded.
+    /// End of all parts: each is added for itself, and rounded.
     pub end: [f32; 2],
 }
 
 impl Sweep {
-    /// The step of a player with this velocity.
+    /// Returns the step of a player with this velocity.
     #[inline(always)]
     pub fn new(walker: &Walker) -> Self {
         let Walker { mut x, mut y, vx, vy, .. } = *walker;

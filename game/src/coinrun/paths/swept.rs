@@ -1,4 +1,4 @@
-//! The places that a moving player passes.
+//! Range of positions that a moving player passes.
 
 /// The centres that a player passes in a step, or in a path.
 #[derive(Clone, Copy, Debug)]
@@ -10,14 +10,14 @@ pub(super) struct Swept {
 }
 
 impl Swept {
-    /// Everything between two places.
+    /// Returns the range between two positions.
     #[inline]
     pub fn between(a: [f32; 2], b: [f32; 2]) -> Self {
         let sorted = |a: f32, b: f32| if a < b { [a, b] } else { [b, a] };
         Self { x: sorted(a[0], b[0]), y: sorted(a[1], b[1]) }
     }
 
-    /// Adds a place.
+    /// Adds a position.
     #[inline]
     pub fn add(&mut self, [x, y]: [f32; 2]) {
         let wider = |range: &mut [f32; 2], at: f32| {
@@ -28,10 +28,10 @@ impl Swept {
         wider(&mut self.y, y);
     }
 
-    /// Whether one of the places may be nearer than `reach` to one between `from` and `to` (along x).
+    /// Returns true if one of the positions may be nearer than `reach` to one between `from` and `to` (along x).
     ///
-    /// A rounded difference grows with its first number and falls with the second. So this misses no place for which
-    /// [`Body::overlaps`](crate::coinrun::rules::Body::overlaps) says yes.
+    /// A rounded difference grows with its first number and falls with the second. So this misses no position for which
+    /// [`Body::overlaps`](crate::coinrun::rules::Body::overlaps) is true.
     #[inline]
     pub fn comes_near(&self, [from, to]: [f32; 2], y: f32, reach: [f32; 2]) -> bool {
         self.x[0] - to < reach[0] && from - self.x[1] < reach[0] && self.y[0] - y < reach[1] && y - self.y[1] < reach[1]

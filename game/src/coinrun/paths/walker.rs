@@ -14,18 +14,18 @@ pub(super) struct Walker {
     pub vx: f32,
     /// Vertical velocity, tiles per step, upwards.
     pub vy: f32,
-    /// Whether a jump would work now. Nothing else that a player remembers matters to the next step.
+    /// A jump would work now. No other memory of the player matters to the next step.
     pub supported: bool,
 }
 
 impl Walker {
-    /// A player at the beginning of a path.
+    /// Returns a player at the beginning of a path.
     pub fn new(body: &Body, memory: &PlayerState, ground: &Ground) -> Self {
         let supported = is_supported(body, memory, ground.tiles);
         Self { x: body.x, y: body.y, vx: body.vx, vy: body.vy, supported }
     }
 
-    /// The player as the rules know it.
+    /// Returns the player's body by the rules.
     #[inline]
     pub fn body(&self, ground: &Ground) -> Body {
         Body { x: self.x, y: self.y, vx: self.vx, vy: self.vy, rx: ground.rx, ry: ground.ry }

@@ -1,4 +1,4 @@
-//! Brings sprites up to date with the game: places, poses, directions. Touches what moves, and nothing else.
+//! Updates of sprites: positions, poses, directions. Only moving entities are changed.
 
 use bevy::prelude::*;
 use bevy_playbot::vision::PaintedVelocity;
@@ -19,7 +19,7 @@ const STEP_TICKS: u32 = 5;
 /// A player slower than this stands, tiles per tick.
 const STANDING: f32 = 0.01;
 
-/// Player, and the clock of its arena.
+/// Updates players, and the clocks of their arenas.
 pub(super) fn players(
     mut players: Query<(
         &Episode,

@@ -1,4 +1,4 @@
-//! The drawings, which come with the program, and where on them everything is.
+//! The drawings, which come with the program, and the positions of figures on them.
 
 use std::sync::LazyLock;
 
@@ -7,15 +7,10 @@ use bevy::{
     image::{CompressedImageFormats, ImageSampler, ImageType},
     prelude::*,
 };
+use playbot_assets::coinrun;
 
 use super::puffs;
 use crate::coinrun::Tile;
-
-macro_rules! drawing {
-    ($name:literal) => {
-        include_bytes!(concat!("../../../assets/coinrun/", $name, ".png"))
-    };
-}
 
 /// Side of a tile on the drawings, texels.
 const SIDE: f32 = 16.0;
@@ -23,46 +18,44 @@ const SIDE: f32 = 16.0;
 const BACKDROP_TEXELS: f32 = 4.0;
 /// Width of a backdrop, tiles.
 const BACKDROP_WIDTH: f32 = 96.0;
-/// How many of Procgen's backgrounds show landscapes; the others show space.
+/// Number of Procgen's backgrounds with landscapes; the others show space.
 const LANDSCAPES: u8 = 49;
-/// How many of ours do.
+/// The same of ours.
 const OUR_LANDSCAPES: usize = 12;
-
-const FIGURES: &[u8] = drawing!("figures");
 
 /// Strips of tiles, by [`LevelParts::ground_theme`](crate::coinrun::LevelParts::ground_theme).
 const GROUNDS: [&[u8]; 6] = [
-    drawing!("ground_dirt"),
-    drawing!("ground_grass"),
-    drawing!("ground_planet"),
-    drawing!("ground_sand"),
-    drawing!("ground_snow"),
-    drawing!("ground_stone"),
+    coinrun::GROUND_DIRT,
+    coinrun::GROUND_GRASS,
+    coinrun::GROUND_PLANET,
+    coinrun::GROUND_SAND,
+    coinrun::GROUND_SNOW,
+    coinrun::GROUND_STONE,
 ];
 
 /// Landscapes, then space.
 const BACKDROPS: [&[u8]; 16] = [
-    drawing!("backdrop_meadow"),
-    drawing!("backdrop_dusk"),
-    drawing!("backdrop_desert"),
-    drawing!("backdrop_forest"),
-    drawing!("backdrop_winter"),
-    drawing!("backdrop_cave"),
-    drawing!("backdrop_city"),
-    drawing!("backdrop_bricks"),
-    drawing!("backdrop_sea"),
-    drawing!("backdrop_night"),
-    drawing!("backdrop_swamp"),
-    drawing!("backdrop_autumn"),
-    drawing!("backdrop_stars"),
-    drawing!("backdrop_nebula"),
-    drawing!("backdrop_ringed"),
-    drawing!("backdrop_red_planet"),
+    coinrun::BACKDROP_MEADOW,
+    coinrun::BACKDROP_DUSK,
+    coinrun::BACKDROP_DESERT,
+    coinrun::BACKDROP_FOREST,
+    coinrun::BACKDROP_WINTER,
+    coinrun::BACKDROP_CAVE,
+    coinrun::BACKDROP_CITY,
+    coinrun::BACKDROP_BRICKS,
+    coinrun::BACKDROP_SEA,
+    coinrun::BACKDROP_NIGHT,
+    coinrun::BACKDROP_SWAMP,
+    coinrun::BACKDROP_AUTUMN,
+    coinrun::BACKDROP_STARS,
+    coinrun::BACKDROP_NEBULA,
+    coinrun::BACKDROP_RINGED,
+    coinrun::BACKDROP_RED_PLANET,
 ];
 
 /// Decoded once for all Worlds: the figures, the grounds, the backdrops.
 static IMAGES: LazyLock<Vec<Image>> =
-    LazyLock::new(|| [FIGURES].into_iter().chain(GROUNDS).chain(BACKDROPS).map(decode).collect());
+    LazyLock::new(|| [coinrun::FIGURES].into_iter().chain(GROUNDS).chain(BACKDROPS).map(decode).collect());
 
 static PUFFS: LazyLock<Image> = LazyLock::new(puffs::drawing);
 
@@ -73,7 +66,7 @@ fn decode(png: &[u8]) -> Image {
         .expect("the drawings are part of the program, and a test decodes each")
 }
 
-/// How a player holds itself.
+/// The pose of a player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pose {
     /// Standing still.
@@ -88,16 +81,16 @@ pub enum Pose {
 #[derive(Resource, Clone, Debug, Reflect)]
 #[reflect(Resource)]
 pub struct Art {
-    /// The sheet of everything that lives in a level.
+    /// The sheet of all inhabitants of a level.
     pub figures: Handle<Image>,
-    /// What enemies leave behind.
+    /// The trail of enemies.
     pub(super) puffs: Handle<Image>,
     grounds: Vec<Handle<Image>>,
     backdrops: Vec<Handle<Image>>,
 }
 
 impl Art {
-    /// Brings the drawings into an app.
+    /// Adds the drawings to an app.
     pub(super) fn add_to(images: &mut Assets<Image>) -> Self {
         let mut handles: Vec<_> = IMAGES.iter().map(|image| images.add(image.clone())).collect();
         let backdrops = handles.split_off(1 + GROUNDS.len());
@@ -106,12 +99,12 @@ impl Art {
         Self { figures, puffs: images.add(PUFFS.clone()), grounds, backdrops }
     }
 
-    /// The strip of tiles of a ground theme.
+    /// Returns the strip of tiles of a ground theme.
     pub fn ground(&self, theme: u8) -> Handle<Image> {
         self.grounds[usize::from(theme) % self.grounds.len()].clone()
     }
 
-    /// The backdrop for one of Procgen's backgrounds. Ours are fewer, so several of its have the same.
+    /// Returns the backdrop for one of Procgen's backgrounds. Ours are fewer, so several of its have the same.
     pub fn backdrop(&self, background: u8) -> Handle<Image> {
         let index = match background.checked_sub(LANDSCAPES) {
             None => usize::from(background) % OUR_LANDSCAPES,
@@ -120,40 +113,40 @@ impl Art {
         self.backdrops[index].clone()
     }
 
-    /// The part of a backdrop that lies behind a level of `size` tiles, when `offset` (0 to 1) of what is spare hangs
+    /// Returns the part of a backdrop behind a level of `size` tiles, if `offset` (0 to 1) of the spare width hangs
     /// over its left border.
     pub fn backdrop_part(offset: f32, size: f32) -> Rect {
         let left = (offset * (BACKDROP_WIDTH - size) * BACKDROP_TEXELS).floor();
         Rect::new(left, 0.0, left + size * BACKDROP_TEXELS, size * BACKDROP_TEXELS)
     }
 
-    /// A player on the sheet of figures: one of five colours.
+    /// Returns a player on the sheet of figures: one of five colours.
     pub fn player(colour: u8, pose: Pose) -> Rect {
         Self::cell(usize::from(colour) * 3 + pose as usize, 0, 2)
     }
 
-    /// An enemy on the sheet of figures: one of nine, in its first or second step.
+    /// Returns an enemy on the sheet of figures: one of nine, in its first or second step.
     pub fn enemy(sprite: u8, step: usize) -> Rect {
         Self::cell(usize::from(sprite), 2 + step, 1)
     }
 
-    /// A crate on the sheet of figures: one of four.
+    /// Returns a crate on the sheet of figures: one of four.
     pub fn wooden_crate(sprite: u8) -> Rect {
         Self::cell(9 + usize::from(sprite), 2, 1)
     }
 
-    /// A saw on the sheet of figures, in one of its two positions.
+    /// Returns a saw on the sheet of figures, in one of its two positions.
     pub fn saw(turn: usize) -> Rect {
         Self::cell(13 + turn, 2, 1)
     }
 
-    /// `height` tiles high, in row `row` and column `column` of the sheet of figures.
+    /// Returns a cell `height` tiles high, in row `row` and column `column` of the sheet of figures.
     fn cell(column: usize, row: usize, height: usize) -> Rect {
         let (x, y) = (column as f32 * SIDE, row as f32 * SIDE);
         Rect::new(x, y, x + SIDE, y + height as f32 * SIDE)
     }
 
-    /// Number of a tile on the strips; `None` if it cannot be seen.
+    /// Returns the number of a tile on the strips; `None` if it cannot be seen.
     pub fn tile(tile: Tile) -> Option<u16> {
         match tile {
             Tile::Empty | Tile::Barrier => None,

@@ -1,8 +1,8 @@
-//! What CoinRun looks like: Procgen's picture, with drawings of our own.
+//! The look of CoinRun: Procgen's picture, with drawings of our own.
 //!
-//! Each arena becomes a [`Stage`](bevy_playbot::vision::Stage) with a backdrop, its tiles and a sprite for everything
-//! that lives in it, in the arena's own coordinates: one unit is one tile. Nothing here changes the game, and whatever is
-//! shown follows from the episode alone: animations count its ticks, and enemies leave puffs where they were.
+//! Each arena becomes a [`Stage`](bevy_playbot::vision::Stage) with a backdrop, its tiles and a sprite for every
+//! inhabitant, in the arena's own coordinates: one unit is one tile. Nothing here changes the game. The picture follows
+//! from the episode alone: animations count its ticks, and enemies leave puffs behind.
 
 mod animate;
 mod art;

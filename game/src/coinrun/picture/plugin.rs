@@ -7,8 +7,8 @@ use playbot_lab::prelude::*;
 use super::{animate, art::Art, sprites, trail};
 use crate::arena_grid::ArenaGrid;
 
-/// Adds sprites and tiles to [`CoinRunPlugin`](crate::coinrun::CoinRunPlugin). Add it after the plugins that bring images, such as
-/// Bevy's own or a sensor's.
+/// Adds sprites and tiles to [`CoinRunPlugin`](crate::coinrun::CoinRunPlugin). Add it after the plugins that bring
+/// images, such as Bevy's own or a sensor's.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CoinRunPicturePlugin;
 

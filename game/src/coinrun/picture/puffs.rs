@@ -1,12 +1,12 @@
-//! The drawing of the puffs that enemies leave behind: white discs, seen through, side by side. It is made here.
+//! The drawing of the puffs that enemies leave behind: translucent white discs, side by side, made in code.
 //!
-//! An enemy leaves a puff in every tick. Each rises, grows and fades, and is gone after [`PUFFS`] ticks. Those of ticks in
-//! which it walked at one speed are drawn as one: many overlapping sprites would take the raster many times as long, for
-//! the same picture.
+//! An enemy leaves a puff in every tick. Each rises, grows and fades, and is gone after [`PUFFS`] ticks. Those of ticks
+//! in which it walked at one speed are drawn as one: many overlapping sprites would take the raster many times as long,
+//! for the same picture.
 
 use bevy::{image::ImageSampler, prelude::*};
 
-/// Puffs of an enemy that can be seen, and ticks for which each is seen.
+/// Visible puffs of an enemy, and ticks for which each is visible.
 pub const PUFFS: usize = 8;
 /// Half of the width and of the height of a new puff, tiles, and the factor by which it grows in each tick.
 const NEW: Vec2 = Vec2::new(0.3, 0.2);
@@ -19,12 +19,12 @@ const RISE: f32 = 0.01;
 
 /// Tiles between two puffs of the drawing: enemies walk as fast as this until they turn at inner ground.
 const STEP: f32 = 0.15;
-/// From the middle of a new puff to the upper edge of the drawing, and height of the drawing, tiles.
+/// Distance from the middle of a new puff to the upper edge of the drawing, and height of the drawing, tiles.
 const TOP: f32 = 0.35;
 const HEIGHT: f32 = 0.5625;
 /// Texels to the tile.
 const TEXELS: f32 = 16.0;
-/// Texels of the place for each row of puffs.
+/// Texels of the cell of each row of puffs.
 const CELL: (u32, u32) = (32, 10);
 
 /// Puffs of ticks in a row: the newest is `first` ticks old, and there are `count` of them.
@@ -32,11 +32,11 @@ const CELL: (u32, u32) = (32, 10);
 pub struct Row {
     /// Age of the newest.
     pub first: usize,
-    /// How many there are, at least 1; none is [`PUFFS`] ticks old.
+    /// Number of puffs, at least 1; all are younger than [`PUFFS`] ticks.
     pub count: usize,
 }
 
-/// Half of the width and height of a puff of this age.
+/// Returns half of the width and height of a puff of this age.
 fn half_size(age: usize) -> Vec2 {
     (0..age).fold(NEW, |half, _| half * GROWTH)
 }
@@ -46,23 +46,23 @@ impl Row {
         self.first + self.count - 1
     }
 
-    /// Width of the row if the enemy went `walked` tiles between its newest and its oldest puff.
+    /// Returns the width of the row if the enemy went `walked` tiles between its newest and its oldest puff.
     pub fn width(self, walked: f32) -> f32 {
         walked + half_size(self.first).x + half_size(self.last()).x
     }
 
-    /// Size and middle of its sprite, tiles, if the enemy went from `oldest` to `newest` meanwhile. Both are where a new
-    /// puff is.
+    /// Returns size and middle of its sprite, tiles, if the enemy went from `oldest` to `newest` meanwhile. Both are
+    /// positions of new puffs.
     pub fn lay_out(self, newest: Vec2, oldest: Vec2) -> (Vec2, Vec2) {
         let walked = newest.x - oldest.x;
         let width = self.width(walked.abs());
-        // One of the ends of the row, and the way from there to its middle.
+        // One of the ends of the row, and the direction from there to its middle.
         let (edge, way) = if walked < 0.0 { (-1.0, 0.5) } else { (1.0, -0.5) };
         let x = newest.x + edge * half_size(self.first).x + way * width;
         (Vec2::new(width, HEIGHT), Vec2::new(x, newest.y + TOP - HEIGHT / 2.0))
     }
 
-    /// Its place on the drawing, where it walks to the right.
+    /// Returns its cell on the drawing, where it walks to the right.
     pub fn rect(self) -> Rect {
         let (x, y) = ((self.count as u32 - 1) * CELL.0, self.first as u32 * CELL.1);
         let corner = UVec2::new(x, y).as_vec2();
@@ -70,7 +70,7 @@ impl Row {
         Rect::from_corners(corner, corner + Vec2::new(width, HEIGHT) * TEXELS)
     }
 
-    /// How opaque it is at a place right of its left end and above the middle of a new puff, tiles.
+    /// Returns its opacity at a position right of its left end and above the middle of a new puff, tiles.
     fn alpha(self, at: Vec2) -> f32 {
         let (left, mut through) = (half_size(self.last()).x, 1.0);
         let mut alpha = (0..self.first).fold(ALPHA, |alpha, _| alpha * FADING);
@@ -85,7 +85,7 @@ impl Row {
     }
 }
 
-/// All rows of puffs.
+/// Returns all rows of puffs.
 pub fn drawing() -> Image {
     let (width, height) = (PUFFS as u32 * CELL.0, PUFFS as u32 * CELL.1);
     let texel = |x: u32, y: u32| {

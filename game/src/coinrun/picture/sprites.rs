@@ -1,4 +1,4 @@
-//! Gives arenas, and everything in them, sprites and tiles.
+//! Creation of sprites and tiles for arenas and their inhabitants.
 
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::{PaintedVelocity, Stage, TileLayer};
@@ -16,7 +16,7 @@ use crate::{
     },
 };
 
-/// From the corner of one arena to the corner of the next: further than anybody sees over the border of a level.
+/// Distance from the corner of one arena to the corner of the next: further than any view over the border of a level.
 const SPACING: f32 = 96.0;
 
 /// Makes the arenas of new players into stages, and the players into sprites.
@@ -32,7 +32,7 @@ pub(super) fn players(
         let scenery = Scenery { backdrop, ground, placed: 0, tick: 0 };
         commands.entity(plays_in.0).insert((Stage, grid.next(SPACING), scenery));
         let sprite = Sprite { rect: Some(Art::player(0, Pose::Stand)), ..Sprite::from_image(art.figures.clone()) };
-        // The eye is on the middle of the body; the picture stands on the body's feet.
+        // The camera is on the middle of the body; the picture stands on the body's feet.
         let feet = Anchor(Vec2::new(0.0, 0.5 / PLAYER_HEIGHT - 0.5));
         let place = Transform::from_xyz(0.0, 0.0, ACTORS);
         commands.entity(player).insert((ChildOf(plays_in.0), sprite, feet, place, PaintedVelocity::default()));
@@ -73,7 +73,7 @@ pub(super) fn levels(
     }
 }
 
-/// Tile numbers of all cells, bottom row first.
+/// Returns the tile numbers of all cells, bottom row first.
 fn cells(tiles: &TileGrid) -> impl Iterator<Item = u16> {
     tiles.iter().map(|tile| Art::tile(tile).unwrap_or(TileLayer::EMPTY))
 }

@@ -1,4 +1,4 @@
-//! Puffs that enemies leave behind. They are there to be seen and do nothing.
+//! Puffs behind enemies, which are only drawn.
 
 use bevy::prelude::*;
 
@@ -12,13 +12,13 @@ use crate::coinrun::{
     rules::Body,
 };
 
-/// Enemies at least this many tiles to the left or to the right of the player have no puffs: they are outside of what
-/// agents see, half of [`VIEW`](super::VIEW) and the length of a trail, and sprites cost time wherever they are. Only
-/// people see it who look farther.
+/// Enemies at least this many tiles to the left or to the right of the player have no puffs. They are outside of the
+/// agents' view, half of [`VIEW`](super::VIEW) and the length of a trail, and sprites cost time anywhere. Only people
+/// with a wider view see it.
 const REACH: f32 = 9.0;
 
-/// In front of saws and crates, which lie within this of [`BLOCKS`], and behind enemies and player; older puffs lie
-/// farther back, and those of one age as their enemies.
+/// In front of saws and crates, which lie within this of [`BLOCKS`], and behind enemies and player. Older puffs lie
+/// farther back, and those of one age in the order of their enemies.
 const DEPTH: f32 = 0.5;
 const OLDER: f32 = 1.0 / 32.0;
 const NEXT: f32 = 1.0 / 16384.0;
@@ -26,11 +26,11 @@ const NEXT: f32 = 1.0 / 16384.0;
 /// Steps that differ by less, in tiles, are of one speed.
 const ALIKE: f32 = 1e-3;
 
-/// Where an enemy was, and what is drawn there.
+/// Positions of an enemy, and its sprites.
 #[derive(Component, Reflect)]
 #[reflect(Component)]
 pub(super) struct Trail {
-    /// Where new puffs were: that of tick t is number t % [`PUFFS`].
+    /// Positions of new puffs: that of tick t is number t % [`PUFFS`].
     places: [Vec2; PUFFS],
     /// A sprite for each row of puffs, the newest first.
     sprites: Vec<Entity>,
@@ -41,24 +41,24 @@ pub(super) struct Trail {
 }
 
 impl Trail {
-    /// The trail of an enemy that has not moved yet.
+    /// Returns the trail of an enemy that has not moved yet.
     pub fn new(number: u32) -> Self {
         Self { places: default(), sprites: Vec::new(), since: None, number }
     }
 
-    /// Notes where the enemy is in a tick, and returns how many puffs there are then.
+    /// Notes the position of the enemy in a tick, and returns the number of its puffs.
     fn note(&mut self, tick: u32, body: &Body) -> usize {
         let since = *self.since.get_or_insert(tick);
         self.places[tick as usize % PUFFS] = Vec2::new(body.x, body.y - body.ry / 2.0);
         tick.saturating_sub(since).min(PUFFS as u32) as usize
     }
 
-    /// Where the puff was new that is this old.
+    /// Returns the start of the puff of this age.
     fn place(&self, tick: u32, age: usize) -> Vec2 {
         self.places[(tick as usize - age) % PUFFS]
     }
 
-    /// The longest row at one speed whose newest puff is `first` ticks old, of `count` puffs in all.
+    /// Returns the longest row at one speed whose newest puff is `first` ticks old, of `count` puffs in all.
     fn row(&self, tick: u32, first: usize, count: usize) -> Row {
         let step = |age| self.place(tick, age) - self.place(tick, age + 1);
         let alike = (first..count - 1).take_while(|&age| (step(age) - step(first)).length_squared() < ALIKE * ALIKE);
@@ -66,7 +66,7 @@ impl Trail {
     }
 }
 
-/// Moves the puffs of all enemies on. Done again in a tick, it changes nothing.
+/// Moves the puffs of all enemies. Repeated in a tick, it changes nothing.
 pub(super) fn trails(
     mut enemies: Query<(Entity, &InArena, &ArenaBody, &Transform, &mut Trail)>,
     arenas: Query<(&Arena, &Scenery)>,

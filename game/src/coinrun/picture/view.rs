@@ -1,4 +1,4 @@
-//! How much of a level an agent sees.
+//! Size of an agent's view of a level.
 
-/// Tiles from the left to the right edge of what an agent sees.
+/// Tiles from the left to the right edge of an agent's view.
 pub const VIEW: f32 = 13.0;

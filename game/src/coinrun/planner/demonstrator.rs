@@ -1,4 +1,4 @@
-//! A player that follows plans and makes a new one whenever something else happened.
+//! A player that follows plans and makes a new one after each disturbance.
 
 use super::{config::PlannerConfig, plan::plan_or_progress, search::Found};
 use crate::coinrun::sim::Sim;
@@ -11,7 +11,7 @@ pub struct Demonstrator {
     actions: Vec<u8>,
     /// The state in which the next planned action is right.
     expected: Option<u64>,
-    /// Whether it is proved that nothing leads to the coin from the state of the last plan.
+    /// It is proved that nothing leads to the coin from the state of the last plan.
     is_hopeless: bool,
     replans: u64,
 }
@@ -23,19 +23,19 @@ impl Default for Demonstrator {
 }
 
 impl Demonstrator {
-    /// A demonstrator that plans with these settings.
+    /// Returns a demonstrator that plans with these settings.
     pub fn new(config: PlannerConfig) -> Self {
         Self { config, actions: Vec::new(), expected: None, is_hopeless: false, replans: 0 }
     }
 
-    /// The action (0 to 14) for the state of `sim`. A state that does not follow from the last
-    /// action that was given, or belongs to another episode, leads to a new plan.
+    /// Returns the action (0 to 14) for the state of `sim`. A state that does not follow from the last action that was
+    /// given, or belongs to another episode, leads to a new plan.
     pub fn act(&mut self, sim: &Sim) -> u8 {
         let has_plan = !self.actions.is_empty() || self.is_hopeless;
         if !has_plan || self.expected != Some(sim.state_hash()) {
             self.replan(sim);
         }
-        // Without any way forward, waiting is as good as anything.
+        // Without any path forward, waiting is as good as anything.
         let action = self.actions.pop().unwrap_or(4);
         let mut next = sim.clone();
         next.step(action);
@@ -43,7 +43,7 @@ impl Demonstrator {
         action
     }
 
-    /// Number of plans made so far.
+    /// Returns the number of plans made so far.
     pub fn replans(&self) -> u64 {
         self.replans
     }

@@ -1,18 +1,18 @@
-//! How near the player is to something deadly.
+//! Distance of the player to hazards.
 
 use crate::coinrun::sim::Sim;
 
 /// Distance (tiles) at which a hazard begins to count as a risk.
 const RISK_RANGE: f32 = 1.0;
 
-/// Whether a saw or an enemy is nearer than `margin` (tiles, less than 1).
+/// Returns true if a saw or an enemy is nearer than `margin` (tiles, less than 1).
 pub(super) fn is_too_close(sim: &Sim, margin: f32) -> bool {
     let saws = sim.level().saws_near(sim.x());
     let player = sim.player();
     saws.iter().chain(sim.enemies()).any(|body| player.overlaps(body, margin))
 }
 
-/// Risk of the present state: 0 far from saws, enemies and lava, growing to 1 on contact.
+/// Returns the risk of the present state: 0 far from saws, enemies and lava, growing to 1 on contact.
 pub(super) fn risk(sim: &Sim) -> f32 {
     let player = sim.player();
     let saws = sim.level().saws_near(sim.x());
@@ -25,7 +25,7 @@ pub(super) fn risk(sim: &Sim) -> f32 {
     (1.0 - nearest.max(0.0) / RISK_RANGE).max(0.0)
 }
 
-/// Height (tiles) of the player's feet over lava, if there is some in reach below.
+/// Returns the height (tiles) of the player's feet over lava, if there is some in reach below.
 fn lava_below(sim: &Sim) -> f32 {
     let player = sim.player();
     let feet = player.y - player.ry;

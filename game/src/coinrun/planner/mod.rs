@@ -1,8 +1,7 @@
-//! A player that knows the rules: it searches for actions that reach the coin.
+//! A player that searches with the rules for actions that reach the coin.
 //!
-//! [`plan`] looks for a sequence of actions from any state of an episode, [`Demonstrator`] plays
-//! such plans while its actions are disturbed, and [`coin_is_unreachable`] proves that a level
-//! cannot be won.
+//! [`plan`] looks for a sequence of actions from any state of an episode. [`Demonstrator`] plays such plans while its
+//! actions are disturbed. [`coin_is_unreachable`] proves that a level cannot be won.
 
 mod config;
 mod demonstrator;

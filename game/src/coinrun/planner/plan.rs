@@ -1,4 +1,4 @@
-//! Plans: the way to the coin, that there is none, or that none was found.
+//! Plans: a path to the coin, a proof that there is none, or neither.
 
 use super::{
     config::PlannerConfig,
@@ -36,7 +36,8 @@ pub fn plan(sim: &Sim, config: &PlannerConfig) -> Plan {
     }
 }
 
-/// Searches with the whole margin, with half of it, and at last by the exact rules alone, unless there is no way at all.
+/// Searches with the whole margin, with half of it, and at last by the exact rules alone, unless there is no path at
+/// all.
 pub(super) fn plan_or_progress(sim: &Sim, config: &PlannerConfig) -> (Found, usize) {
     let exact = PlannerConfig { margin: 0.0, caution: 0.0, ..*config };
     let mut attempts = vec![exact];
@@ -61,7 +62,7 @@ pub(super) fn plan_or_progress(sim: &Sim, config: &PlannerConfig) -> (Found, usi
             found => return (found, all),
         }
     }
-    // Few states mean that the player is in a tight spot, not that the way is long.
+    // Few states mean that the player is in a tight spot, not that the path is long.
     let (found, expansions) = search(sim, &exact, &FINE);
     (found, all + expansions)
 }

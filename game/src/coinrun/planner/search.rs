@@ -10,7 +10,7 @@ use super::{
 use crate::coinrun::rules::WALK_SPEED;
 use crate::coinrun::sim::Sim;
 
-/// How finely a search looks at actions and states.
+/// Resolution of actions and states in a search.
 pub(super) struct SearchResolution {
     /// Actions on the ground: 8, 5 and 2 jump.
     ground_actions: &'static [u8],
@@ -42,20 +42,20 @@ pub(super) const FINE: SearchResolution = SearchResolution {
     cells_per_tile: 16.0,
 };
 
-/// An enemy this near (tiles) makes the time part of what tells states apart.
+/// An enemy this near (tiles) makes the time a part of the state's key.
 const ENEMY_RANGE: f32 = 8.0;
 
-/// What a search has found.
+/// The result of a search.
 pub(super) enum Found {
     /// Actions up to the coin.
     Coin(Vec<u8>),
     /// Actions to the most promising state that was seen.
     Progress(Vec<u8>),
-    /// The same, where it is proved that nothing leads to the coin.
+    /// The same, with a proof that nothing leads to the coin.
     Hopeless(Vec<u8>),
 }
 
-/// How a node was reached: the held action, for how long, and from where.
+/// The edge to a node: the held action, its duration, and the node before.
 struct Step {
     parent: usize,
     action: u8,
@@ -195,7 +195,7 @@ impl<'a> Search<'a> {
         self.open.push(Open { estimate, node });
     }
 
-    /// A number that states with nearly the same future share.
+    /// Returns a number that states with nearly the same future share.
     fn signature(&self, sim: &Sim) -> u64 {
         let cells = self.resolution.cells_per_tile;
         let x = (sim.x() * cells) as u64;
@@ -223,7 +223,7 @@ impl<'a> Search<'a> {
     }
 }
 
-/// The action of step `tick` while `action` is held: a jump is pressed only once.
+/// Returns the action of step `tick` while `action` is held: a jump is pressed only once.
 fn held(action: u8, tick: u32) -> u8 {
     match action {
         2 | 5 | 8 if tick > 0 => action - 1,
@@ -231,7 +231,7 @@ fn held(action: u8, tick: u32) -> u8 {
     }
 }
 
-/// An optimistic number of steps to the coin: the way along x at full speed.
+/// Returns an optimistic number of steps to the coin: the distance along x at full speed.
 fn steps_to_coin(sim: &Sim) -> f32 {
     let coin = sim.level().coin[0] as f32 + 0.5;
     ((coin - sim.x()).abs() - 1.0).max(0.0) / WALK_SPEED

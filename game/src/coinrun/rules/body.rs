@@ -1,4 +1,4 @@
-//! The rectangle that everything that moves, hurts or carries consists of.
+//! The rectangle of every body.
 
 use super::constants::{BLOCK_HALF, ENEMY_SPEED, PLAYER_HALF_HEIGHT, PLAYER_HALF_WIDTH, START_CELL};
 
@@ -20,7 +20,7 @@ pub struct Body {
 }
 
 impl Body {
-    /// The player at the start of every level.
+    /// Returns the player at the start of every level.
     pub fn player() -> Self {
         Self {
             x: START_CELL[0] as f32 + PLAYER_HALF_WIDTH,
@@ -32,17 +32,17 @@ impl Body {
         }
     }
 
-    /// A saw or a crate: a resting square that fills `cell`.
+    /// Returns a saw or a crate: a resting square that fills `cell`.
     pub fn block(cell: [i32; 2]) -> Self {
         Self { x: cell[0] as f32 + 0.5, y: cell[1] as f32 + 0.5, vx: 0.0, vy: 0.0, rx: BLOCK_HALF, ry: BLOCK_HALF }
     }
 
-    /// An enemy that starts in `cell` and walks to the right (`dir` 1) or to the left (-1).
+    /// Returns an enemy that starts in `cell` and walks to the right (`dir` 1) or to the left (-1).
     pub fn enemy(cell: [i32; 2], dir: i8) -> Self {
         Self { vx: ENEMY_SPEED * f32::from(dir), ..Self::block(cell) }
     }
 
-    /// Whether the two rectangles overlap when the sum of their half sizes is changed by `margin`.
+    /// Returns true if the two rectangles overlap when the sum of their half sizes is changed by `margin`.
     #[inline]
     pub fn overlaps(&self, other: &Body, margin: f32) -> bool {
         let reach_x = (self.rx + other.rx) + margin;

@@ -22,7 +22,7 @@ pub const GRAVITY: f32 = 0.2;
 pub const JUMP_SPEED: f32 = 1.5;
 /// Horizontal speed that walking approaches.
 pub const WALK_SPEED: f32 = 0.5;
-/// Part of the way to the wanted speed that a supported player makes in one step.
+/// Share of the speed difference that a supported player makes up in one step.
 pub const GROUND_CONTROL: f32 = 0.2;
 /// Factor on [`GROUND_CONTROL`] in the air.
 pub const AIR_CONTROL: f32 = 0.15;
@@ -34,5 +34,5 @@ pub const ENEMY_SPEED: f32 = 0.15;
 pub(in crate::coinrun) const OVERLAP_MARGIN: f32 = -0.001;
 /// The corners that are tested against tiles lie at this part of the half size.
 pub(in crate::coinrun) const CORNER: f32 = 0.98;
-/// How far inside its sides and below its feet the player looks for support.
+/// Margin inside its sides and below its feet for the player's support.
 pub(in crate::coinrun) const FOOT_MARGIN: f32 = 0.01;

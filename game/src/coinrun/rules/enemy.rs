@@ -1,4 +1,4 @@
-//! Enemies walk to and fro between walls and barriers.
+//! Enemies, which walk to and fro between walls and barriers.
 
 use super::body::Body;
 use super::constants::OVERLAP_MARGIN;
@@ -8,14 +8,13 @@ use crate::coinrun::tile::TileGrid;
 
 /// Moves one enemy. `crates` may be any subset that contains those within a tile of the enemy.
 ///
-/// Enemies bounce off walls and barriers. Inner ground ([`Tile::Wall`](crate::coinrun::tile::Tile::Wall)) also counts as "outside",
-/// which blocks, so a turn there loses a quarter of the speed: one of four parts was blocked.
+/// Enemies bounce off walls and barriers. Inner ground ([`Tile::Wall`](crate::coinrun::tile::Tile::Wall)) also counts
+/// as "outside", which blocks. A turn there therefore loses a quarter of the speed: one of four parts was blocked.
 ///
-/// The original has an oddity that is kept here. It asks whether a crate holds an enemy with the
-/// state of the player: while a falling player is high enough above a crate that an enemy
-/// overlaps, the player is marked as standing on a crate ([`PlayerState::lent_support`]), and the enemy counts
-/// as blocked vertically. If the enemy turns at inner ground in that moment, both axes are blocked and its
-/// step ends early.
+/// The original has an oddity that is kept here. It asks whether a crate holds an enemy with the state of the player.
+/// While a falling player is high enough above a crate that an enemy overlaps, the player is marked as standing on a
+/// crate ([`PlayerState::lent_support`]), and the enemy counts as blocked vertically. If the enemy turns at inner
+/// ground in that tick, both axes are blocked and its step ends early.
 #[inline]
 pub fn patrol(
     enemy: &mut Body,

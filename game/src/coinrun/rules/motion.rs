@@ -4,12 +4,11 @@ use super::body::Body;
 use super::constants::CORNER;
 use crate::coinrun::tile::Corners;
 
-/// Moves `body` by its velocity in at least four equal parts. `displace` moves it by (dx, dy),
-/// only one of which is not 0, and tells whether something was in the way.
+/// Moves `body` by its velocity in at least four equal parts. `displace` moves it by (dx, dy), only one of which is not
+/// 0, and tells whether something was in the way.
 ///
-/// Each velocity component then keeps the share of the parts in which it was not blocked. So a
-/// fall that ends in the last of five parts leaves 4/5 of the speed for the next step, and only a
-/// completely blocked step leaves 0.
+/// Each velocity component then keeps the share of the parts in which it was not blocked. So a fall that ends in the
+/// last of five parts leaves 4/5 of the speed for the next step. Only a completely blocked step leaves 0.
 #[inline]
 pub(super) fn advance(body: &mut Body, x_first: bool, mut displace: impl FnMut(&mut Body, f32, f32) -> bool) {
     let parts = part_count(body.vx, body.vy);
@@ -35,29 +34,29 @@ pub(super) fn advance(body: &mut Body, x_first: bool, mut displace: impl FnMut(&
     body.vy *= free_y as f32 / parts as f32;
 }
 
-/// Number of equal parts of a step: four per tile of speed, at least four.
+/// Returns the number of equal parts of a step: four per tile of speed, at least four.
 #[inline]
 pub(in crate::coinrun) fn part_count(vx: f32, vy: f32) -> u32 {
     let speed = (vx * vx + vy * vy).sqrt();
     ((4.0 * speed) as u32).max(4)
 }
 
-/// The corners of `body` that are tested against tiles, if its centre were at (x, y).
+/// Returns the corners of `body` that are tested against tiles, if its centre were at (x, y).
 #[inline]
 pub(in crate::coinrun) fn corners(body: &Body, x: f32, y: f32) -> Corners {
     let (rx, ry) = (body.rx * CORNER, body.ry * CORNER);
     Corners { left: x - rx, right: x + rx, low: y - ry, high: y + ry }
 }
 
-/// The centre of a body of half size `half` that was stopped on its way to `centre`: flush with
-/// the tile edge in front of it.
+/// Returns the centre of a body of half size `half` that was stopped on its way to `centre`: flush with the tile edge
+/// in front of it.
 #[inline]
 pub(in crate::coinrun) fn flush(centre: f32, half: f32, moves_up: bool) -> f32 {
     if moves_up { (centre + half).floor() - half } else { (centre - half).ceil() + half }
 }
 
-/// The centre of a body of half size `half` after it bounced off the tile edge that it would have
-/// crossed on its way to `centre`.
+/// Returns the centre of a body of half size `half` after it bounced off the tile edge that it would have crossed on
+/// its way to `centre`.
 #[inline]
 pub(super) fn mirrored(centre: f32, half: f32, moves_up: bool) -> f32 {
     let excess =

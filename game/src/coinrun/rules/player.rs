@@ -7,10 +7,10 @@ use super::constants::{
 use super::motion::{advance, corners, flush};
 use crate::coinrun::tile::TileGrid;
 
-/// How often a crate may pass the player on to another crate within one displacement.
+/// Most times that a crate may pass the player on to another crate within one displacement.
 pub(in crate::coinrun) const MAX_PUSHES: u32 = 5;
 
-/// What a player remembers from step to step besides its [`Body`].
+/// The memory of a player from step to step besides its [`Body`].
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct PlayerState {
     /// The top of a crate held the player in the last step.
@@ -39,15 +39,15 @@ pub struct PlayerStep {
 }
 
 impl PlayerStep {
-    /// Whether the top of `block` holds a player who has now the vertical velocity `vy`: only one
-    /// who falls, does not press down and was not below the top when the step began.
+    /// Returns true if the top of `block` holds a player with the present vertical velocity `vy`: only one that falls,
+    /// does not press down and was not below the top when the step began.
     #[inline]
     pub(super) fn is_held_by(&self, block: &Body, vy: f32) -> bool {
         vy < 0.0 && self.ay >= 0 && self.y >= block.y + block.ry + self.ry
     }
 }
 
-/// The directions (horizontal, vertical) of an action, each -1, 0 or 1.
+/// Returns the directions (horizontal, vertical) of an action, each -1, 0 or 1.
 ///
 /// Actions 0 to 8 are `3 * (horizontal + 1) + (vertical + 1)`; the others do nothing in CoinRun.
 #[inline]
@@ -76,7 +76,8 @@ pub fn begin_step(player: &mut Body, state: &mut PlayerState, tiles: &TileGrid, 
     PlayerStep { ax, ay, vy: player.vy, y: player.y, ry: player.ry }
 }
 
-/// Whether a jump would work now. The vertical speed must be exactly 0, which rules out all but a completed landing.
+/// Returns true if a jump would work now. The vertical speed must be exactly 0, which rules out all but a completed
+/// landing.
 #[inline]
 pub fn is_supported(player: &Body, state: &PlayerState, tiles: &TileGrid) -> bool {
     player.vy == 0.0 && (state.on_crate || state.lent_support || stands_on_wall(player, tiles))
@@ -89,8 +90,8 @@ fn stands_on_wall(player: &Body, tiles: &TileGrid) -> bool {
     tiles.at(player.x - foot, below).is_wall() || tiles.at(player.x + foot, below).is_wall()
 }
 
-/// The horizontal velocity approaches the wanted one. Less than what one step of full
-/// acceleration adds counts as standing still; exactly that much does not.
+/// Moves the horizontal velocity towards the wanted one. Less than the gain of one step of full acceleration counts as
+/// standing still; exactly that much does not.
 #[inline]
 pub(in crate::coinrun) fn walk(vx: f32, ax: i8, supported: bool) -> f32 {
     let control = if supported { GROUND_CONTROL } else { GROUND_CONTROL * AIR_CONTROL };
@@ -98,7 +99,7 @@ pub(in crate::coinrun) fn walk(vx: f32, ax: i8, supported: bool) -> f32 {
     if vx.abs() < control * WALK_SPEED { 0.0 } else { vx }
 }
 
-/// A jump sets the vertical velocity; otherwise gravity acts, and "down" on the ground adds to it.
+/// Returns the vertical velocity: that of a jump, or with gravity added, and with "down" on the ground.
 #[inline]
 pub(in crate::coinrun) fn fall(vy: f32, ay: i8, supported: bool) -> f32 {
     if ay > 0 {
@@ -185,8 +186,8 @@ fn land_on_crates(
     landed
 }
 
-/// The displacement that puts the player flush on the side of `block` on which its centre is. The
-/// sum is exact before it is rounded to f32.
+/// Returns the displacement that puts the player flush on the side of `block` on which its centre is. The sum is exact
+/// before it is rounded to f32.
 pub(in crate::coinrun) fn rise_to_top(player: &Body, block: &Body) -> f32 {
     let reach = f64::from(block.ry + player.ry);
     let side = match player.y - block.y {

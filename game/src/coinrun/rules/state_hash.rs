@@ -4,8 +4,8 @@ use bevy_playbot::state_hash::StateHash;
 
 use super::body::Body;
 
-/// Hash of the step number, then of the bit patterns of x, y, vx and vy of the player and of every enemy in creation
-/// order. Negative zero counts as zero.
+/// Returns the hash of the step number, then of the bit patterns of x, y, vx and vy of the player and of every enemy.
+/// Enemies come in creation order. Negative zero counts as zero.
 pub fn hash_state<'a>(player: &'a Body, enemies: impl IntoIterator<Item = &'a Body>, step: u32) -> u64 {
     let bodies = std::iter::once(player).chain(enemies);
     // Adding zero turns negative zero into zero and changes nothing else.

@@ -1,4 +1,4 @@
-//! What the player touches after everything has moved: how an episode ends.
+//! Contacts of the player after all movement, and the end of an episode.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,7 +6,7 @@ use super::body::Body;
 use super::constants::{OVERLAP_MARGIN, TIMEOUT};
 use crate::coinrun::tile::{SIZE, Tile, TileGrid};
 
-/// Why an episode ended.
+/// The end of an episode.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Outcome {
@@ -25,12 +25,12 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// Whether the coin was reached, which pays the reward.
+    /// Returns true if the coin was reached, which pays the reward.
     pub const fn is_success(self) -> bool {
         matches!(self, Outcome::Coin)
     }
 
-    /// Why the coin was not reached, for people; `None` if it was.
+    /// Returns the cause of a failure in words; `None` if the coin was reached.
     pub const fn cause(self) -> Option<&'static str> {
         match self {
             Outcome::Coin => None,
@@ -43,8 +43,8 @@ impl Outcome {
     }
 }
 
-/// How the episode ends after step number `step` (from 1), if it does. `saws` may be any subset
-/// that contains those within a tile of the player.
+/// Returns the end of the episode after step number `step` (from 1), if it ends. `saws` may be any subset that contains
+/// those within a tile of the player.
 #[inline]
 pub fn touch<'a>(
     player: &Body,
@@ -70,7 +70,7 @@ pub fn touch<'a>(
     }
 }
 
-/// Whether the player's rectangle, a little shrunk, covers a coin tile and a lava tile.
+/// Returns whether the player's rectangle, a little shrunk, covers a coin tile and a lava tile.
 #[inline]
 fn touched_tiles(player: &Body, tiles: &TileGrid) -> (bool, bool) {
     let (rx, ry) = (player.rx + OVERLAP_MARGIN, player.ry + OVERLAP_MARGIN);

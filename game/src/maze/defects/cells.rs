@@ -1,18 +1,20 @@
-//! Walls that are there to the rules only, and walls that are not.
+//! Defects of walls: invisible ones, and ones without effect.
 
 use crate::{
     defect_variant::place,
     maze::{Cell, Maze},
 };
 
-/// The maze with one more wall, on the shortest way from one cell to another; `None` if the way has no cell between.
+/// Returns the maze with one more wall, on the shortest path from one cell to another; `None` if the path has no cell
+/// between.
 pub(super) fn walled_on_the_way(maze: &Maze, start: Cell, goal: Cell, variant: u32) -> Option<Maze> {
     let path = maze.shortest_path_between(start, goal)?;
     let last = path.len().checked_sub(2).filter(|&last| last > 0)?;
     redrawn(maze, path[on_the_way(variant, path.len()).clamp(1, last)], '#')
 }
 
-/// The maze without one of its walls: one between two free cells, the first from the variant's place on along the way.
+/// Returns the maze without one of its walls: one between two free cells, the first from the variant's place on along
+/// the path.
 pub(super) fn wall_gone_beside_the_way(maze: &Maze, start: Cell, goal: Cell, variant: u32) -> Option<Maze> {
     let path = maze.shortest_path_between(start, goal)?;
     let from = on_the_way(variant, path.len()).min(path.len() - 1);
@@ -21,12 +23,12 @@ pub(super) fn wall_gone_beside_the_way(maze: &Maze, start: Cell, goal: Cell, var
     redrawn(maze, wall, 'O')
 }
 
-/// A quarter, a half or three quarters of the way.
+/// Returns a quarter, a half or three quarters of the path.
 fn on_the_way(variant: u32, length: usize) -> usize {
     length * (place(variant) + 1) / 4
 }
 
-/// The walls that share a side with a free cell.
+/// Returns the walls that share a side with a free cell.
 fn walls_beside(maze: &Maze, cell: Cell) -> impl Iterator<Item = Cell> {
     // A free cell is never at the border.
     let Cell { row, col } = cell;
@@ -34,7 +36,7 @@ fn walls_beside(maze: &Maze, cell: Cell) -> impl Iterator<Item = Cell> {
     beside.map(|cell| (!maze.is_free(cell)).then_some(cell)).into_iter().flatten()
 }
 
-/// Whether a wall parts two free cells.
+/// Returns true if a wall parts two free cells.
 fn is_between(maze: &Maze, wall: Cell) -> bool {
     let Cell { row, col } = wall;
     let inside = row > 0 && col > 0 && row + 1 < maze.rows() && col + 1 < maze.columns();
@@ -42,7 +44,7 @@ fn is_between(maze: &Maze, wall: Cell) -> bool {
     inside && (free(row - 1, col) && free(row + 1, col) || free(row, col - 1) && free(row, col + 1))
 }
 
-/// The maze with another letter in a cell; `None` if it is the start or the goal of the map.
+/// Returns the maze with another letter in a cell; `None` if it is the start or the goal of the map.
 pub(super) fn redrawn(maze: &Maze, cell: Cell, letter: char) -> Option<Maze> {
     let mut rows: Vec<Vec<char>> = maze.to_rows().iter().map(|row| row.chars().collect()).collect();
     *rows.get_mut(cell.row)?.get_mut(cell.col)? = letter;

@@ -1,4 +1,4 @@
-//! Defects of levels that are mazes: walls on every way to the goal.
+//! Defects of levels that are mazes: walls on every path to the goal.
 
 use playbot_lab::defect::DefectKind;
 use playbot_learner::rng::{ChaCha8Rng, shuffle};
@@ -8,7 +8,7 @@ use serde_json::Value;
 use super::cells::redrawn;
 use crate::maze::{Cell, Maze, proof::prove};
 
-/// What of a level's text is its maze.
+/// The maze within a level's text.
 #[derive(Deserialize)]
 struct Drawn {
     rows: Vec<String>,
@@ -18,10 +18,10 @@ struct Drawn {
     goal: Option<Cell>,
 }
 
-/// Puts walls into a maze so that no way leads to its goal; `None` if it has no place for that.
+/// Puts walls into a maze until no path leads to its goal; `None` if it has no suitable position.
 type Close = fn(&Maze, &mut ChaCha8Rng) -> Option<Maze>;
 
-/// The defects of levels of a game that reads them so: `reads` says whether a text is a level.
+/// Returns the defects of levels of a game with such texts; `reads` tells whether a text is a level.
 pub(crate) fn of_levels(reads: fn(&str) -> bool) -> Vec<DefectKind> {
     let kind = |class, about, close: Close| {
         DefectKind::level(class, about, move |text: &str, rng: &mut ChaCha8Rng| {
@@ -31,7 +31,7 @@ pub(crate) fn of_levels(reads: fn(&str) -> bool) -> Vec<DefectKind> {
     vec![
         kind("sealed-goal", "walls on all sides of the goal", |maze, _| sealed(maze, maze.goal())),
         kind("sealed-start", "walls on all sides of the start", |maze, _| sealed(maze, maze.start())),
-        kind("walled-way", "a wall across the only way to the goal", walled_way),
+        kind("walled-way", "a wall across the only path to the goal", walled_way),
     ]
 }
 
@@ -39,18 +39,18 @@ fn closed(text: &str, rng: &mut ChaCha8Rng, close: Close) -> Option<String> {
     let Drawn { rows, start, goal } = serde_json::from_str(text).ok()?;
     let maze = Maze::parse_drawn(&rows, start, goal).ok()?;
     let closed = close(&maze, rng)?;
-    // Only what is proved by a search over all cells is broken for certain.
+    // Only a proof by a search over all cells makes a level broken for certain.
     prove(&closed, closed.start(), closed.goal()).why_unsolvable()?;
     let mut level: Value = serde_json::from_str(text).ok()?;
     let fields = level.as_object_mut()?;
     fields.insert("rows".to_owned(), serde_json::json!(closed.to_rows()));
-    // There is none any more.
+    // There is no path any more.
     fields.remove("shortest_path_length");
     Some(level.to_string())
 }
 
-/// Walls in all eight cells around one, so that nobody slips through at a corner either. The cell itself stays free; so do
-/// start and goal, and where they touch there is no place.
+/// Puts walls in all eight cells around one, so that nothing slips through at a corner either. The cell itself stays
+/// free. So do start and goal; `None` where they touch it.
 fn sealed(maze: &Maze, cell: Cell) -> Option<Maze> {
     let around =
         (cell.row - 1..=cell.row + 1).flat_map(|row| (cell.col - 1..=cell.col + 1).map(move |col| Cell { row, col }));
@@ -61,7 +61,7 @@ fn sealed(maze: &Maze, cell: Cell) -> Option<Maze> {
     free.into_iter().try_fold(maze.clone(), |maze, near| redrawn(&maze, near, '#'))
 }
 
-/// A wall on the shortest way, in a cell which every way leads through.
+/// Puts a wall on the shortest path, in a cell on every path.
 fn walled_way(maze: &Maze, rng: &mut ChaCha8Rng) -> Option<Maze> {
     let path = maze.shortest_path();
     let mut between = path.get(1..path.len().checked_sub(1)?)?.to_vec();

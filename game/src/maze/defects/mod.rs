@@ -1,4 +1,4 @@
-//! What defects of the games in mazes have in common: see [`bugs`](playbot_lab::bugs).
+//! Shared defects of the games in mazes: see [`bugs`](playbot_lab::bugs).
 
 mod cells;
 mod levels;

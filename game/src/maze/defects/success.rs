@@ -1,9 +1,9 @@
-//! Taking back what a game has said of an episode.
+//! Reversal of a reached goal.
 
 use bevy::reflect::{GetPath, enums::DynamicEnum};
 use playbot_lab::prelude::*;
 
-/// Lets an episode go on whose aim was reached in this tick. A game cannot say that; only reflection sees what it has said.
+/// Lets an episode go on whose goal was reached in this tick. No game can do that; reflection can.
 pub(crate) fn take_back(episode: &mut Episode) {
     if let Ok(reached) = episode.path_mut::<bool>("reached") {
         *reached = false;
@@ -12,7 +12,7 @@ pub(crate) fn take_back(episode: &mut Episode) {
         return;
     }
     if let Ok(state) = episode.reflect_path_mut("state") {
-        // If episodes are made of something else one day, the test below says so.
+        // If the fields of episodes change, the test below fails.
         let _ = state.try_apply(&DynamicEnum::new("Running", ()));
     }
 }

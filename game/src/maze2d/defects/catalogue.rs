@@ -5,7 +5,7 @@ use playbot_lab::defect::DefectKind;
 use super::{goal, motion, walls};
 use crate::{maze::defects::of_levels, maze2d::level_text};
 
-/// The defects of the game, those of levels first.
+/// Returns the defects of the game, those of levels first.
 pub(in crate::maze2d) fn defects() -> Vec<DefectKind> {
     let levels = of_levels(|text| level_text::parse(text).is_ok());
     [levels, goal::defects(), walls::defects(), motion::defects()].concat()
@@ -26,7 +26,7 @@ mod tests {
 
     const MODE: &str = "random";
 
-    /// The state of an episode of the game's bot after each tick, and whether it had reached the goal.
+    /// Returns the state of an episode of the game's bot after each tick, and whether it had reached the goal.
     fn trace(level: u64, plant: Option<(&ChangeRules, u32)>) -> Vec<(Vec<u64>, bool)> {
         let mut app = test_app();
         Maze2d::default().build(&mut app, MODE);
@@ -73,7 +73,7 @@ mod tests {
             assert!(*variants >= 3, "{}", kind.class);
             for variant in 0..*variants {
                 let differs = |level: usize| trace(level as u64, Some((&**plant, variant))) != sound[level];
-                // The bot keeps away from walls, also from those that are not there.
+                // The bot keeps away from walls, also from missing ones.
                 assert!(kind.class == "missing-collider" || (0..sound.len()).any(differs), "{} {variant}", kind.class);
             }
         }

@@ -1,4 +1,4 @@
-//! Goals that are not noticed, and goals that are noticed from afar.
+//! Defects of the goal: unnoticed, or reached from afar.
 
 use bevy::prelude::*;
 use playbot_lab::{defect::DefectKind, prelude::*};
@@ -12,14 +12,14 @@ use crate::{
     },
 };
 
-/// Within this distance of the goal's middle it is noticed, m: never, and hardly. It should be 0.5.
+/// Distance from the goal's middle within which it is noticed, m: never, and hardly. It should be 0.5.
 const NEAR: [f64; 3] = [-1.0, 0.02, 0.1];
-/// From this distance on the goal counts as reached, m, also through walls.
+/// Distance at which the goal counts as reached, m, also through walls.
 const FAR: [f64; 3] = [1.2, 2.0, 3.5];
 
 pub(super) fn defects() -> Vec<DefectKind> {
     vec![
-        DefectKind::rules("goal-does-not-end", "who is at the goal has not reached it", 3, |app, variant| {
+        DefectKind::rules("goal-does-not-end", "a player at the goal has not reached it", 3, |app, variant| {
             let near = NEAR[variant as usize % NEAR.len()];
             look_at_goal(app, move |episode, away, _| {
                 if away > near {
@@ -46,7 +46,8 @@ pub(super) fn defects() -> Vec<DefectKind> {
     ]
 }
 
-/// Looks at each episode after the rules have: how far the ball is from the goal, m, and whether the goal ends it.
+/// Calls `look` on each episode after the rules, with the distance from the ball to the goal, m, and whether the goal
+/// ends it.
 fn look_at_goal(app: &mut App, look: impl Fn(&mut Episode, f64, bool) + Send + Sync + 'static) {
     app.add_systems(
         FixedUpdate,

@@ -1,4 +1,4 @@
-//! Balls that move otherwise than they are pushed.
+//! Defects of the ball's motion.
 
 use bevy::prelude::*;
 use playbot_lab::{defect::DefectKind, prelude::*};
@@ -14,7 +14,7 @@ use crate::{
 
 /// Share of the push that is lost.
 const LOST: [f64; 2] = [0.5, 0.8];
-/// Acceleration along the columns that nobody asks for, m/s in each tick. A full push makes 0.24.
+/// Added acceleration along the columns, m/s in each tick. A full push makes 0.24.
 const WIND: [f64; 2] = [0.03, 0.1];
 /// Factor on the speed in each tick.
 const GROWTH: [f64; 2] = [1.03, 1.1];
@@ -42,7 +42,7 @@ pub(super) fn defects() -> Vec<DefectKind> {
     ]
 }
 
-/// Changes the ball of each agent that plays and is far enough from its start, after each tick.
+/// Changes the ball of each playing agent that is far enough from its start, after each tick.
 fn after_each_tick(app: &mut App, variant: u32, change: impl Fn(&mut Ball, Vec2d) + Send + Sync + 'static) {
     let begins = BEGINS[place(variant)];
     app.add_systems(

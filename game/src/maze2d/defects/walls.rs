@@ -1,4 +1,4 @@
-//! Walls that the rules know and pictures do not, and the other way round.
+//! Defects of walls in which the rules and the pictures differ.
 
 use std::sync::Arc;
 

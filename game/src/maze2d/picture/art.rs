@@ -7,12 +7,7 @@ use bevy::{
     image::{CompressedImageFormats, ImageSampler, ImageType},
     prelude::*,
 };
-
-macro_rules! drawing {
-    ($name:literal) => {
-        include_bytes!(concat!("../../../assets/maze2d/", $name, ".png"))
-    };
-}
+use playbot_assets::maze2d;
 
 /// Numbers of the tiles on their strip.
 pub(super) const WALL: u16 = 0;
@@ -20,7 +15,7 @@ pub(super) const FLOOR: u16 = 1;
 
 /// Decoded once for all Worlds: tiles, ball, goal.
 static IMAGES: LazyLock<[Image; 3]> =
-    LazyLock::new(|| [decode(drawing!("tiles")), decode(drawing!("ball")), decode(drawing!("goal"))]);
+    LazyLock::new(|| [decode(maze2d::TILES), decode(maze2d::BALL), decode(maze2d::GOAL)]);
 
 fn decode(png: &[u8]) -> Image {
     let kind = ImageType::Extension("png");
@@ -39,7 +34,7 @@ pub(super) struct Art {
 }
 
 impl Art {
-    /// Brings the drawings into an app.
+    /// Adds the drawings to an app.
     pub fn add_to(images: &mut Assets<Image>) -> Self {
         let [tiles, ball, goal] = IMAGES.each_ref().map(|image| images.add(image.clone()));
         Self { tiles, ball, goal }

@@ -1,4 +1,4 @@
-//! Gives arenas what is drawn, and moves it with the game.
+//! Drawings of arenas, and their motion.
 
 use bevy::prelude::*;
 use bevy_playbot::vision::{PaintedVelocity, Stage, TileLayer};
@@ -20,14 +20,14 @@ use crate::{
 /// Layers above the tiles.
 const GOAL: f32 = 1.0;
 const BALL: f32 = 2.0;
-/// Diameters of goal and ball in small mazes and in large ones, cells; and what they aim at in between, world units.
+/// Diameters of goal and ball in small mazes and in large ones, cells, and the target diameter in between, world units.
 const GOAL_SIZES: ([f32; 2], f32) = ([0.8, 1.2], 1.1);
 const BALL_SIZES: ([f32; 2], f32) = ([0.55, 0.9], 0.75);
 
 /// From one arena to the next: further than an agent sees.
 const SPACING: f32 = 4.0 * VIEW;
 
-/// The picture of an arena: the tiles, which the figures lie on.
+/// The picture of an arena: the tiles, below the figures.
 #[derive(Component, Reflect)]
 #[reflect(Component)]
 pub(super) struct Board {
@@ -36,8 +36,8 @@ pub(super) struct Board {
     ball: Entity,
 }
 
-/// Makes the arenas of new agents into stages. The agent itself, which is what sensors follow, stands in the middle of
-/// the picture.
+/// Makes the arenas of new agents into stages. The agent itself, which sensors follow, stands in the middle of the
+/// picture.
 pub(super) fn players(
     new: Query<(Entity, &PlaysIn), (With<MazeBall>, Without<PaintedVelocity>)>,
     art: Res<Art>,
@@ -87,20 +87,20 @@ pub(super) fn levels(
     }
 }
 
-/// A figure that can be seen, whatever the scale of the tiles.
+/// Places a figure that stays visible at any scale of the tiles.
 fn figure_at(place: Vec3, ([least, most], wanted): ([f32; 2], f32), scale: f32) -> Transform {
     let size = (wanted / scale).clamp(least, most);
     Transform::from_translation(place).with_scale(Vec3::new(size, size, 1.0))
 }
 
-/// Tile numbers of all cells, bottom row first: the last row of the maze.
+/// Returns the tile numbers of all cells, bottom row first: the last row of the maze.
 fn cells(maze: &Maze) -> Vec<u16> {
     let rows = (0..maze.rows()).rev();
     let all = rows.flat_map(|row| (0..maze.columns()).map(move |column| Cell::new(row, column)));
     all.map(|cell| if maze.is_free(cell) { FLOOR } else { WALL }).collect()
 }
 
-/// A place on the tiles: columns go to the right and rows down, and the walls stand where they are.
+/// Returns a position on the tiles: columns go to the right and rows down, and the walls are at their actual positions.
 fn on_board(level: &Maze2dLevel, place: Vec2d) -> Vec2 {
     let [down, right] = place.map(|along| (along + level.walls.offset() + 0.5) as f32);
     Vec2::new(right, level.maze.rows() as f32 - down)

@@ -1,6 +1,6 @@
-//! What Maze2D looks like: the whole maze from above, first row at the top, the ball in it and the goal.
+//! The look of Maze2D: the whole maze from above, first row at the top, the ball in it and the goal.
 //!
-//! A maze of any size fills the picture. The ball is drawn larger than it is, so that it can be seen on 64 pixels.
+//! A maze of any size fills the picture. The ball is drawn larger than it is, to be visible on 64 pixels.
 
 mod art;
 mod board;

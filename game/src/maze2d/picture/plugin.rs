@@ -7,8 +7,8 @@ use playbot_lab::prelude::*;
 use super::{art::Art, board};
 use crate::arena_grid::ArenaGrid;
 
-/// Adds sprites and tiles to [`Maze2dPlugin`](crate::maze2d::Maze2dPlugin). Add it after the plugins that bring images, such as
-/// Bevy's own or a sensor's.
+/// Adds sprites and tiles to [`Maze2dPlugin`](crate::maze2d::Maze2dPlugin). Add it after the plugins that bring images,
+/// such as Bevy's own or a sensor's.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Maze2dPicturePlugin;
 

@@ -1,4 +1,4 @@
-//! Defects that the benchmark of testers plants into the game. Whoever plays or tests it needs none of them.
+//! Defects that the benchmark of testers plants into the game. Playing and testing it needs none of them.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use playbot_lab::{defect::DefectKind, foreign::ForeignGame};
 
 use super::{Game, GameState};
 
-/// Rows that nobody gets past. The game is played on 14, from the middle on.
+/// Rows that block the player. The game is played on 14, from the middle on.
 const WALL: [usize; 3] = [7, 8, 10];
 /// Steps from which a cake is eaten.
 const FAR: [usize; 3] = [1, 2, 4];
@@ -16,14 +16,14 @@ const COUNTED: [u32; 3] = [0, 1, 3];
 /// Milliseconds between two steps; 300 in the game.
 const PAUSE: [u64; 3] = [500, 800, 2000];
 
-/// The game with the defects that it can have.
+/// Adds the possible defects to the game.
 pub fn add_to(game: ForeignGame) -> ForeignGame {
     kinds().into_iter().fold(game, ForeignGame::defect)
 }
 
 fn kinds() -> [DefectKind; 4] {
     [
-        DefectKind::rules("invisible-wall", "nobody gets past where nothing is", 3, |app, variant| {
+        DefectKind::rules("invisible-wall", "an empty cell blocks players", 3, |app, variant| {
             let wall = WALL[variant as usize % WALL.len()];
             let stop = move |mut game: ResMut<Game>, mut transforms: Query<&mut Transform>| {
                 if game.player.i <= wall {
@@ -39,7 +39,7 @@ fn kinds() -> [DefectKind; 4] {
         }),
         DefectKind::rules("goal-far-away", "cakes are eaten from afar", 3, |app, variant| {
             let far = FAR[variant as usize % FAR.len()];
-            // The game's own rule eats what is here.
+            // The game's own rule eats a cake here.
             add(app, move |mut game: ResMut<Game>| {
                 let away = game.player.i.abs_diff(game.bonus.i) + game.player.j.abs_diff(game.bonus.j);
                 if game.bonus.entity.is_some() && (1..=far).contains(&away) {
@@ -78,7 +78,7 @@ mod tests {
     use super::*;
     use crate::{game, refresh};
 
-    /// The game with a bot that goes for the cake.
+    /// Returns the game with a bot that walks to the cake.
     fn played() -> Arc<ForeignGame> {
         let played = ForeignGame::new("alien_cake_addict", 1, game)
             .hz(20.0)
@@ -94,11 +94,11 @@ mod tests {
         Arc::new(played)
     }
 
-    /// What a replay compares, and what was paid, after each tick of the bot.
+    /// Returns the values that a replay compares, and the rewards, after each tick of the bot.
     fn trace(played: &dyn PlayedGame, level: u64) -> Vec<(u64, f32)> {
         let (mut world, agents) = build_world(played, "default", 0, 0, 1);
         world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::list([level])));
-        played.attach_demonstrator(&mut world, agents[0], 0.0);
+        played.tools().bots.attach_demonstrator(&mut world, agents[0], 0.0);
         let mut ticks = Vec::new();
         for _ in 0..600 {
             world.tick().expect("sound");

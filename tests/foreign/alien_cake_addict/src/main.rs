@@ -1,6 +1,6 @@
 //! Bevy's example `alien_cake_addict`, as it is in the `bevy` package, with every verb of playbot.
 //!
-//! A level is where the cakes appear. An episode ends when the game is over, or after a minute.
+//! A level is the sequence of the cakes' positions. An episode ends when the game is over, or after a minute.
 
 include!(concat!(env!("OUT_DIR"), "/game.rs"));
 
@@ -34,7 +34,7 @@ fn main() -> ExitCode {
         })])
 }
 
-/// What the game's own setup leaves as it is: the timer, an old cake, and where the camera looks.
+/// Resets state that the game's own setup leaves: the timer, an old cake, and the camera's target.
 fn refresh(level: Res<LevelSeed>, mut rng: ResMut<Random>, mut timer: ResMut<BonusSpawnTimer>, mut game: ResMut<Game>) {
     rng.0 = ChaCha8Rng::seed_from_u64(level.0);
     (game.bonus.i, game.bonus.j, game.bonus.entity, game.camera_is_focus) = (0, 0, None, RESET_FOCUS.into());

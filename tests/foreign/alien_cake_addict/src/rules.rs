@@ -1,4 +1,4 @@
-//! What the game promises of its cakes, as a detector of its own. Whoever plays it needs none of it.
+//! Detector of the game's rules for its cakes. Playing needs none of it.
 
 use bevy::math::UVec2;
 use playbot_lab::{
@@ -8,7 +8,7 @@ use playbot_lab::{
 
 use crate::defects;
 
-/// The game with the detector, and with the defects that it can have.
+/// Adds the detector and the possible defects to the game.
 pub fn add_to(game: ForeignGame) -> ForeignGame {
     defects::add_to(game).detector(|| {
         EachTick::new("cake-rules", "a cake is eaten by nobody who walked onto it, or not by who did", |moment| {
@@ -19,7 +19,7 @@ pub fn add_to(game: ForeignGame) -> ForeignGame {
 
 fn broken_rule(moment: &Moment<'_>) -> Option<String> {
     let at = moment.place?.as_uvec2();
-    // What was seen before the tick, in tens: see the adapter.
+    // The observation before the tick, in tens: see the adapter.
     let &[i, j, cake_i, cake_j, cakes] = moment.observation else { return None };
     let field = |i: f32, j: f32| UVec2::new((10.0 * i).round() as u32, (10.0 * j).round() as u32);
     let has_walked = field(i, j) != at;
@@ -38,8 +38,8 @@ mod tests {
 
     use super::*;
 
-    /// What is said of a player who was seen at the first place and is at the second one, with a cake at the third, and has
-    /// eaten so many.
+    /// Returns the message about a player observed at the first position and now at the second one, with a cake at the
+    /// third, and so many cakes eaten.
     fn said(before: [f32; 2], now: [f32; 2], cake: Option<[f32; 2]>, reward: f32) -> Option<String> {
         let (world, action) = (World::new(), ActionValue::Discrete(0));
         let ([i, j], [cake_i, cake_j]) = (before, cake.unwrap_or([0.0; 2]));

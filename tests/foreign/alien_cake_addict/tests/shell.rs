@@ -1,4 +1,4 @@
-//! The verbs of the command line, as users call them.
+//! Tests of the verbs through the command line.
 
 use playbot_shell::GameProgram;
 

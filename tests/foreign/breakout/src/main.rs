@@ -1,6 +1,6 @@
 //! Bevy's example `breakout`, as it is in the `bevy` package, with every verb of playbot.
 //!
-//! The example knows one level. Here a level is the direction in which the ball sets off.
+//! The example has one level. Here a level is the first direction of the ball.
 
 include!(concat!(env!("OUT_DIR"), "/game.rs"));
 
@@ -31,7 +31,7 @@ fn see(ball: Single<(&Transform, &Velocity)>, paddle: Single<&Transform, With<Pa
     [ball.0.translation.x, ball.0.translation.y, ball.1.x, ball.1.y, paddle.translation.x].map(|it| it / RIGHT_WALL)
 }
 
-/// The ball's first direction, and the score, which the game's own setup leaves as it is.
+/// Resets the ball's first direction, and the score, which the game's own setup leaves.
 fn aim(level: Res<LevelSeed>, mut speed: Single<&mut Velocity>, mut score: ResMut<Score>) {
     let slope = (level.0 as f64 * 0.618_034).fract() as f32 * 1.6 - 0.8;
     (***speed, **score) = (Vec2::new(slope, -0.5).normalize() * BALL_SPEED, 0);

@@ -1,21 +1,20 @@
-//! Defects that the benchmark of testers plants into the game. Whoever plays or tests it needs none of them.
+//! Defects that the benchmark of testers plants into the game. Playing and testing it needs none of them.
 
 use bevy::prelude::*;
 use playbot_lab::{defect::DefectKind, foreign::ForeignGame};
 
 use crate::game::{Hero, Run, Screen};
 
-/// What is added to the vertical speed in the air in each tick, units per second, and from which column on. Gravity makes
-/// -0.7.
+/// Addition to the vertical speed in the air in each tick, units per second, and its first column. Gravity makes -0.7.
 const LIFT: [(f32, f32); 3] = [(0.25, 0.0), (0.45, 20.0), (-0.6, 40.0)];
-/// Factor on the speed of a hop, and from which column on.
+/// Factor on the speed of a hop, and its first column.
 const HOP: [(f32, f32); 3] = [(0.5, 0.0), (0.7, 20.0), (1.4, 40.0)];
 /// A speed that only a hop has in its first tick.
 const HOPS: f32 = 13.9;
-/// Columns that nobody gets past.
+/// Columns that block the player.
 const WALL: [f32; 3] = [12.5, 30.5, 50.5];
 
-/// The game with the defects that it can have.
+/// Adds the possible defects to the game.
 pub fn add_to(game: ForeignGame) -> ForeignGame {
     kinds().into_iter().fold(game, ForeignGame::defect)
 }
@@ -42,7 +41,7 @@ fn kinds() -> [DefectKind; 4] {
             };
             app.add_systems(FixedPostUpdate, change.run_if(in_state(Screen::Playing)));
         }),
-        DefectKind::rules("invisible-wall", "nobody gets past where nothing is", 3, |app, variant| {
+        DefectKind::rules("invisible-wall", "an empty cell blocks players", 3, |app, variant| {
             let wall = WALL[variant as usize % WALL.len()];
             let stop = move |mut at: Single<&mut Transform, With<Hero>>| {
                 if at.translation.x > wall {
@@ -81,7 +80,7 @@ mod tests {
     use super::*;
     use crate::game::{self, Level, Map};
 
-    /// The game with a bot that runs and hops where the ground ahead is another.
+    /// Returns the game with a bot that runs and hops where the ground ahead is another.
     fn game() -> Arc<ForeignGame> {
         let game = ForeignGame::new("gem_hop", 1, game::game)
             .keys([vec![], vec![KeyCode::ArrowRight], vec![KeyCode::ArrowRight, KeyCode::Space]])
@@ -95,18 +94,18 @@ mod tests {
             .ready(in_state(Screen::Playing))
             .demonstrator("runner", |hero: Single<(&Transform, &Hero)>, map: Res<Map>| {
                 let at = hero.0.translation;
-                // Whom no goal stops runs past the end.
+                // A player that no goal stops runs past the end.
                 let next = map.columns[((at.x + 0.8) as usize).min(map.columns.len() - 1)];
                 1 + u32::from(next.spikes || f32::from(next.ground) != at.y.floor() || hero.1.velocity.y > 0.0)
             });
         Arc::new(game)
     }
 
-    /// What a replay compares, after each tick of the bot.
+    /// Returns the values that a replay compares, after each tick of the bot.
     fn trace(game: &dyn Game, level: u64) -> Vec<u64> {
         let (mut world, agents) = build_world(game, "default", 0, 0, 1);
         world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::list([level])));
-        game.attach_demonstrator(&mut world, agents[0], 0.0);
+        game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.0);
         let mut hashes = Vec::new();
         for _ in 0..900 {
             world.tick().expect("sound");

@@ -1,6 +1,6 @@
 //! Gem Hop: run to the flag, hop over pits and spikes, and take the gems on the way.
 //!
-//! Every level is drawn from its number. Arrow keys or A and D run, Space hops (a longer press hops higher), R plays
+//! Every level is drawn from its number. Arrow keys or A and D run, Space hops (a longer press hops higher). R plays
 //! again, or the next level after a flag. One unit is one tile.
 
 use bevy::{camera::ScalingMode, prelude::*};
@@ -40,11 +40,11 @@ enum Move {
     Again,
 }
 
-/// The level that is played, or loaded next.
+/// The present level, or the next one to load.
 #[derive(Resource, Default)]
 pub struct Level(pub u64);
 
-/// One column of the level: the height of its ground, 0 for a pit, and what is on it.
+/// One column of the level: the height of its ground, 0 for a pit, and the object on it.
 #[derive(Clone, Copy, Default)]
 pub struct Column {
     pub ground: u8,
@@ -71,7 +71,7 @@ pub struct Hero {
     pub coyote: f32,
 }
 
-/// What the hero can touch.
+/// An object that the hero can touch.
 #[derive(Component, Clone, Copy)]
 enum Thing {
     Gem(usize),
@@ -176,7 +176,7 @@ fn spawn_column(commands: &mut Commands, index: usize, column: Column) {
     }
 }
 
-/// One body without seams between columns of one height, over which the hero would trip.
+/// Spawns one body without seams between columns of one height, over which the hero would trip.
 fn spawn_ground(commands: &mut Commands, columns: &[Column]) {
     let mut right = 0.0;
     let runs = columns.chunk_by(|a, b| a.ground == b.ground).map(|run| {
@@ -265,7 +265,7 @@ fn touch(
     }
 }
 
-/// Who falls into a pit, or is too slow, has lost.
+/// Ends the run of a hero that falls into a pit or is too slow.
 fn watch_limits(time: Res<Time>, at: Single<&Transform, With<Hero>>, mut run: ResMut<Run>, mut commands: Commands) {
     run.time -= time.delta_secs();
     if at.translation.y < -1.0 || run.time < 0.0 {
@@ -288,7 +288,7 @@ fn banner(mut commands: Commands, screen: Screen, text: &str) {
     commands.spawn((DespawnOnExit(screen), Text::new(text), Node { margin: UiRect::all(auto()), ..default() }));
 }
 
-/// The next level after the flag; the same one after an accident, or when asked.
+/// Loads the next level after the flag, and the same one after an accident or on a key.
 fn again(input: Single<&ActionState<Move>>, on: Res<State<Screen>>, mut level: ResMut<Level>, mut commands: Commands) {
     if input.just_pressed(&Move::Again) {
         level.0 += u64::from(*on.get() == Screen::Won);

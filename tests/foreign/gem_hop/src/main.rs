@@ -1,4 +1,4 @@
-//! Gem Hop, a small platformer that knows nothing of playbot, with every verb of it.
+//! Gem Hop, a small platformer without any code for playbot, with every verb of it.
 
 mod defects;
 mod game;
@@ -33,7 +33,7 @@ fn main() -> ExitCode {
         })])
 }
 
-/// The hero's place and motion, and the ground, spikes and gems of the next eight columns.
+/// Returns the hero's position and motion, and the ground, spikes and gems of the next eight columns.
 fn see(hero: Single<(&Transform, &Hero)>, map: Res<Map>) -> Vec<f32> {
     let (at, hero) = (hero.0.translation, hero.1);
     let ahead = map.columns.iter().skip(at.x as usize).take(8);

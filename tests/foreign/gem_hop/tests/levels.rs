@@ -1,4 +1,4 @@
-//! What a game's own tests assert of its levels.
+//! Tests of levels, as a game's own tests write them.
 
 #[path = "../src/game.rs"]
 #[allow(dead_code, reason = "what the adapter reads")]
@@ -12,7 +12,7 @@ use playbot_lab::{
     verdict::LevelOutcome,
 };
 
-/// The game with a bot that runs and hops, as in `src/main.rs`, and with less to see.
+/// Returns the game with a bot that runs and hops, as in `src/main.rs`, and with smaller observations.
 fn gem_hop() -> ForeignGame {
     let (right, hop) = (KeyCode::ArrowRight, KeyCode::Space);
     ForeignGame::new("gem_hop", 1, game)
@@ -40,7 +40,7 @@ fn the_runner_solves_most_levels() {
     let verdicts = LevelTest::new(&gem_hop(), "default:0..7").verdicts().expect("levels");
     let solved: Vec<_> = verdicts.iter().filter(|level| level.outcome == LevelOutcome::Solved).collect();
     assert!(solved.len() >= 5, "{verdicts:?}");
-    // Whoever knows which levels must stay solvable names them: here the first of them.
+    // A test can name the levels that must stay solvable: here the first of them.
     assert_levels_solvable(&gem_hop(), &solved[0].level);
 }
 

@@ -1,4 +1,4 @@
-//! The game itself, without any bot: its levels can be finished by hand.
+//! Tests of the game itself, without any bot: its levels can be finished by hand.
 
 #[path = "../src/game.rs"]
 #[allow(dead_code, reason = "what the adapter reads")]
@@ -15,7 +15,7 @@ use bevy::{
 };
 use game::{Hero, Level, Map, Run, Screen, game};
 
-/// The game without a window, at 60 frames a second.
+/// Returns the game without a window, at 60 frames a second.
 fn app(level: u64) -> App {
     let mut app = App::new();
     let render = WgpuSettings { backends: None, ..default() };
@@ -33,7 +33,7 @@ fn app(level: u64) -> App {
     app
 }
 
-/// A player who runs, and hops where the ground ahead is another.
+/// Plays as a person who runs, and hops where the ground ahead is another.
 fn hop_along(mut keys: ResMut<ButtonInput<KeyCode>>, hero: Option<Single<(&Transform, &Hero)>>, map: Res<Map>) {
     let Some(hero) = hero else { return };
     let next = map.columns[(hero.0.translation.x + 0.8) as usize];
@@ -45,7 +45,7 @@ fn hop_along(mut keys: ResMut<ButtonInput<KeyCode>>, hero: Option<Single<(&Trans
     }
 }
 
-/// Plays a level to its end: how it ended, after how many frames, with how many gems.
+/// Plays a level to its end; returns the end, the number of frames and the number of gems.
 fn play(level: u64) -> (Screen, u32, u32) {
     let mut app = app(level);
     for frame in 0..2000 {

@@ -1,4 +1,4 @@
-//! Where cargo keeps the sources of the `bevy` package.
+//! Location of the sources of the `bevy` package in cargo's folders.
 
 use std::{
     env,
@@ -8,9 +8,9 @@ use std::{
 
 use serde_json::Value;
 
-/// The folder of the `bevy` package that this workspace is built with, as cargo tells it.
+/// Returns the folder of the `bevy` package of this workspace, from cargo.
 pub(crate) fn bevy_folder() -> Result<PathBuf, String> {
-    // Cargo lists what tests of the workspace need, too, which may not have been downloaded yet.
+    // Cargo also lists dependencies of the workspace's tests, which may not have been downloaded yet.
     let metadata = metadata(&["--offline"]).or_else(|_| metadata(&[]))?;
     let manifest = metadata["packages"]
         .as_array()
@@ -25,7 +25,7 @@ pub(crate) fn bevy_folder() -> Result<PathBuf, String> {
     folder.ok_or_else(|| format!("{manifest} lies in no folder"))
 }
 
-/// What cargo says of the workspace.
+/// Returns cargo's metadata of the workspace.
 fn metadata(options: &[&str]) -> Result<Value, String> {
     let cargo = env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
     let mut command = Command::new(cargo);
@@ -34,7 +34,7 @@ fn metadata(options: &[&str]) -> Result<Value, String> {
     if let Ok(target) = env::var("TARGET") {
         command.args(["--filter-platform", &target]);
     }
-    // It asks the compiler, which reads what it is given there.
+    // Cargo asks the compiler, which reads its standard input.
     let output =
         command.stdin(Stdio::null()).output().map_err(|error| format!("cannot run cargo metadata: {error}"))?;
     if !output.status.success() {

@@ -1,12 +1,12 @@
-//! From an example with a `main` to a file that another `main` can include.
+//! Rewriting of an example with a `main` into a file that another `main` can include.
 
-/// Turns `main` into `pub fn game(app: &mut App)`: without `DefaultPlugins`, which belong to whoever makes the app, and
+/// Turns `main` into `pub fn game(app: &mut App)`: without `DefaultPlugins`, which belong to the maker of the app, and
 /// without `run`. Comments on the whole file become ordinary ones, since `include!` takes no inner ones. The text of
 /// `stand_ins` is put below, and its plugin function of that name is added first, if it has one.
 ///
 /// # Errors
 ///
-/// The example does not look as expected: something to be changed is missing, or is there twice.
+/// The example does not look as expected: a part to be changed is missing, or is there twice.
 pub fn rewrite(example: &str, stand_ins: Option<&str>) -> Result<String, String> {
     let mut text: String = example.lines().map(|line| line.replacen("//!", "//", 1) + "\n").collect();
     let has_plugin = stand_ins.is_some_and(|text| text.contains("fn stand_ins("));

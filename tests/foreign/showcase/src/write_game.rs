@@ -1,4 +1,4 @@
-//! From the example to a file that a game includes.
+//! Writing of an example into a file that a game includes.
 
 use std::{
     fs,
@@ -9,10 +9,10 @@ use super::{find, rewrite};
 
 /// Writes `OUT_DIR/game.rs` from `examples/showcase/NAME.rs`, and the modules `parts` of the example beside it.
 ///
-/// In place of something that the example uses and cannot have, such as a part of Bevy that is not built, `stand_ins` is
-/// put below it: items of the same names and, if they have to be registered, a plugin function `stand_ins`.
+/// `stand_ins` replaces parts of Bevy that the example uses and that are not built. It is put below the example: items
+/// of the same names and, if they have to be registered, a plugin function `stand_ins`.
 ///
-/// Call it as the last expression of a build script's `main`: what goes wrong becomes the build's error.
+/// Call it as the last expression of a build script's `main`: an error becomes the build's error.
 pub fn write_game(name: &str, parts: &[&str], stand_ins: Option<&str>) {
     if let Err(error) = try_write(name, parts, stand_ins) {
         say(&format!("cargo::error=the example `{name}` of the bevy package: {error}"));

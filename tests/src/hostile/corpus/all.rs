@@ -17,8 +17,8 @@ const MAKERS: [(&str, Maker); 6] = [
     ("drawn", drawn),
 ];
 
-/// All kinds of files that the program reads back, each with a whole one. They are made here, in a moment, and are always the
-/// same but for times.
+/// Returns all kinds of files that the program reads back, each with a whole one. They are made here, quickly, and are
+/// always the same but for times.
 pub fn all_kinds() -> Vec<FileKind> {
     let folder = tempfile::tempdir().expect("a folder");
     let made = MAKERS.iter().flat_map(|(name, make)| {

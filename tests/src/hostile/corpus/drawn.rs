@@ -1,4 +1,4 @@
-//! What people write by hand: experiments and level files.
+//! Files written by hand: experiments and level files.
 
 use std::{fs, path::Path};
 
@@ -22,7 +22,7 @@ use crate::{
 const LEVEL: &str = "level.json";
 const EXPERIMENT: &str = "experiment.ron";
 
-/// All kinds of files that people write.
+/// Returns all kinds of files that people write.
 pub(super) fn drawn(folder: &Path) -> Vec<FileKind> {
     let kind = |name: &'static str, file: &str, text: String, read: fn(&Path) -> Read| {
         let own = folder.join(name.replace(' ', "-"));
@@ -30,9 +30,9 @@ pub(super) fn drawn(folder: &Path) -> Vec<FileKind> {
         fs::write(own.join(file), text).expect("writable");
         FileKind::new(name, Form::Text, &own, file, read)
     };
-    let request = LevelRequest { mode: None, map: None, file: None, seed: Some(7), picture: false };
+    let request = LevelRequest { mode: None, map: None, file: None, level: Some(7), picture: false };
     let hard = LevelRequest { mode: Some("hard"), ..request };
-    let medium = LevelRequest { map: Some("medium"), seed: None, ..request };
+    let medium = LevelRequest { map: Some("medium"), level: None, ..request };
     let level = |game: &dyn Game, request: &LevelRequest| game.show_level(request).expect("a level").json;
     let experiment = small::experiment(Algorithm::ScorePpo).to_ron().expect("Unicode");
     vec![
@@ -50,7 +50,7 @@ fn read_level(game: &dyn Game, folder: &Path) -> Read {
     Ok(vec![format!("{:?}", designs.hash(0))])
 }
 
-/// What is checked before anything is run.
+/// Makes the checks before any work.
 fn check_experiment(folder: &Path) -> Read {
     let experiment = read_experiment(&folder.join(EXPERIMENT)).map_err(words)?;
     experiment.check().map_err(words)?;

@@ -1,4 +1,4 @@
-//! What is learned: skill models, checkpoints and policies.
+//! Learned files: skill models, checkpoints and policies.
 
 use std::{fs, path::Path};
 
@@ -20,11 +20,11 @@ use crate::{
     training::train,
 };
 
-/// What every kind of file here is called.
+/// The name of every file here.
 const FILE: &str = "learned";
 const DEVICE: DeviceKind = DeviceKind::Flex;
 
-/// All kinds of files that are learned.
+/// Returns all kinds of learned files.
 pub(super) fn learned(folder: &Path) -> Vec<FileKind> {
     let kind = |name: &'static str, save: &dyn Fn(&Path), read: fn(&Path) -> Read| {
         let own = folder.join(name.replace(' ', "-"));
@@ -61,7 +61,7 @@ fn save_policy(path: &Path) {
     file.save(path, &[0.5; 4][..], &z, 2).expect("written");
 }
 
-/// What was read, as it would be written again.
+/// Returns the contents, as they would be written again.
 fn again(folder: &Path, save: impl FnOnce(&Path) -> Result<(), FileError>) -> Read {
     let path = folder.join("again");
     save(&path).map_err(words)?;
@@ -83,7 +83,8 @@ fn learner(folder: &Path, algorithm: Algorithm) -> Read {
     again(folder, |path| learner.save(path))
 }
 
-/// A policy cannot be written again without the rows by which it was checked: what it does in a state stands for it.
+/// Returns the contents. A policy cannot be written again without the rows by which it was checked: its action in a
+/// state stands for it.
 fn policy(folder: &Path) -> Read {
     let file = PolicyFile::load(&folder.join(FILE), DEVICE).map_err(words)?;
     let output = file.policy.forward(&vec![0.1; file.policy.latent()], &vec![0.3; file.policy.obs_dim()], 1);
@@ -92,7 +93,7 @@ fn policy(folder: &Path) -> Read {
 
 fn handle_policy(folder: &Path) {
     if let Ok(file) = PolicyFile::load(&folder.join(FILE), DEVICE) {
-        // Whether it fits is not asked here.
+        // Its fit is not tested here.
         let _ = check_policy(&Corridor.card(), &file);
     }
 }

@@ -1,4 +1,4 @@
-//! A whole file of each kind, and how it is read.
+//! A whole file of each kind, and its reader.
 
 mod all;
 mod drawn;

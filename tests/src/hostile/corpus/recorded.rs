@@ -1,4 +1,4 @@
-//! What is recorded: episodes, and findings with the way to them.
+//! Recorded files: episodes, and findings with the actions to them.
 
 use std::{fs, path::Path};
 
@@ -21,10 +21,10 @@ use crate::{
 };
 
 const FILE: &str = "a.demo";
-/// Ticks of an episode that nobody has played.
+/// Ticks of a made-up episode.
 const TICKS: u8 = 9;
 
-/// All kinds of recordings.
+/// Returns all kinds of recordings.
 pub(super) fn recorded(folder: &Path) -> Vec<FileKind> {
     let own = |name: &str| {
         let own = folder.join(name);
@@ -45,7 +45,7 @@ pub(super) fn recorded(folder: &Path) -> Vec<FileKind> {
     ]
 }
 
-/// A recording with all that a recording can have: vectors, observations, all who decide, and level files.
+/// Writes a recording with all possible parts: vectors, observations, all deciders, and level files.
 fn walk(path: &Path) {
     let header = DemoHeader {
         observation_names: vec!["x".into(), "y".into()],
@@ -106,7 +106,7 @@ fn read_finding(folder: &Path) -> Read {
     StoredFinding::read(&folder.join(FILE)).map(|finding| vec![format!("{finding:?}")]).map_err(words)
 }
 
-/// What is sound is kept, summed up and gone on with.
+/// Summarises, repairs and continues the whole parts.
 fn handle(folder: &Path) {
     let (path, mended) = (folder.join(FILE), folder.join("mended.demo"));
     let _ = DemoSummary::read(&path);

@@ -13,10 +13,8 @@ use playbot_lab::{
         },
     },
     report::{StudyResult, TestResult, TrainingResult},
-    train::{
-        Algorithm,
-        sealed_file::{read_sealed, write_sealed},
-    },
+    sealed_file::{read_sealed, write_sealed},
+    train::Algorithm,
     verdict::Earlier,
 };
 
@@ -29,7 +27,7 @@ const SCORE: &str = "score.json";
 const COMMAND: &str = "playbot bugs score set --out score.json";
 const RESULT: &str = "result.json";
 
-/// All kinds of files of scores and studies.
+/// Returns all kinds of files of scores and studies.
 pub(super) fn scored(folder: &Path) -> Vec<FileKind> {
     let own = |name: &str| {
         let own = folder.join(name);
@@ -60,7 +58,7 @@ fn subjects() -> Vec<Subject> {
         .to_vec()
 }
 
-/// What came of setting two testers on each, in the order of their names.
+/// Returns the results of two testers on each, in the order of their names.
 fn results() -> Vec<JobResult> {
     let result = |subject: &Subject, tester: &str| JobResult {
         subject: subject.id.clone(),
@@ -110,7 +108,7 @@ fn read_score(folder: &Path) -> Read {
 
 fn handle_score(folder: &Path) {
     if let Ok(score) = Score::read(&folder.join(SCORE)) {
-        // Whether it can be joined with itself alone is all the same.
+        // A join with itself alone may fail.
         let _ = ScoreTable::join(&[(SCORE.into(), score)]).map(|table| format!("{table:?}"));
     }
 }
@@ -157,7 +155,7 @@ fn read_bugs(folder: &Path) -> Read {
 
 fn handle_bugs(folder: &Path) {
     if let Ok(set) = BugSet::read(folder) {
-        // Its level is none.
+        // Its level is no level.
         let _ = set.check(folder, &CoinRun::default());
         let played: BTreeMap<String, u64> = set.mutants.iter().map(|bug| bug.played(folder)).collect();
         drop(played);

@@ -22,13 +22,13 @@ use crate::hostile::{
 
 /// Levels that were tested.
 const LEVELS: u64 = 4;
-/// The folder that is damaged, and one that is not.
+/// The damaged folder, and a whole one.
 const TEST: &str = "test";
 const BEFORE: &str = "before";
 const SHARDS: [&str; 2] = ["zero", "one"];
 const GAME: CoinRun = CoinRun { physics: false };
 
-/// All kinds of files of a test.
+/// Returns all kinds of files of a test.
 pub(super) fn tested(folder: &Path) -> Vec<FileKind> {
     let (whole, sharded) = (folder.join("whole"), folder.join("sharded"));
     for name in [TEST, BEFORE] {
@@ -85,7 +85,7 @@ fn score(solved: u64, episodes: u64) -> Score {
     }
 }
 
-/// A verdict with all that one can have.
+/// Returns a verdict with all possible parts.
 fn verdict(index: u64) -> LevelVerdict {
     let solved = index % 3;
     let places = Some(Places { visited: 3, open: 4 });
@@ -138,7 +138,7 @@ fn read_results(folder: &Path) -> Read {
     Ok(parts)
 }
 
-/// Goes on with the test, of which every level may be finished, and says what its results are then.
+/// Resumes the test, of which every level may be finished, and returns its results.
 fn go_on(folder: &Path) -> Read {
     let folder = folder.join(TEST);
     let (mut opened, told) = TestFolder::open(&folder, &record(None), Earlier::Resume).map_err(words)?;
@@ -164,6 +164,6 @@ fn handle(folder: &Path) {
     let comparison = compared.iter().find_map(|compared| compared.as_ref().ok());
     let _ = Overview::read(&test);
     let _ = write_reports(&test, comparison, "playbot");
-    // Without an error it is the page, which nobody looks at here.
+    // Without an error it is the page, which is not checked here.
     let _ = html(&test, &HtmlReport { game: Some(&GAME), comparison, program: "playbot" });
 }

@@ -1,4 +1,4 @@
-//! The folder of a training.
+//! The folder of a run.
 
 use std::{fs, path::Path};
 
@@ -21,7 +21,7 @@ use crate::{
 
 const RUN: &str = "run";
 
-/// All kinds of files of a run but its learner's, which is a kind of its own.
+/// Returns all kinds of files of a run but its learner's, which is a kind of its own.
 pub(super) fn trained(folder: &Path) -> Vec<FileKind> {
     let mut trainer = small::trainer(Algorithm::Ppo);
     let experiment = trainer.experiment().clone();
@@ -69,7 +69,7 @@ fn read_curves(folder: &Path) -> Read {
     }
 }
 
-/// Goes on with the run for an update, and says what comes of it.
+/// Resumes the run for an update, and returns the result.
 fn go_on(folder: &Path) -> Read {
     let run = folder.join(RUN);
     let opened = RunDir::open_to_write(&run).map_err(words)?;

@@ -1,4 +1,4 @@
-//! Actions and places that cannot be.
+//! Tests of impossible actions and positions.
 
 use bevy::prelude::*;
 use playbot_lab::prelude::*;

@@ -12,7 +12,7 @@ pub fn level(mode: &str, seed: u64) -> AntMazeLevel {
     generate(&mode.parse().expect("a mode"), seed).expect("a level")
 }
 
-/// One agent in one level, and nobody at the controls.
+/// Returns a World with one agent in one level, without a decider.
 pub fn world_with(mode: &str, seed: u64) -> (World, Entity) {
     let (mut world, agents) = build_world(&AntMaze, mode, 0, 0, 1);
     let still = Action(ActionValue::Continuous(vec![0.0; 8]));
@@ -29,7 +29,7 @@ pub fn place(world: &World, agent: Entity) -> [f32; 2] {
     [state.qpos[0], state.qpos[1]]
 }
 
-/// Puts the ant somewhere else, as it was at the start of its level.
+/// Puts the ant elsewhere, as it was at the start of its level.
 pub fn put(world: &mut World, agent: Entity, place: [f32; 3]) {
     let mut state = world.get::<InMaze>(agent).expect("plays").0.reset;
     state.qpos[..3].copy_from_slice(&place);

@@ -1,4 +1,4 @@
-//! It is the same every time.
+//! Tests of determinism.
 
 use bevy::prelude::*;
 use bevy_playbot::{demo::file::DemoReader, test_app::PlaybotTestExt};
@@ -8,7 +8,7 @@ use playbot_tests::recording::record_random;
 
 use super::arena::{act, world_with};
 
-/// State hashes of each agent's whole episodes, agent by agent.
+/// Returns the state hashes of each agent's whole episodes, agent by agent.
 fn traces(worlds: &mut [(World, Vec<Entity>)], threads: usize, ticks: u32) -> Vec<Vec<u64>> {
     let played = on_threads(worlds, threads, |(world, agents)| {
         let mut traces = vec![Vec::new(); agents.len()];
@@ -78,10 +78,10 @@ fn a_recording_replays_to_the_bit() {
 fn systems_are_in_no_ambiguous_order() {
     let mut app = bevy_playbot::test_app::test_app();
     AntMaze.build(&mut app, "umaze+limit=10");
-    AntMaze.build_picture(&mut app);
+    AntMaze.tools().pictures.build_picture(&mut app);
     app.init_resource::<ButtonInput<KeyCode>>();
     let agent = AntMaze.spawn_agent(app.world_mut(), 0);
-    AntMaze.attach_demonstrator(app.world_mut(), agent, 0.2);
+    AntMaze.tools().bots.attach_demonstrator(app.world_mut(), agent, 0.2);
     app.world_mut().entity_mut(agent).insert(Control::Bot);
     app.play_episodes(2, 40).expect("sound");
 }

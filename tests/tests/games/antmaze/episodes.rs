@@ -1,4 +1,4 @@
-//! What is seen and paid, and what ends an episode.
+//! Tests of observations, rewards and ends of episodes.
 
 use playbot_games::antmaze::{AntMaze, components::MazeAnt, geometry::distance};
 use playbot_lab::prelude::*;
@@ -67,7 +67,7 @@ fn an_ant_within_half_a_metre_of_the_goal_has_won() {
     }
 }
 
-/// Where every tick pays the more the nearer the goal is, going there must not end it.
+/// If every tick pays the more the nearer the goal is, reaching it must not end the episode.
 #[test]
 fn an_ant_that_is_paid_for_nearness_stays_at_the_goal() {
     let (mut world, agent) = world_with("medium+dense=exp+limit=20", 3);

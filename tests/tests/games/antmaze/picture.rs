@@ -1,4 +1,4 @@
-//! What agents see.
+//! Tests of the picture.
 
 use std::sync::Arc;
 

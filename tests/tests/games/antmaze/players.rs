@@ -1,4 +1,4 @@
-//! Demonstrator, person and policy.
+//! Tests of demonstrator, person and policy.
 
 use std::path::Path;
 
@@ -36,13 +36,13 @@ fn demonstrations_follow_the_noise_that_is_asked_for() {
     assert!(calm.iter().chain(&noisy).all(|torque| (-1.0..=1.0).contains(torque)));
 }
 
-/// An app with keys in which a person has an ant.
+/// Returns an app with keys in which a person has an ant.
 fn keyboard_with(game: &dyn Game, mode: &str) -> (App, Entity) {
     let mut app = headless_app();
     game.build(&mut app, mode);
     app.init_resource::<ButtonInput<KeyCode>>();
     let agent = game.spawn_agent(app.world_mut(), 0);
-    let keys = game.key_bindings().expect("has keys");
+    let keys = game.tools().input.key_bindings().expect("has keys");
     let still = Action(keys.action(|_| false));
     app.world_mut().entity_mut(agent).insert((Control::Human, still, keys, LevelQueue::Always(2)));
     (app, agent)

@@ -1,4 +1,4 @@
-//! Arenas that are drawn, and playing in them.
+//! Arenas with pictures, and playing in them.
 
 use bevy::{
     ecs::schedule::{LogLevel, ScheduleBuildSettings},
@@ -15,7 +15,7 @@ pub const JUMP: u32 = 5;
 
 pub const LEFT: u32 = 1;
 
-/// Drawn arenas, whose observing systems must not be in an ambiguous order.
+/// Returns arenas with pictures, whose observing systems must not be in an ambiguous order.
 pub fn drawn(mode: &str, agents: u32) -> (App, Vec<Entity>) {
     let mut app = headless_app();
     app.edit_schedule(ObserveSchedule, |schedule| {
@@ -23,7 +23,7 @@ pub fn drawn(mode: &str, agents: u32) -> (App, Vec<Entity>) {
     });
     let game = CoinRun::default();
     game.build(&mut app, mode);
-    game.build_picture(&mut app);
+    game.tools().pictures.build_picture(&mut app);
     let agents = (0..agents).map(|index| game.spawn_agent(app.world_mut(), index)).collect();
     (app, agents)
 }
@@ -39,7 +39,7 @@ pub fn press(world: &mut World, agent: Entity, action: u32, ticks: u32) {
     }
 }
 
-/// Brings the picture up to date with the state after the last tick.
+/// Updates the picture to the state after the last tick.
 pub fn update_picture(world: &mut World) {
     world.run_schedule(ObserveSchedule);
 }

@@ -1,4 +1,4 @@
-//! Arenas as a whole.
+//! Tests of arenas as a whole.
 
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::{

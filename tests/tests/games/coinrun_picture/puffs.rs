@@ -1,4 +1,4 @@
-//! Puffs behind enemies.
+//! Tests of puffs behind enemies.
 
 use bevy::prelude::*;
 use playbot_games::coinrun::{
@@ -9,7 +9,7 @@ use playbot_lab::prelude::*;
 
 use super::arena::{NOTHING, drawn, play, press, sprite, update_picture};
 
-/// The sprites behind the only enemy, each with depth, left and right end, lower and upper end; and the enemy.
+/// Returns the sprites behind the only enemy, each with depth, left and right end, lower and upper end; and the enemy.
 fn puffs(world: &mut World) -> (Vec<[f32; 5]>, Body) {
     let mut enemies = world.query_filtered::<(&ArenaBody, &Transform, Option<&Children>), With<Enemy>>();
     let (body, at, children) = enemies.single(world).expect("one enemy");
@@ -29,7 +29,7 @@ fn hover(world: &mut World, agent: Entity, away: f32) {
     world.get_mut::<PlayerBody>(agent).expect("a player").0 = Body { x, y: 50.0, ..Body::player() };
 }
 
-/// Ends of what is seen of puffs that were left at these places, the newest first.
+/// Returns the ends of the visible puffs that were left at these positions, the newest first.
 fn ends(path: &[f32]) -> [f32; 2] {
     let half = |age: usize| 0.3 * (0..age).fold(1.0f32, |growth, _| growth * 1.05);
     let puffs = || path.iter().take(8).enumerate();
@@ -68,7 +68,7 @@ fn enemies_leave_puffs_where_they_were() {
     let turns = path.windows(3).filter(|last| (last[0] - last[1]) * (last[1] - last[2]) < 0.0).count();
     assert!(turns >= 2, "it walks to and fro: {turns}");
     assert!(rows.iter().filter(|&&rows| rows == 1).count() > 20 && rows.iter().all(|&rows| (1..=4).contains(&rows)));
-    // Far away there are none, and all at once when one comes near again.
+    // Far away there are none, and all at once when an enemy comes near again.
     for (away, near) in [(30.0, false), (-8.0, true)] {
         hover(world, agent, away);
         update_picture(world);

@@ -1,4 +1,4 @@
-//! Sprites are where the game says.
+//! Tests of sprites, which follow the game's positions.
 
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::{PaintedVelocity, Stage, TileLayer};

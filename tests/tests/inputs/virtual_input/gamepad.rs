@@ -1,4 +1,4 @@
-//! Gamepads.
+//! Tests of gamepads.
 
 use bevy::{
     input::gamepad::{
@@ -47,7 +47,7 @@ fn an_agent_plays_on_a_gamepad_of_its_own() {
     }
 }
 
-/// What a game hears of gamepads in each fixed tick.
+/// The game's gamepad events in each fixed tick.
 #[derive(Resource, Default)]
 struct Heard(Vec<Vec<String>>);
 
@@ -71,12 +71,12 @@ fn hear(
     heard.0.push(tick);
 }
 
-/// A stick, and a button that is pressed.
+/// Returns a stick, and a button that is pressed.
 fn pushed(stick: f32, button: f32) -> ActionValue {
     ActionValue::Continuous(vec![stick, button])
 }
 
-/// An app in fixed ticks whose agent has plugged its gamepad in, and pushes what it will push first.
+/// Returns an app in fixed ticks whose agent has plugged its gamepad in, and pushes `first`.
 fn hearing(first: ActionValue) -> (App, Entity) {
     let input = VirtualInput::axes([
         ActionAxis::stick(GamepadAxis::LeftStickX),

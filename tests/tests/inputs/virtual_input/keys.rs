@@ -1,4 +1,4 @@
-//! Keys.
+//! Tests of keys.
 
 use bevy::{
     input::keyboard::{Key, KeyboardInput},
@@ -11,7 +11,7 @@ use bevy_playbot::{
 
 use super::scripted::{InFrames, STEP, Script, actions, app_with, frames, frames_of, left, ticks};
 
-/// What every run of a fixed tick must see of the script nothing, left, left, nothing, nothing, left.
+/// Views of a fixed tick on the script nothing, left, left, nothing, nothing, left.
 const SEEN: [&str; 6] = ["", "Pd", "P", "u", "", "Pd"];
 
 fn script() -> Vec<ActionValue> {

@@ -1,4 +1,4 @@
-//! The mouse.
+//! Tests of the mouse.
 
 use bevy::{
     input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseMotion},
@@ -69,7 +69,7 @@ fn a_motion_by_messages_lasts_one_frame() {
     assert_eq!(app.world().resource::<Motions>().frames, [Vec2::new(10.0, 0.0), Vec2::ZERO]);
 }
 
-/// What is wrong when agent 4 has this input, too.
+/// Returns the error when agent 4 has this input, too.
 fn second(input: VirtualInput, other: VirtualInput, script: Vec<ActionValue>) -> String {
     let action = Action(script[0].clone());
     let (mut app, _) = app_with(InputRoute::Direct, input, script);

@@ -1,4 +1,4 @@
-//! An app whose agent plays a script of actions, and a game that notes what it reads.
+//! An app whose agent plays a script of actions, and a game that notes its input.
 
 use std::time::Duration;
 
@@ -27,7 +27,7 @@ fn follow(mut script: ResMut<Script>, mut agents: Query<(&Control, &Episode, &mu
     }
 }
 
-/// What a game reads of the key in one run of its system: `P`ressed, `d`own just now, `u`p just now.
+/// Describes the game's view of the key in one run of its system: `P`ressed, `d`own just now, `u`p just now.
 fn read(keys: &ButtonInput<KeyCode>) -> String {
     let mut text = String::new();
     let key = KeyCode::ArrowLeft;

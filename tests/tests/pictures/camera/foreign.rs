@@ -1,4 +1,4 @@
-//! A foreign game through its own camera.
+//! Tests of a foreign game's own camera.
 
 use bevy::{camera::ScalingMode, prelude::*};
 use bevy_playbot::vision::{Frame, ImageOptions, ObservationConfig, ObservationKind};
@@ -8,7 +8,7 @@ use playbot_tests::{
     scene::pixel,
 };
 
-/// The game of catching, with a white paddle of two units and a camera that sees 16 by 16 units around its place.
+/// The game of catching, with a white paddle of two units and a camera that sees 16 by 16 units around its position.
 fn drawn(app: &mut App) {
     game(app);
     app.add_systems(PostStartup, dress);

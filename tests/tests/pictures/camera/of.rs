@@ -1,4 +1,4 @@
-//! Sensors that look through a camera of the game.
+//! Tests of sensors that look through a camera of the game.
 
 use bevy::{
     camera::{ImageRenderTarget, RenderTarget, ScalingMode},
@@ -13,7 +13,7 @@ fn agent(world: &mut World, index: u32, camera: Entity, size: [u32; 2]) -> Entit
     world.spawn((player(index), CameraSensor::of(camera, options))).id()
 }
 
-/// Red left of the middle, green right of it, 4 units wide each, between -2 and 2 in height.
+/// Spawns red left of the middle, green right of it, 4 units wide each, between -2 and 2 in height.
 fn spawn_flag(world: &mut World) {
     let flag = world.resource_mut::<Assets<Image>>().add(image(2, &[[200, 0, 0, 255], [0, 200, 0, 255]]));
     world.spawn((Sprite { image: flag, custom_size: Some(Vec2::new(8.0, 4.0)), ..default() }, Transform::default()));

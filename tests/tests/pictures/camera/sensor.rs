@@ -1,4 +1,4 @@
-//! A camera sensor shows known sprites and tiles at known pixels, in every size.
+//! Tests of camera sensors: known sprites and tiles at known pixels, in every size.
 
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::TileLayer;
@@ -19,7 +19,7 @@ fn add(world: &mut World, width: u32, pixels: &[[u8; 4]]) -> Handle<Image> {
     world.resource_mut::<Assets<Image>>().add(image(width, pixels))
 }
 
-/// A World with `sprites`, and what an agent sees that looks at its middle: 4 by 4 units, a pixel each.
+/// Returns the view of an agent in a World with `sprites` that looks at its middle: 4 by 4 units, a pixel each.
 fn see(sprites: impl FnOnce(&mut World)) -> Vec<[u8; 3]> {
     let mut world = camera_world(|_| {});
     sprites(&mut world);
@@ -29,13 +29,13 @@ fn see(sprites: impl FnOnce(&mut World)) -> Vec<[u8; 3]> {
     (0..16).map(|i| pixel(&world, agent, i % 4, i / 4)).collect()
 }
 
-/// A quad of four colours, two units wide, in the middle.
+/// Returns a quad of four colours, two units wide, in the middle.
 fn quad(world: &mut World) -> Sprite {
     let image = add(world, 2, &[RED, GREEN, BLUE, GREY]);
     Sprite { image, custom_size: Some(Vec2::splat(2.0)), ..default() }
 }
 
-/// The four pixels in the middle.
+/// Returns the four pixels in the middle.
 fn middle(seen: &[[u8; 3]]) -> [[u8; 3]; 4] {
     [seen[5], seen[6], seen[9], seen[10]]
 }

@@ -1,4 +1,4 @@
-//! The frame of a tick shows that tick, for thousands of ticks, and one that does not is reported.
+//! Tests that the frame of a tick shows that tick, for thousands of ticks, and that any other frame is reported.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -9,14 +9,14 @@ use bevy_playbot::{
 use playbot_lab::prelude::*;
 use playbot_tests::scene::{camera_world, draw, image, pixel, player, spawn_eye};
 
-/// The one that walks, and where it stood when agents looked.
+/// The walking entity, and its position at the observation.
 #[derive(Resource)]
 struct Walk {
     walker: Entity,
     seen_at: Vec2,
 }
 
-/// A map of 64×64 texels, each of a colour of its own, and somebody who walks over it.
+/// Returns a map of 64×64 texels, each of a colour of its own, and a walker on it.
 fn walking_world() -> (World, Entity) {
     let mut world = camera_world(|app| {
         app.add_systems(FixedUpdate, walk)
@@ -43,7 +43,7 @@ fn note(mut walk: ResMut<Walk>, places: Query<&Transform>) {
     }
 }
 
-/// The colour of the map where the walker stood.
+/// Returns the colour of the map at the walker's position.
 fn expected(world: &World) -> [u8; 3] {
     let place = world.resource::<Walk>().seen_at;
     [((place.x + 31.5) * 4.0) as u8, ((31.5 - place.y) * 4.0) as u8, 99]

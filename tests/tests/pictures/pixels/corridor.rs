@@ -5,11 +5,10 @@ use std::path::Path;
 use bevy_playbot::vision::ObservationConfig;
 use playbot_lab::{
     demo::dataset::Demonstrations,
-    pipeline::learn_skills,
     train::{Experiment, config_file::parse_experiment},
 };
 use playbot_learner::{DeviceKind, SkillModel};
-use playbot_tests::{Corridor, PaintedCorridor, recording::record_random};
+use playbot_tests::{Corridor, PaintedCorridor, recording::record_random, training::learn_skills};
 
 const EXPERIMENT: &str = r#"(
     game: "corridor", train: "plain:0..7", test: "plain:8..15", demos: "unused",
@@ -25,7 +24,7 @@ pub fn experiment() -> Experiment {
     parse_experiment(EXPERIMENT, Path::new("test.ron")).expect("valid")
 }
 
-/// Recordings of a random walker, on levels that are not held out, with one episode that is there twice.
+/// Records a random walker, on levels that are not held out, with one episode that is there twice.
 pub fn record(folder: &Path) {
     for (name, seed) in [("a.demo", 5), ("b.demo", 6), ("c.demo", 6)] {
         record_random(&Corridor, "plain", seed, &folder.join(name), 20..44);
@@ -37,10 +36,10 @@ pub fn demonstrations(folder: &Path, observation_config: &ObservationConfig) -> 
     Demonstrations::read(&PaintedCorridor, observation_config, folder, Some(&test)).expect("readable")
 }
 
-/// A skill model that has seen the recordings of `folder`.
+/// Learns a skill model from the recordings of `folder`.
 pub fn skills(folder: &Path) -> SkillModel {
     let experiment = Experiment { demos: Some(folder.to_owned()), ..experiment() };
-    let learned = learn_skills(&PaintedCorridor, &experiment, DeviceKind::Flex, 2).expect("learns");
+    let learned = learn_skills(&PaintedCorridor, &experiment, 2);
     let path = folder.join("skills.safetensors");
     learned.save(&path).expect("writable");
     SkillModel::load(&path, DeviceKind::Flex).expect("as written")

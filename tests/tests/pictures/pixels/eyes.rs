@@ -1,4 +1,4 @@
-//! Eyes that fit and eyes that do not.
+//! Tests of sensors that fit and of sensors that do not.
 
 use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind, VisionError};
 use playbot_lab::{
@@ -18,7 +18,7 @@ fn what_an_agent_sees_does_not_depend_on_who_is_beside_it() {
     let play = |first, count| {
         let mut collector =
             Collector::new(&PaintedCorridor, &levels, &observation_config, 1, first, count, None).expect("fits");
-        // The state after the first rollout is looked at twice.
+        // The state after the first rollout is observed twice.
         let parts = [19, 45].map(|steps| collector.collect(&policy, 0, steps).expect("sound").0);
         let rows = parts.map(|part| {
             let width = part.obs_kind.numbers();

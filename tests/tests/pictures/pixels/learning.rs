@@ -1,4 +1,4 @@
-//! Runs, their files and what they learn.
+//! Tests of runs, their files and their results.
 
 use bevy_playbot::policy_file::{PolicyMisfit, check_policy, policy_observation};
 use playbot_lab::{

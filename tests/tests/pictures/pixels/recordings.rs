@@ -1,4 +1,4 @@
-//! Recordings are replayed before eyes.
+//! Tests of recordings replayed with picture sensors.
 
 use playbot_tests::PaintedCorridor;
 

@@ -1,4 +1,4 @@
-//! An eye over the origin, and what it sees as text.
+//! A raster sensor over the origin, and its picture as text.
 
 use bevy::{
     ecs::schedule::{LogLevel, ScheduleBuildSettings},
@@ -20,7 +20,7 @@ pub const BLUE: [u8; 4] = [0, 0, 255, 255];
 
 pub const WHITE: [u8; 4] = [255; 4];
 
-/// Systems that observe must not be in an ambiguous order.
+/// Returns a World whose observing systems must not be in an ambiguous order.
 pub fn raster_world() -> World {
     let mut app = headless_app();
     app.edit_schedule(ObserveSchedule, |schedule| {
@@ -37,7 +37,7 @@ pub fn spawn_eye(world: &mut World, target: Entity, width: f32, size: [u32; 2]) 
     world.spawn((Agent::new(index, ActionSpace::Discrete(2)), Control::Human, sensor)).id()
 }
 
-/// A World with an eye over the origin that sees a unit in each pixel.
+/// Returns a World with a sensor over the origin that sees a unit in each pixel.
 pub fn looking(size: [u32; 2]) -> (World, Entity) {
     let mut world = raster_world();
     let target = world.spawn(Transform::default()).id();
@@ -49,12 +49,12 @@ pub fn add(world: &mut World, width: u32, texels: &[[u8; 4]]) -> Handle<Image> {
     world.resource_mut::<Assets<Image>>().add(image(width, texels))
 }
 
-/// A sprite with red and green above, blue and white below, one unit for each.
+/// Returns a sprite with red and green above, blue and white below, one unit for each.
 pub fn four(world: &mut World) -> Sprite {
     Sprite::from_image(add(world, 2, &[RED, GREEN, BLUE, WHITE]))
 }
 
-/// The picture as text: a letter for each pixel, `.` for black and `?` for what is none of the colours.
+/// Returns the picture as text: a letter for each pixel, `.` for black and `?` for other colours.
 pub fn text(world: &mut World, eye: Entity) -> String {
     world.tick().expect("sound");
     let options = world.get::<bevy_playbot::vision::ImageSensor>(eye).expect("a sensor").0;

@@ -1,4 +1,4 @@
-//! What cannot be drawn is named.
+//! Tests of errors about things that cannot be drawn.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -10,7 +10,7 @@ use playbot_tests::scene::image;
 
 use super::eye::{GREEN, RED, add, fault, four, looking};
 
-/// An image without a single texel.
+/// Returns an image without a single texel.
 fn empty(world: &mut World, [width, height]: [u32; 2]) -> Handle<Image> {
     let mut image = image(1, &[RED]);
     (image.texture_descriptor.size.width, image.texture_descriptor.size.height) = (width, height);

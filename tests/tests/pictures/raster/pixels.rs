@@ -1,4 +1,4 @@
-//! Colours, tiles and sizes.
+//! Tests of colours, tiles and sizes.
 
 use bevy::prelude::*;
 use bevy_playbot::vision::TileLayer;
@@ -49,7 +49,7 @@ fn tiles_fill_cells_and_the_outside() {
     assert_eq!(text(&mut world, eye), "WB.RRW/W.BGGW/WRR..W/WGG..W");
     world.get_mut::<TileLayer>(entity).expect("there").outside = TileLayer::EMPTY;
     world.get_mut::<Transform>(entity).expect("there").scale = Vec3::splat(1.0);
-    // One texel in four is seen: the one under the centre, which belongs to the right and to the bottom.
+    // One texel in four is visible: the one under the centre, which belongs to the right and to the bottom.
     assert_eq!(text(&mut world, eye), "....../....../.BG.../.G....");
     let mut place = world.get_mut::<Transform>(entity).expect("there");
     *place = Transform::from_xyz(2.0, 2.0, 0.0).with_scale(Vec3::splat(-2.0));

@@ -1,4 +1,4 @@
-//! Sprites lie where Bevy puts them.
+//! Tests of sprites' positions, which are Bevy's.
 
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::Frame;

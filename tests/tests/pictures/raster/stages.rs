@@ -1,4 +1,4 @@
-//! Whoever stands on a stage sees that stage.
+//! Tests of stages: an agent on a stage sees that stage.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -9,7 +9,7 @@ use playbot_lab::prelude::*;
 
 use super::eye::{BLUE, GREEN, RED, WHITE, four, frame, looking, raster_world, spawn_eye};
 
-/// A stage with a sprite, an agent and, on a stage of its own inside, something that nobody else sees.
+/// Spawns a stage with a sprite, an agent and, on a stage of its own inside, an entity that no other agent sees.
 fn spawn_stage(world: &mut World, index: u32, place: Transform, sprite: &Sprite) -> Entity {
     let stage = world.spawn((Stage, place)).id();
     let holder = world.spawn((Transform::from_xyz(10.0, 20.0, 0.0), ChildOf(stage))).id();
@@ -42,7 +42,7 @@ fn a_picture_does_not_depend_on_where_its_stage_stands() {
     for agent in &agents[1..] {
         assert_eq!(world.get::<Frame>(*agent).expect("an eye").pixels, first);
     }
-    // Whoever stands on no stage sees what stands on none.
+    // An agent on no stage sees entities on no stage.
     let target = world.spawn(Transform::default()).id();
     let outside = spawn_eye(&mut world, target, 10.0, [4, 4]);
     assert_eq!(frame(&mut world, outside), [WHITE; 16]);

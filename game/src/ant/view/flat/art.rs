@@ -1,4 +1,4 @@
-//! The drawings: a disc, and a strip of two tiles. They are made here, texel by texel.
+//! The drawings: a disc, and a strip of two tiles. They are made in code, texel by texel.
 
 use bevy::{image::ImageSampler, prelude::*};
 
@@ -24,20 +24,20 @@ pub struct Art {
 }
 
 impl Art {
-    /// Brings the drawings into an app.
+    /// Adds the drawings to an app.
     pub fn add_to(images: &mut Assets<Image>) -> Self {
         let tile = |x, y| if y < TILE { floor(x, y) } else { wall(x, y - TILE) };
         Self { disc: images.add(image(DISC, DISC, disc)), tiles: images.add(image(TILE, 2 * TILE, tile)) }
     }
 }
 
-/// The floor of one cell.
+/// Returns the floor of one cell.
 #[cfg(feature = "view3d")]
 pub fn floor_tile() -> Image {
     image(TILE, TILE, floor)
 }
 
-/// An image, texel by texel, top row first.
+/// Returns an image, texel by texel, top row first.
 fn image(width: u32, height: u32, texel: impl Fn(u32, u32) -> Texel) -> Image {
     // The type of an image's size has no name in a program without a renderer.
     let mut image = Image::default();
@@ -55,13 +55,13 @@ fn disc(x: u32, y: u32) -> Texel {
     if inside { [255; 4] } else { [255, 255, 255, 0] }
 }
 
-/// Light squares of one metre, so that motion can be seen.
+/// Draws light squares of one metre, which make motion visible.
 fn floor(x: u32, y: u32) -> Texel {
     let metre = TILE / 4;
     if (x / metre + y / metre).is_multiple_of(2) { [201, 207, 196, 255] } else { [186, 193, 181, 255] }
 }
 
-/// Dark, with a rim to the cell.
+/// Draws a dark tile, with a rim to the cell.
 fn wall(x: u32, y: u32) -> Texel {
     let rim = x.min(y).min(TILE - 1 - x).min(TILE - 1 - y) < 2;
     if rim { [66, 70, 84, 255] } else { [84, 88, 104, 255] }

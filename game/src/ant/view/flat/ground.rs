@@ -12,8 +12,8 @@ use crate::{
     arena_grid::ArenaGrid,
 };
 
-/// From the corner of one arena to the corner of the next, metres. Cameras see several arenas where mazes have more than
-/// 120 cells to the side; sensors that draw by themselves never do.
+/// Distance from the corner of one arena to the corner of the next, metres. Cameras see several arenas where mazes have
+/// more than 120 cells to the side; sensors that draw by themselves never do.
 const SPACING: f32 = 512.0;
 
 /// The tiles of an arena.
@@ -54,8 +54,8 @@ pub fn tiles(
     }
 }
 
-/// Keeps the origin of an open floor's tiles within half a cell of its ant: they are alike, so nobody sees them move, and
-/// a floor that is drawn as far as one can see from its origin has no edge.
+/// Keeps the origin of an open floor's tiles within half a cell of its ant. All tiles are alike, so the moves are
+/// invisible, and the floor has no visible edge.
 pub fn follow(
     ants: Query<(&AntPose, &OnGround)>,
     grounds: Query<(&Ground, &Tiling)>,

@@ -1,6 +1,6 @@
-//! How wide the picture is, and what lies in front of what.
+//! Width of the picture, and order of its layers.
 
-/// Metres from the left to the right edge of what an agent sees: four cells of a maze.
+/// Metres from the left to the right edge of an agent's picture: four cells of a maze.
 pub const VIEW: f32 = 16.0;
 
 /// Layers, the farthest first.

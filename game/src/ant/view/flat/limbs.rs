@@ -1,4 +1,4 @@
-//! Ants from above: a disc for the torso, a bar for each limb, and a disc where the ant should go.
+//! Ants from above: a disc for the torso, a bar for each limb, and a disc for the goal.
 
 use bevy::prelude::*;
 
@@ -14,13 +14,13 @@ use crate::ant::{
 /// Torso, seen from above and, of an ant that lies on its back, from below.
 const TORSO: Color = Color::srgb(0.66, 0.26, 0.20);
 const BELLY: Color = Color::srgb(0.95, 0.80, 0.55);
-/// Legs: the first is lighter than the others, so that one sees which way an ant is turned.
+/// Legs: the first is lighter than the others, so that the ant's heading shows.
 const FIRST_LEG: Color = Color::srgb(0.93, 0.55, 0.22);
 const LEG: Color = Color::srgb(0.45, 0.20, 0.17);
 pub const GOAL_COLOUR: Color = Color::srgb(0.20, 0.62, 0.32);
 /// Each leg has three limbs.
 const LIMBS_OF_A_LEG: usize = 3;
-/// What is a metre higher is drawn this much nearer.
+/// Factor by which a part grows per metre of height.
 const NEARER: f32 = 0.1;
 
 /// The sprites of an ant: limbs in the order of its parts, without the torso, which is the agent itself; then the goal.
@@ -31,7 +31,7 @@ pub struct Sprites {
     goal: Entity,
 }
 
-/// The colour of a limb, by its number among the parts of an ant.
+/// Returns the colour of a limb, by its number among the parts of an ant.
 pub fn colour(number: usize) -> Color {
     match number {
         0 => TORSO,
@@ -60,7 +60,7 @@ pub fn spawn(new: Query<(Entity, &OnGround, &AntPose), Without<Sprites>>, art: R
     }
 }
 
-/// Puts torso and limbs where they are.
+/// Moves torso and limbs to their poses.
 pub fn pose(
     mut ants: Query<(&AntPose, &Sprites, &mut Transform, &mut Sprite)>,
     mut limbs: Query<(&mut Transform, &mut Sprite), Without<Sprites>>,
@@ -84,7 +84,7 @@ fn place(part: &Part) -> Vec3 {
     part.centre.truncate().extend(LIMBS + NEARER * (part.centre.z + part.radius))
 }
 
-/// Puts the discs where the goals are.
+/// Moves the discs to the goals.
 pub fn goals(
     changed: Query<(&GoalMark, &Sprites), Or<(Changed<GoalMark>, Added<Sprites>)>>,
     mut discs: Query<(&mut Transform, &mut Sprite, &mut Visibility)>,

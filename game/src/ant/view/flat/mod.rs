@@ -1,4 +1,4 @@
-//! From above, with sprites.
+//! View from above, with sprites.
 
 mod art;
 mod ground;

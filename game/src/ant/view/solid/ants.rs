@@ -60,7 +60,7 @@ fn place(limb: &Part) -> Transform {
     Transform::from_translation(limb.centre).with_rotation(limb.rotation)
 }
 
-/// Marks new goals: a disc with a light above it that is seen over walls.
+/// Marks new goals: a disc with a light above it, visible over walls.
 pub fn goals(
     changed: Query<(&GoalMark, &SolidAnt), Or<(Changed<GoalMark>, Added<SolidAnt>)>>,
     mut meshes: ResMut<Assets<Mesh>>,
@@ -91,8 +91,8 @@ pub fn goals(
     }
 }
 
-/// Takes over new poses. It runs before and after every tick, so that an ant glides from one to the other, and one that was
-/// put elsewhere in between is there at once.
+/// Takes over new poses. It runs before and after every tick, so an ant glides from one to the other, but jumps when it
+/// was moved in between.
 pub fn note_poses(mut ants: Query<(&AntPose, &mut SolidAnt)>) {
     for (pose, mut ant) in &mut ants {
         ant.from = ant.to;

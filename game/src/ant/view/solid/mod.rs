@@ -1,4 +1,4 @@
-//! In space, with meshes, a sun and shadows: for people in a window.
+//! View in space, with meshes, a sun and shadows, for people in a window.
 
 mod ants;
 mod plugin;

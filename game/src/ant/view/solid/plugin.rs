@@ -7,8 +7,8 @@ use playbot_lab::prelude::*;
 use super::{ants, scenery};
 use crate::ant::view::AntViewSystems;
 
-/// Adds meshes to everything that [`AntViewPlugin`](crate::ant::view::AntViewPlugin) draws. x, y and z are those of the physics: z is
-/// up. The camera is the window's.
+/// Adds meshes to all entities that [`AntViewPlugin`](crate::ant::view::AntViewPlugin) draws. x, y and z are those of
+/// the physics: z is up. The camera is the window's.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SolidViewPlugin;
 

@@ -9,13 +9,13 @@ use bevy::{
 
 use crate::ant::view::{Ground, flat::floor_tile};
 
-/// Side of the floor of an arena without walls, and how far a floor goes on behind walls, metres.
+/// Side of the floor of an arena without walls, and extent of a floor behind walls, metres.
 const OPEN: f32 = 400.0;
 const MARGIN: f32 = 20.0;
 
 const WALLS: Color = Color::srgb(0.42, 0.45, 0.55);
 
-/// Materials that many things share.
+/// Shared materials.
 #[derive(Resource, Reflect)]
 #[reflect(Resource)]
 pub struct Paints {
@@ -23,12 +23,12 @@ pub struct Paints {
     floor: Handle<Image>,
 }
 
-/// What was built on a ground.
+/// Entities of a ground.
 #[derive(Component, Reflect)]
 #[reflect(Component)]
 pub struct Built(Vec<Entity>);
 
-/// One light, whose shadows are sharp around the camera.
+/// Adds one light, whose shadows are sharp around the camera.
 pub fn sun(mut commands: Commands) {
     let shadows = CascadeShadowConfigBuilder {
         num_cascades: 2,
@@ -55,7 +55,7 @@ pub fn paints(
     commands.insert_resource(Paints { wall: materials.add(matt(WALLS)), floor: images.add(floor) });
 }
 
-/// A material that does not shine.
+/// Returns a material that does not shine.
 pub fn matt(colour: Color) -> StandardMaterial {
     StandardMaterial { base_color: colour, perceptual_roughness: 0.9, reflectance: 0.1, ..default() }
 }
@@ -89,7 +89,7 @@ pub fn grounds(
     }
 }
 
-/// Middle and size of a floor: whole cells, so that its squares lie where the cells do.
+/// Returns the middle and size of a floor: whole cells, so its squares match the cells.
 fn extent(ground: &Ground) -> (Vec2, Vec2) {
     if ground.columns == 0 {
         return (Vec2::ZERO, Vec2::splat(OPEN));

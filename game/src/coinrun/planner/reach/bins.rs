@@ -1,11 +1,11 @@
-//! Sets of places along x.
+//! Sets of positions along x.
 
 use std::ops::{BitAnd, BitOr, BitOrAssign, Not};
 
 use crate::coinrun::tile::SIZE;
 
-/// Number of bins over the width of a level. A bin is a little wider than an eighth of a tile, the way that a player makes in
-/// one part of a step at most, and four bins are a little wider than that of a whole step: rounding never leads further.
+/// Number of bins over the width of a level. A bin is a little wider than an eighth of a tile, the longest displacement
+/// of one part of a step. Four bins are a little wider than that of a whole step: rounding never leads further.
 pub const BINS: usize = 508;
 /// Width of a bin, tiles.
 pub const WIDTH: f32 = SIZE as f32 / BINS as f32;
@@ -22,7 +22,7 @@ impl Bins {
     /// No bin.
     pub const NONE: Self = Self([0; WORDS]);
 
-    /// The bins for which a condition holds.
+    /// Returns the bins for which a condition holds.
     pub fn of(mut holds: impl FnMut(usize) -> bool) -> Self {
         let mut bins = Self::NONE;
         for bin in (0..BINS).filter(|&bin| holds(bin)) {
@@ -31,23 +31,23 @@ impl Bins {
         bins
     }
 
-    /// The bin of a place.
+    /// Returns the bin of a position.
     pub fn at(x: f32) -> Self {
         let place = ((x / WIDTH) as usize).min(BINS - 1);
         Self::of(|bin| bin == place)
     }
 
-    /// Where a bin begins and ends, tiles from the left.
+    /// Returns the ends of a bin, tiles from the left.
     pub fn ends(bin: usize) -> [f32; 2] {
         [bin as f32 * WIDTH, (bin + 1) as f32 * WIDTH]
     }
 
-    /// Whether no bin is in it.
+    /// Returns true if no bin is in it.
     pub fn is_empty(&self) -> bool {
         *self == Self::NONE
     }
 
-    /// How far the nearest bin is from that of a place, in bins; none is far away.
+    /// Returns the distance from the nearest bin to that of a position, in bins; an empty set is far away.
     pub fn distance(&self, x: f32) -> usize {
         let is_in = |bin: usize| self.0[bin / 64] >> (bin % 64) & 1 == 1;
         let there = ((x / WIDTH) as usize).min(BINS - 1);
@@ -58,7 +58,7 @@ impl Bins {
         near.unwrap_or(BINS)
     }
 
-    /// These and those at most so many bins away.
+    /// Returns these bins and those at most so many bins away.
     #[must_use]
     pub fn spread(mut self, by: usize) -> Self {
         for _ in 0..by {

@@ -1,4 +1,4 @@
-//! The search: from state to state until there is nothing new.
+//! The search: from state to state until there is no new one.
 
 use std::{
     cmp::Ordering,
@@ -17,11 +17,11 @@ use crate::coinrun::{rules::corners, sim::Sim};
 /// The search gives up after so many steps; levels need some thousands.
 const MOST_STEPS: usize = 100_000;
 
-/// Whether no sequence of actions whatever leads from the state of `sim` to the coin.
+/// Returns true if no sequence of actions leads from the state of `sim` to the coin.
 ///
-/// `true` is a proof, `false` says nothing. The search follows heights and vertical speeds exactly until walls stop a step
-/// half-way, and places along x by an eighth of a tile, within which everything counts as possible; the player may turn at
-/// full speed. It knows walls, crates, lava and saws, and neither enemies nor the time.
+/// `true` is a proof, `false` proves nothing. The search follows heights and vertical speeds exactly until walls stop a
+/// step half-way. Positions along x have bins of an eighth of a tile, within which everything counts as possible. The
+/// player may turn at full speed. The search includes walls, crates, lava and saws, and neither enemies nor the time.
 pub fn coin_is_unreachable(sim: &Sim) -> bool {
     let (level, player, memory) = (sim.level(), sim.player(), sim.player_state());
     let mut ground = Ground::new(level);
@@ -58,11 +58,11 @@ pub fn coin_is_unreachable(sim: &Sim) -> bool {
     false
 }
 
-/// A state to go on from. Whoever is nearest to the coin goes first: where there is a way, it is found soon.
+/// A state to go on from. The one nearest to the coin goes first: if there is a path, it is found soon.
 struct Open {
     state: State,
     places: Bins,
-    /// From the coin along x, in bins.
+    /// Distance from the coin along x, in bins.
     distance: usize,
 }
 
@@ -86,7 +86,7 @@ impl Ord for Open {
     }
 }
 
-/// Where the search has been.
+/// Visited states.
 #[derive(Default)]
 struct Known {
     exact: HashMap<(u32, u32, bool), Bins>,
@@ -94,12 +94,12 @@ struct Known {
 }
 
 impl Known {
-    /// Adds places; those that are new.
+    /// Adds positions; returns the new ones.
     fn add(&mut self, state: State, places: Bins) -> Bins {
         let known = match state {
             State::Exact(state) => self.exact.entry(state.key()).or_default(),
             State::Loose(state) => {
-                // Whoever may rise faster may do the same.
+                // A player that may rise faster may do the same.
                 let faster =
                     (state.lift + 1..=loose::FASTEST).filter_map(|lift| self.loose.get(&Loose { lift, ..state }));
                 let covered = faster.fold(Bins::NONE, |covered, places| covered | *places);
@@ -135,13 +135,13 @@ mod tests {
         Sim::new(Arc::new(Level::from_text(text).expect("a valid picture")))
     }
 
-    /// A level with a wall of this height between the start and the coin.
+    /// Returns a level with a wall of this height between the start and the coin.
     fn tower(height: usize) -> String {
         let rows = "#...#.....#\n".repeat(height - 1);
         format!("#.........#\n{rows}#A..#....C#\n#=========#\n")
     }
 
-    /// A level with a pit of this width and depth on the way to the coin.
+    /// Returns a level with a pit of this width and depth on the path to the coin.
     fn pit(width: usize, bottom: &str) -> String {
         let row =
             |ground: &str, gap: &str| format!("#{}{}{}#\n", ground.repeat(12), gap.repeat(width), ground.repeat(4));
@@ -215,7 +215,7 @@ mod tests {
         assert!(!coin_is_unreachable(&level("#...........#")));
     }
 
-    /// A level of random walls, ledges, crates, saws and lava, with room at the start.
+    /// Returns a level of random walls, ledges, crates, saws and lava, with room at the start.
     fn random_level(rng: &mut ChaCha8Rng) -> LevelParts {
         let mut tiles = TileGrid::default();
         tiles.fill(0, 0, 64, 1, Tile::WallTop);
@@ -262,7 +262,7 @@ mod tests {
             let level = Arc::new(Level::new(parts.clone()));
             assert!(!coin_is_unreachable(&Sim::new(level.clone())), "{cell:?}\n{}", level.to_text());
             walks += 1;
-            // Somewhere else.
+            // Another cell.
             parts.tiles.set(cell[0], cell[1], before);
             parts.coin = [rng.random_range(2..20), rng.random_range(1..20)];
             parts.tiles.set(parts.coin[0], parts.coin[1], Tile::Coin);

@@ -1,4 +1,4 @@
-//! What a level lets a player do at a height: where there is room, what is in the way, and what kills or is the coin.
+//! Answers about a level at one height: room, obstacles, hazards and the coin.
 
 use std::{collections::HashMap, sync::LazyLock};
 
@@ -10,23 +10,23 @@ use crate::coinrun::{
     tile::{Corners, Tile},
 };
 
-/// Places are moved by so much where a bin is asked which columns it may touch: more than rounding does.
+/// Shift of a bin's ends when its columns are computed: more than rounding does.
 const SLACK: f32 = 1e-4;
 
-/// Pairs of columns that the two sides of a player can be in, for each bin.
+/// Pairs of columns of the two sides of a player, for each bin.
 type Columns = Vec<Vec<[i32; 2]>>;
 
-/// The rows that the corners of a player are in: low and high.
+/// The rows of a player's corners: low and high.
 pub(super) type Rows = [i32; 2];
 
-/// A level as the search asks for it. What it has answered once it knows.
+/// A level for the search, with cached answers.
 pub(super) struct Ground<'a> {
     level: &'a Level,
     answers: HashMap<Question, Bins>,
     /// Crates, and the bins in which a player may overlap each.
     pub crates: Vec<(Body, Bins)>,
     saws: Vec<(Body, Bins)>,
-    /// Whether enemies may lend support; see [`patrol`](crate::coinrun::rules::patrol).
+    /// Enemies may lend support; see [`patrol`](crate::coinrun::rules::patrol).
     pub enemies_lend: bool,
 }
 
@@ -35,25 +35,25 @@ static PLAYER: LazyLock<Body> = LazyLock::new(|| Body { x: 0.0, y: 0.0, ..Body::
 static CORNER_COLUMNS: LazyLock<Columns> = LazyLock::new(|| columns(corners(&PLAYER, 0.0, 0.0).right));
 static BODY_COLUMNS: LazyLock<Columns> = LazyLock::new(|| columns(PLAYER.rx + OVERLAP_MARGIN));
 
-/// What is asked of a level. Corners are the same corners in both rows of a question: who is free in the one and stopped by the
-/// other does not slide down beside a wall as if on steps.
+/// A question about a level. Corners are the same corners in both rows of a question: a player free in one row and
+/// stopped by the other does not slide down beside a wall as if on steps.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Question {
     Room(Rows),
     Passes(Rows, Rows),
     Stops(Rows, i32),
-    /// Whether a body that covers these rows is free of lava.
+    /// A body that covers these rows is free of lava.
     Dry(Rows),
-    /// Whether it covers the coin.
+    /// It covers the coin.
     Coin(Rows),
 }
 
-/// Where a player touches things, at a height.
+/// Contacts of a player at a height.
 #[derive(Clone, Copy)]
 pub(super) struct Touched {
-    /// Where a player may live on: where not all places of a bin touch something deadly that never moves.
+    /// Bins in which a player may survive: not all of their positions touch a fixed hazard.
     pub alive: Bins,
-    /// Where a player may touch the coin.
+    /// Bins in which a player may touch the coin.
     pub coin: Bins,
 }
 
@@ -71,33 +71,33 @@ impl<'a> Ground<'a> {
         }
     }
 
-    /// The player's body with its centre at this height.
+    /// Returns the player's body with its centre at this height.
     pub fn body(&self, y: f32) -> Body {
         Body { y, ..*PLAYER }
     }
 
-    /// The rows of the corners of a player at this height.
+    /// Returns the rows of the corners of a player at this height.
     pub fn rows(&self, y: f32) -> Rows {
         let Corners { low, high, .. } = corners(&PLAYER, 0.0, y);
         [low.floor() as i32, high.floor() as i32]
     }
 
-    /// The row in which a player at this height looks for support.
+    /// Returns the row in which a player at this height looks for support.
     pub fn feet(&self, y: f32) -> i32 {
         (y - (PLAYER.ry + FOOT_MARGIN)).floor() as i32
     }
 
-    /// Where all corners may be free, for corners in these rows.
+    /// Returns the bins in which all corners may be free, for corners in these rows.
     pub fn room(&mut self, rows: Rows) -> Bins {
         self.ask(Question::Room(rows))
     }
 
-    /// Where all corners may be free in both rows.
+    /// Returns the bins in which all corners may be free in both rows.
     pub fn passes(&mut self, here: Rows, there: Rows) -> Bins {
         self.ask(Question::Passes(here, there))
     }
 
-    /// Where all corners may be free, and a wall in this row below or above one of them.
+    /// Returns the bins in which all corners may be free, with a wall in this row below or above one of them.
     pub fn stops(&mut self, here: Rows, row: i32) -> Bins {
         self.ask(Question::Stops(here, row))
     }
@@ -120,7 +120,7 @@ impl<'a> Ground<'a> {
         })
     }
 
-    /// What a player at this height touches.
+    /// Returns the contacts of a player at this height.
     pub fn touched(&mut self, y: f32) -> Touched {
         let reach = PLAYER.ry + OVERLAP_MARGIN;
         let rows = [(y - reach) as i32, (y + reach) as i32];
@@ -131,7 +131,7 @@ impl<'a> Ground<'a> {
     }
 }
 
-/// The pairs of columns of what lies so far to the left and to the right of each bin's places.
+/// Returns the pairs of columns at this distance to the left and to the right of each bin's positions.
 fn columns(reach: f32) -> Columns {
     let of_bin = |bin| {
         let [first, last] = Bins::ends(bin);
@@ -147,7 +147,7 @@ fn any(columns: &Columns, holds: impl Fn([i32; 2]) -> bool) -> Bins {
     Bins::of(|bin| columns[bin].iter().any(|&pair| holds(pair)))
 }
 
-/// The bins in which a player overlaps a block along x: at some of their places, or at all.
+/// Returns the bins in which a player overlaps a block along x: at some of their positions, or at all.
 fn beside(block: &Body, player: &Body, at_some: bool) -> Bins {
     let reach = block.rx + player.rx;
     Bins::of(|bin| {

@@ -1,7 +1,7 @@
-//! Players who were stopped in the midst of a step: what is left of their speed may be nearly anything.
+//! Players that were stopped in the midst of a step: the rest of their speed may be nearly anything.
 //!
-//! Their height is known by a tenth of a tile, and of their speed the most that it can be upwards. Within a step they may go
-//! to every height between that and the fastest fall.
+//! Their height is known by a tenth of a tile, and of their speed the upper limit upwards. Within a step they may go to
+//! every height between that and the fastest fall.
 
 use std::collections::BTreeMap;
 
@@ -14,51 +14,51 @@ use crate::coinrun::rules::{GRAVITY, JUMP_SPEED, PLAYER_HALF_HEIGHT};
 
 /// Heights and speeds are counted in tenths of a tile.
 const TENTHS: f32 = 10.0;
-/// The most that a player falls in a step, and rises, tenths of a tile.
+/// The largest fall and rise of a player in a step, tenths of a tile.
 pub(super) const FASTEST: i32 = (JUMP_SPEED * TENTHS) as i32;
-/// What a step takes from the speed, tenths of a tile.
+/// Loss of speed in a step, tenths of a tile.
 const SLOWED: i32 = (GRAVITY * TENTHS) as i32;
-/// Who stands on something is in the middle of a tenth.
+/// A standing player is in the middle of a tenth.
 const OFFSET: f32 = PLAYER_HALF_HEIGHT - 0.55;
-/// Bins that a player with a corner in a wall may move before all are free again: a tile, an eighth of one for a part of a
-/// step, and some more.
+/// Bins that a player with a corner in a wall may move before all are free again: a tile, an eighth of one for a part
+/// of a step, and some more.
 const WALL_REACH: usize = 12;
-/// A player who overlaps a crate is at most so far below its top, tenths of a tile.
+/// Largest depth below a crate's top of a player that overlaps it, tenths of a tile.
 const CRATE_DEPTH: i32 = 22;
 
-/// Which tenth of a tile a height is in.
+/// Returns the tenth of a tile of a height.
 fn level_of(y: f32) -> i32 {
     ((y - OFFSET) * TENTHS).floor() as i32
 }
 
-/// Where a tenth of a tile begins and ends.
+/// Returns the ends of a tenth of a tile.
 fn ends(level: i32) -> [f32; 2] {
     [level, level + 1].map(|end| end as f32 / TENTHS + OFFSET)
 }
 
 impl Loose {
-    /// At this height, with at most this speed.
+    /// Returns the state at this height, with at most this speed.
     pub fn at(y: f32, vy: f32) -> Self {
         Self { level: level_of(y), lift: ((vy * TENTHS).ceil() as i32).clamp(-FASTEST, FASTEST) }
     }
 }
 
-/// A player with a corner in a wall: who starts there, or has stood across a ledge and moved up or down. Until all corners are
-/// free again, such a player stays in the same columns, or one beside, and at two heights between two rows; it may have any
-/// speed then.
+/// Follows a player with a corner in a wall: one that starts there, or has stood across a ledge and moved up or down.
+/// Until all corners are free again, such a player stays in the same columns, or one beside, and at two heights between
+/// two rows; it may have any speed then.
 pub(super) fn out_of_wall(ground: &mut Ground, y: f32, places: Bins, after: &mut Vec<(State, Bins)>) {
     let row = y.floor();
     let heights = [row + 1.0 - PLAYER_HALF_HEIGHT, row + PLAYER_HALF_HEIGHT];
     // A part of a step makes at most a quarter of a tile.
     let [lowest, highest] = [level_of(heights[0] - 0.26), level_of(heights[1] + 0.26)];
     for level in lowest..=highest {
-        // The coin is touched by who is still in the wall, too.
+        // A player in the wall touches the coin, too.
         let out = places.spread(WALL_REACH) & (room(ground, level) | touched(ground, level).coin);
         put(after, State::Loose(Loose { level, lift: FASTEST }), out);
     }
 }
 
-/// Where there may be room at a level.
+/// Returns the bins with possible room at a level.
 fn room(ground: &mut Ground, level: i32) -> Bins {
     ends(level).into_iter().fold(Bins::NONE, |room, y| {
         let rows = ground.rows(y);
@@ -66,7 +66,7 @@ fn room(ground: &mut Ground, level: i32) -> Bins {
     })
 }
 
-/// Where a player may stand at a level, and on which height exactly.
+/// Returns the bins in which a player may stand at a level, and the exact height.
 fn standing(ground: &mut Ground, level: i32) -> (f32, Bins) {
     let [low, high] = ends(level);
     let y = (high - PLAYER_HALF_HEIGHT).floor() + PLAYER_HALF_HEIGHT;
@@ -77,13 +77,13 @@ fn standing(ground: &mut Ground, level: i32) -> (f32, Bins) {
     (y, ground.stops(rows, feet))
 }
 
-/// What a player at a level touches.
+/// Returns the contacts of a player at a level.
 pub(super) fn touched(ground: &mut Ground, level: i32) -> Touched {
     let [low, high] = ends(level).map(|y| ground.touched(y));
     Touched { alive: low.alive | high.alive, coin: low.coin | high.coin }
 }
 
-/// All states after a step from these places, with any action.
+/// Adds all states after a step from these positions, with any action.
 pub(super) fn step(ground: &mut Ground, state: Loose, places: Bins, after: &mut Vec<(State, Bins)>) {
     let lift = (state.lift - SLOWED).max(-FASTEST);
     let reached = reached(ground, state.level, lift, places);
@@ -108,7 +108,7 @@ pub(super) fn step(ground: &mut Ground, state: Loose, places: Bins, after: &mut 
     }
 }
 
-/// Where a player may be at the end of a step, by level.
+/// Returns the positions of a player at the end of a step, by level.
 fn reached(ground: &mut Ground, from: i32, lift: i32, places: Bins) -> BTreeMap<i32, Bins> {
     let (lowest, highest) = (from - FASTEST, from + lift.max(0));
     let mut reached = BTreeMap::from([(from, places)]);
@@ -131,7 +131,7 @@ fn reached(ground: &mut Ground, from: i32, lift: i32, places: Bins) -> BTreeMap<
     reached
 }
 
-/// Where corners may be free at both of two levels.
+/// Returns the bins in which corners may be free at both of two levels.
 fn passes(ground: &mut Ground, here: i32, there: i32) -> Bins {
     let mut passes = Bins::NONE;
     for one in ends(here) {

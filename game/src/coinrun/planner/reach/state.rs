@@ -1,4 +1,4 @@
-//! What the search knows of a player apart from the place along x.
+//! State of a player in the search, apart from its position along x.
 
 use super::bins::Bins;
 
@@ -11,19 +11,19 @@ pub(super) enum State {
     Loose(Loose),
 }
 
-/// Height and speed as the rules have them.
+/// Exact height and speed.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(super) struct Exact {
     /// Height of the centre, tiles.
     pub y: f32,
     /// Vertical speed, tiles per step.
     pub vy: f32,
-    /// Whether something other than a wall gives support.
+    /// True if something other than a wall gives support.
     pub is_held: bool,
 }
 
 impl Exact {
-    /// What tells it from others.
+    /// Returns the key that tells it from others.
     pub fn key(&self) -> (u32, u32, bool) {
         (self.y.to_bits(), self.vy.to_bits(), self.is_held)
     }
@@ -32,13 +32,13 @@ impl Exact {
 /// A height and an upper limit of the speed upwards, in tenths of a tile.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(super) struct Loose {
-    /// Which tenth of a tile the centre is in.
+    /// Tenth of a tile of the centre.
     pub level: i32,
-    /// The most that it rises in the last step.
+    /// Its largest rise in the last step.
     pub lift: i32,
 }
 
-/// Adds places to those that are known of the same thing.
+/// Adds positions to the known ones of an equal key.
 pub(super) fn put<T: PartialEq>(all: &mut Vec<(T, Bins)>, thing: T, places: Bins) {
     if places.is_empty() {
         return;

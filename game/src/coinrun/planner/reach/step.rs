@@ -1,4 +1,4 @@
-//! One step of a player whose height and speed are known exactly, for all places at once.
+//! One step of a player with exact height and speed, for all positions at once.
 
 use super::{
     bins::{Bins, STEP_BINS},
@@ -15,23 +15,23 @@ struct Part {
     y: f32,
     /// Parts in which nothing was in the way along y.
     free: u32,
-    /// Whether a crate has caught the player.
+    /// True if a crate has caught the player.
     is_caught: bool,
 }
 
-/// What a player does in a step, and where.
+/// A player's action in a step, and its positions.
 struct Act {
     y: f32,
     vy: f32,
-    /// Whether crates hold who falls onto them.
+    /// Crates hold a player that falls onto them.
     is_held: bool,
     places: Bins,
 }
 
-/// All states after a step from these places, with any action.
+/// Returns all states after a step from these positions, with any action.
 pub(super) fn step(ground: &mut Ground, state: Exact, places: Bins, after: &mut Vec<(State, Bins)>) {
     let supported = supported(ground, state, places);
-    // Who presses down in the air falls like anybody else, and past crates, as who misses them does.
+    // A player that presses down in the air falls as usual, and past crates, as if it missed them.
     let actions = [(0, false, places), (1, true, supported), (-1, true, supported)];
     for (ay, has_support, places) in actions {
         if places.is_empty() {
@@ -48,7 +48,7 @@ pub(super) fn step(ground: &mut Ground, state: Exact, places: Bins, after: &mut 
     }
 }
 
-/// Where a player can jump.
+/// Returns the positions from which a player can jump.
 fn supported(ground: &mut Ground, state: Exact, places: Bins) -> Bins {
     if state.vy != 0.0 {
         return Bins::NONE;
@@ -81,7 +81,7 @@ fn play(ground: &mut Ground, act: &Act, parts: u32, after: &mut Vec<(State, Bins
                 let is_free = stopped == Stopped::Not;
                 let moved = Part { y, free: part.free + u32::from(is_free), is_caught: stopped == Stopped::ByCrate };
                 if !is_free {
-                    // A player who is stopped along x as well makes no more parts.
+                    // A player that is stopped along x as well makes no more parts.
                     end(ground, act, parts, moved, places, after);
                 }
                 put(&mut next, moved, sideways(ground, y, places));
@@ -94,7 +94,7 @@ fn play(ground: &mut Ground, act: &Act, parts: u32, after: &mut Vec<(State, Bins
     }
 }
 
-/// After one part of a step along x, or none.
+/// Returns the positions after one part of a step along x, or none.
 fn sideways(ground: &mut Ground, y: f32, places: Bins) -> Bins {
     let rows = ground.rows(y);
     places | places.spread(1) & ground.room(rows)
@@ -102,10 +102,10 @@ fn sideways(ground: &mut Ground, y: f32, places: Bins) -> Bins {
 
 fn end(ground: &Ground, act: &Act, parts: u32, part: Part, places: Bins, after: &mut Vec<(State, Bins)>) {
     let share = part.free as f32 / parts as f32;
-    // There is one zero.
+    // Zero is never negative.
     let vy = if part.is_caught { 0.0 } else { act.vy * share + 0.0 };
     let is_held = part.is_caught || ground.enemies_lend && act.vy < 0.0 && vy == 0.0;
-    // What is left of a speed is followed loosely: there would be too many.
+    // The rest of a speed is followed loosely: there would be too many.
     let is_partly_stopped = !part.is_caught && part.free > 0 && part.free < parts;
     let state = if is_partly_stopped {
         State::Loose(Loose::at(part.y, vy))

@@ -1,26 +1,26 @@
-//! One part of a step along y, for all places of a state at once.
+//! One part of a step along y, for all positions of a state at once.
 
 use super::{bins::Bins, ground::Ground};
 use crate::coinrun::rules::{Body, MAX_PUSHES, OVERLAP_MARGIN, flush, rise_to_top};
 
-/// What stopped a part of a step along y.
+/// The stop of a part of a step along y.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Stopped {
     /// Nothing.
     Not,
     /// A wall before the player.
     ByWall,
-    /// A ledge that the player stands across: the corners behind met it, and are in it now.
+    /// A ledge below the player: the corners behind met it, and are in it now.
     ByLedge,
     /// The top of a crate, which holds the player.
     ByCrate,
 }
 
-/// Where a part of a step along y leads: a height, by what it was stopped, and where along x.
+/// The end of a part of a step along y: a height, its stop, and positions along x.
 pub(super) type Led = (f32, Stopped, Bins);
 
-/// One displacement by `dy` of players with all corners free, by the rules. `held_from` is the height at the start of the
-/// step, for a player whom crates hold.
+/// Displaces players with all corners free by `dy`, by the rules. `held_from` is the height at the start of the step,
+/// for a player that crates hold.
 pub(super) fn displace(ground: &mut Ground, places: Bins, y: f32, dy: f32, held_from: Option<f32>) -> Vec<Led> {
     let mut all = Vec::new();
     push(ground, places, y, dy, held_from, 0, &mut all);
@@ -55,7 +55,7 @@ fn push(ground: &mut Ground, places: Bins, y: f32, dy: f32, held_from: Option<f3
     }
 }
 
-/// What walls do to a displacement: nothing, or an end flush with them.
+/// Returns the effects of walls on a displacement: none, or an end flush with them.
 fn at_walls(ground: &mut Ground, places: Bins, y: f32, dy: f32) -> [Led; 3] {
     let target = y + dy;
     let flushed = flush(target, ground.body(y).ry, dy > 0.0);
