@@ -1,4 +1,4 @@
-//! `playbot quickstart`: the main job from end to end.
+//! `playbot quickstart`: learn, train, test and report in one command.
 
 mod first_success;
 mod folder;
@@ -9,11 +9,18 @@ use std::{path::PathBuf, time::Instant};
 use bevy_playbot::policy::ActionDraw;
 use playbot_lab::games::Games;
 use playbot_lab::{
-    eval::{EvalPlan, Player},
+    eval::Player,
     game::Game,
     report::{statistics::steps_to_reach, to_text_table},
     runs::RunCurves,
-    train::{Algorithm, Experiment, Trainer, metrics_log::SUCCESS_RATE, run_dir::write_atomically},
+    sealed_file::write_atomically,
+    train::{
+        Algorithm, Experiment,
+        learn_skills::{cloning, learn},
+        metrics_log::SUCCESS_RATE,
+        recordings::read_dataset,
+        train_run::{NewRun, Training, TrainingSetup},
+    },
 };
 use playbot_learner::{Dataset, DeviceKind, SkillModel};
 use serde_json::json;
@@ -23,16 +30,15 @@ use folder::{check_folder, take_folder};
 use report::write_report;
 
 use super::{
-    cloning::cloning,
-    compute::Threads,
+    compute::{Threads, revision},
+    console::Console,
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, option},
-    interrupt, learn_skills, methods, open, program, progress,
-    read_demos::read_demos,
-    train::{Source, create_run, drive, tell_length},
+    interrupt, learn_skills, methods, open, program,
+    train::tell_length,
 };
 
-/// Seeds with which steps to success are measured.
+/// Seeds for the steps to success.
 const SEEDS: u64 = 3;
 
 /// The file of the skill model.
@@ -41,31 +47,31 @@ const SKILLS: &str = "skills.safetensors";
 /// Learn skills, train SCORE-PPO and PPO, test both on unseen levels, write a report.
 ///
 /// Both train for the same number of steps on the experiment's training levels, with its recordings. Behaviour cloning
-/// and the blind baselines are measured beside them, on levels that none of them has seen. How many steps each takes until it
-/// mostly succeeds is measured with further seeds, too, which train no longer than that.
+/// and the blind baselines are measured beside them, on levels that none of them has seen. The steps to success, at
+/// which a method mostly succeeds, are measured with further seeds, which train only that long.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot
   playbot quickstart --json --run runs/another --seed 2
 
-Needs recordings where the experiment's `demos` says, which is demos/ and the name of the game unless it says otherwise; the
-verbs record and play make them.")]
+Needs recordings at the experiment's `demos` (default: demos/ and the name of the game). The verbs record and play make
+them.")]
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
-    /// Folder for everything the quickstart writes; what an earlier quickstart left there is replaced.
+    /// Folder for all output. The output of an earlier quickstart there is replaced.
     #[arg(long, default_value = "runs/quickstart")]
     run: PathBuf,
-    /// Seed, instead of the experiment's.
+    /// Random seed, instead of the experiment's.
     #[arg(long)]
     seed: Option<u64>,
-    /// Seeds with which the steps to success are measured: that seed and those after it.
+    /// Number of random seeds for the steps to success: that seed and those after it.
     #[arg(long, default_value_t = SEEDS, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
     /// Environment steps for each learner, instead of the experiment's.
     #[arg(long)]
     steps: Option<u64>,
-    /// Passes over the demonstrations, instead of the experiment's.
+    /// Passes over the recordings, instead of the experiment's.
     #[arg(long)]
     epochs: Option<usize>,
     #[command(flatten)]
@@ -90,12 +96,12 @@ impl Default for Args {
     }
 }
 
-/// A training as the report shows it.
+/// A training in the report.
 struct Trained {
     algorithm: Algorithm,
     player: Player,
     curve: Vec<CurvePoint>,
-    /// Steps until its success rate first was at the experiment's threshold.
+    /// Steps until its success rate first reached the experiment's threshold.
     steps_to_threshold: Option<u64>,
     steps_per_s: f64,
     finished: bool,
@@ -115,10 +121,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     trained.check_levels(game)?;
     trained.check_memory(game)?;
     check_folder(&args.run)?;
-    // Not later: where there is nothing to learn from, no folder is made.
+    // Not later: without recordings no folder is made.
     let demos = args.from.recordings(&experiment, games)?;
     interrupt::leave(format!("nothing is saved yet: start again with `{} quickstart`", program::name()));
-    let dataset = read_demos(game, &experiment, &demos, args.threads.count())?;
+    let dataset = read_dataset(game, &experiment, &demos, args.threads.count(), &mut Console::default())?;
     let _lock = take_folder(&args.run)?;
     tell_length(&trained);
     let Some(skills) = skills(&experiment, dataset.clone(), &args)? else {
@@ -141,10 +147,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     };
     let mut players: Vec<_> = trained.iter().map(|one| (one.algorithm.name().to_owned(), one.player.clone())).collect();
     players.push(("bc".to_owned(), cloning(&skills, &experiment, draw)));
-    players.extend(game.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
+    players.extend(game.tools().bots.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
     let mut rows = Vec::new();
     for (name, player) in &players {
-        let plan = EvalPlan::of(&experiment, &experiment.test, args.threads.count());
+        let plan = experiment.eval_plan(&experiment.test, args.threads.count());
         let measured = methods::measure(game, name, player, &plan)?;
         if args.json {
             let mut line = json!(measured.summary);
@@ -180,14 +186,21 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
 /// Learns the skill model and saves it; `None` after Ctrl-C.
 fn skills(experiment: &Experiment, dataset: Dataset, args: &Args) -> Result<Option<SkillModel>, CliError> {
     let mut log = String::new();
-    let model = learn_skills::learn(experiment, dataset, DeviceKind::default(), None, |epoch, metrics| {
+    let mut console = Console::default().on_epoch(|epoch, metrics| {
         log.push_str(&format!("{}\n", learn_skills::epoch_json(epoch, metrics)));
         Ok(())
-    })?;
+    });
+    let model = learn(experiment, dataset, DeviceKind::default(), None, &mut console)?;
+    drop(console);
     let Some(model) = model else { return Ok(None) };
     write_atomically(&args.run.join("skills.jsonl"), log.as_bytes())?;
     model.save(&args.run.join(SKILLS))?;
     Ok(Some(model))
+}
+
+/// Returns the setup of all trainings.
+fn setup(args: &Args) -> TrainingSetup<'static> {
+    TrainingSetup { revision: revision(), ..TrainingSetup::new(DeviceKind::default(), args.threads.count()) }
 }
 
 fn train_one(
@@ -200,24 +213,27 @@ fn train_one(
 ) -> Result<Trained, CliError> {
     let experiment = Experiment { algorithm, ..experiment.clone() };
     let skills = algorithm.needs_skills().then_some(skills);
-    let mut trainer = Trainer::new(game, &experiment, skills, DeviceKind::default(), args.threads.count())?;
     let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
-    let source = Source::new(Some(&skill_file), skills, None);
-    let run = create_run(&folder, game, &experiment, &source, DeviceKind::default(), true)?;
-    interrupt::go_on_with(format!(
-        "this training alone, `{} train --run {} --resume`",
-        program::name(),
-        folder.display()
-    ));
-    let (start, mut curve) = (Instant::now(), Vec::new());
-    let finished = drive(&run, &mut trainer, &format!("train {algorithm}"), |report| {
+    let new = NewRun { path: &folder, experiment: &experiment, skills, skill_file: Some(&skill_file), force: true };
+    let mut curve = Vec::new();
+    let mut console = Console::new(format!("train {algorithm}")).on_update(|report| {
         if let Some(kl) = report.initial_kl {
             tell!("{algorithm}: the first policy is the decoder, KL {kl}");
         }
         if let (Some(episodic_return), Some(success_rate)) = (report.episodic_return, report.success_rate) {
             curve.push(CurvePoint { step: report.step, episodic_return, success_rate });
         }
-    })?;
+    });
+    let mut training = Training::begin(game, &new, &setup(args), &mut console)?;
+    interrupt::go_on_with(format!(
+        "this training alone, `{} train --run {} --resume`",
+        program::name(),
+        folder.display()
+    ));
+    let start = Instant::now();
+    let finished = training.drive(&mut console)?;
+    drop(console);
+    let Training { run, trainer } = training;
     let steps_per_s = trainer.steps() as f64 / start.elapsed().as_secs_f64();
     let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
     let settled = RunCurves::read(run.path())?;
@@ -236,8 +252,8 @@ fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
     Outcome::Stopped
 }
 
-/// After how many steps each method mostly succeeds, for the seed that was trained to the end and for the others that were
-/// asked for. `None` after Ctrl-C.
+/// Returns the steps to success of each method, for the fully trained seed and for the others of `--seeds`. `None`
+/// after Ctrl-C.
 fn first_success(
     game: &dyn Game,
     experiment: &Experiment,
@@ -252,7 +268,7 @@ fn first_success(
     let algorithms: Vec<_> = trained.iter().map(|one| one.algorithm).collect();
     for seed in (1..args.seeds).map(|more| experiment.seed.wrapping_add(more)) {
         let experiment = Experiment { seed, ..experiment.clone() };
-        let steps = steps_of_seed(game, &experiment, &algorithms, dataset, args.threads.count())?;
+        let steps = steps_of_seed(game, &experiment, &algorithms, dataset, &setup(args))?;
         let Some(steps) = steps else { return Ok(None) };
         seeds.push(seed);
         first.iter_mut().zip(steps).for_each(|(one, steps)| one.steps.push(steps));
@@ -260,7 +276,7 @@ fn first_success(
     Ok(Some((seeds, first)))
 }
 
-/// How many steps SCORE needed for what PPO reached in the end, in words.
+/// Describes how many steps SCORE needed for PPO's final success rate.
 fn compare(trained: &[Trained]) -> String {
     let [score, ppo] = trained else { return String::new() };
     let (Some(target), Some(total)) = (ppo.curve.last().map(|point| point.episodic_return), ppo.curve.last()) else {

@@ -9,12 +9,16 @@ use bevy_playbot::unknown_name::UnknownName;
 use indicatif::ProgressBar;
 use playbot_lab::games::Games;
 use playbot_lab::{
-    report::{StudyReport, to_svg},
+    report::StudyReport,
+    sealed_file::read_sealed,
     train::{
         Experiment,
-        run_dir::{is_unstarted, write_atomically},
-        sealed_file::read_sealed,
+        length::{never_learns, rounded},
+        run_dir::is_unstarted,
+        run_observer::{CountedWork, Counter, RunEvent, RunObserver},
         study::{StudyError, StudyRun, study_runs, study_variants},
+        study_output::{RESULTS, rewrite_table, write_cost, write_report},
+        study_runner::{StudyRunError, StudyRunner},
     },
 };
 use playbot_learner::DeviceKind;
@@ -22,20 +26,18 @@ use serde_json::json;
 
 use super::{
     compute::Compute,
+    console::Console,
+    differences::{Options, in_words},
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, quoted, sets_key},
-    interrupt, open, output, program, progress,
-    study_cost::cost_table,
-    study_rewrite::rewrite,
-    study_run::Runner,
-    train::{never_learns, rounded},
+    interrupt, learn_skills, open, output, program, progress,
     unread_settings::tell_unread,
 };
 
 /// Compare variants of an experiment over several seeds.
 ///
-/// Every variant with every seed learns skills, trains, and is measured on the held-out levels. The tables and the
-/// plot say nothing of the machine: the same study gives the same files. Only cost.md says what it took.
+/// Every variant with every seed learns skills, trains, and is measured on the held-out levels. The tables and the plot
+/// do not depend on the machine: the same study gives the same files. Only cost.md reports time.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot study GAME --seeds 1,2,3 --out study
@@ -47,25 +49,25 @@ use super::{
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
-    /// Only this variant of the experiment's; may be given several times. All of them if none is named.
+    /// Run only this variant of the experiment's (default: all; repeatable).
     #[arg(long, value_name = "NAME")]
     variant: Vec<String>,
-    /// Seeds, instead of the experiment's.
+    /// Random seeds, instead of the experiment's.
     #[arg(long, value_delimiter = ',')]
     seeds: Vec<u64>,
     /// Folder for table.md, curves.svg, results.json and cost.md, which are replaced.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
-    /// Folder of the runs; `runs/` and the name of the experiment file, or else of the game, if none is named.
+    /// Folder of the runs (default: `runs/` and the name of the experiment file, or else of the game).
     #[arg(long, value_name = "FOLDER")]
     runs: Option<PathBuf>,
-    /// Go on with the runs that are there: finished ones are not repeated.
+    /// Resume existing runs. Finished ones are not repeated.
     #[arg(long)]
     resume: bool,
-    /// Replace the runs that are there.
+    /// Replace existing runs.
     #[arg(long, conflicts_with = "resume")]
     force: bool,
-    /// Run nothing: write table.md anew from the results.json that is in the folder.
+    /// Run nothing. Write table.md anew from the results.json in the folder.
     #[arg(long, conflicts_with_all = ["game", "experiment", "set", "variant", "seeds", "runs", "resume", "force", "json"])]
     rewrite: bool,
     #[command(flatten)]
@@ -77,7 +79,8 @@ pub struct Args {
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if args.rewrite {
-        rewrite(&args.out)?;
+        rewrite_table(&args.out)?;
+        tell!("written to {}: table.md, from its results.json", args.out.display());
         return Ok(Outcome::Pass);
     }
     let seeds = (!args.seeds.is_empty()).then(|| format!("seeds={:?}", args.seeds));
@@ -104,20 +107,26 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     idle.iter().for_each(|words| tell!("warning: {words}"));
     interrupt::listen();
     interrupt::go_on_with(format!("`{} --resume`", restart(&args)));
-    let threads = args.compute.threads();
-    let mut runner = Runner::new(games, &args.from, &folder, args.force, args.compute.device(), threads);
+    let locate = |path: &Path| args.from.find_recordings(path, games);
+    let setup = args.compute.setup(&locate);
+    let mut console = StudyConsole::new(&runs);
+    let mut runner = StudyRunner::new(games, &folder, args.force, setup);
+    let explained = |error| explain(error, &args.from);
     runner.check_folders(&runs)?;
-    runner.check_demos(&runs)?;
-    let Some(report) = all(&mut runner, &runs, command(&args), experiment)? else {
+    runner.check_recordings(&runs, &mut console).map_err(explained)?;
+    console.begin();
+    let ended = runner.run_all(&runs, command(&args), experiment, &mut console).map_err(explained)?;
+    let Some(report) = ended else {
+        drop(console);
         tell!(
             "stopped and saved; the study is incomplete, and its tables are not written: go on with `{} --resume`",
             restart(&args)
         );
         return Ok(Outcome::Stopped);
     };
-    write(&args.out, &report)?;
-    let cost = cost_table(&runs, &folder, &command(&args), threads);
-    write_atomically(&args.out.join("cost.md"), cost.as_bytes())?;
+    console.end();
+    write_report(&args.out, &report)?;
+    write_cost(&args.out, &runs, &folder, &command(&args), setup.threads)?;
     if args.json {
         report.results.iter().try_for_each(|result| print_line(json!(result)))?;
     } else {
@@ -127,40 +136,90 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(Outcome::Pass)
 }
 
-/// Every run, one after the other; `None` after Ctrl-C.
-fn all(
-    runner: &mut Runner<'_>,
-    runs: &[StudyRun],
-    command: String,
-    experiment: Experiment,
-) -> Result<Option<StudyReport>, CliError> {
-    let steps = |run: &StudyRun| if run.experiment.algorithm.is_trained() { run.experiment.whole_steps() } else { 0 };
-    let whole = progress::bar("study", runs.iter().map(steps).sum(), "steps");
-    let mut report = StudyReport { command, experiment, results: Vec::new(), curves: Vec::new() };
-    let mut done = 0;
-    for (index, run) in runs.iter().enumerate() {
-        let id = run.id();
-        whole.set_message(format!("run {} of {}", index + 1, runs.len()));
-        let ended = runner.run(run, &id, |step| whole.set_position(done + step.min(steps(run))))?;
-        let Some((result, curves)) = ended.filter(|_| !interrupt::asked() || index + 1 == runs.len()) else {
-            return Ok(None);
-        };
-        done += steps(run);
-        whole.set_position(done);
-        say(&whole, &format!("{id}: held-out return {:.2} ± {:.2}", result.test.return_mean, result.test.return_se));
-        report.results.push(result);
-        report.curves.push(curves);
+/// Explains an error of a study. Other settings than those of an existing run are named with the options that set them.
+fn explain(error: StudyRunError, from: &ExperimentArgs) -> CliError {
+    let options = Options { from, own: &[] };
+    match error {
+        StudyRunError::OtherSettings { folder, wanted, saved } => CliError::Usage(format!(
+            "{} holds a run with other settings: {}; ask for the same, choose another folder with --runs, or replace all \
+             with --force",
+            folder.display(),
+            in_words(options.differences(&wanted, &saved, "the run", &[]))
+        )),
+        StudyRunError::Skills(error) => learn_skills::explain(*error, &options),
+        other => other.into(),
     }
-    whole.finish_and_clear();
-    Ok(Some(report))
 }
 
-fn say(bar: &ProgressBar, line: &str) {
-    bar.suspend(|| tell!("{line}"));
+/// Reports the progress of a study: that of its runs, and of all together.
+struct StudyConsole {
+    console: Console<'static>,
+    /// The bar of all runs, once the first begins.
+    whole: Option<ProgressBar>,
+    /// Number of runs.
+    runs: usize,
+    /// Steps of all runs, and of those that have ended.
+    steps: u64,
+    done: u64,
+    /// Steps of the present run.
+    present: u64,
 }
 
-/// Keeps the variants that are named, in the order of the experiment; all of them if none is named. What a `--set` makes of the
-/// others is nobody's concern.
+impl StudyConsole {
+    fn new(runs: &[StudyRun]) -> Self {
+        let steps = runs.iter().map(trained_steps).sum();
+        Self { console: Console::default(), whole: None, runs: runs.len(), steps, done: 0, present: 0 }
+    }
+
+    fn begin(&mut self) {
+        self.whole = Some(progress::bar("study", self.steps, "steps"));
+    }
+
+    fn end(self) {
+        self.whole.iter().for_each(ProgressBar::finish_and_clear);
+    }
+}
+
+impl RunObserver for StudyConsole {
+    fn stopped(&self) -> bool {
+        self.console.stopped()
+    }
+
+    fn observe(&mut self, event: RunEvent<'_>) {
+        let Some(whole) = &self.whole else { return self.console.observe(event) };
+        match event {
+            RunEvent::StudyRunBegun { index, run } => {
+                whole.set_message(format!("run {} of {}", index + 1, self.runs));
+                self.console.set_title(run.id());
+                self.present = trained_steps(run);
+            }
+            RunEvent::StudyRunEnded { run, result } => {
+                self.done += self.present;
+                whole.set_position(self.done);
+                let test = &result.test;
+                let line = format!("{}: held-out return {:.2} ± {:.2}", run.id(), test.return_mean, test.return_se);
+                whole.suspend(|| tell!("{line}"));
+            }
+            RunEvent::Updated { report, .. } => {
+                whole.set_position(self.done + report.step.min(self.present));
+                self.console.observe(event);
+            }
+            other => self.console.observe(other),
+        }
+    }
+
+    fn counter(&mut self, work: CountedWork<'_>) -> Counter {
+        self.console.counter(work)
+    }
+}
+
+/// Returns the steps of a run's training.
+fn trained_steps(run: &StudyRun) -> u64 {
+    if run.experiment.algorithm.is_trained() { run.experiment.whole_steps() } else { 0 }
+}
+
+/// Keeps the named variants, in the order of the experiment; all of them by default. A `--set` that does not fit the
+/// others does no harm.
 fn keep(experiment: &mut Experiment, named: &[String]) -> Result<(), CliError> {
     let known = study_variants(experiment)?;
     let names: Vec<&str> = known.iter().map(|variant| variant.name.as_str()).collect();
@@ -181,7 +240,7 @@ fn check_games(runs: &[StudyRun], from: &ExperimentArgs, games: &Games) -> Resul
     Ok(())
 }
 
-/// Says which of the `--set` some variants take back.
+/// Reports `--set` values that variants override.
 fn tell_taken_back(experiment: &Experiment, sets: &[String]) {
     for (key, value) in sets.iter().filter_map(|set| set.split_once('=')) {
         let variants = experiment.variants.iter();
@@ -193,7 +252,7 @@ fn tell_taken_back(experiment: &Experiment, sets: &[String]) {
     }
 }
 
-/// Says which settings are not read: of the `--set` by no run, and of a variant's own by none of its runs.
+/// Reports settings without effect: of `--set` in no run, and of a variant in none of its runs.
 fn tell_idle_settings(experiment: &Experiment, runs: &[StudyRun], sets: &[String]) {
     let of = |is_meant: &dyn Fn(&StudyRun) -> bool| -> Vec<&Experiment> {
         runs.iter().filter(|run| is_meant(run)).map(|run| &run.experiment).collect()
@@ -204,15 +263,14 @@ fn tell_idle_settings(experiment: &Experiment, runs: &[StudyRun], sets: &[String
     }
 }
 
-/// Where the runs are: those of different games lie apart.
+/// Returns the folder of the runs: runs of different games lie apart.
 fn runs_folder(args: &Args, experiment: &Experiment) -> PathBuf {
     let usual = if args.from.names_game() { &experiment.game } else { "study" };
     let name = args.from.experiment.as_deref().and_then(Path::file_stem).unwrap_or(usual.as_ref());
     args.runs.clone().unwrap_or_else(|| Path::new("runs").join(name))
 }
 
-/// Runs that are there are neither overwritten nor gone on with unless somebody says so; those of other variants and seeds may
-/// lie beside them.
+/// Refuses existing runs without `--resume` or `--force`; those of other variants and seeds may lie beside them.
 fn check_folder(folder: &Path, runs: &[StudyRun], args: &Args) -> Result<(), CliError> {
     let begun = runs.iter().map(|run| folder.join(run.id())).find(|run| run.exists() && !is_unstarted(run));
     let Some(begun) = begun.filter(|_| !args.resume && !args.force) else { return Ok(()) };
@@ -223,9 +281,9 @@ fn check_folder(folder: &Path, runs: &[StudyRun], args: &Args) -> Result<(), Cli
     )))
 }
 
-/// Results of other runs that stand where those of this study are to be written are not thrown away unless somebody says so.
+/// Refuses to replace the results of other runs without `--force`.
 fn check_results(runs: &[StudyRun], args: &Args) -> Result<(), CliError> {
-    let path = args.out.join("results.json");
+    let path = args.out.join(RESULTS);
     let Some((there, _)) = read_sealed::<StudyReport>(&path).ok().filter(|_| !args.force) else {
         return Ok(());
     };
@@ -246,16 +304,7 @@ fn check_results(runs: &[StudyRun], args: &Args) -> Result<(), CliError> {
     )))
 }
 
-fn write(out: &Path, report: &StudyReport) -> Result<(), CliError> {
-    let unreadable = |error: &dyn std::error::Error| CliError::Usage(format!("cannot write the experiment: {error}"));
-    let table = report.to_markdown().map_err(|error| unreadable(&error))?;
-    let json = report.to_json().map_err(|error| unreadable(&error))?;
-    write_atomically(&out.join("table.md"), table.as_bytes())?;
-    write_atomically(&out.join("curves.svg"), to_svg(&report.charts()).as_bytes())?;
-    Ok(write_atomically(&out.join("results.json"), json.as_bytes())?)
-}
-
-/// The command that gives the same files: without what does not change them.
+/// Returns the command that gives the same files, without options that do not change them.
 fn command(args: &Args) -> String {
     let game = args.from.game.iter().map(|game| quoted(game));
     let mut words: Vec<String> = [format!("{} study", program::name())].into_iter().chain(game).collect();
@@ -279,7 +328,7 @@ fn command(args: &Args) -> String {
     words.join(" ")
 }
 
-/// The command with what it needs to find its runs again.
+/// Returns the command with the options that find its runs again.
 fn restart(args: &Args) -> String {
     let runs = args.runs.as_ref().map(|path| format!(" --runs {}", quoted(&path.display().to_string())));
     command(args) + &runs.unwrap_or_default()

@@ -1,17 +1,22 @@
-//! The whole road as functions, for those who do not go it on the command line: [`record`], [`learn_skills`], [`train`],
-//! [`evaluate`], [`policy`].
+//! All steps from recordings to a policy, as functions: [`record`], [`learn_skills`], [`train`], [`evaluate`],
+//! [`policy`]. They are those of the command line, and resume what an earlier call began.
 //!
 //! ```no_run
-//! use playbot_lab::{eval::Player, pipeline, prelude::*, train::config_file::parse_experiment};
+//! use playbot_lab::{
+//!     eval::Player, pipeline, prelude::*,
+//!     train::{config_file::parse_experiment, run_observer::{AfterUpdate, Unobserved}, train_run::TrainingSetup},
+//! };
 //! use playbot_learner::DeviceKind;
-//! # fn road(game: &dyn Game) -> Result<(), Box<dyn std::error::Error>> {
+//! # fn steps(game: &dyn Game) -> Result<(), Box<dyn std::error::Error>> {
 //! let text = r#"(game: "lander", train: "moon:0..63", test: "moon:64..127", demos: "lander.demo", steps: 100000)"#;
 //! let experiment = parse_experiment(text, "lander.ron".as_ref())?;
 //! pipeline::record(game, &"moon:128..255".parse()?, 0.1, "lander.demo".as_ref())?;
-//! let skills = pipeline::learn_skills(game, &experiment, DeviceKind::default(), 2)?;
-//! let trainer = pipeline::train(game, &experiment, Some(&skills), DeviceKind::default(), 2, |report| {
-//!     println!("{} steps, return {:?}", report.step, report.episodic_return);
-//! })?;
+//! let setup = TrainingSetup::new(DeviceKind::default(), 2);
+//! let file = "skills.safetensors".as_ref();
+//! let skills = pipeline::learn_skills(game, &experiment, file, &setup, &mut Unobserved)?;
+//! let mut observer = AfterUpdate(|report: &_| println!("{} steps, return {:?}", report.step, report.episodic_return));
+//! let run = "runs/lander".as_ref();
+//! let trainer = pipeline::train(game, &experiment, Some((file, &skills)), run, &setup, &mut observer)?;
 //! let policy = pipeline::policy(game, &trainer);
 //! let player = Player::of_file(&policy, ActionDraw::Sample);
 //! let measured = pipeline::evaluate(game, &experiment, "score-ppo", &player, 2)?;
@@ -21,68 +26,119 @@
 //! # }
 //! ```
 
-use std::{ops::ControlFlow, path::Path};
+use std::path::{Path, PathBuf};
 
 use bevy_playbot::{
     demo::file::{DemoFileError, DemoWriter},
     fault::Fault,
     prelude::*,
 };
-use playbot_learner::{DeviceKind, LearnError, PolicyFile, SkillModel, SkillTrainer};
+use playbot_learner::{FileError, PolicyFile, SkillModel};
 use thiserror::Error;
 
 use crate::{
-    demo::{dataset::Demonstrations, demonstration::DemonstrationPlan, verify::VerifyError},
-    eval::{self, EvalError, EvalPlan, EvalSummary, Player, summarize},
+    demo::demonstration::DemonstrationPlan,
+    eval::{self, EvalError, EvalSummary, Player, summarize},
     game::Game,
     mode::ModeError,
     policy_export::{Provenance, policy_file},
+    runs::settings_that_differ,
     split::LevelSplit,
-    train::{Experiment, TrainError, Trainer, UpdateReport, config::ExperimentError},
+    train::{
+        Experiment, Trainer,
+        config::ExperimentError,
+        learn_skills::{LearnSkillsError, learn_into},
+        recordings::{RecordingsError, find_recordings, read_dataset},
+        run_dir::{RunDir, RunError},
+        run_lock::is_unstarted,
+        run_observer::RunObserver,
+        train_run::{NewRun, Training, TrainingError, TrainingSetup},
+    },
 };
 
-/// A step of the road failed.
+/// Failure of a step.
 #[derive(Debug, Error)]
 pub enum PipelineError {
-    /// Nobody demonstrates the game.
+    /// The game has no demonstrator.
     #[error("`{0}` has no demonstrator: play it yourself, or train without demonstrations")]
     NoDemonstrator(&'static str),
-    /// There is no such mode.
+    /// An invalid mode.
     #[error(transparent)]
     Mode(#[from] ModeError),
-    /// The experiment makes no sense.
+    /// An invalid experiment.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
-    /// The recording cannot be written.
+    /// A recording that cannot be written.
     #[error(transparent)]
     Demo(#[from] DemoFileError),
-    /// The recordings cannot be learned from.
+    /// Recordings that cannot be learned from.
     #[error(transparent)]
-    Verify(#[from] VerifyError),
+    Recordings(Box<RecordingsError>),
     /// The game broke its contract.
     #[error(transparent)]
     Fault(#[from] Fault),
-    /// The learner failed.
+    /// Failure to learn skills.
     #[error(transparent)]
-    Learn(#[from] LearnError),
-    /// The training failed.
+    Skills(Box<LearnSkillsError>),
+    /// A skill model that cannot be read.
     #[error(transparent)]
-    Train(#[from] TrainError),
-    /// Nothing could be measured.
+    Model(#[from] FileError),
+    /// The folder of the run cannot be used.
+    #[error(transparent)]
+    Run(Box<RunError>),
+    /// The folder holds a run of other settings.
+    #[error(
+        "{} holds a run with other settings: {}; use the same settings or another folder", run.display(),
+        settings_that_differ(wanted, saved)
+    )]
+    OtherSettings {
+        /// The folder.
+        run: PathBuf,
+        /// The experiment.
+        wanted: Box<Experiment>,
+        /// The experiment of the run.
+        saved: Box<Experiment>,
+    },
+    /// Failure of training.
+    #[error(transparent)]
+    Training(#[from] TrainingError),
+    /// The observer stopped the work. The same call resumes it.
+    #[error("stopped and saved in {}: call it again to go on", .0.display())]
+    Stopped(PathBuf),
+    /// Failure of the evaluation.
     #[error(transparent)]
     Eval(#[from] EvalError),
 }
 
-/// Records the game's demonstrator on each of these levels into a new file, and returns the number of episodes. `noise` is
-/// the share of random actions, or the deviation of continuous ones, drawn from seed 1, as the command line does unless told
-/// otherwise.
+impl From<RecordingsError> for PipelineError {
+    fn from(error: RecordingsError) -> Self {
+        Self::Recordings(error.into())
+    }
+}
+
+impl From<LearnSkillsError> for PipelineError {
+    fn from(error: LearnSkillsError) -> Self {
+        Self::Skills(error.into())
+    }
+}
+
+impl From<RunError> for PipelineError {
+    fn from(error: RunError) -> Self {
+        Self::Run(error.into())
+    }
+}
+
+/// Records the game's demonstrator on each of these levels into a new file, and returns the number of episodes.
+///
+/// `noise` is the share of random actions, or the deviation of continuous ones. It is drawn from seed 1, the default
+/// of the command line.
 ///
 /// # Errors
 ///
-/// Nobody demonstrates the game, it broke its contract, or the file exists or cannot be written.
+/// The game has no demonstrator, it broke its contract, the file exists, or the file cannot be written.
 pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> Result<u64, PipelineError> {
     levels.check(game)?;
-    if game.demonstrator().is_none() {
+    if game.tools().bots.demonstrator().is_none() {
         return Err(PipelineError::NoDemonstrator(game.name()));
     }
     let plan = DemonstrationPlan {
@@ -101,61 +157,85 @@ pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> 
     Ok(world.resource::<Recorder>().episodes())
 }
 
-/// Learns the skill model of an experiment from its recordings.
+/// Learns the skill model of an experiment from its recordings, and writes it to `file`. Unfinished learning is resumed
+/// from the checkpoint beside it, and a finished model in the file is returned.
 ///
 /// # Errors
 ///
-/// The experiment names no recordings, they cannot be read or do not replay, or a loss is not a number.
+/// The experiment names no recordings, they cannot be read or do not replay, a loss is not a number, or a file cannot be
+/// written. [`PipelineError::Stopped`] if the observer stopped it.
 pub fn learn_skills(
     game: &dyn Game,
     experiment: &Experiment,
-    device: DeviceKind,
-    threads: usize,
+    file: &Path,
+    setup: &TrainingSetup<'_>,
+    observer: &mut dyn RunObserver,
 ) -> Result<SkillModel, PipelineError> {
-    experiment.check_agent(game)?;
-    let dataset = Demonstrations::of(game, experiment, experiment.recordings()?)?.dataset(game, threads, |_| {})?;
-    let mut trainer = SkillTrainer::new(experiment.skills.clone(), dataset, experiment.seed, device)?;
-    while trainer.epochs_done() < experiment.skills.epochs as u64 && !trainer.is_over() {
-        trainer.train_epoch(&mut |_| ControlFlow::Continue(()))?;
+    if file.exists() {
+        return finished_skills(experiment, file, setup);
     }
-    Ok(trainer.into_model().with_picture(experiment.observation_config().card()))
+    experiment.check_agent(game)?;
+    let path = find_recordings(experiment, setup.recordings, observer)?;
+    let dataset = read_dataset(game, experiment, &path, setup.threads, observer)?;
+    let learned = learn_into(file, experiment, dataset, setup.device, observer)?;
+    learned.ok_or_else(|| PipelineError::Stopped(file.into()))
 }
 
-/// Trains to the end of the experiment; `after_update` hears of each update. Nothing is written: a training that is to be
-/// resumed saves itself with [`RunDir`](crate::train::run_dir::RunDir).
+/// Returns the model in a file, if it has the experiment's settings.
+fn finished_skills(
+    experiment: &Experiment,
+    file: &Path,
+    setup: &TrainingSetup<'_>,
+) -> Result<SkillModel, PipelineError> {
+    let model = SkillModel::load(file, setup.device)?;
+    if *model.config() == experiment.skills {
+        return Ok(model);
+    }
+    let begun = Experiment { skills: model.config().clone(), ..experiment.clone() };
+    let (wanted, begun) = (Box::new(experiment.clone()), Box::new(begun));
+    Err(LearnSkillsError::OtherSettings { path: file.into(), wanted, begun }.into())
+}
+
+/// Trains to the end of the experiment in the folder `run`, with its metrics and checkpoints. A run that is there
+/// already is resumed; its experiment may differ in its steps and its checkpoints only. `skills` are the skill model and
+/// its file.
 ///
 /// # Errors
 ///
-/// See [`TrainError`].
+/// See [`TrainingError`]. [`PipelineError::OtherSettings`] for another run in the folder, and
+/// [`PipelineError::Stopped`] if the observer stopped the training.
 pub fn train(
     game: &dyn Game,
     experiment: &Experiment,
-    skills: Option<&SkillModel>,
-    device: DeviceKind,
-    threads: usize,
-    mut after_update: impl FnMut(&UpdateReport),
+    skills: Option<(&Path, &SkillModel)>,
+    run: &Path,
+    setup: &TrainingSetup<'_>,
+    observer: &mut dyn RunObserver,
 ) -> Result<Trainer, PipelineError> {
-    let mut trainer = if experiment.algorithm.trains_on_demos() {
-        let demos = Demonstrations::of(game, experiment, experiment.recordings()?)?;
-        let seen = demos.seen_levels(game);
-        let rollouts = demos.rollouts(game, threads, |_| {})?;
-        let mut trainer = Trainer::with_demos(game, experiment, skills, &rollouts, device, threads)?;
-        trainer.note_seen(&seen);
-        trainer
+    let mut training = if run.exists() && !is_unstarted(run) {
+        let opened = RunDir::open_to_write(run)?;
+        let (steps, checkpoints) = (experiment.steps, experiment.checkpoints);
+        let wanted = experiment.without_study();
+        if (Experiment { steps, checkpoints, ..opened.experiment.clone() }) != wanted {
+            let (wanted, saved) = (Box::new(wanted), Box::new(opened.experiment));
+            return Err(PipelineError::OtherSettings { run: run.into(), wanted, saved });
+        }
+        Training::resume(game, opened, &wanted, setup)?
     } else {
-        Trainer::new(game, experiment, skills, device, threads)?
+        let (skill_file, skills) = skills.unzip();
+        Training::begin(game, &NewRun { path: run, experiment, skills, skill_file, force: false }, setup, observer)?
     };
-    while !trainer.is_done() {
-        after_update(&trainer.update()?);
+    match training.drive(observer)? {
+        true => Ok(training.trainer),
+        false => Err(PipelineError::Stopped(run.into())),
     }
-    Ok(trainer)
 }
 
-/// Measures a player on the experiment's held-out levels, each equally often. `name` is the summary's.
+/// Measures a player on the experiment's held-out levels, each equally often. `name` is the name in the summary.
 ///
 /// # Errors
 ///
-/// There is no such mode, the game broke its contract, or it cannot be seen as the experiment says.
+/// The mode is invalid, the game broke its contract, or it does not support the experiment's observations.
 pub fn evaluate(
     game: &dyn Game,
     experiment: &Experiment,
@@ -164,13 +244,14 @@ pub fn evaluate(
     threads: usize,
 ) -> Result<EvalSummary, PipelineError> {
     experiment.check_test(game)?;
-    let plan = EvalPlan::of(experiment, &experiment.test, threads);
+    let plan = experiment.eval_plan(&experiment.test, threads);
     Ok(summarize(name, &plan.split, &eval::evaluate(game, player, &plan, |_| {})?))
 }
 
-/// What a training has learned so far, as the file that a game ships with:
-/// [`export_policy`](crate::policy_export::export_policy) writes it, and a game plays with it at once with
-/// [`install_policy`](bevy_playbot::policy_file::install_policy).
+/// Returns the policy learned so far, as the file that a game ships with.
+///
+/// [`export_policy`](crate::policy_export::export_policy) writes it, and
+/// [`install_policy`](bevy_playbot::policy_file::install_policy) lets a game play with it.
 pub fn policy(game: &dyn Game, trainer: &Trainer) -> PolicyFile {
     let experiment = trainer.experiment();
     let provenance = Provenance {

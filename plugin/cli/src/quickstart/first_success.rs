@@ -1,32 +1,35 @@
-//! After how many steps each method mostly succeeds, over several seeds.
+//! Steps to success of each method, over several seeds.
 
 use playbot_lab::{
     game::Game,
     report::{statistics::median, whole},
-    train::{Algorithm, Experiment, Trainer},
+    train::{
+        Algorithm, Experiment,
+        learn_skills::learn,
+        train_run::{Reached, TrainingSetup, train_to_success},
+    },
 };
-use playbot_learner::{Dataset, DeviceKind, SkillModel};
+use playbot_learner::Dataset;
 
-use super::{interrupt, learn_skills, progress};
-use crate::error::CliError;
+use crate::{console::Console, error::CliError};
 
-/// The steps until a method's success rate in training first was at the experiment's threshold.
+/// The steps until a method's success rate in training first reached the experiment's threshold.
 pub(super) struct FirstSuccess {
     pub(super) algorithm: Algorithm,
-    /// For each seed, `None` where it never was.
+    /// The steps of each seed, `None` where the threshold was not reached.
     pub(super) steps: Vec<Option<u64>>,
 }
 
 impl FirstSuccess {
-    /// The seed in the middle. One that never got there needs more than any other.
+    /// Returns the median over the seeds. A seed that never succeeds counts as the largest.
     fn median(&self) -> Option<u64> {
         let steps = self.steps.iter().map(|steps| steps.map_or(f64::INFINITY, |steps| steps as f64));
         median(steps.collect()).filter(|steps| steps.is_finite()).map(|steps| steps as u64)
     }
 }
 
-/// Trains `algorithms` with another seed, its own skills included, until each mostly succeeds: nothing is kept but the number
-/// of steps. `None` after Ctrl-C.
+/// Trains `algorithms` with another seed, its own skills included, until each mostly succeeds. Only the number of steps
+/// is kept. `None` after Ctrl-C.
 ///
 /// # Errors
 ///
@@ -36,14 +39,16 @@ pub(super) fn steps_of_seed(
     experiment: &Experiment,
     algorithms: &[Algorithm],
     dataset: &Dataset,
-    threads: usize,
+    setup: &TrainingSetup<'_>,
 ) -> Result<Option<Vec<Option<u64>>>, CliError> {
-    let learned = learn_skills::learn(experiment, dataset.clone(), DeviceKind::default(), None, |_, _| Ok(()))?;
+    let learned = learn(experiment, dataset.clone(), setup.device, None, &mut Console::default())?;
     let Some(skills) = learned else { return Ok(None) };
     let mut all = Vec::new();
     for &algorithm in algorithms {
         let experiment = Experiment { algorithm, ..experiment.clone() };
-        match train_to_success(game, &experiment, &skills, threads)? {
+        let mut console = Console::new(format!("train {algorithm}, seed {}", experiment.seed));
+        let skills = algorithm.needs_skills().then_some(&skills);
+        match train_to_success(game, &experiment, skills, setup, &mut console)? {
             Reached::After(steps) => all.push(Some(steps)),
             Reached::Never => all.push(None),
             Reached::Stopped => return Ok(None),
@@ -52,44 +57,7 @@ pub(super) fn steps_of_seed(
     Ok(Some(all))
 }
 
-/// How a training ended that goes on until it mostly succeeds.
-enum Reached {
-    /// It did after so many steps.
-    After(u64),
-    /// Not in all the steps that it had.
-    Never,
-    /// Ctrl-C.
-    Stopped,
-}
-
-fn train_to_success(
-    game: &dyn Game,
-    experiment: &Experiment,
-    skills: &SkillModel,
-    threads: usize,
-) -> Result<Reached, CliError> {
-    let skills = experiment.algorithm.needs_skills().then_some(skills);
-    let mut trainer = Trainer::new(game, experiment, skills, DeviceKind::default(), threads)?;
-    let title = format!("train {}, seed {}", experiment.algorithm, experiment.seed);
-    let bar = progress::bar(&title, experiment.whole_steps(), "steps");
-    let reached = loop {
-        if trainer.is_done() {
-            break Reached::Never;
-        }
-        if interrupt::asked() {
-            break Reached::Stopped;
-        }
-        let report = trainer.update()?;
-        bar.set_position(report.step);
-        if report.mostly_succeeds(experiment.study.threshold) {
-            break Reached::After(report.step);
-        }
-    };
-    bar.finish_and_clear();
-    Ok(reached)
-}
-
-/// The median of each method, and its seeds.
+/// Describes the median of each method, and its seeds.
 pub(super) fn headline(methods: &[FirstSuccess], seeds: &[u64], threshold: f64) -> String {
     let words = |steps: Option<u64>| steps.map_or("not reached".to_owned(), |steps| whole(steps as f64));
     let each = methods.iter().map(|method| format!("{} {}", method.algorithm, words(method.median())));

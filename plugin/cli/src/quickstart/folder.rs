@@ -11,7 +11,7 @@ use playbot_learner::disk;
 
 use crate::error::CliError;
 
-/// Only the folder of an earlier quickstart is written into again, and not while another one is at work there.
+/// Checks that a folder is new or of an earlier quickstart, and not in use.
 ///
 /// # Errors
 ///
@@ -21,7 +21,7 @@ pub(super) fn check_folder(path: &Path) -> Result<(), CliError> {
     let was_ours = RunLock::is_known(path) || path.join(Algorithm::ScorePpo.name()).join("run.json").is_file();
     if path.exists() && !is_unstarted(path) && (is_run || !was_ours) {
         return Err(CliError::Usage(format!(
-            "{} holds something else than an earlier quickstart, so it is left alone: choose another --run",
+            "{} is not the folder of a quickstart, so it is left alone: choose another --run",
             path.display()
         )));
     }
@@ -30,7 +30,7 @@ pub(super) fn check_folder(path: &Path) -> Result<(), CliError> {
     }
     for run in [Algorithm::ScorePpo, Algorithm::Ppo].map(|algorithm| path.join(algorithm.name())) {
         if run.exists() {
-            // Found out before skills are learned.
+            // Checked before skills are learned.
             check_replaceable(&run)?;
             RunLock::take(&run)?;
         }

@@ -52,7 +52,7 @@ pub(super) fn write_report(
     let config = ron::ser::to_string_pretty(experiment, ron::ser::PrettyConfig::default())
         .map_err(|error| CliError::Io(format!("cannot write the experiment as RON: {error}")))?;
     let report = Report {
-        title: format!("{}: skills from demonstrations, tested on unseen levels", experiment.game),
+        title: format!("{}: skills from recordings, tested on unseen levels", experiment.game),
         subtitle: format!(
             "{} steps on {}, seed {}, {seconds:.0} seconds on this machine",
             experiment.steps, experiment.train, experiment.seed
@@ -82,10 +82,10 @@ pub(super) fn write_report(
     report.write(path).map_err(|error| CliError::Io(error.to_string()))
 }
 
-/// The game that the paper measured on.
+/// The game of the paper's measurements.
 const GAME_OF_THE_PAPER: &str = "coinrun";
 
-/// Table 3 of the paper: 64 unseen hard levels, 100,000 steps of evaluation. Nothing for other games.
+/// Returns Table 3 of the paper: 64 unseen hard levels, 100,000 steps of evaluation. Empty for other games.
 fn paper_rows(game: &str) -> Vec<ResultRow> {
     if game != GAME_OF_THE_PAPER {
         return Vec::new();

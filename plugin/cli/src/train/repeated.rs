@@ -1,10 +1,11 @@
-//! Options that are given again when a training goes on.
+//! Options of a resumed training.
 
 use std::path::Path;
 
 use playbot_lab::{
     games::Games,
-    train::{Experiment, checksum::file_checksum, run_dir::RunInfo},
+    sealed_file::file_checksum,
+    train::{Experiment, run_dir::RunInfo},
 };
 
 use super::Args;
@@ -14,22 +15,22 @@ use crate::{
     experiment::option,
 };
 
-/// Settings of a run that may change when it goes on: how long it is, and when it is saved.
+/// Settings of a run that may change at a resumption: its length and its checkpoint interval.
 const FREE: [&str; 2] = ["steps", "checkpoints.every"];
 
-/// The experiment of a run that goes on: as it was saved, with what may change as the options say. Whatever else they say
-/// must be what the run has, so that a whole command can be repeated with `--resume`.
+/// Returns the experiment of a resumed run: the saved one, with the changeable settings of the options. All other
+/// options must equal the run's, so that a whole command can be repeated with `--resume`.
 ///
 /// # Errors
 ///
-/// The options cannot be read, or name other values: each with that of the run.
+/// The options cannot be read, or have other values: each with that of the run.
 pub(super) fn resumed(args: &Args, saved: &Experiment, info: &RunInfo, games: &Games) -> Result<Experiment, CliError> {
     let sets = args.from.sets(args.settings());
     let mut wanted = match &args.from.experiment {
         Some(_) => args.from.load(games, args.settings())?.without_study(),
         None => saved.with_set(&sets)?.without_study(),
     };
-    // A file says how long the run was to be at first, and it may have been made longer since.
+    // A file has the first length of the run, which may have been made longer since.
     if !is_set(&sets, FREE[0]) {
         wanted.steps = saved.steps;
     }
@@ -43,19 +44,19 @@ pub(super) fn resumed(args: &Args, saved: &Experiment, info: &RunInfo, games: &G
         return Ok(wanted);
     }
     Err(CliError::Usage(format!(
-        "{} goes on as it was begun, and this differs: {}; drop the option, or start a new run with another --run and \
+        "{} is resumed with other settings: {}; drop the option, or start a new run with another --run and \
          without --resume (--steps and --checkpoint-every may change)",
         args.run.display(),
         in_words(differences)
     )))
 }
 
-/// Whether one of the `key=value` sets a key, alone or with its whole section.
+/// Returns true if one of the `key=value` sets a key, alone or with its whole section.
 fn is_set(sets: &[String], key: &str) -> bool {
     sets.iter().any(|set| reaches(set, key))
 }
 
-/// What the options say otherwise than the run, but for what may change.
+/// Returns the differences between the options and the run, but for the changeable settings.
 fn differences(args: &Args, saved: &Experiment, wanted: &Experiment) -> Vec<String> {
     let own = [
         ("algorithm", args.algorithm.map(|algorithm| format!("--algorithm {algorithm}"))),
@@ -64,7 +65,7 @@ fn differences(args: &Args, saved: &Experiment, wanted: &Experiment) -> Vec<Stri
     Options { from: &args.from, own: &own }.differences(wanted, saved, "the run", &FREE)
 }
 
-/// What is to be said of a skill model that is not the one the run has; nothing if the run has none, or does not say which.
+/// Returns a message about a skill model that is not the run's; `None` if the run has none, or does not note which.
 fn other_skills(path: &Path, info: &RunInfo) -> Result<Option<String>, CliError> {
     let Some(kept) = &info.skills else { return Ok(None) };
     let given = file_checksum(path).map_err(|error| {
@@ -77,7 +78,7 @@ fn other_skills(path: &Path, info: &RunInfo) -> Result<Option<String>, CliError>
 }
 
 impl Args {
-    /// The options that have names of their own, as `key=value`.
+    /// Returns the options that have names of their own, as `key=value`.
     pub(super) fn settings(&self) -> [Option<String>; 4] {
         [
             option("algorithm", &self.algorithm),
@@ -104,7 +105,7 @@ mod tests {
         args: Args,
     }
 
-    /// What is gone on with after these options, of a run that began with other ones.
+    /// Returns the experiment of a run that began with some options and is resumed with others.
     fn again(begun: &[&str], options: &[&str]) -> Result<Experiment, String> {
         let game = ForeignGame::new("runner", 1, |_: &mut App| {});
         let games = [&game as &dyn Game];
@@ -165,7 +166,10 @@ mod tests {
         ] {
             let text = again(&BEGUN, options).expect_err("another value");
             assert!(text.contains(words), "{text}");
-            assert!(text.starts_with("runs/first goes on as it was begun") && text.contains("another --run"), "{text}");
+            assert!(
+                text.starts_with("runs/first is resumed with other settings") && text.contains("another --run"),
+                "{text}"
+            );
         }
     }
 }

@@ -1,4 +1,4 @@
-//! The learning curves of a run.
+//! Learning curves of a run.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -11,7 +11,8 @@ use crate::train::{
 };
 use bevy_playbot::unknown_name::UnknownName;
 
-/// All metrics of a run: for each tag the points `(step, value)`, steps ascending. A value that was not a number is NaN.
+/// All metrics of a run: for each tag the points `(step, value)`, steps ascending. A value that was not a number is
+/// NaN.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RunCurves {
     curves: BTreeMap<String, Vec<(u64, f64)>>,
@@ -20,9 +21,10 @@ pub struct RunCurves {
 }
 
 impl RunCurves {
-    /// Reads `metrics.jsonl` and `timing.jsonl` of the run in `folder`. Lines that a crash tore, or that are just being
-    /// written, are left out with a warning; files that do not exist are empty, and of those that end before the last
-    /// checkpoint it is said.
+    /// Reads `metrics.jsonl` and `timing.jsonl` of the run in `folder`.
+    ///
+    /// Lines that a crash tore, or that are incomplete yet, are left out with a warning. Missing files are empty, and
+    /// files that end before the last checkpoint give a warning.
     ///
     /// # Errors
     ///
@@ -30,13 +32,13 @@ impl RunCurves {
     pub fn read(folder: &Path) -> Result<Self, RunsError> {
         let log = MetricsLog::new(folder);
         let mut read = Self::default();
-        // Asked before: a training that goes on may save meanwhile.
+        // Read first, since a training process may save meanwhile.
         let saved = checkpoint::list(folder).ok().and_then(|all| Some(all.last()?.summary.step)).unwrap_or(0);
         for file in [log.metrics_file(), log.timing_file()] {
             let lines = JsonLines::read(file).map_err(|source| RunsError::Io { path: file.into(), source })?;
             let last = lines.lines.last().map_or(0, |line| line.step);
             if last < saved && lines.damaged.is_empty() && file.exists() {
-                // It was cut off between two lines, and looks whole.
+                // A file cut off between two lines looks whole.
                 let words = format!("{}: nothing is left of the steps {last} to {saved}", file.display());
                 read.warnings.push(words);
             }
@@ -53,28 +55,28 @@ impl RunCurves {
         Ok(read)
     }
 
-    /// Environment steps that have been logged.
+    /// Returns the number of logged environment steps.
     pub fn last_step(&self) -> u64 {
         self.last_step
     }
 
-    /// What was wrong with the files, in words.
+    /// Returns the problems of the files, as text.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
 
-    /// All curves by their tags, in alphabetical order.
+    /// Iterates over all curves with their tags, in alphabetical order.
     pub fn iter(&self) -> impl Iterator<Item = (&str, &[(u64, f64)])> {
         self.curves.iter().map(|(tag, curve)| (tag.as_str(), curve.as_slice()))
     }
 
-    /// The curve of one metric; without points if the run does not have it.
+    /// Returns the curve of one metric; without points if the run lacks it.
     pub fn curve(&self, tag: &str) -> &[(u64, f64)] {
         self.curves.get(tag).map_or(&[], Vec::as_slice)
     }
 
-    /// The points of a curve that say something: of a mean over the last 100 episodes those from where on as many had
-    /// ended, of any other metric all.
+    /// Returns the settled points of a curve. A mean over the last 100 episodes settles once 100 episodes have ended;
+    /// any other metric is settled from the start.
     pub fn settled(&self, tag: &str) -> &[(u64, f64)] {
         let (curve, counts) = (self.curve(tag), self.curve(EPISODES));
         if counts.is_empty() || !EPISODE_MEANS.contains(&tag) {
@@ -85,19 +87,19 @@ impl RunCurves {
         &curve[curve.partition_point(|(step, _)| *step < from)..]
     }
 
-    /// The [settled](Self::settled) points of a curve, or all of them where none are.
+    /// Returns the [settled](Self::settled) points of a curve, or all points if no point is settled.
     pub fn settled_or_all(&self, tag: &str) -> &[(u64, f64)] {
         let settled = self.settled(tag);
         if settled.is_empty() { self.curve(tag) } else { settled }
     }
 
-    /// The last value of a metric that is a number.
+    /// Returns the last value of a metric that is a number.
     pub fn last(&self, tag: &str) -> Option<f64> {
         self.curve(tag).iter().rev().map(|(_, value)| *value).find(|value| !value.is_nan())
     }
 
-    /// Environment steps per second of the time that updates took: the harmonic mean of `charts/SPS`, since each update
-    /// has the same number of steps.
+    /// Returns environment steps per second of the updates' time: the harmonic mean of `charts/SPS`, since each
+    /// update has the same number of steps.
     pub fn steps_per_s(&self) -> Option<f64> {
         let curve = self.curve(SPS);
         let seconds_per_step: f64 = curve.iter().map(|(_, sps)| sps.recip()).sum();
@@ -105,7 +107,7 @@ impl RunCurves {
     }
 }
 
-/// Whether at least one of the runs has a metric.
+/// Checks that at least one of the runs has a metric.
 ///
 /// # Errors
 ///

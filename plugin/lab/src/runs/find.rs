@@ -1,4 +1,4 @@
-//! Finding the folders of runs.
+//! Search for the folders of runs.
 
 use std::{
     fs, io,
@@ -7,26 +7,26 @@ use std::{
 
 use super::{error::RunsError, leftover::Leftover};
 
-/// Files and folders that only a run has. One of them is enough, so that a run that lost the others is found as well.
+/// Files and folders that only a run has. One is enough to find a run, even if the others are lost.
 const SIGNS: [&str; 3] = ["run.json", "metrics.jsonl", "checkpoints"];
 
-/// What lies at a place or below it.
+/// Runs and leftovers at a path or below it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct FoundRuns {
     /// The folders of runs, sorted by path, whole or damaged.
     pub runs: Vec<PathBuf>,
-    /// What is left of runs that were to be replaced, sorted by path. It is no run: the next training there ends it.
+    /// Leftovers of replaced runs, sorted by path. They are not runs: the next training in the folder removes them.
     pub leftovers: Vec<Leftover>,
 }
 
 impl FoundRuns {
-    /// Looks at `root` and, if it is no run, at all folders below it. Runs are not searched for further runs, and links to
-    /// folders are not followed.
+    /// Searches `root` and, if it is not a run, all folders below it. Runs are not searched for further runs, and
+    /// links to folders are not followed.
     ///
     /// # Errors
     ///
-    /// [`RunsError::Missing`]; [`RunsError::NoRuns`] if there is nothing of a run; or [`RunsError::Io`] for a folder that
-    /// cannot be listed.
+    /// [`RunsError::Missing`]; [`RunsError::NoRuns`] if neither runs nor leftovers are found; [`RunsError::Io`] for a
+    /// folder that cannot be listed.
     pub fn at(root: &Path) -> Result<Self, RunsError> {
         if !root.is_dir() {
             return Err(RunsError::Missing(root.into()));
@@ -53,11 +53,11 @@ impl FoundRuns {
     }
 }
 
-/// The folders of runs at `root`: itself, or all below it, see [`FoundRuns::at`].
+/// Returns the folders of runs at `root`: itself, or all below it, see [`FoundRuns::at`].
 ///
 /// # Errors
 ///
-/// As there, and [`RunsError::NoRuns`] if there are but parts of runs.
+/// As for [`FoundRuns::at`], and [`RunsError::NoRuns`] if only leftovers are found.
 pub fn find_runs(root: &Path) -> Result<Vec<PathBuf>, RunsError> {
     let runs = FoundRuns::at(root)?.runs;
     if runs.is_empty() { Err(RunsError::NoRuns(root.into())) } else { Ok(runs) }
@@ -108,7 +108,7 @@ mod tests {
         let folders: Vec<&Path> = found.leftovers.iter().map(|leftover| leftover.folder.as_path()).collect();
         assert_eq!(folders, [root.join("a.replaced-31"), root.join("b/seed-1.replaced-7")]);
         assert_eq!(find_runs(root).expect("found"), found.runs);
-        // What alone is there is named all the same.
+        // A leftover alone is reported too.
         fs::remove_dir_all(root.join("b")).expect("removed");
         fs::remove_dir_all(root.join("c.replaced-it")).expect("removed");
         assert!(FoundRuns::at(root).expect("found").runs.is_empty());

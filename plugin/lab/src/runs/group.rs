@@ -1,19 +1,19 @@
-//! Runs that differ only in their seed belong together.
+//! Groups of runs that differ only in their seed.
 
 use std::collections::BTreeMap;
 
 use super::{record::RunRecord, settings::settings};
 
-/// More differing settings than this are not spelled out in a group's label.
+/// Largest number of differing settings that a group's label spells out.
 const NAMED: usize = 3;
 
-/// Under this name the skill models of a group stand among its settings.
+/// Key of a group's skill models among its settings.
 const SKILLS: &str = "skills";
 
 /// Runs of the same experiment and algorithm with several seeds.
 #[derive(Clone, Debug)]
 pub struct RunGroup<'a> {
-    /// The algorithm and what sets the group apart from the others, such as `ppo lr=0.001`.
+    /// Label of the group: the algorithm and the settings that differ from other groups, such as `ppo lr=0.001`.
     pub label: String,
     /// The settings in which the groups differ, with this group's values.
     pub differing: BTreeMap<String, String>,
@@ -22,13 +22,13 @@ pub struct RunGroup<'a> {
 }
 
 impl RunGroup<'_> {
-    /// The seeds, ascending.
+    /// Returns the seeds, ascending.
     pub fn seeds(&self) -> Vec<u64> {
         self.runs.iter().map(|run| run.info.seed).collect()
     }
 
-    /// What makes the runs less comparable than they look: a seed that occurs twice, runs that are not finished, other
-    /// revisions of playbot, devices or skill models.
+    /// Returns the facts that make the runs less comparable: repeated seeds, unfinished runs, other revisions of
+    /// playbot, other devices, other skill models.
     pub fn warnings(&self) -> Vec<String> {
         let mut warnings = Vec::new();
         let first = &self.runs[0];
@@ -58,13 +58,13 @@ impl RunGroup<'_> {
     }
 }
 
-/// A group while it is put together: the settings of its runs, and the runs.
+/// A group under construction: the settings of its runs, and the runs.
 type Members<'a> = (BTreeMap<String, String>, Vec<&'a RunRecord>);
 
-/// Puts runs together that differ only in their seed; groups are in the order of their first run.
+/// Groups runs that differ only in their seed; groups are in the order of their first run.
 ///
-/// Runs with different seeds may have different skill models, as those of a study do; with the same seed they may not:
-/// such runs are no second seed, so they go into groups of their own, which are told apart by their `skills`.
+/// Runs with different seeds may have different skill models, as in a study. Runs of the same seed with different
+/// skill models are not repetitions. They form separate groups, distinguished by their `skills`.
 pub fn group_runs(runs: &[RunRecord]) -> Vec<RunGroup<'_>> {
     let mut groups: Vec<Members> = Vec::new();
     for run in runs {
@@ -90,7 +90,8 @@ pub fn group_runs(runs: &[RunRecord]) -> Vec<RunGroup<'_>> {
     finished
 }
 
-/// The group a run goes into: where its skill model is already, otherwise the first one where its seed has no other.
+/// Returns the group of a run: the one with its skill model, else the first one whose runs of this seed have no
+/// other.
 fn group_of(groups: &[Members], key: &BTreeMap<String, String>, run: &RunRecord) -> Option<usize> {
     let fits = |members: &[&RunRecord]| {
         members.iter().all(|other| other.info.seed != run.info.seed || other.info.skills == run.info.skills)
@@ -100,7 +101,7 @@ fn group_of(groups: &[Members], key: &BTreeMap<String, String>, run: &RunRecord)
     fitting.clone().find(|&index| shares(&groups[index].1)).or_else(|| fitting.next())
 }
 
-/// Writes the skill models of groups that have nothing else to tell them apart among their settings.
+/// Adds the skill models to the settings of groups that differ in nothing else.
 fn name_skills(groups: &mut [Members]) {
     let keys: Vec<_> = groups.iter().map(|(key, _)| key.clone()).collect();
     for (key, members) in groups {

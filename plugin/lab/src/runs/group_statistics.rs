@@ -1,4 +1,4 @@
-//! One metric over the seeds of a group.
+//! Statistics of one metric over the seeds of a group.
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use crate::report::{
     statistics::{mean_and_sd, mean_curve, steps_to_reach},
 };
 
-/// What a group of runs reached in one metric. Values that are not known are NaN.
+/// Results of a group of runs in one metric. Unknown values are NaN.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct GroupStatistics {
     /// The group.
@@ -21,14 +21,14 @@ pub struct GroupStatistics {
     pub last_mean: f64,
     /// Sample standard deviation of the last values; 0 for a single run.
     pub last_sd: f64,
-    /// Lowest value of any run at any step; of means over episodes, where as many ended, from the 100th episode on.
+    /// Lowest value of any run at any step; for means over episodes, from the 100th episode on if as many ended.
     pub lowest: f64,
-    /// Highest value of the same.
+    /// Highest value, likewise.
     pub highest: f64,
-    /// For each run the first step at which it reached the threshold; none if no threshold was given.
+    /// First step of each run at which it reached the threshold; empty without a threshold.
     pub steps_to_threshold: Vec<Option<u64>>,
-    /// Runs that did not reach the threshold because too few of their episodes ended: means over fewer than 100 do not
-    /// count.
+    /// Runs that did not reach the threshold because too few of their episodes ended: means over fewer than 100 do
+    /// not count.
     pub too_few_episodes: usize,
     /// Mean over the runs of their environment steps per second.
     pub steps_per_s: f64,
@@ -59,12 +59,12 @@ impl GroupStatistics {
     }
 }
 
-/// The mean curve of each group with a band: mean ± sample standard deviation of three seeds or more, the range of two,
-/// nothing around a single one.
+/// Returns the mean curve of each group with a band. The band is mean ± sample standard deviation for three seeds or
+/// more, and the range for two; one seed has no band.
 ///
 /// # Errors
 ///
-/// [`RunsError::NoMetrics`] if a run has no metrics at all, [`RunsError::Metric`] if no run has this one.
+/// [`RunsError::NoMetrics`] if a run has no metrics, [`RunsError::Metric`] if no run has this one.
 pub fn mean_and_spread(groups: &[RunGroup], metric: &str) -> Result<Vec<Curve>, RunsError> {
     let runs = || groups.iter().flat_map(|group| group.runs.iter().copied());
     if let Some(run) = runs().find(|run| run.curves.last_step() == 0) {

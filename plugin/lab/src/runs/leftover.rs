@@ -1,4 +1,4 @@
-//! What is left beside runs that were to be replaced.
+//! Leftovers of replaced runs.
 
 use std::{
     fmt,
@@ -7,21 +7,21 @@ use std::{
 
 use crate::{
     shell_word::shell_word,
-    train::{replaced_run::run_of_leftover, run_lock::RunLock},
+    train::run_lock::{RunLock, run_of_leftover},
 };
 
-/// Parts of a run that a process moved aside to put another one into its place, and could not remove any more, say because
-/// it was killed. As text it says what to do about them.
+/// Parts of a run that a process moved aside to replace it, and did not remove, for instance because it was killed.
+/// Its text form names the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Leftover {
-    /// The folder that they lie in.
+    /// Folder of the parts.
     pub folder: PathBuf,
-    /// The run that they were.
+    /// Folder of the replaced run.
     pub run: PathBuf,
 }
 
 impl Leftover {
-    /// What a folder is left of, which its name says; `None` for any other folder.
+    /// Recognises a leftover by its folder's name; `None` for any other folder.
     pub(super) fn of(folder: &Path) -> Option<Self> {
         Some(Self { folder: folder.into(), run: run_of_leftover(folder)? })
     }
@@ -30,18 +30,18 @@ impl Leftover {
 impl fmt::Display for Leftover {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (folder, run) = (self.folder.display(), self.run.display());
-        write!(f, "{folder} holds what {run} was before it was to be replaced, ")?;
+        write!(f, "{folder} holds old files of {run}, ")?;
         if RunLock::is_taken(&self.run) {
-            return write!(f, "and a process works in {run}: look again when it has ended");
+            return write!(f, "which a process is replacing: look again when it has ended");
         }
         if !self.run.is_dir() {
-            return write!(f, "and {run} is gone: give {folder} that name to have the run back, or delete it");
+            return write!(f, "which is gone: rename {folder} to that name to get the run back, or delete it");
         }
         let run = shell_word(&run.to_string());
         write!(
             f,
-            "which was stopped: `playbot train --run {run} --resume` brings the old run back, or removes it if the new \
-             one has begun"
+            "whose replacement was stopped: `playbot train --run {run} --resume` brings the old run back, or removes it \
+             if the new one has begun"
         )
     }
 }
@@ -59,10 +59,13 @@ mod tests {
         let left = Leftover::of(&folder).expect("its name says so");
         assert_eq!(left, Leftover { folder, run: run.clone() });
         assert_eq!(Leftover::of(&run), None);
-        assert!(left.to_string().contains("is gone: give"), "{left}");
+        assert!(left.to_string().contains("is gone: rename"), "{left}");
         fs::create_dir(&run).expect("writable");
         let words = left.to_string();
-        assert!(words.contains("a.replaced-12 holds what ") && words.contains("--resume` brings the old"), "{words}");
+        assert!(
+            words.contains("a.replaced-12 holds old files of ") && words.contains("--resume` brings the old"),
+            "{words}"
+        );
         let _lock = RunLock::take(&run).expect("free");
         assert!(left.to_string().contains("look again when it has ended"), "{left}");
     }

@@ -1,10 +1,10 @@
-//! What trainings left behind: finding runs, reading their metrics, comparing them over seeds.
+//! Runs on disk: finding them, reading their metrics, comparing them over seeds.
 //!
-//! - [`find_runs`] finds the folders of runs, [`RunRecord`] reads one of them. [`FoundRuns`] has what is left of others, too.
+//! - [`find_runs`] finds the folders of runs, and [`RunRecord`] reads one of them. [`FoundRuns`] has leftovers, too.
 //! - [`RunCurves`] has the learning curves of a run by their TensorBoard tags.
-//! - [`group_runs`] puts runs together that differ only in their seed, and [`GroupStatistics`] measures each group.
+//! - [`group_runs`] groups runs that differ only in their seed, and [`GroupStatistics`] measures each group.
 //!
-//! Nothing here changes a run, so a training that goes on at the same time is not disturbed.
+//! Runs are only read, so training may go on at the same time.
 
 mod curves;
 mod error;
@@ -22,4 +22,4 @@ pub use group::{RunGroup, group_runs};
 pub use group_statistics::{GroupStatistics, mean_and_spread};
 pub use leftover::Leftover;
 pub use record::RunRecord;
-pub use settings::{changed_settings, settings, with_defaults};
+pub use settings::{changed_settings, settings, settings_that_differ, with_defaults};

@@ -1,4 +1,4 @@
-//! One run as it lies on the disk.
+//! A run on disk.
 
 use std::{
     fs,
@@ -17,7 +17,7 @@ use crate::train::{
     run_lock::RunLock,
 };
 
-/// What a run is and what it has reached.
+/// Configuration and progress of a run.
 #[derive(Clone, Debug)]
 pub struct RunRecord {
     /// Its folder.
@@ -30,9 +30,9 @@ pub struct RunRecord {
     pub curves: RunCurves,
     /// Its checkpoints, the oldest first.
     pub checkpoints: Vec<Checkpoint>,
-    /// Whether it is trained at this moment.
+    /// True while it is being trained.
     pub is_training: bool,
-    /// When it was last logged to, where the system says so.
+    /// Time of the last log entry, if the system keeps it.
     pub updated: Option<SystemTime>,
 }
 
@@ -41,7 +41,7 @@ impl RunRecord {
     ///
     /// # Errors
     ///
-    /// [`RunsError`] if the folder is not that of a run or a file of it is damaged.
+    /// [`RunsError`] if the folder is not a run or one of its files is damaged.
     pub fn read(path: &Path) -> Result<Self, RunsError> {
         let OpenedRun { run, experiment, info } = RunDir::open(path)?;
         let log = run.metrics_log();
@@ -57,13 +57,13 @@ impl RunRecord {
         })
     }
 
-    /// Whether all steps of the experiment are done and saved.
+    /// Returns whether all steps of the experiment are done and saved.
     pub fn is_finished(&self) -> bool {
         self.checkpoints.last().is_some_and(|last| last.summary.step >= self.experiment.steps)
     }
 
-    /// Environment steps that are done: while it is trained those that are logged, and otherwise those of the last
-    /// checkpoint, from which it goes on. What is logged after that is lost.
+    /// Returns the environment steps done: while it is being trained the logged ones, otherwise those of the last
+    /// checkpoint. A resumed run starts from there, and later log entries are lost.
     pub fn steps(&self) -> u64 {
         match self.checkpoints.last() {
             Some(last) if !self.is_training => last.summary.step,
@@ -71,7 +71,7 @@ impl RunRecord {
         }
     }
 
-    /// The curve of a metric.
+    /// Returns the curve of a metric.
     ///
     /// # Errors
     ///

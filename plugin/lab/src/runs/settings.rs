@@ -1,26 +1,43 @@
-//! Experiments as flat lists of settings, to see where they differ.
+//! Experiments as flat lists of settings, for comparison.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde_json::{Value, json};
 
 use crate::train::Experiment;
 
-/// All settings of an experiment by their path, such as `ppo.lr`, with their values as text.
+/// Returns all settings of an experiment by their path, such as `ppo.lr`, with their values as text.
 pub fn settings(experiment: &Experiment) -> BTreeMap<String, String> {
     let mut found = BTreeMap::new();
     flatten(&json!(experiment), String::new(), &mut found);
     found
 }
 
-/// The settings of an experiment that another one has not, or not with this value.
+/// Returns the settings of an experiment that another one lacks or has with another value.
 pub fn changed_settings(experiment: &Experiment, base: &Experiment) -> BTreeMap<String, String> {
     let (mut changed, base) = (settings(experiment), settings(base));
     changed.retain(|key, value| base.get(key) != Some(value));
     changed
 }
 
-/// An experiment with the default of every key that has one; game, levels, recordings and steps stay.
+/// Formats the first settings in which an experiment differs from another one, with both values.
+pub fn settings_that_differ(wanted: &Experiment, other: &Experiment) -> String {
+    const NAMED: usize = 4;
+    let (wanted, other) = (settings(wanted), settings(other));
+    let keys: BTreeSet<&String> = wanted.keys().chain(other.keys()).collect();
+    let value = |value: Option<&String>| value.cloned().unwrap_or_else(|| "nothing".to_owned());
+    let differing = keys.into_iter().filter(|key| wanted.get(*key) != other.get(*key));
+    let mut words: Vec<String> =
+        differing.map(|key| format!("{key}={} instead of {}", value(wanted.get(key)), value(other.get(key)))).collect();
+    let more = words.len().saturating_sub(NAMED);
+    words.truncate(NAMED);
+    if more > 0 {
+        words.push(format!("and {more} more"));
+    }
+    words.join("; ")
+}
+
+/// Returns an experiment with the default of every key that has one; game, levels, recordings and steps stay.
 pub fn with_defaults(experiment: &Experiment) -> Experiment {
     let required = ["game", "train", "test", "demos", "steps"];
     let all = json!(experiment);

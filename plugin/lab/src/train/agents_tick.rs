@@ -1,8 +1,8 @@
-//! One tick of all agents of a World, before it becomes part of the rollout.
+//! Data of one tick of all agents of a World, before it joins the rollout.
 
 use playbot_learner::{Actions, ObsKind, Observations, Policy, RolloutStep};
 
-/// What each agent did and got in a tick; for the shapes see [`RolloutStep`]. What they saw is kept elsewhere.
+/// Actions and results of each agent in a tick; for the shapes see [`RolloutStep`]. Observations are kept elsewhere.
 pub(super) struct AgentsTick {
     no_obs: Observations,
     pub(super) z: Vec<f32>,

@@ -1,4 +1,4 @@
-//! Ways to make a policy, by name.
+//! Algorithms, by name.
 
 use std::{fmt, str::FromStr};
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use bevy_playbot::unknown_name::UnknownName;
 
-/// How a policy is made. Written as its [`name`](Self::name) in files and on the command line.
+/// An algorithm that makes a policy. Files and the command line use its [`name`](Self::name).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub enum Algorithm {
@@ -18,9 +18,9 @@ pub enum Algorithm {
     ScoreSac,
     /// SAC without skills.
     Sac,
-    /// A policy over skills by PPO (SPiRL): which skill the decoder plays is learned.
+    /// Policy over skills by PPO (SPiRL): it learns which skill the decoder plays.
     SpirlPpo,
-    /// A policy over skills by SAC.
+    /// Policy over skills by SAC.
     SpirlSac,
     /// SAC with recordings in each batch (RLPD).
     Rlpd,
@@ -29,7 +29,7 @@ pub enum Algorithm {
 }
 
 impl Algorithm {
-    /// All of them.
+    /// All algorithms.
     pub const ALL: [Self; 8] = [
         Self::ScorePpo,
         Self::Ppo,
@@ -41,11 +41,11 @@ impl Algorithm {
         Self::BehaviourCloning,
     ];
 
-    /// Those that learn from play, see [`is_trained`](Self::is_trained).
+    /// Algorithms that learn from play, see [`is_trained`](Self::is_trained).
     pub const TRAINED: [Self; 7] =
         [Self::ScorePpo, Self::Ppo, Self::ScoreSac, Self::Sac, Self::SpirlPpo, Self::SpirlSac, Self::Rlpd];
 
-    /// Name on the command line, in files and in results.
+    /// Returns the name on the command line, in files and in results.
     pub fn name(self) -> &'static str {
         match self {
             Self::ScorePpo => "score-ppo",
@@ -59,7 +59,7 @@ impl Algorithm {
         }
     }
 
-    /// Whether a skill model is needed.
+    /// Returns whether a skill model is needed.
     pub fn needs_skills(self) -> bool {
         match self {
             Self::ScorePpo | Self::ScoreSac | Self::SpirlPpo | Self::SpirlSac | Self::BehaviourCloning => true,
@@ -67,22 +67,22 @@ impl Algorithm {
         }
     }
 
-    /// Whether it learns which skill to play, instead of drawing it from the prior.
+    /// Returns whether it learns which skill to play, instead of drawing it from the prior.
     pub fn learns_prior(self) -> bool {
         matches!(self, Self::SpirlPpo | Self::SpirlSac)
     }
 
-    /// Whether there is nothing to learn without recordings: of skills, or of what was done.
+    /// Returns whether it needs recordings, for skills or for its own training.
     pub fn learns_from_demos(self) -> bool {
         self.needs_skills() || self.trains_on_demos()
     }
 
-    /// Whether recordings are part of what it is trained on; skills are learned from them beforehand.
+    /// Returns whether it trains on recordings too; skills are learned from them beforehand.
     pub fn trains_on_demos(self) -> bool {
         self == Self::Rlpd
     }
 
-    /// The learner whose settings count. Behaviour cloning trains none; where settings are asked for, it has those of PPO.
+    /// Returns the learner whose settings apply. Behaviour cloning trains no learner; it has the settings of PPO.
     pub fn learner(self) -> LearnerKind {
         match self {
             Self::ScorePpo | Self::Ppo | Self::SpirlPpo | Self::BehaviourCloning => LearnerKind::Ppo,
@@ -90,14 +90,14 @@ impl Algorithm {
         }
     }
 
-    /// Whether it learns from play; the others are ready as soon as they have their skills.
+    /// Returns whether it learns from play; other algorithms are ready once they have their skills.
     pub fn is_trained(self) -> bool {
         self != Self::BehaviourCloning
     }
 }
 
-/// What improves a policy. Code that depends on it matches every variant, so that the compiler names what a new learner
-/// needs.
+/// The learner behind an algorithm. Dependent code matches every variant, so the compiler lists the places for a new
+/// learner.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum LearnerKind {
     /// Proximal policy optimisation.
@@ -107,7 +107,7 @@ pub enum LearnerKind {
 }
 
 impl LearnerKind {
-    /// The key of its settings in an experiment.
+    /// Returns the key of its settings in an experiment.
     pub fn key(self) -> &'static str {
         match self {
             Self::Ppo => "ppo",

@@ -1,16 +1,15 @@
-//! One World that plays with the current policy and keeps what the learner needs.
+//! Collection of rollouts: a World that plays with the current policy.
 
 use bevy::prelude::*;
 use playbot_learner::{LearnError, ObsColumns, ObsKind, Observations, Policy, Rollout};
 
 use super::{
     agents_tick::AgentsTick,
-    arena_state::ActionLog,
     cut_episodes::{CutEpisodes, cut_episodes, push_state},
 };
 use crate::{game::Game, sensors::GameSensors, split::LevelSplit, worlds::build_observing_world};
 use bevy_playbot::{
-    action::Action,
+    action::{Action, ActionValue},
     agent::{Agent, AgentOrder},
     control::Control,
     demo::recorder,
@@ -36,7 +35,7 @@ pub struct Collector {
     agents: Vec<Entity>,
 }
 
-/// Rows of the rollout that is being filled.
+/// Rows of the rollout under construction.
 #[derive(Resource, Reflect)]
 #[reflect(from_reflect = false)]
 #[reflect(Component)]
@@ -56,12 +55,30 @@ fn note_finished(event: On<EpisodeEnded>, mut finished: ResMut<Finished>) {
     finished.0.push(*event);
 }
 
+/// Actions of the current episode.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+pub(super) struct ActionLog(pub(super) Vec<ActionValue>);
+
+impl ActionLog {
+    /// Notes the action of this tick; the log is emptied after the last tick of an episode.
+    fn note(&mut self, episode: &Episode, action: &ActionValue) {
+        if episode.tick <= 1 || episode.end().is_some() {
+            self.0.clear();
+        }
+        if episode.end().is_none() {
+            self.0.push(action.clone());
+        }
+    }
+}
+
 impl Collector {
-    /// Agents `first..first + count` on the levels of a split, with skills if there is a prior.
+    /// Makes a collector of agents `first..first + count` on the levels of a split, with skills if there is a prior.
     ///
     /// # Errors
     ///
-    /// The game cannot be seen this way.
+    /// The game does not support the observations.
     pub fn new(
         game: &dyn Game,
         split: &LevelSplit,
@@ -100,13 +117,13 @@ impl Collector {
         Ok(Self { world, agents })
     }
 
-    /// Plays `steps` ticks with this policy; `latent` is the width of the skills to keep, 0 for none.
+    /// Plays `steps` ticks with this policy; `latent` is the width of the skills to keep, 0 for no skills.
     ///
     /// Returns the rollout, `[steps, agents]`, and the episodes that ended in it.
     ///
     /// # Errors
     ///
-    /// The first breach of contract of the game, with agent, level and tick.
+    /// The game's first breach of contract, with agent, level and tick.
     pub fn collect(
         &mut self,
         policy: &Policy,
@@ -121,12 +138,12 @@ impl Collector {
         Ok((Rollout { obs, ..rollout }, ended))
     }
 
-    /// [`collect_into`](Self::collect_into), deciding together with the Worlds on the other seats, each of which does this
-    /// on a thread of its own.
+    /// Collects as [`collect_into`](Self::collect_into) does, and decides together with the Worlds on the other
+    /// seats, each of which runs on its own thread.
     ///
     /// # Errors
     ///
-    /// As there.
+    /// As for [`collect`](Self::collect).
     pub fn collect_at(
         &mut self,
         seat: &SharedBatch,
@@ -142,12 +159,12 @@ impl Collector {
         collected
     }
 
-    /// [`collect`](Self::collect) with the observations in these columns and not in the rollout: those for which the policy
-    /// decides.
+    /// Collects as [`collect`](Self::collect) does, with the observations in these columns instead of the rollout.
+    /// The policy decides for them.
     ///
     /// # Errors
     ///
-    /// As there.
+    /// As for [`collect`](Self::collect).
     pub fn collect_into(
         &mut self,
         columns: &mut ObsColumns<'_>,
@@ -171,19 +188,21 @@ impl Collector {
         Ok((rollout, std::mem::take(&mut world.resource_mut::<Finished>().0)))
     }
 
-    /// The World, for saving and restoring its arenas.
+    /// Returns the World, for saving and restoring its arenas.
     pub(crate) fn world_mut(&mut self) -> &mut World {
         &mut self.world
     }
 
-    /// The agents, in the order of their numbers.
+    /// Returns the agents, in the order of their numbers.
     pub fn agents(&self) -> &[Entity] {
         &self.agents
     }
 }
 
-/// Adds the states in which the rollout stopped, with the skills that will be active there, and their values. Agents
-/// between two episodes have no such state; theirs is 0 and is never used, since their last row ended an episode.
+/// Adds the states in which the rollout stopped, with the skills active there, and their values.
+///
+/// Agents between two episodes have no such state. Their row is 0 and is never used, since their last row ended an
+/// episode.
 fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -> Result<(), LearnError> {
     world.run_schedule(ObserveSchedule);
     if world.contains_resource::<SkillPrior>()
@@ -205,7 +224,7 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
     rollout.next_values = vec![0.0; entities.len()];
     rollout.ends.next_obs = Observations::zeros(&kind, entities.len());
     rollout.ends.next_z = vec![0.0; entities.len() * latent];
-    // There may be a prior and nobody who runs.
+    // A prior may exist without running agents.
     let counted = if world.contains_resource::<SkillPrior>() { entities.len() } else { 0 };
     rollout.ends.next_left = vec![1.0; counted];
     for (i, (&row, value)) in running.iter().zip(values).enumerate() {
@@ -225,7 +244,7 @@ fn collect_tick(world: &mut World) {
         // Arenas are being restored, not played.
         return;
     };
-    // The rollout is put back whatever happens to the tick.
+    // The rollout is put back even if the tick fails.
     let pushed = world.try_resource_scope(|world, mut collecting: Mut<Collecting>| {
         let entities = world.resource::<AgentOrder>().entities().to_vec();
         let kind = collecting.kind;
@@ -243,7 +262,7 @@ fn collect_tick(world: &mut World) {
     }
 }
 
-/// What each agent has done and got, added to `tick`.
+/// Adds the actions and results of each agent to `tick`.
 fn tick_of(world: &mut World, entities: &[Entity], mut tick: AgentsTick) -> Result<AgentsTick, LearnError> {
     let mut query =
         world.query_filtered::<(&ActiveSkill, &Action, &Decision, &Reward, &Episode, &mut ActionLog), With<Agent>>();

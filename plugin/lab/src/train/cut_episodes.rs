@@ -1,4 +1,4 @@
-//! Episodes that ran out of time: the states in which they stopped, and what these were still worth.
+//! Episodes that ran out of time: their last states, and the values of these.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -15,7 +15,7 @@ pub(super) struct CutEpisodes {
     pub(super) agents: Vec<usize>,
     pub(super) obs: Observations,
     pub(super) z: Vec<f32>,
-    /// What is left of these skills; empty without a prior.
+    /// Remaining ticks of these skills; empty without a prior.
     pub(super) left: Vec<f32>,
     pub(super) values: Vec<f32>,
 }
@@ -26,10 +26,10 @@ impl CutEpisodes {
     }
 }
 
-/// The last state of each episode that ran out of time in this tick, with its value.
+/// Returns the last state of each episode that ran out of time in this tick, with its value.
 ///
-/// The skill is the one the agent holds, or one drawn as at any other end of a skill if it has just run out. That is drawn
-/// from a copy of the agent's stream: the next draw belongs to the next episode.
+/// The skill is the agent's present one. If it has just run out, the next one is drawn from a copy of the agent's
+/// stream. The next draw of the stream itself belongs to the next episode.
 pub(super) fn cut_episodes(
     world: &mut World,
     entities: &[Entity],
@@ -60,7 +60,7 @@ pub(super) fn cut_episodes(
         }
     }
     cut.values = policy.values_held(&cut.z, &cut.left, &cut.obs, cut.agents.len())?;
-    // The row that is being written belongs to the state before the action.
+    // The current row belongs to the state before the action.
     for (&entity, before) in entities.iter().zip(before) {
         if let (Some(before), Some(mut observation)) = (before, world.get_mut::<Observation>(entity)) {
             *observation = before;
@@ -69,7 +69,7 @@ pub(super) fn cut_episodes(
     Ok(cut)
 }
 
-/// Adds what an agent sees now, its skill, and what is left of it.
+/// Adds an agent's present observation, its skill, and the skill's remaining ticks.
 pub(super) fn push_state(
     world: &World,
     entity: Entity,

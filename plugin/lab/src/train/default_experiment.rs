@@ -1,19 +1,19 @@
-//! The experiment that serves where none is named.
+//! The default experiment.
 
 use crate::{experiment_text::ExperimentText, game::Game, games::Games};
 
-/// Levels to train on, and as many behind them to test on, of a game that names no experiment of its own.
+/// Number of training levels, and of test levels after them, for a game without its own experiment.
 const LEVELS: u64 = 64;
 
-/// The experiment of a program's first game, see [`experiment_of`].
+/// Returns the experiment of a program's first game, see [`experiment_of`].
 pub fn default_experiment(games: &Games) -> ExperimentText {
     experiment_of(games.first())
 }
 
-/// The experiment of a game where none is named. A game that has none of its own gets the plainest: SCORE-PPO in its first
-/// mode, from recordings in `demos/` and the game's name.
+/// Returns the default experiment of a game. A game without its own experiment gets the simplest: SCORE-PPO in its
+/// first mode, from the recording in `demos/` with the game's name.
 pub fn experiment_of(game: &dyn Game) -> ExperimentText {
-    game.experiment().unwrap_or_else(|| ExperimentText {
+    game.tools().training.experiment().unwrap_or_else(|| ExperimentText {
         origin: format!("the experiment of {}", game.name()).into(),
         text: plainest(game).into(),
     })

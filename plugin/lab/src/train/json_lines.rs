@@ -1,4 +1,4 @@
-//! Files with one line of JSON per update, which a crash can tear at their end.
+//! Files with one line of JSON per update, whose end a crash can tear.
 
 use std::{
     fs,
@@ -9,34 +9,34 @@ use std::{
 use playbot_learner::{disk::DiskFile, seal_json};
 use serde_json::Value;
 
-use super::sealed_file::unsealed_line;
+use crate::sealed_file::unsealed_line;
 
 /// One line.
 #[derive(Clone, Debug, PartialEq)]
 pub struct JsonLine {
-    /// Its text as it is written, with its checksum, if it has one, and without the line feed.
+    /// Its text as written, with its checksum if any, and without the line feed.
     pub text: String,
     /// Its `step`.
     pub step: u64,
-    /// What it says.
+    /// Its JSON value.
     pub value: Value,
-    /// Whether it has a checksum. Older versions wrote none.
+    /// True if it has a checksum, which older versions did not write.
     pub had_seal: bool,
 }
 
-/// What a file of JSON lines holds.
+/// Content of a file of JSON lines.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct JsonLines {
     /// The whole lines, in their order.
     pub lines: Vec<JsonLine>,
-    /// Numbers, from 1, of the lines that are no JSON, have no step or another checksum.
+    /// Numbers, from 1, of lines that are not JSON, lack a step, or have a wrong checksum.
     pub damaged: Vec<usize>,
-    /// Whether the last line has no end, as after a crash.
+    /// True if the last line has no end, as after a crash.
     pub is_torn: bool,
 }
 
 impl JsonLines {
-    /// Reads a file; one that does not exist is empty.
+    /// Reads a file; a missing one is empty.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! The learner behind an experiment's algorithm.
+//! The learner of an experiment's algorithm.
 
 use std::{
     ops::{Deref, DerefMut},
@@ -18,7 +18,7 @@ use super::{
 use crate::{game::Game, held_out::HeldOut, sensors::GameSensors};
 use bevy_playbot::vision::ObservationConfig;
 
-/// The learner of an experiment's algorithm, whichever that is.
+/// Learner of any algorithm.
 #[derive(Debug)]
 pub struct TrainedLearner(Box<dyn Learner>);
 
@@ -37,12 +37,12 @@ impl DerefMut for TrainedLearner {
 }
 
 impl TrainedLearner {
-    /// A learner with fresh weights, tied to `skills` if the experiment's algorithm needs them. `demos` are what it trains on
-    /// beside its own play, if it does.
+    /// Makes a learner with fresh weights, tied to `skills` if the experiment's algorithm needs them. `demos` are the
+    /// rollouts for algorithms that train on recordings too.
     ///
     /// # Errors
     ///
-    /// [`TrainError`] if settings, game and skill model do not go together.
+    /// [`TrainError`] if settings, game and skill model do not fit one another.
     pub fn new(
         game: &dyn Game,
         experiment: &Experiment,
@@ -80,16 +80,17 @@ impl TrainedLearner {
         Self(Box::new(learner))
     }
 
-    /// Takes over what an experiment may change while a training is stopped: its length, over which a learning rate falls.
+    /// Takes over the settings that may change while training is stopped: the length, over which a learning rate
+    /// falls.
     pub(crate) fn set_length(&mut self, experiment: &Experiment) {
         self.set_total_updates(experiment.ppo_config().total_updates);
     }
 
-    /// Reads what the learner of this algorithm has saved.
+    /// Loads a learner of this algorithm.
     ///
     /// # Errors
     ///
-    /// [`FileError`] says what is wrong with the file.
+    /// [`FileError`] with the error of the file.
     pub fn load(algorithm: Algorithm, path: &Path, device: DeviceKind) -> Result<Self, FileError> {
         if algorithm.learns_prior() {
             return Ok(Self::of(SpirlLearner::load(path, device)?));
@@ -101,7 +102,7 @@ impl TrainedLearner {
     }
 }
 
-/// Says so if the replay buffer will need more memory than people expect.
+/// Warns of a large replay buffer.
 fn warn_of_large_buffer(experiment: &Experiment, spec: PolicySpec, latent: usize) {
     const GIB: f64 = (1u64 << 30) as f64;
     let transitions = (experiment.sac.buffer as u64).min(experiment.steps);
@@ -116,7 +117,7 @@ fn warn_of_large_buffer(experiment: &Experiment, spec: PolicySpec, latent: usize
     }
 }
 
-/// The skill model, if it is there and was learned for this game.
+/// Returns the skill model, if it exists and was learned for this game.
 fn fitting<'a>(
     game: &dyn Game,
     experiment: &Experiment,

@@ -1,17 +1,17 @@
-//! What is said of a log in which lines are damaged or missing when a training goes on.
+//! Warnings about damaged or missing log lines, for resumed runs.
 
 use std::collections::BTreeSet;
 
 use super::json_lines::JsonLines;
 
-/// Stretches of missing updates that are named; of more the number is said.
+/// Largest number of gaps that are named; beyond it their number is given.
 const NAMED: usize = 8;
 
-/// The damaged lines, which are left out, and the updates up to a step of which no line is left: a log that was cut off between
-/// two lines, or is not there, looks whole otherwise. `None` if there is nothing to say.
+/// Describes the damaged lines, which are left out, and the missing updates up to `step`. A log that is missing or
+/// was cut off between two lines would look whole otherwise. `None` without gaps.
 ///
-/// `read` has no lines behind `step` any more, up to which `updates` updates were made. A line that a kill tore behind it is
-/// written anew, and not spoken of.
+/// `read` has no lines after `step`, up to which `updates` updates were made. A line after it that a kill tore is
+/// written again, and is not mentioned.
 pub(super) fn gaps(read: &JsonLines, step: u64, updates: u64) -> Option<String> {
     let parts: Vec<String> = [damaged(read, step), missing(read, step, updates)].into_iter().flatten().collect();
     (!parts.is_empty()).then(|| parts.join("; "))
@@ -45,10 +45,10 @@ fn missing(read: &JsonLines, step: u64, updates: u64) -> Option<String> {
             format!("{missing} of {updates} updates")
         }
     };
-    Some(format!("nothing is left of {words}: curves have a gap there, and what is learned stays the same"))
+    Some(format!("nothing is left of {words}: curves have a gap there, and learning is not affected"))
 }
 
-/// Updates by their steps; `None` if there are none.
+/// Describes updates by their steps; `None` without updates.
 fn of_updates(updates: Vec<u64>, per_update: u64) -> Option<String> {
     let stretches: Vec<(u64, u64)> = updates
         .chunk_by(|one, next| one + 1 == *next)
@@ -76,7 +76,7 @@ mod tests {
 
     const UPDATES: u64 = 4;
 
-    /// What is said of a log that should have four updates of 8 steps.
+    /// Returns the warning about a log that should have four updates of 8 steps.
     fn said(path: &Path) -> Option<String> {
         gaps(&JsonLines::read(path).expect("readable"), 8 * UPDATES, UPDATES)
     }

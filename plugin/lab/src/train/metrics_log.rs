@@ -1,8 +1,8 @@
-//! What a training measures, written down after each update.
+//! Metrics of training, logged after each update.
 //!
 //! - `metrics.jsonl`: one line per update, the same bytes for the same seed. A value that is not a number is `null`.
-//! - `timing.jsonl`: what differs from run to run: seconds, steps per second, time of day.
-//! - `tensorboard/`: both once more, as an event file. It is derived: a resumed training writes it anew.
+//! - `timing.jsonl`: values that differ between runs: seconds, steps per second, time of day.
+//! - `tensorboard/`: both again, as an event file. It is derived: a resumed run writes it anew.
 
 use std::{
     collections::BTreeMap,
@@ -13,30 +13,22 @@ use std::{
 use playbot_learner::disk::DiskFile;
 use serde_json::{Value, json};
 
+pub use super::update_report::{CLIPPED_SHARE, EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE};
 use super::{
     json_lines::{JsonLines, append_json_line},
     log_gaps::gaps,
-    run_dir::{RunError, io_error, write_atomically},
+    run_error::{RunError, io_error},
     tensorboard::{Event, EventFolder, EventKind},
     update_report::UpdateReport,
 };
+use crate::sealed_file::write_atomically;
 
-/// Tag of the success rate of the last 100 episodes.
-pub const SUCCESS_RATE: &str = "charts/success_rate";
-/// Tag of the mean return of the last 100 episodes.
-pub const EPISODIC_RETURN: &str = "charts/episodic_return";
-/// Tag of the mean length of the last 100 episodes, ticks.
-pub const EPISODIC_LENGTH: &str = "charts/episodic_length";
-/// Tag of the share of clipped actions in the last 100 episodes.
-pub const CLIPPED_SHARE: &str = "charts/clipped_share";
 /// Tag of the environment steps per second.
 pub const SPS: &str = "charts/SPS";
-/// Tag of the number of episodes that have ended.
-pub const EPISODES: &str = "charts/episodes";
 /// Tags of the means over the last 100 episodes.
 pub const EPISODE_MEANS: [&str; 3] = [EPISODIC_RETURN, EPISODIC_LENGTH, SUCCESS_RATE];
 
-/// The range that a metric lies in by its nature; `None` if it may have any value.
+/// Returns the natural range of a metric; `None` if any value is possible.
 pub fn range_of(tag: &str) -> Option<(f64, f64)> {
     [SUCCESS_RATE, CLIPPED_SHARE].contains(&tag).then_some((0.0, 1.0))
 }
@@ -50,23 +42,23 @@ pub struct MetricsLog {
 }
 
 impl MetricsLog {
-    /// The metrics of the run in `folder`.
+    /// Makes the log of the run in `folder`.
     pub fn new(folder: &Path) -> Self {
         let file = |name| folder.join(name);
         Self { metrics: file("metrics.jsonl"), timing: file("timing.jsonl"), events: file("tensorboard") }
     }
 
-    /// `metrics.jsonl`.
+    /// Returns the path of `metrics.jsonl`.
     pub fn metrics_file(&self) -> &Path {
         &self.metrics
     }
 
-    /// `timing.jsonl`.
+    /// Returns the path of `timing.jsonl`.
     pub fn timing_file(&self) -> &Path {
         &self.timing
     }
 
-    /// Appends an update to all files; it is with the operating system when this returns.
+    /// Appends an update to all files, and returns once the operating system has it.
     ///
     /// # Errors
     ///
@@ -75,7 +67,7 @@ impl MetricsLog {
         self.write(report.step, &metrics_line(report), &timing_line(report, steps_per_update, wall_time()))
     }
 
-    /// Waits until all that was appended is on the disk, where a checkpoint relies on it.
+    /// Waits until everything appended is on the disk, for a checkpoint that relies on it.
     ///
     /// # Errors
     ///
@@ -94,12 +86,11 @@ impl MetricsLog {
         folder.append(&event(step, metrics, Some(timing))).map_err(io_error("write", &self.events))
     }
 
-    /// Drops what was logged after `step`, and whatever a crash tore. Lines of the `updates` up to there that are damaged or
-    /// missing are warned of.
+    /// Drops log lines after `step`, and torn lines. Warns of damaged or missing lines among the `updates` before.
     ///
     /// # Errors
     ///
-    /// [`RunError::Io`]; a file is as it was, or done.
+    /// [`RunError::Io`]; each file is then either unchanged or complete.
     pub fn rewind(&self, step: u64, updates: u64) -> Result<(), RunError> {
         let metrics = keep_until(&self.metrics, step, updates)?;
         let timing: BTreeMap<u64, Value> = keep_until(&self.timing, step, updates)?.into_iter().collect();
@@ -109,12 +100,12 @@ impl MetricsLog {
     }
 }
 
-/// Seconds since 1970: the only look at the clock here. Nothing that is computed depends on it.
+/// Returns seconds since 1970. This is the only read of the clock here, and computed values do not depend on it.
 fn wall_time() -> f64 {
     SystemTime::now().duration_since(UNIX_EPOCH).map_or(0.0, |since| since.as_secs_f64())
 }
 
-/// One update under the names that TensorBoard users know.
+/// Returns one update under the tags known to TensorBoard users.
 fn metrics_line(report: &UpdateReport) -> Value {
     let mut line = json!({ "step": report.step, "update": report.update });
     for (tag, value) in report.scalars() {
@@ -131,20 +122,20 @@ fn timing_line(report: &UpdateReport, steps_per_update: u64, wall_time: f64) -> 
     })
 }
 
-/// The tags of a line with their values; `null` is NaN. Whatever has no `/` in its name is no metric.
+/// Returns the tags of a line with their values; `null` is NaN. Names without `/` are not metrics.
 pub fn scalars(line: &Value) -> impl Iterator<Item = (&str, f64)> {
     let entries = line.as_object().into_iter().flatten().filter(|(tag, _)| tag.contains('/'));
     entries.map(|(tag, value)| (tag.as_str(), value.as_f64().unwrap_or(f64::NAN)))
 }
 
-/// The event of an update, from its lines.
+/// Returns the event of an update, from its lines.
 fn event(step: u64, metrics: &Value, timing: Option<&Value>) -> Event {
     let values = scalars(metrics).chain(timing.into_iter().flat_map(scalars));
     let kind = EventKind::Scalars(values.map(|(tag, value)| (tag.to_owned(), value)).collect());
     Event { wall_time: timing.and_then(|line| line["wall_time"].as_f64()).unwrap_or(0.0), step, kind }
 }
 
-/// Cuts a file behind `step`, and returns what is left. Whatever should be there and is not is said.
+/// Cuts a file after `step`, and returns the rest. Warns of missing lines.
 fn keep_until(path: &Path, step: u64, updates: u64) -> Result<Vec<(u64, Value)>, RunError> {
     let mut read = JsonLines::read(path).map_err(io_error("read", path))?;
     read.lines.retain(|line| line.step <= step);
@@ -163,7 +154,7 @@ mod tests {
 
     use super::{super::tensorboard::testing::events_after_the_header, *};
 
-    /// Updates with a value that is no number and one that needs all its digits.
+    /// Writes updates with a value that is not a number and one that needs all its digits.
     fn write(log: &MetricsLog, steps: [u64; 2]) {
         for step in steps {
             let metrics = json!({ "step": step, "update": 1, "losses/a": f64::NAN, "charts/b": 0.1 * step as f64 });

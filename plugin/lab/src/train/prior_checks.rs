@@ -8,7 +8,7 @@ use super::{
 };
 
 impl Experiment {
-    /// A policy over skills learns from whole skills that were drawn.
+    /// Checks that skills are whole and drawn, as a policy over skills needs them.
     pub(super) fn check_skill_draws(&self) -> Result<(), ExperimentError> {
         if !self.algorithm.learns_prior() {
             return Ok(());
@@ -28,7 +28,8 @@ impl Experiment {
         }
         let least = self.score.horizon.saturating_mul(2);
         if steps < least {
-            let why = format!("a policy over skills learns from whole ones, so it takes 2 × `score.horizon` = {least}");
+            let why =
+                format!("a policy over skills learns from whole skills: use at least 2 × `score.horizon` = {least}");
             return refuse(key, steps, why);
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! How far a training is, and how its last episodes went.
+//! Progress of training, and results of its last episodes.
 
 use std::collections::VecDeque;
 
@@ -11,21 +11,20 @@ use super::{
     update_report::{Timing, UpdateReport},
 };
 
-/// Episodes over which the current return, length and success rate are averaged.
-pub(crate) const RECENT: usize = 100;
+pub(crate) use super::update_report::RECENT;
 
-/// A finished episode as the moving averages keep it.
+/// A finished episode, as the moving averages keep it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RecentEpisode {
     total_reward: f64,
     ticks: u32,
     success: bool,
-    /// Ticks whose action was clipped; missing in checkpoints from before it was counted.
+    /// Ticks whose action was clipped; missing in older checkpoints.
     #[serde(default)]
     clipped: u32,
 }
 
-/// How far the training is.
+/// Progress of training.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Progress {
     pub(crate) updates: u64,
@@ -47,7 +46,7 @@ impl Progress {
         self.recent.drain(..surplus);
     }
 
-    /// Mean over the last episodes; `None` before the first has ended.
+    /// Returns the mean over the last episodes; `None` before the first has ended.
     fn mean(&self, value: fn(&RecentEpisode) -> f64) -> Option<f64> {
         let n = self.recent.len();
         (n > 0).then(|| self.recent.iter().map(value).sum::<f64>() / n as f64)
@@ -61,13 +60,13 @@ impl Progress {
         self.mean(|episode| f64::from(u8::from(episode.success)))
     }
 
-    /// Share of the clipped ticks among those of the last episodes.
+    /// Returns the share of the clipped ticks among those of the last episodes.
     fn clipped_share(&self) -> Option<f64> {
         let ticks = self.mean(|episode| f64::from(episode.ticks)).filter(|ticks| *ticks > 0.0)?;
         Some(self.mean(|episode| f64::from(episode.clipped))? / ticks)
     }
 
-    /// How good the policy is, where enough episodes have ended to say so.
+    /// Returns the training results, with means once enough episodes have ended.
     pub(crate) fn summary(&self) -> CheckpointSummary {
         let settled = |mean: Option<f64>| mean.filter(|_| self.recent.len() == RECENT);
         CheckpointSummary {

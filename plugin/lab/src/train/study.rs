@@ -1,7 +1,8 @@
-//! A study: the variants of an experiment, each with every seed.
+//! Studies: the variants of an experiment, each with every seed.
 
 use std::{collections::BTreeSet, path::Path};
 
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 use super::{
@@ -9,30 +10,30 @@ use super::{
     config_error::ConfigError,
 };
 
-/// One training (or none, for behaviour cloning) and one measurement of a study.
+/// One training (except for behaviour cloning) and one measurement of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StudyRun {
     /// Name of the variant.
     pub variant: String,
-    /// What to run, with its seed; without variants.
+    /// Its experiment with its seed and without variants.
     pub experiment: Experiment,
 }
 
-/// A study makes no sense.
+/// An invalid study.
 #[derive(Debug, Error)]
 pub enum StudyError {
     /// Two variants have the same name.
     #[error("two variants are called `{0}`: give each a name of its own")]
     SameName(String),
-    /// A name cannot be that of a folder.
+    /// A name that is not valid for a folder.
     #[error(
         "`{0}` cannot be the name of a variant: use letters, digits, `-`, `_` and `.`, and begin with a letter or digit"
     )]
     BadName(String),
-    /// The same seed is there twice.
+    /// The same seed occurs twice.
     #[error("seed {0} is there twice: another run with it would be the same run")]
     SameSeed(u64),
-    /// A variant changes what the study itself says.
+    /// A variant changes a key of the study itself.
     #[error(
         "variant `{variant}`: `{key}` is not for a variant: all are trained with the study's `seeds` and measured in the same \
          way on the same levels"
@@ -40,35 +41,37 @@ pub enum StudyError {
     OfTheStudy {
         /// Its name.
         variant: String,
-        /// What it tries to change.
+        /// The key.
         key: String,
     },
-    /// A variant does not fit.
+    /// A variant with an invalid change.
     #[error("variant `{variant}`: {source}")]
     Config {
         /// Its name.
         variant: String,
-        /// What does not fit.
+        /// The error.
         source: Box<ConfigError>,
     },
-    /// The values of a variant do not go together.
+    /// A variant whose values contradict one another.
     #[error("variant `{variant}`: {source}")]
     Values {
         /// Its name.
         variant: String,
-        /// Why.
+        /// The error.
         source: ExperimentError,
     },
 }
 
+impl HasExitCode for StudyError {}
+
 impl StudyRun {
-    /// Name of its folder.
+    /// Returns the name of its folder.
     pub fn id(&self) -> String {
         format!("{}-seed{}", self.variant, self.experiment.seed)
     }
 
-    /// Name of the file of its skill model, which it shares with every run of the same skill settings, demonstrations
-    /// and seed.
+    /// Returns the file name of its skill model, which it shares with every run of the same skill settings,
+    /// demonstrations and seed.
     ///
     /// # Errors
     ///
@@ -78,7 +81,7 @@ impl StudyRun {
         let demos = run.demos.as_deref().unwrap_or(Path::new(""));
         let mut settings = ron::to_string(&(&run.game, run.observation, demos, &run.skills))?;
         if !run.skills.norm_obs {
-            // As it was before there was the key, so that studies find the files they have.
+            // The hash stays that of versions without the key, so studies find their existing files.
             settings = settings.replace(",norm_obs:false", "");
         }
         if run.observation_config().is_image() {
@@ -94,12 +97,12 @@ impl StudyRun {
     }
 }
 
-/// The runs of a study, variant by variant: an experiment without variants is compared with nothing, under the name of
-/// its algorithm. What a variant changes is applied last, over everything else.
+/// Returns the runs of a study, variant by variant. An experiment without variants is the only one, under the name of
+/// its algorithm. The changes of a variant are applied last, over everything else.
 ///
 /// # Errors
 ///
-/// [`StudyError`] with the variant that does not fit; every one is checked before anything is run.
+/// [`StudyError`] with the invalid variant; all variants are checked before anything is run.
 pub fn study_runs(experiment: &Experiment) -> Result<Vec<StudyRun>, StudyError> {
     let seeds = if experiment.seeds.is_empty() { vec![experiment.seed] } else { experiment.seeds.clone() };
     let mut known = BTreeSet::new();
@@ -131,7 +134,7 @@ fn check_keys(variant: &Variant) -> Result<(), StudyError> {
     }
 }
 
-/// The variants of a study; one under the name of the algorithm for an experiment that has none.
+/// Returns the variants of a study; an experiment without variants is the only one, under the name of its algorithm.
 ///
 /// # Errors
 ///
@@ -200,9 +203,9 @@ mod tests {
     #[test]
     fn names_of_skill_files_stay_as_they_were() {
         let file = |text: &str| study_runs(&experiment(text)).expect("valid")[0].skill_file().expect("Unicode");
-        // As of the first release with studies; new keys must not change it.
+        // The name in the first release with studies; new keys must not change it.
         assert_eq!(file(""), "skills-72e1ee68-seed3.safetensors");
-        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/experiments/coinrun-ablation.ron");
+        let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../assets/experiments/coinrun-ablation.ron");
         let runs = study_runs(&crate::train::config_file::read_experiment(&shipped).expect("valid")).expect("valid");
         assert_eq!(runs[0].skill_file().expect("Unicode"), "skills-1b4ea9c2-seed1.safetensors");
         assert_ne!(file(""), file(r#"(name: "a", set: ["skills.norm_obs=true"])"#));

@@ -1,10 +1,10 @@
-//! Why training cannot go on.
+//! Errors of training.
 
 use bevy_playbot::{
     fault::Fault,
     vision::{ObservationConfig, UnknownObservation, VisionError},
 };
-use playbot_learner::LearnError;
+use playbot_learner::{HasExitCode, LearnError};
 use thiserror::Error;
 
 use crate::split::LevelSplit;
@@ -14,13 +14,13 @@ use super::{
     config::{Algorithm, ExperimentError},
 };
 
-/// Training cannot go on.
+/// Failure of training.
 #[derive(Debug, Error)]
 pub enum TrainError {
-    /// The experiment makes no sense.
+    /// The experiment is invalid.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
-    /// The game cannot be seen this way.
+    /// The game does not support the observations.
     #[error(transparent)]
     Vision(#[from] VisionError),
     /// The algorithm needs a skill model.
@@ -58,23 +58,24 @@ pub enum TrainError {
          learn skills with this experiment, `playbot learn-skills`, or change it to what the model has seen"
     )]
     SkillObservation {
-        /// What the model has seen.
+        /// Observations of the model.
         model: ObservationConfig,
-        /// What agents see in the experiment.
+        /// Observations of the experiment.
         experiment: ObservationConfig,
     },
-    /// The skill model has seen what is kept for the test.
+    /// The skill model has seen held-out levels.
     #[error(
-        "the skill model was learned from demonstrations of {seen}, and the held-out levels {test} of `test` have some of these: what \
-         is measured there would be no generalisation; learn skills from recordings of other levels, or hold out others"
+        "the skill model was learned from demonstrations of {seen}, and the held-out levels {test} of `test` have some of \
+         these, so a measurement would not show generalisation: learn skills from recordings of other levels, or hold out \
+         others"
     )]
     SeenSkills {
-        /// Levels that its demonstrations show.
+        /// Levels in its demonstrations.
         seen: String,
         /// The held-out levels.
         test: LevelSplit,
     },
-    /// The file of the skill model says of its pictures what this version does not know.
+    /// The skill model's metadata names pictures that this version does not know.
     #[error(transparent)]
     UnknownObservation(#[from] UnknownObservation),
     /// The system does not start a thread for each World.
@@ -83,9 +84,9 @@ pub enum TrainError {
          limits threads or address space (`ulimit -u`, `ulimit -v`, or that of the container)"
     )]
     Threads {
-        /// How many there are.
+        /// Number of Worlds.
         worlds: usize,
-        /// What the system says.
+        /// The system's answer.
         source: std::io::Error,
     },
     /// The game broke its contract.
@@ -94,7 +95,17 @@ pub enum TrainError {
     /// The learner cannot go on, for instance because a loss is not a number.
     #[error(transparent)]
     Learn(#[from] LearnError),
-    /// A checkpoint could not be brought back.
+    /// A checkpoint could not be restored.
     #[error(transparent)]
     Restore(#[from] RestoreError),
+}
+
+impl HasExitCode for TrainError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Fault(_) | Self::Restore(RestoreError::Fault(_)) => 2,
+            Self::Learn(error) => error.exit_code(),
+            _ => 3,
+        }
+    }
 }

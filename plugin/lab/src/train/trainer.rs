@@ -32,7 +32,7 @@ use bevy_playbot::panics::PanicReports;
 /// Rows on which the first policy is compared with the decoder.
 const INITIAL_KL_ROWS: usize = 1024;
 
-/// One algorithm being trained on one experiment.
+/// Training of one algorithm on one experiment.
 pub struct Trainer {
     experiment: Experiment,
     threads: usize,
@@ -41,16 +41,16 @@ pub struct Trainer {
     pub(crate) progress: Progress,
     pub(crate) seen: Option<SeenLevels>,
     obs_kind: ObsKind,
-    /// Memory of the last rollout's observations, for the next.
+    /// Memory of the last rollout's observations, reused for the next.
     obs: Observations,
 }
 
 impl Trainer {
-    /// A trainer at its first step.
+    /// Makes a trainer at its first step.
     ///
     /// # Errors
     ///
-    /// [`TrainError`] if experiment, game and skill model do not go together.
+    /// [`TrainError`] if experiment, game and skill model do not fit one another.
     pub fn new(
         game: &dyn Game,
         experiment: &Experiment,
@@ -61,12 +61,13 @@ impl Trainer {
         Self::with_demos(game, experiment, skills, &[], device, threads)
     }
 
-    /// [`new`](Self::new) for algorithms that may train on recordings too:
-    /// [`rollouts`](crate::demo::dataset::Demonstrations::rollouts) gives them. The others do not look at them.
+    /// Makes a trainer as [`new`](Self::new) does, for algorithms that may train on recordings too.
+    /// [`rollouts`](crate::demo::dataset::Demonstrations::rollouts) gives the recordings, which other algorithms
+    /// ignore.
     ///
     /// # Errors
     ///
-    /// As there; and if nothing in the recordings was ever rewarded.
+    /// As for [`new`](Self::new); and if the recordings have no reward.
     pub fn with_demos(
         game: &dyn Game,
         experiment: &Experiment,
@@ -85,7 +86,7 @@ impl Trainer {
         Ok(Self { seen: Some(seen), ..trainer })
     }
 
-    /// A trainer around a learner that exists already, for an experiment that was checked.
+    /// Makes a trainer around an existing learner, for a checked experiment.
     pub(crate) fn with_learner(
         game: &dyn Game,
         experiment: &Experiment,
@@ -110,7 +111,7 @@ impl Trainer {
     ///
     /// # Errors
     ///
-    /// [`TrainError`]; what was learned before stays as it was.
+    /// [`TrainError`]; the learner stays as it was.
     pub fn update(&mut self) -> Result<UpdateReport, TrainError> {
         let start = Instant::now();
         let (policy, latent) = (self.learner.policy(), self.learner.rollout_latent());
@@ -131,7 +132,7 @@ impl Trainer {
         Ok(report)
     }
 
-    /// Draws skills from what was learned of them, where that goes on.
+    /// Updates the prior that draws skills, for algorithms that learn it.
     fn renew_skills(&mut self) {
         let Some(prior) = self.skill_prior().filter(|_| self.experiment.algorithm.learns_prior()) else { return };
         for collector in &mut self.collectors {
@@ -139,7 +140,7 @@ impl Trainer {
         }
     }
 
-    /// Plays `steps` ticks in all Worlds at once. Their observations share one piece of memory, which is kept.
+    /// Plays `steps` ticks in all Worlds in parallel. Their observations share one buffer, which is reused.
     fn collect(
         &mut self,
         policy: &Policy,
@@ -153,7 +154,7 @@ impl Trainer {
         let collected = if work.len() > self.threads || !policy.is_on_host() {
             collect_together(work, self.threads, policy, latent, steps)?
         } else {
-            // With a core of its own a World gains nothing from waiting for others.
+            // A World with a core of its own gains nothing from shared passes.
             on_threads(&mut work, self.threads, |(collector, columns)| {
                 collector.collect_into(columns, policy, latent, steps)
             })
@@ -167,7 +168,8 @@ impl Trainer {
         Ok((Rollout::join_around(obs, rollouts)?, finished))
     }
 
-    /// Before the first update of SCORE, the policy must be the decoder, to the bit; likewise a policy over skills the prior.
+    /// Compares the policy with the decoder before the first update of SCORE: they must be equal to the bit. For a
+    /// policy over skills, compares it with the prior.
     fn initial_kl(&self, rollout: &Rollout) -> Result<Option<f32>, LearnError> {
         let Experiment { algorithm, score, .. } = &self.experiment;
         let copied = algorithm.learns_prior() || (algorithm.needs_skills() && score.init_from_decoder);
@@ -179,52 +181,53 @@ impl Trainer {
         self.learner.initial_kl(z, obs, rows)
     }
 
-    /// Whether all steps of the experiment are done.
+    /// Returns whether all steps of the experiment are done.
     pub fn is_done(&self) -> bool {
         self.progress.steps >= self.experiment.steps
     }
 
-    /// Environment steps done.
+    /// Returns the environment steps done.
     pub fn steps(&self) -> u64 {
         self.progress.steps
     }
 
-    /// Updates done.
+    /// Returns the updates done.
     pub fn updates(&self) -> u64 {
         self.progress.updates
     }
 
-    /// The experiment.
+    /// Returns the experiment.
     pub fn experiment(&self) -> &Experiment {
         &self.experiment
     }
 
-    /// The levels that it sees, and those that the demonstrations of its skills show; `None` where a run of an older version goes on.
+    /// Returns the levels that it sees, and those in the demonstrations of its skills; `None` for a resumed run of an
+    /// older version.
     pub fn seen(&self) -> Option<&SeenLevels> {
         self.seen.as_ref()
     }
 
-    /// Notes what recordings show that it trains on.
+    /// Notes the levels of the recordings that it trains on.
     pub fn note_seen(&mut self, recorded: &SeenLevels) {
         self.seen.iter_mut().for_each(|seen| seen.extend(recorded));
     }
 
-    /// The policy as it is now.
+    /// Returns a copy of the present policy.
     pub fn policy(&self) -> Policy {
         self.learner.policy()
     }
 
-    /// Time that the learner spent putting minibatches together so far.
+    /// Returns the time that the learner has spent on gathering minibatches.
     pub fn gathering(&self) -> Duration {
         self.learner.gathering()
     }
 
-    /// The Worlds that play, to look into or to measure.
+    /// Iterates over the Worlds that play, for inspection or measurement.
     pub fn worlds_mut(&mut self) -> impl Iterator<Item = &mut World> {
         self.collectors.iter_mut().map(Collector::world_mut)
     }
 
-    /// Writes what is kept of a panic of the game into this folder, instead of the one for temporary files.
+    /// Sets the folder for reports of the game's panics, instead of the one for temporary files.
     pub fn report_panics_to(&mut self, folder: &Path) {
         for world in self.worlds_mut() {
             if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
@@ -233,21 +236,21 @@ impl Trainer {
         }
     }
 
-    /// Where the policy's skills come from, if it has any.
+    /// Returns the source of the policy's skills, if it has skills.
     pub fn skill_source(&self) -> Option<SkillSource> {
         self.learner.skills()
     }
 
-    /// The prior that draws its skills.
+    /// Returns the prior that draws its skills.
     pub fn skill_prior(&self) -> Option<SkillPrior> {
         self.skill_source().as_ref().map(SkillPrior::from)
     }
 }
 
-/// What a World has played.
+/// Result of a World's play.
 type Collected = Result<(Rollout, Vec<EpisodeEnded>), Fault>;
 
-/// Lets Worlds play that share their forward passes: what they play is the same.
+/// Plays the Worlds with shared forward passes: the result is the same.
 fn collect_together(
     worlds: Vec<(&mut Collector, ObsColumns<'_>)>,
     threads: usize,
@@ -258,17 +261,17 @@ fn collect_together(
     let count = worlds.len();
     let seats = SharedBatch::seats(policy, count, threads);
     let mut work: Vec<_> = worlds.into_iter().zip(seats).collect();
-    // Most of them wait, for the others or for their turn.
+    // Most of the threads wait, for the others or for their turn.
     let collected = on_own_threads(
         &mut work,
         |((collector, columns), seat)| collector.collect_at(seat, columns, policy, latent, steps),
-        // Whoever has sat down and leaves is not waited for.
+        // A World that leaves its seat is no longer waited for.
         |(_, seat)| drop(seat.play()),
     );
     collected.map_err(|source| TrainError::Threads { worlds: count, source })
 }
 
-/// Whether the experiment can be run on this game.
+/// Checks that the experiment can be run on this game.
 pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), TrainError> {
     if let Some(problem) = game.problem() {
         return Err(Fault(problem).into());

@@ -1,21 +1,32 @@
-//! What one update of a training brought.
+//! Results of one update of training.
 
 use serde::Serialize;
 
-use super::{
-    learner::LearnerMetrics,
-    metrics_log::{CLIPPED_SHARE, EPISODES, EPISODIC_LENGTH, EPISODIC_RETURN, SUCCESS_RATE},
-    progress::RECENT,
-};
+use super::learner::LearnerMetrics;
 
-/// What one update brought. Everything in it is the same in every run with the same seed, except `timing`.
+/// Tag of the success rate of the last 100 episodes.
+pub const SUCCESS_RATE: &str = "charts/success_rate";
+/// Tag of the mean return of the last 100 episodes.
+pub const EPISODIC_RETURN: &str = "charts/episodic_return";
+/// Tag of the mean length of the last 100 episodes, ticks.
+pub const EPISODIC_LENGTH: &str = "charts/episodic_length";
+/// Tag of the share of clipped actions in the last 100 episodes.
+pub const CLIPPED_SHARE: &str = "charts/clipped_share";
+/// Tag of the number of episodes that have ended.
+pub const EPISODES: &str = "charts/episodes";
+
+/// Episodes over which the current return, length and success rate are averaged.
+pub(crate) const RECENT: usize = 100;
+
+/// Results of one update. Everything except `timing` is the same in every run with the same seed.
 #[derive(Clone, Debug)]
 pub struct UpdateReport {
     /// Updates done, this one included.
     pub update: u64,
     /// Environment steps done, over all arenas together.
     pub step: u64,
-    /// Episodes that have ended. Before the 100th the means below are of fewer, and of short ones more than of long.
+    /// Episodes that have ended. Before the 100th, the means below are over fewer episodes, of which short ones end
+    /// first.
     pub episodes: u64,
     /// Mean return of the last 100 episodes; `None` before the first has ended.
     pub episodic_return: Option<f64>,
@@ -28,19 +39,19 @@ pub struct UpdateReport {
     pub clipped_share: Option<f64>,
     /// KL divergence from decoder to policy before the first update; only in the first report of SCORE.
     pub initial_kl: Option<f32>,
-    /// What the learner reports.
+    /// The learner's metrics.
     pub learner: LearnerMetrics,
-    /// Where the time went.
+    /// Time spent.
     pub timing: Timing,
 }
 
 impl UpdateReport {
-    /// Whether at least 100 episodes have ended, and of the last 100 at least this share with success.
+    /// Returns whether at least 100 episodes have ended, and at least this share of the last 100 succeeded.
     pub fn mostly_succeeds(&self, share: f64) -> bool {
         self.episodes >= RECENT as u64 && self.success_rate.is_some_and(|rate| rate >= share)
     }
 
-    /// Everything measured, by TensorBoard tag; the same numbers in every run with the same seed.
+    /// Returns all measurements by TensorBoard tag; the same numbers in every run with the same seed.
     pub fn scalars(&self) -> Vec<(&'static str, f64)> {
         let episodes = [
             (EPISODES, Some(self.episodes as f64)),

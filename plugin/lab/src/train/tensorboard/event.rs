@@ -1,35 +1,35 @@
 //! The `Event` message of TensorFlow's `event.proto`, as far as scalars need it.
 
-/// What happened at one moment.
+/// An event at one time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
     /// Seconds since 1970.
     pub wall_time: f64,
     /// Environment steps done.
     pub step: u64,
-    /// What happened.
+    /// Kind of the event.
     pub kind: EventKind,
 }
 
-/// The kinds of events.
+/// Kinds of events.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EventKind {
-    /// The first event of every file: which version of the format it has.
+    /// The first event of every file: the version of the format.
     FileVersion,
-    /// Values follow from this step on; later ones that were read before, from another file, are void.
+    /// Values follow from this step on; later ones from another file become void.
     SessionStart,
     /// Numbers by their tags. They are kept as `f32`; NaN is allowed, and TensorBoard shows it as such.
     Scalars(Vec<(String, f64)>),
 }
 
-/// The wire types of protobuf that occur here.
+/// Wire types of protobuf.
 const VARINT: u64 = 0;
 const EIGHT_BYTES: u64 = 1;
 const LENGTH_DELIMITED: u64 = 2;
 const FOUR_BYTES: u64 = 5;
 
 impl Event {
-    /// The event in protobuf's wire format: fields in the order of their numbers, those that are 0 left out.
+    /// Encodes the event in protobuf's wire format: fields in the order of their numbers, those that are 0 left out.
     pub fn encode(&self) -> Vec<u8> {
         let mut out = Vec::new();
         key(1, EIGHT_BYTES, &mut out);
@@ -48,7 +48,7 @@ impl Event {
     }
 }
 
-/// The `Summary` message: a value for each tag.
+/// Encodes the `Summary` message: a value for each tag.
 fn summary(values: &[(String, f64)]) -> Vec<u8> {
     let mut out = Vec::new();
     for (tag, value) in values {
@@ -71,7 +71,7 @@ fn bytes(field: u64, content: &[u8], out: &mut Vec<u8>) {
     out.extend(content);
 }
 
-/// Seven bits a byte, the lowest first; the highest bit of a byte says that another follows.
+/// Encodes seven bits a byte, the lowest first; the highest bit of a byte marks a following byte.
 fn varint(mut value: u64, out: &mut Vec<u8>) {
     while value > 0x7f {
         out.push(value as u8 | 0x80);

@@ -13,7 +13,7 @@ use super::{
     record::frame,
 };
 
-/// What TensorBoard knows event files by.
+/// Prefix by which TensorBoard recognises event files.
 const PREFIX: &str = "events.out.tfevents.";
 
 /// A folder with the event file of one run.
@@ -23,13 +23,13 @@ pub struct EventFolder {
 }
 
 impl EventFolder {
-    /// The event file in `path`, which need not exist yet.
+    /// Makes a folder at `path`, which need not exist yet.
     pub fn new(path: PathBuf) -> Self {
         Self { path }
     }
 
-    /// Appends an event with one write, and starts the file if there is none. Who reads at the same time, or after a
-    /// crash, finds at most the last record torn, which TensorBoard waits for and then passes over.
+    /// Appends an event with one write, and starts the file if it is missing. After a crash, or during the write,
+    /// readers find at most the last record torn. TensorBoard waits for such a record and then skips it.
     ///
     /// # Errors
     ///
@@ -41,10 +41,10 @@ impl EventFolder {
         DiskFile::append(&file)?.write_all(&record)
     }
 
-    /// Puts a new file with these events in the place of the old ones, if there are any.
+    /// Replaces the old files by a new one with these events.
     ///
-    /// The new file sorts behind the old ones, and its first events tell a TensorBoard that is running to forget what it
-    /// read in them. `now` is the present, in seconds since 1970.
+    /// The new file sorts after the old ones, and its first events make a running TensorBoard forget the values of
+    /// those. `now` is the present, in seconds since 1970.
     ///
     /// # Errors
     ///
@@ -68,7 +68,7 @@ impl EventFolder {
         old.iter().try_for_each(|file| disk::remove_file(file))
     }
 
-    /// The event files, from the oldest to the newest.
+    /// Returns the event files, from the oldest to the newest.
     fn files(&self) -> io::Result<Vec<PathBuf>> {
         let entries = match fs::read_dir(&self.path) {
             Ok(entries) => entries,
@@ -87,7 +87,7 @@ impl EventFolder {
     }
 }
 
-/// When an event file was begun, from its name; `None` for other files.
+/// Returns the second in which an event file was begun, from its name; `None` for other files.
 fn second_of(path: &Path) -> Option<u64> {
     let rest = path.file_name()?.to_str()?.strip_prefix(PREFIX)?;
     rest.strip_suffix(".playbot")?.parse().ok()
@@ -121,7 +121,7 @@ mod tests {
         assert_eq!(events_after_the_header(&folder.path), framed(&[scalar(1), scalar(2)]));
         assert_eq!(names(&folder), ["events.out.tfevents.0000000100.playbot"]);
 
-        // A torn record, and a file of somebody else.
+        // A torn record, and an unrelated file.
         let file = folder.files().expect("listed").remove(0);
         fs::OpenOptions::new().append(true).open(file).expect("there").write_all(&[9; 7]).expect("writable");
         fs::write(folder.path.join("notes.txt"), "mine").expect("writable");

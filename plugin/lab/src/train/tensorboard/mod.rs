@@ -1,8 +1,8 @@
 //! Event files for [TensorBoard](https://www.tensorflow.org/tensorboard): the metrics of a run as its curves.
 //!
-//! An event file is a sequence of framed records (TFRecord), each of them a protobuf [`Event`]. The crates that write
-//! them bring image codecs, code generators or an asynchronous runtime along; the part that scalars need is small enough
-//! to be written out here. Every byte of it is tested against what TensorBoard's own writer gives.
+//! An event file is a sequence of framed records (TFRecord), each of them a protobuf [`Event`]. The crates for them
+//! bring image codecs, code generators or an asynchronous runtime along, and the part for scalars is small enough to
+//! implement here. Every byte is tested against the output of TensorBoard's own writer.
 
 mod event;
 mod file;

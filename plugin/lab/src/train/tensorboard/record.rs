@@ -1,6 +1,6 @@
 //! TFRecord framing: length, checksum of the length, data, checksum of the data; numbers are little-endian.
 
-/// What is added to a rotated checksum, so that data that holds checksums itself does not fool them.
+/// Offset added to a rotated checksum, which makes checksums of data that contains checksums reliable.
 const MASK: u32 = 0xa282_ead8;
 
 /// Appends one record with this content.
@@ -12,7 +12,7 @@ pub(super) fn frame(data: &[u8], out: &mut Vec<u8>) {
     out.extend(masked_crc(data).to_le_bytes());
 }
 
-/// CRC-32C (Castagnoli), rotated right by 15 bits and masked.
+/// Returns the CRC-32C (Castagnoli), rotated right by 15 bits and masked.
 fn masked_crc(data: &[u8]) -> u32 {
     crc32c::crc32c(data).rotate_right(15).wrapping_add(MASK)
 }

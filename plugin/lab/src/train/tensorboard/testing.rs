@@ -1,9 +1,9 @@
-//! Reading event files back.
+//! Readers of event files for tests.
 
 use std::{fs, path::Path};
 
-/// The contents of the whole records at the beginning of `bytes`, and how many bytes they take. Lengths are taken as
-/// they are; the checksums have tests of their own.
+/// Returns the contents of the whole records at the beginning of `bytes`, and the number of bytes that they take.
+/// Lengths are trusted; the checksums have tests of their own.
 pub(super) fn whole_records(bytes: &[u8]) -> (Vec<&[u8]>, usize) {
     let (mut records, mut rest) = (Vec::new(), bytes);
     while let Some((length, tail)) = rest.split_first_chunk() {
@@ -15,7 +15,7 @@ pub(super) fn whole_records(bytes: &[u8]) -> (Vec<&[u8]>, usize) {
     (records, bytes.len() - rest.len())
 }
 
-/// The bytes of the only event file in a folder, behind the two events that every file begins with.
+/// Returns the bytes of the only event file in a folder, after the two events at the start of every file.
 pub(in crate::train) fn events_after_the_header(folder: &Path) -> Vec<u8> {
     let mut files: Vec<_> = fs::read_dir(folder).expect("listed").map(|entry| entry.expect("listed").path()).collect();
     files.retain(|file| file.to_string_lossy().contains("tfevents"));

@@ -1,27 +1,23 @@
-//! How long a training is, in words.
+//! Messages about the length of a training.
 
-use playbot_lab::{
-    report::whole,
-    train::{Experiment, LearnerKind},
-};
+use super::{algorithm::LearnerKind, config::Experiment};
+use crate::report::whole;
 
-use crate::number::counted;
-
-/// What is to be said of steps that are no whole number of updates; nothing of those that are.
+/// Returns a message about steps that are no whole number of updates; `None` for whole ones.
 pub fn rounded(experiment: &Experiment) -> Option<String> {
     let (asked, trained) = (experiment.steps, experiment.whole_steps());
     (asked != trained).then(|| {
         format!(
             "{} rounded up to {} of {}: training for {}",
             if asked == 1 { "1 step is".to_owned() } else { format!("{} steps are", whole(asked as f64)) },
-            counted(experiment.updates(), "update"),
+            if experiment.updates() == 1 { "1 update".to_owned() } else { format!("{} updates", experiment.updates()) },
             whole(experiment.steps_per_update() as f64),
             whole(trained as f64)
         )
     })
 }
 
-/// What is to be said of a training that is over before its policy learns; nothing of others.
+/// Returns a message about a training that ends before its policy learns; `None` for others.
 pub fn never_learns(experiment: &Experiment) -> Option<String> {
     let algorithm = experiment.algorithm;
     if !algorithm.is_trained() {
@@ -30,7 +26,7 @@ pub fn never_learns(experiment: &Experiment) -> Option<String> {
     match algorithm.learner() {
         LearnerKind::Ppo => (experiment.updates() <= experiment.ppo.critic_warmup).then(|| {
             format!(
-                "the policy will stay as it is: only its critic learns in the first {} updates (`ppo.critic_warmup`), and \
+                "the policy will not change: only its critic learns in the first {} updates (`ppo.critic_warmup`), and \
                  this training has {}; train for longer, or set it lower",
                 whole(experiment.ppo.critic_warmup as f64),
                 whole(experiment.updates() as f64)
@@ -56,11 +52,11 @@ fn sac_never_learns(experiment: &Experiment) -> Option<String> {
             whole(seen as f64),
         ));
     }
-    // What comes in with the update that reaches the start counts, too.
+    // Steps of the update that reaches the start count, too.
     let steps = sac.updates_per_step * seen as f64;
     (steps <= sac.critic_warmup as f64).then(|| {
         format!(
-            "the policy will stay as it is: only its critics learn in the first {} gradient steps (`sac.critic_warmup`), \
+            "the policy will not change: only its critics learn in the first {} gradient steps (`sac.critic_warmup`), \
              and this training has {} at most; train for longer, or set it lower",
             whole(sac.critic_warmup as f64),
             whole(steps.floor())
@@ -72,7 +68,7 @@ fn sac_never_learns(experiment: &Experiment) -> Option<String> {
 mod tests {
     use std::path::Path;
 
-    use playbot_lab::train::config_file::parse_experiment;
+    use super::super::config_file::parse_experiment;
 
     use super::*;
 
