@@ -1,9 +1,9 @@
-//! `playbot bench`: speed, as steps per second of the whole and microseconds of its parts.
+//! `playbot bench`: steps per second of the whole and microseconds of its parts.
 
 use std::time::Instant;
 
 use bevy::prelude::World;
-use bevy_playbot::vision::{ObservationConfig, ObservationKind};
+use bevy_playbot::vision::{ObservationConfig, ObservationKind, VisionError};
 use playbot_lab::games::Games;
 use playbot_lab::prelude::*;
 use playbot_lab::{
@@ -26,8 +26,8 @@ use super::{
 
 /// Measure speed.
 ///
-/// Numbers are for this machine and this moment; nothing is tested. The parts of a step are measured by the clock, for all
-/// threads together. What is called idle is the share of the threads' time in which this program did not compute: it waited, or
+/// Numbers hold for this machine and this moment. Nothing is tested. The parts of a step are measured by the clock, for
+/// all threads together. Idle is the share of the threads' time in which this program did not compute: it waited, or
 /// other programs had the cores.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -36,19 +36,19 @@ use super::{
   playbot bench --case sim/GAME --threads 1
   playbot bench --case train/GAME/raster --seconds 20 --set 'ppo.cnn=Impala()' --set ppo.num_steps=256")]
 pub struct Args {
-    /// Only cases whose name contains this.
+    /// Measure only cases whose name contains this.
     #[arg(long, default_value = "")]
     case: String,
     /// Arenas.
     #[arg(long, default_value_t = 64)]
     arenas: u32,
-    /// Threads; each has a World of its own.
+    /// Threads. Each has a World of its own.
     #[arg(long, default_value_t = usual_threads())]
     threads: usize,
-    /// Seconds to measure each case for, at least.
+    /// Least seconds to measure each case for.
     #[arg(long, default_value_t = 5.0)]
     seconds: f64,
-    /// Change a value of what is trained, such as ppo.cnn=Impala(); may be given several times.
+    /// Change a setting of the training cases, such as ppo.cnn=Impala() (repeatable).
     #[arg(long = "set", value_name = "KEY=VALUE")]
     set: Vec<String>,
     #[command(flatten)]
@@ -56,12 +56,12 @@ pub struct Args {
     /// One line of JSON per case.
     #[arg(long)]
     json: bool,
-    /// Only list the cases.
+    /// List the cases and measure nothing.
     #[arg(long)]
     list: bool,
 }
 
-/// The largest power of two that the cores and the usual 64 arenas allow.
+/// Returns the largest power of two that the cores and the default 64 arenas allow.
 fn usual_threads() -> usize {
     1 << default_threads().min(64).ilog2()
 }
@@ -98,7 +98,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         tell!("{name}: case {} of {}, {} s at least", number + 1, wanted.len(), args.seconds);
         let measure = if benchmark.train { train } else { simulate };
         let measured = match measure(*game, benchmark.mode, benchmark.observation, &args, games) {
-            Err(CliError::Vision(error)) if args.case.is_empty() => {
+            Err(error) if args.case.is_empty() && error.is::<VisionError>() => {
                 tell!("{name}: {error}");
                 continue;
             }
@@ -124,27 +124,30 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 /// One measurement.
 struct Case<'a> {
     name: String,
-    /// The game that is played.
+    /// Game to play.
     game: &'a dyn Game,
-    /// How it is played.
+    /// Mode and observation to play it with.
     benchmark: Benchmark,
 }
 
-/// The measurements of a game.
+/// Returns the measurements of a game.
 fn cases(game: &dyn Game) -> Vec<Case<'_>> {
+    let tools = game.tools().benchmarks;
     let of = |benchmark: Benchmark| Case {
         name: benchmark.name(game.name()),
-        game: game.benchmarked(&benchmark).unwrap_or(game),
+        game: tools.benchmarked(&benchmark).unwrap_or(game),
         benchmark,
     };
-    game.benchmarks().into_iter().map(of).collect()
+    let vector = |mode| vec![Benchmark::simulate("vector", mode), Benchmark::train("vector", mode)];
+    let default = || game.modes().first().copied().map_or_else(Vec::new, vector);
+    tools.benchmarks().unwrap_or_else(default).into_iter().map(of).collect()
 }
 
 struct Measure {
     steps_per_s: f64,
     /// Microseconds per step of the parts, over all threads together.
     parts: Value,
-    /// Share of the threads' time in which they did nothing; `None` where the system does not say.
+    /// Share of the threads' time in which they did nothing. `None` where the system does not report it.
     idle: Option<f64>,
 }
 
@@ -158,7 +161,7 @@ impl Measure {
         })
     }
 
-    /// The parts in the order in which they happen.
+    /// Returns the parts in the order in which they happen.
     fn parts_in_words(&self) -> String {
         let part = |name: &&str| Some(format!("{name} {} µs", self.parts.get(*name)?.as_f64()?));
         ["simulate", "observe", "infer", "record", "gather", "learn"]
@@ -169,7 +172,7 @@ impl Measure {
     }
 }
 
-/// Random actions on 64 levels, observations filled every tick.
+/// Measures random actions on 64 levels, with observations filled every tick.
 fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
     let observation_config = ObservationConfig { kind, ..ObservationConfig::default() };
     let arrangement = Arrangement::new(game, args.arenas, args.threads as u32);
@@ -201,8 +204,8 @@ fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: 
     Ok(Measure { steps_per_s: steps / seconds, parts: stages(worlds.iter_mut(), steps), idle })
 }
 
-/// PPO with 3 epochs and 8 minibatches: on state vectors with 256 steps a rollout, on pictures with 32 and the
-/// Nature-CNN, if `--set` does not say otherwise.
+/// Measures PPO with 3 epochs and 8 minibatches. State vectors take 256 steps a rollout, pictures 32 and the
+/// Nature-CNN, unless `--set` changes that.
 fn train(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, games: &Games) -> Result<Measure, CliError> {
     let experiment = training(game, mode, kind, args).load(games, [])?;
     let mut trainer = Trainer::new(game, &experiment, None, args.device.device, args.threads)?;
@@ -222,7 +225,7 @@ fn train(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, games:
     Ok(Measure { steps_per_s: steps / seconds, parts, idle: idle_share(busy_s() - busy, seconds, args.threads) })
 }
 
-/// The experiment of a training case: what the case says, under what the command line says.
+/// Returns the experiment of a training case: the settings of the case, overridden by the command line.
 fn training(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args) -> ExperimentArgs {
     let config = ObservationConfig { kind, ..ObservationConfig::default() };
     let known = [
@@ -241,7 +244,7 @@ fn training(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args) -> 
     ExperimentArgs { set: args.set.clone(), ..Default::default() }.over(known)
 }
 
-/// Microseconds per step that the Worlds' threads spent in each part of their ticks.
+/// Returns the microseconds per step that the Worlds' threads spent in each part of their ticks.
 fn stages<'a>(worlds: impl Iterator<Item = &'a mut World>, steps: f64) -> Value {
     let mut sum = StageClock::default();
     for world in worlds {
@@ -261,7 +264,7 @@ fn microseconds(seconds: f64, steps: f64) -> f64 {
     (1e8 * seconds / steps).round() / 100.0
 }
 
-/// Largest resident memory of this process so far, MiB; 0 where the system does not say.
+/// Returns the largest resident memory of this process so far, MiB; 0 where the system does not report it.
 fn peak_rss_mib() -> f64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
@@ -269,7 +272,7 @@ fn peak_rss_mib() -> f64 {
     (kib.unwrap_or(0.0) / 1024.0).round()
 }
 
-/// Seconds of processor time that this process has used so far, all threads together; 0 where the system does not say.
+/// Returns the seconds of processor time used so far, all threads together; 0 where the system does not report it.
 /// Workers that wait awake use it for nothing.
 fn busy_s() -> f64 {
     // A hundredth of a second on every Linux.

@@ -2,17 +2,18 @@
 
 use std::path::Path;
 
-use bevy_playbot::{policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
-use playbot_lab::{eval::Player, game::Game, games::Games, sensors::GameSensors, train::Experiment};
-use playbot_learner::{SkillModel, SkillSource};
+use bevy_playbot::vision::ObservationConfig;
+use playbot_lab::{game::Game, games::Games, sensors::GameSensors};
+use playbot_learner::SkillModel;
 
 use super::{error::CliError, experiment::ExperimentArgs};
 
-/// Checks that a skill model was learned for a game, and returns what it sees. Files of older versions do not name their game.
+/// Checks that a skill model was learned for a game, and returns its observation. Files of older versions do not name
+/// their game.
 ///
 /// # Errors
 ///
-/// What the model reads and how it acts, and which game has that.
+/// The model's observations or actions do not fit the game. The message names the game that they fit.
 pub fn check_skills(
     path: &Path,
     model: &SkillModel,
@@ -42,16 +43,4 @@ pub fn check_skills(
         model.action_space(),
         game.name()
     )))
-}
-
-/// Behaviour cloning: the decoder under the prior, without any reinforcement learning.
-pub fn cloning(model: &SkillModel, experiment: &Experiment, draw: ActionDraw) -> Player {
-    let skills = cloning_skills(model, experiment);
-    Player::Policy { policy: model.policy(), prior: Some(SkillPrior::from(&skills)), draw }
-}
-
-/// The skills of behaviour cloning, held and drawn as the experiment says.
-pub fn cloning_skills(model: &SkillModel, experiment: &Experiment) -> SkillSource {
-    let (horizon, draw) = (experiment.score.horizon, experiment.score.skill_draw);
-    SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw }
 }

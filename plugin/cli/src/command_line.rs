@@ -1,4 +1,4 @@
-//! What can be said on the command line, and who does it.
+//! The command line's verbs and their dispatch.
 
 use std::{ffi::OsString, panic::AssertUnwindSafe, process::ExitCode};
 
@@ -17,7 +17,7 @@ use crate::{
 #[derive(Parser)]
 #[command(name = program::USUAL, version, after_help = EXAMPLES)]
 pub(crate) struct Cli {
-    /// What to do; `quickstart` if nothing is given.
+    /// Verb to run; `quickstart` if left out.
     #[command(subcommand)]
     verb: Option<Verb>,
     /// Print what happens inside; twice for more.
@@ -28,9 +28,9 @@ pub(crate) struct Cli {
 const EXAMPLES: &str = "\
 Examples:
   playbot   learn from recordings of GAME, train, test, and write a report
-  playbot level GAME --seed 7   show a level
+  playbot level GAME --level 7   show a level
   playbot record GAME --levels MODE:0..9 --out my.demo
-  playbot play GAME --seed 7 --record my.demo   play it yourself
+  playbot play GAME --level 7 --record my.demo   play it yourself
   playbot demo verify my.demo   does it replay?
   playbot doctor GAME   is the game the same every time?
   playbot explore GAME --level MODE:7   what can be reached?
@@ -42,9 +42,9 @@ Examples:
   playbot policy export --run runs/first --out GAME.policy
   playbot config show --set ppo.lr=0.0003   an experiment with all its values
   playbot study --experiment my.ron --out study
-  playbot view GAME --seed 64 --run runs/first --episode --out episode.png
+  playbot view GAME --level 64 --run runs/first --episode --out episode.png
   playbot runs compare runs/first runs/second --plot compare.svg
-  playbot bugs make --seed 1 --out runs/bugs   plant defects, to see who finds them
+  playbot bugs make --seed 1 --out runs/bugs   plant defects, to measure testers
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration,
 130 stopped by Ctrl-C before it was done.";
@@ -76,12 +76,12 @@ enum Verb {
     Bugs(bugs::Args),
 }
 
-/// Whether the command line can be read: whoever writes commands into documentation asks it. `args` begin with the name of
-/// the program. Nothing is run, no game is asked whether it has what they name, and no level file has to be there.
+/// Checks that a command line can be parsed, for tests of documentation. `args` begin with the name of the program.
+/// Nothing is run, no game is asked for the names in them, and level files need not exist.
 ///
 /// # Errors
 ///
-/// What is wrong with them, in words.
+/// The parser's message.
 #[doc(hidden)]
 pub fn check_usage<Args>(args: Args) -> Result<(), String>
 where
@@ -89,13 +89,13 @@ where
 {
     match Cli::try_parse_from(args) {
         Ok(_) => Ok(()),
-        // Asking for help is no mistake.
+        // A request for help is no mistake.
         Err(error) if !error.use_stderr() || is_about_missing_files(&error) || is_about_device(&error) => Ok(()),
         Err(error) => Err(error.to_string()),
     }
 }
 
-/// Whether only another build has the device.
+/// Returns true if only another build has the device.
 fn is_about_device(error: &clap::Error) -> bool {
     let device = std::error::Error::source(error).and_then(|source| source.downcast_ref::<UnknownDevice>());
     matches!(device, Some(UnknownDevice::NotBuilt { .. }))
@@ -106,7 +106,8 @@ fn is_about_missing_files(error: &clap::Error) -> bool {
     matches!(split, Some(SplitError::Files(LevelFileError::NoFiles { .. })))
 }
 
-/// Runs the command line on the process's arguments, for these games. The first one is meant by verbs that name none.
+/// Runs the command line on the process's arguments, for these games. The first game is the default of verbs that name
+/// no game.
 ///
 /// Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration, 130 stopped by Ctrl-C.
 pub fn main(games: &[&dyn Game]) -> ExitCode {
@@ -115,7 +116,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
     let cli = match read(games) {
         Ok(cli) => cli,
         Err(error) => {
-            // Asking for help is no mistake; anything else is a wrong usage, which is 3 here.
+            // A request for help is no mistake; anything else is a wrong usage, which is 3 here.
             let code = if error.use_stderr() { 3 } else { 0 };
             match usage_error::in_plain_words(&error) {
                 Some(words) => begin_to_tell!("{words}"),
@@ -157,7 +158,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
     }
 }
 
-/// What the process was called with.
+/// Parses the arguments of the process.
 fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
     let mut command = with_own_name(Cli::command());
     let matches = match command.try_get_matches_from_mut(std::env::args_os()) {
@@ -175,13 +176,13 @@ fn is_help(error: &clap::Error) -> bool {
     matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand)
 }
 
-/// The command line under the name of this program.
+/// Returns the command line under the name of this program.
 fn with_own_name(command: Command) -> Command {
     let command = usage_error::with_negative_numbers(command).name(program::name());
     if program::name() == program::USUAL {
         return command;
     }
-    // The version is this crate's, and nobody here knows the game's.
+    // The version is this crate's, since the game's is not known here.
     command.version(concat!("(playbot_cli ", env!("CARGO_PKG_VERSION"), ")"))
 }
 

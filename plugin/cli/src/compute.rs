@@ -1,6 +1,8 @@
-//! What a verb computes with: options that several verbs have.
+//! Options of computing that several verbs have: threads and device.
 
-use playbot_lab::{parallel::default_threads, train::usable_threads};
+use std::path::{Path, PathBuf};
+
+use playbot_lab::{machine::usable_threads, parallel::default_threads, train::train_run::TrainingSetup};
 use playbot_learner::DeviceKind;
 
 use super::number::at_least_one;
@@ -8,31 +10,36 @@ use super::number::at_least_one;
 /// More threads than any machine has cores.
 pub const MOST_THREADS: usize = 1024;
 
-/// How many threads work.
+/// The number of threads.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct Threads {
-    /// Threads; the result does not depend on it.
+    /// Threads. The result does not depend on their number.
     #[arg(long, default_value_t = usual_threads(), value_parser = number_of_threads)]
     threads: usize,
 }
 
 impl Threads {
-    /// How many threads work: those that were asked for, or as many as limits leave room for.
+    /// Returns the number of threads: the requested one, or as many as the system's limits allow.
     pub fn count(self) -> usize {
         usable_threads(self.threads)
     }
 }
 
-/// One for each core.
+/// Returns the revision of playbot that this program was built from.
+pub fn revision() -> &'static str {
+    env!("PLAYBOT_REVISION")
+}
+
+/// Returns one for each core.
 fn usual_threads() -> usize {
     default_threads().min(MOST_THREADS)
 }
 
-/// A number of threads that the command line names.
+/// Parses a number of threads.
 ///
 /// # Errors
 ///
-/// It is 0, no number, or more than a program has a use for.
+/// It is 0, no number, or more than [`MOST_THREADS`].
 fn number_of_threads(text: &str) -> Result<usize, String> {
     match at_least_one(text)? {
         threads if threads > MOST_THREADS => {
@@ -48,15 +55,15 @@ impl Default for Threads {
     }
 }
 
-/// What networks are computed on.
+/// The device that computes networks.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
 pub struct Device {
-    /// Where to compute: flex or ndarray on the CPU; wgpu or cuda on a graphics card, in programs built with these features.
+    /// Device: flex or ndarray on the CPU, wgpu or cuda on a graphics card in programs built with these features.
     #[arg(long, default_value_t)]
     pub device: DeviceKind,
 }
 
-/// Both, for verbs that learn or measure.
+/// Threads and device, for verbs that learn or measure.
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct Compute {
     #[command(flatten)]
@@ -66,13 +73,19 @@ pub struct Compute {
 }
 
 impl Compute {
-    /// How many threads work: those that were asked for, or as many as limits leave room for.
+    /// Returns the number of threads: the requested one, or as many as the system's limits allow.
     pub fn threads(&self) -> usize {
         self.threads.count()
     }
 
-    /// What networks are computed on.
+    /// Returns the device that computes networks.
     pub fn device(&self) -> DeviceKind {
         self.device.device
+    }
+
+    /// Returns the setup of trainings, whose recordings are where `recordings` finds them.
+    pub fn setup<'a>(&self, recordings: &'a dyn Fn(&Path) -> PathBuf) -> TrainingSetup<'a> {
+        let (device, threads) = (self.device(), self.threads());
+        TrainingSetup { device, threads, revision: revision(), recordings }
     }
 }

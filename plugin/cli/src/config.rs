@@ -8,7 +8,7 @@ use playbot_lab::{
     train::{
         Experiment,
         config::ExperimentError,
-        presets::{PRESETS, Preset},
+        presets::{ExperimentFile, PRESETS, find_preset},
     },
 };
 use serde_json::json;
@@ -47,7 +47,7 @@ enum Verb {
     },
 }
 
-/// Checks that the game can be seen as the experiment says.
+/// Checks that the game has the experiment's observation.
 fn check_sight(experiment: &Experiment, game: &dyn Game) -> Result<(), ExperimentError> {
     experiment.observation_config().check(game).map_err(|error| {
         let words = format!("`observation`: {error}");
@@ -55,7 +55,7 @@ fn check_sight(experiment: &Experiment, game: &dyn Game) -> Result<(), Experimen
     })
 }
 
-/// Checks what an experiment says of its game. Recordings may still be made.
+/// Checks an experiment against its game. Recordings need not exist yet.
 fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
     let game = open::game(games, from, experiment)?;
     let checked = experiment.check_game(game).and_then(|()| check_sight(experiment, game));
@@ -79,11 +79,11 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         Verb::Presets { name, json } => {
             let chosen_by_name = name.is_some();
             let chosen = match &name {
-                Some(name) => vec![Preset::find(name)?],
+                Some(name) => vec![find_preset(name)?],
                 None => PRESETS.to_vec(),
             };
             for preset in chosen {
-                let (Preset { name, text }, about) = (preset, preset.about());
+                let (ExperimentFile { name, text, .. }, about) = (preset, preset.about());
                 print_line(match (json, chosen_by_name) {
                     (true, _) => json!({ "name": name, "about": about, "ron": text }).to_string(),
                     (false, true) => text.trim_end().to_owned(),

@@ -1,5 +1,5 @@
-//! What is played where nobody names a mode or levels. There is one rule, for every verb: what `train` does without options.
-//! A game's mode is that of the training levels of its experiment, and its held-out levels are those of the experiment too.
+//! Default mode and levels of every verb: those that `train` uses without options. The default mode of a game is that
+//! of the training levels of its experiment. The default held-out levels are the experiment's.
 
 use std::path::Path;
 
@@ -9,22 +9,22 @@ use playbot_lab::{
     train::{Experiment, config_file::parse_experiment, default_experiment::experiment_of},
 };
 
-/// The experiment of a game where none is named.
+/// The default experiment of a game.
 pub struct UsualExperiment {
-    /// Where it is from, in words or as a path.
+    /// Its origin, in words or as a path.
     pub origin: String,
     /// All its values.
     pub experiment: Experiment,
 }
 
-/// The experiment of a game where none is named; `None` if the game brings one that cannot be read.
+/// Returns the default experiment of a game; `None` if the game brings one that cannot be read.
 pub fn usual_experiment(game: &dyn Game) -> Option<UsualExperiment> {
     let text = experiment_of(game);
     let experiment = parse_experiment(&text.text, Path::new(&*text.origin)).ok()?;
     Some(UsualExperiment { origin: text.origin.into_owned(), experiment })
 }
 
-/// The mode of every verb to which none is named: the one that is trained in, without the options that it may have.
+/// Returns the default mode of every verb: the one of the training levels, without its options.
 pub fn usual_mode(game: &dyn Game) -> &'static str {
     let modes = game.modes();
     let trained = usual_experiment(game).map(|usual| usual.experiment.train.mode).unwrap_or_default();
@@ -33,13 +33,13 @@ pub fn usual_mode(game: &dyn Game) -> &'static str {
     known(&trained).or_else(|| known(name)).or(modes.first().copied()).unwrap_or_default()
 }
 
-/// The held-out levels of every verb to which no experiment is named; `None` if the game brings none that it has.
+/// Returns the default held-out levels; `None` if the game brings none that it has.
 pub fn usual_held_out(game: &dyn Game) -> Option<LevelSplit> {
     let test = usual_experiment(game)?.experiment.test;
     game.check_mode(&test.mode).is_ok().then_some(test)
 }
 
-/// Levels 0 to `last` of the [`usual_mode`].
+/// Returns levels 0 to `last` of the [`usual_mode`].
 pub fn first_levels(game: &dyn Game, last: u64) -> LevelSplit {
     LevelSplit { mode: usual_mode(game).to_owned(), first: 0, last }
 }

@@ -68,11 +68,11 @@ enum Verb {
     Repair {
         /// The damaged file.
         file: PathBuf,
-        /// File to write; the damaged file itself if none is named, which is then kept beside it as FILE.bak.
+        /// File to write (default: the damaged file itself, which is then kept beside it as FILE.bak).
         #[arg(long)]
         out: Option<PathBuf>,
-        /// Another recording of the same game, mode and version, whose header to take if both copies of the file's own are
-        /// damaged.
+        /// Another recording of the same game, mode and version. Its header is taken if both copies in the damaged file
+        /// are damaged.
         #[arg(long, value_name = "FILE")]
         header_from: Option<PathBuf>,
         /// Print the result as a line of JSON.
@@ -81,10 +81,10 @@ enum Verb {
     },
     /// Join recordings of one game, one version of its rules and one mode into a new one.
     Merge {
-        /// The recordings, in the order in which their episodes are to stand.
+        /// The recordings, in the order of their episodes in the new one.
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
-        /// File to write; it must not exist.
+        /// File to write, which must not exist.
         #[arg(long)]
         out: PathBuf,
         /// Print the result as a line of JSON.
@@ -137,9 +137,8 @@ fn ls(paths: &[PathBuf], as_json: bool) -> Result<Outcome, CliError> {
     Ok(outcome)
 }
 
-/// The share of successes, unless there are none: of many games no episode is ever won. Recordings do not say whether
-/// the aim was reached before time was up, and an episode that was cut off when the recording ended is none of those that
-/// the share is of.
+/// Returns the share of successes in words, empty if there are no successes: many games have no goal. Recordings do not
+/// note whether the goal was reached in time. Episodes that were cut off at the end of the recording do not count.
 fn success(summary: &DemoSummary) -> String {
     let share = match summary.success_share {
         None => "no episode ended".to_owned(),
@@ -154,7 +153,7 @@ fn success(summary: &DemoSummary) -> String {
     if notes.is_empty() { share } else { format!("{share} ({})", notes.join(", ")) }
 }
 
-/// The recordings of all files and folders.
+/// Returns the recordings of all files and folders.
 fn all_demos(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
     let mut files = Vec::new();
     for path in paths {
@@ -170,7 +169,7 @@ fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, Cl
     for (done, file) in files.iter().enumerate() {
         interrupt::leave(format!("{done} of {} checked: name the others", counted(files.len() as u64, "recording")));
         let checked = replay(file, games);
-        // A verdict is never vacuous: nothing replayed proves nothing.
+        // A verdict is never vacuous: without a replay nothing is proved.
         if !checked.as_ref().is_ok_and(|report| report.divergences.is_empty() && report.episodes > 0) {
             outcome = Outcome::Findings;
         }
@@ -186,7 +185,7 @@ fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, Cl
 
 /// Replays a file with a progress bar.
 fn replay(file: &Path, games: &Games) -> Result<VerifyReport, CliError> {
-    // The whole file is read before any of it is played: damage shows at once.
+    // The whole file is read before any of it is played, so that damage shows at once.
     let summary = DemoSummary::read(file)?;
     let game = games.of_file(Artifact::Recording, file, &summary.header.game)?;
     let bar = progress::bar("replay", summary.episodes as u64, "episodes");
@@ -195,7 +194,7 @@ fn replay(file: &Path, games: &Games) -> Result<VerifyReport, CliError> {
     Ok(report?)
 }
 
-/// An error with the file that it is about.
+/// Formats an error with its file.
 fn named(file: &Path, error: &CliError) -> String {
     let (file, words) = (file.display().to_string(), program::named(&error.to_string()));
     if words.contains(&file) { words } else { format!("{file}: {words}") }
@@ -218,7 +217,7 @@ fn print_report(file: &Path, checked: Result<VerifyReport, CliError>) -> Result<
     print_line(format!("{}: {replayed}, {verdict}", file.display()))
 }
 
-/// Repairs a file. One in which no episode is whole is a finding.
+/// Repairs a file. A file without a whole episode is a finding.
 fn mend(file: &Path, out: &Path, header_from: Option<&Path>, as_json: bool) -> Result<Outcome, CliError> {
     let report = repair(file, out, header_from).map_err(open::missing_or_taken)?;
     if as_json {

@@ -1,4 +1,4 @@
-//! `playbot demo merge`: the recordings of many testers become one.
+//! `playbot demo merge`: joins recordings of many testers into one.
 
 use std::path::{Path, PathBuf};
 
@@ -12,12 +12,13 @@ use super::{
     output::prepare,
 };
 
-/// Writes the episodes of all files into a new one, and says what went into it. A recording without a single episode is a
+/// Writes the episodes of all files into a new one, and reports them. A recording without a single episode is a
 /// finding.
 ///
 /// # Errors
 ///
-/// They are of different games or rules, one is damaged, or there is a file at `out` already. Nothing is left at `out` then.
+/// They are of different games or rules, one is damaged, or there is a file at `out` already. Nothing is left at `out`
+/// then.
 pub fn merge(files: &[PathBuf], out: &Path, as_json: bool) -> Result<Outcome, CliError> {
     prepare(out)?;
     let report = merge_demos(files, out).map_err(open::missing_or_taken)?;

@@ -65,7 +65,7 @@ fn show_header(header: &DemoHeader) -> Result<(), CliError> {
         .try_for_each(|(key, value)| print_line(format!("{key:<14}{value}")))
 }
 
-/// What was added to the player's actions.
+/// Describes the noise that was added to the player's actions.
 fn noise(header: &DemoHeader) -> String {
     match header.actions {
         _ if header.action_noise == 0.0 => "none".to_owned(),
@@ -100,7 +100,7 @@ fn show_episode(index: usize, episode: &DemoEpisode, as_json: bool) -> Result<()
     ))
 }
 
-/// The hash in letters: few programs read numbers that large without loss.
+/// Returns a level file as JSON, with the hash as text: few programs read numbers that large without loss.
 fn level_file(file: &LevelFile) -> Value {
     json!({ "path": file.path, "hash": format!("{:016x}", file.hash) })
 }
@@ -114,7 +114,7 @@ fn end(end: DemoEnd) -> &'static str {
     }
 }
 
-/// Who decided which share of the ticks.
+/// Describes the share of the ticks of each decider.
 pub fn deciders(steps_by_decider: &BTreeMap<Decider, usize>) -> String {
     let total: usize = steps_by_decider.values().sum();
     if total == 0 {

@@ -1,4 +1,4 @@
-//! What options say otherwise than the work that is to go on.
+//! Differences between the options and the work to resume.
 
 use std::collections::BTreeSet;
 
@@ -6,19 +6,20 @@ use playbot_lab::{runs::settings, train::Experiment};
 
 use super::experiment::{ExperimentArgs, sets_key};
 
-/// Most differences that are named.
+/// Most differences to print.
 const NAMED: usize = 4;
 
 /// The options of a verb, as they were written.
 pub struct Options<'a> {
-    /// Those of the experiment.
+    /// The options of the experiment.
     pub from: &'a ExperimentArgs,
-    /// Those with names of their own: the key that each sets, and the option with its value, if it was given.
+    /// The options with names of their own: the key that each sets, and the option with its value, if it was given.
     pub own: &'a [(&'a str, Option<String>)],
 }
 
 impl Options<'_> {
-    /// What the options ask for that `whose` work has not, with both values; keys in `free` may differ.
+    /// Returns the settings in which the options differ from the work of `whose`, with both values; keys in `free` may
+    /// differ.
     pub fn differences(&self, wanted: &Experiment, kept: &Experiment, whose: &str, free: &[&str]) -> Vec<String> {
         let (kept, wanted) = (settings(kept), settings(wanted));
         let keys: BTreeSet<&String> = kept.keys().chain(wanted.keys()).collect();
@@ -32,7 +33,7 @@ impl Options<'_> {
             .collect()
     }
 
-    /// The option that says what a setting is: those with names of their own count last.
+    /// Returns the option that sets a key: those with names of their own count last.
     fn option_of(&self, key: &str) -> String {
         let own = self.own.iter().find(|(of, _)| *of == key).and_then(|(_, option)| option.as_ref());
         if let Some(option) = own {
@@ -49,13 +50,13 @@ impl Options<'_> {
     }
 }
 
-/// Whether a `key=value` sets this key, alone or with its whole section.
+/// Returns true if a `key=value` sets this key, alone or with its whole section.
 pub fn reaches(set: &str, key: &str) -> bool {
     let sections = key.match_indices('.').map(|(at, _)| &key[..at]);
     sections.chain([key]).any(|name| sets_key(set, name))
 }
 
-/// The first differences, and how many more there are.
+/// Formats the first differences, and the number of the others.
 pub fn in_words(mut differences: Vec<String>) -> String {
     let more = differences.len().saturating_sub(NAMED);
     differences.truncate(NAMED);

@@ -16,11 +16,11 @@ use playbot_lab::{
     mode::ModeError,
     report::to_text_table,
     split::LevelSplit,
-    train::{Experiment, checkpoint::CheckpointChoice, run_dir::RunDir},
+    train::{Experiment, checkpoint::CheckpointChoice, learn_skills::cloning, run_dir::RunDir},
 };
 
 use super::{
-    cloning::{check_skills, cloning},
+    cloning::check_skills,
     compute::Compute,
     defaults::{first_levels, usual_held_out},
     error::{CliError, Outcome, print_line},
@@ -34,9 +34,9 @@ use super::{
 
 /// Measure policies and baselines, every level equally often.
 ///
-/// Those are trained runs, behaviour cloning, policy files and bots, on the held-out levels. The table's ± is one standard
-/// error of the mean return over levels: playing more levels makes it smaller, playing the same ones more often
-/// makes little difference.
+/// Measured are trained runs, behaviour cloning, policy files and bots, on the held-out levels. The table's ± is one
+/// standard error of the mean return over levels. More levels make it smaller, more episodes on the same levels make
+/// little difference.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot eval --run runs/first
@@ -48,7 +48,7 @@ use super::{
   playbot eval --run runs/first --bot random --levels MODE:64..66 --plot where.png
   playbot eval --run runs/first --bot BOT --levels MODE:64..127 --levels MODE:500..599")]
 pub struct Args {
-    /// Folder of a run; may be given several times.
+    /// Folder of a run (repeatable).
     #[arg(long)]
     run: Vec<PathBuf>,
     /// Checkpoint of the runs: last, best (highest return in training), or its number of environment steps.
@@ -57,18 +57,18 @@ pub struct Args {
     /// Skill model: measures behaviour cloning, the decoder under the prior.
     #[arg(long)]
     skills: Vec<PathBuf>,
-    /// Policy file, as written by `playbot policy export`, which says what game is played; may be given several times.
+    /// Policy file, as written by `playbot policy export`. It names its game (repeatable).
     #[arg(long)]
     policy: Vec<PathBuf>,
-    /// Bot of the game, such as random; a name that it does not have lists all. May be given several times, or several,
-    /// separated by commas.
+    /// Bot of the game, such as random. An unknown name lists all. Repeatable, or separated by commas.
     #[arg(long, value_delimiter = ',')]
     bot: Vec<String>,
-    /// Other eyes for policies that read pictures: camera or raster. Each has those it was trained with if none are named.
+    /// Sensor for policies that read pictures: camera or raster (default: the one that the policy was trained with).
     #[arg(long)]
     observation: Option<ObservationKind>,
-    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/**/*.json"; the experiment's held-out levels if none are named, or those of
-    /// the game's own experiment if a policy file is of another game than the experiment.
+    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/**/*.json". Default: the
+    /// experiment's held-out levels, or those of the game's own experiment if a policy file is of another game than the
+    /// experiment.
     #[arg(long)]
     levels: Vec<LevelSplit>,
     /// Episodes on each level, instead of the experiment's.
@@ -79,12 +79,12 @@ pub struct Args {
     greedy: bool,
     #[command(flatten)]
     from: ExperimentArgs,
-    /// Seed of the players' draws, instead of the experiment's.
+    /// Random seed of the players' draws, instead of the experiment's.
     #[arg(long)]
     seed: Option<u64>,
     #[command(flatten)]
     compute: Compute,
-    /// Also draw where the players went, and how often they were where, into this .png or .svg.
+    /// Also draw the players' paths, and how often they were at each position, into this .png or .svg.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
     /// One line of JSON per player and range of levels.
@@ -92,14 +92,14 @@ pub struct Args {
     json: bool,
 }
 
-/// What is left of measurements that are stopped.
-const KEPT_LINES: &str = "what is printed was measured to its end, and nothing else is kept: measure the rest again";
-const KEPT_NOTHING: &str = "nothing is kept of what was measured: call it again";
+/// The part of a stopped measurement that remains.
+const KEPT_LINES: &str = "the printed rows are complete, and nothing else is kept: measure the rest again";
+const KEPT_NOTHING: &str = "no measurement is kept: call it again";
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if args.run.is_empty() && args.skills.is_empty() && args.policy.is_empty() && args.bot.is_empty() {
         return Err(CliError::Usage(
-            "nobody to measure: name a --run, a --skills file, a --policy or a --bot (see `playbot eval --help`)"
+            "no player to measure: name a --run, a --skills file, a --policy or a --bot (see `playbot eval --help`)"
                 .to_owned(),
         ));
     }
@@ -114,8 +114,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         experiment.check_test(game).map_err(or_levels)?;
     }
     splits.iter().try_for_each(|split| split.check(game).map_err(|error| misfit(&error, split, games)))?;
-    // Not after some of it was measured.
-    let plan_of = |split| EvalPlan::of(&experiment, split, args.compute.threads());
+    // Checked before anything is measured.
+    let plan_of = |split| experiment.eval_plan(split, args.compute.threads());
     splits.iter().try_for_each(|split| plan_of(split).check_memory())?;
     let players = players(game, &experiment, &splits, &args, games)?;
     let kept = if args.json { KEPT_LINES } else { KEPT_NOTHING };
@@ -144,14 +144,14 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if !args.json {
         print_line(to_text_table(&rows))?;
     }
-    // Last: a measurement is not lost because it cannot be drawn.
+    // Last, so that a measurement is not lost because it cannot be drawn.
     if let Some(footprints) = footprints {
         footprints.write(game)?;
     }
     Ok(Outcome::Pass)
 }
 
-/// Levels of a mode that the game does not have, with the games that do: who names it thinks of its game.
+/// Returns the error of levels of a mode that the game does not have. It names the games that have it.
 fn misfit(error: &ModeError, split: &LevelSplit, games: &Games) -> CliError {
     let others: Vec<_> = games.iter().filter(|other| split.check(*other).is_ok()).map(Game::name).collect();
     CliError::Usage(match others.first() {
@@ -167,7 +167,7 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
     let of_sight = |set: &&String| ["observation", "image"].iter().any(|key| set.trim_start().starts_with(key));
     if let Some(set) = args.from.set.iter().find(of_sight) {
         return Err(CliError::Usage(format!(
-            "`{set}`: a policy sees what it was trained with; look at the same pictures through other eyes with \
+            "`{set}`: a policy keeps its observation; take another sensor for the same pictures with \
              --observation camera or --observation raster"
         )));
     }
@@ -186,7 +186,8 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
     }
 }
 
-/// The game of the first policy file, and levels of it, where nobody says which: the experiment may be of another game.
+/// Returns settings for the game and levels of the first policy file, where the command line names neither. The
+/// experiment may be of another game.
 fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
     let Some(path) = args.policy.first().filter(|_| !args.from.names_game()) else { return Ok(Vec::new()) };
     let file = open::policy(path, args.compute.device())?;
@@ -207,7 +208,7 @@ fn players(
 ) -> Result<Vec<Chosen>, CliError> {
     let device = args.compute.device();
     let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
-    // Looks at all levels, which is not needed for bots.
+    // Reads all levels, which bots do not need.
     let measured = LazyCell::new(|| Measured::new(game, splits, !args.levels.is_empty()));
     let mut players = Vec::new();
     for path in &args.run {
@@ -242,7 +243,7 @@ fn players(
     Ok(players)
 }
 
-/// Puts other eyes in place of those that a policy was trained with, as far as they see the same.
+/// Replaces the sensor that a policy was trained with by another one of the same observation form.
 fn look_through(
     observation_config: &mut ObservationConfig,
     eyes: Option<ObservationKind>,
@@ -261,7 +262,7 @@ fn look_through(
     Ok(())
 }
 
-/// A player, with its path in its name where there are several of its kind.
+/// Names a player, with its path if there are several of its kind.
 fn named(chosen: Chosen, path: &Path, of: usize) -> Chosen {
     if of > 1 { Chosen { name: format!("{} {}", chosen.name, path.display()), ..chosen } } else { chosen }
 }

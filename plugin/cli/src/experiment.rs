@@ -1,5 +1,4 @@
-//! Finding and reading experiments, from a path or from those that come with the program, with what the command line
-//! changes in them.
+//! Reading of experiments, from a path or from those that come with the program, with the changes of the command line.
 
 use std::{
     fmt::Display,
@@ -20,26 +19,26 @@ use playbot_lab::{
     },
 };
 
-/// Which experiment, and what to change in it.
+/// Options that choose an experiment and change it.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct ExperimentArgs {
-    /// Name of the game, whose own experiment is taken if no file is named; the program's first game if none is.
+    /// Name of the game, whose own experiment is the default (default: the program's first game).
     pub game: Option<String>,
-    /// Experiment file; if none is named, that of the game (for `eval --run` the run's own).
+    /// Experiment file (default: that of the game, for `eval --run` the run's own).
     #[arg(long, value_name = "FILE")]
     pub experiment: Option<PathBuf>,
-    /// Change a value of the experiment, such as ppo.lr=0.0003; may be given several times.
+    /// Change a setting of the experiment, such as ppo.lr=0.0003 (repeatable).
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub set: Vec<String>,
 }
 
 impl ExperimentArgs {
-    /// The experiment of a game where nothing else is said.
+    /// Returns the default experiment of a game.
     pub fn of_game(game: &str) -> Self {
         Self { game: Some(game.to_owned()), ..Self::default() }
     }
 
-    /// Reads the experiment, changes what `--set` and then what the options with names of their own say, and checks it.
+    /// Reads the experiment, applies `--set` and then the options with names of their own, and checks it.
     ///
     /// # Errors
     ///
@@ -60,8 +59,8 @@ impl ExperimentArgs {
         }
     }
 
-    /// What went wrong when an experiment that was [loaded](Self::load) met its game, with file, line and column of the key to
-    /// blame, or the `key=value` that is.
+    /// Adds the position of the faulty key to an error of an experiment that was [loaded](Self::load): file, line and
+    /// column, or its `key=value`.
     pub fn locate(
         &self,
         games: &Games,
@@ -78,8 +77,8 @@ impl ExperimentArgs {
         }
     }
 
-    /// The game that is named by its name behind the verb is not another one than a file or `--set` names: that would be taken
-    /// for a slip, while `--set` changes the game of a file on purpose.
+    /// Refuses a game behind the verb that differs from the one in a file or in `--set`. That would be a slip, while
+    /// `--set` changes the game of a file on purpose.
     fn check_game(&self) -> Result<(), ConfigError> {
         let Some(game) = &self.game else { return Ok(()) };
         let refused = |message| Err(ConfigError::Set { set: format!("game={game}"), message });
@@ -97,18 +96,18 @@ impl ExperimentArgs {
         }
     }
 
-    /// Whether somebody said which game: by its name, in an experiment file, or with `--set`.
+    /// Returns true if a game is named: behind the verb, in an experiment file, or with `--set`.
     pub fn names_game(&self) -> bool {
         self.experiment.is_some() || self.names_game_itself()
     }
 
-    /// The same without a file.
+    /// Returns true if a game is named behind the verb or with `--set`.
     pub fn names_game_itself(&self) -> bool {
         self.game.is_some() || game_of(&self.set).is_some()
     }
 
-    /// Where the recordings of an experiment are, see [`find_recordings`](Self::find_recordings). Says so if it is not where
-    /// the experiment says.
+    /// Returns the path of an experiment's recordings, see [`find_recordings`](Self::find_recordings). Reports it if
+    /// the path is not the experiment's.
     ///
     /// # Errors
     ///
@@ -122,8 +121,9 @@ impl ExperimentArgs {
         Ok(found)
     }
 
-    /// Where recordings are that an experiment names: as it says, below this folder. Only those of experiments that
-    /// come with the program are looked for beside it, too, if they are not here, so that `cargo run` works from any folder.
+    /// Returns the path of recordings that an experiment names, relative to this folder. Missing recordings of
+    /// experiments that come with the program are also looked for in its sources, so that `cargo run` works from any
+    /// folder.
     pub fn find_recordings(&self, path: &Path, games: &Games) -> PathBuf {
         let beside = sources().join(path);
         let is_usual = self.experiment.is_none() && !self.set.iter().any(|set| sets_key(set, "demos"));
@@ -131,7 +131,7 @@ impl ExperimentArgs {
         if is_beside && is_shipped(path, &unnamed(games, &self.sets([]))) { beside } else { path.into() }
     }
 
-    /// These as they are written behind a verb, with a blank in front of each.
+    /// Formats the options as they are written behind a verb, with a blank in front of each.
     pub fn words(&self) -> String {
         let game = self.game.iter().map(|game| format!(" {}", quoted(game)));
         let experiment =
@@ -140,57 +140,57 @@ impl ExperimentArgs {
         game.chain(experiment).chain(set).collect()
     }
 
-    /// These, under what is already known of the experiment, as `key=value`.
+    /// Returns these options with known `key=value`s of the experiment below them.
     pub fn over(&self, known: impl IntoIterator<Item = String>) -> Self {
         let set = known.into_iter().chain(self.set.iter().cloned()).collect();
         Self { game: self.game.clone(), experiment: self.experiment.clone(), set }
     }
 
-    /// What the name of the game, then `--set`, and then the options with names of their own say.
+    /// Returns the `key=value`s of the game's name, then `--set`, then the options with names of their own.
     pub fn sets(&self, options: impl IntoIterator<Item = Option<String>>) -> Vec<String> {
         let game = self.game.iter().map(|game| format!("game={game}"));
         game.chain(self.set.iter().cloned()).chain(options.into_iter().flatten()).collect()
     }
 }
 
-/// The experiment where no file is named: that of the game that `sets` name, since levels and settings of another one would not
-/// fit it. A game that does not exist is refused when it is looked for.
+/// Returns the default experiment: that of the game that `sets` name, since levels and settings of another one would
+/// not fit it. An unknown game is refused later.
 fn unnamed(games: &Games, sets: &[String]) -> ExperimentText {
     let game = game_of(sets).and_then(|name| games.get(name).ok());
     game.map_or_else(|| default_experiment(games), experiment_of)
 }
 
-/// The game that `key=value`s name; the last of them counts.
+/// Returns the game that `key=value`s name; the last of them counts.
 fn game_of(sets: &[String]) -> Option<&str> {
     let (_, name) = sets.iter().rev().find(|set| sets_key(set, "game"))?.split_once('=')?;
     Some(name.trim().trim_matches('"'))
 }
 
-/// Whether these are the recordings of an experiment that lies in the sources, as nobody has changed it.
+/// Returns true if these are the recordings of an unchanged experiment of the sources.
 fn is_shipped(recordings: &Path, ExperimentText { origin, text }: &ExperimentText) -> bool {
     let is_there = std::fs::read_to_string(sources().join(&**origin)).is_ok_and(|found| found == **text);
     is_there
         && parse_experiment(text, Path::new(&**origin)).is_ok_and(|usual| usual.demos.as_deref() == Some(recordings))
 }
 
-/// Whether a `key=value` sets exactly this key.
+/// Returns true if a `key=value` sets exactly this key.
 pub fn sets_key(set: &str, key: &str) -> bool {
     set.split_once('=').is_some_and(|(name, _)| name.trim() == key)
 }
 
-/// A word for the shell.
+/// Quotes a word for the shell.
 pub fn quoted(word: &str) -> String {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=,:".contains(c);
     if word.chars().all(is_plain) { word.to_owned() } else { format!("'{}'", word.replace('\'', r"'\''")) }
 }
 
-/// An option with a name of its own, as `key=value`.
+/// Returns an option with a name of its own, as `key=value`.
 pub fn option<T: Display>(key: &str, value: &Option<T>) -> Option<String> {
     value.as_ref().map(|value| format!("{key}={value}"))
 }
 
-/// Where this library's sources were when the program was built. Those of the program lie there only if it was built with
-/// them: a game elsewhere has other sources.
+/// Returns the folder of this library's sources at build time. The program's sources are there only if it was built
+/// with them: a game elsewhere has its own.
 fn sources() -> &'static Path {
     let this = Path::new(env!("CARGO_MANIFEST_DIR"));
     this.ancestors().nth(2).unwrap_or(this)

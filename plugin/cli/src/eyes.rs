@@ -1,4 +1,4 @@
-//! `playbot eyes`: the camera's pictures and the raster's, side by side.
+//! `playbot eyes`: the camera's and the raster's pictures, compared side by side.
 
 use std::path::{Path, PathBuf};
 
@@ -22,9 +22,9 @@ use super::{
     view::{film::to_png, screen::Screen},
 };
 
-/// Compare what the camera and the raster see.
+/// Compare the pictures of the camera and of the raster.
 ///
-/// Both look at the same moments: a policy that is trained on one should not notice that it plays with the other.
+/// Both show the same ticks. A policy that is trained on one should not notice that it plays with the other.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot eyes GAME
@@ -35,23 +35,23 @@ game that the raster can draw.")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Levels, as mode:first..last, both included; without it levels 0 to 49 of the mode that `train` trains in. The game's
-    /// demonstrator, or else the first of its bots, plays each once.
+    /// Levels, as mode:first..last, both included (default: levels 0 to 49 of the mode that `train` trains in). The
+    /// game's demonstrator, or else the first of its bots, plays each once.
     #[arg(long)]
     levels: Option<LevelSplit>,
-    /// Frames that are compared on each level, spread over the episode.
+    /// Frames to compare on each level, spread over the episode.
     #[arg(long, default_value_t = 10)]
     frames: usize,
     /// Width and height of the pictures, pixels.
     #[arg(long, default_value_t = 64)]
     size: u32,
-    /// Largest mean absolute difference over all frames, of 255.
+    /// Largest allowed mean absolute difference over all frames, of 255.
     #[arg(long, default_value_t = 4.0)]
     most_mean: f64,
-    /// Smallest share of pixels whose colours are all within 8 of 255.
+    /// Smallest allowed share of pixels whose colours are all within 8 of 255.
     #[arg(long, default_value_t = 0.97)]
     least_close: f64,
-    /// Folder for table.md, results.json and worst.png: raster, camera, and their difference four times as strong.
+    /// Folder for table.md, results.json and worst.png (raster, camera, and their difference four times as strong).
     #[arg(long)]
     out: Option<PathBuf>,
     /// One line of JSON.
@@ -59,7 +59,7 @@ pub struct Args {
     json: bool,
 }
 
-/// The last of the levels from 0 that are compared where none are named.
+/// The last of the default levels, which begin with 0.
 const LAST_LEVEL: u64 = 49;
 /// Factor by which the worst frame is enlarged.
 const ENLARGE: usize = 5;
@@ -78,7 +78,7 @@ struct Compared {
     pictures: [Vec<[u8; 4]>; 2],
 }
 
-/// What both eyes saw, summed up.
+/// The comparison of both sensors.
 #[derive(Serialize)]
 struct Summary {
     game: &'static str,
@@ -113,18 +113,18 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(if alike { Outcome::Pass } else { Outcome::Findings })
 }
 
-/// A camera of the game's own is not enough: the raster draws what the game says of its picture.
+/// Checks that the game has a picture for the raster; a camera of its own is not enough.
 fn check_picture(game: &dyn Game) -> Result<(), CliError> {
-    if game.picture().is_some() {
+    if game.tools().pictures.picture().is_some() {
         return Ok(());
     }
     Err(CliError::Usage(format!(
-        "`{0}` cannot be drawn by the raster, so there is nothing to compare; `playbot view {0}` shows what a bot sees of it",
+        "`{0}` cannot be drawn by the raster, so there is nothing to compare; `playbot view {0}` shows its observation",
         game.name()
     )))
 }
 
-/// One World for each eye, played alike; every frame of both is kept until its level is over.
+/// Plays one World for each sensor alike; every frame of both is kept until its level is over.
 fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args) -> Result<Vec<Compared>, CliError> {
     let mut raster = SensorWorld::new(game, levels, args.size, ObservationKind::Raster)?;
     let mut camera = SensorWorld::new(game, levels, args.size, ObservationKind::Camera)?;
@@ -142,7 +142,7 @@ fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args) -> Result<Vec<Comp
             spread(&mut compared, &mut level, args.frames);
         }
         let difference = Difference::between(&by_raster.pixels, &by_camera.pixels)
-            .ok_or_else(|| CliError::Io("the two eyes' pictures differ in size".to_owned()))?;
+            .ok_or_else(|| CliError::Io("the pictures of the two sensors differ in size".to_owned()))?;
         let pictures = [by_raster.pixels, by_camera.pixels];
         level.push(Compared { level: by_raster.level, tick: by_raster.tick, difference, pictures });
     }
@@ -158,10 +158,10 @@ fn spread(to: &mut Vec<Compared>, level: &mut Vec<Compared>, count: usize) {
     to.extend(level.drain(..).enumerate().filter(|(at, _)| wanted.contains(at)).map(|(_, frame)| frame));
 }
 
-/// A picture with its moment.
+/// A picture with its tick.
 struct Seen {
     level: u64,
-    /// Tick of the episode, from 0, that began with it: as `playbot view --tick` counts.
+    /// Tick of the episode, from 0, that began with it, counted as by `playbot view --tick`.
     tick: u32,
     pixels: Vec<[u8; 4]>,
 }

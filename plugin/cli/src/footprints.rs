@@ -1,4 +1,4 @@
-//! Where measured players went, as a picture.
+//! Picture of the paths of measured players.
 
 use std::path::Path;
 
@@ -26,14 +26,14 @@ struct Ground {
 }
 
 impl Footprints {
-    /// Trails of a game, to be drawn into a file.
+    /// Prepares the trails of a game, to be drawn into a file.
     ///
     /// # Errors
     ///
-    /// The file is of no kind that is known, or the game has no floor plan for these levels.
+    /// The file's ending is unknown, or the game has no floor plan for these levels.
     pub fn new(path: &Path, game: &dyn Game, splits: &[LevelSplit]) -> Result<Self, CliError> {
         let file = PlotFile::new(path)?;
-        match splits.iter().find(|split| game.floor_plan(&split.mode, split.first).is_none()) {
+        match splits.iter().find(|split| game.tools().levels.floor_plan(&split.mode, split.first).is_none()) {
             Some(split) => Err(CliError::Usage(format!(
                 "`{}` has no floor plan of level {}:{}: leave --plot out",
                 game.name(),
@@ -44,7 +44,7 @@ impl Footprints {
         }
     }
 
-    /// Adds what a player did on some levels, from the start of each. The trails come sorted by level.
+    /// Adds a player's trails on some levels, each from its start. The trails come sorted by level.
     pub fn add(&mut self, game: &dyn Game, split: &LevelSplit, player: &str, trails: Vec<Trail>) {
         let mut known = None;
         for mut trail in trails {
@@ -52,13 +52,13 @@ impl Footprints {
             let (at, start) = match known {
                 Some((same, at, start)) if same == level => (at, start),
                 _ => {
-                    let Some(plan) = game.floor_plan(&split.mode, level) else { continue };
+                    let Some(plan) = game.tools().levels.floor_plan(&split.mode, level) else { continue };
                     let start = plan.start;
                     (self.ground(&split.mode, level, plan), start)
                 }
             };
             known = Some((level, at, start));
-            // The first place is that after the first tick, which may be far from the mark of the start.
+            // The first position is that after the first tick, which may be far from the mark of the start.
             trail.places.insert(0, start);
             let walkers = &mut self.grounds[at].floor.walkers;
             match walkers.iter_mut().find(|walker| walker.name == player) {
@@ -68,7 +68,7 @@ impl Footprints {
         }
     }
 
-    /// The place of a level's floor in the list.
+    /// Returns the index of a level's floor in the list.
     fn ground(&mut self, mode: &str, level: u64, plan: FloorPlan) -> usize {
         let is_same = |ground: &Ground| {
             let known = &ground.floor.plan;
@@ -98,7 +98,7 @@ impl Footprints {
     /// The file cannot be written.
     pub fn write(self, game: &dyn Game) -> Result<(), CliError> {
         let floors = self.grounds.into_iter().map(Ground::named).collect();
-        let chart = TrailChart { title: format!("Where players went in {}", game.name()), floors };
+        let chart = TrailChart { title: format!("Paths of players in {}", game.name()), floors };
         self.file.write(&chart.draw())?;
         tell!("plot: {}", self.file.path().display());
         Ok(())

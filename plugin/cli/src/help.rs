@@ -1,7 +1,8 @@
-//! Help with the names of this program and of its games.
+//! Help texts with the names of this program and of its games.
 //!
-//! Examples are written for the program `playbot` with the words `GAME`, `MODE` and `BOT`, which stand for the program's
-//! first game, the mode that it is trained in, and its demonstrator. Those that cannot work in a program are left out.
+//! Examples are written for the program `playbot` with the words `GAME`, `MODE` and `BOT`. They stand for the program's
+//! first game, the mode that it is trained in, and its demonstrator. Examples that cannot work in a program are left
+//! out.
 
 use clap::{Arg, Command};
 use playbot_lab::prelude::{ActionSpace, Game};
@@ -12,11 +13,11 @@ use super::{
     program::{USUAL, with_name},
 };
 
-/// The column in which examples are explained.
+/// The column of explanations of examples.
 const COLUMN: usize = 48;
 
-/// Puts the names of a program and its games into all that a command says of itself. Examples are left out if the program
-/// does not have their game, or the game has not what they need.
+/// Puts the names of a program and its games into all texts of a command. Examples are left out if the program does not
+/// have their game, or the game lacks a part that they need.
 pub fn named(command: Command, program: &'static str, games: &[&dyn Game]) -> Command {
     let plays = command.get_arguments().any(|argument| argument.get_id() == "game");
     let examples = command.get_after_help().map(|text| examples(&text.to_string(), plays, program, games));
@@ -48,11 +49,11 @@ fn of_argument(argument: Arg, program: &str) -> Arg {
     }
 }
 
-/// What stands below a command's options. `plays` says whether the command is given the name of a game.
+/// Returns the text below a command's options. `plays` tells whether the command takes the name of a game.
 fn examples(text: &str, plays: bool, program: &str, games: &[&dyn Game]) -> String {
     let first = games.first();
     let mode = first.map(|game| usual_mode(*game));
-    let bot = first.and_then(|game| game.demonstrator());
+    let bot = first.and_then(|game| game.tools().bots.demonstrator());
     let names = [
         ("GAME", first.map_or("GAME", |game| game.name())),
         ("MODE", mode.unwrap_or("default")),
@@ -72,26 +73,26 @@ fn examples(text: &str, plays: bool, program: &str, games: &[&dyn Game]) -> Stri
     lines.join("\n").trim().to_owned()
 }
 
-/// Whether the game of an example is there, and has what the verb needs.
+/// Returns true if the program has the game of an example, and the game the parts that the verb needs.
 fn works(example: &str, plays: bool, games: &[&dyn Game]) -> bool {
     let mut words = example.split_whitespace().skip(1);
     let (verb, name) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
     let is_first = name == "GAME";
     let game = if is_first { games.first() } else { games.iter().find(|game| game.name() == name) };
-    // A game that may be left out is so where an option follows the verb.
+    // An optional game is left out where an option follows the verb.
     let Some(game) = game else { return !plays || name.starts_with('-') };
     match verb {
-        "record" => game.demonstrator().is_some(),
-        "eyes" => game.picture().is_some(),
+        "record" => game.tools().bots.demonstrator().is_some(),
+        "eyes" => game.tools().pictures.picture().is_some(),
         "level" => shows_levels(*game),
-        // A game that is named here traces its continuous actions in a way of its own.
+        // The games named here trace their continuous actions in a form of their own.
         "trace" => !is_first || matches!(game.actions(), ActionSpace::Discrete(_)),
         _ => true,
     }
 }
 
-/// An example with the names in it, and its explanation, if it has one, in the usual column, at least three blanks behind
-/// it, so that it does not look like a part of the command.
+/// Returns an example with the names in it. Its explanation, if any, stands in the common column, at least three blanks
+/// behind it, so that it does not look like a part of the command.
 fn own_example(example: &str, program: &str, names: &[(&str, &str)]) -> String {
     let own = |text: &str| names.iter().fold(text.to_owned(), |text, (word, name)| text.replace(word, name));
     let (command, explanation) = example.split_once("   ").unwrap_or((example, ""));
@@ -114,8 +115,8 @@ mod tests {
         ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {})
     }
 
-    /// All that a command and those below it say of themselves: what they are, their options with all values that these
-    /// name, and their examples.
+    /// Collects all texts of a command and of those below it: descriptions, options with all their values, and
+    /// examples.
     fn said(command: &Command, all: &mut Vec<String>) {
         let texts = [
             command.get_about(),
@@ -134,7 +135,7 @@ mod tests {
         command.get_subcommands().for_each(|verb| said(verb, all));
     }
 
-    /// All that the program `jump` says, with this game alone.
+    /// Returns all texts of the program `jump` with this game alone.
     fn said_of(game: &ForeignGame) -> Vec<String> {
         let mut all = Vec::new();
         said(&named(Cli::command(), "jump", &[game]), &mut all);
@@ -181,9 +182,9 @@ mod tests {
     #[test]
     fn examples_of_other_games_are_left_out_and_explanations_stand_in_one_column() {
         let game = runner();
-        let text = "Examples:\n  playbot view GAME --seed 5   look\n  playbot view chess --seed 5\n\nMore words.";
+        let text = "Examples:\n  playbot view GAME --level 5   look\n  playbot view chess --level 5\n\nMore words.";
         let own = examples(text, true, "jump", &[&game]);
-        assert_eq!(own, format!("Examples:\n  {:<48} look\n\nMore words.", "jump view runner --seed 5"));
+        assert_eq!(own, format!("Examples:\n  {:<48} look\n\nMore words.", "jump view runner --level 5"));
         assert_eq!(examples("Examples:\n  playbot view chess", true, "jump", &[&game]), "");
         let program = "a_program_whose_name_is_longer_than_most";
         let own = examples("Examples:\n  playbot view GAME   look", true, program, &[&game]);

@@ -1,5 +1,6 @@
-//! Ctrl-C: the first one asks the running work to stop at the next good place, the second one stops at once. Work that has no
-//! good place in time is stopped where it is: everything that was saved is whole, and the last of it goes on.
+//! Ctrl-C: the first one asks the running work to stop at the next safe point, the second one stops at once. Work that
+//! reaches no safe point in time is stopped where it is. All saved files are whole, and the work can be resumed from
+//! the last of them.
 
 use std::{
     sync::{
@@ -10,38 +11,39 @@ use std::{
     time::Duration,
 };
 
-/// The exit code of work that was stopped, as shells have it: 128 and the number of the signal.
+/// The exit code of stopped work, as in shells: 128 and the number of the signal.
 pub const EXIT_CODE: u8 = 130;
 
-/// How long work may look for a good place to stop. Whoever asks waits for two seconds at most, some of which the end needs.
+/// Time in which work must reach a safe point to stop. The user waits for two seconds at most, some of which the end
+/// needs.
 const PATIENCE: Duration = Duration::from_millis(1400);
 
-/// Somebody asked to stop; whoever asks again does not want to wait.
+/// Ctrl-C was pressed; a second one stops at once.
 static HEARD: AtomicBool = AtomicBool::new(false);
 /// Work is to stop.
 static ASKED: AtomicBool = AtomicBool::new(false);
-/// Work need not look for a good place to stop.
+/// Work need not reach a safe point to stop.
 static NOTHING_TO_SAVE: AtomicBool = AtomicBool::new(false);
 static INSTALLED: OnceLock<()> = OnceLock::new();
 static REMAINS: Mutex<Remains> = Mutex::new(Remains { left: None, command: None });
 
-/// What a second Ctrl-C does not take away.
+/// Information that is printed when a second Ctrl-C stops the work.
 struct Remains {
-    /// What is saved.
+    /// The saved part, in words.
     left: Option<String>,
-    /// What goes on with it.
+    /// The command that resumes it.
     command: Option<String>,
 }
 
 impl Remains {
     fn words(&self) -> String {
-        let left = self.left.as_deref().unwrap_or("what was not saved is lost");
+        let left = self.left.as_deref().unwrap_or("unsaved work is lost");
         let command = self.command.as_ref().map_or_else(String::new, |command| format!(": go on with {command}"));
         format!("{left}{command}")
     }
 }
 
-/// Listens for Ctrl-C and for a polite kill from now on.
+/// Listens for Ctrl-C and for SIGTERM from now on.
 pub fn listen() {
     INSTALLED.get_or_init(|| {
         if let Err(error) = ctrlc::set_handler(hear) {
@@ -50,8 +52,8 @@ pub fn listen() {
     });
 }
 
-/// Work that has nothing to save: while there is this, the first Ctrl-C ends the program where it is. What was saved before, if
-/// anything, is told.
+/// Work that has nothing to save: while this lives, the first Ctrl-C ends the program where it is. Earlier saved parts,
+/// if any, are printed.
 pub struct NothingToSave(());
 
 impl NothingToSave {
@@ -69,7 +71,7 @@ impl Drop for NothingToSave {
     }
 }
 
-/// What is done about a signal.
+/// Handles a signal.
 fn hear() {
     if HEARD.swap(true, Ordering::SeqCst) {
         stop("stopped at once");
@@ -78,15 +80,15 @@ fn hear() {
         stop("stopped");
     }
     tell!("\nstopping after this step, or within two seconds; press Ctrl-C again to stop at once and lose it");
-    // Not before that is said: the last words are for what the work leaves.
+    // Set after the message, since the last words are for the saved parts.
     ASKED.store(true, Ordering::SeqCst);
     if thread::Builder::new().spawn(stop_in_time).is_err() {
-        // There is no thread for it but this one.
+        // No other thread is left for it.
         stop_in_time();
     }
 }
 
-/// Stops work that finds no good place.
+/// Stops work that reaches no safe point.
 #[expect(clippy::disallowed_methods, reason = "people wait by the clock, and nothing is simulated here")]
 fn stop_in_time() {
     thread::sleep(PATIENCE);
@@ -95,28 +97,28 @@ fn stop_in_time() {
 
 /// Ends the program where it is.
 fn stop(how: &str) -> ! {
-    // Held to the end, so that of several threads that stop one speaks.
+    // Held to the end, so that only one of several stopping threads prints.
     let remains = REMAINS.lock().unwrap_or_else(PoisonError::into_inner);
     tell!("\n{how}; {}", remains.words());
     std::process::exit(EXIT_CODE.into())
 }
 
-/// Whether somebody asked to stop.
+/// Returns true if Ctrl-C was pressed.
 pub fn asked() -> bool {
     ASKED.load(Ordering::SeqCst)
 }
 
-/// Notes what is saved now, in words for whoever stops the work at once.
+/// Notes the saved part, in words, for the message of a second Ctrl-C.
 pub fn leave(left: String) {
     REMAINS.lock().unwrap_or_else(PoisonError::into_inner).left = Some(left);
 }
 
-/// What was noted, in words for whoever was stopped at a good place.
+/// Returns the noted words, for the message at a safe point.
 pub fn remains() -> String {
     REMAINS.lock().unwrap_or_else(PoisonError::into_inner).words()
 }
 
-/// Notes what goes on with the work, in words for whoever stops it at once.
+/// Notes the command that resumes the work, for the message of a second Ctrl-C.
 pub fn go_on_with(command: String) {
     REMAINS.lock().unwrap_or_else(PoisonError::into_inner).command = Some(command);
 }
@@ -128,7 +130,7 @@ mod tests {
     #[test]
     fn the_last_words_say_what_is_left_and_how_to_go_on() {
         let nothing = Remains { left: None, command: None };
-        assert_eq!(nothing.words(), "what was not saved is lost");
+        assert_eq!(nothing.words(), "unsaved work is lost");
         let left = Some("the last checkpoint of a is that of step 81,920".to_owned());
         let saved = Remains { left, command: Some("`playbot train --run a --resume`".to_owned()) };
         let words = "the last checkpoint of a is that of step 81,920: go on with \

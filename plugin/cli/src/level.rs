@@ -19,41 +19,41 @@ use crate::{
 /// Show the layout of a level.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot level GAME --mode MODE --seed 7
+  playbot level GAME --mode MODE --level 7
   playbot level GAME --levels MODE:7
-  playbot level GAME --seed 0 --json
-  playbot level GAME --seed 7 --png level.png
+  playbot level GAME --level 0 --json
+  playbot level GAME --level 7 --png level.png
   playbot level GAME --file my-level.json
   playbot level antmaze --map large
-  playbot level maze2d --mode medium --seed 7 --json
-  playbot level maze2d --map random+size=21x21+loops=0.2 --seed 7
-  playbot level antmaze --mode medium+goals=random+random-start --seed 7
+  playbot level maze2d --mode medium --level 7 --json
+  playbot level maze2d --map random+size=21x21+loops=0.2 --level 7
+  playbot level antmaze --mode medium+goals=random+random-start --level 7
   playbot level maze2d --map my-maze.txt --png my-maze.png
 
-A file of rows is a map as this command prints it: # is a wall, S the start, G the goal, a blank, a point or O a free cell;
-the rows end at the first empty line.")]
+A file of rows is a map as this command prints it: # is a wall, S the start, G the goal, a blank, a point or O a free cell.
+The rows end at the first empty line.")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Mode of the game; the one that `train` trains in if none is named.
+    /// Mode of the game (default: the one that `train` trains in).
     #[arg(long)]
     mode: Option<String>,
-    /// Map, for games whose levels are maps: its name, with options where it takes any, or a file of rows. --mode has the
-    /// start and goal that the level of the seed has, too.
+    /// Map, for games whose levels are maps: its name, with options where it takes any, or a file of rows. --mode also
+    /// takes the start and goal of the level.
     #[arg(long, value_name = "MAP", conflicts_with_all = ["mode", "levels"])]
     map: Option<String>,
     /// Level file to show, in the form that --json prints.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["mode", "levels", "map", "seed"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["mode", "levels", "map", "level", "seed"])]
     file: Option<PathBuf>,
     #[command(flatten)]
     levels: LevelsArg,
-    /// Seed of the level; 0, or the first of the levels, if none is named.
-    #[arg(long)]
+    /// Old spelling of --level.
+    #[arg(long, hide = true, conflicts_with = "level")]
     seed: Option<u64>,
     /// Print one line of JSON instead of a picture.
     #[arg(long)]
     json: bool,
-    /// Also draw the whole level into this .png; maps into a .svg too.
+    /// Also draw the whole level into this .png (maps also into a .svg).
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
 }
@@ -70,32 +70,32 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(Outcome::Pass)
 }
 
-/// The level that is asked for. Where neither a mode nor a map is named it is one of the usual mode.
+/// Shows the requested level. Without a mode and a map it is one of the default mode.
 fn show(game: &dyn Game, args: &Args, picture: bool) -> Result<LevelView, CliError> {
     let (map, file) = (args.map.as_deref(), args.file.as_deref());
     let show = |request: &LevelRequest| game.show_level(request).map_err(|error| explain(game, error));
     if map.is_some() || file.is_some() {
-        return show(&LevelRequest { mode: None, map, file, seed: args.seed, picture });
+        return show(&LevelRequest { mode: None, map, file, level: args.levels.number(args.seed), picture });
     }
-    let (named, seed) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
+    let (named, level) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
     let mode = named.unwrap_or_else(|| usual_mode(game));
-    let level = show(&LevelRequest { mode: Some(mode), map, file, seed: Some(seed), picture })?;
+    let shown = show(&LevelRequest { mode: Some(mode), map, file, level: Some(level), picture })?;
     if named.is_none() {
-        tell!("no --mode is named: {mode}, which is trained in, level {seed}");
+        tell!("no --mode is named: {mode}, which is trained in, level {level}");
     }
-    Ok(level)
+    Ok(shown)
 }
 
-/// Whether a game can show levels: it is asked for the one that it chooses itself.
+/// Returns true if a game can show levels: its own default level is tried.
 pub fn shows_levels(game: &dyn Game) -> bool {
     game.show_level(&LevelRequest::default()).is_ok()
 }
 
-/// An error of showing a level; of a game that can show none at all, with what can be looked at instead.
+/// Explains an error of showing a level. For a game that can show none, it names the verbs that can.
 fn explain(game: &dyn Game, error: InspectError) -> CliError {
     match error {
         InspectError::Usage(why) if !shows_levels(game) => {
-            CliError::Usage(format!("{why}; `playbot view {} --seed N` shows what a bot sees of one", game.name()))
+            CliError::Usage(format!("{why}; `playbot view {} --level N` shows the observation in a level", game.name()))
         }
         error => error.into(),
     }

@@ -1,4 +1,4 @@
-//! A level that a game has drawn, as a file.
+//! Writing of a level's picture into a file.
 
 use playbot_lab::inspect::LevelPicture;
 

@@ -1,4 +1,4 @@
-//! The command line. One file per verb; data goes to standard output, everything else to standard error.
+//! The command line: one file per verb. Data goes to standard output, everything else to standard error.
 #![allow(clippy::print_stdout, reason = "a command line prints")]
 
 #[macro_use]
@@ -10,6 +10,7 @@ mod cloning;
 mod command_line;
 mod compute;
 mod config;
+mod console;
 mod defaults;
 mod demo;
 mod demo_merge;
@@ -31,7 +32,6 @@ mod log;
 #[cfg(all(target_os = "linux", feature = "camera"))]
 mod mesa;
 mod methods;
-mod missing_demos;
 mod named;
 mod number;
 mod one_level;
@@ -45,18 +45,12 @@ mod policy;
 mod program;
 mod progress;
 mod quickstart;
-mod read_demos;
 mod record;
 mod recording;
 mod replay;
 mod report;
 mod runs;
 mod study;
-mod study_cost;
-mod study_demos;
-mod study_metrics;
-mod study_rewrite;
-mod study_run;
 mod test;
 mod trace;
 mod train;
@@ -71,7 +65,7 @@ mod words;
 
 pub use command_line::{check_usage, main};
 
-/// What the README shows is compiled.
+/// Compiles the code blocks of the README.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;

@@ -1,4 +1,4 @@
-//! What is logged, to standard error.
+//! The log on standard error.
 
 use std::{
     collections::BTreeSet,
@@ -25,15 +25,15 @@ use tracing_subscriber::{
 
 use super::tell::for_people;
 
-/// A window manager without settings, a renderer in software or none at all, and a log that is there already are nothing
-/// to warn of; what a graphics card that failed could not do is told by the error that follows.
+/// Filters messages that need no warning: a window manager without settings, a renderer in software or none at all, and
+/// a log that is there already. A failed graphics card is reported by the error that follows.
 const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off,\
                      cubecl_runtime=error";
 
-/// What broken games log is not news.
+/// Messages of broken games are left out.
 const WITHOUT_GAMES: &str = "off,bevy_playbot=warn,playbot_cli=warn,playbot_lab=warn,playbot_learner=warn";
 
-/// Logs what `RUST_LOG` asks for, or else warnings, and more with each `-v`. Who asks for more is told where it is from.
+/// Logs at the levels of `RUST_LOG`, or else warnings, and more with each `-v`. With `-v` each line names its source.
 pub fn init(verbose: u8, hears_games: bool) {
     let quiet = if hears_games { QUIET } else { WITHOUT_GAMES };
     let level = [quiet, "info", "debug"][usize::from(verbose.min(2))];
@@ -56,9 +56,9 @@ where
     format.event_format(lines).with_writer(writer).finish().with(FilesOnce::default())
 }
 
-/// How a line of the log looks.
+/// The format of a line of the log.
 struct Lines {
-    /// What this workspace says to people is written as the verbs write it, without the place in its sources.
+    /// Messages of this workspace are written as the verbs write theirs, without the source.
     is_plain: bool,
     full: Format<Full, ()>,
 }
@@ -79,7 +79,7 @@ where
     }
 }
 
-/// The words of an event and its values, as people may be told them: much of it comes from files.
+/// The text and values of an event without terminal control characters: much of it comes from files.
 struct HarmlessFields(DefaultFields);
 
 impl<'writer> FormatFields<'writer> for HarmlessFields {
@@ -90,8 +90,8 @@ impl<'writer> FormatFields<'writer> for HarmlessFields {
     }
 }
 
-/// Lets each error about an asset and each warning of a training through once. Every World loads the files of its game, and
-/// each would say the same of one that is not there; and a damaged checkpoint is found again whenever one is looked for.
+/// Lets each error about an asset and each warning of a training through once. Every World loads the files of its game
+/// and reports the same missing ones, and a damaged checkpoint is found again at each look.
 #[derive(Default)]
 struct FilesOnce {
     said: Mutex<BTreeSet<String>>,
@@ -116,7 +116,7 @@ impl<S: Subscriber> Layer<S> for FilesOnce {
     }
 }
 
-/// The words of an event.
+/// The text of an event.
 #[derive(Default)]
 struct Message(String);
 

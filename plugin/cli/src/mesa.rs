@@ -1,12 +1,12 @@
-//! Keeping Mesa quiet where there is no desktop.
+//! Mesa without its warnings where there is no desktop.
 
 use std::{os::unix::process::CommandExt, path::Path, process::Command};
 
-/// What switches off Mesa's layer that chooses among devices.
+/// The variable that switches off Mesa's layer that chooses among devices.
 const SWITCH: &str = "NODEVICE_SELECT";
 
-/// Starts the program anew, as the same process, with Mesa's choice among devices switched off, if there is no folder of a
-/// desktop session: the choice asks a Wayland desktop first, whose library then complains on standard error, several
+/// Restarts the program, as the same process, with Mesa's choice among devices switched off, if there is no folder of a
+/// desktop session. The choice asks a Wayland desktop first, whose library then complains on standard error, several
 /// times. wgpu chooses by itself, so nothing is lost.
 ///
 /// The layer reads the environment of the process, which a program cannot change in itself without unsafe code.

@@ -1,4 +1,4 @@
-//! Players by name: what `eval` and `quickstart` measure.
+//! Players by name, and their measurement for `eval` and `quickstart`.
 
 use bevy_playbot::unknown_name::UnknownName;
 use playbot_lab::{
@@ -16,13 +16,13 @@ use super::{
     progress,
 };
 
-/// The bot of a game with this name: one of its blind bots, chaos, or its demonstrator.
+/// Returns the bot of a game with this name: one of its blind bots, chaos, or its demonstrator.
 ///
 /// # Errors
 ///
 /// [`UnknownName`] with the game's bots.
 pub fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
-    if game.demonstrator() == Some(name) {
+    if game.tools().bots.demonstrator() == Some(name) {
         return Ok(Player::Demonstrator);
     }
     let bots = blind_bots(game);
@@ -32,9 +32,9 @@ pub fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
     }
 }
 
-/// Names of all bots of a game.
+/// Returns the names of all bots of a game.
 pub fn bot_names(game: &dyn Game) -> Vec<&'static str> {
-    blind_bots(game).into_iter().map(|(name, _)| name).chain(game.demonstrator()).collect()
+    blind_bots(game).into_iter().map(|(name, _)| name).chain(game.tools().bots.demonstrator()).collect()
 }
 
 /// A measured player: its row of the result table, its episodes and its speed.
@@ -46,7 +46,7 @@ pub struct Measured {
 }
 
 impl Measured {
-    /// The row as reports have it.
+    /// Returns the row in the form of reports.
     pub fn into_row(self) -> ResultRow {
         let summary = self.summary;
         ResultRow {
@@ -73,7 +73,7 @@ pub fn measure(game: &dyn Game, name: &str, player: &Player, plan: &EvalPlan) ->
         .map(|(measured, _)| measured)
 }
 
-/// [`measure`], and where every episode led.
+/// As [`measure`], with the trail of every episode.
 ///
 /// # Errors
 ///
@@ -102,14 +102,20 @@ fn timed<T>(
     let episodes: Vec<_> = played.iter().map(|episode| *result(episode)).collect();
     let steps: u64 = episodes.iter().map(|episode| u64::from(episode.ticks)).sum();
     let summary = summarize(name, &plan.split, &episodes);
+    tell_clipped(&summary);
+    Ok((Measured { summary, steps_per_s: steps as f64 / seconds }, played))
+}
+
+/// Reports it if actions of a measured player were clipped.
+pub fn tell_clipped(summary: &EvalSummary) {
     if summary.clipped > 0.0 {
         tell!(
-            "{name} on {}: {:.1} % of the actions lay outside the game's range and were clipped",
-            plan.split,
+            "{} on {}: {:.1} % of the actions lay outside the game's range and were clipped",
+            summary.method,
+            summary.split,
             100.0 * summary.clipped
         );
     }
-    Ok((Measured { summary, steps_per_s: steps as f64 / seconds }, played))
 }
 
 /// Prints a row as one line of JSON.

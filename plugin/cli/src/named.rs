@@ -1,4 +1,4 @@
-//! Files with a name of their own on the command line.
+//! Files with a name in front on the command line, `NAME=FILE`.
 
 use std::{
     path::{Path, PathBuf, is_separator},
@@ -15,8 +15,8 @@ pub struct Named {
 }
 
 impl Named {
-    /// What was given where the name may be left out; `None` if it is just a file, as it is wherever one of that whole name
-    /// exists.
+    /// Parses an argument whose name is optional. `None` if it is just a file, which holds whenever a file of that
+    /// whole name exists.
     pub fn given(given: &Path) -> Option<Self> {
         if given.exists() { None } else { given.to_str()?.parse().ok() }
     }
@@ -52,7 +52,7 @@ mod tests {
         let there = folder.path().join("ppo=bot.policy");
         std::fs::write(&there, "").expect("writable");
         assert_eq!(Named::given(&there), None);
-        // What is no name is part of a path.
+        // A prefix that is no name is part of a path.
         assert_eq!(Named::given(&folder.path().join("ppo=none.policy")), None);
         assert_eq!(Named::given(Path::new("none.policy")), None);
         let named = Named { name: "ppo".to_owned(), path: there.clone() };

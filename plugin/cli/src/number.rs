@@ -1,6 +1,6 @@
-//! Numbers on the command line, and in words for people.
+//! Numbers on the command line, and their wording in messages.
 
-/// A number of which there must be at least one.
+/// Parses a number of at least one.
 ///
 /// # Errors
 ///
@@ -13,7 +13,7 @@ pub fn at_least_one(text: &str) -> Result<usize, String> {
     }
 }
 
-/// `1 step`, `2 steps`.
+/// Formats `1 step`, `2 steps`.
 pub fn counted(number: u64, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }

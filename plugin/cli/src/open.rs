@@ -1,4 +1,4 @@
-//! Opening what the command line names, with what to do where it is not there.
+//! Opening of files that the command line names, with advice for missing ones.
 
 use std::{
     io::ErrorKind,
@@ -10,10 +10,10 @@ use playbot_lab::{
     game::Game,
     games::{Artifact, Games},
     report::whole,
+    sealed_file::file_checksum,
     train::{
         Algorithm, Experiment, TrainedLearner,
         checkpoint::{self, Checkpoint, CheckpointChoice},
-        checksum::file_checksum,
         run_dir::{MEND, RunDir},
     },
 };
@@ -24,7 +24,7 @@ use super::{
     experiment::{ExperimentArgs, quoted},
 };
 
-/// A policy file.
+/// Opens a policy file.
 ///
 /// # Errors
 ///
@@ -39,7 +39,7 @@ pub fn policy(path: &Path, device: DeviceKind) -> Result<PolicyFile, CliError> {
     })
 }
 
-/// A skill model.
+/// Opens a skill model.
 ///
 /// # Errors
 ///
@@ -58,7 +58,7 @@ fn is_missing(error: &FileError) -> bool {
     matches!(error, FileError::Io { source, .. } if source.kind() == ErrorKind::NotFound)
 }
 
-/// The game of an experiment that the command line describes.
+/// Returns the game of an experiment.
 ///
 /// # Errors
 ///
@@ -70,11 +70,11 @@ pub fn game<'a>(games: &Games<'a>, from: &ExperimentArgs, experiment: &Experimen
     }
 }
 
-/// A checkpoint of a run of an algorithm. Says which one is the best, and on what grounds.
+/// Opens a checkpoint of a run. Reports which one is the best, and why.
 ///
 /// # Errors
 ///
-/// There is none; where nothing is trained, with the skill model that plays.
+/// There is none. For behaviour cloning, which trains nothing, the error names the skill model to use instead.
 pub fn checkpoint(run: &RunDir, algorithm: Algorithm, choice: CheckpointChoice) -> Result<Checkpoint, CliError> {
     if !algorithm.is_trained() {
         return Err(untrained(run.path(), algorithm));
@@ -86,17 +86,18 @@ pub fn checkpoint(run: &RunDir, algorithm: Algorithm, choice: CheckpointChoice) 
     Ok(checkpoint)
 }
 
-/// What to do about a run that trains nothing.
+/// Returns the error of a run without training, with advice.
 pub fn untrained(run: &Path, algorithm: Algorithm) -> CliError {
     let skills = shown(&skills_beside(run));
     CliError::Usage(format!(
-        "{} is a run of {algorithm}, which trains nothing and has no checkpoint: what plays is its skill model; measure that with \
+        "{} is a run of {algorithm}, which trains nothing and has no checkpoint: its skill model plays; measure that with \
          `playbot eval --skills {skills}`, or make a policy of it, `playbot policy export --skills {skills} --out clone.policy`",
         run.display()
     ))
 }
 
-/// The skill model that a run began with, if it lies in the same folder as the run, as in a study; else a name that it may have.
+/// Returns the skill model of a run, if it lies in the same folder as the run, as in a study; else an example of a
+/// name.
 fn skills_beside(run: &Path) -> PathBuf {
     let wanted = RunDir::open(run).ok().and_then(|opened| opened.info.skills);
     let study = run.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
@@ -106,11 +107,11 @@ fn skills_beside(run: &Path) -> PathBuf {
     own.unwrap_or_else(|| "skills.safetensors".into())
 }
 
-/// What a run had learned at a checkpoint.
+/// Loads the learner of a run at a checkpoint.
 ///
 /// # Errors
 ///
-/// It cannot be read: if it is damaged, with those that may be taken in its place.
+/// It cannot be read: if it is damaged, with the checkpoints to use instead.
 pub fn learner(
     run: &RunDir,
     algorithm: Algorithm,
@@ -125,7 +126,7 @@ pub fn learner(
     })
 }
 
-/// What to do about a checkpoint that is damaged.
+/// Returns the advice for a damaged checkpoint.
 fn in_its_place(run: &Path, damaged: u64) -> String {
     let all = checkpoint::list(run).unwrap_or_default();
     let others: Vec<String> = all
@@ -156,12 +157,12 @@ fn best(run: &Path, checkpoint: &Checkpoint) -> String {
     }
 }
 
-/// The error of a recording that could not be read; where there is none, with the command that makes one.
+/// Explains an error of reading a recording; for a missing file, with the command that makes one.
 pub fn missing_recording(error: DemoFileError) -> CliError {
     missing(error, "record GAME --out")
 }
 
-/// The same where another recording is made of it: a file in the place of that is told with what to do.
+/// As [`missing_recording`], for verbs that write another recording: a file in its place is explained, too.
 pub fn missing_or_taken(error: DemoFileError) -> CliError {
     match error.fault {
         DemoFault::Exists => CliError::Usage(format!("{error}: name another --out, or remove that file first")),
@@ -169,7 +170,7 @@ pub fn missing_or_taken(error: DemoFileError) -> CliError {
     }
 }
 
-/// The same for recordings of people, which nobody else makes.
+/// As [`missing_recording`], for recordings of people, which only `playbot play` makes.
 pub fn missing_recording_of_people(error: DemoFileError) -> CliError {
     missing(error, "play GAME --record")
 }
@@ -185,7 +186,7 @@ fn missing(error: DemoFileError, verb: &str) -> CliError {
     }
     let file: PathBuf = match error.path.extension().and_then(|ending| ending.to_str()) {
         Some("demo") => error.path.clone(),
-        // A file, and none that is recorded into.
+        // A file that is not a recording.
         Some(_) if !error.path.is_dir() => {
             return CliError::Usage(format!("{error}; name recordings that exist, which end in .demo"));
         }
@@ -206,7 +207,7 @@ mod tests {
 
     use super::*;
 
-    /// Checks that an error names the path, and the command that makes what is missing.
+    /// Checks that an error names the path, and the command that makes the missing file.
     fn names(error: &CliError, path: &Path, command: &str) {
         let words = error.to_string();
         assert!(words.starts_with(&format!("{}: ", path.display())) || words.contains("cannot read"), "{words}");

@@ -1,16 +1,16 @@
-//! Files to write: looked at before the work whose result they are to hold.
+//! Output files: tested before the work whose result they hold.
 
 use std::path::{Path, PathBuf};
 
-use playbot_lab::train::run_dir::write_atomically;
+use playbot_lab::sealed_file::write_atomically;
 use playbot_learner::disk::{self, DiskFile};
 
 use super::error::CliError;
 
-/// What to do about a place where nothing can be written.
+/// Advice where nothing can be written.
 const ELSEWHERE: &str = "make room or rights there, or name a file in another folder";
 
-/// Makes the folder that a file lies in, and tries whether one can be written there.
+/// Makes the folder of a file, and tests whether the file can be written.
 ///
 /// # Errors
 ///
@@ -26,7 +26,7 @@ pub fn prepare(path: &Path) -> Result<(), CliError> {
         .map_err(|error| CliError::Io(format!("cannot write {}: {error}; {ELSEWHERE}", path.display())))
 }
 
-/// Makes the folder that a file lies in.
+/// Makes the folder of a file.
 ///
 /// # Errors
 ///
@@ -54,7 +54,7 @@ pub fn make_folder(folder: &Path) -> Result<(), CliError> {
     })
 }
 
-/// Writes a file, and makes the folder it lies in.
+/// Writes a file, and makes its folder.
 ///
 /// # Errors
 ///
@@ -64,27 +64,27 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     Ok(write_atomically(path, bytes)?)
 }
 
-/// The file in the same folder whose name goes on with `ending`.
+/// Returns the file in the same folder whose name goes on with `ending`.
 pub fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(ending);
     path.with_file_name(name)
 }
 
-/// A picture to write that can be a PNG only, as the command line names it.
+/// Parses the path of a PNG.
 ///
 /// # Errors
 ///
-/// Its name says that it is something else.
+/// Its name ends otherwise.
 pub fn png(text: &str) -> Result<PathBuf, String> {
     picture(text, "png")
 }
 
-/// A drawing to write that can be an SVG only, as the command line names it.
+/// Parses the path of an SVG.
 ///
 /// # Errors
 ///
-/// Its name says that it is something else.
+/// Its name ends otherwise.
 pub fn svg(text: &str) -> Result<PathBuf, String> {
     picture(text, "svg")
 }

@@ -1,22 +1,23 @@
-//! How long work will still take, by how fast it has been of late.
+//! Estimate of the time that is left, by the recent speed of the work.
 
 use std::{
     collections::VecDeque,
     time::{Duration, Instant},
 };
 
-/// What is longer ago does not count, as long as there is something newer.
+/// Older progress does not count, as long as there is newer.
 const WINDOW: Duration = Duration::from_secs(60);
 
-/// When work has come on, and how far. Work that comes on in leaps, as a training does after each update, is not thought to
-/// stand still in between.
+/// Times and amounts of progress. Work that advances in leaps, such as a training after each update, does not count as
+/// standing still in between.
 #[derive(Default)]
 pub struct Pace {
     steps: VecDeque<(Instant, u64)>,
 }
 
 impl Pace {
-    /// The time that is left at `now` for the way from `done` to `length`; `None` until something was done twice, and at the end.
+    /// Returns the time that is left at `now` from `done` to `length`; `None` before the second progress, and at the
+    /// end.
     pub fn left(&mut self, now: Instant, done: u64, length: u64) -> Option<Duration> {
         let is_back = self.steps.back().is_some_and(|&(_, last)| last > done);
         if is_back {
@@ -49,7 +50,7 @@ mod tests {
         // 100 in 10 seconds: 80 for the rest, of which time goes by.
         assert_eq!((left(11, 200), left(14, 200)), (Some(Duration::from_secs(80)), Some(Duration::from_secs(77))));
         assert_eq!(left(200, 200), None, "it takes longer than was thought");
-        // It has become slower: what was more than a minute ago is forgotten.
+        // It has become slower: progress of more than a minute ago is forgotten.
         assert_eq!(left(211, 300), Some(Duration::from_secs(1400)));
         assert_eq!(left(300, 1000), None, "done");
         assert_eq!(left(301, 10), None, "begun anew");

@@ -1,4 +1,4 @@
-//! Who plays, as the command line names them.
+//! Players named on the command line.
 
 use std::path::{Path, PathBuf};
 
@@ -22,9 +22,9 @@ use playbot_learner::{DeviceKind, SeenLevels};
 
 use super::{compute::Device, error::CliError, methods, open, unseen::seen_by_run};
 
-/// A policy, a run or a bot.
+/// Options for a policy, a run or a bot.
 #[derive(clap::Args, Clone, Debug)]
-#[command(mut_arg("device", |device| device.help("Where the policy computes: flex or ndarray, or wgpu or cuda if built in")))]
+#[command(mut_arg("device", |device| device.help("Device of the policy: flex or ndarray, or wgpu or cuda if built in")))]
 pub struct PlayerArgs {
     /// Policy file, as written by `playbot policy export`.
     #[arg(long, value_name = "FILE", group = "player")]
@@ -32,7 +32,7 @@ pub struct PlayerArgs {
     /// Folder of a run.
     #[arg(long, value_name = "DIR", group = "player")]
     run: Option<PathBuf>,
-    /// Bot of the game, such as random; a name that it does not have lists all.
+    /// Bot of the game, such as random. An unknown name lists all.
     #[arg(long, value_name = "NAME", group = "player")]
     bot: Option<String>,
     /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
@@ -45,20 +45,20 @@ pub struct PlayerArgs {
     device: Device,
 }
 
-/// A player, its name and what it sees.
+/// A player, its name and its observation.
 pub struct Chosen {
-    /// Its name, for people.
+    /// Its name in messages.
     pub name: String,
     /// The player.
     pub player: Player,
-    /// What it was trained to see; vectors for bots.
+    /// The observation that it was trained with; vectors for bots.
     pub observation_config: ObservationConfig,
-    /// The levels that it has learned from, where they are noted; nothing for bots.
+    /// The levels that it has learned from, if noted; `None` for bots.
     pub seen: Option<SeenLevels>,
 }
 
 impl Chosen {
-    /// A bot of the game, by name.
+    /// Returns a bot of the game by its name.
     ///
     /// # Errors
     ///
@@ -72,19 +72,19 @@ impl Chosen {
         })
     }
 
-    /// The demonstrator, or else the first of the game's bots.
+    /// Returns the demonstrator, or else the first of the game's bots.
     ///
     /// # Errors
     ///
     /// The game has none.
     pub fn usual(game: &dyn Game) -> Result<Self, CliError> {
         let bots = methods::bot_names(game);
-        let name = game.demonstrator().or(bots.first().copied());
+        let name = game.tools().bots.demonstrator().or(bots.first().copied());
         let nobody = || CliError::Usage(format!("`{}` has no bot: name a --policy or a --run", game.name()));
         Self::bot(game, name.ok_or_else(nobody)?)
     }
 
-    /// The policy in a file, under the name of its algorithm.
+    /// Loads the policy in a file, under the name of its algorithm.
     ///
     /// # Errors
     ///
@@ -96,7 +96,7 @@ impl Chosen {
         Ok(Self { name: file.card.algorithm, player, observation_config, seen: file.card.seen })
     }
 
-    /// What a run has learned, under the name of its algorithm. Says so if its training has not ended.
+    /// Loads the policy of a run, under the name of its algorithm. Reports it if the training has not ended.
     ///
     /// # Errors
     ///
@@ -125,11 +125,11 @@ impl Chosen {
         })
     }
 
-    /// Checks that a policy reads what the game shows it, and acts as the game does; bots always fit.
+    /// Checks that a policy's observation and actions are the game's; bots always fit.
     ///
     /// # Errors
     ///
-    /// What differs, in words.
+    /// The difference, in words.
     pub fn check_fit(&self, game: &dyn Game) -> Result<(), CliError> {
         let Player::Policy { policy, .. } = &self.player else { return Ok(()) };
         self.observation_config.check(game)?;
@@ -150,7 +150,7 @@ impl Chosen {
     }
 }
 
-/// The error of a policy file that was made for another game, or another state of it.
+/// Explains the misfit of a policy file that was made for another game, or another version of it.
 fn does_not_fit(path: &Path, misfit: &PolicyMisfit) -> CliError {
     let path = path.display();
     CliError::Usage(match misfit {
@@ -159,7 +159,7 @@ fn does_not_fit(path: &Path, misfit: &PolicyMisfit) -> CliError {
     })
 }
 
-/// Checks that a run is one of the game that is named.
+/// Checks that a run is of the named game.
 ///
 /// # Errors
 ///
@@ -172,7 +172,7 @@ pub fn check_run_of(path: &Path, own: &str, named: &str) -> Result<(), CliError>
     Err(CliError::Usage(format!("{path}: a run of the game `{own}`, not of `{named}`: {}", way_out("run", own, named))))
 }
 
-/// What to do about something that is of one game where another one was named.
+/// Returns the advice about a file of one game where another one was named.
 fn way_out(what: &str, found: &str, named: &str) -> String {
     format!("name a {what} of `{named}`, or name the game `{found}`, in a program that has it")
 }
@@ -199,7 +199,7 @@ impl PlayerArgs {
         Ok(Some(chosen))
     }
 
-    /// Whether somebody is named.
+    /// Returns true if a player is named.
     #[cfg(feature = "window")]
     pub fn is_named(&self) -> bool {
         self.policy.is_some() || self.run.is_some() || self.bot.is_some()

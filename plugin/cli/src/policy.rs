@@ -15,6 +15,7 @@ use playbot_lab::{
     train::{
         Experiment,
         checkpoint::CheckpointChoice,
+        learn_skills::cloning_skills,
         run_dir::{OpenedRun, RunDir},
     },
 };
@@ -22,7 +23,7 @@ use playbot_learner::{DeviceKind, PolicyFile};
 use serde_json::json;
 
 use super::{
-    cloning::{check_skills, cloning_skills},
+    cloning::check_skills,
     compute::Device,
     error::{CliError, Outcome, print_line},
     experiment::{ExperimentArgs, quoted},
@@ -34,7 +35,7 @@ use super::{
     words,
 };
 
-/// Make and look at policy files, which a game ships with.
+/// Make and show policy files, which a game ships with.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot policy export --run runs/first --checkpoint best --out GAME.policy
@@ -50,7 +51,7 @@ pub struct Args {
 enum Verb {
     /// Write the policy of a run, or behaviour cloning, into one self-describing file.
     Export(Export),
-    /// Check a policy file and say what it is.
+    /// Check a policy file and print its metadata.
     Show {
         /// The file.
         file: PathBuf,
@@ -111,7 +112,8 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
     Ok(Outcome::Pass)
 }
 
-/// The command that measures a policy file: on the held-out levels of its training, if the game has them and it has seen none of them.
+/// Returns the command that measures a policy file. It uses the held-out levels of the policy's training, if the game
+/// has them and the policy has seen none of them.
 fn measuring(path: &Path, game: &dyn Game, test: &LevelSplit, file: &PolicyFile) -> String {
     let command = format!("{} eval --policy {}", program::name(), quoted(&path.to_string_lossy()));
     if test.check(game).is_err() {
@@ -127,7 +129,7 @@ fn measuring(path: &Path, game: &dyn Game, test: &LevelSplit, file: &PolicyFile)
     }
 }
 
-/// A policy to export, and what it was trained by.
+/// A policy to export, and its origin.
 struct PolicySource<'a> {
     game: &'a dyn Game,
     experiment: Experiment,
@@ -158,7 +160,7 @@ fn from_run<'a>(
     let seen = Some(seen_by_run(game, &experiment, &info));
     let about = Provenance { algorithm, training, seen, code: code(&info.version, &info.revision) };
     let mut file = policy_file(game, &experiment.observation_config(), learner.policy(), learner.skills(), about);
-    // The rules that it was trained under, which may not be those of today.
+    // The rules of its training, which may differ from the present ones.
     file.card.game_version = info.game_version;
     Ok(PolicySource { game, experiment, file })
 }
@@ -180,7 +182,7 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
     Ok(PolicySource { game, experiment, file })
 }
 
-/// What trained a policy: playbot, whatever the game is, which has a version of its own in the card.
+/// Returns the version of playbot that trained a policy. The game's own version stands elsewhere in the metadata.
 fn code(version: &str, revision: &str) -> String {
     format!("playbot {version} ({revision})")
 }

@@ -1,11 +1,11 @@
-//! What the program is called: as its file is, whatever games are in it.
+//! The program's name: that of its file, whatever games are in it.
 
 use std::{env, ffi::OsStr, path::Path, sync::OnceLock};
 
-/// The name that texts use which do not know what program they are part of, such as the errors of libraries.
+/// The name in texts that do not know their program, such as the errors of libraries.
 pub const USUAL: &str = "playbot";
 
-/// The program's name, for commands that people are told to call.
+/// Returns the program's name, for commands in messages.
 pub fn name() -> &'static str {
     static NAME: OnceLock<String> = OnceLock::new();
     NAME.get_or_init(|| env::args_os().next().as_deref().and_then(of_file).unwrap_or(USUAL).to_owned())
@@ -15,12 +15,12 @@ fn of_file(path: &OsStr) -> Option<&str> {
     Path::new(path).file_name()?.to_str()?.strip_suffix(env::consts::EXE_SUFFIX)
 }
 
-/// A text with this program's name in the commands that it quotes.
+/// Puts this program's name into the commands that a text quotes.
 pub fn named(text: &str) -> String {
     with_name(text, name())
 }
 
-/// A text with a program's name in the commands that it quotes.
+/// Puts a program's name into the commands that a text quotes.
 pub fn with_name(text: &str, program: &str) -> String {
     text.replace(&format!("`{USUAL} "), &format!("`{program} "))
 }

@@ -1,5 +1,5 @@
-//! How far work is, on standard error, for everything that can take longer than two seconds: bars on a terminal, a plain
-//! line now and then elsewhere.
+//! Progress on standard error, for all work that can take longer than two seconds: bars on a terminal, a plain line now
+//! and then elsewhere.
 
 use std::{
     fmt::Write as _,
@@ -13,17 +13,18 @@ use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, Progre
 
 use crate::pace::Pace;
 
-/// All bars, so that a part's bar stands below that of the whole.
+/// All bars, so that the bar of a part stands below that of the whole.
 static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
 
 /// Time between two plain lines.
 const PAUSE: Duration = Duration::from_secs(10);
 
-/// What is reported in plain lines.
+/// The work that is reported in plain lines.
 static TEXT_PROGRESS: Mutex<Vec<TextProgress>> = Mutex::new(Vec::new());
 static REPORTER: Once = Once::new();
 
-/// A bar with a title, a count, the time left and room for a message. A length that grows with the position says nothing.
+/// Makes a bar with a title, a count, the time left and room for a message. A bar whose length grows with its position
+/// shows no time left.
 pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
     let template = format!("{title:<22} [{{bar:32}}] {{human_pos}}/{{human_len}} {unit} {{left}}  {{msg}}");
     let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
@@ -31,7 +32,7 @@ pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
     let left = move |state: &ProgressState, out: &mut dyn std::fmt::Write| {
         let mut pace = pace.lock().unwrap_or_else(PoisonError::into_inner);
         let left = pace.left(Instant::now(), state.pos(), state.len().unwrap_or_default());
-        // What cannot be written is not drawn.
+        // A failed write is not reported.
         let _ = out.write_str(&describe_left(left));
     };
     let bar = BARS.add(ProgressBar::new(length)).with_style(style.with_key("left", left).progress_chars("=> "));
@@ -43,19 +44,19 @@ pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
             bar: bar.downgrade(),
             pace: Pace::default(),
         });
-        // Without a thread for it nothing is reported.
+        // Without a thread for it, nothing is reported.
         REPORTER.call_once(|| drop(thread::Builder::new().spawn(report)));
     }
     bar
 }
 
-/// The time that is left, if it can be told; less than a second is not worth a word.
+/// Describes the time that is left, if known and at least a second.
 fn describe_left(left: Option<Duration>) -> String {
     let left = left.filter(|left| *left >= Duration::from_secs(1));
     left.map_or(String::new(), |left| format!("{:#} left", HumanDuration(left)))
 }
 
-/// A bar that nobody sees, whose progress is reported in lines.
+/// A hidden bar, whose progress is reported in lines.
 struct TextProgress {
     title: String,
     unit: String,
@@ -64,7 +65,7 @@ struct TextProgress {
 }
 
 impl TextProgress {
-    /// Where the work is, as `record: 1200 of 20000 steps`; `None` if it is over.
+    /// Returns the progress, as `record: 1200 of 20000 steps`; `None` if the work is over.
     fn line(&mut self) -> Option<String> {
         let bar = self.bar.upgrade().filter(|bar| !bar.is_finished())?;
         let (title, unit, done) = (&self.title, &self.unit, bar.position());
@@ -88,7 +89,7 @@ fn text_progress() -> MutexGuard<'static, Vec<TextProgress>> {
     TEXT_PROGRESS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Reports all work that goes on, again and again.
+/// Reports all running work, in a loop.
 fn report() {
     loop {
         thread::park_timeout(PAUSE);
@@ -98,7 +99,7 @@ fn report() {
             line.iter().for_each(|line| lines.extend([line, "\n"]));
             line.is_some()
         });
-        // Whoever closed standard error does not want to know.
+        // Standard error may be closed.
         let _ = stderr().write_all(lines.as_bytes());
     }
 }

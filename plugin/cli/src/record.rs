@@ -19,13 +19,13 @@ use super::{
 
 /// Record the game's demonstrator, or another player.
 ///
-/// The demonstrator is a bot of the game's own; --policy, --run and --bot name others, such as a policy that has learned the
-/// game from vectors and shall teach one that sees pixels. --noise replaces some of the actions, so that recordings show how
-/// to go on from there.
+/// The demonstrator is a bot of the game's own. --policy, --run and --bot name others, such as a policy that has
+/// learned the game from vectors and demonstrates it for one that sees pixels. --noise replaces some of the actions, so
+/// that recordings also show recoveries.
 ///
-/// Recordings may show training levels and any others, but no held-out level, on which bots are tested: `learn-skills`
-/// refuses those, and any level that looks like one. Held-out levels are the experiment's `test`; leave them out with
-/// --hold-out.
+/// Recordings may show training levels and any others, but no held-out level, on which bots are tested. `learn-skills`
+/// refuses those, and any level that looks like one. Held-out levels are the experiment's `test`, and --hold-out leaves
+/// them out.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot record GAME --levels MODE:0..9 --out my.demo
@@ -36,11 +36,12 @@ use super::{
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json"; played in order, again and again until --steps is reached. Without it
-    /// levels 0 to 499 of the mode that `train` trains in, but for the held-out ones of the game's own experiment.
+    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json". They are played in
+    /// order, again and again until --steps is reached. Default: levels 0 to 499 of the mode that `train` trains in,
+    /// but for the held-out ones of the game's own experiment.
     #[arg(long)]
     levels: Option<LevelSplit>,
-    /// Leave out these levels, and any that look like one of them; may be given several times.
+    /// Leave out these levels, and any that look like one of them (repeatable).
     #[arg(long, value_name = "LEVELS")]
     hold_out: Vec<LevelSplit>,
     /// File to write.
@@ -48,32 +49,31 @@ pub struct Args {
     out: PathBuf,
     #[command(flatten)]
     player: PlayerArgs,
-    /// Discrete actions: probability with which one is replaced by a uniformly random one. Continuous actions: standard
-    /// deviation of the normal noise on each value, before it is clipped.
+    /// Noise of the actions. Discrete actions: probability with which one is replaced by a uniformly random one.
+    /// Continuous actions: standard deviation of the normal noise on each value, before it is clipped.
     #[arg(long, default_value_t = 0.0)]
     noise: f64,
-    /// Stop after exactly this many steps, not counting those that --append finds; without it, after one round of the
-    /// levels.
+    /// Stop after exactly this many steps, not counting those that --append finds (default: one round of the levels).
     #[arg(long)]
     steps: Option<u64>,
-    /// Seed of the noise.
+    /// Random seed of the noise.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// Keep the observation vectors too (larger; not needed, since replaying brings them back).
+    /// Keep the observation vectors too. The file is larger, and replays restore them anyway.
     #[arg(long)]
     observations: bool,
     #[command(flatten)]
     overwrite: OverwriteArgs,
 }
 
-/// The last of the levels from 0 that are recorded where none are named.
+/// The last of the default levels, which begin with 0.
 const LAST_LEVEL: u64 = 499;
 
-/// Says what a recording does not note: whoever learns from it learns from what its player has learned from.
+/// Warns that policies learned from this recording depend on the levels of its player, which it does not note.
 fn warn_of_pupils(player: &Chosen) {
     if let Some(seen) = &player.seen {
         tell!(
-            "the player has learned from {seen}: hold none of these out from what is to learn of its recordings, which do not note them"
+            "the player has learned from {seen}: hold none of these out from learners of its recordings, which do not note them"
         );
     }
 }
@@ -123,7 +123,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let counts = format!("{}, {}", counted(episodes, "episode"), counted(steps, "step"));
     let finished = finished.inspect_err(|_| {
-        tell!("{}: what was recorded before the error is kept: {counts}", args.out.display());
+        tell!("{}: the part recorded before the error is kept: {counts}", args.out.display());
     })?;
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
     let wins = match ended.successes {
@@ -141,7 +141,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(Outcome::Stopped)
 }
 
-/// Where a recording was stopped.
+/// Position at which a recording was stopped.
 struct StoppedRecording {
     /// The level that was being played, unless every level has been played already.
     level: Option<u64>,
@@ -152,8 +152,8 @@ struct StoppedRecording {
 }
 
 impl StoppedRecording {
-    /// What is to be changed in the call. Each call begins with the first of its levels, counts its own steps, and draws
-    /// the same noise from the same seed.
+    /// Returns the changes of the call that resumes the recording. Each call begins with the first of its levels,
+    /// counts its own steps, and draws the same noise from the same seed.
     fn how_to_go_on(&self, args: &Args, levels: &LevelSplit) -> String {
         let mut changes = "--append".to_owned();
         if let Some(first) = self.level {
@@ -170,21 +170,20 @@ impl StoppedRecording {
     }
 }
 
-/// Somebody must play.
+/// Checks that there is a player.
 fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
-    if game.demonstrator().is_some() {
+    if game.tools().bots.demonstrator().is_some() {
         return Ok(());
     }
     let name = game.name();
-    let mut advice =
-        "train a policy without demonstrations (`playbot train --algorithm ppo --run runs/first`)".to_owned();
-    if game.key_bindings().is_some() {
+    let mut advice = "train a policy without recordings (`playbot train --algorithm ppo --run runs/first`)".to_owned();
+    if game.tools().input.key_bindings().is_some() {
         advice += &format!(", or play and record it yourself: `playbot play {name} --record FILE`");
     }
     Err(CliError::Usage(format!("`{name}` has no demonstrator that could be recorded: {advice}")))
 }
 
-/// A probability for discrete actions, a standard deviation for continuous ones.
+/// Checks the noise: a probability for discrete actions, a standard deviation for continuous ones.
 fn check_noise(game: &dyn Game, noise: f64) -> Result<(), CliError> {
     let (fits, wanted) = match game.actions() {
         ActionSpace::Discrete(_) => ((0.0..=1.0).contains(&noise), "a probability lies between 0 and 1"),
@@ -195,7 +194,7 @@ fn check_noise(game: &dyn Game, noise: f64) -> Result<(), CliError> {
     if fits { Ok(()) } else { Err(CliError::Usage(format!("--noise is {noise}; {wanted}"))) }
 }
 
-/// The levels but for those that are held out.
+/// Returns the levels but for those that are held out.
 fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) -> Result<Vec<u64>, CliError> {
     held_out.iter().try_for_each(|split| split.check(game))?;
     let hidden: Vec<_> = held_out.iter().map(|split| HeldOut::new(game, split)).collect();
@@ -207,7 +206,7 @@ fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) 
     Ok(chosen)
 }
 
-/// Says so if levels that were asked for are held out where nobody names an experiment: an experiment may hold out others.
+/// Warns if requested levels are held out by the game's own experiment. Another experiment may hold out others.
 fn warn_of_held_out(game: &dyn Game, levels: &LevelSplit, chosen: &[u64]) {
     let Some(split) = usual_held_out(game) else { return };
     let hidden = HeldOut::new(game, &split);
@@ -222,7 +221,7 @@ fn warn_of_held_out(game: &dyn Game, levels: &LevelSplit, chosen: &[u64]) {
     }
 }
 
-/// Plays until enough is recorded; false if somebody stopped it before.
+/// Plays until enough is recorded. Returns false if Ctrl-C stopped it before.
 fn play(
     world: &mut bevy::prelude::World,
     agent: bevy::prelude::Entity,

@@ -1,4 +1,4 @@
-//! Opening a recording to write.
+//! Opening of a recording to write.
 
 use std::path::Path;
 
@@ -6,23 +6,23 @@ use bevy_playbot::demo::file::{DemoFault, DemoFileError, DemoHeader, DemoWriter}
 
 use super::{error::CliError, output::prepare};
 
-/// What becomes of a recording that exists.
+/// Options for an existing recording.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
 pub struct OverwriteArgs {
-    /// Add to a recording that exists.
+    /// Add to an existing recording.
     #[arg(long, conflicts_with = "force")]
     append: bool,
-    /// Overwrite a recording that exists.
+    /// Overwrite an existing recording.
     #[arg(long)]
     force: bool,
 }
 
 impl OverwriteArgs {
-    /// Opens the file, and makes the folder it lies in.
+    /// Opens the file, and makes its folder.
     ///
     /// # Errors
     ///
-    /// The file exists and nobody said what to do about it, was recorded under other conditions, or cannot be written.
+    /// The file exists without --append or --force, was recorded under other conditions, or cannot be written.
     pub fn open(self, path: &Path, header: DemoHeader) -> Result<DemoWriter, CliError> {
         let grows = self.append && path.is_file();
         if !grows {
@@ -37,7 +37,7 @@ impl OverwriteArgs {
     }
 }
 
-/// The error of a recording that was not opened, with the options that would open it.
+/// Explains the error of a recording that was not opened, with the options that would open it.
 fn explain(error: DemoFileError) -> CliError {
     match error.fault {
         DemoFault::Exists => CliError::Usage(format!(

@@ -1,18 +1,18 @@
-//! What is said to people, on standard error. Words of files and of the operating system are among it, so that nothing that
-//! could steer a terminal gets through.
+//! Messages on standard error. Parts of them come from files and from the operating system, so characters that could
+//! steer a terminal are replaced.
 
 use std::borrow::Cow;
 
 use playbot_lab::brief::without_long_words;
 use serde::de::IgnoredAny;
 
-/// Whether a character steers a terminal: a control character other than line feed and tab, or one that turns the direction
-/// of writing around.
+/// Returns true if a character steers a terminal: a control character other than line feed and tab, or one that
+/// reverses the direction of writing.
 fn steers(c: char) -> bool {
     (c.is_control() && !matches!(c, '\n' | '\t')) || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// A text in which characters that steer a terminal are replaced.
+/// Replaces characters that steer a terminal.
 fn replaced(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
     if !text.contains(steers) {
         return Cow::Borrowed(text);
@@ -20,13 +20,13 @@ fn replaced(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
     Cow::Owned(text.chars().map(|c| if steers(c) { escape(c) } else { c.to_string() }).collect())
 }
 
-/// A text without what steers a terminal, which is shown as `\u{1b}` is.
+/// Replaces characters that steer a terminal, in the form `\u{1b}`.
 pub fn without_controls(text: &str) -> Cow<'_, str> {
     replaced(text, |c| c.escape_unicode().to_string())
 }
 
-/// Data for standard output without what steers a terminal. JSON stays JSON of the same meaning: there it is written as
-/// `\u001b` is. It can only be within a text, and none of it has more than four digits.
+/// Replaces characters that steer a terminal in data for standard output. JSON keeps its meaning: the form there is
+/// `\u001b`. Such characters occur only within a text, and have at most four digits.
 pub fn for_programs(data: &str) -> Cow<'_, str> {
     if data.contains(steers) && is_json(data) {
         return replaced(data, |c| format!("\\u{:04x}", u32::from(c)));
@@ -34,21 +34,21 @@ pub fn for_programs(data: &str) -> Cow<'_, str> {
     without_controls(data)
 }
 
-/// Whether a text is JSON, of one value or of several.
+/// Returns true if a text is JSON, of one value or of several.
 fn is_json(text: &str) -> bool {
     serde_json::Deserializer::from_str(text).into_iter::<IgnoredAny>().all(|value| value.is_ok())
 }
 
-/// Longest word that is said whole: no path or number is longer.
+/// Longest word that is printed whole: no path or number is longer.
 const LONGEST_WORD: usize = 4096;
 
-/// What people are told: nothing that steers their terminal, and no word that fills it.
+/// Prepares a message for people: no control characters, and no word that fills the terminal.
 pub fn for_people(text: &str) -> String {
     without_long_words(&without_controls(text), LONGEST_WORD).into_owned()
 }
 
-/// A line on standard error. Whoever has closed it, or keeps it on a disk that is full, misses the words: work does not end
-/// because nobody listens, as it would with `eprintln!`.
+/// Prints a line on standard error. A closed standard error, or one on a full disk, loses the words: work does not end
+/// for that, as it would with `eprintln!`.
 macro_rules! tell {
     () => { tell!("") };
     ($($words:tt)*) => {{
@@ -58,7 +58,7 @@ macro_rules! tell {
     }};
 }
 
-/// The beginning of a line, see [`tell`].
+/// Prints the beginning of a line, see [`tell`].
 macro_rules! begin_to_tell {
     ($($words:tt)*) => {{
         use std::io::Write as _;

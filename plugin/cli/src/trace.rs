@@ -16,48 +16,48 @@ use crate::{
 
 /// Play given actions and print the state after each.
 ///
-/// A line holds the numbers by which the game describes its state, which the head of the table names, and of most
-/// games the reward and whether the episode is over. It stops at the end of the episode or of the actions.
+/// A line holds the numbers by which the game describes its state, which the head of the table names. Most games add
+/// the reward and whether the episode is over. It stops at the end of the episode or of the actions.
 #[derive(clap::Args)]
 #[command(group(ArgGroup::new("given").args(["actions", "actions_file"]).required(true)))]
 #[command(after_help = "Examples:
-  playbot trace GAME --seed 2 --actions 0,0,0,0 --json
-  playbot trace GAME --mode MODE --seed 2 --actions-file actions.txt
+  playbot trace GAME --level 2 --actions 0,0,0,0 --json
+  playbot trace GAME --mode MODE --level 2 --actions-file actions.txt
   playbot trace GAME --levels files:my-level.json --actions-file actions.txt
   playbot trace maze2d --map medium --start 1,1,0,0 --actions-file pushes.txt --json
-  playbot trace maze2d --map large+contact=rapier --seed 3 --actions-file pushes.txt")]
+  playbot trace maze2d --map large+contact=rapier --level 3 --actions-file pushes.txt")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Mode of the game, or its map where levels are maps; if none is named, the game's last mode or its own choice.
+    /// Mode of the game, or its map where levels are maps (default: the game's last mode or its own choice).
     #[arg(long, visible_alias = "map")]
     mode: Option<String>,
     #[command(flatten)]
     levels: LevelsArg,
-    /// Seed of the level; 0, or the first of the levels, if none is named.
-    #[arg(long)]
+    /// Old spelling of --level.
+    #[arg(long, hide = true, conflicts_with = "level")]
     seed: Option<u64>,
     /// Discrete actions: their numbers, from 0, separated by commas.
     #[arg(long, value_delimiter = ',')]
     actions: Vec<u32>,
-    /// File of actions. Discrete ones: their numbers, separated by commas, spaces or line ends. Continuous ones, in games
-    /// that can trace them: one action per line, its values separated by spaces.
+    /// File of actions. Discrete ones are numbers, separated by commas, spaces or line ends. Continuous ones, in games
+    /// that can trace them, are one action per line, with values separated by spaces.
     #[arg(long, value_name = "FILE")]
     actions_file: Option<PathBuf>,
-    /// Place and speed to start with instead of the level's, in games that can start anywhere.
+    /// Position and velocity to start with instead of the level's, in games that can start anywhere.
     #[arg(long, value_name = "X,Y,VX,VY", value_delimiter = ',', allow_hyphen_values = true)]
     start: Vec<f64>,
-    /// One line of JSON per step; without it a table.
+    /// One line of JSON per step instead of a table.
     #[arg(long)]
     json: bool,
 }
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    let (mode, seed) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
+    let (mode, level) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
     let request = TraceRequest {
         mode,
-        seed,
+        level,
         start: &args.start,
         actions: &args.actions,
         file: args.actions_file.as_deref(),
@@ -70,7 +70,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             InspectError::Closed
         })
     };
-    let traced = match game.trace(&request, &mut print) {
+    let traced = match game.tools().trace.run(&request, &mut print) {
         Some(traced) => traced,
         None => trace_actions(game, &request, &mut print).map(|()| None),
     };

@@ -1,8 +1,8 @@
-//! Settings that change nothing, since the algorithm does not read them.
+//! Settings without effect, since the algorithm does not read them.
 
 use playbot_lab::train::Experiment;
 
-/// Says which of the `key=value`s none of these experiments reads: whoever sets them expects something of them.
+/// Reports the `key=value`s that none of these experiments reads.
 pub fn tell_unread(whose: &str, sets: &[String], experiments: &[&Experiment]) {
     let mut names: Vec<&str> = experiments.iter().map(|experiment| experiment.algorithm.name()).collect();
     names.sort_unstable();

@@ -1,4 +1,4 @@
-//! Whether levels that are measured were seen before.
+//! Check that measured levels were not learned from.
 
 use std::path::Path;
 
@@ -8,24 +8,24 @@ use playbot_lab::{
     split::LevelSplit,
     train::{Experiment, run_dir::RunInfo},
 };
-use playbot_learner::{SeenLevels, SkillModel};
+use playbot_learner::SeenLevels;
 
 use super::error::CliError;
 
 /// The levels that players are measured on.
 pub struct Measured<'a> {
     splits: Vec<HeldOut<'a>>,
-    /// Somebody named them; else they are the held-out ones of the experiment.
+    /// The levels were named; else they are the held-out ones of the experiment.
     are_named: bool,
 }
 
 impl<'a> Measured<'a> {
-    /// Ranges of levels that the game [has](LevelSplit::check).
+    /// Takes ranges of levels that the game [has](LevelSplit::check).
     pub fn new(game: &'a dyn Game, splits: &'a [LevelSplit], are_named: bool) -> Self {
         Self { splits: splits.iter().map(|split| HeldOut::new(game, split)).collect(), are_named }
     }
 
-    /// What was learned in `path` is measured on levels that it has seen only if somebody names them, who is told so.
+    /// Checks that the policy in `path` has not learned from these levels. Levels that were named are only reported.
     ///
     /// # Errors
     ///
@@ -36,8 +36,8 @@ impl<'a> Measured<'a> {
             let (path, split) = (path.display(), levels.split());
             if !self.are_named {
                 return Err(CliError::Usage(format!(
-                    "{path} has learned from {own}, and the held-out levels {split} have some of these: choose levels that none of \
-                     the players has seen, or measure there on purpose, with --levels"
+                    "{path} has learned from {own}, and the held-out levels {split} have some of these: choose \
+                     levels that no player has seen, or measure there on purpose, with --levels"
                 )));
             }
             tell!(
@@ -48,26 +48,7 @@ impl<'a> Measured<'a> {
     }
 }
 
-/// The levels that a run has seen; of runs that do not say, those that it was trained on.
+/// Returns the levels that a run has seen; for runs without a note, its training levels.
 pub fn seen_by_run(game: &dyn Game, experiment: &Experiment, info: &RunInfo) -> SeenLevels {
     info.seen.clone().unwrap_or_else(|| seen_by_training(game, &experiment.train))
-}
-
-/// Refuses skills in a file that were learned on levels which are held out: a file of an earlier study in the folder of this one.
-///
-/// # Errors
-///
-/// They were, with what to do.
-pub fn check_skills_unseen(
-    file: &Path,
-    model: &SkillModel,
-    game: &dyn Game,
-    test: &LevelSplit,
-) -> Result<(), CliError> {
-    let Some(seen) = HeldOut::new(game, test).shown_by(model.demos()) else { return Ok(()) };
-    Err(CliError::Usage(format!(
-        "{} was learned from demonstrations of {seen}, and the held-out levels {test} have some of these: keep the runs of this study \
-         in a folder of their own, with --runs",
-        file.display()
-    )))
 }

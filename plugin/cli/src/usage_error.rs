@@ -1,4 +1,4 @@
-//! What is said of a command line that cannot be read, in plain words.
+//! Plain wording of errors of the command line's parser.
 
 use std::{
     error::Error,
@@ -7,8 +7,7 @@ use std::{
 
 use clap::Command;
 
-/// Lets options take numbers below 0, so that it is said what is wrong with the number, and not that there is no such
-/// option.
+/// Lets options take numbers below 0, so that the error is about the number, and not about an unknown option.
 pub fn with_negative_numbers(command: Command) -> Command {
     command
         .mut_args(|arg| {
@@ -18,14 +17,14 @@ pub fn with_negative_numbers(command: Command) -> Command {
         .mut_subcommands(with_negative_numbers)
 }
 
-/// The whole text of an error whose reason would be in the words of a parser of numbers; `None` for any other.
+/// Returns the whole text of an error about a number in plain words; `None` for other errors.
 pub fn in_plain_words(error: &clap::Error) -> Option<String> {
     let source = error.source()?;
     let plain = number_wanted(source)?;
     Some(error.render().to_string().replacen(&format!(": {source}"), &format!(": {plain}"), 1))
 }
 
-/// What number is wanted.
+/// Describes the wanted number.
 fn number_wanted(error: &(dyn Error + 'static)) -> Option<String> {
     if let Some(error) = error.downcast_ref::<ParseIntError>() {
         let words = match error.kind() {

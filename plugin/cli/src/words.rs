@@ -1,6 +1,6 @@
-//! What files hold, in words.
+//! Wording of the contents of files.
 
-/// Something, and the first few names of what it consists of, if they have any.
+/// Describes something with the first few names of its parts, if they have any.
 pub fn with_names(what: &str, names: &[String]) -> String {
     const SHOWN: usize = 6;
     if names.is_empty() {

@@ -1,4 +1,4 @@
-//! How arenas are spread over Worlds.
+//! The distribution of arenas over Worlds.
 
 use crate::game::Game;
 
@@ -12,11 +12,11 @@ pub struct Arrangement {
 }
 
 impl Arrangement {
-    /// `arenas` spread over `worlds`, or over more of them if the game does not bear so many in one: see
-    /// [`Game::arenas_per_world`].
+    /// Distributes `arenas` over `worlds`, or over more of them if one World holds fewer arenas: see
+    /// [`HostTools::arenas_per_world`](crate::game::HostTools::arenas_per_world).
     pub fn new(game: &dyn Game, arenas: u32, worlds: u32) -> Self {
         let wanted = (arenas / worlds.max(1)).max(1);
-        let most = game.arenas_per_world().unwrap_or(u32::MAX).max(1);
+        let most = game.tools().host.arenas_per_world().unwrap_or(u32::MAX).max(1);
         if wanted <= most {
             return Self { worlds: worlds.max(1), arenas: wanted };
         }
@@ -25,18 +25,18 @@ impl Arrangement {
         Self { worlds: total / fitting, arenas: fitting }
     }
 
-    /// Number of the first agent of each World.
+    /// Returns the number of the first agent of each World.
     pub fn first_agents(self) -> impl Iterator<Item = u32> {
         (0..self.worlds).map(move |world| world * self.arenas)
     }
 
-    /// Arenas of all Worlds together.
+    /// Returns the number of arenas of all Worlds together.
     pub fn total(self) -> u32 {
         self.worlds * self.arenas
     }
 }
 
-/// The largest number of arenas, up to `wanted`, that one World of the game bears.
+/// Returns the largest number of arenas, up to `wanted`, that one World of the game holds.
 pub fn at_most(game: &dyn Game, wanted: usize) -> usize {
-    game.arenas_per_world().map_or(wanted, |most| wanted.min(most.max(1) as usize))
+    game.tools().host.arenas_per_world().map_or(wanted, |most| wanted.min(most.max(1) as usize))
 }

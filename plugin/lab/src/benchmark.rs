@@ -1,4 +1,4 @@
-//! What is measured of a game when its speed is.
+//! The benchmarks of a game's speed.
 
 use bevy_playbot::vision::ObservationKind;
 
@@ -9,29 +9,29 @@ pub struct Benchmark {
     pub case: &'static str,
     /// Mode that is played.
     pub mode: &'static str,
-    /// What agents see.
+    /// The agents' observation.
     pub observation: ObservationKind,
-    /// Whether a learner learns, too.
+    /// Whether a learner trains as well.
     pub train: bool,
 }
 
 impl Benchmark {
-    /// Random actions in this mode, with state vectors.
+    /// Creates a benchmark of random actions in this mode, with state vectors.
     pub const fn simulate(case: &'static str, mode: &'static str) -> Self {
         Self { case, mode, observation: ObservationKind::Vector, train: false }
     }
 
-    /// PPO in this mode, on state vectors.
+    /// Creates a benchmark of PPO in this mode, on state vectors.
     pub const fn train(case: &'static str, mode: &'static str) -> Self {
         Self { train: true, ..Self::simulate(case, mode) }
     }
 
-    /// The same, with another observation.
+    /// Replaces the observation.
     pub const fn seeing(self, observation: ObservationKind) -> Self {
         Self { observation, ..self }
     }
 
-    /// Its whole name, with that of the game: `sim/coinrun/vector`.
+    /// Returns the full name, with that of the game: `sim/coinrun/vector`.
     pub fn name(&self, game: &str) -> String {
         format!("{}/{game}/{}", if self.train { "train" } else { "sim" }, self.case)
     }

@@ -1,15 +1,15 @@
-//! Texts of files, made short enough for an error.
+//! Texts short enough for an error message.
 
 use std::borrow::Cow;
 
-/// Longest word of an error that is shown whole, in characters. Paths and numbers are shorter.
+/// Longest word of an error that is printed whole, in characters. Paths and numbers are shorter.
 const LONGEST_WORD: usize = 200;
 
 /// Longest text of an error, in characters.
 const LONGEST_TEXT: usize = 1800;
 
-/// What an error says, whatever is in the file that it speaks of: the middle of very long words is left out, and that of a
-/// text that is too long all the same.
+/// Returns an error's text without the middle of very long words. The middle of a text that is still too long is left
+/// out as well. A huge or damaged file then causes no huge message.
 pub fn brief(text: &str) -> Cow<'_, str> {
     match without_long_words(text, LONGEST_WORD) {
         Cow::Borrowed(text) => without_middle(text, LONGEST_TEXT),
@@ -17,7 +17,7 @@ pub fn brief(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// A text of whose words with more than so many characters the middle is left out.
+/// Returns a text with the middle of each word left out that has more than `most` characters.
 pub fn without_long_words(text: &str, most: usize) -> Cow<'_, str> {
     let words = || text.split_inclusive(char::is_whitespace);
     // A text has at least as many bytes as characters.
@@ -27,7 +27,7 @@ pub fn without_long_words(text: &str, most: usize) -> Cow<'_, str> {
     Cow::Owned(words().map(|word| without_middle(word, most)).collect())
 }
 
-/// The first and the last characters of a text that has more than so many.
+/// Returns the first and the last characters of a text that has more than `most` of them.
 fn without_middle(text: &str, most: usize) -> Cow<'_, str> {
     let count = text.chars().count();
     if count <= most {

@@ -1,11 +1,11 @@
-//! What a planted defect is: see [`bugs`](crate::bugs).
+//! The kinds of planted defects: see [`bugs`](crate::bugs).
 
 use std::{fmt, sync::Arc};
 
 use bevy::prelude::*;
 use playbot_learner::rng::ChaCha8Rng;
 
-/// Makes a broken level of a sound one; `None` if this level has no place for the defect.
+/// Turns the text of an unmutated level into a broken one; `None` if this level has no place for the defect.
 pub type ChangeLevel = dyn Fn(&str, &mut ChaCha8Rng) -> Option<String> + Send + Sync;
 
 /// Breaks the rules of a game that has been built into this app, in one of the defect's variants.
@@ -16,22 +16,21 @@ pub type ChangeRules = dyn Fn(&mut App, u32) + Send + Sync;
 pub struct DefectKind {
     /// Its class, in small letters and hyphens: `walled-goal`.
     pub class: &'static str,
-    /// What is wrong then, in one line.
+    /// The defect, in one line.
     pub about: &'static str,
-    /// How it is planted.
+    /// Its change of a level or of the rules.
     pub plant: Plant,
 }
 
-/// How a defect is planted.
+/// The change that plants a defect.
 #[derive(Clone)]
 pub enum Plant {
-    /// Changes a level: takes the JSON text of a sound level, as `playbot level GAME --json` prints it, and a random stream;
-    /// gives the changed text, or `None` if this level has no place for the defect.
+    /// Changes a level: takes the JSON text of an unmutated level, as `playbot level GAME --json` prints it, and a
+    /// random stream. Returns the changed text, or `None` if this level has no place for the defect.
     Level(Arc<ChangeLevel>),
-    /// Changes the rules of a game: is called after the game's own [`build`](crate::game::Game::build).
+    /// Changes the rules of a game, after the game's own [`build`](crate::game::Game::build).
     Rules {
-        /// How many variants there are, from 0. They differ in how strong the defect is, how early or how far from the
-        /// start.
+        /// Number of variants, from 0. They differ in strength, in time, or in distance from the start.
         variants: u32,
         /// Plants one of them.
         plant: Arc<ChangeRules>,
@@ -39,7 +38,7 @@ pub enum Plant {
 }
 
 impl DefectKind {
-    /// A defect of levels: see [`Plant::Level`].
+    /// Creates a defect of levels: see [`Plant::Level`].
     pub fn level(
         class: &'static str,
         about: &'static str,
@@ -48,7 +47,7 @@ impl DefectKind {
         Self { class, about, plant: Plant::Level(Arc::new(change)) }
     }
 
-    /// A defect of rules: see [`Plant::Rules`].
+    /// Creates a defect of rules: see [`Plant::Rules`].
     pub fn rules(
         class: &'static str,
         about: &'static str,

@@ -1,4 +1,4 @@
-//! Shapes on a sheet of paper, to be written as SVG or painted as pixels.
+//! Shapes on a sheet of paper, written as SVG or painted as pixels.
 
 use std::fmt::Write;
 
@@ -12,7 +12,7 @@ pub type Rgb = [u8; 3];
 /// White paper with shapes on it, the first one at the bottom.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Drawing {
-    /// What it shows, for readers who cannot see it.
+    /// A description for screen readers.
     pub label: String,
     /// Width and height, pixels.
     pub size: Vec2,
@@ -20,12 +20,12 @@ pub struct Drawing {
     pub shapes: Vec<Shape>,
 }
 
-/// Something drawn.
+/// A shape.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
     /// A filled rectangle.
     Block {
-        /// What it covers.
+        /// Its area.
         area: Rect,
         /// Its colour.
         fill: Rgb,
@@ -38,7 +38,7 @@ pub enum Shape {
         width: f32,
         /// Its colour.
         colour: Rgb,
-        /// 0 is invisible, 1 covers what is below.
+        /// From 0, invisible, to 1, opaque.
         opacity: f32,
     },
     /// A round or square mark with an outline.
@@ -47,7 +47,7 @@ pub enum Shape {
         form: MarkForm,
         /// Its middle.
         centre: Vec2,
-        /// From its middle to its border, or to its corners.
+        /// Distance from its middle to its border, or to its corners.
         radius: f32,
         /// Its colour.
         fill: Rgb,
@@ -56,13 +56,13 @@ pub enum Shape {
     },
     /// One line of text.
     Text {
-        /// Left end of the line on which letters stand.
+        /// Left end of the baseline.
         at: Vec2,
         /// Font size.
         size: f32,
         /// Its colour.
         colour: Rgb,
-        /// What it says.
+        /// The text.
         words: String,
     },
 }
@@ -72,12 +72,12 @@ pub enum Shape {
 pub enum MarkForm {
     /// A circle.
     Disc,
-    /// A square that stands on a corner.
+    /// A square on its corner.
     Diamond,
 }
 
 impl Drawing {
-    /// A complete SVG file: text as text, no fonts or scripts.
+    /// Returns a complete SVG file: text as text, no fonts or scripts.
     pub fn to_svg(&self) -> String {
         let (Vec2 { x: width, y: height }, label) = (self.size, escape(&self.label));
         let mut svg = format!(

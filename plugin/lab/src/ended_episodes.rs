@@ -1,4 +1,4 @@
-//! Episodes that have ended in a World, for whoever ticks it.
+//! The list of ended episodes in a World, for its callers.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -6,14 +6,13 @@ use bevy_playbot::{
     renewal::Renewal,
 };
 
-/// Whose episodes have ended since this was asked last, in the order in which they did. It outlives Worlds that are built
-/// anew.
+/// Agents with their ended episodes since the last call, in order. The list outlives Worlds that are rebuilt.
 #[derive(Resource, Default, Reflect)]
 #[reflect(Resource)]
 pub(crate) struct EndedEpisodes(Vec<(Entity, EpisodeResult)>);
 
 impl EndedEpisodes {
-    /// From here on the World notes its episodes.
+    /// Makes the World collect its ended episodes from now on.
     pub fn note_in(world: &mut World) {
         Renewal::set_up(world, |world| {
             world.init_resource::<Self>();
@@ -22,12 +21,12 @@ impl EndedEpisodes {
         Renewal::carry_resource::<Self>(world);
     }
 
-    /// All of them, which are then forgotten.
+    /// Returns all of them, and empties the list.
     pub fn take(world: &mut World) -> Vec<(Entity, EpisodeResult)> {
         std::mem::take(&mut world.resource_mut::<Self>().0)
     }
 
-    /// All of them.
+    /// Returns all of them.
     pub fn of(world: &World) -> &[(Entity, EpisodeResult)] {
         world.get_resource::<Self>().map_or(&[], |ended| ended.0.as_slice())
     }

@@ -1,15 +1,15 @@
 //! Text that is safe in HTML, in SVG and on a terminal.
 
-/// Whether a character stands for nothing and changes how others are shown: a control character, or one that turns the
-/// direction of writing around.
+/// Returns whether a character is invisible and changes how others are shown: a control character, or one that changes
+/// the direction of writing.
 pub(crate) fn steers(c: char) -> bool {
     c.is_control() || matches!(c, '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// Escapes text for the content and the attributes of HTML and SVG.
 ///
-/// Control characters, which neither may hold, and those that turn the direction of writing around become U+FFFD; tabs and
-/// line feeds stay.
+/// Control characters, which are invalid in both, and those that change the direction of writing become U+FFFD. Tabs
+/// and line feeds stay.
 pub(crate) fn escape(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -28,8 +28,8 @@ pub(crate) fn escape(text: &str) -> String {
     out
 }
 
-/// Text on one line without control characters and those that turn the direction of writing around, so that it cannot steer a
-/// terminal.
+/// Returns text on one line without control characters and those that change the direction of writing, so that it
+/// cannot control a terminal.
 pub(crate) fn one_line(text: &str) -> String {
     text.chars()
         .map(|c| if c.is_whitespace() { ' ' } else { c })
@@ -37,7 +37,7 @@ pub(crate) fn one_line(text: &str) -> String {
         .collect()
 }
 
-/// Escaped text with `code` between backticks set as code. A backtick without a partner stays.
+/// Returns escaped text with `code` between backticks set as code. A backtick without a partner stays.
 pub(crate) fn with_code_spans(text: &str) -> String {
     let mut out = String::new();
     let mut rest = text;

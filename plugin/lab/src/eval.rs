@@ -1,9 +1,9 @@
-//! Measuring: each level equally often, every episode counted once.
+//! Evaluation: each level equally often, every episode counted once.
 
 use std::collections::HashMap;
 
 use bevy::prelude::*;
-use playbot_learner::{Policy, PolicyFile};
+use playbot_learner::{HasExitCode, Policy, PolicyFile};
 use thiserror::Error;
 
 mod blind;
@@ -17,9 +17,9 @@ use crate::{
     arrangement::Arrangement,
     ended_episodes::EndedEpisodes,
     game::Game,
+    machine::{MemoryError, check_bytes},
     parallel::on_threads,
     split::LevelSplit,
-    train::{Experiment, config::ExperimentError, memory::check_bytes},
     worlds::build_observing_world,
 };
 use bevy_playbot::{
@@ -35,7 +35,7 @@ use bevy_playbot::{
     vision::{ObservationConfig, VisionError},
 };
 
-/// Who is measured.
+/// The player that is evaluated.
 #[derive(Clone)]
 #[allow(clippy::large_enum_variant, reason = "one per measurement")]
 pub enum Player {
@@ -43,45 +43,54 @@ pub enum Player {
     Policy {
         /// The policy.
         policy: Policy,
-        /// Where its skills come from.
+        /// The source of its skills.
         prior: Option<SkillPrior>,
         /// How actions are drawn.
         draw: ActionDraw,
     },
-    /// A bot that does not look.
+    /// A bot without sensors.
     Blind(BlindBot),
     /// The game's own demonstrator, without noise.
     Demonstrator,
 }
 
-/// Nothing could be measured.
+/// The reason why an evaluation failed.
 #[derive(Debug, Error)]
 pub enum EvalError {
-    /// The pictures cannot be made.
+    /// The pictures cannot be drawn.
     #[error(transparent)]
     Vision(#[from] VisionError),
     /// The game broke its contract.
     #[error(transparent)]
     Fault(#[from] Fault),
-    /// There are more episodes than there is memory for.
+    /// The results of the episodes do not fit into memory.
     #[error(transparent)]
-    Memory(#[from] ExperimentError),
+    Memory(#[from] MemoryError),
+}
+
+impl HasExitCode for EvalError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Fault(_) => 2,
+            Self::Vision(_) | Self::Memory(_) => 3,
+        }
+    }
 }
 
 impl Player {
-    /// The policy of a file, with its skills.
+    /// Creates a player from the policy of a file, with its skills.
     pub fn of_file(file: &PolicyFile, draw: ActionDraw) -> Self {
         Self::Policy { policy: file.policy.clone(), prior: file.skills.as_ref().map(SkillPrior::from), draw }
     }
 
-    /// Gives a World what the player needs once: networks and the source of skills.
+    /// Installs the player's networks and its source of skills in a World, once.
     pub fn install(&self, world: &mut World) {
         if let Self::Policy { policy, prior, draw } = self {
             ActivePolicy { policy: policy.clone(), draw: *draw }.install(world, prior.clone());
         }
     }
 
-    /// Prepares an agent for the player, and returns the control under which the player then decides for it.
+    /// Prepares an agent for the player, and returns the control under which the player decides for it.
     pub fn seat(&self, game: &dyn Game, world: &mut World, agent: Entity) -> Control {
         match self {
             Self::Policy { .. } => Control::Policy,
@@ -90,54 +99,41 @@ impl Player {
                 Control::Bot
             }
             Self::Demonstrator => {
-                game.attach_demonstrator(world, agent, 0.0);
+                game.tools().bots.attach_demonstrator(world, agent, 0.0);
                 Control::Bot
             }
         }
     }
 }
 
-/// How to measure.
+/// The settings of an evaluation.
 #[derive(Clone, Debug)]
 pub struct EvalPlan {
     /// Levels.
     pub split: LevelSplit,
-    /// What a learned policy sees. Bots are left with vectors, which are cheaper.
+    /// The observation of a learned policy. Bots have vectors, which are cheaper.
     pub observation_config: ObservationConfig,
     /// Episodes on each level.
     pub episodes_per_level: u32,
-    /// Seed of the players' random streams.
+    /// Random seed of the players.
     pub seed: u64,
     /// Arenas, spread evenly over the Worlds.
     pub arenas: u32,
-    /// Worlds: part of the plan, as in training.
+    /// Worlds. Their number is part of the plan, as in training.
     pub worlds: u32,
-    /// Threads: not part of the result.
+    /// Threads. They change no result.
     pub threads: usize,
 }
 
 impl EvalPlan {
-    /// How an experiment measures on these levels, for a player that sees as it says.
-    pub fn of(experiment: &Experiment, split: &LevelSplit, threads: usize) -> Self {
-        Self {
-            split: split.clone(),
-            observation_config: experiment.observation_config(),
-            episodes_per_level: experiment.eval.episodes_per_level,
-            seed: experiment.seed,
-            arenas: experiment.arenas,
-            worlds: experiment.worlds,
-            threads,
-        }
-    }
-
-    /// Checks that Worlds and what comes of all episodes fit into the memory that is free.
+    /// Checks that the Worlds and the results of all episodes fit into free memory.
     ///
     /// # Errors
     ///
-    /// [`ExperimentError::Memory`].
-    pub fn check_memory(&self) -> Result<(), ExperimentError> {
+    /// [`MemoryError`].
+    pub fn check_memory(&self) -> Result<(), MemoryError> {
         let (levels, episodes) = (self.split.len(), u64::from(self.episodes_per_level));
-        // What came of each, and its number in the list of those to play.
+        // The result of each episode, and its number in the list of those to play.
         let bytes = levels.saturating_mul(episodes).saturating_mul((size_of::<Trail>() + size_of::<u64>()) as u64);
         let what = format!("the results of {levels} levels × {episodes} episodes");
         let worlds = Arrangement { worlds: self.worlds, arenas: self.arenas / self.worlds.max(1) };
@@ -145,22 +141,22 @@ impl EvalPlan {
     }
 }
 
-/// One measured episode, and where it led.
+/// An evaluated episode with its path.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Trail {
     /// The episode.
     pub result: EpisodeResult,
-    /// Where the agent was after each tick, on the game's [`FloorPlan`](crate::floor_plan::FloorPlan). Empty if the
-    /// game does not say.
+    /// Position of the agent after each tick, on the game's [`FloorPlan`](crate::floor_plan::FloorPlan). Empty if the
+    /// game does not report it.
     pub places: Vec<Vec2>,
 }
 
-/// Plays every level of the plan and returns all episodes, sorted by level. `progress` hears each finished episode; it
-/// is called from several threads.
+/// Plays every level of the plan and returns all episodes, sorted by level. `progress` receives each finished episode,
+/// from several threads.
 ///
 /// # Errors
 ///
-/// The game broke its contract, or cannot be seen this way.
+/// The game broke its contract, or cannot be observed this way.
 pub fn evaluate(
     game: &dyn Game,
     player: &Player,
@@ -171,11 +167,11 @@ pub fn evaluate(
     Ok(trails.into_iter().map(|trail| trail.result).collect())
 }
 
-/// [`evaluate`], and where every episode led. The results are the same.
+/// Evaluates as [`evaluate`] does, and also returns the path of every episode. The results are the same.
 ///
 /// # Errors
 ///
-/// The game broke its contract, or cannot be seen this way.
+/// The game broke its contract, or cannot be observed this way.
 pub fn evaluate_with_trails(
     game: &dyn Game,
     player: &Player,
@@ -210,7 +206,7 @@ fn play(
     Ok(trails)
 }
 
-/// A World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
+/// Builds a World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
 fn build_eval_world(
     game: &dyn Game,
     player: &Player,
@@ -235,7 +231,7 @@ fn build_eval_world(
     Ok(world)
 }
 
-/// Ticks until every agent has played its list. With a game, notes where each agent is after each tick.
+/// Ticks until every agent has played its list. With a game, stores the position of each agent after each tick.
 fn play_out(
     world: &mut World,
     followed: Option<&dyn Game>,
@@ -250,7 +246,7 @@ fn play_out(
         for (game, &agent) in followed.iter().flat_map(|game| everybody.iter().map(move |agent| (game, agent))) {
             let is_playing = world.get::<Episode>(agent).is_some_and(Episode::is_running);
             let is_seen = is_playing || ended.iter().any(|(entity, _)| *entity == agent);
-            if let Some(place) = is_seen.then(|| game.whereabouts(world, agent)).flatten() {
+            if let Some(place) = is_seen.then(|| game.tools().state.position(world, agent)).flatten() {
                 places.entry(agent).or_default().push(place);
             }
         }

@@ -1,27 +1,27 @@
-//! A level from above, to draw what agents did in it.
+//! The floor plan of a level, for pictures of paths and for detectors.
 
 use bevy::math::{Rect, Vec2};
 
-/// What a level looks like from above, or from the side, in any units: x to the right, y up.
+/// The shape of a level from above, or from the side, in any units: x to the right, y up.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FloorPlan {
-    /// What is drawn of it.
+    /// The area of the plan.
     pub bounds: Rect,
-    /// Walls, ground and whatever else nobody walks through.
+    /// Walls, ground and everything else that agents cannot pass.
     pub walls: Vec<Rect>,
-    /// What kills.
+    /// Areas that kill.
     pub hazards: Vec<Rect>,
-    /// What agents can stand on and walk through, such as crates.
+    /// Areas that agents can stand on and walk through, such as crates.
     pub platforms: Vec<Rect>,
-    /// Where agents start.
+    /// Start of the agents.
     pub start: Vec2,
-    /// Where they should go.
+    /// Goal of the agents.
     pub goal: Vec2,
 }
 
 impl FloorPlan {
-    /// The plan of a level of tiles that has walls only. `square` says what a tile, by row and column, covers; walls side
-    /// by side in a row become one rectangle. There must be a tile.
+    /// Creates the plan of a level of tiles with walls only. `square` returns the area of a tile, by row and column.
+    /// Adjacent walls in a row become one rectangle. There must be a tile.
     pub fn of_tiles(
         [rows, columns]: [usize; 2],
         is_wall: impl Fn(usize, usize) -> bool,
@@ -34,7 +34,7 @@ impl FloorPlan {
     }
 }
 
-/// What the tiles of one kind cover; those side by side in a row become one rectangle.
+/// Returns the areas of the tiles of one kind. Adjacent tiles in a row become one rectangle.
 pub fn joined_tiles(
     [rows, columns]: [usize; 2],
     is_one: impl Fn(usize, usize) -> bool,

@@ -3,26 +3,29 @@
 use std::path::{Path, PathBuf};
 
 use bevy_playbot::unknown_name::UnknownName;
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 use crate::game::Game;
 
-/// Games with different names, in the order in which they were given.
+/// Games with distinct names, in the order given.
 #[derive(Clone, Copy)]
 pub struct Games<'a>(&'a [&'a dyn Game]);
 
-/// The games of a program cannot be told apart, or there are none.
+/// Invalid list of games: two share a name, or it is empty.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 pub enum GamesError {
     /// Two games have the same name.
     #[error("two games are called `{0}`: give each a name of its own, which recordings and policies keep")]
     Twice(&'static str),
     /// No game was given.
-    #[error("the program has no game: hand it at least one")]
+    #[error("the program has no game: give it at least one")]
     None,
 }
 
-/// A file or folder that names the game it is of.
+impl HasExitCode for GamesError {}
+
+/// Kinds of files and folders that name their game.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Artifact {
     /// The folder of a run.
@@ -31,7 +34,7 @@ pub enum Artifact {
     Policy,
     /// A recording.
     Recording,
-    /// An experiment, which people write.
+    /// An experiment, a file written by hand.
     Experiment,
     /// A finding of a test.
     Finding,
@@ -56,7 +59,7 @@ impl Artifact {
     }
 }
 
-/// A file or folder is of a game that the program does not have.
+/// A file or folder of a game that the program does not have.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 #[error(
     "{}: {} of the game `{game}`, which this program does not have (it has {}): {}",
@@ -65,20 +68,22 @@ impl Artifact {
 pub struct ForeignArtifact {
     /// The file or folder.
     pub path: PathBuf,
-    /// What it is.
+    /// Its kind.
     pub kind: Artifact,
-    /// The game that it names.
+    /// Name of its game.
     pub game: String,
-    /// The games of the program.
+    /// Names of the program's games.
     pub valid: Vec<String>,
 }
 
+impl HasExitCode for ForeignArtifact {}
+
 impl<'a> Games<'a> {
-    /// These games.
+    /// Checks and keeps the games.
     ///
     /// # Errors
     ///
-    /// [`GamesError`] if two have the same name, or there are none.
+    /// [`GamesError`] if two have the same name, or the list is empty.
     pub fn new(games: &'a [&'a dyn Game]) -> Result<Self, GamesError> {
         if games.is_empty() {
             return Err(GamesError::None);
@@ -91,7 +96,7 @@ impl<'a> Games<'a> {
         }
     }
 
-    /// The game with this name.
+    /// Returns the game with this name.
     ///
     /// # Errors
     ///
@@ -101,11 +106,11 @@ impl<'a> Games<'a> {
         self.iter().find(|game| game.name() == name).ok_or_else(|| UnknownName::new("game", name, &names))
     }
 
-    /// The game that a file or folder names.
+    /// Returns the game that a file or folder names.
     ///
     /// # Errors
     ///
-    /// [`ForeignArtifact`] with the path, the program's games and what can be done.
+    /// [`ForeignArtifact`] with the path, the program's games and the remedies.
     pub fn of_file(&self, kind: Artifact, path: &Path, name: &str) -> Result<&'a dyn Game, ForeignArtifact> {
         self.get(name).map_err(|unknown| ForeignArtifact {
             path: path.to_owned(),
@@ -115,12 +120,12 @@ impl<'a> Games<'a> {
         })
     }
 
-    /// All of them.
+    /// Iterates over all games.
     pub fn iter(&self) -> impl Iterator<Item = &'a dyn Game> + use<'a> {
         self.0.iter().copied()
     }
 
-    /// The first one, which verbs mean where none is named.
+    /// Returns the first game, the default of verbs without a game's name.
     pub fn first(&self) -> &'a dyn Game {
         self.0[0]
     }

@@ -1,4 +1,4 @@
-//! Levels that are kept for the test, and whatever would give them away.
+//! Held-out levels, and checks that other levels do not show them.
 
 use std::collections::BTreeSet;
 
@@ -7,11 +7,11 @@ use playbot_learner::SeenLevels;
 
 use crate::{game::Game, level_files::is_level_files, split::LevelSplit};
 
-/// Most levels that a file can ask to be drawn and compared: what it says is not to take for ever.
+/// Largest number of levels that are drawn and compared, which bounds the time for a range from a file.
 const MOST_COMPARED: u64 = 1 << 18;
 
-/// Held-out levels, as nobody may see them before the test: neither under the rules of another mode, nor where another seed
-/// happens to draw the same places.
+/// Held-out levels, kept unseen before the test: also under another mode's rules, or under another seed that draws
+/// the same level.
 pub struct HeldOut<'a> {
     game: &'a dyn Game,
     split: &'a LevelSplit,
@@ -23,33 +23,34 @@ impl<'a> HeldOut<'a> {
     /// Holds out a split of a game whose mode has been checked with [`Game::check_mode`].
     pub fn new(game: &'a dyn Game, split: &'a LevelSplit) -> Self {
         let fingerprints = split.levels().filter_map(|level| game.fingerprint(&split.mode, level)).collect();
-        Self { game, split, family: game.family(&split.mode), fingerprints }
+        Self { game, split, family: game.tools().levels.family(&split.mode), fingerprints }
     }
 
-    /// The levels as they were named.
+    /// Returns the levels as they were named.
     pub fn split(&self) -> &LevelSplit {
         self.split
     }
 
-    /// Whether this level is one of them, or looks like one.
+    /// Returns whether this level is held out, or looks like one that is.
     pub fn contains(&self, mode: &str, level: u64) -> bool {
-        let is_named = self.split.contains(&self.split.mode, level) && self.game.family(mode) == self.family;
+        let is_named =
+            self.split.contains(&self.split.mode, level) && self.game.tools().levels.family(mode) == self.family;
         is_named || self.game.fingerprint(mode, level).is_some_and(|print| self.fingerprints.contains(&print))
     }
 
-    /// Whether one of them is the level in this file, whatever number it has.
+    /// Returns whether the level in this file is held out, under any number.
     pub fn contains_file(&self, file: &LevelFile) -> bool {
         self.fingerprints.contains(&file.hash)
     }
 
-    /// The first of these levels that is held out.
+    /// Returns the first of these levels that is held out.
     pub fn first_of(&self, levels: &LevelSplit) -> Option<u64> {
         self.first_by_number(levels).or_else(|| self.first_by_look(levels))
     }
 
     fn first_by_number(&self, levels: &LevelSplit) -> Option<u64> {
         let (first, last) = (levels.first.max(self.split.first), levels.last.min(self.split.last));
-        (first <= last && self.game.family(&levels.mode) == self.family).then_some(first)
+        (first <= last && self.game.tools().levels.family(&levels.mode) == self.family).then_some(first)
     }
 
     fn first_by_look(&self, levels: &LevelSplit) -> Option<u64> {
@@ -59,14 +60,16 @@ impl<'a> HeldOut<'a> {
         levels.levels().find(|&level| self.contains(&levels.mode, level))
     }
 
-    /// What of `seen` is among them, in words; `None` if nothing is, or if nobody noted what was seen. Of the many levels that a file
-    /// may name, all are compared by their numbers, and those of the first ranges by what they look like.
+    /// Describes the levels of `seen` that are held out; `None` if there are no such levels, or if the seen levels
+    /// are unknown.
+    ///
+    /// All levels of all ranges are compared by their numbers, and those of the first ranges by their looks.
     pub fn shown_by(&self, seen: Option<&SeenLevels>) -> Option<String> {
         let seen = seen.filter(|seen| seen.game == self.game.name())?;
-        // Files are noted by what is in them: a pattern from a stranger is not looked for on the disk.
+        // Files are compared by their content: a pattern from an unknown source is not looked up on the disk.
         let ranges = seen.levels.iter().filter(|range| !is_level_files(range));
         let ranges = ranges.filter_map(|range| range.parse::<LevelSplit>().ok());
-        // A mode that the game has no more has none of its levels.
+        // Ranges of a mode that the game no longer has are skipped.
         let known: Vec<_> = ranges.filter(|range| self.game.check_mode(&range.mode).is_ok()).collect();
         let by_number = || known.iter().find(|range| self.first_by_number(range).is_some());
         let by_look = || {
@@ -84,7 +87,7 @@ impl<'a> HeldOut<'a> {
         Some(if is_all { shown } else { format!("{shown}, among others") })
     }
 
-    /// The first of them that is one of these files.
+    /// Returns the first held-out file whose hash is among these.
     fn file_of(&self, hashes: &[u64]) -> Option<String> {
         if !hashes.iter().any(|hash| self.fingerprints.contains(hash)) {
             return None;
@@ -98,7 +101,7 @@ impl<'a> HeldOut<'a> {
     }
 }
 
-/// What a training on these levels sees. Files are noted by what is in them now.
+/// Returns the levels that training on `train` shows. Files are noted by their present content.
 pub fn seen_by_training(game: &dyn Game, train: &LevelSplit) -> SeenLevels {
     let game_name = game.name().to_owned();
     if is_level_files(&train.mode) {

@@ -4,20 +4,20 @@ use bevy_playbot::action::{ActionSpace, ActionValue};
 
 use crate::game::Game;
 
-/// First words of the names of actions that do nothing.
+/// Words that begin the names of actions that do nothing.
 const NAMES: [&str; 8] = ["none", "nothing", "noop", "no-op", "idle", "stay", "wait", "stand"];
 
-/// Whether a discrete choice does nothing, by its name.
+/// Returns whether a discrete choice does nothing, by its name.
 pub(crate) fn is_named_idle(names: &[String], choice: u32) -> bool {
     let name = names.get(choice as usize).and_then(|name| name.split_whitespace().next()).unwrap_or("");
     NAMES.contains(&name.to_lowercase().as_str())
 }
 
-/// What agents of a game do when they do nothing: the first choice that is named so, or else choice 0; zeros.
+/// Returns the game's idle action: the first choice with an idle name, else choice 0; zeros for continuous actions.
 pub(crate) fn idle_action(game: &dyn Game) -> ActionValue {
     match game.actions() {
         ActionSpace::Discrete(count) => {
-            let names = game.action_names();
+            let names = game.tools().input.action_names();
             ActionValue::Discrete((0..count as u32).find(|&choice| is_named_idle(&names, choice)).unwrap_or(0))
         }
         ActionSpace::Continuous(count) => ActionValue::Continuous(vec![0.0; count]),

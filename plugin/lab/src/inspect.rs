@@ -1,4 +1,4 @@
-//! Looking at single levels and at single steps: what a game can show of itself.
+//! Views of single levels and single steps.
 
 use std::path::Path;
 
@@ -7,20 +7,21 @@ use bevy_playbot::{
     unknown_name::UnknownName,
     vision::{ImageOptions, VisionError},
 };
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 use crate::{drawing::Drawing, mode::ModeError};
 
-/// The game cannot show that.
+/// A view that the game cannot give.
 #[derive(Debug, Error)]
 pub enum InspectError {
-    /// What was asked for does not exist, in words that say what to do.
+    /// An invalid request, with its remedy.
     #[error("{0}")]
     Usage(String),
-    /// There is no such name.
+    /// An unknown name.
     #[error(transparent)]
     Name(#[from] UnknownName),
-    /// There is no such mode.
+    /// An invalid mode.
     #[error(transparent)]
     Mode(#[from] ModeError),
     /// The game broke its contract.
@@ -29,12 +30,21 @@ pub enum InspectError {
     /// The picture cannot be made.
     #[error(transparent)]
     Vision(#[from] VisionError),
-    /// Nobody takes the lines any more.
-    #[error("nobody reads the output")]
+    /// The output is closed.
+    #[error("the output is closed: nothing reads it")]
     Closed,
 }
 
-/// Which level is to be shown.
+impl HasExitCode for InspectError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Fault(_) | Self::Closed => 2,
+            Self::Usage(_) | Self::Name(_) | Self::Mode(_) | Self::Vision(_) => 3,
+        }
+    }
+}
+
+/// The level to show.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LevelRequest<'a> {
     /// Mode, if one is named.
@@ -43,9 +53,9 @@ pub struct LevelRequest<'a> {
     pub map: Option<&'a str>,
     /// File with a level in the game's own format, if one is named.
     pub file: Option<&'a Path>,
-    /// Seed, if one is named.
-    pub seed: Option<u64>,
-    /// Whether a picture is wanted too.
+    /// Number of the level, if one is named.
+    pub level: Option<u64>,
+    /// True if a picture is wanted too.
     pub picture: bool,
 }
 
@@ -63,7 +73,7 @@ pub struct LevelView {
 /// A whole level as a picture.
 #[derive(Clone, Debug)]
 pub enum LevelPicture {
-    /// Pixels, as an agent would see them that sees all of it:
+    /// Pixels as seen by an agent that sees the whole level:
     /// [`Observation::image`](bevy_playbot::observation::Observation::image).
     Pixels {
         /// Form of the image.
@@ -75,42 +85,40 @@ pub enum LevelPicture {
     Drawing(Drawing),
 }
 
-/// Which actions are to be played, and where.
+/// Actions to play, and the level to play them on.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TraceRequest<'a> {
     /// Mode; the game's last one if none is named.
     pub mode: Option<&'a str>,
-    /// Seed of the level.
-    pub seed: u64,
-    /// Where to start instead of where the level says; empty for there.
+    /// Number of the level.
+    pub level: u64,
+    /// Start instead of the level's own; empty for the level's own.
     pub start: &'a [f64],
     /// Discrete actions.
     pub actions: &'a [u32],
     /// File of actions, instead.
     pub file: Option<&'a Path>,
-    /// One line of JSON per step; else a table.
+    /// True for one line of JSON per step, false for a table.
     pub json: bool,
 }
 
-/// Takes one line of output.
+/// Callback that takes one line of output.
 pub type Print<'a> = &'a mut dyn FnMut(String) -> Result<(), InspectError>;
 
-/// The text of a file.
+/// Reads a text file.
 ///
 /// # Errors
 ///
-/// It cannot be read.
+/// The file cannot be read.
 pub fn read_text(path: &Path) -> Result<String, InspectError> {
     let read = std::fs::read_to_string(path);
     read.map_err(|error| {
-        InspectError::Usage(format!(
-            "cannot read {}: {error}; name a file that is there and may be read",
-            path.display()
-        ))
+        InspectError::Usage(format!("cannot read {}: {error}; name an existing file that you may read", path.display()))
     })
 }
 
-/// The shortest decimal that reads back as the same number; whole numbers without a point, and no negative zero.
+/// Formats a number as the shortest decimal that reads back as the same number: whole numbers without a point, and no
+/// negative zero.
 pub fn plain<T: std::fmt::Display + std::ops::Add<Output = T> + Default>(value: T) -> String {
     format!("{}", value + T::default())
 }

@@ -1,23 +1,25 @@
-//! The laboratory of [`bevy_playbot`]: everything that trains, measures and compares bots, headless and on many levels.
+//! Training, measurement and comparison of [`bevy_playbot`] bots, headless and on many levels.
 //!
-//! - A [`Game`](game::Game) says how a game is built without a window, many arenas at a time.
-//! - [`level_files`] are levels that somebody drew, in ranges like those that are made from seeds.
-//! - [`train`] learns from recordings and from play; [`demo`] proves recordings by replay and makes data sets of them.
-//! - [`eval`] measures, every level equally often; [`runs`] reads back and compares what was trained; [`report`] draws it.
-//! - [`verdict`] says of each level whether bots solved it, failed, or nobody can; results of shards and of two states of a
-//!   game are joined and compared there. [`verdict_report`] makes a page of them that people read.
-//! - [`calibration`] holds results beside recordings of people on the same levels.
-//! - [`assertions`] are for a game's own `cargo test`: levels that must be solved, recordings that must play again.
-//! - [`findings`] keeps what was found with the actions that lead there, plays it again and makes it shorter.
-//! - [`detectors`] look for defects while bots play: agents that are stuck, leave their level or are no numbers any more,
-//!   and what a game adds with a [`detector`] of its own.
-//! - [`bugs`] plants defects into games and levels, to measure which testers notice.
-//! - [`explore`] finds its way through a level by itself, without training: what can be reached, and how.
-//! - [`doctor`] finds out whether a game plays the same when it is given the same actions, and what differs if not.
-//! - [`pipeline`] goes the whole road with five functions; [`policy_export`] makes the one file that a game ships with, for
-//!   [`policy_file`](bevy_playbot::policy_file) to load there.
+//! - [`Game`](game::Game) says how a game is built without a window, many arenas at a time.
+//! - [`level_files`] are levels from files, in ranges like those that are generated from seeds.
+//! - [`train`] learns from recordings and from play. [`demo`] verifies recordings by replay and makes data sets of
+//!   them.
+//! - [`eval`] measures policies, every level equally often. [`runs`] reads runs back and compares them, [`report`]
+//!   draws them.
+//! - [`verdict`] says for each level: solved, failed, or proved to be unsolvable. It also joins the results of shards
+//!   and compares those of two states of a game. [`verdict_report`] writes them as a page.
+//! - [`calibration`] compares results with recordings of people on the same levels.
+//! - [`assertions`] are for a game's own `cargo test`: levels must be solved, recordings must replay.
+//! - [`findings`] stores findings with the actions that lead to them, replays them and shortens them.
+//! - [`detectors`] look for defects while bots play: agents that are stuck, leave their level or have positions that
+//!   are no numbers. A game adds its own with [`detector`].
+//! - [`bugs`] plants defects into games and levels, to measure which testers find them.
+//! - [`explore`] searches a level without training, and reports which cells can be reached, and how.
+//! - [`doctor`] checks whether a game plays the same for the same actions, and reports the differences.
+//! - [`pipeline`] goes from recordings to a policy with five functions. [`policy_export`] writes the policy file that a
+//!   game ships with and loads with [`policy_file`](bevy_playbot::policy_file).
 //!
-//! A game that only ships a bot needs none of this: it depends on `bevy_playbot` alone.
+//! A game that only ships a bot needs nothing of this: it depends on `bevy_playbot` alone.
 
 pub mod arrangement;
 pub mod assertions;
@@ -26,6 +28,8 @@ pub mod benchmark;
 pub mod brief;
 pub mod bugs;
 pub mod calibration;
+#[cfg(test)]
+pub(crate) mod corridor;
 pub mod defect;
 pub mod demo;
 pub mod detector;
@@ -46,6 +50,7 @@ pub mod held_out;
 mod idle;
 pub mod inspect;
 pub mod level_files;
+pub mod machine;
 pub mod mode;
 pub mod parallel;
 pub mod pipeline;
@@ -54,6 +59,7 @@ pub mod prelude;
 pub mod proof;
 pub mod report;
 pub mod runs;
+pub mod sealed_file;
 pub mod sensors;
 #[doc(hidden)]
 pub mod shell_word;

@@ -1,36 +1,39 @@
-//! Modes of a game by name, with options behind it where the game takes some.
+//! Errors of a game's modes, their options and their levels.
 
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 use bevy_playbot::unknown_name::UnknownName;
 
 use crate::level_files::LevelFileError;
 
-/// The text names no mode of the game.
+/// Text that is not a mode of the game.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 pub enum ModeError {
-    /// The name, or the name of an option, is none of those that exist.
+    /// Unknown name of a mode or option.
     #[error(transparent)]
     Unknown(#[from] UnknownName),
-    /// The levels are files that cannot be read, or that are no levels of the game.
+    /// Level files that cannot be read, or that are not levels of the game.
     #[error(transparent)]
     Files(#[from] LevelFileError),
-    /// The mode has levels, but not this one.
+    /// The mode has no level of this number.
     #[error("level {level} of `{mode}` does not exist: choose one up to {last}")]
     NoLevel {
         /// The mode.
         mode: String,
-        /// The number that was named.
+        /// The requested number.
         level: u64,
-        /// The largest number.
+        /// Largest number of the mode.
         last: u64,
     },
-    /// An option has a value that cannot be.
+    /// Invalid value of an option.
     #[error("mode `{mode}`: {why}")]
     Option {
-        /// The whole mode.
+        /// The mode, options included.
         mode: String,
-        /// Which option, what is wrong with it and what would be right.
+        /// The option, its error and the valid values.
         why: String,
     },
 }
+
+impl HasExitCode for ModeError {}

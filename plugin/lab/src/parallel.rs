@@ -1,4 +1,4 @@
-//! Several Worlds side by side on a few threads.
+//! Parallel work on a few threads.
 
 use std::{
     io,
@@ -8,8 +8,8 @@ use std::{
 
 /// Runs `work` once for every item, on at most `threads` threads, and returns the results in the order of the items.
 ///
-/// Which thread does what never shows in the results: each item is worked on alone. Where the system starts fewer threads, it
-/// takes longer.
+/// Results do not depend on the distribution over threads, since each item is worked on alone. If the system starts
+/// fewer threads, the work takes longer.
 pub fn on_threads<T: Send, R: Send>(items: &mut [T], threads: usize, work: impl Fn(&mut T) -> R + Sync) -> Vec<R> {
     let threads = threads.clamp(1, items.len().max(1));
     if threads == 1 {
@@ -30,26 +30,26 @@ fn share_out<T: Send, R: Send>(
             shares.iter().map(|share| builder().spawn_scoped(scope, move || work_through(share, work))).collect();
         let parts = shares.iter().zip(started).flat_map(|(share, started)| match started {
             Ok(thread) => thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)),
-            // There is no thread for it but this one.
+            // Works on this thread if the system starts no other.
             Err(_) => work_through(share, work),
         });
         parts.collect()
     })
 }
 
-/// Runs `work` once for every item, each on a thread of its own, for items that wait for one another.
+/// Runs `work` once for every item, each on its own thread, for items that wait for one another.
 ///
 /// # Errors
 ///
-/// The system does not start so many threads. `give_up` is called for each item that has none, so that the others need not
-/// wait for it any more; what they did is lost.
+/// The system does not start enough threads. `give_up` is called for each item without a thread, which frees the
+/// other items from waiting for it. Their results are lost.
 pub(crate) fn on_own_threads<T: Send, R: Send>(
     items: &mut [T],
     work: impl Fn(&mut T) -> R + Sync,
     give_up: impl Fn(&mut T),
 ) -> io::Result<Vec<R>> {
     match items {
-        // There is nobody to wait for.
+        // A single item has no other to wait for.
         [alone] => Ok(vec![work(alone)]),
         items => each_on_its_own(items, Builder::new, &work, &give_up),
     }
@@ -82,12 +82,12 @@ fn each_on_its_own<T: Send, R: Send>(
     })
 }
 
-/// Works on the items of one thread, which nobody else does.
+/// Works on the items of one thread.
 fn work_through<T, R>(share: &Mutex<&mut [T]>, work: &impl Fn(&mut T) -> R) -> Vec<R> {
     share.lock().unwrap_or_else(PoisonError::into_inner).iter_mut().map(work).collect()
 }
 
-/// Threads to use when nobody says: one per core.
+/// Returns the default number of threads: one per core.
 pub fn default_threads() -> usize {
     thread::available_parallelism().map_or(1, usize::from)
 }
@@ -98,7 +98,7 @@ mod tests {
 
     use super::*;
 
-    /// Doubles a number, and says what it was.
+    /// Doubles a number, and returns the old one.
     fn double(number: &mut i32) -> i32 {
         *number *= 2;
         *number / 2
@@ -126,7 +126,7 @@ mod tests {
         assert!(on_own_threads(&mut [], double, |_| {}).expect("none").is_empty());
     }
 
-    /// A thread whose stack is larger than all address space.
+    /// Makes threads with a stack larger than the address space.
     #[cfg(target_os = "linux")]
     fn impossible() -> Builder {
         Builder::new().stack_size(1 << 60)

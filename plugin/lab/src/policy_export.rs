@@ -1,8 +1,8 @@
-//! The one file that a game ships with, made from a trained policy.
+//! Export of a trained policy as the one file that a game ships with.
 
 use std::path::Path;
 
-use playbot_learner::{FileError, Observations, Policy, PolicyCard, PolicyFile, SeenLevels, SkillSource};
+use playbot_learner::{FileError, HasExitCode, Observations, Policy, PolicyCard, PolicyFile, SeenLevels, SkillSource};
 use thiserror::Error;
 
 use crate::{arrangement::at_most, game::Game, split::LevelSplit, train::collect::Collector};
@@ -13,43 +13,53 @@ use bevy_playbot::{
     vision::{ObservationConfig, UnknownObservation, VisionError},
 };
 
-/// Arenas and ticks of the short play from which a file's examples are taken.
+/// Arenas of the short play from which a file's examples are taken.
 const EXAMPLE_ARENAS: usize = 4;
 const EXAMPLE_TICKS: usize = 32;
-/// Every so many of its rows becomes an example.
+/// Distance of the rows that become examples.
 const EXAMPLE_STRIDE: usize = 9;
 
-/// A policy could not be exported.
+/// Failure to export a policy.
 #[derive(Debug, Error)]
 pub enum ExportError {
     /// The game broke its contract while the examples were played.
     #[error(transparent)]
     Fault(#[from] Fault),
-    /// The file does not say what its policy sees.
+    /// The file's metadata does not name the policy's observations.
     #[error(transparent)]
     ObservationConfig(#[from] UnknownObservation),
-    /// The pictures cannot be made.
+    /// Pictures cannot be made.
     #[error(transparent)]
     Vision(#[from] VisionError),
-    /// The file could not be written.
+    /// The file cannot be written.
     #[error(transparent)]
     File(#[from] FileError),
 }
 
-/// How a policy came to be.
+impl HasExitCode for ExportError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Fault(_) => 2,
+            Self::File(error) => error.exit_code(),
+            Self::ObservationConfig(_) | Self::Vision(_) => 3,
+        }
+    }
+}
+
+/// Origin of a policy.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Provenance {
     /// Name of the algorithm.
     pub algorithm: String,
-    /// What it was trained on, and for how long, in words.
+    /// Training levels and length, as text.
     pub training: String,
-    /// The levels that it has seen, where they are known.
+    /// The levels that it has seen, if known.
     pub seen: Option<SeenLevels>,
-    /// Name, version and, where it is known, revision of the program that trained it.
+    /// Name, version and, if known, revision of the program that trained it.
     pub code: String,
 }
 
-/// A policy for this game that sees it so, with the card filled in from both.
+/// Returns a policy for this game and these observations, with the metadata filled in from both.
 pub fn policy_file(
     game: &dyn Game,
     observation_config: &ObservationConfig,
@@ -63,7 +73,7 @@ pub fn policy_file(
         game_version: game.version(),
         observations: if observation_config.is_image() { Vec::new() } else { game.observation().names },
         picture: observation_config.card(),
-        actions: game.action_names(),
+        actions: game.tools().input.action_names(),
         algorithm,
         training,
         seen,

@@ -3,11 +3,7 @@
 pub use bevy_playbot::prelude::*;
 
 pub use crate::{
-    assertions::{
-        LevelTest, assert_deterministic, assert_findings_gone, assert_levels_solvable, assert_levels_solved_by,
-        assert_no_findings, assert_replays,
-    },
-    game::Game,
+    game::{Game, GameTools},
     sensors::GameSensors,
     split::LevelSplit,
 };

@@ -1,18 +1,18 @@
-//! What a game knows for certain of a level, without anybody playing it.
+//! Proofs about levels, found without play.
 
 use serde::{Deserialize, Serialize};
 
-/// Whether the aim of a level can be reached.
+/// Proof about the goal of a level: whether it can be reached.
 ///
-/// A search that gave up has proved nothing: that is [`Unknown`](Self::Unknown).
+/// A search that gave up proves nothing and gives [`Unknown`](Self::Unknown).
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LevelProof {
-    /// There is a way to the aim. Whether the time is enough for it is not said.
+    /// A path to the goal exists. It may take longer than an episode.
     Solvable,
-    /// No sequence of actions whatever reaches the aim.
+    /// The goal cannot be reached by any sequence of actions.
     Unsolvable {
-        /// What was searched to its end, for people.
+        /// Description of the exhausted search.
         why: String,
     },
     /// Nothing is proved.
@@ -21,7 +21,7 @@ pub enum LevelProof {
 }
 
 impl LevelProof {
-    /// Why the aim cannot be reached, if that is proved.
+    /// Returns the reason why the goal cannot be reached, if that is proved.
     pub fn why_unsolvable(&self) -> Option<&str> {
         match self {
             Self::Unsolvable { why } => Some(why),

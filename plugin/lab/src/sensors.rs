@@ -1,4 +1,4 @@
-//! Sensors for the agents of a game, by what an experiment says that they see.
+//! Sensors for the agents of a game, built from an experiment's observation settings.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -11,9 +11,9 @@ use playbot_learner::ObsKind;
 
 use crate::game::Game;
 
-/// What an [`ObservationConfig`] means for a certain game.
+/// Sensors of an [`ObservationConfig`] in a particular game.
 pub trait GameSensors {
-    /// The form of an observation: its length, or the shape of its pictures.
+    /// Returns the form of an observation: its length, or the shape of its pictures.
     fn obs_kind(&self, game: &dyn Game) -> ObsKind;
 
     /// Checks the sizes, that the game can be drawn, and that this build has the sensor.
@@ -30,13 +30,13 @@ pub trait GameSensors {
     /// See [`VisionError`].
     fn build(&self, game: &dyn Game, app: &mut App) -> Result<(), VisionError>;
 
-    /// Bevy's plugins for a headless World whose agents see so.
+    /// Returns Bevy's plugins for a headless World with these sensors.
     fn headless_plugins(&self) -> HeadlessPlugins;
 
-    /// Whether it is a game's own camera that they see through.
+    /// Returns whether the sensors use the game's own camera.
     fn is_own_camera(&self, game: &dyn Game) -> bool;
 
-    /// Gives an agent the sensor. One that sees pictures needs no vector, which costs time to fill.
+    /// Gives an agent the sensor. Agents with pictures get no vector, which costs time to fill.
     fn equip(&self, game: &dyn Game, world: &mut World, agent: Entity);
 }
 
@@ -53,7 +53,7 @@ impl GameSensors for ObservationConfig {
             return Ok(());
         }
         self.image.check()?;
-        if game.picture().is_none() && !self.is_own_camera(game) {
+        if game.tools().pictures.picture().is_none() && !self.is_own_camera(game) {
             return Err(VisionError::NoPicture { game: game.name() });
         }
         if self.kind == ObservationKind::Camera && !cfg!(feature = "camera") {
@@ -73,7 +73,7 @@ impl GameSensors for ObservationConfig {
             ObservationKind::Camera => return Err(VisionError::NoCamera),
         };
         if !self.is_own_camera(game) {
-            game.build_picture(app);
+            game.tools().pictures.build_picture(app);
         }
         Ok(())
     }
@@ -87,7 +87,7 @@ impl GameSensors for ObservationConfig {
     }
 
     fn is_own_camera(&self, game: &dyn Game) -> bool {
-        self.kind == ObservationKind::Camera && game.has_camera()
+        self.kind == ObservationKind::Camera && game.tools().pictures.has_camera()
     }
 
     fn equip(&self, game: &dyn Game, world: &mut World, agent: Entity) {
@@ -98,7 +98,7 @@ impl GameSensors for ObservationConfig {
             entity.remove::<VectorSensor>();
             return;
         }
-        let Some(width) = game.picture().map(|picture| picture.width_on(&self.image)) else { return };
+        let Some(width) = game.tools().pictures.picture().map(|picture| picture.width_on(&self.image)) else { return };
         match self.kind {
             ObservationKind::Vector => return,
             ObservationKind::Raster => entity.insert(RasterSensor::following(agent, width, self.image)),

@@ -1,6 +1,6 @@
-//! Words of commands that people copy.
+//! Quoting of words in shell commands.
 
-/// A text as one word of a shell.
+/// Quotes a text as one word of a shell.
 pub fn shell_word(text: &str) -> String {
     let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=,:+".contains(letter);
     if text.chars().all(is_plain) { text.to_owned() } else { format!("'{}'", text.replace('\'', r"'\''")) }

@@ -1,8 +1,8 @@
-//! A view in space, for windows of games that have one.
+//! The entity that a 3D view follows, for windows of games with such a view.
 
 use bevy::prelude::*;
 
-/// On an agent: the entity that a camera in space follows.
+/// Component of an agent: the entity that a 3D camera follows.
 #[derive(Component, Clone, Copy, Debug, Reflect)]
 #[reflect(Component)]
 pub struct CameraFocus(pub Entity);

@@ -1,7 +1,8 @@
-//! Named ranges of levels, so that training levels and held-out levels are never mixed up.
+//! Named ranges of levels, which keep training levels and held-out levels apart.
 
 use std::{fmt, str::FromStr};
 
+use playbot_learner::HasExitCode;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -11,13 +12,13 @@ use crate::{
     mode::ModeError,
 };
 
-/// Most levels in one split: more could not be listed in memory.
+/// Largest number of levels in a split: more would not fit in memory as a list.
 const MAX_LEVELS: u64 = 1 << 24;
 
 /// Levels `first..=last` of one mode of a game. Written `hard:64..127`, both ends included.
 ///
-/// Levels that are files are written `files:levels/**/*.json`, which counts the files that match when it is read, or with
-/// numbers behind it, `files:levels/**/*.json:0..9`.
+/// Levels from files are written `files:levels/**/*.json`, which counts the matching files when it is read. A range
+/// may follow: `files:levels/**/*.json:0..9`.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct LevelSplit {
@@ -30,44 +31,44 @@ pub struct LevelSplit {
 }
 
 impl LevelSplit {
-    /// Number of levels; at least 1.
+    /// Returns the number of levels, at least 1.
     pub fn len(&self) -> u64 {
         self.last - self.first + 1
     }
 
-    /// Never true: a split has at least one level.
+    /// Returns false: a split has at least one level.
     pub fn is_empty(&self) -> bool {
         false
     }
 
-    /// All levels, in order.
+    /// Iterates over all levels in order.
     pub fn levels(&self) -> impl Iterator<Item = u64> + use<> {
         self.first..=self.last
     }
 
-    /// Whether a level of a mode is one of them.
+    /// Returns whether it has this level of this mode.
     pub fn contains(&self, mode: &str, level: u64) -> bool {
         self.mode == mode && (self.first..=self.last).contains(&level)
     }
 
-    /// Checks that a game has all of these levels, and reads those that are files.
+    /// Checks that a game has all of these levels, and reads those from files.
     ///
     /// # Errors
     ///
-    /// [`ModeError`] with what is valid.
+    /// [`ModeError`] with the valid values.
     pub fn check(&self, game: &dyn Game) -> Result<(), ModeError> {
         game.check_mode(&self.mode)?;
         check_level(game, &self.mode, self.last)
     }
 
-    /// These levels of a mode, which ascend, in as few ranges as there can be.
+    /// Returns the fewest ranges that hold exactly these levels of a mode, which ascend.
     pub fn ranges(mode: &str, levels: &[u64]) -> Vec<Self> {
         let runs = levels.chunk_by(|one, next| one + 1 == *next);
         let range = |run: &[u64]| Some(Self { mode: mode.to_owned(), first: *run.first()?, last: *run.last()? });
         runs.filter_map(range).collect()
     }
 
-    /// Whether some level belongs to both.
+    /// Returns whether a level belongs to both.
     pub fn overlaps(&self, other: &Self) -> bool {
         self.mode == other.mode && self.first <= other.last && other.first <= self.last
     }
@@ -79,32 +80,32 @@ impl fmt::Display for LevelSplit {
     }
 }
 
-/// Checks that a mode which [is one](Game::check_mode) has a level, and reads levels that are files.
+/// Checks that a [valid](Game::check_mode) mode has a level, and reads levels from files.
 ///
 /// # Errors
 ///
-/// [`ModeError`] with the last level that there is.
+/// [`ModeError`] with the last level of the mode.
 pub fn check_level(game: &dyn Game, mode: &str, level: u64) -> Result<(), ModeError> {
     let mode = mode.to_owned();
     if is_level_files(&mode) {
         let count = level_designs(game, &mode)?.count();
         return if level < count { Ok(()) } else { Err(LevelFileError::NoLevel { mode, level, count }.into()) };
     }
-    match game.last_level() {
+    match game.tools().levels.last_level() {
         Some(last) if level > last => Err(ModeError::NoLevel { mode, level, last }),
         _ => Ok(()),
     }
 }
 
-/// The level files that somebody may have meant.
+/// Returns the level files that a text probably means.
 fn files_like(text: &str) -> &str {
     if text.ends_with(".json") { text } else { "levels/*.json" }
 }
 
-/// The text is not a split.
+/// Text that is not a valid split.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum SplitError {
-    /// It is written in another way.
+    /// The text has another form.
     #[error(
         "`{}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127, or name level files, \
          as in files:{}", .0, files_like(.0)
@@ -113,24 +114,26 @@ pub enum SplitError {
     /// The range goes backwards.
     #[error("`{text}`: first level {first} is after last level {last}; write {mode}:{last}..{first}")]
     Reversed {
-        /// What was written.
+        /// The text.
         text: String,
-        /// Its mode.
+        /// Mode of the range.
         mode: String,
-        /// Its first level.
+        /// First level of the range.
         first: u64,
-        /// Its last level.
+        /// Last level of the range.
         last: u64,
     },
-    /// There are too many levels in it.
+    /// Too many levels.
     #[error("`{0}` has too many levels: a range has at most 16,777,216")]
     TooMany(String),
-    /// The levels are files that are not there.
+    /// Missing level files.
     #[error(transparent)]
     Files(#[from] LevelFileError),
 }
 
-/// `4..9` or `4`.
+impl HasExitCode for SplitError {}
+
+/// Parses `4..9` or `4`.
 fn range(text: &str) -> Option<(u64, u64)> {
     let (first, last) = text.split_once("..").unwrap_or((text, text));
     Some((first.parse().ok()?, last.parse().ok()?))

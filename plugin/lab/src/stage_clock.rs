@@ -1,4 +1,4 @@
-//! Where the time of a tick goes: for benchmarks.
+//! Clock of the stages of a tick, for benchmarks.
 
 use std::time::Instant;
 
@@ -6,7 +6,7 @@ use bevy::prelude::*;
 
 use bevy_playbot::{placement::TickSchedules, systems::PlaybotSystems};
 
-/// Seconds spent in the parts of a tick. Insert it to measure; without it no clock is read.
+/// Seconds spent in the parts of a tick. Insert the resource to measure; without it no clock is read.
 #[derive(Resource, Debug, Clone, Reflect)]
 #[reflect(Resource)]
 pub struct StageClock {
@@ -28,7 +28,7 @@ impl Default for StageClock {
 }
 
 impl StageClock {
-    /// Seconds since the last call.
+    /// Returns the seconds since the last call.
     fn lap(&mut self) -> f64 {
         let now = Instant::now();
         let seconds = now.duration_since(self.last).as_secs_f64();
@@ -37,7 +37,7 @@ impl StageClock {
     }
 }
 
-/// Adds the readings between the parts of a tick.
+/// Adds systems that read the clock between the parts of a tick.
 pub(crate) fn add_readings(app: &mut App) {
     let measuring = resource_exists::<StageClock>;
     let TickSchedules { decide, judge, .. } = TickSchedules::of(app);
@@ -49,7 +49,7 @@ pub(crate) fn add_readings(app: &mut App) {
             after_observation.after(PlaybotSystems::Observe).before(PlaybotSystems::Decide),
             after_decision.after(PlaybotSystems::Act),
         )
-            // Nobody else looks at this clock.
+            // No other system reads this clock.
             .ambiguous_with_all()
             .run_if(measuring),
     )

@@ -1,4 +1,4 @@
-//! Reading a whole file of text that anybody may have made.
+//! Safe reading of text files of unknown origin.
 
 use std::{
     fs::{self, File},
@@ -8,25 +8,25 @@ use std::{
 
 use thiserror::Error;
 
-/// A file cannot be read as text.
+/// Failure to read a file as text.
 #[derive(Debug, Error)]
-pub(crate) enum TextFileError {
+pub enum TextFileError {
     /// The operating system refused.
     #[error(transparent)]
     Unreadable(#[from] io::Error),
-    /// It is something that cannot be read from its beginning to its end.
-    #[error("it is no regular file, but a folder, a pipe or a device")]
+    /// Not a regular file.
+    #[error("it is a folder, a pipe or a device, not a regular file")]
     NotAFile,
-    /// It is longer than any file of its kind.
-    #[error("it has {bytes} bytes, and no such file may have more than {most}: is it another file?")]
+    /// The file is larger than any file of its kind.
+    #[error("it has {bytes} bytes, and such a file has at most {most}: name another file")]
     TooLarge {
-        /// Its length, as far as it was read.
+        /// Size, as far as it was read.
         bytes: u64,
-        /// Most bytes of a file of its kind.
+        /// Largest size of a file of its kind, bytes.
         most: u64,
     },
-    /// It holds no letters.
-    #[error("line {line}: byte {byte} of the line is no text in UTF-8: save it as UTF-8, or is it another file?")]
+    /// The file is not UTF-8.
+    #[error("line {line}: byte {byte} of the line is not UTF-8: save it as UTF-8, or name another file")]
     NoText {
         /// Line, from 1.
         line: usize,
@@ -44,13 +44,14 @@ impl From<TextFileError> for io::Error {
     }
 }
 
-/// The text of a regular file of at most `most` bytes. Whatever lies there, this neither waits nor takes more memory.
+/// Returns the text of a regular file of at most `most` bytes. Neither waits nor takes more memory, whatever the path
+/// is.
 ///
 /// # Errors
 ///
 /// [`TextFileError`].
 pub(crate) fn read_text_file(path: &Path, most: u64) -> Result<String, TextFileError> {
-    // Opening a pipe waits for somebody who writes into it.
+    // Opening a pipe would wait for a writer.
     if !fs::metadata(path)?.is_file() {
         return Err(TextFileError::NotAFile);
     }
@@ -60,7 +61,7 @@ pub(crate) fn read_text_file(path: &Path, most: u64) -> Result<String, TextFileE
         return Err(TextFileError::TooLarge { bytes, most });
     }
     let mut read = Vec::new();
-    // Some files do not know how long they are.
+    // Some files report no size.
     file.take(most.saturating_add(1)).read_to_end(&mut read)?;
     if read.len() as u64 > most {
         return Err(TextFileError::TooLarge { bytes: read.len() as u64, most });
@@ -84,7 +85,7 @@ mod tests {
         fs::write(&path, "four").expect("writable");
         assert_eq!(read_text_file(&path, 4).expect("four bytes"), "four");
         let error = read_text_file(&path, 3).expect_err("too long").to_string();
-        assert_eq!(error, "it has 4 bytes, and no such file may have more than 3: is it another file?");
+        assert_eq!(error, "it has 4 bytes, and such a file has at most 3: name another file");
         fs::write(&path, b"a\nbc\xff").expect("writable");
         let error = read_text_file(&path, 100).expect_err("no text").to_string();
         assert!(error.starts_with("line 2: byte 3 of the line"), "{error}");

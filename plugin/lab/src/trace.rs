@@ -1,4 +1,4 @@
-//! Playing given actions and printing what each of them brings.
+//! Traces: play of given actions, printed tick by tick.
 
 use std::path::Path;
 
@@ -10,7 +10,8 @@ use crate::{
     worlds::build_world,
 };
 
-/// Plays given discrete actions and prints the columns of [`Game::trace_row`], the reward and whether the episode ended.
+/// Plays given discrete actions and prints the columns of [`TraceTools::row`](crate::game::TraceTools::row), the
+/// reward and whether the episode ended.
 ///
 /// # Errors
 ///
@@ -19,13 +20,16 @@ pub fn trace_actions(game: &dyn Game, request: &TraceRequest, print: Print) -> R
     let mode = request.mode.or(game.modes().last().copied()).unwrap_or_default();
     game.check_mode(mode)?;
     if !request.start.is_empty() {
-        return Err(InspectError::Usage(format!("--start is not for {}: its levels say where to start", game.name())));
+        return Err(InspectError::Usage(format!(
+            "--start does not apply to {}: its levels have fixed starts",
+            game.name()
+        )));
     }
     let actions = read_actions(game, request)?;
     let (mut world, agents) = build_world(game, mode, 0, 0, 1);
     let agent = agents[0];
-    world.entity_mut(agent).insert((Control::Replay, LevelQueue::Always(request.seed)));
-    let columns = game.trace_columns();
+    world.entity_mut(agent).insert((Control::Replay, LevelQueue::Always(request.level)));
+    let columns = game.tools().trace.columns().unwrap_or_else(|| game.observation().names);
     if !request.json {
         let names: String = columns.iter().map(|name| format!(" {name:>12}")).collect();
         print(format!("{:>5}{names} {:>6} done", "step", "reward"))?;
@@ -33,7 +37,7 @@ pub fn trace_actions(game: &dyn Game, request: &TraceRequest, print: Print) -> R
     for (step, action) in actions.into_iter().enumerate() {
         world.entity_mut(agent).insert(Action(ActionValue::Discrete(action)));
         world.tick()?;
-        let row: Vec<_> = game.trace_row(&world, agent).into_iter().map(plain).collect();
+        let row: Vec<_> = game.tools().trace.row(&world, agent).into_iter().map(plain).collect();
         let reward = plain(world.get::<Reward>(agent).map_or(0.0, Reward::get));
         let done = world.get::<Episode>(agent).is_none_or(|episode| !episode.is_running());
         if request.json {
@@ -78,8 +82,8 @@ fn read_actions(game: &dyn Game, request: &TraceRequest) -> Result<Vec<u32>, Ins
     }
 }
 
-/// How actions are given.
-const HOW: &str = "name actions with --actions 0,1,2, or with --actions-file a file of such numbers";
+/// Hint for the form of actions.
+const HOW: &str = "give actions with --actions 0,1,2, or with --actions-file and a file of such numbers";
 
 fn no_action(path: &Path, word: &str) -> InspectError {
     InspectError::Usage(format!(

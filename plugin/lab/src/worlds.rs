@@ -1,4 +1,4 @@
-//! Worlds of a game: headless, with as many agents as wanted, ready to be ticked on any thread.
+//! Worlds of a game: headless, with any number of agents, ready to be ticked on any thread.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -19,7 +19,8 @@ use crate::{
     stage_clock::{self, StageClock},
 };
 
-/// A World of a game with agents `first..first + count`, all idle, ready to be ticked on any thread. They see vectors.
+/// Builds a World of a game with agents `first..first + count`, all idle, ready to be ticked on any thread. They see
+/// vectors.
 ///
 /// Returns the World and its agents in the order of their numbers.
 pub fn build_world(game: &dyn Game, mode: &str, seed: u64, first: u32, count: u32) -> (World, Vec<Entity>) {
@@ -27,11 +28,11 @@ pub fn build_world(game: &dyn Game, mode: &str, seed: u64, first: u32, count: u3
         .expect("nothing can be wrong with a vector")
 }
 
-/// [`build_world`] with agents that see vectors or pictures.
+/// Builds a World as [`build_world`] does, with agents that see vectors or pictures.
 ///
 /// # Errors
 ///
-/// The pictures cannot be made: see [`VisionError`].
+/// Pictures cannot be made: see [`VisionError`].
 pub fn build_observing_world(
     game: &dyn Game,
     mode: &str,
@@ -61,15 +62,16 @@ fn build_once(
     count: u32,
 ) -> Result<(World, Vec<Entity>), VisionError> {
     observation_config.check(game)?;
-    let mut app = match game.placement() {
+    let mut app = match game.tools().host.placement() {
         TickPlacement::Fixed => {
             let mut app = headless_app();
             set_tick_rate(&mut app, game.tick_hz());
             app
         }
-        TickPlacement::Frame => {
-            headless_frame_app(game.headless_plugins(observation_config.headless_plugins()), game.tick_hz())
-        }
+        TickPlacement::Frame => headless_frame_app(
+            game.tools().host.headless_plugins(observation_config.headless_plugins()),
+            game.tick_hz(),
+        ),
     };
     add_game(game, &mut app, mode, observation_config, seed)?;
     PanicReports::new(game.demo_header(mode), std::env::temp_dir()).add_to(&mut app);
@@ -81,12 +83,12 @@ fn build_once(
     Ok((world, agents))
 }
 
-/// Adds a game and the sensors of its agents to an app that has the [`PlaybotPlugin`](bevy_playbot::plugin::PlaybotPlugin),
-/// with a window or without.
+/// Adds a game and the sensors of its agents to an app that has the
+/// [`PlaybotPlugin`](bevy_playbot::plugin::PlaybotPlugin), with or without a window.
 ///
 /// # Errors
 ///
-/// The pictures cannot be made: see [`VisionError`].
+/// Pictures cannot be made: see [`VisionError`].
 pub fn add_game(
     game: &dyn Game,
     app: &mut App,
@@ -95,7 +97,7 @@ pub fn add_game(
     seed: u64,
 ) -> Result<(), VisionError> {
     app.insert_resource(PlaybotSeed(seed));
-    if let Some(most) = game.arenas_per_world() {
+    if let Some(most) = game.tools().host.arenas_per_world() {
         app.insert_resource(AgentLimit { game: game.name(), most });
     }
     if let (Some(problem), Some(mut faults)) = (game.problem(), app.world_mut().get_resource_mut::<Faults>()) {

@@ -18,35 +18,35 @@ use crate::{
     output, program, progress,
 };
 
-/// Where levels are taken from that nobody has named: far from those that bots are trained on.
+/// First level of a game for which no levels are given, far from the levels that bots are trained on.
 const FIRST: u64 = 1_000_000;
 const LAST: u64 = 1_999_999;
 
-/// Plant defects: make a set of broken games and levels, and name sound levels beside them.
+/// Plant defects: make a set of broken games and levels, and list unmutated levels beside them.
 ///
-/// Every kind of defect that the games have, their own ones and those of all games, is planted a few times, each time into
-/// another level that the game's own bot solves, or with another variant. A game's own defects of rules are planted where some
-/// bot's episode goes another way with them. The same seed makes the same files.
+/// Every kind of defect of the games is planted a few times: their own kinds and those that all games have. Each is
+/// planted into another level that the game's own bot solves, or with another variant. A defect of a game's rules is
+/// planted only where it changes some bot's episode. The same seed makes the same files.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bugs make --seed 1 --out runs/bugs
   playbot bugs make GAME --per-kind 6 --sound 200 --out runs/bugs
   playbot bugs make GAME --levels GAME=MODE:1000..1999 --out runs/bugs --force")]
 pub struct Args {
-    /// Names of the games; all games of the program if none is named.
+    /// Names of the games (default: all games of the program).
     #[arg(value_name = "GAME")]
     games: Vec<String>,
-    /// Seed of all that is drawn.
+    /// Random seed.
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Mutants of each kind and game.
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=100))]
     per_kind: u32,
-    /// Sound levels of all games together.
+    /// Unmutated levels of all games together.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(..=1_000_000))]
     sound: u64,
-    /// Levels of a game to plant defects into, and to name as sound ones; numbers from 1000000 on, in the mode of its held-out
-    /// levels, if none are named. May be given once for each game.
+    /// Levels of a game to plant defects into and to list as unmutated (once for each game). Default: numbers from
+    /// 1000000 on, in the mode of the game's held-out levels.
     #[arg(long, value_name = "GAME=MODE:FIRST..LAST")]
     levels: Vec<LevelsOf>,
     #[command(flatten)]
@@ -54,7 +54,7 @@ pub struct Args {
     /// Folder for the set.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Replace a set that is there.
+    /// Replace an existing set.
     #[arg(long)]
     force: bool,
     /// One line of JSON instead of a table.
@@ -100,14 +100,14 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     print(&made.set, &made.without_place, args.json)?;
     let folder = shell_word(&args.out.display().to_string());
     tell!(
-        "planted: {}; see who finds them: {} bugs score {folder} --out score.json",
+        "planted: {}; measure testers on them: {} bugs score {folder} --out score.json",
         args.out.display(),
         program::name()
     );
     Ok(Outcome::Pass)
 }
 
-/// The games that are asked for, each once, with their levels.
+/// Returns the requested games, each once, with their levels.
 fn sources<'a>(args: &Args, games: &Games<'a>) -> Result<Vec<Source<'a>>, CliError> {
     let mut chosen: Vec<&'a dyn Game> = Vec::new();
     for name in &args.games {
@@ -148,7 +148,7 @@ fn source<'a>(args: &Args, game: &'a dyn Game) -> Result<Source<'a>, CliError> {
     Ok(Source { game, levels, trained: usual.map(|usual| usual.train).filter(is_mode) })
 }
 
-/// How much was planted of each class.
+/// Prints how many defects of each class were planted.
 fn print(set: &BugSet, without_place: &[NoPlace], json: bool) -> Result<(), CliError> {
     let mut classes: BTreeMap<(&str, &str), (u64, u64)> = BTreeMap::new();
     for bug in &set.mutants {

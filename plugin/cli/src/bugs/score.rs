@@ -24,20 +24,20 @@ use crate::{
     interrupt, output, program, progress,
 };
 
-/// Detectors that do not look unless they are named: what the clock says is no finding that comes again, and the other one is
-/// an explorer of its own, beside those that are scored.
+/// Detectors that are opt-in here. `tick-time` depends on the clock, so its findings do not repeat.
+/// `unreachable-region` runs an explorer of its own beside the measured testers.
 const LEFT_OUT: [&str; 2] = ["tick-time", "unreachable-region"];
 
 /// Measure which testers find planted defects: in how many mutants, with how many false findings, and how soon.
 ///
-/// Every tester is set on every mutant of this program's games and on every sound level of the set, at equal budgets and
-/// under all detectors but tick-time and unreachable-region. A mutant is found if a detector finds something or the game
-/// breaks, if it is proved that nobody can solve it, or if a tester fails that solves at least 99 % of the sound levels; one
-/// that solves fewer fails where its reward lies far outside of those of the sound levels. On a sound level the same is a
-/// false finding. Beside that, results are compared with those of the same tester on the sound level that the mutant was
-/// made of.
+/// Every tester plays every mutant of this program's games and every unmutated level of the set, with equal budgets and
+/// under all detectors but tick-time and unreachable-region. A mutant is found if a detector finds something, if the
+/// game breaks, if the level is proved unsolvable, or if a tester fails that solves at least 99 % of the unmutated
+/// levels. A tester that solves fewer fails where its reward lies far outside of its rewards on the unmutated levels.
+/// On an unmutated level the same signs are a false finding. Results are also compared with those of the same tester on
+/// the unmutated level that the mutant was made from.
 ///
-/// All but the times is the same on any number of threads.
+/// All results but the times are the same on any number of threads.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bugs score runs/bugs --out runs/score.json
@@ -47,42 +47,42 @@ pub struct Args {
     /// Folder of the set, as written by `playbot bugs make`.
     #[arg(value_name = "DIR")]
     set: PathBuf,
-    /// Games of the set that are tested, separated by commas; all that this program has if none is named.
+    /// Games of the set to test, separated by commas (default: all that this program has).
     #[arg(long = "game", value_name = "NAME", value_delimiter = ',')]
     names: Vec<String>,
     #[command(flatten)]
     testers: ContestantArgs,
-    /// Episodes of whoever plays, on each mutant and sound level.
+    /// Episodes of each bot or policy, on each mutant and unmutated level.
     #[arg(long, default_value_t = ScoreBudget::default().episodes, value_parser = clap::value_parser!(u32).range(1..))]
     episodes: u32,
-    /// Environment steps of whoever explores, on each mutant and sound level.
+    /// Environment steps of each explorer, on each mutant and unmutated level.
     #[arg(long, default_value_t = ScoreBudget::default().steps, value_parser = clap::value_parser!(u64).range(1..))]
     steps: u64,
-    /// Ways of whoever explores that are played again under the detectors.
+    /// Paths of each explorer to play again under the detectors.
     #[arg(long, default_value_t = ScoreBudget::default().routes)]
     routes: u32,
-    /// Replays in which the first finding of each tester on each mutant is made shorter; 0 for none.
+    /// Replays for shortening the first finding of each tester on each mutant (0 for none).
     #[arg(long, default_value_t = ScoreBudget::default().replays)]
     replays: u32,
-    /// Seed of all that is drawn.
+    /// Random seed.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Detectors that look, too, separated by commas.
+    /// Detectors to add, separated by commas.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     detect: Vec<String>,
-    /// Detectors that do not look, separated by commas.
+    /// Detectors to leave out, separated by commas.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     no_detect: Vec<String>,
-    /// A setting of a detector; may be given several times.
+    /// A setting of a detector (repeatable).
     #[arg(long, value_name = "NAME.KEY=VALUE")]
     detector: Vec<String>,
     /// File for the score.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
-    /// Go on with a score that was stopped or killed; begin it if there is none.
+    /// Go on with a score that was stopped or killed, or begin it if there is none.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
-    /// Replace a score that is there.
+    /// Replace an existing score.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -108,7 +108,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         clock: ClockKind::here(),
         threads: args.compute.threads(),
     };
-    let score_run = ScoreRun::new(&plan).map_err(failed)?;
+    let score_run = ScoreRun::new(&plan)?;
     output::make_folder_of(&args.out)?;
     if args.resume && args.out.exists() && !ScoreJournal::is_begun(&args.out) {
         let score = done_before(&args.out, &plan)?;
@@ -121,9 +121,9 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         (false, false) => Earlier::Keep,
     };
     let opened = ScoreJournal::open(&args.out, &command(), &plan.record(), earlier);
-    let (mut journal, cut) = opened.map_err(failed)?;
+    let (mut journal, cut) = opened?;
     if cut > 0 {
-        tell!("warning: the last {cut} bytes of what was finished are damaged, and are done again");
+        tell!("warning: the last {cut} bytes of the finished part are damaged, and are done again");
     }
     let total = score_run.jobs();
     let finished = journal.finished().len() as u64;
@@ -133,17 +133,17 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let watch = ScoreWatch { progress: &progress, stop: &interrupt::asked };
     let scored = score_run.run(&mut journal, &watch);
     bar.finish_and_clear();
-    let Some(score) = scored.map_err(failed)? else {
+    let Some(score) = scored? else {
         let finished = journal.finished().len();
         tell!("stopped; {finished} of {total} jobs are finished: go on with the same command and --resume");
         return Ok(Outcome::Stopped);
     };
-    score.write(&args.out).map_err(failed)?;
-    journal.close().map_err(failed)?;
+    score.write(&args.out)?;
+    journal.close()?;
     tell_score(&args.out, score, args.json)
 }
 
-/// The games of the set that this program has, each with its testers.
+/// Returns the games of the set that this program has, each with its testers.
 fn tested<'a>(args: &Args, set: &BugSet, games: &Games<'a>) -> Result<Vec<TestedGame<'a>>, CliError> {
     let mut chosen: Vec<&'a dyn Game> = Vec::new();
     for name in &args.names {
@@ -182,7 +182,7 @@ fn tested<'a>(args: &Args, set: &BugSet, games: &Games<'a>) -> Result<Vec<Tested
     Ok(tested)
 }
 
-/// That the set was made for other games.
+/// Returns the error of a set that was made for other games.
 fn none_of_the_games(set: &BugSet, games: &Games) -> CliError {
     let of_set: Vec<&str> = set.games.iter().map(|game| game.name.as_str()).collect();
     let known: Vec<&str> = games.iter().map(|game| game.name()).collect();
@@ -195,19 +195,19 @@ fn none_of_the_games(set: &BugSet, games: &Games) -> CliError {
     ))
 }
 
-/// A score that needs nothing more.
+/// Returns a finished score.
 fn done_before(path: &Path, plan: &ScorePlan) -> Result<Score, CliError> {
-    let score = Score::read(path).map_err(failed)?;
+    let score = Score::read(path)?;
     let differences = score.record.differences(&plan.record());
     if differences.is_empty() {
         Ok(score)
     } else {
-        Err(failed(ScoreError::OtherScore { path: path.into(), differences }))
+        Err(ScoreError::OtherScore { path: path.into(), differences }.into())
     }
 }
 
 fn tell_score(path: &Path, score: Score, json: bool) -> Result<Outcome, CliError> {
-    let table = ScoreTable::join(&[(path.to_owned(), score)]).map_err(failed)?;
+    let table = ScoreTable::join(&[(path.to_owned(), score)])?;
     if json {
         print_line(as_json(&table)?)?;
     } else {
@@ -221,7 +221,7 @@ fn tell_score(path: &Path, score: Score, json: bool) -> Result<Outcome, CliError
     Ok(Outcome::Pass)
 }
 
-/// A table as a line of JSON.
+/// Returns a table as a line of JSON.
 ///
 /// # Errors
 ///
@@ -230,15 +230,10 @@ pub fn as_json(table: &ScoreTable) -> Result<String, CliError> {
     serde_json::to_string(table).map_err(|error| CliError::Io(format!("the table cannot be written as JSON: {error}")))
 }
 
-/// What was called, as people would call it for the first time.
+/// Returns the command line as it reads for a first call.
 fn command() -> String {
     let words = std::env::args().skip(1).filter(|word| !["--resume", "--force", "--json"].contains(&word.as_str()));
     [program::name().to_owned()].into_iter().chain(words.map(|word| quoted(&word))).collect::<Vec<_>>().join(" ")
-}
-
-/// An error of the score, with its exit code.
-pub fn failed(error: ScoreError) -> CliError {
-    if error.is_usage() { CliError::Usage(error.to_string()) } else { CliError::Io(error.to_string()) }
 }
 
 #[cfg(test)]
@@ -258,8 +253,9 @@ mod tests {
 
     #[test]
     fn what_the_caller_can_mend_is_told_from_what_failed() {
-        assert_eq!(failed(ScoreError::Nothing).exit_code(), 3);
+        assert_eq!(CliError::from(ScoreError::Nothing).exit_code(), 3);
         let source = std::io::Error::from(std::io::ErrorKind::StorageFull);
-        assert_eq!(failed(ScoreError::Io { action: "write", path: "a".into(), source }).exit_code(), 2);
+        let failed = ScoreError::Io { action: "write", path: "a".into(), source };
+        assert_eq!(CliError::from(failed).exit_code(), 2);
     }
 }

@@ -4,15 +4,15 @@ use std::path::PathBuf;
 
 use playbot_lab::bugs::score::{Score, ScoreTable};
 
-use super::score::{as_json, failed};
+use super::score::as_json;
 use crate::{
     error::{CliError, Outcome, print_line},
     output,
 };
 
-/// Join scores of different games or sets, and show them as a page of Markdown.
+/// Join scores of different games or sets, and print them as a page of Markdown.
 ///
-/// Scores that were made with other budgets, or that hold the same mutants or sound levels, are not joined.
+/// Scores with different budgets, or with the same mutants or unmutated levels, are not joined.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bugs table runs/score.json
@@ -33,10 +33,10 @@ pub struct Args {
 pub fn run(args: Args) -> Result<Outcome, CliError> {
     let mut scores = Vec::new();
     for path in args.scores {
-        let score = Score::read(&path).map_err(failed)?;
+        let score = Score::read(&path)?;
         scores.push((path, score));
     }
-    let table = ScoreTable::join(&scores).map_err(failed)?;
+    let table = ScoreTable::join(&scores)?;
     let text = if args.json { as_json(&table)? } else { table.to_markdown() };
     match &args.out {
         Some(path) => {

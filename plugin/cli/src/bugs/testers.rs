@@ -1,4 +1,4 @@
-//! Who is scored, as the command line names them.
+//! Testers of `playbot bugs score`, from the command line.
 
 use std::path::Path;
 
@@ -9,38 +9,38 @@ use playbot_lab::{
     explore::Explorer,
     game::Game,
     games::{Artifact, Games},
-    train::checksum::file_checksum,
+    sealed_file::file_checksum,
 };
 use playbot_learner::DeviceKind;
 
 use crate::{error::CliError, explore::Talents, named::Named, open, player::Chosen};
 
-/// What stands for the demonstrators of all games.
+/// The name for the demonstrators of all games.
 const DEMONSTRATOR: &str = "demonstrator";
 
 /// Bots, explorers and policies.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ContestantArgs {
-    /// Testers, separated by commas; all that there are if none is named: random, hold (the action that a bot of the game
-    /// holds, or else its last one), chaos (random actions, each held for up to 30 ticks), explore, explore-skills (with a
-    /// skill model, or else with the first policy that has skills), and demonstrator (the game's own bot, also by its own
-    /// name). Policies that are given test in any case.
+    /// Testers, separated by commas (default: all). random, hold (the action that a bot of the game holds, or else its
+    /// last one), chaos (random actions, each held for up to 30 ticks), explore, explore-skills (with a skill model, or
+    /// else with the first policy that has skills), and demonstrator (the game's own bot, also by its own name).
+    /// Policies given with --policy test in any case.
     #[arg(long = "tester", value_name = "NAME", value_delimiter = ',')]
     testers: Vec<String>,
-    /// Policy file and the name under which it is scored; may be given several times, and a name once for each game.
+    /// Policy file and its name in the score (repeatable). A name is used once for each game.
     #[arg(long, value_name = "NAME=FILE")]
     policy: Vec<Named>,
     /// Policies take their most probable action instead of drawing one.
     #[arg(long)]
     greedy: bool,
-    /// Skill model for explore-skills; may be given several times, and is that of the games that it fits. With GAME= in front
-    /// of that one.
+    /// Skill model for explore-skills (repeatable). It serves the games that it fits, or with GAME= in front only that
+    /// one.
     #[arg(long, value_name = "FILE")]
     skills: Vec<String>,
 }
 
 impl ContestantArgs {
-    /// The testers of each of these games. A game without any of those that are named has none.
+    /// Returns the testers of each of these games. A game for which no tester was named has an empty list.
     ///
     /// # Errors
     ///
@@ -121,7 +121,7 @@ impl ContestantArgs {
         }
     }
 
-    /// Leaves out who is not named.
+    /// Removes the testers that were not named.
     fn keep_named(&self, chosen: &[&dyn Game], all: &mut [Vec<Contestant>]) -> Result<(), CliError> {
         if self.testers.is_empty() {
             return Ok(());
@@ -141,8 +141,8 @@ impl ContestantArgs {
         }
         for (game, testers) in chosen.iter().zip(all) {
             let is_named = |name: &str| {
-                let is_demonstrator = game.demonstrator() == Some(name);
-                // Whoever gives a policy wants to see it tested.
+                let is_demonstrator = game.tools().bots.demonstrator() == Some(name);
+                // A policy that was given is always tested.
                 let is_given = self.policy.iter().any(|policy| policy.name == name);
                 is_given || self.testers.iter().any(|known| known == name || (is_demonstrator && known == DEMONSTRATOR))
             };
@@ -152,7 +152,7 @@ impl ContestantArgs {
     }
 }
 
-/// The explorer with the first policy that has skills.
+/// Returns the explorer with the first policy that has skills.
 fn with_policy(testers: &[Contestant]) -> Option<Contestant> {
     testers.iter().find_map(|tester| match &tester.means {
         Means::Plays(Player::Policy { policy, prior: Some(prior), draw }) => {

@@ -1,4 +1,4 @@
-//! What can be done with planted defects.
+//! The verbs below `playbot bugs`.
 
 use playbot_lab::games::Games;
 

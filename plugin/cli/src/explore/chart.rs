@@ -1,4 +1,4 @@
-//! Where an explorer came, as a picture.
+//! Picture of the cells that an explorer reached.
 
 use playbot_lab::{
     explore::{Cell, Exploration, Route, follow_route},
@@ -9,11 +9,11 @@ use playbot_lab::{
 
 use crate::error::CliError;
 
-/// The cells of an exploration on the level's floor plan, with a way through them.
+/// Draws the cells of an exploration on the level's floor plan, with a path through them.
 ///
 /// # Errors
 ///
-/// The game breaks its contract when the way is played again.
+/// The game breaks its contract when the path is played again.
 pub fn chart(
     game: &dyn Game,
     plan: FloorPlan,
@@ -31,7 +31,7 @@ pub fn chart(
     let reached = cells.filter_map(|(cell, reached)| Some((area(cell)?, reached.visits))).collect();
     let summary = exploration.summary(game).to_string();
     Ok(CellChart {
-        title: format!("Where an explorer came in {} {mode}:{level}", game.name()),
+        title: format!("Cells that an explorer reached in {} {mode}:{level}", game.name()),
         captions: summary
             .lines()
             .chain(["cells: few to many visits, logarithmic; crossed: not reached"])

@@ -1,7 +1,6 @@
 //! `playbot explore`.
 
 mod chart;
-mod failed;
 mod one_level;
 mod recorded;
 mod talents;

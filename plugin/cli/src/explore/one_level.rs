@@ -1,12 +1,12 @@
-//! The level that is explored, as it is written.
+//! The level argument of `playbot explore`.
 
 use playbot_lab::split::{LevelSplit, SplitError};
 
-/// Reads a level.
+/// Parses a level.
 ///
 /// # Errors
 ///
-/// It is none, in words that say how one is written.
+/// The text is no level; the message shows the form of one.
 pub fn one_level(text: &str) -> Result<LevelSplit, String> {
     text.parse::<LevelSplit>().map_err(|error| match error {
         SplitError::NotARange(_) => {

@@ -1,4 +1,4 @@
-//! A way that was found, as a recording.
+//! Recording of a path that was found.
 
 use std::path::{Path, PathBuf};
 
@@ -15,15 +15,15 @@ use crate::{
     output::{beside, prepare},
 };
 
-/// A file for a recording, looked at before the work whose result it is to hold.
+/// A file for a recording, tested before the work whose result it holds.
 pub struct RecordingFile(PathBuf);
 
 impl RecordingFile {
-    /// A file that may be written.
+    /// Checks that a file may be written.
     ///
     /// # Errors
     ///
-    /// It exists and nobody said that it may be overwritten, or nothing can be written there.
+    /// It exists without `--force`, or nothing can be written there.
     pub fn new(path: &Path, force: bool) -> Result<Self, CliError> {
         if path.is_file() && !force {
             return Err(CliError::Usage(format!(
@@ -35,16 +35,16 @@ impl RecordingFile {
         Ok(Self(path.to_owned()))
     }
 
-    /// Where it is.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         &self.0
     }
 
-    /// Plays a way under the recorder, replays what was recorded, and puts it in its place if it is the same.
+    /// Plays a path under the recorder, replays the recording, and moves it to its file if both agree.
     ///
     /// # Errors
     ///
-    /// The game breaks its contract or does not replay, or the disk fails. What was there before stays.
+    /// The game breaks its contract or does not replay, or the disk fails. An earlier file stays.
     pub fn write(&self, game: &dyn Game, exploration: &Exploration, route: &Route) -> Result<(), CliError> {
         let fresh = beside(&self.0, ".fresh");
         let written = self.record(game, exploration, route, &fresh);
@@ -64,14 +64,14 @@ impl RecordingFile {
         let report = verify_file(game, fresh, |_| {})?;
         if report.episodes != 1 || report.ticks != route.len() as u64 {
             return Err(CliError::Io(format!(
-                "{path}: the way that was found has {} ticks, and only {} of them could be played again",
+                "{path}: the path that was found has {} ticks, and only {} of them could be played again",
                 route.len(),
                 report.ticks
             )));
         }
         if let Some((_, divergence)) = report.divergences.first() {
             return Err(CliError::Io(format!(
-                "{path}: the way that was found does not replay ({divergence}): `playbot doctor {} --mode {mode} --seed \
+                "{path}: the path that was found does not replay ({divergence}): `playbot doctor {} --mode {mode} --level \
                  {level}` names what differs",
                 game.name()
             )));

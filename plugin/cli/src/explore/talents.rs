@@ -1,4 +1,4 @@
-//! Who explores, as the command line names it.
+//! Explorers of `playbot explore`, from the command line.
 
 use std::path::Path;
 
@@ -10,26 +10,26 @@ use crate::{
     cloning::check_skills, defaults::usual_experiment, error::CliError, experiment::ExperimentArgs, player::Chosen,
 };
 
-/// An explorer, and what it sees.
+/// An explorer and its observation.
 pub struct Talents {
     pub explorer: Explorer,
     pub observation_config: ObservationConfig,
 }
 
 impl Talents {
-    /// Random actions.
+    /// Returns an explorer with random actions.
     pub fn none() -> Self {
         Self { explorer: Explorer::Random, observation_config: ObservationConfig::default() }
     }
 
-    /// Skills of a model, drawn from its prior and held as long as the game's experiment says.
+    /// Skills of a model, drawn from its prior, with the skill interval of the game's experiment.
     ///
     /// # Errors
     ///
     /// The model cannot be read, or was learned for another game.
     pub fn skills(path: &Path, game: &dyn Game, games: &Games, device: DeviceKind) -> Result<Self, CliError> {
         let model = SkillModel::load(path, device)?;
-        // The game is named, so that nobody is told to name an experiment.
+        // The game is named, so that errors do not ask for an experiment.
         let named = ExperimentArgs::of_game(game.name());
         let observation_config = check_skills(path, &model, game, &named, games)?;
         let horizon = usual_experiment(game).map_or_else(ScoreConfig::default, |usual| usual.experiment.score).horizon;
@@ -37,7 +37,7 @@ impl Talents {
         Ok(Self { explorer: Explorer::skills(SkillPrior::from(&source), source.decoder), observation_config })
     }
 
-    /// The policy of a file, whose actions are drawn.
+    /// Returns the policy of a file, whose actions are drawn.
     ///
     /// # Errors
     ///

@@ -1,4 +1,4 @@
-//! The verb.
+//! Run of `playbot explore`.
 
 use std::{ops::ControlFlow, path::PathBuf};
 
@@ -23,14 +23,14 @@ use crate::{
     progress,
 };
 
-/// Find out what can be reached in a level, and how, without training.
+/// Explore a level without training: print the reachable cells and the actions that lead there.
 ///
-/// That is Go-Explore (Ecoffet et al. 2021): cells that were seldom seen are returned to by the same actions, and explored
-/// from. Cells are squares of the level where the game says where agents are, else observations that are alike. With skills
-/// or a policy these explore instead of random actions. A game that does not play the same by the same actions is told so at
-/// the first tick that differs.
+/// The method is Go-Explore (Ecoffet et al. 2021): return to seldom seen cells by the same actions, and explore from
+/// there. Cells are squares of the level where the game gives positions of agents, else observations that are alike.
+/// Skills or a policy explore instead of random actions if given. If the game does not play the same by the same
+/// actions, the first tick that differs is printed.
 ///
-/// Exit code 1 if the level has a goal and no way to it was found, or if the cell that was asked for was not reached.
+/// Exit code 1 if the level has a goal and no path to it was found, or if the cell of --cell was not reached.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot explore GAME
@@ -41,14 +41,14 @@ use crate::{
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Level, as mode:number; level 0 of the mode that `train` trains in if none is named.
+    /// Level, as mode:number (default: level 0 of the mode that `train` trains in).
     #[arg(long, value_name = "MODE:N", value_parser = one_level)]
     level: Option<LevelSplit>,
-    /// Environment steps to use, ways back included. The last visits may take some more.
+    /// Environment steps to use, including returns to known cells. The last visits may take some more.
     #[arg(long, default_value_t = 500_000, value_parser = clap::value_parser!(u64).range(1..))]
     steps: u64,
-    /// End sooner: solved (a way to the goal is found), covered (and every open cell is reached, where their number is known),
-    /// or spent (never, so that shorter ways are found).
+    /// End earlier: solved (a path to the goal is found), covered (and every open cell is reached, where their number
+    /// is known), or spent (never, to find shorter paths).
     #[arg(long, default_value_t, value_name = "WHEN")]
     until: Until,
     /// Skill model: explores with skills drawn from its prior.
@@ -57,34 +57,34 @@ pub struct Args {
     /// Policy file, as written by `playbot policy export`: explores with the policy.
     #[arg(long, value_name = "FILE", group = "explorer")]
     policy: Option<PathBuf>,
-    /// Ticks that a visit explores without finding anything new before it ends.
+    /// Ticks without anything new after which a visit ends.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
     explore_ticks: u32,
-    /// Probability with which a random action is repeated in the next tick.
+    /// Probability that a random action is repeated in the next tick.
     #[arg(long, default_value_t = 0.95)]
     sticky: f64,
-    /// Side of a cell, in the units of the level, instead of one tile; for cells of observations, the step to which values
-    /// are rounded, instead of 1/8.
+    /// Side of a cell in units of the level (default: one tile). For cells of observations, the step to which values
+    /// are rounded (default: 1/8).
     #[arg(long, value_name = "LENGTH")]
     cell_size: Option<f32>,
-    /// Visits between two updates of what is known.
+    /// Visits between two updates of the known cells.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
     batch: u32,
-    /// Seed of all that is drawn.
+    /// Random seed.
     #[arg(long, default_value_t = 0)]
     seed: u64,
     #[command(flatten)]
     compute: Compute,
-    /// Record the shortest solution, or the way to --cell, into this .demo, once it has been replayed.
+    /// Record the shortest solution, or the path to --cell, into this .demo, once it has been replayed.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Record and draw the way to this cell instead of the solution; cells are called by their numbers, such as 3,4.
+    /// Record and draw the path to this cell instead of the solution. Cells are named by their numbers, such as 3,4.
     #[arg(long, value_name = "CELL", allow_hyphen_values = true)]
     cell: Option<Cell>,
-    /// Overwrite a recording that exists.
+    /// Overwrite an existing recording.
     #[arg(long, requires = "out")]
     force: bool,
-    /// Draw the cells that were reached, and how often, on the floor plan of the level.
+    /// Draw the reached cells, and how often each was reached, on the floor plan of the level.
     #[arg(long, value_name = "FILE", value_parser = output::png)]
     png: Option<PathBuf>,
     /// One line of JSON.
@@ -118,7 +118,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
                     shown(&split)
                 ))
             };
-            let floor_plan = game.floor_plan(&split.mode, split.first).ok_or_else(missing)?;
+            let floor_plan = game.tools().levels.floor_plan(&split.mode, split.first).ok_or_else(missing)?;
             Some((PlotFile::new(path)?, floor_plan))
         }
     };
@@ -131,7 +131,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         None => exploration.solution(),
     };
     let way = way.filter(|route| !route.is_empty());
-    // Last: what was found is not lost because it cannot be written.
+    // Last, so that the result is not lost because it cannot be written.
     if let Some(recording) = recording {
         match &way {
             Some(route) => {
@@ -153,7 +153,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     })
 }
 
-/// Prints what was found, and of a cell that was asked for how soon it is reached.
+/// Prints the result, and for the cell of `--cell` how soon it is reached.
 fn print(
     summary: &ExplorationSummary,
     to_cell: Option<&(&Cell, Option<Route>)>,
@@ -178,7 +178,7 @@ fn print(
     }
 }
 
-/// The level that is named, or the first one.
+/// Returns the named level, or the first one.
 fn level(game: &dyn Game, named: Option<&LevelSplit>) -> Result<LevelSplit, CliError> {
     match named {
         None => {
@@ -216,7 +216,7 @@ fn plan(args: &Args, split: &LevelSplit, explorer: Explorer, observation_config:
     }
 }
 
-/// Explores, with a bar, until it is done or somebody presses Ctrl-C.
+/// Explores, with a progress bar, until it is done or Ctrl-C is pressed.
 fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> {
     interrupt::listen();
     let bar = progress::bar("explore", plan.steps, "steps");
@@ -238,6 +238,6 @@ fn why_nothing(cell: Option<&Cell>, is_missed: bool) -> String {
     match cell {
         Some(cell) if is_missed => format!("cell {cell} was not reached"),
         Some(cell) => format!("the level starts in cell {cell}"),
-        None => "no solution was found; with --cell the way to a cell is recorded".to_owned(),
+        None => "no solution was found; with --cell the path to a cell is recorded".to_owned(),
     }
 }

@@ -1,4 +1,4 @@
-//! What can be said of playing.
+//! Options of `playbot play`.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use crate::{player::PlayerArgs, recording::OverwriteArgs};
 A won level is followed by the next one, a lost one is played again. Every finished episode is on disk at once.
 
 Examples:
-  playbot play GAME --seed 7
+  playbot play GAME --level 7
   playbot play GAME --levels 0..63 --record my.demo
   playbot play GAME --levels 'files:levels/*.json'
   playbot play GAME --run runs/first --record mixed.demo
@@ -27,14 +27,17 @@ Examples:
 pub struct Args {
     /// Name of the game.
     pub(super) game: String,
-    /// Mode of the game; the one that `train` trains in unless the levels name one.
+    /// Mode of the game (default: that of the levels, or else the one that `train` trains in).
     #[arg(long)]
     pub(super) mode: Option<String>,
-    /// Level to begin with; the first of the levels if none is named.
+    /// Number of the level to begin with (default: the first of the levels).
+    #[arg(long, value_name = "N")]
+    pub(super) level: Option<u64>,
+    /// Random seed of the autopilot's draws (default: 0).
     #[arg(long)]
     pub(super) seed: Option<u64>,
-    /// Levels, as first..last or mode:first..last, both included, or files:pattern, such as "files:levels/*.json"; all if none
-    /// are named.
+    /// Levels, as first..last or mode:first..last, both included, or files:pattern, such as "files:levels/*.json"
+    /// (default: all).
     #[arg(long)]
     pub(super) levels: Option<String>,
     /// Recording to write.
@@ -42,10 +45,10 @@ pub struct Args {
     pub(super) record: Option<PathBuf>,
     #[command(flatten)]
     pub(super) overwrite: OverwriteArgs,
-    /// Who plays, for the recording.
+    /// Name of the player, for the recording.
     #[arg(long, default_value = "human")]
     pub(super) name: String,
-    /// Who takes over with Tab.
+    /// The autopilot, which takes over with Tab.
     #[command(flatten)]
     pub(super) autopilot: PlayerArgs,
 }

@@ -17,12 +17,13 @@ use crate::{
     error::{CliError, Outcome},
     interrupt,
     number::counted,
+    one_level::level_number,
     player::Chosen,
     program,
     window::{Autopilot, GameWindow, Playlist, WindowSetup},
 };
 
-/// Levels are numbered with 32 bits where nobody says how many there are.
+/// The last level where the game does not limit them: levels have 32 bits.
 const LAST_LEVEL: u64 = u32::MAX as u64;
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
@@ -33,7 +34,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let seed = args.seed.unwrap_or(0);
     let mut window =
         GameWindow::open(WindowSetup { game, playlist, autopilot, observation_config, seed, stop: interrupt::asked })?;
-    // Not before there is a window: a recording without one would only be in the way.
+    // Only once there is a window: a recording without one would only be in the way.
     if let Some(path) = &args.record {
         window.check_recording()?;
         window.record(args.overwrite.open(path, header)?);
@@ -59,14 +60,14 @@ fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
             "--mode and --levels name different modes: leave out --mode, or {levels}"
         )));
     }
-    let first = args.seed.unwrap_or(levels.first);
+    let first = level_number(args.level, args.seed).unwrap_or(levels.first);
     if !levels.contains(&levels.mode, first) {
-        return Err(CliError::Usage(format!("--seed {first} is none of the levels {levels}")));
+        return Err(CliError::Usage(format!("--level {first} is none of the levels {levels}")));
     }
     Ok(Playlist::new(levels, first))
 }
 
-/// Whoever takes over with Tab, and what it sees.
+/// Returns the autopilot and its observation.
 fn autopilot(game: &dyn Game, args: &Args) -> Result<(Option<Autopilot>, ObservationConfig), CliError> {
     Ok(match args.autopilot.load(game)? {
         Some(Chosen { name, player, observation_config, .. }) => (Some(Autopilot { name, player }), observation_config),
@@ -80,8 +81,8 @@ fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
 }
 
 fn announce(game: &dyn Game, args: &Args) {
-    if let Some(keys) = game.key_bindings() {
-        let zoom = if game.placement() == TickPlacement::Fixed { ", - and = zoom" } else { "" };
+    if let Some(keys) = game.tools().input.key_bindings() {
+        let zoom = if game.tools().host.placement() == TickPlacement::Fixed { ", - and = zoom" } else { "" };
         tell!("{}; R again, N next level, P pause{zoom}, Escape ends", keys.help());
     } else {
         tell!("the game's own keys and mouse; R again, N next level, P pause, Escape ends");
@@ -89,11 +90,11 @@ fn announce(game: &dyn Game, args: &Args) {
     if args.autopilot.is_named() {
         tell!("Tab hands over and takes over again");
     } else {
-        tell!("there is nobody to hand over to: name a --policy, a --run or a --bot");
+        tell!("there is no autopilot to hand over to: name a --policy, a --run or a --bot");
     }
 }
 
-/// Says where the recording is, what it holds and what can be done with it.
+/// Prints the path of the recording, its contents and the next commands.
 fn conclude(path: &Path) -> Result<Outcome, CliError> {
     let summary = DemoSummary::read(path)?;
     let file = path.display();

@@ -1,4 +1,4 @@
-//! Drawings as files.
+//! Drawings written to files.
 
 mod painter;
 mod plot_file;

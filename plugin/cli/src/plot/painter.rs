@@ -1,4 +1,4 @@
-//! Painting a drawing as pixels.
+//! Rasterising of drawings.
 
 use bevy::math::Vec2;
 use playbot_lab::drawing::{Drawing, MarkForm, Rgb, Shape};
@@ -8,14 +8,14 @@ use crate::{
     view::{film, font, screen::Screen},
 };
 
-/// Pixels of the picture to one of the drawing, so that it is sharp on any screen.
+/// Pixels of the picture per pixel of the drawing, so that it is sharp on any screen.
 const ZOOM: f32 = 2.0;
 /// Font size, in pixels of the picture, for each pixel of a letter's height.
 const LETTER: f32 = 8.5;
 /// Half of the width of an outline, in pixels of the picture.
 const OUTLINE: f32 = 1.5;
 
-/// A drawing as the bytes of a PNG.
+/// Returns a drawing as the bytes of a PNG.
 ///
 /// # Errors
 ///
@@ -58,7 +58,7 @@ fn add(screen: &mut Screen, shape: &Shape) {
     }
 }
 
-/// The pixels between two corners, as far as they are on the screen: first column and row, number of columns and rows.
+/// Returns the pixels between two corners, clipped to the screen: first column and row, number of columns and rows.
 fn window(screen: &Screen, min: Vec2, max: Vec2) -> [usize; 4] {
     let clamp = |at: f32, most: usize| at.clamp(0.0, most as f32) as usize;
     let (left, top) = (clamp(min.x.floor(), screen.width), clamp(min.y.floor(), screen.height));
@@ -70,7 +70,7 @@ fn centre_of(column: usize, row: usize) -> Vec2 {
     Vec2::new(column as f32 + 0.5, row as f32 + 0.5)
 }
 
-/// A line of a half width. Each pixel is covered as much as by the piece that is nearest to it, and painted once.
+/// Draws a line of a half width. Each pixel takes the coverage of the nearest piece, and is painted once.
 fn line(screen: &mut Screen, points: &[Vec2], half: f32, colour: Rgb, opacity: f32) {
     let bounds = points.iter().fold(None, |bounds: Option<(Vec2, Vec2)>, point| {
         let (min, max) = bounds.unwrap_or((*point, *point));
@@ -95,7 +95,7 @@ fn line(screen: &mut Screen, points: &[Vec2], half: f32, colour: Rgb, opacity: f
     }
 }
 
-/// From a point to a piece of a line.
+/// Returns the distance from a point to a piece of a line.
 fn distance(at: Vec2, from: Vec2, to: Vec2) -> f32 {
     let way = to - from;
     let along = ((at - from).dot(way) / way.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);

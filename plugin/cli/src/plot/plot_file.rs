@@ -1,4 +1,4 @@
-//! A file that a drawing is written to.
+//! An output file for a drawing.
 
 use std::path::{Path, PathBuf};
 
@@ -7,7 +7,7 @@ use playbot_lab::drawing::Drawing;
 use super::painter;
 use crate::{error::CliError, output};
 
-/// A file for a drawing, of a kind that is known.
+/// A file for a drawing, a PNG or an SVG.
 #[derive(Clone, Debug)]
 pub struct PlotFile {
     path: PathBuf,
@@ -15,8 +15,8 @@ pub struct PlotFile {
 }
 
 impl PlotFile {
-    /// A file by its path; its ending says its kind. The folder it lies in is made, and it is tried whether a file can be
-    /// written there, so that nothing is computed for one that cannot.
+    /// Takes a path whose ending is the kind. Its folder is made, and it is tested for writing, so that nothing is
+    /// computed in vain.
     ///
     /// # Errors
     ///
@@ -37,7 +37,7 @@ impl PlotFile {
         Ok(Self { path: path.to_owned(), is_svg })
     }
 
-    /// Where it is.
+    /// Returns its path.
     pub fn path(&self) -> &Path {
         &self.path
     }

@@ -1,8 +1,11 @@
-//! A finding as a picture of its last tick, or as one that moves.
+//! Pictures of a finding: its last tick, or an animation.
 
 use std::{collections::VecDeque, path::Path};
 
-use bevy_playbot::vision::{ObservationConfig, ObservationKind};
+use bevy_playbot::{
+    fault::Fault,
+    vision::{ObservationConfig, ObservationKind},
+};
 use playbot_lab::{
     findings::StoredFinding,
     game::Game,
@@ -22,21 +25,21 @@ use crate::{
     },
 };
 
-/// Most ticks that are drawn: the last ones.
+/// Most ticks to draw, counted from the end.
 const MOST_TICKS: usize = 3600;
 
-/// Which pictures are wanted.
+/// The requested pictures.
 pub struct Pictures<'a> {
     /// File for a picture of the last tick.
     pub still: Option<&'a Path>,
     /// File for an animated picture.
     pub animated: Option<&'a Path>,
-    /// How many times as large as a bot sees it.
+    /// Enlargement of the bots' picture.
     pub scale: u32,
 }
 
 impl Pictures<'_> {
-    /// Looks whether the files can be written.
+    /// Tests whether the files can be written.
     ///
     /// # Errors
     ///
@@ -76,7 +79,7 @@ impl Pictures<'_> {
         Ok(())
     }
 
-    /// Writes the level, of a finding that comes before the first tick is over, such as that nobody can solve it.
+    /// Writes the level, for a finding before the end of the first tick, such as an unsolvable level.
     fn write_level(&self, game: &dyn Game, finding: &StoredFinding) -> Result<(), CliError> {
         let why = "it was found before the first tick was over";
         let Some(level) = picture_of(game, &finding.header.mode, finding.episode.level_seed) else {
@@ -91,23 +94,23 @@ impl Pictures<'_> {
     }
 }
 
-/// A level as the game draws it; `None` if it draws none.
+/// Returns a level as the game draws it; `None` if it draws none.
 fn picture_of(game: &dyn Game, mode: &str, level: u64) -> Option<LevelPicture> {
-    let request = LevelRequest { mode: Some(mode), seed: Some(level), picture: true, ..LevelRequest::default() };
+    let request = LevelRequest { mode: Some(mode), level: Some(level), picture: true, ..LevelRequest::default() };
     game.show_level(&request).ok()?.picture
 }
 
-/// The pictures that a game has, or else its numbers.
+/// Returns the pictures that a game has, or else its numbers.
 fn seen_as(game: &dyn Game) -> ObservationConfig {
     let of = |kind| ObservationConfig { kind, ..ObservationConfig::default() };
-    if game.picture().is_some() {
+    if game.tools().pictures.picture().is_some() {
         return of(ObservationKind::Raster);
     }
     let camera = of(ObservationKind::Camera);
-    if game.has_camera() && camera.check(game).is_ok() { camera } else { of(ObservationKind::Vector) }
+    if game.tools().pictures.has_camera() && camera.check(game).is_ok() { camera } else { of(ObservationKind::Vector) }
 }
 
-/// The last ticks up to the finding. A game that breaks ends it.
+/// Plays the last ticks up to the finding. A game that breaks ends it.
 fn play(
     game: &dyn Game,
     finding: &StoredFinding,
@@ -127,7 +130,8 @@ fn play(
                 }
                 bar.inc(1);
             }
-            Ok(None) | Err(CliError::Fault(_)) => break,
+            Ok(None) => break,
+            Err(error) if error.is::<Fault>() => break,
             Err(error) => return Err(error),
         }
     }

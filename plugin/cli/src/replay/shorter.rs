@@ -1,4 +1,4 @@
-//! A finding with fewer actions, in a file of its own.
+//! Shortened findings, in files of their own.
 
 use std::path::Path;
 
@@ -9,12 +9,12 @@ use playbot_lab::{
 
 use crate::{error::CliError, interrupt, output, progress};
 
-/// Leaves out what is not needed, with a bar, and writes what remains. Its level is named as it is `stored`: it may have been
-/// found in another folder. Ctrl-C ends it with the best so far.
+/// Leaves out needless actions, with a progress bar, and writes the rest. Its level is named as in `stored`: it may
+/// have been found in another folder. Ctrl-C ends it with the best so far.
 ///
 /// # Errors
 ///
-/// The finding is not there any more, or the file cannot be written.
+/// The finding does not happen any more, or the file cannot be written.
 pub fn write_shorter(
     game: &dyn Game,
     finding: &StoredFinding,

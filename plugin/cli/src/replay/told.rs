@@ -1,4 +1,4 @@
-//! What is said of a finding that was played again.
+//! Report of a finding that was played again.
 
 use std::path::Path;
 
@@ -10,20 +10,20 @@ use crate::{
     number::counted,
 };
 
-/// A finding and what became of it.
+/// A finding and the result of its replay.
 pub struct Told<'a> {
     /// Its file.
     pub path: &'a Path,
     /// The finding as stored.
     pub finding: &'a StoredFinding,
-    /// What came of playing it again.
+    /// The result of playing it again.
     pub again: &'a Recheck,
     /// The shorter one, and its file.
     pub shorter: Option<(&'a Minimised, &'a Path)>,
 }
 
 impl Told<'_> {
-    /// Says it: as a line of JSON, or to people.
+    /// Prints it: as a line of JSON, or as text.
     ///
     /// # Errors
     ///

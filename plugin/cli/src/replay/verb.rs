@@ -1,4 +1,4 @@
-//! The verb.
+//! Run of `playbot replay`.
 
 use std::path::{Path, PathBuf};
 
@@ -19,14 +19,15 @@ use crate::{
     output, program, progress,
 };
 
-/// Findings of a folder that are named instead of it.
+/// Findings of a folder to list in the error about the folder.
 const MOST_NAMED: usize = 3;
 
-/// Play a finding again: does it still happen, and how does it look?
+/// Play a finding again: check that it still happens, and show it.
 ///
-/// Findings are files that `playbot test` writes: a level, the actions that lead there, and what was found, in which tick and
-/// with which state of the game. Detectors look as they were set when they found it. A level file that is not there as seen
-/// from the current folder is looked for in each folder above the finding. Exit code 0 if it happens again just so, 1 if not.
+/// Findings are files that `playbot test` writes. Each holds a level, the actions that lead to the finding, and what
+/// was found, with its tick and the state of the game. Detectors have the settings with which they found it. A level
+/// file that is missing as seen from the current folder is looked for in each folder above the finding. Exit code 0 if
+/// the same happens again, 1 if not.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot replay runs/test/findings/NAME.finding
@@ -42,25 +43,25 @@ pub struct Args {
     /// Write a picture of the last tick, a .png.
     #[arg(long, value_name = "FILE", value_parser = output::png)]
     png: Option<PathBuf>,
-    /// Write a moving picture of the whole way, a .png; of a very long one the last 3600 ticks.
+    /// Write an animation of all ticks, a .png (at most the last 3600 ticks).
     #[arg(long, value_name = "FILE", value_parser = output::png)]
     apng: Option<PathBuf>,
-    /// How many times as large as bots see it.
+    /// Enlargement of the bots' picture.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=32))]
     scale: u32,
-    /// Show it in a window, where you go on behind the last tick.
+    /// Show it in a window, where you play on after the last tick.
     #[arg(long)]
     window: bool,
-    /// Leave out the actions that it does not need, and write what remains to --out. Pictures then show that.
+    /// Leave out actions that it does not need, and write the shorter finding to --out. Pictures then show that one.
     #[arg(long, requires = "out")]
     minimise: bool,
     /// File for the shorter finding.
     #[arg(long, value_name = "FILE", requires = "minimise")]
     out: Option<PathBuf>,
-    /// Most replays to make it shorter.
+    /// Most replays for shortening.
     #[arg(long, default_value_t = 500, requires = "minimise", value_parser = clap::value_parser!(u32).range(1..))]
     replays: u32,
-    /// Overwrite a finding that exists.
+    /// Overwrite an existing finding.
     #[arg(long, requires = "out")]
     force: bool,
     /// One line of JSON.
@@ -101,7 +102,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(if status == FindingStatus::StillThere { Outcome::Pass } else { Outcome::Findings })
 }
 
-/// What to name instead of a folder.
+/// Returns the error of a folder, with findings in it.
 fn instead_of(folder: &Path) -> CliError {
     let found = match list_findings(folder) {
         Ok(found) => found,

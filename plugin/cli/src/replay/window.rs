@@ -1,4 +1,4 @@
-//! Showing a finding in a window.
+//! Window of a finding.
 
 use bevy_playbot::vision::ObservationConfig;
 use playbot_lab::{findings::StoredFinding, game::Game, split::LevelSplit};
@@ -9,7 +9,7 @@ use crate::{
     window::{GameWindow, Playlist, WindowError, WindowSetup},
 };
 
-/// Plays the actions in a window; behind them a person goes on.
+/// Plays the actions in a window; after them a person plays on.
 ///
 /// # Errors
 ///
@@ -28,11 +28,11 @@ pub fn show(game: &dyn Game, finding: &StoredFinding) -> Result<(), CliError> {
     .map_err(or_a_picture)?;
     window.replay(finding.episode.clone());
     interrupt::listen();
-    tell!("what was found is played first, then you go on; P pause, R again, Escape ends");
+    tell!("the finding is played first, then you play on; P pause, R again, Escape ends");
     Ok(window.run()?)
 }
 
-/// Where no window opens, pictures can still be drawn.
+/// Adds the advice to draw pictures where no window opens.
 fn or_a_picture(error: WindowError) -> CliError {
     match error {
         WindowError::NoDisplay(_) | WindowError::NoLibrary(_) | WindowError::NoAdapter(_) => {

@@ -14,16 +14,16 @@ use crate::{
     plot::PlotFile,
 };
 
-/// Levels that are printed; files have more.
+/// Most levels to print; files have all.
 const MOST_PRINTED: usize = 40;
 
-/// Hold results of a test beside recordings of people on the same levels: time, deaths and completion of each level, and how
-/// well each tester agrees with people on which levels are easy.
+/// Compare the results of a test with recordings of people on the same levels: time, deaths and completion of each
+/// level, and how well each tester agrees with people on which levels are easy.
 ///
-/// Agreement is a rank correlation over the levels, Spearman's and Kendall's, with 95 % intervals; some ten levels or more are
-/// needed for it to say anything. Episodes count that people played to their end. Each person counts once on a level: who it
-/// is, the recording says (`playbot play GAME --record my.demo --name alice`). Level files are known by what is in them,
-/// whatever they are called.
+/// Agreement is a rank correlation over the levels, Spearman's and Kendall's, with 95 % intervals. It needs some ten
+/// levels or more to be informative. Only episodes that people played to their end count. Each person counts once on a
+/// level, under the name in the recording (`playbot play GAME --record my.demo --name alice`). Level files are matched
+/// by their contents, whatever their names.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot report calibrate runs/test people.demo
@@ -48,7 +48,7 @@ pub struct Args {
     json: bool,
 }
 
-/// A page to write, as the command line names it.
+/// Parses the path of a page.
 fn page(text: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     match path.extension().and_then(|ending| ending.to_str()) {

@@ -13,8 +13,8 @@ use crate::{
     output, program, unwritten,
 };
 
-/// Make the page of results again: one file that opens without network, with a table of the levels that can be sorted and
-/// filtered, and pictures of the worst of them.
+/// Write the page of results again: one file that opens without network, with a table of the levels to sort and filter,
+/// and pictures of the worst of them.
 ///
 /// `playbot test` and `playbot report merge` write it too. Pictures need the game, in the version that was tested.
 #[derive(clap::Args)]
@@ -25,10 +25,10 @@ pub struct Args {
     /// Folder of the results.
     #[arg(value_name = "DIR")]
     results: PathBuf,
-    /// Folder of earlier results of the same version of the game: tell what has changed since.
+    /// Folder of earlier results of the same version of the game, to report changes.
     #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
-    /// File to write; report.html in the folder of the results if none is named.
+    /// File to write (default: report.html in the folder of the results).
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 }

@@ -13,7 +13,7 @@ use crate::{
     unwritten,
 };
 
-/// Joins the results of all shards of a test: the same bytes as those of the whole test.
+/// Join the results of all shards of a test into the same bytes as those of the whole test.
 ///
 /// All shards must be there once, of the same test. The exit code is that of `playbot test`.
 #[derive(clap::Args)]
@@ -27,10 +27,10 @@ pub struct Args {
     /// Folder for the joined results.
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
-    /// Folder of earlier results of the same version of the game: tell what has changed since.
+    /// Folder of earlier results of the same version of the game, to report changes.
     #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
-    /// Replace results that are there.
+    /// Replace existing results.
     #[arg(long)]
     force: bool,
     /// Print one line of JSON per level instead of a table.
@@ -50,7 +50,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let against = args.against.as_deref().map(results_folder);
     let results = Results { folder: &args.out, against, game, json: args.json };
     results.check_folders()?;
-    // Nothing is written where it turns out that nothing can be compared.
+    // Nothing is written if the comparison fails.
     if let Some(before) = results.against {
         Comparison::check(before, &record)?;
     }
@@ -60,13 +60,13 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     tell_results(&results)
 }
 
-/// Checks that the joined results take the place of nothing that is needed.
+/// Checks that the joined results do not replace needed files.
 fn check_out(args: &Args, shards: &[PathBuf]) -> Result<(), CliError> {
     let out = args.out.display();
     if args.out.is_file() {
         return Err(CliError::Usage(format!("{out} is a file: name a folder to write into")));
     }
-    // A path that is not there is no folder of a shard.
+    // A missing path is no folder of a shard.
     if let Ok(folder) = fs::canonicalize(&args.out)
         && shards.iter().any(|shard| fs::canonicalize(shard).is_ok_and(|shard| shard == folder))
     {

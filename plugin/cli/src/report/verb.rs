@@ -1,4 +1,4 @@
-//! What can be done with results of tests.
+//! The verbs below `playbot report`.
 
 use playbot_lab::games::Games;
 
@@ -20,9 +20,9 @@ pub struct Args {
 enum Verb {
     /// Join the results of all shards of a test.
     Merge(merge::Args),
-    /// Make the page of results again.
+    /// Write the page of results again.
     Html(html::Args),
-    /// Hold the results beside recordings of people.
+    /// Compare the results with recordings of people.
     Calibrate(calibrate::Args),
 }
 

@@ -20,8 +20,8 @@ use super::{
     write_plot,
 };
 
-/// Compares runs. Runs of the same experiment and algorithm with different seeds are one group, with mean and sample
-/// standard deviation; the label of a group names what sets it apart.
+/// Compare runs. Runs of the same experiment and algorithm with different seeds are one group, with mean and sample
+/// standard deviation. The label of a group names its differences from the others.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot runs compare runs/quickstart
@@ -31,11 +31,11 @@ pub struct Args {
     /// Folders of runs, or folders with runs below them.
     #[arg(required = true)]
     runs: Vec<PathBuf>,
-    /// The metric, by its TensorBoard tag; charts/success_rate if none is named.
+    /// The metric, by its TensorBoard tag (default: charts/success_rate).
     #[arg(long)]
     metric: Option<String>,
-    /// Count the steps until the metric first reaches this value; for the success rate the runs' `study.threshold`
-    /// if not given. Means over the last 100 episodes count from the 100th episode on.
+    /// Count the steps until the metric first reaches this value (default for the success rate: the runs'
+    /// `study.threshold`). Means over the last 100 episodes count from the 100th episode on.
     #[arg(long)]
     threshold: Option<f64>,
     /// Draw mean and spread over the seeds into this SVG file.
@@ -87,17 +87,17 @@ pub fn run(args: &Args) -> Result<Outcome, CliError> {
     Ok(Outcome::Pass)
 }
 
-/// Why a run may lack a metric, as far as it is known.
+/// Explains why a run may lack a metric, where known.
 fn why_not(metric: &str) -> &'static str {
     if EPISODE_MEANS.contains(&metric) { ", since no episode has ended" } else { "" }
 }
 
-/// Reads the runs at all paths, each of them once. What is damaged is left out, unless it was named itself or nothing else
-/// is there.
+/// Reads the runs at all paths, each of them once. Damaged runs are left out, unless they were named themselves or
+/// there is no other.
 fn read(paths: &[PathBuf]) -> Result<Vec<RunRecord>, CliError> {
     let (mut seen, mut runs, mut damaged) = (Vec::new(), Vec::new(), None);
     for folder in paths {
-        // What is not there is spoken of as a run, as whoever compares two of them does.
+        // A missing path counts as a run, so that the error is about a run.
         let found = if folder.is_dir() { find_runs(folder)? } else { vec![folder.clone()] };
         for path in found {
             let same = fs::canonicalize(&path).unwrap_or_else(|_| path.clone());
@@ -124,7 +124,7 @@ fn read(paths: &[PathBuf]) -> Result<Vec<RunRecord>, CliError> {
     }
 }
 
-/// The success rate whose first step the experiments of all runs look for.
+/// Returns the threshold of the success rate, if the experiments of all runs have the same.
 fn common_threshold(runs: &[RunRecord]) -> Option<f64> {
     let threshold = |run: &RunRecord| run.experiment.study.threshold;
     let first = runs.first().map(threshold)?;
@@ -155,7 +155,8 @@ fn table(metric: &str, threshold: Option<f64>, groups: &[GroupStatistics]) -> Pl
     PlainTable { caption: metric.to_owned(), columns, rows: groups.iter().map(row).collect() }
 }
 
-/// Mean and range of the steps to the threshold, how many runs never got there, and how many had too few episodes to tell.
+/// Describes mean and range of the steps to the threshold, the number of runs that did not reach it, and of those with
+/// too few episodes.
 fn reached(steps: &[Option<u64>], early: usize) -> String {
     let known: Vec<f64> = steps.iter().flatten().map(|step| *step as f64).collect();
     let (all, never) = (steps.len(), steps.len() - known.len() - early);
@@ -173,7 +174,7 @@ fn reached(steps: &[Option<u64>], early: usize) -> String {
     parts.join(", ")
 }
 
-/// What differs between the groups, where their labels do not say it.
+/// Prints the differences between the groups, where their labels do not show them.
 fn print_settings(groups: &[RunGroup]) -> Result<(), CliError> {
     for group in groups {
         let hidden = group.differing.iter().filter(|(key, value)| !group.label.contains(&format!("{key}={value}")));

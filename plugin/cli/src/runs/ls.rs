@@ -14,14 +14,14 @@ use super::super::{
     program,
 };
 
-/// The folder of runs where none is named.
+/// The default folder of runs.
 const RUNS: &str = "runs";
 
-/// Stands where there is no number.
+/// Placeholder for a missing number.
 pub const UNKNOWN: &str = "–";
 
-/// Lists the runs in a folder and the folders below it, and what is left of others that were to be replaced; exit code 1
-/// if one is damaged.
+/// List the runs in a folder and the folders below it, and the remains of replaced runs. Exit code 1 if a run is
+/// damaged.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot runs ls
@@ -30,7 +30,7 @@ pub struct Args {
     /// The folder.
     #[arg(default_value = RUNS)]
     root: PathBuf,
-    /// One line of JSON per run, and per folder that is left of one.
+    /// One line of JSON per run, and per remains of a run.
     #[arg(long)]
     json: bool,
 }
@@ -72,7 +72,7 @@ fn print_table(table: &PlainTable, damaged: &[RunsError]) -> Result<(), CliError
     Ok(())
 }
 
-/// What is no run, and what to do about it.
+/// Prints a folder that is no run, with advice.
 fn print_leftover(leftover: &Leftover, as_json: bool) -> Result<(), CliError> {
     let words = program::named(&leftover.to_string());
     if as_json {
@@ -113,7 +113,7 @@ fn row(run: &RunRecord) -> Vec<String> {
     ]
 }
 
-/// What `ls` and `show` say of a run as JSON.
+/// Returns the JSON of a run for `ls` and `show`.
 pub fn to_json(run: &RunRecord) -> Value {
     json!({
         "path": run.path,
@@ -138,12 +138,12 @@ pub fn to_json(run: &RunRecord) -> Value {
     })
 }
 
-/// Seconds since the run was last logged to.
+/// Returns the seconds since the run was last logged to.
 pub fn age_s(run: &RunRecord) -> Option<u64> {
     Some(SystemTime::now().duration_since(run.updated?).unwrap_or_default().as_secs())
 }
 
-/// Seconds in the largest unit that fits.
+/// Formats seconds in the largest unit that fits.
 pub fn duration(seconds: u64) -> String {
     match seconds {
         0..120 => format!("{seconds} s"),

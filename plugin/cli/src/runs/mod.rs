@@ -6,11 +6,11 @@ mod show;
 
 use std::path::Path;
 
-use playbot_lab::{games::Games, train::run_dir::write_atomically};
+use playbot_lab::{games::Games, sealed_file::write_atomically};
 
 use super::error::{CliError, Outcome};
 
-/// List, show and compare trainings.
+/// List, show and compare runs.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot runs ls
@@ -19,18 +19,18 @@ use super::error::{CliError, Outcome};
   playbot runs compare runs/ppo-1 runs/ppo-2 runs/score-1 runs/score-2 --metric charts/episodic_return
   tensorboard --logdir runs                        the same curves in TensorBoard (pip install tensorboard)")]
 pub struct Args {
-    /// What to do; `ls` if nothing is given.
+    /// Verb to run; `ls` if left out.
     #[command(subcommand)]
     verb: Option<Verb>,
 }
 
 #[derive(clap::Subcommand)]
 enum Verb {
-    /// List runs and how far they are.
+    /// List runs and their progress.
     Ls(ls::Args),
     /// Show the settings and the metrics of a run.
     Show(show::Args),
-    /// Compare runs: those that differ only in their seed are one group.
+    /// Compare runs. Those that differ only in their seed are one group.
     Compare(compare::Args),
 }
 
@@ -42,7 +42,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
 }
 
-/// Writes a plot, whole or not at all, and says where.
+/// Writes a plot, whole or not at all, and prints its path.
 fn write_plot(path: &Path, svg: &str) -> Result<(), CliError> {
     write_atomically(path, svg.as_bytes())?;
     tell!("plot: {}", path.display());

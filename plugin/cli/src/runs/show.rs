@@ -27,7 +27,7 @@ use super::{
 /// Characters of a curve drawn as text.
 const SPARKS: usize = 60;
 
-/// Shows in which settings a run differs from what it would be without options, its curves and all its metrics.
+/// Show the settings in which a run differs from the defaults, its curves and all its metrics.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot runs show runs/first
@@ -36,7 +36,7 @@ const SPARKS: usize = 60;
 pub struct Args {
     /// Folder of the run.
     run: PathBuf,
-    /// Metric to draw; may be given several times. Return and success rate if none is named.
+    /// Metric to draw (default: return and success rate; repeatable).
     #[arg(long)]
     metric: Vec<String>,
     /// Draw the curves into this SVG file.
@@ -73,7 +73,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
 
 type TaggedCurve<'a> = (&'a str, &'a [(u64, f64)]);
 
-/// The curves that were asked for, or return and success rate as far as they are there: no episode may have ended yet.
+/// Returns the requested curves, or return and success rate as far as they exist: perhaps no episode has ended yet.
 fn curves<'a>(run: &'a RunRecord, wanted: &'a [String]) -> Result<Vec<TaggedCurve<'a>>, CliError> {
     if !wanted.is_empty() {
         return wanted.iter().map(|tag| Ok((tag.as_str(), run.curve(tag)?))).collect();
@@ -121,7 +121,7 @@ fn print_head(run: &RunRecord, games: &Games) -> Result<(), CliError> {
     print_line("")
 }
 
-/// How good a checkpoint was in training. Before the 100th episode has ended only the log says it.
+/// Describes the rating of a checkpoint in training. Before the 100th episode has ended only the log has it.
 fn rating(summary: &CheckpointSummary, curves: &RunCurves) -> String {
     if let Some(value) = summary.episodic_return {
         return format!("return {value:.2}");
@@ -133,8 +133,8 @@ fn rating(summary: &CheckpointSummary, curves: &RunCurves) -> String {
     }
 }
 
-/// What sets an experiment apart from one that nobody changed: that of the program, that of the game, or the defaults of all
-/// keys, whichever is nearest. A run does not say which of them it was built on.
+/// Describes the changed settings of an experiment: against the program's experiment, the game's, or the defaults of
+/// all keys, whichever is nearest. A run does not note its base.
 fn describe_settings(experiment: &Experiment, games: &Games) -> String {
     let own = games.get(&experiment.game).ok().and_then(usual_experiment);
     let usual = usual_experiment(games.first()).into_iter().chain(own);
@@ -159,10 +159,11 @@ fn print_curves(curves: &[TaggedCurve]) -> Result<(), CliError> {
     if curves.is_empty() { print_line("no episode has ended yet\n") } else { print_line("") }
 }
 
-/// The first, the lowest, the highest and the last point that is a number; means over episodes begin at the 100th episode.
+/// Returns the first, the lowest, the highest and the last point that is a number; means over episodes begin at the
+/// 100th episode.
 fn extremes(curve: &[(u64, f64)]) -> Option<[(u64, f64); 4]> {
     let known = || curve.iter().copied().filter(|(_, value)| !value.is_nan());
-    // Of equal values the first one is shown.
+    // The first of equal values is shown.
     let lowest = known().reduce(|best, point| if point.1 < best.1 { point } else { best })?;
     let highest = known().reduce(|best, point| if point.1 > best.1 { point } else { best })?;
     Some([known().next()?, lowest, highest, known().next_back()?])

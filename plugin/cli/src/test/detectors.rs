@@ -1,4 +1,4 @@
-//! What looks for defects, as the command line names it.
+//! Detectors on the command line.
 
 use std::path::{Path, PathBuf};
 
@@ -16,20 +16,20 @@ use crate::{
     number::counted,
 };
 
-/// Which detectors look, and how they are set.
+/// Options for detectors and their settings.
 #[derive(clap::Args, Clone, Debug)]
 pub struct DetectorArgs {
-    /// Detectors that look beside the usual ones, separated by commas; all for all of them.
+    /// Opt-in detectors to add to the default ones, separated by commas (all for all of them).
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     detect: Vec<String>,
-    /// Usual detectors that do not look, separated by commas; all for none but those that --detect names.
+    /// Default detectors to leave out, separated by commas (all for all but those of --detect).
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     no_detect: Vec<String>,
-    /// A setting of a detector; may be given several times.
+    /// A setting of a detector (repeatable).
     #[arg(long, value_name = "NAME.KEY=VALUE")]
     detector: Vec<String>,
-    /// Ticks that levels should take, for the detectors shortcut and too-long, which look then: a .json file with the ticks of
-    /// each level by its name, or recordings, whose fastest won episodes count.
+    /// Ticks that levels should take, for the detectors shortcut and too-long, which it also switches on. It is a .json
+    /// file with the ticks of each level by its name, or recordings, whose fastest won episodes count.
     #[arg(long, value_name = "FILE")]
     par: Option<PathBuf>,
     /// List all detectors with their settings, and test nothing.
@@ -37,15 +37,16 @@ pub struct DetectorArgs {
     pub list_detectors: bool,
 }
 
-/// Detectors that ask for pars.
+/// Detectors that need par times.
 const OF_PARS: [&str; 2] = ["shortcut", "too-long"];
 
 impl DetectorArgs {
-    /// The detectors that were chosen for a test of these levels. Says which of them have pars.
+    /// Returns the detectors for a test of these levels. Reports which of them have par times.
     ///
     /// # Errors
     ///
-    /// There is no such detector or setting, a number makes no sense, or the pars cannot be read or are for other levels.
+    /// There is no such detector or setting, a number makes no sense, or the pars cannot be read or are for other
+    /// levels.
     pub fn choose(&self, game: &dyn Game, split: &LevelSplit) -> Result<Detectors, CliError> {
         let mut with = self.detect.clone();
         if self.par.is_some() {
@@ -68,7 +69,7 @@ impl DetectorArgs {
         Ok(detectors.with_pars(pars))
     }
 
-    /// All detectors of a game, with these settings: they look for findings again.
+    /// Returns all detectors of a game, with these settings, to replay findings.
     ///
     /// # Errors
     ///
@@ -78,7 +79,7 @@ impl DetectorArgs {
         Detectors::choose(game, &DetectorChoice { with, without: Vec::new(), settings })
     }
 
-    /// The checks of findings of a game. A game that lacks a detector which is set has its usual ones.
+    /// Returns the checks of findings of a game. A game without a detector that is set has its default ones.
     pub fn checks(&self, game: &dyn Game) -> Checks {
         self.all(game).map_or_else(|_| Checks::of_game(game), |all| Checks::default().with_detectors(&all))
     }
@@ -87,7 +88,7 @@ impl DetectorArgs {
     ///
     /// # Errors
     ///
-    /// None has: what the first one says.
+    /// No game has them: the error of the first game.
     pub fn check_settings(&self, games: &Games) -> Result<(), CliError> {
         if games.iter().any(|game| self.all(game).is_ok()) {
             return Ok(());
@@ -100,7 +101,7 @@ fn usage(error: &impl ToString) -> CliError {
     CliError::Usage(error.to_string())
 }
 
-/// Lists what there is for a game, a detector to a line, with its settings below it.
+/// Lists the detectors of a game, one per line, with its settings below it.
 pub fn list_detectors(game: &dyn Game, json: bool) -> Result<Outcome, CliError> {
     for (name, about) in ALWAYS {
         if json {
@@ -123,12 +124,12 @@ pub fn list_detectors(game: &dyn Game, json: bool) -> Result<Outcome, CliError> 
     Ok(Outcome::Pass)
 }
 
-/// Forgets the slow ticks of an earlier test in a folder.
+/// Deletes the slow ticks of an earlier test in a folder.
 pub fn forget_slow_ticks(folder: &Path) -> Result<(), CliError> {
     forget_timing(folder).map_err(|error| no_timing(folder, "remove", &error))
 }
 
-/// Writes the slow ticks of a test to their file, and says how many there are.
+/// Writes the slow ticks of a test to their file, and reports their number.
 pub fn tell_slow_ticks(detectors: &Detectors, folder: &Path) -> Result<(), CliError> {
     let Some(clock) = detectors.clock() else { return Ok(()) };
     let count = clock.write(folder).map_err(|error| no_timing(folder, "write", &error))?;

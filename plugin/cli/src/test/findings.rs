@@ -1,4 +1,4 @@
-//! Which findings are written while levels are tested.
+//! Options for the findings of a test.
 
 use std::path::Path;
 
@@ -10,17 +10,17 @@ use playbot_lab::{
 /// Findings as files.
 #[derive(clap::Args, Clone, Debug)]
 pub struct FindingArgs {
-    /// Leave out the actions that findings do not need, which takes up to 500 replays each; `playbot replay` does it for a
-    /// single one.
+    /// Leave out actions that findings do not need, with up to 500 replays each. `playbot replay` does it for a single
+    /// one.
     #[arg(long)]
     minimise: bool,
-    /// Also write a failed episode of each level that no tester solved, if a tester failed that leaves nothing to chance.
+    /// Also write a failed episode of each level that no tester solved, if a deterministic tester failed there.
     #[arg(long)]
     keep_failures: bool,
 }
 
 impl FindingArgs {
-    /// Where they go, and which.
+    /// Returns the folder of findings and the options for them.
     pub fn files(&self, folder: &Path, detectors: &Detectors) -> FindingFiles {
         FindingFiles {
             folder: folder.to_owned(),
@@ -30,7 +30,7 @@ impl FindingArgs {
         }
     }
 
-    /// Says why no failed episode was written, where that was asked for.
+    /// Explains a missing failed episode, where one was requested.
     pub fn tell_missing(&self, folder: &Path) {
         if self.keep_failures && list_findings(folder).is_err() {
             tell!(

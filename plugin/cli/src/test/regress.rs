@@ -1,4 +1,4 @@
-//! Playing stored findings again.
+//! Replay of stored findings.
 
 use std::path::{Path, PathBuf};
 
@@ -17,13 +17,13 @@ use crate::{
     progress,
 };
 
-/// What is asked of stored findings.
+/// Options for stored findings.
 #[derive(clap::Args, Clone, Debug)]
 pub struct RegressArgs {
-    /// Play the findings in this folder again instead, as a test or `playbot replay --minimise` has written them, and say
-    /// which are still there. Exit code 1 if one is, or cannot be played; those that are pinned in DIR/pins.ron do not count
-    /// until the day after their last. Detectors look as they were set when they found it, or as --detector sets them. Ctrl-C
-    /// ends it with what is known by then.
+    /// Play the findings in this folder again instead, as a test or `playbot replay --minimise` has written them, and
+    /// print those that still happen. Exit code 1 if one does, or cannot be played. Findings that are pinned in
+    /// DIR/pins.ron do not count until the day after their last. Detectors have the settings with which they found it,
+    /// or those of --detector. Ctrl-C ends it with the results so far.
     #[arg(
         long,
         value_name = "DIR",
@@ -33,13 +33,13 @@ pub struct RegressArgs {
         ]
     )]
     regress: Option<PathBuf>,
-    /// Day for which pins are looked up, instead of today.
+    /// Date of pins, instead of today.
     #[arg(long, value_name = "YYYY-MM-DD", requires = "regress")]
     today: Option<Date>,
 }
 
 impl RegressArgs {
-    /// Plays the findings again; `None` if nobody asked for it.
+    /// Plays the findings again; `None` without `--regress`.
     pub fn run(
         &self,
         games: &Games,

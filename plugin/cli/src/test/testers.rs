@@ -1,11 +1,12 @@
-//! Who tests, as the command line names them.
+//! Testers on the command line.
 
 use std::path::PathBuf;
 
 use bevy_playbot::policy::ActionDraw;
 use playbot_lab::{
     game::Game,
-    train::{checkpoint::CheckpointChoice, checksum::file_checksum, run_dir::RunDir},
+    sealed_file::file_checksum,
+    train::{checkpoint::CheckpointChoice, run_dir::RunDir},
     verdict::{TestedRun, Tester, TesterRecord},
 };
 use playbot_learner::DeviceKind;
@@ -20,15 +21,15 @@ use crate::{
 /// Bots, policies and runs.
 #[derive(clap::Args, Clone, Debug)]
 pub struct TesterArgs {
-    /// Bots of the game, such as random, separated by commas; a name that it does not have lists all. Its demonstrator, or
-    /// else its first bot, if nobody is named.
+    /// Bots of the game, such as random, separated by commas. An unknown name lists all. Default: the game's
+    /// demonstrator, or else its first bot.
     #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = trimmed)]
     bot: Vec<String>,
-    /// Policy file, as written by `playbot policy export`; may be given several times. Results know it by the name of the
-    /// file, or by a name in front of it, as in ppo=runs/bot.policy: under one name --against knows a file again that was moved.
+    /// Policy file, as written by `playbot policy export` (repeatable). Results have the name of the file, or a name in
+    /// front of it, as in ppo=runs/bot.policy. With such a name, --against recognises a file that was moved.
     #[arg(long, value_name = "[NAME=]FILE")]
     policy: Vec<PathBuf>,
-    /// Folder of a run; may be given several times.
+    /// Folder of a run (repeatable).
     #[arg(long, value_name = "DIR")]
     run: Vec<PathBuf>,
     /// Checkpoint of the runs: last, best (highest return in training), or its number of environment steps.
@@ -39,13 +40,14 @@ pub struct TesterArgs {
     greedy: bool,
 }
 
-/// A name without the blanks that people write behind commas.
+/// Returns a name without the blanks around it.
 fn trimmed(name: &str) -> Result<String, std::convert::Infallible> {
     Ok(name.trim().to_owned())
 }
 
 impl TesterArgs {
-    /// The testers. Policies and runs have the names of their files and folders, unless a policy is given another name.
+    /// Loads the testers. Policies and runs have the names of their files and folders, unless a policy is given another
+    /// name.
     ///
     /// # Errors
     ///
@@ -70,7 +72,7 @@ impl TesterArgs {
             check_run_of(path, &opened.experiment.game, game.name())?;
             let checkpoint = open::checkpoint(&opened.run, opened.info.algorithm, self.checkpoint)?;
             let checksum = Some(file_checksum(&checkpoint.learner_file())?);
-            // The last one may be another by now, while the run is trained.
+            // Another checkpoint may be the last one by now, while the run is trained.
             let step = checkpoint.summary.step;
             let chosen = Chosen::run(game, &opened, CheckpointChoice::Step(step), draw, device)?;
             chosen.check_fit(game)?;
@@ -96,7 +98,7 @@ fn of_bot(chosen: Chosen) -> Tester {
     Tester { record: TesterRecord::bot(name), player, observation_config }
 }
 
-/// Results could not tell two testers of one name apart.
+/// Refuses two testers of one name, which results could not keep apart.
 fn check_names<'a>(testers: impl Iterator<Item = &'a TesterRecord>) -> Result<(), CliError> {
     let mut known: Vec<&TesterRecord> = Vec::new();
     for tester in testers {

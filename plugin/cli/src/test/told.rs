@@ -1,4 +1,4 @@
-//! What is said of results, and the files that go with them.
+//! Report of results, and the files that go with them.
 
 use std::{fs, path::Path};
 
@@ -20,10 +20,10 @@ use crate::{
     program, unwritten,
 };
 
-/// Most findings whose replay is named.
+/// Most findings whose replay command is printed.
 const MOST_REPLAYS: usize = 3;
 
-/// Results, and how they are told.
+/// Results and the form of their report.
 pub struct Results<'a> {
     /// Their folder.
     pub folder: &'a Path,
@@ -31,12 +31,12 @@ pub struct Results<'a> {
     pub against: Option<&'a Path>,
     /// The game that was tested, if the program has it: it draws the levels of the report.
     pub game: Option<&'a dyn Game>,
-    /// Whether to print the levels as JSON instead of tables.
+    /// The levels are printed as JSON instead of tables.
     pub json: bool,
 }
 
 impl Results<'_> {
-    /// Checks that earlier results are not to be overwritten by those that are compared with them.
+    /// Checks that earlier results are not overwritten by those that are compared with them.
     ///
     /// # Errors
     ///
@@ -56,8 +56,8 @@ impl Results<'_> {
     }
 }
 
-/// Compares results if that is asked for, writes the files that go with them, and prints them. The outcome is what was
-/// found: in the comparison if there is one, else in the results.
+/// Compares results if requested, writes the files that go with them, and prints them. The outcome is that of the
+/// comparison if there is one, else that of the results.
 pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
     let comparison = results.against.map(|before| Comparison::read(before, results.folder)).transpose()?;
     let folder = results.folder.display();
@@ -91,7 +91,7 @@ pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
 }
 
-/// How findings of the worst levels are seen, and what else was kept.
+/// Returns the commands that show findings of the worst levels, and the list of other files.
 fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
     let findings = overview.worst.iter().flat_map(|level| &level.findings);
     let files: Vec<_> = findings.filter_map(|finding| finding.file.as_ref()).map(|file| folder.join(file)).collect();
@@ -109,7 +109,7 @@ fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
     lines
 }
 
-/// The command that shows a finding.
+/// Returns the command that shows a finding.
 fn seen_with(file: &Path) -> String {
     format!("see it: {} replay {}", program::name(), shell_word(&file.display().to_string()))
 }
@@ -135,7 +135,7 @@ fn testers(overview: &Overview) -> PlainTable {
     };
     PlainTable {
         caption: format!("{} {}", overview.record.game, overview.record.range),
-        columns: ["tester", "levels solved", "episodes solved", "places visited"].map(str::to_owned).to_vec(),
+        columns: ["tester", "levels solved", "episodes solved", "squares visited"].map(str::to_owned).to_vec(),
         rows: overview.testers.iter().map(row).collect(),
     }
 }

@@ -1,4 +1,4 @@
-//! Tests from the command line to their results.
+//! Run of `playbot test`.
 
 use std::path::PathBuf;
 
@@ -29,18 +29,18 @@ use crate::{
     progress,
 };
 
-/// Test levels: which of them bots and policies solve, and which nobody can.
+/// Test levels: report which of them bots and policies solve, and which are unsolvable.
 ///
-/// Each level is solved, or no tester solved it, or it is proved that nobody can; a game that panics or breaks its contract
-/// on a level is a finding of that level, and the others go on. DIR/results.json has every level, with 95 % intervals, and
-/// is the same on any number of threads; DIR/report.html shows it with pictures of the worst,
+/// Each level is solved, or no tester solved it, or it is proved unsolvable. A game that panics or breaks its contract
+/// on a level is a finding of that level, and the other levels go on. DIR/results.json has every level, with 95 %
+/// intervals, and is the same on any number of threads. DIR/report.html shows it with pictures of the worst,
 /// DIR/junit.xml is for build servers and DIR/summary.md for a pull request.
 ///
-/// What was found by playing is a file in DIR/findings, which `playbot replay` shows. With --regress, such files are played
-/// again instead.
+/// Each finding of an episode is a file in DIR/findings, which `playbot replay` shows. With --regress, such files are
+/// played again instead.
 ///
-/// Exit code 1 if a level was not solved or something was found; with --against, if a level is solved less often than
-/// before, can no longer be solved, or has a new finding.
+/// Exit code 1 if a level was not solved or something was found. With --against, exit code 1 if a level is solved less
+/// often than before, can no longer be solved, or has a new finding.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot test GAME --levels MODE:0..99 --out runs/test
@@ -52,10 +52,10 @@ use crate::{
   playbot test GAME --levels MODE:0..99 --par pars.json --out runs/test
   playbot test GAME --levels MODE:0..99999 --shard 0/4 --out runs/shard-0   one of four machines")]
 pub struct Args {
-    /// Name of the game; not with --regress.
+    /// Name of the game (not with --regress).
     game: Option<String>,
-    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json"; the held-out levels of the
-    /// game's experiment if none are named.
+    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json" (default: the
+    /// held-out levels of the game's experiment).
     #[arg(long)]
     levels: Option<LevelSplit>,
     #[command(flatten)]
@@ -63,22 +63,22 @@ pub struct Args {
     /// Episodes of each tester on each level.
     #[arg(long, visible_alias = "episodes-per-level", default_value = "1", value_parser = at_least_one)]
     episodes: usize,
-    /// Seed of the testers' draws.
+    /// Random seed of the testers' draws.
     #[arg(long, default_value_t = 0)]
     seed: u64,
-    /// Test only one part of the levels, as index/count, counted from 0; `playbot report merge` joins the results.
+    /// Test only one part of the levels, as index/count, counted from 0. `playbot report merge` joins the results.
     #[arg(long, value_name = "INDEX/COUNT")]
     shard: Option<Shard>,
-    /// Folder of earlier results of the same version of the game: tell what has changed since.
+    /// Folder of earlier results of the same version of the game, to report changes.
     #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
-    /// Folder for the results; not with --regress.
+    /// Folder for the results (not with --regress).
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// Go on with a test that was stopped or killed; begin it if there is none.
+    /// Go on with a test that was stopped or killed, or begin it if there is none.
     #[arg(long, conflicts_with = "force")]
     resume: bool,
-    /// Replace results that are there.
+    /// Replace existing results.
     #[arg(long)]
     force: bool,
     #[command(flatten)]
@@ -178,7 +178,7 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
     Ok(plan)
 }
 
-/// Tests what is not finished, with a progress bar.
+/// Tests the unfinished levels, with a progress bar.
 fn test(game: &dyn Game, plan: &TestPlan, folder: &mut TestFolder, files: &FindingFiles) -> Result<TestEnd, CliError> {
     let finished = folder.finished();
     let levels = plan.places().len().saturating_sub(finished.len()) as u64;

@@ -1,4 +1,4 @@
-//! What stands under a picture: tick, action, value, and the skill as bars.
+//! Caption of a picture: tick, action, value, and the skill as bars.
 
 use playbot_lab::report::readable;
 
@@ -15,21 +15,21 @@ const MARGIN: usize = 4;
 const BAR: usize = 12;
 /// The number that fills a bar. Skills are about normally distributed.
 const FULL: f32 = 3.0;
-/// Letters are enlarged so many times where there is room for it.
+/// Enlargement of letters where there is room for it.
 const ENLARGED: usize = 2;
 /// Below this width letters keep their size.
 const ROOMY: usize = 300;
-/// No picture is too narrow for its caption.
+/// Least width of a picture with a caption.
 pub const NARROWEST: usize = 160;
 
-/// Where things are in captions of a width.
+/// Positions of the parts in captions of a width.
 pub struct Caption {
     letter: usize,
     skills: usize,
 }
 
 impl Caption {
-    /// For pictures `width` pixels wide and skills of `skills` numbers.
+    /// Lays out captions of pictures `width` pixels wide and skills of `skills` numbers.
     pub fn new(width: usize, skills: usize) -> Self {
         Self { letter: if width < ROOMY { 1 } else { ENLARGED }, skills }
     }
@@ -38,7 +38,7 @@ impl Caption {
         font::HEIGHT * self.letter + MARGIN
     }
 
-    /// Pixels from top to bottom.
+    /// Returns the pixels from top to bottom.
     pub fn height(&self) -> usize {
         let bars = if self.skills > 0 { self.line() + 2 * BAR + 1 + MARGIN } else { 0 };
         MARGIN + 2 * self.line() + bars

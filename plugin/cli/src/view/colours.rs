@@ -1,4 +1,4 @@
-//! Colours of words and bars, and of the ground they stand on.
+//! Colours of words, bars and their backgrounds.
 
 use super::screen::Colour;
 
@@ -15,7 +15,7 @@ pub const DOWN: Colour = [255, 150, 80];
 mod tests {
     use super::*;
 
-    /// Relative luminance, as WCAG 2 defines it.
+    /// Returns the relative luminance, as WCAG 2 defines it.
     fn luminance(colour: Colour) -> f64 {
         let linear = colour.map(|value| {
             let share = f64::from(value) / 255.0;

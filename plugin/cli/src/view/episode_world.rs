@@ -1,4 +1,4 @@
-//! The World in which the episode is played that is shown.
+//! The World of the shown episode.
 
 use std::sync::Arc;
 
@@ -15,21 +15,21 @@ use playbot_lab::{eval::Player, game::Game, worlds::build_observing_world};
 
 use crate::error::CliError;
 
-/// What an agent saw and did in one tick.
+/// Observation and action of an agent in one tick.
 pub struct EpisodeStep {
     /// Tick of the episode, from 0.
     pub tick: u32,
-    /// What it saw, as in [`Observation::image`].
+    /// Its observation, as in [`Observation::image`].
     pub image: Vec<u8>,
-    /// What it saw in numbers.
+    /// Its observation in numbers.
     pub vector: Vec<f32>,
-    /// What it did, in words.
+    /// Its action, in words.
     pub action: String,
     /// Return that its policy expected, if it has a critic.
     pub value: Option<f32>,
-    /// The skill it followed; empty if there is none.
+    /// Its skill; empty if there is none.
     pub skill: Vec<f32>,
-    /// What it got for it.
+    /// Its reward.
     pub reward: f32,
 }
 
@@ -48,7 +48,7 @@ pub struct EpisodeWorld {
 struct End(Option<EpisodeEnded>);
 
 impl EpisodeWorld {
-    /// A level that a player plays.
+    /// Makes a World in which a player plays a level; `seed` is the random seed.
     ///
     /// # Errors
     ///
@@ -59,15 +59,16 @@ impl EpisodeWorld {
         observation_config: &ObservationConfig,
         level: u64,
         player: &Player,
+        seed: u64,
     ) -> Result<Self, CliError> {
-        let mut new = Self::new(game, mode, observation_config, level)?;
+        let mut new = Self::new(game, mode, observation_config, level, seed)?;
         let control = player.seat(game, &mut new.world, new.agent);
         player.install(&mut new.world);
         new.world.entity_mut(new.agent).insert(control);
         Ok(new)
     }
 
-    /// A recorded episode.
+    /// Makes a World that replays a recorded episode.
     ///
     /// # Errors
     ///
@@ -78,31 +79,37 @@ impl EpisodeWorld {
         observation_config: &ObservationConfig,
         episode: DemoEpisode,
     ) -> Result<Self, CliError> {
-        let mut new = Self::new(game, mode, observation_config, episode.level_seed)?;
+        let mut new = Self::new(game, mode, observation_config, episode.level_seed, 0)?;
         new.over = episode.is_empty();
         Replay::begin(Arc::new(episode), &mut new.world.entity_mut(new.agent));
         Ok(new)
     }
 
-    /// Writes no recording if the game panics: for who has one.
+    /// Writes no recording if the game panics: the caller has one.
     pub fn keep_no_panic_files(&mut self) {
         if let Some(mut reports) = self.world.get_resource_mut::<PanicReports>() {
             reports.keep_no_files();
         }
     }
 
-    fn new(game: &dyn Game, mode: &str, observation_config: &ObservationConfig, level: u64) -> Result<Self, CliError> {
-        let (mut world, agents) = build_observing_world(game, mode, observation_config, 0, 0, 1)?;
+    fn new(
+        game: &dyn Game,
+        mode: &str,
+        observation_config: &ObservationConfig,
+        level: u64,
+        seed: u64,
+    ) -> Result<Self, CliError> {
+        let (mut world, agents) = build_observing_world(game, mode, observation_config, seed, 0, 1)?;
         let agent = agents[0];
         Renewal::set_up(&mut world, |world| {
             world.init_resource::<End>();
             world.add_observer(|ended: On<EpisodeEnded>, mut end: ResMut<End>| end.0 = Some(*ended));
         });
         Renewal::carry_resource::<End>(&mut world);
-        // The sensor for pictures has taken the place of the vector, which a player may read.
+        // The sensor for pictures has replaced the vector, which a player may read.
         let vector = VectorSensor::new(game.observation().names);
         world.entity_mut(agent).insert((vector, LevelQueue::Always(level)));
-        Ok(Self { world, agent, action_names: game.action_names(), level, ticks: 0, over: false })
+        Ok(Self { world, agent, action_names: game.tools().input.action_names(), level, ticks: 0, over: false })
     }
 
     /// Plays one tick; `None` after the end.
@@ -122,7 +129,7 @@ impl EpisodeWorld {
         Ok(Some(step))
     }
 
-    /// What an agent carries after a tick is still what it acted on.
+    /// Returns the step after a tick, in which an agent still carries the observation that it acted on.
     fn step(&self) -> EpisodeStep {
         let agent = self.world.entity(self.agent);
         let by_policy = agent.get::<Control>() == Some(&Control::Policy);
@@ -132,7 +139,7 @@ impl EpisodeWorld {
             image: agent.get::<Observation>().map(|seen| seen.image.clone()).unwrap_or_default(),
             vector: agent.get::<Observation>().map(|seen| seen.vector.clone()).unwrap_or_default(),
             action: agent.get::<Action>().map(|action| self.describe(&action.0)).unwrap_or_default(),
-            // A policy without a critic says 0 to everything.
+            // A policy without a critic has the value 0 everywhere.
             value: decided.map(|decision| decision.value).filter(|value| *value != 0.0),
             skill: agent.get::<ActiveSkill>().map(|skill| skill.z.clone()).unwrap_or_default(),
             reward: agent.get::<Reward>().map_or(0.0, Reward::get),
@@ -151,22 +158,22 @@ impl EpisodeWorld {
         }
     }
 
-    /// Level that is played.
+    /// Returns the level.
     pub fn level(&self) -> u64 {
         self.level
     }
 
-    /// Ticks played so far.
+    /// Returns the ticks played so far.
     pub fn ticks(&self) -> u32 {
         self.ticks
     }
 
-    /// How the episode ended, once it has.
+    /// Returns the end of the episode, once it has ended.
     pub fn end(&self) -> Option<EpisodeEnded> {
         self.world.resource::<End>().0
     }
 
-    /// Where a recording stopped being the game.
+    /// Returns the first difference of a recording from the game.
     pub fn divergence(&self) -> Option<&Divergence> {
         self.world.get::<Replay>(self.agent)?.divergence()
     }

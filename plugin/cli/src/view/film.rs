@@ -1,4 +1,4 @@
-//! Steps of an episode as PNGs: one, or many that move.
+//! Steps of an episode as PNGs, still or animated.
 
 use bevy_playbot::vision::ImageOptions;
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
@@ -15,15 +15,15 @@ use crate::error::CliError;
 /// The bytes of a file, and its width and height in pixels.
 pub type Png = (Vec<u8>, [usize; 2]);
 
-/// How the steps of an episode are drawn.
+/// The drawing of the steps of an episode.
 pub struct Film {
     content: FilmContent,
     tick_hz: f64,
 }
 
-/// What is above the captions.
+/// The part above the captions.
 enum FilmContent {
-    /// Pictures of a form, enlarged so many times.
+    /// Pictures of a form, and their enlargement.
     Pictures(ImageOptions, usize),
     Numbers(Numbers),
 }
@@ -46,7 +46,8 @@ impl Film {
         Self { content: FilmContent::Numbers(numbers), tick_hz }
     }
 
-    /// One observation ([`Observation::image`](bevy_playbot::observation::Observation::image)) and nothing else; stacked pictures side by side, the oldest on the left.
+    /// Draws one observation ([`Observation::image`](bevy_playbot::observation::Observation::image)) and nothing else;
+    /// stacked pictures side by side, the oldest on the left.
     ///
     /// # Errors
     ///
@@ -58,7 +59,7 @@ impl Film {
         Ok((to_png(&screen)?, [width, height]))
     }
 
-    /// One step with its caption.
+    /// Draws one step with its caption.
     ///
     /// # Errors
     ///
@@ -69,7 +70,7 @@ impl Film {
         Ok((to_png(&screen)?, [screen.width, screen.height]))
     }
 
-    /// Room for any of the steps, and for what stands below it.
+    /// Returns a screen with room for any of the steps, and for the caption below it.
     fn screen(&self, steps: &[EpisodeStep]) -> Result<(Screen, Caption), CliError> {
         let [width, height] = self.size();
         let width = width.max(NARROWEST);
@@ -84,7 +85,7 @@ impl Film {
         caption.draw(screen, self.size()[1], step);
     }
 
-    /// All steps one after the other, again and again, each with its caption. `drawn` hears each that is done.
+    /// Draws all steps as an endless animation, each with its caption. `drawn` is called for each.
     ///
     /// # Errors
     ///
@@ -117,7 +118,7 @@ impl Film {
         writer.finish()
     }
 
-    /// Seconds that a tick takes, as a fraction.
+    /// Returns the seconds of a tick, as a fraction.
     fn delay(&self) -> (u16, u16) {
         if self.tick_hz.fract() == 0.0 && self.tick_hz <= f64::from(u16::MAX) {
             (1, self.tick_hz as u16)
@@ -126,7 +127,7 @@ impl Film {
         }
     }
 
-    /// Width and height of the enlarged pictures, side by side, or of the numbers.
+    /// Returns the width and height of the enlarged pictures, side by side, or of the numbers.
     fn size(&self) -> [usize; 2] {
         match &self.content {
             FilmContent::Pictures(ImageOptions { width, height, stack, .. }, scale) => {
@@ -151,7 +152,7 @@ impl Film {
     }
 }
 
-/// The bytes of a PNG file.
+/// Encodes a PNG file.
 ///
 /// # Errors
 ///

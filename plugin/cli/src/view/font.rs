@@ -1,4 +1,4 @@
-//! A font of our own, five pixels high.
+//! A built-in font, five pixels high.
 
 use super::screen::{Colour, Screen};
 
@@ -59,7 +59,7 @@ const GLYPHS: &[(char, [&str; HEIGHT])] = &[
     (' ', ["..", "..", "..", "..", ".."]),
 ];
 
-/// What stands for a letter that is not in the font.
+/// Stands for a letter that is not in the font.
 const UNKNOWN: [&str; HEIGHT] = ["###", "#.#", "#.#", "#.#", "###"];
 
 fn rows(letter: char) -> [&'static str; HEIGHT] {
@@ -67,7 +67,7 @@ fn rows(letter: char) -> [&'static str; HEIGHT] {
     GLYPHS.iter().find(|(known, _)| *known == capital).map_or(UNKNOWN, |(_, rows)| *rows)
 }
 
-/// Width of a text, pixels.
+/// Returns the width of a text, pixels.
 pub fn width(text: &str) -> usize {
     text.chars().map(|letter| rows(letter)[0].len() + 1).sum()
 }

@@ -1,4 +1,4 @@
-//! Observations that are vectors: a line for each number, with its name, a bar, and what fills the bar.
+//! Drawing of vector observations: a line for each number, with its name, a bar, and the bar's scale.
 
 use super::{
     colours::{DOWN, FAINT, UP, WORDS},
@@ -10,7 +10,7 @@ use super::{
 const MARGIN: usize = 4;
 /// Length of the bars from their middle to either side, pixels of the font.
 const BAR: usize = 48;
-/// Pictures are enlarged so many times for each time that letters are.
+/// Enlargement of pictures per enlargement of letters.
 const SCALE_PER_LETTER: u32 = 4;
 
 /// The largest magnitude of each number of an observation, over all ticks that were seen.
@@ -27,17 +27,17 @@ impl Reach {
     }
 }
 
-/// How the numbers of an observation are drawn.
+/// The drawing of the numbers of an observation.
 pub struct Numbers {
     names: Vec<String>,
-    /// For each number, what fills its bar.
+    /// The scale of each number's bar.
     reach: Vec<f32>,
     letter: usize,
 }
 
 impl Numbers {
-    /// Numbers of these names, drawn at a scale of pictures. Each has one scale for all observations that are drawn: its
-    /// bar is full at the largest magnitude of any tick, rounded up.
+    /// Numbers of these names, drawn at a scale of pictures. Each has one scale for all observations that are drawn:
+    /// its bar is full at the largest magnitude of any tick, rounded up.
     pub fn new(names: Vec<String>, scale: u32, reach: &Reach) -> Self {
         let reach = (0..names.len()).map(|number| round_up(reach.0.get(number).copied().unwrap_or(0.0))).collect();
         Self { names, reach, letter: (scale / SCALE_PER_LETTER).max(1) as usize }
@@ -47,7 +47,7 @@ impl Numbers {
         font::HEIGHT * self.letter + MARGIN
     }
 
-    /// Where the values begin, the bars, and what fills them.
+    /// Returns the columns of the values, the bars and their scales.
     fn columns(&self) -> [usize; 3] {
         let name = self.names.iter().map(|name| font::width(name)).max().unwrap_or(0);
         let value = name + font::width("  ");
@@ -55,7 +55,7 @@ impl Numbers {
         [value, bar, bar + 2 * BAR + 1 + font::width("  ")].map(|column| MARGIN + column * self.letter)
     }
 
-    /// Width and height, pixels.
+    /// Returns the width and height, pixels.
     pub fn size(&self) -> [usize; 2] {
         let [.., scales] = self.columns();
         let scale = self.reach.iter().map(|reach| font::width(&describe_scale(*reach))).max().unwrap_or(0);
@@ -79,18 +79,18 @@ impl Numbers {
     }
 }
 
-/// Short enough for its column.
+/// Formats a value for its column.
 fn describe(value: f32) -> String {
     if value.abs() < 99_999.5 { format!("{value:.3}") } else { format!("{value:.1e}") }
 }
 
-/// What fills a bar.
+/// Formats the scale of a bar.
 fn describe_scale(reach: f32) -> String {
     if (1e-3..1e5).contains(&reach) { format!("±{reach}") } else { format!("±{reach:e}") }
 }
 
-/// The next of 1, 2, 5, 10, 20, 50 and so on, larger and smaller ones too, at or above a magnitude: such scales stay as
-/// they are from one picture to the next where magnitudes differ a little. 1 for 0.
+/// Returns the next of 1, 2, 5, 10, 20, 50 and so on, larger and smaller ones too, at or above a magnitude: such scales
+/// stay as they are from one picture to the next where magnitudes differ a little. 1 for 0.
 fn round_up(largest: f32) -> f32 {
     if largest == 0.0 {
         return 1.0;

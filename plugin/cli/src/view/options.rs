@@ -6,7 +6,7 @@ use crate::error::CliError;
 
 const KEYS: [&str; 5] = ["width", "height", "stack", "grayscale", "paint_velocity"];
 
-/// Changes what `key=value` says; a switch without a value is on.
+/// Applies a `key=value`; a switch without a value is on.
 ///
 /// # Errors
 ///

@@ -1,8 +1,8 @@
-//! A picture for people, and what is drawn on it.
+//! A picture for people, with drawing operations.
 
 use crate::error::CliError;
 
-/// Most pixels of a picture, which take 384 MiB. The longest stack of the usual 64 x 64 fits at the largest scale.
+/// Most pixels of a picture, which take 384 MiB. The longest stack of the default 64 x 64 fits at the largest scale.
 const MOST_PIXELS: usize = 1 << 27;
 
 /// Red, green, blue.
@@ -18,7 +18,7 @@ pub struct Screen {
 }
 
 impl Screen {
-    /// An empty screen.
+    /// Returns an empty screen.
     ///
     /// # Errors
     ///
@@ -43,7 +43,7 @@ impl Screen {
         )))
     }
 
-    /// The pixels as bytes, row by row.
+    /// Returns the pixels as bytes, row by row.
     pub fn bytes(&self) -> &[u8] {
         self.pixels.as_flattened()
     }

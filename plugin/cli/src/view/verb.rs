@@ -1,4 +1,4 @@
-//! What is shown, of whom, and where it is written.
+//! Run of `playbot view`.
 
 use std::path::{Path, PathBuf};
 
@@ -30,17 +30,18 @@ use crate::{
     progress,
 };
 
-/// Write what a bot sees as a picture, or an episode as a moving one.
+/// Write a bot's observation as a picture, or an episode as an animation.
 ///
-/// That is a PNG: of one observation, or with --episode an animated one of a whole episode, with tick, action, value
-/// and skill under each picture. A bot that reads vectors plays on, and the picture is drawn beside it. Of a game that
-/// has a camera of its own it is what that sees; of one that cannot be drawn, the numbers. Each has a bar, and behind it,
-/// as ±, what fills the bar: the largest value of the episode, or of its ticks up to the one that is shown, rounded up.
+/// The file is a PNG: of one observation, or with --episode an animated one of a whole episode, with tick, action,
+/// value and skill under each picture. A bot that reads vectors plays on them, and the picture is drawn beside it. A
+/// game with a camera of its own is drawn through that camera. A game that cannot be drawn is shown as numbers with
+/// bars. The number behind each bar, with ±, is its scale: the largest value of the episode, or of its ticks up to the
+/// shown one, rounded up.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
-  playbot view GAME --seed 5
-  playbot view GAME --seed 5 --tick 40 --bot BOT --image stack=4
-  playbot view GAME --seed 64 --run runs/first --episode --out episode.png
+  playbot view GAME --level 5
+  playbot view GAME --level 5 --tick 40 --bot BOT --image stack=4
+  playbot view GAME --level 64 --run runs/first --episode --out episode.png
   playbot view GAME --levels files:my-level.json --episode
   playbot view GAME --demo my.demo --episode-number 3 --episode --scale 4
   playbot view GAME --image width=84 --image height=84 --image grayscale --image paint_velocity
@@ -49,12 +50,12 @@ Animated PNGs play in browsers and in most viewers of pictures.")]
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Mode of the game; the one that it is trained in, or that of the recording.
+    /// Mode of the game (default: the one that it is trained in, or that of the recording).
     #[arg(long, conflicts_with = "demo")]
     mode: Option<String>,
     #[command(flatten)]
     levels: LevelsArg,
-    /// Seed of the level; 0, or the first of the levels, if none is named.
+    /// Random seed of the player's draws (default: 0).
     #[arg(long, conflicts_with = "demo")]
     seed: Option<u64>,
     /// Tick of the episode, from 0, whose observation is written.
@@ -65,8 +66,8 @@ pub struct Args {
     episode: bool,
     #[command(flatten)]
     player: PlayerArgs,
-    /// Recording to show; without it and without a player, the game's demonstrator plays.
-    #[arg(long, value_name = "FILE", conflicts_with = "player")]
+    /// Recording to show. Without it and without a player, the game's demonstrator plays.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["player", "level"])]
     demo: Option<PathBuf>,
     /// Episode of the recording, counted from 0.
     #[arg(long, default_value_t = 0, requires = "demo")]
@@ -74,17 +75,17 @@ pub struct Args {
     /// File to write, a .png.
     #[arg(long, default_value = "view.png", value_parser = output::png)]
     out: PathBuf,
-    /// How many times as large as the bot sees it.
+    /// Enlargement of the bot's picture.
     #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=32))]
     scale: u32,
-    /// Form of the pictures, instead of the policy's own: width=84, height=84, stack=4, grayscale, paint_velocity; may
-    /// be given several times.
+    /// Form of the pictures, instead of the policy's own: width=84, height=84, stack=4, grayscale, paint_velocity
+    /// (repeatable).
     #[arg(long = "image", value_name = "KEY=VALUE")]
     image: Vec<String>,
-    /// Look through a Bevy camera instead of the raster.
+    /// Use a Bevy camera instead of the raster.
     #[arg(long)]
     camera: bool,
-    /// Print what was written as a line of JSON.
+    /// Print the written file as a line of JSON.
     #[arg(long)]
     json: bool,
 }
@@ -138,7 +139,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         None if interrupt::asked() => Ok(Outcome::Stopped),
         None => Ok(Outcome::Pass),
         Some(divergence) => {
-            tell!("from there on it is not the game that was recorded: {divergence}");
+            tell!("from there on the game differs from the recording: {divergence}");
             Ok(Outcome::Findings)
         }
     }
@@ -157,7 +158,7 @@ struct Opened {
 fn open_episode(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, CliError> {
     if let Some(path) = &args.demo {
         if args.levels.is_named() {
-            return Err(CliError::Usage("--demo says what level is shown: leave out --levels".to_owned()));
+            return Err(CliError::Usage("--demo sets the level: leave out --levels".to_owned()));
         }
         let reader = open_recording(game, path, games)?;
         let mode = reader.header().mode.clone();
@@ -175,11 +176,12 @@ fn open_episode(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, C
         None => Chosen::usual(game)?,
     };
     let observation_config = observation_config(game, args, Some(&chosen))?;
-    let episode_world = EpisodeWorld::playing(game, mode, &observation_config, level, &chosen.player)?;
+    let seed = args.levels.random_seed(args.seed);
+    let episode_world = EpisodeWorld::playing(game, mode, &observation_config, level, &chosen.player, seed)?;
     Ok(Opened { episode_world, observation_config, mode: mode.to_owned(), player: chosen.name })
 }
 
-/// A recording of this game and these rules.
+/// Opens a recording of this game and these rules.
 fn open_recording(game: &dyn Game, path: &Path, games: &Games) -> Result<DemoReader, CliError> {
     let reader = DemoReader::open(path).map_err(open::missing_recording)?;
     let (header, name) = (reader.header(), game.name());
@@ -197,19 +199,19 @@ fn open_recording(game: &dyn Game, path: &Path, games: &Games) -> Result<DemoRea
     }
 }
 
-/// Whether this build has the sensor for the camera of a game.
+/// Returns true if this build has the sensor for the camera of a game.
 fn can_look_through_camera(game: &dyn Game) -> bool {
     ObservationConfig { kind: ObservationKind::Camera, ..ObservationConfig::default() }.check(game).is_ok()
 }
 
-/// The pictures that are shown: those that the policy reads, or those that were asked for, or else those that the game
-/// has. Numbers for a game without any.
+/// Returns the form of the pictures: the policy's, or the requested one, or else the game's. Numbers for a game without
+/// pictures.
 fn observation_config(game: &dyn Game, args: &Args, chosen: Option<&Chosen>) -> Result<ObservationConfig, CliError> {
     let own = chosen.map(|chosen| chosen.observation_config).filter(ObservationConfig::is_image);
     let is_asked_for = !args.image.is_empty();
-    let kind = if game.picture().is_some() || is_asked_for && !game.has_camera() {
+    let kind = if game.tools().pictures.picture().is_some() || is_asked_for && !game.tools().pictures.has_camera() {
         ObservationKind::Raster
-    } else if game.has_camera() && (is_asked_for || can_look_through_camera(game)) {
+    } else if game.tools().pictures.has_camera() && (is_asked_for || can_look_through_camera(game)) {
         ObservationKind::Camera
     } else {
         ObservationKind::Vector
@@ -244,7 +246,7 @@ fn episode(reader: DemoReader, path: &Path, number: usize) -> Result<DemoEpisode
     )))
 }
 
-/// Plays until the tick that is asked for, or to the end; `None` after Ctrl-C before that tick.
+/// Plays until the requested tick, or to the end; `None` after Ctrl-C before that tick.
 fn play(episode_world: &mut EpisodeWorld, args: &Args) -> Result<Option<(Vec<EpisodeStep>, Reach)>, CliError> {
     interrupt::listen();
     let bar = progress::bar("play", 0, "ticks");

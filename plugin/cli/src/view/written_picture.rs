@@ -1,4 +1,4 @@
-//! What is said of a picture that was written.
+//! Report of a written picture.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::{
     number::counted,
 };
 
-/// A picture that was written, and what it shows.
+/// A written picture and its contents.
 pub struct WrittenPicture<'a> {
     /// The file.
     pub path: &'a Path,
@@ -22,7 +22,7 @@ pub struct WrittenPicture<'a> {
     pub game: &'a dyn Game,
     /// Mode that was played.
     pub mode: &'a str,
-    /// Whether somebody asked for that mode.
+    /// The mode was named on the command line.
     pub is_mode_named: bool,
     /// Level that was played.
     pub level: u64,
@@ -30,7 +30,7 @@ pub struct WrittenPicture<'a> {
     pub player: &'a str,
     /// The recording, if one was shown.
     pub demo: Option<&'a Path>,
-    /// The tick that is shown; `None` for a whole episode.
+    /// The shown tick; `None` for a whole episode.
     pub tick: Option<u32>,
     /// Number of pictures.
     pub frames: usize,
@@ -40,14 +40,14 @@ pub struct WrittenPicture<'a> {
     pub size: [usize; 2],
     /// Ticks that were played.
     pub ticks: u32,
-    /// How the episode ended, if it did.
+    /// The end of the episode, if it ended.
     pub end: Option<EpisodeEnded>,
-    /// Where a recording stopped being the game.
+    /// The first difference of a recording from the game.
     pub divergence: Option<&'a Divergence>,
 }
 
 impl WrittenPicture<'_> {
-    /// Says it: as a line of JSON on standard output, or to people.
+    /// Prints it: as a line of JSON on standard output, or as text.
     ///
     /// # Errors
     ///
@@ -95,7 +95,7 @@ impl WrittenPicture<'_> {
     }
 }
 
-/// How an episode ended, after "the episode".
+/// Describes the end of an episode, after "the episode".
 fn describe_end(ended: EpisodeEnded) -> &'static str {
     match ended.end {
         EpisodeEnd::Terminated { success: true } => "was won",

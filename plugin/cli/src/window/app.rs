@@ -1,4 +1,4 @@
-//! Putting the window together.
+//! Construction of the window's app.
 
 use std::time::Duration;
 
@@ -34,22 +34,22 @@ use super::{
 
 /// Width and height of the window at first: eleven pixels for each of the bots' 64.
 const SIDE: u32 = 704;
-/// Longest time between two frames. Frames are drawn for the eye; ticks have their own rate.
+/// Longest time between two frames. Frames have their own rate, and ticks another.
 const FRAME: Duration = Duration::from_micros(16_667);
 
-/// What is played in a window, and who plays beside the person.
+/// Setup of a window: game, levels and autopilot.
 pub struct WindowSetup<'a> {
     /// The game.
     pub game: &'a dyn Game,
     /// Its levels.
     pub playlist: Playlist,
-    /// Who takes over when the person presses Tab.
+    /// The player that takes over with Tab.
     pub autopilot: Option<Autopilot>,
-    /// What the autopilot sees.
+    /// The autopilot's observation.
     pub observation_config: ObservationConfig,
-    /// Seed of the autopilot's draws.
+    /// Random seed of the autopilot's draws.
     pub seed: u64,
-    /// Whether somebody outside the window wants it closed; asked every frame.
+    /// Returns true when the window must close; called every frame.
     pub stop: fn() -> bool,
 }
 
@@ -57,29 +57,29 @@ pub struct WindowSetup<'a> {
 pub struct GameWindow {
     app: App,
     agent: Entity,
-    /// The game in which a person's actions are not known.
+    /// The game, if a person's actions in it cannot be recorded.
     unrecorded: Option<&'static str>,
 }
 
 impl GameWindow {
-    /// Prepares the window; it is seen when it runs.
+    /// Prepares the window, which appears when it runs.
     ///
     /// # Errors
     ///
-    /// No display, nothing that can draw, or a game whose ticks are no frames, without keys or a picture.
+    /// No display, no means of drawing, or a game whose ticks are no frames, without keys or a picture.
     pub fn open(setup: WindowSetup) -> Result<Self, WindowError> {
         setup.observation_config.check(setup.game)?;
-        match setup.game.placement() {
+        match setup.game.tools().host.placement() {
             TickPlacement::Fixed => Self::with_our_camera(setup),
             TickPlacement::Frame => Self::as_it_is(setup),
         }
     }
 
-    /// A game that is drawn for us.
+    /// Builds the window of a game that this crate draws.
     fn with_our_camera(setup: WindowSetup) -> Result<Self, WindowError> {
         let WindowSetup { game, playlist, autopilot, observation_config, seed, stop } = setup;
-        let keys = game.key_bindings().ok_or(WindowError::NoKeys(game.name()))?;
-        let picture = game.picture().ok_or(VisionError::NoPicture { game: game.name() })?;
+        let keys = game.tools().input.key_bindings().ok_or(WindowError::NoKeys(game.name()))?;
+        let picture = game.tools().pictures.picture().ok_or(VisionError::NoPicture { game: game.name() })?;
         let resolution = WindowResolution::new(SIDE, SIDE);
         let window = Window { title: game.name().to_owned(), resolution, ..default() };
         let mut app = bevy_app(window, ImagePlugin::default_nearest())?;
@@ -88,13 +88,13 @@ impl GameWindow {
         set_fixed_step(&mut app, game.tick_hz());
         add_game(game, &mut app, playlist.mode(), &observation_config, seed)?;
         if !observation_config.is_image() {
-            // Those who see pictures have brought it already.
-            game.build_picture(&mut app);
+            // Sensors of pictures have added it already.
+            game.tools().pictures.build_picture(&mut app);
         }
         let agent = seat(&mut app, game, &observation_config, autopilot, playlist);
         app.world_mut().entity_mut(agent).insert(keys);
         camera::build(&mut app, picture.width);
-        let has_space_view = game.has_space_view();
+        let has_space_view = game.tools().pictures.has_space_view();
         #[cfg(feature = "view3d")]
         if has_space_view {
             super::solid::build(&mut app, game);
@@ -111,13 +111,13 @@ impl GameWindow {
         Ok(Self { app, agent, unrecorded: None })
     }
 
-    /// A game that draws itself, and whose ticks are frames: in a window like the one that it has headless.
+    /// Builds the window of a game that draws itself, and whose ticks are frames. The window is like its headless one.
     fn as_it_is(setup: WindowSetup) -> Result<Self, WindowError> {
         let WindowSetup { game, playlist, autopilot, observation_config, seed, stop } = setup;
         let window = Window {
             title: game.name().to_owned(),
             resolution: WindowResolution::new(1280, 720),
-            // Where things are may depend on it.
+            // Positions may depend on the size.
             resizable: false,
             // The frames of the game have a rate of their own.
             present_mode: PresentMode::AutoNoVsync,
@@ -128,7 +128,7 @@ impl GameWindow {
         add_game(game, &mut app, playlist.mode(), &observation_config, seed)?;
         let hz = game.tick_hz();
         set_frame_rate(&mut app, hz);
-        // Nothing but the clock starts a frame.
+        // Only the clock starts a frame.
         let wait = Duration::from_secs_f64(1.0 / hz);
         let by_the_clock = UpdateMode::Reactive {
             wait,
@@ -138,7 +138,7 @@ impl GameWindow {
         };
         set_pace(&mut app, by_the_clock, by_the_clock);
         let agent = seat(&mut app, game, &observation_config, autopilot, playlist);
-        let unrecorded = match game.key_bindings() {
+        let unrecorded = match game.tools().input.key_bindings() {
             Some(keys) => {
                 app.world_mut().entity_mut(agent).insert((keys, PressesForPeople));
                 None
@@ -151,7 +151,7 @@ impl GameWindow {
         Ok(Self { app, agent, unrecorded })
     }
 
-    /// Checks that what a person does can be recorded.
+    /// Checks that a person's actions can be recorded.
     ///
     /// # Errors
     ///
@@ -160,13 +160,13 @@ impl GameWindow {
         self.unrecorded.map_or(Ok(()), |game| Err(WindowError::NotRecorded(game)))
     }
 
-    /// Records every episode from now on, whoever decides.
+    /// Records every episode from now on, of any decider.
     pub fn record(&mut self, writer: DemoWriter) {
         self.app.insert_resource(Recorder::new(writer));
         self.app.world_mut().entity_mut(self.agent).insert(Recording::default());
     }
 
-    /// Plays this episode first. Where it ends, the person goes on.
+    /// Plays this episode first. After its end the person plays on.
     pub fn replay(&mut self, episode: DemoEpisode) {
         replayed::build(&mut self.app, self.agent, episode);
     }
@@ -185,7 +185,7 @@ impl GameWindow {
     }
 }
 
-/// The agent, under a person's control, and whoever takes over.
+/// Prepares the agent under a person's control, and the autopilot.
 fn seat(
     app: &mut App,
     game: &dyn Game,
@@ -200,12 +200,12 @@ fn seat(
     agent
 }
 
-/// When frames come, with the keyboard and without it.
+/// Sets the times of frames, with and without keyboard focus.
 fn set_pace(app: &mut App, focused_mode: UpdateMode, unfocused_mode: UpdateMode) {
     app.insert_resource(WinitSettings { focused_mode, unfocused_mode });
 }
 
-/// Bevy with a window, silent and without its own ways of stopping.
+/// Makes a Bevy app with a window, without log output and without its own ways of stopping.
 fn bevy_app(window: Window, images: ImagePlugin) -> Result<App, WindowError> {
     let no_display = std::env::var_os("DISPLAY").is_none_or(|display| display.is_empty());
     if cfg!(target_os = "linux") && no_display {

@@ -11,12 +11,12 @@ use bevy_playbot::camera::TileBorder;
 
 use super::seats::Seats;
 
-/// How far the view widens and narrows with each key, and how often.
+/// Factor of the view for each zoom key, and the most steps.
 const ZOOM_STEP: f32 = 1.25;
 const MOST_STEPS: i32 = 8;
 
 pub(super) fn build(app: &mut App, width: f32) {
-    // What lies outside a level is drawn as far as anybody can see it.
+    // Tiles outside a level are drawn as far as the view reaches.
     app.insert_resource(TileBorder(Zoom { width, steps: MOST_STEPS }.side() / 2.0))
         .insert_resource(Zoom { width, steps: 0 })
         .insert_resource(ClearColor(Color::BLACK))
@@ -24,13 +24,13 @@ pub(super) fn build(app: &mut App, width: f32) {
         .add_systems(PostUpdate, (follow, zoom, keep_square).before(TransformSystems::Propagate));
 }
 
-/// How much is seen.
+/// Size of the view.
 #[derive(Resource, Reflect)]
 #[reflect(Resource)]
 pub(super) struct Zoom {
-    /// World units that bots see from left to right.
+    /// World units of the bots' view from left to right.
     width: f32,
-    /// Keys pressed to see more.
+    /// Zoom steps out.
     steps: i32,
 }
 
@@ -40,17 +40,17 @@ impl Zoom {
         self.steps = (self.steps + 1).min(MOST_STEPS);
     }
 
-    /// Shows less, down to what bots see.
+    /// Shows less, down to the bots' view.
     pub fn closer(&mut self) {
         self.steps = (self.steps - 1).max(0);
     }
 
-    /// How many times as much is seen as at the nearest.
+    /// Returns the size of the view relative to the nearest one.
     pub fn factor(&self) -> f32 {
         (0..self.steps).fold(1.0, |factor, _| factor * ZOOM_STEP)
     }
 
-    /// World units from left to right.
+    /// Returns the world units from left to right.
     fn side(&self) -> f32 {
         self.width * self.factor()
     }
@@ -61,7 +61,7 @@ impl Zoom {
     }
 }
 
-/// Marks the camera through which the person sees the game.
+/// Marks the person's camera.
 #[derive(Component, Reflect)]
 #[reflect(Component)]
 struct WindowCamera;
@@ -72,7 +72,7 @@ fn spawn_camera(zoom: Res<Zoom>, mut commands: Commands) {
 }
 
 fn follow(seats: Res<Seats>, mut camera: ParamSet<(TransformHelper, Single<&mut Transform, With<WindowCamera>>)>) {
-    // Until the first level is drawn the agent may be nowhere.
+    // Until the first level is drawn the agent may have no position.
     let Ok(at) = camera.p0().compute_global_transform(seats.agent) else { return };
     let at = at.translation();
     let mut camera = camera.p1();
@@ -88,7 +88,7 @@ fn zoom(zoom: Res<Zoom>, mut camera: Single<&mut Projection, With<WindowCamera>>
     }
 }
 
-/// A window of any shape shows the square in its middle.
+/// Shows the square in the middle of a window of any shape.
 fn keep_square(window: Single<Ref<Window>, With<PrimaryWindow>>, mut camera: Single<&mut Camera, With<WindowCamera>>) {
     let size = window.physical_size();
     let side = size.min_element();

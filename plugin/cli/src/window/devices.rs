@@ -1,7 +1,7 @@
 //! The person's devices, kept from the game or handed on to it.
 //!
-//! Between two frames the window system writes its messages into empty lists, while those of the game are stashed. So
-//! what the person does can be told from what virtual input does, message by message.
+//! Between two frames the window system writes its messages into empty lists, while those of the game are stashed. This
+//! keeps the person's input apart from virtual input, message by message.
 
 use bevy::{
     input::{
@@ -14,17 +14,17 @@ use bevy::{
 
 use super::own_keys::OwnKeys;
 
-/// Whether the game sees the person's devices.
+/// Visibility of the person's devices for the game.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Resource)]
 pub(super) enum Devices {
     /// It sees them as they are.
     Open,
-    /// It sees nothing of them.
+    /// The game sees none of their input.
     Kept,
 }
 
-/// The messages that do not count at the moment: between frames the game's, in frames nobody's.
+/// The stashed messages: between frames the game's, in frames an empty list.
 #[derive(Resource, Reflect)]
 #[reflect(from_reflect = false)]
 struct StashedMessages<M: Message>(#[reflect(ignore)] Messages<M>);
@@ -46,7 +46,7 @@ fn add_stash<M: Message + TypePath>(app: &mut App) {
         .register_type::<StashedMessages<M>>();
 }
 
-/// At the start of a frame: reads the person's keys, and hands on what the game may see.
+/// Reads the person's keys at the start of a frame, and hands on the messages that the game may see.
 pub(super) fn take(world: &mut World) {
     let is_open = *world.resource::<Devices>() == Devices::Open;
     let keys: Vec<KeyboardInput> = lift(world);
@@ -60,7 +60,7 @@ pub(super) fn take(world: &mut World) {
             own.release(key.key_code);
         }
     }
-    // Whoever looks at another window holds no key of this one.
+    // Without focus no key of this window is held.
     if focus.iter().any(|change| !change.focused) {
         own.release_all();
     }
@@ -78,7 +78,7 @@ pub(super) fn take(world: &mut World) {
     }
 }
 
-/// At the end of a frame: makes room for what the window system writes.
+/// Makes room for the window system's messages at the end of a frame.
 pub(super) fn give_back(world: &mut World) {
     swap::<KeyboardInput>(world);
     swap::<MouseButtonInput>(world);
@@ -126,7 +126,7 @@ fn take_all<M: Message>(world: &mut World, is_open: bool) {
     hand_on(world, messages, is_open);
 }
 
-/// Whether it tells of what a person does to the game, and not to the window.
+/// Returns true if the event is input to the game, and not to the window.
 fn is_of_person(event: &WindowEvent) -> bool {
     use WindowEvent as Event;
     matches!(

@@ -1,4 +1,4 @@
-//! Ending in good order: the recording is finished before the window goes.
+//! Orderly end: the recording is finished before the window closes.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -22,7 +22,7 @@ pub(super) fn listen_in(app: &mut App, schedule: impl ScheduleLabel) {
     app.add_systems(schedule, (hear_close, end).chain());
 }
 
-/// Whether the window is to end.
+/// A request to end the window.
 #[derive(Resource, Reflect)]
 #[reflect(Component, from_reflect = false)]
 pub(super) struct Ending {
@@ -39,7 +39,7 @@ impl Ending {
     }
 }
 
-/// Why the window ended, if not because somebody wished so. Outlives the World.
+/// The error that ended the window, if it was not closed on purpose. Outlives the World.
 #[derive(Resource, Clone, Default, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone)]
@@ -50,7 +50,7 @@ impl Verdict {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
     }
 
-    /// The verdict of an app that has exited.
+    /// Returns the verdict of an app that has exited.
     pub fn take(&self, exit: AppExit) -> Result<(), WindowError> {
         match self.0.lock().unwrap_or_else(PoisonError::into_inner).take() {
             Some(error) => Err(error),

@@ -1,4 +1,4 @@
-//! Why a window does not open, or does not stay open.
+//! Errors of opening a window and of running it.
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
@@ -6,9 +6,10 @@ use std::{
 };
 
 use bevy_playbot::{demo::file::DemoFileError, fault::Fault, vision::VisionError};
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
-/// Why a window does not open, or does not stay open.
+/// An error of opening a window or of running it.
 #[derive(Debug, Error)]
 pub enum WindowError {
     /// There is no display to open a window on.
@@ -23,25 +24,25 @@ pub enum WindowError {
          libxi6 and libxkbcommon-x11-0; without them there is `playbot eval`"
     )]
     NoLibrary(String),
-    /// Nothing can draw.
+    /// No device can draw.
     #[error(
         "nothing here can draw a window ({0}): install a Vulkan driver, such as Debian's mesa-vulkan-drivers, which \
          needs no graphics card; without one there is `playbot eval`"
     )]
     NoAdapter(String),
-    /// The keyboard means nothing to the game.
+    /// The game has no keys.
     #[error(
         "{0} has no keys for a person to play with: let the game name them (`key_bindings`), or watch a bot play with \
          `playbot view {0} --episode`"
     )]
     NoKeys(&'static str),
-    /// What a person does is nothing that a recording could hold.
+    /// A person's actions in the game cannot be recorded.
     #[error(
-        "what a person does in {0} cannot be recorded, since it is not played with keys alone: leave out --record, or \
+        "a person's actions in {0} cannot be recorded, since it is not played with keys alone: leave out --record, or \
          record its bots with `playbot record`"
     )]
     NotRecorded(&'static str),
-    /// The game, or what the policy sees of it, cannot be drawn.
+    /// The game, or the policy's observation, cannot be drawn.
     #[error(transparent)]
     Vision(#[from] VisionError),
     /// The game broke its contract.
@@ -55,13 +56,18 @@ pub enum WindowError {
     Lost(String),
 }
 
-impl WindowError {
-    /// Whether the caller can put it right by calling differently or from elsewhere.
-    pub fn is_usage(&self) -> bool {
-        !matches!(self, Self::Fault(_) | Self::Recording(_) | Self::Lost(_))
+impl HasExitCode for WindowError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Fault(_) | Self::Recording(_) | Self::Lost(_) => 2,
+            // Whatever is missing, the caller can install it or call from elsewhere.
+            _ => 3,
+        }
     }
+}
 
-    /// What a panic of Bevy's plugins means. They know no other way to say that something is missing.
+impl WindowError {
+    /// Turns a panic of Bevy's plugins into an error. They have no other way to report that something is missing.
     pub(super) fn of_panic(words: String) -> Self {
         if words.contains("XOpenDisplayFailed") {
             let display = std::env::var("DISPLAY").unwrap_or_default();
@@ -80,7 +86,7 @@ impl WindowError {
     }
 }
 
-/// Runs what may panic, silently, and returns the words of the panic on one line.
+/// Runs work that may panic, silently, and returns the panic's message on one line.
 pub(super) fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     let words = Arc::new(Mutex::new(String::new()));
     let heard = words.clone();
@@ -88,7 +94,7 @@ pub(super) fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     set_hook(Box::new(move |panic| {
         let said = panic.payload_as_str().unwrap_or("no reason given");
         let mut words = heard.lock().unwrap_or_else(PoisonError::into_inner);
-        // What panics later only follows from the first.
+        // Later panics only follow from the first.
         if words.is_empty() {
             *words = said.split_whitespace().collect::<Vec<_>>().join(" ");
         }

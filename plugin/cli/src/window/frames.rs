@@ -1,7 +1,7 @@
-//! Games whose ticks are frames: each frame of the window is one, or it shows the state as it is.
+//! Windows of games whose ticks are frames: each frame of the window is one, or it shows the state as it is.
 //!
-//! The game stands still only if nothing of it runs: a frame without a tick would still move it, and a recording would
-//! know nothing of that.
+//! While the game stands still, none of its systems may run: a frame without a tick would still move it, and a
+//! recording would lack that.
 
 use bevy::{
     ecs::schedule::{ScheduleLabel, SingleThreadedExecutor},
@@ -23,7 +23,7 @@ use super::{
     title,
 };
 
-/// Everything that a frame of the window does.
+/// The schedule of a frame of the window.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct WindowFrame;
 
@@ -35,11 +35,11 @@ struct WindowStart;
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct WindowEnd;
 
-/// What a frame in which the game stands still must not miss.
+/// The systems that must run in a frame in which the game stands still.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct StandStill;
 
-/// Frames of the game in a second of its time.
+/// Frames of the game per second of its time.
 #[derive(Resource, Reflect)]
 #[reflect(Resource)]
 struct FrameRate(f64);
@@ -62,14 +62,14 @@ pub(super) fn build(app: &mut App, game: &'static str, hz: f64) {
     title::build(app, game, WindowEnd);
     let decide = TickSchedules::of(app).decide;
     app.add_systems(decide, decide_by_hand.in_set(PlaybotSystems::Decide));
-    // Virtual input and title are for the thread that the window belongs to.
+    // Virtual input and title need the window's thread.
     app.edit_schedule(WindowFrame, |schedule| {
         schedule.set_executor(SingleThreadedExecutor::new());
     });
     app.main_mut().update_schedule = Some(WindowFrame.intern());
 }
 
-/// The end of an episode is seen for a moment.
+/// Shows the end of an episode for a moment.
 fn rest(_: On<EpisodeEnded>, rate: Res<FrameRate>, mut pace: ResMut<Pace>) {
     pace.rest_in_frames(rate.0);
 }
@@ -86,7 +86,7 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
     // Tab may just have been pressed.
     choose_devices(world);
     if world.resource_mut::<Pace>().is_still_frame() {
-        // The renderer sends one message a frame, and bears no more than two that nobody has read.
+        // The renderer sends one message a frame, and holds at most two unread ones.
         if let Some(times) = world.get_resource::<TimeReceiver>() {
             let _ = times.0.try_recv();
         }
@@ -103,7 +103,7 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
     devices::give_back(world);
 }
 
-/// A person without bindings plays with the devices themselves; nobody else's game sees them.
+/// Opens the devices to the game where a person plays without bindings, and keeps them otherwise.
 fn choose_devices(world: &mut World) {
     let agent = world.resource::<Seats>().agent;
     let is_person = world.get::<Control>(agent) == Some(&Control::Human);
@@ -111,8 +111,8 @@ fn choose_devices(world: &mut World) {
     devices::set(world, if is_open { Devices::Open } else { Devices::Kept });
 }
 
-/// The keys of this frame are its action, which then presses the game's keys in the same frame. A short tap counts for one
-/// tick.
+/// Turns the keys of this frame into the action, which then presses the game's keys in the same frame. A short tap
+/// counts for one tick.
 fn decide_by_hand(keys: Res<OwnKeys>, mut agents: Query<(&Control, &KeyBindings, &Episode, &mut Action)>) {
     for (control, bindings, episode, mut action) in &mut agents {
         if *control == Control::Human && episode.is_running() {

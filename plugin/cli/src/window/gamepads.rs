@@ -1,7 +1,7 @@
-//! A person's gamepads, kept from the game while somebody else plays it.
+//! A person's gamepads, kept from the game while another decider plays it.
 //!
-//! What they do arrives within a frame, after the window's messages, and each message names its gamepad: those of virtual
-//! input are let through.
+//! Their input arrives within a frame, after the window's messages, and each message names its gamepad: those of
+//! virtual input are let through.
 
 use bevy::{
     input::{
@@ -31,7 +31,7 @@ pub(super) fn build(app: &mut App) {
         );
 }
 
-/// Gamepads that have just been taken away lie at rest, whoever holds them.
+/// Lets go of all buttons of gamepads that have just been kept away.
 fn let_go(mut gamepads: Query<&mut Gamepad, Without<VirtualGamepad>>) {
     for mut gamepad in &mut gamepads {
         gamepad.digital_mut().release_all();
@@ -46,7 +46,7 @@ type VirtualGamepads<'w, 's> = Query<'w, 's, (), With<VirtualGamepad>>;
 
 fn keep_events(events: ResMut<Messages<RawGamepadEvent>>, virtual_gamepads: VirtualGamepads) {
     keep(events, |event| match event {
-        // A game may show which gamepads are connected; only what they do is kept from it.
+        // A game may show the connected gamepads; only their input is kept from it.
         RawGamepadEvent::Connection(_) => true,
         RawGamepadEvent::Button(change) => virtual_gamepads.contains(change.gamepad),
         RawGamepadEvent::Axis(change) => virtual_gamepads.contains(change.gamepad),
@@ -61,7 +61,7 @@ fn keep_axes(events: ResMut<Messages<RawGamepadAxisChangedEvent>>, virtual_gamep
     keep(events, |change| virtual_gamepads.contains(change.gamepad));
 }
 
-/// Drops what is not let through. What came before this frame has been read.
+/// Drops messages that are not let through. Messages from before this frame have been read.
 fn keep<M: Message + Clone>(mut events: ResMut<Messages<M>>, is_let_through: impl Fn(&M) -> bool) {
     if events.iter_current_update_messages().all(&is_let_through) {
         return;
@@ -80,7 +80,7 @@ mod tests {
 
     use super::*;
 
-    /// What is done in the next frame, as a plugin would tell it: gamepad and value.
+    /// Input of the next frame, as from a plugin: gamepad and value.
     #[derive(Resource, Default)]
     struct Next(Vec<(Entity, f32)>);
 

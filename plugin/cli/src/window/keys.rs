@@ -1,4 +1,4 @@
-//! The keys that are the window's own: the game's are in its [`KeyBindings`](bevy_playbot::key_bindings::KeyBindings).
+//! The window's own keys. The game's are in its [`KeyBindings`](bevy_playbot::key_bindings::KeyBindings).
 
 use bevy::{
     ecs::schedule::{IntoScheduleConfigs, ScheduleConfigs},
@@ -22,12 +22,12 @@ pub(super) fn build(app: &mut App) {
     app.add_systems(PreUpdate, systems().after(OwnKeysRead));
 }
 
-/// What the keys do.
+/// Returns the systems of the keys.
 pub(super) fn systems() -> ScheduleConfigs<ScheduleSystem> {
     (hand_over, change_level, other_keys).into_configs()
 }
 
-/// Has V say why it does nothing, where the game could be seen in space by another build of the program.
+/// Makes V explain itself, where another build of the program has a view in space of the game.
 pub(super) fn excuse_view(app: &mut App) {
     let says = |keys: Res<OwnKeys>, mut notice: ResMut<Notice>| {
         if keys.just_pressed(KeyCode::KeyV) {
@@ -37,7 +37,7 @@ pub(super) fn excuse_view(app: &mut App) {
     app.add_systems(PreUpdate, says.after(OwnKeysRead));
 }
 
-/// Tab: the autopilot takes over, or gives back.
+/// Hands over to the autopilot and back with Tab.
 fn hand_over(
     keys: Res<OwnKeys>,
     seats: Res<Seats>,
@@ -51,14 +51,14 @@ fn hand_over(
     match seats.other(*control) {
         Some(other) => {
             *control = other;
-            // A skill that was drawn for another state says nothing about this one.
+            // A skill that was drawn for another state does not fit this one.
             skill.ticks_left = 0;
         }
-        None => notice.say("nobody to hand over to: start with --policy, --run or --bot"),
+        None => notice.say("no autopilot to hand over to: start with --policy, --run or --bot"),
     }
 }
 
-/// R plays the level again, N the next one.
+/// Plays the level again with R, the next one with N.
 fn change_level(keys: Res<OwnKeys>, mut playlist: ResMut<Playlist>, mut pace: ResMut<Pace>, mut commands: Commands) {
     let next = keys.just_pressed(KeyCode::KeyN);
     if !next && !keys.just_pressed(KeyCode::KeyR) {
@@ -84,12 +84,12 @@ fn leave_level(world: &mut World) {
     }
 }
 
-/// P pauses, plus and minus change how much is seen, Escape and Ctrl-Q end.
+/// Pauses with P, zooms with plus and minus, ends with Escape and Ctrl-Q.
 fn other_keys(keys: Res<OwnKeys>, mut pace: ResMut<Pace>, zoom: Option<ResMut<Zoom>>, mut ending: ResMut<Ending>) {
     if keys.just_pressed(KeyCode::KeyP) {
         pace.toggle_pause();
     }
-    // Games with cameras of their own know no zoom.
+    // Games with cameras of their own have no zoom.
     if let Some(mut zoom) = zoom {
         if keys.any_just_pressed([KeyCode::Minus, KeyCode::NumpadSubtract]) {
             zoom.out();

@@ -1,11 +1,12 @@
 //! A window in which a person plays, and hands over to a policy or a bot and back.
 //!
-//! The game runs as it does without a window: its rules, the recorder and the policy see fixed ticks only, so that what
-//! was recorded here replays headless. The window adds a clock, a keyboard and a camera, and with the feature `view3d` a view in
+//! The game runs as it does without a window. Its rules, the recorder and the policy see fixed ticks only, so its
+//! recordings replay headless. The window adds a clock, a keyboard and a camera. The feature `view3d` adds a view in
 //! space for games that have one.
 //!
-//! Games whose ticks are frames draw themselves, and are shown as they are. What a person does there becomes an action
-//! first, which then presses the game's keys as a bot's would: the game sees nothing that the recording does not hold.
+//! Games whose ticks are frames draw themselves, and are shown as they are. A person's keys there become an action
+//! first, which then presses the game's keys as a bot's would. The game therefore sees no input that the recording
+//! lacks.
 
 mod app;
 mod camera;

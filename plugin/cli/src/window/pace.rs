@@ -1,4 +1,4 @@
-//! When the clock stands still, and showing the state after each tick.
+//! Pauses of game time, and the picture after each tick.
 
 use std::time::Duration;
 
@@ -10,7 +10,7 @@ use bevy::{
 use bevy_playbot::{keyboard::TappedKeys, tick::Tick, vision::VisionSystems};
 use playbot_lab::prelude::*;
 
-/// How long the end of an episode stays to be seen.
+/// Time for which the end of an episode stays visible.
 const REST: Duration = Duration::from_millis(700);
 
 pub(super) fn build(app: &mut App) {
@@ -22,7 +22,7 @@ pub(super) fn build(app: &mut App) {
         .configure_sets(ObserveSchedule, (VisionSystems::Render, VisionSystems::Compose).run_if(not(only_syncing)));
 }
 
-/// Whether game time stands still.
+/// Pauses of game time.
 #[derive(Resource, Default, Reflect)]
 #[reflect(Resource)]
 pub(super) struct Pace {
@@ -44,12 +44,12 @@ impl Pace {
         *self = Self::default();
     }
 
-    /// Rests at the end of an episode, for so many frames a second.
+    /// Rests at the end of an episode, in a game of `hz` frames a second.
     pub fn rest_in_frames(&mut self, hz: f64) {
         self.rest_frames = (REST.as_secs_f64() * hz).ceil() as u32;
     }
 
-    /// Whether the game stands still in this frame, where that is decided frame by frame.
+    /// Returns true if the game stands still in this frame, for games whose ticks are frames.
     pub fn is_still_frame(&mut self) -> bool {
         if self.paused {
             return true;
@@ -59,13 +59,13 @@ impl Pace {
         rests
     }
 
-    /// Whether the person has paused.
+    /// Returns true if the person has paused.
     pub fn is_paused(&self) -> bool {
         self.paused
     }
 }
 
-/// The end of an episode is seen for a moment: its level goes when the next tick begins.
+/// Shows the end of an episode for a moment: its level goes when the next tick begins.
 fn rest(_: On<EpisodeEnded>, clock: Res<Time<Real>>, mut pace: ResMut<Pace>) {
     pace.rest_until = clock.elapsed() + REST;
 }
@@ -87,7 +87,7 @@ fn keep_pace(
     }
 }
 
-/// Set while the picture is brought up to date for people only.
+/// Set while the picture is updated for people only.
 #[derive(Resource, Default, Reflect)]
 #[reflect(Resource)]
 struct OnlySync(bool);
@@ -96,7 +96,7 @@ fn only_syncing(only: Res<OnlySync>) -> bool {
     only.0
 }
 
-/// Brings the picture up to the state after the tick. Agents look before they act; people want to see what came of it.
+/// Updates the picture to the state after the tick. Agents observe before they act; people want to see the result.
 fn show_tick(world: &mut World, mut shown: Local<Tick>) {
     let tick = *world.resource::<Tick>();
     if tick != *shown {

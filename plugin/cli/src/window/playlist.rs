@@ -1,9 +1,10 @@
-//! Which level comes next in a window.
+//! Order of the levels in a window.
 
 use bevy::prelude::*;
 use playbot_lab::prelude::*;
 
-/// The levels of a session: won ones are followed by the next, lost ones come again, and after the last comes the first.
+/// The levels of a session. A won level is followed by the next, a lost one comes again, and the first follows the
+/// last.
 #[derive(Resource, Clone, Debug, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone, Debug)]
@@ -13,13 +14,13 @@ pub struct Playlist {
 }
 
 impl Playlist {
-    /// Levels to play, beginning with one of them.
+    /// Takes levels, and the first one to play.
     pub fn new(levels: LevelSplit, first: u64) -> Self {
         let current = first.clamp(levels.first, levels.last);
         Self { levels, current }
     }
 
-    /// Mode of the levels.
+    /// Returns the mode of the levels.
     pub fn mode(&self) -> &str {
         &self.levels.mode
     }
@@ -29,7 +30,7 @@ impl Playlist {
         self.current = if self.current == self.levels.last { self.levels.first } else { self.current + 1 };
     }
 
-    /// The current level, as an agent's queue.
+    /// Returns the current level, as an agent's queue.
     pub(super) fn queue(&self) -> LevelQueue {
         LevelQueue::Always(self.current)
     }

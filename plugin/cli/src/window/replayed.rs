@@ -1,4 +1,4 @@
-//! An episode that is played again before the person plays.
+//! Replay of an episode before the person plays.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ pub(super) fn build(app: &mut App, agent: Entity, episode: DemoEpisode) {
     app.add_systems(judge, hand_over.in_set(PlaybotSystems::Reset));
 }
 
-/// Behind the last recorded tick the person goes on.
+/// Gives the person control after the last recorded tick.
 fn hand_over(mut agents: Query<(&mut Control, &Replay)>) {
     for (mut control, replay) in &mut agents {
         if *control == Control::Replay && replay.is_finished() {

@@ -1,4 +1,4 @@
-//! What came of the last episode, and what follows it.
+//! Result of the last episode, and the next level.
 
 use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
@@ -16,7 +16,7 @@ pub(super) fn build(app: &mut App) {
 pub(super) struct LastEpisode(Option<EpisodeResult>);
 
 impl LastEpisode {
-    /// How it ended, in words.
+    /// Describes its end.
     pub fn words(&self) -> Option<String> {
         let EpisodeResult { level, end, success, ticks, .. } = self.0?;
         let how = match end {
@@ -29,7 +29,7 @@ impl LastEpisode {
     }
 }
 
-/// A won level is followed by the next one, any other is played again.
+/// Plays the next level after a won one, and any other again.
 fn note_end(
     event: On<EpisodeEnded>,
     mut last: ResMut<LastEpisode>,

@@ -1,18 +1,18 @@
-//! Who may decide: the person, and whoever the person hands over to.
+//! The deciders in a window: the person, and the autopilot.
 
 use bevy::prelude::*;
 use playbot_lab::eval::Player;
 use playbot_lab::prelude::*;
 
-/// Whoever takes over from the person, and gives back.
+/// The player that takes over from the person, and gives back.
 pub struct Autopilot {
-    /// Its name, for people.
+    /// Its name in messages.
     pub name: String,
     /// A policy or a bot.
     pub player: Player,
 }
 
-/// The agent of the window and those who play it.
+/// The agent of the window and its deciders.
 #[derive(Resource, Clone, Debug, Reflect)]
 #[reflect(Resource)]
 pub(super) struct Seats {
@@ -22,7 +22,7 @@ pub(super) struct Seats {
 }
 
 impl Seats {
-    /// Prepares the agent for the autopilot; nobody decides yet.
+    /// Prepares the agent for the autopilot; no decider is set yet.
     pub fn new(game: &dyn Game, world: &mut World, agent: Entity, autopilot: Option<Autopilot>) -> Self {
         let autopilot = autopilot.map(|Autopilot { name, player }| {
             player.install(world);
@@ -31,18 +31,18 @@ impl Seats {
         Self { agent, autopilot }
     }
 
-    /// Who decides after a change; `None` if there is nobody to change with.
+    /// Returns the decider after a change; `None` without an autopilot.
     pub fn other(&self, control: Control) -> Option<Control> {
         let (_, autopilot) = self.autopilot.as_ref()?;
         Some(if control == Control::Human { *autopilot } else { Control::Human })
     }
 
-    /// Who decides, in words.
+    /// Names the decider.
     pub fn who(&self, control: Control) -> String {
         match (&self.autopilot, control) {
             (_, Control::Human) => "you play".to_owned(),
             (Some((name, autopilot)), control) if *autopilot == control => format!("{name} plays"),
-            _ => "nobody plays".to_owned(),
+            _ => "no player".to_owned(),
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A view in space for games that have one, and the key that changes between it and the view from above.
+//! A view in space for games that have one, and the key that switches between it and the view from above.
 
 use bevy::{
     camera::RenderTarget, core_pipeline::tonemapping::Tonemapping, prelude::*, transform::helper::TransformHelper,
@@ -11,13 +11,14 @@ use super::{
 };
 use playbot_lab::{game::Game, space_view::CameraFocus};
 
-/// From what it follows to the eye at the nearest zoom, metres: so steep that the wall behind an agent does not hide it.
+/// Offset of the camera from its target at the nearest zoom, metres. It is so steep that the wall behind an agent does
+/// not hide it.
 const BEHIND: Vec3 = Vec3::new(0.0, -3.2, 8.0);
-/// Share of the way to the agent that the eye makes in a second is 1 - exp(-HASTE).
+/// Speed of the camera: in a second it covers the share 1 - exp(-HASTE) of its distance to the agent.
 const HASTE: f32 = 6.0;
 
 pub(super) fn build(app: &mut App, game: &dyn Game) {
-    game.build_space_view(app);
+    game.tools().pictures.build_space_view(app);
     app.insert_resource(Solid(true))
         .insert_resource(ClearColor(Color::srgb(0.62, 0.72, 0.82)))
         .add_systems(Startup, spawn_camera)
@@ -25,12 +26,12 @@ pub(super) fn build(app: &mut App, game: &dyn Game) {
         .add_systems(PostUpdate, (choose, follow).before(TransformSystems::Propagate));
 }
 
-/// Whether the view is the one in space.
+/// The view in space is shown.
 #[derive(Resource, Reflect)]
 #[reflect(Resource)]
 struct Solid(bool);
 
-/// The camera in space, and the place it looks at.
+/// The camera in space, and its target position.
 #[derive(Component, Reflect)]
 #[reflect(Component)]
 struct SolidCamera(Option<Vec3>);
@@ -39,14 +40,14 @@ fn spawn_camera(mut commands: Commands) {
     commands.spawn((SolidCamera(None), Camera3d::default(), Tonemapping::AcesFitted, Camera { order: 1, ..default() }));
 }
 
-/// V: from above, or in space.
+/// Switches with V between the view from above and the view in space.
 fn change_view(keys: Res<OwnKeys>, mut solid: ResMut<Solid>) {
     if keys.just_pressed(KeyCode::KeyV) {
         solid.0 = !solid.0;
     }
 }
 
-/// Only one of the window's cameras draws.
+/// Lets only one of the window's cameras draw.
 fn choose(solid: Res<Solid>, mut cameras: Query<(&mut Camera, &RenderTarget, Has<SolidCamera>)>) {
     for (mut camera, target, in_space) in &mut cameras {
         let wanted = in_space == solid.0;

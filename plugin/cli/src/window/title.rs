@@ -1,4 +1,4 @@
-//! The window's title: level, tick, who plays, and how it goes.
+//! The window's title: level, tick, decider and state of the game.
 
 use std::time::Duration;
 
@@ -7,7 +7,7 @@ use playbot_lab::prelude::*;
 
 use super::{Playlist, pace::Pace, score::LastEpisode, seats::Seats};
 
-/// How long a notice is shown.
+/// Time for which a notice is shown.
 const NOTICE: Duration = Duration::from_secs(3);
 
 /// Writes the title in `schedule`.
@@ -21,7 +21,7 @@ pub(super) fn build(app: &mut App, game: &'static str, schedule: impl ScheduleLa
 #[reflect(Resource)]
 struct GameName(&'static str);
 
-/// Something the person should know now.
+/// A notice for the person.
 #[derive(Resource, Default, Reflect)]
 #[reflect(Resource)]
 pub(super) struct Notice {
@@ -45,7 +45,7 @@ fn age_notice(clock: Res<Time<Real>>, mut notice: ResMut<Notice>) {
     }
 }
 
-/// With as many decimals as it needs, at most two.
+/// Formats with as many decimals as needed, at most two.
 fn to_cents(value: f64) -> String {
     // Adding 0 takes the sign from what rounds to nothing.
     ((value * 100.0).round() / 100.0 + 0.0).to_string()
@@ -82,7 +82,7 @@ fn write_title(
     }
 }
 
-/// Hands the title on at once, in frames in which Bevy's own systems do not.
+/// Applies the title at once, in frames in which Bevy's own systems do not.
 pub(super) fn show(window: Single<(Entity, &Window), With<PrimaryWindow>>) {
     let (entity, window) = *window;
     WINIT_WINDOWS.with_borrow(|windows| {

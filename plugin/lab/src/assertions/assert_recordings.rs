@@ -17,18 +17,18 @@ use crate::{
     shell_word::shell_word,
 };
 
-/// How the program with the game is called.
+/// Name of the program with the game.
 const PROGRAM: &str = "playbot";
-/// Episodes of a recording that are told.
+/// Most episodes of a recording that a failure lists.
 const MOST_EPISODES: usize = 10;
 
-/// Asserts that a recording plays the same game again, bit for bit, or that a finding (a `.finding`) happens again in the same
-/// tick and with the same state. Of a folder that is asserted of all recordings and findings in it.
+/// Asserts that a recording replays bit for bit, or that a finding (a `.finding`) happens again in the same tick and
+/// with the same state. For a folder, this is asserted of all recordings and findings in it.
 ///
 /// # Panics
 ///
-/// It does not: the message has the first tick that differs, and the command that shows it. Or there is none, it holds no
-/// episode, is damaged, or is of another game or version.
+/// A replay differs: the message has the first tick that differs, and the command that shows it. Or the path has no
+/// recording or finding, holds no episode, is damaged, or is of another game or version.
 #[track_caller]
 pub fn assert_replays(game: &dyn Game, path: impl AsRef<Path>) {
     if let Err(message) = check_all(game, path.as_ref()) {
@@ -36,12 +36,14 @@ pub fn assert_replays(game: &dyn Game, path: impl AsRef<Path>) {
     }
 }
 
-/// Asserts that no finding in this folder happens any more, so that what was mended stays mended: `playbot test --regress`
-/// for `cargo test`. Those that are pinned in its `pins.ron` do not count up to their last day.
+/// Asserts that no finding in this folder happens any more, so that repaired defects stay repaired:
+/// `playbot test --regress` for `cargo test`. Findings that are pinned in the folder's `pins.ron` do not count up to
+/// their last day.
 ///
 /// # Panics
 ///
-/// One is still there, or cannot be played: the message has the commands that show them. Or the folder has no findings.
+/// A finding still happens or cannot be played: the message has the commands that show it. Or the folder has no
+/// findings.
 #[track_caller]
 pub fn assert_findings_gone(game: &dyn Game, folder: impl AsRef<Path>) {
     if let Err(message) = check_gone(game, folder.as_ref()) {
@@ -63,7 +65,7 @@ fn is_finding(path: &Path) -> bool {
     path.extension().is_some_and(|ending| ending == "finding")
 }
 
-/// The file, or those in the folder.
+/// Returns the file itself, or the files in the folder.
 fn files(path: &Path) -> Result<Vec<PathBuf>, String> {
     if !path.is_dir() {
         return Ok(vec![path.to_owned()]);
@@ -85,7 +87,7 @@ fn files(path: &Path) -> Result<Vec<PathBuf>, String> {
 }
 
 fn check_recording(game: &dyn Game, path: &Path) -> Result<(), String> {
-    // Errors of files name them.
+    // Errors of files already name the file.
     let report = verify_file(game, path, |_| {}).map_err(|error| match error.to_string() {
         words if words.contains(&path.display().to_string()) => words,
         words => format!("{}: {words}", path.display()),
@@ -116,7 +118,7 @@ fn check_finding(game: &dyn Game, path: &Path) -> Result<(), String> {
     Err(format!("{}: {what} ({found})\n    {}", path.display(), replay(PROGRAM, path)))
 }
 
-/// What is not as it is stored, if anything.
+/// Returns the difference between a finding and its replay, if there is one.
 fn difference(finding: &StoredFinding, again: &Recheck) -> Option<String> {
     if again.is_same(finding) {
         return None;

@@ -1,4 +1,4 @@
-//! The commands that show what is wrong with a level.
+//! The commands that reproduce a broken level.
 
 use std::path::Path;
 
@@ -9,19 +9,19 @@ use crate::{
 
 /// Commands of a program.
 pub(super) struct Commands<'a> {
-    /// How the program is called.
+    /// The command that starts the program.
     pub program: &'a str,
-    /// What was tested, without testers that the program does not know.
+    /// The test, without testers that the program does not know.
     pub record: TestRecord,
     /// Name and path of each policy.
     pub policies: Vec<(String, String)>,
 }
 
 impl Commands<'_> {
-    /// Those that play a level again: the same episodes.
+    /// Returns the commands that play the same episodes of a level again.
     pub fn again(&self, level: &LevelVerdict) -> Vec<String> {
         let mut commands = rerun_commands(self.program, &self.record, level);
-        // Findings are named with their own files, and all is run from the same folder.
+        // Findings are named with their own files, and all commands run in the same folder.
         commands
             .retain(|command| !command.starts_with(&format!("{} replay ", self.program)) && !command.starts_with('#'));
         for command in &mut commands {
@@ -32,13 +32,13 @@ impl Commands<'_> {
         commands
     }
 
-    /// The one that plays a finding again.
+    /// Returns the command that replays a finding.
     pub fn replay(&self, file: &Path) -> String {
         replay(self.program, file)
     }
 }
 
-/// The command that plays a finding again.
+/// Returns the command that replays a finding.
 pub(super) fn replay(program: &str, file: &Path) -> String {
     format!("{program} replay {}", shell_word(&file.display().to_string()))
 }

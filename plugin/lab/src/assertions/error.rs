@@ -1,4 +1,4 @@
-//! Why levels cannot be tested.
+//! Errors of a test of levels.
 
 use std::path::PathBuf;
 
@@ -11,17 +11,17 @@ use playbot_learner::FileError;
 use thiserror::Error;
 
 use crate::{
-    detectors::DetectorError, findings::FindingError, mode::ModeError, split::SplitError, train::run_dir::RunError,
+    detectors::DetectorError, findings::FindingError, mode::ModeError, sealed_file::SealedFileError, split::SplitError,
     verdict::TestError,
 };
 
-/// Levels cannot be tested at all.
+/// The reason why levels cannot be tested.
 #[derive(Debug, Error)]
 pub enum LevelTestError {
     /// The text names no levels.
     #[error(transparent)]
     Levels(#[from] SplitError),
-    /// The game has no such mode, or a level file is none of its levels.
+    /// The game has no such mode, or a level file does not fit the game.
     #[error(transparent)]
     Mode(#[from] ModeError),
     /// The game has no such bot.
@@ -35,25 +35,25 @@ pub enum LevelTestError {
     Policy(#[from] FileError),
     /// The policy's file cannot be read again.
     #[error(transparent)]
-    Checksum(#[from] RunError),
+    Checksum(#[from] SealedFileError),
     /// The policy was made for another game, or another state of it.
     #[error("{}: {misfit}", path.display())]
     Misfit {
         /// Its file.
         path: PathBuf,
-        /// What does not fit.
+        /// The difference between policy and game.
         misfit: Box<PolicyMisfit>,
     },
-    /// The policy does not say what it sees.
+    /// The policy does not name its observation.
     #[error(transparent)]
     Observation(#[from] UnknownObservation),
-    /// The game cannot be seen as the policy needs it.
+    /// The game cannot draw the picture that the policy needs.
     #[error(transparent)]
     Vision(#[from] VisionError),
     /// There is no such detector or setting.
     #[error(transparent)]
     Detector(#[from] DetectorError),
-    /// The game cannot be played, or the plan makes no sense.
+    /// The game cannot be played, or the plan is invalid.
     #[error(transparent)]
     Test(#[from] TestError),
     /// A finding cannot be written.

@@ -9,10 +9,10 @@ use crate::{
     verdict::{LevelVerdict, TestPlan, Tester},
 };
 
-/// Episodes of a tester that are tried until one is found that failed.
+/// Most episodes of a tester that are replayed to find a failed one.
 const MOST_TRIES: u32 = 16;
 
-/// What is kept of broken levels.
+/// The files that are kept of broken levels.
 pub(super) struct Evidence<'a> {
     game: &'a dyn Game,
     plan: &'a TestPlan,
@@ -21,7 +21,7 @@ pub(super) struct Evidence<'a> {
 }
 
 impl<'a> Evidence<'a> {
-    /// Files in this folder, with or without the actions that they do not need.
+    /// Creates the writer for this folder, with or without minimisation of the findings.
     pub fn new(game: &'a dyn Game, plan: &'a TestPlan, wanted: Wanted, folder: &Path, minimise: bool) -> Self {
         let files = FindingFiles {
             folder: folder.to_owned(),
@@ -32,8 +32,8 @@ impl<'a> Evidence<'a> {
         Self { game, plan, wanted, files }
     }
 
-    /// Writes what was found in a level, and names the files in it. Also returns the file of an episode that failed, if that
-    /// is what is complained about and nothing else shows it.
+    /// Writes the findings of a level, and names the files in it. Also returns the file of a failed episode, if the
+    /// assertion is about solving and no finding shows it.
     pub fn keep(&self, verdict: &mut LevelVerdict) -> Result<Option<String>, FindingError> {
         let LevelVerdict { level: name, index, testers, findings, .. } = verdict;
         let level = SeenLevel { mode: &self.plan.split.mode, level: self.plan.split.first + *index, name };
@@ -66,7 +66,7 @@ impl<'a> Evidence<'a> {
         Ok(None)
     }
 
-    /// An episode of a tester on a level.
+    /// Returns an episode of a tester on a level.
     fn played(&self, level: &str, tester: &str, episode: u32) -> Option<Played<'a>> {
         let tester = self.plan.testers.iter().find(|known| known.record.name == tester)?;
         let Tester { record, player, observation_config } = tester;

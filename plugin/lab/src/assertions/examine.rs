@@ -1,4 +1,4 @@
-//! Testing the levels of an assertion.
+//! The run of the testers over the levels of an assertion.
 
 use std::{
     collections::BTreeSet,
@@ -20,18 +20,18 @@ use crate::{
     verdict::{LevelVerdict, TestError, TestPlan, TestWatch, Tester, run_tests},
 };
 
-/// One test of a process plays at a time: each takes all cores, and two may write the same finding.
+/// Only one test of a process plays at a time: each takes all cores, and two may write the same finding.
 static PLAYING: Mutex<()> = Mutex::new(());
 
 impl LevelTest<'_> {
-    /// What the testers say of all levels.
+    /// Returns the verdicts on all levels.
     pub(super) fn all(&self) -> Result<Vec<LevelVerdict>, LevelTestError> {
         let _alone = PLAYING.lock().unwrap_or_else(PoisonError::into_inner);
         let plan = self.plan(Wanted::Nothing)?;
         self.broken(&plan, Wanted::Nothing)
     }
 
-    /// Whether the assertion holds; if not, what is wrong.
+    /// Checks whether the assertion holds, and returns the message of its failure if not.
     pub(super) fn check(&self, wanted: Wanted) -> Result<(), String> {
         match self.failure(wanted) {
             Ok(None) => Ok(()),
@@ -40,7 +40,7 @@ impl LevelTest<'_> {
         }
     }
 
-    /// What is wrong with the levels, if anything.
+    /// Returns the message of a failure, if there is one.
     fn failure(&self, wanted: Wanted) -> Result<Option<String>, LevelTestError> {
         let _alone = PLAYING.lock().unwrap_or_else(PoisonError::into_inner);
         let plan = self.plan(wanted)?;
@@ -65,7 +65,7 @@ impl LevelTest<'_> {
         Commands { program: &self.program, record, policies: policies.collect() }
     }
 
-    /// Levels of which the assertion is not true, in their order.
+    /// Returns the levels for which the assertion does not hold, in their order.
     fn broken(&self, plan: &TestPlan, wanted: Wanted) -> Result<Vec<LevelVerdict>, LevelTestError> {
         let mut broken = Vec::new();
         let mut keep = |level: LevelVerdict| -> Result<(), TestError> {
@@ -108,14 +108,14 @@ impl LevelTest<'_> {
         bots.into_iter().take(count).map(|name| Named::Bot(name.to_owned()).tester(self.game)).collect()
     }
 
-    /// The detectors that were chosen, or `determinism` alone for what is about that.
+    /// Returns the selected detectors, or `determinism` alone for [`Wanted::Deterministic`].
     fn choice(&self, wanted: Wanted) -> DetectorChoice {
         let mut choice = self.detectors.clone();
         if wanted == Wanted::Deterministic {
             choice.with.push("determinism".to_owned());
             choice.without.push("all".to_owned());
             let usual = ["determinism.every=1", "determinism.ticks=100000"].map(str::to_owned);
-            // Whatever was set comes last, and counts.
+            // Explicit settings come last, and win.
             choice.settings = usual.into_iter().chain(choice.settings).collect();
         }
         choice

@@ -1,4 +1,4 @@
-//! What is said of broken levels.
+//! Failure messages of broken levels.
 
 use std::path::{Path, PathBuf};
 
@@ -8,31 +8,31 @@ use crate::{
     verdict::{Finding, LevelVerdict, TestPlan, TesterVerdict},
 };
 
-/// Broken levels that are told with all that is known of them.
+/// Most broken levels that are listed in full.
 pub(super) const MOST_SHOWN: usize = 10;
-/// Further ones that are named.
+/// Most further levels that are named.
 const MOST_NAMED: usize = 200;
-/// Findings of a level that are told.
+/// Most findings of a level that are listed.
 const MOST_FINDINGS: usize = 5;
 
-/// What an assertion that does not hold says.
+/// The failure message of an assertion.
 pub(super) struct Failure<'a> {
     /// The assertion.
     pub wanted: Wanted,
-    /// What was tested.
+    /// The test.
     pub plan: &'a TestPlan,
     /// The broken levels, in their order.
     pub broken: &'a [LevelVerdict],
-    /// Of the first of them, an episode that failed.
+    /// For each of the first of them, an episode that failed.
     pub episodes: &'a [Option<String>],
-    /// The folder with the files that they name.
+    /// The folder that paths of files start from.
     pub folder: &'a Path,
     /// The commands.
     pub commands: Commands<'a>,
 }
 
 impl Failure<'_> {
-    /// It in words.
+    /// Returns the message.
     pub fn text(&self) -> String {
         let mut lines = vec![self.headline()];
         for (level, episode) in self.broken.iter().zip(self.episodes) {

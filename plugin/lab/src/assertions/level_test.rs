@@ -7,10 +7,11 @@ use bevy_playbot::policy::ActionDraw;
 use super::{error::LevelTestError, testers::Named, usual_folder::usual_folder, wanted::Wanted};
 use crate::{detectors::DetectorChoice, eval::Player, game::Game, parallel::default_threads, verdict::LevelVerdict};
 
-/// A test of levels, to be set up and then asserted.
+/// A test of levels: set up first, then asserted.
 ///
-/// Without [`bot`](Self::bot), [`policy`](Self::policy) and [`player`](Self::player), levels are solved by the game's
-/// demonstrator, or else its first bot, and looked at for findings by all of its bots.
+/// Testers are named with [`bot`](Self::bot), [`policy`](Self::policy) and [`player`](Self::player). Without them, the
+/// game's demonstrator or else its first bot must solve the levels, and all of its bots play when findings are
+/// asserted.
 #[derive(Clone)]
 #[must_use = "nothing is tested before something is asserted"]
 pub struct LevelTest<'a> {
@@ -28,8 +29,8 @@ pub struct LevelTest<'a> {
 }
 
 impl<'a> LevelTest<'a> {
-    /// A test of these levels, written as `MODE:first..last`, both included, or `files:levels/*.json`: one episode of each
-    /// tester on each level, with the usual detectors, on all cores.
+    /// Creates a test of these levels: `MODE:first..last`, both included, or `files:levels/*.json`. Each tester plays
+    /// one episode on each level, with the default detectors, on all cores.
     pub fn new(game: &'a dyn Game, levels: &str) -> Self {
         Self {
             game,
@@ -58,79 +59,79 @@ impl<'a> LevelTest<'a> {
         self
     }
 
-    /// Policies that are added from here on take their most probable action instead of drawing one.
+    /// Makes policies that are added from here on take their most probable action instead of drawing one.
     pub fn greedy(mut self) -> Self {
         self.draw = ActionDraw::Greedy;
         self
     }
 
-    /// Adds any player. The command line does not know it, so there are only the commands that replay files.
+    /// Adds any player. The command line does not know it, so a failure shows only the commands that replay files.
     pub fn player(mut self, name: &str, player: Player) -> Self {
         self.named.push(Named::Player { name: name.to_owned(), player });
         self
     }
 
-    /// Episodes of each tester on each level; at least 1.
+    /// Sets the episodes of each tester on each level, at least 1.
     pub fn episodes(mut self, episodes: u32) -> Self {
         self.episodes = episodes.max(1);
         self
     }
 
-    /// Seed of the testers' draws; 0 unless said otherwise.
+    /// Sets the random seed of the testers. Default: 0.
     pub fn seed(mut self, seed: u64) -> Self {
         self.seed = seed;
         self
     }
 
-    /// Lets a detector look that is not usual; `all` for all. `playbot test --detectors` lists them.
+    /// Adds an opt-in detector; `all` for all of them. `playbot test --detectors` lists them.
     pub fn detect(mut self, detector: &str) -> Self {
         self.detectors.with.push(detector.to_owned());
         self
     }
 
-    /// Leaves a usual detector out; `all` for all that are not named.
+    /// Leaves out a default detector; `all` leaves out every detector that is not named.
     pub fn without_detector(mut self, detector: &str) -> Self {
         self.detectors.without.push(detector.to_owned());
         self
     }
 
-    /// A setting of a detector, such as `stuck.ticks=200`.
+    /// Changes a setting of a detector, such as `stuck.ticks=200`.
     pub fn set_detector(mut self, setting: &str) -> Self {
         self.detectors.settings.push(setting.to_owned());
         self
     }
 
-    /// Threads, at least 1; they change no result.
+    /// Sets the number of threads, at least 1. It changes no result.
     pub fn threads(mut self, threads: usize) -> Self {
         self.threads = threads.max(1);
         self
     }
 
-    /// Folder for findings and failed episodes, which go into its `findings`.
+    /// Sets the folder for findings and failed episodes. They go into its subfolder `findings`.
     pub fn findings_in(mut self, folder: impl AsRef<Path>) -> Self {
         self.folder = folder.as_ref().to_owned();
         self
     }
 
-    /// Leaves out the actions that findings do not need, which takes up to 500 replays each.
+    /// Shortens findings: leaves out the actions that they do not need, which takes up to 500 replays each.
     pub fn minimise(mut self) -> Self {
         self.minimise = true;
         self
     }
 
-    /// How the program with the game is called in the commands that a failure shows, such as `cargo run --release --`;
-    /// `playbot` unless said otherwise.
+    /// Sets the command that starts the program in a failure's messages, such as `cargo run --release --`. Default:
+    /// `playbot`.
     pub fn program(mut self, program: &str) -> Self {
         program.clone_into(&mut self.program);
         self
     }
 
-    /// Asserts that some tester reaches the aim of each level.
+    /// Asserts that at least one tester reaches the goal of each level.
     ///
     /// # Panics
     ///
-    /// A level was not solved: the message names each, with what its testers did, the reason if it is proved that nobody
-    /// can, and the commands that show it. Or the levels cannot be tested.
+    /// A level was not solved: the message names each, with the results of its testers, the proof if it is unsolvable,
+    /// and the commands that show it. Or the levels cannot be tested.
     #[track_caller]
     pub fn assert_solvable(&self) {
         if let Err(message) = self.check(Wanted::Solvable) {
@@ -138,7 +139,7 @@ impl<'a> LevelTest<'a> {
         }
     }
 
-    /// Asserts that every tester reaches the aim of each level in every episode.
+    /// Asserts that every tester reaches the goal of each level in every episode.
     ///
     /// # Panics
     ///
@@ -150,8 +151,8 @@ impl<'a> LevelTest<'a> {
         }
     }
 
-    /// Asserts that nothing is found on any level: neither by detectors, nor a panic, nor that its aim is proved to be out of
-    /// reach.
+    /// Asserts that nothing is found on any level: no finding of a detector, no panic, and no proof that the goal is
+    /// out of reach.
     ///
     /// # Panics
     ///
@@ -163,12 +164,12 @@ impl<'a> LevelTest<'a> {
         }
     }
 
-    /// Asserts that each tester has the same episode again on each level: the detector `determinism`, alone and on every
+    /// Asserts that each tester repeats its episode on each level, with the detector `determinism` alone and on every
     /// level.
     ///
     /// # Panics
     ///
-    /// An episode was another one: the message has the first tick that differs. Or it broke, or the levels cannot be tested.
+    /// An episode differed: the message has the first tick that differs. Or it broke, or the levels cannot be tested.
     #[track_caller]
     pub fn assert_deterministic(&self) {
         if let Err(message) = self.check(Wanted::Deterministic) {
@@ -176,7 +177,7 @@ impl<'a> LevelTest<'a> {
         }
     }
 
-    /// What the testers say of all levels, in their order, for assertions of one's own. No file is written.
+    /// Returns the verdicts on all levels, in their order, for assertions of one's own. Writes no file.
     ///
     /// # Errors
     ///

@@ -36,13 +36,13 @@
 //! LevelTest::new(&walk(), "default:0..3").bot("walker").episodes(2).assert_solved();
 //! ```
 //!
-//! Levels are named as on the command line: `MODE:first..last`, both included, or `files:levels/**/*.json`, seen from the
-//! folder of the package, in which `cargo test` runs tests. A range without a level is a failure, and so is all that keeps
-//! levels from being tested.
+//! Levels are named as on the command line: `MODE:first..last`, both included, or `files:levels/**/*.json`. Paths are
+//! relative to the folder of the package, in which `cargo test` runs tests. A range without a level is a failure, and
+//! so is any other reason why levels cannot be tested.
 //!
-//! A failure names each broken level with what is wrong with it, and the commands that show it. Failed episodes and what
-//! was found are written below `target/playbot-findings`, so that `playbot replay` shows them; `playbot` stands for the
-//! program with the game.
+//! A failure names each broken level with its defect, and the commands that show it. Failed episodes and findings are
+//! written below `target/playbot-findings`, so that `playbot replay` shows them; `playbot` stands for the program with
+//! the game.
 
 mod assert_levels;
 mod assert_recordings;

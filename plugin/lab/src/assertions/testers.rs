@@ -1,4 +1,4 @@
-//! Who plays the levels of an assertion.
+//! The testers of an assertion.
 
 use std::path::{Path, PathBuf};
 
@@ -14,12 +14,12 @@ use super::error::LevelTestError;
 use crate::{
     eval::{Player, blind_bots},
     game::Game,
+    sealed_file::file_checksum,
     sensors::GameSensors,
-    train::checksum::file_checksum,
     verdict::{Tester, TesterRecord},
 };
 
-/// Somebody who is named.
+/// A tester by its name.
 #[derive(Clone)]
 #[allow(clippy::large_enum_variant, reason = "a few per test")]
 pub(super) enum Named {
@@ -32,7 +32,7 @@ pub(super) enum Named {
 }
 
 impl Named {
-    /// Prepares it for the game.
+    /// Prepares the tester for the game.
     pub fn tester(&self, game: &dyn Game) -> Result<Tester, LevelTestError> {
         match self {
             Self::Bot(name) => Ok(of_player(name, bot(game, name)?)),
@@ -41,7 +41,7 @@ impl Named {
         }
     }
 
-    /// Its name, if the command line does not know it.
+    /// Returns the tester's name, if the command line does not know it.
     pub fn own_name(&self) -> Option<&str> {
         match self {
             Self::Player { name, .. } => Some(name),
@@ -50,14 +50,14 @@ impl Named {
     }
 }
 
-/// Names of all bots of a game, the demonstrator first.
+/// Returns the names of all bots of a game, the demonstrator first.
 pub(super) fn bot_names(game: &dyn Game) -> Vec<&'static str> {
     let blind = blind_bots(game).into_iter().map(|(name, _)| name);
-    game.demonstrator().into_iter().chain(blind).collect()
+    game.tools().bots.demonstrator().into_iter().chain(blind).collect()
 }
 
 fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
-    if game.demonstrator() == Some(name) {
+    if game.tools().bots.demonstrator() == Some(name) {
         return Ok(Player::Demonstrator);
     }
     let found = blind_bots(game).into_iter().find(|(bot, _)| *bot == name);

@@ -1,21 +1,21 @@
-//! Where findings go if nobody says so.
+//! The default folder of findings.
 
 use std::{
     env,
     path::{Path, PathBuf},
 };
 
-/// The folder for the findings of a game: `target/playbot-findings` and its name.
+/// Returns the folder for the findings of a game: `target/playbot-findings/` and the game's name.
 pub(super) fn usual_folder(game: &str) -> PathBuf {
     let program = env::current_exe().ok();
     let target = program.as_deref().and_then(target_of).map(Path::to_owned);
     let target = target.or_else(|| env::var_os("CARGO_TARGET_DIR").map(PathBuf::from));
     let folder = target.unwrap_or_else(|| "target".into()).join("playbot-findings").join(game);
-    // Commands are called from other folders, too.
+    // Commands may be called from other folders.
     std::path::absolute(&folder).unwrap_or(folder)
 }
 
-/// The folder that cargo has built a program into: the one above it that cargo has marked as what may be built again.
+/// Returns the folder that cargo built a program into: the ancestor that cargo marks as a cache.
 fn target_of(program: &Path) -> Option<&Path> {
     program.ancestors().skip(1).find(|folder| folder.join("CACHEDIR.TAG").is_file())
 }

@@ -1,27 +1,27 @@
-//! What is asserted of levels.
+//! The assertions about levels.
 
 use crate::verdict::{LevelOutcome, LevelVerdict};
 
-/// The finding that an aim is out of reach, which says nothing of how a game plays.
+/// The finding that a goal is out of reach. It says nothing about determinism.
 const UNREACHABLE: &str = "unreachable-goal";
 
 /// An assertion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Wanted {
-    /// Some tester reaches the aim.
+    /// At least one tester reaches the goal.
     Solvable,
-    /// Every tester reaches the aim in every episode.
+    /// Every tester reaches the goal in every episode.
     Solved,
     /// Nothing is found.
     NoFindings,
     /// Episodes are the same again.
     Deterministic,
-    /// Nothing: whoever asks looks for himself.
+    /// No condition: the caller reads the verdicts.
     Nothing,
 }
 
 impl Wanted {
-    /// Whether it is true of a level.
+    /// Returns whether the assertion holds for a level.
     pub fn holds(self, level: &LevelVerdict) -> bool {
         match self {
             Self::Solvable => level.outcome == LevelOutcome::Solved,
@@ -30,13 +30,13 @@ impl Wanted {
                     && level.testers.iter().all(|tester| tester.score.solved == tester.score.episodes)
             }
             Self::NoFindings => level.findings.is_empty(),
-            // What breaks an episode hides whether it is the same again.
+            // A panic hides whether the episode would repeat.
             Self::Deterministic => level.findings.iter().all(|finding| finding.detector == UNREACHABLE),
             Self::Nothing => false,
         }
     }
 
-    /// What is wrong with so many of these levels.
+    /// Returns the headline for this number of broken levels.
     pub fn complaint(self, broken: usize, levels: u64) -> String {
         let was = if broken == 1 { "was" } else { "were" };
         let of = format!("{broken} of {levels} level{}", if levels == 1 { "" } else { "s" });
@@ -49,7 +49,7 @@ impl Wanted {
         }
     }
 
-    /// Whether an episode that was not solved is a reason to complain.
+    /// Returns whether an unsolved episode is a failure.
     pub fn is_about_solving(self) -> bool {
         matches!(self, Self::Solvable | Self::Solved)
     }
@@ -61,7 +61,7 @@ mod tests {
 
     use super::*;
 
-    /// Two testers with two episodes each, of which so many were solved.
+    /// Two testers with two episodes each, and the solved ones of each.
     fn level(solved: [u64; 2], found: &[&str]) -> LevelVerdict {
         let score = |solved: u64, episodes: u64| {
             json!({

@@ -1,4 +1,4 @@
-//! Levels on which a defect of rules changes something: a wall that nobody walks into is no defect of that level.
+//! Levels on which a defect of rules has an effect: a broken wall that no bot walks into is no defect of that level.
 
 use std::{
     collections::BTreeMap,
@@ -17,16 +17,17 @@ use crate::{
     parallel::on_threads,
 };
 
-/// Sound levels that are tried for each mutant.
+/// Unmutated levels that are tried for each mutant.
 pub(super) const MOST_TRIED: usize = 20;
 /// Episodes of each bot that draws random numbers.
 const SEEDS: u64 = 3;
 
-/// The sound level of each mutant, by class and number; `None` if its variant changes nothing on any that was tried.
+/// The unmutated level of each mutant, by class and number; `None` if its variant changes nothing on any level that was
+/// tried.
 pub(super) type Bases = BTreeMap<(&'static str, u32), Option<u64>>;
 
-/// Finds a sound level on which a bot notices each mutant of the rules among these kinds. The levels are tried in a random
-/// order of the mutant's own; `progress` hears of each mutant.
+/// Finds an unmutated level on which a bot notices each mutant of the rules among these kinds. The levels are tried in
+/// a random order of the mutant's own. `progress` is called for each mutant.
 pub(super) fn bases_with_effect(
     game: &dyn Game,
     (mode, bases): (&str, &[u64]),
@@ -58,18 +59,18 @@ pub(super) fn bases_with_effect(
     found.into_iter().flatten().collect()
 }
 
-/// All that is drawn for a mutant.
+/// Returns the random numbers of a mutant.
 pub(super) fn stream(seed: u64, game: &dyn Game, kind: &DefectKind, number: u32) -> ChaCha8Rng {
     Streams::new(seed).stream(&format!("{}/{}", game.name(), kind.class), u64::from(number))
 }
 
-/// How the episodes of some bots go in the sound game.
+/// The episodes of some bots in the unmutated game.
 struct SoundCourses<'a> {
     game: &'a dyn Game,
     mode: &'a str,
-    /// Bots with the seeds of their episodes, first those that notice most.
+    /// Bots with the seeds of their episodes, the most sensitive first.
     bots: Vec<(Player, u64)>,
-    /// What has been played, by level and bot.
+    /// Episodes that were played, by level and bot.
     played: Mutex<BTreeMap<(u64, usize), Arc<Replayed>>>,
 }
 
@@ -78,7 +79,7 @@ impl<'a> SoundCourses<'a> {
         let is_constant = |bot: &BlindBot| matches!(bot, BlindBot::Constant(_));
         let constant = blind_bots(game).into_iter().map(|(_, bot)| bot).find(is_constant);
         let mut bots: Vec<(Player, u64)> = Vec::new();
-        bots.extend(game.demonstrator().map(|_| (Player::Demonstrator, 0)));
+        bots.extend(game.tools().bots.demonstrator().map(|_| (Player::Demonstrator, 0)));
         bots.extend(constant.map(|bot| (Player::Blind(bot), 0)));
         for seed in 0..SEEDS {
             bots.extend([BlindBot::Chaos, BlindBot::Uniform].map(|bot| (Player::Blind(bot), seed)));
@@ -86,7 +87,7 @@ impl<'a> SoundCourses<'a> {
         Self { game, mode, bots, played: Mutex::default() }
     }
 
-    /// Whether some bot's episode goes another way with the defect.
+    /// Returns whether some bot's episode differs with the defect.
     fn are_left(&self, kind: &DefectKind, variant: u32, level: u64) -> bool {
         let mutant = Mutant::new(self.game, kind, variant);
         self.bots.iter().enumerate().any(|(number, (bot, seed))| {
@@ -99,7 +100,7 @@ impl<'a> SoundCourses<'a> {
         if let Some(course) = known {
             return course;
         }
-        // Two threads may play the same, and the same comes of it.
+        // Two threads may play the same episode; the result is equal.
         let (bot, seed) = &self.bots[number];
         let course = Arc::new(course_of(self.game, (self.mode, level), *seed, bot));
         self.played.lock().unwrap_or_else(PoisonError::into_inner).insert((level, number), Arc::clone(&course));
@@ -117,7 +118,7 @@ mod tests {
     use super::*;
     use crate::bugs::general::testing::Track;
 
-    /// Variant 0 changes nothing; variant 1 ends episodes on even levels after ten ticks; variant 2 does so behind the end.
+    /// Variant 0 changes nothing. Variant 1 ends episodes on even levels after ten ticks, variant 2 behind the end.
     fn late() -> DefectKind {
         DefectKind::rules("late", "episodes end on even levels", 3, |app, variant| {
             let Some(last) = [None, Some(10), Some(1000)][variant as usize] else { return };

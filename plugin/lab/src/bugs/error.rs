@@ -1,31 +1,32 @@
-//! What can go wrong with planted defects.
+//! Errors of planting defects.
 
 use std::{
     io,
     path::{Path, PathBuf},
 };
 
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 use crate::{eval::EvalError, inspect::InspectError, level_files::LevelFileError, mode::ModeError};
 
-/// Defects cannot be planted, or a set of them cannot be used.
+/// The reason why defects cannot be planted, or a set of them cannot be used.
 #[derive(Debug, Error)]
 pub enum BugError {
-    /// There is a set already.
+    /// The folder already has a set.
     #[error("{} has planted defects already: choose another --out, or replace them with --force", .0.display())]
     Exists(PathBuf),
-    /// There is no set.
+    /// The folder has no set.
     #[error("{} has no mutants.json: make one with `playbot bugs make --out {}`", .0.display(), .0.display())]
     Missing(PathBuf),
-    /// A file is not what it should be.
+    /// A file has an invalid line.
     #[error("{}, line {line}: {what}; make the set again with `playbot bugs make`", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
         /// Line, from 1.
         line: usize,
-        /// What is wrong.
+        /// The error.
         what: String,
     },
     /// The set was made for another version of the game.
@@ -43,10 +44,10 @@ pub enum BugError {
         /// The program's.
         is: u32,
     },
-    /// A game has no level into which anything could be planted.
+    /// A game has no level that defects can be planted into.
     #[error(
-        "`{game}`: none of the levels {levels} is one that nobody trains on and that its bot `{bot}` plays to a good end, \
-         so that nothing can be planted into them: name others with --levels {game}=MODE:first..last"
+        "`{game}`: none of the levels {levels} is held out from training and played to a good end by its bot \
+         `{bot}`: name others with --levels {game}=MODE:first..last"
     )]
     NoBase {
         /// The game.
@@ -56,7 +57,7 @@ pub enum BugError {
         /// Its demonstrator.
         bot: String,
     },
-    /// There are fewer levels than are asked for.
+    /// There are fewer unmutated levels than needed.
     #[error(
         "`{game}`: {levels} has {count} sound levels, and {wanted} are needed: name more with --levels {game}=MODE:first..last, or \
          ask for fewer with --sound and --per-kind"
@@ -66,13 +67,13 @@ pub enum BugError {
         game: String,
         /// The levels.
         levels: String,
-        /// How many of them are sound.
+        /// How many of them are unmutated levels.
         count: u64,
         /// How many are needed.
         wanted: u64,
     },
-    /// A kind of defect makes levels that are none.
-    #[error("the defect `{class}` of `{game}` makes of {base} what is no level of the game: {why}")]
+    /// A kind of defect makes an invalid level.
+    #[error("the defect `{class}` of `{game}` turned {base} into an invalid level: {why}")]
     NoLevel {
         /// The game.
         game: String,
@@ -80,26 +81,26 @@ pub enum BugError {
         class: String,
         /// The level, as `MODE:N`.
         base: String,
-        /// What is wrong.
+        /// The reason.
         why: String,
     },
-    /// A file of the system's.
+    /// The system cannot read or write a file.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried.
+        /// The action that failed.
         action: &'static str,
-        /// On which file.
+        /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The system's error.
         source: io::Error,
     },
     /// The game does not have the levels.
     #[error(transparent)]
     Mode(#[from] ModeError),
-    /// The sound levels cannot be played.
+    /// The unmutated levels cannot be played.
     #[error(transparent)]
     Eval(#[from] EvalError),
-    /// A level cannot be shown.
+    /// A level cannot be printed.
     #[error(transparent)]
     Inspect(#[from] InspectError),
     /// A level file cannot be read.
@@ -107,10 +108,12 @@ pub enum BugError {
     Level(#[from] LevelFileError),
 }
 
-impl BugError {
-    /// Whether calling differently helps; otherwise the game or the system failed.
-    pub fn is_usage(&self) -> bool {
-        !matches!(self, Self::Io { .. } | Self::NoLevel { .. } | Self::Eval(EvalError::Fault(_)))
+impl HasExitCode for BugError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Io { .. } | Self::NoLevel { .. } | Self::Eval(EvalError::Fault(_)) => 2,
+            _ => 3,
+        }
     }
 }
 

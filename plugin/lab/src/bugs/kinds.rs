@@ -3,9 +3,9 @@
 use super::general::general_defects;
 use crate::{defect::DefectKind, game::Game};
 
-/// The game's own defects, and the general ones. An own class takes the place of a general one.
+/// Returns the game's own defects, and the general ones. A class of the game's own replaces a general one.
 pub fn defect_kinds(game: &dyn Game) -> Vec<DefectKind> {
-    let mut kinds = game.defects();
+    let mut kinds = game.tools().tests.defects();
     let is_own = |class: &str| kinds.iter().any(|kind| kind.class == class);
     let general: Vec<_> = general_defects(game).into_iter().filter(|kind| !is_own(kind.class)).collect();
     kinds.extend(general);

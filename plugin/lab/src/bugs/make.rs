@@ -1,4 +1,4 @@
-//! Planting defects into the games of a program.
+//! The planting of defects into the games of a program.
 
 use std::collections::BTreeSet;
 
@@ -20,7 +20,7 @@ use crate::{
     split::LevelSplit,
 };
 
-/// Sound levels that a defect is planted into, for each mutant of a kind; and at least so many.
+/// Unmutated levels that defects are planted into, for each mutant of a kind; also the least number of them.
 const BASES_PER_MUTANT: u64 = 4;
 const FEWEST_BASES: u64 = 24;
 
@@ -31,35 +31,35 @@ pub struct Source<'a> {
     pub game: &'a dyn Game,
     /// Its levels.
     pub levels: LevelSplit,
-    /// Levels that are left out, since bots learn on them.
+    /// Levels that are left out, since bots train on them.
     pub trained: Option<LevelSplit>,
 }
 
-/// How many defects are planted.
+/// The number of defects, and the random seed.
 #[derive(Clone, Copy, Debug)]
 pub struct MakePlan {
-    /// Seed of all that is drawn.
+    /// Random seed of everything.
     pub seed: u64,
     /// Mutants of each kind and game.
     pub per_kind: u32,
-    /// Sound levels of all games together.
+    /// Unmutated levels of all games together.
     pub sound: u64,
-    /// Threads: not part of the result.
+    /// Threads. They change no result.
     pub threads: usize,
 }
 
-/// What was planted.
+/// The result of planting.
 #[derive(Clone, Debug)]
 pub struct Made {
     /// The set.
     pub set: BugSet,
     /// Texts of the levels that a defect was planted into, by the names of their mutants.
     pub levels: Vec<(String, String)>,
-    /// Kinds for which not enough levels had a place, or that change nothing.
+    /// Kinds of defects that no level, or not enough levels, have a place for, and those without an effect.
     pub without_place: Vec<NoPlace>,
 }
 
-/// A kind of defect for which not enough levels had a place, or a variant of which changes nothing.
+/// A kind of defect that not enough levels have a place for, or with a variant that changes nothing.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct NoPlace {
     /// The game.
@@ -68,14 +68,14 @@ pub struct NoPlace {
     pub class: String,
     /// How many were planted.
     pub planted: u32,
-    /// How many were to be.
+    /// How many were asked for.
     pub wanted: u32,
     /// Variants, of a defect of rules, that change nothing on any level that was tried.
     pub without_effect: BTreeSet<u32>,
 }
 
 impl NoPlace {
-    /// What is missing and why, in words.
+    /// Returns a message that says how many are missing, and why.
     pub fn describe(&self) -> String {
         let Self { game, class, planted, wanted, without_effect } = self;
         let start = format!("{game}: only {planted} of {wanted} mutants with the defect {class} were made");
@@ -88,10 +88,11 @@ impl NoPlace {
 }
 
 impl MakePlan {
-    /// Sound levels that are looked for, and mutants for which a level is looked for, in all of these games: for a bar.
+    /// Returns the steps for a progress bar: unmutated levels to find, and mutants to find a level for, in all of these
+    /// games.
     pub fn steps(&self, sources: &[Source]) -> u64 {
         let rules = |source: &Source| {
-            let kinds = source.game.defects();
+            let kinds = source.game.tools().tests.defects();
             kinds.iter().filter(|kind| matches!(kind.plant, Plant::Rules { .. })).count() as u64
         };
         let mutants: u64 = sources.iter().map(|source| rules(source) * u64::from(self.per_kind)).sum();
@@ -102,21 +103,23 @@ impl MakePlan {
         (BASES_PER_MUTANT * u64::from(self.per_kind)).max(FEWEST_BASES)
     }
 
-    /// The sound levels of the n-th of so many games.
+    /// Returns the number of unmutated levels of the n-th game.
     fn share(&self, n: usize, games: usize) -> u64 {
         let (games, n) = (games.max(1) as u64, n as u64);
         self.sound / games + u64::from(n < self.sound % games)
     }
 }
 
-/// Plants every kind of defect into every game. The same seed gives the same set, whatever the number of threads; each
-/// mutant depends on nothing but the seed, its game, class and number. A defect of rules that a game has itself is planted
-/// where some bot's episode goes another way with it: that of the demonstrator, of a bot that holds an action, of chaos or of
-/// random actions. `progress` hears how many more levels were found sound, and how many of those mutants have their level.
+/// Plants every kind of defect into every game. The same seed gives the same set, for any number of threads. Each
+/// mutant depends on the seed, its game, class and number alone.
+///
+/// A defect of a game's own rules is planted on a level where it changes some bot's episode: that of the demonstrator,
+/// of a bot that holds an action, of chaos or of random actions. `progress` receives how many more unmutated levels
+/// were found, and how many of those mutants have their level.
 ///
 /// # Errors
 ///
-/// A game has not enough levels that its demonstrator plays to a good end, breaks in one, or cannot show them.
+/// A game has too few levels that its demonstrator solves, panics in one, or cannot print them.
 pub fn make_bugs(sources: &[Source], plan: &MakePlan, progress: &(dyn Fn(u64) + Sync)) -> Result<Made, BugError> {
     let set = BugSet { seed: plan.seed, games: Vec::new(), mutants: Vec::new(), sound: Vec::new() };
     let mut made = Made { set, levels: Vec::new(), without_place: Vec::new() };
@@ -129,7 +132,7 @@ pub fn make_bugs(sources: &[Source], plan: &MakePlan, progress: &(dyn Fn(u64) + 
         let (beside, bases) = levels.split_at(usize::try_from(share).unwrap_or(usize::MAX).min(levels.len()));
         made.set.games.push(BugGame { name: game.name().to_owned(), version: game.version() });
         made.set.sound.extend(ranges(game.name(), mode, beside));
-        let noticed = bases_with_effect(game, (mode, bases), &game.defects(), plan, progress);
+        let noticed = bases_with_effect(game, (mode, bases), &game.tools().tests.defects(), plan, progress);
         for kind in defect_kinds(game) {
             plant(&mut made, game, (mode, bases), &kind, &noticed, plan)?;
         }
@@ -137,15 +140,15 @@ pub fn make_bugs(sources: &[Source], plan: &MakePlan, progress: &(dyn Fn(u64) + 
     Ok(made)
 }
 
-/// The number of the first level that is looked at.
+/// Returns the number of the first level to try.
 fn start(source: &Source, plan: &MakePlan, wanted: u64) -> u64 {
     let LevelSplit { first, last, .. } = source.levels;
     let mut rng = Streams::new(plan.seed).stream(&format!("{}/levels", source.game.name()), 0);
-    // Not all of those that follow are sound.
+    // Some of the levels that follow are not solved.
     first + below(&mut rng, (last - first + 1).saturating_sub(4 * wanted))
 }
 
-/// Plants all mutants of a kind. Those of rules that are among the `noticed` have their levels already.
+/// Plants all mutants of a kind. Mutants of rules in `noticed` have their levels already.
 fn plant(
     made: &mut Made,
     game: &dyn Game,

@@ -1,10 +1,11 @@
-//! Planted defects: games and levels that are broken on purpose, to measure which testers notice.
+//! Planted defects: games and levels that are broken on purpose, to measure which testers find them. A level or game
+//! without one is called *unmutated*; reports and files call such levels *sound levels*.
 //!
 //! - A [`DefectKind`] says how a defect is planted, into a level or into the rules of a game. Every game has
-//!   [general ones](general_defects), and those that it says itself with
-//!   [`Game::defects`](crate::game::Game::defects): [`defect_kinds`].
+//!   [general ones](general_defects), and those of its own [`TestTools::defects`](crate::game::TestTools::defects):
+//!   [`defect_kinds`].
 //! - A [`Mutant`] is a game with one of them in its rules.
-//! - [`make_bugs`] plants a [`BugSet`], reproducibly from a seed, which is kept in a folder.
+//! - [`make_bugs`] plants a [`BugSet`], which is kept in a folder and reproducible from a seed.
 //! - [`score`] measures which testers find them.
 
 mod effect;

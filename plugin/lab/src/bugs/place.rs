@@ -1,4 +1,4 @@
-//! Finding a level that has a place for a defect.
+//! The search for a level that has a place for a defect.
 
 use std::collections::BTreeSet;
 
@@ -14,16 +14,16 @@ use crate::{
 /// A level with a defect.
 #[derive(Debug)]
 pub(super) struct BrokenLevel {
-    /// Number of the sound one.
+    /// Number of the unmutated level.
     pub(super) base: u64,
-    /// Its text.
+    /// Text of the broken level.
     pub(super) text: String,
-    /// Hash of what is played.
+    /// Hash of the broken level.
     pub(super) hash: u64,
 }
 
-/// Plants a defect into the first of these levels, in a random order, that has a place for it and becomes one that was not
-/// made before.
+/// Plants a defect into the first of these levels, in a random order, that has a place for it. The broken level must
+/// not be in `taken`.
 pub(super) fn plant_level(
     game: &dyn Game,
     class: &str,
@@ -47,7 +47,7 @@ pub(super) fn plant_level(
             Ok::<_, BugError>(design.hash())
         };
         let hash = hash_of(&text)?;
-        // What is played as before is no defect.
+        // A level that plays as before has no defect.
         if hash != hash_of(&sound)? && taken.insert(hash) {
             return Ok(Some(BrokenLevel { base, text, hash }));
         }
@@ -55,14 +55,14 @@ pub(super) fn plant_level(
     Ok(None)
 }
 
-/// The text of a level, as `playbot level GAME --json` prints it. Games whose levels are maps take modes by another name,
-/// and some maps have no numbers.
+/// Returns the text of a level, as `playbot level GAME --json` prints it. Games whose levels are maps take modes by
+/// another name, and some maps have no numbers.
 fn level_json(game: &dyn Game, mode: &str, level: u64) -> Result<String, InspectError> {
-    let usual = LevelRequest { mode: Some(mode), seed: Some(level), ..LevelRequest::default() };
+    let usual = LevelRequest { mode: Some(mode), level: Some(level), ..LevelRequest::default() };
     let requests = [
         usual,
         LevelRequest { mode: None, map: Some(mode), ..usual },
-        LevelRequest { mode: None, map: Some(mode), seed: None, ..usual },
+        LevelRequest { mode: None, map: Some(mode), level: None, ..usual },
     ];
     let mut first = None;
     for request in requests {

@@ -1,7 +1,7 @@
 //! Sets of planted defects, in memory and as files.
 //!
 //! ```text
-//! DIR/mutants.json     what is planted where, and the sound levels beside it
+//! DIR/mutants.json     the defects with their levels, and the unmutated (sound) levels
 //! DIR/levels/ID.json   the levels that a defect was planted into
 //! ```
 
@@ -33,16 +33,16 @@ const MUTANTS: &str = "mutants.json";
 /// Folder of the levels.
 const LEVELS: &str = "levels";
 
-/// Planted defects, and sound levels beside them.
+/// Planted defects, and unmutated levels to compare with.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct BugSet {
-    /// Seed from which they were made.
+    /// Random seed that they were made from.
     pub seed: u64,
     /// The games, each once.
     pub games: Vec<BugGame>,
     /// The defects, by game and class.
     pub mutants: Vec<PlantedBug>,
-    /// Levels into which nothing is planted.
+    /// Unmutated levels.
     pub sound: Vec<SoundLevels>,
 }
 
@@ -66,29 +66,29 @@ pub struct PlantedBug {
     pub game: String,
     /// Class of the defect.
     pub class: String,
-    /// What is wrong, in one line.
+    /// The defect, in one line.
     pub about: String,
-    /// Mode of the sound level.
+    /// Mode of the unmutated level.
     pub mode: String,
-    /// Number of the sound level.
+    /// Number of the unmutated level.
     pub level: u64,
-    /// Where the defect is.
+    /// The part that the defect is in.
     pub planted: PlantedPart,
 }
 
-/// Where a defect is.
+/// The part that a defect is in.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum PlantedPart {
-    /// In a level, which is this file of the set's folder.
+    /// A level: this file of the set's folder.
     Level(LevelFile),
-    /// In the rules, which are played on the sound level.
+    /// The rules, which are played on the unmutated level.
     Rules {
-        /// Which variant of the defect.
+        /// Variant of the defect.
         variant: u32,
     },
 }
 
-/// Sound levels of a game.
+/// Unmutated levels of a game.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SoundLevels {
@@ -99,12 +99,12 @@ pub struct SoundLevels {
 }
 
 impl PlantedBug {
-    /// The sound level, as `MODE:N`.
+    /// Returns the unmutated level, as `MODE:N`.
     pub fn base(&self) -> String {
         format!("{}:{}", self.mode, self.level)
     }
 
-    /// What is played to find it: mode and number of the level. `folder` is the set's.
+    /// Returns mode and number of the level that testers play. `folder` is the set's.
     pub fn played(&self, folder: &Path) -> (String, u64) {
         match &self.planted {
             PlantedPart::Level(file) => (level_files_mode(&folder.join(&file.path).to_string_lossy()), 0),
@@ -114,7 +114,7 @@ impl PlantedBug {
 }
 
 impl BugSet {
-    /// Whether a folder has a set already.
+    /// Returns whether a folder has a set.
     pub fn is_in(folder: &Path) -> bool {
         folder.join(MUTANTS).exists()
     }
@@ -128,7 +128,7 @@ impl BugSet {
         let path = folder.join(MUTANTS);
         let text = fs::read_to_string(&path).map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => BugError::Missing(folder.to_owned()),
-            io::ErrorKind::InvalidData => damaged(&path, 1, "it is no text"),
+            io::ErrorKind::InvalidData => damaged(&path, 1, "it is not UTF-8 text"),
             _ => io_error("read", &path)(error),
         })?;
         let set: SetText = serde_json::from_str(&text).map_err(|error| damaged(&path, error.line(), error))?;
@@ -140,7 +140,7 @@ impl BugSet {
         let set = Self { seed, games, mutants, sound };
         let contradiction = set.contradiction().map(|(name, what)| (name.to_owned(), what));
         match contradiction {
-            // The line on which it is named first.
+            // The first line that names it.
             Some((name, what)) => {
                 let line = text.lines().position(|line| line.contains(&format!("\"{name}\""))).map_or(1, |at| at + 1);
                 Err(damaged(&path, line, what))
@@ -149,7 +149,7 @@ impl BugSet {
         }
     }
 
-    /// What does not go together, with the name that it is about.
+    /// Returns an inconsistency, with the name that it is about.
     fn contradiction(&self) -> Option<(&str, String)> {
         let mut ids = BTreeSet::new();
         let games: BTreeSet<&str> = self.games.iter().map(|game| game.name.as_str()).collect();
@@ -163,20 +163,20 @@ impl BugSet {
             if !games.contains(bug.game.as_str()) {
                 return Some((
                     bug.id.as_str(),
-                    format!("the game `{}` of `{}` is not among `games`", bug.game, bug.id),
+                    format!("the game `{}` of `{}` is missing in `games`", bug.game, bug.id),
                 ));
             }
         }
         let strange = self.sound.iter().find(|sound| !games.contains(sound.game.as_str()))?;
-        Some((strange.game.as_str(), format!("the game `{}` of sound levels is not among `games`", strange.game)))
+        Some((strange.game.as_str(), format!("the game `{}` of sound levels is missing in `games`", strange.game)))
     }
 
-    /// Writes the set, with the texts of its levels by the names of their mutants. Levels that were there before are removed;
-    /// the file that names them is written last.
+    /// Writes the set, with the texts of its levels by the names of their mutants. Older levels are removed, and the
+    /// file that names them is written last.
     ///
     /// # Errors
     ///
-    /// [`BugError::Exists`] unless `replace`; or the system refuses.
+    /// [`BugError::Exists`] unless `replace`; or the system cannot write.
     pub fn write(&self, folder: &Path, levels: &[(String, String)], replace: bool) -> Result<(), BugError> {
         if !replace && Self::is_in(folder) {
             return Err(BugError::Exists(folder.to_owned()));
@@ -200,8 +200,8 @@ impl BugSet {
         .map_err(io_error("write", &path))
     }
 
-    /// Checks that the mutants of a game can be planted: the game has the version that the set was made for and these
-    /// kinds of defects, and levels are those that were written. Sets for other games pass.
+    /// Checks that the mutants of a game can be planted. The game must have the version of the set and these kinds of
+    /// defects, and the levels must be unchanged. Sets for other games pass.
     ///
     /// # Errors
     ///
@@ -216,7 +216,7 @@ impl BugSet {
         let kinds = defect_kinds(game);
         for bug in self.mutants.iter().filter(|bug| bug.game == known.name) {
             let fits = match &bug.planted {
-                // A broken level is a file: nobody has to know how it was made.
+                // A broken level is a file, so its kind need not be known.
                 PlantedPart::Level(_) => true,
                 PlantedPart::Rules { variant } => kinds.iter().any(|kind| match &kind.plant {
                     Plant::Rules { variants, .. } => kind.class == bug.class && variant < variants,
@@ -224,14 +224,15 @@ impl BugSet {
                 }),
             };
             if !fits {
-                let what = format!("this program's `{}` has no defect `{}` like `{}`", known.name, bug.class, bug.id);
+                let (game, class, id) = (&known.name, &bug.class, &bug.id);
+                let what = format!("this program's `{game}` has no defect `{class}`, which `{id}` needs");
                 return Err(damaged(&path, 1, what));
             }
             if let PlantedPart::Level(file) = &bug.planted {
                 let level = folder.join(&file.path);
                 let designs = LevelDesigns::of_file(&level.to_string_lossy(), &|text| game.parse_level(text))?;
                 if designs.hash(0) != Some(file.hash) {
-                    let what = format!("it is not the level that was planted as `{}`: it was changed since", bug.id);
+                    let what = format!("the level of `{}` was changed after it was planted", bug.id);
                     return Err(damaged(&level, 1, what));
                 }
             }
@@ -242,12 +243,12 @@ impl BugSet {
 
 fn damaged(path: &Path, line: usize, what: impl ToString) -> BugError {
     let what = what.to_string();
-    // serde has it at the end of its words, too.
+    // serde repeats the line at the end of its message.
     let words = what.find(" at line ").map_or(what.as_str(), |at| &what[..at]).to_owned();
     BugError::Damaged { path: PathBuf::from(path), line: line.max(1), what: words }
 }
 
-/// What was not there has been removed.
+/// Treats a missing file as removed.
 fn gone(removed: io::Result<()>) -> io::Result<()> {
     match removed {
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),

@@ -1,11 +1,11 @@
-//! Planted defects as files have them.
+//! The file format of planted defects.
 
 use bevy_playbot::level_files::LevelFile;
 use serde::{Deserialize, Serialize};
 
 use super::set::{BugGame, PlantedBug, PlantedPart, SoundLevels};
 
-/// The only form of the file.
+/// Version of the file format.
 pub(super) const FORMAT: u32 = 1;
 
 /// `mutants.json`.
@@ -38,7 +38,7 @@ pub(super) struct BugText {
 #[serde(deny_unknown_fields)]
 struct LevelText {
     file: String,
-    /// 16 hexadecimal digits, since not all readers of JSON have whole numbers of 64 bits.
+    /// 16 hexadecimal digits, since some readers of JSON have no integers of 64 bits.
     hash: String,
 }
 
@@ -49,7 +49,7 @@ impl TryFrom<BugText> for PlantedBug {
         let BugText { id, game, class, about, base, level, variant } = text;
         let parsed = base.rsplit_once(':').and_then(|(mode, level)| Some((mode.to_owned(), level.parse().ok()?)));
         let Some((mode, level_number)) = parsed else {
-            return Err(format!("the base `{base}` of `{id}` is no level: it must be MODE:N"));
+            return Err(format!("the base `{base}` of `{id}` must be MODE:N"));
         };
         let planted = match (level, variant) {
             (Some(LevelText { file, hash }), None) => {
@@ -81,12 +81,12 @@ impl From<PlantedBug> for BugText {
     }
 }
 
-/// Where the level of a mutant is, from the folder of the set.
+/// Returns the path of a mutant's level in the folder of the set.
 pub(super) fn level_path(id: &str) -> String {
     format!("levels/{id}.json")
 }
 
-/// Whether a name leads to no other folder.
+/// Returns whether a name is a plain file name that leaves no folder.
 fn is_plain(id: &str) -> bool {
     !id.is_empty() && id.chars().all(|letter| letter.is_ascii_alphanumeric() || "-_".contains(letter))
 }

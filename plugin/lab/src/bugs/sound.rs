@@ -1,4 +1,4 @@
-//! Levels that are sound: those that defects are planted into, and those beside them.
+//! The search for unmutated levels: to plant defects into, and to compare with.
 
 use bevy_playbot::{episode::EpisodeEnd, vision::ObservationConfig};
 
@@ -9,27 +9,27 @@ use crate::{
     split::LevelSplit,
 };
 
-/// Most levels that are played at a time, and most arenas in which they are: numbers of their own, so that the number of
-/// threads changes nothing.
+/// Most levels and most arenas that are played at a time. They do not depend on the number of threads, so that it
+/// changes no result.
 const CHUNK: u64 = 128;
 const ARENAS: u32 = 32;
 const WORLDS: u32 = 8;
-/// Times as many levels as are needed are looked at before it is said that there are too few.
+/// The search gives up after this many times the levels that are needed.
 const MOST_TRIES: u64 = 8;
 
-/// What a good end is.
+/// The best end that a demonstrator can reach.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum GoodEnd {
     /// The level is solved.
     Won,
-    /// Time was up, in a game that nobody wins.
+    /// The time limit was reached, in a game that cannot be won.
     Lasted,
-    /// Any, in a game that always ends by losing.
+    /// Any end, in a game that always ends by losing.
     Any,
 }
 
 impl GoodEnd {
-    /// The best one that some episode had.
+    /// Returns the best end among some episodes.
     fn of(results: &[EpisodeResult]) -> Self {
         if results.iter().any(|result| result.success) {
             Self::Won
@@ -49,8 +49,8 @@ impl GoodEnd {
     }
 }
 
-/// So many levels from this number on, in their order, none of which was trained on, and each of which the game's
-/// demonstrator plays to a good end, if there is one.
+/// Returns `wanted` levels from this number on, in their order. They are held out from training, and the game's
+/// demonstrator, if there is one, plays them to a good end.
 pub(super) fn sound_levels(
     source: &Source,
     start: u64,
@@ -67,7 +67,7 @@ pub(super) fn sound_levels(
         let missing = wanted - found.len() as u64;
         let count = (missing + missing / 4 + 4).min(CHUNK).min(source.levels.last - next + 1);
         let chunk = LevelSplit { mode: source.levels.mode.clone(), first: next, last: next + count - 1 };
-        let good: Vec<u64> = match game.demonstrator() {
+        let good: Vec<u64> = match game.tools().bots.demonstrator() {
             None => chunk.levels().filter(is_new).collect(),
             Some(_) => {
                 let results = play(source, &chunk, threads)?;
@@ -83,7 +83,7 @@ pub(super) fn sound_levels(
         tried += count;
     }
     if found.is_empty() {
-        let bot = game.demonstrator().unwrap_or("none").to_owned();
+        let bot = game.tools().bots.demonstrator().unwrap_or("none").to_owned();
         return Err(BugError::NoBase { game: game.name().to_owned(), levels: source.levels.to_string(), bot });
     }
     if (found.len() as u64) < wanted {
@@ -107,7 +107,7 @@ fn play(source: &Source, chunk: &LevelSplit, threads: usize) -> Result<Vec<Episo
     Ok(evaluate(source.game, &Player::Demonstrator, &plan, |_| {})?)
 }
 
-/// Numbers in their order, as ranges without gaps.
+/// Groups ordered numbers into ranges without gaps.
 pub(super) fn ranges(game: &str, mode: &str, numbers: &[u64]) -> Vec<SoundLevels> {
     let ranges = LevelSplit::ranges(mode, numbers).into_iter();
     ranges.map(|range| SoundLevels { game: game.to_owned(), range }).collect()

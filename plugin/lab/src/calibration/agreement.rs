@@ -1,4 +1,4 @@
-//! How well testers and people agree.
+//! The agreement of testers and people on which levels are hard.
 
 use serde::Serialize;
 
@@ -8,26 +8,26 @@ use super::{
     tau::kendall,
 };
 
-/// With fewer levels an interval is so wide that it says little.
+/// Levels that an interval needs to be narrow enough to be useful.
 pub const FEW_LEVELS: usize = 10;
 
-/// What is compared.
+/// A number that is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Measure {
-    /// Share of tries that reached the aim.
+    /// Share of tries that reached the goal.
     Completion,
-    /// Median ticks of those that did.
+    /// Median ticks of the tries that reached it.
     Time,
     /// Deaths in a try.
     Deaths,
 }
 
 impl Measure {
-    /// All of them.
+    /// All measures.
     pub const ALL: [Self; 3] = [Self::Completion, Self::Time, Self::Deaths];
 
-    /// As people read it.
+    /// Returns the name for reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Completion => "completion",
@@ -36,7 +36,7 @@ impl Measure {
         }
     }
 
-    /// The number; `None` if there is none, such as the time on a level that nobody completed.
+    /// Returns the number; `None` if there is none, such as the time on a level that was never completed.
     pub fn of(self, numbers: &Numbers) -> Option<f64> {
         match self {
             Self::Completion => Some(numbers.completion),
@@ -45,19 +45,19 @@ impl Measure {
         }
     }
 
-    /// The numbers of people and of a tester on each level that has both.
+    /// Returns the numbers of people and of a tester on each level that has both.
     pub(super) fn pairs(self, levels: &[CalibratedLevel], tester: usize) -> Vec<(f64, f64)> {
         let pair = |level: &CalibratedLevel| self.of(&level.people).zip(self.of(level.testers.get(tester)?));
         levels.iter().filter_map(pair).collect()
     }
 }
 
-/// How well a tester and people agree on which levels are hard.
+/// The rank correlations of a tester and people.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Agreement {
     /// The tester.
     pub tester: String,
-    /// What is compared.
+    /// The measure.
     pub measure: Measure,
     /// Levels that have a number of both.
     pub levels: usize,
@@ -65,12 +65,12 @@ pub struct Agreement {
     pub spearman: Option<RankCorrelation>,
     /// Kendall's tau-b, if both vary.
     pub kendall: Option<RankCorrelation>,
-    /// What to know about these numbers.
+    /// A caveat about these numbers.
     pub note: Option<String>,
 }
 
 impl Agreement {
-    /// That of a tester on these levels.
+    /// Computes the agreement of a tester and people on these levels.
     pub(super) fn of(measure: Measure, name: &str, tester: usize, levels: &[CalibratedLevel]) -> Self {
         let pairs = measure.pairs(levels, tester);
         let (people, bots): (Vec<f64>, Vec<f64>) = pairs.into_iter().unzip();

@@ -1,4 +1,4 @@
-//! Why results and recordings say nothing of each other.
+//! Errors of comparing results with recordings.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use thiserror::Error;
 
 use crate::{level_files::LevelFileError, verdict::TestError};
 
-/// Results cannot be held beside recordings.
+/// The reason why results cannot be compared with recordings.
 #[derive(Debug, Error)]
 pub enum CalibrationError {
     /// The results cannot be read.
@@ -51,7 +51,7 @@ pub enum CalibrationError {
         /// The game.
         game: String,
     },
-    /// Level files are known by hashes that the game makes.
+    /// The levels of the results are files, and only the game can compute their hashes.
     #[error(
         "the levels of {} are files, which the program of `{game}` must read to know them in recordings: use that program",
         results.display()
@@ -62,10 +62,10 @@ pub enum CalibrationError {
         /// Their game.
         game: String,
     },
-    /// The files hold other levels by now.
+    /// The files contain other levels than the tested ones.
     #[error(
-        "the level files of {} ({range}) are not those that were tested: bring them back, call from the folder in which they \
-         were tested, or test them again", results.display()
+        "the level files of {} ({range}) changed since the test: bring them back, run this in the folder in which they were \
+         tested, or test them again", results.display()
     )]
     ChangedFiles {
         /// The folder of the results.
@@ -73,7 +73,7 @@ pub enum CalibrationError {
         /// The levels.
         range: String,
     },
-    /// Nobody played.
+    /// No person played an episode to its end.
     #[error(
         "no episode of {files} was played by a person to its end{}: record people with `playbot play GAME --record people.demo`",
         why(left_out)
@@ -81,10 +81,10 @@ pub enum CalibrationError {
     Nobody {
         /// The recordings.
         files: String,
-        /// What was left out, each in words.
+        /// Counts of the episodes that do not count, each in words.
         left_out: Vec<String>,
     },
-    /// People and bots played other levels.
+    /// People and testers played different levels.
     #[error(
         "no level is in both: people played {recorded}, and {} have {tested}: test the levels that people played, or record \
          people on these", results.display()

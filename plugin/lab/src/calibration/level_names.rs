@@ -1,4 +1,4 @@
-//! Which level of results an episode was played on.
+//! The level names of recorded episodes, as results use them.
 
 use std::{collections::BTreeMap, path::Path};
 
@@ -13,14 +13,14 @@ use crate::{
 
 /// The levels of results, as recordings know them.
 pub(super) enum LevelNames {
-    /// Made from seeds: by mode and number.
+    /// Generated from seeds: by mode and number.
     Seeds,
-    /// Files: the names of all that hold the level with a hash.
+    /// Files: the names of all files with a level of this hash.
     Files(BTreeMap<u64, Vec<String>>),
 }
 
 impl LevelNames {
-    /// Those of the results in this folder.
+    /// Reads the levels of the results in this folder.
     pub fn of(results: &Path, record: &TestRecord, game: Option<&dyn Game>) -> Result<Self, CalibrationError> {
         if !is_level_files(&record.range.mode) {
             return Ok(Self::Seeds);
@@ -41,7 +41,7 @@ impl LevelNames {
         Ok(Self::Files(names))
     }
 
-    /// What results call the level of an episode. Files that hold the same level have several names.
+    /// Returns the names that results give to the level of an episode. Files with the same level have several names.
     pub fn of_episode(&self, header: &DemoHeader, episode: &DemoEpisode) -> Vec<String> {
         match (&episode.level_file, self) {
             (None, _) => vec![format!("{}:{}", header.mode, episode.level_seed)],

@@ -1,8 +1,9 @@
-//! Results of tests beside recordings of people: do levels that are hard for bots cost people time and lives, too?
+//! The comparison of test results with recordings of people: do levels that are hard for bots cost people time and
+//! lives, too?
 //!
-//! [`Calibration::read`] takes the results of a test and recordings of people on the same levels. Of each level it has
-//! [`Numbers`] of the people and of every tester, and of every tester and [`Measure`] an [`Agreement`]: rank correlations over
-//! the levels, with 95 % intervals.
+//! [`Calibration::read`] takes the results of a test and recordings of people on the same levels. For each level it has
+//! [`Numbers`] of the people and of every tester. For every tester and [`Measure`] it has an [`Agreement`]: rank
+//! correlations over the levels, with 95 % intervals.
 //!
 //! ```
 //! use playbot_lab::calibration::spearman;

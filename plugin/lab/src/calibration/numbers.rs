@@ -1,37 +1,37 @@
-//! What a level cost somebody.
+//! The numbers of a level: tries, completion, time and deaths.
 
 use serde::Serialize;
 
 use crate::{report::statistics::median, verdict::Score};
 
-/// How a tester, or people, did on a level.
+/// The results of a tester, or of people, on a level.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Numbers {
     /// Episodes.
     pub tries: u64,
-    /// Share of the tries that reached the aim.
+    /// Share of the tries that reached the goal.
     pub completion: f64,
-    /// Median ticks of those that did, if there are any.
+    /// Median ticks of the tries that reached it, if there are any.
     pub ticks: Option<f64>,
-    /// Deaths in a try: the share of tries that the game ended without the aim.
+    /// Deaths in a try: the share of tries that the game ended before the goal.
     pub deaths: f64,
 }
 
-/// A level that people have played and testers have tested.
+/// A level that both people and testers have played.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct CalibratedLevel {
-    /// Its name, as results have it.
+    /// Its name in the results.
     pub level: String,
-    /// How many people have played it.
+    /// Number of people who played it.
     pub persons: u64,
-    /// How these did, each of whom counts once, however often each tried.
+    /// Results of people. Each person counts once, for any number of tries.
     pub people: Numbers,
-    /// How each tester did, in the order of the results.
+    /// Results of each tester, in the order of the results.
     pub testers: Vec<Numbers>,
 }
 
 impl Numbers {
-    /// Those of a tester.
+    /// Returns the numbers of a tester.
     pub(super) fn of_score(score: &Score) -> Self {
         let share = |count: u64| if score.episodes == 0 { 0.0 } else { count as f64 / score.episodes as f64 };
         Self {
@@ -42,7 +42,7 @@ impl Numbers {
         }
     }
 
-    /// Those of several people: means, and the median of their times.
+    /// Returns the numbers of several people: means, and the median of their times.
     pub(super) fn of_people(people: &[Self]) -> Self {
         let mean = |value: fn(&Self) -> f64| people.iter().map(value).sum::<f64>() / people.len().max(1) as f64;
         Self {

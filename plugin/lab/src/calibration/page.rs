@@ -1,4 +1,4 @@
-//! Results beside recordings, as a page with charts and as Markdown.
+//! The page of a calibration, as HTML with charts and as Markdown.
 
 use super::{agreement::Measure, read::Calibration};
 use crate::{
@@ -10,7 +10,7 @@ use crate::{
 const MOST_LEVELS: usize = 2000;
 
 impl Calibration {
-    /// A page that opens from disk without network: what agrees, scatter plots, and every level.
+    /// Returns a page that opens from disk without network: agreement, scatter plots, and every level.
     pub fn to_html(&self) -> String {
         let section = |heading: &str| Section { heading: heading.to_owned(), ..Section::default() };
         let agreement = Section {
@@ -32,7 +32,7 @@ impl Calibration {
         report.to_html()
     }
 
-    /// The same without charts, for a pull request.
+    /// Returns the page without charts, for a pull request.
     pub fn to_markdown(&self) -> String {
         let mut parts = vec![format!(
             "# Bots beside people: {} {}",
@@ -47,7 +47,7 @@ impl Calibration {
         parts.join("\n\n") + "\n"
     }
 
-    /// The scatter plots of all measures as one picture.
+    /// Returns the scatter plots of all measures as one picture.
     pub fn to_drawing(&self) -> Drawing {
         draw_scatters(&self.scatters())
     }
@@ -56,8 +56,8 @@ impl Calibration {
         Measure::ALL.into_iter().filter_map(|measure| self.scatter(measure)).collect()
     }
 
-    /// A dot for each level, the number of people to the right and that of a tester up, and the line on which they are equal;
-    /// `None` if no level has both.
+    /// Returns a scatter plot of the levels, people on the x axis and a tester on the y axis, with the line on which
+    /// both are equal; `None` if no level has both numbers.
     pub fn scatter(&self, measure: Measure) -> Option<Chart> {
         let curve =
             |(tester, name): (usize, &String)| Curve::scatter(name.as_str(), measure.pairs(&self.levels, tester));
@@ -82,7 +82,8 @@ impl Calibration {
     }
 }
 
-/// Where both numbers are equal, as far as dots lie: they have one unit. `None` if all lie in one point.
+/// Returns the line on which both numbers are equal, within the range of the dots; `None` if all dots coincide. Both
+/// axes have one unit.
 fn diagonal(curves: &[Curve]) -> Option<Curve> {
     let numbers =
         || curves.iter().flat_map(|curve| &curve.points).flat_map(|&(x, y)| [x, y]).filter(|it| it.is_finite());

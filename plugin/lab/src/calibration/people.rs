@@ -1,4 +1,4 @@
-//! What people did in recordings.
+//! The tries of people in recordings.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -14,7 +14,7 @@ use super::{
 };
 use crate::verdict::TestRecord;
 
-/// What a recording is called whose player has not said a name.
+/// Name of the person in a recording without a name.
 const NAMELESS: &str = "human";
 
 /// Tries of people, by level.
@@ -23,12 +23,12 @@ pub(super) struct People {
     pub levels: BTreeMap<String, LevelTries>,
     /// Episodes that a bot played, or a policy.
     by_others: u64,
-    /// Episodes that were left in their middle.
+    /// Episodes that were left before their end.
     unfinished: u64,
 }
 
 impl People {
-    /// Those in these recordings, or in all of a folder.
+    /// Reads the tries in these recordings, or in all recordings of a folder.
     pub fn read(
         recordings: &[PathBuf],
         results: &Path,
@@ -36,7 +36,7 @@ impl People {
         names: &LevelNames,
     ) -> Result<Self, CalibrationError> {
         let mut people = Self::default();
-        // A file that is named twice holds its tries once.
+        // A file that is named twice counts once.
         let mut files = BTreeSet::new();
         for path in recordings {
             files.extend(find_demos(path)?);
@@ -62,7 +62,7 @@ impl People {
             return;
         }
         let by_hand = episode.deciders.iter().filter(|decider| **decider == Decider::Human).count();
-        // A bot may have helped, but not played.
+        // A bot may have helped, but not played most of the episode.
         if 2 * by_hand <= episode.len() {
             self.by_others += 1;
             return;
@@ -76,7 +76,7 @@ impl People {
         }
     }
 
-    /// What does not count, in words.
+    /// Returns the counts of episodes that do not count, in words.
     pub fn left_out(&self) -> Vec<String> {
         let words = |count: u64, what: &str| {
             (count > 0).then(|| format!("{count} episode{} {what}", if count == 1 { "" } else { "s" }))
@@ -98,7 +98,7 @@ fn check(path: &Path, header: &DemoHeader, results: &Path, record: &TestRecord) 
     if found == version { Ok(()) } else { Err(CalibrationError::OtherVersion { path, found, results, version, game }) }
 }
 
-/// Who played: by name, or by file if nobody said a name.
+/// Returns the person's name, or the file's if the recording has no name.
 fn person(header: &DemoHeader, path: &Path) -> String {
     let name = header.demonstrator.trim();
     if name.is_empty() || name == NAMELESS { path.display().to_string() } else { name.to_owned() }

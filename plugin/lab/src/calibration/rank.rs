@@ -5,19 +5,18 @@ use serde::Serialize;
 /// Number of standard deviations around the mean of a normal distribution that hold 95 % of it.
 const Z_95: f64 = 1.959_963_984_540_054;
 
-/// A rank correlation: 1 if two lists are in the same order, -1 if one is the other backwards, 0 if neither says anything of
-/// the other.
+/// A rank correlation: 1 if two lists have the same order, -1 if the reverse order, 0 if their orders are unrelated.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct RankCorrelation {
     /// The correlation.
     pub value: f64,
-    /// Its 95 % interval, by Fisher's z. `None` for too few values, and where the order is exactly the same or reversed,
-    /// of which the formula says nothing.
+    /// Its 95 % interval, by Fisher's z. `None` for too few values, and for exactly the same or the reverse order, for
+    /// which the formula has no interval.
     pub interval: Option<[f64; 2]>,
 }
 
 impl RankCorrelation {
-    /// A correlation whose z has this variance; `None` if there are too few values for it.
+    /// Creates a correlation whose z has this variance; `None` for too few values.
     pub(super) fn new(value: f64, variance: Option<f64>) -> Self {
         let value = value.clamp(-1.0, 1.0);
         let is_exact = 1.0 - value.abs() < 1e-12;
@@ -29,14 +28,16 @@ impl RankCorrelation {
     }
 }
 
-/// Without the digits in which machines may differ.
+/// Drops the digits in which machines may differ.
 fn rounded(value: f64) -> f64 {
     (value * 1e9).round() / 1e9
 }
 
-/// Spearman's rank correlation of two lists of the same length; equal values share their mean rank. Its interval is by
-/// Fisher's z with the variance of Bonett and Wright (Sample size requirements for estimating Pearson, Kendall and Spearman
-/// correlations, 2000), (1 + r² / 2) / (n - 3), and needs four values. `None` if a list does not vary.
+/// Returns Spearman's rank correlation of two lists of the same length; `None` if a list does not vary. Equal values
+/// share their mean rank.
+///
+/// The interval is by Fisher's z with the variance of Bonett and Wright (Sample size requirements for estimating
+/// Pearson, Kendall and Spearman correlations, 2000), (1 + r² / 2) / (n - 3), and needs four values.
 pub fn spearman(one: &[f64], other: &[f64]) -> Option<RankCorrelation> {
     let value = pearson(&ranks(one), &ranks(other))?;
     let count = one.len().min(other.len()) as f64;
@@ -44,7 +45,7 @@ pub fn spearman(one: &[f64], other: &[f64]) -> Option<RankCorrelation> {
     Some(RankCorrelation::new(value, variance))
 }
 
-/// The rank of each value, from 1; the mean one of those that are equal.
+/// Returns the rank of each value, from 1; equal values have their mean rank.
 fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|one, other| values[*one].total_cmp(&values[*other]));

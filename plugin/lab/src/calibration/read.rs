@@ -1,4 +1,4 @@
-//! Results beside recordings.
+//! Reading results and recordings into a calibration.
 
 use std::{
     collections::BTreeSet,
@@ -20,10 +20,10 @@ use crate::{
     verdict::{LevelVerdict, ResultLines},
 };
 
-/// Levels that are named where none is shared.
+/// Most levels that the error of no shared level names.
 const MOST_NAMED: usize = 4;
 
-/// How testers and people did on the same levels.
+/// The results of testers and people on the same levels.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Calibration {
     /// Name of the game.
@@ -34,31 +34,31 @@ pub struct Calibration {
     pub range: LevelSplit,
     /// Names of the testers.
     pub testers: Vec<String>,
-    /// Who has played, by name, or by recording where nobody said one.
+    /// Names of the people, or names of the recordings without one.
     pub people: Vec<String>,
-    /// Levels that nobody has recorded.
+    /// Levels that were tested and not recorded.
     pub only_tested: u64,
     /// Levels that were recorded and not tested.
     pub only_recorded: u64,
-    /// What does not count in recordings, in words.
+    /// Counts of recorded episodes that do not count, in words.
     pub left_out: Vec<String>,
-    /// How well each tester agrees with people, measure by measure.
+    /// The agreement of each tester with people, measure by measure.
     pub agreements: Vec<Agreement>,
-    /// The levels that both have played, in the order of the results.
+    /// The levels that both testers and people have played, in the order of the results.
     pub levels: Vec<CalibratedLevel>,
 }
 
 impl Calibration {
-    /// Holds the results in a folder beside recordings of people, or folders of them. Level files are known by the hash of
-    /// the level in them, which takes the game.
+    /// Compares the results in a folder with recordings of people, or folders of them. Level files are identified by
+    /// the hash of their level, which needs the game.
     ///
-    /// Episodes count that people have played to their end. Who has played is told by the name in the recording
+    /// Only episodes that a person has played to their end count. A person is identified by the name in the recording
     /// (`playbot play --name`).
     ///
     /// # Errors
     ///
-    /// [`CalibrationError`]: a file is missing or damaged, recordings are of another game, version or other levels, or nobody
-    /// has played.
+    /// [`CalibrationError`]: a file is missing or damaged, recordings are of another game, version or other levels, or
+    /// there is no episode of a person.
     pub fn read(results: &Path, recordings: &[PathBuf], game: Option<&dyn Game>) -> Result<Self, CalibrationError> {
         let mut lines = ResultLines::open(results)?;
         let record = lines.record().clone();
@@ -108,7 +108,7 @@ fn of_tester(verdict: &LevelVerdict, name: &str) -> Numbers {
     found.map_or(none, |tester| Numbers::of_score(&tester.score))
 }
 
-/// The first few levels that people played.
+/// Returns the names of the first few levels that people played.
 fn named(people: &People) -> String {
     let names: Vec<&str> = people.levels.keys().take(MOST_NAMED).map(String::as_str).collect();
     let more = people.levels.len().saturating_sub(MOST_NAMED);

@@ -1,4 +1,4 @@
-//! Results beside recordings, as tables.
+//! The tables of a calibration.
 
 use super::{
     agreement::{Agreement, Measure},
@@ -8,11 +8,11 @@ use super::{
 };
 use crate::report::{PlainTable, percent, readable, whole};
 
-/// What stands for a number that there is not.
+/// The sign for a missing number.
 const NONE: &str = "–";
 
 impl Calibration {
-    /// How well each tester agrees with people.
+    /// Returns the table of agreement of each tester with people.
     pub fn agreement_table(&self) -> PlainTable {
         let row = |agreement: &Agreement| {
             vec![
@@ -32,7 +32,7 @@ impl Calibration {
         }
     }
 
-    /// What each level cost people and testers, of so many levels at most.
+    /// Returns the table of levels, with the numbers of people and testers, of at most `most` levels.
     pub fn level_table(&self, most: usize) -> PlainTable {
         let mut columns = ["level", "people", "tries"].map(str::to_owned).to_vec();
         for who in ["people"].into_iter().chain(self.testers.iter().map(String::as_str)) {
@@ -68,7 +68,7 @@ fn cell(measure: Measure, numbers: &Numbers) -> String {
 }
 
 fn correlation(found: Option<RankCorrelation>) -> String {
-    // A number that rounds to zero has no sign.
+    // Negative zero is printed without its sign.
     let shown = |value: f64| format!("{value:.2}").replace("-0.00", "0.00").replace('-', "−");
     match found {
         None => NONE.to_owned(),

@@ -2,9 +2,11 @@
 
 use super::rank::RankCorrelation;
 
-/// Kendall's tau-b of two lists of the same length, which counts pairs that are in the same order and takes equal values into
-/// account. Its interval is by Fisher's z with the variance of Fieller, Hartley and Pearson (Tests for rank correlation
-/// coefficients, 1957), 0.437 / (n - 4), and needs five values. `None` if a list does not vary.
+/// Returns Kendall's tau-b of two lists of the same length; `None` if a list does not vary. It counts pairs in the same
+/// order, and corrects for equal values.
+///
+/// The interval is by Fisher's z with the variance of Fieller, Hartley and Pearson (Tests for rank correlation
+/// coefficients, 1957), 0.437 / (n - 4), and needs five values.
 pub fn kendall(one: &[f64], other: &[f64]) -> Option<RankCorrelation> {
     let mut pairs: Vec<(f64, f64)> = one.iter().copied().zip(other.iter().copied()).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
@@ -15,7 +17,7 @@ pub fn kendall(one: &[f64], other: &[f64]) -> Option<RankCorrelation> {
     let equal_one = equal(|a, b| a.0 == b.0, &pairs);
     let equal_both = equal(|a, b| a == b, &pairs);
     let mut others: Vec<f64> = pairs.iter().map(|pair| pair.1).collect();
-    // Knight 1966: as many pairs are in the opposite order as a sort swaps.
+    // Knight 1966: the number of pairs in opposite order equals the number of swaps of a sort.
     let swaps = sort(&mut others);
     let equal_other: f64 = others.chunk_by(|a, b| a == b).map(|equal| pairs_of(equal.len())).sum();
     let spread = ((all - equal_one) * (all - equal_other)).sqrt();
@@ -27,7 +29,7 @@ pub fn kendall(one: &[f64], other: &[f64]) -> Option<RankCorrelation> {
     Some(RankCorrelation::new(value, (count > 4.0).then(|| 0.437 / (count - 4.0))))
 }
 
-/// How many pairs so many values make.
+/// Returns the number of pairs among `count` values.
 fn pairs_of(count: usize) -> f64 {
     count as f64 * (count as f64 - 1.0) / 2.0
 }

@@ -1,4 +1,4 @@
-//! What people did, level by level.
+//! The tries of people on a level.
 
 use std::collections::BTreeMap;
 
@@ -7,7 +7,7 @@ use bevy_playbot::demo::file::{DemoEnd, DemoEpisode};
 use super::numbers::Numbers;
 use crate::report::statistics::median;
 
-/// A try that came to its end.
+/// A try with a known end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Try {
     end: TryEnd,
@@ -22,7 +22,7 @@ enum TryEnd {
 }
 
 impl Try {
-    /// `None` for an episode that was left in its middle, of which nobody knows how it would have ended.
+    /// Returns the try; `None` for an episode that was left before its end, since its outcome is unknown.
     pub fn of(episode: &DemoEpisode) -> Option<Self> {
         let end = match episode.end {
             DemoEnd::Terminated { success: true } => TryEnd::Completed,
@@ -34,22 +34,22 @@ impl Try {
     }
 }
 
-/// Tries on one level, by the people who made them.
+/// Tries on one level, by person.
 #[derive(Clone, Debug, Default)]
 pub(super) struct LevelTries(BTreeMap<String, Vec<Try>>);
 
 impl LevelTries {
-    /// One more.
+    /// Adds a try.
     pub fn add(&mut self, person: &str, one: Try) {
         self.0.entry(person.to_owned()).or_default().push(one);
     }
 
-    /// Who has played.
+    /// Returns the names of the people.
     pub fn people(&self) -> impl Iterator<Item = &str> {
         self.0.keys().map(String::as_str)
     }
 
-    /// How these people did.
+    /// Returns the numbers of these people.
     pub fn numbers(&self) -> Numbers {
         let people: Vec<Numbers> = self.0.values().map(|tries| of_person(tries)).collect();
         Numbers::of_people(&people)

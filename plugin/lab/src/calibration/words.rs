@@ -1,12 +1,12 @@
-//! What is said of results beside recordings.
+//! The sentences of a calibration's reports.
 
 use super::{agreement::FEW_LEVELS, read::Calibration};
 
-/// People that are named.
+/// Most people that are named.
 const MOST_NAMED: usize = 8;
 
 impl Calibration {
-    /// What was compared, what does not count, and how far the numbers can be trusted: a sentence or two each.
+    /// Returns the sentences about the compared levels, the left-out episodes and the limits of the numbers.
     pub fn words(&self) -> Vec<String> {
         let shared = counted(self.levels.len() as u64, "level");
         let tries: u64 = self.levels.iter().map(|level| level.people.tries).sum();
@@ -42,7 +42,7 @@ impl Calibration {
         words
     }
 
-    /// How the numbers are made.
+    /// Returns the method in a few sentences.
     pub fn method(&self) -> &'static str {
         "A rank correlation is 1 if a tester orders the levels from easy to hard as people do, 0 if its order says nothing of \
          theirs, −1 if it is the reverse. Spearman's has a 95 % interval by Fisher's z with the variance of Bonett and Wright \

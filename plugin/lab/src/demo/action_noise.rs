@@ -1,4 +1,4 @@
-//! Noise on what a recorded player does, so that recordings show how to go on from elsewhere.
+//! Noise on the actions of a recorded player, so that recordings also show how to recover.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -8,7 +8,7 @@ use bevy_playbot::{
 };
 use playbot_learner::{Streams, rng::ChaCha8Rng};
 
-/// Replaces some of an agent's actions, or shakes them, whoever decided.
+/// Replaces some of an agent's actions, or adds noise to them, for any controller.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug)]
@@ -18,12 +18,13 @@ pub(super) struct ActionNoise {
 }
 
 impl ActionNoise {
-    /// The share of random actions, or the standard deviation of the noise on continuous ones, drawn from `seed`.
+    /// Creates noise with this share of random actions, or with this standard deviation for continuous ones, drawn from
+    /// `seed`.
     pub(super) fn new(noise: f64, seed: u64) -> Self {
         Self { noise, rng: Streams::new(seed).stream("demo.noise", 0) }
     }
 
-    /// Lets agents of a World carry it: it comes after whoever decides, and before the game hears of the action.
+    /// Installs the system in a World. It runs after the controllers, and before the game reads the action.
     pub(super) fn install(world: &mut World) {
         let TickSchedules { decide, .. } = *world.resource::<TickSchedules>();
         let system = add_noise.after(PlaybotSystems::Decide).before(PlaybotSystems::Act).run_if(is_tick);

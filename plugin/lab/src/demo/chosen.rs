@@ -1,4 +1,4 @@
-//! Which of the recorded episodes are learned from.
+//! The selection of recorded episodes to learn from.
 
 use std::path::Path;
 
@@ -11,7 +11,7 @@ impl Demonstrations {
     ///
     /// # Errors
     ///
-    /// [`VerifyError::NoneWon`] if none did.
+    /// [`VerifyError::NoneWon`] if there are none.
     pub(super) fn won(mut self, path: &Path) -> Result<Self, VerifyError> {
         let episodes = self.episodes.len();
         self.episodes.retain(|demo| demo.episode.is_success());
@@ -21,11 +21,11 @@ impl Demonstrations {
         Ok(self)
     }
 
-    /// Keeps whole episodes of at most `steps` steps together (but at least one episode), drawn evenly over the
-    /// recordings, always the same ones. More steps keep them and others.
+    /// Keeps whole episodes of at most `steps` steps together, but at least one episode. They are drawn evenly over the
+    /// recordings. The choice is reproducible, and more steps only add episodes.
     pub fn at_most(mut self, steps: u64) -> Self {
-        // At random: recordings repeat the same levels in the same order, so that every n-th episode might always be on the
-        // same level.
+        // At random, since recordings repeat the same levels in the same order: every n-th episode might always be on
+        // the same level.
         let mut order: Vec<usize> = (0..self.episodes.len()).collect();
         shuffle(&mut order, &mut Streams::new(0).stream("demonstrations", 0));
         let mut sum = 0;

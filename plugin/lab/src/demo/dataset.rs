@@ -1,4 +1,4 @@
-//! Turning recordings into what the skill model learns from.
+//! Data sets for the skill model, made from recordings.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -10,38 +10,44 @@ use playbot_learner::{Actions, Dataset, DemoEpisode as LearnerEpisode, Observati
 
 use super::{replay_observations::ObservedEpisode, verify::VerifyError};
 use crate::sensors::GameSensors;
-use crate::{game::Game, held_out::HeldOut, split::LevelSplit, train::Experiment, train::free_memory::free_memory};
+use crate::{game::Game, held_out::HeldOut, machine::free_memory, split::LevelSplit, train::Experiment};
 use bevy_playbot::demo::{
     file::{DemoEpisode, DemoReader, EpisodeActions, find_demos},
     replay::Replay,
 };
 use bevy_playbot::vision::ObservationConfig;
 
-/// Recorded episodes of a game, read and checked, before each action is paired with what was seen.
+/// Recorded episodes of a game, read and checked, before each action is paired with its observation.
 ///
-/// Recordings hold no pictures and may hold other vectors than the game has now, so an episode is replayed through the
-/// sensor. Vectors that a recording keeps are used as they are.
+/// Recordings contain no pictures, and their vectors may be older than the game's, so an episode is replayed through
+/// the sensor. Vectors of the right kind are used as they are.
 #[derive(Debug)]
 pub struct Demonstrations {
+    /// Observations of the learner.
     pub(super) observation_config: ObservationConfig,
+    /// The episodes, in the order of files and of their ends.
     pub(super) episodes: Vec<Demonstration>,
-    /// What learns from them is to tell the game's state of pictures.
+    /// The learner of pictures also predicts the game's state.
     with_states: bool,
 }
 
-/// One episode and where it comes from.
+/// One episode and its source.
 #[derive(Debug)]
 pub(super) struct Demonstration {
+    /// The recording.
     pub(super) file: Arc<Path>,
+    /// Number of the episode in the recording, from 0.
     pub(super) index: usize,
+    /// Mode of the game.
     pub(super) mode: Arc<str>,
+    /// The recorded actions.
     pub(super) episode: Arc<DemoEpisode>,
-    /// Its file keeps the vectors that the game has now.
+    /// The file has the vectors that the game has now.
     pub(super) is_seen: bool,
 }
 
 impl Demonstration {
-    /// Mode and seed, or the hash of the file that it is from, whose number differs from recording to recording.
+    /// Returns mode and seed, or the hash of the level file, whose number differs from recording to recording.
     fn level(&self) -> (Arc<str>, Result<u64, u64>) {
         let Some(file) = &self.episode.level_file else { return (self.mode.clone(), Ok(self.episode.level_seed)) };
         (self.mode.clone(), Err(file.hash))
@@ -51,13 +57,13 @@ impl Demonstration {
 impl Demonstrations {
     /// Reads all recordings of a game below a path.
     ///
-    /// The files may differ in mode; the observation must not depend on it. None may show a level of `held_out`, if there
-    /// is such a split: what is measured there would be no generalisation.
+    /// The files may differ in mode, but the observation must not depend on it. If there is a split `held_out`, no
+    /// recording may show a level of it: results on these levels would be no generalisation.
     ///
     /// # Errors
     ///
     /// [`VerifyError`] for files that cannot be read, belong to another game or version, or show a held-out level, and
-    /// for a game that cannot be seen this way.
+    /// for a game that cannot be observed this way.
     pub fn read(
         game: &dyn Game,
         observation_config: &ObservationConfig,
@@ -85,7 +91,7 @@ impl Demonstrations {
                     return Err(VerifyError::HeldOut { path: file, level, split: hidden.split().clone() });
                 }
                 if !is_seen {
-                    // Vectors that are not used would only take room.
+                    // Unused vectors would only take memory.
                     episode.observations = Vec::new();
                 }
                 let (file, mode, episode) = (shared.clone(), mode.clone(), Arc::new(episode));
@@ -95,8 +101,8 @@ impl Demonstrations {
         Ok(Self { observation_config: *observation_config, episodes, with_states: false })
     }
 
-    /// What an experiment learns skills from, of all recordings below a path: none of its held-out levels, no more steps
-    /// than it asks for, and only what was won if it wants that.
+    /// Selects the episodes that an experiment learns skills from, of all recordings below a path. It excludes held-out
+    /// levels, keeps at most the steps that the experiment asks for, and only won episodes if it wants that.
     ///
     /// # Errors
     ///
@@ -111,22 +117,22 @@ impl Demonstrations {
         })
     }
 
-    /// The modes that were recorded, each once.
+    /// Returns the recorded modes, each once.
     pub fn modes(&self) -> BTreeSet<&str> {
         self.episodes.iter().map(|demo| &*demo.mode).collect()
     }
 
-    /// Steps of all episodes together.
+    /// Returns the number of steps of all episodes together.
     pub fn steps(&self) -> u64 {
         self.episodes.iter().map(|demo| demo.episode.len() as u64).sum()
     }
 
-    /// Episodes.
+    /// Returns the number of episodes.
     pub fn episodes(&self) -> usize {
         self.episodes.len()
     }
 
-    /// Memory that their pictures will take; 0 for vectors.
+    /// Returns the memory that the pictures will take; 0 for vectors.
     pub fn picture_bytes(&self) -> u64 {
         if self.observation_config.is_image() {
             self.steps() * self.observation_config.image.shape().numbers() as u64
@@ -135,9 +141,9 @@ impl Demonstrations {
         }
     }
 
-    /// Pairs each action with the observation that preceded it, in the order of the recordings, replaying what has to be
-    /// replayed: each distinct demonstration once, on at most `threads` threads. `progress` hears numbers of steps that
-    /// are done, from several threads.
+    /// Pairs each action with the observation before it, in the order of the recordings. Each distinct demonstration
+    /// that needs a replay is replayed once, on at most `threads` threads. `progress` receives numbers of finished
+    /// steps, from several threads.
     ///
     /// # Errors
     ///
@@ -157,7 +163,7 @@ impl Demonstrations {
         Ok(seen.with_states(states.seen(game, threads, &|_| {})?)?)
     }
 
-    /// The data set of what the sensor shows.
+    /// Returns the data set of the sensor's observations.
     fn seen(&self, game: &dyn Game, threads: usize, progress: &(impl Fn(u64) + Sync)) -> Result<Dataset, VerifyError> {
         self.check_room(self.bytes(game), free_memory())?;
         let originals = self.originals();
@@ -170,7 +176,7 @@ impl Demonstrations {
             } else if let Some(ObservedEpisode { observations, .. }) = observed.remove(&i) {
                 observations
             } else {
-                // An earlier episode is the same.
+                // An earlier episode is equal.
                 progress(demo.episode.len() as u64);
                 let earlier: &LearnerEpisode = &episodes[originals[i]];
                 earlier.observations.clone()
@@ -181,26 +187,26 @@ impl Demonstrations {
         Ok(dataset.with_levels(self.levels())?)
     }
 
-    /// Memory of the pictures, and of the states beside them if those are to be told.
+    /// Returns the memory of the pictures, and of the states if those are predicted.
     pub fn bytes(&self, game: &dyn Game) -> u64 {
         let numbers = ObservationConfig::default().obs_kind(game).numbers() as u64;
         let states = if self.with_states { self.steps() * numbers * size_of::<f32>() as u64 } else { 0 };
         self.picture_bytes() + states
     }
 
-    /// Nothing is replayed that has no room.
+    /// Checks that there is memory for the pictures, before the replay.
     fn check_room(&self, bytes: u64, free: u64) -> Result<(), VerifyError> {
         let (steps, observation_config) = (self.steps(), self.observation_config);
         if bytes > free { Err(VerifyError::TooLarge { steps, observation_config, bytes, free }) } else { Ok(()) }
     }
 
-    /// For each episode the index of the first one of the same level.
+    /// Returns for each episode the index of the first one of the same level.
     fn levels(&self) -> Vec<usize> {
         let mut first = BTreeMap::new();
         self.episodes.iter().enumerate().map(|(i, demo)| *first.entry(demo.level()).or_insert(i)).collect()
     }
 
-    /// For each episode the index of the first one that is the same game from beginning to end.
+    /// Returns for each episode the index of the first one that is equal from start to end.
     pub(super) fn originals(&self) -> Vec<usize> {
         let mut first = BTreeMap::new();
         let key = |demo: &Demonstration| (demo.level(), bits(&demo.episode.actions));
@@ -208,7 +214,7 @@ impl Demonstrations {
     }
 }
 
-/// Actions as numbers that can be compared.
+/// Returns the actions as numbers that can be compared.
 fn bits(actions: &EpisodeActions) -> Vec<u32> {
     match actions {
         EpisodeActions::Discrete(list) => list.clone(),
@@ -216,6 +222,7 @@ fn bits(actions: &EpisodeActions) -> Vec<u32> {
     }
 }
 
+/// Returns the actions of an episode as learners take them.
 pub(super) fn learner_actions(episode: &DemoEpisode) -> Actions {
     match &episode.actions {
         EpisodeActions::Discrete(list) => Actions::Discrete(list.clone()),
@@ -232,7 +239,7 @@ pub(super) mod tests {
         vision::{ImageOptions, ObservationKind},
     };
 
-    pub(in super::super) fn all(episodes: impl Iterator<Item = DemoEpisode>) -> Demonstrations {
+    pub(crate) fn all(episodes: impl Iterator<Item = DemoEpisode>) -> Demonstrations {
         let demo = |(index, episode)| Demonstration {
             file: Path::new("a.demo").into(),
             index,

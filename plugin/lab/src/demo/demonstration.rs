@@ -1,4 +1,4 @@
-//! A game's demonstrator, or another player, about to be recorded.
+//! The recording of a game's demonstrator, or of another player.
 //!
 //! ```no_run
 //! use bevy_playbot::demo::file::DemoWriter;
@@ -36,7 +36,7 @@ use crate::{
     worlds::{build_observing_world, build_world},
 };
 
-/// What of a game's demonstrator is recorded.
+/// A plan of the recording of a game's demonstrator.
 #[derive(Clone, Debug)]
 pub struct DemonstrationPlan {
     /// A mode that the game has.
@@ -45,20 +45,19 @@ pub struct DemonstrationPlan {
     pub levels: Vec<u64>,
     /// The share of random actions, or the standard deviation of the noise on continuous ones.
     pub noise: f64,
-    /// Seed of the noise.
+    /// Random seed of the noise.
     pub seed: u64,
-    /// Steps after which nothing more is recorded: until then the levels are played again and again. `None` for each level
-    /// once.
+    /// Steps after which the recording stops. Until then the levels are repeated. `None` plays each level once.
     pub steps: Option<u64>,
-    /// Whether the recording keeps the observation vectors, which replaying would bring back.
+    /// Whether the recording keeps the observation vectors. Without them a replay restores them.
     pub keep_observations: bool,
 }
 
 impl DemonstrationPlan {
-    /// The head of the recording.
+    /// Returns the header of the recording.
     pub fn header(&self, game: &dyn Game) -> DemoHeader {
         let mut header = game.demo_header(&self.mode);
-        header.demonstrator = game.demonstrator().unwrap_or_default().to_owned();
+        header.demonstrator = game.tools().bots.demonstrator().unwrap_or_default().to_owned();
         header.action_noise = self.noise;
         if self.keep_observations {
             header.observation_names = game.observation().names;
@@ -66,22 +65,23 @@ impl DemonstrationPlan {
         header
     }
 
-    /// A World with an agent that the demonstrator plays, recorded by `writer` in each tick. After the last level the agent is
-    /// idle. With a number of steps it plays on, and whoever ticks the World looks at [`Recorder::steps`].
+    /// Builds a World with an agent that the demonstrator plays, recorded by `writer` in each tick. After the last
+    /// level the agent is idle. With a number of steps it plays on, and the caller checks [`Recorder::steps`].
     pub fn build_world(&self, game: &dyn Game, writer: DemoWriter) -> (World, Entity) {
         let (mut world, agents) = build_world(game, &self.mode, self.seed, 0, 1);
         let agent = agents[0];
-        game.attach_demonstrator(&mut world, agent, self.noise);
+        game.tools().bots.attach_demonstrator(&mut world, agent, self.noise);
         self.record(&mut world, agent, Control::Bot, writer);
         (world, agent)
     }
 
-    /// [`build_world`](Self::build_world) with another player, such as a policy that has learned the game, which sees as
-    /// `observation_config` says. [`header`](Self::header) names the demonstrator: put the player's name there.
+    /// Builds a World as [`build_world`](Self::build_world) does, with another player, such as a trained policy, and
+    /// the observation of `observation_config`. [`header`](Self::header) names the demonstrator: replace the name by
+    /// the player's.
     ///
     /// # Errors
     ///
-    /// What it sees cannot be made: see [`VisionError`].
+    /// The observation cannot be made: see [`VisionError`].
     pub fn build_world_of(
         &self,
         game: &dyn Game,
@@ -101,7 +101,7 @@ impl DemonstrationPlan {
         Ok((world, agent))
     }
 
-    /// Lets the agent play the levels and `writer` record it.
+    /// Makes the agent play the levels and `writer` record it.
     fn record(&self, world: &mut World, agent: Entity, control: Control, writer: DemoWriter) {
         let recorder = Recorder::new(writer);
         let (recorder, levels) = match self.steps {

@@ -1,4 +1,4 @@
-//! Recordings in the laboratory: making them of a demonstrator, checking them by replay, and reading them back for learning.
+//! Recordings: making them with a demonstrator, verifying them by replay, and reading them for learning.
 
 mod action_noise;
 mod chosen;

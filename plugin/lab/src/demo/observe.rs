@@ -1,4 +1,4 @@
-//! Which recordings have to be replayed, and how.
+//! The replay of recordings whose files lack observations.
 
 use std::{collections::BTreeMap, sync::Arc};
 
@@ -13,8 +13,8 @@ use crate::{game::Game, sensors::GameSensors};
 use bevy_playbot::demo::{file::DemoEpisode, replay::Replay};
 
 impl Demonstrations {
-    /// Replays what no file keeps, mode by mode, each distinct demonstration once: what comes of it, by the index of the
-    /// episode. `replay` says what is compared with the recordings.
+    /// Replays the episodes whose observations are not in a file, mode by mode, each distinct demonstration once.
+    /// Returns the results by the index of the episode. `replay` says what is compared with the recordings.
     ///
     /// # Errors
     ///
@@ -47,7 +47,7 @@ impl Demonstrations {
         Ok(all)
     }
 
-    /// An error with the files of the episodes that were played.
+    /// Returns an error with the files of the episodes that were played.
     fn explained(&self, error: ReplayError) -> VerifyError {
         let place = |id: usize| (self.episodes[id].file.to_path_buf(), self.episodes[id].index);
         match error {
@@ -58,7 +58,7 @@ impl Demonstrations {
         }
     }
 
-    /// Episodes that were left before their first tick.
+    /// Returns empty results for the episodes that were left before their first tick.
     fn nothing_to_see(&self, game: &dyn Game) -> BTreeMap<usize, ObservedEpisode> {
         let kind = self.observation_config.obs_kind(game);
         let empty = self.episodes.iter().enumerate().filter(|(_, demo)| demo.episode.is_empty());

@@ -1,4 +1,4 @@
-//! Observations of recordings: they are played again, many at a time, and what the agents see and earn is kept.
+//! Observations and rewards of recordings, from replays of many at a time.
 
 use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations};
@@ -15,34 +15,34 @@ use bevy_playbot::{
     vision::{ObservationConfig, VisionError},
 };
 
-/// Recordings that one World replays at the same time: shares the cost of a tick, and a camera's.
+/// Recordings that one World replays at the same time. They share the cost of a tick and of a camera.
 const SIDE_BY_SIDE: usize = 16;
 
-/// A replay that is to be played, with a number to know it by.
+/// A replay with its number.
 pub(super) type Job = (usize, Replay);
 
-/// What an agent saw and earned in an episode.
+/// An agent's observations and rewards in an episode.
 pub(super) struct ObservedEpisode {
     /// Number of the job.
     pub id: usize,
     /// The observation before each action.
     pub observations: Observations,
-    /// What the game paid for each action.
+    /// The reward of each action.
     pub rewards: Vec<f32>,
-    /// Where the episode stopped being the recorded one, if it did.
+    /// The first divergence from the recorded episode, if there is one.
     pub divergence: Option<Divergence>,
 }
 
-/// Why replays came to no end.
+/// The errors of replays.
 pub(super) enum ReplayError {
     /// The game broke its contract while these jobs were played side by side.
     Fault {
         /// Numbers of the jobs.
         ids: Vec<usize>,
-        /// What happened.
+        /// The fault.
         fault: Fault,
     },
-    /// The game cannot be seen this way.
+    /// The game cannot be observed this way.
     Vision(VisionError),
 }
 
@@ -52,11 +52,11 @@ impl From<VisionError> for ReplayError {
     }
 }
 
-/// Replays episodes of one mode on at most `threads` threads. What is seen does not depend on their number.
+/// Replays episodes of one mode on at most `threads` threads. Their number changes no observation.
 ///
 /// # Errors
 ///
-/// [`ReplayError`] if the game breaks its contract or cannot be seen this way.
+/// [`ReplayError`] if the game breaks its contract or cannot be observed this way.
 pub(super) fn observe_replays(
     game: &dyn Game,
     observation_config: &ObservationConfig,
@@ -125,7 +125,7 @@ impl ReplayWorld {
         }
     }
 
-    /// Hands an agent the next episode; it stands still if there is none.
+    /// Gives an agent the next episode, or makes it idle if there is none.
     fn begin(&mut self, agent: usize, job: Option<Job>) {
         let mut entity = self.world.entity_mut(self.agents[agent]);
         let Some((id, replay)) = job else {
@@ -137,11 +137,11 @@ impl ReplayWorld {
         self.replaying[agent] = Some(ObservedEpisode { id, observations, rewards: Vec::new(), divergence: None });
     }
 
-    /// Keeps what an agent saw and earned in this tick; gives out the episode if that was its last.
+    /// Stores an agent's observation and reward of this tick. Returns the episode after its last tick.
     fn note(&mut self, agent: usize) -> Option<ObservedEpisode> {
         let observed = self.replaying[agent].as_mut()?;
         let entity = self.world.entity(self.agents[agent]);
-        // What an agent carries after a tick is still what it acted on.
+        // After a tick the agent still has the observation that it acted on.
         entity.get::<Observation>()?.push_to(&mut observed.observations);
         observed.rewards.push(entity.get::<Reward>()?.get());
         let replay = entity.get::<Replay>().filter(|replay| replay.is_finished())?;

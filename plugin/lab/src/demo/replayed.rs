@@ -1,4 +1,4 @@
-//! Which recorded episodes were played when something went wrong.
+//! The recorded episodes that were replayed when an error occurred.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -6,12 +6,13 @@ use std::{
     path::PathBuf,
 };
 
-/// Recorded episodes that were played at the same time. As text they are named by their files: one of them is to blame.
+/// Recorded episodes that were replayed at the same time. Its text names their files: one of the episodes caused the
+/// error.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Replayed(BTreeMap<PathBuf, BTreeSet<usize>>);
 
 impl Replayed {
-    /// These episodes, each by its file and its index there, from 0.
+    /// Creates it from the episodes, each with its file and its index there, from 0.
     pub fn new(episodes: impl IntoIterator<Item = (PathBuf, usize)>) -> Self {
         let mut by_file: BTreeMap<PathBuf, BTreeSet<usize>> = BTreeMap::new();
         for (file, index) in episodes {

@@ -1,4 +1,4 @@
-//! Turning recordings into what an algorithm trains on beside its own play.
+//! Rollouts for algorithms that learn from recordings beside their own play.
 
 use bevy_playbot::demo::{
     file::{DemoEnd, DemoEpisode},
@@ -14,14 +14,14 @@ use super::{
 use crate::{game::Game, sensors::GameSensors};
 
 impl Demonstrations {
-    /// What was played, with its rewards, as rollouts of one environment each. Every episode is replayed, and what it earns is
-    /// what the game pays today: recordings that know of no reward, or of an earlier one, serve as well, as long as the game
-    /// still comes to the recorded states. The last step of an episode that did not end by the rules is left out: nobody has
-    /// recorded what came after it.
+    /// Returns the episodes with their rewards, as rollouts of one environment each. Every episode is replayed, and its
+    /// rewards are those of the current game. Recordings with no rewards or older ones serve as well, if the game still
+    /// reaches the recorded states. The last step of an episode that the rules did not end is left out, since its
+    /// outcome was not recorded.
     ///
     /// # Errors
     ///
-    /// [`VerifyError`] if an episode does not replay: nobody knows what it would earn.
+    /// [`VerifyError`] if an episode does not replay, since its rewards are then unknown.
     pub fn rollouts(
         mut self,
         game: &dyn Game,
@@ -43,7 +43,7 @@ impl Demonstrations {
     }
 }
 
-/// The steps of an episode whose outcome is known, if there are any.
+/// Returns the steps of an episode with a known outcome, if there are any.
 fn rollout(
     episode: &DemoEpisode,
     ObservedEpisode { observations, rewards, .. }: &ObservedEpisode,

@@ -1,4 +1,4 @@
-//! Which levels demonstrations show, as what learns from them notes it.
+//! The levels of demonstrations, as learners store them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -8,7 +8,7 @@ use super::dataset::Demonstrations;
 use crate::{game::Game, split::LevelSplit};
 
 impl Demonstrations {
-    /// The levels that they show.
+    /// Returns the levels that the demonstrations show.
     pub fn seen_levels(&self, game: &dyn Game) -> SeenLevels {
         let (mut levels, mut files) = (BTreeMap::<&str, BTreeSet<u64>>::new(), BTreeSet::new());
         for demo in &self.episodes {

@@ -1,4 +1,4 @@
-//! Proving a recording: it is played again, and each tick must come out as recorded.
+//! The verification of recordings by replay: each tick must repeat as recorded.
 
 use std::{
     path::{Path, PathBuf},
@@ -7,6 +7,7 @@ use std::{
 
 use bevy::prelude::*;
 use serde::Serialize;
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 pub use super::replayed::Replayed;
@@ -21,52 +22,52 @@ use bevy_playbot::{
     vision::{ObservationConfig, VisionError},
 };
 
-/// What a check by replay found.
+/// The result of a verification.
 #[derive(Clone, Debug, Serialize)]
 pub struct VerifyReport {
     /// Episodes replayed.
     pub episodes: u64,
     /// Ticks replayed.
     pub ticks: u64,
-    /// First divergence of each episode that diverged: index of the episode, and where.
+    /// First divergence of each episode that diverged: index of the episode, and tick with the difference.
     pub divergences: Vec<(u64, String)>,
 }
 
-/// A recording could not be checked.
+/// The reason why a recording cannot be verified.
 #[derive(Debug, Error)]
 pub enum VerifyError {
     /// The file cannot be read, or belongs to another game.
     #[error(transparent)]
     File(#[from] DemoFileError),
-    /// The game broke its contract while it was replayed.
+    /// The game broke its contract during a replay.
     #[error("while replaying {replayed}: {fault}; if the game has changed since, record it again or leave it out")]
     Fault {
-        /// What was replayed.
+        /// The replayed episodes.
         replayed: Replayed,
-        /// What happened.
+        /// The fault.
         fault: Fault,
     },
-    /// A recording is not of this game any more.
+    /// A recording does not replay in this game.
     #[error("{}: episode {episode} does not replay ({divergence}): record it again", path.display())]
     Diverged {
         /// The file.
         path: PathBuf,
         /// Index of the episode.
         episode: usize,
-        /// Where it stops being the recorded game.
+        /// The first difference.
         divergence: Divergence,
     },
-    /// The recording is of a mode the game does not have.
+    /// The recording has a mode that the game does not have.
     #[error("{}: {source}", path.display())]
     Mode {
         /// The file.
         path: PathBuf,
-        /// The mode, and those there are.
+        /// The mode, and the valid ones.
         source: ModeError,
     },
-    /// A recording shows a level that is kept for the test.
+    /// A recording shows a held-out level.
     #[error(
-        "{}: level {level} is, or looks like, one of the held-out levels {split}, which nobody may learn from: take \
+        "{}: level {level} is, or looks like, one of the held-out levels {split}, which must not be learned from: take \
          recordings of other levels (`playbot record --hold-out {split}` leaves these out), or hold out others with `test`",
         path.display()
     )]
@@ -78,7 +79,7 @@ pub enum VerifyError {
         /// The held-out levels.
         split: LevelSplit,
     },
-    /// Only won episodes were wanted.
+    /// Only won episodes were asked for, and there are none.
     #[error(
         "{}: none of the {episodes} recorded episodes ended at the goal, and `demo_wins` takes only those that did: record a \
          demonstrator that gets there, or leave `demo_wins` out, as it must be for games that go on at the goal",
@@ -90,7 +91,7 @@ pub enum VerifyError {
         /// Episodes that were recorded there.
         episodes: usize,
     },
-    /// The pictures cannot be made.
+    /// The game cannot draw these pictures.
     #[error(transparent)]
     Vision(#[from] VisionError),
     /// The pictures need more memory than there is.
@@ -102,7 +103,7 @@ pub enum VerifyError {
     TooLarge {
         /// Steps of the recordings.
         steps: u64,
-        /// What is seen.
+        /// The observation.
         observation_config: ObservationConfig,
         /// Memory of the pictures.
         bytes: u64,
@@ -114,11 +115,22 @@ pub enum VerifyError {
     Data(#[from] playbot_learner::LearnError),
 }
 
+impl HasExitCode for VerifyError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Fault { .. } => 2,
+            Self::File(error) => error.exit_code(),
+            Self::Data(error) => error.exit_code(),
+            _ => 3,
+        }
+    }
+}
+
 fn gib(bytes: u64) -> f64 {
     bytes as f64 / (1u64 << 30) as f64
 }
 
-/// Replays every episode of a file; `progress` hears the number of episodes done.
+/// Replays every episode of a file; `progress` receives the number of finished episodes.
 ///
 /// # Errors
 ///
@@ -145,14 +157,14 @@ pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) 
     Ok(report)
 }
 
-/// A World with one agent on which recordings are played.
+/// A World with one agent that replays recordings.
 pub struct EpisodeReplayer {
     world: World,
     agent: Entity,
 }
 
 impl EpisodeReplayer {
-    /// Builds the game in a mode it has.
+    /// Builds the game in one of its modes.
     pub fn new(game: &dyn Game, mode: &str) -> Self {
         let (world, agents) = build_world(game, mode, 0, 0, 1);
         Self { world, agent: agents[0] }

@@ -1,4 +1,4 @@
-//! What a detector is.
+//! The traits of a detector.
 
 use bevy_playbot::episode::EpisodeResult;
 
@@ -8,39 +8,39 @@ use super::{
 };
 use crate::floor_plan::FloorPlan;
 
-/// Looks for one kind of defect in every episode of a test.
+/// A search for one kind of defect in every episode of a test.
 ///
-/// What it finds must depend on the episode alone, neither on the clock nor on what was played before it: then results are
-/// the same on any number of threads and shards.
+/// Findings must depend on the episode alone, not on the clock and not on earlier episodes. Then results are the same
+/// on any number of threads and shards.
 pub trait Detector: Send + Sync {
-    /// Its name, in small letters and hyphens, as findings and the command line have it.
+    /// Returns its name, in small letters and hyphens, as findings and the command line have it.
     fn name(&self) -> &'static str;
 
-    /// What it finds, in one line.
+    /// Returns the defect that it finds, in one line.
     fn describe(&self) -> &'static str;
 
-    /// Whether it looks where nobody chooses: it costs little and gives no false alarm in a sound game.
+    /// Returns whether it is a default detector: cheap, and without false alarms in an unmutated game.
     fn is_usual(&self) -> bool {
         true
     }
 
-    /// Its settings, which may be changed before the test begins.
+    /// Returns its settings, which may be changed before the test starts.
     fn settings(&mut self) -> Vec<Setting<'_>> {
         Vec::new()
     }
 
-    /// Begins to look at an episode; `None` if there is nothing to look at.
+    /// Starts to watch an episode; `None` if there is nothing to watch.
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
         None
     }
 
-    /// Begins to look at a World; `None` if agents are all that is looked at.
+    /// Starts to watch a World; `None` if it watches agents only.
     fn watch_world(&self) -> Option<Box<dyn WorldWatch>> {
         None
     }
 }
 
-/// The level of an episode that begins.
+/// The level of an episode that starts.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LevelAhead {
     /// Number of the level.
@@ -49,28 +49,28 @@ pub struct LevelAhead {
     pub plan: Option<FloorPlan>,
 }
 
-/// Looks at one agent during one episode.
+/// A detector's view of one agent during one episode.
 pub trait Watch {
-    /// Looks at the tick that was just played, the last one included. What is wrong, if anything: it is the finding of this
-    /// tick, and the only one of the episode.
+    /// Examines the tick that was just played, the last one included. Returns a message if something is wrong: the
+    /// finding of this tick, and the only one of the episode.
     fn tick(&mut self, moment: &Moment<'_>) -> Option<String>;
 
-    /// Looks at the end of the episode, after its last tick.
+    /// Examines the end of the episode, after its last tick.
     fn end(&mut self, _moment: &Moment<'_>, _result: &EpisodeResult) -> Option<String> {
         None
     }
 }
 
-/// Looks at a World after each of its ticks.
+/// A detector's view of a World after each of its ticks.
 ///
-/// If it finds something while several agents play there, their episodes are played again, each alone in a World of its own,
-/// to see whose it is.
+/// If it finds something while several agents play there, their episodes are replayed, each alone in a World of its
+/// own, to see whose finding it is.
 pub trait WorldWatch {
-    /// Whether it wants to hear what is logged as an error.
+    /// Returns whether it reads the errors of the log.
     fn hears_errors(&self) -> bool {
         false
     }
 
-    /// What is wrong, if anything.
+    /// Returns a message if something is wrong.
     fn tick(&mut self, moment: &WorldMoment<'_>) -> Option<String>;
 }

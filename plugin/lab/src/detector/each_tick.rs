@@ -1,4 +1,4 @@
-//! Detectors that are one question, asked after each tick.
+//! Detectors with one question, asked after each tick.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use super::{
     moment::Moment,
 };
 
-/// Asks one question after each tick of each episode: the short way to a game's own detector.
+/// A detector that asks one question after each tick of each episode: the short form of a game's own detector.
 pub struct EachTick<F> {
     name: &'static str,
     describe: &'static str,
@@ -20,7 +20,7 @@ impl<F> EachTick<F>
 where
     F: Fn(&Moment<'_>) -> Option<String> + Send + Sync + 'static,
 {
-    /// A detector with this name and one line about it. The question answers what is wrong, if anything.
+    /// Creates a detector with this name and one line about it. The question returns a message if something is wrong.
     pub fn new(name: &'static str, describe: &'static str, question: F) -> Self {
         Self { name, describe, question: Arc::new(question) }
     }

@@ -1,11 +1,11 @@
-//! The contract of a detector: what looks for one kind of defect while testers play.
+//! The contract of a detector, which looks for one kind of defect while testers play.
 //!
 //! ```
 //! use playbot_lab::detector::{Detector, EachTick, Moment};
 //!
-//! /// A game's own: nobody may ever owe money.
+//! /// A game's own detector: no agent may owe money.
 //! fn debt() -> Box<dyn Detector> {
-//!     Box::new(EachTick::new("debt", "somebody owes money", |moment: &Moment<'_>| {
+//!     Box::new(EachTick::new("debt", "an agent owes money", |moment: &Moment<'_>| {
 //!         let purse = moment.observation.first().copied().unwrap_or_default();
 //!         (purse < 0.0).then(|| format!("the purse holds {purse}"))
 //!     }))
@@ -13,8 +13,8 @@
 //! assert_eq!(debt().name(), "debt");
 //! ```
 //!
-//! [`Game::detectors`](crate::game::Game::detectors) names a game's own; [`detectors`](crate::detectors) has those that
-//! every game gets.
+//! [`TestTools::detectors`](crate::game::TestTools::detectors) names a game's own; [`detectors`](crate::detectors) has
+//! those that every game gets.
 
 mod contract;
 mod each_tick;

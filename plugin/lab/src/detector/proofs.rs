@@ -1,21 +1,22 @@
-//! What is known for certain while an episode is played.
+//! Proofs about a level and about the state of an episode.
 
 use crate::proof::LevelProof;
 
-/// What the game can prove, for detectors that ask. An answer may take a millisecond, so nobody asks in each tick.
+/// The game's proofs, on request. One may take a millisecond, so a detector must not ask in each tick.
 pub trait Proofs {
-    /// Of the level, from its start: [`Game::prove`](crate::game::Game::prove).
+    /// Returns the proof about the level, from its start: [`LevelTools::prove`](crate::game::LevelTools::prove).
     fn of_level(&self) -> LevelProof {
         LevelProof::Unknown
     }
 
-    /// Of the state in which the World is now: [`Game::prove_from`](crate::game::Game::prove_from).
+    /// Returns the proof about the World's current state:
+    /// [`StateTools::prove_from`](crate::game::StateTools::prove_from).
     fn of_state(&self) -> LevelProof {
         LevelProof::Unknown
     }
 }
 
-/// Nothing is ever proved.
+/// A game without proofs.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct NoProofs;
 

@@ -1,4 +1,4 @@
-//! Numbers by which detectors are adjusted.
+//! Settings of detectors.
 
 /// A setting of a detector.
 pub struct Setting<'a> {
@@ -6,19 +6,19 @@ pub struct Setting<'a> {
     pub key: &'static str,
     /// Its value.
     pub value: &'a mut f64,
-    /// The least value that makes sense.
+    /// The least valid value.
     pub least: f64,
-    /// What it means, with its unit.
+    /// Its meaning, with its unit.
     pub what: &'static str,
 }
 
 impl<'a> Setting<'a> {
-    /// A setting that is at least 0.
+    /// Creates a setting that is at least 0.
     pub fn new(key: &'static str, value: &'a mut f64, what: &'static str) -> Self {
         Self { key, value, least: 0.0, what }
     }
 
-    /// The same with another least value.
+    /// Replaces the least value.
     pub fn at_least(self, least: f64) -> Self {
         Self { least, ..self }
     }

@@ -4,12 +4,12 @@ use bevy_playbot::{agent::AgentOrder, vision::BlankEpisodes};
 
 use crate::detector::{Detector, WorldMoment, WorldWatch};
 
-/// Every picture of an episode was of one colour. Only testers that see pictures have any; an agent that has never seen
-/// anything is a fault of the game, which is a finding, too.
+/// A finding for episodes in which every picture was of one colour. Only testers with pictures have any. An agent that
+/// never gets an observation is a fault of the game, which is a finding of its own.
 #[derive(Default)]
 pub struct BlankPicture;
 
-/// Blank episodes that are known.
+/// The blank episodes so far.
 #[derive(Default)]
 struct Counted(u64);
 

@@ -1,4 +1,4 @@
-//! All detectors that there are.
+//! The list of all detectors.
 
 use super::{
     blank_picture::BlankPicture, clock_end::ClockEnd, dead_action::DeadAction, determinism::Determinism,
@@ -13,21 +13,21 @@ use crate::{
     game::Game,
 };
 
-/// What every test finds, whoever is selected: names and what they find.
+/// The findings of every test, for any selection of detectors: names and descriptions.
 pub const ALWAYS: [(&str, &str); 4] = [
     ("panic", "the game panics"),
-    ("fault", "the game breaks its contract: a reward that is no number, an observation that is missing and the like"),
+    ("fault", "the game breaks its contract: a reward that is not a number, a missing observation or the like"),
     ("endless", "an episode does not end"),
-    ("unreachable-goal", "it is proved that the aim of the level cannot be reached"),
+    ("unreachable-goal", "the goal of the level is proved to be out of reach"),
 ];
 
-/// A detector of one of the kinds that there are.
+/// A detector of one of the three kinds.
 pub(super) enum Known {
-    /// Looks at agents or Worlds, tick by tick.
+    /// Watches agents or Worlds, tick by tick.
     Ticks(Box<dyn Detector>),
-    /// Looks at levels after they were tested.
+    /// Examines levels after they were tested.
     Level(Box<dyn LevelDetector>),
-    /// Looks at the clock.
+    /// Measures time.
     Clock(TickTime),
 }
 
@@ -65,7 +65,7 @@ impl Known {
     }
 }
 
-/// Those of all games.
+/// Returns the detectors of all games.
 fn general() -> impl Iterator<Item = Known> {
     let ticks: Vec<Box<dyn Detector>> = vec![
         Box::<Stuck>::default(),
@@ -98,41 +98,41 @@ fn general() -> impl Iterator<Item = Known> {
     known.chain([Known::Clock(TickTime::default())])
 }
 
-/// All detectors for a game, its own included. Its own one takes the place of another with its name.
+/// Returns all detectors for a game, its own included. A detector of the game replaces a general one with its name.
 pub(super) fn all(game: &dyn Game) -> Vec<Known> {
-    let own = game.detectors();
+    let own = game.tools().tests.detectors();
     let is_own = |name: &str| own.iter().any(|detector| detector.name() == name);
     let mut known: Vec<Known> = general().filter(|known| !is_own(known.name())).collect();
     known.extend(own.into_iter().map(Known::Ticks));
     known
 }
 
-/// Whether the detector with this name compares what several testers did.
+/// Returns whether the detector with this name compares several testers.
 pub(crate) fn compares_testers(name: &str) -> bool {
     general().any(|known| matches!(known, Known::Level(known) if known.name() == name && known.compares_testers()))
 }
 
-/// Names of the detectors that only this game has.
+/// Returns the names of the detectors that only this game has.
 pub(crate) fn own_detectors(game: &dyn Game) -> Vec<String> {
     let is_general = |name: &str| general().any(|known| known.name() == name);
-    let names = game.detectors().into_iter().map(|detector| detector.name());
+    let names = game.tools().tests.detectors().into_iter().map(|detector| detector.name());
     names.filter(|name| !is_general(name)).map(str::to_owned).collect()
 }
 
-/// What is said of a detector.
+/// The description of a detector.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DetectorInfo {
     /// Its name.
     pub name: &'static str,
-    /// What it finds, in one line.
+    /// The defect that it finds, in one line.
     pub about: &'static str,
-    /// Whether it looks where nobody chooses.
+    /// Whether it is a default detector.
     pub is_usual: bool,
     /// Its settings: name, value and meaning.
     pub settings: Vec<(&'static str, f64, &'static str)>,
 }
 
-/// What there is for a game, but for [`ALWAYS`].
+/// Returns the descriptions of a game's detectors, without [`ALWAYS`].
 pub fn list(game: &dyn Game) -> Vec<DetectorInfo> {
     let info = |mut known: Known| DetectorInfo {
         name: known.name(),

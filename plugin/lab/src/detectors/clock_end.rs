@@ -1,4 +1,4 @@
-//! Episodes that the clock loses.
+//! Episodes that a timer loses.
 
 use bevy::math::Vec2;
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
@@ -6,10 +6,10 @@ use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
 use super::level_detector::{LevelDefect, LevelDetector, ShownBy, TestedLevel};
 use crate::{detector::Setting, explore::CellGrid};
 
-/// Episodes of a level are all over by the same tick, and those that last so long are lost, wherever their agents are:
-/// nothing but the clock can have ended them, and time limits truncate.
+/// A finding for levels on which the longest episodes are lost in the same tick with their agents at different
+/// positions. Only a timer can have ended them, and time limits should truncate.
 ///
-/// Games that let a timer kill do that on purpose, so it is not usual.
+/// It is opt-in, because some games let a timer kill on purpose.
 pub struct ClockEnd {
     episodes: f64,
     distance: f64,
@@ -52,7 +52,7 @@ impl LevelDetector for ClockEnd {
         if last().count() < self.episodes as usize || !last().all(|(_, _, result)| is_lost(result)) {
             return Vec::new();
         }
-        let plan = level.game.floor_plan(level.mode, level.level);
+        let plan = level.game.tools().levels.floor_plan(level.mode, level.level);
         let apart = self.distance as f32 * CellGrid::new(plan.as_ref(), None).size;
         let mut places: Vec<Vec2> = Vec::new();
         let ended =

@@ -1,4 +1,4 @@
-//! Actions that never do anything.
+//! Actions without an effect.
 
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
@@ -16,13 +16,14 @@ use crate::{
     idle::{idle_action, is_named_idle},
 };
 
-/// An action that does what doing nothing does, wherever it is tried in an episode.
+/// A finding for actions that do the same as doing nothing, at every moment of an episode at which they are tried.
 ///
-/// Actions are tried at a few moments of the episode, each held for some ticks; an episode in which these would overlap is
-/// too short to say anything. What an action does must show in the state hash, the observation or the reward. Who is stuck
-/// somewhere says nothing of actions: the episode is one that was solved, or, on a level that nobody solves, the best paid
-/// one, if its agent was at different places at these moments. Games have actions that do nothing in some levels, and some
-/// have such that never do, so it is not usual.
+/// Actions are tried at a few moments of the episode, each held for some ticks. An episode that is too short for that
+/// is skipped. An effect must show in the state hash, the observation or the reward.
+///
+/// A stuck agent says nothing about actions. So the episode is one that was solved or, on an unsolved level, the one
+/// with the best reward. Its agent must be at different positions at these moments. It is opt-in, because games may
+/// have actions without an effect in some levels or in all.
 pub struct DeadAction {
     every: f64,
     moments: f64,
@@ -46,7 +47,7 @@ impl LevelDetector for DeadAction {
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
         vec![
-            Setting::new("every", &mut self.every, "look at every so many-th level of the range").at_least(1.0),
+            Setting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
             Setting::new("moments", &mut self.moments, "moments of the episode in which it is tried").at_least(1.0),
             Setting::new("ticks", &mut self.ticks, "ticks for which it is held").at_least(1.0),
         ]
@@ -54,7 +55,7 @@ impl LevelDetector for DeadAction {
 
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         let Some(tester) = teller(level).filter(|_| level.is_sample(self.every)) else { return Vec::new() };
-        // A game that breaks is found by others.
+        // Other detectors report a panic.
         let has_solved = level.episodes().any(|(_, _, result)| result.success);
         let dead = self.dead(&Script::new(level, tester), has_solved).unwrap_or_default();
         let defect = |name: String| LevelDefect {
@@ -68,21 +69,21 @@ impl LevelDetector for DeadAction {
     }
 }
 
-/// Whose first episode is looked at: that of the first tester that solved the level in it, or, if nobody did in any, of the
-/// best paid one.
+/// Returns the tester whose first episode is examined: the first tester that solved the level in it, else the one with
+/// the best reward.
 fn teller<'a, 'b>(level: &'b TestedLevel<'a>) -> Option<&'b TestedBy<'a>> {
     let first = |tester: &'b TestedBy<'a>| tester.episodes.iter().find(|(number, _)| *number == 0);
     let firsts = || level.testers.iter().filter_map(|tester| Some((tester, &first(tester)?.1)));
     if level.episodes().any(|(_, _, result)| result.success) {
         return firsts().find(|(_, result)| result.success).map(|(tester, _)| tester);
     }
-    // Of equal ones the first.
+    // The first of equal ones.
     let best = firsts().rev().max_by(|(_, one), (_, other)| one.total_reward.total_cmp(&other.total_reward));
     best.map(|(tester, _)| tester)
 }
 
 impl DeadAction {
-    /// Names of the actions that are dead. `has_solved`: whether the episode was solved when it was tested.
+    /// Returns the names of the dead actions. `has_solved`: whether the episode was solved in the test.
     fn dead(&self, script: &Script<'_>, has_solved: bool) -> Result<Vec<String>, Fault> {
         let (course, idle) = (script.course()?, idle_action(script.game));
         let (moments, ticks) = (self.moments as usize, self.ticks as usize);
@@ -118,9 +119,9 @@ impl DeadAction {
     }
 }
 
-/// Whether the agent is on different tiles in at least half of these moments, more than one.
+/// Returns whether the agent is on different tiles in at least half of these moments, more than one.
 fn gets_around(script: &Script<'_>, course: &Course, moments: &[usize]) -> bool {
-    let grid = CellGrid::new(script.game.floor_plan(script.mode, script.level).as_ref(), None);
+    let grid = CellGrid::new(script.game.tools().levels.floor_plan(script.mode, script.level).as_ref(), None);
     let place = |moment: &usize| course.places.get(*moment - 1).copied().flatten();
     let mut cells: Vec<_> = moments.iter().filter_map(place).filter_map(|place| grid.cell_at(place)).collect();
     cells.sort();
@@ -128,9 +129,10 @@ fn gets_around(script: &Script<'_>, course: &Course, moments: &[usize]) -> bool 
     cells.len() > 1 && cells.len() >= moments.len().div_ceil(2)
 }
 
-/// What is tried: each choice that is not called doing nothing, or each value of continuous actions, far up and far down.
+/// Returns the actions to try: each choice that is not named as doing nothing, or each continuous value, far up and far
+/// down.
 fn tried(game: &dyn Game) -> Vec<(String, Vec<ActionValue>)> {
-    let (names, idle) = (game.action_names(), idle_action(game));
+    let (names, idle) = (game.tools().input.action_names(), idle_action(game));
     let named =
         |number: usize| names.get(number).map_or_else(|| format!("action {number}"), |name| format!("`{name}`"));
     match game.actions() {
@@ -168,7 +170,7 @@ mod tests {
     #[derive(Component)]
     struct Runner;
 
-    /// Space does nothing, unless the runner is far enough and it works at all. Whoever comes to this place has won.
+    /// Space does nothing, unless the runner is far enough and the action works. The end of the track wins.
     fn game(works: bool, goal: f32) -> ForeignGame {
         let game = move |app: &mut App| {
             app.add_systems(Startup, |mut commands: Commands| {
@@ -192,7 +194,7 @@ mod tests {
             .demonstrator("runs", || 1_u32)
     }
 
-    /// The dead actions of the game. With somebody who runs as long as there is time, or who never does anything.
+    /// The dead actions of the game, with a player that runs until the time limit, or one that never acts.
     fn dead(game: &ForeignGame, player: &Player, ticks: f64) -> Vec<String> {
         let observation_config = ObservationConfig::default();
         let stop = &|| false;

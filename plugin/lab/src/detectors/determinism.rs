@@ -1,4 +1,4 @@
-//! Games that do not play the same twice.
+//! Games that do not repeat their episodes.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -16,8 +16,8 @@ use super::{
 };
 use crate::detector::Setting;
 
-/// Two Worlds in which the same tester plays the same episode differ, or one does in which it plays it again and again. A
-/// tester's first episode on some of the levels is played several times more, so it is not usual.
+/// A finding for testers whose episode differs between two Worlds, or within one World that plays it again and again.
+/// It is opt-in, because it plays a tester's first episode on some of the levels several more times.
 pub struct Determinism {
     every: f64,
     ticks: f64,
@@ -31,7 +31,7 @@ impl Default for Determinism {
 }
 
 impl Determinism {
-    /// The same episode, so many times in a row in one World.
+    /// Plays the episode `episodes` times in a row in one World.
     fn play(&self, level: &TestedLevel<'_>, tester: &TestedBy<'_>, episodes: usize) -> Result<Vec<Played>, Fault> {
         let (player, config) = (tester.player, &tester.observation_config);
         let probe = Probe::new(level.game, level.mode, level.level, player, config, vec![tester.seed; episodes]);
@@ -43,7 +43,7 @@ impl Determinism {
             let finished = probe.world.get::<EpisodeCount>(probe.agent).map_or(0, |count| count.finished as usize);
             let is_last = finished == episodes;
             if finished > played.len() {
-                // What comes after the last tick of an episode is that of the next one, if there is one.
+                // The state after the last tick of an episode is that of the next one, if there is one.
                 if is_last && now.hashes.len() < most {
                     now.hashes.push(hash(&probe.world, probe.agent));
                 }
@@ -60,20 +60,20 @@ impl Determinism {
         Ok(played)
     }
 
-    /// What is not the same when a tester plays its first episode again.
+    /// Returns a difference between repetitions of a tester's first episode, with its tick.
     fn difference(&self, level: &TestedLevel<'_>, tester: &TestedBy<'_>) -> Option<(u32, String)> {
-        // A game that breaks is found by others.
+        // Other detectors report a panic.
         let (one, other) = (self.play(level, tester, 1).ok()?, self.play(level, tester, 1).ok()?);
         if let Some(tick) = one.first()?.difference(other.first()?) {
-            let message = "the episode was another one when it was played again; `playbot doctor` names what differs";
+            let message = "the episode differed when it was played again; `playbot doctor` names what differs";
             return Some((tick, message.to_owned()));
         }
-        // One more, whose end is not looked at as that of the others is not.
+        // One more, since the end of the last one is not comparable.
         let row = self.play(level, tester, self.episodes as usize + 1).ok()?;
         let (first, later) = (row.first()?, row.iter().enumerate().take(self.episodes as usize).skip(1));
         let (number, tick) = later.filter_map(|(number, played)| Some((number, first.difference(played)?))).next()?;
         let message = format!(
-            "episode {} of a World was another one than the first, though it began from the same seed: something is left \
+            "episode {} of a World differed from the first, though it began from the same seed: something is left \
              from one episode to the next",
             number + 1
         );
@@ -81,17 +81,18 @@ impl Determinism {
     }
 }
 
-/// What is known of an episode.
+/// The states of an episode.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 struct Played {
     /// A hash for each tick.
     hashes: Vec<u64>,
-    /// Whether it came to its end; otherwise it was cut off.
+    /// Whether it ended; otherwise it was cut off.
     is_over: bool,
 }
 
 impl Played {
-    /// The first tick that differs, or the first that one of them lacks which was not cut off.
+    /// Returns the first tick that differs, or the first tick after the end of the shorter episode, unless that was cut
+    /// off.
     fn difference(&self, other: &Self) -> Option<u32> {
         let (one, another) = (&self.hashes, &other.hashes);
         let shared = one.iter().zip(another).position(|(one, another)| one != another);
@@ -105,7 +106,7 @@ fn is_loading(probe: &Probe<'_>) -> bool {
     probe.world.get::<Episode>(probe.agent).is_some_and(Episode::is_loading)
 }
 
-/// All that is known of the state, and what was done.
+/// Returns a hash of the known state and the action.
 fn hash(world: &World, agent: Entity) -> u64 {
     let action = world.get::<Action>(agent);
     let done = action.and_then(Action::continuous).unwrap_or(&[]);
@@ -114,7 +115,7 @@ fn hash(world: &World, agent: Entity) -> u64 {
     StateHash::of([hash_of_state(world, agent), u64::from(choice)].into_iter().chain(done)).0
 }
 
-/// All that is known of the state.
+/// Returns a hash of the known state.
 pub(super) fn hash_of_state(world: &World, agent: Entity) -> u64 {
     let state = world.get::<StateHash>(agent).map_or(0, |hash| hash.0);
     let reward = world.get::<Reward>(agent).map_or(0.0, Reward::get);
@@ -134,7 +135,7 @@ impl LevelDetector for Determinism {
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
         vec![
-            Setting::new("every", &mut self.every, "look at every so many-th level of the range").at_least(1.0),
+            Setting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
             Setting::new("ticks", &mut self.ticks, "ticks of an episode that are compared").at_least(1.0),
             Setting::new("episodes", &mut self.episodes, "episodes of a World that are compared").at_least(1.0),
         ]

@@ -1,4 +1,4 @@
-//! Hears what a game logs as an error.
+//! The reader of a game's log of errors.
 
 use std::{
     fmt,
@@ -13,8 +13,8 @@ use tracing::{
     subscriber::Interest,
 };
 
-/// Crates whose errors are not the game's: the engine, what it is made of, and the plugin itself. Crates of the same name
-/// with an underscore and more behind it belong to these, but for `bevy`, whose name many games have in theirs.
+/// Crates whose errors are not the game's: the engine, its dependencies, and the plugin. Crates of the same name
+/// followed by an underscore belong to these as well, except for `bevy`, which many games have in their names.
 const ENGINE: [&str; 14] = [
     "wgpu",
     "naga",
@@ -31,7 +31,7 @@ const ENGINE: [&str; 14] = [
     "playbot_learner",
     "playbot_cli",
 ];
-/// Parts of the engine, behind `bevy_`.
+/// Parts of the engine, after `bevy_`.
 const BEVY: [&str; 41] = [
     "a11y",
     "animation",
@@ -76,8 +76,7 @@ const BEVY: [&str; 41] = [
     "world_serialization",
 ];
 
-/// Hears the errors of what runs on one thread, whatever else is logged and whether anybody sees it. All events go on to
-/// whoever listened before.
+/// Collects the errors of a thread, for any log filter. All events go on to the previous subscriber.
 pub struct Ear {
     listener: Dispatch,
     heard: Arc<Mutex<Vec<String>>>,
@@ -90,7 +89,7 @@ struct Listener {
 }
 
 impl Ear {
-    /// An ear for this thread.
+    /// Creates an ear for this thread.
     pub fn new() -> Self {
         let heard = Arc::<Mutex<Vec<String>>>::default();
         let outer = dispatcher::get_default(Clone::clone);
@@ -99,12 +98,12 @@ impl Ear {
         Self { listener, heard }
     }
 
-    /// Does some work and hears its errors.
+    /// Runs some work and collects its errors.
     pub fn listen<T>(&self, work: impl FnOnce() -> T) -> T {
         dispatcher::with_default(&self.listener, work)
     }
 
-    /// The errors since the last call.
+    /// Returns the errors since the last call.
     pub fn take(&self) -> Vec<String> {
         std::mem::take(&mut *self.heard.lock().unwrap_or_else(PoisonError::into_inner))
     }
@@ -116,7 +115,7 @@ impl Default for Ear {
     }
 }
 
-/// Whether somebody other than the game says it.
+/// Returns whether the message is not the game's.
 fn is_of_engine(target: &str) -> bool {
     let name = target.split("::").next().unwrap_or_default();
     if let Some(part) = name.strip_prefix("bevy") {
@@ -125,7 +124,7 @@ fn is_of_engine(target: &str) -> bool {
     ENGINE.iter().any(|engine| name.strip_prefix(engine).is_some_and(|rest| rest.is_empty() || rest.starts_with('_')))
 }
 
-/// The words of an event.
+/// The text of an event.
 #[derive(Default)]
 struct Message(String);
 
@@ -138,7 +137,7 @@ impl Visit for Message {
 }
 
 impl Subscriber for Listener {
-    /// Whoever listened before may want to be asked each time.
+    /// The previous subscriber may want to be asked each time.
     fn register_callsite(&self, _: &'static Metadata<'static>) -> Interest {
         Interest::sometimes()
     }

@@ -1,8 +1,8 @@
-//! Whether an agent tries anything.
+//! The activity of an agent: how often it changes its action.
 
 use bevy_playbot::action::ActionValue;
 
-/// How often an agent has tried something else.
+/// A count of an agent's changes of action.
 #[derive(Default)]
 pub(super) struct Efforts {
     last: Option<ActionValue>,
@@ -10,7 +10,7 @@ pub(super) struct Efforts {
 }
 
 impl Efforts {
-    /// Notes what it does now.
+    /// Counts the action of this tick.
     pub fn note(&mut self, action: &ActionValue) {
         if self.last.as_ref() != Some(action) {
             self.changes += 1;
@@ -18,12 +18,13 @@ impl Efforts {
         }
     }
 
-    /// Forgets how often.
+    /// Resets the count.
     pub fn restart(&mut self) {
         self.changes = 0;
     }
 
-    /// Whether it did something else in at least every tenth of so many ticks. Who holds one key for ever tries nothing.
+    /// Returns whether the action changed in at least a tenth of these ticks. An agent that holds one key for ever
+    /// tries nothing.
     pub fn are_many(&self, ticks: u32) -> bool {
         self.changes.saturating_mul(10) >= ticks.max(20)
     }

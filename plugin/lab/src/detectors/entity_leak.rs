@@ -12,17 +12,17 @@ use super::{
 };
 use crate::{detector::Setting, eval::Player, game::Game};
 
-/// Each episode of a level leaves entities behind. Some levels are played a few times anew, each time up to the same tick,
-/// and what is in the World is counted.
+/// A finding for levels on which each episode leaves entities behind. Some levels are played a few times, each time up
+/// to the same tick, and the entities in the World are counted.
 pub struct EntityLeak {
     every: f64,
     ticks: f64,
     episodes: f64,
 }
 
-/// Episodes in the beginning that may make what stays, such as pools.
+/// First episodes that may create permanent entities, such as pools.
 const FIRST: usize = 2;
-/// Times as many ticks of the World as of an episode, for levels that take long to load.
+/// Most ticks of the World for each tick of an episode, for levels that take long to load.
 const MOST_TRIES: u32 = 20;
 
 impl Default for EntityLeak {
@@ -32,7 +32,7 @@ impl Default for EntityLeak {
 }
 
 impl EntityLeak {
-    /// How many entities there are after each episode; fewer numbers if the game breaks.
+    /// Returns the number of entities after each episode; fewer numbers if the game panics.
     fn counts(&self, game: &dyn Game, mode: &str, level: u64, stop: &dyn Fn() -> bool) -> Vec<u32> {
         let (episodes, ticks) = (self.episodes as usize, self.ticks as u32);
         let player = Player::Blind(BlindBot::Uniform);
@@ -48,7 +48,7 @@ impl EntityLeak {
                 |probe: &Probe<'_>| probe.world.get::<EpisodeCount>(probe.agent).map_or(0, |count| count.finished);
             let before = finished(&probe);
             for _ in 0..ticks.saturating_mul(MOST_TRIES) {
-                // A game that breaks is found by others.
+                // Other detectors report a panic.
                 if probe.tick().is_err() {
                     return counts;
                 }
@@ -65,9 +65,9 @@ impl EntityLeak {
         counts
     }
 
-    /// What a level leaks, in words.
+    /// Returns the message about a leak of a level, if there is one.
     fn leak(&self, game: &dyn Game, mode: &str, level: u64, stop: &dyn Fn() -> bool) -> Option<String> {
-        // A World that is built anew has forgotten everything.
+        // A World that is rebuilt has no entities left.
         if game.built_anew().is_some() {
             return None;
         }
@@ -90,7 +90,7 @@ impl LevelDetector for EntityLeak {
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
         vec![
-            Setting::new("every", &mut self.every, "look at every so many-th level of the range").at_least(1.0),
+            Setting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
             Setting::new("ticks", &mut self.ticks, "ticks of an episode").at_least(1.0),
             Setting::new("episodes", &mut self.episodes, "episodes on a level").at_least(4.0),
         ]
@@ -113,7 +113,7 @@ impl LevelDetector for EntityLeak {
     }
 }
 
-/// Whether there are more each time, in words.
+/// Returns the message if the count grows each time.
 fn grows(counts: &[u32]) -> Option<String> {
     let later = counts.get(FIRST..).filter(|later| later.len() > 1)?;
     let leaks = later.windows(2).all(|pair| pair[0] < pair[1]);

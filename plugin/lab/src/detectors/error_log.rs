@@ -2,7 +2,7 @@
 
 use crate::detector::{Detector, WorldMoment, WorldWatch};
 
-/// The game logs an error while it is played. Errors of the engine and of missing files are not the game's code and do not
+/// A finding for games that log an error. Errors of the engine and of missing files are not the game's code and do not
 /// count.
 #[derive(Default)]
 pub struct ErrorLog;

@@ -7,8 +7,8 @@ use crate::{
     floor_plan::FloorPlan,
 };
 
-/// An agent moves farther in one tick than anything can that has not been flung away. In games with portals that is what
-/// they do, so it is not usual.
+/// A finding for agents that move farther in one tick than physics allows. It is opt-in, because portals do that on
+/// purpose.
 pub struct PhysicsExplosion {
     share: f64,
     distance: f64,

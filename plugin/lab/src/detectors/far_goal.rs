@@ -7,10 +7,10 @@ use crate::{
     explore::CellGrid,
 };
 
-/// An agent succeeds far from the goal of its level's plan.
+/// A finding for agents that succeed far from the goal of their level's plan.
 ///
-/// Where success is something else than being at the goal, it is no defect; so it is usual only for games that say
-/// [how near](Self::beyond) one has to be.
+/// In some games success does not depend on the position. So it is a default detector only for games that declare
+/// [the distance of their goals](Self::beyond).
 pub struct FarGoal {
     distance: f64,
     is_usual: bool,
@@ -23,7 +23,8 @@ impl Default for FarGoal {
 }
 
 impl FarGoal {
-    /// For [a game's own detectors](crate::game::Game::detectors): nobody who is farther from the goal, in tiles, reaches it.
+    /// Creates the detector for [a game's own detectors](crate::game::TestTools::detectors): no agent farther from the
+    /// goal than this, in tiles, can reach it.
     pub fn beyond(distance: f64) -> Self {
         Self { distance, is_usual: true }
     }

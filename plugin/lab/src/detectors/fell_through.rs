@@ -2,7 +2,7 @@
 
 use crate::detector::{Detector, LevelAhead, Moment, Setting, Watch};
 
-/// An agent falls, and nothing is left below it.
+/// A finding for agents that fall with nothing left below them.
 pub struct FellThrough {
     ticks: f64,
     depth: f64,
@@ -16,7 +16,7 @@ impl Default for FellThrough {
 
 struct Falling {
     ticks: u32,
-    /// Below this there is nothing; not known before the first tick in a level without a plan.
+    /// The lowest point of the level; unknown before the first tick in a level without a plan.
     lowest: Option<f32>,
     depth: f32,
     last: f32,

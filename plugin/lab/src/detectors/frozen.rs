@@ -3,7 +3,7 @@
 use super::efforts::Efforts;
 use crate::detector::{Detector, LevelAhead, Moment, Setting, Watch};
 
-/// Nothing changes, whatever is done: neither the state nor what agents see.
+/// A finding for games in which nothing changes for any action: not the state and not the observations.
 pub struct FrozenWorld {
     ticks: f64,
 }

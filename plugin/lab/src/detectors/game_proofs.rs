@@ -4,7 +4,7 @@ use bevy::prelude::*;
 
 use crate::{detector::Proofs, game::Game, proof::LevelProof};
 
-/// What a game can prove of the episode that an agent plays in a World.
+/// The game's proofs about an agent's episode in a World.
 pub(crate) struct GameProofs<'a> {
     pub game: &'a dyn Game,
     pub mode: &'a str,
@@ -15,10 +15,10 @@ pub(crate) struct GameProofs<'a> {
 
 impl Proofs for GameProofs<'_> {
     fn of_level(&self) -> LevelProof {
-        self.game.prove(self.mode, self.level)
+        self.game.tools().levels.prove(self.mode, self.level)
     }
 
     fn of_state(&self) -> LevelProof {
-        self.game.prove_from(self.world, self.agent)
+        self.game.tools().state.prove_from(self.world, self.agent)
     }
 }

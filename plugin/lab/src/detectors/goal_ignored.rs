@@ -1,4 +1,4 @@
-//! Goals that do nothing.
+//! Goals without an effect.
 
 use bevy::math::Vec2;
 
@@ -7,10 +7,10 @@ use crate::{
     explore::CellGrid,
 };
 
-/// An agent is at the goal of its level's plan, and that is no success.
+/// A finding for agents that are at the goal of their level's plan without success.
 ///
-/// Where a goal asks for more than being there, such as a key, it is no defect; so it is usual only for games that say
-/// [how near](Self::within) is near enough.
+/// Some goals need more than a position, such as a key. So it is a default detector only for games that declare
+/// [the distance of their goals](Self::within).
 pub struct GoalIgnored {
     distance: f64,
     ticks: f64,
@@ -24,8 +24,8 @@ impl Default for GoalIgnored {
 }
 
 impl GoalIgnored {
-    /// For [a game's own detectors](crate::game::Game::detectors): whoever is so near to the goal after a tick, in tiles, has
-    /// reached it in this tick.
+    /// Creates the detector for [a game's own detectors](crate::game::TestTools::detectors): an agent within this
+    /// distance of the goal after a tick, in tiles, has reached it in this tick.
     pub fn within(distance: f64) -> Self {
         Self { distance, ticks: 1.0, is_usual: true }
     }
@@ -79,7 +79,7 @@ mod tests {
     use super::*;
     use crate::detectors::testing::{Step, found, room};
 
-    /// Towards the goal at 8.5, 8.5, where it stays.
+    /// Towards the goal at 8.5, 8.5, where the agent stays.
     fn arrive(is_success: bool) -> Vec<Step> {
         let step = |tick: usize| {
             let along = (0.5 * tick as f32).min(8.5);

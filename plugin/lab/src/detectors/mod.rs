@@ -1,8 +1,8 @@
-//! Detectors that every game has: each looks for one kind of defect while testers play, or in the levels that they played.
+//! Detectors that every game has: each looks for one kind of defect while testers play, or in the levels after play.
 //!
-//! [`Detectors`] are those of a test. Some are usual: they cost little and give no false alarm in a sound game. Others are
-//! chosen by name, and all have settings; [`list`] says which there are. A game adds its own with
-//! [`Game::detectors`](crate::game::Game::detectors), see [`detector`](crate::detector).
+//! [`Detectors`] are those of a test. Default detectors cost little and give no false alarm in an unmutated game.
+//! Opt-in detectors are named with `--detect`. All have settings, and [`list`] describes them. A game adds its own with
+//! [`TestTools::detectors`](crate::game::TestTools::detectors), see [`detector`](crate::detector).
 
 mod blank_picture;
 mod catalogue;

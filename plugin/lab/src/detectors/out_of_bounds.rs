@@ -7,14 +7,14 @@ use crate::{
     explore::CellGrid,
 };
 
-/// An agent is outside the plan of its level. Levels without walls end nowhere, and are not asked.
+/// A finding for agents outside the plan of their level. Levels without walls have no outside, and are skipped.
 pub struct OutOfBounds {
     margin: f64,
 }
 
 impl Default for OutOfBounds {
     fn default() -> Self {
-        // More than anybody jumps over the edge of a platformer's plan.
+        // More than any jump over the edge of a platformer's plan.
         Self { margin: 8.0 }
     }
 }

@@ -1,4 +1,4 @@
-//! Ticks that levels should take.
+//! Pars: the ticks that levels should take.
 
 use std::{
     collections::BTreeMap,
@@ -15,24 +15,24 @@ use thiserror::Error;
 
 use crate::game::Game;
 
-/// The pars of levels, by the names that results have for them: `hard:7`, or the path of a level file.
+/// The pars of levels, by their names in results: `hard:7`, or the path of a level file.
 #[derive(Clone, Debug, Default)]
 pub struct Pars {
     ticks: Arc<BTreeMap<String, f64>>,
     path: PathBuf,
 }
 
-/// Where they were read does not make them other ones.
+/// Pars from different files may be equal.
 impl PartialEq for Pars {
     fn eq(&self, other: &Self) -> bool {
         self.ticks == other.ticks
     }
 }
 
-/// Pars cannot be read.
+/// The reason why pars cannot be read.
 #[derive(Debug, Error)]
 pub enum ParError {
-    /// The file is no list of levels.
+    /// The file is not a list of levels.
     #[error(
         "{}, line {line}, column {column}: {message}; write each level's name with its ticks, as in \
          {{\"hard:7\": 120, \"levels/cave.json\": 300}}", path.display()
@@ -44,41 +44,41 @@ pub enum ParError {
         line: usize,
         /// Column.
         column: usize,
-        /// What is wrong.
+        /// The error.
         message: String,
     },
-    /// A number of ticks makes no sense.
+    /// A number of ticks is invalid.
     #[error("{}: the par of {level} is {ticks}: write ticks, more than 0", path.display())]
     Ticks {
         /// The file.
         path: PathBuf,
         /// The level.
         level: String,
-        /// What stands there.
+        /// The value in the file.
         ticks: f64,
     },
-    /// There is no par in it.
+    /// The file has no par.
     #[error(
-        "{}: no level has a par there: list levels with their ticks, or name recordings in which they are solved",
+        "{}: there is no par: list levels with their ticks, or name recordings in which they are solved",
         .0.display()
     )]
     None(PathBuf),
     /// A recording cannot be read.
     #[error(transparent)]
     Demo(#[from] DemoFileError),
-    /// The operating system refused.
+    /// The system cannot read a file.
     #[error("cannot read {}: {source}; name a .json file with ticks, a recording or a folder of recordings", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The system's error.
         source: io::Error,
     },
 }
 
 impl Pars {
-    /// Reads pars: of a `.json` file, an object with the ticks of each level by its name; else of recordings of this game, the
-    /// fastest episode of each level that was won in them.
+    /// Reads pars. A `.json` file has an object with the ticks of each level by its name. From recordings of this game,
+    /// a level's par is its fastest won episode.
     ///
     /// # Errors
     ///
@@ -92,30 +92,30 @@ impl Pars {
         Ok(Self { ticks: Arc::new(pars), path: path.into() })
     }
 
-    /// The par of a level.
+    /// Returns the par of a level.
     pub fn of(&self, level: &str) -> Option<f64> {
         self.ticks.get(level).copied()
     }
 
-    /// The names of the levels that have one.
+    /// Returns the names of the levels with a par.
     pub fn levels(&self) -> impl Iterator<Item = &str> {
         self.ticks.keys().map(String::as_str)
     }
 
-    /// Where they were read.
+    /// Returns the path that the pars were read from.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Whether no level has one.
+    /// Returns whether there is no par.
     pub fn is_empty(&self) -> bool {
         self.ticks.is_empty()
     }
 
-    /// A hash of all of them.
+    /// Returns a hash of all pars.
     pub fn hash(&self) -> u64 {
         let words = self.ticks.iter().flat_map(|(level, ticks)| {
-            // What no byte is ends each name.
+            // A value that is no byte ends each name.
             level.bytes().map(u64::from).chain([u64::from(u8::MAX) + 1, ticks.to_bits()])
         });
         StateHash::of(words).0
@@ -192,7 +192,7 @@ mod tests {
             ("{\n\"hard:7\": soon}", "line 2"),
             ("[1, 2]", "\"hard:7\": 120"),
             (r#"{"hard:7": 0}"#, "the par of hard:7 is 0"),
-            ("{}", "no level has a par"),
+            ("{}", "there is no par"),
         ] {
             let error = read(text).expect_err(text).to_string();
             assert!(error.contains("pars.json") && error.contains(words), "{error}");

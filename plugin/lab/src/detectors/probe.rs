@@ -1,4 +1,4 @@
-//! Worlds in which detectors play themselves.
+//! Worlds for detectors that play.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -14,7 +14,7 @@ use bevy_playbot::{
 
 use crate::{eval::Player, game::Game, worlds::build_observing_world};
 
-/// A World with one agent, who plays one level again and again, each time from the same seed.
+/// A World with one agent that plays one level again and again, each time from the same seed.
 pub struct Probe<'a> {
     /// The World.
     pub world: World,
@@ -24,11 +24,11 @@ pub struct Probe<'a> {
 }
 
 impl<'a> Probe<'a> {
-    /// A World for so many episodes.
+    /// Builds a World for this many episodes.
     ///
     /// # Errors
     ///
-    /// The pictures that the player needs cannot be made.
+    /// The pictures that the player needs cannot be drawn.
     pub fn new(
         game: &dyn Game,
         mode: &str,
@@ -44,11 +44,11 @@ impl<'a> Probe<'a> {
         Ok(probe)
     }
 
-    /// A World for one episode, in which the caller writes what the agent does before each tick.
+    /// Builds a World for one episode, in which the caller sets the agent's action before each tick.
     ///
     /// # Errors
     ///
-    /// Its World cannot be made.
+    /// The World cannot be built.
     pub fn led(game: &dyn Game, mode: &str, level: u64, seed: u64) -> Result<Self, VisionError> {
         let mut probe = Self::empty(game, mode, level, &ObservationConfig::default(), vec![seed])?;
         probe.world.entity_mut(probe.agent).insert(Control::Bot);
@@ -64,7 +64,7 @@ impl<'a> Probe<'a> {
     ) -> Result<Self, VisionError> {
         let (mut world, agents) = build_observing_world(game, mode, observation_config, 0, 0, 1)?;
         if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
-            // The detector's findings say how to see it again.
+            // The detector's findings name their own reproduction.
             reports.keep_no_files();
         }
         let agent = agents.into_iter().next().expect("one agent was asked for");
@@ -73,25 +73,25 @@ impl<'a> Probe<'a> {
         Ok(Self { world, agent, stop: &|| false })
     }
 
-    /// The same, for as long as nobody asks to stop.
+    /// Makes the probe stop when `stop` returns true.
     #[must_use]
     pub fn until(self, stop: &'a dyn Fn() -> bool) -> Self {
         Self { stop, ..self }
     }
 
-    /// Whether an episode is over.
+    /// Returns whether an episode is over.
     pub fn is_over(&self) -> bool {
         self.world.get::<EpisodeCount>(self.agent).is_some_and(|count| count.finished > 0)
     }
 
-    /// Plays a tick. Whether the agent is still playing.
+    /// Plays a tick. Returns whether the agent is still playing.
     ///
     /// # Errors
     ///
-    /// The game broke, or somebody asked to stop.
+    /// The game broke its contract, or `stop` returned true.
     pub fn tick(&mut self) -> Result<bool, Fault> {
         if (self.stop)() {
-            return Err(Fault("somebody asked to stop".to_owned()));
+            return Err(Fault("the test was stopped".to_owned()));
         }
         tick_world(&mut self.world)?;
         Ok(Control::of(&self.world, self.agent).is_active())

@@ -1,11 +1,11 @@
-//! Scores that are better without the aim.
+//! Rewards that are higher without the goal.
 
 use bevy_playbot::episode::EpisodeEnd;
 
 use super::level_detector::{LevelDefect, LevelDetector, TestedLevel};
 use crate::detector::Setting;
 
-/// An episode in which time ran out brought more reward than any that was solved.
+/// A finding for episodes with more reward at the time limit than any solved one.
 pub struct RewardFarm {
     factor: f64,
 }
@@ -45,7 +45,7 @@ impl LevelDetector for RewardFarm {
             tick: result.ticks.checked_sub(1),
             settings: Vec::new(),
             message: format!(
-                "a reward of {} until time was up, and at most {best} for reaching the aim",
+                "a reward of {} until time was up, and at most {best} for reaching the goal",
                 result.total_reward
             ),
         });

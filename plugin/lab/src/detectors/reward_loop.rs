@@ -1,4 +1,4 @@
-//! Rewards that can be had again and again.
+//! Rewards that can be collected without end.
 
 use std::collections::BTreeMap;
 
@@ -7,9 +7,9 @@ use crate::{
     explore::CellGrid,
 };
 
-/// An agent comes back to the same spot, or stays there, and has earned something, again and again. A reward for getting
-/// nearer to something pays nothing on the way back to where one was; a game that pays for each tick does so everywhere, so it
-/// is not usual.
+/// A finding for agents that earn again and again for coming back to the same spot or staying there. A reward for
+/// getting nearer to something pays nothing on the path back. It is opt-in, because a game that pays for each tick does
+/// so everywhere.
 pub struct RewardLoop {
     times: f64,
     spot: f64,
@@ -24,12 +24,12 @@ impl Default for RewardLoop {
 /// Least sum of rewards that is more than rounding.
 const SOMETHING: f32 = 1e-4;
 
-/// What an agent has earned between its visits to a spot.
+/// The earnings of an agent between its visits to a spot.
 #[derive(Default)]
 struct Visits {
     /// The sum of all rewards at the last visit.
     last: f32,
-    /// How often it had become more.
+    /// Number of visits with a higher sum.
     paid: u32,
 }
 
@@ -46,7 +46,7 @@ impl Detector for RewardLoop {
     }
 
     fn describe(&self) -> &'static str {
-        "whoever comes back to the same spot, or stays there, is paid again and again"
+        "the agent is paid again and again for coming back to the same spot or staying there"
     }
 
     fn is_usual(&self) -> bool {

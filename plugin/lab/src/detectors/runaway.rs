@@ -1,10 +1,11 @@
-//! Numbers that have run away.
+//! Numbers that are not finite, or far too large.
 
 use bevy::{ecs::world::WorldId, prelude::*};
 
 use crate::detector::{Detector, LevelAhead, Moment, Setting, Watch, WorldMoment, WorldWatch};
 
-/// A transform, the agent's place or what it sees is not a number, or is somewhere out of this world.
+/// A finding for a transform, an agent's position or an observation that is not a number, and for positions too far
+/// from the origin.
 pub struct Runaway {
     distance: f64,
 }
@@ -20,7 +21,7 @@ struct Numbers {
     most: f32,
 }
 
-/// A query is kept as long as its World.
+/// A query that is reused for its World.
 struct Transforms {
     most: f32,
     query: Option<(WorldId, QueryState<(Entity, &'static Transform)>)>,
@@ -32,7 +33,7 @@ impl Detector for Runaway {
     }
 
     fn describe(&self) -> &'static str {
-        "a transform, a place or an observation is not a number, or a position is out of this world"
+        "a transform, a position or an observation is not a number, or a position is too far from the origin"
     }
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
@@ -70,7 +71,7 @@ impl WorldWatch for Transforms {
         let world = moment.world;
         let (id, mut query) = match self.query.take() {
             Some((id, query)) if id == world.id() => (id, query),
-            // Nothing in the World has a transform yet if there is no such query.
+            // Without such a query, the World has no transform yet.
             _ => (world.id(), world.try_query::<(Entity, &Transform)>()?),
         };
         let wrong = query.iter(world).find(|(_, transform)| self.is_wrong(transform));

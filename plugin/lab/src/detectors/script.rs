@@ -1,4 +1,4 @@
-//! Episodes that are played up to some tick, and then otherwise.
+//! Episodes that are replayed up to some tick, and then changed.
 
 use bevy::math::Vec2;
 use bevy_playbot::{
@@ -26,33 +26,33 @@ pub struct Script<'a> {
     pub stop: &'a dyn Fn() -> bool,
 }
 
-/// What came of it.
+/// The recorded course of an episode.
 #[derive(Default)]
 pub struct Course {
-    /// What the agent did in each tick.
+    /// The agent's action in each tick.
     pub actions: Vec<ActionValue>,
-    /// Where it was then, if the game says.
+    /// The agent's position in each tick, if the game reports it.
     pub places: Vec<Option<Vec2>>,
-    /// Whether it reached the aim.
+    /// Whether it reached the goal.
     pub is_solved: bool,
 }
 
-/// Ticks and frames after which nobody waits any longer.
+/// Most ticks and frames to wait.
 const MOST_RUNS: u32 = 200_000;
 
 impl<'a> Script<'a> {
-    /// That of a tester on a level.
+    /// Creates the script of a tester on a level.
     pub fn new(level: &TestedLevel<'a>, tester: &TestedBy<'a>) -> Self {
         let TestedBy { player, observation_config, seed, .. } = *tester;
         let TestedLevel { game, mode, level, stop, .. } = *level;
         Self { game, mode, level, player, observation_config, seed, stop }
     }
 
-    /// What the tester does.
+    /// Plays the tester's episode.
     ///
     /// # Errors
     ///
-    /// The game broke, or somebody asked to stop.
+    /// The game broke its contract, or the test was stopped.
     pub fn course(&self) -> Result<Course, Fault> {
         let config = &self.observation_config;
         let probe = Probe::new(self.game, self.mode, self.level, self.player, config, vec![self.seed]);
@@ -62,7 +62,7 @@ impl<'a> Script<'a> {
             let is_active = probe.tick()?;
             if ticks(&probe) > course.actions.len() {
                 course.actions.extend(probe.world.get::<Action>(probe.agent).map(|action| action.0.clone()));
-                course.places.push(self.game.whereabouts(&probe.world, probe.agent));
+                course.places.push(self.game.tools().state.position(&probe.world, probe.agent));
             }
             if !is_active || probe.is_over() {
                 break;
@@ -72,11 +72,11 @@ impl<'a> Script<'a> {
         Ok(course)
     }
 
-    /// Hashes of the states that follow if these actions are done, and then another one for so many ticks.
+    /// Plays these actions, then another one for this many ticks. Returns the hashes of the states of the latter.
     ///
     /// # Errors
     ///
-    /// The game broke, or somebody asked to stop.
+    /// The game broke its contract, or the test was stopped.
     pub fn play(&self, before: &[ActionValue], then: &ActionValue, ticks_then: usize) -> Result<Vec<u64>, Fault> {
         let probe = Probe::led(self.game, self.mode, self.level, self.seed);
         let mut probe = probe.map_err(broken)?.until(self.stop);
@@ -102,7 +102,7 @@ fn broken(error: VisionError) -> Fault {
     Fault(error.to_string())
 }
 
-/// Ticks of the episode.
+/// Returns the ticks of the episode.
 fn ticks(probe: &Probe<'_>) -> usize {
     probe.world.get::<Episode>(probe.agent).map_or(0, |episode| episode.tick as usize)
 }

@@ -1,4 +1,4 @@
-//! Which detectors look, and how they are set.
+//! The selection of detectors and their settings.
 
 use std::sync::Arc;
 
@@ -13,15 +13,15 @@ use super::{
 };
 use crate::{detector::Detector, game::Game};
 
-/// Stands for all detectors.
+/// The name that stands for all detectors.
 const ALL: &str = "all";
 
-/// What somebody asks for.
+/// The detectors and settings that a caller asks for.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct DetectorChoice {
-    /// Names of detectors that look beside the usual ones; `all` for all.
+    /// Names of opt-in detectors to add; `all` for all.
     pub with: Vec<String>,
-    /// Names of usual detectors that do not look; `all` for none but those that are named.
+    /// Names of default detectors to leave out; `all` keeps only those that are named.
     pub without: Vec<String>,
     /// Settings, as `name.key=value`.
     pub settings: Vec<String>,
@@ -30,17 +30,19 @@ pub struct DetectorChoice {
 /// The detectors of a test.
 #[derive(Clone, Default)]
 pub struct Detectors {
-    pub(crate) ticks: Vec<Arc<dyn Detector>>,
-    pub(crate) levels: Vec<Arc<dyn LevelDetector>>,
+    /// Detectors that look at every tick.
+    pub ticks: Vec<Arc<dyn Detector>>,
+    /// Detectors that look at the episodes of a level together.
+    pub levels: Vec<Arc<dyn LevelDetector>>,
     clock: Option<Arc<TickTime>>,
     pars: Pars,
     record: Vec<String>,
-    /// Settings that somebody asked for, as `name.key=value`.
+    /// Settings that the caller asked for, as `name.key=value`.
     pub(crate) settings: Vec<String>,
     options: Vec<String>,
 }
 
-/// Detectors cannot be chosen so.
+/// The reason why a selection is invalid.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 pub enum DetectorError {
     /// There is no such detector.
@@ -51,29 +53,29 @@ pub enum DetectorError {
     Setting {
         /// The detector.
         detector: String,
-        /// What was named.
+        /// The unknown name.
         key: String,
         /// Its settings.
         known: Vec<String>,
     },
-    /// What every test finds can neither be chosen nor left out, and has no settings.
-    #[error("`{0}` looks in every test, whatever is chosen, and has no settings: leave it out of the options")]
+    /// Findings of every test can neither be selected nor left out, and have no settings.
+    #[error("`{0}` looks in every test and has no settings: leave it out of the options")]
     Always(String),
-    /// This is no setting.
-    #[error("`{0}` sets nothing: write it as detector.setting=number, such as stuck.ticks=200")]
+    /// The text is not a setting.
+    #[error("`{0}` is not a setting: write detector.setting=number, such as stuck.ticks=200")]
     Form(String),
-    /// The number makes no sense.
-    #[error("`{text}`: the setting is a number of at least {least}")]
+    /// The number is out of range.
+    #[error("`{text}`: write a number of at least {least}")]
     Value {
-        /// What was written.
+        /// The text.
         text: String,
-        /// The least that makes sense.
+        /// The least valid number.
         least: String,
     },
-    /// A detector is set that does not look.
-    #[error("`{text}` sets a detector that does not look: choose it, too, with `--detect {name}`")]
+    /// A setting of a detector that is not selected.
+    #[error("`{text}` sets a detector that is not selected: add `--detect {name}`")]
     Idle {
-        /// What was written.
+        /// The text.
         text: String,
         /// The detector.
         name: String,
@@ -81,16 +83,16 @@ pub enum DetectorError {
 }
 
 impl Detectors {
-    /// The usual ones: those that cost little and give no false alarm in a sound game.
+    /// Selects the default detectors: those that cost little and give no false alarm in an unmutated game.
     pub fn usual(game: &dyn Game) -> Self {
         Self::of(all(game).into_iter().filter(Known::is_usual).collect())
     }
 
-    /// Those that somebody asks for.
+    /// Selects the detectors of a choice.
     ///
     /// # Errors
     ///
-    /// There is no such detector or setting, or a number makes no sense.
+    /// There is no such detector or setting, or a number is out of range.
     pub fn choose(game: &dyn Game, choice: &DetectorChoice) -> Result<Self, DetectorError> {
         let mut known = all(game);
         set(&mut known, choice)?;
@@ -113,7 +115,7 @@ impl Detectors {
             match known {
                 Known::Ticks(detector) => detectors.ticks.push(detector.into()),
                 Known::Level(detector) => detectors.levels.push(detector.into()),
-                // What it finds is no part of the results.
+                // Its findings are no part of the results.
                 Known::Clock(times) => {
                     detectors.clock = Some(Arc::new(times));
                     continue;
@@ -124,7 +126,7 @@ impl Detectors {
         detectors
     }
 
-    /// With pars of levels, for those detectors that ask for them, and that come with `--par`.
+    /// Adds pars of levels, for the detectors that use them, and that come with `--par`.
     #[must_use]
     pub fn with_pars(mut self, pars: Pars) -> Self {
         if !pars.is_empty() {
@@ -139,22 +141,22 @@ impl Detectors {
         self
     }
 
-    /// The par of the level with this name.
+    /// Returns the par of the level with this name.
     pub fn par(&self, level: &str) -> Option<f64> {
         self.pars.of(level)
     }
 
-    /// What results depend on: each detector with its settings, and a hash of the pars.
+    /// Returns what results depend on: each detector with its settings, and a hash of the pars.
     pub fn record(&self) -> &[String] {
         &self.record
     }
 
-    /// The same as words of a command line: whatever is not usual.
+    /// Returns the options of a command line that select the same detectors and settings.
     pub fn options(&self) -> &[String] {
         &self.options
     }
 
-    /// What looks at the clock, if anything does.
+    /// Returns the detector that measures time, if it is selected.
     pub fn clock(&self) -> Option<&TickTime> {
         self.clock.as_deref()
     }
@@ -173,7 +175,7 @@ impl DetectorChoice {
     }
 }
 
-/// What a choice changes in the results, as words of a command line, in an order that does not depend on that of the choice.
+/// Returns the options of a command line that change results, in an order that does not depend on that of the choice.
 fn options(known: &mut [Known], choice: &DetectorChoice, usual: &mut [Known]) -> Vec<String> {
     let is_all = |list: &[String]| list.iter().any(|name| name == ALL);
     let (adds_all, leaves_all) = (is_all(&choice.with), is_all(&choice.without));
@@ -201,7 +203,7 @@ fn options(known: &mut [Known], choice: &DetectorChoice, usual: &mut [Known]) ->
     words
 }
 
-/// That a name is no detector that can be chosen.
+/// Returns the error of an unknown detector.
 fn no_detector(name: &str, names: &[&str]) -> DetectorError {
     if ALWAYS.iter().any(|(always, _)| *always == name) {
         return DetectorError::Always(name.to_owned());

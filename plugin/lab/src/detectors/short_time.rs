@@ -1,4 +1,4 @@
-//! Time limits that nobody can keep.
+//! Time limits that are too short.
 
 use bevy::math::Vec2;
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
@@ -8,8 +8,8 @@ use crate::{
     explore::CellGrid,
 };
 
-/// Time is up before anybody could have come to the goal, even straight through all walls, at the fastest pace that the agent
-/// has shown. An agent that does not go anywhere has shown none.
+/// A finding for time limits before which the agent could not have reached the goal, even straight through all walls,
+/// at its fastest pace. An agent that goes nowhere shows no pace.
 pub struct ShortTime {
     factor: f64,
     tiles: f64,
@@ -21,7 +21,7 @@ impl Default for ShortTime {
     }
 }
 
-/// How far from its place a goal may reach, in tiles.
+/// Largest distance at which a goal may be reached, in tiles.
 const AT_GOAL: f32 = 2.0;
 
 struct Going {
@@ -31,9 +31,9 @@ struct Going {
     least: f32,
     first: Option<Vec2>,
     last: Vec2,
-    /// Longest way in a tick, along each axis.
+    /// Longest move in a tick, along each axis.
     fastest: Vec2,
-    /// Farthest from its first place, along each axis.
+    /// Largest distance from the first position, along each axis.
     farthest: Vec2,
 }
 
@@ -97,7 +97,7 @@ impl Watch for Going {
         let is_short = axes.any(|((way, most), gone)| gone >= self.least && most < way);
         is_short.then(|| {
             format!(
-                "time was up after {} ticks, in which nobody comes from {:.1}, {:.1} to the goal at {:.1}, {:.1}",
+                "time was up after {} ticks, too few to come from {:.1}, {:.1} to the goal at {:.1}, {:.1}",
                 result.ticks, first.x, first.y, self.goal.x, self.goal.y
             )
         })

@@ -1,4 +1,4 @@
-//! Levels that are over too soon.
+//! Levels that are solved too fast.
 
 use bevy_playbot::{episode::EpisodeResult, vision::ObservationConfig};
 
@@ -9,8 +9,8 @@ use crate::{
     split::LevelSplit,
 };
 
-/// A tester solves a level in far fewer ticks than it should take: its par, by the designer or by demonstrations, or else what
-/// the game's demonstrator needs.
+/// A finding for testers that solve a level in far fewer ticks than expected: its par, by the designer or by
+/// demonstrations, or else the ticks of the game's demonstrator.
 pub struct Shortcut {
     factor: f64,
     par: f64,
@@ -23,7 +23,7 @@ impl Default for Shortcut {
 }
 
 impl Shortcut {
-    /// Ticks that the level should take.
+    /// Returns the ticks that the level should take.
     fn par(&self, level: &TestedLevel<'_>) -> Option<f64> {
         if self.par > 0.0 {
             return Some(self.par);
@@ -31,7 +31,7 @@ impl Shortcut {
         if level.par.is_some() {
             return level.par;
         }
-        level.game.demonstrator()?;
+        level.game.tools().bots.demonstrator()?;
         let split = LevelSplit { mode: level.mode.to_owned(), first: level.level, last: level.level };
         let plan = EvalPlan {
             split,
@@ -42,7 +42,7 @@ impl Shortcut {
             worlds: 1,
             threads: 1,
         };
-        // A game that breaks is found by others.
+        // Other detectors report a panic.
         let results = evaluate(level.game, &Player::Demonstrator, &plan, |_| {}).ok()?;
         results.iter().find(|result| result.success).map(|result| f64::from(result.ticks))
     }
@@ -77,7 +77,7 @@ impl LevelDetector for Shortcut {
         if !is_too_fast(fastest, par, self.factor) {
             return Vec::new();
         }
-        let message = format!("solved in {} ticks, where {par} are to be expected", fastest.ticks);
+        let message = format!("solved in {} ticks, where {par} are expected", fastest.ticks);
         let (tester, episode, tick) = (Some(tester.to_owned()), Some(episode), fastest.ticks.checked_sub(1));
         let settings = vec![format!("shortcut.par={par}")];
         vec![LevelDefect { tester, episode, tick, message, settings }]
@@ -87,7 +87,7 @@ impl LevelDetector for Shortcut {
         ShownBy::Episode
     }
 
-    /// Findings know their level's par. Of older ones, which do not, whoever is as fast has found it again.
+    /// Findings store their level's par. In older ones without it, an episode that is as fast counts.
     fn is_in_episode(&self, result: &EpisodeResult, tick: Option<u32>) -> bool {
         let is_fast = if self.par > 0.0 {
             is_too_fast(result, self.par, self.factor)

@@ -10,16 +10,18 @@ use crate::{
     explore::{Cell, CellGrid},
 };
 
-/// The game [proves](crate::game::Game::prove_from) that an agent can no longer reach its aim, and yet the episode goes on.
+/// A finding for episodes that go on after the game [proves](crate::game::StateTools::prove_from) that their agent can
+/// no longer reach the goal.
 ///
-/// Whoever falls to its death cannot win any more either, so the episode has to go on for a while. Of a level that nobody can
-/// solve from its start, that is told instead.
+/// An agent that falls to its death cannot win either, so the episode must go on for a while. For a level that is
+/// unsolvable from its start, that is reported instead.
 pub struct SoftLock {
     every: f64,
     ticks: f64,
 }
 
-/// A place is asked about again after so many times the ticks between two questions: a door may have closed meanwhile.
+/// A position is asked about again after this many times the ticks between two questions: a door may have closed
+/// meanwhile.
 const STALE: u32 = 20;
 
 impl Default for SoftLock {
@@ -32,12 +34,12 @@ struct Asking {
     every: u32,
     ticks: u32,
     grid: CellGrid,
-    /// The next tick in which somebody may ask; never again if there is none.
+    /// The next tick with a question; `None` if there is no further one.
     next: Option<u32>,
-    /// When it was asked, by tile and whether the agent rested there.
+    /// Ticks of the questions, by tile and whether the agent rested there.
     asked: BTreeMap<(Cell, bool), u32>,
     last: Option<Vec2>,
-    /// Since when the aim is out of reach, and why.
+    /// The tick since which the goal is out of reach, and why.
     locked: Option<(u32, String)>,
 }
 
@@ -47,7 +49,7 @@ impl Detector for SoftLock {
     }
 
     fn describe(&self) -> &'static str {
-        "the agent can no longer reach its aim, which is proved, and the episode goes on"
+        "the agent provably can no longer reach its goal, and the episode goes on"
     }
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
@@ -68,7 +70,7 @@ impl Detector for SoftLock {
             every,
             ticks: self.ticks as u32,
             grid: CellGrid::new(level.plan.as_ref(), None),
-            // Nobody is lost at the start.
+            // At the start the level's own proof counts.
             next: Some(every),
             asked: BTreeMap::new(),
             last: None,
@@ -78,7 +80,7 @@ impl Detector for SoftLock {
 }
 
 impl Asking {
-    /// Whether nobody has asked about this place before, or so long ago that it may be another one now.
+    /// Returns whether this position was never asked about, or so long ago that the answer may have changed.
     fn is_unknown(&mut self, moment: &Moment<'_>, rests: bool) -> bool {
         let Some(cell) = moment.place.and_then(|place| self.grid.cell_at(place)) else { return true };
         let place = (cell, rests);
@@ -91,7 +93,7 @@ impl Asking {
     }
 
     fn ask(&mut self, moment: &Moment<'_>) {
-        // Who is locked in stays so: later it will do to ask less often.
+        // A locked agent stays locked, so rarer questions are enough later.
         self.next = moment.tick.checked_add(self.every.max(moment.tick / 2));
         let proof = moment.proofs.of_state();
         let Some(why) = proof.why_unsolvable() else { return };
@@ -102,7 +104,7 @@ impl Asking {
         }
     }
 
-    /// What is wrong once the episode has gone on for so many ticks.
+    /// Returns the message once the episode has gone on for this many ticks.
     fn told(&self, moment: &Moment<'_>, ticks: u32) -> Option<String> {
         let (since, why) = self.locked.as_ref()?;
         (moment.tick >= since.saturating_add(ticks)).then(|| format!("since tick {since} at the latest {why}"))
@@ -125,7 +127,7 @@ impl Watch for Asking {
         None
     }
 
-    /// Time was up in a place without hope. Half the ticks are enough then, since nothing kills there.
+    /// The time limit came while the goal was out of reach. Half the ticks are enough then, since nothing kills there.
     fn end(&mut self, moment: &Moment<'_>, result: &EpisodeResult) -> Option<String> {
         let is_late = result.end == EpisodeEnd::Truncated && !result.success;
         is_late.then(|| self.told(moment, self.ticks / 2)).flatten()
@@ -143,7 +145,7 @@ mod tests {
         proof::LevelProof,
     };
 
-    /// The aim is out of reach from one question on, and perhaps from the start of the level.
+    /// A goal that is out of reach from one question on, and perhaps from the start of the level.
     #[derive(Default)]
     struct Trap {
         asked: Counter<u32>,
@@ -178,7 +180,7 @@ mod tests {
     fn who_goes_on_without_hope_is_found() {
         let trap = Trap { from: 2, ..Trap::default() };
         let (tick, message) = found_proving(&quick(), &room(), &wander(100), &trap).expect("the door is shut");
-        // It is asked at ticks 10, 20 and 30, and then the episode goes on for 30 ticks.
+        // There are questions at ticks 10, 20 and 30, and then the episode goes on for 30 ticks.
         assert_eq!((tick, trap.asked.get()), (60, 3));
         assert!(message.contains("since tick 30") && message.contains("the door is shut"), "{message}");
         let trap = Trap::default();

@@ -4,12 +4,12 @@ use bevy::math::Vec2;
 
 use crate::{explore::CellGrid, floor_plan::FloorPlan};
 
-/// Most tiles of a plan that are looked at.
+/// Most tiles of a plan that are examined.
 const MOST_TILES: f32 = 4e6;
-/// Corners may be so far off the grid, in tiles.
+/// Largest distance of a corner from the grid, in tiles.
 const ROUNDING: f32 = 0.01;
 
-/// Which tiles of a level's plan are wall all over. What is outside the plan is not.
+/// The tiles of a level's plan that are entirely wall. Outside the plan there is no wall.
 pub(super) struct SolidTiles {
     grid: CellGrid,
     columns: usize,
@@ -18,7 +18,7 @@ pub(super) struct SolidTiles {
 }
 
 impl SolidTiles {
-    /// Those of a plan; `None` for one without walls, and for one that is too large.
+    /// Reads the tiles of a plan; `None` for a plan without walls, and for one that is too large.
     pub fn of(plan: &FloorPlan) -> Option<Self> {
         let grid = CellGrid::new(Some(plan), None);
         let count = (plan.bounds.size() / grid.size).round();
@@ -41,7 +41,7 @@ impl SolidTiles {
         Some(Self { grid, columns, rows, is_solid })
     }
 
-    /// Whether all is wall up to this distance from a place along both axes, in tiles.
+    /// Returns whether all is wall up to this distance from a position along both axes, in tiles.
     pub fn surround(&self, place: Vec2, distance: f32) -> bool {
         let at = (place - self.grid.origin) / self.grid.size;
         let (low, high) = ((at - distance + ROUNDING).floor(), (at + distance - ROUNDING).floor());

@@ -8,8 +8,8 @@ use crate::{
     explore::CellGrid,
 };
 
-/// An agent stays at one place, whatever it does, and has not reached its goal. Whoever wanders without getting on, or holds
-/// a key against a wall, is not stuck.
+/// A finding for agents that stay at one position for any action, away from the goal. An agent that wanders without
+/// progress, or holds a key against a wall, is not stuck.
 pub struct Stuck {
     ticks: f64,
     distance: f64,
@@ -21,7 +21,7 @@ impl Default for Stuck {
     }
 }
 
-/// Whoever is so near to the goal may rest, in tiles.
+/// Distance from the goal within which an agent may rest, in tiles.
 const AT_GOAL: f32 = 2.0;
 
 struct Staying {

@@ -15,7 +15,7 @@ use crate::{
     foreign::ForeignGame,
 };
 
-/// What happens in a tick.
+/// The data of a tick.
 #[derive(Clone, Debug)]
 pub struct Step {
     pub place: Option<Vec2>,
@@ -26,7 +26,7 @@ pub struct Step {
 }
 
 impl Step {
-    /// An agent at this place; the number of the tick is its action.
+    /// An agent at this position; the number of the tick is its action.
     pub fn at(tick: usize, x: f32, y: f32) -> Self {
         let action = tick as u32 % 3;
         Self { place: Some(Vec2::new(x, y)), action, seen: 0.5, reward: 0.0, is_success: false }
@@ -44,12 +44,12 @@ pub fn room() -> LevelAhead {
     LevelAhead { level: 0, plan: Some(plan) }
 }
 
-/// What a detector says of an episode on a level, and in which tick.
+/// The message of a detector about an episode on a level, with the tick.
 pub fn found(detector: &dyn Detector, level: &LevelAhead, steps: &[Step]) -> Option<(u32, String)> {
     found_proving(detector, level, steps, &NoProofs)
 }
 
-/// The same in a game that can prove something.
+/// The same in a game with proofs.
 pub fn found_proving(
     detector: &dyn Detector,
     level: &LevelAhead,
@@ -59,7 +59,7 @@ pub fn found_proving(
     play(detector, level, steps, proofs, false)
 }
 
-/// The same of an episode in which time is up after its last tick.
+/// The same for an episode that ends with the time limit after its last tick.
 pub fn timed_out_proving(
     detector: &dyn Detector,
     level: &LevelAhead,
@@ -110,19 +110,20 @@ fn play(
     })
 }
 
-/// What a detector says of a World.
+/// The message of a detector about a World.
 pub fn found_in(detector: &dyn Detector, world: &World) -> Option<String> {
     detector.watch_world()?.tick(&WorldMoment { world, errors: &[] })
 }
 
-/// How an episode ended.
+/// The end of a won episode.
 pub const WON: EpisodeEnd = EpisodeEnd::Terminated { success: true };
-/// Another way.
+/// The end of a lost episode.
 pub const LOST: EpisodeEnd = EpisodeEnd::Terminated { success: false };
-/// And the third one.
+/// The end of an episode by the time limit.
 pub const TIMED_OUT: EpisodeEnd = EpisodeEnd::Truncated;
 
-/// What a detector says of a level without plan after these episodes of one tester: how each ended, its ticks, and where.
+/// The messages of a detector about a level without plan after these episodes of one tester. For each episode: its end,
+/// its ticks and its position.
 pub fn inspected(
     detector: &dyn LevelDetector,
     episodes: &[(EpisodeEnd, u32, [f32; 2])],

@@ -3,23 +3,24 @@
 use super::solid_tiles::SolidTiles;
 use crate::detector::{Detector, LevelAhead, Moment, Setting, Watch};
 
-/// An agent is deep inside a wall of its level's plan, to all sides.
+/// A finding for agents deep inside a wall of their level's plan, on all sides.
 ///
-/// Bodies are round or have corners, sink in a little, and may hang over a ledge that is thinner than they are. Games in
-/// which nobody does say [how deep](Self::deeper_than) is too deep.
+/// Bodies are round or have corners, sink in a little, and may hang over a ledge that is thinner than they are. A game
+/// without such bodies declares [its own depth](Self::deeper_than).
 pub struct ThroughWall {
     depth: f64,
 }
 
 impl Default for ThroughWall {
     fn default() -> Self {
-        // More than half a tile: who hangs over a ledge of one tile is not inside it.
+        // More than half a tile: a body that hangs over a ledge of one tile is not inside it.
         Self { depth: 0.75 }
     }
 }
 
 impl ThroughWall {
-    /// For [a game's own detectors](crate::game::Game::detectors): nobody is so deep inside a wall, in tiles.
+    /// Creates the detector for [a game's own detectors](crate::game::TestTools::detectors): agents are never this deep
+    /// inside a wall, in tiles.
     pub fn deeper_than(depth: f64) -> Self {
         Self { depth }
     }
@@ -64,7 +65,7 @@ mod tests {
     use super::*;
     use crate::detectors::testing::{Step, found, room};
 
-    /// Upwards at x = 5, into the wall above, which goes on for three tiles.
+    /// Upwards at x = 5, into the wall above, which is three tiles thick.
     fn climb() -> (LevelAhead, Vec<Step>) {
         let mut level = room();
         let plan = level.plan.as_mut().expect("a plan");

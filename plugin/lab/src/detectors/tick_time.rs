@@ -17,8 +17,8 @@ pub const TIMING: &str = "timing.jsonl";
 /// Most slow ticks that are kept.
 const MOST: usize = 10_000;
 
-/// A tick takes longer by the clock than it may. That differs from machine to machine and from run to run, so it is no part of
-/// the results: slow ticks have a file of their own.
+/// A finding for ticks that take too long. Times differ from machine to machine and from run to run, so slow ticks are
+/// no part of the results and have a file of their own.
 pub struct TickTime {
     pub(super) milliseconds: f64,
     slow: Mutex<Vec<SlowTick>>,
@@ -27,15 +27,15 @@ pub struct TickTime {
 /// A tick that took too long.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct SlowTick {
-    /// What says so.
+    /// Name of the detector.
     pub detector: &'static str,
-    /// Who played.
+    /// The tester.
     pub tester: String,
-    /// Levels that were being played in the World.
+    /// Levels that were played in the World.
     pub levels: Vec<u64>,
     /// Ticks of their episodes.
     pub ticks: Vec<u32>,
-    /// How long it took.
+    /// Its duration.
     pub milliseconds: f64,
 }
 
@@ -48,7 +48,7 @@ impl Default for TickTime {
 impl TickTime {
     /// Its name.
     pub const NAME: &str = "tick-time";
-    /// What it finds.
+    /// The defect that it finds.
     pub const ABOUT: &str = "a tick takes too long by the clock; written to timing.jsonl, not to the results";
 
     pub(super) fn settings(&mut self) -> Vec<Setting<'_>> {
@@ -56,13 +56,13 @@ impl TickTime {
         vec![Setting::new("milliseconds", &mut self.milliseconds, what)]
     }
 
-    /// Whether a tick in which so many agents played, of a game with so many ticks per second, took too long.
+    /// Returns whether a tick with this many agents took too long, in a game with `tick_hz` ticks per second.
     pub fn is_slow(&self, took: Duration, agents: usize, tick_hz: f64) -> bool {
         let most = if self.milliseconds > 0.0 { self.milliseconds } else { 1000.0 / tick_hz };
         took.as_secs_f64() * 1000.0 > most * agents.max(1) as f64
     }
 
-    /// Notes a slow tick.
+    /// Adds a slow tick.
     pub fn note(&self, slow: SlowTick) {
         let mut known = self.slow.lock().unwrap_or_else(PoisonError::into_inner);
         if known.len() < MOST {
@@ -70,7 +70,7 @@ impl TickTime {
         }
     }
 
-    /// Adds the slow ticks so far to the file in a folder, and returns how many these were.
+    /// Appends the slow ticks so far to the file in a folder, and returns their number.
     ///
     /// # Errors
     ///

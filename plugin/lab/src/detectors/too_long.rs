@@ -3,8 +3,8 @@
 use super::level_detector::{LevelDefect, LevelDetector, TestedLevel};
 use crate::detector::Setting;
 
-/// Testers solve a level, but none of them within its par: the designer's, or that of demonstrations. Nothing is expected of
-/// levels without one.
+/// A finding for levels that testers solve, but never within their par, by the designer or by demonstrations. Levels
+/// without a par are skipped.
 pub struct TooLong {
     factor: f64,
     par: f64,
@@ -22,7 +22,7 @@ impl LevelDetector for TooLong {
     }
 
     fn describe(&self) -> &'static str {
-        "the level is solved, and by nobody within its par"
+        "the level is solved, and never within its par"
     }
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
@@ -47,7 +47,7 @@ impl LevelDetector for TooLong {
             episode: Some(episode),
             tick: result.ticks.checked_sub(1),
             settings: Vec::new(),
-            message: format!("solved in {} ticks at best, where {most} are to be enough", result.ticks),
+            message: format!("solved in {} ticks at best, where {most} should be enough", result.ticks),
         });
         defect.into_iter().collect()
     }

@@ -4,8 +4,8 @@ use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
 
 use super::level_detector::{LevelDefect, LevelDetector, ShownBy, TestedLevel};
 
-/// Time is up in one episode of a level while another one goes on for longer. Games that give more time for getting on, or
-/// truncate for other reasons, do that on purpose, so it is not usual.
+/// A finding for time limits that are shorter than another episode of the level. It is opt-in, because some games give
+/// more time for progress, or truncate for other reasons.
 #[derive(Default)]
 pub struct UnevenTime;
 

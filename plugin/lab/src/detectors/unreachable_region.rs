@@ -1,4 +1,4 @@
-//! Parts of a level that nobody gets to.
+//! Parts of a level that cannot be reached.
 
 use std::ops::ControlFlow;
 
@@ -9,8 +9,8 @@ use crate::{
     game::Game,
 };
 
-/// An explorer does not get to tiles that no wall cuts off from the start. It is no proof, and takes some seconds for each
-/// level, so it is not usual.
+/// A finding for tiles that an explorer does not reach, though no wall cuts them off from the start. It is opt-in,
+/// because it is no proof and takes some seconds for each level.
 pub struct UnreachableRegion {
     steps: f64,
     share: f64,
@@ -27,13 +27,13 @@ impl Default for UnreachableRegion {
 }
 
 impl UnreachableRegion {
-    /// What an explorer does not get to, in words.
+    /// Returns the message about tiles that an explorer does not reach.
     fn missed(&self, game: &dyn Game, mode: &str, level: u64, stop: &dyn Fn() -> bool) -> Option<String> {
-        // Without a plan nobody knows what is open.
-        game.floor_plan(mode, level)?;
+        // Without a plan, the open tiles are unknown.
+        game.tools().levels.floor_plan(mode, level)?;
         let plan =
             ExplorePlan { steps: self.steps as u64, arenas: 8, worlds: 1, threads: 1, ..ExplorePlan::new(mode, level) };
-        // A game that breaks or does not replay is found by others.
+        // Other detectors report a game that panics or does not replay.
         let go_on = |_| if stop() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
         let found = explore(game, &plan, |_| {}, go_on).ok()?;
         let coverage = found.coverage().filter(|coverage| 1.0 - coverage > self.share)?;
@@ -60,7 +60,7 @@ impl LevelDetector for UnreachableRegion {
         vec![
             Setting::new("steps", &mut self.steps, "steps of the explorer on a level").at_least(1.0),
             Setting::new("share", &mut self.share, "share of the tiles that it may miss"),
-            Setting::new("every", &mut self.every, "look at every so many-th level of the range").at_least(1.0),
+            Setting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
         ]
     }
 

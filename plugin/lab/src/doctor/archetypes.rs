@@ -1,9 +1,9 @@
-//! More archetypes in a World, so that a game in which their order decides shows.
+//! More archetypes in a World, to reveal games that depend on the order of archetypes.
 
 use bevy::prelude::*;
 use bevy_playbot::renewal::Renewal;
 
-/// Copies with other numbers of archetypes. Of several, one shows a difference that another may hide by chance.
+/// Copies with other numbers of archetypes. One of several shows a difference that another may hide by chance.
 pub(super) const VARIANTS: u32 = 7;
 
 #[derive(Component, Reflect)]
@@ -18,15 +18,15 @@ struct Second;
 #[reflect(Component)]
 struct Third;
 
-/// Makes `count` archetypes, at most 7, before those of the game's start.
+/// Creates `count` archetypes, at most 7, before those of the game's start.
 ///
-/// Bevy's queries go over archetypes in an order that depends on their numbers, and these on how many there were before: a
-/// recorder, a window and every plugin add some.
+/// Bevy's queries go over archetypes in an order that depends on their numbers, and these depend on how many archetypes
+/// there were before. A recorder, a window and every plugin add some.
 pub(super) fn add_archetypes(world: &mut World, count: u32) {
     Renewal::set_up(world, move |world| (1..=count).for_each(|kinds| add_archetype(world, kinds)));
 }
 
-/// The archetype of these components, one bit for each.
+/// Creates the archetype of these components, one bit for each.
 fn add_archetype(world: &mut World, kinds: u32) {
     let mut entity = world.spawn_empty();
     if kinds & 1 != 0 {

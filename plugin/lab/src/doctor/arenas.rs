@@ -1,4 +1,4 @@
-//! Which entities of a World with several arenas belong to which agent.
+//! The assignment of entities to agents, in a World with several arenas.
 
 use bevy::{
     ecs::entity::{EntityHashMap, EntityHashSet},
@@ -10,8 +10,8 @@ use super::{census::types_of, game_copy::GameCopy, types::KnownTypes, values::ea
 /// The number of the agent that an entity is tied to, or `None` if several are.
 pub(super) type Owners = EntityHashMap<Option<u32>>;
 
-/// Follows the entities that components name, from every agent outwards, in both directions. What two agents reach at the
-/// same distance belongs to neither, and nothing behind it does.
+/// Follows the entities that components name, from every agent outwards, in both directions. An entity that two agents
+/// reach at the same distance belongs to neither, and the search stops there.
 pub(super) fn owners(known_types: &KnownTypes, copy: &GameCopy, entities: impl Iterator<Item = Entity>) -> Owners {
     let mut ties: EntityHashMap<EntityHashSet> = EntityHashMap::default();
     for entity in entities {
@@ -54,8 +54,8 @@ fn named_by(known_types: &KnownTypes, world: &World, entity: Entity) -> Vec<Enti
     named
 }
 
-/// Of the entities of one kind in the shared World, those that play the part of the `wanted` ones which agent `number` has
-/// when it is alone. `None` if nobody can tell.
+/// Returns the entities of one kind in the shared World that correspond to the `wanted` ones of agent `number` alone.
+/// `None` if that is ambiguous.
 pub(super) fn share_of(owners: &Owners, number: u32, wanted: usize, all: &[Entity]) -> Option<Vec<Entity>> {
     let own = |entity: &&Entity| owners.get(*entity) == Some(&Some(number));
     let common = |entity: &&Entity| owners.get(*entity).copied().flatten().is_none();

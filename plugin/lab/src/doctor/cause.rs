@@ -1,14 +1,14 @@
-//! Usual causes of a difference, and what to do about them.
+//! Common causes of a difference, and advice.
 
 use serde::Serialize;
 
 use super::report::{Comparison, Difference, DifferenceKind};
 
-/// A usual cause.
+/// A common cause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum CauseKind {
-    /// Random numbers that no seed decides.
+    /// Random numbers without a seed.
     Randomness,
     /// The order of a `HashMap` or `HashSet`.
     HashOrder,
@@ -20,14 +20,14 @@ pub enum CauseKind {
     ThreadState,
     /// A resource of which two arenas have only one.
     SharedByArenas,
-    /// Something that a restart does not reset.
+    /// State that a restart does not reset.
     SurvivesRestart,
-    /// Files that are loaded while the game already runs.
+    /// Files that are still loading while the game runs.
     Loading,
 }
 
 impl CauseKind {
-    /// The cause in words.
+    /// Returns the cause in words.
     pub fn describe(self) -> &'static str {
         match self {
             Self::Randomness => "random numbers without a seed",
@@ -46,7 +46,7 @@ impl CauseKind {
         }
     }
 
-    /// What to do about it.
+    /// Returns the advice against it.
     pub fn advice(self) -> &'static str {
         match self {
             Self::Randomness => {
@@ -54,11 +54,11 @@ impl CauseKind {
                  starts, and draw from nothing else (no thread_rng, no RandomState, no address of anything)"
             }
             Self::HashOrder => {
-                "take a BTreeMap, an IndexMap or Bevy's own `bevy::platform::collections::HashMap`, or sort the entries \
+                "use a BTreeMap, an IndexMap or Bevy's own `bevy::platform::collections::HashMap`, or sort the entries \
                  before anything depends on their order"
             }
             Self::WallClock => {
-                "take `Res<Time>` (game time) for everything that moves or counts, and leave Time<Real> and Instant to \
+                "use `Res<Time>` (game time) for everything that moves or counts, and leave Time<Real> and Instant to \
                  what is only shown"
             }
             Self::ArchetypeOrder => {
@@ -90,16 +90,16 @@ impl CauseKind {
 /// A cause that fits a difference.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Cause {
-    /// Which.
+    /// The cause.
     pub kind: CauseKind,
-    /// What in the game points to it.
+    /// Hints in the game that point to it.
     pub evidence: Vec<String>,
-    /// What to do.
+    /// The advice.
     pub advice: &'static str,
 }
 
-/// The causes that fit a difference, likeliest first. Which comparison differs says most; among several, types that the game
-/// holds decide.
+/// Returns the causes that fit a difference, likeliest first. The comparison that differs matters most. Among several
+/// causes, the types in the game decide.
 pub(super) fn causes(
     comparison: Comparison,
     difference: Option<&Difference>,

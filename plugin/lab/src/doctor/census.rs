@@ -10,7 +10,7 @@ use bevy_playbot::agent::Agent;
 
 use super::types::KnownTypes;
 
-/// What entities of two Worlds must have in common to be the same one: its name, and the game's own components. Those of the
+/// The key by which entities of two Worlds are matched: the name, and the game's own components. Components of the
 /// engine come and go with the loading of files.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) struct GroupKey {
@@ -25,7 +25,7 @@ pub(super) struct GroupKey {
 /// Entities of the same kind, in the order of their spawning.
 pub(super) type Groups = BTreeMap<GroupKey, Vec<Entity>>;
 
-/// Numbers entities in the order of their spawning, from tick to tick. Their ids are used again after a despawn, in another
+/// Numbers entities in the order of their spawning, from tick to tick. Their ids are reused after a despawn, in another
 /// order.
 #[derive(Default)]
 pub(super) struct Census {
@@ -34,7 +34,7 @@ pub(super) struct Census {
 }
 
 impl Census {
-    /// Notes who has come and who has gone. To be called after each tick.
+    /// Adds new entities and removes despawned ones. Call it after each tick.
     pub fn update(&mut self, world: &World) {
         let mut numbers = EntityHashMap::default();
         let mut new = Vec::new();
@@ -55,7 +55,7 @@ impl Census {
         self.numbers = numbers;
     }
 
-    /// All entities, by kind.
+    /// Returns all entities, by kind.
     pub fn groups(&self, world: &World, known_types: &KnownTypes) -> Groups {
         let mut numbered: Vec<_> = self.numbers.iter().map(|(&entity, &number)| (number, entity)).collect();
         numbered.sort();
@@ -67,7 +67,7 @@ impl Census {
     }
 }
 
-/// Every entity but those that hold resources, observers and systems.
+/// Returns every entity except those with resources, observers and systems.
 fn game_entities(world: &World) -> Vec<Entity> {
     let components = world.components();
     let hidden = [
@@ -90,7 +90,7 @@ fn key(world: &World, entity: Entity, known_types: &KnownTypes) -> GroupKey {
     }
 }
 
-/// The types of components, in an order that is the same in all Worlds of a process.
+/// Returns the types of components, in an order that is the same in all Worlds of a process.
 pub(super) fn types_of(world: &World, components: &[bevy::ecs::component::ComponentId]) -> Vec<TypeId> {
     let infos = components.iter().filter_map(|&id| world.components().get_info(id));
     let mut types: Vec<_> = infos.filter_map(|info| info.type_id()).collect();

@@ -1,4 +1,4 @@
-//! Two copies of a game after the same tick, component by component and resource by resource.
+//! The comparison of two copies of a game after the same tick, component by component and resource by resource.
 
 use std::{
     any::TypeId,
@@ -20,29 +20,29 @@ use super::{
     types::{KnownType, KnownTypes},
 };
 
-/// How copies are compared.
+/// The settings of a comparison.
 pub(super) struct Comparer<'a> {
     pub known_types: &'a KnownTypes,
     pub comparison: Comparison,
-    /// Parts of paths of types that nobody wants to hear of.
+    /// Parts of type paths that are ignored.
     pub ignored: &'a [String],
     /// Types of fields that could not be compared.
     pub incomparable: BTreeSet<String>,
 }
 
-/// What differs after a tick.
+/// The differences after a tick.
 #[derive(Default)]
 pub(super) struct Found {
     pub differences: Vec<Difference>,
     pub unmatched: usize,
 }
 
-/// In which group an entity is, and at which place.
+/// Group and index of an entity.
 type Places = EntityHashMap<(usize, usize)>;
 
 impl Comparer<'_> {
-    /// Everything that differs, nearest to its cause first: types of the game before those of the engine, resources before
-    /// components, whose values often come from them.
+    /// Returns all differences, nearest to their cause first: types of the game before those of the engine, and
+    /// resources before components, whose values often come from them.
     pub fn compare(&mut self, left: &GameCopy, right: &GameCopy, tick: u32) -> Found {
         let mut found = Found::default();
         let pairs = self.pair_up(left, right, tick, &mut found);
@@ -55,7 +55,7 @@ impl Comparer<'_> {
         let (left_places, right_places) = (places(|pairs| &pairs.left), places(|pairs| &pairs.right));
         let loose = self.is_loose();
         let same_entity = |a: Entity, b: Entity| match (left_places.get(&a), right_places.get(&b)) {
-            // A list of entities is in the order of their spawning, which need not be that of a first episode.
+            // A list of entities has the order of their spawning, which may differ from that of a first episode.
             (Some(a), Some(b)) => {
                 if loose {
                     a.0 == b.0
@@ -70,8 +70,8 @@ impl Comparer<'_> {
         for group in &pairs {
             found.differences.extend(self.compare_group(left, right, tick, group, &same_entity));
         }
-        // After a restart a surplus of entities is itself the cause, so it comes early; in other comparisons it is the effect of
-        // another difference, and comes last.
+        // After a restart, a surplus of entities is itself the cause, so it comes early. In other comparisons it is the
+        // effect of another difference, and comes last.
         let is_cause = self.comparison == Comparison::Restart;
         let rank = |difference: &Difference| match difference.kind {
             DifferenceKind::Entities => (false, if is_cause { 1 } else { 3 }),
@@ -82,7 +82,7 @@ impl Comparer<'_> {
         found
     }
 
-    /// Whether entities of one kind may stand in another order.
+    /// Returns whether entities of one kind may have another order.
     fn is_loose(&self) -> bool {
         matches!(self.comparison, Comparison::Archetypes | Comparison::Restart | Comparison::Arenas)
     }
@@ -102,7 +102,7 @@ impl Comparer<'_> {
         same_entity: &dyn Fn(Entity, Entity) -> bool,
         found: &mut Found,
     ) {
-        // Lists in resources hold both agents of a shared World, so the second one is not where it is when it is alone.
+        // Lists in resources contain both agents of a shared World, so the second one has another index than alone.
         if self.comparison == Comparison::Arenas && left.number(0) != right.number(0) {
             return;
         }
@@ -133,7 +133,7 @@ impl Comparer<'_> {
         copy.world.resource_entities().iter().filter_map(typed).collect()
     }
 
-    /// The first field in which a component or resource of two entities differs.
+    /// Returns the first field in which a component or resource of two entities differs.
     fn field(
         &mut self,
         known: &KnownType,
@@ -174,7 +174,7 @@ impl Comparer<'_> {
         if in_another_order { Vec::new() } else { differences }
     }
 
-    /// Whether every entity on the left has an equal one on the right, whatever the order.
+    /// Returns whether every entity on the left has an equal one on the right, in any order.
     fn is_reordered(
         &mut self,
         left: &GameCopy,
@@ -189,8 +189,8 @@ impl Comparer<'_> {
         })
     }
 
-    /// Components of two entities that differ, and the first field in which they do. Components that only one of them has
-    /// are the engine's: those of the game decided which entities were matched.
+    /// Returns the components of two entities that differ, and the first field in which they do. Components that only
+    /// one of them has are the engine's: those of the game decided the matching.
     fn components(
         &mut self,
         left: &GameCopy,

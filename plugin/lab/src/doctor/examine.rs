@@ -11,39 +11,41 @@ use super::{
 };
 use crate::{game::Game, mode::ModeError};
 
-/// How a game is examined.
+/// The settings of an examination.
 #[derive(Clone, Debug)]
 pub struct DoctorOptions {
     /// Mode of the game.
     pub mode: String,
     /// Ticks that each comparison plays.
     pub ticks: u32,
-    /// The level, and the seed of the actions.
+    /// The level.
+    pub level: u64,
+    /// Random seed of the World and of the actions.
     pub seed: u64,
-    /// Components and resources whose path contains one of these are left out, such as a high score that is meant to last.
+    /// Components and resources whose path contains one of these are ignored, such as a high score that should last.
     pub ignored: Vec<String>,
 }
 
 impl DoctorOptions {
-    /// 300 ticks of a mode.
+    /// Creates options for 300 ticks of a mode.
     pub fn new(mode: impl Into<String>) -> Self {
-        Self { mode: mode.into(), ticks: 300, seed: 0, ignored: Vec::new() }
+        Self { mode: mode.into(), ticks: 300, level: 0, seed: 0, ignored: Vec::new() }
     }
 }
 
-/// Plays copies of a game with the same random actions, compares them after every tick, and says what is wrong.
-/// `progress` hears what is compared next.
+/// Plays copies of a game with the same random actions, compares them after every tick, and reports the differences.
+/// `progress` receives the next comparison.
 ///
 /// # Errors
 ///
-/// The game has no such mode. Whatever else is wrong with the game is in the report.
+/// The game has no such mode. Every other problem of the game is in the report.
 pub fn examine(
     game: &dyn Game,
     options: &DoctorOptions,
     mut progress: impl FnMut(Comparison),
 ) -> Result<DoctorReport, ModeError> {
     game.check_mode(&options.mode)?;
-    let plan = Plan { mode: &options.mode, seed: options.seed };
+    let plan = Plan { mode: &options.mode, level: options.level, seed: options.seed };
     let mut known_types = KnownTypes::new(&bare_world());
     let mut comparisons: Vec<ComparisonReport> = Vec::new();
     let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
@@ -69,6 +71,7 @@ pub fn examine(
         game: game.name().to_owned(),
         version: game.version(),
         mode: options.mode.clone(),
+        level: options.level,
         seed: options.seed,
         ticks: options.ticks,
         safety: assess_safety(&comparisons, &observation),
@@ -80,15 +83,15 @@ pub fn examine(
     })
 }
 
-/// A game that differs from itself differs everywhere, and no comparison could tell why.
+/// A game that differs from itself differs in every comparison, and no comparison could name a cause.
 fn reason_to_skip(comparison: Comparison, game: &dyn Game, done: &[ComparisonReport]) -> Option<String> {
-    if comparison == Comparison::Arenas && game.arenas_per_world() == Some(1) {
+    if comparison == Comparison::Arenas && game.tools().host.arenas_per_world() == Some(1) {
         return Some("a World of this game holds only one arena (its `arenas_per_world` is 1)".to_owned());
     }
     let broken = done.iter().find(|of| of.comparison == Comparison::Repeat && of.same() == Some(false))?;
     Some(match broken.fault.is_some() {
-        true => "the game has a fault, which must be mended first".to_owned(),
-        false => "the game already differs from itself without this, which must be mended first".to_owned(),
+        true => "the game has a fault, which must be repaired first".to_owned(),
+        false => "the game already differs from itself without this, which must be repaired first".to_owned(),
     })
 }
 

@@ -9,7 +9,7 @@ use bevy::{
 
 use super::values::{plain_equal, show};
 
-/// Where two values differ, and what they are there.
+/// The path of a difference, and both values.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct FieldDifference {
     /// From the component or resource, such as `.position[2].x`; empty if it has no parts.
@@ -33,20 +33,20 @@ impl FieldDifference {
     }
 }
 
-/// How values are compared.
+/// The settings of a comparison of values.
 pub(super) struct FieldComparison<'a> {
-    /// Whether an entity of the left World plays the part of one of the right World.
+    /// Returns whether an entity of the left World corresponds to one of the right World.
     pub same_entity: &'a dyn Fn(Entity, Entity) -> bool,
-    /// Whether handles of assets are compared. A second episode makes new ones.
+    /// Whether handles of assets are compared. A second episode creates new ones.
     pub handles: bool,
-    /// Whether a list or map on the right may hold more, as for agents that are not on the left.
+    /// Whether a list or map on the right may have more entries, as for agents that are not on the left.
     pub right_may_hold_more: bool,
-    /// Hears of types whose values cannot be compared.
+    /// Collects types whose values cannot be compared.
     pub incomparable: &'a mut BTreeSet<String>,
 }
 
 impl FieldComparison<'_> {
-    /// The first field that differs, in the order of declaration.
+    /// Returns the first field that differs, in the order of declaration.
     pub fn first(&mut self, left: &dyn PartialReflect, right: &dyn PartialReflect) -> Option<FieldDifference> {
         if let (Some(&left_entity), Some(&right_entity)) =
             (left.try_downcast_ref::<Entity>(), right.try_downcast_ref::<Entity>())
@@ -98,7 +98,7 @@ impl FieldComparison<'_> {
         element.or_else(|| self.lengths(left.len(), right.len()))
     }
 
-    /// The order in which a map gives out its entries is no part of its value, so that the least key is named.
+    /// The order of a map's entries is no part of its value, so the least key is named.
     fn maps(&mut self, left: &dyn Map, right: &dyn Map) -> Option<FieldDifference> {
         let mut found: Vec<_> = left
             .iter()

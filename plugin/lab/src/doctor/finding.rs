@@ -1,4 +1,4 @@
-//! What is wrong with a game.
+//! The findings of an examination.
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use super::{
     report::{Comparison, ComparisonReport, Difference},
 };
 
-/// What kind of thing is wrong.
+/// The kind of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum FindingKind {
@@ -16,7 +16,7 @@ pub enum FindingKind {
     Differs,
     /// The game broke its contract, or panicked.
     Fault,
-    /// An observed value was no finite number.
+    /// An observed value was not a finite number.
     NotFinite,
     /// The number of observed values changed.
     LengthChanges,
@@ -24,12 +24,12 @@ pub enum FindingKind {
     Blind,
 }
 
-/// One thing that is wrong.
+/// A finding.
 #[derive(Clone, Debug, Serialize)]
 pub struct Finding {
-    /// What kind of thing.
+    /// The kind.
     pub kind: FindingKind,
-    /// In a sentence.
+    /// The message, in a sentence.
     pub what: String,
     /// The comparison that showed it.
     pub comparison: Option<Comparison>,
@@ -39,7 +39,7 @@ pub struct Finding {
     pub causes: Vec<Cause>,
 }
 
-/// Everything that is wrong, worst first.
+/// Returns all findings, worst first.
 pub(super) fn findings(
     comparisons: &[ComparisonReport],
     observation: &ObservationReport,
@@ -58,7 +58,7 @@ pub(super) fn findings(
             });
         }
         let Some(fault) = &report.fault else { continue };
-        // A bad observation is reported in its own words already, and one fault shows in every comparison.
+        // A bad observation has its own message already, and one fault shows in every comparison.
         let is_known = findings.iter().any(|finding| finding.kind == FindingKind::Fault && finding.what == *fault);
         if !is_of_observation && !is_known {
             findings.push(plain(FindingKind::Fault, fault.clone(), Some(report.comparison)));

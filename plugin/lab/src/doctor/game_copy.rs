@@ -1,4 +1,4 @@
-//! One running copy of a game, whose agents do what a script of random actions says.
+//! A running copy of a game, whose agents play a script of random actions.
 
 use std::{any::TypeId, collections::BTreeSet};
 
@@ -26,7 +26,7 @@ use crate::{game::Game, worlds::build_world};
 #[reflect(Resource)]
 struct Ends(Vec<(Entity, EpisodeEnd)>);
 
-/// What an agent saw, got and came to in a tick.
+/// An agent's observation, reward and end in a tick.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Outcome {
     pub observation: Vec<f32>,
@@ -41,7 +41,7 @@ pub(super) struct GameCopy {
     pub world: World,
     pub agents: Vec<Entity>,
     pub census: Census,
-    /// What went wrong, after which the copy is not ticked any more.
+    /// The fault or panic after which the copy is not ticked any more.
     pub fault: Option<String>,
     first: u32,
     space: ActionSpace,
@@ -49,34 +49,35 @@ pub(super) struct GameCopy {
     in_prelude: bool,
 }
 
-/// What is played.
+/// The game, mode and level that are played.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Plan<'a> {
     pub mode: &'a str,
-    /// The level, and the seed of the actions.
+    pub level: u64,
+    /// Random seed of the World and of the actions.
     pub seed: u64,
 }
 
 impl GameCopy {
-    /// A World with agents `first..first + count`, all in the same level.
+    /// Builds a World with agents `first..first + count`, all in the same level.
     pub fn new(game: &dyn Game, plan: &Plan, first: u32, count: u32) -> Self {
         let (mut world, agents) = build_world(game, plan.mode, plan.seed, first, count);
         prepare(&mut world);
         for &agent in &agents {
-            // Replay without a recording: nobody else decides, and virtual input acts.
-            world.entity_mut(agent).insert((Control::Replay, LevelQueue::Always(plan.seed)));
+            // Replay without a recording: no other controller decides, and virtual input acts.
+            world.entity_mut(agent).insert((Control::Replay, LevelQueue::Always(plan.level)));
         }
         let scripts = (first..first + count).map(|number| AgentStreams::new(plan.seed, number)).collect();
         let (census, fault, space) = (Census::default(), None, game.actions());
         Self { world, agents, census, fault, first, space, scripts, in_prelude: false }
     }
 
-    /// Number of an agent.
+    /// Returns the number of an agent.
     pub fn number(&self, agent: usize) -> u32 {
         self.first + agent as u32
     }
 
-    /// Draws everybody's action and runs one tick. A fault or a panic ends the play of this copy.
+    /// Draws the actions of all agents and runs one tick. A fault or a panic ends this copy.
     pub fn tick(&mut self) {
         if self.fault.is_some() {
             return;
@@ -89,7 +90,7 @@ impl GameCopy {
         let before = self.world.id();
         self.fault = tick_world(&mut self.world).err().map(|fault| fault.to_string());
         if self.world.id() != before {
-            // Another World has taken its place, with other entities.
+            // Another World has replaced it, with other entities.
             self.census = Census::default();
         }
         self.census.update(&self.world);
@@ -113,7 +114,7 @@ impl GameCopy {
         self.in_prelude = false;
     }
 
-    /// What the tick brought an agent.
+    /// Returns an agent's outcome of the tick.
     pub fn outcome(&self, agent: usize) -> Outcome {
         let entity = self.agents[agent];
         let observation = self.world.get::<Observation>(entity).cloned().unwrap_or_default();
@@ -126,26 +127,26 @@ impl GameCopy {
         }
     }
 
-    /// How an agent's episode ended in this tick, if it did.
+    /// Returns how an agent's episode ended in this tick, if it did.
     pub fn end(&self, agent: usize) -> Option<EpisodeEnd> {
         let (entity, ends) = (self.agents[agent], &self.world.resource::<Ends>().0);
         ends.iter().find(|(ended, _)| *ended == entity).map(|(_, end)| *end)
     }
 
-    /// Names of the values that agents observe.
+    /// Returns the names of the values that agents observe.
     pub fn observed_names(&self) -> Vec<String> {
         let sensor = self.agents.first().and_then(|&agent| self.world.get::<VectorSensor>(agent));
         sensor.map(|sensor| sensor.space().names.clone()).unwrap_or_default()
     }
 
-    /// Types of all components and resources that this World holds.
+    /// Returns the types of all components and resources in this World.
     pub fn present_types(&self) -> BTreeSet<TypeId> {
         let archetypes = self.world.archetypes().iter().filter(|archetype| !archetype.is_empty());
         archetypes.flat_map(|archetype| types_of(&self.world, archetype.components())).collect()
     }
 }
 
-/// Adds what a copy needs beside the game.
+/// Adds the examination's own systems and components.
 fn prepare(world: &mut World) {
     Renewal::set_up(world, |world| {
         world.init_resource::<Ends>();
@@ -153,7 +154,7 @@ fn prepare(world: &mut World) {
     });
 }
 
-/// A World with the plugin and an agent, without a game: to tell the game's types from the others.
+/// Builds a World with the plugin and an agent, without a game, to distinguish the game's types from the others.
 pub(super) fn bare_world() -> World {
     let mut world = into_world(headless_app());
     prepare(&mut world);

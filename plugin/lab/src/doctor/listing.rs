@@ -1,4 +1,4 @@
-//! What was seen and what was compared, line by line.
+//! The report's lists of observations and of types.
 
 use std::fmt::{self, Display, Formatter};
 
@@ -7,7 +7,7 @@ use super::{
     types::TypesReport,
 };
 
-/// Most lines of one list; a longer one ends with how many more there are.
+/// Most lines of one list; a longer one ends with the number of further lines.
 const LISTED: usize = 8;
 
 impl Display for ObservationReport {

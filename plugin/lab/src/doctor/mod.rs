@@ -1,11 +1,12 @@
-//! Does a game play the same when it is given the same actions? If not: what differs first, when, and what to do.
+//! The examination of a game: does it play the same for the same actions? If not, it names the first difference, its
+//! tick, and advice.
 //!
-//! Recording, replay, resume and training in many arenas all rest on games that are a function of their level and their
+//! Recording, replay, resume and training in many arenas need games that are a function of their level and their
 //! actions. [`examine`] plays copies of a game with the same random actions and compares them after every tick, by
-//! reflection: see [`Comparison`] for what is compared with what. That nothing was found in some ticks of one level does not
-//! prove that there is nothing; more ticks and other levels say more. Components and resources that are `Reflect` and carry
-//! `#[reflect(Component)]` or `#[reflect(Resource)]` are compared field by field; the rest shows only in what agents
-//! observe, get and end with.
+//! reflection: see [`Comparison`] for the pairs. No finding in some ticks of one level is no proof: more ticks and
+//! other levels show more. Components and resources that are `Reflect` and have `#[reflect(Component)]` or
+//! `#[reflect(Resource)]` are compared field by field. The rest shows only in observations, rewards and ends of
+//! episodes.
 
 mod archetypes;
 mod arenas;

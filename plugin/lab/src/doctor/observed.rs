@@ -1,4 +1,4 @@
-//! What agents observed: values that are no numbers, that are not always there, or that never change.
+//! The observations of agents: values that are not numbers, that are sometimes missing, or that never change.
 
 use serde::Serialize;
 
@@ -9,31 +9,31 @@ use super::game_copy::Outcome;
 pub struct ConstantValue {
     /// Its name.
     pub name: String,
-    /// What it was.
+    /// The value.
     pub value: f32,
 }
 
-/// An observed value that was no finite number.
+/// An observed value that was not a finite number.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct NonFiniteValue {
     /// The tick, from 0.
     pub tick: u32,
     /// Name of the value.
     pub name: String,
-    /// What it was: `NaN`, `inf` or `-inf`.
+    /// The value: `NaN`, `inf` or `-inf`.
     pub value: String,
 }
 
-/// What one agent observed.
+/// The observations of one agent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct ObservationReport {
-    /// Number of values that the game says there are: those that its sensor names.
+    /// Number of values that the game's sensor names.
     pub values: usize,
     /// Ticks that were watched.
     pub ticks: u32,
-    /// Those that were the same in all of them.
+    /// Values that were the same in all of them.
     pub constant: Vec<ConstantValue>,
-    /// The first value that was no finite number.
+    /// The first value that was not a finite number.
     pub not_finite: Option<NonFiniteValue>,
     /// The first tick, from 0, with another number of values, and that number.
     pub length: Option<(u32, usize)>,
@@ -41,7 +41,7 @@ pub struct ObservationReport {
     pub state_hash: bool,
 }
 
-/// Looks at one agent's observations.
+/// Monitors one agent's observations.
 pub(super) struct ObservationMonitor {
     names: Vec<String>,
     first: Option<Outcome>,
@@ -51,13 +51,13 @@ pub(super) struct ObservationMonitor {
 }
 
 impl ObservationMonitor {
-    /// Values of these names are expected.
+    /// Creates a monitor for values with these names.
     pub fn new(names: Vec<String>) -> Self {
         let report = ObservationReport { values: names.len(), ..Default::default() };
         Self { changed: vec![false; names.len()], names, first: None, image_changed: false, report }
     }
 
-    /// Notes what a tick brought.
+    /// Adds the outcome of a tick.
     pub fn note(&mut self, tick: u32, seen: &Outcome) {
         self.report.ticks += 1;
         self.report.state_hash |= seen.hash != 0;
@@ -77,14 +77,14 @@ impl ObservationMonitor {
         self.image_changed |= seen.image != first.image;
     }
 
-    /// What there was to see. Nothing can be said to be constant that was seen only once.
+    /// Returns the report. A value that was seen only once does not count as constant.
     pub fn report(mut self) -> ObservationReport {
         if self.report.ticks > 1 {
             let values = self.first.map(|first| first.observation).unwrap_or_default();
             let all = self.names.into_iter().zip(self.changed).enumerate();
             let constant = all.filter(|(_, (_, changed))| !changed).map(|(at, (name, _))| ConstantValue {
                 name,
-                // A value that was not there at first is not known, and the report says so elsewhere.
+                // A value that was missing at first is unknown, and the report says so elsewhere.
                 value: values.get(at).copied().unwrap_or(f32::NAN),
             });
             self.report.constant = constant.collect();
@@ -94,7 +94,7 @@ impl ObservationMonitor {
 }
 
 impl ObservationReport {
-    /// Whether there was nothing to see in all ticks.
+    /// Returns whether there were values, and none of them ever changed.
     pub fn is_blind(&self) -> bool {
         self.values > 0 && self.ticks > 1 && self.constant.len() == self.values
     }

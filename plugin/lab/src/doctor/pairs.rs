@@ -1,4 +1,4 @@
-//! Which entity of one copy plays the part of which in the other.
+//! The pairs of corresponding entities in two copies.
 
 use std::any::TypeId;
 
@@ -20,7 +20,7 @@ pub(super) struct Pairs {
 }
 
 impl Comparer<'_> {
-    /// Finds the partners of all entities; kinds of which there are more on one side are reported and left out.
+    /// Finds the partners of all entities. Kinds with more entities on one side are reported and left out.
     pub(super) fn pair_up(&self, left: &GameCopy, right: &GameCopy, tick: u32, found: &mut Found) -> Vec<Pairs> {
         let lefts = left.census.groups(&left.world, self.known_types);
         let mut rights = right.census.groups(&right.world, self.known_types);
@@ -78,7 +78,7 @@ impl Comparer<'_> {
         })
     }
 
-    /// `"Paddle" [Velocity, Collider]`.
+    /// Returns the kind, such as `"Paddle" [Velocity, Collider]`.
     fn describe_kind(&self, key: &GroupKey) -> String {
         let types = key.types.iter().filter_map(|id| self.known_types.get(*id)?.short_name());
         let types: Vec<_> = types.collect();
@@ -92,7 +92,7 @@ impl Comparer<'_> {
         }
     }
 
-    /// `entity 3v0, number 2 of 5 [Brick]`.
+    /// Returns the entity, such as `entity 3v0, number 2 of 5 [Brick]`.
     pub(super) fn describe(&self, group: &Pairs, place: usize, entity: Entity) -> String {
         let kind = self.describe_kind(&group.key);
         match group.left.len() {

@@ -1,19 +1,19 @@
-//! What an examination found, for people and for programs.
+//! The report of an examination, for people and for programs.
 
 use serde::Serialize;
 
 use super::{finding::Finding, observed::ObservationReport, safety::Safety, types::TypesReport};
 
-/// Which copies of the game are held side by side.
+/// The copies of the game that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Comparison {
     /// Two Worlds on one thread, one after the other in every tick.
     Repeat,
-    /// Two Worlds, in one of which Bevy's `Time<Real>` runs slower, as on a machine that is.
+    /// Two Worlds. In one of them Bevy's `Time<Real>` runs slower, as on a slow machine.
     Clock,
-    /// A World as usual, and some with more archetypes, as a recorder, a window or another plugin brings them. What differs
-    /// counts only if agents notice it: the order of things alone does no harm.
+    /// A default World, and some with more archetypes, as a recorder, a window or another plugin adds them. A
+    /// difference counts only if agents notice it: another order alone does no harm.
     Archetypes,
     /// A World on this thread, and two that are ticked at the same time on two threads.
     Threads,
@@ -24,11 +24,11 @@ pub enum Comparison {
 }
 
 impl Comparison {
-    /// All of them, in the order in which they are made.
+    /// All comparisons, in the order in which they are made.
     pub const ALL: [Self; 6] =
         [Self::Repeat, Self::Archetypes, Self::Clock, Self::Threads, Self::Arenas, Self::Restart];
 
-    /// What is held side by side, for people.
+    /// Returns the comparison in words.
     pub fn describe(self) -> &'static str {
         match self {
             Self::Repeat => "twice in one thread",
@@ -40,12 +40,12 @@ impl Comparison {
         }
     }
 
-    /// What the left value of a difference is of, and the right one.
+    /// Returns the names of the left and the right copy.
     pub fn sides(self) -> (&'static str, &'static str) {
         match self {
             Self::Repeat => ("first copy", "second copy"),
-            Self::Clock => ("usual clock", "slower clock"),
-            Self::Archetypes => ("usual World", "more archetypes"),
+            Self::Clock => ("normal clock", "slower clock"),
+            Self::Archetypes => ("default World", "more archetypes"),
             Self::Threads => ("one thread", "two threads"),
             Self::Arenas => ("alone", "with another arena"),
             Self::Restart => ("first episode", "second episode"),
@@ -53,7 +53,7 @@ impl Comparison {
     }
 }
 
-/// What kind of thing differs.
+/// The kind of value that differs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DifferenceKind {
@@ -73,14 +73,14 @@ pub enum DifferenceKind {
     StateHash,
 }
 
-/// One thing that is not the same in two copies of the game.
+/// A difference between two copies of the game.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Difference {
     /// The tick of the comparison, from 0.
     pub tick: u32,
-    /// What kind of thing.
+    /// The kind of value.
     pub kind: DifferenceKind,
-    /// Path of the component's or resource's type; what agents have by name, such as `reward`.
+    /// Path of the component's or resource's type; the name of other values, such as `reward`.
     pub name: String,
     /// The entity: its name, or how the two were matched.
     pub entity: Option<String>,
@@ -92,42 +92,42 @@ pub struct Difference {
     pub right: String,
 }
 
-/// What one comparison found.
+/// The result of one comparison.
 #[derive(Clone, Debug, Serialize)]
 pub struct ComparisonReport {
-    /// Which.
+    /// The comparison.
     pub comparison: Comparison,
-    /// Why it was not made, if it was not.
+    /// Why it was skipped, if it was.
     pub skipped: Option<String>,
     /// Ticks compared.
     pub ticks: u32,
-    /// Episodes that began in these ticks, in the copy on the left; the last one need not have come to its end.
+    /// Episodes that started in these ticks, in the copy on the left; the last one may be unfinished.
     pub episodes: u32,
     /// The first difference, the one nearest to its cause if a tick has several.
     pub first: Option<Difference>,
-    /// Further differences of that tick, a few of them.
+    /// A few further differences of that tick.
     pub others: Vec<Difference>,
-    /// The first difference in what agents observe, get or end with, if it came to that.
+    /// The first difference in observations, rewards or ends of episodes, if there is one.
     pub effect: Option<Difference>,
-    /// Entities that could not be matched with one of the other copy.
+    /// Entities without a match in the other copy.
     pub unmatched: usize,
-    /// What the game did wrong so that the comparison ended early: a fault, or a panic.
+    /// The fault or panic of the game that ended the comparison early.
     pub fault: Option<String>,
 }
 
 impl ComparisonReport {
-    /// Whether the copies played the same game to the end; `None` if they were not compared.
+    /// Returns whether the copies played the same game to the end; `None` if they were not compared.
     pub fn same(&self) -> Option<bool> {
         self.skipped.is_none().then(|| self.first.is_none() && self.effect.is_none() && self.fault.is_none())
     }
 
-    /// The first difference of any kind.
+    /// Returns the first difference of any kind.
     pub fn difference(&self) -> Option<&Difference> {
         self.first.as_ref().or(self.effect.as_ref())
     }
 }
 
-/// What an examination found.
+/// The result of an examination.
 #[derive(Clone, Debug, Serialize)]
 pub struct DoctorReport {
     /// Name of the game.
@@ -136,31 +136,33 @@ pub struct DoctorReport {
     pub version: u32,
     /// Its mode.
     pub mode: String,
-    /// Level that was played, and seed of the actions.
+    /// The level.
+    pub level: u64,
+    /// Random seed of the World and of the actions.
     pub seed: u64,
     /// Ticks that each comparison was to play.
     pub ticks: u32,
-    /// What was compared.
+    /// The comparisons.
     pub comparisons: Vec<ComparisonReport>,
-    /// What agents saw.
+    /// The observations of agents.
     pub observation: ObservationReport,
-    /// Which types could be compared.
+    /// The types that could be compared.
     pub types: TypesReport,
-    /// What the game is safe for.
+    /// The uses that the game is safe for.
     pub safety: Safety,
-    /// What is wrong, worst first.
+    /// The findings, worst first.
     pub findings: Vec<Finding>,
-    /// Ticks per second of one arena, if somebody measured it: the examination itself reads no clock.
+    /// Ticks per second of one arena, if they were measured: the examination itself reads no clock.
     pub ticks_per_second: Option<f64>,
 }
 
 impl DoctorReport {
-    /// Whether nothing is wrong.
+    /// Returns whether there is no finding.
     pub fn is_healthy(&self) -> bool {
         self.findings.is_empty()
     }
 
-    /// What a comparison found.
+    /// Returns the report of a comparison.
     pub fn of(&self, comparison: Comparison) -> Option<&ComparisonReport> {
         self.comparisons.iter().find(|report| report.comparison == comparison)
     }

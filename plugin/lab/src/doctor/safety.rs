@@ -1,4 +1,4 @@
-//! What a game can be used for as it is.
+//! The uses that a game is safe for.
 
 use serde::Serialize;
 
@@ -7,23 +7,23 @@ use super::{
     report::{Comparison, ComparisonReport},
 };
 
-/// Whether the game is safe for something, as far as a few ticks can show.
+/// Whether the game is safe for a use, as far as a few ticks can show.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Verdict {
-    /// `None` if that was not looked at.
+    /// `None` if it was not compared.
     pub safe: Option<bool>,
-    /// Why, or under which condition.
+    /// The reason, or the condition.
     pub why: String,
-    /// What it rests on: it is safe as far as none of these comparisons found a difference in the ticks that they played.
+    /// The comparisons behind it: the game is safe if they found no difference in their ticks.
     pub comparisons: Vec<Comparison>,
 }
 
-/// What the game is safe for.
+/// The uses that the game is safe for.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Safety {
     /// Recording: whether a recording replays.
     pub recording: Verdict,
-    /// Stopping a training and going on with it.
+    /// Resume: whether a stopped run can go on.
     pub resume: Verdict,
     /// Many arenas in one World.
     pub arenas: Verdict,
@@ -34,11 +34,11 @@ pub struct Safety {
 }
 
 impl Safety {
-    /// All of them, with what they are about.
+    /// Returns all uses, with their names.
     pub fn all(&self) -> [(&'static str, &Verdict); 5] {
         [
             ("recording and replay", &self.recording),
-            ("resume of a training", &self.resume),
+            ("resume of a run", &self.resume),
             ("many arenas per World", &self.arenas),
             ("several threads", &self.threads),
             ("a window", &self.window),
@@ -46,7 +46,7 @@ impl Safety {
     }
 }
 
-/// What is safe, by what the comparisons found.
+/// Judges the uses by the results of the comparisons.
 pub(super) fn assess_safety(comparisons: &[ComparisonReport], observation: &ObservationReport) -> Safety {
     let verdict = |needed: &[Comparison]| verdict(comparisons, needed);
     let mut resume = verdict(&[Comparison::Repeat, Comparison::Restart]);
@@ -65,7 +65,7 @@ pub(super) fn assess_safety(comparisons: &[ComparisonReport], observation: &Obse
     }
 }
 
-/// Safe if all these comparisons found nothing, unsafe if one of them did.
+/// Returns safe if all these comparisons found nothing, unsafe if one of them did.
 fn verdict(reports: &[ComparisonReport], needed: &[Comparison]) -> Verdict {
     let comparisons = needed.to_vec();
     let mut of_needed = reports.iter().filter(|report| needed.contains(&report.comparison));

@@ -1,9 +1,9 @@
-//! What is compared: the game's state, not the engine's housekeeping.
+//! The scope of comparisons: the game's state, without the engine's housekeeping.
 
 use super::report::Comparison;
 
-/// Types that start so are the plugin's own, or are made by the engine for itself: on other threads, for the screen, or
-/// whenever a file happens to be loaded.
+/// Path prefixes of the plugin's own types, and of types that the engine creates for itself: on other threads, for the
+/// screen, or whenever a file happens to be loaded.
 const HOUSEKEEPING: [&str; 31] = [
     "accesskit",
     "bevy_a11y::",
@@ -44,21 +44,21 @@ const HIERARCHY: [&str; 2] = ["bevy_ecs::hierarchy::ChildOf", "bevy_ecs::hierarc
 /// Clocks and keys go on from one episode to the next.
 const GOES_ON: [&str; 4] = ["bevy_time::", "bevy_input::", "leafwing_input_manager::", "bevy_enhanced_input::"];
 
-/// Bevy's clock on the wall. Without a window it is a mock; [`Comparison::Clock`] sees who reads it.
+/// Bevy's real-time clock. Without a window it is a mock; [`Comparison::Clock`] reveals its readers.
 const WALL_CLOCK: &str = "bevy_time::time::Time<bevy_time::real::Real>";
 
-/// Whether a type is the engine's or the plugin's, so that it says little about the cause of a difference.
+/// Returns whether a type is the engine's or the plugin's, so that it says little about the cause of a difference.
 pub(super) fn is_engine(path: &str) -> bool {
     path.starts_with("bevy_") || HOUSEKEEPING.iter().any(|prefix| path.starts_with(prefix))
 }
 
-/// Whether components and resources of this type are compared at all.
+/// Returns whether components and resources of this type are compared at all.
 pub(super) fn is_compared(path: &str) -> bool {
     let is_housekeeping = HOUSEKEEPING.iter().any(|prefix| path.starts_with(prefix)) || path == WALL_CLOCK;
     !is_housekeeping && (!path.starts_with("bevy_ecs::") || HIERARCHY.contains(&path))
 }
 
-/// Whether they are in this comparison.
+/// Returns whether they are part of this comparison.
 pub(super) fn is_compared_in(comparison: Comparison, path: &str) -> bool {
     comparison != Comparison::Restart || !GOES_ON.iter().any(|prefix| path.starts_with(prefix))
 }

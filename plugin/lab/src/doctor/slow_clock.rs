@@ -1,4 +1,4 @@
-//! Another clock on the wall, so that a game that reads it shows.
+//! A slower real-time clock, to reveal games that read it.
 
 use bevy::{
     prelude::*,
@@ -7,7 +7,7 @@ use bevy::{
 
 use bevy_playbot::renewal::Renewal;
 
-/// `Time<Real>` as it was before this frame, and whether it runs slower in this World.
+/// `Time<Real>` before this frame, and whether it runs slower in this World.
 #[derive(Resource, Reflect)]
 #[reflect(Resource)]
 struct WallClock {
@@ -15,13 +15,14 @@ struct WallClock {
     is_slow: bool,
 }
 
-/// Lets `Time<Real>` of a World run slower than its ticks say if `is_slow`, by a little more in some frames than in others.
+/// Makes `Time<Real>` of a World run slower than its ticks say if `is_slow`, by a little more in some frames than in
+/// others.
 ///
-/// A World without a window takes the length of a tick for that of a frame, so that reading the wall clock changes
-/// nothing in it, and everything in a window.
+/// Without a window a frame lasts exactly a tick, so reading the real-time clock changes nothing there. In a window it
+/// changes everything.
 ///
-/// A World whose clock is not slow gets the same resource and systems, so that two Worlds differ in nothing but the clock:
-/// not in the number of their archetypes either.
+/// A World with the normal clock gets the same resource and systems, so that two Worlds differ only in the clock, and
+/// have the same number of archetypes.
 pub(super) fn add_wall_clock(world: &mut World, is_slow: bool) {
     Renewal::set_up(world, move |world| add_one(world, is_slow));
 }
@@ -46,7 +47,7 @@ fn slow(mut real: ResMut<Time<Real>>, clock: Res<WallClock>, mut frame: Local<u3
     let delta = real.delta();
     let mut slower = clock.before;
     slower.advance_by(delta + delta / 8 * (1 + *frame % 3));
-    // What the next frame counts from stays as it was: game time goes on as ever.
+    // The next frame's reference stays unchanged, so game time is unaffected.
     *slower.context_mut() = *real.context();
     *real = slower;
 }
@@ -57,7 +58,7 @@ mod tests {
 
     use super::*;
 
-    /// A World with the usual clock and one with the slow one, after five ticks.
+    /// A World with the normal clock and one with the slow one, after five ticks.
     fn ticked() -> [World; 2] {
         [false, true].map(|is_slow| {
             let mut world = into_world(headless_app());

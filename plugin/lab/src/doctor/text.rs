@@ -10,8 +10,8 @@ use super::{
 
 impl Display for DoctorReport {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { game, version, mode, seed, ticks, .. } = self;
-        writeln!(f, "{game} (version {version}), mode {mode}, level {seed}\n")?;
+        let Self { game, version, mode, level, ticks, .. } = self;
+        writeln!(f, "{game} (version {version}), mode {mode}, level {level}\n")?;
         writeln!(f, "Copies of the game played this level for {ticks} ticks with the same random actions, and were")?;
         writeln!(f, "compared after each tick. When an episode ended, the same level began again.")?;
         for report in &self.comparisons {
@@ -37,21 +37,21 @@ impl Display for DoctorReport {
 
 impl DoctorReport {
     fn write_safety(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { seed, ticks, .. } = self;
+        let Self { level, seed, ticks, .. } = self;
         writeln!(f, "Safe for")?;
         let verdicts = self.safety.all();
         for (what, verdict) in verdicts {
             writeln!(f, "  {what:<26}{}", in_words(verdict))?;
         }
         if verdicts.iter().any(|(_, verdict)| verdict.safe == Some(true)) {
-            let (longer, other) = (ticks.saturating_mul(10), seed.wrapping_add(1));
+            let (longer, level, seed) = (ticks.saturating_mul(10), level.wrapping_add(1), seed.wrapping_add(1));
             writeln!(
                 f,
                 "  \"yes\" means that no difference was found in {ticks} ticks of this one level, not that there"
             )?;
             writeln!(
                 f,
-                "  is none: `--ticks {longer}` plays longer, `--seed {other}` another level with other actions."
+                "  is none: `--ticks {longer}` plays longer, `--level {level}` another level, `--seed {seed}` other actions."
             )?;
         }
         Ok(())
@@ -75,7 +75,7 @@ impl DoctorReport {
             }
         }
         for cause in &finding.causes {
-            writeln!(f, "   usual cause: {}", cause.kind.describe())?;
+            writeln!(f, "   common cause: {}", cause.kind.describe())?;
             for evidence in &cause.evidence {
                 writeln!(f, "     a hint: {evidence}")?;
             }
@@ -88,7 +88,7 @@ impl DoctorReport {
 fn outcome(report: &ComparisonReport) -> String {
     let unmatched = match report.unmatched {
         0 => String::new(),
-        count => format!(" ({count} entities could not be told apart, and were left out)"),
+        count => format!(" ({count} entities could not be matched, and were left out)"),
     };
     match (&report.skipped, report.difference(), &report.fault) {
         (Some(why), ..) => format!("not compared: {why}"),
@@ -101,7 +101,7 @@ fn outcome(report: &ComparisonReport) -> String {
     }
 }
 
-/// Whether it is safe, and what was compared to find out.
+/// Returns whether it is safe, with the comparisons.
 fn in_words(verdict: &Verdict) -> String {
     let Verdict { safe, why, comparisons } = verdict;
     match safe {

@@ -11,17 +11,17 @@ use super::{
 };
 use crate::{game::Game, parallel::on_threads};
 
-/// Differences of one tick that a report names beside the first.
+/// Further differences of a tick that a report names.
 const OTHERS: usize = 5;
 
-/// Copies of a game that are held side by side.
+/// Copies of a game that are compared.
 pub(super) struct Trial {
     comparison: Comparison,
-    /// The copies; the first one is watched.
+    /// The copies. The observations of the first one are monitored.
     pub copies: Vec<GameCopy>,
-    /// Which copies are compared with each other.
+    /// Indices of the copies that are compared with each other.
     pairs: Vec<(usize, usize)>,
-    /// How many of the last copies are ticked on threads of their own.
+    /// Number of the last copies that are ticked on threads of their own.
     on_threads: usize,
 }
 
@@ -124,14 +124,14 @@ impl Trial {
     }
 }
 
-/// What came of a trial.
+/// The result of a trial.
 pub(super) struct TrialResult {
     pub report: ComparisonReport,
     /// Types of fields that could not be compared.
     pub incomparable: std::collections::BTreeSet<String>,
 }
 
-/// The first difference in what the left copy's agent and its double on the right observe, get and come to.
+/// Returns the first difference in the observation, reward or end of the left copy's agent and its double on the right.
 fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<Difference> {
     let number = left.number(0);
     let double = (0..right.agents.len()).find(|&agent| right.number(agent) == number)?;
@@ -142,7 +142,7 @@ fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<Difference> {
     first_of_outcomes(&left.outcome(0), &right.outcome(double), &left.observed_names(), differs)
 }
 
-/// What two outcomes differ in first, as `differs` puts it.
+/// Returns the first difference of two outcomes, made with `differs`.
 fn first_of_outcomes(
     a: &Outcome,
     b: &Outcome,

@@ -1,4 +1,4 @@
-//! What is known of the types of components and resources.
+//! The types of components and resources that are compared.
 
 use std::{
     any::TypeId,
@@ -14,60 +14,60 @@ use serde::Serialize;
 
 use super::{cause::CauseKind, game_copy::GameCopy, scope};
 
-/// Which types of the game could be compared.
+/// The types of the game, by whether they could be compared.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct TypesReport {
     /// Components and resources that were compared field by field.
     pub compared: Vec<String>,
-    /// Components and resources that were not, since they are not reflected: a difference in one of them shows only later,
-    /// in what agents observe, get and end with, and in the state hash.
+    /// Components and resources that were not compared, since they are not reflected. A difference in one of them shows
+    /// only later, in observations, rewards and ends of episodes, and in the state hash.
     pub not_reflected: Vec<String>,
-    /// Further ones whose names are not known, because Bevy is built without its feature `debug`.
+    /// Further types without known names, because Bevy is built without its feature `debug`.
     pub unnamed: usize,
-    /// Types of fields that can be reflected, and not compared.
+    /// Types of fields that are reflected and cannot be compared.
     pub incomparable: Vec<String>,
 }
 
 /// One type of component or resource.
 pub(super) struct KnownType {
-    /// Its path, if anybody knows it.
+    /// Its path, if it is known.
     pub path: Option<String>,
-    /// Reads it, if it is reflected.
+    /// Its reader, if it is reflected.
     pub reflect: Option<ReflectComponent>,
     /// Whether it belongs to the engine or to the plugin.
     pub engine: bool,
-    /// What in it may be the cause of a difference, and why.
+    /// Possible causes of a difference in it, and why.
     pub suspicions: Vec<(CauseKind, String)>,
 }
 
 impl KnownType {
-    /// Whether values of this type are compared.
+    /// Returns whether values of this type are compared.
     pub fn is_compared(&self) -> bool {
         self.reflect.is_some() && self.path.as_deref().is_some_and(scope::is_compared)
     }
 
-    /// The last part of the path.
+    /// Returns the last part of the path.
     pub fn short_name(&self) -> Option<&str> {
         let plain = self.path.as_deref()?.split('<').next()?;
         plain.rsplit("::").next()
     }
 }
 
-/// All types that have been met.
+/// All types so far.
 pub(super) struct KnownTypes {
     known: BTreeMap<TypeId, KnownType>,
-    /// Those of a World without a game.
+    /// Types of a World without a game.
     bare: BTreeSet<TypeId>,
 }
 
 impl KnownTypes {
-    /// Starts with a World without a game, in which only the engine's and the plugin's types are.
+    /// Starts with a World without a game, which has only the engine's and the plugin's types.
     pub fn new(bare: &World) -> Self {
         let engine = bare.components().iter_registered().filter_map(ComponentInfo::type_id);
         Self { known: BTreeMap::new(), bare: engine.collect() }
     }
 
-    /// Looks at types that are new in a World.
+    /// Adds types that are new in a World.
     pub fn learn(&mut self, world: &World) {
         let registry = world.get_resource::<AppTypeRegistry>().map(|registry| registry.read());
         for info in world.components().iter_registered() {
@@ -88,12 +88,12 @@ impl KnownTypes {
         }
     }
 
-    /// What is known of a type.
+    /// Returns a type by its id.
     pub fn get(&self, id: TypeId) -> Option<&KnownType> {
         self.known.get(&id)
     }
 
-    /// Types of the game that a copy of it holds, sorted by whether they can be compared.
+    /// Returns the game's types in a copy, by whether they can be compared.
     pub fn report(&self, copy: &GameCopy, incomparable: &BTreeSet<String>) -> TypesReport {
         let mut report = TypesReport { incomparable: incomparable.iter().cloned().collect(), ..Default::default() };
         for known in copy.present_types().into_iter().filter_map(|id| self.get(id)) {
@@ -109,7 +109,7 @@ impl KnownTypes {
         report
     }
 
-    /// What in the types of a copy may be the cause of a difference.
+    /// Returns the possible causes of a difference in the types of a copy.
     pub fn suspicions(&self, copy: &GameCopy) -> Vec<(CauseKind, String)> {
         let present = copy.present_types();
         let game = present.into_iter().filter_map(|id| self.get(id)).filter(|known| !known.engine);
@@ -120,13 +120,13 @@ impl KnownTypes {
     }
 }
 
-/// The name of a type that is not reflected. Bevy knows it only with its feature `debug`.
+/// Returns the name of a type that is not reflected. Bevy knows it only with its feature `debug`.
 fn named(info: &ComponentInfo) -> Option<String> {
     let name = info.name().to_string();
     (!name.starts_with('<')).then_some(name)
 }
 
-/// Words in the path of a field's type, and what they point to.
+/// Words in the path of a field's type, and the causes that they point to.
 const SIGNS: [(&str, CauseKind); 6] = [
     ("RandomState", CauseKind::HashOrder),
     ("::Instant", CauseKind::WallClock),

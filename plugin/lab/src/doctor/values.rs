@@ -1,4 +1,4 @@
-//! Reflected values: how they look, whether they are equal, and which entities they name.
+//! Reflected values: their text, their equality, and the entities that they name.
 
 use bevy::{
     prelude::Entity,
@@ -8,7 +8,7 @@ use bevy::{
 /// Most characters of a value in a report.
 const LONGEST: usize = 96;
 
-/// A value for people, cut if it is long.
+/// Returns a value as text, cut if it is long.
 pub(super) fn show(value: &dyn PartialReflect) -> String {
     let text = format!("{value:?}");
     if text.chars().count() <= LONGEST {
@@ -17,7 +17,7 @@ pub(super) fn show(value: &dyn PartialReflect) -> String {
     text.chars().take(LONGEST).chain("…".chars()).collect()
 }
 
-/// Whether two values without parts are equal to the bit; `None` if their type cannot say.
+/// Returns whether two values without parts are equal to the bit; `None` if their type cannot say.
 pub(super) fn plain_equal(left: &dyn PartialReflect, right: &dyn PartialReflect) -> Option<bool> {
     if let (Some(left), Some(right)) = (left.try_downcast_ref::<f32>(), right.try_downcast_ref::<f32>()) {
         return Some(left.to_bits() == right.to_bits() || (left.is_nan() && right.is_nan()));
@@ -27,12 +27,12 @@ pub(super) fn plain_equal(left: &dyn PartialReflect, right: &dyn PartialReflect)
     }
     left.reflect_partial_eq(right).or_else(|| Some(left.reflect_hash()? == right.reflect_hash()?)).or_else(|| {
         let (left, right) = (format!("{left:?}"), format!("{right:?}"));
-        // What reflection prints for a type that has no `Debug` says nothing about its value.
+        // Text that reflection prints for a type without `Debug` says nothing about its value.
         (!left.starts_with("Reflect(")).then(|| left == right)
     })
 }
 
-/// Hears of every entity that a value names, however deep.
+/// Calls `hear` for every entity in a value, at any depth.
 pub(super) fn each_entity(value: &dyn PartialReflect, hear: &mut dyn FnMut(Entity)) {
     if let Some(&entity) = value.try_downcast_ref::<Entity>() {
         return hear(entity);

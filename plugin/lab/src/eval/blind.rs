@@ -1,15 +1,15 @@
-//! Bots without eyes, by name.
+//! Bots without sensors, by name.
 
 use bevy_playbot::bot::BlindBot;
 
 use crate::game::Game;
 
-/// Name of the bot that every game has beside its own: [`BlindBot::Chaos`].
+/// Name of the bot that every game has in addition to its own: [`BlindBot::Chaos`].
 pub const CHAOS: &str = "chaos";
 
-/// The blind bots that can play a game: [its own](Game::blind_bots), and [`CHAOS`].
+/// Returns the blind bots that can play a game: [its own](crate::game::BotTools::blind_bots), and [`CHAOS`].
 pub fn blind_bots(game: &dyn Game) -> Vec<(&'static str, BlindBot)> {
-    let mut bots = game.blind_bots();
+    let mut bots = game.tools().bots.blind_bots();
     if bots.iter().all(|(name, _)| *name != CHAOS) {
         bots.push((CHAOS, BlindBot::Chaos));
     }
@@ -26,6 +26,6 @@ mod tests {
         let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {});
         let bots = blind_bots(&game);
         assert_eq!(bots.last(), Some(&(CHAOS, BlindBot::Chaos)));
-        assert_eq!(bots.len(), game.blind_bots().len() + 1);
+        assert_eq!(bots.len(), game.tools().bots.blind_bots().len() + 1);
     }
 }

@@ -1,4 +1,4 @@
-//! What measured episodes come to.
+//! Summaries of evaluated episodes.
 
 use std::collections::BTreeMap;
 
@@ -7,9 +7,9 @@ use serde::Serialize;
 
 use crate::split::LevelSplit;
 
-/// The summary of a measurement: one row of a result table.
+/// The summary of an evaluation: one row of a result table.
 ///
-/// Standard errors tell how far the means lie from those of all levels like these, see [`error_over_levels`].
+/// Standard errors estimate the distance of the means from those of all levels like these, see [`error_over_levels`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EvalSummary {
     /// Name of the player.
@@ -24,7 +24,7 @@ pub struct EvalSummary {
     pub return_mean: f64,
     /// Its standard error, over levels.
     pub return_se: f64,
-    /// Share of episodes that reached the level's aim.
+    /// Share of episodes that reached the level's goal.
     pub success: f64,
     /// Its standard error, over levels.
     pub success_se: f64,
@@ -32,13 +32,13 @@ pub struct EvalSummary {
     pub length_mean: f64,
     /// Share of all ticks whose action was clipped to the game's range.
     pub clipped: f64,
-    /// Mean return on each level, in ascending order of levels; for [`PairedDifference`](crate::report::PairedDifference), and no
-    /// part of a table's JSON.
+    /// Mean return on each level, in ascending order of levels, for comparisons level by level. It is not part of a
+    /// table's JSON.
     #[serde(skip)]
     pub level_returns: Vec<f64>,
 }
 
-/// Sums up the episodes of one player on one split.
+/// Summarises the episodes of one player on one split.
 pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) -> EvalSummary {
     let by_level = |value: fn(&EpisodeResult) -> f64| -> Vec<(u64, f64)> {
         results.iter().map(|result| (result.level, value(result))).collect()
@@ -63,13 +63,12 @@ pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) ->
     }
 }
 
-/// Standard error of the mean of values that come in clusters, the levels: s / √L, with s the sample standard deviation of
-/// the L level means.
+/// Returns the standard error of the mean of values that come in clusters, the levels: s / √L, with s the sample
+/// standard deviation of the L level means.
 ///
-/// Episodes of one level are alike, and those of a player without randomness are the same: repeats of a level say nothing
-/// about other levels, so they must not make the error smaller as if they did. Every level is taken to have equally many
-/// values. With a single level there is no telling how levels differ: the error is then that over its episodes, and 0 of a
-/// single episode.
+/// Episodes of one level are alike, and those of a player without randomness are equal. Repeats of a level say nothing
+/// about other levels, so they must not reduce the error. Every level counts as if it had equally many values. With a
+/// single level the error is that over its episodes, and 0 for a single episode.
 pub fn error_over_levels(values: &[(u64, f64)]) -> f64 {
     match &means_of_levels(values)[..] {
         [_] => standard_error(&values.iter().map(|(_, value)| *value).collect::<Vec<_>>()),
@@ -106,7 +105,7 @@ mod tests {
 
     use super::*;
 
-    /// Levels 0, 1 and 2 with the returns 0, 3 and 6, each as often as said.
+    /// Levels 0, 1 and 2 with the returns 0, 3 and 6, each repeated `times` times.
     fn repeated(times: usize) -> Vec<(u64, f64)> {
         [(0, 0.0), (1, 3.0), (2, 6.0)].into_iter().flat_map(|value| std::iter::repeat_n(value, times)).collect()
     }

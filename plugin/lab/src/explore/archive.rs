@@ -1,4 +1,4 @@
-//! What has been reached, and how.
+//! The archive of reached cells, with the paths to them.
 
 use std::{collections::BTreeMap, iter};
 
@@ -13,21 +13,21 @@ use super::{
     ways::{Route, Way, Ways},
 };
 
-/// A cell that has been reached.
+/// A cell that was reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReachedCell {
     way: Way,
-    /// Whether the episode was over on arrival, on every way there: nobody can go on from it.
+    /// Whether the episode was over on arrival, on every path there, so that no path goes on from it.
     pub is_over: bool,
-    /// Whether every way there only passes it between two ticks: it ends with the tick behind the cell.
+    /// Whether every path there only passes it between two ticks. The path then ends with the tick after the cell.
     pub is_passed: bool,
     /// Visits in which it was seen.
     pub visits: u64,
 }
 
 impl ReachedCell {
-    /// Ticks of the shortest way that was found to it. A way on which the episode goes on comes before a shorter one on
-    /// which it ends, and one that ends in the cell before a shorter one that passes it.
+    /// Returns the ticks of the shortest known path to it. A path on which the episode goes on comes before a shorter
+    /// one on which it ends. One that ends in the cell comes before a shorter one that passes it.
     pub fn ticks(&self) -> u32 {
         self.way.ticks
     }
@@ -37,13 +37,13 @@ impl ReachedCell {
     }
 }
 
-/// Where a visit goes.
+/// The destination of a visit.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Destination {
-    /// The cell; `None` for the start of the level, which has no way.
+    /// The cell; `None` for the start of the level, which needs no path.
     pub cell: Option<Cell>,
     pub way: Way,
-    /// Whether the way only passes the cell: the agent is behind it then.
+    /// Whether the path only passes the cell, with the agent behind it at the end.
     pub is_passed: bool,
 }
 
@@ -52,7 +52,7 @@ impl Destination {
     pub const START: Self = Self { cell: None, way: Way::START, is_passed: false };
 }
 
-/// All cells, with their ways.
+/// All cells, with their paths.
 pub(super) struct Archive {
     start: ReachedCell,
     cells: BTreeMap<Cell, ReachedCell>,
@@ -61,38 +61,39 @@ pub(super) struct Archive {
 }
 
 impl Archive {
-    /// Nothing but the start of a level.
+    /// Creates an archive with the start of a level alone.
     pub fn new(space: ActionSpace) -> Self {
         let start = ReachedCell { way: Way::START, is_over: false, is_passed: false, visits: 0 };
         Self { start, cells: BTreeMap::new(), ways: Ways::new(space), solution: None }
     }
 
-    /// All cells, in their order.
+    /// Returns all cells, in their order.
     pub fn cells(&self) -> &BTreeMap<Cell, ReachedCell> {
         &self.cells
     }
 
-    /// The shortest way on which the level's aim was reached.
+    /// Returns the shortest path on which the level's goal was reached.
     pub fn solution(&self) -> Option<Way> {
         self.solution
     }
 
-    /// A whole way.
+    /// Returns a whole path.
     pub fn route(&self, way: Way) -> Route {
         self.ways.route(way)
     }
 
-    /// The way to a cell.
+    /// Returns the path to a cell.
     pub fn route_to(&self, cell: &Cell) -> Option<Route> {
         self.cells.get(cell).map(|reached| self.route(reached.way))
     }
 
-    /// Whether a cell has not been reached yet, or not so soon.
+    /// Returns whether a cell is new, or reached sooner than before.
     pub fn is_news(&self, cell: &Cell, sight: &Sight) -> bool {
         self.cells.get(cell).is_none_or(|known| sight.is_better_than(&known.sight()))
     }
 
-    /// Draws cells to explore from, with the weights of the paper's version without knowledge of the game: 1/√(visits + 1).
+    /// Draws cells to explore from, with the weights of the paper's version without knowledge of the game:
+    /// 1/√(visits + 1).
     pub fn choose(&self, count: usize, rng: &mut ChaCha8Rng) -> Vec<Destination> {
         let all = iter::once((None, &self.start)).chain(self.cells.iter().map(|(cell, reached)| (Some(cell), reached)));
         let open: Vec<_> = all.filter(|(_, reached)| !reached.is_over).collect();
@@ -110,7 +111,7 @@ impl Archive {
         (0..count).map(|_| draw()).collect()
     }
 
-    /// Takes in what a visit has found.
+    /// Adds the cells of a visit.
     pub fn merge(&mut self, visit: Visited) {
         let Visited { destination, piece, seen, solved, .. } = visit;
         if destination.cell.is_none() {
@@ -150,7 +151,8 @@ mod tests {
         Cell(vec![number])
     }
 
-    /// A visit from a place of the archive, with the actions behind it and what was seen after which tick.
+    /// A visit from a cell of the archive, with the actions after it, and the cells by the tick in which they were
+    /// seen.
     fn visit(archive: &Archive, from: Option<i32>, actions: &[u32], seen: &[(i32, u32, bool)]) -> Visited {
         let from = from.map(cell);
         let way = from.as_ref().map_or(Way::START, |from| archive.cells[from].way);

@@ -1,17 +1,17 @@
-//! What the explorer takes for one and the same state.
+//! The cells of an exploration: groups of states that count as the same.
 
 use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// States that count as the same: a square of a grid, what the game says, or observations that are alike.
+/// A group of states that count as the same: a square of a grid, the game's own cell, or similar observations.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct Cell(pub Vec<i32>);
 
-/// The text names no cell.
+/// The text is not a cell.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("`{0}` is no cell: write its numbers as they are printed, separated by commas, such as 3,4")]
+#[error("`{0}` is not a cell: write its numbers as they are printed, separated by commas, such as 3,4")]
 pub struct NoCell(pub String);
 
 impl fmt::Display for Cell {
@@ -41,7 +41,7 @@ mod tests {
         assert_eq!("3,-4".parse(), Ok(cell));
         for bad in ["", "3,", "a,1", "1.5,2"] {
             let error = bad.parse::<Cell>().expect_err(bad).to_string();
-            assert!(error.contains(&format!("`{bad}` is no cell")) && error.contains("3,4"), "{error}");
+            assert!(error.contains(&format!("`{bad}` is not a cell")) && error.contains("3,4"), "{error}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Whether a level can have a cell that somebody asks for.
+//! The check that a level can have a requested cell.
 
 use bevy::math::Rect;
 
@@ -15,19 +15,20 @@ use super::{
 };
 use crate::game::Game;
 
-/// Cells beyond each side of a level that are not refused: agents can be there, for instance above it.
+/// Cells beyond each side of a level that are accepted: agents can be there, for instance above it.
 const MARGIN: i64 = 8;
 /// Part of a cell by which a level may be longer than its cells, through rounding.
 const SLACK: f32 = 1e-3;
 
-/// Plays one tick of the level, and checks that a cell has as many numbers as its cells have, and does not lie far outside.
+/// Plays one tick of the level, and checks a cell: it must have as many numbers as the level's cells, and must not lie
+/// far outside.
 ///
 /// # Errors
 ///
-/// [`ExploreError::Plan`] with what is valid, or the plan does not fit the game, or the game breaks its contract.
+/// [`ExploreError::Plan`] with the valid values, or the plan does not fit the game, or the game breaks its contract.
 pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &Cell) -> Result<(), ExploreError> {
     plan.check(game)?;
-    let floor_plan = game.floor_plan(&plan.mode, plan.level);
+    let floor_plan = game.tools().levels.floor_plan(&plan.mode, plan.level);
     let grid = CellGrid::new(floor_plan.as_ref(), plan.cell_size);
     let lookout = Lookout::new(grid, plan.cell_size, None, grid.size);
     let one = ExplorePlan { arenas: 1, worlds: 1, threads: 1, ..plan.clone() };
@@ -38,7 +39,7 @@ pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &Cell) -> Result<()
     let Some(seen) = visits.iter().find_map(|(_, visited)| visited.seen.keys().next()) else { return Ok(()) };
     if seen.0.len() != cell.0.len() {
         return Err(ExploreError::Plan(format!(
-            "cell {cell} is named by another count of numbers than those of this level: theirs is {}, such as {seen}",
+            "cell {cell} has the wrong count of numbers: cells of this level have {}, such as {seen}",
             seen.0.len()
         )));
     }

@@ -1,43 +1,55 @@
-//! What can keep a level from being explored.
+//! Errors of explorations.
 
 use bevy_playbot::{
     demo::{file::DemoFileError, replay::Divergence},
     fault::Fault,
     vision::VisionError,
 };
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 use crate::mode::ModeError;
 
-/// A level cannot be explored.
+/// The reason why a level cannot be explored.
 #[derive(Debug, Error)]
 pub enum ExploreError {
-    /// The plan cannot be carried out, in words that say what to do.
+    /// The plan is invalid; the text says what to do.
     #[error("{0}")]
     Plan(String),
     /// The game has no such level.
     #[error(transparent)]
     Mode(#[from] ModeError),
-    /// The pictures that the explorer's policy reads cannot be made.
+    /// The pictures that the explorer's policy reads cannot be drawn.
     #[error(transparent)]
     Vision(#[from] VisionError),
     /// The game broke its contract.
     #[error(transparent)]
     Fault(#[from] Fault),
-    /// The game does not play the same when it is given the same actions.
+    /// The game does not repeat an episode from the same actions.
     #[error(
-        "the way back to a cell does not replay: {divergence}. Explorers return by the same actions, and `{game}` does not \
-         play the same by them: `playbot doctor {game} --mode {mode} --seed {}` names what differs", divergence.level
+        "the path back to a cell does not replay: {divergence}. Explorers return by the same actions, but \
+         `{game}` does not repeat them: `playbot doctor {game} --mode {mode} --level {}` names what differs", divergence.level
     )]
     Diverged {
         /// Name of the game.
         game: &'static str,
         /// The mode.
         mode: String,
-        /// Where the way stops being the known one.
+        /// The first difference from the known path.
         divergence: Divergence,
     },
-    /// A way could not be recorded.
+    /// A path could not be recorded.
     #[error(transparent)]
     Demo(#[from] DemoFileError),
+}
+
+impl HasExitCode for ExploreError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            // The game is at fault, and the message says what to do.
+            Self::Fault(_) | Self::Diverged { .. } => 2,
+            Self::Demo(error) => error.exit_code(),
+            Self::Plan(_) | Self::Mode(_) | Self::Vision(_) => 3,
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! What an exploration has found.
+//! The result of an exploration.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -12,7 +12,7 @@ use super::{
     ways::Route,
 };
 
-/// Why an exploration ended.
+/// The reason why an exploration ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stop {
@@ -20,20 +20,20 @@ pub enum Stop {
     Spent,
     /// A solution was found.
     Solved,
-    /// All cells that are open were reached, and a solution was found if the level has a goal.
+    /// All open cells were reached, and a solution was found if the level has a goal.
     Covered,
-    /// Somebody asked for it.
+    /// The caller stopped it.
     Asked,
 }
 
-/// How the episodes of visits ended that did not just stop.
+/// Counts of the ends of episodes, without visits that just stopped.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct EndCounts {
-    /// Terminated, with the aim reached.
+    /// Terminated at the goal.
     pub won: u64,
-    /// Terminated without.
+    /// Terminated elsewhere.
     pub lost: u64,
-    /// Truncated: time was up.
+    /// Truncated by the time limit.
     pub out_of_time: u64,
 }
 
@@ -48,69 +48,69 @@ impl EndCounts {
     }
 }
 
-/// Cells with the shortest ways that were found to them, and what else is known of a level.
+/// Cells with the shortest known paths to them, and further results on a level.
 pub struct Exploration {
     /// Mode of the game.
     pub mode: String,
     /// Number of the level.
     pub level: u64,
-    /// Seed of what was drawn.
+    /// Random seed.
     pub seed: u64,
-    /// Who explored.
+    /// Name of the explorer.
     pub explorer: &'static str,
-    /// Environment steps, ways back included.
+    /// Environment steps, with the paths back.
     pub steps: u64,
     /// Visits.
     pub visits: u64,
-    /// How their episodes ended.
+    /// Ends of their episodes.
     pub ends: EndCounts,
     /// Steps and cells after each round.
     pub curve: Vec<(u64, u64)>,
-    /// Why it ended.
+    /// The reason why it ended.
     pub stop: Stop,
-    /// The squares that cells are; `None` where they are no places.
+    /// The squares of the cells; `None` if cells are not positions.
     pub grid: Option<CellGrid>,
-    /// Whether the level is known to have a goal: its floor plan shows one.
+    /// Whether the level is known to have a goal, by its floor plan.
     pub has_goal: bool,
-    /// The cells that no wall cuts off from the start, where cells are places and the floor plan says it: see
+    /// The cells that no wall cuts off from the start, if cells are positions and there is a floor plan: see
     /// [`open_cells`](super::open_cells()).
     pub open: Option<BTreeSet<Cell>>,
     pub(super) archive: Archive,
 }
 
 impl Exploration {
-    /// All cells that were reached, in their order.
+    /// Returns all cells that were reached, in their order.
     pub fn cells(&self) -> &BTreeMap<Cell, ReachedCell> {
         self.archive.cells()
     }
 
-    /// The shortest way that was found to a cell, with the state hash after each tick; its last one is that on arrival,
-    /// or that behind a cell that is only passed.
+    /// Returns the shortest known path to a cell, with the state hash after each tick. The last hash is that on
+    /// arrival, or that after a cell that is only passed.
     pub fn route_to(&self, cell: &Cell) -> Option<Route> {
         self.archive.route_to(cell)
     }
 
-    /// The shortest way that was found on which the level's aim was reached.
+    /// Returns the shortest known path to the level's goal.
     pub fn solution(&self) -> Option<Route> {
         self.archive.solution().map(|way| self.archive.route(way))
     }
 
-    /// Ticks of the [`solution`](Self::solution).
+    /// Returns the ticks of the [`solution`](Self::solution).
     pub fn solution_ticks(&self) -> Option<u32> {
         self.archive.solution().map(|way| way.ticks)
     }
 
-    /// The cells that are open and were not reached.
+    /// Returns the open cells that were not reached.
     pub fn missed(&self) -> impl Iterator<Item = &Cell> {
         self.open.iter().flatten().filter(move |cell| !self.cells().contains_key(cell))
     }
 
-    /// How many of the open cells were reached; `None` if nobody knows how many there are.
+    /// Returns how many of the open cells were reached; `None` if the open cells are unknown.
     pub fn open_reached(&self) -> Option<usize> {
         Some(self.open.as_ref()?.len() - self.missed().count())
     }
 
-    /// The share of the open cells that were reached; `None` if nobody knows how many there are.
+    /// Returns the share of the open cells that were reached; `None` if the open cells are unknown.
     pub fn coverage(&self) -> Option<f64> {
         let open = self.open.as_ref().map(BTreeSet::len)?;
         Some(self.open_reached()? as f64 / open.max(1) as f64)

@@ -1,4 +1,4 @@
-//! Who acts where nothing is known yet.
+//! Explorers: players that act where nothing is known yet.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -7,7 +7,7 @@ use bevy_playbot::{
 };
 use playbot_learner::Policy;
 
-/// Who explores from a cell.
+/// The player that explores from a cell.
 #[derive(Clone, Default)]
 #[allow(clippy::large_enum_variant, reason = "one per exploration")]
 pub enum Explorer {
@@ -18,7 +18,7 @@ pub enum Explorer {
     Policy {
         /// The policy.
         policy: Policy,
-        /// Where its skills come from.
+        /// The source of its skills.
         prior: Option<SkillPrior>,
         /// How actions are drawn.
         draw: ActionDraw,
@@ -26,12 +26,12 @@ pub enum Explorer {
 }
 
 impl Explorer {
-    /// Skills drawn from a prior, which a decoder acts out.
+    /// Creates an explorer with skills drawn from a prior, and played by a decoder.
     pub fn skills(prior: SkillPrior, decoder: Policy) -> Self {
         Self::Policy { policy: decoder, prior: Some(prior), draw: ActionDraw::Sample }
     }
 
-    /// What it does, in words.
+    /// Returns its kind in words.
     pub fn describe(&self) -> &'static str {
         match self {
             Self::Random => "random actions",
@@ -40,12 +40,12 @@ impl Explorer {
         }
     }
 
-    /// Whether a policy decides.
+    /// Returns whether a policy decides.
     pub(super) fn is_policy(&self) -> bool {
         matches!(self, Self::Policy { .. })
     }
 
-    /// Gives a World what the explorer needs once.
+    /// Installs the explorer's networks in a World, once.
     pub(super) fn install(&self, world: &mut World) {
         if let Self::Policy { policy, prior, draw } = self {
             ActivePolicy { policy: policy.clone(), draw: *draw }.install(world, prior.clone());

@@ -1,16 +1,16 @@
-//! Squares over the places of a level.
+//! Grids of square cells over a level.
 
 use bevy::math::{Rect, Vec2};
 
 use super::cell::Cell;
 use crate::floor_plan::FloorPlan;
 
-/// Squares along the longer side of a plan that has no walls to take their size from.
+/// Squares along the longer side of a plan without walls that would give their size.
 const SQUARES: f32 = 16.0;
 /// Sizes are multiples of its inverse, so that rounding in the corners of a plan's walls does not shift the grid.
 const FINENESS: f32 = 1024.0;
 
-/// A grid of square cells: their numbers are those of column and row, from the origin on.
+/// A grid of square cells. The numbers of a cell are its column and row, from the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CellGrid {
     /// Corner of cell 0,0 with the least x and y.
@@ -20,8 +20,8 @@ pub struct CellGrid {
 }
 
 impl CellGrid {
-    /// The grid over a level: its cells are the tiles of the floor plan, unless another size is wanted. Without a plan they
-    /// are of side 1 and count from the origin.
+    /// Creates the grid of a level: its cells are the tiles of the floor plan, unless `size` is given. Without a plan
+    /// they have side 1 and start at the origin.
     pub fn new(plan: Option<&FloorPlan>, size: Option<f32>) -> Self {
         let usual = plan.map_or(1.0, |plan| {
             let even = || plan.bounds.size().max_element() / SQUARES;
@@ -31,13 +31,13 @@ impl CellGrid {
         Self { origin: plan.map_or(Vec2::ZERO, |plan| plan.bounds.min), size: size.unwrap_or(usual) }
     }
 
-    /// The cell around a place; `None` for a place that is not finite.
+    /// Returns the cell at a position; `None` for a position that is not finite.
     pub fn cell_at(&self, place: Vec2) -> Option<Cell> {
         let at = ((place - self.origin) / self.size).floor();
         place.is_finite().then(|| Cell(vec![at.x as i32, at.y as i32]))
     }
 
-    /// What a cell covers; `None` for a cell of another kind.
+    /// Returns the area of a cell; `None` for a cell of another kind.
     pub fn area(&self, cell: &Cell) -> Option<Rect> {
         let &[column, row] = cell.0.as_slice() else { return None };
         let corner = self.origin + Vec2::new(column as f32, row as f32) * self.size;
@@ -45,7 +45,7 @@ impl CellGrid {
     }
 }
 
-/// The side of a plan's tiles, by the narrowest of its walls.
+/// Returns the side of a plan's tiles: that of the narrowest wall.
 pub(super) fn tile_size(plan: &FloorPlan) -> Option<f32> {
     let narrow = plan.walls.iter().map(|wall| wall.size().min_element());
     let side = narrow.filter(|side| side.is_finite() && *side > 0.0).min_by(f32::total_cmp)?;

@@ -1,16 +1,17 @@
-//! One visit that is to be made.
+//! The task of one visit.
 
 use super::{archive::Destination, ways::Route};
 
-/// A way back to a cell, and how long to explore there.
+/// A path back to a cell, and the ticks to explore there.
 pub(super) struct Job {
-    /// Number of the visit in the whole exploration: its random numbers come from it, so that it does not matter who makes it.
+    /// Number of the visit in the whole exploration. Its random numbers are derived from it, so that any World may make
+    /// it.
     pub number: u64,
     pub destination: Destination,
-    /// The way there.
+    /// The path back.
     pub route: Route,
-    /// Ticks to explore without finding anything new.
+    /// Ticks to explore without a find.
     pub patience: u32,
-    /// Ticks to explore at most.
+    /// Most ticks to explore.
     pub most: u32,
 }

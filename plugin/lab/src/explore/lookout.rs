@@ -1,4 +1,4 @@
-//! In which cell an agent is.
+//! The cell of an agent after each tick.
 
 use std::collections::BTreeSet;
 
@@ -12,56 +12,56 @@ use super::{
 };
 use crate::game::Game;
 
-/// Steps to which observed values are rounded where nobody says it.
+/// Default step to which observed values are rounded.
 const FINENESS: f32 = 0.125;
 
-/// What cells are made of.
+/// The kind of cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum CellKind {
-    /// What the game says.
+    /// The game's own cells.
     Own,
-    /// Places on a grid.
+    /// Positions on a grid.
     Places,
-    /// Observed values, downscaled.
+    /// Rounded observations.
     Values,
 }
 
-/// Tells cells apart.
+/// Computes the cells of agents.
 #[derive(Clone, Copy)]
 pub(super) struct Lookout<'a> {
     grid: CellGrid,
     /// The cells that can be passed.
     open: Option<&'a BTreeSet<Cell>>,
-    /// How far an agent goes in a tick at most.
+    /// The farthest that an agent moves in a tick.
     reach: f32,
     fineness: f32,
     kind: Option<CellKind>,
 }
 
-/// A cell, and after how many ticks of the episode the agent was in it.
+/// A cell, and the tick of the episode in which the agent was there.
 pub(super) struct Spotted {
     pub ticks: u32,
     pub cell: Cell,
-    /// Where that is, where cells are places.
+    /// Position of the agent, if cells are positions.
     pub place: Option<Vec2>,
-    /// The open cells that it has passed on its way there from the place where it was a tick before.
+    /// The open cells that it passed since the position of the tick before.
     pub passed: Vec<Cell>,
 }
 
 impl<'a> Lookout<'a> {
-    /// For cells of this grid, unless the game says which cells there are, or does not say where agents are. Of the cells
-    /// that are passed between two ticks those that are open count, if they are known; tiles are as long as `tile`.
+    /// Creates it for cells of this grid, unless the game has its own cells, or reports no positions. Of the cells that
+    /// are passed between two ticks only open ones count, if they are known. `tile` is the side of a tile.
     pub fn new(grid: CellGrid, cell_size: Option<f32>, open: Option<&'a BTreeSet<Cell>>, tile: f32) -> Self {
         Self { grid, open, reach: reach(tile), fineness: cell_size.unwrap_or(FINENESS), kind: None }
     }
 
-    /// Whether cells are squares of the grid; false as long as nobody has been seen.
+    /// Returns whether cells are squares of the grid; false before the first agent was seen.
     pub fn has_places(&self) -> bool {
         self.kind == Some(CellKind::Places)
     }
 
-    /// The cell of an agent that has played so many ticks, and was in a place a tick before, if that is known. An observation
-    /// is older by a tick: it is made before the action.
+    /// Returns the cell of an agent after this many ticks, with its position a tick before, if that is known. An
+    /// observation is older by a tick, since it is made before the action.
     pub fn spot(
         &mut self,
         game: &dyn Game,
@@ -72,9 +72,9 @@ impl<'a> Lookout<'a> {
     ) -> Option<Spotted> {
         let alone = |ticks, cell| Spotted { ticks, cell, place: None, passed: Vec::new() };
         match *self.kind.get_or_insert_with(|| kind_of(game, world, agent)) {
-            CellKind::Own => game.explore_cell(world, agent).map(|cell| alone(ticks, Cell(cell))),
+            CellKind::Own => game.tools().state.explore_cell(world, agent).map(|cell| alone(ticks, Cell(cell))),
             CellKind::Places => {
-                let place = game.whereabouts(world, agent)?;
+                let place = game.tools().state.position(world, agent)?;
                 let cell = self.grid.cell_at(place)?;
                 let passed = before.map_or_else(Vec::new, |before| self.passed(before, place));
                 Some(Spotted { ticks, cell, place: Some(place), passed })
@@ -87,7 +87,7 @@ impl<'a> Lookout<'a> {
         }
     }
 
-    /// The open cells between two places.
+    /// Returns the open cells between two positions.
     fn passed(&self, from: Vec2, to: Vec2) -> Vec<Cell> {
         let Some(open) = self.open else { return Vec::new() };
         let between = cells_between(self.grid, from, to, self.reach).map(|cell| Cell(cell.to_vec()));
@@ -96,9 +96,9 @@ impl<'a> Lookout<'a> {
 }
 
 fn kind_of(game: &dyn Game, world: &World, agent: Entity) -> CellKind {
-    if game.explore_cell(world, agent).is_some() {
+    if game.tools().state.explore_cell(world, agent).is_some() {
         CellKind::Own
-    } else if game.whereabouts(world, agent).is_some() {
+    } else if game.tools().state.position(world, agent).is_some() {
         CellKind::Places
     } else {
         CellKind::Values

@@ -1,14 +1,14 @@
-//! Exploring a level without training and without knowledge of the game: Go-Explore (Ecoffet et al. 2021, "First return, then
-//! explore") over exact replay.
+//! Exploring a level without training and without knowledge of the game: Go-Explore (Ecoffet et al. 2021, "First
+//! return, then explore") over exact replay.
 //!
-//! What has been reached is kept as an archive of [`Cell`]s, each with the shortest way that was found to it. Again and
-//! again a cell that was seldom seen is chosen, an agent goes back to it by the same actions, and explores from there. A game
-//! is not asked to store its state: since it is deterministic, the level and the actions bring it back, as they do for
-//! checkpoints. A game for which that does not hold is told so at the first tick that differs.
+//! An archive holds the reached [`Cell`]s, each with the shortest known path to it. Each visit draws a rarely seen
+//! cell, returns to it by the same actions, and explores from there. A game need not store its state: it must be
+//! deterministic, so the level and the actions restore it. A game that is not deterministic causes an error at the
+//! first tick that differs.
 //!
-//! Agents that see places ([`Game::whereabouts`](crate::game::Game::whereabouts)) have a grid of cells over the level;
-//! others have what the game says ([`Game::explore_cell`](crate::game::Game::explore_cell)), or else their observations,
-//! downscaled.
+//! Games with positions ([`StateTools::position`](crate::game::StateTools::position)) have a grid of cells over the
+//! level. Others have cells of their own ([`StateTools::explore_cell`](crate::game::StateTools::explore_cell)), or else
+//! cells of rounded observations.
 //!
 //! ```no_run
 //! use std::ops::ControlFlow;

@@ -1,4 +1,4 @@
-//! Which cells there are to reach, as far as the floor plan says it.
+//! The reachable cells of a level, by its floor plan.
 
 use std::collections::{BTreeSet, VecDeque};
 
@@ -10,14 +10,14 @@ use super::{
 };
 use crate::floor_plan::FloorPlan;
 
-/// Most squares that are looked at.
+/// Most squares that are examined.
 const MOST: f32 = (1 << 20) as f32;
 
-/// The cells of a grid that no wall cuts off from the start of a level.
+/// Returns the cells of a grid that no wall cuts off from the start of a level; `None` if the plan is too large for
+/// such squares, or its start lies in a wall.
 ///
-/// In a maze these are exactly the cells that can be reached. Where gravity or enemies have a say they are a bound: nobody
-/// reaches others, and some of these may be out of reach. `None` if the plan is too large for such squares, or its start
-/// lies in a wall.
+/// In a maze these are exactly the reachable cells. With gravity or enemies they are a bound: no other cell is
+/// reachable, and some of these may be out of reach.
 pub fn open_cells(plan: &FloorPlan, grid: &CellGrid) -> Option<BTreeSet<Cell>> {
     let squares = Squares::new(plan, grid)?;
     let start = squares.index_at(plan.start).filter(|index| !squares.is_wall[*index])?;
@@ -62,7 +62,7 @@ impl Squares {
         let (columns, rows) = (count.x as usize, count.y as usize);
         let mut squares = Self { origin: plan.bounds.min, side, columns, rows, is_wall: vec![false; columns * rows] };
         for wall in &plan.walls {
-            // Those whose middle lies in the wall.
+            // Those with their middle in the wall.
             let first = ((wall.min - squares.origin) / side - 0.5).ceil().max(Vec2::ZERO);
             let last = ((wall.max - squares.origin) / side - 0.5).floor();
             if last.min_element() < 0.0 {
@@ -95,7 +95,7 @@ mod tests {
 
     use super::*;
 
-    /// A room of five cells, and one that nobody can enter.
+    /// A room of five cells, and a closed one.
     const ROWS: [&str; 5] = ["#######", "#..#..#", "#.##..#", "#..####", "#######"];
 
     fn plan() -> FloorPlan {

@@ -4,21 +4,22 @@ use bevy::math::Vec2;
 
 use super::grid::CellGrid;
 
-/// Tiles that an agent goes in a tick at most: one that is farther away has been put there, and has passed nothing.
+/// Most tiles that an agent moves in a tick. An agent that is farther away was teleported, and has passed nothing.
 const FARTHEST: f32 = 4.0;
 
-/// How far an agent goes in a tick at most, where tiles are this long.
+/// Returns the farthest that an agent moves in a tick, for tiles of this side.
 pub(crate) fn reach(tile: f32) -> f32 {
     FARTHEST * tile
 }
 
-/// The cells between those of two places, along a straight line, without the first and the last; none if the places are
-/// farther from each other than `reach`. A line through a corner goes from cell to cell there, and touches no third one.
+/// Returns the cells between those of two positions, along a straight line, without the first and the last. The
+/// list is empty if the positions are farther apart than `reach`. A line through a corner goes diagonally from cell to
+/// cell, and touches no third one.
 pub(crate) fn cells_between(grid: CellGrid, from: Vec2, to: Vec2, reach: f32) -> CellsBetween {
     let [from, to] = [from, to].map(|place| ((place - grid.origin) / grid.size).to_array());
     let at = from.map(|value| value.floor() as i32);
     let is_near = Vec2::from_array(from).distance(Vec2::from_array(to)) * grid.size <= reach;
-    // What is no number is not near either.
+    // NaN is not near either.
     let end = if is_near { to.map(|value| value.floor() as i32) } else { at };
     let crossing = [0_usize, 1].map(|axis| {
         let border = if to[axis] > from[axis] { from[axis].floor() + 1.0 } else { from[axis].floor() };
@@ -39,7 +40,7 @@ pub(crate) struct CellsBetween {
 }
 
 impl CellsBetween {
-    /// Where the next column or row begins; never for one that is the last.
+    /// Returns where the next column or row begins; infinity for the last one.
     fn next_border(&self, axis: usize) -> f32 {
         if self.at[axis] == self.end[axis] { f32::INFINITY } else { self.crossing[axis] }
     }
@@ -75,7 +76,7 @@ mod tests {
     const GRID: CellGrid = CellGrid { origin: Vec2::new(-1.0, 0.0), size: 0.5 };
 
     fn between(from: [f32; 2], to: [f32; 2]) -> Vec<[i32; 2]> {
-        // In cells, from the corner of the grid on.
+        // In cells, from the corner of the grid.
         let [from, to] = [from, to].map(|place| GRID.origin + Vec2::from_array(place) * GRID.size);
         cells_between(GRID, from, to, reach(0.5)).collect()
     }

@@ -1,49 +1,49 @@
-//! What is explored, how, and for how long.
+//! The plan of an exploration.
 
 use bevy_playbot::{fault::Fault, vision::ObservationConfig};
 
 use super::{error::ExploreError, explorer::Explorer, until::Until};
 use crate::{game::Game, parallel::default_threads, split::LevelSplit};
 
-/// How a level is explored. All but the threads is part of the result.
+/// The plan of an exploration of a level. All fields but the threads affect the result.
 #[derive(Clone)]
 pub struct ExplorePlan {
     /// Mode of the game.
     pub mode: String,
     /// Number of the level.
     pub level: u64,
-    /// Environment steps to use, ways back included. A visit that finds something new may go on a little longer.
+    /// Environment steps to use, with the paths back. A visit that finds something new may go on a little longer.
     pub steps: u64,
-    /// What ends the exploration before.
+    /// The condition that ends the exploration sooner.
     pub until: Until,
-    /// Who explores.
+    /// The explorer.
     pub explorer: Explorer,
-    /// What the explorer's policy sees. Random actions need no more than vectors, which are cheaper.
+    /// The observation of the explorer's policy. Random actions need only vectors, which are cheaper.
     pub observation_config: ObservationConfig,
-    /// Ticks that a visit explores without finding anything new before it ends. Each find gives it as many again, up to ten
-    /// times as many in all.
+    /// Ticks that a visit explores without a find before it ends. Each find gives it as many again, up to ten times as
+    /// many in all.
     pub explore_ticks: u32,
     /// Probability with which a random action is repeated in the next tick.
     pub sticky: f64,
-    /// Side of a cell: of the grid over places, in their units, by default the tiles of the floor plan; or of the steps
-    /// to which observed values are rounded, by default 1/8. Games that name their cells themselves do not ask.
+    /// Side of a cell. For a grid it is in the units of positions, by default the tiles of the floor plan. For
+    /// observations it is the step of rounding, by default 1/8. Games with cells of their own ignore it.
     pub cell_size: Option<f32>,
     /// Visits between two updates of the archive.
     pub batch: u32,
-    /// Seed of all that is drawn.
+    /// Random seed.
     pub seed: u64,
     /// Arenas that are played side by side, spread evenly over the Worlds.
     pub arenas: u32,
     /// Worlds.
     pub worlds: u32,
-    /// Threads: not part of the result.
+    /// Threads. They change no result.
     pub threads: usize,
-    /// Whether the actions before a panic of the game are kept in a file.
+    /// Whether the actions before a panic of the game are written to a file.
     pub keeps_panics: bool,
 }
 
 impl ExplorePlan {
-    /// The usual plan for a level: random actions that last for 20 ticks on average, and 500,000 steps.
+    /// Creates the default plan for a level: random actions that last for 20 ticks on average, and 500,000 steps.
     pub fn new(mode: impl Into<String>, level: u64) -> Self {
         Self {
             mode: mode.into(),
@@ -64,11 +64,11 @@ impl ExplorePlan {
         }
     }
 
-    /// Checks that a game can be explored so.
+    /// Checks that a game can be explored with this plan.
     ///
     /// # Errors
     ///
-    /// The game cannot be played, has no such level, or a number makes no sense.
+    /// The game cannot be played, has no such level, or a number is out of range.
     pub fn check(&self, game: &dyn Game) -> Result<(), ExploreError> {
         if let Some(problem) = game.problem() {
             return Err(Fault(problem).into());
@@ -76,17 +76,17 @@ impl ExplorePlan {
         LevelSplit { mode: self.mode.clone(), first: self.level, last: self.level }.check(game)?;
         let wrong = |why: String| Err(ExploreError::Plan(why));
         if self.steps == 0 || self.explore_ticks == 0 || self.batch == 0 {
-            return wrong("an exploration has at least one step, a visit one tick, and a round one visit".to_owned());
+            return wrong("an exploration needs at least one step, a visit one tick, and a round one visit".to_owned());
         }
         if !(0.0..=1.0).contains(&self.sticky) {
             return wrong(format!(
-                "the probability with which an action is repeated is {}: it lies between 0 and 1",
+                "the probability with which an action is repeated is {}: write a number from 0 to 1",
                 self.sticky
             ));
         }
         match self.cell_size {
             Some(size) if !(size.is_finite() && size > 0.0) => {
-                wrong(format!("the size of a cell is {size}: it is a number above 0, in the units of the level"))
+                wrong(format!("the size of a cell is {size}: write a number above 0, in the units of the level"))
             }
             _ => Ok(()),
         }

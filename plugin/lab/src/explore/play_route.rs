@@ -1,4 +1,4 @@
-//! Playing a way that was found once more, alone: for recordings and for pictures.
+//! The replay of a path, alone: for recordings and for pictures.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -19,8 +19,9 @@ use playbot_learner::Actions;
 use super::error::ExploreError;
 use crate::{game::Game, worlds::build_world};
 
-/// Plays actions on a level under the recorder. An episode that goes on behind them is recorded as aborted. Whoever replays
-/// the recording, for instance with [`verify_file`](crate::demo::verify::verify_file), sees whether it is the same way.
+/// Plays actions on a level under the recorder. An episode that goes on after them is recorded as aborted. A replay of
+/// the recording, for instance with [`verify_file`](crate::demo::verify::verify_file), checks that the path is the
+/// same.
 ///
 /// # Errors
 ///
@@ -40,7 +41,8 @@ pub fn record_route(
     Ok(())
 }
 
-/// Where an agent is after each tick of these actions, on the game's floor plan; nowhere if the game does not say.
+/// Returns the position of an agent after each tick of these actions, on the game's floor plan. Empty if the game does
+/// not report positions.
 ///
 /// # Errors
 ///
@@ -48,11 +50,11 @@ pub fn record_route(
 pub fn follow_route(game: &dyn Game, mode: &str, level: u64, actions: &Actions) -> Result<Vec<Vec2>, Fault> {
     let (mut world, agent) = world_of(game, mode, level);
     let mut places = Vec::new();
-    play(&mut world, agent, actions, |world| places.extend(game.whereabouts(world, agent)))?;
+    play(&mut world, agent, actions, |world| places.extend(game.tools().state.position(world, agent)))?;
     Ok(places)
 }
 
-/// A World with an agent that plays the level once.
+/// Builds a World with an agent that plays the level once.
 fn world_of(game: &dyn Game, mode: &str, level: u64) -> (World, Entity) {
     let (mut world, agents) = build_world(game, mode, 0, 0, 1);
     let agent = agents[0];
@@ -68,7 +70,7 @@ fn play(world: &mut World, agent: Entity, actions: &Actions, mut after_tick: imp
         tick_world(world)?;
         let is_over = world.get::<EpisodeCount>(agent).is_some_and(|count| count.finished > 0);
         let played = world.get::<Episode>(agent).map_or(0, |episode| episode.tick as usize);
-        // Levels that are still being made ready have no tick.
+        // Levels that are still loading have no tick.
         if is_over || played != ticks {
             after_tick(world);
         }

@@ -20,30 +20,30 @@ use super::{
 };
 use crate::{arrangement::Arrangement, game::Game, parallel::on_threads};
 
-/// How many times its patience a visit may last that goes on finding something.
+/// Longest visit, as a multiple of its patience, if it goes on finding cells.
 const LONGEST: u32 = 10;
 
-/// Where an exploration stands after a round of visits.
+/// The state of an exploration after a round of visits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Round {
     /// Environment steps so far.
     pub steps: u64,
-    /// Cells that have been reached.
+    /// Cells that were reached.
     pub cells: usize,
     /// Ticks of the shortest solution so far.
     pub solution: Option<u32>,
 }
 
-/// What a World is to do in a round.
+/// The tasks of a World in a round.
 struct Crew<'a> {
     world: ExploreWorld<'a>,
     jobs: Vec<Job>,
 }
 
-/// Explores a level. `progress` hears the ticks of each visit, from several threads; `after_round` may end the exploration,
-/// which is then what it was by the end of that round.
+/// Explores a level. `progress` receives the ticks of each visit, from several threads. `after_round` may end the
+/// exploration, whose result is then that of the last finished round.
 ///
-/// The same plan finds the same, whatever the number of threads, of arenas and of Worlds.
+/// The same plan has the same result for any number of threads, arenas and Worlds.
 ///
 /// # Errors
 ///
@@ -55,7 +55,7 @@ pub fn explore(
     mut after_round: impl FnMut(Round) -> ControlFlow<()>,
 ) -> Result<Exploration, ExploreError> {
     plan.check(game)?;
-    let floor_plan = game.floor_plan(&plan.mode, plan.level);
+    let floor_plan = game.tools().levels.floor_plan(&plan.mode, plan.level);
     let grid = CellGrid::new(floor_plan.as_ref(), plan.cell_size);
     let open = floor_plan.as_ref().and_then(|floor_plan| open_cells(floor_plan, &grid));
     let tile = CellGrid::new(floor_plan.as_ref(), None).size;
@@ -87,7 +87,7 @@ pub fn explore(
         }
     };
     let grid = has_places(&crews).then_some(grid);
-    // They look at the open cells, which are part of what was found.
+    // They borrow the open cells, which are part of the result.
     drop(crews);
     Ok(Exploration {
         mode: plan.mode.clone(),
@@ -106,12 +106,13 @@ pub fn explore(
     })
 }
 
-/// Whether cells are squares of the grid: all Worlds see the same.
+/// Returns whether cells are squares of the grid, which is equal for all Worlds.
 fn has_places(crews: &[Crew<'_>]) -> bool {
     crews.iter().any(|crew| crew.world.has_places())
 }
 
-/// Worlds of agents. Games that are built anew for each episode have one in each, since others would have to wait for it.
+/// Builds the Worlds of agents. Games that are rebuilt for each episode have one agent in each, since others would have
+/// to wait for it.
 fn build_crews<'a>(
     game: &'a dyn Game,
     plan: &'a ExplorePlan,
@@ -127,7 +128,7 @@ fn build_crews<'a>(
     Ok(crews)
 }
 
-/// The visits of a round, as far as the budget allows them.
+/// Draws the visits of a round, within the budget.
 fn choose_jobs(plan: &ExplorePlan, archive: &Archive, chance: &mut ChaCha8Rng, steps: u64, visits: u64) -> Vec<Job> {
     let mut left = plan.steps.saturating_sub(steps);
     let mut jobs: Vec<Job> = Vec::new();
@@ -149,7 +150,7 @@ fn choose_jobs(plan: &ExplorePlan, archive: &Archive, chance: &mut ChaCha8Rng, s
     jobs
 }
 
-/// Makes all visits of a round, and returns what they brought in their order.
+/// Makes all visits of a round, and returns their results in order.
 fn play_round(
     crews: &mut [Crew<'_>],
     jobs: Vec<Job>,
@@ -173,7 +174,7 @@ fn play_round(
     Ok(all.into_iter().map(|(_, visited)| visited).collect())
 }
 
-/// Whether there is nothing more to look for.
+/// Returns the reason to stop, if there is one.
 fn stop_of(until: Until, archive: &Archive, open: Option<&BTreeSet<Cell>>, has_goal: bool) -> Option<Stop> {
     let is_solved = archive.solution().is_some();
     let is_covered = || open.is_some_and(|open| open.iter().all(|cell| archive.cells().contains_key(cell)));

@@ -1,4 +1,4 @@
-//! An exploration in a few numbers.
+//! The summary of an exploration.
 
 use std::{collections::BTreeSet, fmt};
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::exploration::{EndCounts, Exploration, Stop};
 use crate::game::Game;
 
-/// What an exploration came to, for people and as JSON.
+/// The summary of an exploration, for people and as JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExplorationSummary {
     /// Name of the game.
@@ -16,38 +16,38 @@ pub struct ExplorationSummary {
     pub mode: String,
     /// Number of the level.
     pub level: u64,
-    /// Who explored.
+    /// Name of the explorer.
     pub explorer: &'static str,
-    /// Seed of what was drawn.
+    /// Random seed.
     pub seed: u64,
-    /// Environment steps, ways back included.
+    /// Environment steps, with the paths back.
     pub steps: u64,
     /// Visits.
     pub visits: u64,
-    /// Why it ended.
+    /// The reason why it ended.
     pub stop: Stop,
     /// Cells that were reached, open or not.
     pub cells: usize,
-    /// Cells that no wall cuts off from the start, if the floor plan says it.
+    /// Cells that no wall cuts off from the start, if there is a floor plan.
     pub open_cells: Option<usize>,
-    /// How many of these were reached.
+    /// Number of these that were reached.
     pub open_cells_reached: Option<usize>,
     /// The share of these that were reached.
     pub coverage: Option<f64>,
-    /// Cells that were reached and are none of these, such as those above the level.
+    /// Cells that were reached and are not among these, such as those above the level.
     pub other_cells: Option<usize>,
     /// Whether the level is known to have a goal.
     pub has_goal: bool,
     /// Ticks of the shortest solution.
     pub solution_ticks: Option<u32>,
-    /// How episodes ended.
+    /// Ends of episodes.
     pub ends: EndCounts,
     /// Steps and cells after each round.
     pub curve: Vec<(u64, u64)>,
 }
 
 impl Exploration {
-    /// It in a few numbers.
+    /// Returns the summary.
     pub fn summary(&self, game: &dyn Game) -> ExplorationSummary {
         ExplorationSummary {
             game: game.name(),
@@ -92,7 +92,7 @@ impl fmt::Display for ExplorationSummary {
             (None, false) => writeln!(f, "solution  none was found, and no goal is known")?,
         }
         if *ends == EndCounts::default() {
-            return write!(f, "episodes  none came to its end");
+            return write!(f, "episodes  none has ended");
         }
         write!(f, "episodes  {} won, {} lost, {} out of time", ends.won, ends.lost, ends.out_of_time)
     }
@@ -148,6 +148,6 @@ mod tests {
         assert!(won.contains("solution  12 ticks\n") && won.contains("3 won, 0 lost"), "{won}");
         let endless = solved(EndCounts::default());
         assert!(endless.contains("solution  12 ticks; episodes go on after it\n"), "{endless}");
-        assert!(endless.ends_with("episodes  none came to its end"), "{endless}");
+        assert!(endless.ends_with("episodes  none has ended"), "{endless}");
     }
 }

@@ -1,18 +1,18 @@
-//! When an exploration is over.
+//! The conditions that end an exploration.
 
 use std::{fmt, str::FromStr};
 
 use bevy_playbot::unknown_name::UnknownName;
 
-/// What ends an exploration before its budget does.
+/// The condition that ends an exploration before its budget does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Until {
     /// A solution.
     Solved,
-    /// A solution, if the level has a goal, and all of the cells that are open, if their number is known.
+    /// A solution, if the level has a goal, and all open cells, if they are known.
     #[default]
     Covered,
-    /// Nothing: shorter ways are looked for until the budget is used up.
+    /// No condition: shorter paths are searched for until the budget is used up.
     Spent,
 }
 

@@ -1,4 +1,4 @@
-//! An agent on its way back to a cell, and beyond.
+//! The visit of an agent: its path back to a cell, and the exploration from there.
 
 use std::collections::BTreeMap;
 
@@ -27,10 +27,10 @@ use super::{
     ways::Route,
 };
 
-/// When a cell was seen.
+/// The moment at which a cell was seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Sight {
-    /// Ticks of the episode up to then.
+    /// Ticks of the episode until then.
     pub ticks: u32,
     /// Whether the episode was over.
     pub is_over: bool,
@@ -39,29 +39,29 @@ pub(super) struct Sight {
 }
 
 impl Sight {
-    /// Whether it says more of the way to a cell than another one.
+    /// Returns whether it is a better path to a cell than another one.
     pub fn is_better_than(&self, other: &Self) -> bool {
         let rank = |sight: &Self| (sight.is_over, sight.is_passed, sight.ticks);
         rank(self) < rank(other)
     }
 }
 
-/// What a visit has brought.
+/// The result of a visit.
 pub(super) struct Visited {
     pub destination: Destination,
-    /// What was done behind the way to the destination.
+    /// The actions after the path to the destination.
     pub piece: Route,
-    /// The cells that were seen from the destination on, each when the way to it was best.
+    /// The cells that were seen from the destination on, each by its best path.
     pub seen: BTreeMap<Cell, Sight>,
-    /// Ticks after which the level's aim was reached.
+    /// Ticks after which the level's goal was reached.
     pub solved: Option<u32>,
-    /// Ticks played, the way back included.
+    /// Ticks played, with the path back.
     pub steps: u64,
-    /// How the episode ended, if it did.
+    /// The result of the episode, if it ended.
     pub end: Option<EpisodeResult>,
 }
 
-/// How actions are drawn.
+/// The random numbers of actions.
 #[derive(Clone, Copy)]
 pub(super) struct Draws {
     pub streams: Streams,
@@ -71,33 +71,33 @@ pub(super) struct Draws {
     pub space: ActionSpace,
 }
 
-/// A visit that is being made.
+/// A visit in progress.
 pub(super) struct Visit {
     level: u64,
     job: Job,
     visited: Visited,
     /// Ticks of the episode so far.
     ticks: u32,
-    /// Ticks that are left unless something new is found.
+    /// Ticks left, unless something new is found.
     left: u32,
-    /// Where the agent was after the last tick, from the destination on.
+    /// Position of the agent after the last tick, from the destination on.
     place: Option<Vec2>,
     rng: ChaCha8Rng,
     /// The last random action that was played.
     last: Option<ActionValue>,
-    /// The action that is about to be played.
+    /// The next action.
     next: Option<ActionValue>,
-    /// Whether the aim had been reached before anything was explored.
+    /// Whether the goal was reached on the path back.
     was_solved: bool,
 }
 
 impl Visit {
-    /// Hands an agent the level from its start on: whatever it was playing is left at once.
+    /// Starts the level for an agent. Its current episode is dropped.
     pub fn begin(job: Job, level: u64, draws: &Draws, agent: &mut EntityWorldMut) -> Self {
         if let Some(mut running) = agent.get_mut::<Episode>() {
             running.abandon();
         }
-        // As replays have them, in case a game draws from the streams of its agents.
+        // The streams of replays, for games that draw from the streams of their agents.
         agent.insert((Control::Bot, LevelQueue::Always(level), AgentStreams::new(0, 0)));
         let destination = job.destination.clone();
         let sight = Sight { ticks: destination.way.ticks, is_over: false, is_passed: destination.is_passed };
@@ -110,7 +110,7 @@ impl Visit {
         Self { level, job, visited, ticks, left, place: None, rng, last: None, next: None, was_solved: false }
     }
 
-    /// Decides what the agent does in the next tick, or lets the policy do so.
+    /// Sets the agent's next action, or lets the policy decide.
     pub fn act(&mut self, draws: &Draws, agent: &mut EntityWorldMut) {
         let way = self.job.route.len();
         if let Some(action) = self.job.route.actions.get(self.ticks as usize) {
@@ -122,7 +122,7 @@ impl Visit {
                 agent.insert((Control::Policy, AgentStreams::restored(level, action, skill), ActiveSkill::default()));
             }
         } else {
-            // Drawn once, even if the level takes several ticks to be there.
+            // Drawn once, even if the level takes several ticks to load.
             let action = match self.next.take() {
                 Some(action) => action,
                 None => self.draw(draws),
@@ -140,12 +140,12 @@ impl Visit {
         }
     }
 
-    /// Takes notes after a tick; true if the visit is over. `spot` says in which cell the agent is after so many ticks,
-    /// and which ones it has passed since it was in a place.
+    /// Updates the visit after a tick; true if the visit is over. `spot` returns the cell of the agent after this many
+    /// ticks, and the cells that it has passed since a position.
     ///
     /// # Errors
     ///
-    /// The way back is not the known one.
+    /// The path back differs from the known one.
     pub fn note(
         &mut self,
         world: &World,
@@ -157,7 +157,7 @@ impl Visit {
         let episode = world.get::<Episode>(agent);
         let ticks = end.map_or_else(|| episode.map_or(0, |episode| episode.tick), |end| end.ticks);
         if ticks == self.ticks {
-            // The level is still being made ready.
+            // The level is still loading.
             return Ok(false);
         }
         self.ticks = ticks;
@@ -189,7 +189,7 @@ impl Visit {
         Ok(end.is_some() || is_spent)
     }
 
-    /// What differs from the known way in this tick.
+    /// Checks that this tick equals that of the known path.
     fn check_way(&self, hash: u32, end: Option<EpisodeResult>) -> Result<(), Divergence> {
         let tick = self.ticks - 1;
         let known = self.job.route.hashes[tick as usize];
@@ -204,20 +204,20 @@ impl Visit {
         }
     }
 
-    /// Notes the cell that the agent is in, and those that it has passed.
+    /// Adds the cell of the agent, and those that it has passed.
     fn look(&mut self, spotted: Spotted, is_last: bool, archive: &Archive) -> Result<(), Divergence> {
         let Spotted { ticks, cell, place, passed } = spotted;
         let Destination { cell: wanted, way, is_passed } = &self.visited.destination;
         if ticks < way.ticks {
             return Ok(());
         }
-        // Whoever has passed a cell is in another one, and the state hash has said that it is the same one.
+        // After passing a cell the agent is in another one. The state hash has confirmed the path.
         let is_there = ticks == way.ticks && !is_passed;
         if let Some(wanted) = wanted.as_ref().filter(|wanted| is_there && **wanted != cell) {
             let what = format!("the agent is in cell {cell}, and the same actions led to cell {wanted} before");
             return Err(self.divergence(ticks.saturating_sub(1), what));
         }
-        // What was seen before the last action was not the end.
+        // An earlier sighting was not the end.
         let is_over = is_last && ticks == self.ticks;
         for cell in passed {
             self.see(cell, Sight { ticks, is_over, is_passed: true }, archive);
@@ -227,7 +227,7 @@ impl Visit {
         Ok(())
     }
 
-    /// Notes a cell, unless the visit knows a better way to it.
+    /// Adds a cell, unless the visit has a better path to it.
     fn see(&mut self, cell: Cell, sight: Sight, archive: &Archive) {
         if self.visited.seen.get(&cell).is_some_and(|known| !sight.is_better_than(known)) {
             return;
@@ -242,7 +242,7 @@ impl Visit {
         Divergence { level: self.level, tick, what }
     }
 
-    /// What it has brought, by the number of the visit.
+    /// Returns the result, with the number of the visit.
     pub fn finish(self) -> (u64, Visited) {
         (self.job.number, self.visited)
     }

@@ -1,8 +1,8 @@
-//! Ways to cells. They share their beginnings: each is a piece of its own behind one that was known before.
+//! Paths to cells. They share their beginnings: each is a piece of its own after a path that was known before.
 
 use playbot_learner::{ActionSpace, Actions};
 
-/// Actions from the start of a level on, and what the state was after each.
+/// Actions from the start of a level, with the state hash after each.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Route {
     /// The action of each tick.
@@ -12,22 +12,22 @@ pub struct Route {
 }
 
 impl Route {
-    /// A route without a tick.
+    /// Creates a route without a tick.
     pub(super) fn empty(space: &ActionSpace) -> Self {
         Self { actions: Actions::empty(space), hashes: Vec::new() }
     }
 
-    /// Number of ticks.
+    /// Returns the number of ticks.
     pub fn len(&self) -> usize {
         self.hashes.len()
     }
 
-    /// Whether it has no ticks, as the way to the start.
+    /// Returns whether it has no ticks, as the path to the start.
     pub fn is_empty(&self) -> bool {
         self.hashes.is_empty()
     }
 
-    /// Adds the first ticks of another one.
+    /// Appends the first ticks of another route.
     fn extend(&mut self, piece: &Self, ticks: usize) {
         let ticks = ticks.min(piece.len());
         self.actions.extend_rows(&piece.actions, 0, ticks).expect("all actions are those of one game");
@@ -35,44 +35,44 @@ impl Route {
     }
 }
 
-/// The first ticks up to the end of a segment, or up to a place within it.
+/// A path: the first ticks up to the end of a segment, or up to a tick within it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Way {
     segment: usize,
-    /// Its length, from the start of the level on.
+    /// Its length, from the start of the level.
     pub ticks: u32,
 }
 
 impl Way {
-    /// The way to the start of the level.
+    /// The path to the start of the level.
     pub const START: Self = Self { segment: 0, ticks: 0 };
 
-    /// The first ticks of this way.
+    /// Returns the first ticks of this path.
     pub fn cut(self, ticks: u32) -> Self {
         Self { ticks: ticks.min(self.ticks), ..self }
     }
 }
 
-/// What was done behind a way that was known before.
+/// The actions after a path that was known before.
 struct Segment {
     parent: Way,
     piece: Route,
 }
 
-/// All ways of an exploration. What leads to a shorter way stays, since other ways may go on behind it.
+/// All paths of an exploration. Segments stay when a shorter path is found, since other paths may go through them.
 pub(super) struct Ways {
     space: ActionSpace,
     segments: Vec<Segment>,
 }
 
 impl Ways {
-    /// The way to the start, and no other.
+    /// Creates it with the path to the start alone.
     pub fn new(space: ActionSpace) -> Self {
         let start = Segment { parent: Way::START, piece: Route::empty(&space) };
         Self { space, segments: vec![start] }
     }
 
-    /// A way of so many ticks that goes on behind a known one with the beginning of a piece.
+    /// Adds a path of this many ticks, which extends a known one by the beginning of a piece.
     pub fn extend(&mut self, parent: Way, piece: &Route, ticks: u32) -> Way {
         if ticks <= parent.ticks {
             return parent.cut(ticks);
@@ -83,7 +83,7 @@ impl Ways {
         Way { segment: self.segments.len() - 1, ticks }
     }
 
-    /// A whole way.
+    /// Returns a whole path.
     pub fn route(&self, way: Way) -> Route {
         let mut pieces = Vec::new();
         let mut rest = way;

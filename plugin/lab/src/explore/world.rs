@@ -1,4 +1,4 @@
-//! A World in which agents make visits.
+//! Worlds in which agents make visits.
 
 use bevy::prelude::*;
 use bevy_playbot::{control::Control, headless::tick_world, panics::PanicReports, vision::VisionError};
@@ -26,11 +26,11 @@ pub(super) struct ExploreWorld<'a> {
 }
 
 impl<'a> ExploreWorld<'a> {
-    /// Agents `first..first + count`, all idle.
+    /// Builds agents `first..first + count`, all idle.
     ///
     /// # Errors
     ///
-    /// What the explorer's policy sees cannot be drawn.
+    /// The observation of the explorer's policy cannot be drawn.
     pub fn new(
         game: &'a dyn Game,
         plan: &'a ExplorePlan,
@@ -53,12 +53,12 @@ impl<'a> ExploreWorld<'a> {
         Ok(Self { game, mode: &plan.mode, level: plan.level, world, agents, draws, lookout })
     }
 
-    /// Whether cells are squares of the grid.
+    /// Returns whether cells are squares of the grid.
     pub fn has_places(&self) -> bool {
         self.lookout.has_places()
     }
 
-    /// Makes visits, several of them at a time. `progress` hears the ticks of each.
+    /// Makes visits, several of them at a time. `progress` receives the ticks of each.
     ///
     /// # Errors
     ///

@@ -1,21 +1,21 @@
-//! Actions one by one, and as recordings have them.
+//! Conversions between lists of actions and those of recordings.
 
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     demo::{file::EpisodeActions, replay::recorded_action},
 };
 
-/// How many actions do something.
+/// Returns the number of actions with an effect.
 pub(super) fn efforts(actions: &[ActionValue], idle: &ActionValue) -> u32 {
     u32::try_from(actions.iter().filter(|action| *action != idle).count()).unwrap_or(u32::MAX)
 }
 
-/// The actions of a recorded episode.
+/// Returns the actions of a recorded episode.
 pub(super) fn listed(actions: &EpisodeActions) -> Vec<ActionValue> {
     (0..).map_while(|tick| recorded_action(actions, tick)).collect()
 }
 
-/// The same for a recording. Actions that do not fit the space are left out.
+/// Returns the actions for a recording. Actions that do not fit the space are left out.
 pub(super) fn recorded(actions: &[ActionValue], space: &ActionSpace) -> EpisodeActions {
     match space {
         ActionSpace::Discrete(_) => {

@@ -1,26 +1,26 @@
-//! A game that broke in the middle of an episode.
+//! Panics and faults of a game during an episode.
 
 use bevy_playbot::fault::Fault;
 
-/// How a game's panic is told, behind where it was.
+/// Beginning of the message of a game's panic, after its position.
 const PANICKED: &str = "the game panicked: ";
-/// How an agent is told whose eye has never seen anything.
+/// Beginning of the message of an agent whose pictures were all blank.
 const BLANK: &str = "each picture of an episode of ";
 
-/// The game broke: it panicked, broke its contract, or the episode never ended.
+/// A failure of the game: it panicked, broke its contract, or the episode never ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Breakage {
     /// `panic`, `fault`, `blank-picture` or `endless`.
     pub detector: &'static str,
     /// Tick of the episode, from 0.
     pub tick: u32,
-    /// What the game said.
+    /// The game's message.
     pub message: String,
 }
 
 impl Breakage {
-    /// What a fault in this tick means.
-    pub(crate) fn of_fault(fault: &Fault, tick: u32) -> Self {
+    /// Classifies a fault in this tick.
+    pub fn of_fault(fault: &Fault, tick: u32) -> Self {
         let Fault(message) = fault;
         match message.split_once(PANICKED) {
             Some((_, words)) => Self { detector: "panic", tick, message: words.to_owned() },
@@ -28,14 +28,14 @@ impl Breakage {
         }
     }
 
-    /// An episode that has not ended after so many ticks.
+    /// Creates the breakage of an episode that has not ended after this many ticks.
     pub(super) fn endless(tick: u32) -> Self {
         let message = format!("the episode has not ended after {tick} ticks: give the game a time limit");
         Self { detector: "endless", tick, message }
     }
 }
 
-/// What finds a fault with these words.
+/// Returns the detector of a fault with this message.
 pub(crate) fn detector_of(message: &str) -> &'static str {
     if message.contains(PANICKED) {
         "panic"
@@ -46,7 +46,7 @@ pub(crate) fn detector_of(message: &str) -> &'static str {
     }
 }
 
-/// A message such as `agent 0, level 3, tick 7: words` without its beginning.
+/// Returns a message such as `agent 0, level 3, tick 7: words` without its beginning.
 fn without_moment(message: &str) -> &str {
     match message.split_once(": ") {
         Some((place, words)) if place.starts_with("agent ") => words,
@@ -54,7 +54,7 @@ fn without_moment(message: &str) -> &str {
     }
 }
 
-/// Whether two messages say the same: numbers and, after a panic, the line of the source may differ.
+/// Returns whether two messages are equal, except for numbers and, after a panic, the line of the source.
 pub(super) fn say_the_same(one: &str, other: &str) -> bool {
     fn letters(message: &str) -> impl Iterator<Item = char> {
         let place = message.rfind(" (").filter(|_| message.ends_with(')'));

@@ -1,4 +1,4 @@
-//! How it is found out whether a finding is still there.
+//! The checks that reproduce a finding.
 
 use std::sync::Arc;
 
@@ -9,24 +9,24 @@ use crate::{
     game::Game,
 };
 
-/// How a detector's findings are looked for again.
+/// The check that reproduces a detector's findings.
 #[derive(Clone)]
 pub enum Check {
-    /// In the level itself: nobody has to play. Asks whether the finding of this mode and level is there.
+    /// Examines the level, without play. Returns whether the finding of this mode and level is there.
     Level(fn(&dyn Game, &str, u64) -> bool),
-    /// In what came of the episode: the tick of the finding, if it is there.
+    /// Examines the result of the episode. Returns the tick of the finding, if it is there.
     Episode(fn(&FindingHead, &Replayed) -> Option<u32>),
-    /// In the World, tick by tick; each replay gets a watcher of its own.
+    /// Watches the World tick by tick; each replay gets a watcher of its own.
     Ticks(Arc<dyn Fn(&FindingHead) -> Watcher + Send + Sync>),
-    /// By a detector that looks while somebody plays. It says anew what is wrong.
+    /// Runs a detector during play. The message is then the new one.
     Detector(Arc<dyn Detector>),
-    /// By a detector that looks at whole levels: in the level itself, or in what came of the episode, as it
-    /// [says](LevelDetector::shown_by).
+    /// Runs a detector of whole levels: on the level, or on the result of the episode, as it
+    /// [declares](LevelDetector::shown_by).
     WholeLevel(Arc<dyn LevelDetector>),
 }
 
 impl Check {
-    /// Whether somebody has to play.
+    /// Returns whether the check needs a replay.
     pub fn needs_play(&self) -> bool {
         match self {
             Self::Level(_) => false,

@@ -15,15 +15,15 @@ use crate::game::Game;
 #[derive(Clone)]
 pub struct Checks {
     checks: Vec<(&'static str, Check)>,
-    /// The detectors among them with all their settings, as [`Detectors::record`](crate::detectors::Detectors::record) has
-    /// them.
+    /// The detectors among them with all their settings, in the form of
+    /// [`Detectors::record`](crate::detectors::Detectors::record).
     pub(super) records: Vec<String>,
-    /// Settings that somebody asked for, as `name.key=value`.
+    /// Settings that the caller asked for, as `name.key=value`.
     pub(super) asked: Vec<String>,
 }
 
 impl Default for Checks {
-    /// Those of what tests of levels find.
+    /// Creates the checks of the general findings of tests.
     fn default() -> Self {
         let checks = vec![
             ("panic", Check::Episode(is_broken)),
@@ -38,7 +38,7 @@ impl Default for Checks {
 }
 
 impl Checks {
-    /// These and one more; it takes the place of the one that has its name.
+    /// Adds a check; it replaces the one with its name.
     #[must_use]
     pub fn with(mut self, detector: &'static str, check: Check) -> Self {
         self.checks.retain(|(name, _)| *name != detector);
@@ -46,35 +46,35 @@ impl Checks {
         self
     }
 
-    /// The check of a detector.
+    /// Returns the check of a detector.
     pub fn of(&self, detector: &str) -> Option<Check> {
         self.checks.iter().find(|(name, _)| *name == detector).map(|(_, check)| check.clone())
     }
 
-    /// Names of the detectors.
+    /// Returns the names of the detectors.
     pub fn names(&self) -> impl Iterator<Item = &'static str> {
         self.checks.iter().map(|(name, _)| *name)
     }
 }
 
-/// The game breaks in the same way.
+/// Checks that the game breaks in the same way.
 fn is_broken(head: &FindingHead, replayed: &Replayed) -> Option<u32> {
     let broken = replayed.broken.as_ref()?;
     (broken.detector == head.detector && say_the_same(&broken.message, &head.message)).then_some(broken.tick)
 }
 
-/// It is still proved that the aim cannot be reached.
+/// Checks that the goal is still proved to be out of reach.
 fn is_unreachable(game: &dyn Game, mode: &str, level: u64) -> bool {
-    game.prove(mode, level).why_unsolvable().is_some()
+    game.tools().levels.prove(mode, level).why_unsolvable().is_some()
 }
 
-/// The game ends the episode without the aim: the tick of the end.
+/// Checks that the game ends the episode before the goal. Returns the tick of the end.
 fn is_lost(_: &FindingHead, replayed: &Replayed) -> Option<u32> {
     let end = replayed.end.filter(|end| end.end == EpisodeEnd::Terminated { success: false } && !end.success)?;
     end.ticks.checked_sub(1)
 }
 
-/// Time is up without the aim: the tick of the end.
+/// Checks that the time limit ends the episode before the goal. Returns the tick of the end.
 fn is_not_solved(_: &FindingHead, replayed: &Replayed) -> Option<u32> {
     let end = replayed.end.filter(|end| end.end == EpisodeEnd::Truncated && !end.success)?;
     end.ticks.checked_sub(1)

@@ -1,4 +1,4 @@
-//! How an episode goes tick by tick, and whether another one goes the same way.
+//! The course of an episode tick by tick, and its comparison with another one.
 
 use bevy_playbot::vision::ObservationConfig;
 
@@ -8,15 +8,15 @@ use super::{
 };
 use crate::{eval::Player, game::Game};
 
-/// How the episode of a bot with this seed goes.
+/// Returns the course of the episode of a bot with this seed.
 pub(crate) fn course_of(game: &dyn Game, (mode, level): (&str, u64), seed: u64, bot: &Player) -> Replayed {
     let played = play_player(Setting { game, mode, level, seed }, bot, &ObservationConfig::default());
     let (_, course) = played.expect("nothing can be wrong with a vector");
     course
 }
 
-/// Whether a bot's episode goes as it went before: the same rewards and states in each tick, and the same end. It is played
-/// up to the first difference.
+/// Returns whether a bot's episode is the same as before: the same rewards and states in each tick, and the same end.
+/// It is played up to the first difference.
 pub(crate) fn keeps_course(
     game: &dyn Game,
     (mode, level): (&str, u64),
@@ -55,7 +55,7 @@ mod tests {
     use bevy_playbot::{action::ActionValue, bot::BlindBot};
 
     use super::*;
-    use crate::bugs::score::testing::{Corridor, Rule};
+    use crate::corridor::{Corridor, Rule};
 
     #[test]
     fn the_same_game_keeps_its_course_and_a_broken_one_does_not() {

@@ -1,4 +1,4 @@
-//! Days.
+//! Dates.
 
 use std::{
     fmt,
@@ -12,7 +12,7 @@ use thiserror::Error;
 /// Seconds of a day.
 const DAY: u64 = 24 * 60 * 60;
 
-/// A day of the calendar, as `2027-01-31`.
+/// A date, such as `2027-01-31`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Date {
@@ -21,20 +21,20 @@ pub struct Date {
     day: u8,
 }
 
-/// The text is no day.
+/// The text is not a date.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("`{0}` is no day: write year, month and day, as in 2027-01-31")]
+#[error("`{0}` is not a date: write year, month and day, as in 2027-01-31")]
 pub struct DateError(String);
 
 impl Date {
-    /// The day that it is now, in universal time.
+    /// Returns today's date, in universal time.
     pub fn today() -> Self {
-        // A clock that stands before 1970 lets nothing expire.
+        // With a clock before 1970 nothing expires.
         let seconds = SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |passed| passed.as_secs());
         Self::of_day(seconds / DAY)
     }
 
-    /// The day that is so many days after the first one of 1970.
+    /// Returns the date this many days after 1970-01-01.
     fn of_day(mut days: u64) -> Self {
         let mut year = 1970;
         while days >= days_of(year) {

@@ -1,10 +1,10 @@
-//! ddmin: a part of a list that still shows what the whole list shows (Zeller and Hildebrandt, Simplifying and isolating
-//! failure-inducing input, IEEE Transactions on Software Engineering 28 (2), 2002).
+//! ddmin: the search for a part of a list with the same effect as the whole list (Zeller and Hildebrandt, Simplifying
+//! and isolating failure-inducing input, IEEE Transactions on Software Engineering 28 (2), 2002).
 
-/// Leaves out parts of a list until none can be left out, or `try_it` has had enough.
+/// Leaves out parts of a list until no more can be left out, or the budget of `try_it` is used up.
 ///
-/// `try_it` is given a shorter list: `Some` if it still shows it, with how many of its items were needed to show it, counted
-/// from the first; `None` if it does not. It is asked in the same order each time.
+/// `try_it` receives a shorter list. It returns `Some` if the effect remains, with the number of items that were
+/// needed, counted from the first; else `None`. The order of its calls is reproducible.
 pub(super) fn ddmin<T: Clone>(
     mut items: Vec<T>,
     has_enough: &dyn Fn() -> bool,
@@ -27,7 +27,8 @@ pub(super) fn ddmin<T: Clone>(
     items
 }
 
-/// The first of the parts, or else of what remains without one of them, that still shows it, and in how many parts to go on.
+/// Returns the first part with the effect, or else the first remainder without one part, with the number of parts to go
+/// on with.
 fn reduced<T: Clone>(
     items: &[T],
     parts: usize,
@@ -45,7 +46,7 @@ fn reduced<T: Clone>(
             return Some((part, 2));
         }
     }
-    // With two parts, what remains without one is the other.
+    // With two parts, the remainder without one is the other.
     if parts > 2 {
         for (start, end) in ends() {
             if let Some(rest) = still([&items[..start], &items[end..]].concat()) {
@@ -64,7 +65,7 @@ mod tests {
 
     const NEVER: &dyn Fn() -> bool = &|| false;
 
-    /// Shows it if these stand in the list in this order: how far it has to be read.
+    /// The effect needs these items in this order. Returns how far the list has to be read.
     fn needs(list: &[u32], wanted: &[u32]) -> Option<usize> {
         let mut at = 0;
         for number in wanted {

@@ -1,4 +1,4 @@
-//! Checks of detectors that look while somebody plays.
+//! Checks of detectors that watch play.
 
 use std::{cell::RefCell, rc::Rc, sync::Arc};
 
@@ -16,15 +16,15 @@ use crate::{
 };
 
 impl Checks {
-    /// Those of what tests of levels find, and of all detectors that look at this game, with their usual settings.
+    /// Returns the checks of general findings, and of all detectors of this game with their default settings.
     pub fn of_game(game: &dyn Game) -> Self {
         let choice = DetectorChoice { with: vec!["all".to_owned()], ..DetectorChoice::default() };
         let all = Detectors::choose(game, &choice).unwrap_or_else(|_| Detectors::usual(game));
         Self::default().with_detectors(&all)
     }
 
-    /// These and those of the detectors of a test, as they are set there. Detectors that look at whole levels have one if
-    /// a level or the end of an episode [shows](ShownBy) what they find.
+    /// Adds the checks of the detectors of a test, with their settings. Detectors of whole levels have a check if a
+    /// level or the end of an episode [reproduces](ShownBy) their findings.
     #[must_use]
     pub fn with_detectors(self, detectors: &Detectors) -> Self {
         let checks = self.with_records(detectors.record(), &detectors.settings);
@@ -37,7 +37,7 @@ impl Checks {
     }
 }
 
-/// Looks as the detector does in a test. The second has what it says, once it has seen something.
+/// Runs the detector as in a test. The second value holds its message, once it has seen something.
 pub(super) fn watcher(detector: Arc<dyn Detector>) -> (Watcher, Rc<RefCell<Option<String>>>) {
     let said = Rc::<RefCell<Option<String>>>::default();
     let (mut looking, heard) = (Looking::new(detector), Rc::clone(&said));
@@ -53,7 +53,7 @@ pub(super) fn watcher(detector: Arc<dyn Detector>) -> (Watcher, Rc<RefCell<Optio
 pub(super) struct Looking {
     detector: Arc<dyn Detector>,
     worlds: Option<Box<dyn WorldWatch>>,
-    /// Nothing before the first tick.
+    /// `None` before the first tick.
     begun: Option<Option<Box<dyn Watch>>>,
 }
 
@@ -63,12 +63,12 @@ impl Looking {
         Self { detector, worlds, begun: None }
     }
 
-    /// Looks at a tick. What is wrong, if anything.
+    /// Examines a tick. Returns a message if something is wrong.
     pub fn look(&mut self, moment: &Moment) -> Option<String> {
         let Moment { game, mode, world, agent, tick, end, errors } = *moment;
         let (episode, action) = (world.get::<Episode>(agent)?, world.get::<Action>(agent)?);
         let level = episode.level;
-        let ahead = || LevelAhead { level, plan: game.floor_plan(mode, level) };
+        let ahead = || LevelAhead { level, plan: game.tools().levels.floor_plan(mode, level) };
         let watch = self.begun.get_or_insert_with(|| self.detector.watch(&ahead()));
         let proofs = GameProofs { game, mode, level, world, agent };
         let seen = detector::Moment {
@@ -80,7 +80,7 @@ impl Looking {
             observation: world.get::<Observation>(agent).map_or(&[][..], |seen| seen.vector.as_slice()),
             state_hash: world.get::<StateHash>(agent).map_or(0, |hash| hash.0),
             reward: world.get::<Reward>(agent).map_or(0.0, Reward::get),
-            place: game.whereabouts(world, agent),
+            place: game.tools().state.position(world, agent),
             is_success: end.map_or_else(|| episode.is_success(), |end| end.success),
             proofs: &proofs,
         };

@@ -1,4 +1,4 @@
-//! What can be wrong with files of findings.
+//! Errors of files of findings.
 
 use std::{
     io,
@@ -6,15 +6,16 @@ use std::{
 };
 
 use bevy_playbot::demo::file::{DemoFault, DemoFileError};
+use playbot_learner::{HasExitCode, io_exit_code};
 use thiserror::Error;
 
-/// Findings cannot be read or written.
+/// The reason why findings cannot be read or written.
 #[derive(Debug, Error)]
 pub enum FindingError {
-    /// The file cannot be read as a recording, or not be written.
+    /// The file cannot be read as a recording, or cannot be written.
     #[error("{}", file_words(.0))]
     File(#[from] DemoFileError),
-    /// It is a recording without a head.
+    /// It is a recording without the head of a finding.
     #[error("{}", no_finding_words(path, game))]
     NoFinding {
         /// The file.
@@ -32,12 +33,12 @@ pub enum FindingError {
         /// Newest form that is read.
         newest: u32,
     },
-    /// It holds none or several episodes.
+    /// It has no episode or several ones.
     #[error("{}: {episodes} episodes, but a finding has one: test the level again with `playbot test`", path.display())]
     Episodes {
         /// The file.
         path: PathBuf,
-        /// How many.
+        /// Number of episodes.
         episodes: usize,
     },
     /// A folder has no findings.
@@ -48,11 +49,11 @@ pub enum FindingError {
     None(PathBuf),
     /// There is no such folder.
     #[error(
-        "{} is no folder: name one with .finding files, such as one that `playbot test` has written; a single finding is \
-         played by `playbot replay`", .0.display()
+        "{} is not a folder: name one with .finding files, such as one that `playbot test` has written; a \
+         single finding is played by `playbot replay`", .0.display()
     )]
     NoFolder(PathBuf),
-    /// The pins cannot be understood.
+    /// The pins cannot be parsed.
     #[error(
         "{}, line {line}, column {column}: {message}; write \
          [(finding: \"NAME\", reason: \"why it is known\", until: \"2027-01-31\")]", path.display()
@@ -64,37 +65,34 @@ pub enum FindingError {
         line: usize,
         /// Column, from 1.
         column: usize,
-        /// What is wrong.
+        /// The error.
         message: String,
     },
-    /// The operating system refused.
+    /// The system cannot read or write a file.
     #[error("cannot {action} {}: {source}", path.display())]
     Io {
-        /// What was tried.
+        /// The action that failed.
         action: &'static str,
-        /// On which file.
+        /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The system's error.
         source: io::Error,
     },
 }
 
-impl FindingError {
-    /// Whether calling differently helps; otherwise the system failed.
-    pub fn is_usage(&self) -> bool {
-        use io::ErrorKind::{IsADirectory, NotADirectory, NotFound};
-        let is_named = |source: &io::Error| matches!(source.kind(), NotFound | IsADirectory | NotADirectory);
+impl HasExitCode for FindingError {
+    fn exit_code(&self) -> u8 {
         match self {
             Self::File(DemoFileError { fault: DemoFault::Io { source, .. }, .. }) | Self::Io { source, .. } => {
-                is_named(source)
+                io_exit_code(source)
             }
-            Self::File(DemoFileError { fault: DemoFault::PushFailed { .. } | DemoFault::PushTorn { .. }, .. }) => false,
-            _ => true,
+            Self::File(DemoFileError { fault: DemoFault::PushFailed { .. } | DemoFault::PushTorn { .. }, .. }) => 2,
+            _ => 3,
         }
     }
 }
 
-/// What is wrong with a file, and what helps. A finding is a single episode, so nothing of it can be repaired.
+/// Returns the message about a file, with the next step. A finding is a single episode, so it cannot be repaired.
 fn file_words(error: &DemoFileError) -> String {
     let path = error.path.display();
     match &error.fault {
@@ -109,21 +107,21 @@ fn file_words(error: &DemoFileError) -> String {
         fault => {
             let what = fault.to_string();
             let what = what.split("; run `playbot demo repair").next().unwrap_or_default();
-            format!("{path}: {what}; test the level again with `playbot test`, which writes its findings anew")
+            format!("{path}: {what}; test the level again with `playbot test`, which writes its findings again")
         }
     }
 }
 
-/// What helps with a recording that is no finding.
+/// Returns the message about a recording that is not a finding, with the next step.
 fn no_finding_words(path: &Path, game: &str) -> String {
     let (shown, word) = (path.display(), word(path));
     format!(
-        "{shown}: a recording, but of no finding: `playbot demo show {word}` says what is in it, `playbot view {game} \
+        "{shown}: a recording, but not a finding: `playbot demo show {word}` says what is in it, `playbot view {game} \
          --demo {word}` shows it; a finding is a .finding that `playbot test` has written"
     )
 }
 
-/// A path as one word of a command.
+/// Returns a path as one word of a command.
 fn word(path: &Path) -> String {
     let name = path.display().to_string();
     if name.contains(char::is_whitespace) { format!("'{name}'") } else { name }

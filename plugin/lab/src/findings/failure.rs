@@ -1,15 +1,15 @@
-//! Episodes that failed, as findings call them.
+//! Failed episodes as findings.
 
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
 
 use super::play::Replayed;
 
-/// The game ended the episode without the aim.
+/// The game ended the episode before the goal.
 pub(super) const LOST: &str = "lost";
-/// Time was up without the aim.
+/// The time limit ended the episode before the goal.
 pub(super) const NOT_SOLVED: &str = "not-solved";
 
-/// What an episode that ended without its aim is called, and the words for it; `None` if the aim was reached.
+/// Returns the kind of an episode that ended before the goal, and its message; `None` if the goal was reached.
 pub(super) fn failure_of(end: &EpisodeResult) -> Option<(&'static str, String)> {
     if end.success {
         return None;
@@ -24,7 +24,7 @@ pub(super) fn failure_of(end: &EpisodeResult) -> Option<(&'static str, String)> 
     }
 }
 
-/// What is said of an episode in which this was found, if that is known: how the game broke, or how the episode failed.
+/// Returns the message about a replayed episode with this finding, if it is known: the panic or fault, or the failure.
 pub(super) fn message_of(detector: &str, replayed: &Replayed) -> Option<String> {
     let broken = replayed.broken.as_ref().filter(|broken| broken.detector == detector);
     let failed = || replayed.end.as_ref().and_then(failure_of).filter(|(name, _)| *name == detector);

@@ -6,12 +6,12 @@ use super::stored::StoredFinding;
 
 /// Ending of the files.
 pub(super) const ENDING: &str = "finding";
-/// Most letters of a name that say what it is.
+/// Most letters of the descriptive part of a name.
 const MOST_LETTERS: usize = 80;
 
 impl StoredFinding {
-    /// The name of its file, such as `hard-7.panic.random-1f2e3d4c.finding`: it says which level, detector and tester, and
-    /// ends with letters that tell it from others. A test gives a minimised finding the name that it had before.
+    /// Returns the name of its file, such as `hard-7.panic.random-1f2e3d4c.finding`: level, detector, tester, and
+    /// letters that make it unique. In a test, a minimised finding keeps its name.
     pub fn file_name(&self) -> String {
         let head = &self.head;
         let parts = [Some(&head.level), Some(&head.detector), head.tester.as_ref()];
@@ -21,7 +21,7 @@ impl StoredFinding {
         let text: String = parts.join(".").chars().take(MOST_LETTERS).collect();
         let game = [self.header.game.as_str(), &head.level, &head.detector, head.tester.as_deref().unwrap_or("")];
         let bytes = game.into_iter().chain([head.message.as_str()]).flat_map(|part| {
-            // What no byte is ends each part.
+            // A value that is no byte ends each part.
             part.bytes().map(u64::from).chain([u64::from(u8::MAX) + 1])
         });
         let hash = StateHash::of(bytes.chain([head.seed])).folded();

@@ -12,14 +12,15 @@ use super::{
     file_name::ENDING,
 };
 
-/// Name of the folder with findings, below that of a test.
+/// Name of the folder with findings, in that of a test.
 pub const FINDINGS: &str = "findings";
 
-/// The files of findings in a folder and in its `findings`, with their names without ending, in the order of these.
+/// Returns the files of findings in a folder and in its `findings`, with their names without ending, sorted by name.
 ///
 /// # Errors
 ///
-/// [`FindingError::None`] if there are none, [`FindingError::NoFolder`] if it is none; or the folder cannot be read.
+/// [`FindingError::None`] if there are no findings, [`FindingError::NoFolder`] if the path is not a folder; or the
+/// folder cannot be read.
 pub fn list_findings(folder: &Path) -> Result<Vec<(String, PathBuf)>, FindingError> {
     let mut found = files_in(folder).map_err(|source| match source.kind() {
         io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => FindingError::NoFolder(folder.into()),
@@ -32,7 +33,7 @@ pub fn list_findings(folder: &Path) -> Result<Vec<(String, PathBuf)>, FindingErr
     if found.is_empty() {
         return Err(FindingError::None(folder.into()));
     }
-    // Not the file system's order, which differs.
+    // The file system's order is not reproducible.
     found.sort();
     Ok(found)
 }
@@ -41,7 +42,7 @@ pub fn list_findings(folder: &Path) -> Result<Vec<(String, PathBuf)>, FindingErr
 ///
 /// # Errors
 ///
-/// The operating system refuses.
+/// The system cannot remove them.
 pub fn clear_findings(folder: &Path) -> Result<(), FindingError> {
     let below = folder.join(FINDINGS);
     if !below.is_dir() {
@@ -57,7 +58,7 @@ pub fn clear_findings(folder: &Path) -> Result<(), FindingError> {
 ///
 /// # Errors
 ///
-/// The operating system refuses.
+/// The system cannot copy them.
 pub fn gather_findings(folders: &[PathBuf], out: &Path) -> Result<(), FindingError> {
     for folder in folders {
         let (below, target) = (folder.join(FINDINGS), out.join(FINDINGS));
@@ -88,6 +89,8 @@ fn files_in(folder: &Path) -> io::Result<Vec<(String, PathBuf)>> {
 
 #[cfg(test)]
 mod tests {
+    use playbot_learner::HasExitCode as _;
+
     use super::*;
 
     #[test]
@@ -110,7 +113,7 @@ mod tests {
         assert!(one.join(FINDINGS).join("notes.txt").exists(), "what is no finding stays");
         for no_folder in [parent.path().join("none"), all.join("c.finding")] {
             let error = list_findings(&no_folder).expect_err("no folder");
-            assert!(error.is_usage() && error.to_string().contains("is no folder: name one"), "{error}");
+            assert!(error.is_usage() && error.to_string().contains("is not a folder: name one"), "{error}");
         }
         assert!(list_findings(&one).expect_err("none").to_string().contains("nothing to play again"));
     }

@@ -1,40 +1,40 @@
-//! What a file says of its finding.
+//! The head of a finding's file.
 
 use serde::{Deserialize, Serialize};
 
 /// Newest form of the head that is read and written.
 pub(super) const HEAD_FORMAT: u32 = 1;
 
-/// What was found, by whom and where: RON text in the note of the recording. What an older program does not know in it, it
-/// leaves aside.
+/// The description of a finding: RON text in the note of the recording. Older programs ignore fields that they do not
+/// know.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FindingHead {
     /// Form of the head: 1.
     pub finding: u32,
-    /// The level as results call it: `hard:7`, or the path of its file.
+    /// The level's name in results: `hard:7`, or the path of its file.
     pub level: String,
-    /// Who played; `None` if nobody had to.
+    /// The tester; `None` if the finding needs none.
     pub tester: Option<String>,
-    /// Seed of the agent's random streams in the episode.
+    /// Random seed of the agent in the episode.
     pub seed: u64,
-    /// What found it.
+    /// Name of the detector.
     pub detector: String,
-    /// Tick of the episode in which it was found, from 0; `None` if nobody had to play.
+    /// Tick of the finding in the episode, from 0; `None` if it needs no play.
     pub tick: Option<u32>,
-    /// What is wrong.
+    /// The message.
     pub message: String,
-    /// Hash of the game's state after that tick, or after the last one before it if the game broke in it; `None` if there is
-    /// none.
+    /// Hash of the game's state after that tick, or after the last one before it if the game broke in it; `None` if
+    /// there is no hash.
     pub state_hash: Option<u32>,
-    /// Ticks of the episode before any were left out.
+    /// Ticks of the episode before minimisation.
     pub original_ticks: u32,
-    /// Settings of the detector that were not the usual ones, as `name.key=value`. Older files have none.
+    /// Settings of the detector that differ from the default, as `name.key=value`. Older files have no settings.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub settings: Vec<String>,
 }
 
 impl FindingHead {
-    /// Of something that was found, before it is known in which tick.
+    /// Creates the head of a finding whose tick is not known yet.
     pub fn new(level: impl Into<String>, detector: impl Into<String>, message: impl Into<String>) -> Self {
         Self {
             finding: HEAD_FORMAT,

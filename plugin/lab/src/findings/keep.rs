@@ -1,4 +1,4 @@
-//! Writing findings while levels are tested.
+//! The writer of findings during a test.
 
 use std::path::PathBuf;
 
@@ -23,41 +23,41 @@ use crate::{
     level_files::{is_level_files, level_files_mode},
 };
 
-/// Where findings are written, and which.
+/// The folder of findings, and the settings of their writer.
 #[derive(Clone)]
 pub struct FindingFiles {
     /// Folder of the test; files go into its `findings`.
     pub folder: PathBuf,
-    /// How much is tried to make them shorter; nothing if there is no budget.
+    /// The budget of minimisation; `None` for no minimisation.
     pub minimise: Option<Budget>,
-    /// Whether failed episodes of testers that leave nothing to chance are written too, on levels that nobody solved.
+    /// Whether failed episodes of testers without random numbers are written as well, on levels that were not solved.
     pub keep_failures: bool,
-    /// Checks of the detectors. What none of them can check is not written.
+    /// Checks of the detectors. Findings without a check are not written.
     pub checks: Checks,
 }
 
-/// Who played an episode.
+/// The tester of an episode.
 #[derive(Clone, Copy)]
 pub struct Played<'a> {
     /// Name of the tester.
     pub tester: &'a str,
     /// The tester.
     pub player: &'a Player,
-    /// What a learned policy sees.
+    /// The observation of a learned policy.
     pub observation_config: &'a ObservationConfig,
     /// Seed of the episode.
     pub seed: u64,
 }
 
-/// Something that was found in a level.
+/// A finding in a level, during a test.
 pub struct SeenFinding<'a> {
-    /// What found it.
+    /// Name of the detector.
     pub detector: &'a str,
-    /// What is wrong.
+    /// The message.
     pub message: &'a str,
-    /// Settings of the detector, as `name.key=value`, that count beside those of the test.
+    /// Settings of the detector, as `name.key=value`, in addition to those of the test.
     pub settings: &'a [String],
-    /// Who played, if somebody had to.
+    /// The tester, if the finding needs one.
     pub played: Option<Played<'a>>,
 }
 
@@ -73,8 +73,9 @@ pub struct SeenLevel<'a> {
 }
 
 impl FindingFiles {
-    /// Plays the episode of a finding again, alone, and writes it. Returns the file, seen from the folder of the test; `None`
-    /// if there is no check for it, or if it is not there again in the same tick and with the same state.
+    /// Replays the episode of a finding, alone, and writes it. Returns the file, relative to the folder of the test.
+    /// `None` if the detector has no check, or if the finding does not happen again in the same tick and with the same
+    /// state.
     ///
     /// # Errors
     ///
@@ -91,15 +92,15 @@ impl FindingFiles {
             Some(played) => {
                 let setting = Setting { game, mode: &mode, level: number, seed: played.seed };
                 let again = play_player(setting, played.player, played.observation_config);
-                // Whoever has played it once can see it.
+                // Cannot fail: the test has drawn the same observation.
                 let Ok((actions, _)) = again else { return Ok(None) };
                 self.store(game, &mode, number, by(head, played), &actions)
             }
         }
     }
 
-    /// The same for an episode that failed: as `lost` if the game ended it, or as `not-solved` if time was up. One that does
-    /// not fail again is not written.
+    /// Writes an episode that failed: as `lost` if the game ended it, or as `not-solved` if the time limit did. An
+    /// episode that does not fail again is not written.
     ///
     /// # Errors
     ///
@@ -129,7 +130,7 @@ impl FindingFiles {
     ) -> Result<Option<String>, FindingError> {
         let found = StoredFinding::of_actions(game, mode, level, head, actions, &self.checks);
         let Some(mut finding) = found else { return Ok(None) };
-        // A shorter way is the same finding, though its words may have other numbers.
+        // A minimised finding is the same one, though the numbers in its message may differ.
         let name = finding.file_name();
         if let Some(budget) = self.minimise
             && let Ok(shorter) = minimise(game, &finding, &self.checks, budget, &|_| {}, &|| false)
@@ -151,7 +152,7 @@ fn by(head: FindingHead, played: Played) -> FindingHead {
     FindingHead { tester: Some(played.tester.to_owned()), seed: played.seed, ..head }
 }
 
-/// Mode and number by which the level is played for itself: that of a file does not change when others come and go.
+/// Returns mode and number of the level alone. For a level file they do not depend on other files.
 fn alone(game: &dyn Game, level: SeenLevel) -> (String, u64) {
     if is_level_files(level.mode) {
         let mode = level_files_mode(level.name);

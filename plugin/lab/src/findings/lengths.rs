@@ -1,4 +1,4 @@
-//! How long findings are, before and after what they do not need was left out.
+//! The lengths of findings, before and after minimisation.
 
 use bevy_playbot::{action::ActionValue, vision::ObservationConfig};
 
@@ -13,19 +13,19 @@ use super::{
 };
 use crate::{eval::Player, game::Game, idle::idle_action};
 
-/// Lengths of a finding, in actions that do something.
+/// Lengths of a finding, in actions with an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Lengths {
     /// The whole episode.
     pub played: u32,
     /// Up to the finding.
     pub original: u32,
-    /// With nothing in it that could be left out.
+    /// After minimisation.
     pub minimised: u32,
 }
 
-/// Makes the finding of this head in these actions shorter. `None` if it is not there again, if nobody has to play for it, or
-/// if there is no check for it.
+/// Minimises the finding of this head in these actions. `None` if it does not happen again, needs no play, or has no
+/// check.
 pub(crate) fn lengths(
     game: &dyn Game,
     (mode, level): (&str, u64),
@@ -44,7 +44,7 @@ pub(crate) fn lengths(
     Some(Lengths { played: efforts(actions, &idle_action(game)), original, minimised })
 }
 
-/// What a player does in the episode with this seed; `None` if what it sees cannot be drawn.
+/// Returns a player's actions in the episode with this seed; `None` if its observation cannot be drawn.
 pub(crate) fn actions_of(
     game: &dyn Game,
     (mode, level): (&str, u64),

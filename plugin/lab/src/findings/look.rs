@@ -1,4 +1,4 @@
-//! Playing actions and looking for a finding.
+//! The replay of actions in search of a finding.
 
 use std::sync::Arc;
 
@@ -18,19 +18,19 @@ use crate::{
     level_files::is_level_files,
 };
 
-/// What was seen.
+/// The result of a replay.
 pub(super) struct Look {
     /// Whether the finding is there.
     pub is_there: bool,
-    /// In which tick, if somebody had to play.
+    /// Its tick, if it needs play.
     pub tick: Option<u32>,
-    /// What came of the episode.
+    /// The replayed episode.
     pub replayed: Replayed,
-    /// What is said of it now, where that is known.
+    /// Its current message, if it is known.
     pub message: Option<String>,
 }
 
-/// Plays the actions, unless the check needs nobody to play, and asks the check.
+/// Plays the actions, unless the check needs no play, and runs the check.
 pub(super) fn look(setting: Setting, head: &FindingHead, actions: &[ActionValue], check: &Check) -> Look {
     match check {
         Check::Level(is_there) => in_level(setting, *is_there),
@@ -61,7 +61,7 @@ pub(super) fn look(setting: Setting, head: &FindingHead, actions: &[ActionValue]
     }
 }
 
-/// Asks about the level; nobody plays.
+/// Runs the check on the level, without play.
 fn in_level(setting: Setting, is_there: impl Fn(&dyn Game, &str, u64) -> bool) -> Look {
     let Setting { game, mode, level, .. } = setting;
     let designs = is_level_files(mode).then(|| level_designs(game, mode).ok());
@@ -70,7 +70,7 @@ fn in_level(setting: Setting, is_there: impl Fn(&dyn Game, &str, u64) -> bool) -
     Look { is_there: is_there(game, mode, level), tick: None, replayed, message: None }
 }
 
-/// Plays, and asks in which tick of the episode it was.
+/// Plays, and runs the check on the result of the episode.
 fn in_episode(setting: Setting, actions: &[ActionValue], tick: impl Fn(&Replayed) -> Option<u32>) -> Look {
     let replayed = play_actions(setting, actions, None);
     let tick = tick(&replayed);

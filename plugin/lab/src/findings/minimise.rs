@@ -1,4 +1,4 @@
-//! Leaving out the actions that a finding does not need.
+//! Minimisation of findings: leaving out the actions that a finding does not need.
 
 use std::cell::Cell;
 
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{game::Game, idle::idle_action};
 
-/// How much may be tried.
+/// The budget of a minimisation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Budget {
     /// Most replays.
@@ -25,27 +25,32 @@ impl Default for Budget {
     }
 }
 
-/// A finding with fewer ticks, or fewer actions that do something.
+/// A finding with fewer ticks, or fewer actions with an effect.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Minimised {
-    /// The finding; the one that was given, if nothing could be left out.
+    /// The finding; the original one, if nothing could be left out.
     pub finding: StoredFinding,
     /// Replays that it took.
     pub replays: u32,
-    /// Actions that do something, in the finding that was given and in the shorter one.
+    /// Actions with an effect, in the original finding and in the shorter one.
     pub efforts: [u32; 2],
-    /// Whether nothing more can be left out, one part at a time; otherwise the budget was used up, or somebody stopped it.
+    /// Whether no single part can be left out. Otherwise the budget was used up, or `stop` returned true.
     pub is_minimal: bool,
 }
 
-/// Leaves out actions as long as the finding is still there, at whatever tick: first by idling in place of large parts, since
-/// many findings need little or nothing to be done; then with ddmin; then by idling in place of whatever cannot be left out
-/// without changing all that follows, and with ddmin again. Where time has to be up, nothing can be left out, only idled. The
-/// same finding and budget give the same result. `stop` ends it with the best so far.
+/// Leaves out actions as long as the finding still happens, at any tick. The steps are:
+///
+/// 1. Large parts are replaced by idling, since many findings need few actions or none.
+/// 2. ddmin leaves out parts.
+/// 3. Single actions are replaced by idling where leaving them out would change all that follows.
+/// 4. ddmin again.
+///
+/// For findings at the time limit actions are only replaced by idling. The same finding and budget give the same
+/// result. `stop` ends it with the best result so far.
 ///
 /// # Errors
 ///
-/// [`Unplayable`], or the finding is not there any more.
+/// [`Unplayable`], or the finding does not happen any more.
 pub fn minimise(
     game: &dyn Game,
     finding: &StoredFinding,
@@ -66,7 +71,7 @@ pub fn minimise(
     let actions = trial.shortened(actions_before[..needed].to_vec(), &has_enough);
     let found = look(setting, &finding.head, &actions, &trial.check);
     let shorter = found.is_there.then(|| {
-        // The episode is another one, and so are the numbers in its words.
+        // The episode is another one, and so are the numbers in its message.
         let message = found.message.unwrap_or_else(|| finding.head.message.clone());
         let head = FindingHead { tick: None, state_hash: None, message, ..finding.head.clone() };
         StoredFinding::of_replay(setting, head, &actions, found.replayed, found.tick)
@@ -79,10 +84,10 @@ pub fn minimise(
     Ok(Minimised { finding: shorter, efforts, replays: trial.replays.get(), is_minimal: !has_enough() })
 }
 
-/// Parts into which the actions are cut at most before ddmin begins: 31 replays.
+/// Most parts into which the actions are cut before ddmin: 31 replays.
 const LARGE_PARTS: usize = 16;
 
-/// Tries out actions, and counts.
+/// Tries actions, and counts.
 struct Trial<'a> {
     setting: Setting<'a>,
     head: &'a FindingHead,
@@ -93,7 +98,7 @@ struct Trial<'a> {
 }
 
 impl Trial<'_> {
-    /// How many of the actions it takes until the finding is there; `None` if it is not.
+    /// Returns the number of actions until the finding happens; `None` if it does not.
     fn needed(&self, actions: &[ActionValue]) -> Option<usize> {
         let found = look(self.setting, self.head, actions, &self.check);
         self.replays.set(self.replays.get() + 1);
@@ -103,10 +108,10 @@ impl Trial<'_> {
         found.is_there.then(needed)
     }
 
-    /// The actions without what is not needed.
+    /// Returns the actions without those that are not needed.
     fn shortened(&self, mut actions: Vec<ActionValue>, has_enough: &dyn Fn() -> bool) -> Vec<ActionValue> {
         let nothing = idle_action(self.setting.game);
-        // Fewer actions of this kind are the beginning of the same episode, in which it was not there yet.
+        // Fewer idle actions are the beginning of the same episode, in which the finding had not happened yet.
         let is_idle = |actions: &[ActionValue]| actions.iter().all(|action| *action == nothing);
         if is_idle(&actions) {
             return actions;
@@ -114,7 +119,7 @@ impl Trial<'_> {
         let parts = if self.head.detector == NOT_SOLVED { usize::MAX } else { LARGE_PARTS };
         self.idle_instead(&mut actions, parts, has_enough);
         if self.head.detector == NOT_SOLVED || is_idle(&actions) {
-            // No shorter way lasts until time is up.
+            // A shorter episode does not last until the time limit.
             return actions;
         }
         actions = ddmin(actions, has_enough, |shorter| self.needed(shorter));
@@ -124,8 +129,8 @@ impl Trial<'_> {
         actions
     }
 
-    /// Replaces actions by idling where the finding is still there: all, then halves, quarters and so on, down to so many
-    /// parts at most or to single actions. Whether any was.
+    /// Replaces actions by idling where the finding still happens: all, then halves, quarters and so on, down to this
+    /// many parts or to single actions. Returns whether anything was replaced.
     fn idle_instead(&self, actions: &mut Vec<ActionValue>, parts: usize, has_enough: &dyn Fn() -> bool) -> bool {
         let nothing = idle_action(self.setting.game);
         let least = (actions.len() / parts).max(1);
@@ -158,7 +163,7 @@ impl Trial<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{bugs::score::testing::Corridor, findings::failure::LOST};
+    use crate::{corridor::Corridor, findings::failure::LOST};
 
     /// A finding of this detector on a level of the corridor, where action 0 is idling, and goes to the end that loses.
     fn stored(detector: &str, actions: &[u32]) -> StoredFinding {

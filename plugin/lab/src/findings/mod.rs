@@ -1,13 +1,13 @@
-//! Findings as files: what a detector found, the actions that lead there, and whether they still do.
+//! Findings as files: a detector's message, the actions that lead to it, and the check whether it still happens.
 //!
-//! - A [`StoredFinding`] is a recording of one episode, up to the tick in which something was found. Its note holds the
-//!   [`FindingHead`]: who found what, where, and with which state hash.
-//! - [`recheck()`] plays the actions again in a World of their own and asks the detector's [`Check`]. [`Checks`] has them by
-//!   name; a detector is added with [`Checks::with`].
-//! - [`minimise()`] leaves out what is not needed: ddmin (Zeller and Hildebrandt, Simplifying and isolating failure-inducing
-//!   input, 2002) over the actions.
-//! - [`FindingFiles`] writes findings while levels are tested; [`regress()`] plays all findings of a folder again, with
-//!   [`Pins`] for those that are known.
+//! - A [`StoredFinding`] is a recording of one episode, up to the tick of the finding. Its note is the [`FindingHead`]:
+//!   tester, detector, message, tick and state hash.
+//! - [`recheck()`] replays the actions in a World of their own and runs the detector's [`Check`]. [`Checks`] has them
+//!   by name, and [`Checks::with`] adds one.
+//! - [`minimise()`] leaves out actions that are not needed: ddmin (Zeller and Hildebrandt, Simplifying and isolating
+//!   failure-inducing input, 2002).
+//! - [`FindingFiles`] writes findings during a test. [`regress()`] replays all findings of a folder, with [`Pins`] for
+//!   known ones.
 
 mod actions;
 mod breakage;

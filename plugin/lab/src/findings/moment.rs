@@ -1,4 +1,4 @@
-//! What a check sees of an episode.
+//! The data of a tick that checks examine.
 
 use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
@@ -18,11 +18,11 @@ pub struct Moment<'a> {
     pub agent: Entity,
     /// The tick that has just been played, from 0.
     pub tick: u32,
-    /// What came of the episode, if it ended in this tick.
+    /// The result of the episode, if it ended in this tick.
     pub end: Option<EpisodeResult>,
-    /// What was logged as an error since the tick before, by anybody but the engine.
+    /// Errors that were logged since the tick before, except by the engine.
     pub errors: &'a [String],
 }
 
-/// Hears every tick of an episode in their order, and says in which tick the finding was seen, once it was.
+/// A function that receives every tick of an episode in order, and returns the tick of the finding, once it was seen.
 pub type Watcher = Box<dyn FnMut(&Moment) -> Option<u32>>;

@@ -1,4 +1,4 @@
-//! Findings that are known.
+//! Pins: known findings that are accepted for a while.
 
 use std::{fs, io, path::Path};
 
@@ -13,24 +13,24 @@ use super::{
 /// Name of the file with pins, beside the findings.
 pub const PINS: &str = "pins.ron";
 
-/// A finding that is known, why, and until when that is an excuse.
+/// A known finding, with a reason and a last day.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pin {
     /// Name of the finding's file, with its ending or without.
     pub finding: String,
-    /// Why it is left alone.
+    /// Why it is accepted.
     pub reason: String,
-    /// The last day on which it is.
+    /// The last day on which it is accepted.
     pub until: Date,
 }
 
-/// Whether a pin still holds.
+/// The state of a pin on a day.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct PinState {
-    /// Why the finding is left alone.
+    /// Why the finding is accepted.
     pub reason: String,
-    /// The last day on which it is.
+    /// The last day on which it is accepted.
     pub until: Date,
     /// Whether that day has passed.
     pub expired: bool,
@@ -41,11 +41,11 @@ pub struct PinState {
 pub struct Pins(Vec<Pin>);
 
 impl Pins {
-    /// Those in a folder's `pins.ron`; none if there is no such file.
+    /// Reads a folder's `pins.ron`; there are no pins if there is no such file.
     ///
     /// # Errors
     ///
-    /// [`FindingError::Pins`] with line and column, or it cannot be read.
+    /// [`FindingError::Pins`] with line and column, or the file cannot be read.
     pub fn read(folder: &Path) -> Result<Self, FindingError> {
         let path = folder.join(PINS);
         let text = match fs::read_to_string(&path) {
@@ -66,13 +66,13 @@ impl Pins {
         Ok(Self(pins))
     }
 
-    /// The pin of a finding, by its name without ending: the one that holds longest.
+    /// Returns the pin of a finding, by its name without ending. Of several it is the one with the last date.
     pub fn of(&self, finding: &str, today: Date) -> Option<PinState> {
         let pin = self.0.iter().filter(|pin| name(pin) == finding).max_by_key(|pin| pin.until)?;
         Some(PinState { reason: pin.reason.clone(), until: pin.until, expired: pin.until < today })
     }
 
-    /// Names of pins that none of these findings has.
+    /// Returns the names of pins without a finding.
     pub fn unknown(&self, findings: &[&str]) -> Vec<String> {
         self.0.iter().map(name).filter(|name| !findings.contains(name)).map(str::to_owned).collect()
     }
@@ -85,6 +85,8 @@ fn name(pin: &Pin) -> &str {
 
 #[cfg(test)]
 mod tests {
+    use playbot_learner::HasExitCode as _;
+
     use super::*;
 
     fn read(text: &str) -> Result<Pins, FindingError> {
@@ -114,7 +116,7 @@ mod tests {
     #[test]
     fn what_is_no_pin_is_told_with_its_line() {
         for (text, parts) in [
-            ("[\n(finding: \"a\", reason: \"b\", until: \"soon\")]", ["line 2", "`soon` is no day"]),
+            ("[\n(finding: \"a\", reason: \"b\", until: \"soon\")]", ["line 2", "`soon` is not a date"]),
             ("[(finding: \"a\", until: \"2027-01-31\")]", ["line 1", "reason"]),
             ("[(finding: \"a\", reason: \" \", until: \"2027-01-31\")]", ["line 1", "`a` is pinned without a reason"]),
             ("[(finding: \"a\", why: \"b\", until: \"2027-01-31\")]", ["line 1", "why"]),

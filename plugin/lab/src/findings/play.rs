@@ -1,4 +1,4 @@
-//! Playing an episode once more, by its actions or by its player.
+//! The replay of an episode, by its actions or by its player.
 
 use bevy_playbot::{
     action::{ActionValue, misfit},
@@ -14,30 +14,30 @@ use super::{
 };
 use crate::{eval::Player, idle::idle_action};
 
-/// What came of an episode that was played again.
+/// The result of a replayed episode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Replayed {
     /// Reward of each tick.
     pub rewards: Vec<f32>,
     /// Hash of the game's state after each tick.
     pub state_hashes: Vec<u32>,
-    /// What came of the episode, if it ended.
+    /// The result of the episode, if it ended.
     pub end: Option<EpisodeResult>,
-    /// How the game broke, if it did.
+    /// The panic or fault of the game, if there was one.
     pub broken: Option<Breakage>,
-    /// The tick in which a watcher saw the finding; nothing is played behind it.
+    /// The tick in which a watcher saw the finding; the replay ends there.
     pub noticed: Option<u32>,
-    /// The file of the level, where levels are files.
+    /// The file of the level, for levels from files.
     pub level_file: Option<LevelFile>,
 }
 
 impl Replayed {
-    /// Hash of the state after a tick, or after the last one before it.
+    /// Returns the hash of the state after a tick, or after the last one before it.
     pub fn state_hash(&self, tick: u32) -> Option<u32> {
         self.state_hashes.get(tick as usize).or(self.state_hashes.last()).copied()
     }
 
-    /// Notes a tick; whether the episode goes on.
+    /// Adds a tick. Returns whether the episode goes on.
     fn note(&mut self, solo: &Solo, watcher: Option<&mut Watcher>) -> bool {
         let (reward, hash) = solo.outcome();
         self.rewards.push(reward);
@@ -48,9 +48,9 @@ impl Replayed {
     }
 }
 
-/// Plays actions up to their end, that of the episode, or the tick in which the watcher has seen enough.
+/// Plays actions up to their end, to that of the episode, or to the tick in which the watcher saw the finding.
 pub(super) fn play_actions(setting: Setting, actions: &[ActionValue], mut watcher: Option<Watcher>) -> Replayed {
-    // The watcher looks at the World, not at what agents see.
+    // The watcher examines the World, not the observations.
     let built = Solo::new(setting, &ObservationConfig::default());
     let mut solo = built.expect("nothing can be wrong with a vector");
     if watcher.is_some() {
@@ -75,12 +75,12 @@ pub(super) fn play_actions(setting: Setting, actions: &[ActionValue], mut watche
     replayed
 }
 
-/// Lets a player play to the end of the episode, or until the game breaks. The actions include that of the tick in which it
-/// broke.
+/// Lets a player play to the end of the episode, or until the game breaks. The actions include that of the tick in
+/// which it broke.
 ///
 /// # Errors
 ///
-/// What the player sees cannot be drawn.
+/// The player's observation cannot be drawn.
 pub(super) fn play_player(
     setting: Setting,
     player: &Player,
@@ -93,7 +93,7 @@ pub(super) fn play_player(
     let (mut actions, mut replayed) = (Vec::new(), Replayed { level_file: solo.level_file(), ..Replayed::default() });
     let space = setting.game.actions();
     let done = |solo: &Solo| {
-        // What does not fit was not done.
+        // An action that does not fit had no effect.
         let action = solo.action().filter(|action| misfit(action, &space).is_none());
         action.unwrap_or_else(|| idle_action(setting.game))
     };

@@ -1,6 +1,7 @@
-//! Whether a finding can be played again at all.
+//! The check that a finding can be replayed at all.
 
 use bevy_playbot::demo::recorder::demo_actions;
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 use super::stored::StoredFinding;
@@ -9,18 +10,20 @@ use crate::{
     level_files::{LevelFileError, is_level_files},
 };
 
-/// Why a finding cannot be played again, in words.
+/// The reason why a finding cannot be replayed, in words.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("{0}")]
 pub struct Unplayable(pub String);
+
+impl HasExitCode for Unplayable {}
 
 impl StoredFinding {
     /// Checks that the game is the one that was tested, and that the level is still there.
     ///
     /// # Errors
     ///
-    /// [`Unplayable`]: another game or version, other actions, a mode that the game no longer has, a level file that is gone
-    /// or was changed.
+    /// [`Unplayable`]: another game or version, other actions, a mode that the game no longer has, a level file that is
+    /// gone or was changed.
     pub fn check_playable(&self, game: &dyn Game) -> Result<(), Unplayable> {
         let StoredFinding { header, episode, .. } = self;
         if header.game != game.name() {
@@ -57,10 +60,10 @@ impl StoredFinding {
     }
 }
 
-/// A level file that cannot be read. What is said of patterns elsewhere helps nobody here.
+/// Returns the error of a level file that cannot be read, without the general advice about patterns.
 fn gone(error: &LevelFileError) -> Unplayable {
     Unplayable(match error {
-        // It may be there, seen from where the test was run.
+        // The file may exist relative to the folder of the test.
         LevelFileError::NoFiles { pattern, folder } => format!(
             "there is no level file {pattern}, neither seen from {folder} nor from a folder above the finding: do this from \
              the folder where the test was run, or bring the recorded file back"

@@ -1,4 +1,4 @@
-//! Whether a finding is still there.
+//! The recheck of a finding.
 
 use serde::Serialize;
 
@@ -13,32 +13,32 @@ use super::{
 };
 use crate::game::Game;
 
-/// Where a finding was seen again.
+/// The tick and state in which a finding was seen again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Sighting {
-    /// Tick of the episode; `None` if nobody had to play.
+    /// Tick of the episode; `None` if the finding needs no play.
     pub tick: Option<u32>,
-    /// Hash of the state, as the head of a finding has it.
+    /// Hash of the state, in the form of a finding's head.
     pub state_hash: Option<u32>,
 }
 
-/// What came of playing a finding again.
+/// The result of replaying a finding.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recheck {
-    /// Where it was seen, if it was.
+    /// The sighting, if there was one.
     pub sighting: Option<Sighting>,
-    /// What came of the episode.
+    /// The replayed episode.
     pub replayed: Replayed,
 }
 
 impl Recheck {
-    /// Whether it happened exactly as stored.
+    /// Returns whether it happened exactly as stored.
     pub fn is_same(&self, finding: &StoredFinding) -> bool {
         let (tick, state_hash) = (finding.head.tick, finding.head.state_hash);
         self.sighting == Some(Sighting { tick, state_hash })
     }
 
-    /// What became of it.
+    /// Returns its status.
     pub fn status(&self, finding: &StoredFinding) -> FindingStatus {
         match self.sighting {
             None => FindingStatus::Gone,
@@ -48,11 +48,11 @@ impl Recheck {
     }
 }
 
-/// Plays a finding's actions in a World of their own, and looks for it.
+/// Replays a finding's actions in a World of their own, and runs its check.
 ///
 /// # Errors
 ///
-/// [`Unplayable`]: another game or version, a level that is no longer there, or a detector that has no check.
+/// [`Unplayable`]: another game or version, a level that no longer exists, or a detector without a check.
 pub fn recheck(game: &dyn Game, finding: &StoredFinding, checks: &Checks) -> Result<Recheck, Unplayable> {
     let StoredFinding { header, head, episode } = finding;
     let check = checks.of_finding(game, head).ok_or_else(|| {

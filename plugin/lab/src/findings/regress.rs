@@ -1,4 +1,4 @@
-//! Playing all findings of a folder again.
+//! The replay of all findings of a folder.
 
 use std::path::{Path, PathBuf};
 
@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{game::Game, games::Games, parallel::on_threads};
 
-/// What is played again, and how.
+/// The folder of findings, and the settings of their replay.
 pub struct Regress<'a> {
     /// Folder with findings.
     pub folder: &'a Path,
@@ -24,13 +24,13 @@ pub struct Regress<'a> {
     pub games: &'a Games<'a>,
     /// Checks of the detectors of a game.
     pub checks: &'a (dyn Fn(&dyn Game) -> Checks + Sync),
-    /// The day for which pins are asked.
+    /// The day on which pins must hold.
     pub today: Date,
-    /// Threads: not part of the result.
+    /// Threads. They change no result.
     pub threads: usize,
 }
 
-/// A finding that was played again.
+/// A replayed finding.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RegressRow {
     /// Its name: that of its file, without the ending.
@@ -41,56 +41,57 @@ pub struct RegressRow {
     pub game: Option<String>,
     /// The level.
     pub level: Option<String>,
-    /// What found it.
+    /// Name of the detector.
     pub detector: Option<String>,
-    /// Who played, if somebody had to.
+    /// The tester, if the finding needs one.
     pub tester: Option<String>,
-    /// What became of it.
+    /// Its status.
     pub status: FindingStatus,
-    /// Why, or what is wrong.
+    /// The reason or the message.
     pub message: String,
-    /// Where it was seen now.
+    /// The new sighting.
     pub seen: Option<Sighting>,
     /// Its pin, if it has one.
     pub pin: Option<PinState>,
 }
 
 impl RegressRow {
-    /// Whether it is a reason to complain: it is still there or cannot be played, and no pin holds.
+    /// Returns whether it is an alarm: it still happens or cannot be played, and no pin holds.
     pub fn is_alarm(&self) -> bool {
         let is_pinned = self.pin.as_ref().is_some_and(|pin| !pin.expired);
         self.status != FindingStatus::Gone && !is_pinned
     }
 }
 
-/// What became of all findings of a folder.
+/// The results of all findings of a folder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Regression {
     /// Each finding, in the order of their names.
     pub rows: Vec<RegressRow>,
     /// Names of pins that no finding has.
     pub unknown_pins: Vec<String>,
-    /// Findings that were not played, since somebody asked to stop.
+    /// Findings that were not replayed, because the caller stopped.
     pub left: u64,
 }
 
 impl Regression {
-    /// Whether there is something to complain about.
+    /// Returns whether there are alarms.
     pub fn has_alarms(&self) -> bool {
         self.rows.iter().any(RegressRow::is_alarm)
     }
 }
 
-/// Plays all findings of a folder again, on several threads. `progress` hears each that is done.
+/// Replays all findings of a folder, on several threads. `progress` receives each one that is done.
 ///
 /// # Errors
 ///
-/// There are none, or the pins cannot be understood. What is wrong with a single finding is told in its row.
+/// There are no findings, or the pins cannot be parsed. Errors of a single finding are in its row.
 pub fn regress(request: &Regress, progress: &(dyn Fn(u64) + Sync)) -> Result<Regression, FindingError> {
     regress_until(request, progress, &|| false)
 }
 
-/// [`regress`], until somebody asks to stop: then the rows are those of the findings that were played by then.
+/// Replays as [`regress`] does, until the caller stops. The rows are then those of the findings that were replayed by
+/// then.
 ///
 /// # Errors
 ///
@@ -165,7 +166,7 @@ fn row(request: &Regress, name: &str, path: &Path) -> RegressRow {
     }
 }
 
-/// What is not as stored, behind a message.
+/// Returns the difference to the stored finding, as the end of a message.
 fn elsewhere(seen: Sighting, finding: &StoredFinding) -> String {
     match (seen.tick, finding.head.tick) {
         (Some(now), Some(stored)) if now != stored => format!(" (at tick {now}, stored was {stored})"),

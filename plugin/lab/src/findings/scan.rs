@@ -1,4 +1,4 @@
-//! All detectors at once, over the actions of one episode.
+//! The scan of one episode's actions with all detectors.
 
 use std::{cell::RefCell, rc::Rc, sync::Arc};
 
@@ -12,27 +12,27 @@ use super::{
 };
 use crate::{detectors::Detectors, game::Game};
 
-/// Something that a detector saw, or that broke.
+/// A message of a detector, or a panic or fault.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Seen {
+pub struct Seen {
     /// The detector; or `panic`, `fault` or `endless`.
     pub detector: &'static str,
     /// Tick of the episode.
     pub tick: u32,
-    /// What is wrong.
+    /// The message.
     pub message: String,
 }
 
-/// What came of the actions.
+/// The result of a scan.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Scan {
-    /// What was seen, in the order of the ticks; each detector tells one thing.
+pub struct Scan {
+    /// The messages, in the order of the ticks; each detector has at most one.
     pub seen: Vec<Seen>,
-    /// What came of the episode, if it ended.
+    /// The result of the episode, if it ended.
     pub end: Option<EpisodeResult>,
 }
 
-/// Plays actions on a level, up to their end or that of the episode, with all detectors that look tick by tick.
+/// Plays actions on a level, up to their end or that of the episode, with all detectors that watch tick by tick.
 pub(crate) fn scan(
     game: &dyn Game,
     mode: &str,
@@ -53,7 +53,7 @@ pub(crate) fn scan(
             notes.borrow_mut().extend(note);
             is_silent
         });
-        // Whatever was seen, others may see more.
+        // Other detectors may still see more.
         None
     });
     let replayed = play_actions(Setting { game, mode, level, seed }, actions, Some(watcher));
@@ -70,7 +70,7 @@ pub(crate) fn scan(
 mod tests {
     use super::*;
     use crate::{
-        bugs::score::testing::{Corridor, Rule, to_the_goal},
+        corridor::{Corridor, Rule, to_the_goal},
         detectors::DetectorChoice,
     };
 

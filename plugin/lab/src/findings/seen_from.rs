@@ -1,4 +1,4 @@
-//! Findings on level files that are seen from another folder than that of the test.
+//! Findings on level files that are replayed from another folder than that of the test.
 
 use std::path::{Path, PathBuf};
 
@@ -9,9 +9,9 @@ use crate::{
 };
 
 impl StoredFinding {
-    /// The finding in this file, with its level file where it is found: level files are named as seen from the folder where a
-    /// test was run. One that is not there as seen from the current folder is looked for in each folder above the finding,
-    /// and taken if it holds the level that was recorded. Otherwise nothing changes.
+    /// Returns the finding of this file with the right path of its level file. Level files are named relative to the
+    /// folder of the test. A level file that is not in the current folder is searched for in each folder above the
+    /// finding. It is accepted if it has the recorded level. Otherwise nothing changes.
     #[must_use]
     pub fn seen_from(mut self, game: &dyn Game, file: &Path) -> Self {
         if let Some(mode) = self.mode_above(game, file) {
@@ -21,7 +21,8 @@ impl StoredFinding {
         self
     }
 
-    /// With mode, number and file of another finding's level: what is written names the level as the test did.
+    /// Replaces mode, number and file of the level by those of another finding, so that the level has the name from the
+    /// test.
     #[must_use]
     pub fn with_level_of(mut self, other: &Self) -> Self {
         self.header.mode.clone_from(&other.header.mode);
@@ -30,7 +31,7 @@ impl StoredFinding {
         self
     }
 
-    /// The mode of the level file in a folder above this file.
+    /// Returns the mode of the level file in a folder above this file.
     fn mode_above(&self, game: &dyn Game, file: &Path) -> Option<String> {
         let recorded = self.episode.level_file.as_ref().filter(|_| is_level_files(&self.header.mode))?;
         let path = Path::new(&recorded.path);
@@ -42,7 +43,7 @@ impl StoredFinding {
         candidates.filter(|candidate| candidate.is_file()).find_map(|candidate: PathBuf| {
             let mode = level_files_mode(candidate.to_str()?);
             let designs = read_level_designs(game, &mode).ok()?;
-            // A file of that name may hold another level.
+            // A file of that name may contain another level.
             (designs.hash(0) == Some(recorded.hash)).then_some(mode)
         })
     }
@@ -56,12 +57,12 @@ mod tests {
 
     use super::*;
     use crate::{
-        bugs::score::testing::{Corridor, to_the_goal},
+        corridor::{Corridor, to_the_goal},
         findings::{Checks, FindingHead, recheck},
         level_files::LevelDesign,
     };
 
-    /// Where no file is, as seen from the folder of this test.
+    /// A path without a file, relative to the folder of this test.
     const LEVEL: &str = "lv-of-another-folder/a.json";
 
     #[test]

@@ -1,4 +1,4 @@
-//! Settings of detectors under which findings were made.
+//! The settings of detectors with which findings were made.
 
 use super::{check::Check, checks::Checks, head::FindingHead};
 use crate::{
@@ -7,7 +7,7 @@ use crate::{
 };
 
 impl Checks {
-    /// Notes how detectors are set. What was known of them before no longer counts.
+    /// Replaces the settings of detectors.
     pub(super) fn with_records(mut self, records: &[String], asked: &[String]) -> Self {
         self.records.retain(|old| !records.iter().any(|new| name_of(new) == name_of(old)));
         self.records.extend_from_slice(records);
@@ -15,7 +15,7 @@ impl Checks {
         self
     }
 
-    /// The settings of a detector that are not the usual ones, as `name.key=value`.
+    /// Returns the settings of a detector that differ from the default, as `name.key=value`.
     pub(super) fn settings_of(&self, game: &dyn Game, detector: &str) -> Vec<String> {
         let Some(record) = self.records.iter().find(|record| name_of(record) == detector) else { return Vec::new() };
         let usual = list(game).into_iter().find(|known| known.name == detector);
@@ -26,23 +26,24 @@ impl Checks {
         values.map(|value| format!("{detector}.{value}")).collect()
     }
 
-    /// The settings of a detector that somebody asked for, usual ones included.
+    /// Returns the settings of a detector that the caller asked for, default ones included.
     fn asked_of(&self, detector: &str) -> Vec<String> {
         let is_own = |text: &&String| text.split_once('.').is_some_and(|(name, _)| name == detector);
         self.asked.iter().filter(is_own).cloned().collect()
     }
 
-    /// The check of a finding: its detector is set as it was when it found this, but for what is set in another way here.
+    /// Returns the check of a finding: its detector has the settings of the finding, except for those that are set
+    /// here.
     pub(super) fn of_finding(&self, game: &dyn Game, head: &FindingHead) -> Option<Check> {
         let check = self.of(&head.detector)?;
         let has_settings = matches!(check, Check::Detector(_) | Check::WholeLevel(_));
         if head.settings.is_empty() || !has_settings {
             return Some(check);
         }
-        // The last one counts.
+        // The last one wins.
         let settings = [head.settings.clone(), self.asked_of(&head.detector)].concat();
         let choice = DetectorChoice { with: vec!["all".to_owned()], settings, ..DetectorChoice::default() };
-        // A setting that the detector no longer has cannot be used.
+        // A setting that the detector no longer has is ignored.
         let set = Detectors::choose(game, &choice).ok();
         let set = set.and_then(|all| Self::default().with_detectors(&all).of(&head.detector));
         Some(set.unwrap_or(check))
@@ -59,7 +60,7 @@ mod tests {
 
     use super::*;
     use crate::{
-        bugs::score::testing::{Corridor, Rule},
+        corridor::{Corridor, Rule},
         findings::{FindingStatus, StoredFinding, recheck},
     };
 
@@ -83,7 +84,7 @@ mod tests {
 
     #[test]
     fn a_finding_is_looked_for_as_it_was_found_unless_somebody_says_otherwise() {
-        // Whoever walks against the end of the corridor changes nothing.
+        // Walking against the end of the corridor changes nothing.
         let game = Corridor { rule: Rule::NoExit };
         let actions: Vec<ActionValue> = [1, 2].repeat(10).into_iter().map(ActionValue::Discrete).collect();
         let strict = set(&["frozen-world.ticks=8"]);

@@ -18,16 +18,16 @@ use bevy_playbot::{
 use super::{breakage::Breakage, moment::Moment};
 use crate::{detectors::Ear, ended_episodes::EndedEpisodes, eval::Player, game::Game, worlds::build_observing_world};
 
-/// Ticks after which an episode counts as one that never ends, as in tests of levels.
+/// Ticks after which an episode counts as endless, as in tests of levels.
 const MOST_TICKS: u32 = 1_000_000;
 
-/// Which episode is played.
+/// The episode to play.
 #[derive(Clone, Copy)]
 pub(super) struct Setting<'a> {
     pub game: &'a dyn Game,
     pub mode: &'a str,
     pub level: u64,
-    /// Seed of the agent's streams.
+    /// Random seed of the agent.
     pub seed: u64,
 }
 
@@ -40,18 +40,18 @@ pub(super) struct Solo<'a> {
     agent: Entity,
     /// Ticks of the episode so far.
     ticks: u32,
-    /// Ticks and frames of the World: a level need not ever be ready.
+    /// Ticks and frames of the World: a level may never be ready.
     runs: u32,
-    /// Hears what is logged, if somebody wants to know.
+    /// Collects errors of the log, if they are needed.
     ear: Option<Ear>,
-    /// What it heard in the last tick, and while the level was made ready before it.
+    /// The errors of the last tick, and of the level's loading before it.
     errors: Vec<String>,
     /// Whether the last run was a tick of the episode.
     was_tick: bool,
 }
 
 impl<'a> Solo<'a> {
-    /// A World as tests of levels build it, with an agent for whom somebody else writes the actions.
+    /// Builds a World as tests of levels do, with an agent whose actions the caller sets.
     pub fn new(setting: Setting<'a>, observation_config: &ObservationConfig) -> Result<Self, VisionError> {
         let Setting { game, mode, level, seed } = setting;
         let (mut world, agents) = build_observing_world(game, mode, observation_config, 0, 0, 1)?;
@@ -67,7 +67,7 @@ impl<'a> Solo<'a> {
         Ok(Self { game, mode, level, world, agent, ticks: 0, runs: 0, ear, errors, was_tick: false })
     }
 
-    /// From here on hears what is logged as an error.
+    /// Collects errors of the log from now on.
     pub fn listen(&mut self) {
         self.ear = Some(Ear::new());
     }
@@ -79,12 +79,12 @@ impl<'a> Solo<'a> {
         player.install(&mut self.world);
     }
 
-    /// Says what the agent does in the next tick.
+    /// Sets the agent's next action.
     pub fn act(&mut self, action: ActionValue) {
         self.world.entity_mut(self.agent).insert(Action(action));
     }
 
-    /// Plays on; whether that was a tick of the episode. A level that is made ready has none.
+    /// Runs the World. Returns whether that was a tick of the episode: a level that is still loading has no ticks.
     pub fn tick(&mut self) -> Result<bool, Breakage> {
         if let Some(endless) = self.endless() {
             return Err(endless);
@@ -109,39 +109,39 @@ impl<'a> Solo<'a> {
         Ok(is_tick)
     }
 
-    /// Ticks of the episode so far.
+    /// Returns the ticks of the episode so far.
     pub fn ticks(&self) -> u32 {
         self.ticks
     }
 
-    /// What it means that so many ticks have been played, if anything.
+    /// Returns the breakage if this many ticks mean that the episode is endless.
     pub fn endless(&self) -> Option<Breakage> {
         (self.ticks >= MOST_TICKS || self.runs >= 2 * MOST_TICKS).then(|| Breakage::endless(MOST_TICKS))
     }
 
-    /// What came of the episode, once it is over.
+    /// Returns the result of the episode, once it is over.
     pub fn end(&self) -> Option<EpisodeResult> {
         EndedEpisodes::of(&self.world).last().map(|(_, result)| *result)
     }
 
-    /// What the agent did in the last tick.
+    /// Returns the agent's action in the last tick.
     pub fn action(&self) -> Option<ActionValue> {
         self.world.get::<Action>(self.agent).map(|action| action.0.clone())
     }
 
-    /// Reward and state hash of the last tick.
+    /// Returns reward and state hash of the last tick.
     pub fn outcome(&self) -> (f32, u32) {
         let reward = self.world.get::<Reward>(self.agent).map_or(0.0, Reward::get);
         let hash = self.world.get::<StateHash>(self.agent).map_or(0, StateHash::folded);
         (reward, hash)
     }
 
-    /// The file of the level, where levels are files.
+    /// Returns the file of the level, for levels from files.
     pub fn level_file(&self) -> Option<LevelFile> {
         self.world.get_resource::<LevelFiles>()?.of(self.level).cloned()
     }
 
-    /// The World after its last tick.
+    /// Returns the World after its last tick.
     pub fn moment(&self) -> Moment<'_> {
         let (tick, end) = (self.ticks.saturating_sub(1), self.end());
         let (game, mode, world, agent) = (self.game, self.mode, &self.world, self.agent);

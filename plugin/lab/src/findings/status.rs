@@ -1,8 +1,8 @@
-//! What became of a finding.
+//! The status of a replayed finding.
 
 use serde::Serialize;
 
-/// What became of a finding.
+/// The status of a replayed finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FindingStatus {
@@ -12,12 +12,12 @@ pub enum FindingStatus {
     Changed,
     /// It does not happen any more.
     Gone,
-    /// It cannot be played: the level no longer exists, the game is another one, or the file is damaged.
+    /// It cannot be played: the level no longer exists, the game differs, or the file is damaged.
     Unplayable,
 }
 
 impl FindingStatus {
-    /// As files and people have it.
+    /// Returns the name in files and reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::StillThere => "still-there",

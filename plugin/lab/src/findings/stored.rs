@@ -1,7 +1,7 @@
 //! Files of findings.
 //!
 //! A file is a recording of one episode, in the format that all recordings have ([`bevy_playbot::demo::file`]): framed,
-//! checksummed, and shown by every program that shows recordings. The head of the finding is the recording's note.
+//! checksummed, and readable by every program that reads recordings. The head of the finding is the recording's note.
 
 use std::{io, path::Path};
 
@@ -29,23 +29,23 @@ use crate::game::Game;
 pub struct StoredFinding {
     /// Game, version, mode and kind of actions. The note is written from the head.
     pub header: DemoHeader,
-    /// What was found.
+    /// The description of the finding.
     pub head: FindingHead,
-    /// The episode up to the tick of the finding; without ticks if nobody had to play.
+    /// The episode up to the tick of the finding; without ticks if the finding needs no play.
     pub episode: DemoEpisode,
 }
 
-/// What is read of a head before its form is known.
+/// The part of a head that is read before its form is known.
 #[derive(Deserialize)]
 struct FormOnly {
     finding: u32,
 }
 
 impl StoredFinding {
-    /// Plays actions on a level and looks for the finding with its detector's check. What follows its tick is cut off; tick,
-    /// state hash and, if none is known, original length are put into the head.
+    /// Plays actions on a level and searches for the finding with its detector's check. Later ticks are cut off. The
+    /// head gets tick, state hash and, if it is unknown, original length.
     ///
-    /// `None` if it is not there, or nobody has a check of that name.
+    /// `None` if the finding does not happen, or there is no check of that name.
     pub fn of_actions(
         game: &dyn Game,
         mode: &str,
@@ -59,7 +59,7 @@ impl StoredFinding {
         is_there.then(|| Self::of_replay(setting, head, actions, replayed, tick))
     }
 
-    /// What was found in actions that were played.
+    /// Creates a finding from replayed actions.
     pub(super) fn of_replay(
         setting: Setting,
         mut head: FindingHead,
@@ -77,7 +77,7 @@ impl StoredFinding {
         let mut header = game.demo_header(mode);
         header.demonstrator = head.tester.clone().unwrap_or_default();
         let end = replayed.end.filter(|end| end.ticks as usize == ticks).map(|end| end.end);
-        // The tick in which a game breaks pays nothing and leaves no state.
+        // A tick in which a game breaks has no reward and no state.
         let mut rewards: Vec<f32> =
             replayed.rewards.iter().map(|reward| if reward.is_finite() { *reward } else { 0.0 }).collect();
         rewards.resize(ticks, 0.0);
@@ -97,7 +97,7 @@ impl StoredFinding {
         Self { header, head, episode }
     }
 
-    /// The actions, one for each tick.
+    /// Returns the actions, one for each tick.
     pub fn actions(&self) -> Vec<ActionValue> {
         listed(&self.episode.actions)
     }
@@ -106,7 +106,7 @@ impl StoredFinding {
     ///
     /// # Errors
     ///
-    /// It is no recording, damaged, or a recording without the head of a finding.
+    /// It is not a recording, damaged, or a recording without the head of a finding.
     pub fn read(path: &Path) -> Result<Self, FindingError> {
         let reader = DemoReader::open(path)?;
         let header = reader.header().clone();
@@ -120,11 +120,11 @@ impl StoredFinding {
         }
     }
 
-    /// Writes a file, whole or not at all; one that is there is replaced. The same finding gives the same bytes.
+    /// Writes a file atomically, and replaces an existing one. The same finding gives the same bytes.
     ///
     /// # Errors
     ///
-    /// The disk fails.
+    /// The system cannot write.
     pub fn write(&self, path: &Path) -> Result<(), FindingError> {
         let fresh = disk::temporary_name(path);
         let written = self.write_new(&fresh).and_then(|()| disk::rename(&fresh, path).map_err(io_error("write", path)));
@@ -146,7 +146,7 @@ impl StoredFinding {
 
 fn head_of(path: &Path, header: &DemoHeader) -> Result<FindingHead, FindingError> {
     let DemoHeader { note, game, .. } = header;
-    // What the parser says helps nobody: notes of recordings are free text.
+    // The parser's message is useless here: notes of recordings are free text.
     let none = |_: ron::error::SpannedError| FindingError::NoFinding { path: path.into(), game: game.clone() };
     let FormOnly { finding } = ron::from_str(note).map_err(none)?;
     if finding > HEAD_FORMAT {

@@ -1,10 +1,10 @@
-//! What a game's own systems may return.
+//! The return types of a game's own systems.
 
 use bevy_playbot::action::ActionValue;
 
 /// Values of an observation.
 pub trait IntoValues: 'static {
-    /// The values in their order.
+    /// Returns the values in their order.
     fn into_values(self) -> Vec<f32>;
 }
 
@@ -20,9 +20,9 @@ impl IntoValues for Vec<f32> {
     }
 }
 
-/// What a demonstrator wants to do.
+/// The action of a demonstrator.
 pub trait IntoActionValue: 'static {
-    /// The action.
+    /// Returns the action.
     fn into_action(self) -> ActionValue;
 }
 
@@ -40,7 +40,7 @@ impl IntoActionValue for u32 {
 
 impl IntoActionValue for usize {
     fn into_action(self) -> ActionValue {
-        // What does not fit is refused as an action that does not exist.
+        // An invalid number is refused as an action that does not exist.
         ActionValue::Discrete(u32::try_from(self).unwrap_or(u32::MAX))
     }
 }

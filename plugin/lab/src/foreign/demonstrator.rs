@@ -1,11 +1,11 @@
-//! A scripted bot that sees the World.
+//! The scripted bot of a foreign game.
 
 use bevy::prelude::*;
 
 use super::runtime::{playing_agent, with_foreign};
 use bevy_playbot::{action::Action, agent::Agent, bot::with_noise, control::Control, streams::AgentStreams};
 
-/// The agent is played by the game's demonstrator while its control is [`Control::Bot`].
+/// Marks an agent that the game's demonstrator plays while its control is [`Control::Bot`].
 #[derive(Component, Clone, Copy, Debug, Reflect)]
 #[reflect(Component)]
 pub(super) struct ForeignBot {

@@ -1,4 +1,4 @@
-//! Systems of a game's description: one for each World that is built.
+//! Factories of the systems in a game's description, with one system for each World.
 
 use std::{any::type_name, sync::Arc};
 
@@ -9,7 +9,7 @@ use bevy::{
 
 use bevy_playbot::system_errors;
 
-/// Makes a system as often as it is needed.
+/// A factory of copies of a system.
 pub(super) struct SystemFactory<Out: 'static> {
     name: &'static str,
     make: Arc<dyn Fn() -> BoxedSystem<(), Out> + Send + Sync>,
@@ -22,7 +22,7 @@ impl<Out: 'static> Clone for SystemFactory<Out> {
 }
 
 impl<Out: 'static> SystemFactory<Out> {
-    /// A factory of copies of `system`, whose output is converted.
+    /// Creates a factory of copies of `system`, whose output is converted.
     pub(super) fn new<S, Given, M>(system: S, convert: fn(Given) -> Out) -> Self
     where
         S: IntoSystem<(), Given, M> + Clone + Send + Sync + 'static,
@@ -35,12 +35,12 @@ impl<Out: 'static> SystemFactory<Out> {
         Self { name: type_name::<S>(), make: Arc::new(make) }
     }
 
-    /// Name of the system, for messages.
+    /// Returns the name of the system, for messages.
     pub(super) fn name(&self) -> &'static str {
         self.name
     }
 
-    /// A system for one World.
+    /// Creates a system for one World.
     pub(super) fn make(&self) -> OwnedSystem<Out> {
         OwnedSystem { name: self.name, system: (self.make)(), is_initialized: false }
     }
@@ -54,11 +54,11 @@ pub(super) struct OwnedSystem<Out: 'static> {
 }
 
 impl<Out: 'static> OwnedSystem<Out> {
-    /// Runs the system; `None` if it is skipped, since an entity that it asks for does not exist.
+    /// Runs the system; `None` if it is skipped, because an entity that it asks for does not exist.
     ///
     /// # Errors
     ///
-    /// Why it cannot run, in words.
+    /// The reason why it cannot run, in words.
     pub(super) fn run(&mut self, world: &mut World) -> Result<Option<Out>, String> {
         if !self.is_initialized {
             self.system.initialize(world);
@@ -73,11 +73,11 @@ impl<Out: 'static> OwnedSystem<Out> {
         }
     }
 
-    /// [`run`](Self::run) where a system that is skipped is an error.
+    /// Runs the system as [`run`](Self::run) does, where skipping is an error.
     ///
     /// # Errors
     ///
-    /// Why it cannot run, in words.
+    /// The reason why it cannot run, in words.
     pub(super) fn demand(&mut self, world: &mut World) -> Result<Out, String> {
         let name = self.name;
         self.run(world)?.ok_or_else(|| {

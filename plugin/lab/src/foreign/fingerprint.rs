@@ -1,11 +1,12 @@
-//! A hash of a game whose state nobody has described.
+//! The default state hash of a foreign game.
 
 use bevy::prelude::*;
 
 use super::kept::Baseline;
 use bevy_playbot::{observation::Observation, reward::Reward, state_hash::StateHash};
 
-/// A hash of where everything of the game is. Neither the numbers of entities nor their order in memory count.
+/// Returns a hash of the transforms of all entities of the game. The ids of entities and their order in memory do not
+/// matter.
 pub(super) fn of_transforms(world: &World, baseline: &Baseline) -> u64 {
     let mut sum = 0_u64;
     for entity in baseline.spawned(world) {
@@ -20,7 +21,7 @@ pub(super) fn of_transforms(world: &World, baseline: &Baseline) -> u64 {
     sum
 }
 
-/// The hash of the state, with what the agent saw and got.
+/// Returns the hash of the state, with the agent's observation and reward.
 pub(super) fn with_agent(state: u64, observation: Option<&Observation>, reward: Option<&Reward>) -> u64 {
     let reward = reward.map_or(0, |reward| u64::from(reward.get().to_bits()));
     let seen = observation.into_iter().flat_map(|seen| seen.vector.iter().map(|value| u64::from(value.to_bits())));

@@ -1,4 +1,4 @@
-//! What the agent of a foreign game does.
+//! The input of a foreign game's agent.
 
 use bevy::prelude::*;
 
@@ -10,35 +10,35 @@ use bevy_playbot::{
     virtual_input::{ActionAxis, HeldInput, UnknownInput, VirtualButton, VirtualInput},
 };
 
-/// The way from an action into the game, part by part: in which order they were said does not matter.
+/// The parts of the path from an action into the game, set in any order.
 #[derive(Clone, Default)]
 pub(super) struct Input {
-    /// The keys of each discrete action; other buttons among them, where they were said by name.
+    /// The keys of each discrete action, and other buttons that were set by name.
     pub(super) keys: Vec<Vec<VirtualButton>>,
-    /// The first name that no key has, and its action.
+    /// The first unknown name of a key, and its action.
     pub(super) unknown_key: Option<(usize, UnknownInput)>,
     /// The mouse buttons of each discrete action.
     pub(super) mouse: Vec<Vec<MouseButton>>,
     /// The gamepad buttons of each discrete action.
     pub(super) pads: Vec<Vec<GamepadButton>>,
-    /// What each value of a continuous action moves.
+    /// The axis that each value of a continuous action moves.
     pub(super) axes: Option<Vec<ActionAxis>>,
-    /// What was said as a whole.
+    /// The complete input, if it was set as a whole.
     pub(super) whole: Option<VirtualInput>,
-    /// For games that a system of their own hands actions to.
+    /// The actions of games with a system of their own for them.
     pub(super) space: Option<ActionSpace>,
     /// Names of the actions.
     pub(super) names: Vec<String>,
 }
 
 impl Input {
-    /// Takes the keys of each action.
+    /// Sets the keys of each action.
     pub(super) fn set_keys(&mut self, sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>) {
         self.keys = sets.into_iter().map(|set| set.into_iter().map(VirtualButton::Key).collect()).collect();
         self.unknown_key = None;
     }
 
-    /// Takes the keys of each action by their names. A name that no key has becomes the [`problem`](Self::problem).
+    /// Sets the keys of each action by their names. An unknown name becomes the [`problem`](Self::problem).
     pub(super) fn name_keys(&mut self, sets: impl IntoIterator<Item = impl IntoIterator<Item = impl AsRef<str>>>) {
         (self.keys, self.unknown_key) = (Vec::new(), None);
         for (action, names) in sets.into_iter().enumerate() {
@@ -60,7 +60,7 @@ impl Input {
         self.space.or_else(pressed).unwrap_or(ActionSpace::Discrete(0))
     }
 
-    /// What the parts press together; none for a game that nothing is pressed in.
+    /// Returns the input that the parts press together; `None` for a game in which nothing is pressed.
     pub(super) fn pressed(&self) -> Option<VirtualInput> {
         let is_discrete = !(self.keys.is_empty() && self.mouse.is_empty() && self.pads.is_empty());
         let base = match (&self.whole, &self.axes) {
@@ -75,8 +75,8 @@ impl Input {
         }
     }
 
-    /// What is wrong with what was said of the input: a key does not exist, or parts do not go together. To be read after
-    /// the name of the game.
+    /// Returns the problem of the input: an unknown key, or parts that contradict each other. The text follows the name
+    /// of the game.
     pub(super) fn problem(&self) -> Option<String> {
         if let Some((action, unknown)) = &self.unknown_key {
             return Some(format!("names a key that does not exist, in action {action}: {unknown}"));
@@ -85,10 +85,7 @@ impl Input {
             [("`.keys`", !self.keys.is_empty()), ("`.axes`", self.axes.is_some()), ("`.input`", self.whole.is_some())];
         let said: Vec<&str> = said.into_iter().filter_map(|(name, is_said)| is_said.then_some(name)).collect();
         if said.len() > 1 {
-            return Some(format!(
-                "has {}, and each of them says what every action does: choose one",
-                said.join(" and ")
-            ));
+            return Some(format!("has {}, and each of them declares every action: keep one", said.join(" and ")));
         }
         let buttons = if self.mouse.is_empty() { "`.gamepad_buttons`" } else { "`.mouse_buttons`" };
         let has_buttons = !(self.mouse.is_empty() && self.pads.is_empty());
@@ -101,7 +98,7 @@ impl Input {
         })
     }
 
-    /// Names as given, or those of the keys.
+    /// Returns the names that were set, or those of the keys.
     pub(super) fn names(&self) -> Vec<String> {
         let of_keys = |keys: &Vec<VirtualButton>| match keys.as_slice() {
             [] => "nothing".to_owned(),
@@ -111,7 +108,7 @@ impl Input {
         if is_of_keys { self.keys.iter().map(of_keys).collect() } else { self.names.clone() }
     }
 
-    /// What a person's keys mean: for games that are played with nothing else.
+    /// Returns the keys of a person: for games that are played with keys alone.
     pub(super) fn bindings(&self) -> Option<KeyBindings> {
         let key = |button: &VirtualButton| match button {
             VirtualButton::Key(key) => Some(*key),
@@ -126,7 +123,7 @@ impl Input {
     }
 }
 
-/// Lets a game's own system hand the action on, for everybody but people, who have their own devices.
+/// Lets the game's own system pass the action on, except for people, who have their own devices.
 pub(super) fn act(world: &mut World) {
     let Some(agent) = playing_agent(world) else { return };
     if world.get(agent) == Some(&Control::Human) {

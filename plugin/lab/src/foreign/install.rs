@@ -1,4 +1,4 @@
-//! Adding a foreign game to an app.
+//! The plugin that adds a foreign game to an app.
 
 use bevy::{app::MainScheduleOrder, ecs::schedule::ScheduleLabel, prelude::*};
 
@@ -24,7 +24,7 @@ use bevy_playbot::{
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 struct BeforeGame;
 
-/// The game, with what stands between it and its agent.
+/// The game, with the systems between it and its agent.
 pub(super) struct ForeignPlugin(pub(super) ForeignGame);
 
 impl Plugin for ForeignPlugin {
@@ -44,9 +44,9 @@ impl Plugin for ForeignPlugin {
             decide,
             (
                 ready::check.in_set(PlaybotSystems::Load),
-                // An agent is decided for by one alone, so it does not matter who decides for which agent first.
+                // Each agent has one controller, so the order of the controllers does not matter.
                 demonstrator::decide.in_set(PlaybotSystems::Decide).ambiguous_with(PlaybotSystems::Decide),
-                // What the game's own system does is pressed by nobody else.
+                // No other system presses the inputs of the game's own system.
                 input::act
                     .in_set(PlaybotSystems::Act)
                     .after(check_actions)
@@ -69,7 +69,7 @@ impl Plugin for ForeignPlugin {
     }
 }
 
-/// Lets the game add itself. Its panic is a fault of the first tick, so that it is told as the game's.
+/// Adds the game. Its panic becomes a fault of the first tick, so that it is reported as the game's.
 fn add_game(app: &mut App, name: &str, plugin: &dyn Fn(&mut App)) {
     let Err(words) = panics::hear(|| plugin(app)) else { return };
     let mut fault = format!("the game `{name}` panicked when it was added to the app: {words}");
@@ -80,7 +80,7 @@ fn add_game(app: &mut App, name: &str, plugin: &dyn Fn(&mut App)) {
     app.world_mut().resource_mut::<Faults>().report(fault);
 }
 
-/// Whatever is there now is not the game's.
+/// Marks all current entities as not the game's.
 fn note_baseline(world: &mut World) {
     let baseline = Baseline::of(world);
     if let Some(cell) = world.get_resource::<ForeignCell>().cloned() {

@@ -1,4 +1,4 @@
-//! Which entities are the game's, and which were there before it or belong to others.
+//! The distinction of the game's entities from those that were there before it, or belong to the plugin.
 
 use std::any::TypeId;
 
@@ -11,17 +11,17 @@ use bevy::{
 
 use bevy_playbot::agent::Agent;
 
-/// A World before its game has begun: what is there later and was not there then belongs to the game.
+/// A World before its game has started. Later entities belong to the game.
 pub(super) struct Baseline {
     entities: EntityHashSet,
-    /// Components of entities that never belong to the game, where they exist.
+    /// Components of entities that never belong to the game, if they exist.
     kept: Vec<TypeId>,
-    /// Components of roots of scenes. What is beneath them comes when its file is loaded, and not in a certain tick.
+    /// Components of roots of scenes. The entities below them appear when their file is loaded, not in a fixed tick.
     scenes: Vec<ComponentId>,
 }
 
 impl Baseline {
-    /// To be made before the first systems of the game run.
+    /// Creates the baseline. Call it before the first systems of the game run.
     pub(super) fn of(world: &mut World) -> Self {
         let kept = vec![
             TypeId::of::<Agent>(),
@@ -36,15 +36,15 @@ impl Baseline {
         Self { entities: all(world).collect(), kept, scenes: scene_roots(world) }
     }
 
-    /// Everything that the game has spawned, in the order in which it is stored.
+    /// Returns all entities that the game has spawned, in the order of their storage.
     pub(super) fn spawned(&self, world: &World) -> Vec<Entity> {
         let kept: Vec<ComponentId> = self.kept.iter().filter_map(|id| world.components().get_id(*id)).collect();
         let is_kept = |entity: Entity| kept.iter().any(|&component| world.entity(entity).contains_id(component));
         all(world).filter(|entity| !self.entities.contains(entity) && !is_kept(*entity)).collect()
     }
 
-    /// Whether an entity of the game is where and when the game wants it: not part of a scene, which comes when its file is
-    /// loaded.
+    /// Returns whether the game itself decides when and where an entity appears. Parts of a scene do not count: they
+    /// appear when their file is loaded.
     pub(super) fn is_placed(&self, world: &World, entity: Entity) -> bool {
         let mut entity = entity;
         while let Some(parent) = world.get::<ChildOf>(entity).map(ChildOf::parent) {
@@ -62,7 +62,7 @@ fn all(world: &World) -> impl Iterator<Item = Entity> + '_ {
     archetypes.flat_map(|archetype| archetype.entities().iter().map(|entity| entity.id()))
 }
 
-/// The components that Bevy's scenes are spawned beneath, if this build has them.
+/// Returns the components of the roots of Bevy's scenes, if this build has them.
 fn scene_roots(world: &mut World) -> Vec<ComponentId> {
     let Some(registry) = world.get_resource::<AppTypeRegistry>().cloned() else { return Vec::new() };
     let registry = registry.read();

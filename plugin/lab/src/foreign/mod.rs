@@ -1,9 +1,9 @@
-//! Games that know nothing of this plugin.
+//! Games that are not written for this plugin.
 //!
-//! A [`ForeignGame`] wraps the function that adds a game to an app, as it is, and says what an agent does, sees and gets
-//! there. In such a game one tick is one frame of a fixed length, headless and in a window: whatever schedules the game
-//! uses, it runs as it always does. The agent's action presses keys before Bevy's own input systems run; reward and end
-//! are asked for in `Last`.
+//! A [`ForeignGame`] wraps the function that adds a game to an app, as it is, and declares the agent's actions,
+//! observations and rewards. In such a game one tick is one frame of a fixed length, headless and in a window: the
+//! game's own schedules run as always. The agent's action presses keys before Bevy's own input systems run; reward and
+//! end are read in `Last`.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -36,7 +36,7 @@
 //! let right = BlindBot::Constant(ActionValue::Discrete(1));
 //! world.entity_mut(agents[0]).insert((Control::Bot, right, LevelQueue::list([7])));
 //! while world.get::<Control>(agents[0]) != Some(&Control::Idle) {
-//!     world.tick().expect("the game is sound");
+//!     world.tick().expect("the game keeps its contract");
 //! }
 //! let count = world.get::<EpisodeCount>(agents[0]).expect("an agent");
 //! assert_eq!((count.finished, count.successes), (1, 1));

@@ -1,4 +1,4 @@
-//! Reward and end of a tick, as the game's state tells them.
+//! Reward and end of a tick, read from the game's state.
 
 use bevy::prelude::*;
 
@@ -12,14 +12,14 @@ use bevy_playbot::{
     state_hash::StateHash,
 };
 
-/// Asks for reward and end, when the game's frame is over.
+/// Reads reward and end, after the game's frame.
 pub(super) fn read_outcome(world: &mut World) {
     let Some(agent) = playing_agent(world) else { return };
     let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
     let outcome = with_foreign(world, agent, |world, foreign| {
         let mut reward = 0.0;
         for part in &mut foreign.rewards {
-            // What is measured on an entity that does not exist now pays nothing.
+            // A value of an entity that does not exist now pays nothing.
             let Some(value) = part.system.run(world)? else { continue };
             reward += if part.is_delta { value - part.last.unwrap_or(value) } else { value };
             part.last = Some(value);

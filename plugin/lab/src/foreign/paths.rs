@@ -1,4 +1,4 @@
-//! Observations by their paths.
+//! Observations by the paths of their values.
 
 use bevy::{
     ecs::component::ComponentId,
@@ -13,9 +13,9 @@ pub(super) struct ObservedPath {
     found: Option<Found>,
 }
 
-/// What the names of a path mean in this World.
+/// The meaning of a path in this World.
 struct Found {
-    /// The component by which the entity is found, or its `Name`.
+    /// The component or `Name` by which the entity is found.
     marker: Option<Marker>,
     /// The component that is read.
     component: ComponentId,
@@ -29,13 +29,13 @@ enum Marker {
     Name(String),
 }
 
-/// A path leads nowhere.
+/// The error of a path without a number.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
 #[error("the path `{path}` of `.observe_paths` {why}")]
 pub struct PathError {
     /// The path.
     pub path: String,
-    /// What is wrong with it.
+    /// The reason.
     pub why: String,
 }
 
@@ -44,11 +44,11 @@ impl ObservedPath {
         Self { path: path.to_owned(), found: None }
     }
 
-    /// The number, now.
+    /// Returns the current number.
     ///
     /// # Errors
     ///
-    /// [`PathError`] if nothing, or more than one thing, is at the path, or no number.
+    /// [`PathError`] if the path has no value, several, or one that is not a number.
     pub(super) fn read(&mut self, world: &mut World) -> Result<f32, PathError> {
         let path = self.path.clone();
         self.look_up(world).map_err(|why| PathError { path, why })
@@ -63,7 +63,7 @@ impl ObservedPath {
         let entity = found.entity(world)?;
         let value = found.reflect.reflect(world.entity(entity)).ok_or("leads to a component that is not there")?;
         let at = value.reflect_path(found.field.as_str()).map_err(|error| format!("leads nowhere: {error}"))?;
-        number(at).ok_or_else(|| format!("leads to a {}, which is no number", at.reflect_short_type_path()))
+        number(at).ok_or_else(|| format!("leads to a {}, which is not a number", at.reflect_short_type_path()))
     }
 }
 
@@ -89,7 +89,7 @@ impl Found {
         Ok(Self { marker: None, component, reflect, field: path[first.len()..].to_owned() })
     }
 
-    /// The one entity that is meant.
+    /// Returns the one entity of the path.
     fn entity(&self, world: &World) -> Result<Entity, String> {
         let is_meant = |entity: &EntityRef| match &self.marker {
             None => true,
@@ -107,7 +107,7 @@ impl Found {
     }
 }
 
-/// A component or resource that can be read by reflection, by its short name.
+/// Returns a component or resource that can be read by reflection, by its short name.
 fn reflected(world: &mut World, name: &str) -> Option<(ComponentId, ReflectComponent)> {
     let registry = world.get_resource::<AppTypeRegistry>()?.clone();
     let registry = registry.read();
@@ -115,7 +115,8 @@ fn reflected(world: &mut World, name: &str) -> Option<(ComponentId, ReflectCompo
     Some((reflect.register_component(world), reflect))
 }
 
-/// A component by its short name: from the type registry, or by the name that Bevy keeps with its feature `debug`.
+/// Returns a component by its short name: from the type registry, or by the name that Bevy keeps with its feature
+/// `debug`.
 fn component_of(world: &World, name: &str) -> Option<ComponentId> {
     let components = world.components();
     let by_type = |may_be_ours: bool| {
@@ -129,7 +130,7 @@ fn component_of(world: &World, name: &str) -> Option<ComponentId> {
     by_type(false).or_else(by_name).or_else(|| by_type(true))
 }
 
-/// A type by its short name. Of several the game's is meant, which need not know what the plugin calls its own.
+/// Returns a type by its short name. The game's types win over the plugin's.
 fn registered<'a>(registry: &'a TypeRegistry, name: &str) -> Option<&'a TypeRegistration> {
     registry.get_with_short_type_path(name).or_else(|| {
         let named = registry.iter().filter(|known| known.type_info().type_path_table().short_path() == name);
@@ -139,12 +140,12 @@ fn registered<'a>(registry: &'a TypeRegistry, name: &str) -> Option<&'a TypeRegi
     })
 }
 
-/// Whether a type belongs to the plugin.
+/// Returns whether a type belongs to the plugin.
 fn is_ours(path: &str) -> bool {
     ["bevy_playbot::", "playbot_cli::", "playbot_lab::"].iter().any(|of| path.starts_with(of))
 }
 
-/// A number of any kind, or a truth value as 0 or 1.
+/// Converts a number of any kind, or a truth value as 0 or 1.
 fn number(value: &dyn PartialReflect) -> Option<f32> {
     if !matches!(value.reflect_ref(), ReflectRef::Opaque(_)) {
         return None;

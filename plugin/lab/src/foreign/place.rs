@@ -1,4 +1,4 @@
-//! Where the agent of a foreign game is.
+//! The position of a foreign game's agent.
 
 use bevy::prelude::*;
 
@@ -13,12 +13,12 @@ use bevy_playbot::{
     vision::VisionSystems,
 };
 
-/// Where the agent is on its level's plan. Not there while nobody knows.
+/// Position of the agent on its level's plan. Missing while it is unknown.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
 pub(super) struct ForeignPlace(pub(super) Vec2);
 
-/// Asks the game where its agent is: before each tick, so that it is known where an episode begins, and after it.
+/// Adds the systems that read the position: before each tick, so that the start of an episode is known, and after it.
 pub(super) fn build(app: &mut App) {
     let judge = TickSchedules::of(app).judge;
     app.add_systems(ObserveSchedule, locate.before(observe).before(VisionSystems::Sync))
@@ -73,13 +73,13 @@ mod tests {
         let game = snail();
         let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
         let agent = agents[0];
-        assert_eq!(game.whereabouts(&world, agent), None, "nothing is played");
+        assert_eq!(game.tools().state.position(&world, agent), None, "nothing is played");
         world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, LevelQueue::list([7, 8])));
         let mut places = Vec::new();
         for _ in 0..20 {
             world.tick().expect("sound");
             if Control::of(&world, agent).is_active() {
-                places.extend(game.whereabouts(&world, agent).map(|place| place.x));
+                places.extend(game.tools().state.position(&world, agent).map(|place| place.x));
             }
         }
         let episodes: Vec<&[f32]> = places.chunk_by(|one, next| one <= next).collect();
@@ -89,9 +89,9 @@ mod tests {
 
     #[test]
     fn plans_are_those_of_the_level_that_is_played() {
-        let goal = |level| snail().floor_plan("default", level).map(|plan| plan.goal.x);
+        let goal = |level| snail().tools().levels.floor_plan("default", level).map(|plan| plan.goal.x);
         assert_eq!([goal(1), goal(7)], [Some(1.0), Some(1.0)]);
         let bare = ForeignGame::new("bare", 1, |_: &mut App| {});
-        assert_eq!(bare.floor_plan("default", 0), None);
+        assert_eq!(bare.tools().levels.floor_plan("default", 0), None);
     }
 }

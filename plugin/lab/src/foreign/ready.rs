@@ -1,4 +1,4 @@
-//! Waiting until a level is there.
+//! The loading of a level before its first tick.
 
 use bevy::prelude::*;
 
@@ -8,7 +8,7 @@ use super::{
 };
 use bevy_playbot::episode::Episode;
 
-/// Asks the game whether its level is ready. Each restart is given one frame to settle: commands, states and transforms.
+/// Checks whether the level is ready. Each restart gets one frame to settle: commands, states and transforms.
 pub(super) fn check(world: &mut World) {
     let Some(agent) = active_agent(world) else { return };
     if !world.get::<Episode>(agent).is_some_and(Episode::is_loading) {
@@ -36,7 +36,7 @@ pub(super) fn check(world: &mut World) {
         if foreign.ready.is_some() {
             leave_loading_out(world);
         }
-        // What a reward grows from is its value before the first tick.
+        // A reward by growth starts from the value before the first tick.
         for part in foreign.rewards.iter_mut().filter(|part| part.is_delta) {
             part.last = part.system.run(world)?;
         }

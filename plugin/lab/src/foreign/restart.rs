@@ -1,4 +1,4 @@
-//! The beginning of an episode.
+//! The start of an episode.
 
 use bevy::prelude::*;
 
@@ -12,7 +12,7 @@ use bevy_playbot::{
     renewal::{EpisodeAhead, Renewal},
 };
 
-/// Begins the game anew as soon as the schedule allows it.
+/// Restarts the game as soon as the schedule allows it.
 pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, mut commands: Commands) {
     let StartEpisode { entity, level } = *event;
     if let Ok(mut episode) = episodes.get_mut(entity) {
@@ -22,7 +22,7 @@ pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, 
 }
 
 fn begin(world: &mut World, agent: Entity, level: u64) {
-    // Where the last episode ended says nothing of this one.
+    // The last position of the previous episode is stale.
     world.entity_mut(agent).remove::<ForeignPlace>();
     with_foreign(world, agent, |world, foreign| {
         world.insert_resource(LevelSeed(foreign.level_of(level)));
@@ -57,12 +57,12 @@ fn restart(world: &mut World, foreign: &mut Foreign) -> Result<(), String> {
     }
 }
 
-/// The World must have been built for this episode. Its first frames have begun the game already.
+/// Checks that the World is new. Its first frames have started the game already.
 fn demand_a_new_world(world: &mut World, foreign: &mut Foreign) -> Result<(), String> {
     let others = "`Restart::Startup`, `Restart::state` or `Restart::system`";
     if !world.contains_resource::<Renewal>() {
         return Err(format!(
-            "`Restart::Rebuild` builds a World anew, which a window's cannot be: play it without a window, or let it \
+            "`Restart::Rebuild` rebuilds the World, which is impossible in a window: play it without a window, or let it \
              restart with {others}"
         ));
     }
@@ -76,16 +76,16 @@ fn demand_a_new_world(world: &mut World, foreign: &mut Foreign) -> Result<(), St
     Ok(())
 }
 
-/// The systems of the game's start find the level.
+/// Stores the level for the systems of the game's start.
 pub(super) fn announce(event: On<EpisodeAhead>, cell: Res<ForeignCell>, mut seed: ResMut<LevelSeed>) {
     seed.0 = cell.lock().level_of(event.level);
 }
 
-/// Despawns what the game has spawned, and does again what is done once when a program starts.
+/// Despawns the game's entities, and runs the schedules of a program's start again.
 fn start_again(world: &mut World, foreign: &Foreign) {
     let Some(baseline) = &foreign.baseline else { return };
     for entity in baseline.spawned(world) {
-        // Some have gone along with their parents.
+        // Some are despawned with their parents.
         if let Ok(entity) = world.get_entity_mut(entity) {
             entity.despawn();
         }
@@ -93,13 +93,13 @@ fn start_again(world: &mut World, foreign: &Foreign) {
     world.flush();
     set_clock_back(world);
     for &label in &foreign.startup {
-        // Not every schedule that is named has been filled.
+        // Some schedules have no system.
         let _ = world.try_run_schedule(label);
     }
 }
 
-/// The clock at the start of a program: this frame has no length, and the next one is the first that has. Fixed steps begin
-/// anew, too, wherever the episode before stopped between two of them.
+/// Resets the clock to the start of a program: this frame has no length, and the next one is the first that has. Fixed
+/// steps are reset as well, for any remainder of the last episode.
 fn set_clock_back(world: &mut World) {
     if let Some(mut clock) = world.get_resource_mut::<Time<Virtual>>() {
         let mut fresh = Time::<Virtual>::from_max_delta(clock.max_delta());
@@ -114,8 +114,8 @@ fn set_clock_back(world: &mut World) {
     }
 }
 
-/// The clock of the first tick after a level has been waited for, however many frames that took: the game has entered the
-/// level in the frame before, and that counts as the first with a length. The clock goes on at its own speed.
+/// Sets the clock of the first tick after loading, for any number of frames: the game entered the level in the frame
+/// before, and that counts as the first with a length. The clock keeps its speed.
 pub(super) fn leave_loading_out(world: &mut World) {
     let Some(clock) = world.get_resource::<Time<Virtual>>() else { return };
     let (frame, mut fresh) = (clock.delta(), Time::new_with(*clock.context()));

@@ -1,4 +1,4 @@
-//! How a game begins anew.
+//! The ways to restart a foreign game.
 
 use std::{any::type_name, sync::Arc};
 
@@ -6,23 +6,23 @@ use bevy::{prelude::*, state::state::FreelyMutableState};
 
 use super::factory::SystemFactory;
 
-/// How a foreign game begins anew, for each episode.
+/// The way in which a foreign game restarts for each episode.
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum Restart {
-    /// Everything that the game has spawned since the program began is despawned, the clock is set back to 0, and
-    /// `PreStartup`, `Startup` and `PostStartup` run again. Resources stay as they are, unless those systems insert them:
-    /// set back what counts in [`ForeignGame::level`](super::ForeignGame::level).
+    /// Despawns everything that the game has spawned since the program started, resets the clock to 0, and runs
+    /// `PreStartup`, `Startup` and `PostStartup` again. Resources stay unchanged, unless those systems insert them:
+    /// reset them in [`ForeignGame::level`](super::ForeignGame::level).
     Startup,
-    /// The World is built anew, as if the program were started again for each episode: the last resort, for games whose
-    /// resources, `Local`s or timers survive [`Startup`](Self::Startup). It takes far longer, loads assets again, and is for
-    /// Worlds without a window only. `Startup` already finds the level in [`LevelSeed`](super::LevelSeed).
+    /// Rebuilds the World, as if the program were started again for each episode. It is the last resort, for games
+    /// whose resources, `Local`s or timers survive [`Startup`](Self::Startup). It takes far longer, loads assets again,
+    /// and works only in Worlds without a window. `Startup` already finds the level in [`LevelSeed`](super::LevelSeed).
     Rebuild,
-    /// The game's own way: see [`Restart::system`] and [`Restart::state`].
+    /// The game's own restart: see [`Restart::system`] and [`Restart::state`].
     Own(OwnRestart),
 }
 
-/// A game's own way to begin anew.
+/// A game's own restart.
 #[derive(Clone)]
 pub struct OwnRestart(pub(super) OwnRestartKind);
 
@@ -33,13 +33,13 @@ pub(super) enum OwnRestartKind {
 }
 
 impl Restart {
-    /// A system that begins the game anew. The clock is set back to 0 before it.
+    /// Restarts the game with a system. The clock is reset to 0 before it.
     pub fn system<M: 'static>(system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static) -> Self {
         Self::Own(OwnRestart(OwnRestartKind::System(SystemFactory::new(system, |()| ()))))
     }
 
-    /// The state in which the game begins: it is left, if the game is in it, and entered again, with everything that the
-    /// game does on the way. The clock is set back to 0 before it.
+    /// Restarts the game by a state: the state is left, if the game is in it, and entered again, with all systems of
+    /// these transitions. The clock is reset to 0 before it.
     pub fn state<S: FreelyMutableState + Clone>(state: S) -> Self {
         Self::Own(OwnRestart(OwnRestartKind::State(Arc::new(move |world: &mut World| enter(world, state.clone())))))
     }

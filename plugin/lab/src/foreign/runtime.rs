@@ -19,12 +19,12 @@ use bevy_playbot::{
     fault::Faults,
 };
 
-/// The level that is being played: for a game that wants to seed its generator. Inserted before every restart.
+/// The level that is played, for a game that seeds its generator by it. Inserted before every restart.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Resource)]
 pub struct LevelSeed(pub u64);
 
-/// How an observation is made.
+/// The source of the observation.
 pub(super) enum Sensor {
     System(OwnedSystem<Vec<f32>>),
     Paths(Vec<ObservedPath>),
@@ -34,12 +34,12 @@ pub(super) enum Sensor {
 /// A part of the reward.
 pub(super) struct RewardPart {
     pub(super) system: OwnedSystem<f32>,
-    /// Pays what the value has grown by since the last tick.
+    /// Whether the growth of the value since the last tick is paid.
     pub(super) is_delta: bool,
     pub(super) last: Option<f32>,
 }
 
-/// The one [`Foreign`] of a World. Shared, so that it can be worked with while its systems have the whole World.
+/// The [`Foreign`] of a World. It is shared, so that it can be used while its systems have the whole World.
 #[derive(Resource, Clone, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone)]
@@ -55,7 +55,7 @@ impl ForeignCell {
     }
 }
 
-/// Everything that the plugin keeps of a foreign game in its World.
+/// The plugin's state of a foreign game in its World.
 pub(super) struct Foreign {
     pub(super) game: ForeignGame,
     pub(super) sensor: Sensor,
@@ -68,13 +68,13 @@ pub(super) struct Foreign {
     pub(super) act: Option<OwnedSystem<()>>,
     pub(super) bot: Option<OwnedSystem<ActionValue>>,
     pub(super) hash: Option<OwnedSystem<u64>>,
-    /// The World as it was before the game began.
+    /// The World before the game started.
     pub(super) baseline: Option<Baseline>,
-    /// What runs once when a program starts, in its order.
+    /// The schedules that run once when a program starts, in order.
     pub(super) startup: Vec<InternedScheduleLabel>,
     /// Frames since the last restart.
     pub(super) frames: u32,
-    /// Whether an episode has begun in this World, where each has its own.
+    /// Whether an episode has started in this World, if each has its own World.
     pub(super) has_begun: bool,
 }
 
@@ -112,19 +112,19 @@ impl Foreign {
         }
     }
 
-    /// The level that is played when this one is asked for.
+    /// Returns the level that is played for this number.
     pub(super) fn level_of(&self, level: u64) -> u64 {
         self.game.level_of(level)
     }
 }
 
-/// The agent of the World, if somebody decides for it.
+/// Returns the agent of the World, if it has a controller.
 pub(super) fn active_agent(world: &mut World) -> Option<Entity> {
     let mut agents = world.query_filtered::<(Entity, &Control), With<Agent>>();
     agents.iter(world).find(|(_, control)| control.is_active()).map(|(entity, _)| entity)
 }
 
-/// The agent of the World, if it is playing.
+/// Returns the agent of the World, if it is playing.
 pub(super) fn playing_agent(world: &mut World) -> Option<Entity> {
     let agent = active_agent(world)?;
     world.get::<Episode>(agent).filter(|episode| episode.is_running()).map(|_| agent)
@@ -149,7 +149,7 @@ pub(super) fn with_foreign<T>(
     }
 }
 
-/// Reports what the game has done wrong, and stops its agent.
+/// Reports a fault of the game, and stops its agent.
 fn report(world: &mut World, agent: Entity, game: &str, why: &str) {
     let index = world.get::<Agent>(agent).map_or(0, |agent| agent.index);
     let (level, tick) = world.get::<Episode>(agent).map_or((0, 0), |episode| (episode.level, episode.tick));

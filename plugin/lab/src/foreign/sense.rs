@@ -1,4 +1,4 @@
-//! What the agent of a foreign game sees.
+//! The observation of a foreign game's agent.
 
 use bevy::prelude::*;
 

@@ -1,17 +1,17 @@
-//! A level that somebody drew.
+//! Levels read from files.
 
 use std::{any::Any, sync::Arc};
 
 use bevy_playbot::state_hash::StateHash;
 
-/// A level as its game has read it.
+/// A level as read by its game.
 #[derive(Clone, Debug)]
 pub struct LevelDesign {
     level: Arc<dyn Any + Send + Sync>,
     hash: u64,
 }
 
-/// A drawn level and where it is from.
+/// A level with the path of its file.
 #[derive(Clone, Debug)]
 pub(super) struct DrawnLevel {
     pub(super) path: String,
@@ -19,18 +19,20 @@ pub(super) struct DrawnLevel {
 }
 
 impl LevelDesign {
-    /// A level of the game's own type. `content` is all that is played of it, written in one way only, so that the same
-    /// level has the same hash however its file is laid out.
+    /// Wraps a level of the game's own type.
+    ///
+    /// `content` is all of the level that affects play, in one canonical form. So the level has the same hash under
+    /// any layout of its file.
     pub fn new<T: Any + Send + Sync>(level: T, content: &str) -> Self {
         Self { level: Arc::new(level), hash: StateHash::of(content.bytes().map(u64::from)).0 }
     }
 
-    /// A hash of what is played.
+    /// Returns a hash of the content.
     pub fn hash(&self) -> u64 {
         self.hash
     }
 
-    /// The level; `None` if it is of another type.
+    /// Returns the level; `None` if it is of another type.
     pub fn level<T: Any + Send + Sync>(&self) -> Option<Arc<T>> {
         self.level.clone().downcast().ok()
     }

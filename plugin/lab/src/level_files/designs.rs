@@ -1,4 +1,4 @@
-//! The drawn levels of a World.
+//! The levels of a World that come from files.
 
 use std::{any::Any, sync::Arc};
 
@@ -13,21 +13,21 @@ use super::{
     text_error::LevelTextError,
 };
 
-/// Levels that somebody drew, by their numbers.
+/// Levels from files, by number.
 ///
-/// Worlds whose mode names files have them as a resource before the game is built. A game asks it first when an episode
-/// starts, and makes levels itself where it is missing.
+/// Worlds whose mode names files hold them as a resource before the game is built. When an episode starts, a game
+/// looks here first, and makes a level itself if the resource is missing.
 #[derive(Resource, Clone, Debug, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone, Debug)]
 pub struct LevelDesigns(DrawnLevels);
 
 impl LevelDesigns {
-    /// The files of a mode, as they are on disk now. From here on [`of`](Self::of) gives out these.
+    /// Reads the files of a mode from the disk. [`of`](Self::of) returns these from now on.
     ///
     /// # Errors
     ///
-    /// The mode names no files, or one of them cannot be read or is no level of this game.
+    /// The mode names no files, a file cannot be read, or a file is not a level of this game.
     pub fn read(
         game: &str,
         mode: &str,
@@ -36,7 +36,7 @@ impl LevelDesigns {
         read::read_now(game, level_file_pattern(mode).unwrap_or(mode), parse).map(Self)
     }
 
-    /// The files of a mode, as they were when they were read last. They are read if they never were.
+    /// Returns the files of a mode as last read, and reads them first if needed.
     ///
     /// # Errors
     ///
@@ -49,11 +49,11 @@ impl LevelDesigns {
         read::as_read(game, level_file_pattern(mode).unwrap_or(mode), parse).map(Self)
     }
 
-    /// The level of one file, as level 0.
+    /// Reads the level of one file, as level 0.
     ///
     /// # Errors
     ///
-    /// It cannot be read, or is no level of this game.
+    /// The file cannot be read, or is not a level of this game.
     pub fn of_file(
         path: &str,
         parse: &dyn Fn(&str) -> Result<LevelDesign, LevelTextError>,
@@ -61,12 +61,12 @@ impl LevelDesigns {
         Ok(Self(Arc::new(vec![read::read_one(path, parse)?])))
     }
 
-    /// A single level, as level 0, under a name instead of a path.
+    /// Wraps a single level as level 0, under a name instead of a path.
     pub fn one(name: impl Into<String>, design: LevelDesign) -> Self {
         Self(Arc::new(vec![DrawnLevel { path: name.into(), design }]))
     }
 
-    /// Number of levels, at least 1.
+    /// Returns the number of levels, at least 1.
     pub fn count(&self) -> u64 {
         self.0.len() as u64
     }
@@ -75,11 +75,11 @@ impl LevelDesigns {
         self.0.get(usize::try_from(level).ok()?)
     }
 
-    /// A level in the game's own type.
+    /// Returns a level in the game's own type.
     ///
     /// # Errors
     ///
-    /// There is no such level, or it is of another type, in words.
+    /// A message if there is no such level, or it is of another type.
     pub fn get<T: Any + Send + Sync>(&self, level: u64) -> Result<Arc<T>, String> {
         let Some(DrawnLevel { path, design }) = self.drawn(level) else {
             let count = self.count();
@@ -88,17 +88,17 @@ impl LevelDesigns {
         design.level().ok_or_else(|| format!("{path} was read by another game"))
     }
 
-    /// Path of the file of a level.
+    /// Returns the path of a level's file.
     pub fn path(&self, level: u64) -> Option<&str> {
         self.drawn(level).map(|drawn| drawn.path.as_str())
     }
 
-    /// Hash of what is played in a level.
+    /// Returns the hash of a level's content.
     pub fn hash(&self, level: u64) -> Option<u64> {
         self.drawn(level).map(|drawn| drawn.design.hash())
     }
 
-    /// What recordings keep of the levels.
+    /// Returns the description of the levels that recordings keep.
     pub fn files(&self) -> LevelFiles {
         let file = |drawn: &DrawnLevel| LevelFile { path: drawn.path.clone(), hash: drawn.design.hash() };
         LevelFiles::new(self.0.iter().map(file).collect())
@@ -112,7 +112,7 @@ mod tests {
     use super::*;
     use crate::level_files::level_files_mode;
 
-    /// A game whose levels are numbers.
+    /// Parses a level that is a single number.
     fn number(text: &str) -> Result<LevelDesign, LevelTextError> {
         let number: u32 =
             text.trim().parse().map_err(|_| LevelTextError { line: Some(1), what: "no number".into() })?;
@@ -166,11 +166,11 @@ mod tests {
         fs::write(folder.path().join("c"), b"1\n 2\xff").expect("writable");
         let path = folder.path().join("c").to_string_lossy().into_owned();
         let error = LevelDesigns::of_file(&path, &number).expect_err("no text").to_string();
-        assert!(error.contains("/c, line 2: byte 3 of the line is no text"), "{error}");
+        assert!(error.contains("/c, line 2: byte 3 of the line is not UTF-8"), "{error}");
         let path = folder.path().join("d").to_string_lossy().into_owned();
         fs::File::create(&path).and_then(|file| file.set_len((32 << 20) + 1)).expect("writable");
         let error = LevelDesigns::of_file(&path, &number).expect_err("too large").to_string();
-        assert!(error.contains("/d has 33554433 bytes, but no level file has more than 33554432"), "{error}");
+        assert!(error.contains("/d has 33554433 bytes, and a level file has at most 33554432"), "{error}");
         let missing = LevelDesigns::of_file("no/such/file", &number).expect_err("missing");
         assert!(matches!(missing, LevelFileError::Unreadable { .. }));
     }

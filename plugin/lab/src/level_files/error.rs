@@ -1,49 +1,49 @@
-//! What can be wrong with a level file, and with a pattern of files.
+//! Errors of level files and of file patterns.
 
 use thiserror::Error;
 
 use super::text_error::LevelTextError;
 
-/// Levels cannot be read from files.
+/// Failure to read levels from files.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum LevelFileError {
-    /// The pattern is none.
+    /// Invalid pattern.
     #[error(
-        "`files:{pattern}` is no pattern of files: {why} (character {at}); write * for any name, ** for any folders, as in \
-         files:levels/**/*.json"
+        "`files:{pattern}` is not a valid file pattern: {why} (character {at}); write * for any name, ** for any folders, \
+         as in files:levels/**/*.json"
     )]
     Pattern {
         /// The pattern.
         pattern: String,
-        /// Which character of it, from 1.
+        /// Position of the wrong character in the pattern, from 1.
         at: usize,
         /// What is wrong with it.
         why: String,
     },
-    /// There is no such file.
+    /// No file matches the pattern.
     #[error(
-        "files:{pattern} matches no file (seen from {folder}): name level files, as in files:levels/**/*.json, in quotes so \
-         that the shell leaves it alone"
+        "files:{pattern} matches no file (seen from {folder}): name level files, as in files:levels/**/*.json, quoted \
+         against the shell"
     )]
     NoFiles {
         /// The pattern.
         pattern: String,
-        /// The folder from which it is read.
+        /// Folder from which the pattern is read.
         folder: String,
     },
-    /// It names a folder.
+    /// The path is a folder.
     #[error("{path} is a folder: name the files in it, as in files:{path}/**/*.json")]
     Folder {
         /// The folder.
         path: String,
     },
-    /// There are too many.
+    /// Too many files.
     #[error("files:{pattern} matches more than 16,777,216 files: name fewer")]
     TooMany {
         /// The pattern.
         pattern: String,
     },
-    /// There are fewer files than levels were asked for.
+    /// Fewer files than the requested level needs.
     #[error("there is no level {level} in {mode}: it has {}; leave out the numbers for all", files(*count))]
     NoLevel {
         /// The mode.
@@ -53,24 +53,22 @@ pub enum LevelFileError {
         /// Number of files, at least 1.
         count: u64,
     },
-    /// The operating system refused.
-    #[error("cannot read {path}: {why}; name a level file that is there and may be read")]
+    /// The operating system refused to read a file or folder.
+    #[error("cannot read {path}: {why}; name an existing level file that you may read")]
     Unreadable {
         /// File or folder.
         path: String,
         /// The answer of the operating system.
         why: String,
     },
-    /// It is something that cannot be read from its beginning to its end.
-    #[error("{path} is no regular file, but a folder, a pipe or a device: name a file with a level")]
+    /// Not a regular file.
+    #[error("{path} is a folder, a pipe or a device, not a regular file: name a file with a level")]
     NotAFile {
         /// Its path.
         path: String,
     },
-    /// It holds no letters.
-    #[error(
-        "{path}, line {line}: byte {byte} of the line is no text in UTF-8: save the level as UTF-8, or is it another file?"
-    )]
+    /// The file is not UTF-8 text.
+    #[error("{path}, line {line}: byte {byte} of the line is not UTF-8: save the level as UTF-8, or name another file")]
     NoText {
         /// The file.
         path: String,
@@ -79,25 +77,25 @@ pub enum LevelFileError {
         /// Byte of the line, from 1.
         byte: usize,
     },
-    /// No level takes so much room.
-    #[error("{path} has {bytes} bytes, but no level file has more than {most}: is it another file?")]
+    /// The file is larger than any level.
+    #[error("{path} has {bytes} bytes, and a level file has at most {most}: name another file")]
     TooLarge {
         /// The file.
         path: String,
         /// Its length.
         bytes: u64,
-        /// Most bytes of a level file.
+        /// Largest accepted size, bytes.
         most: u64,
     },
-    /// Several are no levels of the game.
+    /// Several files are not levels of the game.
     #[error("{first}; and {} more: {}", others.len(), listed(others))]
     Several {
-        /// What is wrong with the first one.
+        /// Error of the first file.
         first: Box<LevelFileError>,
-        /// The paths of the others.
+        /// Paths of the other files.
         others: Vec<String>,
     },
-    /// It is no level of the game.
+    /// The file is not a level of the game.
     #[error("{path}{}: {}", line(error), error.what)]
     Text {
         /// The file.
@@ -111,7 +109,7 @@ fn files(count: u64) -> String {
     if count == 1 { "1 file, level 0".to_owned() } else { format!("{count} files, so levels 0 to {}", count - 1) }
 }
 
-/// The first few paths.
+/// Lists the first few paths.
 fn listed(paths: &[String]) -> String {
     const SHOWN: usize = 5;
     let shown = paths.iter().take(SHOWN).cloned().collect::<Vec<_>>().join(", ");

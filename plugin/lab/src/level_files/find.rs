@@ -1,18 +1,18 @@
-//! Which files a pattern names.
+//! Search for the files that match a pattern.
 
 use std::path::Path;
 
 use super::error::LevelFileError;
 
-/// Most files: more levels than a range can have.
+/// Largest number of files: a range cannot have more levels.
 const MOST: usize = 1 << 24;
 
-/// The files that match a pattern, in the order of their paths: `*` stands for any name, `**` for any folders. Paths are read
-/// from the folder that the program runs in.
+/// Returns the files that match a pattern, sorted by path: `*` stands for any name, `**` for any folders. Paths are
+/// relative to the current folder of the program.
 ///
 /// # Errors
 ///
-/// The text is no pattern, or matches no file.
+/// The pattern is invalid, or no file matches.
 pub fn find_level_files(pattern: &str) -> Result<Vec<String>, LevelFileError> {
     let found = glob::glob(pattern).map_err(|error| LevelFileError::Pattern {
         pattern: pattern.to_owned(),
@@ -36,7 +36,7 @@ pub fn find_level_files(pattern: &str) -> Result<Vec<String>, LevelFileError> {
         }
     }
     if !paths.is_empty() {
-        // Not the file system's order, which differs.
+        // The order of file systems differs.
         paths.sort_unstable();
         return Ok(paths);
     }
@@ -49,7 +49,7 @@ pub fn find_level_files(pattern: &str) -> Result<Vec<String>, LevelFileError> {
     })
 }
 
-/// A path as text, the same on all systems.
+/// Formats a path, equal on all systems.
 fn shown(path: &Path) -> String {
     let text = path.to_string_lossy();
     if cfg!(windows) { text.replace('\\', "/") } else { text.into_owned() }

@@ -1,4 +1,4 @@
-//! JSON texts, and the lines on which their values stand.
+//! Line numbers of the values of a JSON text.
 
 /// A step from a value of a JSON text to one inside it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -9,8 +9,8 @@ pub enum JsonStep<'a> {
     Index(usize),
 }
 
-/// The line, from 1, on which a value of a sound JSON text begins; of a value that is not there, that of the last one on the
-/// way to it.
+/// Returns the line, from 1, on which a value of valid JSON begins. If the value is missing, returns the line of the
+/// last value on the path to it.
 pub(super) fn line_of(text: &str, path: &[JsonStep]) -> usize {
     let mut scanner = Scanner { bytes: text.trim_start_matches('\u{feff}').as_bytes(), at: 0 };
     scanner.skip_space();
@@ -28,7 +28,7 @@ pub(super) fn line_of(text: &str, path: &[JsonStep]) -> usize {
     1 + scanner.bytes[..found].iter().filter(|&&byte| byte == b'\n').count()
 }
 
-/// Walks over a JSON text.
+/// Scanner of a JSON text.
 struct Scanner<'a> {
     bytes: &'a [u8],
     at: usize,
@@ -49,7 +49,7 @@ impl<'a> Scanner<'a> {
         }
     }
 
-    /// The text between quotation marks, as it is written.
+    /// Returns the text between quotation marks, escapes included.
     fn string(&mut self) -> Option<&'a [u8]> {
         self.take(b'"')?;
         let start = self.at;
@@ -83,7 +83,7 @@ impl<'a> Scanner<'a> {
                 }
                 _ => {
                     self.at += 1;
-                    // Numbers and words end before these.
+                    // Numbers and words end before these characters.
                     let goes_on = self.peek().is_some_and(|byte| !b",]}".contains(&byte));
                     if depth == 0 && goes_on {
                         continue;
@@ -122,7 +122,7 @@ impl<'a> Scanner<'a> {
             self.take(b',')?;
             self.skip_space();
         }
-        // Behind the last entry there is none.
+        // No entry follows the last one.
         (self.peek()? != b']').then_some(())
     }
 }

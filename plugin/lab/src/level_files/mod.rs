@@ -1,8 +1,8 @@
-//! Levels that are files, as a designer drew them.
+//! Levels from files, as drawn by a designer.
 //!
-//! Their mode is the text `files:` with a pattern behind it, such as `files:levels/**/*.json`, and their numbers count the
-//! files in the order of their paths. A game reads one with [`Game::parse_level`](crate::game::Game::parse_level); its Worlds
-//! hold them all as [`LevelDesigns`], which the game asks before it makes a level itself.
+//! Their mode is the text `files:` followed by a pattern, such as `files:levels/**/*.json`. Their numbers count the
+//! files in the order of their paths. A game reads a file with [`Game::parse_level`](crate::game::Game::parse_level).
+//! Its Worlds hold all files as [`LevelDesigns`], where the game looks before it makes a level itself.
 
 mod design;
 mod designs;

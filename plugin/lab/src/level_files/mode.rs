@@ -1,19 +1,19 @@
-//! The mode of levels that are files, as text.
+//! The mode of levels from files, as text.
 
-/// What the mode of levels that are files begins with.
+/// Prefix of the mode of levels from files.
 pub const LEVEL_FILES: &str = "files:";
 
-/// Whether the levels of a mode are files.
+/// Returns whether the levels of a mode are files.
 pub fn is_level_files(mode: &str) -> bool {
     level_file_pattern(mode).is_some()
 }
 
-/// The pattern of the files, if the levels of a mode are files.
+/// Returns the file pattern of a mode, if its levels are files.
 pub fn level_file_pattern(mode: &str) -> Option<&str> {
     mode.strip_prefix(LEVEL_FILES)
 }
 
-/// The mode whose only level is this file, whatever characters its path has.
+/// Returns the mode whose only level is this file, for any characters in the path.
 pub fn level_files_mode(path: &str) -> String {
     format!("{LEVEL_FILES}{}", glob::Pattern::escape(path))
 }

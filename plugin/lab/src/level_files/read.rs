@@ -1,4 +1,4 @@
-//! Reading level files, once for all Worlds of a verb.
+//! Level files, read once for all Worlds of a verb.
 
 use std::{
     collections::BTreeMap,
@@ -14,28 +14,28 @@ use super::{
 };
 use crate::text_file::{TextFileError, read_text_file};
 
-/// Most bytes of a level file: the largest levels there are, with some room between their letters.
+/// Largest size of a level file, bytes: the largest levels with some white space.
 const MOST_BYTES: u64 = 32 << 20;
 
-/// All levels of a pattern, in their order.
+/// All levels of a pattern, in order.
 pub(super) type DrawnLevels = Arc<Vec<DrawnLevel>>;
 
-/// How a game reads a level.
+/// A game's parser of levels.
 pub(super) type Parse<'a> = &'a dyn Fn(&str) -> Result<LevelDesign, LevelTextError>;
 
-/// The files of a pattern as they were when it was last checked.
+/// The files of a pattern as last read.
 struct Snapshot {
     /// Path and text of each.
     texts: Vec<(String, String)>,
-    /// What the games made of them, by their names.
+    /// Parsed levels by the game's name.
     designs: Mutex<BTreeMap<String, DrawnLevels>>,
 }
 
-/// What has been read, by pattern. All Worlds of a verb play the same levels, even if somebody saves a file meanwhile, and a
-/// file is read and understood once for all of them.
+/// Snapshots by pattern. All Worlds of a verb play the same levels even if a file is saved meanwhile, and each file
+/// is read and parsed once.
 static READ: Mutex<BTreeMap<String, Arc<Snapshot>>> = Mutex::new(BTreeMap::new());
 
-/// The files as they are on disk now.
+/// Reads the files from the disk.
 pub(super) fn read_now(game: &str, pattern: &str, parse: Parse) -> Result<DrawnLevels, LevelFileError> {
     let texts: Result<Vec<_>, _> =
         find_level_files(pattern)?.into_iter().map(|path| read_text(&path).map(|text| (path, text))).collect();
@@ -45,7 +45,7 @@ pub(super) fn read_now(game: &str, pattern: &str, parse: Parse) -> Result<DrawnL
     Ok(designs)
 }
 
-/// The files as they were read last; read now if they never were.
+/// Returns the files as last read, and reads them first if needed.
 pub(super) fn as_read(game: &str, pattern: &str, parse: Parse) -> Result<DrawnLevels, LevelFileError> {
     let known = READ.lock().unwrap_or_else(PoisonError::into_inner).get(pattern).cloned();
     match known {
@@ -66,7 +66,7 @@ impl Snapshot {
     }
 }
 
-/// All levels; where several are none, the error names them all.
+/// Parses all levels. If several are invalid, the error names them all.
 fn understand_all(texts: &[(String, String)], parse: Parse) -> Result<Vec<DrawnLevel>, LevelFileError> {
     let (mut drawn, mut first, mut others) = (Vec::new(), None, Vec::new());
     for (path, text) in texts {
@@ -83,7 +83,7 @@ fn understand_all(texts: &[(String, String)], parse: Parse) -> Result<Vec<DrawnL
     }
 }
 
-/// The level in a file.
+/// Reads the level in a file.
 pub(super) fn read_one(path: &str, parse: Parse) -> Result<DrawnLevel, LevelFileError> {
     understand(path, &read_text(path)?, parse)
 }

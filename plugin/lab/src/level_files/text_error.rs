@@ -1,47 +1,47 @@
-//! What is wrong with the text of a level.
+//! Errors in the text of a level.
 
 use serde::de::DeserializeOwned;
 
 use super::json_lines::{JsonStep, line_of};
 
-/// A text is no level of the game.
+/// Invalid text of a level.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LevelTextError {
-    /// Line of the text, from 1; `None` if it is about none in particular.
+    /// Line of the text, from 1; `None` for the whole text.
     pub line: Option<usize>,
-    /// What is wrong, and what would be right.
+    /// The error, with the form that would be valid.
     pub what: String,
 }
 
 impl LevelTextError {
-    /// Something that is wrong with the whole text.
+    /// Makes an error of the whole text.
     pub fn whole(what: impl Into<String>) -> Self {
         Self { line: None, what: what.into() }
     }
 
-    /// Something that is wrong with a value of a JSON text, or with what it stands in if it is not there.
+    /// Makes an error at a value of a JSON text, or at the value that encloses it if it is missing.
     pub fn at(text: &str, path: &[JsonStep], what: impl Into<String>) -> Self {
         Self { line: Some(line_of(text, path)), what: what.into() }
     }
 }
 
-/// Reads a JSON text that is an object. Structs would also be read from a list of their fields.
+/// Reads a JSON text that is an object. Without this check, serde would also read a struct from a list of its fields.
 ///
 /// # Errors
 ///
-/// It is none, or not of this form: [`LevelTextError`] with the line.
+/// [`LevelTextError`] with the line if the text is not JSON or not of this form.
 pub fn read_json_object<T: DeserializeOwned>(text: &str) -> Result<T, LevelTextError> {
     let text = without_mark(text);
     let blank = text.len() - text.trim_start().len();
     if text[blank..].starts_with('[') {
         let line = 1 + text[..blank].matches('\n').count();
-        let what = "a level is an object, `{…}`, and this is a list".to_owned();
+        let what = "a level must be an object, `{…}`, and this is a list".to_owned();
         return Err(LevelTextError { line: Some(line), what });
     }
     read_json(text)
 }
 
-/// Some editors put a mark in front of all they write.
+/// Strips the byte order mark that some editors write.
 fn without_mark(text: &str) -> &str {
     text.trim_start_matches('\u{feff}')
 }
@@ -50,7 +50,7 @@ fn without_mark(text: &str) -> &str {
 ///
 /// # Errors
 ///
-/// It is none, or not of this form: [`LevelTextError`] with the line.
+/// [`LevelTextError`] with the line if the text is not JSON or not of this form.
 pub fn read_json<T: DeserializeOwned>(text: &str) -> Result<T, LevelTextError> {
     serde_json::from_str(without_mark(text)).map_err(|error| {
         let (line, column) = (error.line().max(1), error.column());

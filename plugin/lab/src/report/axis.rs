@@ -1,32 +1,35 @@
-//! Axes: the range of the values and round tick positions.
+//! Axes: ranges of values with round tick positions.
 
-/// Larger magnitudes count as not finite: their differences overflow.
+/// Largest magnitude that counts as finite: differences of larger ones overflow.
 pub(super) const LARGEST: f64 = 1e300;
 
-/// Whether a value can be drawn.
+/// Returns whether a value can be drawn.
 pub(super) fn is_drawable(value: f64) -> bool {
     value.abs() <= LARGEST
 }
 
-/// One axis: a range that is never empty, and ticks inside it.
+/// An axis: a range that is never empty, and ticks inside it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Axis {
+    /// Lower end.
     pub low: f64,
+    /// Upper end.
     pub high: f64,
     /// Tick positions in ascending order, `step` apart.
     pub ticks: Vec<f64>,
+    /// Distance between two ticks.
     pub step: f64,
 }
 
 impl Axis {
-    /// A range with exactly the drawable values; the ticks lie inside.
+    /// Makes a range with exactly the drawable values; the ticks lie inside.
     pub fn tight(values: impl Iterator<Item = f64>, ticks: usize) -> Self {
         let (low, high) = range(values);
         let step = round_step((high - low) / ticks as f64);
         Self::with_step(low, high, step)
     }
 
-    /// A range that begins and ends at a tick; it includes 0 when the values come close to it.
+    /// Makes a range that begins and ends at a tick; it includes 0 when the values come close to it.
     pub fn rounded(values: impl Iterator<Item = f64>, ticks: usize) -> Self {
         let (mut low, mut high) = range(values);
         if low > 0.0 && low < 0.4 * high {
@@ -49,33 +52,33 @@ impl Axis {
         Self { low, high, ticks, step }
     }
 
-    /// Where a value lies: 0 at the low end, 1 at the high end.
+    /// Returns the position of a value: 0 at the low end, 1 at the high end.
     pub fn place(&self, value: f64) -> f64 {
         (value - self.low) / (self.high - self.low)
     }
 }
 
-/// The range of the drawable values, widened when it would be empty.
+/// Returns the range of the drawable values, widened if it would be empty.
 fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let (low, high) =
         values.filter(|v| is_drawable(*v)).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
     if low > high {
         return (0.0, 1.0);
     }
-    // Closer than this, the ticks would be rounding errors.
+    // Below this distance, the ticks would be rounding errors.
     let least = (low.abs().max(high.abs()) * 1e-9).max(1e-290);
     if high - low > least {
         return (low, high);
     }
     if low.abs() < 1e-280 {
-        // What is 0 throughout is mostly a count, a rate or a time.
+        // Values that are all 0 are mostly counts, rates or times.
         return (0.0, 1.0);
     }
     let margin = low.abs() * 0.1;
     (low - margin, high + margin)
 }
 
-/// The next larger of 1, 2, 2.5, 5 times a power of ten.
+/// Returns the next larger of 1, 2, 2.5, 5 times a power of ten.
 fn round_step(step: f64) -> f64 {
     let power = 10f64.powf(step.log10().floor());
     let digits = step / power;

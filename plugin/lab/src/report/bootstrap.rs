@@ -1,5 +1,5 @@
-//! Intervals and comparisons for few runs (Agarwal et al. 2021, "Deep reinforcement learning at the edge of the statistical
-//! precipice"). Scores are those of several seeds, each on the same levels.
+//! Intervals and comparisons for few runs (Agarwal et al. 2021, "Deep reinforcement learning at the edge of the
+//! statistical precipice"). Scores are of several seeds, each on the same levels.
 
 use playbot_learner::rng::{ChaCha8Rng, Streams, below};
 
@@ -11,27 +11,27 @@ const INSIDE: f64 = 0.95;
 /// A number with its 95 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// Of the scores themselves.
+    /// Statistic of the scores themselves.
     pub value: f64,
-    /// Where the interval begins.
+    /// Lower end of the interval.
     pub low: f64,
-    /// Where it ends.
+    /// Upper end of the interval.
     pub high: f64,
 }
 
-/// The interquartile mean of the runs, each with its mean score over the levels: that of the middle half, to which the best and
-/// the worst quarter of the seeds count nothing. The interval is that of other seeds and other levels. `None` without scores,
-/// or if seeds have other levels.
+/// Returns the interquartile mean of the runs: the mean of the middle half, without the best and the worst quarter of
+/// the seeds. The score of a run is its mean over the levels. The interval covers other seeds and other levels.
+/// `None` without scores, or if the seeds have different levels.
 ///
-/// Levels are no tasks of their own here, but draws of one: where each is won or lost, the middle half of them all would be won
-/// by whoever wins three quarters.
+/// Levels are not tasks of their own here, but draws of one task. If each is won or lost, a middle half over levels
+/// would count three quarters of wins as all.
 pub fn interquartile_mean(scores: &[&[f64]]) -> Option<Estimate> {
     let of_run = |row: &Vec<f64>| row.iter().sum::<f64>() / row.len() as f64;
     estimate(&[scores], |[scores]| middle_mean(scores.iter().map(of_run).collect()))
 }
 
-/// The probability that a run of one method scores higher than a run of another on the same level; ties count half.
-/// The interval is that of other seeds of both, and other levels. `None` without scores, or with other levels.
+/// Returns the probability that a run of one method scores higher than a run of another on the same level; ties count
+/// half. The interval covers other seeds of both, and other levels. `None` without scores, or with different levels.
 pub fn probability_of_improvement(one: &[&[f64]], other: &[&[f64]]) -> Option<Estimate> {
     estimate(&[one, other], |[one, other]| {
         let wins = one.iter().flat_map(|one| other.iter().map(|other| wins(one, other)));
@@ -39,13 +39,13 @@ pub fn probability_of_improvement(one: &[&[f64]], other: &[&[f64]]) -> Option<Es
     })
 }
 
-/// The mean of several numbers with the interval of others of their kind; `None` without any.
+/// Returns the mean of several numbers with its interval; `None` without numbers.
 pub fn mean(values: &[f64]) -> Option<Estimate> {
     let rows: Vec<&[f64]> = values.iter().map(std::slice::from_ref).collect();
     estimate(&[&rows], |[rows]| rows.concat().iter().sum::<f64>() / rows.len() as f64)
 }
 
-/// Share of the levels on which the first is higher, and half of those on which the two are equal.
+/// Returns the share of the levels on which the first is higher; equal levels count half.
 fn wins(one: &[f64], other: &[f64]) -> f64 {
     let points = one.iter().zip(other).map(|(one, other)| match one.total_cmp(other) {
         std::cmp::Ordering::Greater => 1.0,
@@ -55,7 +55,7 @@ fn wins(one: &[f64], other: &[f64]) -> f64 {
     points.sum::<f64>() / one.len() as f64
 }
 
-/// Mean of the middle half; numbers at its ends count in part where a quarter is no whole number of them.
+/// Returns the mean of the middle half. Numbers at its ends count in part if a quarter is not a whole number of them.
 fn middle_mean(mut values: Vec<f64>) -> f64 {
     values.sort_by(f64::total_cmp);
     let quarter = values.len() as f64 / 4.0;
@@ -70,7 +70,8 @@ fn middle_mean(mut values: Vec<f64>) -> f64 {
 /// Seeds, each with its scores on all levels.
 type Scores = Vec<Vec<f64>>;
 
-/// A statistic of the scores of `N` methods, with its interval by drawing seeds of each and levels of all with replacement.
+/// Estimates a statistic of the scores of `N` methods, with its interval by drawing seeds of each and levels of all
+/// with replacement.
 fn estimate<const N: usize>(methods: &[&[&[f64]]; N], statistic: impl Fn(&[Scores; N]) -> f64) -> Option<Estimate> {
     let levels = methods[0].first()?.len();
     if levels == 0 || methods.iter().any(|seeds| seeds.is_empty() || seeds.iter().any(|row| row.len() != levels)) {
@@ -92,7 +93,7 @@ fn estimate<const N: usize>(methods: &[&[&[f64]]; N], statistic: impl Fn(&[Score
     Some(Estimate { value: statistic(&whole), low: at(outside), high: at(1.0 - outside) })
 }
 
-/// As many numbers below `n`, drawn with replacement.
+/// Draws `n` numbers below `n` with replacement.
 fn choices(n: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     (0..n).map(|_| below(rng, n as u64) as usize).collect()
 }
@@ -121,7 +122,7 @@ mod tests {
         assert_eq!(same.value, 0.5);
     }
 
-    /// Scores of `seeds` by `levels`, of which both vary.
+    /// Draws scores of `seeds` by `levels`, both of which vary.
     fn scores(draw: u64, seeds: usize, levels: usize) -> Scores {
         let mut rng = Streams::new(8).stream("scores", draw);
         let of_levels: Vec<f32> = (0..levels).map(|_| normal(&mut rng)).collect();
@@ -140,7 +141,7 @@ mod tests {
             let got = interquartile_mean(&rows).expect("scores");
             got.low <= 0.0 && 0.0 <= got.high
         });
-        // With eight seeds a percentile bootstrap is off by a few of a hundred.
+        // With eight seeds a percentile bootstrap is off by a few per cent.
         let inside = inside.count();
         assert!((170..=199).contains(&inside), "{inside} of 200");
     }

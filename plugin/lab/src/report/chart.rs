@@ -1,4 +1,4 @@
-//! What a line chart shows.
+//! Data of a line chart.
 
 use super::axis::is_drawable;
 
@@ -12,17 +12,17 @@ pub struct Curve {
     /// Lower and upper end of a band around the line, one pair for each point: the range over the seeds,
     /// or mean ± standard deviation. Pairs that are not finite are left out.
     pub band: Option<Vec<(f64, f64)>>,
-    /// Whether its points are dots that nothing joins.
+    /// True if its points are dots without a line.
     pub is_scatter: bool,
 }
 
 impl Curve {
-    /// A line without a band.
+    /// Makes a line without a band.
     pub fn new(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self { label: label.into(), points, ..Self::default() }
     }
 
-    /// Dots that nothing joins.
+    /// Makes dots without a line.
     pub fn scatter(label: impl Into<String>, points: Vec<(f64, f64)>) -> Self {
         Self { is_scatter: true, ..Self::new(label, points) }
     }
@@ -33,18 +33,18 @@ impl Curve {
         self
     }
 
-    /// Number of points that are gaps.
+    /// Returns the number of points that are gaps.
     pub(super) fn gaps(&self) -> usize {
         self.points.iter().filter(|p| !is_point(p)).count()
     }
 
-    /// Whether there is nothing to draw.
+    /// Returns whether nothing can be drawn.
     pub(super) fn is_blank(&self) -> bool {
         self.gaps() == self.points.len()
     }
 }
 
-/// Whether a point can be drawn.
+/// Returns whether a point can be drawn.
 pub(super) fn is_point(&(x, y): &(f64, f64)) -> bool {
     is_drawable(x) && is_drawable(y)
 }
@@ -68,20 +68,20 @@ pub(super) fn is_point(&(x, y): &(f64, f64)) -> bool {
 pub struct Chart {
     /// Headline of the chart.
     pub title: String,
-    /// What x is, with its unit.
+    /// Label of the x axis, with its unit.
     pub x_label: String,
-    /// What y is, with its unit.
+    /// Label of the y axis, with its unit.
     pub y_label: String,
     /// The lines, in the order of their colours.
     pub curves: Vec<Curve>,
-    /// What the y axis shows at least, such as 0 to 1 for a rate; as much as the values need if it is `None`.
+    /// Least range of the y axis, such as 0 to 1 for a rate; `None` for the range of the values.
     pub y_range: Option<(f64, f64)>,
     /// Vertical marks: a label and its x.
     pub marks: Vec<(String, f64)>,
 }
 
 impl Chart {
-    /// What the reader must know about values that are missing from the picture.
+    /// Returns the notes about values that are missing from the picture.
     pub(super) fn footnotes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         let gaps: Vec<String> = self

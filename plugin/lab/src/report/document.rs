@@ -1,4 +1,4 @@
-//! The report: a single HTML file.
+//! Reports as a single HTML file.
 
 use std::fmt::Write as _;
 use std::io;
@@ -12,7 +12,7 @@ use super::table::Table;
 use crate::escape::{escape, with_code_spans};
 
 const PAGE_STYLE: &str = include_str!("page.css");
-/// Reports with more sections than this begin with a list of them.
+/// Number of sections beyond which a report begins with a list of them.
 const SHORT: usize = 3;
 
 /// A part of a report, shown in this order: heading, text, tables, charts, code.
@@ -50,13 +50,13 @@ pub struct Section {
 pub struct Report {
     /// The title.
     pub title: String,
-    /// What, when and under which conditions, in one line.
+    /// Subject, date and conditions, in one line.
     pub subtitle: String,
     /// The parts.
     pub sections: Vec<Section>,
 }
 
-/// A report could not be written.
+/// Failure to write a report.
 #[derive(Debug, Error)]
 #[error("cannot write the report {}: {source}", path.display())]
 pub struct ReportError {
@@ -67,7 +67,7 @@ pub struct ReportError {
 }
 
 impl Report {
-    /// The whole HTML file.
+    /// Returns the whole HTML file.
     pub fn to_html(&self) -> String {
         let mut body = format!("<header>\n<h1>{}</h1>\n", escape(&self.title));
         if !self.subtitle.is_empty() {

@@ -1,4 +1,4 @@
-//! From the points of a curve to SVG paths: gaps, bands, and no more points than pixels.
+//! SVG paths of a curve: gaps, bands, and no more points than pixels.
 
 use std::fmt::Write;
 
@@ -13,7 +13,8 @@ pub(super) struct Dot {
     pub band: Option<(f64, f64)>,
 }
 
-/// The stretches of a curve without gaps, in pixels, thinned to what the eye can tell apart. Of a scatter every point is one.
+/// Returns the stretches of a curve without gaps, in pixels, thinned to visible differences. Each point of a scatter
+/// is a stretch.
 pub(super) fn stretches(curve: &Curve, x: impl Fn(f64) -> f64, y: impl Fn(f64) -> f64) -> Vec<Vec<Dot>> {
     if curve.is_scatter {
         let dots = curve.points.iter().filter(|point| is_point(point));
@@ -32,7 +33,7 @@ pub(super) fn stretches(curve: &Curve, x: impl Fn(f64) -> f64, y: impl Fn(f64) -
     stretches.into_iter().filter(|s| !s.is_empty()).map(thin).collect()
 }
 
-/// Keeps the lowest and the highest point of each half pixel, when there are many.
+/// Keeps the lowest and the highest point of each half pixel, if there are many.
 fn thin(dots: Vec<Dot>) -> Vec<Dot> {
     if dots.len() <= 1500 || !dots.is_sorted_by(|a, b| a.x <= b.x) {
         return dots;
@@ -54,7 +55,7 @@ fn thin(dots: Vec<Dot>) -> Vec<Dot> {
     kept
 }
 
-/// The `d` attribute of a line through the dots.
+/// Returns the `d` attribute of a line through the dots.
 pub(super) fn line_path(dots: &[Dot]) -> String {
     let mut path = String::new();
     for (i, dot) in dots.iter().enumerate() {
@@ -63,7 +64,7 @@ pub(super) fn line_path(dots: &[Dot]) -> String {
     path
 }
 
-/// The `d` attributes of the areas between the ends of the bands.
+/// Returns the `d` attributes of the areas between the ends of the bands.
 pub(super) fn band_paths(dots: &[Dot]) -> Vec<String> {
     dots.split(|d| d.band.is_none())
         .filter(|part| part.len() > 1)

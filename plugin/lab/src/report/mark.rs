@@ -1,9 +1,9 @@
-//! Where the labels of vertical marks go: above the plot, in as few rows as possible.
+//! Layout of the labels of vertical marks: above the plot, in as few rows as possible.
 
 use super::axis::is_drawable;
 use super::text_width::text_width;
 
-/// A mark with its place in the drawing.
+/// A mark with its position in the drawing.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Mark {
     pub label: String,
@@ -11,11 +11,11 @@ pub(super) struct Mark {
     pub x: f64,
     /// Row of the label, 0 just above the plot.
     pub row: usize,
-    /// Whether the label is left of the line, because there is no room at its right.
+    /// True if the label is left of the line, for lack of room at its right.
     pub label_left: bool,
 }
 
-/// A mark, and where its label begins and ends.
+/// A mark, with the ends of its label.
 struct PlacedMark {
     mark: Mark,
     start: f64,
@@ -23,10 +23,10 @@ struct PlacedMark {
 }
 
 impl Mark {
-    /// Places the marks that can be drawn, in a drawing of the given width, with a font size in pixels.
+    /// Positions the marks that can be drawn, in a drawing of the given width, with a font size in pixels.
     ///
-    /// Labels do not overlap, and as far as possible no line of a mark runs through the label of another:
-    /// the line of the leftmost mark is the longest.
+    /// Labels do not overlap. As far as possible, the line of a mark misses the labels of others: the line of the
+    /// leftmost mark is the longest.
     pub fn place(marks: &[(String, f64)], width: f64, size: f64, px: impl Fn(f64) -> f64) -> Vec<Self> {
         let mut placed: Vec<PlacedMark> = marks
             .iter()

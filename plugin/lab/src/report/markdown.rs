@@ -2,7 +2,7 @@
 
 use crate::escape::steers;
 
-/// Text that neither ends a cell of a table nor begins anything in Markdown.
+/// Escapes text, which then neither ends a cell of a table nor begins anything in Markdown.
 pub(crate) fn markdown_cell(text: &str) -> String {
     let mut out = String::new();
     for letter in text.chars() {
@@ -15,7 +15,7 @@ pub(crate) fn markdown_cell(text: &str) -> String {
     out
 }
 
-/// The cells of a row.
+/// Returns the cells of a row, joined.
 pub(crate) fn markdown_row(cells: &[String]) -> String {
     let cells: Vec<String> = cells.iter().map(|text| markdown_cell(text)).collect();
     format!("| {} |", cells.join(" | "))

@@ -5,7 +5,8 @@
 //! - [`ResultTable`] compares [`ResultRow`]s, on the console with [`to_text_table`]; a [`PlainTable`] holds any text.
 //! - [`StudyReport`] compares the variants of a study, as Markdown, chart and JSON.
 //! - [`CellChart`] draws which cells of a level an explorer has reached.
-//! - [`TrailChart`] draws where agents went on a [`FloorPlan`](crate::floor_plan::FloorPlan), as a [`Drawing`](crate::drawing::Drawing).
+//! - [`TrailChart`] draws the paths of agents on a [`FloorPlan`](crate::floor_plan::FloorPlan), as a
+//!   [`Drawing`](crate::drawing::Drawing).
 //! - [`PairedDifference`] compares two methods on the same levels and with the same seeds.
 //! - [`bootstrap`] gives intervals for few runs, [`statistics`] compares runs that differ in their seed.
 //! - [`Report`] puts them together with text into a file that needs nothing else: no scripts, no fonts,

@@ -1,9 +1,9 @@
 //! Numbers for people: axis labels, table cells.
 
-/// What stands for a value that is not known.
+/// Sign for an unknown value.
 pub(super) const UNKNOWN: &str = "–";
 
-/// `value` with a fixed number of decimals, a real minus sign and thousands separated; NaN is unknown.
+/// Formats `value` with a fixed number of decimals, a real minus sign and thousands separated; NaN is unknown.
 pub(super) fn fixed(value: f64, decimals: usize) -> String {
     if value.is_nan() {
         return UNKNOWN.to_owned();
@@ -30,22 +30,22 @@ pub(super) fn fixed(value: f64, decimals: usize) -> String {
     out + &fraction
 }
 
-/// `value` without decimals, for counts; NaN is unknown.
+/// Formats `value` without decimals, for counts; NaN is unknown.
 pub fn whole(value: f64) -> String {
     fixed(value, 0)
 }
 
-/// Ticks, of which medians and quartiles may lie between two: without decimals where they are whole; NaN is unknown.
+/// Formats ticks: without decimals if whole, since medians and quartiles may lie between two ticks; NaN is unknown.
 pub fn ticks(value: f64) -> String {
     if value.fract() == 0.0 { whole(value) } else { fixed(value, 1) }
 }
 
-/// How often something is done, in words.
+/// Formats a count as `once` or `3 times`.
 pub fn times(count: u32) -> String {
     if count == 1 { "once".to_owned() } else { format!("{count} times") }
 }
 
-/// `value` with about four significant digits, for numbers whose size is not known beforehand; NaN is unknown.
+/// Formats `value` with about four significant digits, for numbers of unknown size; NaN is unknown.
 pub fn readable(value: f64) -> String {
     let size = value.abs();
     match size {
@@ -55,7 +55,7 @@ pub fn readable(value: f64) -> String {
     }
 }
 
-/// `mean ± spread`, both with the decimals that [`readable`] gives the larger one.
+/// Formats `mean ± spread`, both with the decimals that [`readable`] gives the larger one.
 pub fn readable_with_spread(mean: f64, spread: f64) -> String {
     let size = mean.abs().max(spread.abs());
     if size < 1e-4 || !size.is_finite() {
@@ -68,18 +68,18 @@ fn decimals_of(size: f64) -> usize {
     (3.0 - size.log10().floor()).clamp(0.0, 6.0) as usize
 }
 
-/// A share (0 to 1) in percent with one decimal, as `40.0 %`.
+/// Formats a share (0 to 1) in percent with one decimal, as `40.0 %`.
 pub fn percent(share: f64) -> String {
     if share.is_nan() { UNKNOWN.to_owned() } else { format!("{} %", fixed(share * 100.0, 1)) }
 }
 
-/// Decimals that show at least one digit of every standard error above 0; 2 when there is none.
+/// Returns the decimals that show at least one digit of every standard error above 0; 2 if there is no such error.
 pub(super) fn decimals_for(errors: impl Iterator<Item = f64>) -> usize {
     let smallest = errors.filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
     if smallest.is_finite() { (-smallest.log10().floor()).clamp(0.0, 4.0) as usize } else { 2 }
 }
 
-/// Mean and, where it is known, standard error.
+/// Formats a mean and, if known, its standard error.
 pub(super) fn mean_and_error(mean: f64, error: f64, decimals: usize) -> String {
     if mean.is_nan() || error.is_nan() {
         return fixed(mean, decimals);
@@ -87,7 +87,7 @@ pub(super) fn mean_and_error(mean: f64, error: f64, decimals: usize) -> String {
     format!("{} ± {}", fixed(mean, decimals), fixed(error, decimals))
 }
 
-/// Labels of axis ticks that are `step` apart, all in the same unit (none, k, M, G).
+/// Returns the labels of axis ticks that are `step` apart, all with the same unit prefix (no prefix, k, M, G).
 pub(super) fn tick_labels(ticks: &[f64], step: f64) -> Vec<String> {
     let largest = ticks.iter().fold(0.0f64, |m, t| m.max(t.abs()));
     if largest >= 1e13 || (largest > 0.0 && largest < 1e-3) {

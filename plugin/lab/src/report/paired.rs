@@ -1,16 +1,16 @@
-//! Whether one method is better than another: differences on the same levels with the same seeds.
+//! Paired differences of two methods on the same levels with the same seeds.
 
 use serde::Serialize;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 use super::statistics::mean_and_sd;
 
-/// By how much one method's return is above another's.
+/// Difference between the returns of two methods.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PairedDifference {
     /// The mean over levels and seeds.
     pub mean: f64,
-    /// Its standard error; 0 with a single level, of which nothing follows for others.
+    /// Standard error of the mean; 0 with a single level, which does not generalise to others.
     pub se: f64,
     /// Levels that both played.
     pub levels: usize,
@@ -19,13 +19,13 @@ pub struct PairedDifference {
 }
 
 impl PairedDifference {
-    /// Of `one` less `other`: for each seed the mean return on each level, with seeds and levels in the same order. `None` if
-    /// these are not the same, or there are none.
+    /// Computes the difference of `one` less `other`: for each seed the mean return on each level, with seeds and
+    /// levels in the same order. `None` if these differ, or are empty.
     ///
-    /// Other levels and other seeds would have given other differences. With d the difference of seed s on level l, and the
-    /// model d = mean + seed + level + rest, all drawn independently, the variance of the mean is
-    /// (Q of seeds + Q of levels - Q of the rest) / (S L), with Q the mean squares of a two-way table without repeats (Cochran
-    /// and Cox 1957, chapter 4). It is taken to be at least what seeds or levels alone make of it.
+    /// Other levels and other seeds would give other differences. Let d be the difference of seed s on level l. In
+    /// the model d = mean + seed + level + rest, all terms are drawn independently. The variance of the mean is (Q of
+    /// seeds + Q of levels - Q of the rest) / (S L). Q are the mean squares of a two-way table without repeats
+    /// (Cochran and Cox 1957, chapter 4). It is at least the variance from seeds alone or levels alone.
     pub fn of(one: &[&[f64]], other: &[&[f64]]) -> Option<Self> {
         let (seeds, levels) = (one.len(), one.first()?.len());
         let same = one.iter().zip(other).all(|(a, b)| a.len() == levels && b.len() == levels);
@@ -43,17 +43,17 @@ impl PairedDifference {
             .zip(&of_seeds)
             .flat_map(|(row, seed)| row.iter().zip(&of_levels).map(move |(d, level)| (d - seed - level + all).powi(2)));
         let (q_seeds, q_levels) = (levels as f64 * sd_of_seeds.powi(2), seeds as f64 * sd_of_levels.powi(2));
-        // With a single seed or level there is no rest.
+        // A single seed or level leaves no rest.
         let q_rest = rest.sum::<f64>() / ((seeds - 1) * (levels - 1)).max(1) as f64;
         let squares = (q_seeds + q_levels - q_rest).max(q_seeds).max(q_levels);
         Some(Self { mean: all, se: (squares / (seeds * levels) as f64).sqrt(), levels, seeds })
     }
 
-    /// How probable a difference this far from 0 or further would be if there were none: Student's t with one degree of freedom
-    /// less than there are seeds. `None` with one seed, of which nothing follows for others.
+    /// Returns the probability of a difference at least this far from 0 between equal methods: Student's t with one
+    /// degree of freedom less than seeds. `None` with one seed, which does not generalise to others.
     ///
-    /// Differences that vary more from level to level than from seed to seed have more degrees of freedom than that, so that
-    /// it errs on the side of caution.
+    /// Differences that vary more over levels than over seeds have more degrees of freedom, which makes the value
+    /// conservative.
     pub fn p_value(&self) -> Option<f64> {
         let freedom = self.seeds.checked_sub(1).filter(|&freedom| freedom > 0)? as f64;
         if self.se == 0.0 {
@@ -64,8 +64,11 @@ impl PairedDifference {
     }
 }
 
-/// The p-values of comparisons that are made together, so that none of them is called clear by chance more often than a single
-/// one would be (Holm 1979): of n, the smallest times n, the next one times n - 1, and so on, none below the one before it.
+/// Adjusts the p-values of comparisons that are made together. The probability of any false alarm then is at most
+/// that of a single comparison.
+///
+/// Method of Holm (1979): the smallest of n values is multiplied by n, the next one by n - 1, and so on. No value
+/// becomes less than the one before it.
 pub fn holm(p_values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p_values.len()).collect();
     order.sort_by(|&a, &b| p_values[a].total_cmp(&p_values[b]));
@@ -105,7 +108,7 @@ mod tests {
         assert_eq!(is_clear(&difference), Some(true));
     }
 
-    /// The differences of two methods that do equally well, drawn again and again: deviations of seeds, levels and the rest.
+    /// Draws the differences of two equal methods many times, with these deviations of seeds, levels and the rest.
     fn of_equals(seeds: usize, levels: usize, deviations: [f64; 3], tries: usize) -> Vec<PairedDifference> {
         let mut rng = Streams::new(3).stream("paired", 0);
         let mut draw = |size: f64| size * f64::from(normal(&mut rng));
@@ -162,7 +165,7 @@ mod tests {
         // The second is smallest: 3 · 0.01; then 2 · 0.04; the last one is not below that.
         assert_eq!(holm(&[0.04, 0.01, 0.06]), [0.08, 0.03, 0.08]);
         assert_eq!((holm(&[0.2]), holm(&[0.9, 0.8]), holm(&[])), (vec![0.2], vec![1.0, 1.0], vec![]));
-        // Of five methods that do as well as the first, none is told from it in nineteen of twenty studies.
+        // For five methods equal to the first, nineteen of twenty studies report no difference from it.
         let studies = of_equals(3, 30, [1.0, 0.1, 0.5], 4000);
         let p_values: Vec<f64> = studies.iter().map(|found| found.p_value().expect("three seeds")).collect();
         let any = |clear: &dyn Fn(&[f64]) -> bool| p_values.chunks(5).filter(|five| clear(five)).count() as f64 / 800.0;

@@ -4,7 +4,7 @@ use super::table::{PlainTable, number_columns};
 use crate::escape::one_line;
 
 impl PlainTable {
-    /// The table for the console, with aligned columns; ends with a line feed.
+    /// Returns the table for the console, with aligned columns; ends with a line feed.
     pub fn to_text(&self) -> String {
         let numbers = number_columns(self);
         let rows: Vec<Vec<String>> = std::iter::once(&self.columns)

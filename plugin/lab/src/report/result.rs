@@ -1,10 +1,10 @@
-//! Results of methods: rows, and which of them is best.
+//! Results of methods as rows, and their ranks.
 
 use serde::{Deserialize, Deserializer, Serialize};
 
 use super::paired::PairedDifference;
 
-/// What one method reached on one set of levels. NaN stands for a value that is not known.
+/// Results of one method on one set of levels. NaN stands for an unknown value.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ResultRow {
     /// The method: "SCORE-PPO", "PPO", "random", …
@@ -28,11 +28,11 @@ pub struct ResultRow {
     /// Mean number of ticks of an episode.
     #[serde(deserialize_with = "null_is_nan")]
     pub length_mean: f64,
-    /// Environment steps per second of wall-clock time, where it was measured.
+    /// Environment steps per second of wall-clock time, if measured.
     pub steps_per_s: Option<f64>,
 }
 
-/// JSON has no NaN: it is written as null.
+/// Reads null as NaN, which JSON lacks.
 fn null_is_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
@@ -40,26 +40,26 @@ fn null_is_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Err
 /// A table of results.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ResultTable {
-    /// What the table shows.
+    /// Caption of the table.
     pub caption: String,
     /// The results, in the order they are shown.
     pub rows: Vec<ResultRow>,
-    /// Figures from elsewhere, such as a paper's, shown below for comparison. They are never the best.
+    /// Figures from other sources, such as a paper, shown below for comparison. They are not ranked.
     pub references: Vec<ResultRow>,
 }
 
-/// How a row compares with the others of its split.
+/// Rank of a row within its split.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Rank {
     /// The highest mean return.
     Best,
     /// Below the best, by less than two [standard errors of the difference](error_of_difference).
     CloseToBest,
-    /// Clearly below the best, or there is nothing to compare with.
+    /// Clearly below the best, or without a row to compare with.
     Other,
 }
 
-/// Ranks the rows within each split, by mean return. A row alone in its split is not the best of anything.
+/// Ranks the rows within each split, by mean return. A row alone in its split is not ranked best.
 pub(super) fn ranks(rows: &[ResultRow]) -> Vec<Rank> {
     let rank = |row: &ResultRow| {
         let rivals = || rows.iter().filter(|r| r.split == row.split && !r.return_mean.is_nan());
@@ -79,16 +79,16 @@ pub(super) fn ranks(rows: &[ResultRow]) -> Vec<Rank> {
     rows.iter().map(|row| rank(row).unwrap_or(Rank::Other)).collect()
 }
 
-/// Standard error of the difference of two mean returns: over levels, in pairs, since what is hard for one is hard for the other,
-/// too; of two independent means where the returns on the levels are not known.
+/// Returns the standard error of the difference of two mean returns. It is paired over levels, since hard levels are
+/// hard for both. If the returns on the levels are unknown, the means count as independent.
 fn error_of_difference(one: &ResultRow, other: &ResultRow) -> f64 {
     let in_pairs = PairedDifference::of(&[&one.level_returns], &[&other.level_returns]);
-    // A single level says nothing about how levels differ.
+    // A single level shows no variation over levels.
     let in_pairs = in_pairs.filter(|difference| difference.levels > 1);
     in_pairs.map_or_else(|| one.return_se.hypot(other.return_se), |difference| difference.se)
 }
 
-/// The key to the signs of [`Rank`], for the signs that occur.
+/// Returns the key to the signs of [`Rank`] that occur.
 pub(super) fn rank_key(ranks: &[Rank], best: &str, close: &str) -> Option<String> {
     if !ranks.contains(&Rank::Best) {
         return None;

@@ -1,4 +1,4 @@
-//! Scatter plots as a drawing, for pictures.
+//! Scatter plots as a drawing, for pixel images.
 
 use bevy::math::{Rect, Vec2};
 
@@ -10,7 +10,7 @@ use super::{
 };
 use crate::drawing::{Drawing, MarkForm, Rgb, Shape};
 
-/// Width of the paper, and height of a plot without its labels. All lengths in pixels.
+/// Width of the paper, and height of a plot without its labels, in pixels.
 const WIDTH: f32 = 720.0;
 const PLOT: f32 = 250.0;
 /// Space around everything.
@@ -30,8 +30,8 @@ const PAPER: Rgb = [255, 255, 255];
 const DOTS: [Rgb; 7] =
     [[0, 114, 178], [213, 94, 0], [0, 158, 115], [178, 82, 155], [201, 133, 0], [58, 155, 220], [91, 91, 91]];
 
-/// The dots of charts, one chart below the other, on white paper, and lines that are no scatter. What stands around points is
-/// left out.
+/// Draws the dots of charts on white paper, one chart below the other, with lines for curves that are not scatters.
+/// Bands are left out.
 pub fn draw_scatters(charts: &[Chart]) -> Drawing {
     let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
     let (mut shapes, mut top) = (Vec::new(), MARGIN);
@@ -41,7 +41,7 @@ pub fn draw_scatters(charts: &[Chart]) -> Drawing {
     Drawing { label: titles.join("; "), size: Vec2::new(WIDTH, top.max(2.0 * MARGIN)), shapes }
 }
 
-/// Draws a chart from this height on; where it ends.
+/// Draws a chart from this height on, and returns its lower end.
 fn draw(chart: &Chart, top: f32, shapes: &mut Vec<Shape>) -> f32 {
     let points = || chart.curves.iter().flat_map(|curve| curve.points.iter().copied()).filter(is_point);
     let wanted = chart.y_range.into_iter().flat_map(|(low, high)| [low, high]);

@@ -1,9 +1,10 @@
-//! A curve in one line of text.
+//! Curves in one line of text.
 
 const BARS: [char; 8] = ['▁', '▂', '▃', '▄', '▅', '▆', '▇', '█'];
 
-/// The values as bars of different height, the lowest to the highest, at most `width` characters: each stands for the
-/// mean of its share of the values. Values that are not finite are left out; where there is no other, a space stands.
+/// Draws the values as bars of different height, from the lowest to the highest value. Each of at most `width`
+/// characters stands for the mean of its share of the values. Values that are not finite are left out; a share
+/// without other values is a space.
 pub fn sparkline(values: &[f64], width: usize) -> String {
     let size = values.len().div_ceil(width.max(1)).max(1);
     let means: Vec<f64> = values

@@ -2,9 +2,9 @@
 
 use super::bootstrap::{self, Estimate};
 
-/// Mean and sample standard deviation (with n - 1) of the values; the deviation of a single value is 0.
+/// Returns the mean and sample standard deviation (with n - 1) of the values; the deviation of a single value is 0.
 ///
-/// Both are NaN without any value.
+/// Both are NaN without values.
 pub fn mean_and_sd(values: &[f64]) -> (f64, f64) {
     match values {
         [] => return (f64::NAN, f64::NAN),
@@ -17,23 +17,24 @@ pub fn mean_and_sd(values: &[f64]) -> (f64, f64) {
     (mean, (squares / (n - 1.0)).sqrt())
 }
 
-/// The value in the middle, or the mean of the two there; `None` without any value.
+/// Returns the median, which is the mean of the two middle values of an even number; `None` without values.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     values.sort_by(f64::total_cmp);
     let last = values.len().checked_sub(1)?;
     Some(f64::midpoint(values[last / 2], values[last.div_ceil(2)]))
 }
 
-/// The first step at which a learning curve of `(step, value)` is at `threshold` or above; `None` if it never is.
+/// Returns the first step at which a learning curve of `(step, value)` is at `threshold` or above; `None` if it never
+/// is.
 ///
-/// A single good value counts, so the curve should be a moving mean, as `charts/success_rate` and
+/// A single good value counts. So the curve should be a moving mean, as `charts/success_rate` and
 /// `charts/episodic_return` are: over the last 100 episodes.
 pub fn steps_to_reach(curve: &[(u64, f64)], threshold: f64) -> Option<u64> {
     curve.iter().find(|(_, value)| *value >= threshold).map(|(step, _)| *step)
 }
 
-/// The value of a curve at a step, interpolated linearly between its points, whose steps ascend; `None` before its first
-/// and after its last point.
+/// Returns the value of a curve at a step, interpolated linearly between its points, whose steps ascend. `None`
+/// before its first and after its last point.
 pub fn value_at(curve: &[(u64, f64)], step: u64) -> Option<f64> {
     let after = curve.partition_point(|(at, _)| *at < step);
     let (right, right_value) = *curve.get(after)?;
@@ -45,23 +46,23 @@ pub fn value_at(curve: &[(u64, f64)], step: u64) -> Option<f64> {
     Some(left_value + share * (right_value - left_value))
 }
 
-/// Mean of several curves at a step, and how far they spread.
+/// Mean and interval of several curves at a step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MeanPoint {
     /// The step.
     pub step: u64,
     /// Mean of the curves.
     pub mean: f64,
-    /// Where the 95 % interval of the mean begins.
+    /// Lower end of the 95 % interval of the mean.
     pub low: f64,
-    /// Where it ends.
+    /// Upper end.
     pub high: f64,
 }
 
-/// The mean of several learning curves with its 95 % interval over such curves: see [`bootstrap::mean`].
+/// Returns the mean of several learning curves with its 95 % interval over such curves: see [`bootstrap::mean`].
 ///
-/// The points are at every step that any of the curves has, from where the last one begins to where the first one ends,
-/// so that a mean is always that of all of them.
+/// Points are at every step of any curve, from the latest first step to the earliest last step. So each mean is over
+/// all curves.
 pub fn mean_curve(curves: &[Vec<(u64, f64)>]) -> Vec<MeanPoint> {
     let mut steps: Vec<u64> = curves.iter().flatten().map(|(step, _)| *step).collect();
     steps.sort_unstable();
@@ -113,7 +114,7 @@ mod tests {
 
         let third = vec![(10, 8.0), (30, 3.0)];
         let at_10 = mean_curve(&[short, long, third])[0];
-        // Of the 27 ways to draw three of 1, 3 and 8 one gives 1 and one gives 8, which is more than 2.5 % each.
+        // Of the 27 draws of three from 1, 3 and 8, one has mean 1 and one has mean 8: more than 2.5 % each.
         assert_eq!((at_10.mean, at_10.low, at_10.high), (4.0, 1.0, 8.0));
         assert!(mean_curve(&[]).is_empty() && mean_curve(&[vec![]]).is_empty());
     }

@@ -1,4 +1,4 @@
-//! What a study found: the results of its runs, and what they come to over the seeds.
+//! Results of a study: those of its runs, and their statistics over the seeds.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,7 +15,8 @@ use crate::{
     },
 };
 
-/// What a run learned, over its environment steps: means over the last 100 training episodes. Empty without training.
+/// Learning curves of a run over environment steps: means over the last 100 training episodes. Empty without
+/// training.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LearningCurves {
     /// Steps and success rates.
@@ -24,27 +25,27 @@ pub struct LearningCurves {
     pub returns: Vec<(u64, f64)>,
 }
 
-/// What one run of a study came to.
+/// Result of one run of a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StudyResult {
     /// Name of the variant.
     pub variant: String,
-    /// How its policy was made.
+    /// Method that made its policy.
     pub algorithm: Algorithm,
     /// The seed.
     pub seed: u64,
-    /// The training; `None` where there is none, as in behaviour cloning.
+    /// Result of training; `None` without training, as in behaviour cloning.
     pub training: Option<TrainingResult>,
     /// The measurement on the held-out levels.
     pub test: TestResult,
 }
 
-/// What a training came to. Rates and means are those of the last 100 training episodes.
+/// Result of training. Rates and means are over the last 100 training episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TrainingResult {
     /// Environment steps.
     pub steps: u64,
-    /// The first step at which the success rate was at the threshold; `None` if it never was.
+    /// First step at which the success rate reached the threshold; `None` if it never did.
     pub steps_to_threshold: Option<u64>,
     /// Success rate at the end; `None` if no episode ended.
     pub success: Option<f64>,
@@ -57,7 +58,7 @@ pub struct TrainingResult {
 pub struct TestResult {
     /// Episodes.
     pub episodes: u64,
-    /// Share of episodes that reached the level's aim.
+    /// Share of episodes that reached the level's goal.
     pub success: f64,
     /// Its standard error.
     pub success_se: f64,
@@ -67,7 +68,7 @@ pub struct TestResult {
     pub return_se: f64,
     /// Mean length, ticks.
     pub length_mean: f64,
-    /// Mean return on each level, in ascending order of levels; empty in results from before they were kept.
+    /// Mean return on each level, in ascending order of levels; empty in results of older versions.
     #[serde(default)]
     pub level_returns: Vec<f64>,
 }
@@ -86,7 +87,7 @@ impl From<&EvalSummary> for TestResult {
     }
 }
 
-/// A study that is done. It says nothing of the machine or the time: the same study gives the same bytes.
+/// A finished study. Machine and time are left out: the same study gives the same bytes.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StudyReport {
     /// The command that made it.
@@ -101,24 +102,25 @@ pub struct StudyReport {
 }
 
 impl StudyReport {
-    /// Names of the variants, in their order.
+    /// Returns the names of the variants, in order.
     pub(super) fn variants(&self) -> Vec<&str> {
         let mut names: Vec<&str> = self.results.iter().map(|result| result.variant.as_str()).collect();
         names.dedup();
         names
     }
 
-    /// The results of one variant.
+    /// Returns the results of one variant.
     pub(super) fn of(&self, variant: &str) -> Vec<&StudyResult> {
         self.results.iter().filter(|result| result.variant == variant).collect()
     }
 
-    /// The held-out returns of a variant: its seeds, each with the mean return on each level.
+    /// Returns the held-out returns of a variant: its seeds, each with the mean return on each level.
     pub(super) fn level_returns(&self, variant: &str) -> Vec<&[f64]> {
         self.of(variant).into_iter().map(|run| run.test.level_returns.as_slice()).collect()
     }
 
-    /// The held-out return of a variant less that of another; `None` unless both have the same seeds and levels.
+    /// Returns the held-out return of a variant less that of another; `None` unless both have the same seeds and
+    /// levels.
     pub fn difference(&self, variant: &str, other: &str) -> Option<PairedDifference> {
         let seeds = |variant| self.of(variant).iter().map(|run| run.seed).collect::<Vec<_>>();
         if seeds(variant) != seeds(other) {
@@ -127,7 +129,7 @@ impl StudyReport {
         PairedDifference::of(&self.level_returns(variant), &self.level_returns(other))
     }
 
-    /// Success and return over steps: the mean of each variant that was trained, with its interval over the seeds.
+    /// Returns success and return over steps: the mean of each trained variant, with its interval over the seeds.
     pub fn charts(&self) -> [Chart; 2] {
         [
             self.chart("success", "success rate", range_of(SUCCESS_RATE), |curves| &curves.success),
@@ -170,7 +172,7 @@ impl StudyReport {
         }
     }
 
-    /// Command, experiment and the numbers of every run.
+    /// Returns command, experiment and the numbers of every run.
     ///
     /// # Errors
     ///
@@ -180,7 +182,7 @@ impl StudyReport {
     }
 }
 
-/// What lines and bands of this many seeds are.
+/// Describes the lines and bands of a chart over this many seeds.
 fn over_seeds(seeds: usize) -> &'static str {
     match seeds {
         0 => "mean over the seeds",

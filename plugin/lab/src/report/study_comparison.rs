@@ -1,4 +1,4 @@
-//! How the variants of a study compare: paired differences, interquartile means, and who probably does better.
+//! Comparison of the variants of a study: paired differences, interquartile means, and probabilities of improvement.
 
 use super::{
     bootstrap::{Estimate, interquartile_mean, probability_of_improvement},
@@ -9,7 +9,7 @@ use super::{
 };
 
 impl StudyReport {
-    /// How far the first variant is above each other one, where they can be paired.
+    /// Returns the paired differences of the first variant from each other one.
     pub(super) fn differences(&self) -> String {
         let variants = self.variants();
         let Some((first, others)) = variants.split_first() else { return String::new() };
@@ -24,7 +24,7 @@ impl StudyReport {
             let p = found.p_value();
             let p_together = p.and_then(|_| together.next());
             let words = match (p_together, found.mean > 0.0) {
-                (None, _) => "not to be told from one seed",
+                (None, _) => "one seed is too few",
                 (Some(0.05..), _) => "no difference that is clear",
                 (Some(_), true) => "clearly above",
                 (Some(_), false) => "clearly below",
@@ -42,8 +42,8 @@ impl StudyReport {
         )
     }
 
-    /// Interquartile means, and how probable it is that the first variant does better. Of a variant with a single seed nothing
-    /// follows for others, so that it has neither.
+    /// Returns interquartile means, and the probability that the first variant does better. A variant with a single
+    /// seed has neither, since one seed does not generalise to others.
     pub(super) fn intervals(&self) -> String {
         let variants = self.variants();
         let seeds = |variant: &str| Some(self.level_returns(variant)).filter(|returns| returns.len() > 1);
@@ -80,7 +80,7 @@ impl StudyReport {
     }
 }
 
-/// A p-value; unknown where there is none.
+/// Formats a p-value; unknown if there is no value.
 fn p_cell(p: Option<f64>) -> String {
     p.map_or(UNKNOWN.to_owned(), |p| if p < 0.001 { "< 0.001".to_owned() } else { fixed(p, 3) })
 }

@@ -1,4 +1,4 @@
-//! Under what conditions the variants of a study were trained and measured, in words.
+//! Training and test conditions of a study's variants, as text.
 
 use playbot_learner::brief_number;
 
@@ -13,6 +13,7 @@ use crate::{
 };
 
 impl StudyReport {
+    /// Returns the conditions of the study as a paragraph of Markdown.
     pub(super) fn conditions(&self) -> String {
         let experiment = &self.experiment;
         let mut seeds: Vec<u64> = self.results.iter().map(|result| result.seed).collect();
@@ -36,7 +37,7 @@ impl StudyReport {
         )
     }
 
-    /// On what levels and for how long the variants were trained: once if all were alike, else with the names of each kind.
+    /// Describes the training levels and lengths of the variants: once if all are alike, else by groups of variants.
     fn trainings(&self) -> String {
         let mut kinds: Vec<(String, Vec<&str>)> = Vec::new();
         for (variant, run) in self.trained() {
@@ -56,14 +57,14 @@ impl StudyReport {
         }
     }
 
-    /// The levels that all variants were trained on; `None` if they differ.
+    /// Returns the training levels of all variants; `None` if they differ.
     pub(super) fn trained_on(&self) -> Option<LevelSplit> {
         let mut splits = self.trained().into_iter().map(|(_, run)| run.train);
         let first = splits.next()?;
         splits.all(|split| split == first).then_some(first)
     }
 
-    /// The variants that were trained, with their experiments.
+    /// Returns the trained variants with their experiments.
     fn trained(&self) -> Vec<(&str, Experiment)> {
         let runs = study_runs(&self.experiment).unwrap_or_default();
         let experiment = |variant: &str| {
@@ -75,7 +76,7 @@ impl StudyReport {
     }
 }
 
-/// Levels, steps and, of learners that choose how many there are, gradient steps.
+/// Describes levels, steps and, for learners with a free number of them, gradient steps.
 fn training(run: &Experiment) -> String {
     let words = format!("{} for {} environment steps", run.train, fixed(run.whole_steps() as f64, 0));
     match run.algorithm.learner() {

@@ -1,4 +1,4 @@
-//! A study as Markdown: a table of means over the seeds, the numbers of every seed, and how to run it again.
+//! Studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again.
 
 use std::fmt::Write;
 
@@ -9,7 +9,7 @@ use super::{
 };
 
 impl StudyReport {
-    /// The page: command, tables, the plot `curves.svg`, what each variant changes, and the experiment.
+    /// Returns the page: command, tables, the plot `curves.svg`, the changes of each variant, and the experiment.
     ///
     /// # Errors
     ///
@@ -33,7 +33,7 @@ impl StudyReport {
         Ok(page)
     }
 
-    /// The table of means over the seeds, one row for each variant.
+    /// Returns the table of means over the seeds, one row for each variant.
     pub fn summary(&self) -> String {
         let threshold = format!("steps to {} success", rate_cell(self.experiment.study.threshold));
         let headings =
@@ -86,7 +86,7 @@ impl StudyReport {
     }
 }
 
-/// Steps to the threshold: of the runs that reached it, and how many did if some did not.
+/// Formats the steps to the threshold of the runs that reached it, with their number if some did not.
 fn steps_cell(runs: &[&StudyResult]) -> String {
     let trained: Vec<&TrainingResult> = runs.iter().filter_map(|run| run.training.as_ref()).collect();
     let reached: Vec<f64> = trained.iter().filter_map(|run| run.steps_to_threshold).map(|step| step as f64).collect();
@@ -98,13 +98,13 @@ fn steps_cell(runs: &[&StudyResult]) -> String {
     }
 }
 
-/// Mean and standard deviation; a single value has none.
+/// Formats mean and standard deviation; a single value has no deviation.
 fn mean_cell(values: &[f64], decimals: usize) -> String {
     let (mean, sd) = mean_and_sd(values);
     mean_and_error(mean, if values.len() > 1 { sd } else { f64::NAN }, decimals)
 }
 
-/// A success rate as the cells below it are written, `70.0 ± 14.1%`: without a blank, which would widen every column.
+/// Formats a success rate as in the cells below it, `70.0 ± 14.1%`: a blank before the sign would widen every column.
 pub(super) fn rate_cell(share: f64) -> String {
     format!("{}%", fixed(100.0 * share, 1))
 }
@@ -117,7 +117,7 @@ fn share_cell(values: &[f64]) -> String {
     format!("{}%", mean_cell(&percents, 1))
 }
 
-/// A table with its first column to the left and the others to the right, padded so that the text itself is readable.
+/// Formats a table with its first column to the left and the others to the right, padded to be readable as text.
 pub fn markdown_table(headings: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
     let mut lines = vec![headings.iter().map(|heading| (*heading).to_owned()).collect::<Vec<_>>()];
     lines.extend(rows);
@@ -150,7 +150,7 @@ mod tests {
         train::{Algorithm, config_file::parse_experiment},
     };
 
-    /// What a run learned after 512 and 1,024 steps.
+    /// Makes learning curves with points at 512 and 1,024 steps.
     fn learned(success: [f64; 2], returns: [f64; 2]) -> LearningCurves {
         let over = |values: [f64; 2]| [512, 1024].into_iter().zip(values).collect();
         LearningCurves { success: over(success), returns: over(returns) }
@@ -233,7 +233,7 @@ mod tests {
         };
         let page = alone(&["full", "cloned"]);
         assert!(!page.contains("95 %") && !page.contains("interquartile"), "{page}");
-        assert!(page.contains("not to be told from one seed"), "{page}");
+        assert!(page.contains("one seed is too few"), "{page}");
         let page = alone(&["cloned"]);
         assert!(page.lines().any(|line| line.starts_with("| full ") && line.contains(" 7.00 [")), "{page}");
         assert!(!page.lines().any(|line| line.starts_with("| cloned ") && line.contains('[')), "{page}");

@@ -1,4 +1,4 @@
-//! Drawing a chart as SVG.
+//! Charts as SVG.
 
 use std::fmt::Write;
 
@@ -26,18 +26,18 @@ const LINE: f64 = 17.0;
 const MARGIN: f64 = 12.0;
 /// Space between charts of one file in pixels.
 const GAP: f64 = 20.0;
-/// Length of the piece of line before a label, with its space.
+/// Length of the sample line before a label, with its space.
 const KEY: f64 = 26.0;
 
 impl Chart {
-    /// The chart as a complete SVG file: text as text, no fonts or scripts, 720 pixels wide and a margin,
-    /// in light or dark colours as the reader prefers.
+    /// Returns the chart as a complete SVG file, 720 pixels wide and a margin. Text stays text, without fonts or
+    /// scripts, and colours follow the reader's light or dark setting.
     pub fn to_svg(&self) -> String {
         to_svg(std::slice::from_ref(self))
     }
 }
 
-/// Charts below each other as one complete SVG file, see [`Chart::to_svg`].
+/// Draws charts below each other as one complete SVG file, see [`Chart::to_svg`].
 pub fn to_svg(charts: &[Chart]) -> String {
     let (mut body, mut height) = (String::new(), 0.0);
     for chart in charts {
@@ -51,13 +51,13 @@ pub fn to_svg(charts: &[Chart]) -> String {
     element(&titles.join("; "), (height - GAP).max(0.0), MARGIN, &(style + &body))
 }
 
-/// The chart inside a page that holds [`CHART_STYLE`].
+/// Draws the chart for a page that holds [`CHART_STYLE`].
 pub(super) fn draw(chart: &Chart) -> String {
     let (content, height) = content(chart);
     element(&chart.title, height, 0.0, &content)
 }
 
-/// Everything in a chart, and its height.
+/// Returns the elements of a chart, and its height.
 fn content(chart: &Chart) -> (String, f64) {
     let layout = Layout::new(chart);
     let mut body = String::new();
@@ -80,7 +80,7 @@ fn element(label: &str, height: f64, margin: f64, body: &str) -> String {
     )
 }
 
-/// Where things are. All lengths in pixels.
+/// Positions in the drawing. All lengths in pixels.
 struct Layout {
     x: Axis,
     y: Axis,
@@ -91,7 +91,7 @@ struct Layout {
     height: f64,
     title: Vec<String>,
     marks: Vec<Mark>,
-    /// Whether the labels stand beside the lines, or below the plot.
+    /// True if the labels stand beside the lines, false for below the plot.
     direct: bool,
     notes: Vec<String>,
 }
@@ -106,7 +106,7 @@ impl Layout {
 
         let drawn = || chart.curves.iter().filter(|c| !c.is_blank() && !c.label.is_empty());
         let label = drawn().map(|c| text_width(&c.label, SIZE)).fold(0.0, f64::max);
-        // A scatter ends nowhere, so that no label can stand where it ends.
+        // The lines of a scatter have no end to label.
         let has_ends = !chart.curves.iter().any(|curve| curve.is_scatter);
         let direct = has_ends && label <= 170.0 && drawn().count() as f64 * LINE <= PLOT_HEIGHT;
         let ticks = tick_labels(&y.ticks, y.step).iter().map(|t| text_width(t, SIZE)).fold(0.0, f64::max);
@@ -195,7 +195,7 @@ fn marks(at: &Layout, out: &mut String) {
     }
 }
 
-/// The classes that give a line its colour and, from the second round of colours on, its dashes.
+/// Returns the classes that give a line its colour and, from the second round of colours on, its dashes.
 fn line_class(index: usize) -> String {
     format!("c{} d{}", index % COLOURS, (index / COLOURS).min(2))
 }
@@ -230,7 +230,7 @@ fn lines(chart: &Chart, at: &Layout, out: &mut String) {
     }
 }
 
-/// The names of the lines: at the right of the plot, at the height where each line ends, or below it.
+/// Writes the names of the lines: at the right of the plot, at the height of each line's end, or below the plot.
 fn labels(chart: &Chart, at: &Layout, out: &mut String) {
     let named: Vec<(usize, &str, (f64, f64))> = chart
         .curves

@@ -10,7 +10,7 @@ use crate::escape::escape;
 /// A table of text.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct PlainTable {
-    /// What the table shows.
+    /// Caption of the table.
     pub caption: String,
     /// The headings.
     pub columns: Vec<String>,
@@ -56,7 +56,7 @@ fn wrapped(caption: &str, head: &str, body: &str, key: Option<String>) -> String
     )
 }
 
-/// Which columns hold numbers, so far as they hold anything; a table without rows has none.
+/// Returns the columns that hold numbers and empty cells only; no column without rows.
 pub(super) fn number_columns(table: &PlainTable) -> Vec<bool> {
     let width = table.rows.iter().map(Vec::len).fold(table.columns.len(), usize::max);
     let is_number = |text: &String| {
@@ -141,7 +141,7 @@ fn results(table: &ResultTable) -> String {
     wrapped(&table.caption, &head, &body, (!key.is_empty()).then(|| key.join("; ") + "."))
 }
 
-/// The common scale of the bars of a table; it includes 0.
+/// Common scale of the bars of a table; it includes 0.
 struct BarScale {
     low: f64,
     high: f64,
@@ -166,7 +166,7 @@ impl BarScale {
         1.0 + (value - self.low) / (self.high - self.low) * (Self::WIDTH - 2.0)
     }
 
-    /// A bar from 0 to the mean, with a whisker of one standard error.
+    /// Draws a bar from 0 to the mean, with a whisker of one standard error.
     fn draw(&self, row: &ResultRow) -> String {
         let Some((low, high)) = ends(row) else {
             return String::new();
@@ -189,7 +189,7 @@ impl BarScale {
     }
 }
 
-/// Mean minus and plus one standard error; `None` when the mean cannot be drawn.
+/// Returns the mean minus and plus one standard error; `None` if the mean cannot be drawn.
 fn ends(row: &ResultRow) -> Option<(f64, f64)> {
     let se = if row.return_se.is_finite() { row.return_se.abs() } else { 0.0 };
     let ends = (row.return_mean - se, row.return_mean + se);

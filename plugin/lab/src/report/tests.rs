@@ -1,4 +1,4 @@
-//! Whole charts and reports.
+//! Tests of whole charts and reports.
 
 use super::result::sample_rows;
 use super::*;
@@ -7,7 +7,7 @@ fn chart(curves: Vec<Curve>) -> Chart {
     Chart { title: "Return".into(), x_label: "steps".into(), y_label: "return".into(), curves, ..Chart::default() }
 }
 
-/// Tags that open must close, in order; attributes are quoted. Enough to catch text that was not escaped.
+/// Checks that tags close in order and that attributes are quoted, which catches unescaped text.
 fn assert_well_formed(markup: &str) {
     let mut open = Vec::new();
     for tag in markup.split('<').skip(1) {
@@ -68,7 +68,7 @@ fn everything_is_escaped() {
     assert_well_formed(
         &html[styles..].replacen("</style>", "", 1).replacen("</head>", "", 1).replacen("</html>", "", 1),
     );
-    // Nothing is loaded from anywhere; the only address is the name of the SVG format.
+    // Nothing is loaded; the only address is the name of the SVG format.
     assert_eq!(html.matches("http://").count(), html.matches("xmlns=\"http://www.w3.org/2000/svg\"").count());
     assert!(!html.contains("https://") && !html.contains("url(") && !html.contains("src="));
 }

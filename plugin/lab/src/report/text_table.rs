@@ -1,4 +1,4 @@
-//! Results for the console.
+//! Results as text for the console.
 
 use super::number::{UNKNOWN, decimals_for, fixed, mean_and_error, percent};
 use super::result::{Rank, ResultRow, ResultTable, rank_key, ranks};
@@ -7,20 +7,20 @@ use crate::escape::one_line;
 const HEADINGS: [&str; 7] = ["method", "split", "episodes", "return", "success", "length", "steps/s"];
 /// The column of successes.
 const SUCCESS: usize = 4;
-/// The first columns are words, the others numbers.
+/// Number of leading columns that hold words; the others hold numbers.
 const WORDS: usize = 2;
 
-/// The rows as an aligned table for the console: the best row of each split is marked with `*`, those
-/// that are not clearly worse with `~`. A column that is unknown in all rows is left out, and so is that of successes
-/// where no row has any: most likely the game has none to report.
+/// Formats the rows as an aligned table for the console. The best row of each split is marked with `*`, rows that are
+/// not clearly worse with `~`. A column that is unknown in all rows is left out. So is the column of successes if it
+/// is 0 in all rows: the game most likely reports no success.
 ///
-/// Ends with a line feed; without rows it says so.
+/// Ends with a line feed; an empty list gives a message.
 pub fn to_text_table(rows: &[ResultRow]) -> String {
     render(rows, &[])
 }
 
 impl ResultTable {
-    /// The table for the console, see [`to_text_table`]: caption, results, then the references.
+    /// Formats the table for the console, see [`to_text_table`]: caption, results, then the references.
     pub fn to_text(&self) -> String {
         let table = render(&self.rows, &self.references);
         if self.caption.is_empty() { table } else { format!("{}\n{table}", one_line(&self.caption)) }
@@ -73,10 +73,10 @@ fn render(rows: &[ResultRow], references: &[ResultRow]) -> String {
     out
 }
 
-/// What stands in place of a column of successes.
+/// Text in place of a column without successes.
 pub(super) const NO_SUCCESS: &str = "no episode was reported as a success";
 
-/// Whether successes are known and there are none.
+/// Returns whether successes are known and all 0.
 pub(super) fn has_no_success<'a>(rows: impl Iterator<Item = &'a ResultRow>) -> bool {
     let known: Vec<f64> = rows.map(|row| row.success).filter(|success| !success.is_nan()).collect();
     !known.is_empty() && known.iter().all(|success| *success == 0.0)

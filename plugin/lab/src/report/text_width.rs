@@ -1,6 +1,6 @@
-//! The room that text takes in a drawing, estimated: the font is the reader's.
+//! Estimated width of text in a drawing: the reader's font is unknown.
 
-/// Width of `text` in pixels at a font size in pixels; rather too wide than too narrow.
+/// Returns the width of `text` in pixels at a font size in pixels; rather too wide than too narrow.
 pub(super) fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(|c| char_width(c) * size).sum()
 }
@@ -31,8 +31,8 @@ pub(super) fn wrap(text: &str, width: f64, size: f64) -> Vec<String> {
     lines
 }
 
-/// Positions for labels of height `height` that want to be at `wanted`, moved apart within
-/// `top..=bottom`. The order of the labels along the axis is kept.
+/// Positions labels of height `height` near `wanted`, moved apart within `top..=bottom`. The order of the labels
+/// along the axis is kept.
 pub(super) fn spread(wanted: &[f64], height: f64, top: f64, bottom: f64) -> Vec<f64> {
     let mut order: Vec<usize> = (0..wanted.len()).collect();
     order.sort_by(|&a, &b| wanted[a].total_cmp(&wanted[b]));

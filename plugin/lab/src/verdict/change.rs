@@ -1,4 +1,4 @@
-//! What differs between earlier results and these, on one level.
+//! Differences of a level from earlier results.
 
 use std::fmt;
 
@@ -11,15 +11,15 @@ use super::fisher::Trials;
 pub struct Change {
     /// The level.
     pub level: String,
-    /// The tester that shows it; `None` for several together.
+    /// The tester that shows the change; `None` for several together.
     pub tester: Option<String>,
     /// Solved episodes before.
     pub before: Trials,
     /// Solved episodes now.
     pub now: Trials,
-    /// Probability of such a difference by chance, by Fisher's exact test; `None` where nothing is left to chance.
+    /// Probability of such a difference by chance, by Fisher's exact test; `None` without randomness.
     pub probability: Option<f64>,
-    /// What is proved of the level now and was not before, or the other way round.
+    /// Change of the level's proof, described.
     pub proof: Option<String>,
 }
 
@@ -31,7 +31,7 @@ impl fmt::Display for Change {
         match (&self.proof, self.probability, &self.tester) {
             (Some(proof), ..) => write!(f, " ({proof})"),
             (None, Some(probability), _) => write!(f, " (p = {probability:.1e})"),
-            (None, None, Some(tester)) => write!(f, " ({tester}, which leaves nothing to chance)"),
+            (None, None, Some(tester)) => write!(f, " ({tester}, which draws no random numbers)"),
             (None, None, None) => Ok(()),
         }
     }
@@ -42,9 +42,9 @@ impl fmt::Display for Change {
 pub struct FindingChange {
     /// The level.
     pub level: String,
-    /// What found it.
+    /// Its detector.
     pub detector: String,
-    /// Who played.
+    /// The tester that played.
     pub tester: Option<String>,
 }
 

@@ -1,4 +1,4 @@
-//! What has changed since earlier results, and what is noise.
+//! Comparison with earlier results, separating changes from noise.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -21,38 +21,40 @@ mod common_levels;
 
 use common_levels::{may_have_common_levels, no_common_level};
 
-/// Expected share of false alarms among the levels that are said to be easier or harder.
+/// Expected share of false alarms among the levels reported as easier or harder.
 pub const FALSE_DISCOVERY_RATE: f64 = 0.05;
 
-/// Earlier results and these, level by level.
+/// Comparison of two results, level by level.
 ///
-/// A tester that drew no random number on a level, before and now, would do the same again: that it solves what it did not
-/// solve, or the other way round, is a change of the level, however few episodes there are. What other testers solved is
-/// taken together and compared by Fisher's exact test; over all levels, at most one alarm in twenty is false on average
-/// (Benjamini and Hochberg). A proof that a level cannot be solved is always told if it is new.
+/// A tester that drew no random number on a level, before and now, would repeat its episode exactly. So if it newly
+/// solves the level, or no longer does, the level has changed, even with a single episode.
+///
+/// The episodes of all other testers are pooled and compared by Fisher's exact test. Over all levels, at most one
+/// alarm in twenty is false on average (Benjamini and Hochberg). A new proof that a level cannot be solved is always
+/// reported.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Comparison {
     /// Levels in both.
     pub levels: u64,
     /// Levels that were not tested before.
     pub only_now: u64,
-    /// Levels that are not tested any more.
+    /// Levels that are no longer tested.
     pub only_before: u64,
-    /// Testers that are left out, and why.
+    /// Testers that are left out, with reasons.
     pub left_out: Vec<String>,
-    /// Levels that cannot be solved any more, or of which that is known now.
+    /// Levels that became unsolvable, or newly proved so.
     pub unsolvable: Vec<Change>,
     /// Levels that are solved less often.
     pub harder: Vec<Change>,
     /// Levels that are solved more often.
     pub easier: Vec<Change>,
-    /// What was not found before.
+    /// Findings that are new.
     pub new_findings: Vec<FindingChange>,
-    /// What is found no longer.
+    /// Findings that are gone.
     pub gone_findings: Vec<FindingChange>,
 }
 
-/// What is kept in memory of an earlier level.
+/// Results of an earlier level that are kept in memory.
 struct Known {
     testers: Vec<TesterVerdict>,
     total: Trials,
@@ -71,8 +73,8 @@ impl Comparison {
     ///
     /// # Errors
     ///
-    /// [`TestError::Incomparable`] for those of another game or version, or without a level or a tester in common; or they
-    /// cannot be read.
+    /// [`TestError::Incomparable`] for results of another game or version, or without a common level or tester;
+    /// another [`TestError`] if they cannot be read.
     pub fn read(before: &Path, now: &Path) -> Result<Self, TestError> {
         let mut lines = ResultLines::open_whole(now)?;
         let Comparable { mut earlier, common, other_detectors, left_out } = comparable(before, lines.record())?;
@@ -99,16 +101,16 @@ impl Comparison {
         Ok(comparison)
     }
 
-    /// Checks that results of such a test can be compared with those in a folder, before it is run.
+    /// Checks before a test that its results can be compared with those in a folder.
     ///
     /// # Errors
     ///
-    /// As for [`read`](Self::read), as far as it is known beforehand.
+    /// As for [`read`](Self::read), as far as known in advance.
     pub fn check(before: &Path, record: &TestRecord) -> Result<(), TestError> {
         comparable(before, record).map(drop)
     }
 
-    /// Whether something has become worse.
+    /// Returns whether something has become worse.
     pub fn has_alarms(&self) -> bool {
         !(self.unsolvable.is_empty() && self.harder.is_empty() && self.new_findings.is_empty())
     }
@@ -152,7 +154,7 @@ impl Comparison {
                 add(&mut pooled_now, is);
                 continue;
             }
-            // All its episodes are the same one.
+            // All its episodes are equal.
             let (solved, solves) = (was.successes > 0, is.successes > 0);
             if solved != solves {
                 let change = Change { tester: Some(before.tester.clone()), ..change(was, is) };
@@ -171,7 +173,7 @@ impl Comparison {
         }
     }
 
-    /// Tells of those levels that differ by more than chance.
+    /// Keeps the changes of those levels that differ by more than chance.
     fn judge(&mut self, doubtful: Vec<Doubtful>) {
         let probabilities: Vec<f64> = doubtful.iter().map(|level| level.probability).collect();
         let alarms = benjamini_hochberg(&probabilities, FALSE_DISCOVERY_RATE);
@@ -190,7 +192,7 @@ impl Comparison {
 }
 
 impl Known {
-    /// What the testers with these names say, and all detectors but these.
+    /// Keeps the results of the testers with these names, and of all detectors except these.
     fn of(level: LevelVerdict, testers: &[String], other_detectors: &[String]) -> Self {
         let is_unsolvable = level.proof.why_unsolvable().is_some();
         let is_common = |name: &Option<String>| name.as_ref().is_none_or(|name| testers.contains(name));
@@ -218,7 +220,7 @@ fn add(sum: &mut Trials, more: Trials) {
     sum.trials = sum.trials.saturating_add(more.trials);
 }
 
-/// Earlier results, and what they have in common with others.
+/// Earlier results, and the names in common with others.
 struct Comparable {
     earlier: ResultLines,
     common: Vec<String>,
@@ -235,7 +237,7 @@ fn comparable(before: &Path, record: &TestRecord) -> Result<Comparable, TestErro
     }
     let (common, mut left_out) = common_testers(earlier.record(), record);
     let other_detectors = other_detectors(earlier.record(), record);
-    left_out.extend(other_detectors.iter().map(|name| format!("the detector `{name}` did not look so before and now")));
+    left_out.extend(other_detectors.iter().map(|name| format!("the detector `{name}` is not the same in both tests")));
     let differences = match (differences.is_empty(), common.is_empty()) {
         (true, false) => return Ok(Comparable { earlier, common, other_detectors, left_out }),
         (true, true) => left_out,
@@ -244,7 +246,7 @@ fn comparable(before: &Path, record: &TestRecord) -> Result<Comparable, TestErro
     Err(TestError::Incomparable { folder: before.into(), differences })
 }
 
-/// Names of the detectors that are not the same in both.
+/// Returns the names of the detectors that differ between both.
 fn other_detectors(before: &TestRecord, now: &TestRecord) -> Vec<String> {
     let only = |these: &TestRecord, those: &TestRecord| {
         let alone = these.detectors.iter().filter(|detector| !those.detectors.contains(*detector));
@@ -253,7 +255,7 @@ fn other_detectors(before: &TestRecord, now: &TestRecord) -> Vec<String> {
     only(before, now).union(&only(now, before)).cloned().collect()
 }
 
-/// Names of the testers that are the same in both, and why others are left out.
+/// Returns the names of the testers that are equal in both, and the reasons for leaving others out.
 fn common_testers(before: &TestRecord, now: &TestRecord) -> (Vec<String>, Vec<String>) {
     let (mut common, mut left_out) = (Vec::new(), Vec::new());
     for tester in &now.testers {

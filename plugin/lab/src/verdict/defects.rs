@@ -1,4 +1,4 @@
-//! What detectors found, as findings of a level.
+//! Defects reported by detectors, as findings of a level.
 
 use bevy::math::Vec2;
 use bevy_playbot::episode::EpisodeResult;
@@ -13,7 +13,8 @@ use crate::{
     game::Game,
 };
 
-/// What was found while testers played. What a detector finds in several episodes of a tester is told once: of the first.
+/// Returns the defects seen while testers played. A repeated defect in several episodes of a tester is reported once,
+/// for the first.
 pub(super) fn seen(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
     let mut findings: Vec<Finding> = Vec::new();
     for (tester, episodes) in plan.testers.iter().zip(played) {
@@ -38,7 +39,7 @@ pub(super) fn seen(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
     findings
 }
 
-/// What those find that look at a level after it was tested. Who asks to stop cannot use it.
+/// Returns the findings of detectors that look at a level after its test. Incomplete if `stop` returned true.
 pub(super) fn inspect(
     game: &dyn Game,
     plan: &TestPlan,

@@ -1,4 +1,4 @@
-//! Where episodes ended without the aim, and why.
+//! Positions and causes of episodes that ended without the goal.
 
 use std::collections::BTreeMap;
 
@@ -9,19 +9,19 @@ use super::level_verdict::EndPlace;
 /// Squares along the longer side of a floor plan to which [`EndPlace`]s are rounded.
 pub const END_SQUARES: f32 = 32.0;
 
-/// How an episode ended without the aim.
+/// The end of an episode without the goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct FailedEnd {
-    /// Where, if the game says.
+    /// Position, if the game reports it.
     pub place: Option<Vec2>,
-    /// Whether time was up.
+    /// True if time was up.
     pub is_timed_out: bool,
-    /// What ended it, if the game says.
+    /// Cause, if the game reports it.
     pub cause: Option<&'static str>,
 }
 
-/// The squares of a floor plan in which something ended, row by row from below. Places outside the plan belong to squares
-/// outside; what is no place is left out.
+/// Returns the squares of a floor plan in which episodes ended, row by row from below. Positions outside the plan
+/// belong to squares outside; positions that are not finite are left out.
 pub(super) fn end_places(bounds: Rect, ended: &[FailedEnd]) -> Vec<EndPlace> {
     let side = bounds.width().max(bounds.height()) / END_SQUARES;
     if !(side.is_finite() && side > 0.0) {
@@ -43,7 +43,7 @@ pub(super) fn end_places(bounds: Rect, ended: &[FailedEnd]) -> Vec<EndPlace> {
     counts.into_values().collect()
 }
 
-/// How often each cause ended an episode, wherever that was.
+/// Returns how often each cause ended an episode, anywhere.
 pub(super) fn causes(ended: &[FailedEnd]) -> BTreeMap<String, u64> {
     let mut causes = BTreeMap::new();
     ended.iter().for_each(|end| add_cause(&mut causes, end.cause));

@@ -1,75 +1,79 @@
-//! What can go wrong with tests and their results.
+//! Errors of tests and their results.
 
 use std::{
     io,
     path::{Path, PathBuf},
 };
 
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 use super::shard::Shard;
 use crate::{eval::EvalError, findings::FindingError};
 
-/// Levels cannot be tested, or results cannot be used.
+/// Name of the journal in the folder of a test.
+pub(super) const JOURNAL: &str = "levels.jsonl";
+
+/// Failure to test levels, or to use results.
 #[derive(Debug, Error)]
 pub enum TestError {
-    /// The game cannot be played at all, or not be seen as a policy needs it.
+    /// The game cannot be played, or does not support the observations of a policy.
     #[error(transparent)]
     Eval(#[from] EvalError),
-    /// Nobody would play.
-    #[error("nobody tests: name a bot or a policy")]
+    /// The test has no tester.
+    #[error("the test has no tester: name a bot or a policy")]
     NoTester,
-    /// Results could not tell two testers apart.
+    /// Two testers share a name.
     #[error("two testers are called `{0}`: give each file or folder a name of its own, and name each bot once")]
     SameName(String),
-    /// A shard without any level tests nothing.
+    /// A shard without levels.
     #[error("shard {shard} has no level, since {range} has only {length}: use at most {}", shards_of(*length))]
     EmptyShard {
         /// The shard.
         shard: Shard,
-        /// The levels.
+        /// The range of levels.
         range: String,
-        /// How many there are.
+        /// Number of levels.
         length: u64,
     },
-    /// The folder has results already.
+    /// The folder already has results.
     #[error(
         "{} has results already: go on with --resume, choose another --out, or replace them with --force", .0.display()
     )]
     Exists(PathBuf),
-    /// There is a file where the folder should be.
+    /// A file is at the path of the folder.
     #[error("{} is a file, and results need a folder: name another --out", .0.display())]
     NotAFolder(PathBuf),
     /// Another process tests into the folder.
     #[error("{} is in use by another test: wait for it or stop it, or choose another --out", .0.display())]
     Busy(PathBuf),
-    /// What is in the folder was tested in another way.
+    /// The folder holds results of another test.
     #[error(
-        "{} holds another test; what is there and what was asked for: {}; call with what is there, or choose another --out",
+        "{} holds another test, which differs (there and here) in {}; use its options, or choose another --out",
         folder.display(), differences.join(", ")
     )]
     OtherPlan {
         /// The folder.
         folder: PathBuf,
-        /// What differs, each in words.
+        /// The differences, described.
         differences: Vec<String>,
     },
-    /// There are no results.
+    /// The folder has no results.
     #[error("{} has no results.json{}", .0.display(), no_results(.0))]
     NoResults(PathBuf),
-    /// A file is not what it should be.
+    /// A file is damaged.
     #[error("{}, line {line}: {message}; make it again with `playbot test`", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
         /// Line, from 1.
         line: usize,
-        /// What is wrong.
+        /// The damage.
         message: String,
     },
     /// Results that cannot be joined.
     #[error(
-        "{} and {} cannot be joined: {}; name shards of one test, and test those again that are of another one",
+        "{} and {} cannot be joined: {}; name shards of one test, and test the other shards again",
         first.display(), second.display(), differences.join(", ")
     )]
     Unlike {
@@ -77,11 +81,11 @@ pub enum TestError {
         first: PathBuf,
         /// The other one.
         second: PathBuf,
-        /// What differs, each in words.
+        /// The differences, described.
         differences: Vec<String>,
     },
-    /// Results of a whole range cannot be joined with anything.
-    #[error("{} is no shard, but the results of a whole range: name folders of `playbot test --shard`", .0.display())]
+    /// Results of a whole range cannot be joined.
+    #[error("{} holds results of a whole range, not of a shard: name folders of `playbot test --shard`", .0.display())]
     NotAShard(PathBuf),
     /// Two folders hold the same levels.
     #[error("{} and {} overlap: both are shard {shard}; name each shard once", first.display(), second.display())]
@@ -90,13 +94,13 @@ pub enum TestError {
         first: PathBuf,
         /// The other one.
         second: PathBuf,
-        /// Both.
+        /// Their shard.
         shard: Shard,
     },
-    /// Not all folders are there.
+    /// Missing shards.
     #[error("missing {} with `playbot test --shard`", shards(.0))]
     Missing(Vec<Shard>),
-    /// Results that say nothing about each other.
+    /// Results that cannot be compared.
     #[error(
         "{} and this test cannot be compared: {}; name results of the same version of the game with a level and a tester in common, or \
          leave --against out", folder.display(), differences.join(", ")
@@ -104,10 +108,10 @@ pub enum TestError {
     Incomparable {
         /// The folder of the earlier results.
         folder: PathBuf,
-        /// What differs, each in words.
+        /// The differences, described.
         differences: Vec<String>,
     },
-    /// The results as JUnit XML cannot be made.
+    /// JUnit XML could not be written.
     #[error("the results cannot be written as JUnit XML: {0}")]
     Junit(String),
     /// A finding could not be written.
@@ -116,16 +120,16 @@ pub enum TestError {
     /// The operating system refused.
     #[error("cannot {action} {}: {source}; {}", path.display(), next_step(source))]
     Io {
-        /// What was tried.
+        /// The failed action.
         action: &'static str,
-        /// On which file.
+        /// Its file.
         path: PathBuf,
         /// The system's answer.
         source: io::Error,
     },
-    /// A level could not be written down.
+    /// The verdict of a level could not be written.
     #[error(
-        "cannot write {}: {source}; the {finished} levels that are finished are whole in it: make room or rights there \
+        "cannot write {}: {source}; the {finished} finished levels in it are whole: make room or grant write access there, \
          and go on with --resume", path.display()
     )]
     NotKept {
@@ -138,17 +142,16 @@ pub enum TestError {
     },
 }
 
-impl TestError {
-    /// Whether calling differently helps; otherwise the game or the system failed.
-    pub fn is_usage(&self) -> bool {
-        !matches!(
-            self,
+impl HasExitCode for TestError {
+    fn exit_code(&self) -> u8 {
+        match self {
             Self::Eval(EvalError::Fault(_))
-                | Self::Finding(_)
-                | Self::Io { .. }
-                | Self::NotKept { .. }
-                | Self::Junit(_)
-        )
+            | Self::Finding(_)
+            | Self::Io { .. }
+            | Self::NotKept { .. }
+            | Self::Junit(_) => 2,
+            _ => 3,
+        }
     }
 }
 
@@ -156,7 +159,7 @@ pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Err
     move |source| TestError::Io { action, path: path.into(), source }
 }
 
-/// What serde says of a line, with its column: the line that it counts from 1 is another one.
+/// Returns serde's message about a line, with its column only: serde always counts the line as 1.
 pub(super) fn json_fault(error: &serde_json::Error) -> String {
     let (words, column) = (error.to_string(), error.column());
     let place = format!(" at line {} column {column}", error.line());
@@ -166,17 +169,17 @@ pub(super) fn json_fault(error: &serde_json::Error) -> String {
     }
 }
 
-/// What to do where the system refused.
+/// Returns the remedy for a failure of the system.
 fn next_step(source: &io::Error) -> &'static str {
     use io::ErrorKind::{
         FileTooLarge, IsADirectory, NotADirectory, NotFound, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem,
         StorageFull,
     };
     match source.kind() {
-        StorageFull | QuotaExceeded | FileTooLarge => "make room there and call this again",
-        PermissionDenied | ReadOnlyFilesystem => "make rights there or name another folder, and call this again",
-        NotFound | NotADirectory | IsADirectory => "name another folder, or move what is in the way",
-        _ => "call this again, and look at the disk if that does not help",
+        StorageFull | QuotaExceeded | FileTooLarge => "make room there and run this again",
+        PermissionDenied | ReadOnlyFilesystem => "grant write access there or name another folder, and run this again",
+        NotFound | NotADirectory | IsADirectory => "name another folder, or move the file that blocks it",
+        _ => "run this again, and check the disk if that does not help",
     }
 }
 
@@ -185,7 +188,7 @@ fn shards_of(levels: u64) -> String {
 }
 
 fn no_results(folder: &Path) -> &'static str {
-    if folder.join(super::journal::JOURNAL).exists() {
+    if folder.join(JOURNAL).exists() {
         ": its test is not done, finish it with `playbot test --resume`"
     } else if folder.exists() {
         ": name the --out of a `playbot test`"
@@ -255,7 +258,7 @@ mod tests {
         assert!(words().contains("has no results.json: name the --out"), "{}", words());
         let none = TestError::NoResults(folder.path().join("none")).to_string();
         assert!(none.contains("no such folder"), "{none}");
-        std::fs::write(folder.path().join(super::super::journal::JOURNAL), "").expect("writable");
+        std::fs::write(folder.path().join(JOURNAL), "").expect("writable");
         assert!(words().contains("--resume"), "{}", words());
     }
 }

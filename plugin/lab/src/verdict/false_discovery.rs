@@ -1,7 +1,9 @@
-//! Many tests at once: which of them say something.
+//! Control of the false discovery rate over many tests.
 
-/// Which of these probabilities are small enough for the expected share of false alarms among all alarms to stay at most
-/// `rate` (Benjamini and Hochberg 1995): the `k` smallest, with the largest `k` whose `k`-th smallest is at most
+/// Returns which of these probabilities are significant, with an expected share of false alarms of at most `rate`
+/// among all alarms.
+///
+/// Method of Benjamini and Hochberg (1995): the `k` smallest, with the largest `k` whose `k`-th smallest is at most
 /// `k / n * rate`.
 pub fn benjamini_hochberg(probabilities: &[f64], rate: f64) -> Vec<bool> {
     let mut sorted = probabilities.to_vec();
@@ -30,7 +32,7 @@ mod tests {
 
     #[test]
     fn a_larger_one_counts_if_those_below_it_do_and_the_order_is_kept() {
-        // 0.04 is above 0.05 / 3 by itself, and 0.03 above 2 / 3 * 0.05 is not.
+        // 0.03 is above 0.05 / 3, and 0.04 above 2 / 3 * 0.05.
         assert_eq!(benjamini_hochberg(&[0.04, 0.9, 0.03], 0.05), [false; 3]);
         assert_eq!(benjamini_hochberg(&[0.04, 0.045, 0.03], 0.05), [true; 3]);
         assert_eq!(benjamini_hochberg(&[0.9, 0.001], 0.05), [false, true]);

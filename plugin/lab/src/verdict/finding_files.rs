@@ -1,4 +1,4 @@
-//! Findings of a level as files.
+//! Files of the findings of a level.
 
 use super::{
     error::TestError,
@@ -11,7 +11,7 @@ use crate::{
     game::Game,
 };
 
-/// Writes the findings of a level, and names their files in it.
+/// Writes the findings of a level to files, and notes the files' names in it.
 pub(super) fn keep_findings(
     game: &dyn Game,
     plan: &TestPlan,

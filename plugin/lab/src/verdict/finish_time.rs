@@ -1,21 +1,21 @@
-//! How long solved episodes took.
+//! Times of solved episodes.
 
 use serde::{Deserialize, Serialize};
 
 /// Ticks of solved episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FinishTime {
-    /// A quarter of them took at most so long.
+    /// A quarter of the episodes took at most so many ticks.
     pub lower_quartile: f64,
-    /// Half of them took at most so long.
+    /// Half of the episodes took at most so many ticks.
     pub median: f64,
-    /// Three quarters of them took at most so long.
+    /// Three quarters of the episodes took at most so many ticks.
     pub upper_quartile: f64,
 }
 
 impl FinishTime {
-    /// That of these episodes; `None` without any. Between two values it is interpolated (type 7 of Hyndman and Fan 1996,
-    /// as R's `quantile` does).
+    /// Computes the quartiles of these episodes; `None` without episodes. Interpolates between two values (type 7 of
+    /// Hyndman and Fan 1996, as in R's `quantile`).
     pub fn of(mut ticks: Vec<u32>) -> Option<Self> {
         ticks.sort_unstable();
         let last = ticks.len().checked_sub(1)?;

@@ -1,24 +1,25 @@
-//! Whether two shares of successes differ.
+//! Fisher's exact test for two shares of successes.
 
 use serde::Serialize;
 
 /// Successes among trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Trials {
-    /// Those that succeeded.
+    /// Number of successes.
     pub successes: u64,
-    /// All of them.
+    /// Number of trials.
     pub trials: u64,
 }
 
-/// Trials beyond which nothing is computed: nobody has played so often, so that the numbers are made up.
+/// Largest number of trials: larger ones are not from real play.
 const MOST_TRIALS: u64 = 1 << 34;
 
-/// Tables that are so much less likely than the observed one do not count, however many of them there are.
+/// Likelihood relative to the observed table below which tables do not count, in any number.
 const LEAST_WEIGHT: f64 = 1e-30;
 
-/// Fisher's exact test (1922), two-sided: the probability of a table that is at most as likely as this one, if both had the
-/// same chance of success, given the totals. As R's `fisher.test` has it. 1 for numbers that cannot be.
+/// Computes Fisher's exact test (1922), two-sided, equal to R's `fisher.test`. The result is the probability of a
+/// table at most as likely as this one, under equal chances of success and given totals. Returns 1 for impossible
+/// numbers.
 pub fn fisher_exact(one: Trials, other: Trials) -> f64 {
     if [one, other].iter().any(|of| of.successes > of.trials || of.trials > MOST_TRIALS) {
         return 1.0;
@@ -26,7 +27,7 @@ pub fn fisher_exact(one: Trials, other: Trials) -> f64 {
     let successes = one.successes + other.successes;
     let lowest = successes.saturating_sub(other.trials);
     let highest = successes.min(one.trials);
-    // How likely a table is, in units of the observed one: neighbours differ by a simple factor.
+    // Likelihood of a table in units of the observed one: neighbours differ by a simple factor.
     let factor_up = |x: u64| {
         let up = (successes - x) as f64 * (one.trials - x) as f64;
         up / ((x + 1) as f64 * (other.trials + x + 1 - successes) as f64)
@@ -38,23 +39,25 @@ pub fn fisher_exact(one: Trials, other: Trials) -> f64 {
     (extreme / all).min(1.0)
 }
 
-/// The tables to one side of the observed one, in its units.
+/// Tables to one side of the observed one, in its units.
 #[derive(Default)]
 struct Tail {
     all: f64,
-    /// Those that are at most as likely as the observed one.
+    /// Sum of those that are at most as likely as the observed one.
     extreme: f64,
 }
 
 impl Tail {
-    /// From the factors by which each table is more likely than the one before it. These only fall, so that tables become more
-    /// likely first and then less: the sum ends where what follows no longer counts.
+    /// Sums the tables from the ratios of their likelihoods, each to the one before.
+    ///
+    /// The ratios only fall, so the tables become more likely first and then less. The sum ends at terms that no
+    /// longer count.
     fn of(factors: impl Iterator<Item = f64>) -> Self {
         let (mut tail, mut weight) = (Self::default(), 1.0);
         for factor in factors {
             weight *= factor;
             tail.all += weight;
-            // Tables that are just as likely differ from the observed one by rounding only.
+            // Equally likely tables differ from the observed one by rounding only.
             if weight <= 1.0 + 1e-7 {
                 tail.extreme += weight;
             }
@@ -76,7 +79,7 @@ mod tests {
     fn probabilities_are_those_of_the_literature() {
         let p = |a, n, b, m| fisher_exact(Trials { successes: a, trials: n }, Trials { successes: b, trials: m });
         for (found, known) in [
-            // The lady who tastes tea.
+            // The lady tasting tea.
             (p(3, 4, 1, 4), 0.485_714_3),
             (p(1, 10, 11, 14), 0.002_759_456),
             (p(0, 5, 5, 5), 0.007_936_508),

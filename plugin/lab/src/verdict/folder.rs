@@ -1,7 +1,7 @@
 //! The folder of a test.
 //!
 //! ```text
-//! DIR/test.json      what is tested, how and by whom
+//! DIR/test.json      levels, testers and settings
 //! DIR/levels.jsonl   finished levels as they come in
 //! DIR/results.json   all of them in their order, once the test is done
 //! ```
@@ -14,32 +14,32 @@ use std::{
 use playbot_learner::{disk, seal_json, unseal_json, write_atomically, write_atomically_with};
 
 use super::{
-    error::{TestError, io_error, json_fault},
-    journal::{JOURNAL, Journal},
+    error::{JOURNAL, TestError, io_error, json_fault},
+    journal::Journal,
     level_verdict::LevelVerdict,
     plan::TestRecord,
     results::{RESULTS, ResultWriter},
 };
 use crate::{
     findings::{FINDINGS, clear_findings},
-    train::tidy::remove_temporaries,
+    sealed_file::remove_temporaries,
 };
 
-/// Name of the file that says what is tested.
+/// Name of the file with the description of the test.
 const RECORD: &str = "test.json";
 
-/// What to do where results are already.
+/// Treatment of earlier results in the folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Earlier {
-    /// Leave them alone: an error.
+    /// Keep them: opening is an error.
     Keep,
-    /// Go on with them, if they are of the same test.
+    /// Continue them, if they are of the same test.
     Resume,
     /// Replace them.
     Replace,
 }
 
-/// An open folder of a test, locked for others.
+/// An open folder of a test, locked for other processes.
 pub struct TestFolder {
     path: PathBuf,
     record: TestRecord,
@@ -47,8 +47,8 @@ pub struct TestFolder {
 }
 
 impl TestFolder {
-    /// Opens the folder for a test; makes it if it is not there. Also returns what people should know: that something was
-    /// damaged, and is tested again.
+    /// Opens the folder for a test, and makes it if it is missing. Also returns a warning if something was damaged
+    /// and is tested again.
     ///
     /// # Errors
     ///
@@ -73,7 +73,7 @@ impl TestFolder {
         remove_temporaries(&path.join(FINDINGS));
         let goes_on = is_known && earlier == Earlier::Resume;
         if !goes_on {
-            // Without what was tested, old levels mean nothing.
+            // Old levels are meaningless without the description of their test.
             for file in [&record_file, &results] {
                 remove(file)?;
             }
@@ -84,17 +84,17 @@ impl TestFolder {
             written.map_err(io_error("write", &record_file))?;
         }
         let message = (goes_on && cut > 0).then(|| {
-            format!("{}: the last {cut} bytes are no whole level and were dropped", path.join(JOURNAL).display())
+            format!("{}: the last {cut} bytes are an incomplete level and were dropped", path.join(JOURNAL).display())
         });
         Ok((Self { path: path.into(), record: record.clone(), journal }, message))
     }
 
-    /// Places in the range of the levels that are finished.
+    /// Returns the finished levels by their index in the range.
     pub fn finished(&self) -> std::collections::BTreeSet<u64> {
         self.journal.places()
     }
 
-    /// Keeps a finished level, whole or not at all.
+    /// Adds a finished level, atomically.
     ///
     /// # Errors
     ///
@@ -103,7 +103,7 @@ impl TestFolder {
         self.journal.push(verdict)
     }
 
-    /// Writes `results.json`, when all levels are finished.
+    /// Writes `results.json`, once all levels are finished.
     ///
     /// # Errors
     ///
@@ -142,6 +142,8 @@ fn check_same(folder: &Path, file: &Path, record: &TestRecord) -> Result<(), Tes
 
 #[cfg(test)]
 mod tests {
+    use playbot_learner::HasExitCode as _;
+
     use super::*;
     use crate::verdict::{MapScope, TesterRecord, results::ResultLines, testing::verdict};
 
@@ -172,10 +174,7 @@ mod tests {
         assert!(matches!(open(&record(), Earlier::Keep), Err(TestError::Exists(_))));
         let other = TestRecord { seed: 1, shard: Some("0/2".parse().expect("a shard")), ..record() };
         let error = open(&other, Earlier::Resume).map(drop).expect_err("another test").to_string();
-        assert!(
-            error.contains("what is there and what was asked for: seeds 0 and 1, all levels and shard 0/2"),
-            "{error}"
-        );
+        assert!(error.contains("which differs (there and here) in seeds 0 and 1, all levels and shard 0/2"), "{error}");
         let file = path.join(RECORD);
         let error = TestFolder::open(&file, &record(), Earlier::Replace).map(drop).expect_err("a file");
         assert!(error.is_usage() && error.to_string().contains("test.json is a file"), "{error}");

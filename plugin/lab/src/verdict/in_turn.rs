@@ -1,4 +1,4 @@
-//! Testing one level on this thread, one episode after the other in the same World.
+//! A test of one level on this thread, with all episodes in sequence in the same World.
 
 use bevy_playbot::{episode::EpisodeResult, fault::Fault};
 
@@ -13,21 +13,23 @@ use super::{
 };
 use crate::{eval::EvalError, game::Game};
 
-/// What came of a level.
-pub(crate) struct TestedInTurn {
-    /// What the tester says of it.
+/// Results of a level.
+pub struct TestedInTurn {
+    /// Verdict of the tester.
     pub verdict: LevelVerdict,
-    /// How each episode ended; `None` where the game broke.
+    /// Result of each episode; `None` if the game broke.
     pub ends: Vec<Option<EpisodeResult>>,
 }
 
-/// Lets the first tester of the plan play its first level under this name, from which the seeds of the episodes come. What a
-/// game keeps from one episode to the next shows here. `progress` hears of each episode in their order, on this thread;
-/// `None` if somebody asked to stop.
+/// Lets the first tester of the plan play its first level under this name, which determines the seeds of the
+/// episodes.
+///
+/// State that a game keeps from one episode to the next shows here. `progress` is called for each episode in order,
+/// on this thread. `None` if `stop` returned true.
 ///
 /// # Errors
 ///
-/// The plan tests nothing, or the game cannot be played at all.
+/// The plan tests nothing, or the game cannot be played.
 pub(crate) fn test_in_turn(
     game: &dyn Game,
     plan: &TestPlan,

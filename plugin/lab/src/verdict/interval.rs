@@ -1,10 +1,10 @@
-//! How sure a share of successes is.
+//! Wilson intervals of shares.
 
 /// Number of standard deviations around the mean of a normal distribution that hold 95 % of it.
 const Z_95: f64 = 1.959_963_984_540_054;
 
-/// The 95 % Wilson score interval of a share: lowest and highest share with which `successes` of `trials` are no surprise
-/// (Wilson 1927). `[0, 1]` without trials.
+/// Returns the 95 % Wilson score interval of a share: lowest and highest share that are plausible given `successes`
+/// of `trials` (Wilson 1927). `[0, 1]` without trials.
 pub fn wilson(successes: u64, trials: u64) -> [f64; 2] {
     if trials == 0 {
         return [0.0, 1.0];

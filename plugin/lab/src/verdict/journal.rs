@@ -1,4 +1,4 @@
-//! `levels.jsonl`: finished levels as they come in, each with a checksum.
+//! The journal `levels.jsonl`: finished levels as they come in, each with a checksum.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -11,33 +11,29 @@ use playbot_learner::{disk::DiskFile, seal_json};
 use serde::Deserialize;
 
 use super::{
-    error::{TestError, io_error},
+    error::{JOURNAL, TestError, io_error},
     level_verdict::LevelVerdict,
 };
-use crate::train::sealed_file::unsealed_line;
+use crate::sealed_file::unsealed_line;
 
-/// Name of the file in the folder of a test.
-pub(super) const JOURNAL: &str = "levels.jsonl";
-
-/// A file with a line of JSON for each finished level, in the order in which they were finished. It is locked while
-/// somebody writes.
+/// A file with a line of JSON for each finished level, in the order of finishing. It is locked while open.
 pub(super) struct Journal {
     path: PathBuf,
     file: DiskFile,
-    /// Where the line of each level begins and how many bytes it has, without its line feed: by place in the range.
+    /// Start and length in bytes of each level's line, without its line feed, by index in the range.
     lines: BTreeMap<u64, (u64, usize)>,
     length: u64,
 }
 
-/// What tells a level from others.
+/// Index of a level in the range.
 #[derive(Deserialize)]
 struct Place {
     index: u64,
 }
 
 impl Journal {
-    /// Opens the journal of a folder, with all whole lines; a file that is not there is made. What follows after the first
-    /// damaged line is cut off; the number of bytes that were is returned.
+    /// Opens the journal of a folder with all whole lines, and makes a missing file. Cuts off everything from the
+    /// first damaged line on, and returns the number of bytes cut.
     ///
     /// # Errors
     ///
@@ -65,7 +61,7 @@ impl Journal {
         Ok((Self { path, file, lines, length }, cut))
     }
 
-    /// Forgets all levels.
+    /// Removes all levels.
     ///
     /// # Errors
     ///
@@ -74,11 +70,11 @@ impl Journal {
         self.lines.clear();
         self.length = 0;
         let emptied = self.file.set_len(0).and_then(|()| self.file.seek(SeekFrom::Start(0)));
-        // After a power cut old levels must not be taken for those of the test that is begun now.
+        // Without a sync, a power cut could bring old levels into the new test.
         emptied.and_then(|_| self.file.sync()).map_err(io_error("empty", &self.path))
     }
 
-    /// Places in the range of the levels that are finished.
+    /// Returns the finished levels by their index in the range.
     pub fn places(&self) -> BTreeSet<u64> {
         self.lines.keys().copied().collect()
     }
@@ -101,18 +97,18 @@ impl Journal {
                 Ok(())
             }
             Err(source) => {
-                // Half a line would be dropped anyway when the file is read again.
+                // A partial line would be dropped at the next read anyway.
                 let _ = self.file.set_len(self.length);
                 Err(TestError::NotKept { path: self.path.clone(), finished: self.lines.len() as u64, source })
             }
         }
     }
 
-    /// Hands the lines over in the order of the levels, without their line feeds.
+    /// Passes the lines to `take` in the order of the levels, without their line feeds.
     ///
     /// # Errors
     ///
-    /// What is handed over cannot be taken, or the file cannot be read.
+    /// `take` fails, or the file cannot be read.
     pub fn in_order(&mut self, mut take: impl FnMut(&str) -> io::Result<()>) -> io::Result<()> {
         for &(start, bytes) in self.lines.values() {
             let mut line = vec![0; bytes];
@@ -124,7 +120,8 @@ impl Journal {
     }
 }
 
-/// Where the lines are up to the first damaged one, and where that begins. Of two lines of one level the first counts.
+/// Returns the positions of the lines before the first damaged one, and the start of that one. Of two lines of one
+/// level the first counts.
 fn whole_lines(file: &mut DiskFile) -> io::Result<(BTreeMap<u64, (u64, usize)>, u64)> {
     let (mut lines, mut length) = (BTreeMap::new(), 0);
     let mut reader = BufReader::new(file);

@@ -1,4 +1,4 @@
-//! From episodes to what they say of a level.
+//! Verdicts from episodes.
 
 use bevy_playbot::episode::EpisodeEnd;
 
@@ -14,8 +14,8 @@ use super::{
 };
 use crate::{game::Game, proof::LevelProof};
 
-/// What the testers say of the level at this place in the range, which has this name in results. `played` has the episodes
-/// of each tester, in the order of the plan. Who asks to stop cannot use it.
+/// Returns the verdict on the level with this index in the range and this name in results. `played` has the episodes
+/// of each tester, in the order of the plan. Incomplete if `stop` returned true.
 pub(super) fn judge(
     game: &dyn Game,
     plan: &TestPlan,
@@ -33,8 +33,8 @@ pub(super) fn judge(
     });
     let all = || played.iter().flat_map(|episodes| episodes.iter());
     let score = score(all());
-    // Whoever reached the aim has proved that it can be reached.
-    let proof = if score.solved > 0 { LevelProof::Solvable } else { game.prove(mode, level) };
+    // Reaching the goal proves that it can be reached.
+    let proof = if score.solved > 0 { LevelProof::Solvable } else { game.tools().levels.prove(mode, level) };
     let mut findings = broken(plan, played);
     findings.extend(seen(plan, played));
     findings.extend(inspect(game, plan, (index, &name), played, stop));
@@ -75,7 +75,9 @@ pub(super) fn judge(
     };
     let has_maps = plan.maps().wants(verdict.is_perfect());
     let has_places = failed.iter().any(|end| end.place.is_some());
-    let Some(floor) = (has_maps || has_places).then(|| game.floor_plan(mode, level)).flatten() else { return verdict };
+    let Some(floor) = (has_maps || has_places).then(|| game.tools().levels.floor_plan(mode, level)).flatten() else {
+        return verdict;
+    };
     verdict.ends = end_places(floor.bounds, &failed);
     if has_maps {
         let names: Vec<&str> = plan.testers.iter().map(|tester| tester.record.name.as_str()).collect();
@@ -108,7 +110,7 @@ fn score<'a>(episodes: impl Iterator<Item = &'a Played>) -> Score {
     Score { solved, episodes: count, interval, ticks: FinishTime::of(ticks), lost, timed_out, broken }
 }
 
-/// How an episode ended without the aim.
+/// Returns the end of an episode without the goal.
 fn failed_end(episode: &Played) -> Option<FailedEnd> {
     match &episode.end {
         PlayedEnd::Ended { result, place, cause } if !result.success => {
@@ -119,7 +121,8 @@ fn failed_end(episode: &Played) -> Option<FailedEnd> {
     }
 }
 
-/// Episodes in which the game broke. What several episodes of a tester say in the same words is told once.
+/// Returns the findings of episodes in which the game broke. Equal messages of several episodes of a tester are
+/// reported once.
 fn broken(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
     let mut findings: Vec<Finding> = Vec::new();
     for (tester, episodes) in plan.testers.iter().zip(played) {

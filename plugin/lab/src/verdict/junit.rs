@@ -1,4 +1,4 @@
-//! Results as JUnit XML, which build servers show: a test case for each level.
+//! Results as JUnit XML for build servers: a test case for each level.
 
 use std::path::Path;
 
@@ -12,7 +12,7 @@ use super::{
     results::ResultLines,
 };
 
-/// The results in a folder. A level that was not solved, or of which something was found, has failed.
+/// Converts the results in a folder. A level that was not solved, or that has a finding, has failed.
 pub(super) fn junit(folder: &Path, program: &str) -> Result<String, TestError> {
     let mut lines = ResultLines::open(folder)?;
     let record = lines.record().clone();
@@ -40,7 +40,7 @@ fn test_case(record: &TestRecord, level: &LevelVerdict, program: &str) -> TestCa
     case
 }
 
-/// What failed, in a word.
+/// Returns the kind of a failure, in a word.
 fn kind(level: &LevelVerdict) -> &str {
     match level.outcome {
         LevelOutcome::Solved => level.findings.first().map_or("finding", |finding| finding.detector.as_str()),
@@ -48,7 +48,7 @@ fn kind(level: &LevelVerdict) -> &str {
     }
 }
 
-/// What is wrong with a level, in one line.
+/// Describes the failure of a level in one line.
 pub(super) fn message(level: &LevelVerdict) -> String {
     let solved = format!("solved {} of {} episodes", level.score.solved, level.score.episodes);
     let finding = level.findings.first().map(|finding| format!("{}: {}", finding.detector, finding.message));

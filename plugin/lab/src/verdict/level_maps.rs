@@ -1,11 +1,11 @@
-//! Where agents went in a level, as results have it.
+//! Maps of where agents went in a level, as in results.
 
 use serde::{Deserialize, Serialize};
 
 /// Ticks by squares of a level, of all episodes of all testers.
 ///
-/// Squares are the level's tiles, or several of them in levels of more than 64. They are counted row by row from the lower
-/// left corner, from 0; lists have pairs of a square and what is said of it, in the order of the squares.
+/// A square is a tile of the level, or several of them in levels of more than 64. Squares are counted row by row from
+/// the lower left corner, from 0. Lists have pairs of a square and its value, in the order of the squares.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct LevelMaps {
     /// Lower left corner, in the units of the floor plan.
@@ -20,38 +20,38 @@ pub struct LevelMaps {
     pub rows: u64,
     /// Ticks that agents were there. An open square that an episode only passes between two ticks counts one.
     pub visits: Vec<[u64; 2]>,
-    /// Those among them that came more than two seconds after the agent was last in a square that was new in its episode: it
+    /// Lost ticks: those more than two seconds after the agent last entered a square that was new in its episode. It
     /// rested, or went back and forth.
     pub lost: Vec<[u64; 2]>,
-    /// Skills that were active, those of most ticks first.
+    /// Skills that were active, the most frequent first.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub skills: Vec<SkillTicks>,
-    /// Which of these was active for most ticks.
+    /// The skill that was active for most ticks in a square, as an index of `skills`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub skill_at: Vec<[u64; 2]>,
-    /// The way of an episode that failed, or in which something was found.
+    /// The path of an episode that failed, or that has a finding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<FailureWay>,
 }
 
-/// How long a skill was active.
+/// Ticks of a skill.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SkillTicks {
-    /// Its name: the number of z that is furthest from 0, counted from 1, and its sign, such as `z3+`. Only the first 16
-    /// numbers are looked at.
+    /// Its name: the number of z that is furthest from 0, counted from 1, and its sign, such as `z3+`. Only the first
+    /// 16 numbers count.
     pub skill: String,
     /// Ticks.
     pub ticks: u64,
 }
 
-/// The way of one episode.
+/// The path of one episode.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FailureWay {
-    /// Who went it.
+    /// The tester.
     pub tester: String,
     /// Episode of that tester on the level, from 0.
     pub episode: u32,
-    /// Squares one after the other, with the ticks spent in each; of a long way the last 200.
+    /// Squares in order, with the ticks spent in each; of a long path the last 200.
     pub way: Vec<[u64; 2]>,
 }
 

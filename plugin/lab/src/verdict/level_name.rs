@@ -1,4 +1,4 @@
-//! What a level is called in results.
+//! Names of levels in results.
 
 use bevy_playbot::state_hash::StateHash;
 
@@ -9,20 +9,20 @@ use crate::{
     split::LevelSplit,
 };
 
-/// The name of a level of these: `hard:7`, or the path of its file.
+/// Returns the name of a level of these: `hard:7`, or the path of its file.
 pub fn level_name(game: &dyn Game, split: &LevelSplit, level: u64) -> String {
     let designs = drawn(game, split);
     let path = designs.as_ref().and_then(|designs| designs.path(level));
     path.map_or_else(|| format!("{}:{level}", split.mode), str::to_owned)
 }
 
-/// What `--levels` says for the level with this name alone, as a word for the shell.
+/// Returns the value of `--levels` for the level with this name alone, as a word for the shell.
 pub(super) fn level_argument(split: &LevelSplit, name: &str) -> String {
     let word = if is_level_files(&split.mode) { level_files_mode(name) } else { name.to_owned() };
     shell_word(&word)
 }
 
-/// A hash of the files of these levels and of what is played in them; `None` for levels that are no files.
+/// Returns a hash of these levels' files and of their content; `None` for levels that are not files.
 pub fn hash_of_files(game: &dyn Game, split: &LevelSplit) -> Option<String> {
     let designs = drawn(game, split)?;
     let path = |level| designs.path(level).unwrap_or_default().bytes().map(u64::from).collect::<Vec<_>>();

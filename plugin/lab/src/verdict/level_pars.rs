@@ -1,4 +1,4 @@
-//! Which levels of a test have a par.
+//! Pars of the levels of a test.
 
 use std::{collections::BTreeSet, fmt};
 
@@ -7,28 +7,28 @@ use bevy_playbot::unknown_name::nearest;
 use super::level_name::drawn;
 use crate::{detectors::Pars, game::Game, split::LevelSplit};
 
-/// Most names that are told.
+/// Largest number of names that are reported.
 const MOST_NAMES: usize = 5;
 
-/// Which of these levels have a par, and which pars are for none of them.
+/// Number of these levels with a par, and the pars without a level.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LevelPars {
     /// Levels with a par.
     pub with: u64,
     /// All levels.
     pub levels: u64,
-    /// Names of pars that are no level of these; the first few with the level that may be meant.
+    /// Names of pars that match no level; the first few with the level that may be meant.
     pub others: Vec<String>,
 }
 
 impl LevelPars {
-    /// Those of the levels of a test, whatever shard of them is tested.
+    /// Computes the pars of all levels of a test, in any shard.
     pub fn of(pars: &Pars, game: &dyn Game, split: &LevelSplit) -> Self {
         let designs = drawn(game, split);
         let path = |level| designs.as_ref().and_then(|designs| designs.path(level));
         let paths: Vec<&str> = if designs.is_some() { split.levels().filter_map(path).collect() } else { Vec::new() };
         let known: BTreeSet<&str> = paths.iter().copied().collect();
-        // Levels that are no files are too many to list.
+        // Numbered levels are too many to list.
         let by_number = |name: &str| {
             let level: u64 = name.rsplit_once(':')?.1.parse().ok()?;
             let is_one = designs.is_none() && split.contains(&split.mode, level);

@@ -1,4 +1,4 @@
-//! What the testers say of one level.
+//! Verdicts of the testers on one level.
 
 use std::collections::BTreeMap;
 
@@ -7,20 +7,20 @@ use serde::{Deserialize, Serialize};
 use super::{finish_time::FinishTime, fisher::Trials, level_maps::LevelMaps, places::Places};
 use crate::proof::LevelProof;
 
-/// What became of a level.
+/// Outcome of a level.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LevelOutcome {
-    /// The aim cannot be reached, and that is proved.
+    /// The goal cannot be reached, which is proved.
     ProvedUnsolvable,
-    /// No tester reached the aim, which proves nothing.
+    /// No tester reached the goal, which proves nothing.
     BotFailed,
-    /// A tester reached the aim at least once.
+    /// A tester reached the goal at least once.
     Solved,
 }
 
 impl LevelOutcome {
-    /// As files and people have it.
+    /// Returns the name in files and in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::ProvedUnsolvable => "proved-unsolvable",
@@ -30,10 +30,10 @@ impl LevelOutcome {
     }
 }
 
-/// How episodes ended.
+/// Ends of episodes.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Score {
-    /// Episodes that reached the aim.
+    /// Episodes that reached the goal.
     pub solved: u64,
     /// All episodes.
     pub episodes: u64,
@@ -41,22 +41,22 @@ pub struct Score {
     pub interval: [f64; 2],
     /// Ticks of the solved episodes, if there are any.
     pub ticks: Option<FinishTime>,
-    /// Episodes that the game ended without the aim.
+    /// Episodes that the game ended without the goal.
     pub lost: u64,
-    /// Episodes that ended since time was up.
+    /// Episodes that ended because time was up.
     pub timed_out: u64,
     /// Episodes in which the game broke, each of which is a finding.
     pub broken: u64,
 }
 
 impl Score {
-    /// Solved among all.
+    /// Returns the solved episodes among all.
     pub fn trials(&self) -> Trials {
         Trials { successes: self.solved, trials: self.episodes }
     }
 }
 
-/// Where episodes ended without the aim, rounded to a square of the level's floor plan.
+/// Ends of episodes without the goal in one square of the level's floor plan.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EndPlace {
     /// Middle of the square, in the units of the floor plan.
@@ -67,12 +67,12 @@ pub struct EndPlace {
     pub lost: u64,
     /// Episodes whose time was up there.
     pub timed_out: u64,
-    /// How often each cause ended one there, if the game says.
+    /// How often each cause ended an episode there, if the game reports it.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub causes: BTreeMap<String, u64>,
 }
 
-/// How a tester did on a level.
+/// Results of a tester on a level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TesterVerdict {
     /// Name of the tester.
@@ -80,73 +80,73 @@ pub struct TesterVerdict {
     /// Its episodes.
     #[serde(flatten)]
     pub score: Score,
-    /// Whether it drew no random number in any of them: it does the same each time, whatever the seed.
+    /// True if it drew no random number in any of them: it repeats itself under any seed.
     pub exact: bool,
-    /// What it visited in all its episodes, for levels with maps.
+    /// Open squares that it visited in all its episodes, for levels with maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places: Option<Places>,
 }
 
-/// Something that is wrong with a level or with the game in it.
+/// A defect of a level, or of the game in it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Finding {
-    /// What found it: `panic`, `fault`, `endless`, `unreachable-goal`, or the name of a [detector](crate::detectors).
+    /// Its detector: `panic`, `fault`, `endless`, `unreachable-goal`, or the name of a [detector](crate::detectors).
     pub detector: String,
-    /// Who played; `None` if nobody had to.
+    /// The tester that played; `None` if it was found without play.
     pub tester: Option<String>,
     /// Episode of that tester on the level, from 0.
     pub episode: Option<u32>,
     /// Tick of the episode, from 0.
     pub tick: Option<u32>,
-    /// What is wrong.
+    /// The message.
     pub message: String,
-    /// Its file, seen from the folder of the results: see [`findings`](crate::findings).
+    /// Its file, relative to the folder of the results: see [`findings`](crate::findings).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
-    /// Settings, as `name.key=value`, with which its file looks for it again beside those of the test: see
+    /// Settings, as `name.key=value`, for the search of its file beside those of the test: see
     /// [`LevelDefect::settings`](crate::detectors::LevelDefect::settings). Results have none.
     #[serde(skip)]
     pub settings: Vec<String>,
 }
 
-/// Everything about one level.
+/// All results of one level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LevelVerdict {
     /// Its name, such as `hard:7`.
     pub level: String,
-    /// Its place in the range, from 0.
+    /// Its index in the range, from 0.
     pub index: u64,
-    /// What became of it.
+    /// Its outcome.
     pub outcome: LevelOutcome,
-    /// What is certain of it. A level that was solved is solvable.
+    /// Proof about the level. A level that was solved is solvable.
     pub proof: LevelProof,
     /// All episodes of all testers.
     #[serde(flatten)]
     pub score: Score,
-    /// Where episodes ended without the aim, if the game says.
+    /// Positions of episodes that ended without the goal, if the game reports them.
     pub ends: Vec<EndPlace>,
-    /// How often each cause ended an episode without the aim, if the game says.
+    /// How often each cause ended an episode without the goal, if the game reports causes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub causes: BTreeMap<String, u64>,
-    /// What all testers together visited, for levels with maps.
+    /// Open squares that all testers together visited, for levels with maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places: Option<Places>,
-    /// Where agents went, for levels with maps: see [`MapScope`](super::MapScope).
+    /// Maps of where agents went, for levels with maps: see [`MapScope`](super::MapScope).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub maps: Option<LevelMaps>,
     /// Each tester, in the order of the plan.
     pub testers: Vec<TesterVerdict>,
-    /// What is wrong, if anything.
+    /// Findings.
     pub findings: Vec<Finding>,
 }
 
 impl LevelVerdict {
-    /// Whether it was solved and nothing was found.
+    /// Returns whether it was solved and has no finding.
     pub fn is_sound(&self) -> bool {
         self.outcome == LevelOutcome::Solved && self.findings.is_empty()
     }
 
-    /// Whether it is sound and was solved in every episode.
+    /// Returns whether it was solved in every episode and has no finding.
     pub fn is_perfect(&self) -> bool {
         self.is_sound() && self.score.solved == self.score.episodes
     }

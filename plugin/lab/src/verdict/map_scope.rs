@@ -1,31 +1,30 @@
-//! Of which levels results have maps.
+//! Scope of the maps in results.
 
 use serde::{Deserialize, Serialize};
 
-/// Most levels of a range all of which have maps: as many as the page shows.
+/// Largest number of levels of a range that all have maps: as many as the page shows.
 const MOST_LEVELS: u64 = 2_000;
 
-/// Of which levels results say where agents went. The number of levels of the whole range decides, so that its shards say the
-/// same.
+/// The levels whose results have maps of where agents went. The size of the whole range decides, so its shards agree.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MapScope {
-    /// Of none, as in results that are older than maps.
+    /// No level, as in results that are older than maps.
     #[default]
     None,
-    /// Of those that were not solved each time, or of which something was found.
+    /// Levels that were not solved each time, or that have a finding.
     Failed,
-    /// Of all.
+    /// All levels.
     All,
 }
 
 impl MapScope {
-    /// That of a range of so many levels.
+    /// Returns the scope for a range of so many levels.
     pub fn of(levels: u64) -> Self {
         if levels <= MOST_LEVELS { Self::All } else { Self::Failed }
     }
 
-    /// As files and people have it.
+    /// Returns the name in files and in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::None => "none",
@@ -34,7 +33,7 @@ impl MapScope {
         }
     }
 
-    /// Whether a level has maps.
+    /// Returns whether a level has maps.
     pub(super) fn wants(self, is_perfect: bool) -> bool {
         match self {
             Self::None => false,
@@ -43,8 +42,8 @@ impl MapScope {
         }
     }
 
-    /// For files, which do not mention what older ones do not know.
-    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde asks so")]
+    /// Returns whether no level has maps; files leave the key out then, as older versions do.
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde requires this signature")]
     pub(super) fn is_none(&self) -> bool {
         *self == Self::None
     }

@@ -1,4 +1,4 @@
-//! Joining the results of shards.
+//! Joining of the results of shards.
 
 use std::{
     io,
@@ -15,8 +15,8 @@ use super::{
 };
 use crate::findings::gather_findings;
 
-/// Joins the results of all shards of a test, given by their folders in any order, into `out`: the same bytes as the results
-/// of the whole test. Levels are not kept in memory. The files of their findings are copied.
+/// Joins the results of all shards of a test into `out`, given their folders in any order. The result has the same
+/// bytes as the results of the whole test. Levels are not kept in memory. The files of their findings are copied.
 ///
 /// # Errors
 ///
@@ -24,12 +24,12 @@ use crate::findings::gather_findings;
 pub fn merge(folders: &[PathBuf], out: &Path) -> Result<(), TestError> {
     let mut shards = Vec::new();
     for folder in folders {
-        // What their heads say is compared before their levels are read.
+        // Heads are compared before levels are read.
         let lines = ResultLines::open_whole(folder)?;
         let shard = lines.record().shard.ok_or_else(|| TestError::NotAShard(folder.clone()))?;
         shards.push((folder, shard, lines));
     }
-    // What only the first one says must not depend on the order of the folders.
+    // Facts from the first folder must not depend on the order of the folders.
     let Some((first, count, record)) = shards
         .iter()
         .min_by_key(|(_, shard, _)| shard.index)
@@ -49,7 +49,7 @@ pub fn merge(folders: &[PathBuf], out: &Path) -> Result<(), TestError> {
             return Err(TestError::Overlap { first: (*other).clone(), second: (*folder).clone(), shard: *shard });
         }
     }
-    // Shards of a range that has fewer levels than shards test nothing, and are not there.
+    // A range with fewer levels than shards has empty shards, which have no results.
     let wanted = count.min(record.range.len());
     let is_there = |index: u64| shards.iter().any(|(_, shard, _)| shard.index == index);
     let missing: Vec<Shard> =
@@ -67,7 +67,7 @@ fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out
     let is_new = !out.exists();
     disk::create_dir_all(out).map_err(io_error("create", out))?;
     let path = out.join(RESULTS);
-    // The writer knows errors of the system alone.
+    // The writer's errors are the system's only.
     let mut damaged = None;
     let written = write_atomically_with(&path, |file| {
         let mut set_aside = |error: TestError| {
@@ -79,7 +79,7 @@ fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out
             let line = shards[(index % count) as usize].line_of(index).map_err(&mut set_aside)?;
             results.push(&line)?;
         }
-        // What gets a checksum of its own now has to be what theirs are of.
+        // The checksum of the joined file must cover checked content only.
         shards.iter_mut().try_for_each(ResultLines::expect_end).map_err(&mut set_aside)?;
         results.end()
     });
@@ -88,7 +88,7 @@ fn write_joined(record: &TestRecord, count: u64, shards: &mut [ResultLines], out
         (written, None) => written.map_err(io_error("write", &path)),
     };
     if written.is_err() && is_new {
-        // If it is not empty after all, it stays; what went wrong before is what is told.
+        // A folder that is not empty stays; the earlier error is the one to report.
         let _ = disk::remove_dir(out);
     }
     written
@@ -121,7 +121,7 @@ mod tests {
         }
     }
 
-    /// Results of a test, in the folder of this name.
+    /// Makes the results of a test, in the folder of this name.
     fn tested(parent: &Path, name: &str, record: &TestRecord) -> PathBuf {
         let path = parent.join(name);
         let (mut folder, _) = TestFolder::open(&path, record, Earlier::Keep).expect("new");
@@ -171,7 +171,7 @@ mod tests {
         for (words, parts) in [
             (said(&[&zero, &one]), ["missing shard 2/3", "--shard"]),
             (said(&[&zero, &one, &again]), ["one and ", "again overlap: both are shard 1/3"]),
-            (said(&[&zero, &whole]), ["whole is no shard", "whole range"]),
+            (said(&[&zero, &whole]), ["whole holds results of a whole range", "not of a shard"]),
             (said(&[&zero, &one, &newer]), ["newer cannot be joined", "versions 1 and 2 of `garden`"]),
             (said(&[&zero, &half]), ["half cannot be joined", "3 and 2 shards"]),
             (said(&[&parent.path().join("none")]), ["none has no results.json", "playbot test"]),
@@ -188,7 +188,7 @@ mod tests {
         assert!(!parent.path().join("out").exists(), "nothing is half there");
     }
 
-    /// Two shards of two levels, and the results of the second one.
+    /// Makes two shards of two levels, and the results of the second one.
     fn two_shards(parent: &Path) -> (Vec<PathBuf>, Vec<u8>) {
         let shard = |name: &str, shard: &str| {
             let range = "hard:0..1".parse().expect("a split");

@@ -1,13 +1,13 @@
-//! Verdicts: what bots and policies say of each level of a range.
+//! Verdicts of bots and policies on each level of a range.
 //!
-//! - A [`TestPlan`] names levels, [`Tester`]s, episodes and a seed; [`run_tests`] plays them on all cores, and makes a
-//!   [`LevelVerdict`] of each level: solved, bot failed, or proved unsolvable.
-//! - [`LevelMaps`] say where agents went in a level: visits, lost time, skills, and the way of a failure. A [`MapScope`] says
-//!   which levels have them.
-//! - A [`TestFolder`] keeps them while they come in, so that a test that was killed goes on; [`TestFolder::finish`] writes
-//!   `results.json`, which is the same on any number of threads, and what people and other programs read of it.
+//! - A [`TestPlan`] names levels, [`Tester`]s, episodes and a seed. [`run_tests`] plays them on all cores, and makes
+//!   a [`LevelVerdict`] of each level: solved, bot failed, or proved unsolvable.
+//! - [`LevelMaps`] show where agents went in a level: visits, lost time, skills, and the path of a failure. A
+//!   [`MapScope`] names the levels with maps.
+//! - A [`TestFolder`] keeps verdicts as they come in, so a killed test can be resumed. [`TestFolder::finish`] writes
+//!   `results.json`, which is the same on any number of threads, and reports for people and other programs.
 //! - [`merge()`] joins the results of shards to those of the whole range, byte for byte.
-//! - [`Comparison`] tells what has changed since earlier results, and what is noise.
+//! - [`Comparison`] reports changes since earlier results, apart from noise.
 
 mod change;
 mod compare;

@@ -1,4 +1,4 @@
-//! What results come to.
+//! Totals of results, and the worst levels.
 
 use std::path::Path;
 
@@ -11,10 +11,10 @@ use super::{
     results::ResultLines,
 };
 
-/// Most levels that are told as the worst.
+/// Largest number of worst levels that are reported.
 pub const MOST_WORST: usize = 20;
 
-/// What a tester did on all levels.
+/// Totals of a tester over all levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TesterTotal {
     /// Its name.
@@ -23,30 +23,30 @@ pub struct TesterTotal {
     pub levels: Trials,
     /// Episodes that it solved, among all.
     pub episodes: Trials,
-    /// Places that it visited, of all levels with maps.
+    /// Open squares that it visited, over all levels with maps.
     pub places: Places,
 }
 
-/// Numbers of all results, and the worst levels.
+/// Totals of all results, and the worst levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overview {
-    /// What was tested.
+    /// Description of the test.
     pub record: TestRecord,
-    /// Levels.
+    /// Number of levels.
     pub levels: u64,
-    /// Those that were solved.
+    /// Levels that were solved.
     pub solved: u64,
-    /// Those that no tester solved, of which nothing is proved.
+    /// Levels without a success and without a proof.
     pub bot_failed: u64,
-    /// Those whose aim cannot be reached.
+    /// Levels whose goal cannot be reached.
     pub proved_unsolvable: u64,
     /// Findings of all levels.
     pub findings: u64,
-    /// Places that were visited by any tester, of all levels with maps.
+    /// Open squares that any tester visited, over all levels with maps.
     pub places: Places,
     /// The testers, in the order of the test.
     pub testers: Vec<TesterTotal>,
-    /// At most 20 levels that were not solved each time, or of which something was found, the worst ones first.
+    /// At most 20 levels that were not solved each time, or that have a finding, the worst ones first.
     pub worst: Vec<LevelVerdict>,
 }
 
@@ -55,7 +55,7 @@ impl Overview {
     ///
     /// # Errors
     ///
-    /// There are none, or they are damaged.
+    /// The folder has no results, or they are damaged.
     pub fn read(folder: &Path) -> Result<Self, TestError> {
         let mut lines = ResultLines::open(folder)?;
         let mut overview = Self::empty(lines.record().clone());
@@ -104,13 +104,13 @@ impl Overview {
         }
     }
 
-    /// Whether every level was solved and nothing was found.
+    /// Returns whether every level was solved and has no finding.
     pub fn is_sound(&self) -> bool {
         self.findings == 0 && self.solved == self.levels
     }
 }
 
-/// Whether a level comes before another one that was tested later.
+/// Returns whether a level is at least as bad as a later one of the range.
 fn is_worse(level: &LevelVerdict, later: &LevelVerdict) -> bool {
     let rank = |level: &LevelVerdict| (level.outcome, level.findings.is_empty());
     let (one, other) = (level.score.trials(), later.score.trials());

@@ -1,9 +1,9 @@
-//! How much of a level was visited.
+//! Visited share of a level.
 
 use serde::{Deserialize, Serialize};
 
-/// Squares that were visited, among all that no wall cuts off from the start: see [`open_cells`](crate::explore::open_cells).
-/// Where gravity has a say, nobody may be able to reach some of these.
+/// Visited squares, among all that walls do not cut off from the start: see
+/// [`open_cells`](crate::explore::open_cells). Under gravity, some of these may be unreachable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Places {
     /// Open squares that were visited, or passed between two ticks.
@@ -13,17 +13,17 @@ pub struct Places {
 }
 
 impl Places {
-    /// The share that was visited, in percent; `None` if there is nothing to visit.
+    /// Returns the visited share in percent; `None` without open squares.
     pub fn percent(self) -> Option<f64> {
         (self.open > 0).then(|| 100.0 * self.visited as f64 / self.open as f64)
     }
 
-    /// The share for people.
+    /// Formats the share.
     pub fn describe(self) -> String {
         self.percent().map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %"))
     }
 
-    /// Adds those of another level.
+    /// Adds the squares of another level.
     pub(super) fn add(&mut self, other: Option<Self>) {
         let other = other.unwrap_or_default();
         self.visited = self.visited.saturating_add(other.visited);

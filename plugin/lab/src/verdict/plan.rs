@@ -1,4 +1,4 @@
-//! What is tested, how and by whom.
+//! The plan of a test: levels, testers and settings.
 
 use bevy_playbot::state_hash::StateHash;
 use serde::{Deserialize, Serialize};
@@ -12,26 +12,26 @@ use super::{
 };
 use crate::{detectors::Detectors, eval::EvalError, game::Game, split::LevelSplit};
 
-/// How to test.
+/// Plan of a test.
 #[derive(Clone)]
 pub struct TestPlan {
     /// Levels.
     pub split: LevelSplit,
-    /// Who plays them, with different names. At least one.
+    /// Testers with distinct names, at least one.
     pub testers: Vec<Tester>,
     /// Episodes of each tester on each level; at least 1.
     pub episodes: u32,
     /// Seed of the testers' random streams.
     pub seed: u64,
-    /// What looks for defects while they play.
+    /// The detectors at work during play.
     pub detectors: Detectors,
-    /// Which of the levels; all of them if none is named.
+    /// Shard of the levels; all levels if `None`.
     pub shard: Option<Shard>,
-    /// Threads: not part of the result.
+    /// Number of threads, which does not affect the results.
     pub threads: usize,
 }
 
-/// What files say of a plan: whatever the results depend on.
+/// Description of a plan in files: everything that the results depend on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct TestRecord {
     /// Name of the game.
@@ -49,26 +49,28 @@ pub struct TestRecord {
     pub testers: Vec<TesterRecord>,
     /// Episodes of each tester on each level.
     pub episodes: u32,
-    /// What looked for defects, each detector with its settings.
+    /// The detectors, each with its settings.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub detectors: Vec<String>,
-    /// The same as words of a command line: whatever is not usual. Files are named as the test named them.
+    /// The detectors as words of a command line: all options that differ from the default. Files are named as the
+    /// test named them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub options: Vec<String>,
-    /// Of which levels results say where agents went.
+    /// Levels whose results have maps of where agents went.
     #[serde(default, skip_serializing_if = "MapScope::is_none")]
     pub maps: MapScope,
-    /// Which of the levels; all of them if there is none.
+    /// Shard of the levels; all levels if `None`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub shard: Option<Shard>,
 }
 
 impl TestPlan {
-    /// Checks that somebody tests something, that testers can be told apart, and that there is room for what is kept.
+    /// Checks that the plan has testers with distinct names and levels, and that memory suffices.
     ///
     /// # Errors
     ///
-    /// [`TestError::NoTester`], [`TestError::SameName`], [`TestError::EmptyShard`], or [`TestError::Eval`] with what to lower.
+    /// [`TestError::NoTester`], [`TestError::SameName`], [`TestError::EmptyShard`], or [`TestError::Eval`] with what
+    /// to lower.
     pub fn check(&self) -> Result<(), TestError> {
         if self.testers.is_empty() {
             return Err(TestError::NoTester);
@@ -86,7 +88,7 @@ impl TestPlan {
         }
     }
 
-    /// What files say of it.
+    /// Returns its description for files.
     pub fn record(&self, game: &dyn Game) -> TestRecord {
         TestRecord {
             game: game.name().to_owned(),
@@ -103,12 +105,12 @@ impl TestPlan {
         }
     }
 
-    /// Of which levels results say where agents went. The whole range decides, not the shard.
+    /// Returns the scope of the maps in results. The whole range decides, not the shard.
     pub fn maps(&self) -> MapScope {
         MapScope::of(self.split.len())
     }
 
-    /// Places in the range of the levels that are tested.
+    /// Returns the indices in the range of the levels to test.
     pub fn places(&self) -> Vec<u64> {
         match self.shard {
             Some(shard) => shard.places(self.split.len()).collect(),
@@ -116,9 +118,9 @@ impl TestPlan {
         }
     }
 
-    /// Seed of an episode: from the plan's seed, the tester's and the level's names and the number of the episode alone. So
-    /// the same episode is played whatever other levels and testers there are, and wherever it is played.
-    pub(crate) fn episode_seed(&self, tester: &TesterRecord, level: &str, episode: u32) -> u64 {
+    /// Returns the seed of an episode, from the plan's seed, the names of tester and level, and the number of the
+    /// episode. So the episode is the same beside any other levels and testers, and on any machine.
+    pub fn episode_seed(&self, tester: &TesterRecord, level: &str, episode: u32) -> u64 {
         let bytes = |text: &str| text.bytes().map(u64::from).chain([u64::from(u8::MAX) + 1]).collect::<Vec<_>>();
         let names = bytes(&tester.name).into_iter().chain(bytes(level));
         StateHash::of([self.seed].into_iter().chain(names).chain([u64::from(episode)])).0
@@ -126,7 +128,7 @@ impl TestPlan {
 }
 
 impl TestRecord {
-    /// What differs between two tests, each in words; the shards are not compared.
+    /// Describes the differences between two tests, without their shards.
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let mut found = self.differences_of_game(other);
         let mut compare = |what: &str, one: String, other: String| {
@@ -145,7 +147,7 @@ impl TestRecord {
         found
     }
 
-    /// Whether the games and their versions differ, in words.
+    /// Describes the differences between the games and their versions.
     pub fn differences_of_game(&self, other: &Self) -> Vec<String> {
         if self.game != other.game {
             return vec![format!("games `{}` and `{}`", self.game, other.game)];

@@ -1,4 +1,4 @@
-//! How much memory a test takes at least, so that nobody finds out when half of it is done.
+//! Least memory of a test, checked before it begins.
 
 use super::{
     plan::TestPlan,
@@ -6,22 +6,22 @@ use super::{
 };
 use crate::{
     arrangement::Arrangement,
-    train::{config::ExperimentError, memory::check_bytes},
+    machine::{MemoryError, check_bytes},
 };
 
-/// Bytes of a level that is listed, and of the place of its results in the journal, with its number.
+/// Bytes of a listed level, and of its entry in the journal.
 const LEVEL: usize = size_of::<u64>() + size_of::<(u64, (u64, usize))>();
 
-/// Something that is kept, its bytes, and what to lower.
+/// Data in memory: description, bytes, and the option to lower.
 type Kept = (String, u64, &'static str);
 
 impl TestPlan {
-    /// Checks that the list of levels and what is played on one of them fit into the memory that is free.
+    /// Checks that the list of levels and the episodes on one of them fit into the free memory.
     ///
     /// # Errors
     ///
-    /// [`ExperimentError::Memory`].
-    pub(super) fn check_memory(&self) -> Result<(), ExperimentError> {
+    /// [`MemoryError`].
+    pub(super) fn check_memory(&self) -> Result<(), MemoryError> {
         let worlds = Arrangement { worlds: 1, arenas: 1 };
         self.kept().into_iter().try_for_each(|(what, bytes, options)| check_bytes(what, bytes, options, worlds))
     }
@@ -47,6 +47,7 @@ impl TestPlan {
 #[cfg(test)]
 mod tests {
     use bevy_playbot::{bot::BlindBot, vision::ObservationConfig};
+    use playbot_learner::HasExitCode as _;
 
     use super::super::{TestError, Tester, TesterRecord};
     use super::*;

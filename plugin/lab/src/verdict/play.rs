@@ -1,4 +1,4 @@
-//! Playing a few episodes to their end, whatever the game does in them.
+//! Play of a few episodes to their end, whatever the game does in them.
 
 use bevy_playbot::vision::VisionError;
 
@@ -9,16 +9,17 @@ use super::{
 };
 use crate::game::Game;
 
-/// Plays episodes and returns what came of them, in their order; `None` if somebody asked to stop.
+/// Plays episodes and returns their results in order; `None` if `stop` returned true.
 ///
-/// Many are played in one World. If it breaks, the episodes that were being played are played again, each alone in a World
-/// of its own, and the one that breaks that too is the broken one; all others are played as if nothing had been. If none
-/// does, it takes what other episodes have left in the World to break it, and that is a finding of the episode in which it
-/// broke.
+/// Many are played in one World. If it breaks, its current episodes are played again, each alone in a World of its
+/// own. An episode that breaks its World again is the broken one; all others are played as if nothing had happened.
+///
+/// If no episode does, the break depends on state that other episodes left in the World. It is then a finding of the
+/// episode in which it occurred.
 ///
 /// # Errors
 ///
-/// The game cannot be seen as the tester needs it.
+/// The game does not support the tester's observations.
 pub(super) fn play_tasks(
     game: &dyn Game,
     mode: &str,

@@ -1,4 +1,4 @@
-//! Episodes to be played, and what came of them.
+//! Episodes to play, and their results.
 
 use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
@@ -6,7 +6,7 @@ use bevy_playbot::episode::EpisodeResult;
 use super::walk::Walk;
 use crate::detectors::Detectors;
 
-/// An episode to be played.
+/// An episode to play.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Task {
     /// The level.
@@ -15,48 +15,48 @@ pub(super) struct Task {
     pub seed: u64,
 }
 
-/// What came of an episode.
+/// Result of an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Played {
-    /// How it ended.
+    /// Its end.
     pub end: PlayedEnd,
-    /// Whether the player drew no random number.
+    /// True if the player drew no random number.
     pub exact: bool,
-    /// What detectors found in it.
+    /// The detectors' findings in it.
     pub found: Vec<EpisodeFinding>,
-    /// Where its agent went, if the game says.
+    /// Walk of its agent, if the game reports positions.
     pub walk: Option<Walk>,
 }
 
 impl Played {
-    /// Whether this detector found something in it, or the game broke so.
+    /// Returns whether this detector has a finding in it, or the game broke this way.
     pub fn shows(&self, detector: &str) -> bool {
         let is_broken = matches!(&self.end, PlayedEnd::Broken { detector: how, .. } if *how == detector);
         is_broken || self.found.iter().any(|finding| finding.detector == detector)
     }
 }
 
-/// What a detector found in an episode.
+/// A detector's finding in an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct EpisodeFinding {
     /// The detector.
     pub detector: &'static str,
     /// Tick of the episode.
     pub tick: u32,
-    /// What is wrong.
+    /// The message.
     pub message: String,
 }
 
-/// How an episode ended.
+/// The end of an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum PlayedEnd {
-    /// As the game says.
+    /// An end by the game.
     Ended {
-        /// What came of it.
+        /// The result.
         result: EpisodeResult,
-        /// Where the agent was then, if the game says.
+        /// Last position of the agent, if the game reports it.
         place: Option<Vec2>,
-        /// Why it ended without the aim, if the game says.
+        /// Cause of an end without the goal, if the game reports it.
         cause: Option<&'static str>,
     },
     /// The game broke.
@@ -65,36 +65,37 @@ pub(super) enum PlayedEnd {
         detector: &'static str,
         /// Tick of the episode, if it had begun.
         tick: Option<u32>,
-        /// What the game said.
+        /// The game's message.
         message: String,
     },
 }
 
-/// Why the episodes of a World could not all be played.
+/// Interruption of the episodes of a World.
 pub(super) enum Interruption {
-    /// Somebody asked to stop.
+    /// `stop` returned true.
     Stopped,
     /// The World cannot go on.
     Broken {
-        /// What is wrong.
+        /// `panic`, `fault` or `endless`.
         detector: &'static str,
-        /// What the game said.
+        /// The game's message.
         message: String,
     },
 }
 
-/// How it is watched while it is played.
+/// Observers of an episode during play.
 pub(super) struct Watch<'a> {
-    /// Hears how many episodes have been finished.
+    /// Called with the number of newly finished episodes.
     pub progress: &'a (dyn Fn(u64) + Sync),
-    /// Whether to stop.
+    /// Returns whether to stop.
     pub stop: &'a (dyn Fn() -> bool + Sync),
-    /// What looks for defects.
+    /// The detectors at work.
     pub detectors: &'a Detectors,
     /// Mode of the levels.
     pub mode: &'a str,
-    /// Name of who plays.
+    /// Name of the tester.
     pub tester: &'a str,
-    /// Most arenas of a World. It changes no result of a game that keeps nothing from one episode to the next.
+    /// Largest number of arenas of a World. It does not change the results of a game that keeps no state between
+    /// episodes.
     pub arenas: usize,
 }

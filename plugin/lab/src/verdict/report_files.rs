@@ -1,4 +1,4 @@
-//! What people and other programs read of results.
+//! Reports of results for people and other programs.
 
 use std::path::Path;
 
@@ -17,13 +17,14 @@ pub const SUMMARY: &str = "summary.md";
 /// Name of the file with the comparison, in JSON.
 pub const AGAINST: &str = "against.json";
 
-/// Writes `junit.xml`, `summary.md` and, with a comparison, `against.json` beside the results in a folder. `program` is the
-/// name of the program in the commands that they show. `report.html` has pictures, which need the game:
-/// [`verdict_report`](crate::verdict_report) makes it.
+/// Writes `junit.xml`, `summary.md` and, with a comparison, `against.json` beside the results in a folder.
+///
+/// `program` is the name of the program in the commands that they show. [`verdict_report`](crate::verdict_report)
+/// makes `report.html`, whose pictures need the game.
 ///
 /// # Errors
 ///
-/// There are no results, they are damaged, or the files cannot be written.
+/// The folder has no results, they are damaged, or the files cannot be written.
 pub fn write_reports(folder: &Path, comparison: Option<&Comparison>, program: &str) -> Result<Overview, TestError> {
     let overview = Overview::read(folder)?;
     write(&folder.join(JUNIT), &junit(folder, program)?)?;

@@ -1,17 +1,18 @@
-//! How a level is looked at again.
+//! Commands that show a level of results again.
 
 use super::{level_name::level_argument, level_verdict::LevelVerdict, plan::TestRecord, tester::TesterRecord};
 use crate::{detectors::compares_testers, shell_word::shell_word};
 
-/// Most findings that are shown by their files.
+/// Largest number of findings that are shown by their files.
 const MOST_FILES: usize = 3;
-/// Where findings are replayed: their files are named as the results name them.
+/// Comment on the folder for the replay of findings: their files are named as in the results.
 const OF_RESULTS: &str = "# from the folder of the results:";
-/// Where the rest is run: recordings, policies and level files are named as the test named them.
+/// Comment on the folder for all other commands: recordings, policies and level files are named as the test named
+/// them.
 const OF_TEST: &str = "# from the folder where the test was run:";
 
-/// The commands that show a level's findings, play its failed episodes again, and show them: for people, of the program with
-/// this name. Where they are meant from different folders, comments of the shell say which.
+/// Returns the commands that replay a level's findings, play its failed episodes again, and show them, for the
+/// program of this name. If they belong to different folders, shell comments name these.
 pub fn rerun_commands(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec<String> {
     let files = level.findings.iter().filter_map(|finding| finding.file.as_ref());
     let replays: Vec<String> = files.take(MOST_FILES).map(|file| format!("{program} replay {file}")).collect();
@@ -25,8 +26,8 @@ pub fn rerun_commands(program: &str, record: &TestRecord, level: &LevelVerdict) 
     comment(of_results).into_iter().chain(replays).chain(comment(of_test)).chain(again).collect()
 }
 
-/// The episodes of a tester that found something or else failed, if one did; of all testers, if what was found compares them.
-/// And a picture, if it does the same each time.
+/// Returns the command for the episodes of the tester that has a finding or else failed, if any. If the finding
+/// compares testers, the command is for all of them. Adds a picture if the tester repeats itself exactly.
 fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec<String> {
     let found = level.findings.iter().find_map(|finding| finding.tester.as_ref());
     let failed = || level.testers.iter().find(|tester| tester.score.solved < tester.score.episodes);
@@ -42,13 +43,14 @@ fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec
     let again = format!(
         "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{detectors} --out again"
     );
-    // What draws random numbers draws others in a picture.
+    // A tester that draws random numbers draws others in a picture.
     let exact = level.testers.iter().any(|tester| tester.tester == *name && tester.exact);
     let picture = format!("{program} view {game} --levels {levels} {shown} --episode --out again.png");
     [again].into_iter().chain(exact.then_some(picture)).collect()
 }
 
-/// Testers as `playbot test` takes them. What a policy draws there depends on its name, so that comes along.
+/// Returns the testers as arguments of `playbot test`. The draws of a policy depend on its name, so the name is
+/// included.
 fn testers(testers: &[TesterRecord]) -> String {
     let bots: Vec<&str> =
         testers.iter().filter(|tester| tester.checksum.is_none()).map(|tester| tester.name.as_str()).collect();
@@ -62,7 +64,8 @@ fn testers(testers: &[TesterRecord]) -> String {
     bots.into_iter().chain(policies).chain(runs(testers)).chain(greedy).collect::<Vec<_>>().join(" ")
 }
 
-/// The runs among testers. One checkpoint is named for all of them, so that none is where they differ.
+/// Returns the arguments for runs among testers. One checkpoint applies to all, so runs with different checkpoints
+/// get none.
 fn runs(testers: &[TesterRecord]) -> Vec<String> {
     let runs: Vec<_> = testers.iter().filter_map(|tester| tester.run.as_ref()).collect();
     let folders = runs.iter().map(|run| format!("--run {}", shell_word(&run.folder)));
@@ -70,7 +73,7 @@ fn runs(testers: &[TesterRecord]) -> Vec<String> {
     folders.chain(step.map(|step| format!("--checkpoint {step}"))).collect()
 }
 
-/// A tester as `playbot view` takes it, which knows files of policies alone.
+/// Returns a tester as an argument of `playbot view`, which takes the files of policies only.
 fn seen(tester: &TesterRecord) -> String {
     let unnamed =
         TesterRecord { name: tester.file.clone().unwrap_or_else(|| tester.name.clone()), file: None, ..tester.clone() };

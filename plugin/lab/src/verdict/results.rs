@@ -1,7 +1,7 @@
-//! `results.json`: what was tested, and a line for each level.
+//! The file `results.json`: the description of a test, and a line for each level.
 //!
-//! The file is one JSON object whose levels stand one to a line, so that files of any length are read and joined without
-//! having them in memory.
+//! The file is one JSON object whose levels stand one to a line. So files of any length are read and joined without
+//! holding them in memory.
 
 use std::{
     fs::File,
@@ -21,17 +21,17 @@ use super::{
 
 /// Name of the file in the folder of a test.
 pub const RESULTS: &str = "results.json";
-/// Between what was tested and the first level.
+/// Text between the description and the first level.
 const LEVELS: &str = ",\"levels\":[";
-/// After the last level, in files of older versions.
+/// Text after the last level in files of older versions.
 const END: &str = "]}";
 
-/// After the last level, with the checksum of all bytes of the lines before.
+/// Returns the text after the last level, with the checksum of all bytes of the lines before.
 fn end(hasher: &Hasher) -> String {
     format!("],\"crc32\":\"{:08x}\"}}", hasher.clone().finalize())
 }
 
-/// The folder of results that are named by it, or by the file in it.
+/// Returns the folder of results, given the folder or the file in it.
 pub fn results_folder(named: &Path) -> &Path {
     let is_file = named.file_name().is_some_and(|name| name == RESULTS) && named.is_file();
     match named.parent() {
@@ -41,7 +41,7 @@ pub fn results_folder(named: &Path) -> &Path {
     }
 }
 
-/// Writes results, a level at a time.
+/// Writer of results, a level at a time.
 pub(super) struct ResultWriter<W> {
     out: W,
     is_first: bool,
@@ -49,7 +49,7 @@ pub(super) struct ResultWriter<W> {
 }
 
 impl<W: Write> ResultWriter<W> {
-    /// Begins with what was tested.
+    /// Begins with the description of the test.
     pub fn begin(out: W, record: &TestRecord) -> io::Result<Self> {
         let head = serde_json::to_string(record)?;
         let mut results = Self { out, is_first: true, hasher: Hasher::new() };
@@ -84,10 +84,10 @@ pub struct ResultLines {
     path: PathBuf,
     record: TestRecord,
     lines: io::Lines<BufReader<File>>,
-    /// Lines read so far.
+    /// Number of lines read so far.
     number: usize,
     is_over: bool,
-    /// Of the lines read so far.
+    /// Checksum of the lines read so far.
     hasher: Hasher,
 }
 
@@ -96,8 +96,8 @@ impl ResultLines {
     ///
     /// # Errors
     ///
-    /// [`TestError::NoResults`] if there are none; [`TestError::Damaged`] if they are not as [`TestFolder`](super::TestFolder)
-    /// writes them.
+    /// [`TestError::NoResults`] without results; [`TestError::Damaged`] if they differ from the form of
+    /// [`TestFolder`](super::TestFolder).
     pub fn open(folder: &Path) -> Result<Self, TestError> {
         let path = folder.join(RESULTS);
         let file = File::open(&path).map_err(|source| match source.kind() {
@@ -120,27 +120,27 @@ impl ResultLines {
         Ok(Self { path, record, lines, number: 1, is_over: false, hasher })
     }
 
-    /// [`open`](Self::open), after the whole file was read once: what was tested is what was written.
+    /// Opens the results as [`open`](Self::open) does, after a check of the checksum over the whole file.
     ///
     /// # Errors
     ///
-    /// As for [`open`](Self::open); and the file ends before its end, or its checksum is another one.
+    /// As for [`open`](Self::open); and the file is incomplete, or its checksum is wrong.
     pub fn open_whole(folder: &Path) -> Result<Self, TestError> {
         let mut lines = Self::open(folder)?;
         while lines.next_line()?.is_some() {}
         Self::open(folder)
     }
 
-    /// What was tested.
+    /// Returns the description of the test.
     pub fn record(&self) -> &TestRecord {
         &self.record
     }
 
-    /// The next level as it is written; `None` after the last one.
+    /// Returns the line of the next level; `None` after the last one.
     ///
     /// # Errors
     ///
-    /// The file ends before its end, or cannot be read.
+    /// The file is incomplete, or cannot be read.
     pub fn next_line(&mut self) -> Result<Option<String>, TestError> {
         if self.is_over {
             return Ok(None);
@@ -155,7 +155,7 @@ impl ResultLines {
                 }
                 if self.lines.next().is_some() {
                     self.number += 1;
-                    return Err(self.damaged("the file goes on behind its end"));
+                    return Err(self.damaged("the file goes on after its end"));
                 }
                 self.is_over = true;
                 Ok(None)
@@ -168,21 +168,21 @@ impl ResultLines {
         }
     }
 
-    /// The next level; `None` after the last one.
+    /// Returns the next level; `None` after the last one.
     ///
     /// # Errors
     ///
-    /// The file ends before its end, holds something else, or cannot be read.
+    /// The file is incomplete, is malformed, or cannot be read.
     pub fn next_level(&mut self) -> Result<Option<LevelVerdict>, TestError> {
         let Some(line) = self.next_line()? else { return Ok(None) };
         serde_json::from_str(&line).map(Some).map_err(|error| self.damaged(&json_fault(&error)))
     }
 
-    /// The next level as it is written, if it is the one at this place of the range.
+    /// Returns the line of the next level, which must have this index in the range.
     ///
     /// # Errors
     ///
-    /// It is another one, or none.
+    /// The next level is another one, or missing.
     pub(super) fn line_of(&mut self, index: u64) -> Result<String, TestError> {
         let line = self.next_line()?.ok_or_else(|| self.damaged("levels are missing"))?;
         let found = serde_json::from_str::<Value>(&line).map_err(|error| self.damaged(&json_fault(&error)))?;
@@ -192,12 +192,11 @@ impl ResultLines {
         }
     }
 
-    /// Reads the end, behind which nothing may follow: only there is known whether the levels before it are those that were
-    /// written.
+    /// Reads the end, which nothing may follow: the checksum there confirms the levels before it.
     ///
     /// # Errors
     ///
-    /// Another level follows, or the checksum is that of other levels.
+    /// Another level follows, or the checksum is wrong.
     pub(super) fn expect_end(&mut self) -> Result<(), TestError> {
         match self.next_line()? {
             None => Ok(()),

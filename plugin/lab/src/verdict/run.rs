@@ -1,4 +1,4 @@
-//! Testing a range of levels on all cores.
+//! Tests of a range of levels on all cores.
 
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -19,34 +19,34 @@ use super::{
 use crate::{eval::EvalError, findings::FindingFiles, game::Game};
 use bevy_playbot::fault::Fault;
 
-/// Levels are handed out in about so many portions, so that no thread waits long for the last one.
+/// Approximate number of portions in which levels are handed out: no thread waits long for the last one.
 const PORTIONS: usize = 64;
-/// Levels of the first portion, so that the first results come soon; each portion has twice as many as the one before until
-/// they are as large as they become.
+/// Levels of the first portion, which gives results soon. Each portion has twice as many as the one before, up to the
+/// largest size.
 const FIRST: usize = 4;
-/// Most episodes of a portion, so that little is in memory and little is lost when somebody stops.
+/// Most episodes of a portion: limits the memory, and the loss if the test is stopped.
 const MOST_EPISODES: usize = 128;
 /// Most arenas of a World.
 const MOST_ARENAS: usize = 16;
 
-/// Whether a test came to its end.
+/// End of a test: complete or stopped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TestEnd {
     /// Every level was tested.
     Done,
-    /// Somebody asked to stop.
+    /// `stop` returned true.
     Stopped,
 }
 
-/// How a test is watched.
+/// Observers of a test.
 pub struct TestWatch<'a> {
-    /// Hears how many more episodes have been finished; called from several threads.
+    /// Called with the number of newly finished episodes, from several threads.
     pub progress: &'a (dyn Fn(u64) + Sync),
-    /// Whether to stop; what is finished is kept.
+    /// Returns whether to stop; finished levels are kept.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// What the threads share.
+/// State that the threads share.
 struct Shared<'a> {
     next: usize,
     /// Portions that some testers have played: by portion and tester.
@@ -56,15 +56,16 @@ struct Shared<'a> {
     is_stopped: bool,
 }
 
-/// Tests every level of the plan but those at the places in `finished`, and hands each verdict to `keep`, in no particular
-/// order. What is in memory does not grow with the number of levels.
+/// Tests every level of the plan except those with an index in `finished`, and hands each verdict to `keep`, in no
+/// particular order. Memory does not grow with the number of levels.
 ///
-/// Episodes depend on nothing but the plan's seed, their tester and their level: not on the threads, the shard, or on what
-/// else is tested. A game that keeps something from one episode to the next breaks that, and `playbot doctor` says so.
+/// An episode depends on the plan's seed, its tester and its level only: not on the threads, the shard, or other
+/// levels and testers. A game that keeps state from one episode to the next breaks that, and `playbot doctor` reports
+/// it.
 ///
 /// # Errors
 ///
-/// The plan tests nothing, the game cannot be played at all, or `keep` failed.
+/// The plan tests nothing, the game cannot be played, or `keep` failed.
 pub fn run_tests(
     game: &dyn Game,
     plan: &TestPlan,
@@ -75,7 +76,7 @@ pub fn run_tests(
     run_tests_keeping(game, plan, finished, keep, watch, None)
 }
 
-/// [`run_tests`], with a file for each finding.
+/// Runs tests as [`run_tests`] does, with a file for each finding.
 ///
 /// # Errors
 ///
@@ -101,7 +102,7 @@ pub fn run_tests_keeping(
     let threads = plan.threads.clamp(1, (portions.len() * plan.testers.len()).max(1));
     thread::scope(|scope| {
         for _ in 1..threads {
-            // Where the system starts fewer threads, it takes longer.
+            // If the system starts fewer threads, the test takes longer.
             let _ = Builder::new().spawn_scoped(scope, || work(game, plan, &portions, &shared, watch, files));
         }
         work(game, plan, &portions, &shared, watch, files);
@@ -114,7 +115,7 @@ pub fn run_tests_keeping(
     }
 }
 
-/// The places in portions that grow up to this size. What is found on a level does not depend on its portion.
+/// Splits the indices into portions that grow up to this size. Findings on a level do not depend on its portion.
 fn portions(places: &[u64], largest: usize) -> Vec<&[u64]> {
     let (mut portions, mut rest, mut size) = (Vec::new(), places, FIRST.min(largest));
     while !rest.is_empty() {
@@ -129,7 +130,7 @@ fn lock<'a, 'b>(shared: &'a Mutex<Shared<'b>>) -> MutexGuard<'a, Shared<'b>> {
     shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What one thread does: portion after portion, each by one tester after the other.
+/// Runs one thread: portion after portion, each by one tester after the other.
 fn work(
     game: &dyn Game,
     plan: &TestPlan,
@@ -207,7 +208,7 @@ fn play_portion(
     play_tasks(game, mode, tester, &tasks, &watch).map_err(|error| EvalError::from(error).into())
 }
 
-/// Adds what a tester played of a portion; the episodes of all of them once it is complete.
+/// Adds a tester's episodes of a portion, and returns the episodes of all testers once the portion is complete.
 fn add(
     shared: &Mutex<Shared>,
     portion: usize,
@@ -224,7 +225,7 @@ fn add(
     shared.open.remove(&portion).map(|complete| complete.into_iter().flatten().collect())
 }
 
-/// Who asks to stop cannot use it.
+/// Judges the levels of a portion. Incomplete if `stop` returned true.
 fn judge_portion(
     game: &dyn Game,
     plan: &TestPlan,

@@ -1,23 +1,23 @@
-//! Parts of a test for several machines.
+//! Shards: parts of a test for several machines.
 
 use std::{fmt, str::FromStr};
 
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-/// Part `index` of `count`, counted from 0: the levels whose place in the range, divided by `count`, leaves `index`.
-/// Written `0/4` to `3/4`.
+/// Part `index` of `count`, counted from 0: the levels whose index in the range, divided by `count`, has the
+/// remainder `index`. Written `0/4` to `3/4`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct Shard {
-    /// Which part.
+    /// Index of the part.
     pub index: u64,
-    /// Of how many.
+    /// Number of parts.
     pub count: u64,
 }
 
 impl Shard {
-    /// Places of its levels in a range of this length.
+    /// Returns the indices of its levels in a range of this length.
     pub fn places(self, length: u64) -> impl Iterator<Item = u64> + use<> {
         (self.index..length).step_by(usize::try_from(self.count).unwrap_or(usize::MAX))
     }
@@ -29,18 +29,18 @@ impl fmt::Display for Shard {
     }
 }
 
-/// The text is no shard.
+/// Text that is not a valid shard.
 #[derive(Debug, Error, PartialEq, Eq)]
 pub enum ShardError {
-    /// It is written in another way.
+    /// The text has another form.
     #[error("`{0}` is not a shard: write index/count, such as 0/4, 1/4, 2/4 and 3/4 for four machines")]
     NotAShard(String),
-    /// There is no such part.
+    /// The index is too large.
     #[error("`{index}/{count}`: shards are counted from 0, so the last one is {}/{count}", count - 1)]
     Beyond {
-        /// Which part was asked for.
+        /// The requested index.
         index: u64,
-        /// Of how many, at least 1.
+        /// Number of parts, at least 1.
         count: u64,
     },
 }

@@ -1,18 +1,18 @@
 //! Names for skills that are points of a continuous space.
 //!
-//! A skill is called by the one of fixed directions that is nearest to it: the positive and the negative half of each axis of
-//! z. That is the number of z that is furthest from 0, and its sign. So names need no other level and no other draw, and mean
-//! the same in every test of a policy.
+//! A skill is named after the nearest of several fixed directions: the positive and the negative half of each axis of
+//! z. That is the number of z that is furthest from 0, and its sign. So a name is independent of levels and draws,
+//! and is the same in every test of a policy.
 
-/// Most numbers of a skill that give it a name: those behind them are left out.
+/// Largest number of axes with a name: further ones are left out.
 const MOST_NUMBERS: usize = 16;
 
-/// How many names there are for skills as long as this one; none without a skill.
+/// Returns the number of names for skills of this length; 0 without a skill.
 pub(super) fn skill_count(z: &[f32]) -> usize {
     2 * z.len().min(MOST_NUMBERS)
 }
 
-/// The number of a skill's name, below [`skill_count`]; of equally long numbers the first counts.
+/// Returns the number of a skill's name, below [`skill_count`]; of equally large numbers the first counts.
 pub(super) fn skill_number(z: &[f32]) -> Option<usize> {
     let mut nearest: Option<(usize, f32)> = None;
     for (number, value) in z.iter().take(MOST_NUMBERS).enumerate() {
@@ -23,7 +23,7 @@ pub(super) fn skill_number(z: &[f32]) -> Option<usize> {
     nearest.map(|(number, value)| 2 * number + usize::from(value < 0.0))
 }
 
-/// The name: `z3+` for a skill whose third number is the one furthest from 0, and is positive.
+/// Returns the name: `z3+` for a skill whose third number is furthest from 0, and is positive.
 pub(super) fn skill_name(number: usize) -> String {
     format!("z{}{}", number / 2 + 1, if number.is_multiple_of(2) { '+' } else { '-' })
 }

@@ -1,4 +1,4 @@
-//! The squares of a level in which what happens there is counted.
+//! The squares of a level in which events are counted.
 
 use std::collections::BTreeSet;
 
@@ -14,18 +14,18 @@ const MOST: f32 = 64.0;
 /// Part of a square by which a level may be longer than its squares, through rounding.
 const SLACK: f32 = 1e-3;
 
-/// A level's own tiles; in larger levels several of them are one square.
+/// The squares of a level: its own tiles, or several of them in larger levels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LevelSquares {
     pub grid: CellGrid,
     pub columns: usize,
     pub rows: usize,
-    /// How far an agent goes in a tick at most.
+    /// Largest distance of an agent's step in a tick.
     reach: f32,
 }
 
 impl LevelSquares {
-    /// The squares of a level; `None` for one without extent.
+    /// Returns the squares of a level; `None` for one without extent.
     pub fn of(plan: &FloorPlan) -> Option<Self> {
         let size = plan.bounds.size();
         if !(plan.bounds.min.is_finite() && size.is_finite() && size.min_element() > 0.0) {
@@ -41,25 +41,26 @@ impl LevelSquares {
         Some(Self { grid, columns: count.x as usize, rows: count.y as usize, reach: reach(tile) })
     }
 
-    /// How many there are.
+    /// Returns the number of squares.
     pub fn count(&self) -> usize {
         self.columns * self.rows
     }
 
-    /// The square around a place, counted row by row from below; `None` outside the level.
+    /// Returns the square around a position, counted row by row from below; `None` outside the level.
     pub fn at(&self, place: Vec2) -> Option<usize> {
         let at = (place - self.grid.origin) / self.grid.size;
-        // What is no number is not inside either.
+        // Positions that are not numbers count as outside.
         let is_inside = at.x >= 0.0 && at.y >= 0.0 && at.x < self.columns as f32 && at.y < self.rows as f32;
         is_inside.then(|| at.y as usize * self.columns + at.x as usize)
     }
 
-    /// Those that an agent passes which was in one place a tick ago and is in another one now; none if it has been put there.
+    /// Returns the squares between two positions of an agent in consecutive ticks; no squares if it has been put
+    /// there.
     pub fn between(self, from: Vec2, to: Vec2) -> impl Iterator<Item = usize> {
         cells_between(self.grid, from, to, self.reach).filter_map(move |cell| self.index(cell))
     }
 
-    /// Those that no wall cuts off from the start, if the plan says it.
+    /// Returns the squares that walls do not cut off from the start, if the plan has a start.
     pub fn open(&self, plan: &FloorPlan) -> Option<BTreeSet<usize>> {
         let cells = open_cells(plan, &self.grid)?;
         Some(cells.iter().filter_map(|cell| self.of_cell(cell)).collect())

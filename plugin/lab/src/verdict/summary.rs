@@ -1,4 +1,4 @@
-//! Results in a page of Markdown, short enough for a pull request.
+//! Summary of results in a page of Markdown, short enough for a pull request.
 
 use std::fmt::Display;
 
@@ -10,7 +10,7 @@ use crate::report::markdown_cell;
 /// Most changes of a kind that are listed.
 const MOST_CHANGES: usize = 20;
 
-/// The page.
+/// Writes the page.
 pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, program: &str) -> String {
     let record = &overview.record;
     let mut lines = vec![format!("# {} {}", record.game, markdown_cell(&record.range.to_string())), String::new()];
@@ -27,9 +27,9 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
         if overview.findings == 1 { "" } else { "s" }
     ));
     if overview.places.percent().is_some() {
-        lines.push(format!("{} of the open places were visited.", overview.places.describe()));
+        lines.push(format!("{} of the open squares were visited.", overview.places.describe()));
     }
-    let head = ["", "| tester | levels solved | episodes solved | places visited |", "|---|---:|---:|---:|"];
+    let head = ["", "| tester | levels solved | episodes solved | squares visited |", "|---|---:|---:|---:|"];
     lines.extend(head.map(str::to_owned));
     for tester in &overview.testers {
         let share = |of: Trials| format!("{} of {}{}", of.successes, of.trials, interval(of));
@@ -40,15 +40,16 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
         lines.extend(compared(comparison));
     }
     if !overview.worst.is_empty() {
-        lines
-            .extend(["", "## Levels to look at", "", "| level | outcome | what |", "|---|---|---|"].map(str::to_owned));
+        lines.extend(
+            ["", "## Levels to look at", "", "| level | outcome | problem |", "|---|---|---|"].map(str::to_owned),
+        );
         for level in &overview.worst {
             let what = markdown_cell(&message(level));
             lines.push(format!("| {} | {} | {what} |", markdown_cell(&level.level), level.outcome.name()));
         }
         let shown = overview.worst.first().map(|level| rerun_commands(program, record, level)).unwrap_or_default();
         if !shown.is_empty() {
-            lines.extend(["", "The first one again:", "", "```sh"].map(str::to_owned));
+            lines.extend(["", "To play the first one again:", "", "```sh"].map(str::to_owned));
             lines.extend(shown);
             lines.push("```".to_owned());
         }
@@ -57,7 +58,7 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
     lines.join("\n")
 }
 
-/// The 95 % interval of a share, in percent.
+/// Formats the 95 % interval of a share, in percent.
 pub(super) fn interval(of: Trials) -> String {
     let [low, high] = wilson(of.successes, of.trials).map(|share| 100.0 * share);
     format!(" ({low:.1} to {high:.1} %)")
@@ -125,10 +126,10 @@ mod tests {
         };
         let plain = said(&verdict(0, 2, 2));
         assert!(plain.contains("| random | 1 of 1") && plain.contains(" | – |"), "{plain}");
-        assert!(!plain.contains("open places"), "{plain}");
+        assert!(!plain.contains("open squares"), "{plain}");
         let mut level = LevelVerdict { places: Some(Places { visited: 3, open: 4 }), ..verdict(0, 2, 2) };
         level.testers[0].places = Some(Places { visited: 1, open: 4 });
         let mapped = said(&level);
-        assert!(mapped.contains("75.0 % of the open places") && mapped.contains(" | 25.0 % |"), "{mapped}");
+        assert!(mapped.contains("75.0 % of the open squares") && mapped.contains(" | 25.0 % |"), "{mapped}");
     }
 }

@@ -1,4 +1,4 @@
-//! A World in which testers play their episodes.
+//! Worlds in which testers play their episodes.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -23,38 +23,38 @@ use crate::{
     worlds::build_observing_world,
 };
 
-/// Ticks after which an episode counts as one that never ends: more than four hours at 60 a second.
+/// Ticks after which an episode counts as endless: more than four hours at 60 a second.
 const MOST_TICKS: u32 = 1_000_000;
-/// How a game's panic is told, behind where it was.
+/// Text before the message of a game's panic, after its position.
 const PANICKED: &str = "the game panicked: ";
 
-/// An agent and what it plays, in this order.
+/// An agent and its tasks, in order.
 struct Seat {
     agent: Entity,
-    /// Which tasks, with the seeds of their episodes.
+    /// Indices of its tasks, with the seeds of their episodes.
     tasks: Vec<(usize, u64)>,
     done: usize,
-    /// Where the agent goes.
+    /// Walk of the agent.
     walk: WalkCounter,
 }
 
 impl Seat {
-    /// What is played, or would be next: the task and the seed of its episode.
+    /// Returns the present or next task, and the seed of its episode.
     fn current(&self) -> Option<(usize, u64)> {
         self.tasks.get(self.done).copied()
     }
 }
 
-/// The World and who plays in it.
+/// A World and the agents in it.
 pub(super) struct TestWorld {
     world: World,
     seats: Vec<Seat>,
-    /// What was found in the only episode, if it broke the World.
+    /// Findings in the only episode, if it broke the World.
     pub found: Vec<EpisodeFinding>,
 }
 
 impl TestWorld {
-    /// A World for the tasks that wait, shared out evenly over its agents, of whom there are at most so many.
+    /// Builds a World for the waiting tasks, shared out evenly over its agents, at most this many.
     pub fn build(
         game: &dyn Game,
         mode: &str,
@@ -67,7 +67,7 @@ impl TestWorld {
         let sees = matches!(player, Player::Policy { .. });
         let observation_config = if sees { tester.observation_config } else { ObservationConfig::default() };
         let count = at_most(game, arenas.min(waiting.len()));
-        // Agents have the seeds of their episodes; that of the World is left to the game, and always the same.
+        // Agents have the seeds of their episodes; the seed of the World is for the game, and always the same.
         let (mut world, agents) = build_observing_world(game, mode, &observation_config, 0, 0, count as u32)?;
         EndedEpisodes::note_in(&mut world);
         if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
@@ -89,7 +89,7 @@ impl TestWorld {
         Ok(Self { world, seats, found: Vec::new() })
     }
 
-    /// Ticks until everybody has played, and notes what came of it.
+    /// Returns ticks until all tasks are played, and notes their results.
     pub fn play_out(
         &mut self,
         game: &dyn Game,
@@ -108,7 +108,7 @@ impl TestWorld {
                 self.found = watched.take_found(0);
                 return Err(Interruption::Broken { detector, message });
             }
-            // Whose it is shows when each plays alone.
+            // Play of each episode alone shows which episode it belongs to.
             if let Some((detector, message)) = watched.look(&self.world, EndedEpisodes::of(&self.world)) {
                 return Err(Interruption::Broken { detector, message });
             }
@@ -123,7 +123,7 @@ impl TestWorld {
         Ok(())
     }
 
-    /// Counts where the agents are after this tick.
+    /// Counts the positions of the agents after this tick.
     fn count_places(&mut self, game: &dyn Game, watch: &Watch) {
         let ended = EndedEpisodes::of(&self.world);
         for seat in &mut self.seats {
@@ -132,7 +132,7 @@ impl TestWorld {
         }
     }
 
-    /// Where an agent went in the episode that is over.
+    /// Returns the walk of an agent in the episode that is over.
     pub fn take_walk(&mut self, seat: usize) -> Option<Walk> {
         self.seats.get_mut(seat)?.walk.take()
     }
@@ -143,8 +143,8 @@ impl TestWorld {
             let Some(seat) = self.seats.iter().position(|seat| seat.agent == agent) else { continue };
             let walk = self.take_walk(seat);
             let Some((task, seed)) = self.seats[seat].current() else { continue };
-            let place = game.whereabouts(&self.world, agent);
-            let cause = if result.success { None } else { game.end_cause(&self.world, agent) };
+            let place = game.tools().state.position(&self.world, agent);
+            let cause = if result.success { None } else { game.tools().state.end_cause(&self.world, agent) };
             let exact = self.is_untouched(seat, seed);
             let found = watched.take_found(seat);
             let end = PlayedEnd::Ended { result, place, cause };
@@ -154,15 +154,15 @@ impl TestWorld {
         }
     }
 
-    /// Ticks of the longest episode that is being played.
+    /// Returns the ticks of the longest current episode.
     fn longest(&self) -> u32 {
         let ticks = |seat: &Seat| self.world.get::<Episode>(seat.agent).map_or(0, |episode| episode.tick);
         let playing = self.seats.iter().filter(|seat| is_playing(&self.world, seat.agent));
         playing.map(ticks).max().unwrap_or(0)
     }
 
-    /// The tasks one of which may have broken the World: those that were being played or have just ended, or else those
-    /// that would be next.
+    /// Returns the tasks that may have broken the World: those that were being played or have just ended, or else the
+    /// next ones.
     pub fn suspects(&self) -> Vec<usize> {
         self.suspected().into_iter().map(|(_, task)| task).collect()
     }
@@ -176,8 +176,8 @@ impl TestWorld {
         if begun.is_empty() { seats().collect() } else { begun }
     }
 
-    /// What broke the World, if no episode does it alone: a finding of the suspect whose agent the game names, or else of
-    /// the first one.
+    /// Returns the message about a broken World that no episode breaks alone. It is a finding of the suspect whose
+    /// agent the game names, or else of the first one.
     pub fn left_behind(&self, detector: &'static str, message: &str) -> Option<(usize, EpisodeFinding)> {
         let told = |seat: &Seat| {
             let (agent, episode) = (self.world.get::<Agent>(seat.agent)?, self.world.get::<Episode>(seat.agent)?);
@@ -187,24 +187,24 @@ impl TestWorld {
         let played = || self.world.get::<Episode>(seat.agent).map_or(0, |episode| episode.tick.saturating_sub(1));
         let (tick, words) = told(seat).unwrap_or_else(|| (played(), message));
         let words = words.strip_prefix(PANICKED).unwrap_or(words);
-        // A World with a single episode breaks of itself.
+        // A World with a single episode breaks by that episode.
         let is_shared = self.seats.iter().map(|seat| seat.tasks.len()).sum::<usize>() > 1;
         let when = if is_shared {
-            "not when the episode is played alone: other episodes in the same World may have left something behind"
+            "not when the episode is played alone: other episodes in the same World may have left state behind"
         } else {
-            "not when the episode is played again: the game does not play the same twice"
+            "not when the episode is played again: the game is not deterministic"
         };
         Some((task, EpisodeFinding { detector, tick, message: format!("{words} ({when})") }))
     }
 
-    /// Whether nothing was drawn from a player's streams in the episode with this seed.
+    /// Returns whether nothing was drawn from a player's streams in the episode with this seed.
     pub fn is_untouched(&self, seat: usize, seed: u64) -> bool {
         let streams = self.seats.get(seat).and_then(|seat| self.world.get::<AgentStreams>(seat.agent));
         streams.is_some_and(|streams| *streams == EpisodeSeeds::streams(seed))
     }
 
-    /// The tick in which the only agent broke the World, and what the game said of it, without the place that the report of
-    /// the level names anyway.
+    /// Returns the tick in which the only agent broke the World, and the game's message without its position: reports
+    /// of a level name that anyway.
     pub fn without_moment(&self, message: &str) -> (Option<u32>, String) {
         let agent = self.seats.first().map(|seat| seat.agent);
         let parts = agent.and_then(|agent| Some((self.world.get::<Agent>(agent)?, self.world.get::<Episode>(agent)?)));
@@ -216,14 +216,15 @@ impl TestWorld {
     }
 }
 
-/// The tick that a message begins with, as in `agent 0, level 3, tick 7: words`, and the words.
+/// Parses the tick at the start of a message such as `agent 0, level 3, tick 7: words`, and returns it with the
+/// words.
 fn told_tick(message: &str, agent: u32, level: u64) -> Option<(u32, &str)> {
     let rest = message.strip_prefix(&format!("agent {agent}, level {level}, tick "))?;
     let (tick, words) = rest.split_once(": ")?;
     Some((tick.parse().ok()?, words))
 }
 
-/// Whether an agent has an episode that is not over.
+/// Returns whether an agent has an episode that is not over.
 fn is_playing(world: &World, agent: Entity) -> bool {
     let is_begun = |episode: &Episode| episode.is_running() || episode.is_loading();
     Control::of(world, agent).is_active() && world.get::<Episode>(agent).is_some_and(is_begun)

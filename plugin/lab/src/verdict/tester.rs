@@ -1,4 +1,4 @@
-//! Who tests.
+//! Testers: players with names and observations.
 
 use std::path::Path;
 
@@ -7,37 +7,37 @@ use serde::{Deserialize, Serialize};
 
 use crate::eval::Player;
 
-/// A player under a name, with what it sees.
+/// A player with a name and its observations.
 #[derive(Clone)]
 pub struct Tester {
-    /// What files say of it.
+    /// Its description for files.
     pub record: TesterRecord,
     /// The player.
     pub player: Player,
-    /// What a learned policy sees; bots are left with vectors.
+    /// Observations of a learned policy; bots keep vectors.
     pub observation_config: ObservationConfig,
 }
 
-/// What files say of a tester.
+/// Description of a tester in files.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TesterRecord {
-    /// Its name, unlike that of all others of the test.
+    /// Its name, unique in the test.
     pub name: String,
-    /// Checksum of the policy's file, for policies: another one is another tester.
+    /// Checksum of a policy's file: another file is another tester.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checksum: Option<String>,
-    /// Whether a policy takes its most probable action instead of drawing one.
+    /// True if a policy takes its most probable action instead of drawing one.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub greedy: bool,
-    /// The policy's file, where it is not the tester's name.
+    /// The policy's file, if it differs from the tester's name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
-    /// The run that the policy is of.
+    /// The policy's run.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub run: Option<TestedRun>,
 }
 
-/// The checkpoint of a run.
+/// A checkpoint of a run.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct TestedRun {
     /// The run's folder.
@@ -46,7 +46,7 @@ pub struct TestedRun {
     pub step: u64,
 }
 
-/// Where a policy's file lies does not make it another one.
+/// The path of a policy's file does not identify the tester.
 impl PartialEq for TesterRecord {
     fn eq(&self, other: &Self) -> bool {
         (&self.name, &self.checksum, self.greedy) == (&other.name, &other.checksum, other.greedy)
@@ -56,12 +56,12 @@ impl PartialEq for TesterRecord {
 impl Eq for TesterRecord {}
 
 impl TesterRecord {
-    /// A bot of the game.
+    /// Makes the tester of a bot of the game.
     pub fn bot(name: impl Into<String>) -> Self {
         Self { name: name.into(), checksum: None, greedy: false, file: None, run: None }
     }
 
-    /// A policy's file, under a name of its own or else the file's.
+    /// Makes the tester of a policy's file, under its own name or else the file's.
     pub fn policy(name: Option<String>, path: &Path, checksum: String) -> Self {
         let of_file = || path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let name = name.unwrap_or_else(of_file);
@@ -69,7 +69,7 @@ impl TesterRecord {
         Self { checksum: Some(checksum), file, ..Self::bot(name) }
     }
 
-    /// As people read it.
+    /// Describes the tester.
     pub fn describe(&self) -> String {
         let checksum = self.checksum.as_ref().map_or_else(String::new, |sum| format!(" (file {sum})"));
         format!("{}{checksum}{}", self.name, if self.greedy { ", greedy" } else { "" })

@@ -1,4 +1,4 @@
-//! Verdicts for tests.
+//! Verdicts for unit tests.
 
 use std::collections::BTreeMap;
 
@@ -9,7 +9,7 @@ use super::{
 };
 use crate::proof::LevelProof;
 
-/// So many solved episodes among these.
+/// Makes a score with so many solved episodes.
 pub(super) fn score(solved: u64, episodes: u64) -> Score {
     let ticks = FinishTime::of(vec![40; solved as usize]);
     Score {
@@ -23,7 +23,7 @@ pub(super) fn score(solved: u64, episodes: u64) -> Score {
     }
 }
 
-/// The level at this place of `hard:0..`, tested by `random` alone.
+/// Makes the verdict on the level with this index of `hard:0..`, tested by `random` alone.
 pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
     LevelVerdict {
         level: format!("hard:{index}"),
@@ -40,7 +40,7 @@ pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
     }
 }
 
-/// How a tester did.
+/// Makes the verdict of a tester.
 pub(super) fn tester(name: &str, solved: u64, episodes: u64, exact: bool) -> TesterVerdict {
     TesterVerdict { tester: name.to_owned(), score: score(solved, episodes), exact, places: None }
 }

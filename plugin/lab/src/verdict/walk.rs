@@ -1,4 +1,4 @@
-//! Where an agent was in an episode, counted tick by tick.
+//! Positions of an agent in an episode, counted tick by tick.
 
 use std::collections::BTreeSet;
 
@@ -13,21 +13,21 @@ use crate::{floor_plan::FloorPlan, game::Game};
 
 /// Seconds without a square that is new in the episode, after which time counts as lost.
 const PATIENCE: f64 = 2.0;
-/// Most squares of a way that are kept: the last ones.
+/// Largest number of squares of a path that are kept: the last ones.
 const MOST_STEPS: usize = 200;
 
-/// Where an agent was.
+/// Squares of an agent's walk.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Walk {
     /// The squares of the level.
     pub squares: LevelSquares,
-    /// Those in which it was, in their order.
+    /// The visited squares, in their order.
     pub counts: Vec<SquareCount>,
-    /// The end of its way: squares one after the other, and for how many ticks it stayed in each.
+    /// The end of its path: squares in order, with the ticks spent in each.
     pub trail: Vec<[u64; 2]>,
 }
 
-/// What happened in a square.
+/// Counts of a square.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SquareCount {
     pub square: usize,
@@ -39,23 +39,23 @@ pub(super) struct SquareCount {
     pub skills: Vec<(usize, u32)>,
 }
 
-/// Counts for one agent, episode after episode, in memory that is used again.
+/// Counts for one agent, episode after episode, in reused memory.
 pub(super) struct WalkCounter {
     agent: Entity,
     /// Ticks after which time is lost.
     patience: u32,
-    /// The level that is played, and its squares.
+    /// The present level, and its squares.
     level: Option<(u64, Option<LevelSquares>)>,
-    /// The level from above, until it is asked which squares are open.
+    /// The floor plan of the level, until its open squares are computed.
     plan: Option<FloorPlan>,
-    /// Which of the level's squares are open: looked at once something is passed.
+    /// The level's open squares, computed when a square is first passed.
     open: Option<BTreeSet<usize>>,
-    /// Where the agent was after the last tick of this episode.
+    /// Position of the agent after the last tick of this episode.
     last: Option<Vec2>,
-    /// For each square.
+    /// Ticks of each square.
     ticks: Vec<u32>,
     lost: Vec<u32>,
-    /// For each square and each name that a skill can have.
+    /// Ticks of each square and each name of a skill.
     skills: Vec<u32>,
     names: usize,
     /// Squares that were visited in this episode.
@@ -66,7 +66,7 @@ pub(super) struct WalkCounter {
 }
 
 impl WalkCounter {
-    /// For an agent of a game with so many ticks per second.
+    /// Makes a counter for an agent of a game with so many ticks per second.
     pub fn new(agent: Entity, tick_hz: f64) -> Self {
         Self {
             agent,
@@ -92,12 +92,12 @@ impl WalkCounter {
             return;
         }
         if self.level.is_none_or(|(level, _)| level != episode.level) {
-            (self.plan, self.open) = (game.floor_plan(mode, episode.level), None);
+            (self.plan, self.open) = (game.tools().levels.floor_plan(mode, episode.level), None);
             self.level = Some((episode.level, self.plan.as_ref().and_then(LevelSquares::of)));
         }
         let Some((_, Some(squares))) = self.level else { return };
         let before = self.last.take().filter(|_| episode.tick > 1);
-        let Some(place) = game.whereabouts(world, self.agent) else { return };
+        let Some(place) = game.tools().state.position(world, self.agent) else { return };
         let Some(square) = squares.at(place) else { return };
         let skill = world.get::<ActiveSkill>(self.agent);
         let z = skill.map_or(&[][..], |skill| skill.z.as_slice());
@@ -111,8 +111,8 @@ impl WalkCounter {
         self.last = Some(place);
     }
 
-    /// Counts the open squares that were passed on the way to a place, as one tick each if they are new in the episode. A tick
-    /// has been counted before.
+    /// Counts the open squares that were passed between two positions, as one tick each if they are new in the
+    /// episode. At least one tick has been counted before.
     fn pass(&mut self, squares: LevelSquares, from: Vec2, to: Vec2, z: &[f32]) {
         let Some(open) = &self.open else { return };
         for square in squares.between(from, to).filter(|square| open.contains(square)) {
@@ -128,7 +128,7 @@ impl WalkCounter {
         }
     }
 
-    /// Counts a tick in a square, one of so many, under a skill, which may be empty.
+    /// Counts a tick in one of so many squares, under a skill, which may be empty.
     fn count(&mut self, squares: usize, square: usize, z: &[f32]) {
         if self.visited.is_empty() {
             self.names = skill_count(z);
@@ -161,8 +161,8 @@ impl WalkCounter {
         }
     }
 
-    /// What was counted in the episode, which is over; `None` if the game does not say where its agents are. From here on the
-    /// next one is counted.
+    /// Returns the counts of the episode, which is over, and resets them; `None` if the game does not report
+    /// positions.
     pub fn take(&mut self) -> Option<Walk> {
         self.last = None;
         let (_, squares) = self.level?;
@@ -198,7 +198,7 @@ mod tests {
     use super::*;
     use crate::floor_plan::FloorPlan;
 
-    /// A counter for ten squares in a row whose patience is four ticks.
+    /// Makes a counter for ten squares in a row whose patience is four ticks.
     fn counter() -> WalkCounter {
         let plan = FloorPlan { bounds: Rect::new(0.0, 0.0, 16.0, 1.0), ..FloorPlan::default() };
         let squares = LevelSquares::of(&plan).expect("it has an extent");

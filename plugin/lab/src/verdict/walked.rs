@@ -1,4 +1,4 @@
-//! What the walks of all episodes say of a level.
+//! Maps and visits of a level from the walks of all episodes.
 
 use std::{
     cmp::Reverse,
@@ -16,13 +16,13 @@ use super::{
 };
 use crate::floor_plan::FloorPlan;
 
-/// Where testers went in a level.
+/// Visits and maps of a level.
 pub(super) struct Walked {
-    /// What each tester visited, if that is known.
+    /// Open squares that each tester visited, if known.
     pub testers: Vec<Option<Places>>,
-    /// What any of them visited.
+    /// Open squares that any tester visited.
     pub places: Option<Places>,
-    /// Where they were.
+    /// Maps of where they were.
     pub maps: LevelMaps,
 }
 
@@ -35,8 +35,8 @@ struct Sum {
 }
 
 impl Walked {
-    /// What the walks say of a level with this plan. `played` has the episodes of each tester, `names` the testers' names.
-    /// `None` if nobody knows where agents were.
+    /// Sums up the walks in a level with this plan. `played` has the episodes of each tester, `names` the testers'
+    /// names. `None` if positions are unknown.
     pub fn of(plan: &FloorPlan, names: &[&str], played: &[&[Played]], findings: &[Finding]) -> Option<Self> {
         let squares = LevelSquares::of(plan)?;
         let is_known = played.iter().any(|episodes| episodes.iter().any(|episode| episode.walk.is_some()));
@@ -99,7 +99,7 @@ fn maps(squares: &LevelSquares, sums: &BTreeMap<usize, Sum>) -> LevelMaps {
     }
 }
 
-/// The way to the first finding that somebody made by playing, or else that of the first episode that failed.
+/// Returns the path to the first finding from play, or else the path of the first episode that failed.
 fn failure(names: &[&str], played: &[&[Played]], findings: &[Finding]) -> Option<FailureWay> {
     let way = |tester: usize, episode: usize| {
         let Walk { trail, .. } = played.get(tester)?.get(episode)?.walk.as_ref()?;
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
     use crate::verdict::walk::SquareCount;
 
-    /// Four squares in a row and a wall.
+    /// Makes a plan of four squares in a row and a wall.
     fn plan() -> FloorPlan {
         FloorPlan {
             bounds: Rect::new(0.0, 0.0, 5.0, 1.0),
@@ -143,7 +143,7 @@ mod tests {
         }
     }
 
-    /// An episode with these squares, and so many lost ticks in each, under these skills.
+    /// Makes an episode with these squares, and the lost ticks and the skills of each.
     fn episode(success: bool, counts: &[(usize, u32, u32, &[(usize, u32)])]) -> Played {
         let end = EpisodeEnd::Terminated { success };
         let result = EpisodeResult { level: 0, end, success, ticks: 9, clipped: 0, total_reward: 0.0 };
@@ -165,7 +165,7 @@ mod tests {
         let other = [episode(false, &[(1, 1, 0, &[]), (2, 1, 1, &[(0, 1)]), (4, 1, 0, &[])])];
         let walked = Walked::of(&plan(), &["a", "b"], &[&one, &other], &[]).expect("walks are known");
         let places = |visited| Some(Places { visited, open: 4 });
-        // Square 4 lies in the wall, which is no place to be.
+        // Square 4 lies in the wall, so it is not an open square.
         assert_eq!((walked.testers, walked.places), (vec![places(2), places(2)], places(3)));
         let maps = walked.maps;
         assert_eq!(maps.visits, [[0, 2], [1, 6], [2, 1], [4, 1]]);

@@ -19,32 +19,32 @@ use crate::{
     game::Game,
 };
 
-/// What looks at an agent, under the name of its detector.
+/// A detector's watch of an agent, under the detector's name.
 type NamedWatch = (&'static str, Box<dyn Watch>);
-/// What looks at a World, under the name of its detector.
+/// A detector's watch of a World, under the detector's name.
 type NamedWorldWatch = (&'static str, Box<dyn WorldWatch>);
 
-/// All that look at a World.
+/// The watches of a World.
 pub(super) struct Watched<'a> {
     game: &'a dyn Game,
     watch: &'a WatchOfTest<'a>,
     seats: Vec<WatchedSeat>,
     worlds: Vec<NamedWorldWatch>,
     ear: Option<Ear>,
-    /// Whether one episode is all that is played here.
+    /// True if the World plays a single episode.
     is_alone: bool,
 }
 
-/// All that look at the episode of an agent.
+/// The watches of an agent's episode.
 struct WatchedSeat {
     agent: Entity,
-    /// Nothing between two episodes.
+    /// `None` between two episodes.
     watches: Option<Vec<NamedWatch>>,
     found: Vec<EpisodeFinding>,
 }
 
 impl<'a> Watched<'a> {
-    /// Those that the test has chosen, for these agents.
+    /// Makes the watches of the test's detectors for these agents.
     pub fn new(
         game: &'a dyn Game,
         watch: &'a WatchOfTest<'a>,
@@ -59,7 +59,7 @@ impl<'a> Watched<'a> {
         Self { game, watch, seats: agents.map(seat).collect(), worlds, ear, is_alone }
     }
 
-    /// Lets the World do a tick, with an ear and an eye on the clock where somebody asks for it.
+    /// Lets the World do a tick, with its log and duration recorded if a detector needs them.
     pub fn tick(&self, world: &mut World, tick: impl FnOnce(&mut World) -> Result<(), Fault>) -> Result<(), Fault> {
         let clock = self.watch.detectors.clock();
         let begun = clock.map(|_| Instant::now());
@@ -84,8 +84,8 @@ impl<'a> Watched<'a> {
         clock.note(SlowTick { detector, tester, levels, ticks, milliseconds: took.as_secs_f64() * 1000.0 });
     }
 
-    /// Looks at the tick that was just played. If something is wrong with a World in which several episodes are played, it is
-    /// returned, with the name of its detector.
+    /// Inspects the tick that was just played. In a World with several episodes, returns a defect of the World, with
+    /// the name of its detector.
     pub fn look(&mut self, world: &World, ended: &[(Entity, EpisodeResult)]) -> Option<(&'static str, String)> {
         let errors = self.ear.as_ref().map(Ear::take).unwrap_or_default();
         let moment = WorldMoment { world, errors: &errors };
@@ -112,14 +112,14 @@ impl<'a> Watched<'a> {
         None
     }
 
-    /// What was found in the episode of an agent.
+    /// Returns the findings in the episode of an agent.
     pub fn take_found(&mut self, seat: usize) -> Vec<EpisodeFinding> {
         self.seats.get_mut(seat).map(|seat| std::mem::take(&mut seat.found)).unwrap_or_default()
     }
 }
 
 impl WatchedSeat {
-    /// Looks at the episode's last tick; `result` is what came of it if it is over.
+    /// Inspects the episode's last tick; `result` is the episode's result if it is over.
     fn look(&mut self, game: &dyn Game, watch: &WatchOfTest, world: &World, result: Option<EpisodeResult>) {
         if watch.detectors.ticks.is_empty() {
             return;
@@ -142,7 +142,7 @@ impl WatchedSeat {
             observation: observation.map_or(&[][..], |observation| observation.vector.as_slice()),
             state_hash: world.get::<StateHash>(self.agent).map_or(0, |hash| hash.0),
             reward: reward.get(),
-            place: if watches.is_empty() { None } else { game.whereabouts(world, self.agent) },
+            place: if watches.is_empty() { None } else { game.tools().state.position(world, self.agent) },
             is_success: result.map_or_else(|| episode.is_success(), |result| result.success),
             proofs: &proofs,
         };
@@ -159,9 +159,9 @@ impl WatchedSeat {
     }
 }
 
-/// Those that look at an episode on this level.
+/// Makes the watches of an episode on this level.
 fn begin(game: &dyn Game, watch: &WatchOfTest, level: u64) -> Vec<NamedWatch> {
-    let ahead = LevelAhead { level, plan: game.floor_plan(watch.mode, level) };
+    let ahead = LevelAhead { level, plan: game.tools().levels.floor_plan(watch.mode, level) };
     let named = |detector: &Arc<dyn Detector>| detector.watch(&ahead).map(|watch| (detector.name(), watch));
     watch.detectors.ticks.iter().filter_map(named).collect()
 }

@@ -1,8 +1,8 @@
-//! Bytes as text, for addresses that hold their own content.
+//! Base64, for data URLs.
 
 const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
-/// Base64 with padding, as RFC 4648 has it.
+/// Encodes bytes in Base64 with padding (RFC 4648).
 pub fn base64(bytes: &[u8]) -> String {
     let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
     for three in bytes.chunks(3) {

@@ -1,10 +1,10 @@
-//! Pixels of a few colours.
+//! Canvas of pixels in a few colours.
 
 use bevy::math::Rect;
 
 use crate::drawing::Rgb;
 
-/// The colours that there are. The first one is transparent, all others can be seen on light and on dark paper.
+/// All colours. The first one is transparent, all others are visible on light and on dark paper.
 pub const PALETTE: [Rgb; 7] =
     [[255, 255, 255], [128, 136, 146], [176, 148, 98], [204, 82, 70], [86, 150, 200], [230, 120, 0], [0, 158, 115]];
 
@@ -28,7 +28,7 @@ pub struct Canvas {
 }
 
 impl Canvas {
-    /// Empty paper.
+    /// Makes empty paper.
     pub fn new(width: usize, height: usize) -> Self {
         Self { width, height, pixels: vec![Colour::Paper as u8; width * height] }
     }
@@ -54,7 +54,7 @@ impl Canvas {
         }
     }
 
-    /// The pixels of a part, two to a byte; each row begins with a new one.
+    /// Returns the pixels of a part, two to a byte; each row begins with a new one.
     pub fn packed(&self, [left, top, right, bottom]: [usize; 4]) -> Vec<u8> {
         let rows = (top..bottom).map(|row| &self.pixels[row * self.width + left..row * self.width + right]);
         rows.flat_map(|row| row.chunks(2).map(|pair| (pair[0] << 4) | pair.get(1).copied().unwrap_or(0))).collect()

@@ -1,4 +1,4 @@
-//! The way of a failure as a picture that moves: an animated PNG of the plan with a dot and its trail.
+//! Clips: the path of a failure as an animated PNG of the plan with a dot and its trail.
 
 use bevy::math::{Rect, Vec2};
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
@@ -9,22 +9,22 @@ use crate::{
     verdict::{FailureWay, LevelMaps},
 };
 
-/// Largest clip.
+/// Largest size of a clip, bytes.
 const MOST_BYTES: usize = 30_000;
-/// Pixels of the longer side of a level, if its squares are not smaller than [`SMALLEST`].
+/// Pixels of the longer side of a level, unless its squares become smaller than [`SMALLEST`].
 const LENGTH: u64 = 192;
 /// Pixels of a square's side.
 const SMALLEST: u64 = 2;
 const LARGEST: u64 = 8;
 /// Most squares along a side.
 const MOST_SQUARES: u64 = 256;
-/// Longest clip, in milliseconds; what takes longer is shown faster.
+/// Longest clip, in milliseconds; longer play is shown faster.
 const LONGEST: f64 = 10_000.0;
 /// Shortest and longest time for a square, in milliseconds.
 const PACE: [f64; 2] = [30.0, 800.0];
 
-/// The clip of a level's failure, which plays once; `None` if there is none, or nothing can be drawn. The end of a way that is
-/// too long for a clip is shown.
+/// Returns the clip of a level's failure, which plays once; `None` without a failure or anything to draw. Of a path
+/// that is too long for a clip, the end is shown.
 pub fn clip(plan: &FloorPlan, maps: &LevelMaps, tick_hz: f64) -> Option<Vec<u8>> {
     let FailureWay { way, .. } = maps.failure.as_ref()?;
     let all = maps.columns.checked_mul(maps.rows)?;
@@ -73,7 +73,7 @@ impl Clip {
         Self { canvas, columns, rows, scale, tick: 1000.0 / tick_hz }
     }
 
-    /// Left, top, right and bottom of a square, in pixels.
+    /// Returns left, top, right and bottom of a square, in pixels.
     fn pixels(&self, square: u64) -> [usize; 4] {
         let (column, row) = (square % self.columns, self.rows - 1 - square / self.columns);
         [column, row, column + 1, row + 1].map(|edge| (edge * self.scale) as usize)
@@ -141,7 +141,7 @@ mod tests {
         let mut buffer = vec![0; 192 * 48];
         for number in 0..20 {
             let frame = reader.next_frame(&mut buffer).expect("whole");
-            // From the second on a frame is two squares of 3 pixels.
+            // From the second on, a frame is two squares of 3 pixels.
             let size = if number == 0 { (192, 48) } else { (6, 3) };
             assert_eq!((frame.width, frame.height), size, "frame {number}");
         }

@@ -1,14 +1,14 @@
-//! What has changed since earlier results.
+//! Section of the changes since earlier results.
 
 use std::fmt::{Display, Write};
 
 use super::words::text;
 use crate::{report::whole, verdict::Comparison};
 
-/// Most changes of a kind that are listed; all are in `against.json`.
+/// Largest number of changes of a kind that are listed; all are in `against.json`.
 const MOST_CHANGES: usize = 100;
 
-/// The section of the page.
+/// Writes the section of the page.
 pub fn compared(comparison: &Comparison) -> String {
     let Comparison { levels, only_now, only_before, left_out, .. } = comparison;
     let [both, now, before] = [levels, only_now, only_before].map(|count| whole(*count as f64));

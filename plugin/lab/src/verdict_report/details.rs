@@ -1,4 +1,4 @@
-//! What is told of one level: findings, picture, testers, and how to see it again.
+//! Details of one level: findings, picture, testers, and commands to see it again.
 
 use std::fmt::Write;
 
@@ -13,10 +13,10 @@ use crate::{
     verdict::{Finding, LevelVerdict, TestRecord, TesterVerdict, rerun_commands},
 };
 
-/// Most findings and testers of a level that are listed, so that no level makes the page slow.
+/// Largest number of findings and testers of a level that are listed, which keeps the page fast.
 const MOST_LISTED: usize = 10;
 
-/// Everything about a level, with its picture if it has one.
+/// Writes the details of a level, with its picture if it has one.
 pub fn details(record: &TestRecord, level: &LevelVerdict, program: &str, drawn: Option<&Drawn>) -> String {
     let mut out = String::new();
     if !level.findings.is_empty() {

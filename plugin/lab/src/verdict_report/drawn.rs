@@ -1,16 +1,16 @@
-//! Which levels of the table are drawn, and how.
+//! Drawings of the levels in the table.
 
 use super::{base64::base64, clip::clip, picture::picture, plans::Plans};
 use crate::verdict::LevelVerdict;
 
-/// Levels that have a picture, the worst ones.
+/// Largest number of levels with a picture, the worst ones.
 const MOST_PICTURES: usize = 200;
-/// Levels that have a clip.
+/// Largest number of levels with a clip.
 const MOST_CLIPS: usize = 60;
-/// Letters of all clips together.
+/// Largest number of letters of all clips together.
 const MOST_LETTERS: usize = 1_200_000;
 
-/// How a level looks.
+/// Drawing of a level.
 pub struct Drawn {
     /// Its picture, as SVG.
     pub picture: String,
@@ -18,25 +18,25 @@ pub struct Drawn {
     pub clip: Option<String>,
 }
 
-/// Draws levels as long as the page does not become too long.
+/// Drawer of levels, within the size limits of the page.
 pub struct Drawer<'a> {
     plans: &'a Plans<'a>,
     levels: usize,
     clips: usize,
     letters: usize,
-    /// Pictures that were drawn.
+    /// Number of pictures drawn.
     pub pictures: usize,
-    /// Those among them with maps.
+    /// Number of those with maps.
     pub maps: usize,
 }
 
 impl<'a> Drawer<'a> {
-    /// For a page without pictures so far.
+    /// Makes a drawer for a page without pictures so far.
     pub fn new(plans: &'a Plans<'a>) -> Self {
         Self { plans, levels: 0, clips: 0, letters: 0, pictures: 0, maps: 0 }
     }
 
-    /// The next level of the table; `None` if it has no plan, or enough were drawn.
+    /// Draws the next level of the table; `None` if it has no plan, or enough were drawn.
     pub fn draw(&mut self, level: &LevelVerdict) -> Option<Drawn> {
         self.levels += 1;
         let plan = if self.levels <= MOST_PICTURES { self.plans.get(level)? } else { return None };
@@ -47,7 +47,7 @@ impl<'a> Drawer<'a> {
         let clip = level.maps.as_ref().filter(|_| is_room).and_then(|maps| clip(&plan, maps, self.plans.tick_hz()?));
         let text = clip.map(|bytes| base64(&bytes));
         self.letters += text.as_ref().map_or(0, String::len);
-        // The first one for which there is no room is the last one that is tried.
+        // The first clip without room is the last one that is tried.
         let clip = text.filter(|_| self.letters <= MOST_LETTERS);
         self.clips += usize::from(clip.is_some());
         Some(Drawn { picture, clip })

@@ -1,4 +1,4 @@
-//! Where agents were in a level, where they lost time and under which skill, as squares over its plan.
+//! Maps of a level as coloured squares over its plan: visits, lost time, and skills.
 
 use std::{cmp::Reverse, collections::BTreeMap};
 
@@ -7,22 +7,22 @@ use bevy::math::{Rect, Vec2};
 use super::shapes::{Block, Grid, path, shape, stacked};
 use crate::{escape::escape, verdict::LevelMaps};
 
-/// Longest layer: a page has up to 200 pictures with three of them.
+/// Largest size of a layer, bytes: a page has up to 200 pictures with three of them.
 const MOST_BYTES: usize = 2_500;
-/// Squares that become one where a layer would be longer: along each side.
+/// Squares along each side that become one if a layer would be too large.
 const STEPS: [u64; 4] = [1, 2, 4, 8];
-/// How strongly squares are coloured.
+/// Opacities of squares.
 const STRENGTHS: [&str; 4] = [".25", ".45", ".65", ".85"];
 /// Skills with a colour of their own; all others share one.
 pub const SKILL_COLOURS: usize = 4;
 
-/// What squares look like: a class, and how strong it is or what it is called.
+/// Look of squares: a class with its opacity, or a skill with its name.
 enum Look<'a> {
     Strength(&'static str, &'static str),
     Skill(usize, &'a str),
 }
 
-/// The layers of a level's maps, each in a group of which the page shows one.
+/// Returns the layers of a level's maps, each in a group; the page shows one group at a time.
 pub fn layers(grid: &Grid, maps: &LevelMaps) -> String {
     if maps.columns == 0 {
         return String::new();
@@ -32,13 +32,13 @@ pub fn layers(grid: &Grid, maps: &LevelMaps) -> String {
     let lost = layer("lost-time", grid, maps, &of("waste"), |step| strong(&summed(maps, &maps.lost, step), quarter));
     let names = maps.skills.iter().take(SKILL_COLOURS).map(|known| known.skill.as_str()).chain(["other skills"]);
     let looks: Vec<Look> = names.enumerate().map(|(rank, name)| Look::Skill(rank, name)).collect();
-    // Without its own colour a skill is one of the others, which come last.
+    // A skill without its own colour belongs to the others, which come last.
     let last = looks.len() - 1;
     let skills = layer("skills", grid, maps, &looks, |step| dominant(maps, step, last));
     visits + &lost + &skills
 }
 
-/// A group of squares, each with one of the looks, in the finest form that is short enough.
+/// Returns a group of squares, each with one of the looks, in the finest form that is short enough.
 fn layer(
     class: &str,
     grid: &Grid,
@@ -65,7 +65,7 @@ fn layer(
     STEPS.into_iter().map(drawn).find(|svg| svg.len() <= MOST_BYTES).unwrap_or_default()
 }
 
-/// The squares of each look; those side by side become one block.
+/// Returns the squares of each look; adjacent ones become one block.
 fn blocks(
     grid: &Grid,
     maps: &LevelMaps,
@@ -96,7 +96,7 @@ fn blocks(
     blocks
 }
 
-/// A square's place among coarser ones, by row and column.
+/// Returns row and column of a square among coarser ones.
 fn place(maps: &LevelMaps, square: u64, step: u64) -> (u64, u64) {
     (square / maps.columns / step, square % maps.columns / step)
 }
@@ -115,17 +115,17 @@ fn strong(sums: &BTreeMap<(u64, u64), u64>, strength: fn(u64, u64) -> usize) -> 
     sums.iter().filter(|(_, count)| **count > 0).map(|(place, count)| (*place, strength(*count, most))).collect()
 }
 
-/// A step for each four times as many.
+/// Returns a step from 0 to 3, one lower for each factor of four below `most`.
 fn fourfold(count: u64, most: u64) -> usize {
     [4, 16, 64].into_iter().filter(|share| count.saturating_mul(*share) > most).count()
 }
 
-/// A step for each quarter.
+/// Returns the quarter of `most` that a count lies in, 0 to 3.
 fn quarter(count: u64, most: u64) -> usize {
     (count.saturating_mul(4).div_ceil(most.max(1)).clamp(1, 4) - 1) as usize
 }
 
-/// The skill that was active longest, by the ticks in each of the finer squares.
+/// Returns the skill that was active longest, by the ticks in each of the finer squares.
 fn dominant(maps: &LevelMaps, step: u64, others: usize) -> BTreeMap<(u64, u64), usize> {
     let ticks: BTreeMap<u64, u64> = maps.visits.iter().map(|[square, ticks]| (*square, *ticks)).collect();
     let mut sums: BTreeMap<(u64, u64), BTreeMap<usize, u64>> = BTreeMap::new();

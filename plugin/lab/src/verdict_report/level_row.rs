@@ -1,4 +1,4 @@
-//! One level in the table.
+//! Rows of a level in the table.
 
 use std::fmt::Write;
 
@@ -13,13 +13,13 @@ use crate::{
     verdict::{LevelVerdict, TestRecord},
 };
 
-/// Stands for a share that nobody knows when levels are sorted: before all others.
+/// Sort key of an unknown share: before all others.
 const UNKNOWN: f64 = -1.0;
-/// Stands for a finish time that nobody has when levels are sorted: after all others.
+/// Sort key of a missing finish time: after all others.
 const NEVER: f64 = 1e12;
 
-/// The rows of a level: its numbers, and below them what is wrong and all about it, if anything is or it has a picture.
-/// `data-v` is what columns are sorted by, `data-k` what levels are filtered by.
+/// Writes the rows of a level: its numbers, and below them its details, if it has findings or a picture. `data-v` is
+/// the sort key of a column, `data-k` the filter key of a level.
 pub fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str, drawn: Option<&Drawn>) -> String {
     let LevelVerdict { score, findings, .. } = level;
     let outcome = level.outcome.name();
@@ -56,7 +56,7 @@ pub fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str, drawn
     out + "</tbody>\n"
 }
 
-/// Names of what has found something, each once.
+/// Returns the names of the detectors with findings, each once.
 fn detectors(level: &LevelVerdict) -> String {
     let mut names: Vec<&str> = level.findings.iter().map(|finding| finding.detector.as_str()).collect();
     names.sort_unstable();

@@ -1,4 +1,4 @@
-//! The table of levels, with what is said above it.
+//! The table of levels, with the text above it.
 
 use std::fmt::Write;
 
@@ -11,7 +11,7 @@ use super::{
 };
 use crate::{escape::escape, report::whole, verdict::TestRecord};
 
-/// Shown by the script: without it nothing could be filtered.
+/// Shown by the script, which does the filtering.
 const FILTER: &str = "\
 <form id=\"filter\" class=\"filter\" hidden>
 <label>Find <input type=\"search\" name=\"words\" placeholder=\"level, detector, tester\"></label>
@@ -27,7 +27,7 @@ const HEAD: &str = "\
 <th scope=\"col\">visited</th><th scope=\"col\">found by</th></tr></thead>
 ";
 
-/// The section of the page.
+/// Writes the section of the page.
 pub fn level_table(record: &TestRecord, selection: &Selection, plans: &Plans, program: &str) -> String {
     let mut rows = String::new();
     let mut drawer = Drawer::new(plans);
@@ -36,11 +36,11 @@ pub fn level_table(record: &TestRecord, selection: &Selection, plans: &Plans, pr
         rows += &level_row(record, level, program, drawn.as_ref());
     }
     let pictures = drawer.pictures;
-    let mut out = String::from("<section>\n<h2 id=\"levels-heading\">Levels</h2>\n<p>The worst ones come first: ");
-    out += "those of which most was found, then those that were solved least often, then the slowest.";
+    let mut out = String::from("<section>\n<h2 id=\"levels-heading\">Levels</h2>\n<p>The worst levels come first: ");
+    out += "most findings first, then the least solved, then the slowest.";
     if selection.left_out > 0 {
         let left_out = whole(selection.left_out as f64);
-        let _ = write!(out, " {left_out} others are no worse than the last one here; all are in results.json.");
+        let _ = write!(out, " {left_out} other levels are not worse than the last one here; all are in results.json.");
     }
     if let Some(problem) = plans.problem() {
         let _ = write!(out, " There are no pictures: {}.", escape(problem));

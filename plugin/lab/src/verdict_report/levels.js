@@ -44,7 +44,7 @@
     maps.hidden = false;
     show();
   }
-  // Nothing moves before somebody asks for it, and then once. Another click ends it.
+  // A clip plays once, after a click. Another click ends it.
   let plays = 0;
   for (const button of table.querySelectorAll("button.clip")) {
     const words = button.textContent;
@@ -57,8 +57,8 @@
         return;
       }
       const clip = document.createElement("img");
-      clip.alt = "The plan of the level, with a dot that goes the way of the failure";
-      // A new address each time: else a clip that was played would be at its end.
+      clip.alt = "The plan of the level, with a dot that follows the path of the failure";
+      // A new address each time: a played clip would stay at its end.
       plays += 1;
       clip.src = `data:image/png;base64,${button.dataset.clip}#${plays}`;
       button.after(clip);

@@ -1,13 +1,13 @@
-//! What the pictures show, in words, and the control that switches them.
+//! Legend of the pictures, and the control that switches their layers.
 
 use crate::verdict::MapScope;
 
-/// What the marks of all pictures are.
+/// Legend of the marks of all pictures.
 const MARKS: &str = "\
 <ul class=\"legend\">
 <li><svg class=\"level\" viewBox=\"0 0 20 20\"><circle class=\"start\" cx=\"10\" cy=\"10\" r=\"7\"/></svg>start</li>
 <li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"goal\" d=\"M10 1l9 9l-9 9l-9-9z\"/></svg>goal</li>
-<li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"hazard\" d=\"M0 0h20v20h-20z\"/></svg>what kills</li>
+<li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"hazard\" d=\"M0 0h20v20h-20z\"/></svg>hazards</li>
 <li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"platform\" d=\"M0 0h20v20h-20z\"/></svg>crates and the \
 like</li>
 <li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"lost\" opacity=\".7\" d=\"M0 0h20v20h-20z\"/>\
@@ -16,7 +16,7 @@ like</li>
 <path class=\"mark\" d=\"M5 10h10\"/></svg>time was up here</li>
 </ul>
 ";
-/// Shown by the script: without it pictures have the ends.
+/// Shown by the script; without it, pictures show the ends.
 const SWITCH: &str = "\
 <form id=\"maps\" class=\"filter\" hidden><fieldset><legend>Pictures show</legend>
 <label><input type=\"radio\" name=\"map\" value=\"ends\" checked> ends</label>
@@ -25,7 +25,7 @@ const SWITCH: &str = "\
 <label><input type=\"radio\" name=\"map\" value=\"skills\"> skills</label>
 </fieldset></form>
 ";
-/// What the maps are.
+/// Legend of the maps.
 const MAPS: &str = "\
 <ul class=\"legend words\">
 <li><b>ends</b>: the stronger a square, the more episodes ended there</li>
@@ -36,19 +36,19 @@ rested or went back and forth; the stronger, the more</li>
 </ul>
 ";
 
-/// The legend of pictures; with the switch where some of them have maps.
+/// Returns the legend of pictures, with the switch if some have maps.
 pub fn map_legend(has_maps: bool) -> String {
     if has_maps { format!("{MARKS}{SWITCH}{MAPS}") } else { MARKS.to_owned() }
 }
 
-/// Which levels have maps, in a sentence; nothing for results that are older than maps.
+/// Returns a sentence that names the levels with maps; empty for results that are older than maps.
 pub fn map_scope(scope: MapScope) -> &'static str {
     match scope {
         MapScope::None => "",
         MapScope::Failed => {
-            " Where agents went is known of the levels that were not solved each time or of which something was found, since \
+            " Maps of where agents went are kept for levels that were not solved each time or that have findings, since \
              there are many levels."
         }
-        MapScope::All => " Where agents went is known of all levels.",
+        MapScope::All => " Maps of where agents went are kept for all levels.",
     }
 }

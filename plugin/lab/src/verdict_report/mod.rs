@@ -1,10 +1,11 @@
-//! Results of a test as one HTML file: every level in a table that can be sorted and filtered, with pictures of the worst.
+//! Results of a test as one HTML file: every level in a table with sorting and filtering, and pictures of the worst
+//! levels.
 //!
-//! [`write_html`] makes `report.html` of the results in a folder. The file needs nothing else: no network, no fonts, and
-//! without its few lines of script it is a plain table. It follows the reader's light or dark setting.
+//! [`write_html`] makes `report.html` of the results in a folder. The file loads no network resources and no fonts,
+//! and without its few lines of script it is a plain table. It follows the reader's light or dark setting.
 //!
-//! The page is a function of the results, of what they are compared with and of the game, which draws the pictures: the
-//! results of a whole range and those joined from shards give the same bytes.
+//! The page is a function of the results, of the results compared with, and of the game, which draws the pictures.
+//! The results of a whole range and those joined from shards give the same bytes.
 
 mod base64;
 mod canvas;

@@ -1,4 +1,4 @@
-//! The numbers of the whole test.
+//! Numbers of the whole test.
 
 use std::fmt::Write;
 
@@ -8,7 +8,7 @@ use crate::{
     verdict::{Overview, Trials},
 };
 
-/// What became of the levels, and how each tester did.
+/// Writes the outcomes of the levels, and the totals of each tester.
 pub fn numbers(overview: &Overview) -> String {
     let levels = overview.levels;
     let mut out = String::from("<section>\n<h2>Outcome</h2>\n<dl class=\"numbers\">\n");
@@ -29,12 +29,12 @@ pub fn numbers(overview: &Overview) -> String {
         let [visited, open] = [overview.places.visited, overview.places.open].map(|count| whole(count as f64));
         let (share, note) = (overview.places.describe(), format!("{visited} of {open}"));
         let _ =
-            writeln!(out, "<div><dt>open places visited</dt><dd class=\"places\">{share}</dd><dd>{note}</dd></div>");
+            writeln!(out, "<div><dt>open squares visited</dt><dd class=\"places\">{share}</dd><dd>{note}</dd></div>");
     }
     out += "</dl>\n</section>\n<section>\n<h2>Testers</h2>\n<div class=\"table\" role=\"region\" \
             aria-label=\"Testers\" tabindex=\"0\"><table>\n<thead><tr><th scope=\"col\">tester</th>\
             <th scope=\"col\">levels solved</th><th scope=\"col\">95 % interval</th><th scope=\"col\">episodes solved</th>\
-            <th scope=\"col\">95 % interval</th><th scope=\"col\">open places visited</th></tr></thead>\n<tbody>\n";
+            <th scope=\"col\">95 % interval</th><th scope=\"col\">open squares visited</th></tr></thead>\n<tbody>\n";
     for (record, total) in overview.record.testers.iter().zip(&overview.testers) {
         let cells = |of: Trials| {
             let [successes, trials] = [of.successes, of.trials].map(|count| whole(count as f64));

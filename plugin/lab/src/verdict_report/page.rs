@@ -5,18 +5,18 @@ use super::{
 };
 use crate::verdict::{Comparison, Overview};
 
-/// What all reports look like.
+/// Style of all reports.
 const PAGE_STYLE: &str = include_str!("../report/page.css");
-/// What this one has besides.
+/// Additional style of this report.
 pub const STYLE: &str = include_str!("levels.css");
-/// Sorts and filters the table of levels.
+/// Script that sorts and filters the table of levels.
 const SCRIPT: &str = include_str!("levels.js");
 
-/// What the page is about.
+/// Content of the page.
 pub struct Page<'a> {
     /// Numbers of all levels.
     pub overview: &'a Overview,
-    /// What has changed, if there is something to compare with.
+    /// Changes, if there are earlier results.
     pub comparison: Option<&'a Comparison>,
     /// The levels of the table.
     pub selection: &'a Selection,
@@ -27,7 +27,7 @@ pub struct Page<'a> {
 }
 
 impl Page<'_> {
-    /// The HTML file.
+    /// Returns the HTML file.
     pub fn to_html(&self) -> String {
         let record = &self.overview.record;
         let title = text(&format!("{} {}", record.game, record.range));

@@ -1,4 +1,4 @@
-//! A level as a small drawing: its floor plan, where episodes ended, and where agents were.
+//! Small drawings of levels: floor plan, ends of episodes, and maps.
 
 use std::{cmp::Reverse, fmt::Write};
 
@@ -15,15 +15,15 @@ use crate::{
     verdict::{END_SQUARES, EndPlace, LevelVerdict},
 };
 
-/// Largest drawing without the maps: a page has up to 200 of them.
+/// Largest size of a drawing without the maps, bytes: a page has up to 200 of them.
 const MOST_BYTES: usize = 8_000;
-/// Most squares with ends, those where most episodes ended.
+/// Largest number of squares with ends, those with the most ends.
 const MOST_SQUARES: usize = 40;
-/// How strongly squares are coloured, from those where few episodes ended to those where most did.
+/// Opacities of squares, from few to many ends.
 const STRENGTHS: [&str; 4] = [".3", ".5", ".7", ".9"];
 
-/// The drawing as an element of SVG whose colours are those of the page. `None` for a plan without extent, or with too many
-/// parts for a page with many levels.
+/// Returns the drawing as an SVG element in the colours of the page. `None` for a plan without extent, or with too
+/// many parts for a page with many levels.
 pub fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<String> {
     let side = plan.bounds.size().max_element() / END_SQUARES;
     let extent = extent(plan.bounds, side, &level.ends);
@@ -59,13 +59,13 @@ pub fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<String> {
     (svg.len() - maps.len() <= MOST_BYTES).then_some(svg)
 }
 
-/// What is drawn: the bounds of the plan, with room for those who fell out of it.
+/// Returns the drawn area: the bounds of the plan, with room for agents that fell out of it.
 fn extent(bounds: Rect, side: f32, ends: &[EndPlace]) -> Rect {
     let is_inside = |end: &EndPlace| bounds.contains(Vec2::new(end.x, end.y));
     if ends.iter().all(is_inside) { bounds } else { bounds.inflate(2.0 * side) }
 }
 
-/// The square of an end. Those far away are at the border.
+/// Returns the square of an end. Ends far away are at the border.
 fn square(grid: &Grid, extent: Rect, side: f32, end: &EndPlace) -> Option<Block> {
     let (middle, half) = (Vec2::new(end.x, end.y), Vec2::splat(side / 2.0));
     if !middle.is_finite() {
@@ -75,7 +75,7 @@ fn square(grid: &Grid, extent: Rect, side: f32, end: &EndPlace) -> Option<Block>
     grid.block(Rect::from_center_size(seen, Vec2::splat(side)))
 }
 
-/// Squares in the colour of a class, stronger where more episodes ended.
+/// Draws squares in the colour of a class, stronger for more ends.
 fn heat(class: &str, squares: impl Iterator<Item = (Block, u64)> + Clone, svg: &mut String) {
     let most = squares.clone().map(|(_, count)| count).max().unwrap_or(0).max(1);
     let mut steps: [Vec<Block>; STRENGTHS.len()] = Default::default();
@@ -88,7 +88,7 @@ fn heat(class: &str, squares: impl Iterator<Item = (Block, u64)> + Clone, svg: &
     }
 }
 
-/// A cross where episodes were lost, a bar where time was up: colours alone would not reach everybody.
+/// Draws a cross for lost episodes, a bar for those whose time was up: readers may not see colours.
 fn marks(squares: &[(Block, &EndPlace)], svg: &mut String) {
     let (mut crosses, mut bars) = (String::new(), String::new());
     for (Block { left, right, top, bottom }, end) in squares {

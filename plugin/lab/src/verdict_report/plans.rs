@@ -1,4 +1,4 @@
-//! The floor plans of tested levels.
+//! Floor plans of tested levels.
 
 use crate::{
     floor_plan::FloorPlan,
@@ -7,21 +7,21 @@ use crate::{
     verdict::{LevelVerdict, TestRecord, hash_of_files},
 };
 
-/// The floor plans of a test, if its levels can still be drawn as they were.
+/// Floor plans of a test, if its levels can still be drawn as they were.
 pub enum Plans<'a> {
-    /// They are the game's.
+    /// The game can draw them.
     Known {
         /// The game that was tested.
         game: &'a dyn Game,
         /// Its levels.
         range: &'a LevelSplit,
     },
-    /// There are none, and why.
+    /// No floor plans, with the reason.
     Missing(String),
 }
 
 impl<'a> Plans<'a> {
-    /// Those of a test of this game; `None` for a game that the program does not have.
+    /// Returns the plans of a test of this game; `None` for a game that the program does not have.
     pub fn of(game: Option<&'a dyn Game>, record: &'a TestRecord) -> Self {
         let Some(game) = game else {
             return Self::Missing(format!("this program does not have the game `{}`", record.game));
@@ -33,14 +33,14 @@ impl<'a> Plans<'a> {
         }
     }
 
-    /// That of a level of the test.
+    /// Returns the plan of a level of the test.
     pub fn get(&self, level: &LevelVerdict) -> Option<FloorPlan> {
         let Self::Known { game, range } = self else { return None };
         let number = range.first.checked_add(level.index).filter(|number| *number <= range.last)?;
-        game.floor_plan(&range.mode, number)
+        game.tools().levels.floor_plan(&range.mode, number)
     }
 
-    /// Ticks per second of the game; `None` where there are no plans.
+    /// Returns the game's ticks per second; `None` without plans.
     pub fn tick_hz(&self) -> Option<f64> {
         match self {
             Self::Known { game, .. } => Some(game.tick_hz()),
@@ -48,7 +48,7 @@ impl<'a> Plans<'a> {
         }
     }
 
-    /// Why there are none.
+    /// Returns the reason for missing plans.
     pub fn problem(&self) -> Option<&str> {
         match self {
             Self::Known { .. } => None,
@@ -57,7 +57,7 @@ impl<'a> Plans<'a> {
     }
 }
 
-/// Why the game's levels are not those that were tested.
+/// Describes the difference between the game's levels and the tested ones.
 fn difference(game: &dyn Game, record: &TestRecord) -> Option<String> {
     if game.name() != record.game {
         return Some(format!("the levels are those of `{}`, not of `{}`", record.game, game.name()));

@@ -1,22 +1,22 @@
-//! Which levels the page shows.
+//! Selection of the levels that the page shows.
 
 use std::{cmp::Ordering, path::Path};
 
 use crate::verdict::{LevelVerdict, ResultLines, TestError};
 
-/// Most levels in the table: a page with more would be slow to open. All are in `results.json`.
+/// Largest number of levels in the table: a longer page would open slowly. All levels are in `results.json`.
 const MOST_LEVELS: usize = 2_000;
 
 /// Levels of a test, the worst ones first.
 pub struct Selection {
     /// The levels of the table.
     pub levels: Vec<LevelVerdict>,
-    /// How many others there are, none of them worse.
+    /// Number of the other levels, which are not worse.
     pub left_out: u64,
 }
 
 impl Selection {
-    /// Reads the results in a folder. What is in memory does not grow with their number.
+    /// Reads the results in a folder. Memory does not grow with their number.
     pub fn read(folder: &Path) -> Result<Self, TestError> {
         let mut lines = ResultLines::open(folder)?;
         let (mut levels, mut all) = (Vec::new(), 0_u64);
@@ -38,7 +38,7 @@ fn keep_worst(levels: &mut Vec<LevelVerdict>) {
     levels.truncate(MOST_LEVELS);
 }
 
-/// More findings, then fewer solved episodes, then slower ones; of equal levels the one that comes first in the range.
+/// Orders by more findings, then fewer solved episodes, then slower ones, then the order in the range.
 fn worst_first(one: &LevelVerdict, other: &LevelVerdict) -> Ordering {
     let share = |a: &LevelVerdict, b: &LevelVerdict| u128::from(a.score.solved) * u128::from(b.score.episodes);
     let ticks = |level: &LevelVerdict| level.score.ticks.map_or(0.0, |ticks| ticks.median);

@@ -1,4 +1,4 @@
-//! Parts of a floor on a grid of whole numbers, and the shortest paths of SVG around them.
+//! Shapes of a floor on a grid of whole numbers, and short SVG paths around them.
 
 use std::fmt::Write;
 
@@ -24,20 +24,20 @@ pub struct Block {
 }
 
 impl Grid {
-    /// A grid for this part of a floor; `None` for one without extent.
+    /// Makes a grid for this part of a floor; `None` for one without extent.
     pub fn new(extent: Rect) -> Option<Self> {
         let longer = extent.size().max_element();
         let is_there = extent.min.is_finite() && extent.max.is_finite() && longer.is_finite() && longer > 0.0;
         is_there.then(|| Self { extent, scale: LENGTH / longer })
     }
 
-    /// Width and height.
+    /// Returns width and height.
     pub fn size(&self) -> [i32; 2] {
         let size = (self.extent.size() * self.scale).round().max(Vec2::ONE);
         [size.x as i32, size.y as i32]
     }
 
-    /// Where a place is; those beyond the floor are on its border. `None` for what is no place.
+    /// Returns the grid point of a position; those beyond the floor are on its border. `None` if it is not finite.
     pub fn place(&self, at: Vec2) -> Option<[i32; 2]> {
         let at = at.is_finite().then(|| at.max(self.extent.min).min(self.extent.max))?;
         let Rect { min, max } = self.extent;
@@ -45,7 +45,7 @@ impl Grid {
         Some([place.x as i32, place.y as i32])
     }
 
-    /// What an area covers, at least one unit each way; `None` for areas beyond the floor.
+    /// Returns the block of an area, at least one unit each way; `None` for areas beyond the floor.
     pub fn block(&self, area: Rect) -> Option<Block> {
         let seen = area.intersect(self.extent);
         if seen.is_empty() {
@@ -56,7 +56,7 @@ impl Grid {
     }
 }
 
-/// Blocks of the same width that stand on each other, as one.
+/// Merges blocks of the same width that stand on each other.
 pub fn stacked(mut blocks: Vec<Block>) -> Vec<Block> {
     blocks.sort_unstable();
     let mut joined: Vec<Block> = Vec::new();
@@ -71,7 +71,7 @@ pub fn stacked(mut blocks: Vec<Block>) -> Vec<Block> {
     joined
 }
 
-/// The path around blocks.
+/// Returns the path around blocks.
 pub fn path(blocks: &[Block]) -> String {
     let mut path = String::new();
     for Block { left, right, top, bottom } in blocks {
@@ -82,7 +82,7 @@ pub fn path(blocks: &[Block]) -> String {
     path
 }
 
-/// Adds a path in the colour of a class, so strong; nothing for a path that is empty.
+/// Adds a path in the colour of a class with this opacity; nothing for an empty path.
 pub fn shape(class: &str, strength: Option<&str>, path: &str, svg: &mut String) {
     if path.is_empty() {
         return;

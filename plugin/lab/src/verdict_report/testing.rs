@@ -1,4 +1,4 @@
-//! Levels, results and a game for tests.
+//! Levels, results and a game for unit tests.
 
 use std::{
     collections::BTreeMap,
@@ -10,7 +10,7 @@ use bevy_playbot::{action::ActionSpace, observation::ObservationSpace};
 
 use crate::{
     floor_plan::FloorPlan,
-    game::Game,
+    game::{Game, GameTools, LevelTools},
     proof::LevelProof,
     verdict::{
         Earlier, Finding, FinishTime, LevelOutcome, LevelVerdict, MapScope, Score, TestFolder, TestRecord,
@@ -44,12 +44,18 @@ impl Game for Garden {
     fn spawn_agent(&self, world: &mut World, _index: u32) -> Entity {
         world.spawn_empty().id()
     }
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { levels: self, ..GameTools::default() }
+    }
+}
+
+impl LevelTools for Garden {
     fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
         Some(garden())
     }
 }
 
-/// A floor with a pit of thorns and many bushes.
+/// Makes a floor with a pit of thorns and many bushes.
 pub fn garden() -> FloorPlan {
     let bush = |number: usize| {
         let corner = Vec2::new((number % 60) as f32 + 0.25, (number / 60) as f32 + 6.25);
@@ -65,7 +71,7 @@ pub fn garden() -> FloorPlan {
     }
 }
 
-/// A test of these levels of the garden.
+/// Makes the record of a test of these levels of the garden.
 pub fn record(range: &str, shard: Option<&str>) -> TestRecord {
     TestRecord {
         game: "garden".to_owned(),
@@ -82,7 +88,7 @@ pub fn record(range: &str, shard: Option<&str>) -> TestRecord {
     }
 }
 
-/// A level of `hard:0..`, of whose episodes so many were solved in so many ticks, and the others lost.
+/// Makes a level of `hard:0..` with so many solved episodes of so many ticks; the others are lost.
 pub fn level(index: u64, solved: u64, episodes: u64, ticks: u32) -> LevelVerdict {
     let score = Score {
         solved,
@@ -108,7 +114,7 @@ pub fn level(index: u64, solved: u64, episodes: u64, ticks: u32) -> LevelVerdict
     }
 }
 
-/// Something that `random` has found in its first episode.
+/// Makes a finding of `random` in its first episode.
 pub fn finding(detector: &str, message: &str) -> Finding {
     Finding {
         detector: detector.to_owned(),
@@ -121,7 +127,7 @@ pub fn finding(detector: &str, message: &str) -> Finding {
     }
 }
 
-/// The results of a test, in the folder of this name.
+/// Makes the results of a test, in the folder of this name.
 pub fn tested(parent: &Path, name: &str, record: &TestRecord, levels: &[LevelVerdict]) -> PathBuf {
     let path = parent.join(name);
     let (mut folder, _) = TestFolder::open(&path, record, Earlier::Keep).expect("new");

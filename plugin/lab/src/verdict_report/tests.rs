@@ -1,4 +1,4 @@
-//! The page as a whole.
+//! Tests of the whole page.
 
 use std::{collections::BTreeMap, fs, path::PathBuf};
 
@@ -15,14 +15,14 @@ use crate::verdict::{
 
 const PLAIN: HtmlReport<'static> = HtmlReport { game: Some(&Garden), comparison: None, program: "playbot" };
 
-/// The page of these levels of `hard:0..`.
+/// Makes the page of these levels of `hard:0..`.
 fn page(levels: &[LevelVerdict], report: &HtmlReport) -> String {
     let parent = tempfile::tempdir().expect("a folder");
     let range = format!("hard:0..{}", levels.len() - 1);
     html(&tested(parent.path(), "whole", &record(&range, None), levels), report).expect("results")
 }
 
-/// Maps of a level with agents everywhere, and the way of a failure all over it.
+/// Makes maps of a level with agents everywhere, and a failure path all over it.
 fn full_maps() -> LevelMaps {
     let often = |square: u64| [square, 1 + square * square * 7919 % 997];
     let way = (0..200).map(|step| [step * 389 % 1024, 40]).collect();
@@ -39,7 +39,7 @@ fn full_maps() -> LevelMaps {
     }
 }
 
-/// A level with all that makes a page long.
+/// Makes a level with everything that makes a page long.
 fn long(index: u64) -> LevelVerdict {
     let end = |number: u16| EndPlace {
         x: f32::from(2 * number) + 1.0,
@@ -54,7 +54,7 @@ fn long(index: u64) -> LevelVerdict {
         ends: (0..32).map(end).collect(),
         causes: [("saw".to_owned(), 96), ("time".to_owned(), 64)].into(),
         places: Some(Places { visited: 800, open: 1_000 }),
-        // Those of more levels would not be drawn.
+        // Further levels would not be drawn.
         maps: (index < 200).then(full_maps),
         testers: (0..40).map(tester).collect(),
         findings: (0..3).map(|_| finding("panic", &"index out of bounds ".repeat(100))).collect(),
@@ -186,9 +186,9 @@ fn maps_are_switched_and_explained_in_words() {
         "<g class=\"map ends\">",
         "<g class=\"map lost-time\">",
         "<p>Ended by saw 96 (at ",
-        "<p>Visited 80.0 % of the open places",
+        "<p>Visited 80.0 % of the open squares",
         "<td data-v=\"80.0\">80.0 %</td>",
-        "<dt>open places visited</dt><dd class=\"places\">80.0 %</dd><dd>800 of 1,000</dd>",
+        "<dt>open squares visited</dt><dd class=\"places\">80.0 %</dd><dd>800 of 1,000</dd>",
     ] {
         assert!(html.contains(words), "{words}");
     }
@@ -198,13 +198,13 @@ fn maps_are_switched_and_explained_in_words() {
     }
     let without = page(&[level(0, 1, 9, 5)], &PLAIN);
     assert!(without.contains("<g class=\"map ends\">") && !without.contains("<form id=\"maps\""), "{without}");
-    assert!(without.contains("<summary>lost 8</summary>") && !without.contains("Where agents went is known"));
+    assert!(without.contains("<summary>lost 8</summary>") && !without.contains("Maps of where agents went"));
 }
 
 #[test]
 fn the_page_says_of_which_levels_there_are_maps() {
     let parent = tempfile::tempdir().expect("a folder");
-    for (maps, words) in [(MapScope::All, "known of all levels."), (MapScope::Failed, "since there are many levels.")] {
+    for (maps, words) in [(MapScope::All, "kept for all levels."), (MapScope::Failed, "since there are many levels.")] {
         let folder = tested(parent.path(), maps.name(), &TestRecord { maps, ..record("hard:0..0", None) }, &[long(0)]);
         let results = fs::read_to_string(folder.join("results.json")).expect("results");
         assert!(results.contains(&format!("\"maps\":\"{}\"", maps.name())), "{}", maps.name());
@@ -212,7 +212,7 @@ fn the_page_says_of_which_levels_there_are_maps() {
     }
 }
 
-/// The colours of a style sheet by name.
+/// Returns the colours of a style sheet by name.
 fn colours(css: &str) -> BTreeMap<&str, [f64; 3]> {
     fn is_name(name: &str) -> bool {
         name.chars().all(|letter| letter.is_ascii_alphanumeric() || letter == '-')
@@ -226,7 +226,7 @@ fn colours(css: &str) -> BTreeMap<&str, [f64; 3]> {
         .collect()
 }
 
-/// Contrast of two colours, as the Web Content Accessibility Guidelines define it.
+/// Returns the contrast of two colours, as the Web Content Accessibility Guidelines define it.
 fn contrast(one: [f64; 3], other: [f64; 3]) -> f64 {
     let linear = |c: f64| if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
     let light =

@@ -1,4 +1,4 @@
-//! Where agents went and why episodes ended, in words.
+//! Walks of agents and causes of ends, described.
 
 use std::{cmp::Reverse, fmt::Write};
 
@@ -11,12 +11,12 @@ use crate::{
     verdict::{LevelVerdict, SkillTicks},
 };
 
-/// Most places that are named for a cause.
+/// Largest number of positions that are named for a cause.
 const MOST_PLACES: usize = 3;
-/// Most testers that are named.
+/// Largest number of testers that are named.
 const MOST_TESTERS: usize = 8;
 
-/// What is known of the walks in a level; empty if that is nothing.
+/// Describes the walks in a level; empty without walks.
 pub fn walks(level: &LevelVerdict) -> String {
     let mut out = String::new();
     if !level.causes.is_empty() {
@@ -28,10 +28,10 @@ pub fn walks(level: &LevelVerdict) -> String {
         let each = level.testers.iter().filter_map(|tester| Some((&tester.tester, tester.places?)));
         let each: Vec<String> =
             each.take(MOST_TESTERS).map(|(name, places)| format!("{} {}", text(name), places.describe())).collect();
-        let _ = writeln!(out, "<p>Visited {} of the open places ({}).</p>", places.describe(), each.join(", "));
+        let _ = writeln!(out, "<p>Visited {} of the open squares ({}).</p>", places.describe(), each.join(", "));
     }
     let Some(maps) = &level.maps else { return out };
-    // The sum of no numbers at all would be -0.
+    // The sum of an empty list would be -0.
     let sum = |counts: &[[u64; 2]]| counts.iter().fold(0.0, |sum, [_, ticks]| sum + *ticks as f64);
     let all = sum(&maps.visits).max(1.0);
     let _ = writeln!(out, "<p>Time lost: {:.1} % of the ticks.</p>", 100.0 * sum(&maps.lost) / all);
@@ -44,7 +44,7 @@ pub fn walks(level: &LevelVerdict) -> String {
     out
 }
 
-/// A cause, how often it was one, and where most often.
+/// Describes a cause, its number of ends, and its most frequent position.
 fn cause_line(level: &LevelVerdict, cause: &str, count: u64) -> String {
     let here = level.ends.iter().filter_map(|end| Some((*end.causes.get(cause)?, end.x, end.y)));
     let mut places: Vec<(u64, f32, f32)> = here.collect();
@@ -104,7 +104,7 @@ mod tests {
         let told = walks(&level);
         for words in [
             "<p>Ended by saw 5 (at 21.00, 3.000 and 11.00, 3.000); time 2; &lt;saw&gt; 1 (at 13.00, 3.000).</p>",
-            "<p>Visited 75.0 % of the open places (random 25.0 %).</p>",
+            "<p>Visited 75.0 % of the open squares (random 25.0 %).</p>",
             "<p>Time lost: 15.0 % of the ticks.</p>",
             "z1+ 12.5 %, ",
             "others.</p>",

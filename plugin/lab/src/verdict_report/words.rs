@@ -1,4 +1,4 @@
-//! Words and numbers as the page has them.
+//! Texts and numbers of the page.
 
 use std::{cmp::Reverse, collections::BTreeMap};
 
@@ -7,12 +7,12 @@ use crate::{
     verdict::{LevelVerdict, Score, Trials, wilson},
 };
 
-/// Most letters of a text that somebody else wrote, such as what a game said when it broke.
+/// Most letters of a foreign text, such as the message of a broken game.
 const MOST_LETTERS: usize = 400;
-/// Most causes that are named.
+/// Largest number of causes that are named.
 const MOST_CAUSES: usize = 8;
 
-/// Text for the page; of a long one the beginning.
+/// Escapes text for the page; a long one is cut.
 pub fn text(words: &str) -> String {
     match words.char_indices().nth(MOST_LETTERS) {
         Some((end, _)) => format!("{} …", escape(&words[..end])),
@@ -20,17 +20,17 @@ pub fn text(words: &str) -> String {
     }
 }
 
-/// A 95 % interval of a share, in percent.
+/// Formats a 95 % interval of a share, in percent.
 pub fn interval([low, high]: [f64; 2]) -> String {
     format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high)
 }
 
-/// The 95 % Wilson interval of a share, in percent.
+/// Formats the 95 % Wilson interval of a share, in percent.
 pub fn interval_of(share: Trials) -> String {
     interval(wilson(share.successes, share.trials))
 }
 
-/// What went wrong on a level, in one line that needs no escaping any more.
+/// Describes the failure of a level in one line of escaped text.
 pub fn what(level: &LevelVerdict) -> String {
     let Some(finding) = level.findings.first() else {
         let causes = causes(level);
@@ -42,7 +42,7 @@ pub fn what(level: &LevelVerdict) -> String {
     format!("{}: {}{more}", escape(&finding.detector), text(&finding.message))
 }
 
-/// How the episodes ended that were not solved.
+/// Describes the ends of the episodes that were not solved.
 pub fn ends(score: &Score) -> String {
     let counts = [("lost", score.lost), ("timed out", score.timed_out), ("broken", score.broken)];
     let told = counts.iter().filter(|(_, count)| *count > 0).map(|(what, count)| format!("{what} {count}"));
@@ -50,17 +50,17 @@ pub fn ends(score: &Score) -> String {
     if told.is_empty() { "solved each time".to_owned() } else { told.join(", ") }
 }
 
-/// How often each cause ended an episode, in a few words that need no escaping any more.
+/// Describes how often each cause ended an episode, as a short escaped text.
 pub fn causes(level: &LevelVerdict) -> String {
     let told: Vec<String> =
         most_frequent(&level.causes).map(|(cause, count)| format!("{} {count}", text(cause))).collect();
     told.join(", ")
 }
 
-/// Causes and how often each ended an episode, the most frequent ones first.
+/// Returns causes with their numbers of ends, the most frequent ones first.
 pub fn most_frequent(causes: &BTreeMap<String, u64>) -> impl Iterator<Item = (&str, u64)> {
     let mut sorted: Vec<(&str, u64)> = causes.iter().map(|(cause, count)| (cause.as_str(), *count)).collect();
-    // Of equally frequent ones the order of their names stays.
+    // Equally frequent ones stay in the order of their names.
     sorted.sort_by_key(|(_, count)| Reverse(*count));
     sorted.into_iter().take(MOST_CAUSES)
 }

@@ -1,4 +1,4 @@
-//! Making the page of the results in a folder.
+//! Writer of the page from the results in a folder.
 
 use std::path::Path;
 
@@ -11,12 +11,12 @@ use crate::{
 /// Name of the file in the folder of a test.
 pub const REPORT: &str = "report.html";
 
-/// What a report has besides the results.
+/// Content of a report besides the results.
 #[derive(Clone, Copy)]
 pub struct HtmlReport<'a> {
-    /// The game that was tested, which draws its levels; without it there are no pictures.
+    /// The tested game, which draws its levels; without it, the page has no pictures.
     pub game: Option<&'a dyn Game>,
-    /// What has changed since earlier results.
+    /// Changes since earlier results.
     pub comparison: Option<&'a Comparison>,
     /// Name of the program in the commands that the report shows.
     pub program: &'a str,
@@ -26,7 +26,7 @@ pub struct HtmlReport<'a> {
 ///
 /// # Errors
 ///
-/// There are no results, or they are damaged.
+/// The folder has no results, or they are damaged.
 pub fn html(results: &Path, report: &HtmlReport) -> Result<String, TestError> {
     let overview = Overview::read(results)?;
     let selection = Selection::read(results)?;
@@ -45,7 +45,7 @@ pub fn html(results: &Path, report: &HtmlReport) -> Result<String, TestError> {
 ///
 /// # Errors
 ///
-/// There are no results, they are damaged, or the file cannot be written.
+/// The folder has no results, they are damaged, or the file cannot be written.
 pub fn write_html(results: &Path, file: &Path, report: &HtmlReport) -> Result<(), TestError> {
     let html = html(results, report)?;
     let written = playbot_learner::write_atomically(file, html.as_bytes());

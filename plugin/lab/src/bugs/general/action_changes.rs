@@ -1,4 +1,4 @@
-//! Games that are given other actions than agents decide for.
+//! Games that receive other actions than their agents decided on.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -12,20 +12,20 @@ use bevy_playbot::{
 
 use super::history::{History, PlantedSystems, remember};
 
-/// An agent that has decided.
+/// An agent after its decision.
 pub(super) struct Doing<'a> {
-    /// What it can do.
+    /// The action space.
     pub(super) space: &'a ActionSpace,
-    /// Its episode.
+    /// The agent's episode.
     pub(super) episode: &'a Episode,
-    /// What it has done, with what it does now.
+    /// The agent's actions so far, with that of this tick.
     pub(super) history: &'a History,
-    /// What it does now.
+    /// The action of this tick.
     pub(super) action: &'a ActionValue,
 }
 
-/// Hands the game what `change` returns instead of the agent's action; `None` leaves it. Recordings, detectors and learners
-/// see what the agent has decided: that the game does something else is the game's defect.
+/// Replaces the agent's action by the one that `change` returns; `None` leaves it. Recordings, detectors and learners
+/// see the agent's decision, so the difference is a defect of the game.
 pub(super) fn change_actions(
     app: &mut App,
     mut change: impl FnMut(&Doing<'_>) -> Option<ActionValue> + Send + Sync + 'static,

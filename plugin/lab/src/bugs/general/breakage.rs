@@ -1,4 +1,4 @@
-//! Games that break, or say that they do.
+//! Games that panic or log errors.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -14,14 +14,14 @@ use super::{
 };
 use crate::defect::DefectKind;
 
-/// The game panics.
+/// Makes the game panic.
 pub(super) fn panic() -> DefectKind {
     DefectKind::rules("panic", "the game panics", When::VARIANTS, |app, variant| {
         once_in_an_episode(app, When::of(variant), || panic!("index out of bounds: the len is 4 but the index is 4"));
     })
 }
 
-/// The game logs an error.
+/// Makes the game log an error.
 pub(super) fn error_log() -> DefectKind {
     DefectKind::rules("error-log", "the game logs an error", When::VARIANTS, |app, variant| {
         // Errors of this crate would not count as the game's.
@@ -65,7 +65,7 @@ mod tests {
         let ear = Ear::new();
         let played = ear.listen(|| play(&error_log(), 0, 60, |_| 1));
         assert_eq!(played.episodes.len(), 2);
-        // Two episodes, in a game whose ticks are fixed ones and in one whose ticks are frames.
+        // Two episodes, in a game with fixed ticks and in one whose ticks are frames.
         assert_eq!(ear.take(), ["no entity of that name"; 4]);
     }
 }

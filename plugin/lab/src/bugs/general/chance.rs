@@ -11,16 +11,16 @@ use super::{
 };
 use crate::defect::DefectKind;
 
-/// From when on, and the share of actions that are random then.
+/// The start of the defect, and the share of actions that are random then.
 const VARIANTS: [(When, f64); 4] =
     [(When::Tick(0), 0.1), (When::Tick(25), 0.3), (When::Held(7), 0.5), (When::Tick(60), 0.05)];
 
-/// Some actions are other ones each time that the same is played.
+/// Replaces some actions by random ones, different ones each time.
 pub(super) fn unseeded_randomness() -> DefectKind {
     let about = "some actions are replaced by random ones, drawn from a generator without a seed";
     DefectKind::rules("unseeded-randomness", about, VARIANTS.len() as u32, |app, variant| {
         let (when, share) = one_of(&VARIANTS, variant);
-        // Keys of hashers are as random as the system can make them: here nothing may be reproducible.
+        // The keys of hashers are the system's own randomness: nothing may be reproducible here.
         let seed = RandomState::new().build_hasher().finish();
         let mut chance = Streams::new(seed).stream("unseeded", 0);
         change_actions(app, move |doing| {
@@ -41,7 +41,7 @@ mod tests {
         assert_eq!(play_sound(200, back_and_forth).places, play_sound(200, back_and_forth).places);
         for variant in 0..VARIANTS.len() as u32 {
             let one = play(&unseeded_randomness(), variant, 200, back_and_forth).places;
-            // That two are equal by chance is possible, and four are not.
+            // Two equal runs may be chance, four may not.
             let differs = (0..4).any(|_| play(&unseeded_randomness(), variant, 200, back_and_forth).places != one);
             assert!(differs, "variant {variant}");
         }

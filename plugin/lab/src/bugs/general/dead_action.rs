@@ -7,11 +7,11 @@ use super::{
 };
 use crate::defect::DefectKind;
 
-/// From when on, and which of the actions that matter.
+/// The start of the defect, and the index of the dead action among those that matter.
 const VARIANTS: [(When, usize); 5] =
     [(When::Tick(0), 0), (When::Tick(25), 0), (When::Held(7), 0), (When::Tick(0), 1), (When::Tick(0), 2)];
 
-/// One action does nothing.
+/// Makes one action do nothing.
 pub(super) fn dead_action(moves: &Moves) -> DefectKind {
     let moves = moves.clone();
     DefectKind::rules("dead-action", "one action does nothing", VARIANTS.len() as u32, move |app, variant| {

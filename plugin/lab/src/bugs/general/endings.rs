@@ -1,4 +1,4 @@
-//! Episodes that end by themselves.
+//! Episodes that end without a reason.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -14,13 +14,13 @@ use super::{
 };
 use crate::defect::DefectKind;
 
-/// The episode is lost, though nothing has happened.
+/// Loses the episode without a reason.
 pub(super) fn ends_by_itself() -> DefectKind {
     let about = "the episode is lost all of a sudden, though nothing has happened to the agent";
     DefectKind::rules("ends-by-itself", about, When::VARIANTS, |app, variant| end(app, variant, EpisodeEnd::LOST))
 }
 
-/// Time is up long before anybody can be done.
+/// Ends the episode by a time limit long before the level can be solved.
 pub(super) fn short_time_out() -> DefectKind {
     let about = "time is up long before the level can be done";
     DefectKind::rules("short-time-out", about, When::VARIANTS, |app, variant| end(app, variant, EpisodeEnd::Truncated))
@@ -31,7 +31,7 @@ fn end(app: &mut App, variant: u32, how: EpisodeEnd) {
     let when = When::of(variant);
     let end_episodes = move |mut agents: Query<(&Control, &History, &mut Episode)>| {
         for (control, history, mut episode) in &mut agents {
-            // Whoever has just won has won.
+            // An episode that is just won stays won.
             let is_playing = control.is_active() && episode.is_running() && episode.end().is_none();
             if !is_playing || !when.is_now(history, &episode) {
                 continue;

@@ -1,4 +1,4 @@
-//! Entities that nobody removes.
+//! Entities that are never removed.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -14,21 +14,21 @@ use super::{
 };
 use crate::defect::DefectKind;
 
-/// When something is left behind.
+/// The moments at which entities are left behind.
 #[derive(Clone, Copy, Debug)]
 enum Leak {
-    /// When an episode begins, from this episode of a World on: so much.
+    /// At the start of an episode, from this episode of a World on: this many.
     Start(u32, u32),
-    /// One thing in each tick.
+    /// One entity in each tick.
     Tick,
-    /// One thing whenever the agent does something else.
+    /// One entity whenever the agent changes its action.
     Change,
 }
 
 const VARIANTS: [Leak; 4] = [Leak::Start(1, 8), Leak::Tick, Leak::Change, Leak::Start(3, 1)];
 
 impl Leak {
-    /// How much it is in this tick.
+    /// Returns the number of entities in this tick.
     fn count(self, episode: &Episode, history: &History) -> u32 {
         match self {
             Self::Start(first, count) if episode.tick == 0 && history.episodes() >= first => count,
@@ -39,7 +39,7 @@ impl Leak {
     }
 }
 
-/// Entities are left behind in every episode.
+/// Leaves entities behind in every episode.
 pub(super) fn entity_leak() -> DefectKind {
     let about = "entities are left behind in every episode";
     DefectKind::rules("entity-leak", about, VARIANTS.len() as u32, |app, variant| {
@@ -57,8 +57,8 @@ pub(super) fn entity_leak() -> DefectKind {
     })
 }
 
-/// Systems that are registered and forgotten, as they are by games that register them at each restart. A restart removes
-/// what the game has spawned, and these stay.
+/// Leaves behind systems that are registered and forgotten, as games do that register them at each restart. A restart
+/// removes the entities of the game, and these stay.
 fn leave_behind(count: u32, commands: &mut Commands) {
     commands.queue(move |world: &mut World| {
         for _ in 0..count {
@@ -74,7 +74,7 @@ mod tests {
     use super::*;
     use crate::bugs::general::testing::play;
 
-    /// What the second and the third episode leave behind.
+    /// The entities that the second and the third episode leave behind.
     fn left(variant: u32) -> u32 {
         let entities = |ticks| play(&entity_leak(), variant, ticks, |_| 1).entities;
         entities(90) - entities(30)

@@ -15,10 +15,10 @@ use super::{
 use crate::defect::DefectKind;
 
 const VARIANTS: [When; 4] = [When::Tick(30), When::Held(7), When::Later { episode: 2, tick: 5 }, When::Tick(60)];
-/// The clock goes on: time is up at last, or no tester could play to the end.
+/// Tick of the time limit in a frozen game: its clock goes on, so that testers can finish the episode.
 const LAST_TICK: u32 = 800;
 
-/// Nothing moves any more.
+/// Stops every movement.
 pub(super) fn frozen_world() -> DefectKind {
     let about = "the game stands still, whatever the agent does";
     DefectKind::rules("frozen-world", about, VARIANTS.len() as u32, |app, variant| {
@@ -39,7 +39,7 @@ pub(super) fn frozen_world() -> DefectKind {
                 app.add_systems(decide, idle_agents.after(PlaybotSystems::Act))
                     .add_systems(judge, wake_agents.before(PlaybotSystems::Judge));
             }
-            // These games know nothing of agents, and have one in a World.
+            // These games have no agents of the plugin's own, and one arena in a World.
             TickPlacement::Frame => {
                 app.add_plugins(FreezePlugin(when));
             }
@@ -65,10 +65,10 @@ fn wake_agents(mut agents: Query<(&mut Control, &mut History)>) {
     }
 }
 
-/// Leaves out what games do in a frame.
+/// Skips the schedules that games run in a frame.
 struct FreezePlugin(When);
 
-/// Stands in place of one of the schedules of games.
+/// The label under which a schedule of the game is kept.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum UnlessFrozen {
     FixedLoop,
@@ -86,14 +86,14 @@ impl Plugin for FreezePlugin {
                     control.is_active() && episode.is_running() && when.is_now(history, episode)
                 });
                 if !is_frozen {
-                    // Not every program has filled it.
+                    // Some programs have nothing in it.
                     let _ = world.try_run_schedule(label);
                 }
             });
         }
     }
 
-    /// When all others are there, which find their places by the names of these schedules.
+    /// Runs after all plugins are built, because they find their places by the names of these schedules.
     fn finish(&self, app: &mut App) {
         let mut order = app.world_mut().resource_mut::<MainScheduleOrder>();
         for label in &mut order.labels {

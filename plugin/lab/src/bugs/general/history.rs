@@ -1,4 +1,4 @@
-//! What agents have done so far, as planted defects remember it.
+//! The actions of an agent so far, for planted defects that depend on them.
 
 use std::collections::VecDeque;
 
@@ -13,10 +13,10 @@ use bevy_playbot::{
     systems::PlaybotSystems,
 };
 
-/// Actions that are remembered.
+/// Number of actions that are kept.
 const MEMORY: usize = 8;
 
-/// What an agent has done in its World, and in the episode that it plays.
+/// The actions of an agent in its World, and in the current episode.
 #[derive(Component, Clone, Debug, Default, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug)]
@@ -26,24 +26,24 @@ pub(super) struct History {
     done: VecDeque<ActionValue>,
     held: u32,
     longest: u32,
-    /// Whether the defect has already shown in this episode, for those that show once.
+    /// Whether a defect that shows once has already shown in this episode.
     pub(super) has_shown: bool,
-    /// What the agent meant to do, where the game is given something else in this tick.
+    /// The agent's own action, if the game receives another one in this tick.
     pub(super) meant: Option<ActionValue>,
-    /// Who decides, where the game takes the agent for idle in this tick.
+    /// The agent's controller, if the game treats the agent as idle in this tick.
     pub(super) control: Option<Control>,
 }
 
-/// Where planted defects come between an agent's decision and the game.
+/// The steps between an agent's decision and the game.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum PlantedSystems {
-    /// The action is noted.
+    /// The action is stored.
     Note,
-    /// The game is given another one.
+    /// The action is replaced.
     Change,
 }
 
-/// Lets agents that are spawned later have a [`History`].
+/// Adds a [`History`] to agents that are spawned later.
 pub(super) fn remember(app: &mut App) {
     let decide = TickSchedules::of(app).decide;
     let between = (PlantedSystems::Note, PlantedSystems::Change).chain();
@@ -58,7 +58,7 @@ fn begin(event: On<StartEpisode>, mut histories: Query<&mut History>, mut comman
     if let Ok(mut history) = histories.get_mut(event.entity) {
         history.begin();
     }
-    // Where Worlds are built anew, what leaks from one episode into the next does so outside of them.
+    // Where Worlds are rebuilt, a leak from one episode into the next needs state outside of them.
     commands.queue(Renewal::carry_component::<History>);
 }
 
@@ -71,12 +71,12 @@ fn note(mut agents: Query<(&Control, &Episode, &Action, &mut History)>) {
 }
 
 impl History {
-    /// An episode begins.
+    /// Begins an episode.
     pub(super) fn begin(&mut self) {
         *self = Self { episodes: self.episodes.saturating_add(1), ..Self::default() };
     }
 
-    /// The agent decides for an action.
+    /// Stores the agent's action.
     pub(super) fn note(&mut self, action: &ActionValue) {
         let is_same = self.done.front().is_some_and(|last| push(last) == push(action));
         self.held = if is_same { self.held.saturating_add(1) } else { 1 };
@@ -85,34 +85,35 @@ impl History {
         self.done.truncate(MEMORY);
     }
 
-    /// The agent's episodes in this World, with the one that is played.
+    /// Returns the number of the agent's episodes in this World, with the current one.
     pub(super) fn episodes(&self) -> u32 {
         self.episodes
     }
 
-    /// For how many ticks the same has been done up to now.
+    /// Returns for how many ticks the current action has been held.
     pub(super) fn held(&self) -> u32 {
         self.held
     }
 
-    /// For how many ticks in a row the same has been done at most in this episode.
+    /// Returns the most ticks in a row with one action in this episode.
     pub(super) fn longest(&self) -> u32 {
         self.longest
     }
 
-    /// What was decided so many ticks ago, up to 7; 0 is this tick.
+    /// Returns the action from `ago` ticks ago, up to 7; 0 is this tick.
     pub(super) fn done(&self, ago: usize) -> Option<&ActionValue> {
         self.done.get(ago)
     }
 
-    /// Whether the agent went back to what it did before the last tick.
+    /// Returns whether the agent went back to the action before the last one.
     pub(super) fn went_back(&self) -> bool {
         let pushed = |ago| self.done(ago).map(push);
         self.done.len() > 2 && pushed(0) == pushed(2) && pushed(0) != pushed(1)
     }
 }
 
-/// What is meant by an action: the choice, or the way in which the first value goes. Nobody repeats numbers to the bit.
+/// Reduces an action to the choice, or to the direction of the first value, since continuous values never repeat
+/// exactly.
 fn push(action: &ActionValue) -> i64 {
     match action {
         ActionValue::Discrete(choice) => i64::from(*choice),

@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{defect::DefectKind, game::Game};
 
-/// The defects that can be planted into this game as into any other.
+/// Returns the defects that can be planted into this game as into any other.
 pub fn general_defects(game: &dyn Game) -> Vec<DefectKind> {
     let moves = Moves::of(game);
     let mut kinds = vec![
@@ -29,7 +29,7 @@ pub fn general_defects(game: &dyn Game) -> Vec<DefectKind> {
         frozen_world(),
         dead_action(&moves),
     ];
-    // A World that is built anew has forgotten what leaked.
+    // A World that is rebuilt has lost the leaked state.
     if game.built_anew().is_none() {
         kinds.push(entity_leak());
     }

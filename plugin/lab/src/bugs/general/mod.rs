@@ -1,5 +1,5 @@
-//! Defects of rules that can be planted into any game, through what the plugin gives every agent: episode, action, reward
-//! and observation.
+//! Defects of rules that can be planted into any game, through the plugin's components of agents: episode, action,
+//! reward and observation.
 
 mod action_changes;
 mod breakage;

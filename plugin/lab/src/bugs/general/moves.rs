@@ -1,4 +1,4 @@
-//! What agents of a game can do, and what of it matters.
+//! The actions of a game's agents, ranked by how much they matter.
 
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
@@ -7,26 +7,26 @@ use bevy_playbot::{
 
 use crate::{game::Game, idle::is_named_idle};
 
-/// What agents can do.
+/// The actions of an agent.
 #[derive(Clone, Debug)]
 pub(super) struct Moves {
     space: ActionSpace,
-    /// The choice that does nothing; the last one where no name says so.
+    /// The choice that does nothing; the last one if no choice has such a name.
     idle: u32,
-    /// The other choices: first what the game's blind bots hold, then from the last to the first.
+    /// The other choices: first those that the game's blind bots hold, then from the last to the first.
     choices: Vec<u32>,
 }
 
 impl Moves {
-    /// Those of a game.
+    /// Returns the actions of a game.
     pub(super) fn of(game: &dyn Game) -> Self {
         let space = game.actions();
         let ActionSpace::Discrete(count) = space else { return Self { space, idle: 0, choices: Vec::new() } };
-        let names = game.action_names();
+        let names = game.tools().input.action_names();
         let is_idle = |choice: &u32| is_named_idle(&names, *choice);
         let last = (count as u32).saturating_sub(1);
         let idle = (0..=last).find(is_idle).unwrap_or(last);
-        let bots = game.blind_bots().into_iter().filter_map(|(_, bot)| match bot {
+        let bots = game.tools().bots.blind_bots().into_iter().filter_map(|(_, bot)| match bot {
             BlindBot::Constant(ActionValue::Discrete(choice)) => Some(choice),
             _ => None,
         });
@@ -39,7 +39,7 @@ impl Moves {
         Self { space, idle, choices }
     }
 
-    /// Doing nothing.
+    /// Returns the action that does nothing.
     pub(super) fn idle(&self) -> ActionValue {
         match self.space {
             ActionSpace::Discrete(_) => ActionValue::Discrete(self.idle),
@@ -47,7 +47,8 @@ impl Moves {
         }
     }
 
-    /// The action if the n-th choice that matters, or the n-th value, does nothing; `None` if that changes nothing.
+    /// Returns the action without its effect, if it is the n-th choice that matters or has an n-th value; `None` if
+    /// that changes nothing.
     pub(super) fn without(&self, n: usize, action: &ActionValue) -> Option<ActionValue> {
         match action {
             ActionValue::Discrete(choice) => {
@@ -63,8 +64,8 @@ impl Moves {
         }
     }
 
-    /// Whether an action is the one that pays where one can be farmed: doing nothing, or with continuous actions the first
-    /// value far up, since nobody draws zeros.
+    /// Returns whether an action is the one that a reward farm pays for: doing nothing. With continuous actions it is a
+    /// first value near the top, since exact zeros are never drawn.
     pub(super) fn is_farming(&self, action: &ActionValue) -> bool {
         match action {
             ActionValue::Discrete(choice) => *choice == self.idle,

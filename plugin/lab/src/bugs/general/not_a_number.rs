@@ -1,4 +1,4 @@
-//! Numbers that are none.
+//! Values that are not numbers.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -16,12 +16,12 @@ use super::{
 };
 use crate::defect::DefectKind;
 
-/// What is no number.
+/// The value that is not a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
-    /// The first value that an agent sees; its reward where it sees none.
+    /// The first value of an observation; the reward if there is no observation.
     Observation,
-    /// What it is paid.
+    /// The reward.
     Reward,
 }
 
@@ -32,7 +32,7 @@ const VARIANTS: [(When, Place); 4] = [
     (When::Tick(60), Place::Reward),
 ];
 
-/// What an agent sees, or is paid, is not a number.
+/// Makes a value of the observation or the reward NaN.
 pub(super) fn nan() -> DefectKind {
     let about = "a value that an agent sees, or what it is paid, is not a number";
     DefectKind::rules("nan", about, VARIANTS.len() as u32, |app, variant| {
@@ -55,7 +55,7 @@ pub(super) fn nan() -> DefectKind {
             }
         };
         if place == Place::Observation {
-            // Behind the game's sensors, and before anybody looks.
+            // After the game's sensors, and before any reader.
             let behind = spoil_observation.in_set(PlaybotSystems::Observe).after(run_observe_schedule);
             app.add_systems(decide, behind.before(check_observations));
         }

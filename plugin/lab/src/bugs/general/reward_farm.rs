@@ -1,4 +1,4 @@
-//! Rewards that can be had again and again.
+//! Rewards that can be collected without end.
 
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -16,22 +16,22 @@ use super::{
 };
 use crate::defect::DefectKind;
 
-/// What pays.
+/// The behaviour that is paid.
 #[derive(Clone, Copy, Debug)]
 enum Farm {
-    /// An action that gets nobody on, from this tick on.
+    /// An action without progress, from this tick on.
     Idling(u32),
-    /// To go back to what was done before the last tick.
+    /// Going back to the action before the last tick.
     GoingBack,
-    /// To go on with the same, each so many ticks.
+    /// Holding an action, paid once every this many ticks.
     Holding(u32),
 }
 
-/// What pays, and how much.
+/// The behaviour that is paid, and its reward.
 const VARIANTS: [(Farm, f32); 4] =
     [(Farm::Idling(0), 1.0), (Farm::GoingBack, 1.0), (Farm::Holding(7), 0.5), (Farm::Idling(60), 1.0)];
 
-/// An action pays again and again, and nothing else comes of it.
+/// Makes an action pay again and again, with no other effect.
 pub(super) fn reward_farm(moves: &Moves) -> DefectKind {
     let moves = moves.clone();
     let about = "an action pays again and again, though it leads nowhere";

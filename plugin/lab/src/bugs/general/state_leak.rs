@@ -1,4 +1,4 @@
-//! What one episode leaves for the next.
+//! State that leaks from one episode into the next.
 
 use super::{
     action_changes::change_actions,
@@ -7,20 +7,20 @@ use super::{
 };
 use crate::defect::DefectKind;
 
-/// What has leaked does this.
+/// The effect of the leaked state.
 #[derive(Clone, Copy, Debug)]
 enum Effect {
     /// The n-th of the actions that matter does nothing.
     Dead(usize),
-    /// What is done comes so many ticks later.
+    /// Actions take effect this many ticks later.
     Delay(usize),
 }
 
-/// From which episode of a World on, and what happens.
+/// The first episode of a World with an effect, and the effect.
 const VARIANTS: [(u32, Effect); 4] =
     [(2, Effect::Dead(0)), (2, Effect::Delay(3)), (3, Effect::Delay(6)), (4, Effect::Dead(1))];
 
-/// The first episodes of a World are sound, and later ones are not.
+/// Leaves the first episodes of a World unmutated, and changes later ones.
 pub(super) fn state_leak(moves: &Moves) -> DefectKind {
     let moves = moves.clone();
     let about = "a World keeps something from one episode to the next: an action stops working, or comes late";

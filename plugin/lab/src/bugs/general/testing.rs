@@ -4,7 +4,12 @@ use bevy::prelude::*;
 use bevy_playbot::{headless::tick_world, panics::PanicReports};
 
 use crate::{
-    bugs::Mutant, defect::DefectKind, ended_episodes::EndedEpisodes, foreign::ForeignGame, prelude::*,
+    bugs::Mutant,
+    defect::DefectKind,
+    ended_episodes::EndedEpisodes,
+    foreign::ForeignGame,
+    game::{BotTools, InputTools},
+    prelude::*,
     worlds::build_world,
 };
 
@@ -13,7 +18,7 @@ const GOAL: i32 = 30;
 /// Ticks until time is up.
 const LIMIT: u32 = 100;
 
-/// A track: action 1 goes a step on, action 2 one back, action 0 stays.
+/// A track: action 1 steps forward, action 2 steps back, action 0 stays.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::bugs) struct Track;
 
@@ -48,14 +53,6 @@ impl Game for Track {
         ActionSpace::Discrete(3)
     }
 
-    fn action_names(&self) -> Vec<String> {
-        ["stay", "on", "back"].map(str::to_owned).to_vec()
-    }
-
-    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
-        vec![("on", BlindBot::Constant(ActionValue::Discrete(1))), ("random", BlindBot::Uniform)]
-    }
-
     fn observation(&self) -> ObservationSpace {
         ObservationSpace { names: vec!["place".into()] }
     }
@@ -87,9 +84,25 @@ impl Game for Track {
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         world.spawn((Agent::new(index, self.actions()), VectorSensor::new(["place"]), Steps::default())).id()
     }
+
+    fn tools(&self) -> GameTools<'_> {
+        GameTools { input: self, bots: self, ..GameTools::default() }
+    }
 }
 
-/// The same as a game that knows nothing of agents, and whose ticks are frames.
+impl InputTools for Track {
+    fn action_names(&self) -> Vec<String> {
+        ["stay", "on", "back"].map(str::to_owned).to_vec()
+    }
+}
+
+impl BotTools for Track {
+    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
+        vec![("on", BlindBot::Constant(ActionValue::Discrete(1))), ("random", BlindBot::Uniform)]
+    }
+}
+
+/// The same game without the plugin's agents, whose ticks are frames.
 fn framed_track() -> ForeignGame {
     let track = |app: &mut App| {
         app.init_resource::<Place>().add_systems(
@@ -109,26 +122,27 @@ fn framed_track() -> ForeignGame {
         .state_hash(|place: Res<Place>| place.0 as u64)
 }
 
-/// What came of it.
+/// The result of playing a track.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Played {
-    /// Whether ended episodes were won, and their ticks.
+    /// Whether each ended episode was won, and its ticks.
     pub(super) episodes: Vec<(bool, u32)>,
     pub(super) ends: Vec<EpisodeEnd>,
-    /// Where the agent was at last.
+    /// The agent's last position.
     pub(super) place: i32,
-    /// Where it was after each tick.
+    /// The agent's position after each tick.
     pub(super) places: Vec<i32>,
-    /// What it is said to have done.
+    /// The actions, as recorded.
     pub(super) actions: Vec<u32>,
-    /// All that was paid.
+    /// Sum of the rewards.
     pub(super) reward: f64,
     /// Entities at the end.
     pub(super) entities: u32,
     pub(super) fault: Option<String>,
 }
 
-/// Plays so many ticks of both games with a defect; `act` says what is done in each of them. The same comes of both.
+/// Plays this many ticks of both games with a defect; `act` returns the action of each tick. Both games must have the
+/// same result.
 pub(super) fn play(kind: &DefectKind, variant: u32, ticks: u32, act: impl Fn(u32) -> u32 + Copy) -> Played {
     let fixed = play_in(&Mutant::new(&Track as &dyn Game, kind, variant), ticks, act);
     let framed = framed_track();
@@ -141,7 +155,7 @@ pub(super) fn play(kind: &DefectKind, variant: u32, ticks: u32, act: impl Fn(u32
     fixed
 }
 
-/// The game as it is.
+/// Plays the unmutated game.
 pub(super) fn play_sound(ticks: u32, act: impl Fn(u32) -> u32) -> Played {
     play_in(&Track, ticks, act)
 }
@@ -151,7 +165,7 @@ fn play_in(game: &dyn Game, ticks: u32, act: impl Fn(u32) -> u32) -> Played {
     let agent = agents[0];
     EndedEpisodes::note_in(&mut world);
     world.resource_mut::<PanicReports>().keep_no_files();
-    // A bot without a script leaves the action as it is.
+    // A bot without a script leaves the action unchanged.
     world.entity_mut(agent).insert(Control::Bot);
     let mut played = Played::default();
     for tick in 0..ticks {

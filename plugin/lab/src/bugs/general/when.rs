@@ -1,15 +1,15 @@
-//! When a planted defect shows.
+//! The moments at which a planted defect shows.
 
 use bevy_playbot::episode::Episode;
 
 use super::history::History;
 
-/// From which moment of an episode on a defect is there.
+/// The moment of an episode from which a defect shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum When {
     /// From this tick on, counted from 0.
     Tick(u32),
-    /// From when the agent has done the same for so many ticks in a row.
+    /// Once the agent has held one action for this many ticks.
     Held(u32),
     /// In this episode of an agent in its World, counted from 1, and in all later ones, from this tick on.
     Later {
@@ -21,19 +21,19 @@ pub(super) enum When {
 }
 
 impl When {
-    /// Early, after something was held, in later episodes, and late.
+    /// The default moments: early, after an action was held, in later episodes, and late.
     pub(super) const USUAL: [Self; 4] =
         [Self::Tick(25), Self::Held(7), Self::Later { episode: 2, tick: 10 }, Self::Tick(60)];
 
-    /// The number of [`USUAL`](Self::USUAL) ones.
+    /// The number of default moments, [`USUAL`](Self::USUAL).
     pub(super) const VARIANTS: u32 = Self::USUAL.len() as u32;
 
-    /// The moment of a variant.
+    /// Returns the moment of a variant.
     pub(super) fn of(variant: u32) -> Self {
         one_of(&Self::USUAL, variant)
     }
 
-    /// Whether the defect is there in this tick of an episode.
+    /// Returns whether the defect shows in this tick of an episode.
     pub(super) fn is_now(self, history: &History, episode: &Episode) -> bool {
         match self {
             Self::Tick(tick) => episode.tick >= tick,
@@ -43,7 +43,7 @@ impl When {
     }
 }
 
-/// The entry of a variant.
+/// Returns the entry of a variant.
 pub(super) fn one_of<T: Copy>(of: &[T], variant: u32) -> T {
     of[variant as usize % of.len()]
 }

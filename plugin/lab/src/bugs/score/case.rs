@@ -1,4 +1,4 @@
-//! Subjects with all that is needed to play them.
+//! Subjects, ready to be played.
 
 use std::collections::BTreeSet;
 
@@ -13,21 +13,21 @@ use crate::{
     split::LevelSplit,
 };
 
-/// A subject, and how it is played.
+/// A subject, and its levels and rules.
 pub(super) struct Case {
     pub subject: Subject,
-    /// Which game of the plan.
+    /// Index of the game in the plan.
     pub game: usize,
     pub mode: String,
     pub level: u64,
-    /// Name of the sound level, from which seeds come.
+    /// Name of the unmutated level. Seeds are derived from it.
     pub name: String,
-    /// The defect in the rules and its variant, if one is planted there.
+    /// The defect in the rules and its variant, if there is one.
     rules: Option<(DefectKind, u32)>,
 }
 
 impl Case {
-    /// The game as it is played.
+    /// Returns the game that is played.
     pub fn mutant<'a>(&self, game: &'a dyn Game) -> Mutant<&'a dyn Game> {
         match &self.rules {
             Some((kind, variant)) => Mutant::new(game, kind, *variant),
@@ -48,11 +48,12 @@ impl Case {
     }
 }
 
-/// All subjects of the plan's games: for each game the mutants, the levels that they were made of, and the sound levels.
+/// Returns all subjects of the plan's games: for each game the mutants, the levels that they were made of, and the
+/// unmutated levels.
 ///
 /// # Errors
 ///
-/// A level cannot be played, or a defect is not known.
+/// A level cannot be played, or a defect is unknown.
 pub(super) fn cases(plan: &ScorePlan) -> Result<Vec<Case>, ScoreError> {
     let mut cases = Vec::new();
     for (index, tested) in plan.games.iter().enumerate() {

@@ -1,26 +1,26 @@
-//! How long jobs take.
+//! Clocks for the time of jobs.
 
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-/// What the time of jobs is measured with. It is no part of the other results.
+/// The clock that jobs are timed with. It is no part of the other results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ClockKind {
-    /// CPU time of the thread that does the job, as the system counts it.
+    /// CPU time of the job's thread, as the system counts it.
     ThreadCpu,
-    /// Wall time: what else runs on the machine counts too.
+    /// Wall time, which includes whatever else the machine does.
     Wall,
 }
 
 impl ClockKind {
-    /// CPU time where the system tells it, else wall time.
+    /// Returns CPU time where the system reports it, else wall time.
     pub fn here() -> Self {
         if thread_cpu_seconds().is_some() { Self::ThreadCpu } else { Self::Wall }
     }
 
-    /// In words.
+    /// Returns the clock's name for reports.
     pub fn describe(self) -> &'static str {
         match self {
             Self::ThreadCpu => "CPU time of the job's thread",
@@ -29,7 +29,7 @@ impl ClockKind {
     }
 }
 
-/// Measures a job from its beginning on, on its own thread.
+/// Measures a job from its start, on its own thread.
 pub(super) struct JobClock {
     kind: ClockKind,
     cpu: f64,
@@ -41,7 +41,7 @@ impl JobClock {
         Self { kind, cpu: thread_cpu_seconds().unwrap_or(0.0), begun: Instant::now() }
     }
 
-    /// Seconds since the beginning, to the microsecond.
+    /// Returns the seconds since the start, to the microsecond.
     pub fn seconds(&self) -> f64 {
         let wall = || self.begun.elapsed().as_secs_f64();
         let seconds = match self.kind {
@@ -52,7 +52,7 @@ impl JobClock {
     }
 }
 
-/// CPU time of this thread since it was started: the first number of the file is in nanoseconds.
+/// Returns the CPU time of this thread since it started. The first number of the file is in nanoseconds.
 #[cfg(target_os = "linux")]
 fn thread_cpu_seconds() -> Option<f64> {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
@@ -74,7 +74,7 @@ mod tests {
         for kind in [ClockKind::here(), ClockKind::Wall] {
             let clock = JobClock::start(kind);
             let mut number = 1_u64;
-            // Longer than the system takes to bring its count up to date.
+            // Longer than the system takes to update its count.
             while clock.begun.elapsed().as_millis() < 50 {
                 number = number.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
             }

@@ -1,4 +1,4 @@
-//! Who is measured.
+//! The testers that are scored.
 
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
@@ -12,7 +12,7 @@ use crate::{
     explore::Explorer,
     game::Game,
 };
-/// Name of the bot that acts at random.
+/// Name of the bot with random actions.
 pub const RANDOM: &str = "random";
 /// Name of the bot that holds an action.
 pub const HOLD: &str = "hold";
@@ -24,30 +24,30 @@ pub const EXPLORE_SKILLS: &str = "explore-skills";
 /// A tester of one game.
 #[derive(Clone)]
 pub struct Contestant {
-    /// What files say of it.
+    /// The tester as files store it.
     pub record: ContestantRecord,
-    /// How it tests.
+    /// The means of testing.
     pub means: Means,
-    /// What a policy sees; bots are left with vectors.
+    /// Observation of a policy; bots have vectors.
     pub observation_config: ObservationConfig,
 }
 
-/// How a tester tests.
+/// The means of testing.
 #[derive(Clone)]
 #[allow(clippy::large_enum_variant, reason = "a few per measurement")]
 pub enum Means {
-    /// It plays episodes.
+    /// Plays episodes.
     Plays(Player),
-    /// It explores, and the ways that it finds are played again under the detectors.
+    /// Explores. Some of the paths that it finds are replayed under the detectors.
     Explores(Explorer),
 }
 
-/// What files say of a tester.
+/// A tester, as files store it.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ContestantRecord {
-    /// Its name, unlike that of all others of the game; testers of several games with the same name are counted together.
+    /// Its name, unique within the game. Testers of several games with the same name are counted together.
     pub name: String,
-    /// Checksum of the file that it was read from, if it was.
+    /// Checksum of the tester's file, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checksum: Option<String>,
     /// Whether a policy takes its most probable action instead of drawing one.
@@ -58,15 +58,15 @@ pub struct ContestantRecord {
 }
 
 impl ContestantRecord {
-    /// A tester without a file and without skills.
+    /// Creates a tester without a file and without skills.
     pub fn bot(name: impl Into<String>) -> Self {
         Self { name: name.into(), checksum: None, greedy: false, skilled: false }
     }
 }
 
 impl Contestant {
-    /// The game's bots and the explorer without skills: [`RANDOM`], [`HOLD`], [`CHAOS`], [`EXPLORE`] and, under its own name,
-    /// the demonstrator, if there is one.
+    /// Returns the game's bots and the explorer without skills: [`RANDOM`], [`HOLD`], [`CHAOS`], [`EXPLORE`] and, under
+    /// its own name, the demonstrator, if there is one.
     pub fn usual(game: &dyn Game) -> Vec<Self> {
         let bots = blind_bots(game);
         let is_constant = |bot: &BlindBot| matches!(bot, BlindBot::Constant(_));
@@ -78,22 +78,22 @@ impl Contestant {
             Self::bot(CHAOS, Player::Blind(BlindBot::Chaos)),
             Self::of(ContestantRecord::bot(EXPLORE), Means::Explores(Explorer::Random)),
         ];
-        all.extend(game.demonstrator().map(|name| Self::bot(name, Player::Demonstrator)));
+        all.extend(game.tools().bots.demonstrator().map(|name| Self::bot(name, Player::Demonstrator)));
         all
     }
 
-    /// A bot of the game.
+    /// Creates a tester from a bot of the game.
     pub fn bot(name: &str, player: Player) -> Self {
         Self::of(ContestantRecord::bot(name), Means::Plays(player))
     }
 
-    /// A tester that sees vectors.
+    /// Creates a tester with vectors as observations.
     pub fn of(record: ContestantRecord, means: Means) -> Self {
         Self { record, means, observation_config: ObservationConfig::default() }
     }
 }
 
-/// The last of the discrete actions, or all values at their highest.
+/// Returns the last of the discrete actions, or all values at their highest.
 fn last_action(game: &dyn Game) -> ActionValue {
     match game.actions() {
         ActionSpace::Discrete(count) => ActionValue::Discrete(count.saturating_sub(1) as u32),
@@ -104,7 +104,7 @@ fn last_action(game: &dyn Game) -> ActionValue {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bugs::score::testing::Corridor;
+    use crate::corridor::Corridor;
 
     #[test]
     fn a_game_without_a_bot_that_holds_an_action_holds_its_last() {

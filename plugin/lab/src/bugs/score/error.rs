@@ -1,4 +1,4 @@
-//! What can go wrong when testers are scored.
+//! Errors of scoring testers.
 
 use std::{
     io,
@@ -6,22 +6,23 @@ use std::{
 };
 
 use bevy_playbot::vision::VisionError;
+use playbot_learner::HasExitCode;
 use thiserror::Error;
 
 use crate::{bugs::BugError, explore::ExploreError, mode::ModeError, verdict::TestError};
 
-/// Testers cannot be scored, or scores cannot be used.
+/// The reason why testers cannot be scored, or scores cannot be used.
 #[derive(Debug, Error)]
 pub enum ScoreError {
-    /// The set has nothing for the games that were named.
+    /// The set has no mutant of the named games.
     #[error(
         "the set has no mutant of {0}: name the folder of another set, or score with the program that has its games"
     )]
     NoMutant(String),
-    /// Nobody would test.
-    #[error("nobody tests `{0}`: name a tester that it has")]
+    /// A game has no tester.
+    #[error("`{0}` has no tester: name one of its bots, or a policy")]
     NoTester(String),
-    /// Two testers of a game cannot be told apart.
+    /// Two testers of a game have the same name.
     #[error("two testers of `{game}` are called `{tester}`: give each a name of its own")]
     SameName {
         /// The game.
@@ -32,17 +33,17 @@ pub enum ScoreError {
     /// The set cannot be used.
     #[error(transparent)]
     Set(#[from] BugError),
-    /// A level cannot be played, and that is no finding.
-    #[error("{subject} cannot be played: {source}; make the set anew with `playbot bugs make`")]
+    /// A level cannot be played, for a reason that is no finding.
+    #[error("{subject} cannot be played: {source}; make the set again with `playbot bugs make`")]
     Level {
-        /// The mutant or the sound level.
+        /// The mutant or the unmutated level.
         subject: String,
-        /// Why.
+        /// The reason.
         source: ModeError,
     },
-    /// A defect that the program does not know.
+    /// The program does not know the defect.
     #[error(
-        "{subject} cannot be planted: this program has no defect `{class}`; make the set anew with `playbot bugs make`"
+        "{subject} cannot be planted: this program has no defect `{class}`; make the set again with `playbot bugs make`"
     )]
     Unknown {
         /// The mutant.
@@ -53,38 +54,38 @@ pub enum ScoreError {
     /// A tester cannot play the game at all.
     #[error(transparent)]
     Test(#[from] TestError),
-    /// A tester cannot see the game.
+    /// The game cannot draw the picture that a tester needs.
     #[error(transparent)]
     Vision(#[from] VisionError),
     /// An explorer cannot explore at all.
     #[error(transparent)]
     Explore(#[from] ExploreError),
-    /// There is a score already.
+    /// The score exists already.
     #[error("{} is there already: go on with --resume, choose another --out, or replace it with --force", .0.display())]
     Exists(PathBuf),
-    /// Another process writes it.
+    /// Another process writes the score.
     #[error("{} is in use by another score: wait for it or stop it, or choose another --out", .0.display())]
     Busy(PathBuf),
-    /// What was begun is another score.
+    /// The journal belongs to another score.
     #[error(
-        "{} was begun as another score: {}; call with the same, choose another --out, or replace it with --force",
+        "{} was started with other settings: {}; use the same ones, choose another --out, or replace it with --force",
         path.display(), differences.join(", ")
     )]
     OtherScore {
         /// Its file.
         path: PathBuf,
-        /// What differs, each in words.
+        /// Each difference, in words.
         differences: Vec<String>,
     },
-    /// A file is no score.
+    /// A file is not a score.
     #[error("{}: {why}; name a file that `playbot bugs score` has written", path.display())]
     NoScore {
         /// The file.
         path: PathBuf,
-        /// What is wrong.
+        /// The reason.
         why: String,
     },
-    /// Two scores hold the same.
+    /// Two scores have a subject in common.
     #[error(
         "{} and {} both score {what}: name each score once, and scores of different games or sets",
         first.display(), second.display()
@@ -94,12 +95,12 @@ pub enum ScoreError {
         first: PathBuf,
         /// The other one.
         second: PathBuf,
-        /// A subject of both.
+        /// The common subject.
         what: String,
     },
-    /// Scores that were not made in the same way.
+    /// Scores that were made with different settings.
     #[error(
-        "{} and {} cannot be joined: {}; score both in the same way",
+        "{} and {} cannot be joined: {}; score both with the same settings",
         first.display(), second.display(), differences.join(", ")
     )]
     Unlike {
@@ -107,42 +108,41 @@ pub enum ScoreError {
         first: PathBuf,
         /// The other one.
         second: PathBuf,
-        /// What differs, each in words.
+        /// Each difference, in words.
         differences: Vec<String>,
     },
     /// No score was named.
-    #[error("there is nothing to join: name at least one file that `playbot bugs score` has written")]
+    #[error("no score to join: name at least one file that `playbot bugs score` has written")]
     Nothing,
-    /// The operating system refused.
+    /// The system cannot read or write a file.
     #[error("cannot {action} {}: {source}; {}", path.display(), next_step(action))]
     Io {
-        /// What was tried.
+        /// The action that failed.
         action: &'static str,
-        /// On which file.
+        /// The file.
         path: PathBuf,
-        /// The system's answer.
+        /// The system's error.
         source: io::Error,
     },
 }
 
-impl ScoreError {
-    /// Whether calling differently helps; otherwise the game or the system failed.
-    pub fn is_usage(&self) -> bool {
+impl HasExitCode for ScoreError {
+    fn exit_code(&self) -> u8 {
         match self {
-            Self::Test(error) => error.is_usage(),
-            Self::Set(error) => error.is_usage(),
-            Self::Explore(error) => !matches!(error, ExploreError::Fault(_) | ExploreError::Diverged { .. }),
-            Self::Io { source, .. } => source.kind() == io::ErrorKind::NotFound,
-            _ => true,
+            Self::Test(error) => error.exit_code(),
+            Self::Set(error) => error.exit_code(),
+            Self::Explore(ExploreError::Fault(_) | ExploreError::Diverged { .. }) => 2,
+            Self::Io { source, .. } if source.kind() != io::ErrorKind::NotFound => 2,
+            _ => 3,
         }
     }
 }
 
-/// What to do where the system refused.
+/// Returns the next step after an error of the system.
 fn next_step(action: &str) -> &'static str {
     match action {
-        "read" => "name a file that is there, as `playbot bugs score` has written it",
-        _ => "make room or rights there, or name another file, and call this again",
+        "read" => "name an existing file that `playbot bugs score` has written",
+        _ => "check free space and permissions, or name another file, and run the command again",
     }
 }
 

@@ -18,14 +18,14 @@ use crate::{
     proof::LevelProof,
 };
 
-/// Arenas in which is explored, side by side in one World.
+/// Arenas of an exploration, side by side in one World.
 const ARENAS: u32 = 8;
 
-/// What was found on the way, and when.
+/// Findings of an exploration, with their times.
 struct Sightings {
     findings: Vec<JobFinding>,
     first: Option<f64>,
-    /// Place among the findings of those that can be played again, with the actions that lead there.
+    /// Indices of the findings that can be replayed, with the actions that lead to them.
     playable: Vec<(usize, Vec<ActionValue>)>,
 }
 
@@ -38,8 +38,8 @@ impl Sightings {
     }
 }
 
-/// Explores a subject, and plays some of the ways that were found again under the detectors; `None` if somebody asked to
-/// stop.
+/// Explores a subject, and replays some of the paths that were found under the detectors; `None` if `stop` returned
+/// true.
 ///
 /// # Errors
 ///
@@ -70,7 +70,8 @@ pub(super) fn search(trial: &Trial, explorer: &Explorer) -> Result<Option<JobRes
         return Ok(None);
     }
     let ticks = found.solution_ticks();
-    let proof = if ticks.is_some() { LevelProof::Solvable } else { trial.game.prove(trial.mode, trial.level) };
+    let proof =
+        if ticks.is_some() { LevelProof::Solvable } else { trial.game.tools().levels.prove(trial.mode, trial.level) };
     let unsolvable = proof.why_unsolvable().map(str::to_owned);
     let seconds = trial.clock.seconds();
     let shortened = shortened(trial, &sightings);
@@ -96,13 +97,13 @@ fn plan(trial: &Trial, explorer: &Explorer) -> ExplorePlan {
     }
 }
 
-/// What it means that an exploration did not come to its end.
+/// Turns an error that ended an exploration into a finding.
 fn finding_of(error: ExploreError) -> Result<JobFinding, ScoreError> {
     match error {
         ExploreError::Diverged { divergence, .. } => Ok(JobFinding {
             detector: "determinism".to_owned(),
             tick: Some(divergence.tick),
-            message: format!("the way back to a cell does not replay: {divergence}"),
+            message: format!("the path back to a cell does not replay: {divergence}"),
         }),
         ExploreError::Fault(fault) => {
             let Breakage { detector, message, .. } = Breakage::of_fault(&fault, 0);
@@ -112,7 +113,7 @@ fn finding_of(error: ExploreError) -> Result<JobFinding, ScoreError> {
     }
 }
 
-/// Errors that were logged while somebody explored, if a detector listens.
+/// Adds the errors that were logged during the exploration, if a detector reads them.
 fn hear_errors(trial: &Trial, ear: &Ear, sightings: &mut Sightings) {
     let mut ticks = trial.detectors.ticks.iter();
     let listening = ticks.find(|it| it.watch_world().is_some_and(|watch| watch.hears_errors()));
@@ -124,8 +125,8 @@ fn hear_errors(trial: &Trial, ear: &Ear, sightings: &mut Sightings) {
     }
 }
 
-/// The way to the aim, and the longest ways, at most so many: those on which the episode ended, and those on which it goes
-/// on, in turn.
+/// Returns the path to the goal and the longest paths, at most `most`. Paths on which the episode ended and those on
+/// which it goes on alternate.
 fn routes(found: &Exploration, most: usize) -> Vec<Route> {
     let mut cells: Vec<(&Cell, &ReachedCell)> = found.cells().iter().collect();
     cells.sort_by(|(one, near), (other, far)| far.ticks().cmp(&near.ticks()).then_with(|| one.cmp(other)));
@@ -145,17 +146,17 @@ fn routes(found: &Exploration, most: usize) -> Vec<Route> {
     routes
 }
 
-/// Ticks for which an agent stays where a way ends.
+/// Ticks for which an agent stays at the end of a path.
 const STAY: usize = 150;
 
 fn actions(route: &Route) -> Vec<ActionValue> {
     (0..route.len()).map_while(|tick| route.actions.get(tick)).collect()
 }
 
-/// Plays a way again under the detectors that look tick by tick.
+/// Replays a path under the detectors that look tick by tick.
 fn look_again(trial: &Trial, route: &Route, sightings: &mut Sightings) {
     let mut actions = actions(route);
-    // Some defects are only seen by who stays a while.
+    // Some defects show only after the agent has stayed for a while.
     actions.extend(std::iter::repeat_n(idle_action(trial.game), STAY));
     // The streams of explorers begin from 0.
     let scanned = scan(trial.game, trial.mode, trial.level, 0, &actions, trial.detectors);
@@ -169,11 +170,11 @@ fn look_again(trial: &Trial, route: &Route, sightings: &mut Sightings) {
     }
 }
 
-/// Lets the detectors of levels look; the way to the aim is an episode to them.
+/// Runs the detectors of levels. The path to the goal counts as an episode.
 fn inspect(trial: &Trial, solution: Option<&Route>, sightings: &mut Sightings) {
     let ended = solution
         .and_then(|route| scan(trial.game, trial.mode, trial.level, 0, &actions(route), &Detectors::default()).end);
-    // Who looks for differences has somebody play who acts at random, as explorers do.
+    // The detector of differences replays a random player, since explorers act at random.
     let anybody = Player::Blind(BlindBot::Uniform);
     let tester = TestedBy {
         name: &trial.contestant.record.name,
@@ -181,7 +182,7 @@ fn inspect(trial: &Trial, solution: Option<&Route>, sightings: &mut Sightings) {
         observation_config: trial.contestant.observation_config,
         seed: trial.budget.seed,
         episodes: ended.map(|end| (0, end)).into_iter().collect(),
-        // Where it ended is not looked at.
+        // The last positions are not examined.
         places: std::collections::BTreeMap::new(),
     };
     let (game, mode, level) = (trial.game, trial.mode, trial.level);
@@ -194,7 +195,7 @@ fn inspect(trial: &Trial, solution: Option<&Route>, sightings: &mut Sightings) {
     }
 }
 
-/// The first finding that can be played again, made shorter.
+/// Returns the first finding that can be replayed, minimised.
 fn shortened(trial: &Trial, sightings: &Sightings) -> Option<Lengths> {
     let budget = trial.shortening()?;
     let checks = Checks::default().with_detectors(trial.detectors);

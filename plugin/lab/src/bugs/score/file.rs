@@ -12,32 +12,32 @@ use super::{
     subject::Subject,
 };
 
-/// What testers found in a set.
+/// The results of testers on a set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Score {
-    /// What was scored, and how.
+    /// The set, the testers and the settings.
     #[serde(flatten)]
     pub record: ScoreRecord,
-    /// What people called to make it.
+    /// The command that made it.
     pub command: String,
-    /// What testers were set on.
+    /// The mutants and unmutated levels.
     pub subjects: Vec<Subject>,
-    /// What came of it, in the order of the subjects and, for each, of the testers.
+    /// The results, in the order of the subjects and, for each, of the testers.
     pub jobs: Vec<ScoredJob>,
 }
 
-/// What is read before the form is known.
+/// The part of the file that is read before its form is known.
 #[derive(Deserialize)]
 struct FormOnly {
     format: u32,
 }
 
 impl Score {
-    /// Writes it, whole or not at all: a line for each subject and each job.
+    /// Writes the file atomically, with a line for each subject and each job.
     ///
     /// # Errors
     ///
-    /// The system refuses.
+    /// The system cannot write.
     pub fn write(&self, path: &Path) -> Result<(), ScoreError> {
         let written = self.text().and_then(|text| write_atomically(path, seal_json(&text).as_bytes()));
         written.map_err(io_error("write", path))
@@ -51,11 +51,11 @@ impl Score {
         Ok(format!("{head},\"command\":{command},\n\"subjects\":[{subjects}],\n\"jobs\":[{jobs}]}}\n"))
     }
 
-    /// Reads one.
+    /// Reads a file.
     ///
     /// # Errors
     ///
-    /// It is no score, one in a form that this program does not know, or cannot be read.
+    /// The file is not a score, has a form that this program does not know, or cannot be read.
     pub fn read(path: &Path) -> Result<Self, ScoreError> {
         let text = fs::read_to_string(path).map_err(io_error("read", path))?;
         let no_score = |why: String| ScoreError::NoScore { path: path.into(), why };
@@ -69,7 +69,7 @@ impl Score {
     }
 }
 
-/// JSON of some items, a line each.
+/// Returns the JSON of some items, a line each.
 fn lines(items: &[impl Serialize]) -> serde_json::Result<String> {
     let mut text = String::new();
     for (index, item) in items.iter().enumerate() {
@@ -111,7 +111,7 @@ mod tests {
             Score::read(&path).expect_err("no score").to_string()
         };
         let none = Score::read(&folder.path().join("none.json")).expect_err("no file").to_string();
-        assert!(none.contains("none.json") && none.contains("name a file that is there"), "{none}");
+        assert!(none.contains("none.json") && none.contains("name an existing file"), "{none}");
         assert!(said("{").contains("score.json: line 1: "));
         assert!(said("{\"format\":1}").contains("missing field"));
         assert!(said("{\"format\":9}").contains("a score in form 9, but this program reads form 1"));

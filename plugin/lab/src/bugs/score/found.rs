@@ -1,4 +1,4 @@
-//! Which defects were found.
+//! The rules that decide which defects were found.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,50 +11,50 @@ use super::{
 };
 use crate::verdict::{FALSE_DISCOVERY_RATE, Trials, benjamini_hochberg, fisher_exact};
 
-/// Share of a game's sound levels that a tester has to solve for its failure to say something. Of who solves fewer only the
-/// reward says something.
+/// Least share of a game's unmutated levels that a tester must solve before its failure counts. Below it, only an
+/// unusual reward counts.
 pub const RELIABLE: f64 = 0.99;
 
-/// How something was found. On a sound level it is false.
+/// The means by which a defect was found. On an unmutated level they are false.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Found {
-    /// A detector found something, or the game broke.
+    /// A detector reported something, or the game panicked.
     pub detected: bool,
-    /// It is proved that nobody can solve the level.
+    /// The level is proved to be unsolvable.
     pub unsolvable: bool,
-    /// A tester failed that solves nearly all sound levels of the game: see [`RELIABLE`]. Or one that does not collected far
-    /// more or far less than on any of them: see [`FEWEST_SOUND`](super::FEWEST_SOUND).
+    /// A tester failed. Either it solves nearly all unmutated levels of the game: see [`RELIABLE`]. Or it collected far
+    /// more or far less reward than on any of them: see [`FEWEST_SOUND`](super::FEWEST_SOUND).
     pub failed: bool,
-    /// Beside a sound build: the tester does not do there what it does here.
+    /// The tester's episodes differ from those in the unmutated game.
     pub differs: bool,
 }
 
 impl Found {
-    /// Whether it was found with nothing to compare it with.
+    /// Returns whether the defect was found without a comparison with the unmutated game.
     pub fn alone(self) -> bool {
         self.detected || self.unsolvable || self.failed
     }
 
-    /// Whether it was found by some means.
+    /// Returns whether the defect was found by any means.
     pub fn at_all(self) -> bool {
         self.alone() || self.differs
     }
 }
 
-/// What a tester found on a subject, and what that means.
+/// The result of a tester on a subject, judged.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ScoredJob {
-    /// What it found.
+    /// The result.
     #[serde(flatten)]
     pub result: JobResult,
-    /// How the defect was found, if it was.
+    /// The means by which the defect was found.
     pub found: Found,
-    /// Seconds until then, with nothing to compare it with.
+    /// Seconds until the defect was found, without a comparison with the unmutated game.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub first: Option<f64>,
 }
 
-/// Says of all jobs what was found. `results` are in any order and stay in it.
+/// Judges all jobs. `results` may have any order, and keep it.
 pub fn judge(subjects: &[Subject], results: Vec<JobResult>) -> Vec<ScoredJob> {
     let subjects: BTreeMap<&str, &Subject> = subjects.iter().map(|subject| (subject.id.as_str(), subject)).collect();
     let failures = failures(&subjects, &results);
@@ -68,7 +68,7 @@ pub fn judge(subjects: &[Subject], results: Vec<JobResult>) -> Vec<ScoredJob> {
         };
         let failed_after = failure.and_then(|failure| match failure {
             Failure::Unsolved => result.failed_after,
-            // Only all episodes together have a mean.
+            // A mean reward needs all episodes.
             Failure::Reward => Some(result.seconds),
         });
         let first = [result.found_after, failed_after].into_iter().flatten().min_by(f64::total_cmp);
@@ -77,16 +77,16 @@ pub fn judge(subjects: &[Subject], results: Vec<JobResult>) -> Vec<ScoredJob> {
     results.into_iter().enumerate().zip(failures).map(scored).collect()
 }
 
-/// How a tester failed that does not on sound levels.
+/// The kinds of failures that do not occur on unmutated levels.
 #[derive(Clone, Copy)]
 enum Failure {
-    /// It did not solve the level.
+    /// The level was not solved.
     Unsolved,
-    /// It collected far more or far less.
+    /// The reward was far higher or far lower.
     Reward,
 }
 
-/// For each of the results, whether the tester failed in a way that it does not on sound levels.
+/// Returns for each result how the tester failed, if it does not fail in this way on unmutated levels.
 fn failures(subjects: &BTreeMap<&str, &Subject>, results: &[JobResult]) -> Vec<Option<Failure>> {
     let reliable = reliable(subjects, results);
     let usual = UsualRewards::new(subjects, results);
@@ -101,7 +101,7 @@ fn failures(subjects: &BTreeMap<&str, &Subject>, results: &[JobResult]) -> Vec<O
     results.iter().map(failure).collect()
 }
 
-/// Games and the testers that solve nearly all of their sound levels.
+/// Returns games and the testers that solve nearly all of their unmutated levels.
 fn reliable(subjects: &BTreeMap<&str, &Subject>, results: &[JobResult]) -> BTreeSet<(String, String)> {
     let mut counts: BTreeMap<(String, String), Trials> = BTreeMap::new();
     for result in results {
@@ -116,9 +116,9 @@ fn reliable(subjects: &BTreeMap<&str, &Subject>, results: &[JobResult]) -> BTree
     counts.into_iter().filter(|(_, count)| is_reliable(count)).map(|(names, _)| names).collect()
 }
 
-/// Places of the results on mutants that differ from those of the same tester on the original: in anything, where neither
-/// leaves anything to chance; else by Fisher's exact test, with at most one in twenty false on average over all mutants
-/// (Benjamini and Hochberg).
+/// Returns the indices of results on mutants that differ from those of the same tester on the original. Without random
+/// numbers on either side, any difference counts. Otherwise Fisher's exact test decides, with at most one in twenty
+/// false on average over all mutants (Benjamini and Hochberg).
 fn differing(subjects: &BTreeMap<&str, &Subject>, results: &[JobResult]) -> BTreeSet<usize> {
     let key = |result: &JobResult| (result.subject.clone(), result.tester.clone());
     let known: BTreeMap<(String, String), &JobResult> = results.iter().map(|result| (key(result), result)).collect();

@@ -1,73 +1,73 @@
-//! What came of setting a tester on a subject.
+//! The result of a tester on a subject.
 
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
 use serde::{Deserialize, Serialize};
 
 use crate::findings::{Breakage, Lengths};
 
-/// What a tester found on a subject.
+/// The result of a tester on a subject.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct JobResult {
     /// The subject.
     pub subject: String,
     /// The tester.
     pub tester: String,
-    /// Episodes in which the aim was reached; for an explorer, whether it found a way to it.
+    /// Episodes in which the goal was reached; for an explorer, 1 if it found a path to it.
     pub solved: u64,
     /// All episodes; 1 for an explorer.
     pub episodes: u64,
-    /// Whether the tester drew no random number.
+    /// Whether the tester used no random number.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub exact: bool,
-    /// How each episode ended, and after how many ticks: `won 83`, `lost 12`, `time up 1000` or `broken`.
+    /// The end of each episode and its tick: `won 83`, `lost 12`, `time up 1000` or `broken`.
     pub ends: Vec<String>,
-    /// Mean total reward of the episodes; of explorers, and where one is no number, none.
+    /// Mean total reward of the episodes. `None` for explorers, and if a reward is not a number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reward: Option<f64>,
-    /// What detectors found, and how the game broke.
+    /// Findings of the detectors, and panics of the game.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<JobFinding>,
-    /// Why nobody can solve the level, if that was proved.
+    /// Why the level is unsolvable, if that was proved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unsolvable: Option<String>,
-    /// Actions that do something in the whole episode of the first finding that can be played again.
+    /// Actions with an effect in the whole episode of the first finding that can be replayed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub played: Option<u32>,
-    /// Those of them up to the tick of the finding.
+    /// Actions with an effect up to the tick of the finding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub original: Option<u32>,
-    /// The same after all that it does not need was left out.
+    /// Actions that are left after minimisation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minimised: Option<u32>,
-    /// Seconds that the job took, without that.
+    /// Seconds that the job took, without minimisation.
     pub seconds: f64,
     /// Seconds until the first finding or the proof.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub found_after: Option<f64>,
-    /// Seconds until the end of the first episode without the aim.
+    /// Seconds until the end of the first episode that did not reach the goal.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failed_after: Option<f64>,
 }
 
-/// Something that a tester found.
+/// A finding of a tester.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct JobFinding {
-    /// What found it.
+    /// Name of the detector.
     pub detector: String,
     /// Tick of the episode, if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tick: Option<u32>,
-    /// What is wrong.
+    /// The message.
     pub message: String,
 }
 
 impl JobResult {
-    /// Whether the aim was reached in every episode.
+    /// Returns whether the goal was reached in every episode.
     pub fn is_solved(&self) -> bool {
         self.episodes > 0 && self.solved == self.episodes
     }
 
-    /// The game broke before anybody could play, or outside of its ticks.
+    /// Creates the result of a game that panicked before the first tick, or outside of its ticks.
     pub(super) fn broken(broken: Breakage, seconds: f64) -> Self {
         let Breakage { detector, tick: _, message } = broken;
         Self {
@@ -81,7 +81,7 @@ impl JobResult {
         }
     }
 
-    /// The same with the lengths of a finding that was made shorter.
+    /// Adds the lengths of a minimised finding.
     #[must_use]
     pub(super) fn with_lengths(self, lengths: Option<Lengths>) -> Self {
         let of = |length: fn(Lengths) -> u32| lengths.map(length);
@@ -89,21 +89,21 @@ impl JobResult {
         Self { played, original, minimised: of(|lengths| lengths.minimised), ..self }
     }
 
-    /// The same without what is measured with a clock.
+    /// Returns the result without its times.
     #[must_use]
     pub fn without_times(&self) -> Self {
         Self { seconds: 0.0, found_after: None, failed_after: None, ..self.clone() }
     }
 }
 
-/// Mean total reward of episodes; `None` if there are none, one broke, or one has no number for a reward.
+/// Returns the mean total reward of episodes; `None` if there are no episodes, one broke, or a reward is not a number.
 pub(super) fn mean_reward(ends: &[Option<EpisodeResult>]) -> Option<f64> {
     let rewards: Option<Vec<f64>> = ends.iter().map(|end| end.as_ref().map(|end| end.total_reward)).collect();
     let mean = rewards.map(|rewards| rewards.iter().sum::<f64>() / rewards.len() as f64);
     mean.filter(|mean| mean.is_finite())
 }
 
-/// How an episode ended, in words.
+/// Returns the end of an episode in words.
 pub(super) fn end_of(result: Option<&EpisodeResult>) -> String {
     let Some(result) = result else { return "broken".to_owned() };
     let how = match result.end {

@@ -1,4 +1,4 @@
-//! Finished jobs as they come in, beside the file of their score.
+//! The journal of finished jobs, beside the file of their score.
 
 use std::{
     collections::BTreeMap,
@@ -19,7 +19,7 @@ use super::{
     job::JobResult,
     record::ScoreRecord,
 };
-use crate::{train::sealed_file::unsealed_line, verdict::Earlier};
+use crate::{sealed_file::unsealed_line, verdict::Earlier};
 
 /// The first line.
 #[derive(Serialize, Deserialize)]
@@ -29,7 +29,7 @@ struct Head {
     record: ScoreRecord,
 }
 
-/// A file with a line of JSON for each finished job. It is locked while somebody writes.
+/// A file with a line of JSON for each finished job. It is locked while it is open for writing.
 pub struct ScoreJournal {
     path: PathBuf,
     file: DiskFile,
@@ -39,12 +39,13 @@ pub struct ScoreJournal {
 }
 
 impl ScoreJournal {
-    /// The journal of a score file that is to be written, with all jobs of it that are finished. `command` is what people
-    /// call to make the score; that of the first call is kept. Also returns how many damaged bytes were cut off.
+    /// Opens the journal of a score file that is not written yet, with all of its finished jobs. `command` is the
+    /// command that makes the score; that of the first call is kept. Also returns how many damaged bytes were cut off.
     ///
     /// # Errors
     ///
-    /// There is a score already, another process makes it, or what was begun is another one; or the system refuses.
+    /// The score exists already, another process makes it, the journal belongs to another score, or the system cannot
+    /// read or write it.
     pub fn open(
         score: &Path,
         command: &str,
@@ -75,40 +76,40 @@ impl ScoreJournal {
         Ok((journal, cut))
     }
 
-    /// Whether jobs of a score are kept that is not done.
+    /// Returns whether the journal has jobs of an unfinished score.
     pub fn is_begun(score: &Path) -> bool {
         journal_of(score).exists()
     }
 
-    /// Jobs that are finished: by subject and tester.
+    /// Returns the finished jobs, by subject and tester.
     pub fn finished(&self) -> &BTreeMap<(String, String), JobResult> {
         &self.finished
     }
 
-    /// What people called to make the score.
+    /// Returns the command that makes the score.
     pub fn command(&self) -> &str {
         &self.command
     }
 
-    /// Adds a job with one write. If that fails, those before stay whole.
+    /// Adds a job with one write. If that fails, earlier jobs stay intact.
     ///
     /// # Errors
     ///
-    /// The system refuses.
+    /// The system cannot write.
     pub fn push(&mut self, result: JobResult) -> Result<(), ScoreError> {
         self.write(&result)?;
         self.finished.insert((result.subject.clone(), result.tester.clone()), result);
         Ok(())
     }
 
-    /// Removes the file, when the score is written.
+    /// Removes the file, after the score is written.
     ///
     /// # Errors
     ///
-    /// The system refuses.
+    /// The system cannot remove it.
     pub fn close(self) -> Result<(), ScoreError> {
         let Self { path, file, .. } = self;
-        // Not every system removes files that are open.
+        // Some systems cannot remove open files.
         drop(file);
         disk::remove_file(&path).map_err(io_error("remove", &path))
     }
@@ -132,7 +133,7 @@ impl ScoreJournal {
         }
     }
 
-    /// Reads all whole lines, and cuts off what follows after the first damaged one.
+    /// Reads all intact lines, and cuts off the rest from the first damaged one.
     fn read(&mut self, score: &Path, record: &ScoreRecord) -> Result<u64, ScoreError> {
         let mut reader = BufReader::new(self.file.as_file());
         let mut line = Vec::new();
@@ -162,7 +163,7 @@ impl ScoreJournal {
     }
 }
 
-/// `score.json` has `score.json.jobs`.
+/// Returns the journal's path: `score.json` has `score.json.jobs`.
 fn journal_of(score: &Path) -> PathBuf {
     let mut name = score.file_name().unwrap_or_default().to_owned();
     name.push(".jobs");

@@ -1,28 +1,28 @@
-//! Which testers together find most.
+//! The mixes of testers that find most together.
 
-/// Most testers of whom all mixes are tried; with more, the one that adds most is added again and again.
+/// Most testers for which all mixes are tried. With more, the best next tester is added again and again.
 const MOST_TRIED: usize = 14;
 
-/// A tester as mixes see it: which defects it found, and on which sound levels it found something.
+/// The defects that a tester found, and its false findings.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Catch {
-    /// For each mutant, in the same order for all.
+    /// For each mutant, in the same order for all testers.
     pub found: Vec<bool>,
-    /// For each sound level, in the same order for all.
+    /// For each unmutated level, in the same order for all testers.
     pub false_findings: Vec<bool>,
-    /// For each sound level, whether it is called unsolvable.
+    /// For each unmutated level, whether it is called unsolvable.
     pub unsolvable: Vec<bool>,
 }
 
-/// What a mix may do wrong.
+/// The limits of false findings.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Limits {
-    /// Share of the sound levels on which it may find something.
+    /// Largest share of the unmutated levels with a finding.
     pub false_share: f64,
 }
 
 impl Catch {
-    /// What a mix of testers found together.
+    /// Joins the findings of a mix of testers.
     pub fn of(all: &[Self], mix: &[usize]) -> Self {
         let join = |part: fn(&Self) -> &Vec<bool>| {
             let length = all.first().map_or(0, |catch| part(catch).len());
@@ -46,13 +46,13 @@ fn count(list: &[bool]) -> usize {
     list.iter().filter(|is| **is).count()
 }
 
-/// The smallest mix of testers that finds most, by their places; of several of the same size the one with fewest false
-/// findings, then the first. With limits, only mixes that keep them.
+/// Returns the smallest mix of testers that finds most, by their indices. Of several of the same size it is the one
+/// with the fewest false findings, then the first. With limits, only mixes within them count.
 pub(super) fn best_mix(all: &[Catch], limits: Option<Limits>) -> Vec<usize> {
     if all.len() <= MOST_TRIED { best_of_all(all, limits) } else { greedy(all, limits) }
 }
 
-/// How good a mix is: more is better.
+/// Returns the rank of a mix; more is better.
 fn rank(catch: &Catch, size: usize) -> (usize, std::cmp::Reverse<(usize, usize)>) {
     (count(&catch.found), std::cmp::Reverse((size, count(&catch.false_findings))))
 }
@@ -84,7 +84,7 @@ fn greedy(all: &[Catch], limits: Option<Limits>) -> Vec<usize> {
             let is_better = count(&catch.found) > before && is_allowed(&catch, limits);
             is_better.then(|| (rank(&catch, longer.len()), longer))
         });
-        // Of equals the first.
+        // The first of equal ones.
         let best = more.reduce(|best, other| if other.0 > best.0 { other } else { best });
         match best {
             Some((_, longer)) => mix = longer,

@@ -1,9 +1,9 @@
-//! How well testers find planted defects.
+//! The score of testers: how well they find planted defects.
 //!
-//! A [`ScorePlan`] sets [`Contestant`]s on all mutants and sound levels of a [`BugSet`](crate::bugs::BugSet), at equal
-//! budgets and under the detectors of a test. A [`ScoreRun`] does so on all cores; a [`ScoreJournal`] keeps what is
-//! finished. A [`Score`] is what came of it, and a [`ScoreTable`] joins several: recall and precision by class and tester,
-//! what a defect costs, and which testers find most together.
+//! A [`ScorePlan`] runs [`Contestant`]s on all mutants and unmutated levels of a [`BugSet`](crate::bugs::BugSet), at
+//! equal budgets and under the detectors of a test. A [`ScoreRun`] does so on all cores, and a [`ScoreJournal`] keeps
+//! the finished jobs. A [`Score`] is the result. A [`ScoreTable`] joins several: recall and precision by class and
+//! tester, the cost of a defect, and the testers that find most together.
 
 mod case;
 mod clock;

@@ -1,27 +1,27 @@
-//! Numbers of a table.
+//! Shares and numbers of a table.
 
 use serde::Serialize;
 
 use crate::{report::whole, verdict::wilson};
 
-/// So many of so many, with the 95 % Wilson interval of the share.
+/// A count of a total, with the 95 % Wilson interval of the share.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Share {
-    /// So many.
+    /// The count.
     pub count: u64,
-    /// Of so many.
+    /// The total.
     pub of: u64,
-    /// Lowest and highest share with which that is no surprise.
+    /// Lower and upper bound of the share.
     pub interval: [f64; 2],
 }
 
 impl Share {
-    /// So many of so many.
+    /// Creates the share of a count of a total.
     pub fn new(count: u64, of: u64) -> Self {
         Self { count, of, interval: wilson(count, of) }
     }
 
-    /// How many of these are so.
+    /// Counts the true values.
     pub fn of(list: impl IntoIterator<Item = bool>) -> Self {
         let (mut count, mut of) = (0, 0);
         for is in list {
@@ -31,25 +31,25 @@ impl Share {
         Self::new(count, of)
     }
 
-    /// The share; `None` of nothing.
+    /// Returns the share; `None` if the total is 0.
     pub fn share(&self) -> Option<f64> {
         (self.of > 0).then(|| self.count as f64 / self.of as f64)
     }
 
-    /// As people read it.
+    /// Returns the share, the counts and the interval in words.
     pub fn describe(&self) -> String {
         let Some(share) = self.share() else { return "–".to_owned() };
         let [low, high] = self.interval.map(|end| 100.0 * end);
         format!("{:.1} % ({} of {}; {low:.1} to {high:.1})", 100.0 * share, self.count, self.of)
     }
 
-    /// The same in few words.
+    /// Returns the counts in words.
     pub fn short(&self) -> String {
         if self.of == 0 { "–".to_owned() } else { format!("{} of {}", self.count, self.of) }
     }
 }
 
-/// A number with the two or three digits that say something.
+/// Formats a number with two or three significant digits.
 pub(super) fn short_number(value: f64) -> String {
     let size = value.abs();
     let decimals = match size {

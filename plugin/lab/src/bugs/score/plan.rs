@@ -1,4 +1,4 @@
-//! What is to be scored.
+//! The plan of a score.
 
 use std::path::Path;
 
@@ -16,40 +16,41 @@ use crate::{
     game::Game,
 };
 
-/// How testers are scored.
+/// The plan of a score: sets, games, testers, budget.
 #[derive(Clone)]
 pub struct ScorePlan<'a> {
-    /// The mutants and sound levels.
+    /// The mutants and unmutated levels.
     pub set: &'a BugSet,
     /// Folder of the set.
     pub folder: &'a Path,
     /// The games that are tested; others of the set are left out.
     pub games: Vec<TestedGame<'a>>,
-    /// How much each tester may do on each of them.
+    /// The budget of each tester on each of them.
     pub budget: ScoreBudget,
-    /// What times are measured with.
+    /// The clock.
     pub clock: ClockKind,
-    /// Threads; no part of the result but for the times.
+    /// Threads. They change no result but the times.
     pub threads: usize,
 }
 
-/// A game, and who tests it.
+/// A game, and its testers.
 #[derive(Clone)]
 pub struct TestedGame<'a> {
     /// The game.
     pub game: &'a dyn Game,
-    /// Who tests it, with different names.
+    /// The testers, with different names.
     pub contestants: Vec<Contestant>,
-    /// What looks for defects.
+    /// The detectors.
     pub detectors: Detectors,
 }
 
 impl ScorePlan<'_> {
-    /// Checks that something is tested, and that testers can be told apart.
+    /// Checks that there is something to test, and that testers have different names.
     ///
     /// # Errors
     ///
-    /// [`ScoreError::NoMutant`], [`ScoreError::NoTester`], [`ScoreError::SameName`], or the set is none of this program.
+    /// [`ScoreError::NoMutant`], [`ScoreError::NoTester`], [`ScoreError::SameName`], or the set does not fit this
+    /// program.
     pub fn check(&self) -> Result<(), ScoreError> {
         let is_tested = |name: &str| self.games.iter().any(|tested| tested.game.name() == name);
         if !self.set.mutants.iter().any(|bug| is_tested(&bug.game)) {
@@ -71,7 +72,7 @@ impl ScorePlan<'_> {
         Ok(())
     }
 
-    /// What files say of it.
+    /// Returns the record of the plan that files store.
     pub fn record(&self) -> ScoreRecord {
         let game = |tested: &TestedGame| GameRecord {
             name: tested.game.name().to_owned(),
@@ -90,7 +91,7 @@ impl ScorePlan<'_> {
     }
 }
 
-/// A hash of all that is planted, and of the sound levels.
+/// Returns a hash of all mutants and unmutated levels.
 fn hash_of(set: &BugSet) -> String {
     let BugSet { seed, games, mutants, sound } = set;
     let text = serde_json::to_string(&(seed, games, mutants, sound)).unwrap_or_default();

@@ -14,10 +14,10 @@ use crate::{
     verdict::{Finding, LevelVerdict, TestError, TestPlan, TestWatch, Tester, TesterRecord, test_in_turn},
 };
 
-/// Findings of a job that are tried, until one can be played again.
+/// Findings of a job that are tried until one can be replayed.
 const MOST_TRIED: usize = 3;
 
-/// Plays a subject's episodes, one after the other in the same World; `None` if somebody asked to stop.
+/// Plays a subject's episodes, one after the other in the same World; `None` if `stop` returned true.
 ///
 /// # Errors
 ///
@@ -30,7 +30,7 @@ pub(super) fn play(trial: &Trial, player: &Player) -> Result<Option<JobResult>, 
     let tested = match test_in_turn(trial.game, &plan, trial.name, &watch) {
         Ok(Some(tested)) => tested,
         Ok(None) => return Ok(None),
-        // The World cannot even be made.
+        // The game panicked while its World was built.
         Err(TestError::Eval(EvalError::Fault(fault))) => {
             return Ok(Some(JobResult::broken(Breakage::of_fault(&fault, 0), trial.clock.seconds())));
         }
@@ -92,12 +92,12 @@ fn plan(trial: &Trial, player: &Player) -> TestPlan {
     }
 }
 
-/// Whether this finding is the proof that nobody can solve the level.
+/// Returns whether this finding is the proof that the level is unsolvable.
 fn is_proof(verdict: &LevelVerdict, finding: &Finding) -> bool {
     finding.tester.is_none() && verdict.proof.why_unsolvable() == Some(finding.message.as_str())
 }
 
-/// The first finding that can be played again, made shorter.
+/// Returns the first finding that can be replayed, minimised.
 fn shortened(trial: &Trial, player: &Player, plan: &TestPlan, found: &[&Finding]) -> Option<Lengths> {
     let budget = trial.shortening()?;
     let tester = plan.testers.first()?;

@@ -1,4 +1,4 @@
-//! What was scored, and how.
+//! The record of a score: set, games, testers and settings.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,58 +7,58 @@ use super::{clock::ClockKind, contestant::ContestantRecord};
 /// Newest form of score files that is read and written.
 pub const SCORE_FORMAT: u32 = 1;
 
-/// Whatever the results of a score depend on.
+/// Everything that the results of a score depend on.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScoreRecord {
     /// Form of the file.
     pub format: u32,
     /// The set.
     pub set: SetRecord,
-    /// Its games that were tested.
+    /// The games of the set that were tested.
     pub games: Vec<GameRecord>,
-    /// How.
+    /// The budget.
     pub budget: ScoreBudget,
-    /// What times were measured with.
+    /// The clock.
     pub clock: ClockKind,
 }
 
 /// A set of mutants.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SetRecord {
-    /// Seed that it was made from.
+    /// Random seed of the set.
     pub seed: u64,
-    /// Hash of what is in it.
+    /// Hash of the set.
     pub hash: String,
 }
 
-/// A game, and who tests it.
+/// A game, and its testers.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct GameRecord {
     /// Name of the game.
     pub name: String,
     /// Version of its rules.
     pub version: u32,
-    /// Who tests it.
+    /// The testers.
     pub testers: Vec<ContestantRecord>,
-    /// What looks for defects, each detector with its settings.
+    /// The detectors, each with its settings.
     pub detectors: Vec<String>,
-    /// Names of those that the game brings itself and no other game has.
+    /// Names of the detectors that the game itself adds.
     #[serde(default)]
     pub own_detectors: Vec<String>,
 }
 
-/// How much each tester may do on each subject.
+/// The budget of each tester on each subject.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ScoreBudget {
-    /// Episodes of whoever plays.
+    /// Episodes of a tester that plays.
     pub episodes: u32,
-    /// Environment steps of whoever explores.
+    /// Environment steps of an explorer.
     pub steps: u64,
-    /// Ways of whoever explores that are played again.
+    /// Paths of an explorer that are replayed.
     pub routes: u32,
-    /// Replays in which a finding is made shorter; 0 for none.
+    /// Replays to minimise a finding; 0 for no minimisation.
     pub replays: u32,
-    /// Seed of all that is drawn.
+    /// Random seed.
     pub seed: u64,
 }
 
@@ -69,7 +69,7 @@ impl Default for ScoreBudget {
 }
 
 impl ScoreRecord {
-    /// What differs between two scores, each in words.
+    /// Returns the differences between two scores, each in words.
     pub fn differences(&self, other: &Self) -> Vec<String> {
         let mut found = self.differences_of_way(other);
         if self.set != other.set {
@@ -82,7 +82,7 @@ impl ScoreRecord {
         found
     }
 
-    /// What differs in how they were made: scores of other games and sets can be joined all the same.
+    /// Returns the differences in settings. Scores of other games and sets can still be joined.
     pub fn differences_of_way(&self, other: &Self) -> Vec<String> {
         let mut found = Vec::new();
         let mut compare = |what: &str, one: String, other: String| {

@@ -1,4 +1,4 @@
-//! All scores side by side: mutants, sound levels and testers, each by its place.
+//! All scores side by side: mutants, unmutated levels and testers, each by its index.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -24,35 +24,36 @@ pub(super) struct MutantRow {
     pub class: String,
 }
 
-/// A sound level.
+/// An unmutated level.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct SoundRow {
     pub game: String,
 }
 
-/// All that was scored.
+/// All scores.
 #[derive(Default)]
 pub(super) struct Rows<'a> {
     pub mutants: Vec<MutantRow>,
     pub sound: Vec<SoundRow>,
     pub testers: Vec<TesterOfGames>,
-    /// For each tester, its jobs by the place of the mutant.
+    /// For each tester, its jobs by the index of the mutant.
     pub played: Vec<BTreeMap<usize, &'a ScoredJob>>,
-    /// For each tester, its jobs by the place of the sound level.
+    /// For each tester, its jobs by the index of the unmutated level.
     pub played_sound: Vec<BTreeMap<usize, &'a ScoredJob>>,
-    /// For each tester, what it found with nothing to compare it with.
+    /// For each tester, its findings without a comparison with the unmutated game.
     pub catches: Vec<Catch>,
-    /// Names of the detectors that games bring themselves, by the game.
+    /// Names of the detectors that games add, by the game.
     own_detectors: BTreeMap<&'a str, &'a [String]>,
 }
 
 impl Rows<'_> {
-    /// Whether a tester found a mutant by any means.
+    /// Returns whether a tester found a mutant by any means.
     pub fn beside(&self, tester: usize, mutant: usize) -> bool {
         self.played[tester].get(&mutant).is_some_and(|job| job.found.at_all())
     }
 
-    /// Whether a tester found a mutant with nothing to compare it with, and without the detectors that its game brings itself.
+    /// Returns whether a tester found a mutant without a comparison with the unmutated game, and without its game's own
+    /// detectors.
     pub fn without_own(&self, tester: usize, mutant: usize) -> bool {
         let own = self.own_detectors.get(self.mutants[mutant].game.as_str()).copied().unwrap_or_default();
         self.played[tester].get(&mutant).is_some_and(|job| {
@@ -63,7 +64,7 @@ impl Rows<'_> {
     }
 }
 
-/// The same scores by places. Testers of the same name are one.
+/// Indexes the scores. Testers of the same name are one.
 pub(super) fn rows(scores: &[(PathBuf, Score)]) -> Rows<'_> {
     let mut rows = Rows::default();
     for (_, score) in scores {

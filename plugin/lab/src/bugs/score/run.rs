@@ -1,4 +1,4 @@
-//! Setting all testers on all subjects, on all cores.
+//! The run of all testers on all subjects, on all cores.
 
 use std::{
     sync::{Mutex, MutexGuard, PoisonError},
@@ -23,21 +23,21 @@ use super::{
 };
 use crate::findings::Breakage;
 
-/// How a score is watched.
+/// The callbacks of a running score.
 pub struct ScoreWatch<'a> {
-    /// Hears how many more jobs have been finished; called from several threads.
+    /// Receives how many more jobs have finished; called from several threads.
     pub progress: &'a (dyn Fn(u64) + Sync),
-    /// Whether to stop; what is finished is kept.
+    /// Returns true to stop; finished jobs are kept.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// A score that is being made.
+/// A score in progress.
 pub struct ScoreRun<'a> {
     plan: &'a ScorePlan<'a>,
     cases: Vec<Case>,
 }
 
-/// What the threads share.
+/// The state that the threads share.
 struct Shared<'a> {
     next: usize,
     journal: &'a mut ScoreJournal,
@@ -56,15 +56,15 @@ impl<'a> ScoreRun<'a> {
         Ok(Self { plan, cases: cases(plan)? })
     }
 
-    /// Number of jobs: each tester on each subject of its game.
+    /// Returns the number of jobs: each tester on each subject of its game.
     pub fn jobs(&self) -> u64 {
         self.cases.iter().map(|case| self.plan.games[case.game].contestants.len() as u64).sum()
     }
 
-    /// Does all jobs that are not finished in the journal, and says what was found; `None` if somebody asked to stop.
+    /// Runs all jobs that the journal does not have, and judges all of them; `None` if `stop` returned true.
     ///
-    /// Each job is done on one thread. Its results but for the times depend on the plan's budget, the tester and the subject
-    /// alone. A mutant that breaks a tester is a finding.
+    /// Each job runs on one thread. Its results, apart from the times, depend on the plan's budget, the tester and the
+    /// subject alone. A mutant that makes a tester panic is a finding.
     ///
     /// # Errors
     ///
@@ -79,7 +79,7 @@ impl<'a> ScoreRun<'a> {
         let shared = Mutex::new(Shared { next: 0, journal: &mut *journal, failure: None, is_stopped: false });
         thread::scope(|scope| {
             for _ in 1..threads {
-                // Where the system starts fewer threads, it takes longer.
+                // With fewer threads than asked for, the score only takes longer.
                 let _ = Builder::new().spawn_scoped(scope, || self.work(&open, &shared, watch));
             }
             self.work(&open, &shared, watch);
@@ -99,14 +99,14 @@ impl<'a> ScoreRun<'a> {
         Ok(Some(Score { record: self.plan.record(), command: journal.command().to_owned(), subjects, jobs }))
     }
 
-    /// All jobs in the order of the score.
+    /// Returns all jobs in the order of the score.
     fn all(&self) -> impl Iterator<Item = (&Case, &Contestant)> {
         self.cases.iter().flat_map(move |case| {
             self.plan.games[case.game].contestants.iter().map(move |contestant| (case, contestant))
         })
     }
 
-    /// What one thread does: job after job.
+    /// Runs job after job on one thread.
     fn work(&self, open: &[(&Case, &Contestant)], shared: &Mutex<Shared>, watch: &ScoreWatch) {
         loop {
             let (case, contestant) = {

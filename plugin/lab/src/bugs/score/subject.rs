@@ -1,38 +1,38 @@
-//! What testers are set on.
+//! The subjects of a score: mutants and unmutated levels.
 
 use serde::{Deserialize, Serialize};
 
-/// A level of a game, as it should be or with a planted defect.
+/// A level of a game, unmutated or with a planted defect.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Subject {
-    /// Its name, unlike that of all others: that of the mutant, or game and level, such as `GAME MODE:7`.
+    /// Its unique name: that of the mutant, or game and level, such as `GAME MODE:7`.
     pub id: String,
     /// Name of the game.
     pub game: String,
-    /// What it is.
+    /// Its kind.
     #[serde(flatten)]
     pub kind: SubjectKind,
 }
 
-/// What a subject is.
+/// The kind of a subject.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 pub enum SubjectKind {
-    /// A defect is planted in it.
+    /// A subject with a planted defect.
     Mutant {
         /// Class of the defect.
         class: String,
         /// Name of the subject that it was made of.
         original: String,
     },
-    /// Nothing is wrong with it, and whatever is found in it is false.
+    /// An unmutated level: every finding in it is false.
     Sound,
-    /// A sound one that mutants were made of, and that is not among those that are counted.
+    /// An unmutated level that mutants were made of, and that is not among those that are counted.
     Original,
 }
 
 impl Subject {
-    /// Class of its defect, if it has one.
+    /// Returns the class of its defect, if it has one.
     pub fn class(&self) -> Option<&str> {
         match &self.kind {
             SubjectKind::Mutant { class, .. } => Some(class),
@@ -40,7 +40,7 @@ impl Subject {
         }
     }
 
-    /// What a sound level is called.
+    /// Returns the name of an unmutated level.
     pub fn id_of_level(game: &str, mode: &str, level: u64) -> String {
         format!("{game} {mode}:{level}")
     }

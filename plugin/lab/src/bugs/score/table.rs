@@ -1,4 +1,4 @@
-//! What scores say, in one table.
+//! The table that joins several scores.
 
 use std::{collections::BTreeMap, path::PathBuf};
 
@@ -16,57 +16,58 @@ use super::{
     tester_row::{TesterRow, tester_row},
 };
 
-/// Share of the sound levels on which the best mix with few false findings may find something.
+/// Largest share of the unmutated levels with a finding, for the best mix with few false findings.
 pub const FEW_FALSE: f64 = 0.01;
 
-/// What scores say: recall and precision by class and tester, and what it costs.
+/// Recall, precision and costs of testers, by class and tester.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ScoreTable {
     /// The sets, each once.
     pub sets: Vec<SetRecord>,
     /// The games with their versions.
     pub games: Vec<String>,
-    /// How much each tester did.
+    /// The budget of each tester.
     pub budget: ScoreBudget,
-    /// What times were measured with.
+    /// The clock.
     pub clock: ClockKind,
-    /// What people called.
+    /// The commands that made the scores.
     pub commands: Vec<String>,
     /// Number of mutants.
     pub mutants: u64,
-    /// Number of sound levels.
+    /// Number of unmutated levels.
     pub sound: u64,
     /// Each tester by itself.
     pub testers: Vec<TesterRow>,
     /// The smallest mix that finds most.
     pub best: TesterRow,
-    /// The smallest mix that finds most with something found on at most [`FEW_FALSE`] of the sound levels and none of them
-    /// called unsolvable.
+    /// The smallest mix that finds most with findings on at most [`FEW_FALSE`] of the unmutated levels and no such
+    /// level called unsolvable.
     pub careful: TesterRow,
     /// All testers together.
     pub all: TesterRow,
     /// Each class of defects.
     pub classes: Vec<ClassRow>,
-    /// Defects that testers with learned skills find and no other tester.
+    /// Defects that testers with learned skills find and other testers do not.
     pub only_skills: Share,
-    /// The same among the defects that anybody finds.
+    /// The same share among the defects that are found at all.
     pub only_skills_of_found: Share,
 }
 
-/// How the defects of a class are found.
+/// The recall of a class of defects.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ClassRow {
     /// The class.
     pub class: String,
-    /// By each tester, in the order of the table; of nothing where it does not test the games that have the class.
+    /// By each tester, in the order of the table. The total is 0 if a tester does not test the games that have the
+    /// class.
     pub testers: Vec<Share>,
     /// By the best mix.
     pub best: Share,
-    /// Of what the best mix finds in this class and on sound levels of the same games: how much is no false finding.
+    /// Share of true findings among those of the best mix, in this class and on unmutated levels of the same games.
     pub precision: Share,
     /// By the careful mix.
     pub careful: Share,
-    /// By the best mix, beside a sound build.
+    /// By the best mix, with a comparison with the unmutated game.
     pub beside: Share,
     /// By testers with learned skills alone.
     pub only_skills: Share,
@@ -77,7 +78,7 @@ impl ScoreTable {
     ///
     /// # Errors
     ///
-    /// There is none, two hold the same, or they were not made in the same way.
+    /// There is no score, two scores have a subject in common, or they were made with different settings.
     pub fn join(scores: &[(PathBuf, Score)]) -> Result<Self, ScoreError> {
         let (first, others) = scores.split_first().ok_or(ScoreError::Nothing)?;
         for (path, score) in others {
@@ -122,7 +123,7 @@ impl ScoreTable {
     }
 }
 
-/// Checks that nothing is scored twice.
+/// Checks that no subject is scored twice.
 fn check_different(scores: &[(PathBuf, Score)]) -> Result<(), ScoreError> {
     let mut known: BTreeMap<&str, &PathBuf> = BTreeMap::new();
     for (path, score) in scores {
@@ -137,7 +138,7 @@ fn check_different(scores: &[(PathBuf, Score)]) -> Result<(), ScoreError> {
     Ok(())
 }
 
-/// For each mutant, whether somebody with learned skills found it and nobody else.
+/// Returns for each mutant whether only testers with learned skills found it.
 fn only_skills(rows: &Rows) -> Vec<bool> {
     let (skilled, others): (Vec<usize>, Vec<usize>) =
         (0..rows.testers.len()).partition(|tester| rows.testers[*tester].skilled);

@@ -8,10 +8,10 @@ use super::{
 use crate::report::PlainTable;
 
 impl ScoreTable {
-    /// What it comes to, in a few lines.
+    /// Returns the summary, in a few lines.
     pub fn headlines(&self) -> Vec<String> {
         let mix = |row: &TesterRow| {
-            let names = if row.testers.is_empty() { "nobody".to_owned() } else { row.testers.join(" + ") };
+            let names = if row.testers.is_empty() { "no tester".to_owned() } else { row.testers.join(" + ") };
             let first =
                 row.first_seconds.map_or_else(String::new, |s| format!("; median to the first {} s", short_number(s)));
             format!(
@@ -42,7 +42,7 @@ impl ScoreTable {
         lines
     }
 
-    /// What the columns mean, a line each.
+    /// Returns the meanings of the columns, a line each.
     pub fn meanings() -> Vec<String> {
         vec![
             "best mix: the fewest testers that together find most".to_owned(),
@@ -50,16 +50,16 @@ impl ScoreTable {
                 "careful mix: the same, with something found on at most {} % of the sound levels and none called unsolvable",
                 100.0 * FEW_FALSE
             ),
-            "without games' own detectors: found by what all games have, by a proof, or by failing".to_owned(),
+            "without games' own detectors: found by detectors of all games, by a proof, or by failing".to_owned(),
             "beside a sound build: found as before, or by a difference from the sound level or game, with the best mix"
                 .to_owned(),
-            "of the way there, of the episode: what is left of the actions up to the finding, and of all of its episode"
+            "of the path, of the episode: the share that is left of the actions up to the finding, and of its episode"
                 .to_owned(),
             "skills alone: found by testers with learned skills and by no other".to_owned(),
         ]
     }
 
-    /// Each class.
+    /// Returns the table of classes.
     pub fn class_table(&self) -> PlainTable {
         let names = self.testers.iter().map(|tester| tester.testers.join(" + "));
         let last = ["best mix", "precision", "careful mix", "beside a sound build", "skills alone"];
@@ -73,7 +73,7 @@ impl ScoreTable {
         PlainTable { caption: "defects found, by class".to_owned(), columns: columns.collect(), rows: rows.collect() }
     }
 
-    /// Each tester and the mixes.
+    /// Returns the table of testers and mixes.
     pub fn tester_table(&self) -> PlainTable {
         let columns = [
             "tester",
@@ -86,7 +86,7 @@ impl ScoreTable {
             "defects per hour",
             "seconds to the first",
             "minimised actions",
-            "of the way there",
+            "of the path",
             "of the episode",
         ];
         let number = |number: Option<f64>| number.map_or_else(|| "–".to_owned(), short_number);

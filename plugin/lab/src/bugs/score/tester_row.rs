@@ -1,4 +1,4 @@
-//! How good a tester is, or several together.
+//! The numbers of a tester, or of several together.
 
 use std::collections::BTreeSet;
 
@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::{found::ScoredJob, mix::Catch, numbers::Share, rows::Rows};
 use crate::report::statistics::median;
 
-/// What a tester finds, and what it costs; or several testers together.
+/// Recall, precision and costs of a tester, or of several together.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TesterRow {
     /// Names of the testers.
@@ -16,41 +16,41 @@ pub struct TesterRow {
     pub games: Vec<String>,
     /// Whether all of them act with learned skills.
     pub skilled: bool,
-    /// Mutants that are found, of those that they test; for several, of all mutants.
+    /// Share of the mutants that they test and find; for several testers, of all mutants.
     pub recall: Share,
-    /// The same beside a sound build.
+    /// The same with a comparison with the unmutated game.
     pub beside: Share,
-    /// Recall without the detectors that games bring themselves.
+    /// Recall without the detectors that games add.
     pub without_own: Share,
-    /// Of all that they find in mutants and sound levels: how much is no false finding.
+    /// Share of true findings among all in mutants and on unmutated levels.
     pub precision: Share,
-    /// Sound levels on which something is found.
+    /// Unmutated levels with a finding.
     pub false_findings: Share,
-    /// Sound levels that are called unsolvable.
+    /// Unmutated levels that are called unsolvable.
     pub called_unsolvable: u64,
-    /// Seconds that they took for the mutants.
+    /// Seconds on the mutants.
     pub seconds: f64,
-    /// Distinct defects that are found in an hour of that.
+    /// Distinct defects that are found in an hour.
     pub found_per_hour: Option<f64>,
-    /// Median of the seconds until a defect is found first, of those that are found.
+    /// Median of the seconds until a defect is first found, among those that are found.
     pub first_seconds: Option<f64>,
-    /// Median length of the minimised replays, in actions that do something.
+    /// Median length of the minimised replays, in actions with an effect.
     pub minimised: Option<f64>,
     /// Median of their share of the actions up to the finding.
     pub minimised_share: Option<f64>,
     /// Median of their share of the actions of the whole episode.
     pub episode_share: Option<f64>,
-    /// How many there are.
+    /// Number of minimised replays.
     pub replays: u64,
 }
 
 /// Seconds of an hour.
 const HOUR: f64 = 3600.0;
 
-/// The row of these testers, by their places. A defect is first found by the fastest of them.
+/// Returns the row of these testers, by their indices. A defect counts as found when the fastest of them finds it.
 pub(super) fn tester_row(rows: &Rows, testers: &[usize]) -> TesterRow {
     let catch = Catch::of(&rows.catches, testers);
-    // What a single tester does not test says nothing of it.
+    // A single tester is not judged by mutants that it does not test.
     let is_tested = |mutant: &usize| match testers {
         [tester] => rows.played[*tester].contains_key(mutant),
         _ => true,

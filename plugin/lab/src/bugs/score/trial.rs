@@ -1,37 +1,37 @@
-//! One tester, set on one subject.
+//! The trial of one tester on one subject.
 
 use super::{clock::JobClock, contestant::Contestant, record::ScoreBudget};
 use crate::{detectors::Detectors, findings::Budget, game::Game};
 
-/// What a job works on.
+/// The inputs of a job.
 pub(super) struct Trial<'a> {
-    /// The game, with a defect in its rules if one is planted there.
+    /// The game, with a defect in its rules if there is one.
     pub game: &'a dyn Game,
     /// Mode of the level.
     pub mode: &'a str,
     /// Number of the level.
     pub level: u64,
-    /// Name from which all seeds come: that of the sound level, so that a mutant is tested as its original is.
+    /// Name of the unmutated level, from which all seeds are derived, so that a mutant is tested as its original is.
     pub name: &'a str,
-    /// Who tests.
+    /// The tester.
     pub contestant: &'a Contestant,
-    /// What looks for defects.
+    /// The detectors.
     pub detectors: &'a Detectors,
-    /// How much may be done.
+    /// The budget.
     pub budget: ScoreBudget,
-    /// Whether findings are made shorter.
+    /// Whether findings are minimised.
     pub shortens: bool,
-    /// Runs since the beginning of the job.
+    /// Runs from the start of the job.
     pub clock: JobClock,
-    /// Whether to stop.
+    /// Returns true to stop.
     pub stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-/// Most ticks of all replays in which a finding is made shorter, for each replay that is allowed.
+/// Most ticks of all replays that minimise a finding, for each replay that is allowed.
 const TICKS_PER_REPLAY: u64 = 2000;
 
 impl Trial<'_> {
-    /// How much is tried to make a finding shorter; `None` for nothing.
+    /// Returns the budget of minimisation; `None` for no minimisation.
     pub fn shortening(&self) -> Option<Budget> {
         let replays = self.budget.replays;
         let is_wanted = self.shortens && replays > 0;

@@ -1,4 +1,4 @@
-//! What rewards testers usually collect.
+//! The rewards that testers collect on unmutated levels.
 
 use std::collections::BTreeMap;
 
@@ -7,23 +7,23 @@ use super::{
     subject::{Subject, SubjectKind},
 };
 
-/// Fewest sound levels, beside the one that is looked at, from which a tester's usual reward is known.
+/// Fewest unmutated levels, beside the one that is judged, from which a tester's typical reward is known.
 pub const FEWEST_SOUND: usize = 8;
-/// Standard deviations from the mean that are far: with 20 sound levels and normal rewards, one in a thousand lies there (Student's
-/// t with 19 degrees of freedom).
+/// Standard deviations from the mean that count as unusual. With 20 unmutated levels and normal rewards, one in a
+/// thousand lies there (Student's t with 19 degrees of freedom).
 pub const FAR: f64 = 4.0;
 
-/// The rewards of each tester on the sound levels of each game.
+/// The rewards of each tester on the unmutated levels of each game.
 ///
-/// In a game that cannot be won no tester fails by not reaching the aim, but one may still collect far more or far less than
-/// it does elsewhere.
+/// In a game that cannot be won, no tester fails by missing the goal. It may still collect far more or far less reward
+/// than elsewhere.
 pub(super) struct UsualRewards<'a> {
-    /// By game and tester: the mean reward of the tester's episodes on each sound level.
+    /// By game and tester: the mean reward of the tester's episodes on each unmutated level.
     known: BTreeMap<(&'a str, &'a str), Vec<(&'a str, f64)>>,
 }
 
 impl<'a> UsualRewards<'a> {
-    /// Those of these results.
+    /// Collects the rewards of these results.
     pub fn new(subjects: &BTreeMap<&'a str, &'a Subject>, results: &'a [JobResult]) -> Self {
         let mut known: BTreeMap<_, Vec<_>> = BTreeMap::new();
         for result in results {
@@ -36,9 +36,9 @@ impl<'a> UsualRewards<'a> {
         Self { known }
     }
 
-    /// Whether a tester's reward lies outside of all that it collects on the sound levels of the game, this one left out, and
-    /// more than [`FAR`] standard deviations from their mean. Only a tester that collects much the same on all of them says
-    /// something: the least and the most lie less far apart than their middle from 0.
+    /// Returns whether a tester's reward is unusual. It must lie outside of all its rewards on the other unmutated
+    /// levels of the game, and more than [`FAR`] standard deviations from their mean. Only testers with similar rewards
+    /// on all of them count: the range must be smaller than the distance of its middle from 0.
     pub fn is_unusual(&self, game: &str, result: &JobResult) -> bool {
         let Some(reward) = result.reward else { return false };
         let Some(known) = self.known.get(&(game, result.tester.as_str())) else { return false };
@@ -51,7 +51,8 @@ impl<'a> UsualRewards<'a> {
     }
 }
 
-/// Whether a number is more than [`FAR`] standard deviations from the mean of these, of which there are two or more.
+/// Returns whether a number is more than [`FAR`] standard deviations from the mean of these, of which there are two or
+/// more.
 fn is_far(number: f64, others: &[f64]) -> bool {
     let count = others.len() as f64;
     let mean = others.iter().sum::<f64>() / count;
@@ -69,7 +70,8 @@ mod tests {
         JobResult { subject, tester, episodes: 1, reward: Some(reward), ..JobResult::default() }
     }
 
-    /// Which of the rewards on a mutant are unusual after these on sound levels, and on which sound level it is.
+    /// The indices of unusual rewards: on a mutant, after these on unmutated levels, and on the unmutated levels
+    /// themselves.
     fn unusual(sound_rewards: &[f64], rewards: &[f64]) -> (Vec<bool>, Vec<usize>) {
         let levels: Vec<Subject> = (0..sound_rewards.len() as u64).map(|level| sound("garden", level)).collect();
         let results: Vec<JobResult> =

@@ -74,8 +74,8 @@ fn damaged_files_are_refused_with_their_line() {
         ("track-panic-00", "track-hole-00", "two mutants are called `track-hole-00`"),
         ("levels/track-hole-00", "../track-hole-00", "must be levels/ID.json"),
         ("fffffffffffffffe", "gone", "not made of hexadecimal digits"),
-        ("9x9:7\"", "9x9\"", "is no level: it must be MODE:N"),
-        ("\"name\": \"track\"", "\"name\": \"truck\"", "is not among `games`"),
+        ("9x9:7\"", "9x9\"", "must be MODE:N"),
+        ("\"name\": \"track\"", "\"name\": \"truck\"", "is missing in `games`"),
         ("plain:3..9", "plain:9..3", "first level 9 is after last level 3"),
     ] {
         let told = error(old, new);
@@ -98,7 +98,7 @@ fn sets_for_another_version_and_changed_levels_are_refused() {
     rules.check(folder.path(), &Track).expect("there is such a variant");
     rules.mutants[0].planted = PlantedPart::Rules { variant: 99 };
     let words = rules.check(folder.path(), &Track).expect_err("no such variant").to_string();
-    assert!(words.contains("has no defect `panic` like `track-panic-00`"), "{words}");
+    assert!(words.contains("has no defect `panic`, which `track-panic-00` needs"), "{words}");
 }
 
 #[test]

@@ -1,6 +1,7 @@
 use std::{fs, path::PathBuf};
 
 use bevy_playbot::demo::file::DemoFault;
+use playbot_learner::HasExitCode as _;
 
 use super::*;
 use crate::findings::testing::stored;
@@ -79,9 +80,9 @@ fn files_of_others_are_told_what_they_are() {
         StoredFinding::read(&path).expect_err(note).to_string()
     };
     let words = with_note("played on Sunday", 1);
-    assert!(words.contains("a recording, but of no finding") && words.contains("`playbot demo show "), "{words}");
+    assert!(words.contains("a recording, but not a finding") && words.contains("`playbot demo show "), "{words}");
     assert!(words.contains("`playbot view garden --demo ") && !words.contains("FormOnly"), "{words}");
-    assert!(with_note("(finding: 1, level: \"a\")", 1).contains("a recording, but of no finding"));
+    assert!(with_note("(finding: 1, level: \"a\")", 1).contains("a recording, but not a finding"));
     assert!(with_note("(finding: 9, colour: \"red\")", 1).contains("form 9, but this program reads forms up to 1"));
     let sound = ron::ser::to_string(&stored().head).expect("text");
     assert!(with_note(&sound, 0).contains("0 episodes, but a finding has one"));

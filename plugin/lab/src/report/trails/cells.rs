@@ -1,4 +1,4 @@
-//! Which cells of a floor were reached, and how often.
+//! Chart of the cells of a floor that were reached, by number of visits.
 
 use bevy::math::{Rect, Vec2};
 
@@ -13,47 +13,47 @@ use crate::{
     report::text_width::{text_width, wrap},
 };
 
-/// Space around everything, pixels.
+/// Space around each part, pixels.
 const GAP: f32 = 20.0;
 const TITLE: f32 = 16.0;
 const TEXT: f32 = 13.0;
 /// Distance of lines, pixels.
 const LINE: f32 = 19.0;
-/// Width of the letters of pictures made of pixels, in font sizes.
+/// Width of the letters of pixel images, in font sizes.
 const PIXEL_LETTER: f64 = 0.58;
-/// Lines of text are at least so long before they are broken, pixels.
+/// Shortest width at which lines of text are broken, pixels.
 const SHORTEST: f32 = 360.0;
-/// Pixels of the longer side of a floor.
+/// Length of the longer side of a floor, pixels.
 const LENGTH: f32 = 640.0;
 /// Space between two cells, pixels.
 const SEAM: f32 = 0.5;
 
-/// Cells of one floor, coloured by how often something was there, and a way through them.
+/// Cells of one floor, coloured by their number of visits, and a path through them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CellChart {
-    /// What it shows.
+    /// Title of the chart.
     pub title: String,
     /// Lines below the title.
     pub captions: Vec<String>,
     /// The bounds and the walls.
     pub plan: FloorPlan,
-    /// What each cell covers, and how often it was visited. Darker is more, on a logarithmic scale.
+    /// Area and number of visits of each cell. Darker is more, on a logarithmic scale.
     pub reached: Vec<(Rect, u64)>,
-    /// Cells that nobody reached: they are crossed.
+    /// Cells that were not reached: they are crossed.
     pub missed: Vec<Rect>,
-    /// A way, from the start on; may be empty.
+    /// Path from the start on; may be empty.
     pub way: Vec<Vec2>,
 }
 
 impl CellChart {
-    /// The chart.
+    /// Draws the chart.
     pub fn draw(&self) -> Drawing {
         let mut shapes = Vec::new();
         let mut right = write(0.0, TITLE, INK, &self.title, &mut shapes);
         let mut y = LINE;
         let extent = self.extent();
         let share = extent.width() / extent.size().max_element().max(f32::MIN_POSITIVE);
-        // No line is longer than the floor is wide, unless that is narrow.
+        // Lines are at most as long as the floor is wide, or as the shortest width.
         let room = f64::from((LENGTH * share).max(SHORTEST));
         for caption in self.captions.iter().flat_map(|caption| wrap(caption, room, f64::from(TEXT))) {
             right = right.max(write(y, TEXT, SOFT, &caption, &mut shapes));
@@ -67,7 +67,7 @@ impl CellChart {
         Drawing { label: self.title.clone(), size: Vec2::new(right.max(corner.x), corner.y) + GAP, shapes }
     }
 
-    /// Says what the marks are, and returns where that ends.
+    /// Explains the marks, and returns the lower end.
     fn legend(&self, y: f32, out: &mut Vec<Shape>) -> f32 {
         let middle = GAP + y + TEXT - 4.5;
         out.push(start_mark(Vec2::new(GAP + 8.0, middle), 6.0));
@@ -79,10 +79,10 @@ impl CellChart {
         }
         let ends = [right + 16.0, right + 40.0].map(|x| Vec2::new(x, middle));
         out.push(line(ends.to_vec(), 2.0, LINES[0]));
-        write_at(right + 48.0, y, TEXT, SOFT, "way", out)
+        write_at(right + 48.0, y, TEXT, SOFT, "path", out)
     }
 
-    /// The bounds of the plan, and around them whatever else was reached.
+    /// Returns the bounds of the plan, extended to everything that was reached.
     fn extent(&self) -> Rect {
         self.reached.iter().fold(self.plan.bounds, |extent, (area, _)| extent.union(*area))
     }
@@ -116,7 +116,7 @@ impl CellChart {
     }
 }
 
-/// Writes a line of text and returns where it ends.
+/// Writes a line of text and returns its lower end.
 fn write(y: f32, size: f32, colour: Rgb, words: &str, out: &mut Vec<Shape>) -> f32 {
     write_at(GAP, y, size, colour, words, out)
 }
@@ -168,11 +168,11 @@ mod tests {
         assert!(blocks[0].0.max.x < blocks[1].0.min.x && blocks[0].0.min.y == blocks[1].0.min.y);
         assert!((blocks[2].0.width() - LENGTH / 4.0).abs() < 0.01);
         let lines = drawing.shapes.iter().filter(|shape| matches!(shape, Shape::Line { .. })).count();
-        assert_eq!(lines, 2 + 1 + 1 + 1, "a cross, the way, the border, and the way in the legend");
+        assert_eq!(lines, 2 + 1 + 1 + 1, "a cross, the path, the border, and the path in the legend");
         let is_there = |wanted: &str| {
             drawing.shapes.iter().any(|shape| matches!(shape, Shape::Text { words, .. } if words == wanted))
         };
-        assert!(["start", "goal", "way"].into_iter().all(is_there));
+        assert!(["start", "goal", "path"].into_iter().all(is_there));
     }
 
     #[test]

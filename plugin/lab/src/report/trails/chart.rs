@@ -1,4 +1,4 @@
-//! What is drawn of where agents went.
+//! Chart of where agents went.
 
 use bevy::math::{Rect, Vec2};
 
@@ -8,24 +8,24 @@ use crate::{drawing::Drawing, eval::Trail, floor_plan::FloorPlan};
 /// Trajectories and visits of one or more players on one or more floors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrailChart {
-    /// What it shows.
+    /// Title of the chart.
     pub title: String,
     /// The floors, below each other. Only the first 6 are drawn.
     pub floors: Vec<Floor>,
 }
 
-/// Levels with the same walls, and who walked there.
+/// Levels with the same walls, and the players that walked there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Floor {
-    /// The levels, for people.
+    /// Description of the levels.
     pub name: String,
     /// The bounds and the walls.
     pub plan: FloorPlan,
-    /// Where agents start, on one level or another.
+    /// Start positions of agents on these levels.
     pub starts: Vec<Vec2>,
-    /// Where they should go, on one level or another.
+    /// Goal positions on these levels.
     pub goals: Vec<Vec2>,
-    /// Who walked, side by side.
+    /// The players, side by side.
     pub walkers: Vec<Walker>,
 }
 
@@ -39,7 +39,7 @@ pub struct Walker {
 }
 
 impl Floor {
-    /// The bounds of the plan, and around them whatever else was walked on.
+    /// Returns the bounds of the plan, extended to everything that was walked on.
     pub(super) fn extent(&self) -> Rect {
         let places = self.walkers.iter().flat_map(|walker| &walker.trails).flat_map(|trail| &trail.places);
         places.filter(|place| place.is_finite()).fold(self.plan.bounds, |extent, &place| extent.union_point(place))
@@ -47,8 +47,8 @@ impl Floor {
 }
 
 impl TrailChart {
-    /// The chart: for each player its trajectories, one coloured line per episode and at most 24 of them, and a map of
-    /// the places that all its episodes visited.
+    /// Draws the chart: for each player its trajectories, and a map of the squares visited in all its episodes.
+    /// Trajectories are coloured lines, one per episode and at most 24.
     pub fn draw(&self) -> Drawing {
         layout::draw(self)
     }

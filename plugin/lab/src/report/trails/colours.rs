@@ -1,4 +1,4 @@
-//! Colours on white paper that people with any kind of colour vision can tell apart.
+//! Colours on white paper, distinct for every kind of colour vision.
 
 use crate::drawing::Rgb;
 
@@ -16,7 +16,7 @@ pub const LINES: [Rgb; 7] =
 /// From rarely to often visited: darker at every step.
 const HEAT: [Rgb; 5] = [[255, 237, 160], [254, 178, 76], [240, 82, 40], [177, 0, 60], [68, 1, 52]];
 
-/// The colour of a share, 0 to 1, of the most visits.
+/// Returns the colour of a share, 0 to 1, of the most visits.
 pub fn heat(share: f64) -> Rgb {
     let place = share.clamp(0.0, 1.0) * (HEAT.len() - 1) as f64;
     let below = (place as usize).min(HEAT.len() - 2);

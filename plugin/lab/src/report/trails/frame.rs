@@ -1,8 +1,8 @@
-//! Where a floor lies on the paper.
+//! Position of a floor on the paper.
 
 use bevy::math::{Rect, Vec2};
 
-/// A floor on the paper: from its units to pixels, with y turned around.
+/// A floor on the paper: converts its units to pixels, with y turned around.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
     bounds: Rect,
@@ -11,28 +11,28 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// The floor with its upper left corner here, this wide.
+    /// Makes a floor with its upper left corner here, this wide.
     pub fn new(bounds: Rect, corner: Vec2, width: f32) -> Self {
         Self { bounds, corner, scale: width / bounds.width().max(f32::MIN_POSITIVE) }
     }
 
-    /// What is drawn of the floor, in its units.
+    /// Returns the drawn part of the floor, in its units.
     pub fn bounds(&self) -> Rect {
         self.bounds
     }
 
-    /// Where a place of the floor is drawn.
+    /// Returns the pixel of a position on the floor.
     pub fn place(&self, at: Vec2) -> Vec2 {
         self.corner + Vec2::new(at.x - self.bounds.min.x, self.bounds.max.y - at.y) * self.scale
     }
 
-    /// Where a part of the floor is drawn, as far as it is within the bounds.
+    /// Returns the pixels of an area of the floor, cut at the bounds.
     pub fn area(&self, area: Rect) -> Rect {
         let seen = area.intersect(self.bounds);
         Rect::from_corners(self.place(seen.min), self.place(seen.max))
     }
 
-    /// The whole floor.
+    /// Returns the pixels of the whole floor.
     pub fn whole(&self) -> Rect {
         self.area(self.bounds)
     }

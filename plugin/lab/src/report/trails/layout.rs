@@ -1,4 +1,4 @@
-//! Where the drawings of a chart stand.
+//! Layout of the drawings of a chart.
 
 use bevy::math::{Rect, Vec2};
 
@@ -11,15 +11,15 @@ use super::{
 use crate::drawing::{Drawing, Rgb, Shape};
 use crate::report::text_width::text_width;
 
-/// Floors that are drawn.
+/// Largest number of floors that are drawn.
 const MOST_FLOORS: usize = 6;
-/// Space around everything and between drawings, pixels.
+/// Space around and between drawings, pixels.
 const GAP: f32 = 20.0;
 /// Font size and distance of lines, pixels.
 const TEXT: f32 = 13.0;
 const TITLE: f32 = 16.0;
 const LINE: f32 = 19.0;
-/// Letters of pictures made of pixels are wider than those of drawings by this.
+/// Ratio of the widths of letters in pixel images and in drawings.
 const WIDEST: f32 = 1.4;
 /// Room for the words above a drawing.
 const HEAD: f32 = 3.0 * LINE + 2.0;
@@ -36,7 +36,7 @@ pub fn draw(chart: &TrailChart) -> Drawing {
     paper.text(0.0, TITLE, INK, &chart.title);
     let has = |kind: fn(&Floor) -> bool| chart.floors.iter().take(MOST_FLOORS).any(kind);
     let tiles = [
-        ("what kills", HAZARD, has(|floor| !floor.plan.hazards.is_empty())),
+        ("hazards", HAZARD, has(|floor| !floor.plan.hazards.is_empty())),
         ("crates and the like", PLATFORM, has(|floor| !floor.plan.platforms.is_empty())),
     ];
     paper.legend(&tiles);
@@ -52,7 +52,7 @@ pub fn draw(chart: &TrailChart) -> Drawing {
 }
 
 impl Paper {
-    /// Writes a line of text, and goes on below it.
+    /// Writes a line of text, and moves below it.
     fn text(&mut self, x: f32, size: f32, colour: [u8; 3], words: &str) {
         self.words(x, size, colour, words);
         self.y += LINE;
@@ -67,7 +67,7 @@ impl Paper {
         right - GAP
     }
 
-    /// Says what is what; of some kinds of tiles only if there are any.
+    /// Writes the legend; tile kinds only if they occur.
     fn legend(&mut self, tiles: &[(&str, Rgb, bool)]) {
         let middle = self.y + TEXT - 4.5;
         self.shapes.push(start_mark(Vec2::new(GAP + 8.0, middle), 6.0));
@@ -85,12 +85,12 @@ impl Paper {
             self.shapes.push(Shape::Block { area: Rect::from_corners(corner, corner + Vec2::new(9.0, 12.0)), fill });
             x += 9.0;
         }
-        self.text(x + 8.0, TEXT, SOFT, "few to most ticks in a place, logarithmic");
+        self.text(x + 8.0, TEXT, SOFT, "few to most ticks in a square, logarithmic");
         self.y += GAP / 2.0;
     }
 
-    /// All players on a floor: one of them with both drawings side by side, several side by side with the drawings below
-    /// each other.
+    /// Draws all players on a floor: a single one with both drawings side by side, several side by side with the
+    /// drawings below each other.
     fn floor(&mut self, floor: &Floor) {
         self.text(0.0, TEXT, INK, &floor.name);
         let extent = floor.extent();
@@ -110,7 +110,7 @@ impl Paper {
         }
     }
 
-    /// A drawing in its frame, with words above it, and goes on below it.
+    /// Draws a frame with a caption above it, and moves below it.
     fn panel(&mut self, floor: &Floor, walker: &Walker, content: Content, frame: &Frame) {
         let area = frame.whole();
         let reached = walker.trails.iter().filter(|trail| trail.result.success).count();
@@ -123,7 +123,7 @@ impl Paper {
     }
 }
 
-/// A name on one line of this width. Of one that is too long the end is kept, where paths differ.
+/// Shortens a name to one line of this width. The end is kept, since paths differ there.
 fn fitted(name: &str, width: f32) -> String {
     let fits = |words: &str| text_width(words, f64::from(TEXT * WIDEST)) <= f64::from(width);
     if fits(name) {
@@ -133,7 +133,7 @@ fn fitted(name: &str, width: f32) -> String {
     ends.into_iter().find(|words| fits(words)).unwrap_or_else(|| "..".to_owned())
 }
 
-/// Wide floors get more room.
+/// Returns the width of a panel, larger for wide floors.
 fn panel_width(extent: Rect) -> f32 {
     let shape = extent.width() / extent.height().max(f32::MIN_POSITIVE);
     (330.0 * shape.sqrt()).clamp(260.0, 900.0)

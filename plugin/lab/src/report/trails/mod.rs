@@ -1,4 +1,4 @@
-//! Where agents went: their trajectories on the floor plan, and how often each place was visited.
+//! Charts of where agents went: trajectories on the floor plan, and a map of visits.
 
 mod cells;
 mod chart;

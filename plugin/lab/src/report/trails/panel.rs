@@ -1,4 +1,4 @@
-//! One drawing of a floor: trajectories, or visits.
+//! A drawing of a floor: trajectories, or visits.
 
 use bevy::math::Vec2;
 
@@ -14,22 +14,24 @@ use crate::{
     floor_plan::FloorPlan,
 };
 
-/// Most trajectories in one drawing: more could not be told apart.
+/// Largest number of trajectories in one drawing: more are indistinct.
 const MOST_LINES: usize = 24;
 /// Points of a line are at least this far apart, pixels.
 const STEP: f32 = 0.7;
 const LINE_WIDTH: f32 = 1.8;
 const OPACITY: f32 = 0.75;
 
-/// What a drawing shows.
+/// Content of a drawing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Content {
+    /// The paths of agents.
     Trajectories,
+    /// Ticks per square.
     Visits,
 }
 
 impl Content {
-    /// What stands above the drawing.
+    /// Returns the caption above the drawing.
     pub fn caption(self, walker: &Walker) -> String {
         let all = walker.trails.len();
         let episodes = if all == 1 { "episode" } else { "episodes" };
@@ -78,20 +80,20 @@ fn lines(trails: &[Trail], frame: &Frame, out: &mut Vec<Shape>) {
         colour,
         opacity: OPACITY,
     }));
-    // Where each episode ended.
+    // Marks at the end of each episode.
     out.extend(coloured().filter_map(|(points, &colour)| {
         let centre = *points.last()?;
         Some(Shape::Mark { form: MarkForm::Disc, centre, radius: 3.0, fill: colour, outline: PAPER })
     }));
 }
 
-/// At most `most` of them, the first and the last among them.
+/// Returns at most `most` of the trails, with the first and the last among them.
 fn evenly(trails: &[Trail], most: usize) -> impl Iterator<Item = &Trail> {
     let shown = trails.len().min(most);
     (0..shown).map(move |at| &trails[at * (trails.len() - 1) / (shown - 1).max(1)])
 }
 
-/// The points of a trajectory on the paper, without those that nobody could see.
+/// Returns the points of a trajectory on the paper, thinned to visible steps.
 fn points(trail: &Trail, frame: &Frame) -> Vec<Vec2> {
     let mut points: Vec<Vec2> = Vec::new();
     let mut all = trail.places.iter().map(|&place| frame.place(place)).filter(|point| point.is_finite());
@@ -110,17 +112,17 @@ fn border(frame: &Frame, out: &mut Vec<Shape>) {
     out.push(Shape::Line { points: corners.to_vec(), width: 1.0, colour: INK, opacity: 1.0 });
 }
 
-/// Marks are smaller where there are many.
+/// Returns the size of marks, smaller if there are many.
 fn size(places: &[Vec2]) -> f32 {
     if places.len() > 1 { 3.0 } else { 6.0 }
 }
 
-/// The mark of a start.
+/// Returns the mark of a start.
 pub fn start_mark(centre: Vec2, radius: f32) -> Shape {
     Shape::Mark { form: MarkForm::Disc, centre, radius, fill: PAPER, outline: INK }
 }
 
-/// The mark of a goal.
+/// Returns the mark of a goal.
 pub fn goal_mark(centre: Vec2, radius: f32) -> Shape {
     Shape::Mark { form: MarkForm::Diamond, centre, radius: 1.3 * radius, fill: INK, outline: PAPER }
 }

@@ -1,4 +1,4 @@
-//! How often each place was visited.
+//! Number of visits of each square.
 
 use bevy::math::{Rect, Vec2};
 
@@ -19,7 +19,7 @@ pub struct Visits {
 }
 
 impl Visits {
-    /// Counts the places of all trails. Places outside of the bounds count nowhere.
+    /// Counts the positions of all trails. Positions outside of the bounds are not counted.
     pub fn count<'a>(bounds: Rect, trails: impl IntoIterator<Item = &'a Trail>) -> Self {
         let side = (bounds.size().max_element() / SQUARES).max(f32::MIN_POSITIVE);
         let squares = |length: f32| ((length / side).ceil() as usize).clamp(1, SQUARES as usize);
@@ -42,22 +42,22 @@ impl Visits {
         })
     }
 
-    /// Ticks in the square around a place; 0 outside of the bounds.
+    /// Returns the ticks in the square around a position; 0 outside of the bounds.
     pub fn at(&self, place: Vec2) -> u64 {
         self.index(place).map_or(0, |index| self.ticks[index])
     }
 
-    /// Ticks in all squares together.
+    /// Returns the sum of the ticks in all squares.
     pub fn total(&self) -> u64 {
         self.ticks.iter().sum()
     }
 
-    /// Ticks in the square with the most of them.
+    /// Returns the largest number of ticks in a square.
     pub fn most(&self) -> u64 {
         self.ticks.iter().copied().max().unwrap_or(0)
     }
 
-    /// Every square that was visited, with its ticks.
+    /// Returns every visited square with its ticks.
     pub fn visited(&self) -> impl Iterator<Item = (Rect, u64)> + '_ {
         self.ticks.iter().enumerate().filter(|(_, ticks)| **ticks > 0).map(|(index, &ticks)| {
             let corner = Vec2::new((index % self.columns) as f32, (index / self.columns) as f32);

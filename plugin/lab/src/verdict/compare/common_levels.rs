@@ -1,11 +1,12 @@
-//! Whether two tests have a level in common.
+//! Check for common levels of two tests.
 
 use crate::{
     level_files::is_level_files,
     verdict::{Shard, TestRecord},
 };
 
-/// Whether they may have, as far as their ranges say: which files other patterns match, results alone say.
+/// Returns whether they may have common levels, judged by their ranges: the files of other patterns are known from
+/// results only.
 pub(super) fn may_have_common_levels(before: &TestRecord, now: &TestRecord) -> bool {
     if is_level_files(&before.range.mode) && is_level_files(&now.range.mode) {
         return true;
@@ -15,13 +16,13 @@ pub(super) fn may_have_common_levels(before: &TestRecord, now: &TestRecord) -> b
     before.range.mode == now.range.mode && levels.any(|level| has(before, level))
 }
 
-/// Whether a level of the mode is tested.
+/// Returns whether a level of the mode is tested.
 fn has(record: &TestRecord, level: u64) -> bool {
     let is_mine = |shard: Shard| (level - record.range.first) % shard.count == shard.index;
     (record.range.first..=record.range.last).contains(&level) && record.shard.is_none_or(is_mine)
 }
 
-/// That they have none, in words.
+/// Describes the lack of a common level.
 pub(super) fn no_common_level(before: &TestRecord, now: &TestRecord) -> String {
     let levels = |record: &TestRecord| match record.shard {
         Some(shard) => format!("shard {shard} of {}", record.range),

@@ -31,7 +31,7 @@ fn written(folder: &Path, record: &TestRecord, levels: &[LevelVerdict]) {
     open.finish().expect("writable");
 }
 
-/// What is said of these levels, tested by `testers` before and now.
+/// Compares these levels, tested by `testers` before and now.
 fn compared(before: &[LevelVerdict], now: &[LevelVerdict], testers: &[&str]) -> Comparison {
     let parent = tempfile::tempdir().expect("a folder");
     let (one, other) = (parent.path().join("before"), parent.path().join("now"));
@@ -40,7 +40,7 @@ fn compared(before: &[LevelVerdict], now: &[LevelVerdict], testers: &[&str]) -> 
     Comparison::read(&one, &other).expect("comparable")
 }
 
-/// A level that a tester without randomness plays once.
+/// Makes a level that a tester without randomness plays once.
 fn exact(index: u64, solved: u64) -> LevelVerdict {
     LevelVerdict { testers: vec![tester("plan", solved, 1, true)], ..verdict(index, solved, 1) }
 }
@@ -59,7 +59,7 @@ fn one_episode_is_enough_where_nothing_is_left_to_chance() {
     assert_eq!((comparison.levels, comparison.harder[0].probability), (500, None));
     assert!(comparison.has_alarms());
     let words = comparison.harder[0].to_string();
-    assert_eq!(words, "hard:3: solved 1 of 1, now 0 of 1 (plan, which leaves nothing to chance)");
+    assert_eq!(words, "hard:3: solved 1 of 1, now 0 of 1 (plan, which draws no random numbers)");
     let same = compared(&before, &before, &["plan"]);
     assert!(!same.has_alarms() && same.easier.is_empty(), "{same:?}");
 }
@@ -76,7 +76,7 @@ fn chance_gives_no_alarm_and_what_is_more_does() {
     let comparison = compared(&before, &now, &["random"]);
     assert_eq!((names(&comparison.harder), names(&comparison.easier)), (vec!["hard:4"], vec!["hard:5"]));
     assert!(comparison.harder[0].probability.is_some_and(|p| p < 1e-4), "{comparison:?}");
-    // A single episode says nothing of a tester that draws.
+    // A single episode of a tester that draws is not significant.
     assert!(!compared(&[verdict(0, 1, 1)], &[verdict(0, 0, 1)], &["random"]).has_alarms());
 }
 
@@ -122,7 +122,7 @@ fn what_cannot_be_compared_is_refused_by_name() {
     let stranger = said(&record(&["jumper"]), 0).expect_err("a stranger");
     assert!(stranger.contains("the tester `jumper` was not there before"), "{stranger}");
     assert!(said(&record(&["random"]), 7).expect_err("other levels").contains("no level is in"));
-    // What the ranges say is known before anybody plays.
+    // Ranges are known before any play.
     let elsewhere = TestRecord { range: "easy:0..9".parse().expect("a split"), ..record(&["random"]) };
     let words = Comparison::check(&one, &elsewhere).expect_err("another mode").to_string();
     assert!(words.contains("no level is in hard:0..499 and in easy:0..9; name results"), "{words}");

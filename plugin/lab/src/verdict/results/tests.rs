@@ -113,8 +113,8 @@ fn nothing_may_follow_the_last_level_or_the_end() {
     assert!(error.contains("results.json, line 3: there are more levels than were tested"), "{error}");
     fs::write(&path, format!("{text}]}}\n")).expect("writable");
     let error = ResultLines::open_whole(folder.path()).map(drop).expect_err("another end").to_string();
-    assert!(error.contains("results.json, line 5: the file goes on behind its end"), "{error}");
-    // As older versions ended it.
+    assert!(error.contains("results.json, line 5: the file goes on after its end"), "{error}");
+    // The end as older versions wrote it.
     let (levels, _) = text.rsplit_once("],").expect("an end");
     fs::write(&path, format!("{levels}]}}\n")).expect("writable");
     assert_eq!(*ResultLines::open_whole(folder.path()).expect("an older file").record(), record());

@@ -8,14 +8,15 @@ use super::*;
 use crate::{
     bugs::{
         BugSet,
-        score::{ClockKind, Found, ScoreBudget, ScoredJob, TestedGame, testing::Corridor},
+        score::{ClockKind, Found, ScoreBudget, ScoredJob, TestedGame},
     },
+    corridor::Corridor,
     detectors::{DetectorChoice, Detectors},
     game::Game,
     verdict::Earlier,
 };
 
-/// Three mutants and three sound levels, as a file has them.
+/// Three mutants and three unmutated levels, as a file has them.
 const SET: &str = r#"{"format":1,"seed":7,"games":[{"name":"corridor","version":1}],"mutants":[
 {"id":"corridor-burns-01","game":"corridor","class":"burns","about":"it burns","base":"plain:1","variant":0},
 {"id":"corridor-no-exit-01","game":"corridor","class":"no-exit","about":"it has none","base":"plain:7","variant":0},
@@ -50,7 +51,7 @@ fn without_times(score: &Score) -> Vec<(JobResult, Found)> {
     score.jobs.iter().map(|job| (job.result.without_times(), job.found)).collect()
 }
 
-/// Scores from the beginning, or goes on; stops after so many jobs.
+/// Scores from the start, or resumes; stops after `most` jobs.
 fn scored(plan: &ScorePlan, file: &Path, earlier: Earlier, most: u64) -> (Option<Score>, u64) {
     let run = ScoreRun::new(plan).expect("it can be played");
     let (mut journal, _) = ScoreJournal::open(file, "the command", &plan.record(), earlier).expect("writable");
@@ -70,7 +71,7 @@ fn defects_are_found_by_whoever_can_see_them_and_sound_levels_are_left_alone() {
     let plan = plan(&set, folder.path(), &game, 2);
     let (score, _) = scored(&plan, &folder.path().join("score.json"), Earlier::Keep, u64::MAX);
     let score = score.expect("nobody stopped it");
-    // Seven subjects, with the original that is not among the sound levels, and five testers.
+    // Seven subjects, with the original that is not among the unmutated levels, and five testers.
     assert_eq!((score.subjects.len(), score.jobs.len()), (7, 35));
     let job = |subject: &str, tester: &str| {
         let is = |job: &&ScoredJob| job.result.subject == subject && job.result.tester == tester;
@@ -91,7 +92,7 @@ fn defects_are_found_by_whoever_can_see_them_and_sound_levels_are_left_alone() {
     let guide = &job("corridor-burns-01", "guide").result;
     assert_eq!((guide.exact, guide.original, guide.minimised), (true, Some(2), Some(2)));
     assert!(job("corridor-no-exit-01", "guide").found.differs, "beside the sound level");
-    // Holding the last action is to stay.
+    // The last action is to stay.
     assert!(!job("corridor-no-exit-01", "hold").found.failed);
 }
 
@@ -122,11 +123,11 @@ fn what_only_breaks_after_other_episodes_is_found_by_whoever_plays_several() {
     let set = BugSet::read(folder.path()).expect("a set");
     let plan = plan(&set, folder.path(), &game, 1);
     let (score, _) = scored(&plan, &folder.path().join("score.json"), Earlier::Keep, u64::MAX);
-    // Who holds the last action stays for the whole time.
+    // `hold` holds the last action and stays for the whole time.
     let is_hold = |job: &&ScoredJob| job.result.tester == "hold" && job.result.subject == "corridor-panic-01";
     let score = score.expect("nobody stopped it");
     let JobResult { findings, ends, .. } = &score.jobs.iter().find(is_hold).expect("it was done").result;
     assert_eq!(findings[0].detector, "panic");
-    assert!(findings[0].message.contains("other episodes in the same World may have left something"), "{findings:?}");
+    assert!(findings[0].message.contains("other episodes in the same World may have left state"), "{findings:?}");
     assert_eq!(ends.as_slice(), ["time up 30"; 3], "each episode is sound when it is played alone");
 }

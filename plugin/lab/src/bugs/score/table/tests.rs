@@ -4,7 +4,8 @@ use crate::bugs::score::{
     testing::{job, mutant, record, sound},
 };
 
-/// Two classes in a garden: `stone` finds a and b, `skill` b and c, both something on one of four sound levels.
+/// Two classes in a garden: `stone` finds a and b, `skill` b and c, both have a finding on one of four unmutated
+/// levels.
 fn garden() -> (PathBuf, Score) {
     let mut subjects = vec![mutant("garden", "a", "wall"), mutant("garden", "b", "wall"), mutant("garden", "c", "pit")];
     subjects.push(mutant("garden", "d", "pit"));
@@ -49,7 +50,7 @@ fn numbers_are_those_that_are_worked_out_by_hand() {
     assert_eq!((stone.games.clone(), skill.skilled), (vec!["forest".to_owned(), "garden".to_owned()], true));
     assert_eq!(table.best.testers, ["stone", "skill"]);
     assert_eq!(table.best.recall, Share::new(4, 5));
-    // Both have found something on a sound level.
+    // Both have a finding on an unmutated level.
     assert!(table.careful.testers.is_empty());
     assert_eq!((table.only_skills, table.only_skills_of_found), (Share::new(1, 5), Share::new(1, 4)));
     let [pit, wall] = table.classes.as_slice() else { panic!("two classes") };
