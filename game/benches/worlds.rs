@@ -6,8 +6,9 @@ use std::time::Duration;
 
 use bevy::prelude::World;
 use criterion::{Criterion, Throughput};
+use playbot::prelude::*;
 use playbot_games::registry::GAMES;
-use playbot_lab::{arrangement::Arrangement, prelude::*, worlds::build_world};
+use playbot_harness::{arrangement::Arrangement, worlds::build_world};
 
 const ARENAS: u32 = 16;
 const TICKS: u64 = 10;

@@ -1,7 +1,5 @@
 //! The games of this crate.
 
-use playbot_lab::game::Game;
-
 use crate::{
     ant::Ant,
     antmaze::AntMaze,
@@ -9,6 +7,7 @@ use crate::{
     maze2d::Maze2d,
     senses::{Mapped, Placed, Sighted, WithSenses},
 };
+use playbot_harness::game::Game;
 
 /// All games, CoinRun first.
 pub const GAMES: [&dyn Game; 10] = [

@@ -1,14 +1,13 @@
 //! Episodes of a game's demonstrator under one detector, for tests.
 
-use std::sync::Arc;
-
 use bevy::prelude::*;
 use bevy_playbot::test_app::test_app;
-use playbot_lab::{
+use playbot_harness::{
     defect::{ChangeRules, Plant},
     detector::{Detector, LevelAhead, Moment, NoProofs},
     prelude::*,
 };
+use std::sync::Arc;
 
 /// Returns a game's defect of the rules with this name.
 pub(crate) fn planted(game: &dyn Game, class: &str) -> Arc<ChangeRules> {

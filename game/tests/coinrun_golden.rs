@@ -5,7 +5,7 @@ mod golden;
 
 use std::sync::Arc;
 
-use playbot_games::coinrun::{Level, Mode, Outcome, Sim, generate};
+use playbot_games::coinrun::{Level, Mode, Outcome, Sim, generator::generate};
 use rand_mt::Mt;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use playbot_games::coinrun::{Demonstrator, Mode, Outcome, Plan, PlannerConfig, Sim, generate, plan};
+use playbot_games::coinrun::{
+    Demonstrator, Mode, Outcome, Plan, PlannerConfig, Sim, generator, generator::generate, planner, planner::plan,
+};
 use rand_mt::Mt;
 
 fn start(mode: Mode, seed: u32) -> Sim {

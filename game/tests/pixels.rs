@@ -5,7 +5,7 @@ mod program;
 
 use std::path::Path;
 
-use playbot_lab::train::config_file::read_experiment;
+use playbot_train::experiment::file::read_experiment;
 use program::{done, ended};
 use serde_json::Value;
 

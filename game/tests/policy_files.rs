@@ -10,13 +10,11 @@ use bevy_playbot::{
     policy_file::{PolicyFile, PolicyMisfit, install_policy},
     vision::ObservationConfig,
 };
+use playbot::prelude::*;
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::prelude::*;
-use playbot_lab::{
-    policy_export::{Provenance, export_policy, policy_file},
-    worlds::build_world,
-};
+use playbot_harness::worlds::build_world;
 use playbot_learner::{ActionSpace, DeviceKind, FileError, Learner, PolicySpec, PpoConfig, PpoLearner};
+use playbot_train::policy_export::{Provenance, export_policy, policy_file};
 use serde_json::Value;
 
 fn learner(obs_dim: usize) -> PpoLearner {

@@ -4,8 +4,9 @@
 //!
 //! The policy is part of the program, and plays. F9 hands the controls to you and takes them back;
 //! the space bar burns. A file, or `PLAYBOT`, lets another policy play, or records or replays
-//! instead. The policy was trained by the example `lander` of `playbot_lab`.
+//! instead. The policy was trained by the example `lander` of `playbot`.
 
+#[path = "lander_rules/rules.rs"]
 pub mod lander_rules;
 
 use bevy::prelude::*;
@@ -16,7 +17,7 @@ use bevy_playbot::{
     takeover::{GameIdentity, TakeoverPlugin, TakeoverRequest},
 };
 
-use lander_rules::rules::{Capsule, OBSERVATION, TICK_HZ, add_rules, capsule};
+use lander_rules::{Capsule, OBSERVATION, TICK_HZ, add_rules, capsule};
 
 /// The policy that the game ships with.
 const SHIPPED: &[u8] = include_bytes!("lander.policy");

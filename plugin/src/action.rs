@@ -21,10 +21,15 @@
 //! assert_eq!(app.world().get::<Transform>(agent).expect("spawned with it").translation.y, 2.0);
 //! ```
 
+use crate::{
+    agent::{Agent, Control},
+    carry_over::ReflectCarryComponent,
+    episode::Episode,
+    fault::Faults,
+};
 use bevy::prelude::*;
-pub use playbot_learner::{Action as ActionValue, ActionSpace};
 
-use crate::{agent::Agent, carry_over::ReflectCarryComponent, control::Control, episode::Episode, fault::Faults};
+pub use playbot_learner::{Action as ActionValue, ActionSpace};
 
 /// The action of this tick. The holder of the [`Control`] writes it in
 /// [`PlaybotSystems::Decide`](crate::systems::PlaybotSystems::Decide); the game reads it in
@@ -64,8 +69,6 @@ pub(crate) fn plugin(app: &mut App) {
 }
 
 /// Returns why an action does not belong to its space, or `None` if it does.
-// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
 pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
     match (action, space) {
         (ActionValue::Discrete(index), ActionSpace::Discrete(n)) if (*index as usize) < *n => None,
@@ -85,7 +88,6 @@ pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
 
 /// Reports actions outside their agent's space, with agent and tick, and stops those agents. The
 /// game need not handle impossible actions.
-#[doc(hidden)]
 pub fn check_actions(mut agents: Query<(&Agent, &Action, &Episode, &mut Control)>, mut faults: ResMut<Faults>) {
     for (agent, action, episode, mut control) in &mut agents {
         if !control.is_active() || !episode.is_running() {

@@ -17,14 +17,16 @@
 //! assert_eq!(seen, BTreeSet::from([0, 1, 2, 3]));
 //! ```
 
+use crate::{
+    action::Action,
+    agent::{Agent, Control},
+    carry_over::ReflectCarryComponent,
+    episode::Episode,
+    streams::AgentStreams,
+};
 use bevy::prelude::*;
 use playbot_learner::{Action as ActionValue, ActionSpace, rng::normal};
 use rand::RngExt;
-
-use crate::{
-    action::Action, agent::Agent, carry_over::ReflectCarryComponent, control::Control, episode::Episode,
-    streams::AgentStreams,
-};
 
 /// A scripted bot without sensors. Acts while the agent's control is [`Control::Bot`].
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
@@ -48,7 +50,6 @@ const LONGEST_HOLD: u32 = 30;
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]
-#[doc(hidden)]
 pub struct HeldAction {
     action: Action,
     /// Remaining ticks.
@@ -85,8 +86,6 @@ pub(crate) fn run_blind_bots(
 }
 
 /// Returns a uniformly random action of a space.
-// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
 pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
     match space {
         ActionSpace::Discrete(n) => ActionValue::Discrete(rng.random_range(0..*n as u32)),
@@ -97,7 +96,6 @@ pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
 /// Returns the planned action of a demonstrator with noise. The noise is the probability of
 /// replacing a discrete action by a uniformly random one, or the standard deviation of the normal
 /// noise on each continuous value. Zero noise draws no random number and keeps the action.
-#[doc(hidden)]
 pub fn with_noise(planned: ActionValue, space: &ActionSpace, noise: f64, rng: &mut impl rand::Rng) -> ActionValue {
     match planned {
         ActionValue::Discrete(_) if noise > 0.0 && rng.random_bool(noise.min(1.0)) => uniform(space, rng),

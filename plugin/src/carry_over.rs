@@ -2,14 +2,14 @@
 //!
 //! `#[reflect(Component, CarryComponent)]` is for components of agents, `#[reflect(Resource, CarryResource)]` for resources.
 
-use std::any::TypeId;
-
 use bevy::{
     prelude::*,
     reflect::{FromType, TypeRegistration},
 };
+use std::any::TypeId;
 
 type MoveResource = fn(&mut World, &mut World);
+
 type MoveComponent = fn(&mut World, &mut World, Entity);
 
 /// Type data of a resource that is carried over.

@@ -21,19 +21,27 @@
 //! assert!(results.iter().all(|result| result.end == EpisodeEnd::Truncated && result.ticks == 3));
 //! assert_eq!(results.iter().map(|result| result.level).collect::<Vec<_>>(), [7, 8]);
 //! ```
-
-use bevy::prelude::*;
-use serde::{Deserialize, Serialize};
+//!
+//! # The count of ticks
+//!
+//! ```
+//! use bevy_playbot::{prelude::*, tick::Tick};
+//!
+//! let mut app = headless_app();
+//! app.ticks(3).expect("no agent broke its contract");
+//! assert_eq!(app.world().resource::<Tick>(), &Tick(3));
+//! ```
 
 use crate::{
-    agent::{Agent, AgentOrder},
+    agent::{Agent, AgentOrder, Control},
     carry_over::ReflectCarryComponent,
-    control::Control,
     fault::Faults,
     level::LevelQueue,
     reward::Reward,
     streams::{AgentStreams, EpisodeSeeds},
 };
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
 
 /// The end of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Reflect)]
@@ -293,4 +301,13 @@ pub(crate) fn end_episodes(
         reward.end_episode();
         episode.abandon();
     }
+}
+
+/// Number of fixed ticks since the World began.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
+pub struct Tick(pub u64);
+
+pub(crate) fn count_tick(mut tick: ResMut<Tick>) {
+    tick.0 += 1;
 }

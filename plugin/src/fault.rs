@@ -3,9 +3,8 @@
 //! Under [`tick`](crate::headless::PlaybotAppExt::tick) the first fault of a tick is returned as an error. In an app that
 //! runs by itself each fault is logged as an error and triggers a [`FaultOccurred`] in the same frame.
 
-use bevy::prelude::*;
-
 use crate::carry_over::ReflectCarryResource;
+use bevy::prelude::*;
 use playbot_learner::HasExitCode;
 use thiserror::Error;
 
@@ -55,8 +54,6 @@ pub struct FaultOccurred {
 
 /// In `Last`: faults are announced. Systems before it may still [`take`](Faults::take) them.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
 pub struct FaultSystems;
 
 impl Faults {

@@ -15,26 +15,43 @@
 //! app.ticks(50).expect("no agent broke its contract");
 //! assert!((app.world().resource::<Metres>().0 - 10.0).abs() < 1e-3);
 //! ```
-
-use std::time::Duration;
-
-use bevy::{
-    app::PluginGroupBuilder,
-    ecs::schedule::{Schedules, SingleThreadedExecutor},
-    prelude::*,
-    time::{TimePlugin, TimeUpdateStrategy},
-};
+//!
+//! # Bevy's default plugins without a screen
+//!
+//! ```
+//! use bevy::{prelude::*, window::PrimaryWindow};
+//! use bevy_playbot::{headless_plugins::HeadlessPlugins, prelude::*};
+//!
+//! let mut app = App::new();
+//! app.add_plugins((HeadlessPlugins::default(), PlaybotPlugin { placement: TickPlacement::Frame }));
+//! app.finish();
+//! app.cleanup();
+//! app.tick().expect("no agent broke its contract");
+//! // The resources that games need are there.
+//! let mut windows = app.world_mut().query_filtered::<&Window, With<PrimaryWindow>>();
+//! assert_eq!(windows.single(app.world()).expect("one window").width(), 1280.0);
+//! assert!(app.world().contains_resource::<ButtonInput<KeyCode>>());
+//! assert!(app.world().contains_resource::<Assets<Image>>());
+//! ```
 
 use crate::{
-    control::Control,
-    episode::Episode,
+    agent::Control,
+    episode::{Episode, Tick},
     fault::{Fault, Faults},
+    no_screen::NoScreenPlugin,
     panics,
     placement::{FrameGate, TickPlacement},
     plugin::PlaybotPlugin,
-    renewal, system_errors, system_order,
-    tick::Tick,
+    renewal, system_errors, systems,
 };
+use bevy::{
+    app::{PanicHandlerPlugin, PluginGroupBuilder, TerminalCtrlCHandlerPlugin},
+    ecs::schedule::{Schedules, SingleThreadedExecutor},
+    prelude::*,
+    time::{TimePlugin, TimeUpdateStrategy},
+    window::{ExitCondition, WindowPlugin, WindowResolution},
+};
+use std::time::Duration;
 
 /// Creates an app with time and [`PlaybotPlugin`] that needs no screen, GPU or clock.
 ///
@@ -72,10 +89,8 @@ pub fn set_frame_rate(app: &mut App, hz: f64) {
 }
 
 /// Creates an app for games in which a frame is a tick, with all of Bevy but a screen. It has
-/// [`HeadlessPlugins`](crate::headless_plugins::HeadlessPlugins), with or without a renderer, and
+/// [`HeadlessPlugins`](HeadlessPlugins), with or without a renderer, and
 /// [`PlaybotPlugin`] under [`TickPlacement::Frame`].
-// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
 pub fn headless_frame_app(plugins: PluginGroupBuilder, hz: f64) -> App {
     let mut app = App::new();
     app.add_plugins((plugins, PlaybotPlugin { placement: TickPlacement::Frame }));
@@ -87,7 +102,6 @@ pub fn headless_frame_app(plugins: PluginGroupBuilder, hz: f64) -> App {
 ///
 /// Bevy's own threads cost more than they save in a World of this size. Several Worlds side by side
 /// use the cores better: see [`run_on_one_thread`].
-#[doc(hidden)]
 pub fn into_world(mut app: App) -> World {
     app.finish();
     app.cleanup();
@@ -100,26 +114,24 @@ pub fn into_world(mut app: App) -> World {
 /// A system that cannot run, for instance because a resource does not exist, becomes a fault of the
 /// next tick instead of a panic. Where ticks are frames, the game may leave the order of its
 /// systems open, and the systems are ordered here.
-#[doc(hidden)]
 pub fn run_on_one_thread(world: &mut World) {
     for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
         schedule.set_executor(SingleThreadedExecutor::new());
     }
     if world.contains_resource::<FrameGate>() {
-        system_order::put_in_order(world);
+        systems::put_in_order(world);
     }
     system_errors::listen(world);
 }
 
 /// Runs one tick. Under [`TickPlacement::Frame`] this may take several frames, while a level is
-/// being built. A World with a [`Renewal`](renewal::Renewal) is replaced by a new one before an
+/// being built. A World with a [`Renewal`](crate::renewal::Renewal) is replaced by a new one before an
 /// episode begins in it.
 ///
 /// # Errors
 ///
 /// The first breach of contract of the game in this tick: see [`Faults`]. A panic, in Worlds with
 /// [`PanicReports`](crate::panics::PanicReports).
-#[doc(hidden)]
 pub fn tick_world(world: &mut World) -> Result<(), Fault> {
     if let Some(mut faults) = world.get_resource_mut::<Faults>() {
         faults.set_caller(true);
@@ -203,4 +215,65 @@ impl PlaybotAppExt for World {
     fn tick(&mut self) -> Result<(), Fault> {
         tick_world(self)
     }
+}
+
+/// Bevy's `DefaultPlugins`, as this program is built with them, for a World without a screen.
+/// Input, assets, states, text, meshes and materials are there, and a window of 1280 by 720 that
+/// only the game sees. There is no event loop, and the renderer has no surface to draw on.
+///
+/// With Bevy's feature `bevy_winit`, it needs the feature `window` of this crate; with
+/// `bevy_render`, the feature `camera`: a plugin can be left out only by its type. Leave out others
+/// with [`disable`](bevy::app::PluginGroupBuilder::disable), as with any group.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct HeadlessPlugins {
+    /// True if pictures are drawn for agents that see through a camera.
+    draws: bool,
+}
+
+impl HeadlessPlugins {
+    /// Creates the plugins with a renderer that draws for [`CameraSensor`](crate::camera::CameraSensor)s.
+    #[cfg(feature = "camera")]
+    pub fn drawing() -> Self {
+        Self { draws: true }
+    }
+}
+
+impl PluginGroup for HeadlessPlugins {
+    fn build(self) -> PluginGroupBuilder {
+        let window = Window { resolution: WindowResolution::new(1280, 720), ..default() };
+        let plugins =
+            DefaultPlugins.build().disable::<PanicHandlerPlugin>().disable::<TerminalCtrlCHandlerPlugin>().set(
+                WindowPlugin {
+                    primary_window: Some(window),
+                    exit_condition: ExitCondition::DontExit,
+                    close_when_requested: false,
+                    ..default()
+                },
+            );
+        without_screen(plugins, self.draws).add(NoScreenPlugin)
+    }
+}
+
+#[cfg(feature = "camera")]
+fn without_screen(plugins: PluginGroupBuilder, draws: bool) -> PluginGroupBuilder {
+    use bevy::render::{RenderPlugin, pipelined_rendering::PipelinedRenderingPlugin};
+    let render_creation = if draws { crate::camera::drawing() } else { crate::camera::not_drawing() };
+    let renderer = RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() };
+    let plugins = without_event_loop(plugins.set(renderer)).add(crate::camera::RenderListPlugin);
+    if plugins.contains::<PipelinedRenderingPlugin>() { plugins.disable::<PipelinedRenderingPlugin>() } else { plugins }
+}
+
+#[cfg(not(feature = "camera"))]
+fn without_screen(plugins: PluginGroupBuilder, _draws: bool) -> PluginGroupBuilder {
+    without_event_loop(plugins)
+}
+
+#[cfg(feature = "window")]
+fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+    plugins.disable::<bevy::winit::WinitPlugin>()
+}
+
+#[cfg(not(feature = "window"))]
+fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+    plugins
 }

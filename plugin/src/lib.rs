@@ -18,7 +18,7 @@
 //! - [`demo`] records the actions of people, bots and policies, and replays them bit by bit.
 //! - A [`policy_file`] brings a trained policy into a game that ships with it.
 //!
-//! Training, evaluation and reports are in `playbot_lab`, the command line for any list of games in `playbot_cli`.
+//! Training, evaluation and reports are in `playbot`, with a command line for any list of games.
 //!
 //! # One tick
 //!
@@ -93,57 +93,37 @@ pub mod bot;
 #[cfg(feature = "camera")]
 pub mod camera;
 mod carry_over;
-pub mod control;
 pub mod demo;
+pub mod engine;
 pub mod episode;
 pub mod fault;
 pub mod headless;
-pub mod headless_plugins;
 pub mod key_bindings;
-pub mod keyboard;
-mod known_plugins;
 pub mod level;
-// For playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
-pub mod level_files;
 mod no_screen;
 pub mod observation;
-#[doc(hidden)]
 pub mod panics;
 pub mod placement;
 pub mod plugin;
-pub mod plugins;
 pub mod policy;
-// For rollouts of playbot_lab.
-#[doc(hidden)]
 pub mod policy_batch;
 pub mod policy_file;
-mod policy_rows;
 pub mod prelude;
 pub mod raster;
-#[doc(hidden)]
 pub mod renewal;
 pub mod reward;
-#[doc(hidden)]
-pub mod shared_batch;
 pub mod skill_prior;
 pub mod state_hash;
 pub mod streams;
-#[doc(hidden)]
 pub mod system_errors;
-#[doc(hidden)]
-pub mod system_order;
 pub mod systems;
 pub mod takeover;
 pub mod test_app;
-pub mod tick;
 pub mod unknown_name;
 pub mod virtual_input;
 pub mod vision;
-mod waves;
 
-pub use plugin::PlaybotPlugin;
-pub use plugins::PlaybotPlugins;
+pub use crate::plugin::{PlaybotPlugin, PlaybotPlugins};
 
 /// Compiles the examples of the README.
 #[cfg(doctest)]

@@ -1,30 +1,27 @@
 //! Panics of a game: turned into faults, with a file that replays to the panic.
 
-use std::{
-    cell::{Cell, RefCell},
-    panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
-    path::PathBuf,
-    sync::Once,
-};
-
-use bevy::prelude::*;
-
 use crate::{
     action::{Action, check_actions},
-    agent::{Agent, AgentOrder},
+    agent::{Agent, AgentOrder, Control},
     carry_over::{ReflectCarryComponent, ReflectCarryResource},
-    control::Control,
     demo::{
         file::{DemoEpisode, DemoHeader, DemoWriter},
         recorder::{decider, demo_actions, push_action},
     },
     episode::Episode,
     fault::Fault,
-    level_files::LevelFiles,
+    level::LevelFiles,
     placement::TickSchedules,
     reward::Reward,
     state_hash::StateHash,
     systems::PlaybotSystems,
+};
+use bevy::prelude::*;
+use std::{
+    cell::{Cell, RefCell},
+    panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
+    path::PathBuf,
+    sync::Once,
 };
 
 /// Turns panics of the game into a [`Fault`] that [`tick_world`](crate::headless::tick_world) returns, with the running

@@ -24,12 +24,14 @@
 //! }
 //! ```
 
+use crate::{
+    agent::{Agent, Control},
+    episode::{Episode, Tick},
+};
 use bevy::{
     ecs::schedule::{InternedScheduleLabel, ScheduleLabel},
     prelude::*,
 };
-
-use crate::{agent::Agent, control::Control, episode::Episode, tick::Tick};
 
 /// The extent of a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
@@ -77,8 +79,6 @@ impl TickSchedules {
 /// clock, and a frame in which an agent waits for its level is no tick.
 #[derive(Resource, Clone, Copy, Debug, Default, Reflect)]
 #[reflect(Resource)]
-// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
 pub struct FrameGate {
     frames: u64,
     is_tick: bool,
@@ -96,7 +96,6 @@ pub(crate) fn has_begun(gate: Res<FrameGate>) -> bool {
 
 /// Returns whether this frame is a tick, as a run condition. Always true under
 /// [`TickPlacement::Fixed`], where systems run only in ticks.
-#[doc(hidden)]
 pub fn is_tick(gate: Option<Res<FrameGate>>) -> bool {
     gate.is_none_or(|gate| gate.is_tick)
 }

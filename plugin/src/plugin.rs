@@ -12,17 +12,19 @@
 //! assert!(app.world().contains_resource::<Tick>());
 //! ```
 
-use bevy::{ecs::schedule::ScheduleLabel, input::InputSystems, prelude::*};
-
 use crate::{
-    action, agent, bot, demo, episode,
+    action, agent, bot, episode,
     fault::{FaultSystems, Faults, announce_faults},
-    observation,
-    placement::{self, FrameGate, TickPlacement, TickSchedules},
+    key_bindings::KeyboardPlugin,
+    observation, placement,
+    placement::{FrameGate, TickPlacement, TickSchedules},
     policy, reward, skill_prior, streams,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
-    tick, vision,
+    takeover::{GameIdentity, TakeoverPlugin},
+    virtual_input::{InputRoute, VirtualInputPlugin},
+    vision,
 };
+use bevy::{app::PluginGroupBuilder, ecs::schedule::ScheduleLabel, input::InputSystems, prelude::*};
 
 /// Adds agents, episodes, skills, policies, recording and replay to a game.
 ///
@@ -37,7 +39,7 @@ impl Plugin for PlaybotPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<agent::AgentOrder>()
             .init_resource::<Faults>()
-            .init_resource::<tick::Tick>()
+            .init_resource::<episode::Tick>()
             .add_plugins((action::plugin, episode::plugin, observation::plugin))
             .add_plugins((streams::plugin, policy::plugin, skill_prior::plugin))
             .init_schedule(ObserveSchedule)
@@ -61,7 +63,7 @@ impl Plugin for PlaybotPlugin {
             );
         match self.placement {
             TickPlacement::Fixed => {
-                app.add_systems(FixedFirst, tick::count_tick);
+                app.add_systems(FixedFirst, episode::count_tick);
             }
             TickPlacement::Frame => place_in_frames(app),
         }
@@ -107,7 +109,7 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
                 .in_set(PlaybotSystems::Observe),
             (
                 bot::run_blind_bots,
-                demo::replay::run_replays,
+                crate::demo::replay::run_replays,
                 skill_prior::draw_skills.run_if(resource_exists::<skill_prior::SkillPrior>),
                 policy::run_policy.run_if(resource_exists::<policy::ActivePolicy>),
             )
@@ -124,10 +126,73 @@ fn add_outcome_systems(app: &mut App, schedule: impl ScheduleLabel) {
         schedule,
         (
             (episode::count_tick_and_reward, skill_prior::count_down_skills).chain().in_set(PlaybotSystems::Judge),
-            (demo::recorder::record_ticks, demo::replay::check_replays).chain().in_set(PlaybotSystems::Record),
+            (crate::demo::recorder::record_ticks, crate::demo::replay::check_replays)
+                .chain()
+                .in_set(PlaybotSystems::Record),
             episode::end_episodes.in_set(PlaybotSystems::Reset),
         ),
     );
+}
+
+// All plugins of a game that ships with agents.
+
+/// The plugins that a game with agents needs at run time:
+///
+/// | plugin | what it brings |
+/// |---|---|
+/// | [`PlaybotPlugin`] | agents, episodes, observations, skills, policies, recording and replay |
+/// | [`VirtualInputPlugin`] | actions that press keys, for agents with a [`VirtualInput`](crate::virtual_input::VirtualInput) |
+/// | [`KeyboardPlugin`] | keys that become actions, for agents with [`KeyBindings`](crate::key_bindings::KeyBindings) |
+/// | [`TakeoverPlugin`] | `PLAYBOT=record:FILE`, `policy:FILE` and `replay:FILE`, and a key, in a shipped build |
+///
+/// Needs Bevy's time and input, which are part of `DefaultPlugins`.
+///
+/// ```
+/// use bevy::{input::InputPlugin, prelude::*, time::TimePlugin};
+/// use bevy_playbot::{plugins::PlaybotPlugins, prelude::*};
+///
+/// let mut app = App::new();
+/// // A game with a window adds `DefaultPlugins` instead of these two.
+/// app.add_plugins((TimePlugin, InputPlugin)).add_plugins(PlaybotPlugins::new("walk", 1));
+/// app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human));
+/// app.update();
+/// ```
+#[derive(Clone, Debug)]
+pub struct PlaybotPlugins {
+    game: GameIdentity,
+    placement: TickPlacement,
+}
+
+impl PlaybotPlugins {
+    /// Creates the plugins for a game of this name, at this version of its rules: see
+    /// [`GameIdentity`].
+    pub fn new(name: &str, version: u32) -> Self {
+        Self { game: GameIdentity::new(name, version), placement: TickPlacement::Fixed }
+    }
+
+    /// Sets the mode of the game.
+    pub fn with_mode(self, mode: &str) -> Self {
+        Self { game: self.game.with_mode(mode), ..self }
+    }
+
+    /// Adapts to a game whose ticks are whole frames: virtual input then uses messages.
+    pub fn in_frames(self) -> Self {
+        Self { placement: TickPlacement::Frame, ..self }
+    }
+}
+
+impl PluginGroup for PlaybotPlugins {
+    fn build(self) -> PluginGroupBuilder {
+        let route = match self.placement {
+            TickPlacement::Fixed => InputRoute::Direct,
+            TickPlacement::Frame => InputRoute::Messages,
+        };
+        PluginGroupBuilder::start::<Self>()
+            .add(PlaybotPlugin { placement: self.placement })
+            .add(VirtualInputPlugin { route })
+            .add(KeyboardPlugin)
+            .add(TakeoverPlugin::new(self.game))
+    }
 }
 
 #[cfg(test)]

@@ -24,23 +24,20 @@
 //! assert!(decision.log_prob < 0.0, "it might have done something else");
 //! ```
 
-use bevy::prelude::*;
-use playbot_learner::{ObsKind, Policy};
-
 use crate::{
     action::Action,
-    agent::{Agent, AgentOrder},
+    agent::{Agent, AgentOrder, Control},
     carry_over::{ReflectCarryComponent, ReflectCarryResource},
-    control::Control,
     episode::Episode,
     fault::Faults,
     observation::Observation,
-    policy_batch::PolicyBatch,
-    shared_batch::SharedBatch,
+    policy_batch::{PolicyBatch, SharedBatch},
     skill_prior::{ActiveSkill, SkillPrior},
     streams::AgentStreams,
     vision::{ImageSensor, seen_as},
 };
+use bevy::prelude::*;
+use playbot_learner::{ObsKind, Policy};
 
 /// The choice of an action from the policy's distribution.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]

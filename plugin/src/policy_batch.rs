@@ -1,13 +1,17 @@
 //! Decisions of the policy in a tick, for all agents of a World in one pass.
 
-use bevy::prelude::*;
-use playbot_learner::{ObsKind, Observations, Policy, PolicyOutput};
+#[cfg(test)]
+mod shared_batch_tests;
 
 use crate::{
     observation::{Observation, start_batch},
-    policy_rows::PolicyRows,
-    shared_batch::SharedBatch,
     skill_prior::ActiveSkill,
+};
+use bevy::prelude::*;
+use playbot_learner::{LearnError, ObsKind, Observations, Policy, PolicyOutput};
+use std::sync::{
+    Arc, Condvar, Mutex, MutexGuard, PoisonError,
+    mpsc::{Receiver, Sender, channel},
 };
 
 /// The states for which the policy has decided in this tick, and their agents.
@@ -60,4 +64,202 @@ impl PolicyBatch {
             None => self.rows.decide(policy).map_err(|error| error.to_string()),
         }
     }
+}
+
+// Rows of states for which a policy decides in one pass.
+
+/// The states for which a policy decides in one pass.
+#[derive(Clone, Debug)]
+pub struct PolicyRows {
+    /// `count` observations.
+    pub observations: Observations,
+    /// `count` skills, one after the other; empty without skills.
+    pub skills: Vec<f32>,
+    /// The remaining share of each skill's ticks, this one included; empty without skills.
+    pub left: Vec<f32>,
+    /// Number of states.
+    pub count: usize,
+}
+
+impl Default for PolicyRows {
+    fn default() -> Self {
+        Self { observations: Observations::Vector(Vec::new()), skills: Vec::new(), left: Vec::new(), count: 0 }
+    }
+}
+
+impl PolicyRows {
+    /// Returns the policy's output for the states.
+    ///
+    /// # Errors
+    ///
+    /// As [`Policy::forward_held`].
+    pub fn decide(&self, policy: &Policy) -> Result<PolicyOutput, LearnError> {
+        policy.forward_held(&self.skills, &self.left, &self.observations, self.count)
+    }
+
+    pub(crate) fn append(&mut self, more: &Self) -> Result<(), LearnError> {
+        self.observations.push(&more.observations)?;
+        self.skills.extend_from_slice(&more.skills);
+        self.left.extend_from_slice(&more.left);
+        self.count += more.count;
+        Ok(())
+    }
+}
+
+// Shared forward passes: one pass for the agents of several Worlds.
+//
+// A pass over a few rows takes a GPU as long as one over thousands. Worlds of a single agent spend more time on the
+// pass than on computing. So each World gets a thread and a seat. It submits its rows and waits; the last World of a
+// group computes for the whole group. There are two groups: one simulates while the other is decided for.
+//
+// The result of a row does not depend on the other rows, so the games run as they do alone.
+
+/// A World's seat among those that share passes.
+#[derive(Resource, Clone, Debug, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug)]
+pub struct SharedBatch {
+    table: Arc<Table>,
+    seat: usize,
+}
+
+/// Number of groups: seats of even number make one, those of odd number the other.
+const GROUPS: usize = 2;
+
+#[derive(Debug)]
+struct Table {
+    policy: Policy,
+    groups: [Mutex<Group>; GROUPS],
+    /// Number of further Worlds that may simulate. More would compete for the cores.
+    free: Mutex<usize>,
+    freed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct Group {
+    /// Worlds that have not left.
+    worlds: usize,
+    waiting: Vec<Waiting>,
+}
+
+/// A World that has submitted its rows.
+#[derive(Debug)]
+struct Waiting {
+    seat: usize,
+    rows: PolicyRows,
+    answer: Sender<Answer>,
+}
+
+/// A World's own rows, and the policy's output for them.
+type Answer = (PolicyRows, Result<PolicyOutput, String>);
+
+impl SharedBatch {
+    /// Creates seats for as many Worlds, of which at most `threads` simulate at a time. Each World
+    /// runs on its own thread.
+    pub fn seats(policy: &Policy, worlds: usize, threads: usize) -> Vec<Self> {
+        let group = |first| Mutex::new(Group { worlds: (first..worlds).step_by(GROUPS).count(), waiting: Vec::new() });
+        let table = Arc::new(Table {
+            policy: policy.clone(),
+            groups: std::array::from_fn(group),
+            free: Mutex::new(threads.max(1)),
+            freed: Condvar::new(),
+        });
+        (0..worlds).map(|seat| Self { table: table.clone(), seat }).collect()
+    }
+
+    /// Waits until this World may simulate. When the guard is dropped the World leaves, and the
+    /// others no longer wait for it.
+    pub fn play(&self) -> Playing<'_> {
+        self.table.begin();
+        Playing(self)
+    }
+
+    /// Returns the policy's output for the rows, which all Worlds of a group submit at the same
+    /// time. Call it on the thread that has [begun to play](Self::play).
+    ///
+    /// # Errors
+    ///
+    /// The reason why the pass failed, as text.
+    pub(crate) fn decide(&self, rows: &mut PolicyRows) -> Result<PolicyOutput, String> {
+        let (answer, answered) = channel();
+        let mine = Waiting { seat: self.seat, rows: std::mem::take(rows), answer };
+        self.change(|group| group.waiting.push(mine));
+        self.table.end();
+        let output = self.receive(&answered, rows);
+        self.table.begin();
+        output
+    }
+
+    fn receive(&self, answered: &Receiver<Answer>, rows: &mut PolicyRows) -> Result<PolicyOutput, String> {
+        let (mine, output) = answered.recv().map_err(|_| "the World that computed for all has stopped".to_owned())?;
+        *rows = mine;
+        output
+    }
+
+    /// Changes the group. If all of its Worlds wait then, this thread computes for them.
+    fn change(&self, change: impl FnOnce(&mut Group)) {
+        let mut group = lock(&self.table.groups[self.seat % GROUPS]);
+        change(&mut group);
+        if group.waiting.len() == group.worlds && group.worlds > 0 {
+            let waiting = std::mem::take(&mut group.waiting);
+            drop(group);
+            compute(&self.table.policy, waiting);
+        }
+    }
+}
+
+/// A World that simulates, or waits for its turn.
+#[must_use]
+#[derive(Debug)]
+pub struct Playing<'a>(&'a SharedBatch);
+
+impl Drop for Playing<'_> {
+    fn drop(&mut self) {
+        self.0.change(|group| group.worlds -= 1);
+        self.0.table.end();
+    }
+}
+
+impl Table {
+    fn begin(&self) {
+        let free = lock(&self.free);
+        let mut free = self.freed.wait_while(free, |free| *free == 0).unwrap_or_else(PoisonError::into_inner);
+        *free -= 1;
+    }
+
+    fn end(&self) {
+        *lock(&self.free) += 1;
+        self.freed.notify_one();
+    }
+}
+
+/// Locks a mutex. A World that panicked leaves the locked data as it was.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Computes for all waiting Worlds, and wakes them.
+fn compute(policy: &Policy, mut waiting: Vec<Waiting>) {
+    // The result must not depend on the order in which they came.
+    waiting.sort_by_key(|world| world.seat);
+    let outputs = outputs(policy, &waiting).map_err(|error| error.to_string());
+    let mut outputs = outputs.map(Vec::into_iter);
+    for Waiting { rows, answer, .. } in waiting {
+        let output = match &mut outputs {
+            Ok(outputs) => outputs.next().ok_or_else(|| "the policy has left out some".to_owned()),
+            Err(error) => Err(error.clone()),
+        };
+        // The receiver is gone if that World has panicked.
+        drop(answer.send((rows, output)));
+    }
+}
+
+fn outputs(policy: &Policy, waiting: &[Waiting]) -> Result<Vec<PolicyOutput>, LearnError> {
+    if let [alone] = waiting {
+        return Ok(vec![alone.rows.decide(policy)?]);
+    }
+    let mut all = PolicyRows { observations: Observations::empty(&policy.observation()), ..PolicyRows::default() };
+    waiting.iter().try_for_each(|world| all.append(&world.rows))?;
+    let sizes: Vec<usize> = waiting.iter().map(|world| world.rows.count).collect();
+    Ok(all.decide(policy)?.split(&sizes))
 }

@@ -35,17 +35,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-use bevy::prelude::*;
-pub use playbot_learner::{DeviceKind, PolicyCard, PolicyFile, SkillSource};
-use playbot_learner::HasExitCode;
-use thiserror::Error;
-
 use crate::{
     action::ActionSpace,
     policy::{ActionDraw, ActivePolicy},
     skill_prior::SkillPrior,
     vision::{ObservationConfig, UnknownObservation},
 };
+use bevy::prelude::*;
+use playbot_learner::HasExitCode;
+use thiserror::Error;
+
+pub use playbot_learner::{DeviceKind, PolicyCard, PolicyFile, SkillSource};
 
 /// Metadata of a game. A policy that was made for another game, or another version of this one,
 /// does not fit.
@@ -226,7 +226,7 @@ fn check_names(game: &GameCard<'_>, file: &PolicyFile) -> Result<(), PolicyMisfi
 }
 
 /// Lets a policy, with its skills, drive every agent of this World under
-/// [`Control::Policy`](crate::control::Control::Policy). If the policy reads pictures, its agents
+/// [`Control::Policy`](crate::agent::Control::Policy). If the policy reads pictures, its agents
 /// need the sensor that [`policy_observation`] names.
 pub fn install_policy(world: &mut World, file: &PolicyFile, draw: ActionDraw) {
     let active = ActivePolicy { policy: file.policy.clone(), draw };

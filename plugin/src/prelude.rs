@@ -10,9 +10,8 @@
 
 pub use crate::{
     action::{Action, ActionSpace, ActionValue},
-    agent::Agent,
+    agent::{Agent, Control},
     bot::BlindBot,
-    control::Control,
     demo::{
         recorder::{Recorder, Recording},
         replay::Replay,
@@ -23,8 +22,7 @@ pub use crate::{
     level::{LevelQueue, LevelSource},
     observation::{Observation, ObservationSpace, VectorSensor},
     placement::TickPlacement,
-    plugin::PlaybotPlugin,
-    plugins::PlaybotPlugins,
+    plugin::{PlaybotPlugin, PlaybotPlugins},
     policy::{ActionDraw, ActivePolicy},
     reward::Reward,
     skill_prior::{ActiveSkill, SkillPrior},

@@ -27,22 +27,20 @@
 //! assert_eq!(world.get::<EpisodeCount>(agent).expect("it goes over").finished, 3);
 //! ```
 
-use std::sync::Arc;
-
-use bevy::prelude::*;
-
 use crate::{
-    agent::Agent,
+    agent::{Agent, Control},
     carry_over::CarryOver,
-    control::Control,
     episode::Episode,
     fault::Fault,
     level::LevelQueue,
     streams::{AgentStreams, PlaybotSeed},
 };
+use bevy::prelude::*;
+use std::sync::Arc;
 
 /// The function that builds the World.
 type Builder = Arc<dyn Fn() -> Result<World, Fault> + Send + Sync>;
+
 /// Work that was done on the World after it was built.
 type Work = Arc<dyn Fn(&mut World) + Send + Sync>;
 

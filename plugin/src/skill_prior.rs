@@ -19,19 +19,17 @@
 //! assert_ne!(skill_after(1), first, "and then another one is drawn");
 //! ```
 
-use bevy::prelude::*;
-use playbot_learner::{ObsKind, Observations, Prior, SkillDraw, SkillSource};
-
 use crate::{
-    agent::{Agent, AgentOrder},
+    agent::{Agent, AgentOrder, Control},
     carry_over::{ReflectCarryComponent, ReflectCarryResource},
-    control::Control,
     episode::Episode,
     fault::Faults,
     observation::Observation,
     streams::AgentStreams,
     vision::{ImageSensor, seen_as},
 };
+use bevy::prelude::*;
+use playbot_learner::{ObsKind, Observations, Prior, SkillDraw, SkillSource};
 
 /// Draws a skill z from p(z | s) for each agent at the first tick of an episode and then every
 /// `horizon` fixed ticks (the paper's T). Each agent has its own count.
@@ -68,7 +66,6 @@ impl ActiveSkill {
     /// `horizon` ticks. A skill that has run out counts as a whole one, because the next draw
     /// replaces it.
     // Hidden: for rollouts.
-    #[doc(hidden)]
     pub fn left(&self, horizon: u32) -> f32 {
         if self.ticks_left == 0 { 1.0 } else { self.ticks_left as f32 / horizon.max(1) as f32 }
     }
@@ -90,8 +87,6 @@ pub(crate) fn end_skills(mut agents: Query<(&Episode, &mut ActiveSkill)>) {
 }
 
 /// Draws skills in one batch for the agents whose skill has run out.
-// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
 pub fn draw_skills(
     prior: Res<SkillPrior>,
     order: Res<AgentOrder>,

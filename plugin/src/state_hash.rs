@@ -9,9 +9,8 @@
 //! assert_ne!(ball(1.0, 2.0), ball(1.0, 2.000_001), "and so does every bit");
 //! ```
 
-use bevy::prelude::*;
-
 use crate::carry_over::ReflectCarryComponent;
+use bevy::prelude::*;
 
 /// Hash of all state that decides how the agent's arena goes on, written by the game after its own
 /// step.
@@ -23,6 +22,7 @@ pub struct StateHash(pub u64);
 
 /// Start value and factor of 64-bit FNV-1a.
 const FNV_OFFSET: u64 = 0xcbf2_9ce4_8422_2325;
+
 const FNV_PRIME: u64 = 0x0000_0100_0000_01b3;
 
 impl StateHash {

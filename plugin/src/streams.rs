@@ -18,15 +18,14 @@
 //! assert_ne!(streams_of_agent_3(7, 0), streams_of_agent_3(8, 0));
 //! ```
 
-use bevy::prelude::*;
-use playbot_learner::Streams;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-
 use crate::{
     agent::Agent,
     carry_over::{ReflectCarryComponent, ReflectCarryResource},
 };
+use bevy::prelude::*;
+use playbot_learner::Streams;
+use rand::SeedableRng;
+use rand_chacha::ChaCha8Rng;
 
 /// Gives every agent its streams.
 pub(crate) fn plugin(app: &mut App) {
@@ -85,8 +84,6 @@ impl AgentStreams {
 /// that play it. After the last seed the streams run on.
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, CarryComponent)]
-// Hidden here and below: for playbot_lab; games need none of it.
-#[doc(hidden)]
 pub struct EpisodeSeeds {
     seeds: Vec<u64>,
     used: usize,

@@ -16,7 +16,15 @@
 //! assert_eq!(app.world().get::<Episode>(agent).expect("every agent has one").total_reward, -1.0);
 //! ```
 
-use bevy::{ecs::schedule::ScheduleLabel, prelude::*};
+use bevy::{
+    ecs::schedule::{
+        FlattenedDependencies, NodeId, ScheduleBuildError, ScheduleBuildPass, ScheduleGraph, ScheduleLabel, Schedules,
+        SystemKey, SystemSetKey, graph::DiGraph,
+    },
+    platform::{collections::HashMap, hash::FixedHasher},
+    prelude::*,
+};
+use std::{cmp::Reverse, collections::BinaryHeap};
 
 /// Parts of a tick, in this order, in the schedules that
 /// [`TickSchedules`](crate::placement::TickSchedules) names: by default `FixedPreUpdate` and
@@ -30,7 +38,7 @@ pub enum PlaybotSystems {
     Load,
     /// `FixedPreUpdate`: [`ObserveSchedule`] fills the observations.
     Observe,
-    /// `FixedPreUpdate`: the source of the agent's [`Control`](crate::control::Control) writes the
+    /// `FixedPreUpdate`: the source of the agent's [`Control`](crate::agent::Control) writes the
     /// action.
     Decide,
     /// `FixedPreUpdate`: actions are checked and handed to the game's input.
@@ -49,8 +57,153 @@ pub enum PlaybotSystems {
 pub struct ObserveSchedule;
 
 /// Runs the sensors.
-// Hidden: planted defects of playbot_lab come right behind it; games need none of it.
-#[doc(hidden)]
 pub fn run_observe_schedule(world: &mut World) {
     world.run_schedule(ObserveSchedule);
+}
+
+// A fixed order for systems whose order the game leaves open.
+//
+// Bevy's order of such systems depends on the rest of the schedule. A game with ambiguous systems
+// would run differently headless and in a window, where more plugins add systems. Here such
+// systems run in the order in which they were added.
+
+/// Gives the systems of each schedule one order: the game's constraints, and otherwise the order in
+/// which they were added. Call it before the schedules run, with single-threaded executors.
+pub fn put_in_order(world: &mut World) {
+    for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
+        schedule.add_build_pass(InOrderOfAddition);
+    }
+}
+
+/// Leaves the order open, as in a game that runs by itself: for tests that look for ambiguous
+/// systems.
+pub fn leave_open(world: &mut World) {
+    for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
+        schedule.remove_build_pass::<InOrderOfAddition>();
+    }
+}
+
+/// Bevy adds its synchronisation points in a pass before this one, so they stay where they are
+/// needed.
+#[derive(Debug)]
+struct InOrderOfAddition;
+
+impl ScheduleBuildPass for InOrderOfAddition {
+    type EdgeOptions = ();
+
+    fn add_dependency(&mut self, _: NodeId, _: NodeId, _: Option<&()>) {}
+
+    fn collapse_set(
+        &mut self,
+        _: SystemSetKey,
+        _: &indexmap::IndexSet<SystemKey, FixedHasher>,
+        _: &DiGraph<NodeId>,
+    ) -> impl Iterator<Item = (NodeId, NodeId)> {
+        std::iter::empty()
+    }
+
+    fn build(
+        &mut self,
+        _: &mut World,
+        _: &mut ScheduleGraph,
+        mut dependencies: FlattenedDependencies<'_>,
+    ) -> Result<(), ScheduleBuildError> {
+        for pair in order(&dependencies).windows(2) {
+            dependencies.add_edge(pair[0], pair[1]);
+        }
+        Ok(())
+    }
+}
+
+/// Sorts the systems: each after those that it depends on, otherwise the earlier one first (Kahn's
+/// algorithm). Keys count up as systems are added.
+fn order(dependencies: &DiGraph<SystemKey>) -> Vec<SystemKey> {
+    let mut waits_for: HashMap<SystemKey, usize> = dependencies.nodes().map(|system| (system, 0)).collect();
+    for (_, later) in dependencies.all_edges() {
+        *waits_for.entry(later).or_default() += 1;
+    }
+    let mut free: BinaryHeap<_> = dependencies.nodes().filter(|system| waits_for[system] == 0).map(Reverse).collect();
+    let mut order = Vec::new();
+    while let Some(Reverse(system)) = free.pop() {
+        order.push(system);
+        for later in dependencies.neighbors(system) {
+            let waits = waits_for.entry(later).or_default();
+            *waits -= 1;
+            if *waits == 0 {
+                free.push(Reverse(later));
+            }
+        }
+    }
+    order
+}
+
+#[cfg(test)]
+mod system_order_tests {
+    use bevy::ecs::schedule::SingleThreadedExecutor;
+
+    use super::*;
+
+    #[derive(Resource, Default)]
+    struct Ran(Vec<&'static str>);
+
+    fn note(name: &'static str) -> impl FnMut(ResMut<Ran>) {
+        move |mut ran| ran.0.push(name)
+    }
+
+    fn ran(game: impl Fn(&mut App)) -> Vec<&'static str> {
+        let mut app = App::new();
+        app.init_resource::<Ran>();
+        game(&mut app);
+        put_in_order(app.world_mut());
+        app.edit_schedule(Update, |schedule| {
+            schedule.set_executor(SingleThreadedExecutor::new());
+        });
+        app.update();
+        std::mem::take(&mut app.world_mut().resource_mut::<Ran>().0)
+    }
+
+    #[derive(SystemSet, Clone, Debug, PartialEq, Eq, Hash)]
+    enum Set {
+        Early,
+        Late,
+    }
+
+    fn game(app: &mut App) {
+        app.add_systems(Update, (note("move"), note("look").in_set(Set::Late), note("spawn").in_set(Set::Early)));
+        app.add_systems(Update, note("score"));
+    }
+
+    #[test]
+    fn systems_run_in_the_order_of_their_addition_whatever_else_is_there() {
+        assert_eq!(ran(game), ["move", "look", "spawn", "score"]);
+        let with_others = ran(|app| {
+            app.add_systems(Update, note("other").in_set(Set::Late));
+            game(app);
+            app.add_systems(Update, (note("more"), note("last").after(Set::Late)).chain());
+        });
+        assert_eq!(with_others, ["other", "move", "look", "spawn", "score", "more", "last"]);
+    }
+
+    #[test]
+    fn what_is_in_order_stays_so() {
+        let ordered = ran(|app| {
+            game(app);
+            app.configure_sets(Update, Set::Early.before(Set::Late));
+        });
+        assert_eq!(ordered, ["move", "spawn", "look", "score"]);
+    }
+
+    #[test]
+    fn commands_are_applied_where_the_order_asks_for_it() {
+        #[derive(Resource)]
+        struct Made;
+        let seen = ran(|app| {
+            app.add_systems(
+                Update,
+                (|mut commands: Commands| commands.insert_resource(Made), note("made").run_if(resource_exists::<Made>))
+                    .chain(),
+            );
+        });
+        assert_eq!(seen, ["made"]);
+    }
 }

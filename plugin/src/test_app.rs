@@ -25,22 +25,19 @@
 //! assert_eq!(app.ambiguous_orders(&[module_path!()]), [""; 0]);
 //! ```
 
-use std::collections::BTreeMap;
-
-use bevy::{
-    ecs::schedule::{LogLevel, ScheduleBuildSettings, ScheduleLabel, Schedules},
-    prelude::*,
-};
-
 use crate::{
-    agent::AgentOrder,
-    control::Control,
+    agent::{AgentOrder, Control},
     episode::EpisodeCount,
     fault::Fault,
     headless::{PlaybotAppExt, headless_app},
     state_hash::StateHash,
     systems::ObserveSchedule,
 };
+use bevy::{
+    ecs::schedule::{LogLevel, ScheduleBuildSettings, ScheduleLabel, Schedules},
+    prelude::*,
+};
+use std::collections::BTreeMap;
 
 /// Creates a headless app whose fixed schedules refuse ambiguous systems, since such a game is not
 /// reproducible.

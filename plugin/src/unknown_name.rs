@@ -51,8 +51,6 @@ impl UnknownName {
 const LONGEST: usize = 256;
 
 /// Returns the candidate nearest to `name`, if one is similar at all.
-// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
 pub fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
     if let Some(same) = candidates.iter().find(|candidate| candidate.eq_ignore_ascii_case(name)) {
         return Some(same);

@@ -7,8 +7,8 @@
 use bevy::{prelude::*, winit::WinitSettings};
 use bevy_playbot::{
     camera::{CameraSensor, CameraSensorPlugin},
+    episode::Tick,
     plugin::PlaybotPlugin,
-    tick::Tick,
     vision::{Frame, ImageOptions, TileLayer},
 };
 use playbot_tests::scene::{image, player};

@@ -4,9 +4,9 @@
 //! `raster_soak [ticks] [agents]`
 
 use bevy_playbot::vision::{ObservationConfig, ObservationKind};
+use playbot::prelude::*;
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::prelude::*;
-use playbot_lab::worlds::build_observing_world;
+use playbot_harness::worlds::build_observing_world;
 use playbot_tests::soak::soak;
 
 fn main() {

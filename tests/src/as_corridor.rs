@@ -1,7 +1,7 @@
 //! Variants of the corridor game for tests.
 
-/// Implements the methods of [`Game`](playbot_lab::prelude::Game) as the [`Corridor`](crate::Corridor) does, for the
-/// `impl Game` of a variant of it. `but build` leaves out [`Game::build`](playbot_lab::prelude::Game::build), and a
+/// Implements the methods of [`Game`](playbot::prelude::Game) as the [`Corridor`](crate::Corridor) does, for the
+/// `impl Game` of a variant of it. `but build` leaves out [`Game::build`](playbot::prelude::Game::build), and a
 /// list has only the named ones.
 #[macro_export]
 macro_rules! as_corridor {
@@ -17,14 +17,14 @@ macro_rules! as_corridor {
             fn version() -> u32;
             fn modes() -> &'static [&'static str];
             fn tick_hz() -> f64;
-            fn actions() -> ::playbot_lab::prelude::ActionSpace;
-            fn observation() -> ::playbot_lab::prelude::ObservationSpace;
+            fn actions() -> ::playbot::prelude::ActionSpace;
+            fn observation() -> ::playbot::prelude::ObservationSpace;
             fn spawn_agent(world: &mut ::bevy::prelude::World, index: u32) -> ::bevy::prelude::Entity;
         }
     };
     ($(fn $name:ident($($argument:ident: $type:ty),*) $(-> $result:ty)?;)+) => {
         $(fn $name(&self, $($argument: $type),*) $(-> $result)? {
-            ::playbot_lab::prelude::Game::$name(&$crate::Corridor, $($argument),*)
+            ::playbot::prelude::Game::$name(&$crate::Corridor, $($argument),*)
         })+
     };
 }

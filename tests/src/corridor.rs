@@ -1,7 +1,7 @@
 //! A corridor with an exit and a pit.
 
 use bevy::prelude::*;
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 
 /// A corridor of 7 cells. The agent starts in the middle. Action 1 goes right, action 0 left, action 2 stays. The right
 /// end wins 1 point, the left end loses, and after 20 ticks time is up. Even levels start one cell further right.

@@ -8,7 +8,7 @@ use std::{
 };
 
 use bevy::{prelude::*, time::Real};
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 
 /// The fault of a copy of the game.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

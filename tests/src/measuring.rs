@@ -1,7 +1,7 @@
 //! Measurement of players in tests.
 
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::eval::EvalPlan;
+use playbot_harness::eval::EvalPlan;
 
 /// Returns a plan of one episode on each of these levels, by four arenas in two Worlds on two threads.
 pub fn plan(levels: &str) -> EvalPlan {

@@ -7,7 +7,8 @@ use bevy::{
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
 };
 use bevy_playbot::vision::{Picture, Stage, VisionSystems};
-use playbot_lab::{game::PictureTools, prelude::*};
+use playbot::prelude::*;
+use playbot_harness::game::PictureTools;
 
 use crate::corridor::Cell;
 

@@ -4,7 +4,8 @@ use std::path::Path;
 
 use bevy::prelude::*;
 use bevy_playbot::demo::file::{DemoHeader, DemoWriter};
-use playbot_lab::{prelude::*, worlds::build_world};
+use playbot::prelude::*;
+use playbot_harness::worlds::build_world;
 
 /// Records uniformly random actions on each of these levels, in a World with this seed.
 pub fn record_random(game: &dyn Game, mode: &str, seed: u64, path: &Path, levels: impl IntoIterator<Item = u64>) {

@@ -6,7 +6,7 @@ use bevy_playbot::{
     headless::into_world,
     vision::{Frame, ImageOptions, ImageSensor, Stage, TileLayer},
 };
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 
 /// Returns an image of `width` columns from its pixels, top row first.
 pub fn image(width: u32, pixels: &[[u8; 4]]) -> Image {

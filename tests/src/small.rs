@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use playbot_lab::train::{Algorithm, Experiment, Trainer, config_file::parse_experiment};
 use playbot_learner::{ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, SkillTrainer};
+use playbot_train::{Algorithm, Experiment, Trainer, experiment::file::parse_experiment};
 
 use crate::Corridor;
 

@@ -4,7 +4,7 @@
 use std::time::Instant;
 
 use bevy::prelude::*;
-use bevy_playbot::{headless::PlaybotAppExt, tick::Tick, vision::Frame};
+use bevy_playbot::{episode::Tick, headless::PlaybotAppExt, vision::Frame};
 
 use crate::memory::resident_kib;
 

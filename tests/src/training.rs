@@ -3,18 +3,16 @@
 use std::path::Path;
 
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{
-    prelude::*,
-    train::{
-        Experiment, Trainer,
-        checkpoint::CheckpointChoice,
-        learn_skills::learn,
-        recordings::read_dataset,
-        run_dir::{OpenedRun, RunDir, RunInfo},
-        run_observer::Unobserved,
-    },
-};
+use playbot::prelude::*;
 use playbot_learner::{DeviceKind, Learner as _, Policy, PolicySpec, PpoConfig, PpoLearner, SkillModel};
+use playbot_train::{
+    Experiment, Trainer,
+    checkpoint::CheckpointChoice,
+    learn_skills::learn,
+    recordings::read_dataset,
+    run_dir::{OpenedRun, RunDir, RunInfo},
+    run_observer::Unobserved,
+};
 
 /// Learns the skill model of an experiment from its recordings, without a file.
 pub fn learn_skills(game: &dyn Game, experiment: &Experiment, threads: usize) -> SkillModel {

@@ -3,7 +3,7 @@
 
 use bevy::prelude::*;
 use bevy_playbot::vision::{Stage, TileLayer};
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 use playbot_tests::{
     memory::resident_kib,
     scene::{camera_world, drift, image, pixel, spawn_eye, spawn_large_scene},

@@ -13,7 +13,7 @@ use bevy_playbot::{
     raster::{RasterPlugin, RasterSensor},
     vision::{ImageOptions, PaintedVelocity, Stage, TileLayer},
 };
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 use playbot_tests::scene::image;
 
 struct Counting;

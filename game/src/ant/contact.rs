@@ -3,12 +3,11 @@
 //! As in MuJoCo a capsule touches with the balls at its two ends, and a wall's edge also with the nearest point
 //! between.
 
-use bevy::math::DVec3;
-
-use super::{
+use crate::ant::{
     kinematics::Pose,
     skeleton::{LEGS, LIMB_RADIUS, TORSO_RADIUS},
 };
+use bevy::math::DVec3;
 
 /// Contacts begin this far before surfaces touch, in metres.
 pub const MARGIN: f64 = 0.01;

@@ -1,17 +1,14 @@
 //! The walker that comes with the program: a policy, trained in the game `ant`, that walks in a commanded direction.
 
-use std::{path::Path, sync::LazyLock};
-
+use crate::ant::{
+    skeleton::JOINTS,
+    state::{AntState, SENSES, senses},
+};
 use bevy::math::Vec2;
 use playbot_assets::ANT_WALKER;
 use playbot_learner::{Action, DeviceKind, FileError, LearnError, Policy, PolicyFile};
+use std::{path::Path, sync::LazyLock};
 use thiserror::Error;
-
-use super::{
-    sense::{SENSES, senses},
-    skeleton::JOINTS,
-    state::AntState,
-};
 
 const NAME: &str = "assets/models/ant-walker.safetensors";
 

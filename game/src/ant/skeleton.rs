@@ -7,20 +7,28 @@ use bevy::math::{DMat3, DVec3};
 
 /// Number of legs.
 pub const LEGS: usize = 4;
+
 /// Number of hinges: hip 1, ankle 1, hip 2, ankle 2, and so on.
 pub const JOINTS: usize = 2 * LEGS;
+
 /// Radius of the torso, in metres.
 pub const TORSO_RADIUS: f64 = 0.25;
+
 /// Radius of every limb, in metres.
 pub const LIMB_RADIUS: f64 = 0.08;
+
 /// Density of everything, in kg/m³.
 pub const DENSITY: f64 = 5.0;
+
 /// Height of the torso's centre in the nominal pose, in metres.
 pub const NOMINAL_HEIGHT: f64 = 0.75;
+
 /// Moment of inertia of each hinge's rotor, in kg·m². It dwarfs that of the limbs.
 pub const ARMATURE: f64 = 1.0;
+
 /// Friction of each hinge, in N·m·s.
 pub const HINGE_DAMPING: f64 = 1.0;
+
 /// Torque of an action of 1, in N·m.
 pub const TORQUE: f64 = 30.0;
 

@@ -1,25 +1,33 @@
 //! The game `ant`: get to goals on an open floor.
 
+use crate::ant::{
+    body::AntBody,
+    pilot::{Pilot, PilotInput},
+    skeleton::JOINTS,
+    state::{AntState, senses},
+};
 use bevy::prelude::*;
-use bevy_playbot::fault::Faults;
-use playbot_lab::floor_plan::FloorPlan;
-use playbot_lab::prelude::*;
+use bevy_playbot::{agent::AgentOrder, fault::Faults};
+use playbot_harness::{floor_plan::FloorPlan, prelude::*};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use super::{body::AntBody, sense::senses, skeleton::JOINTS, state::AntState, steering::AntComponent};
-
 /// Distance at which a goal counts as reached, in metres.
 pub const GOAL_RADIUS: f32 = 0.5;
+
 /// Distance of the goal of [`Task::Goal`], in metres.
 const GOAL_DISTANCE: f32 = 8.0;
+
 /// Reward for each metre of progress to the goal. A control step at 1 m/s gives 1.
 const PROGRESS_REWARD: f32 = 10.0;
+
 /// Reward for each step on the feet.
 const UPRIGHT_REWARD: f32 = 0.1;
+
 /// Price of the square of each number of an action, before clipping. Requests beyond the range also cost, so the gait
 /// stays within the range and can be imitated.
 const EFFORT_PRICE: f32 = 0.05;
+
 /// Most that the square of a number costs.
 const MOST_EFFORT: f32 = 9.0;
 
@@ -187,6 +195,61 @@ pub(super) fn observe(mut walkers: Query<(&Episode, &Walker, &mut Observation), 
     for (episode, walker, mut observation) in &mut walkers {
         if episode.is_running() {
             observation.set(senses(&walker.body.state(), walker.goal));
+        }
+    }
+}
+
+// Steering for people: keys give a direction, and the walker walks.
+
+/// Keys for one direction along an axis.
+type Keys = [KeyCode; 2];
+
+const LEFT: Keys = [KeyCode::ArrowLeft, KeyCode::KeyA];
+
+const RIGHT: Keys = [KeyCode::ArrowRight, KeyCode::KeyD];
+
+const DOWN: Keys = [KeyCode::ArrowDown, KeyCode::KeyS];
+
+const UP: Keys = [KeyCode::ArrowUp, KeyCode::KeyW];
+
+/// Returns bindings without effect. No person can turn eight hinges at once, so an action cannot come from the keys
+/// alone: [`steer`] writes it.
+pub fn key_bindings() -> KeyBindings {
+    let help = "arrow keys or W, A, S and D steer the ant's walker; without a key the ant lets go of its legs";
+    KeyBindings::new(Vec::new(), |_| ActionValue::Continuous(vec![0.0; JOINTS]), help)
+}
+
+/// A component that holds an agent's ant.
+pub trait AntComponent: Component {
+    /// Returns the ant's positions and velocities.
+    fn state(&self) -> AntState;
+}
+
+/// Walks for people in the direction of their keys. Runs after [`PlaybotSystems::Decide`], when the keyboard has
+/// written an action that does nothing, in apps with a keyboard.
+pub fn steer<C: AntComponent>(
+    keys: Res<ButtonInput<KeyCode>>,
+    order: Res<AgentOrder>,
+    mut ants: Query<(&Control, &Episode, &C, &mut Action), With<KeyBindings>>,
+    mut faults: ResMut<Faults>,
+    mut input: Local<PilotInput>,
+) {
+    let way = |back, ahead| f32::from(i8::from(keys.any_pressed(ahead)) - i8::from(keys.any_pressed(back)));
+    let direction = [way(LEFT, RIGHT), way(DOWN, UP)];
+    if direction == [0.0, 0.0] {
+        return;
+    }
+    for &agent in order.entities() {
+        let Ok((control, episode, ant, mut action)) = ants.get_mut(agent) else { continue };
+        if *control != Control::Human || !episode.is_running() {
+            continue;
+        }
+        input.clear();
+        let state = ant.state();
+        input.push(&state, [state.qpos[0] + direction[0], state.qpos[1] + direction[1]]);
+        match Pilot::shipped().and_then(|pilot| pilot.act(&input)) {
+            Ok(torques) => action.0 = ActionValue::Continuous(torques.concat()),
+            Err(error) => return faults.report(error.to_string()),
         }
     }
 }

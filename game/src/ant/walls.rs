@@ -4,10 +4,9 @@
 //! the ant: its impulse joints do not keep up with hinges whose rotors are a hundred times heavier than the limbs, see
 //! [the module](super).
 
+use crate::ant::contact::WallBox;
 use bevy::math::{DVec3, Vec3};
 use bevy_rapier3d::rapier::prelude::*;
-
-use super::contact::WallBox;
 
 /// Largest distance of a part of the ant from the torso's centre in one control step, in metres: legs of 1.13 m and the
 /// path of a jump.

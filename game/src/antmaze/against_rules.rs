@@ -1,21 +1,18 @@
 //! Detector of ants whose motion or reward breaks the rules.
 
-use playbot_lab::{
-    detector::{Detector, LevelAhead, Moment, Setting, Watch},
-    prelude::*,
-};
-
-use super::{
-    components::{InMaze, MazeAnt},
-    geometry::distance,
-    level::AntMazeLevel,
-    play::pay,
-    view,
-    walls::wall_boxes,
-};
 use crate::{
     ant::{AntBody, AntState, walk::within_reach},
+    antmaze::{
+        arena,
+        arena::{InMaze, MazeAnt, pay},
+        geometry::{distance, wall_boxes},
+        level::AntMazeLevel,
+    },
     maze::paid_otherwise,
+};
+use playbot_harness::{
+    detector::{Detector, LevelAhead, Moment, Setting, Watch},
+    prelude::*,
 };
 
 /// Computes ticks once more, from the ant before them, the action and the map of the level, and compares the results.
@@ -97,9 +94,9 @@ fn moved_otherwise(after: &AntState, by_rules: &AntState) -> Option<String> {
         let is_same = (is - should).abs() <= SLACK;
         !is_same
     };
-    let (at, (is, should)) = view::values(after).zip(view::values(by_rules)).enumerate().find(differs)?;
+    let (at, (is, should)) = arena::values(after).zip(arena::values(by_rules)).enumerate().find(differs)?;
     // Names are made only for reports.
-    let name = &view::names()[at];
+    let name = &arena::names()[at];
     Some(format!("the ant's `{name}` is {is:.4}; by the rules it is {should:.4}"))
 }
 

@@ -1,15 +1,14 @@
 //! A level: the maze, the ant's start, and its goal.
 
-use playbot_learner::rng::{ChaCha8Rng, Streams, below, unit};
-
-use super::{
-    geometry::centre_of,
-    mode::{AntMazeMode, GoalNoise, Goals, Pay},
-};
 use crate::{
     ant::AntState,
+    antmaze::{
+        geometry::centre_of,
+        mode::{AntMazeMode, GoalNoise, Goals, Pay},
+    },
     maze::{Cell, Maze, MazeError},
 };
+use playbot_learner::rng::{ChaCha8Rng, Streams, below, unit};
 
 /// A level, from a mode and seed or from a file, with its rules.
 #[derive(Clone, Debug)]

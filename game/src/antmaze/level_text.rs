@@ -1,24 +1,24 @@
 //! Levels as JSON: the output of `playbot level antmaze --json` for a whole mode, and level files.
 
-use bevy_playbot::unknown_name::UnknownName;
-use playbot_lab::level_files::{JsonStep::Key, LevelDesign, LevelTextError, read_json_object};
-use serde::{Deserialize, Serialize};
-
-use super::{
-    geometry::{cell_at, centre_of},
-    level::AntMazeLevel,
-    mode::{AntMazeMode, subject},
-};
 use crate::{
     ant::{
         AntState,
         state::{POSITIONS, VELOCITIES},
     },
+    antmaze::{
+        geometry::{cell_at, centre_of},
+        level::AntMazeLevel,
+        mode::{AntMazeMode, subject},
+    },
     maze::{Cell, Map, MazeModeError, MazeSpec, read_maze},
 };
+use bevy_playbot::unknown_name::UnknownName;
+use playbot_harness::level_files::{JsonStep::Key, LevelDesign, LevelTextError, read_json_object};
+use serde::{Deserialize, Serialize};
 
 /// The options of a mode that a level file may have. Its start and goal are drawn, so they are no options.
 const RULES: [&str; 3] = ["sparse", "dense=exp", "limit=1000"];
+
 /// Largest difference of a quaternion's length from 1.
 const NEARLY: f32 = 1e-3;
 

@@ -1,8 +1,7 @@
 //! Modes of the game: a map and its options, as text.
 
-use std::{fmt, str::FromStr};
-
 use crate::maze::{Cell, Map, MazeModeError, OptionError, fixed::antmaze};
+use std::{fmt, str::FromStr};
 
 /// The ingredients of a level of AntMaze. Written as the map and its options, `large+sparse+limit=500`; the defaults of
 /// options are those of [`AntMazeMode::on`].

@@ -1,20 +1,21 @@
 //! The picture of AntMaze.
 
-use bevy::prelude::*;
-use playbot_lab::prelude::*;
-
-use super::{
-    components::{InMaze, MazeAnt, PlaysIn},
-    geometry::{CELL, centre_of},
-    play::GOAL_RADIUS,
-    walls::wall_boxes,
-};
 use crate::{
     ant::view::{AntPose, AntViewPlugin, AntViewSystems, GoalMark, Ground, OnGround},
+    antmaze::{
+        arena::{GOAL_RADIUS, InMaze, MazeAnt, PlaysIn},
+        geometry::{CELL, centre_of, wall_boxes},
+        level::AntMazeLevel,
+    },
     maze::{Cell, Maze},
 };
+use bevy::{
+    math::{Rect, Vec2},
+    prelude::*,
+};
+use playbot_harness::{floor_plan::FloorPlan, prelude::*};
 
-/// Adds sprites to [`AntMazePlugin`](super::AntMazePlugin). Add it after the plugins that bring images, such as Bevy's
+/// Adds sprites to [`AntMazePlugin`](crate::antmaze::AntMazePlugin). Add it after the plugins that bring images, such as Bevy's
 /// own or a sensor's.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AntMazePicturePlugin;
@@ -56,5 +57,16 @@ fn ground(maze: &Maze) -> Ground {
         is_wall: cells.map(|cell| !maze.is_free(cell)).collect(),
         walled: true,
         boxes: wall_boxes(maze),
+    }
+}
+
+// Floor plan of a level, in metres, for drawing trajectories.
+
+impl AntMazeLevel {
+    /// Returns the maze from above: columns go along x, to the right, and rows along y, up.
+    pub fn floor_plan(&self) -> FloorPlan {
+        let place = |cell| Vec2::from_array(centre_of(&self.maze, cell));
+        let plan = self.maze.floor_plan(|cell| Rect::from_center_size(place(cell), Vec2::splat(CELL)), place);
+        FloorPlan { start: place(self.start), goal: Vec2::from_array(self.goal_at), ..plan }
     }
 }

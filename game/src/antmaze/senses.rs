@@ -1,23 +1,22 @@
 //! AntMaze with more observations: goal and rays, a map, or positional encoding.
 
+use crate::{
+    ant::walls::Walls,
+    antmaze::{
+        AntMaze, arena,
+        arena::{InMaze, MazeAnt},
+        geometry::{CELL, cell_at},
+    },
+    senses::{Mapped, Placed, Senses, Sighted, WithSenses, push_map, push_rays, push_waves},
+};
 use bevy::{math::Vec3, prelude::*};
 use bevy_playbot::vision::VisionSystems;
 use bevy_rapier3d::rapier::prelude::{QueryFilter, Ray};
-use playbot_lab::prelude::*;
-
-use super::{
-    components::{InMaze, MazeAnt},
-    game::AntMaze,
-    geometry::{CELL, cell_at},
-    play,
-};
-use crate::{
-    ant::walls::Walls,
-    senses::{Mapped, Placed, Senses, Sighted, WithSenses, mapped::push_map, placed::push_waves, sighted::push_rays},
-};
+use playbot_harness::prelude::*;
 
 /// Length of a ray, in metres: two cells.
 pub const RAY_LENGTH: f32 = 8.0;
+
 /// Heights of rays, in metres, between the floor and the top of the walls.
 const RAY_HEIGHTS: std::ops::RangeInclusive<f32> = 0.1..=1.9;
 
@@ -34,7 +33,7 @@ impl Senses<AntMaze> for Sighted {
     const NAME: &'static str = "antmaze-sighted";
 
     fn build(self, app: &mut App) {
-        app.add_systems(ObserveSchedule, sense_rays.after(play::observe).before(VisionSystems::Sync));
+        app.add_systems(ObserveSchedule, sense_rays.after(arena::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -43,7 +42,7 @@ impl Senses<AntMaze> for Mapped {
 
     fn build(self, app: &mut App) {
         let systems = (sense_rays, sense_map).chain();
-        app.add_systems(ObserveSchedule, systems.after(play::observe).before(VisionSystems::Sync));
+        app.add_systems(ObserveSchedule, systems.after(arena::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -51,7 +50,7 @@ impl Senses<AntMaze> for Placed {
     const NAME: &'static str = "antmaze-placed";
 
     fn build(self, app: &mut App) {
-        app.add_systems(ObserveSchedule, sense_place.after(play::observe).before(VisionSystems::Sync));
+        app.add_systems(ObserveSchedule, sense_place.after(arena::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -98,7 +97,7 @@ fn distance(walls: &Walls, from: Vec3, [east, north]: [f64; 2]) -> f32 {
 
 #[cfg(test)]
 mod tests {
-    use playbot_lab::worlds::build_world;
+    use playbot_harness::worlds::build_world;
 
     use super::*;
     use crate::maze::Cell;

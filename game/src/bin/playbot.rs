@@ -1,5 +1,5 @@
 //! The program `playbot`.
 
 fn main() -> std::process::ExitCode {
-    playbot_cli::main(&playbot_games::registry::GAMES)
+    playbot::main(&playbot_games::registry::GAMES)
 }

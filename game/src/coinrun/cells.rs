@@ -1,9 +1,6 @@
 //! Coverage of the cells of a view by squares.
 
-use super::{
-    tile::SIZE,
-    view_size::{REACH, SIDE},
-};
+use crate::coinrun::tile::{REACH, SIDE, SIZE};
 
 /// One tile more than cells, since the edge of the view cuts through tiles; and room for whole registers.
 const WIDE: usize = 16;

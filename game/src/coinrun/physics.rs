@@ -3,15 +3,14 @@
 //! The rules of CoinRun move the bodies; rapier follows them. Each arena has a physics context of its own, since arenas
 //! lie on top of each other and must not meet.
 
-use bevy::{prelude::*, transform::TransformPlugin};
-use bevy_rapier2d::prelude::*;
-
-use super::{
+use crate::coinrun::{
     SIZE, Tile,
     components::{Arena, ArenaBody, Crate, Enemy, InArena, PlayerBody, PlaysIn, Saw, Tiles},
+    play::CoinRunSystems,
     rules::Body,
-    systems::CoinRunSystems,
 };
+use bevy::{prelude::*, transform::TransformPlugin};
+use bevy_rapier2d::prelude::*;
 
 /// Adds rapier to CoinRun.
 ///

@@ -1,19 +1,18 @@
 //! One tick of every arena, by the rules.
 
-use bevy::{ecs::system::SystemParam, prelude::*};
-use playbot_lab::prelude::*;
-
-use super::{
+use crate::coinrun::{
     Outcome,
     components::{
         Arena, ArenaBody, ArenaEntities, Crate, Enemy, LastOutcome, PlayerBody, PlayerMemory, PlaysIn, Saw, Tiles,
     },
     paths::Surroundings,
-    rules::{Body, COIN_REWARD, begin_step, hash_state, move_player, patrol, touch},
+    rules::{Body, COIN_REWARD, begin_step, hash_state, motion::touch, move_player, patrol},
 };
+use bevy::{ecs::system::SystemParam, prelude::*};
+use playbot_harness::prelude::*;
 
 /// The action that does nothing.
-pub const NOTHING: u8 = 4;
+pub(crate) const NOTHING: u8 = 4;
 
 /// All inhabitants of arenas, with their queries.
 #[derive(SystemParam)]
@@ -124,7 +123,7 @@ pub(super) fn observe(
             continue;
         }
         let Some((arena, tiles)) = arenas.gather(plays_in.0, &mut bodies) else { continue };
-        let scene = super::view::Scene {
+        let scene = crate::coinrun::view::Scene {
             tiles: &tiles.0,
             player: &body.0,
             memory: memory.0,
@@ -136,3 +135,9 @@ pub(super) fn observe(
         scene.fill(&mut surroundings, &mut observation.vector);
     }
 }
+
+// System set of a tick of CoinRun.
+
+/// The tick of CoinRun, in `FixedUpdate`. Systems of your game go before or after it.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct CoinRunSystems;

@@ -1,19 +1,16 @@
 //! Proofs that a level of CoinRun can or cannot be won.
 
-use std::sync::Arc;
-
-use bevy::prelude::*;
-use bevy_playbot::episode::Episode;
-use playbot_lab::proof::LevelProof;
-
-use super::{
+use crate::coinrun::{
     components::{Arena, ArenaBody, ArenaEntities, Crate, Enemy, PlayerBody, PlayerMemory, PlaysIn, Saw, Tiles},
-    level::{Level, LevelParts},
+    level::{Level, LevelParts, Spawn},
     planner::coin_is_unreachable,
     rules::Body,
     sim::Sim,
-    spawn::Spawn,
 };
+use bevy::prelude::*;
+use bevy_playbot::episode::Episode;
+use playbot_harness::detector::LevelProof;
+use std::sync::Arc;
 
 /// Proves a level unsolvable if [`coin_is_unreachable`] is true at its start: a search over more than the rules allow
 /// has ended without the coin. Nothing is proved of other levels, since that search includes neither enemies nor time.
@@ -60,7 +57,7 @@ fn resumed(world: &World, agent: Entity) -> Option<Sim> {
 }
 
 /// Returns the level with the bodies that stand in it now, in case they were moved.
-fn with_changes(level: &Arc<Level>, tiles: &super::TileGrid, standing: Vec<Spawn>) -> Arc<Level> {
+fn with_changes(level: &Arc<Level>, tiles: &crate::coinrun::TileGrid, standing: Vec<Spawn>) -> Arc<Level> {
     let is_enemy = |spawn: &Spawn| matches!(spawn, Spawn::Enemy { .. });
     let is_same = level.spawns.iter().filter(|spawn| !is_enemy(spawn)).eq(&standing);
     if is_same && *tiles == level.tiles {
@@ -79,7 +76,7 @@ fn cell_of(body: &Body) -> Option<[i32; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coinrun::{Tile, arena::build, generator::generate, level::Mode};
+    use crate::coinrun::{Tile, components::build, generator, generator::generate, level::Mode};
 
     #[test]
     fn generated_levels_are_not_called_unsolvable() {

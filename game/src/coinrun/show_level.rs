@@ -1,26 +1,32 @@
 //! A level of CoinRun as text, as JSON, and as a picture of the whole of it.
 
-use std::sync::Arc;
-
-use bevy::prelude::*;
+use crate::coinrun::{
+    Level, Spawn,
+    components::{PlaysIn, level_of},
+    rules::Body,
+};
+use bevy::{
+    math::{Rect, Vec2},
+    prelude::*,
+};
 use bevy_playbot::{
     raster::RasterSensor,
     vision::{ImageOptions, ObservationConfig, ObservationKind},
 };
-use playbot_lab::{
+use playbot_harness::{
+    floor_plan::{FloorPlan, joined_tiles},
     inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
     level_files::{LevelDesign, LevelDesigns},
     prelude::*,
     worlds::build_observing_world,
 };
-
-use super::{Level, components::PlaysIn, levels::level_of};
+use std::sync::Arc;
 
 const LEGEND: &str =
     "A start  C coin  # = ground  ~ ^ lava  S saw  < > enemy and its direction  x crate  | enemies turn here";
 
 /// Shows a level.
-pub fn show(game: &dyn Game, request: &LevelRequest) -> Result<LevelView, InspectError> {
+pub(crate) fn show(game: &dyn Game, request: &LevelRequest) -> Result<LevelView, InspectError> {
     if request.map.is_some() {
         return Err(InspectError::Usage("CoinRun has no maps: name a --mode and a --level".to_owned()));
     }
@@ -60,4 +66,33 @@ fn draw(game: &dyn Game, level: Arc<Level>) -> Result<LevelPicture, InspectError
     world.tick()?;
     let seen = world.get::<Observation>(agent).expect("required by Agent");
     Ok(LevelPicture::Pixels { image, pixels: seen.image.clone() })
+}
+
+// Floor plan of a level, for drawing trajectories.
+
+impl Level {
+    /// Returns the used part of the level, from the side, in tiles: ground, lava and saws, crates. Enemies walk about,
+    /// so they are left out.
+    pub fn floor_plan(&self) -> FloorPlan {
+        let [columns, rows] = self.used_size().map(|tiles| tiles.unsigned_abs() as usize);
+        let square = |row: usize, column: usize| {
+            let corner = Vec2::new(column as f32, row as f32);
+            Rect::from_corners(corner, corner + 1.0)
+        };
+        let is_wall = |row: usize, column: usize| self.tiles.get(column as i32, row as i32).is_wall();
+        let (player, [x, y]) = (Body::player(), self.coin);
+        let ends = [Vec2::new(player.x, player.y), Vec2::new(x as f32 + 0.5, y as f32 + 0.5)];
+        let is_lava = |row: usize, column: usize| self.tiles.get(column as i32, row as i32).is_lava();
+        let at = |[x, y]: [i32; 2]| square(y as usize, x as usize);
+        let mut hazards = joined_tiles([rows, columns], is_lava, square);
+        let mut platforms = Vec::new();
+        for spawn in self.spawns.iter().copied() {
+            match spawn {
+                Spawn::Saw(cell) => hazards.push(at(cell)),
+                Spawn::Crate { cell, .. } => platforms.push(at(cell)),
+                Spawn::Enemy { .. } => {}
+            }
+        }
+        FloorPlan { hazards, platforms, ..FloorPlan::of_tiles([rows, columns], is_wall, square, ends) }
+    }
 }

@@ -1,11 +1,12 @@
 //! A CoinRun episode without an engine: fast, exact and cheap to copy.
 
-use std::sync::Arc;
-
-use super::level::Level;
-use super::rules::{
-    ACTIONS, Body, COIN_REWARD, Outcome, PlayerState, begin_step, hash_state, move_player, patrol, touch,
+use crate::coinrun::{
+    level::Level,
+    rules::{
+        ACTIONS, Body, COIN_REWARD, Outcome, PlayerState, begin_step, hash_state, motion::touch, move_player, patrol,
+    },
 };
+use std::sync::Arc;
 
 /// The result of one step.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -127,8 +128,8 @@ impl Sim {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coinrun::generator::generate;
     use crate::coinrun::level::Mode;
+    use crate::coinrun::{generator, generator::generate};
 
     #[test]
     fn steps_after_the_end_change_nothing() {

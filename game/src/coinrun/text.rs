@@ -4,10 +4,11 @@
 //! `^` lava surface, `C` coin, `|` enemy barrier, `S` saw, `>` and `<` enemy with its direction,
 //! `x` crate, `A` start of the player. A body hides the tile in its cell.
 
-use super::level::{Level, LevelParts, Mode};
-use super::rules::START_CELL;
-use super::spawn::Spawn;
-use super::tile::{SIZE, Tile, TileGrid};
+use crate::coinrun::{
+    level::{Level, LevelParts, Mode, Spawn},
+    rules::START_CELL,
+    tile::{SIZE, Tile, TileGrid},
+};
 
 /// Rows shown above the highest thing in a level.
 const HEADROOM: i32 = 3;
@@ -193,7 +194,7 @@ impl Reader {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coinrun::generator::generate;
+    use crate::coinrun::{generator, generator::generate};
 
     #[test]
     fn pictures_read_back() {

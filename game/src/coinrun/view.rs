@@ -15,20 +15,24 @@
 //! the middle of cell (6, 6). Velocities are divided by their largest value. `cell_x` and `cell_y` are the player's
 //! position in its tile, from -0.5 to 0.5, and `a` is the number of the held action.
 
-pub use super::view_size::{REACH, SIDE};
-use super::{
+use crate::coinrun::{
     cells::Cells,
     paths,
     rules::{Body, ENEMY_SPEED, JUMP_SPEED, PlayerState, WALK_SPEED, is_supported},
     tile::TileGrid,
 };
 
+pub use crate::coinrun::tile::{REACH, SIDE};
+
 /// Cells in view.
 pub const CELLS: usize = SIDE * SIDE;
+
 /// Enemies that are listed by themselves.
 pub const LISTED_ENEMIES: usize = 3;
+
 /// Values about the player's motion.
 const MOTION: usize = 8;
+
 /// Number of values.
 pub const LENGTH: usize = 3 * CELLS + 3 + 3 * LISTED_ENEMIES + MOTION + paths::HELD.len() * paths::VALUES;
 
@@ -149,7 +153,7 @@ impl Scene<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coinrun::{Level, Mode, generate};
+    use crate::coinrun::{Level, Mode, generator, generator::generate};
 
     /// Returns a level with a player and no other body.
     fn empty<'a>(level: &'a Level, player: &'a Body) -> Scene<'a> {

@@ -1,11 +1,7 @@
 //! Errors of mazes.
 
+use crate::maze::Cell;
 use thiserror::Error;
-
-use super::{
-    cell::Cell,
-    limits::{MAX_CELLS, MAX_SIDE},
-};
 
 /// The maze cannot be played or made. Rows and columns are counted from 0.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -117,3 +113,11 @@ pub enum MazeError {
         longest: usize,
     },
 }
+
+// Limits of the size of a maze.
+
+/// Most cells to a side.
+pub const MAX_SIDE: usize = 4096;
+
+/// Most cells in all.
+pub const MAX_CELLS: usize = 1 << 22;

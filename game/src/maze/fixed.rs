@@ -3,9 +3,8 @@
 //! Maze2D and AntMaze share their walls from medium on. The original Maze2D draws its start at random. The option for a
 //! fixed start takes the `S` of these maps, in the corner where AntMaze starts.
 
+use crate::maze::{Cell, Maze};
 use std::sync::LazyLock;
-
-use super::{cell::Cell, layout::Maze};
 
 fn map<const N: usize>(rows: [&str; N]) -> Maze {
     Maze::parse(&rows).expect("a map that tests read")

@@ -1,13 +1,13 @@
 //! The map of a mode: one of the fixed ones, or a generated one for each seed.
 
-use std::{fmt, str::FromStr};
-
-use bevy_playbot::unknown_name::UnknownName;
-
-use super::{
-    error::MazeError, fixed, generator::generate, layout::Maze, mode_error::MazeModeError, spec::MazeSpec,
-    spec_text::OptionError,
+use crate::maze::{
+    Maze,
+    error::MazeError,
+    generator::generate,
+    spec::{MazeModeError, MazeSpec, OptionError},
 };
+use bevy_playbot::unknown_name::UnknownName;
+use std::{fmt, str::FromStr};
 
 /// The source of a mode's mazes.
 #[derive(Clone, Debug, PartialEq)]
@@ -121,10 +121,10 @@ impl Map {
     /// No maze can be generated from the spec.
     pub fn maze2d(&self, seed: u64) -> Result<Maze, MazeError> {
         Ok(match self {
-            Self::Umaze => fixed::maze2d::umaze(),
-            Self::Medium => fixed::maze2d::medium(),
-            Self::Large => fixed::maze2d::large(),
-            Self::Xl => fixed::maze2d::xl(),
+            Self::Umaze => crate::maze::fixed::maze2d::umaze(),
+            Self::Medium => crate::maze::fixed::maze2d::medium(),
+            Self::Large => crate::maze::fixed::maze2d::large(),
+            Self::Xl => crate::maze::fixed::maze2d::xl(),
             Self::Random(spec) => generate(spec, seed)?,
         })
     }
@@ -136,10 +136,10 @@ impl Map {
     /// No maze can be generated from the spec.
     pub fn antmaze(&self, seed: u64) -> Result<Maze, MazeError> {
         Ok(match self {
-            Self::Umaze => fixed::antmaze::umaze(),
-            Self::Medium => fixed::antmaze::medium(),
-            Self::Large => fixed::antmaze::large(),
-            Self::Xl => fixed::antmaze::xl(),
+            Self::Umaze => crate::maze::fixed::antmaze::umaze(),
+            Self::Medium => crate::maze::fixed::antmaze::medium(),
+            Self::Large => crate::maze::fixed::antmaze::large(),
+            Self::Xl => crate::maze::fixed::antmaze::xl(),
             Self::Random(spec) => generate(spec, seed)?,
         })
     }

@@ -1,21 +1,16 @@
 //! A maze as text, as JSON, and as a drawing.
 
-use std::{
-    fs::File,
-    io::{self, Read},
-    path::Path,
-};
-
+use crate::maze::{Cell, MAX_CELLS, Map, Maze, MazeError, MazeModeError};
 use bevy::math::{Rect, Vec2};
-use playbot_lab::{
+use playbot_harness::{
     drawing::{Drawing, MarkForm, Rgb, Shape},
+    floor_plan::FloorPlan,
     game::Game,
     inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
     level_files::{LevelDesigns, is_level_files},
 };
 use serde_json::{Value, json};
-
-use super::{Cell, MAX_CELLS, Map, Maze, MazeError, MazeModeError};
+use std::{fs::File, io, io::Read, path::Path};
 
 /// Most bytes that a file of rows may have: two line ends for each cell of the largest maze.
 const MAX_BYTES: u64 = 3 * MAX_CELLS as u64;
@@ -152,10 +147,14 @@ fn picture(maze: &Maze) -> Vec<String> {
 
 /// Side of a cell in a drawing, pixels.
 const SIDE: f32 = 16.0;
+
 /// Most cells to a side of a drawing.
 const MOST_DRAWN: usize = 256;
+
 const WALL: Rgb = [190, 195, 201];
+
 const PATH: Rgb = [0, 114, 178];
+
 const INK: Rgb = [31, 35, 40];
 
 /// Returns the maze with its shortest path, the first row at the top.
@@ -175,4 +174,19 @@ fn draw(maze: &Maze) -> Result<Drawing, InspectError> {
     }
     let size = Vec2::new(maze.columns() as f32, maze.rows() as f32) * SIDE;
     Ok(Drawing { label: "A maze with its shortest path".to_owned(), size, shapes })
+}
+
+// Floor plan of a maze, for drawing trajectories.
+
+impl Maze {
+    /// Returns the maze from above. `square` gives the area of a cell and `place` the position of agents in it, both in
+    /// the game's coordinates. They differ where walls are shifted against positions, as in the original Maze2D.
+    pub fn floor_plan(&self, square: impl Fn(Cell) -> Rect, place: impl Fn(Cell) -> Vec2) -> FloorPlan {
+        FloorPlan::of_tiles(
+            [self.rows(), self.columns()],
+            |row, col| !self.is_free(Cell { row, col }),
+            |row, col| square(Cell { row, col }),
+            [place(self.start()), place(self.goal())],
+        )
+    }
 }

@@ -1,6 +1,10 @@
 //! Mazes as text, one character to the cell.
 
-use super::{cell::Cell, error::MazeError, layout::Maze, walls::Walls};
+use crate::maze::{Cell, Maze, error::MazeError, walls::Walls};
+use playbot_harness::level_files::{
+    JsonStep::{Index, Key},
+    LevelTextError,
+};
 
 impl Maze {
     /// Reads a maze from its rows: `#` or `1` is a wall, `O`, `0`, a blank or `.` a free cell, `S` or `r` the start and
@@ -82,6 +86,32 @@ fn mark(place: &mut Option<Cell>, cell: Cell, what: &'static str) -> Result<(), 
     match place.replace(cell) {
         Some(first) => Err(MazeError::Twice { what, first, second: cell }),
         None => Ok(()),
+    }
+}
+
+// Shared parts of the level files of maze games.
+
+/// Reads the maze of a level file: rows, the first one at the top, with start and goal as letters in them, as cells, or
+/// both.
+///
+/// # Errors
+///
+/// The mistake, with its line.
+pub fn read_maze(text: &str, rows: &[String], start: Option<Cell>, goal: Option<Cell>) -> Result<Maze, LevelTextError> {
+    Maze::parse_drawn(rows, start, goal).map_err(|error| at_maze(text, &error))
+}
+
+/// Returns a mistake in a maze, on the line where it is.
+fn at_maze(text: &str, error: &MazeError) -> LevelTextError {
+    let row = match *error {
+        MazeError::Ragged { row, .. } | MazeError::UnknownCharacter { row, .. } => Some(row),
+        MazeError::Twice { second: cell, .. } | MazeError::Open(cell) | MazeError::NotFree(cell) => Some(cell.row),
+        _ => None,
+    };
+    let what = error.to_string();
+    match row {
+        Some(row) => LevelTextError::at(text, &[Key("rows"), Index(row)], what),
+        None => LevelTextError::at(text, &[Key("rows")], what),
     }
 }
 

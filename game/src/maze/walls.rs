@@ -1,9 +1,8 @@
 //! Walls and free cells in rows.
 
-use super::{
-    cell::Cell,
-    error::MazeError,
-    limits::{MAX_CELLS, MAX_SIDE},
+use crate::maze::{
+    Cell,
+    error::{MAX_CELLS, MAX_SIDE, MazeError},
 };
 
 /// The walls alone, row by row.
@@ -60,4 +59,13 @@ pub(super) fn check_size(rows: usize, columns: usize) -> Result<(), MazeError> {
     }
     let fits = rows <= MAX_SIDE && columns <= MAX_SIDE && rows * columns <= MAX_CELLS;
     if fits { Ok(()) } else { Err(MazeError::TooLarge { rows, columns }) }
+}
+
+// Comparison of a tick's reward with the rules.
+
+/// Describes a reward that differs from the rules by more than `slack`; `None` if it does not.
+pub(crate) fn paid_otherwise(paid: f32, by_rules: f32, slack: f32) -> Option<String> {
+    // NaN is not near to anything.
+    let is_same = (paid - by_rules).abs() <= slack;
+    (!is_same).then(|| format!("the tick paid {paid}; by the rules it pays {by_rules}"))
 }

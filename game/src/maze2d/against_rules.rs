@@ -1,18 +1,19 @@
 //! Detector of balls whose motion or reward breaks the rules.
 
-use playbot_lab::{
+use crate::{
+    maze::paid_otherwise,
+    maze2d::{
+        arena::{MazeArena, MazeBall, PlaysIn},
+        ball::{Ball, FORCE, RADIUS, Vec2d, clip_action, length, scale, sub},
+        mode::{Contact, Maze2dMode},
+        sim::{reward, step_soft},
+        walls::Walls,
+    },
+};
+use playbot_harness::{
     detector::{Detector, LevelAhead, Moment, Watch},
     prelude::*,
 };
-
-use super::{
-    ball::{Ball, FORCE, RADIUS, Vec2d, clip_action, length, scale, sub},
-    components::{MazeArena, MazeBall, PlaysIn},
-    mode::{Contact, Maze2dMode},
-    sim::{reward, step_soft},
-    walls::Walls,
-};
-use crate::maze::paid_otherwise;
 
 /// Computes each tick once more from the position of the ball before it, the action and the map of the level, and
 /// compares the results.
@@ -24,10 +25,13 @@ pub(super) struct AgainstRules;
 
 /// Largest allowed difference of two results of the same tick, m and m/s.
 const SLACK: f64 = 1e-6;
+
 /// The same for rapier, which computes in single precision.
 const SLACK_OF_SOLVER: f64 = 1e-3;
+
 /// A ball this far from all walls, surface to surface, is in free flight, m.
 const CLEAR: f64 = 2.0 * RADIUS;
+
 /// Largest allowed difference of two rewards of the same tick.
 const SLACK_OF_REWARD: f32 = 1e-5;
 

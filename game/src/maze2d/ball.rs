@@ -11,14 +11,19 @@ pub type Vec2d = [f64; 2];
 
 /// Seconds of one step.
 pub const STEP: f64 = 0.01;
+
 /// Radius of the ball.
 pub const RADIUS: f64 = 0.1;
+
 /// Mass of the ball, kg: that of a sphere with density 1000.
 pub const MASS: f64 = 1000.0 * 4.0 / 3.0 * PI * RADIUS * RADIUS * RADIUS;
+
 /// Force of a full push along one axis.
 pub const FORCE: f64 = 100.0;
+
 /// Damping of each axis, N s/m.
 pub const DAMPING: f64 = 1.0;
+
 /// Limit of the velocity along each axis before each step; after the step it can be larger.
 pub const MAX_SPEED: f64 = 5.0;
 

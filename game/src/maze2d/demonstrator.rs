@@ -1,21 +1,26 @@
 //! D4RL's demonstrator: plans a path over the cells and steers from one to the next.
 
-use std::{collections::VecDeque, sync::Arc};
-
+use crate::{
+    maze::{Cell, Planner},
+    maze2d::{
+        arena::{MazeArena, MazeBall, PlaysIn},
+        ball::{Ball, Vec2d, add, length, scale, sub},
+        level::{Maze2dLevel, any_cell, centre, normal},
+    },
+};
+use bevy::prelude::*;
+use bevy_playbot::streams::AgentStreams;
+use playbot_harness::prelude::*;
 use playbot_learner::rng::unit;
 use rand::Rng;
-
-use super::{
-    ball::{Ball, Vec2d, add, length, scale, sub},
-    draws::normal,
-    level::{Maze2dLevel, any_cell, centre},
-};
-use crate::maze::{Cell, Planner};
+use std::{collections::VecDeque, sync::Arc};
 
 /// Gain of the distance to the next waypoint, per metre, and of the velocity, per metre and second. A push of 1 is
 /// full.
 const PULL: f64 = 10.0;
+
 const BRAKE: f64 = 1.0;
+
 /// Distance at which a waypoint is passed, and a target reached, m. The original also requires less than 0.1 m in the
 /// last step; no ball moves faster.
 const NEAR: f64 = 0.1;
@@ -99,4 +104,43 @@ impl Demonstrator {
 /// Returns the moves between two cells without walls.
 fn moves_between(a: Cell, b: Cell) -> usize {
     a.row.abs_diff(b.row) + a.col.abs_diff(b.col)
+}
+
+// The waypoint demonstrator as an agent of the game.
+
+/// Plays by walking from waypoint to waypoint. See [`Demonstrator`].
+#[derive(Component, Reflect)]
+#[reflect(Component)]
+pub struct DemonstratorBot {
+    noise: f64,
+    /// Made anew at the first tick of an episode.
+    #[reflect(ignore)]
+    walker: Option<Demonstrator>,
+}
+
+impl DemonstratorBot {
+    /// Takes the standard deviation of normal noise on each axis of its actions.
+    pub fn new(noise: f64) -> Self {
+        Self { noise, walker: None }
+    }
+}
+
+pub(super) fn decide(
+    mut bots: Query<(&Control, &Episode, &PlaysIn, &MazeBall, &mut DemonstratorBot, &mut AgentStreams, &mut Action)>,
+    arenas: Query<&MazeArena>,
+) {
+    for (control, episode, plays_in, ball, mut bot, mut streams, mut action) in &mut bots {
+        if *control != Control::Bot || !episode.is_running() {
+            continue;
+        }
+        let Ok(arena) = arenas.get(plays_in.0) else { continue };
+        let (noise, rng) = (bot.noise, &mut streams.action);
+        if episode.tick == 0 {
+            bot.walker = None;
+        }
+        let walker =
+            bot.walker.get_or_insert_with(|| Demonstrator::new(arena.level.clone(), arena.rules.retarget, rng));
+        let push = walker.act(&ball.0, noise, rng);
+        action.0 = ActionValue::Continuous(push.map(|axis| axis as f32).to_vec());
+    }
 }

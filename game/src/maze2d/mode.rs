@@ -1,9 +1,10 @@
 //! Modes of Maze2D: a map with options, such as `medium+fixed-start+limit=1000`.
 
+use crate::{
+    maze::{Map, Maze, MazeError, MazeModeError, OptionError},
+    maze2d::walls::D4RL_OFFSET,
+};
 use std::{fmt, str::FromStr};
-
-use super::walls::D4RL_OFFSET;
-use crate::maze::{Map, Maze, MazeError, MazeModeError, OptionError};
 
 /// The contact model of walls and ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

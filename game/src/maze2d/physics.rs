@@ -4,15 +4,14 @@
 //! [`Contact::Rapier`](super::mode::Contact) it computes the contacts of the ball. Under
 //! [`Contact::Soft`](super::mode::Contact) it only follows the ball, for sensors and rays of a game's own.
 
+use crate::maze2d::{
+    ball::{Ball, MASS, RADIUS, STEP, Vec2d},
+    walls::{HALF, Walls},
+};
 use bevy::prelude::{Component, Reflect};
 use bevy_rapier2d::rapier::prelude::{
     ColliderBuilder, ColliderHandle, IVector, IntegrationParameters, PhysicsWorld, Real, RigidBodyBuilder,
     RigidBodyHandle, Vector,
-};
-
-use super::{
-    ball::{Ball, MASS, RADIUS, STEP, Vec2d},
-    walls::{HALF, Walls},
 };
 
 /// Distance ahead of a fast ball at which contacts are looked for, m: more than it can move in a step.

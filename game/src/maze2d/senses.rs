@@ -1,18 +1,16 @@
 //! Maze2D with more observations: goal and rays, a map, or positional encoding.
 
+use crate::{
+    maze2d::{
+        Maze2d, arena,
+        arena::{MazeArena, MazeBall, PlaysIn},
+        ball::sub,
+    },
+    senses::{Mapped, Placed, Senses, Sighted, WithSenses, push_map, push_rays, push_waves},
+};
 use bevy::prelude::*;
 use bevy_playbot::vision::VisionSystems;
-use playbot_lab::prelude::*;
-
-use super::{
-    ball::sub,
-    components::{MazeArena, MazeBall, PlaysIn},
-    game::Maze2d,
-    play,
-};
-use crate::senses::{
-    Mapped, Placed, Senses, Sighted, WithSenses, mapped::push_map, placed::push_waves, sighted::push_rays,
-};
+use playbot_harness::prelude::*;
 
 /// Length of a ray from the centre of a ball, in metres: four cells.
 pub const RAY_LENGTH: f64 = 4.0;
@@ -31,7 +29,7 @@ impl Senses<Maze2d> for Sighted {
     const NAME: &'static str = "maze2d-sighted";
 
     fn build(self, app: &mut App) {
-        app.add_systems(ObserveSchedule, sense_rays.after(play::observe).before(VisionSystems::Sync));
+        app.add_systems(ObserveSchedule, sense_rays.after(arena::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -40,7 +38,7 @@ impl Senses<Maze2d> for Mapped {
 
     fn build(self, app: &mut App) {
         let systems = (sense_rays, sense_map).chain();
-        app.add_systems(ObserveSchedule, systems.after(play::observe).before(VisionSystems::Sync));
+        app.add_systems(ObserveSchedule, systems.after(arena::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -48,7 +46,7 @@ impl Senses<Maze2d> for Placed {
     const NAME: &'static str = "maze2d-placed";
 
     fn build(self, app: &mut App) {
-        app.add_systems(ObserveSchedule, sense_place.after(play::observe).before(VisionSystems::Sync));
+        app.add_systems(ObserveSchedule, sense_place.after(arena::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -96,7 +94,7 @@ fn sense_place(mut balls: Query<(&Episode, &MazeBall, &mut Observation), With<Ve
 mod tests {
     use std::f32::consts::SQRT_2;
 
-    use playbot_lab::worlds::build_world;
+    use playbot_harness::worlds::build_world;
 
     use super::*;
     use crate::maze2d::Ball;

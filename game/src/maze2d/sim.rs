@@ -1,12 +1,11 @@
 //! A Maze2D episode without an engine: one step and its reward.
 
-use super::{
+use crate::maze2d::{
     ball::{Ball, FORCE, Vec2d, length, scale, sub},
     level::Maze2dLevel,
     mode::{Contact, Maze2dMode},
     physics::MazePhysics,
-    soft_contact::contact_force,
-    walls::Walls,
+    walls::{Walls, contact_force},
 };
 
 /// The goal is reached within this distance of its centre, m.

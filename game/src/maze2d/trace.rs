@@ -1,18 +1,16 @@
 //! Tracing Maze2D: the ball under given pushes.
 
-use std::{path::Path, sync::Arc};
-
-use playbot_lab::{
+use crate::maze2d::{
+    Ball, Maze2dLevel,
+    arena::level_of,
+    ball::{Vec2d, clip_action},
+    sim::BallSim,
+};
+use playbot_harness::{
     game::Game,
     inspect::{InspectError, Print, TraceRequest, plain, read_text},
 };
-
-use super::{
-    Ball, Maze2dLevel,
-    ball::{Vec2d, clip_action},
-    levels::level_of,
-    sim::BallSim,
-};
+use std::{path::Path, sync::Arc};
 
 /// Plays the pushes of a file and prints the ball after each. Reports the number of clipped pushes.
 pub(super) fn run(game: &dyn Game, request: &TraceRequest, print: Print) -> Result<Option<String>, InspectError> {

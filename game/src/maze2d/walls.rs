@@ -1,8 +1,9 @@
 //! The walls of the ball: squares of side 1, one for each wall cell.
 
-use crate::maze::{Cell, Maze};
-
-use super::ball::{RADIUS, Vec2d, add, length, sub};
+use crate::{
+    maze::{Cell, Maze},
+    maze2d::ball::{Ball, DAMPING, MASS, RADIUS, Vec2d, add, dot, length, scale, sub},
+};
 
 /// Offset of D4RL's walls from their coordinates, along both axes: a cell (i, j) is centred at (i - 0.2, j - 0.2).
 /// Starts, goals and rewards use (i, j).
@@ -136,4 +137,209 @@ fn touch(centre: Vec2d, place: Vec2d) -> Touch {
     let mut normal = [0.0; 2];
     normal[axis] = if from[axis] < 0.0 { -1.0 } else { 1.0 };
     Touch { normal, gap: from[axis].abs() - HALF - RADIUS }
+}
+
+// Distance to the next wall.
+
+impl Walls {
+    /// Returns the distance from a position to the nearest wall in a direction of length 1, m; at most `most`. 0 inside
+    /// a wall.
+    ///
+    /// Walks from cell to cell through the sides that the ray leaves by. Each is computed from the position itself, so
+    /// no error adds up. Every maze is closed, so the walk ends.
+    pub fn ray(&self, place: Vec2d, way: Vec2d, most: f64) -> f64 {
+        let (row, column) = self.cell_at(place);
+        let mut cell = [row, column];
+        let mut gone: f64 = 0.0;
+        while !self.is_solid(cell[0], cell[1]) {
+            let middle = self.centre(cell[0], cell[1]);
+            let until_side = [0, 1].map(|axis: usize| match way[axis] {
+                0.0 => f64::INFINITY,
+                along => (middle[axis] + HALF.copysign(along) - place[axis]) / along,
+            });
+            // Through a corner it takes the first axis, so it never passes between two walls that touch there.
+            let axis = usize::from(until_side[1] < until_side[0]);
+            gone = until_side[axis];
+            if gone >= most {
+                return most;
+            }
+            cell[axis] += if way[axis] > 0.0 { 1 } else { -1 };
+        }
+        // Rounding can put a position on a side beyond it.
+        gone.max(0.0)
+    }
+}
+
+// Contact as MuJoCo 3.1.6 solves it for D4RL's ball and walls, in closed form.
+//
+// MuJoCo's contacts are soft constraints: each has a reference acceleration that brings the surfaces apart like a
+// damped spring, and a weight. The acceleration is the one with the least cost: the smallest deviation from the free
+// acceleration and from the references that it falls short of. With MuJoCo's defaults (`solref` 0.02 1, `solimp` 0.9
+// 0.95 0.001, margin 0.002) and two dimensions there is little left to solve.
+
+/// Contacts act when the surfaces are closer than this, m.
+pub const MARGIN: f64 = 0.002;
+
+/// Least and most impedance, and the depth at which it is most, m.
+const IMPEDANCE: [f64; 2] = [0.9, 0.95];
+
+const DEPTH: f64 = 0.001;
+
+/// Time constant of the reference, s; its damping ratio is 1.
+const TIME: f64 = 0.02;
+
+/// One contact of the step.
+#[derive(Clone, Copy, Default)]
+struct Contact {
+    normal: Vec2d,
+    /// Requested acceleration along the normal.
+    target: f64,
+    /// Cost of falling short of it.
+    weight: f64,
+}
+
+/// Most contacts at once: more walls than these cannot be within the margin of a ball that is outside of all.
+const SOFT_CONTACT_MOST: usize = 4;
+
+/// Returns the force of the walls on a ball that is driven by `drive`, N.
+pub fn contact_force(ball: &Ball, drive: Vec2d, walls: &Walls) -> Vec2d {
+    let touches = walls.touches(ball.position, MARGIN);
+    if touches.as_slice().is_empty() {
+        return [0.0; 2];
+    }
+    let (contacts, count) = contacts(ball, &touches);
+    let contacts = &contacts[..count];
+    let free = sub(scale(drive, 1.0 / MASS), scale(ball.velocity, DAMPING / MASS));
+    let acceleration = least_cost(free, contacts);
+    let force_of = |contact: &Contact| {
+        let short = (contact.target - dot(contact.normal, acceleration)).max(0.0);
+        scale(contact.normal, contact.weight * short)
+    };
+    contacts.iter().map(force_of).fold([0.0; 2], add)
+}
+
+fn contacts(ball: &Ball, touches: &Touches) -> ([Contact; SOFT_CONTACT_MOST], usize) {
+    let mut contacts = [Contact::default(); SOFT_CONTACT_MOST];
+    let mut count = 0;
+    for (contact, touch) in contacts.iter_mut().zip(touches.as_slice()) {
+        let depth = touch.gap - MARGIN;
+        let impedance = impedance(depth.abs() / DEPTH);
+        let (damping, stiffness) = (2.0 / (IMPEDANCE[1] * TIME), 1.0 / (IMPEDANCE[1] * TIME).powi(2));
+        *contact = Contact {
+            normal: touch.normal,
+            target: -damping * dot(touch.normal, ball.velocity) - stiffness * impedance * depth,
+            weight: MASS * impedance / (1.0 - impedance),
+        };
+        count += 1;
+    }
+    (contacts, count)
+}
+
+/// Returns the impedance at a depth in units of [`DEPTH`]: from least to most along two parabolas.
+fn impedance(depth: f64) -> f64 {
+    let rise = match depth {
+        ..=0.5 => 2.0 * depth * depth,
+        0.5..1.0 => 1.0 - 2.0 * (1.0 - depth) * (1.0 - depth),
+        _ => 1.0,
+    };
+    IMPEDANCE[0] + (IMPEDANCE[1] - IMPEDANCE[0]) * rise
+}
+
+/// Returns the acceleration with the least cost.
+///
+/// The cost is convex and, for each choice of contacts that push, quadratic: the choice that is consistent with its own
+/// minimum is the right one.
+fn least_cost(free: Vec2d, contacts: &[Contact]) -> Vec2d {
+    let mut best = free;
+    for pushing in 0..1_u32 << contacts.len() {
+        let pushes = |index: usize| pushing & 1 << index != 0;
+        let acceleration = minimum(free, contacts, pushes);
+        let is_consistent =
+            |(index, contact): (usize, &Contact)| (dot(contact.normal, acceleration) < contact.target) == pushes(index);
+        if contacts.iter().enumerate().all(is_consistent) {
+            return acceleration;
+        }
+        best = acceleration;
+    }
+    // Rounding has left no choice consistent: all push.
+    best
+}
+
+/// Returns the minimum of the cost if exactly these contacts push: two linear equations.
+fn minimum(free: Vec2d, contacts: &[Contact], pushes: impl Fn(usize) -> bool) -> Vec2d {
+    let (mut xx, mut xy, mut yy) = (MASS, 0.0, MASS);
+    let mut right = scale(free, MASS);
+    for (_, contact) in contacts.iter().enumerate().filter(|&(index, _)| pushes(index)) {
+        let Contact { normal: [x, y], target, weight } = *contact;
+        xx += weight * x * x;
+        xy += weight * x * y;
+        yy += weight * y * y;
+        right = add(right, scale(contact.normal, weight * target));
+    }
+    let determinant = xx * yy - xy * xy;
+    [(yy * right[0] - xy * right[1]) / determinant, (xx * right[1] - xy * right[0]) / determinant]
+}
+
+#[cfg(test)]
+mod ray_tests {
+    use bevy_rapier2d::rapier::prelude::{QueryFilter, Ray, Vector};
+    use playbot_learner::rng::Streams;
+
+    use super::*;
+    use crate::{
+        maze::Maze,
+        maze2d::{
+            Ball,
+            level::{any_cell, centre, uniform},
+            physics::MazePhysics,
+        },
+        senses::WAYS,
+    };
+
+    fn walls(rows: &[&str], offset: f64) -> Walls {
+        Walls::new(&Maze::parse(rows).expect("a maze"), offset)
+    }
+
+    #[test]
+    fn no_ray_slips_between_walls_that_touch_at_a_corner() {
+        let walls = walls(&["#####", "#SO##", "#O#O#", "#OOG#", "#####"], 0.0);
+        let diagonal = std::f64::consts::FRAC_1_SQRT_2;
+        // Between (1, 3) and (2, 2), from the middles of (1, 2) and (2, 3), exactly to the corner where the four meet.
+        for (from, way) in [([1.0, 2.0], [diagonal, diagonal]), ([2.0, 3.0], [-diagonal, -diagonal])] {
+            assert!((walls.ray(from, way, 9.0) - diagonal).abs() < 1e-12, "{from:?}");
+        }
+    }
+
+    #[test]
+    fn rays_end_at_sight_in_walls_and_outside() {
+        let walls = walls(&["######", "#SOOG#", "######"], 0.2);
+        let east = [0.0, 1.0];
+        assert!((walls.ray([0.8, 0.8], east, 9.0) - 3.5).abs() < 1e-12);
+        assert_eq!(walls.ray([0.8, 0.8], east, 2.0), 2.0);
+        assert_eq!(walls.ray([0.0, 0.8], east, 9.0), 0.0, "inside a wall");
+        assert_eq!(walls.ray([-7.0, 30.0], east, 9.0), 0.0, "outside");
+        assert_eq!(walls.ray([f64::NAN, 0.8], east, 9.0), 0.0);
+    }
+
+    #[test]
+    fn rapier_measures_the_same() {
+        let mut rng = Streams::new(1).stream("rays", 0);
+        for seed in 0..8 {
+            let mode: crate::maze2d::Maze2dMode = "random+loops=0.3".parse().expect("a mode");
+            let maze = mode.maze(seed).expect("a maze");
+            let walls = Walls::new(&maze, [0.0, 0.2][seed as usize % 2]);
+            let physics = MazePhysics::following(&walls, &Ball::default());
+            let filter = QueryFilter::default().exclude_rigid_body(physics.ball());
+            for _ in 0..50 {
+                let place =
+                    centre(any_cell(&maze, &mut rng)).map(|along| along - walls.offset() + uniform(&mut rng, 0.4));
+                for (name, [x, y]) in WAYS {
+                    let ray = Ray::new(Vector::new(place[0] as f32, place[1] as f32), Vector::new(x as f32, y as f32));
+                    let found = physics.world.cast_ray(&ray, 4.0, true, filter).map_or(4.0, |(_, distance)| distance);
+                    let ours = walls.ray(place, [x, y], 4.0);
+                    assert!((ours - f64::from(found)).abs() < 1e-4, "{name} of {place:?}: {ours}, not {found}");
+                }
+            }
+        }
+    }
 }

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoReader, DemoWriter, EpisodeActions};
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::game::Game;
+use playbot_harness::game::Game;
 
 use crate::program::{code, done, ended, errors, json_lines, playbot};
 

@@ -2,8 +2,9 @@
 
 use std::{collections::BTreeSet, fs, path::Path};
 
+use playbot::prelude::*;
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::{inspect::LevelRequest, prelude::*};
+use playbot_harness::inspect::LevelRequest;
 use serde_json::{Value, json};
 
 use crate::program::ended;

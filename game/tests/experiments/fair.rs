@@ -1,6 +1,6 @@
 //! Tests of fair comparisons: the variants of an experiment differ only as their names say.
 
-use playbot_lab::train::{Experiment, LearnerKind, study::study_runs};
+use playbot_train::{Experiment, LearnerKind, study::study_runs};
 
 use crate::{MAZES, names, read};
 

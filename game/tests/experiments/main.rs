@@ -7,16 +7,15 @@ mod program;
 use std::path::{Path, PathBuf};
 
 use playbot_games::registry::GAMES;
-use playbot_lab::{
+use playbot_harness::{
     game::Game,
     games::Games,
-    held_out::HeldOut,
-    split::LevelSplit,
-    train::{
-        Experiment,
-        config_file::{parse_experiment, read_experiment},
-        study::study_runs,
-    },
+    split::{HeldOut, LevelSplit},
+};
+use playbot_train::{
+    Experiment,
+    experiment::file::{parse_experiment, read_experiment},
+    study::study_runs,
 };
 use program::done;
 use serde_json::Value;

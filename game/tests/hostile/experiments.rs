@@ -7,10 +7,8 @@ use std::{
 };
 
 use playbot_games::registry::GAMES;
-use playbot_lab::{
-    games::Games,
-    train::config_file::{locate, parse_experiment_with, read_experiment},
-};
+use playbot_harness::games::Games;
+use playbot_train::experiment::file::{locate, parse_experiment_with, read_experiment};
 
 use crate::dice::Dice;
 

@@ -7,12 +7,12 @@ use std::{
 };
 
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::train::{
+use playbot_learner::DeviceKind;
+use playbot_train::{
     Algorithm, Experiment, Trainer,
-    config_file::parse_experiment,
+    experiment::file::parse_experiment,
     run_dir::{RunDir, RunInfo},
 };
-use playbot_learner::DeviceKind;
 
 use crate::dice::Dice;
 

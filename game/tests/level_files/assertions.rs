@@ -6,8 +6,9 @@ use std::{
     path::Path,
 };
 
+use playbot::prelude::*;
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::{level_files::level_files_mode, prelude::*};
+use playbot_harness::level_files::level_files_mode;
 
 /// Writes a level with these rows, the first of which is the bottom one.
 fn draw(folder: &Path, name: &str, rows: &[&str]) {

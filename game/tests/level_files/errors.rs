@@ -1,7 +1,8 @@
 //! Tests that mistakes in a level file are reported with their line.
 
+use playbot::prelude::*;
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
-use playbot_lab::{level_files::level_files_mode, prelude::*};
+use playbot_harness::level_files::level_files_mode;
 
 /// Checks that a text is refused on this line, with these words.
 fn assert_refused(game: &dyn Game, text: &str, line: usize, words: &str) {

@@ -1,10 +1,10 @@
 //! Tests of held-out levels that are files.
 
+use playbot::prelude::*;
 use playbot_games::{coinrun::CoinRun, maze2d::Maze2d};
-use playbot_lab::{
-    held_out::{HeldOut, seen_by_training},
+use playbot_harness::{
     level_files::level_files_mode,
-    prelude::*,
+    split::{HeldOut, seen_by_training},
 };
 use playbot_learner::SeenLevels;
 

@@ -2,15 +2,15 @@
 
 use std::path::Path;
 
+use playbot::prelude::*;
 use playbot_games::{
     antmaze::{AntMaze, AntMazeWithMap, AntMazeWithRays, AntMazeWithWaves},
     coinrun::CoinRun,
     maze2d::{Maze2d, Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves},
 };
-use playbot_lab::{
+use playbot_harness::{
     inspect::{LevelRequest, LevelView},
     level_files::level_files_mode,
-    prelude::*,
     worlds::build_world,
 };
 use proptest::prelude::*;

@@ -1,6 +1,6 @@
 //! Tests of the fixed maps against the original sources.
 
-use playbot_games::maze::{Cell, Map, Maze, fixed};
+use playbot_games::maze::{Cell, Map, Maze};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -58,10 +58,10 @@ fn walls_and_goals_are_the_golden_ones() {
         }
         let Some(golden_goals) = map.demo_goals else { continue };
         let demo_goals: &[Cell] = match map.id.as_str() {
-            "antmaze-umaze" => &fixed::antmaze::UMAZE_DEMO_GOALS,
-            "antmaze-medium" => &fixed::antmaze::MEDIUM_DEMO_GOALS,
-            "antmaze-large" => &fixed::antmaze::LARGE_DEMO_GOALS,
-            "antmaze-xl" => &fixed::antmaze::XL_DEMO_GOALS,
+            "antmaze-umaze" => &playbot_games::maze::fixed::antmaze::UMAZE_DEMO_GOALS,
+            "antmaze-medium" => &playbot_games::maze::fixed::antmaze::MEDIUM_DEMO_GOALS,
+            "antmaze-large" => &playbot_games::maze::fixed::antmaze::LARGE_DEMO_GOALS,
+            "antmaze-xl" => &playbot_games::maze::fixed::antmaze::XL_DEMO_GOALS,
             _ => &[],
         };
         assert_eq!(demo_goals, golden_goals, "{}", map.id);
@@ -79,6 +79,6 @@ fn every_map_of_both_games_can_be_played() {
             assert!(maze.difficulty() >= 6, "{name}");
         }
     }
-    let umaze = fixed::antmaze::umaze();
-    assert!(fixed::antmaze::UMAZE_DEMO_GOALS.iter().all(|&cell| umaze.is_free(cell)));
+    let umaze = playbot_games::maze::fixed::antmaze::umaze();
+    assert!(playbot_games::maze::fixed::antmaze::UMAZE_DEMO_GOALS.iter().all(|&cell| umaze.is_free(cell)));
 }

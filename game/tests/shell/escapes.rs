@@ -7,8 +7,8 @@ use bevy_playbot::{
     vision::ObservationConfig,
 };
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::policy_export::{Provenance, export_policy, policy_file};
 use playbot_learner::{ActionSpace, DeviceKind, Learner, PolicySpec, PpoConfig, PpoLearner};
+use playbot_train::policy_export::{Provenance, export_policy, policy_file};
 
 use crate::program::{done, errors, json_lines, playbot, said, unsealed};
 

@@ -1,21 +1,27 @@
 //! The command line's verbs and their dispatch.
 
-use std::{ffi::OsString, panic::AssertUnwindSafe, process::ExitCode};
-
-use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind};
-use playbot_lab::{game::Game, games::Games, level_files::LevelFileError, split::SplitError};
-use playbot_learner::UnknownDevice;
-
 use crate::{
-    bench, bugs, config, demo, doctor,
     error::{CliError, Outcome},
-    eval, explore, eyes, help, interrupt, learn_skills, level, log, play, policy, program, quickstart, record, replay,
-    report, runs, study, test, trace, train, usage_error, view,
+    help, interrupt, log, output,
+    verbs::{
+        bench, bugs, config, demo, doctor, eval, explore, eyes, learn_skills, level, play, policy, quickstart, record,
+        replay, report, runs, study, test, trace, train, view,
+    },
+};
+use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind};
+use playbot_harness::{game::Game, games::Games, level_files::LevelFileError, split::SplitError};
+use playbot_learner::UnknownDevice;
+use std::{
+    error::Error,
+    ffi::OsString,
+    num::{IntErrorKind, ParseFloatError, ParseIntError},
+    panic::AssertUnwindSafe,
+    process::ExitCode,
 };
 
 /// Playtesting bots that learn from demonstrations.
 #[derive(Parser)]
-#[command(name = program::USUAL, version, after_help = EXAMPLES)]
+#[command(name = output::USUAL, version, after_help = EXAMPLES)]
 pub(crate) struct Cli {
     /// Verb to run; `quickstart` if left out.
     #[command(subcommand)]
@@ -82,7 +88,6 @@ enum Verb {
 /// # Errors
 ///
 /// The parser's message.
-#[doc(hidden)]
 pub fn check_usage<Args>(args: Args) -> Result<(), String>
 where
     Args: IntoIterator<Item: Into<OsString> + Clone>,
@@ -118,7 +123,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
         Err(error) => {
             // A request for help is no mistake; anything else is a wrong usage, which is 3 here.
             let code = if error.use_stderr() { 3 } else { 0 };
-            match usage_error::in_plain_words(&error) {
+            match in_plain_words(&error) {
                 Some(words) => begin_to_tell!("{words}"),
                 None => {
                     if let Err(refused) = error.print()
@@ -148,7 +153,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
         Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::EXIT_CODE),
         Ok(Err(CliError::BrokenPipe)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
-            tell!("error: {}", program::named(&error.to_string()));
+            tell!("error: {}", output::named(&error.to_string()));
             ExitCode::from(error.exit_code())
         }
         Err(_) => {
@@ -164,7 +169,7 @@ fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
     let matches = match command.try_get_matches_from_mut(std::env::args_os()) {
         Err(error) if is_help(&error) => {
             // Not before: to know which examples work, games are asked for a level, which takes them some work.
-            let helpful = with_own_name(help::named(Cli::command(), program::name(), games));
+            let helpful = with_own_name(help::named(Cli::command(), output::name(), games));
             helpful.try_get_matches_from(std::env::args_os())?
         }
         matches => matches?,
@@ -178,12 +183,12 @@ fn is_help(error: &clap::Error) -> bool {
 
 /// Returns the command line under the name of this program.
 fn with_own_name(command: Command) -> Command {
-    let command = usage_error::with_negative_numbers(command).name(program::name());
-    if program::name() == program::USUAL {
+    let command = with_negative_numbers(command).name(output::name());
+    if output::name() == output::USUAL {
         return command;
     }
     // The version is this crate's, since the game's is not known here.
-    command.version(concat!("(playbot_cli ", env!("CARGO_PKG_VERSION"), ")"))
+    command.version(concat!("(playbot ", env!("CARGO_PKG_VERSION"), ")"))
 }
 
 fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
@@ -210,5 +215,77 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::View(args) => view::run(args, games),
         Verb::Bench(args) => bench::run(args, games),
         Verb::Bugs(args) => bugs::run(args, games),
+    }
+}
+
+// Plain wording of errors of the command line's parser.
+
+/// Lets options take numbers below 0, so that the error is about the number, and not about an unknown option.
+pub(crate) fn with_negative_numbers(command: Command) -> Command {
+    command
+        .mut_args(|arg| {
+            let takes_number = !arg.is_positional() && arg.get_action().takes_values();
+            if takes_number { arg.allow_negative_numbers(true) } else { arg }
+        })
+        .mut_subcommands(with_negative_numbers)
+}
+
+/// Returns the whole text of an error about a number in plain words; `None` for other errors.
+pub(crate) fn in_plain_words(error: &clap::Error) -> Option<String> {
+    let source = error.source()?;
+    let plain = number_wanted(source)?;
+    Some(error.render().to_string().replacen(&format!(": {source}"), &format!(": {plain}"), 1))
+}
+
+/// Describes the wanted number.
+fn number_wanted(error: &(dyn Error + 'static)) -> Option<String> {
+    if let Some(error) = error.downcast_ref::<ParseIntError>() {
+        let words = match error.kind() {
+            IntErrorKind::PosOverflow => "the number is too large",
+            _ => "it must be a whole number, 0 or more",
+        };
+        return Some(words.to_owned());
+    }
+    if error.downcast_ref::<ParseFloatError>().is_some() {
+        return Some("it must be a number, such as 0.5".to_owned());
+    }
+    let words = error.to_string();
+    let (_, bounds) = words.split_once(" is not in ")?;
+    let (first, last) = bounds.split_once("..=")?;
+    Some(format!("it must be a whole number from {first} to {last}"))
+}
+
+#[cfg(test)]
+mod usage_error_tests {
+    use clap::{Arg, value_parser};
+
+    use super::*;
+
+    fn said(option: &str, value: &str) -> String {
+        let inner = Command::new("inner")
+            .arg(Arg::new("seed").long("seed").value_parser(value_parser!(u64)))
+            .arg(Arg::new("noise").long("noise").value_parser(value_parser!(f64)))
+            .arg(Arg::new("scale").long("scale").value_parser(value_parser!(u32).range(1..=32)));
+        let command = with_negative_numbers(Command::new("outer").subcommand(inner));
+        match command.try_get_matches_from(["outer", "inner", option, value]) {
+            Ok(_) => "taken".to_owned(),
+            Err(error) => in_plain_words(&error).unwrap_or_else(|| format!("in other words: {error}")),
+        }
+    }
+
+    #[test]
+    fn numbers_that_cannot_be_read_are_refused_in_plain_words() {
+        for (option, value, words) in [
+            ("--seed", "x", "error: invalid value 'x' for '--seed <seed>': it must be a whole number, 0 or more"),
+            ("--seed", "-1", "it must be a whole number, 0 or more"),
+            ("--seed", "18446744073709551616", "the number is too large"),
+            ("--noise", "abc", "it must be a number, such as 0.5"),
+            ("--scale", "0", "it must be a whole number from 1 to 32"),
+        ] {
+            let text = said(option, value);
+            assert!(text.contains(words) && text.ends_with('\n'), "{text}");
+        }
+        assert_eq!(said("--noise", "-1"), "taken", "whoever reads it says what is wrong with it");
+        assert!(said("--nose", "1").starts_with("in other words: "));
     }
 }

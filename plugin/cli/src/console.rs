@@ -1,25 +1,23 @@
 //! The observer of the command line: progress bars and messages for trainings, and Ctrl-C to stop them.
 
-use indicatif::ProgressBar;
-use playbot_lab::{
-    report::whole,
-    train::{
-        UpdateReport,
-        run_observer::{CountedWork, Counter, KeptSkills, RecordingsSummary, RunEvent, RunObserver},
-    },
-};
-use playbot_learner::SkillMetrics;
-
-use super::{
+use crate::{
+    arguments::{counted, player::tell_clipped},
     error::CliError,
-    interrupt::{self, NothingToSave},
-    methods::tell_clipped,
-    number::counted,
+    interrupt,
+    interrupt::NothingToSave,
     progress,
+};
+use indicatif::ProgressBar;
+use playbot_learner::SkillMetrics;
+use playbot_report::whole;
+use playbot_train::{
+    UpdateReport,
+    run_observer::{CountedWork, Counter, KeptSkills, RecordingsSummary, RunEvent, RunObserver},
 };
 
 /// Receives the metrics of each epoch of skills.
 type OnEpoch<'a> = Box<dyn FnMut(u64, &SkillMetrics) -> Result<(), CliError> + 'a>;
+
 /// Receives the results of each update of training.
 type OnUpdate<'a> = Box<dyn FnMut(&UpdateReport) + 'a>;
 

@@ -1,11 +1,9 @@
 //! The errors of verbs, with their exit codes.
 
-use std::{error::Error, io};
-
+use crate::tell::for_programs;
 use playbot_learner::HasExitCode;
+use std::{error::Error, io};
 use thiserror::Error;
-
-use super::tell::for_programs;
 
 /// The end of a command that worked.
 pub enum Outcome {
@@ -67,7 +65,7 @@ impl<E: HasExitCode + Send + Sync + 'static> From<E> for CliError {
 /// # Errors
 ///
 /// [`CliError::BrokenPipe`] if nobody reads any more.
-pub fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
+pub(crate) fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
     use io::Write;
     let line = line.to_string();
     writeln!(io::stdout().lock(), "{}", for_programs(&line)).map_err(|error| match error.kind() {
@@ -85,18 +83,11 @@ mod tests {
         fault::Fault,
         vision::VisionError,
     };
-    use playbot_lab::{
-        bugs::BugError,
-        demo::verify::VerifyError,
-        eval::EvalError,
-        findings::FindingError,
-        inspect::InspectError,
-        policy_export::ExportError,
-        runs::RunsError,
-        train::{TrainError, run_dir::RunError},
-        verdict::TestError,
-    };
+    use playbot_harness::{demo::VerifyError, eval::EvalError, inspect::InspectError};
     use playbot_learner::{FileError, LearnError};
+    use playbot_mutation::bugs::BugError;
+    use playbot_test::{findings::FindingError, verdict::TestError};
+    use playbot_train::{TrainError, policy_export::ExportError, run_dir::RunError, runs::RunsError};
 
     use super::*;
 

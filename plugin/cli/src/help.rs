@@ -4,21 +4,20 @@
 //! first game, the mode that it is trained in, and its demonstrator. Examples that cannot work in a program are left
 //! out.
 
-use clap::{Arg, Command};
-use playbot_lab::prelude::{ActionSpace, Game};
-
-use super::{
-    defaults::usual_mode,
-    level::shows_levels,
-    program::{USUAL, with_name},
+use crate::{
+    arguments::usual_mode,
+    output::{USUAL, with_name},
+    verbs::level::shows_levels,
 };
+use clap::{Arg, Command};
+use playbot_harness::prelude::{ActionSpace, Game};
 
 /// The column of explanations of examples.
 const COLUMN: usize = 48;
 
 /// Puts the names of a program and its games into all texts of a command. Examples are left out if the program does not
 /// have their game, or the game lacks a part that they need.
-pub fn named(command: Command, program: &'static str, games: &[&dyn Game]) -> Command {
+pub(crate) fn named(command: Command, program: &'static str, games: &[&dyn Game]) -> Command {
     let plays = command.get_arguments().any(|argument| argument.get_id() == "game");
     let examples = command.get_after_help().map(|text| examples(&text.to_string(), plays, program, games));
     let command = command.mut_args(|argument| of_argument(argument, program));
@@ -103,7 +102,7 @@ fn own_example(example: &str, program: &str, names: &[(&str, &str)]) -> String {
 #[cfg(test)]
 mod tests {
     use clap::CommandFactory;
-    use playbot_lab::foreign::ForeignGame;
+    use playbot_harness::foreign::ForeignGame;
 
     use super::*;
     use crate::command_line::{Cli, check_usage};

@@ -12,7 +12,7 @@ use std::{
 };
 
 /// The exit code of stopped work, as in shells: 128 and the number of the signal.
-pub const EXIT_CODE: u8 = 130;
+pub(crate) const EXIT_CODE: u8 = 130;
 
 /// Time in which work must reach a safe point to stop. The user waits for two seconds at most, some of which the end
 /// needs.
@@ -20,11 +20,15 @@ const PATIENCE: Duration = Duration::from_millis(1400);
 
 /// Ctrl-C was pressed; a second one stops at once.
 static HEARD: AtomicBool = AtomicBool::new(false);
+
 /// Work is to stop.
 static ASKED: AtomicBool = AtomicBool::new(false);
+
 /// Work need not reach a safe point to stop.
 static NOTHING_TO_SAVE: AtomicBool = AtomicBool::new(false);
+
 static INSTALLED: OnceLock<()> = OnceLock::new();
+
 static REMAINS: Mutex<Remains> = Mutex::new(Remains { left: None, command: None });
 
 /// Information that is printed when a second Ctrl-C stops the work.
@@ -44,7 +48,7 @@ impl Remains {
 }
 
 /// Listens for Ctrl-C and for SIGTERM from now on.
-pub fn listen() {
+pub(crate) fn listen() {
     INSTALLED.get_or_init(|| {
         if let Err(error) = ctrlc::set_handler(hear) {
             tracing::warn!("Ctrl-C will stop at once, without saving: {error}");
@@ -104,22 +108,22 @@ fn stop(how: &str) -> ! {
 }
 
 /// Returns true if Ctrl-C was pressed.
-pub fn asked() -> bool {
+pub(crate) fn asked() -> bool {
     ASKED.load(Ordering::SeqCst)
 }
 
 /// Notes the saved part, in words, for the message of a second Ctrl-C.
-pub fn leave(left: String) {
+pub(crate) fn leave(left: String) {
     REMAINS.lock().unwrap_or_else(PoisonError::into_inner).left = Some(left);
 }
 
 /// Returns the noted words, for the message at a safe point.
-pub fn remains() -> String {
+pub(crate) fn remains() -> String {
     REMAINS.lock().unwrap_or_else(PoisonError::into_inner).words()
 }
 
 /// Notes the command that resumes the work, for the message of a second Ctrl-C.
-pub fn go_on_with(command: String) {
+pub(crate) fn go_on_with(command: String) {
     REMAINS.lock().unwrap_or_else(PoisonError::into_inner).command = Some(command);
 }
 

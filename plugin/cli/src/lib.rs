@@ -1,71 +1,44 @@
 //! The command line: one file per verb. Data goes to standard output, everything else to standard error.
+
 #![allow(clippy::print_stdout, reason = "a command line prints")]
 
 #[macro_use]
 mod tell;
-
-mod bench;
-mod bugs;
-mod cloning;
+mod arguments;
 mod command_line;
-mod compute;
-mod config;
 mod console;
-mod defaults;
-mod demo;
-mod demo_merge;
-mod demo_show;
-mod differences;
-mod doctor;
 mod error;
-mod eval;
-mod experiment;
-mod explore;
-mod eyes;
-mod footprints;
 mod help;
 mod interrupt;
-mod learn_skills;
-mod level;
-mod level_picture;
 mod log;
 #[cfg(all(target_os = "linux", feature = "camera"))]
 mod mesa;
-mod methods;
-mod named;
-mod number;
-mod one_level;
-mod open;
 mod output;
-mod pace;
-mod play;
-mod player;
+pub mod pictures;
 mod plot;
-mod policy;
-mod program;
 mod progress;
-mod quickstart;
-mod record;
-mod recording;
-mod replay;
-mod report;
-mod runs;
-mod study;
-mod test;
-mod trace;
-mod train;
-mod unread_settings;
-mod unseen;
-mod unwritten;
-mod usage_error;
-mod view;
+mod verbs;
 #[cfg(feature = "window")]
 pub mod window;
-mod words;
 
-pub use command_line::{check_usage, main};
+pub use crate::command_line::{check_usage, main};
 
 /// Compiles the code blocks of the README.
 #[cfg(doctest)]
 #[doc = include_str!("../README.md")]
 struct Readme;
+
+pub mod prelude;
+
+pub use playbot_harness as harness;
+pub use playbot_learner as learner;
+pub use playbot_mutation as mutation;
+pub use playbot_report as report;
+pub use playbot_test as test;
+pub use playbot_train as train;
+
+pub use playbot_harness::{foreign::ForeignGame, game::Game};
+pub use playbot_test::assertions::{
+    LevelTest, assert_deterministic, assert_findings_gone, assert_levels_solvable, assert_levels_solved_by,
+    assert_no_findings, assert_replays,
+};

@@ -1,12 +1,12 @@
 //! The log on standard error.
 
+use crate::tell::for_people;
 use std::{
     collections::BTreeSet,
     fmt,
     io::IsTerminal,
     sync::{Mutex, PoisonError},
 };
-
 use tracing::{
     Event, Level, Subscriber,
     field::{Field, Visit},
@@ -23,18 +23,16 @@ use tracing_subscriber::{
     util::SubscriberInitExt,
 };
 
-use super::tell::for_people;
-
 /// Filters messages that need no warning: a window manager without settings, a renderer in software or none at all, and
 /// a log that is there already. A failed graphics card is reported by the error that follows.
 const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off,\
                      cubecl_runtime=error";
 
 /// Messages of broken games are left out.
-const WITHOUT_GAMES: &str = "off,bevy_playbot=warn,playbot_cli=warn,playbot_lab=warn,playbot_learner=warn";
+const WITHOUT_GAMES: &str = "off,bevy_playbot=warn,playbot=warn,playbot_games=off";
 
 /// Logs at the levels of `RUST_LOG`, or else warnings, and more with each `-v`. With `-v` each line names its source.
-pub fn init(verbose: u8, hears_games: bool) {
+pub(crate) fn init(verbose: u8, hears_games: bool) {
     let quiet = if hears_games { QUIET } else { WITHOUT_GAMES };
     let level = [quiet, "info", "debug"][usize::from(verbose.min(2))];
     let asked = EnvFilter::try_from_default_env().ok();
@@ -102,9 +100,7 @@ impl<S: Subscriber> Layer<S> for FilesOnce {
         let metadata = event.metadata();
         let is_repeated = match *metadata.level() {
             Level::ERROR => metadata.target().starts_with("bevy_asset"),
-            Level::WARN => {
-                ["playbot_lab::train", "playbot_learner"].iter().any(|from| metadata.target().starts_with(from))
-            }
+            Level::WARN => ["playbot_train", "playbot_learner"].iter().any(|from| metadata.target().starts_with(from)),
             _ => false,
         };
         if !is_repeated {
@@ -173,7 +169,7 @@ mod tests {
     fn a_warning_of_a_training_is_one_plain_line() {
         let text = logged(|| {
             for _list in 0..3 {
-                tracing::warn!(target: "playbot_lab::train::checkpoint", "a checkpoint is passed over: {}", "x: damaged");
+                tracing::warn!(target: "playbot_train::checkpoint", "a checkpoint is passed over: {}", "x: damaged");
             }
             tracing::warn!(target: "bevy_ecs", "something of the engine");
         });
@@ -188,7 +184,7 @@ mod tests {
             let text = logged(|| {
                 let name = "a\u{1b}[2J\u{202e}b\u{9b}\u{7}\rc";
                 match from_us {
-                    true => tracing::warn!(target: "playbot_lab::train", file = name, "{name} is damaged"),
+                    true => tracing::warn!(target: "playbot_train", file = name, "{name} is damaged"),
                     false => tracing::error!(target: "bevy_asset", file = %name, "{name} is damaged"),
                 }
             });

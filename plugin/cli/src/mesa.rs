@@ -10,7 +10,7 @@ const SWITCH: &str = "NODEVICE_SELECT";
 /// times. wgpu chooses by itself, so nothing is lost.
 ///
 /// The layer reads the environment of the process, which a program cannot change in itself without unsafe code.
-pub fn silence_warnings() {
+pub(crate) fn silence_warnings() {
     let has_session = std::env::var_os("XDG_RUNTIME_DIR").is_some_and(|folder| Path::new(&folder).is_absolute());
     if has_session || std::env::var_os(SWITCH).is_some() {
         return;

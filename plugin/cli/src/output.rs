@@ -1,11 +1,15 @@
 //! Output files: tested before the work whose result they hold.
 
-use std::path::{Path, PathBuf};
-
-use playbot_lab::sealed_file::write_atomically;
-use playbot_learner::disk::{self, DiskFile};
-
-use super::error::CliError;
+use crate::error::CliError;
+use playbot_harness::sealed_file::write_atomically;
+use playbot_learner::{disk, disk::DiskFile};
+use playbot_test::verdict::TestError;
+use std::{
+    env,
+    ffi::OsStr,
+    path::{Path, PathBuf},
+    sync::OnceLock,
+};
 
 /// Advice where nothing can be written.
 const ELSEWHERE: &str = "make room or rights there, or name a file in another folder";
@@ -15,7 +19,7 @@ const ELSEWHERE: &str = "make room or rights there, or name a file in another fo
 /// # Errors
 ///
 /// The path is a folder's, or the system refuses.
-pub fn prepare(path: &Path) -> Result<(), CliError> {
+pub(crate) fn prepare(path: &Path) -> Result<(), CliError> {
     if path.is_dir() {
         return Err(CliError::Usage(format!("{} is a folder: name a file to write", path.display())));
     }
@@ -31,7 +35,7 @@ pub fn prepare(path: &Path) -> Result<(), CliError> {
 /// # Errors
 ///
 /// The system refuses.
-pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
+pub(crate) fn make_folder_of(path: &Path) -> Result<(), CliError> {
     let folder = path.parent().unwrap_or(path);
     disk::create_dir_all(folder)
         .map_err(|error| CliError::Io(format!("cannot create {}: {error}; {ELSEWHERE}", folder.display())))
@@ -42,7 +46,7 @@ pub fn make_folder_of(path: &Path) -> Result<(), CliError> {
 /// # Errors
 ///
 /// The path is a file's, or the system refuses.
-pub fn make_folder(folder: &Path) -> Result<(), CliError> {
+pub(crate) fn make_folder(folder: &Path) -> Result<(), CliError> {
     if folder.is_file() {
         return Err(CliError::Usage(format!("{} is a file: name a folder to write into", folder.display())));
     }
@@ -59,13 +63,13 @@ pub fn make_folder(folder: &Path) -> Result<(), CliError> {
 /// # Errors
 ///
 /// The folder or the file cannot be written.
-pub fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
+pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     make_folder_of(path)?;
     Ok(write_atomically(path, bytes)?)
 }
 
 /// Returns the file in the same folder whose name goes on with `ending`.
-pub fn beside(path: &Path, ending: &str) -> PathBuf {
+pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(ending);
     path.with_file_name(name)
@@ -76,7 +80,7 @@ pub fn beside(path: &Path, ending: &str) -> PathBuf {
 /// # Errors
 ///
 /// Its name ends otherwise.
-pub fn png(text: &str) -> Result<PathBuf, String> {
+pub(crate) fn png(text: &str) -> Result<PathBuf, String> {
     picture(text, "png")
 }
 
@@ -85,7 +89,7 @@ pub fn png(text: &str) -> Result<PathBuf, String> {
 /// # Errors
 ///
 /// Its name ends otherwise.
-pub fn svg(text: &str) -> Result<PathBuf, String> {
+pub(crate) fn svg(text: &str) -> Result<PathBuf, String> {
     picture(text, "svg")
 }
 
@@ -95,6 +99,55 @@ fn picture(text: &str, kind: &str) -> Result<PathBuf, String> {
         Ok(path)
     } else {
         Err(format!("this picture is written as .{kind}: choose a name that ends so"))
+    }
+}
+
+// The program's name: that of its file, whatever games are in it.
+
+/// The name in texts that do not know their program, such as the errors of libraries.
+pub(crate) const USUAL: &str = "playbot";
+
+/// Returns the program's name, for commands in messages.
+pub(crate) fn name() -> &'static str {
+    static NAME: OnceLock<String> = OnceLock::new();
+    NAME.get_or_init(|| env::args_os().next().as_deref().and_then(of_file).unwrap_or(USUAL).to_owned())
+}
+
+fn of_file(path: &OsStr) -> Option<&str> {
+    Path::new(path).file_name()?.to_str()?.strip_suffix(env::consts::EXE_SUFFIX)
+}
+
+/// Puts this program's name into the commands that a text quotes.
+pub(crate) fn named(text: &str) -> String {
+    with_name(text, name())
+}
+
+/// Puts a program's name into the commands that a text quotes.
+pub(crate) fn with_name(text: &str, program: &str) -> String {
+    text.replace(&format!("`{USUAL} "), &format!("`{program} "))
+}
+
+// Wording of the contents of files.
+
+/// Describes something with the first few names of its parts, if they have any.
+pub(crate) fn with_names(what: &str, names: &[String]) -> String {
+    const SHOWN: usize = 6;
+    if names.is_empty() {
+        return what.to_owned();
+    }
+    let more = if names.len() > SHOWN { ", …" } else { "" };
+    format!("{what}: {}{more}", names[..names.len().min(SHOWN)].join(", "))
+}
+
+// Advice for results that cannot be written.
+
+/// Adds advice, and the list of whole files, to an error of writing; other errors have their own.
+pub(crate) fn told(error: TestError, next: &str) -> CliError {
+    match error {
+        TestError::Io { action, path, source } if action != "read" => {
+            CliError::Io(format!("cannot {action} {}: {source}; {next}", path.display()))
+        }
+        error => error.into(),
     }
 }
 
@@ -126,5 +179,60 @@ mod tests {
         prepare(&folder.join("new/a")).expect("the folder is made");
         make_folder(&folder.join("new/b")).expect("the folder is made");
         assert_eq!(fs::read_dir(folder.join("new")).expect("there").count(), 1, "no probe is left");
+    }
+}
+
+#[cfg(test)]
+mod program_tests {
+    use super::*;
+
+    #[test]
+    fn a_program_is_called_as_its_file() {
+        let called = |name: &str| of_file(OsStr::new(&format!("{name}{}", env::consts::EXE_SUFFIX))).map(str::to_owned);
+        assert_eq!(called("target/release/runner").as_deref(), Some("runner"));
+        assert_eq!(called("my.game").as_deref(), Some("my.game"));
+        assert_eq!(of_file(OsStr::new("..")), None);
+    }
+
+    #[test]
+    fn quoted_commands_get_the_name_and_other_words_keep_theirs() {
+        let text = "playbot 0.2 wrote it: `playbot eval --run a` and `playbot demo repair FILE`";
+        let own = "playbot 0.2 wrote it: `runner eval --run a` and `runner demo repair FILE`";
+        assert_eq!(with_name(text, "runner"), own);
+        assert_eq!(with_name(text, "playbot"), text);
+    }
+}
+
+#[cfg(test)]
+mod words_tests {
+    use super::*;
+
+    #[test]
+    fn only_the_first_names_are_listed() {
+        assert_eq!(with_names("3 values", &[]), "3 values");
+        let names: Vec<String> = (0..7).map(|number| format!("x{number}")).collect();
+        assert_eq!(with_names("2 values", &names[..2]), "2 values: x0, x1");
+        assert_eq!(with_names("7 values", &names), "7 values: x0, x1, x2, x3, x4, x5, …");
+    }
+}
+
+#[cfg(test)]
+mod unwritten_tests {
+    use std::io;
+
+    use super::*;
+
+    #[test]
+    fn a_full_disk_says_what_to_do_and_wrong_usage_stays_that() {
+        let refused = |action, kind: io::ErrorKind| {
+            let source = io::Error::from(kind);
+            TestError::Io { action, path: "a/report.html".into(), source }
+        };
+        let words = told(refused("write", io::ErrorKind::StorageFull), "make room").to_string();
+        assert!(words.starts_with("cannot write a/report.html: ") && words.ends_with("; make room"), "{words}");
+        assert_eq!(words.matches("; ").count(), 1, "one next step is enough: {words}");
+        let words = told(refused("read", io::ErrorKind::PermissionDenied), "make room").to_string();
+        assert!(!words.ends_with("; make room"), "nothing is known to be whole: {words}");
+        assert_eq!(told(TestError::NoTester, "make room").exit_code(), 3);
     }
 }

@@ -1,17 +1,15 @@
 //! Progress on standard error, for all work that can take longer than two seconds: bars on a terminal, a plain line now
 //! and then elsewhere.
 
+use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle, WeakProgressBar};
 use std::{
+    collections::VecDeque,
     fmt::Write as _,
     io::{IsTerminal, Write as _, stderr},
     sync::{Arc, LazyLock, Mutex, MutexGuard, Once, PoisonError},
     thread,
     time::{Duration, Instant},
 };
-
-use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle, WeakProgressBar};
-
-use crate::pace::Pace;
 
 /// All bars, so that the bar of a part stands below that of the whole.
 static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
@@ -21,11 +19,12 @@ const PAUSE: Duration = Duration::from_secs(10);
 
 /// The work that is reported in plain lines.
 static TEXT_PROGRESS: Mutex<Vec<TextProgress>> = Mutex::new(Vec::new());
+
 static REPORTER: Once = Once::new();
 
 /// Makes a bar with a title, a count, the time left and room for a message. A bar whose length grows with its position
 /// shows no time left.
-pub fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
+pub(crate) fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
     let template = format!("{title:<22} [{{bar:32}}] {{human_pos}}/{{human_len}} {unit} {{left}}  {{msg}}");
     let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
     let pace = Arc::new(Mutex::new(Pace::default()));
@@ -104,6 +103,39 @@ fn report() {
     }
 }
 
+// Estimate of the time that is left, by the recent speed of the work.
+
+/// Older progress does not count, as long as there is newer.
+const WINDOW: Duration = Duration::from_secs(60);
+
+/// Times and amounts of progress. Work that advances in leaps, such as a training after each update, does not count as
+/// standing still in between.
+#[derive(Default)]
+pub struct Pace {
+    steps: VecDeque<(Instant, u64)>,
+}
+
+impl Pace {
+    /// Returns the time that is left at `now` from `done` to `length`; `None` before the second progress, and at the
+    /// end.
+    pub fn left(&mut self, now: Instant, done: u64, length: u64) -> Option<Duration> {
+        let is_back = self.steps.back().is_some_and(|&(_, last)| last > done);
+        if is_back {
+            self.steps.clear();
+        }
+        if done > 0 && self.steps.back().is_none_or(|&(_, last)| last != done) {
+            self.steps.push_back((now, done));
+        }
+        while self.steps.len() > 2 && now.duration_since(self.steps[1].0) >= WINDOW {
+            self.steps.pop_front();
+        }
+        let (&(begin, first), &(end, last)) = (self.steps.front()?, self.steps.back()?);
+        let way = length.checked_sub(last).filter(|&way| way > 0 && last > first)?;
+        let needed = end.duration_since(begin).as_secs_f64() * way as f64 / (last - first) as f64;
+        Duration::try_from_secs_f64(needed).ok()?.checked_sub(now.duration_since(end))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -132,5 +164,26 @@ mod tests {
     fn less_than_a_second_is_not_worth_a_word() {
         let words = [None, Some(Duration::from_millis(900)), Some(Duration::from_secs(5))].map(describe_left);
         assert_eq!(words, ["", "", "5s left"]);
+    }
+}
+
+#[cfg(test)]
+mod pace_tests {
+    use super::*;
+
+    #[test]
+    fn work_that_leaps_does_not_stand_still_in_between() {
+        let (start, mut pace) = (Instant::now(), Pace::default());
+        let mut left = |seconds, done| pace.left(start + Duration::from_secs(seconds), done, 1000);
+        assert_eq!(left(0, 0), None);
+        // A training that was resumed at 100.
+        assert_eq!((left(1, 100), left(5, 100)), (None, None));
+        // 100 in 10 seconds: 80 for the rest, of which time goes by.
+        assert_eq!((left(11, 200), left(14, 200)), (Some(Duration::from_secs(80)), Some(Duration::from_secs(77))));
+        assert_eq!(left(200, 200), None, "it takes longer than was thought");
+        // It has become slower: progress of more than a minute ago is forgotten.
+        assert_eq!(left(211, 300), Some(Duration::from_secs(1400)));
+        assert_eq!(left(300, 1000), None, "done");
+        assert_eq!(left(301, 10), None, "begun anew");
     }
 }

@@ -1,10 +1,9 @@
 //! Messages on standard error. Parts of them come from files and from the operating system, so characters that could
 //! steer a terminal are replaced.
 
-use std::borrow::Cow;
-
-use playbot_lab::brief::without_long_words;
+use playbot_harness::brief::without_long_words;
 use serde::de::IgnoredAny;
+use std::borrow::Cow;
 
 /// Returns true if a character steers a terminal: a control character other than line feed and tab, or one that
 /// reverses the direction of writing.
@@ -21,13 +20,13 @@ fn replaced(text: &str, escape: impl Fn(char) -> String) -> Cow<'_, str> {
 }
 
 /// Replaces characters that steer a terminal, in the form `\u{1b}`.
-pub fn without_controls(text: &str) -> Cow<'_, str> {
+pub(crate) fn without_controls(text: &str) -> Cow<'_, str> {
     replaced(text, |c| c.escape_unicode().to_string())
 }
 
 /// Replaces characters that steer a terminal in data for standard output. JSON keeps its meaning: the form there is
 /// `\u001b`. Such characters occur only within a text, and have at most four digits.
-pub fn for_programs(data: &str) -> Cow<'_, str> {
+pub(crate) fn for_programs(data: &str) -> Cow<'_, str> {
     if data.contains(steers) && is_json(data) {
         return replaced(data, |c| format!("\\u{:04x}", u32::from(c)));
     }
@@ -43,7 +42,7 @@ fn is_json(text: &str) -> bool {
 const LONGEST_WORD: usize = 4096;
 
 /// Prepares a message for people: no control characters, and no word that fills the terminal.
-pub fn for_people(text: &str) -> String {
+pub(crate) fn for_people(text: &str) -> String {
     without_long_words(&without_controls(text), LONGEST_WORD).into_owned()
 }
 

@@ -36,11 +36,9 @@
 //! # Ok::<(), playbot_learner::LearnError>(())
 //! ```
 
-mod among_workers;
 mod device;
 pub mod disk;
 mod error;
-mod exit_code;
 mod file;
 mod learner;
 pub mod nn;
@@ -57,34 +55,32 @@ mod seen_levels;
 pub mod settings;
 pub mod skill;
 mod space;
-mod spec;
 pub mod spirl;
 
-pub(crate) use among_workers::are_awake;
-pub use among_workers::{among_awake_workers, among_workers, waited};
-pub use device::{DeviceKind, UnknownDevice};
-pub use disk::{write_atomically, write_atomically_with};
-pub use error::{FileError, LearnError, SettingError, brief_number};
-pub use exit_code::{HasExitCode, io_exit_code};
-pub use file::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text};
-pub use learner::{Learner, LearnerBase, LearnerMetrics};
-pub use norm::RewardReset;
-pub use observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureCard};
-pub use policy::{Policy, PolicyOutput, StdKind};
-pub use policy_file::{PolicyCard, PolicyFile};
-pub use ppo::{PpoConfig, PpoLearner, UpdateMetrics};
-pub use rng::{RngState, Streams};
-pub use rollout::{EndStates, ObsColumns, Rollout, RolloutStep};
-pub use sac::{EntropyCoef, RlpdConfig, SacConfig, SacLearner, SacMetrics};
-pub use score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig};
-pub use seen_levels::SeenLevels;
-pub use skill::{
-    ActionInput, Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
-    SkillProgress, SkillSource, SkillTrainer, WindowRule,
+pub use crate::{
+    device::{DeviceKind, UnknownDevice},
+    disk::{write_atomically, write_atomically_with},
+    error::{FileError, HasExitCode, LearnError, SettingError, brief_number, io_exit_code},
+    file::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text},
+    learner::{Learner, LearnerBase, LearnerMetrics},
+    norm::RewardReset,
+    observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureCard},
+    policy::{Policy, PolicyOutput, StdKind},
+    policy_file::{PolicyCard, PolicyFile},
+    ppo::{PpoConfig, PpoLearner, UpdateMetrics},
+    rng::{RngState, Streams},
+    rollout::{EndStates, ObsColumns, Rollout, RolloutStep},
+    sac::{EntropyCoef, RlpdConfig, SacConfig, SacLearner, SacMetrics},
+    score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig},
+    seen_levels::SeenLevels,
+    skill::{
+        ActionInput, Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
+        SkillProgress, SkillSource, SkillTrainer, WindowRule,
+    },
+    space::{Action, ActionSpace, Actions, PolicySpec, TimeLimit},
+    spirl::{SpirlConfig, SpirlLearner},
 };
-pub use space::{Action, ActionSpace, Actions};
-pub use spec::{PolicySpec, TimeLimit};
-pub use spirl::{SpirlConfig, SpirlLearner};
+pub use playbot_kernels::among_workers::{among_awake_workers, among_workers, waited};
 
 /// Compiles and runs the examples of the README.
 #[cfg(doctest)]

@@ -6,13 +6,14 @@
 
 use crate::LearnError;
 use rand::{Rng, SeedableRng};
-pub use rand_chacha::ChaCha8Rng;
 use serde::{Deserialize, Serialize};
+
+pub use rand_chacha::ChaCha8Rng;
 
 /// Source of the named generators of one seed.
 ///
 /// ```
-/// use playbot_learner::rng::{Streams, unit};
+/// use self::{Streams, unit};
 /// let streams = Streams::new(7);
 /// let mut a = streams.stream("actions", 0);
 /// let mut b = streams.stream("actions", 1);

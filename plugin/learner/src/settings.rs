@@ -4,9 +4,8 @@
 //! describes its rows as [`Setting`]s. Files, `--set`, warnings and the reference page read those descriptions: a new
 //! setting is one new row.
 
-use serde::Serialize;
-
 use crate::error::{SettingError, brief_number};
+use serde::Serialize;
 
 /// A struct of settings.
 pub trait Settings {
@@ -286,8 +285,8 @@ pub fn text(value: &impl Serialize) -> String {
 ///
 /// Required are documentation, field and type, and the default in a table of a section. (The second form is for the
 /// struct of all sections, whose rows name the attributes of serde themselves, and `keys of Type` for a section.) A
-/// value that is `off` by the named function is not written. Ranges are [`Range`](crate::settings::Range)s, readers
-/// slices of [`Reader`](crate::settings::Reader)s; without `by` a row has those of its table.
+/// value that is `off` by the named function is not written. Ranges are [`Range`](Range)s, readers
+/// slices of [`Reader`](Reader)s; without `by` a row has those of its table.
 #[macro_export]
 macro_rules! settings {
     (@key $field:ident) => { stringify!($field) };

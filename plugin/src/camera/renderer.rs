@@ -1,14 +1,35 @@
 //! Bevy's renderer, taken out of the app and run by hand.
 
+use crate::{
+    camera::{TileLayerPlugin, request},
+    vision::VisionError,
+};
 use bevy::{
+    app::{SubApp, TaskPoolPlugin},
+    asset::{AssetEventSystems, AssetPlugin},
+    camera::CameraPlugin,
+    core_pipeline::CorePipelinePlugin,
+    diagnostic::FrameCountPlugin,
     ecs::schedule::{Schedules, SingleThreadedExecutor},
+    image::ImagePlugin,
+    mesh::MeshPlugin,
     platform::cell::SyncCell,
     prelude::*,
-    render::{RenderApp, RenderScheduleOrder, render_resource::PipelineCache, view::ExtractedWindows},
+    render::{
+        RenderApp, RenderPlugin, RenderScheduleOrder,
+        extract_plugin::ExtractPlugin,
+        render_resource::PipelineCache,
+        settings::{Backends, RenderCreation, WgpuSettings},
+        view::ExtractedWindows,
+    },
+    sprite::SpritePlugin,
+    sprite_render::SpriteRenderPlugin,
+    tasks::block_on,
+    text::TextPlugin,
     time::TimeReceiver,
+    transform::TransformPlugin,
+    window::{ExitCondition, WindowPlugin},
 };
-
-use super::scene_schedule::SceneSchedule;
 
 /// The renderer and the schedules that feed it.
 #[derive(Resource, Reflect)]
@@ -85,4 +106,132 @@ fn run(world: &mut World) {
         }
     });
     world.clear_trackers();
+}
+
+// Bevy's systems after `Update` that prepare a scene for drawing, to be run in the middle of a tick.
+
+/// Adds the parts of the renderer that the app lacks.
+pub(super) fn add_renderer(app: &mut App, render_creation: RenderCreation) {
+    add(app, TaskPoolPlugin::default());
+    add(app, FrameCountPlugin);
+    add(app, TransformPlugin);
+    let closed = WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() };
+    add(app, closed);
+    add(app, AssetPlugin::default());
+    add(app, RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() });
+    add(app, ImagePlugin::default_nearest());
+    add(app, MeshPlugin);
+    add(app, CameraPlugin);
+    add(app, CorePipelinePlugin);
+    // Sprites add systems for text, which need it.
+    add(app, TextPlugin);
+    add(app, SpritePlugin);
+    add(app, SpriteRenderPlugin);
+    add(app, TileLayerPlugin);
+}
+
+fn add<P: Plugin>(app: &mut App, plugin: P) {
+    if !app.is_plugin_added::<P>() {
+        app.add_plugins(plugin);
+    }
+}
+
+/// Bevy's own systems, in schedules without systems of the game.
+///
+/// Most of them are private to Bevy. They are taken from an app that contains nothing else.
+pub(super) struct SceneSchedule {
+    /// Loading of assets, from `PreUpdate`.
+    pub(super) load: Schedule,
+    /// Transforms, bounds, visibility, asset events, from `PostUpdate`.
+    pub(super) prepare: Schedule,
+}
+
+impl SceneSchedule {
+    pub(super) fn new() -> Self {
+        let mut app = App::new();
+        // Bevy complains about plugins without a renderer. This one never runs.
+        app.add_plugins(ExtractPlugin::default());
+        add_renderer(&mut app, none());
+        app.add_systems(PostUpdate, request::note_missing_images.after(AssetEventSystems));
+        let mut schedules = app.world_mut().resource_mut::<Schedules>();
+        let mut take = |label: bevy::ecs::schedule::InternedScheduleLabel| {
+            let mut schedule = schedules.remove(label).unwrap_or_else(|| Schedule::new(label));
+            schedule.set_executor(SingleThreadedExecutor::new());
+            schedule
+        };
+        use bevy::ecs::schedule::ScheduleLabel;
+        Self { load: take(PreUpdate.intern()), prepare: take(PostUpdate.intern()) }
+    }
+}
+
+// Detection of a graphics adapter, and settings of the renderer.
+
+/// Returns the settings of a renderer without a window. OpenGL is left out: it needs a display, and its drivers
+/// print.
+fn settings() -> WgpuSettings {
+    WgpuSettings { backends: Some(Backends::from_env().unwrap_or(Backends::PRIMARY)), ..WgpuSettings::default() }
+}
+
+pub(crate) fn creation() -> RenderCreation {
+    settings().into()
+}
+
+/// Settings of a renderer that draws nothing.
+pub(crate) fn none() -> RenderCreation {
+    WgpuSettings { backends: None, ..WgpuSettings::default() }.into()
+}
+
+/// Lets the C library keep the memory that drivers free after each picture, instead of returning it to the kernel.
+///
+/// Software Vulkan builds each picture in several megabytes of small blocks. glibc returns them after each picture,
+/// and the page faults cost a third of the time. glibc does so from a size that is twice the largest separately
+/// mapped block ever freed, up to 32 MiB.
+pub(super) fn keep_memory() {
+    const LARGE: usize = 31 << 20;
+    drop(std::hint::black_box(Vec::<u8>::with_capacity(LARGE)));
+}
+
+/// Checks for an adapter, because Bevy panics without one.
+pub(super) fn check() -> Result<(), VisionError> {
+    let settings = settings();
+    let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
+    descriptor.backends = settings.backends.unwrap_or(Backends::PRIMARY);
+    descriptor.flags = settings.instance_flags;
+    let instance = wgpu::Instance::new(descriptor);
+    let options = wgpu::RequestAdapterOptions { power_preference: settings.power_preference, ..Default::default() };
+    block_on(instance.request_adapter(&options)).map(drop).map_err(|_| VisionError::NoAdapter)
+}
+
+// Bevy's list of changes for a renderer, in apps without one.
+
+/// Empties the list in place of a renderer.
+#[derive(Resource, Reflect)]
+#[reflect(from_reflect = false)]
+#[reflect(Component)]
+struct NoRenderer(#[reflect(ignore)] SyncCell<SubApp>);
+
+/// Bevy notes changes of sprites, meshes and cameras for the renderer, and fails if the list is not kept. The plugin
+/// keeps the list and empties it.
+pub(crate) struct RenderListPlugin;
+
+impl Plugin for RenderListPlugin {
+    fn build(&self, app: &mut App) {
+        if app.get_sub_app(RenderApp).is_some() || app.is_plugin_added::<ExtractPlugin>() {
+            return;
+        }
+        app.add_plugins(ExtractPlugin::default());
+        // Removed at once: plugins that find the sub-app would assume a renderer and add their systems to it.
+        if let Some(renderer) = app.remove_sub_app(RenderApp) {
+            // Nothing else reads the list.
+            app.insert_resource(NoRenderer(SyncCell::new(renderer))).add_systems(Last, empty_list.ambiguous_with_all());
+        }
+    }
+}
+
+fn empty_list(world: &mut World) {
+    world.resource_scope(|world, mut renderer: Mut<NoRenderer>| {
+        // Each frame, as a renderer does. The list changes entities, and these changes must not depend on the World's
+        // age.
+        renderer.0.get().extract(world);
+    });
 }

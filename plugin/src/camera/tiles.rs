@@ -1,5 +1,6 @@
 //! Drawing tile layers with Bevy's renderer.
 
+use crate::{fault::Faults, vision::TileLayer};
 use bevy::{
     asset::{AssetEventSystems, RenderAssetUsages, embedded_asset, embedded_path},
     image::ImageSampler,
@@ -10,12 +11,10 @@ use bevy::{
     sprite_render::{AlphaMode2d, Material2d, Material2dPlugin, MeshMaterial2d},
 };
 
-use crate::{fault::Faults, vision::TileLayer};
-
 /// Draws [`TileLayer`]s, for windows and for sensors alike. Each layer is one rectangle, and its pixels look up their
 /// tile.
 ///
-/// Added by [`CameraSensorPlugin`](super::CameraSensorPlugin). It needs Bevy's renderer for sprites.
+/// Added by [`CameraSensorPlugin`](crate::camera::CameraSensorPlugin). It needs Bevy's renderer for sprites.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct TileLayerPlugin;
 

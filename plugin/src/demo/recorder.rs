@@ -21,21 +21,19 @@
 //! # Ok::<(), bevy_playbot::demo::file::DemoFileError>(())
 //! ```
 
-use bevy::prelude::*;
-
-use super::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoFileError, DemoWriter, EpisodeActions};
 use crate::{
     action::{Action, ActionSpace, ActionValue},
-    agent::{Agent, AgentOrder},
+    agent::{Agent, AgentOrder, Control},
     carry_over::{ReflectCarryComponent, ReflectCarryResource},
-    control::Control,
+    demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoFileError, DemoWriter, EpisodeActions},
     episode::{Episode, EpisodeEnd},
     fault::Faults,
-    level_files::LevelFiles,
+    level::LevelFiles,
     observation::Observation,
     reward::Reward,
     state_hash::StateHash,
 };
+use bevy::prelude::*;
 
 /// The target of finished episodes. Insert it, and add [`Recording`] to the agents to be recorded.
 ///
@@ -97,8 +95,6 @@ pub struct Recording {
 }
 
 /// Returns the kind of actions for a recording's header.
-// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
 pub fn demo_actions(space: &ActionSpace) -> DemoActions {
     match space {
         ActionSpace::Discrete(n) => DemoActions::Discrete(*n),
@@ -126,7 +122,6 @@ pub(crate) fn push_action(actions: &mut EpisodeActions, action: &ActionValue) {
 }
 
 /// Appends this tick to each recorded agent's episode; an ended episode goes to disk.
-#[doc(hidden)]
 pub fn record_ticks(
     recorder: Option<ResMut<Recorder>>,
     order: Res<AgentOrder>,
@@ -186,7 +181,6 @@ pub fn record_ticks(
 /// # Errors
 ///
 /// The file could not be written.
-#[doc(hidden)]
 pub fn flush_unfinished(world: &mut World) -> Result<(), DemoFileError> {
     let entities = world.resource::<AgentOrder>().entities().to_vec();
     for entity in entities {

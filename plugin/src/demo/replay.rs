@@ -31,23 +31,20 @@
 //! assert_eq!(app.world().resource::<Heard>().0, ["level 7, tick 1: the reward is 1, but 0 in the recording"]);
 //! ```
 
-use std::sync::Arc;
-
-use bevy::prelude::*;
-use thiserror::Error;
-
-use super::file::{DemoEnd, DemoEpisode, EpisodeActions};
 use crate::{
     action::{Action, ActionValue},
+    agent::Control,
     carry_over::ReflectCarryComponent,
-    control::Control,
+    demo::file::{DemoEnd, DemoEpisode, EpisodeActions},
     episode::{Episode, EpisodeEnd},
-    level::LevelQueue,
-    level_files::LevelFiles,
+    level::{LevelFiles, LevelQueue},
     reward::Reward,
     state_hash::StateHash,
     streams::AgentStreams,
 };
+use bevy::prelude::*;
+use std::sync::Arc;
+use thiserror::Error;
 
 /// The recorded episode that drives an agent under [`Control::Replay`].
 #[derive(Component, Clone, Debug, Reflect)]
@@ -90,8 +87,6 @@ impl Replay {
 
     /// Accepts the game's current rewards in place of the recorded ones, as long as the game is in the recorded
     /// states. If no state was ever hashed, rewards are the only evidence, and are compared all the same.
-    // Hidden: for playbot_lab.
-    #[doc(hidden)]
     #[must_use]
     pub fn paid_anew(self) -> Self {
         let compares_rewards = self.episode.state_hashes.iter().all(|&hash| hash == 0);
@@ -105,8 +100,6 @@ impl Replay {
     }
 
     /// Hands an agent over to this replay, as [`begin`](Self::begin) does.
-    // Hidden: for playbot_lab.
-    #[doc(hidden)]
     pub fn start(self, agent: &mut EntityWorldMut) {
         let episode = &self.episode;
         if let Some(mut running) = agent.get_mut::<Episode>() {
@@ -135,8 +128,6 @@ impl Replay {
 }
 
 /// Returns the action of one tick of a recording.
-// Hidden here and below: for playbot_lab, playbot_cli and tests; games need none of it.
-#[doc(hidden)]
 pub fn recorded_action(actions: &EpisodeActions, tick: usize) -> Option<ActionValue> {
     match actions {
         EpisodeActions::Discrete(list) => list.get(tick).map(|index| ActionValue::Discrete(*index)),

@@ -1,11 +1,10 @@
 //! Images as texels, converted once.
 
-use bevy::{asset::AssetId, platform::collections::HashMap, prelude::*};
-
-use super::{
-    colour::{Rgba, SRGB},
-    error::Undrawable,
+use crate::raster::{
+    Undrawable,
+    canvas::{Rgba, SRGB},
 };
+use bevy::{asset::AssetId, platform::collections::HashMap, prelude::*};
 
 /// The transparency of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

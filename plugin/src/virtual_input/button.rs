@@ -1,13 +1,16 @@
 //! Inputs that can be held down.
 
-use std::{fmt, str::FromStr};
-
-use bevy::prelude::*;
-use serde::{Deserialize, Serialize};
-use thiserror::Error;
-
-use super::names::{unit_names, unit_variant};
 use crate::unknown_name::nearest;
+use bevy::{
+    prelude::*,
+    reflect::{
+        FromReflect, TypeInfo, Typed,
+        enums::{DynamicEnum, DynamicVariant, VariantInfo},
+    },
+};
+use serde::{Deserialize, Serialize};
+use std::{fmt, str::FromStr};
+use thiserror::Error;
 
 /// A key, a mouse button or a gamepad button.
 ///
@@ -16,7 +19,7 @@ use crate::unknown_name::nearest;
 ///
 /// ```
 /// use bevy::prelude::*;
-/// use bevy_playbot::virtual_input::VirtualButton;
+/// use crate::virtual_input::VirtualButton;
 ///
 /// assert_eq!("ArrowLeft".parse(), Ok(VirtualButton::Key(KeyCode::ArrowLeft)));
 /// assert_eq!(VirtualButton::from(MouseButton::Left).to_string(), "MouseLeft");
@@ -49,6 +52,7 @@ pub struct UnknownInput {
 }
 
 const MOUSE: &str = "Mouse";
+
 const GAMEPAD: &str = "Gamepad";
 
 impl fmt::Display for VirtualButton {
@@ -117,6 +121,57 @@ impl From<VirtualButton> for String {
     }
 }
 
+// Inputs with a continuous value.
+
+/// A motion or a stick that takes a number in each tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
+pub enum VirtualAxis {
+    /// Motion of the mouse to the right, pixels per tick.
+    MouseX,
+    /// Motion of the mouse downwards, pixels per tick.
+    MouseY,
+    /// The mouse wheel sideways, lines per tick.
+    WheelX,
+    /// The mouse wheel, lines per tick.
+    WheelY,
+    /// A stick of the agent's own gamepad, -1 to 1, held until the next tick.
+    Stick(GamepadAxis),
+    /// A trigger of the agent's own gamepad, 0 to 1, held until the next tick.
+    Trigger(GamepadButton),
+}
+
+impl VirtualAxis {
+    /// Returns whether it belongs to the gamepad. Every agent has its own.
+    pub(super) fn is_gamepad(self) -> bool {
+        matches!(self, Self::Stick(_) | Self::Trigger(_))
+    }
+}
+
+impl From<GamepadAxis> for VirtualAxis {
+    fn from(axis: GamepadAxis) -> Self {
+        Self::Stick(axis)
+    }
+}
+
+// Names of keys and buttons in text, taken from Bevy's own types.
+
+/// Returns the names of an enum's unit variants.
+pub(super) fn unit_names<T: Typed>() -> Vec<&'static str> {
+    match T::type_info() {
+        TypeInfo::Enum(info) => info
+            .iter()
+            .filter(|variant| matches!(variant, VariantInfo::Unit(_)))
+            .map(|variant| variant.name())
+            .collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Returns the unit variant of this name, if there is one.
+pub(super) fn unit_variant<T: Typed + FromReflect>(name: &str) -> Option<T> {
+    unit_names::<T>().contains(&name).then(|| T::from_reflect(&DynamicEnum::new(name, DynamicVariant::Unit)))?
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -137,5 +192,22 @@ mod tests {
         assert_eq!("§".parse::<VirtualButton>().expect_err("no such name").near, None);
         let error = ron::from_str::<VirtualButton>("\"GamepadSauth\"").expect_err("no such name").to_string();
         assert!(error.contains("did you mean `GamepadSouth`?"), "{error}");
+    }
+}
+
+#[cfg(test)]
+mod names_tests {
+    use super::*;
+
+    #[test]
+    fn every_named_key_is_found_by_its_name() {
+        let names = unit_names::<KeyCode>();
+        assert!(names.len() > 150 && names.contains(&"ArrowLeft"), "{}", names.len());
+        for name in names {
+            let key: KeyCode = unit_variant(name).expect("a key");
+            assert_eq!(format!("{key:?}"), name);
+        }
+        assert_eq!(unit_variant::<KeyCode>("Unidentified"), None);
+        assert_eq!(unit_variant::<MouseButton>("Left"), Some(MouseButton::Left));
     }
 }

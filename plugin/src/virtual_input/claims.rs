@@ -1,13 +1,14 @@
 //! Claims of agents to the one keyboard and the one mouse of a World.
 
-use bevy::prelude::*;
-
-use super::{axis::VirtualAxis, button::VirtualButton, component::VirtualInput, person::PressesForPeople};
 use crate::{
-    agent::{Agent, AgentOrder},
-    control::Control,
+    agent::{Agent, AgentOrder, Control},
     fault::Faults,
+    virtual_input::{
+        PressesForPeople, VirtualInput,
+        button::{VirtualAxis, VirtualButton},
+    },
 };
+use bevy::prelude::*;
 
 /// Returns whether virtual input plays under this control; `for_people` includes people.
 pub(super) fn is_virtual(control: Control, for_people: bool) -> bool {

@@ -3,26 +3,23 @@
 //! A [`VirtualInput`](super::VirtualInput) drives them through their bindings, without this module. Use it where
 //! actions have no bindings that a bot can press, or to skip conditions such as `Hold`.
 
-use std::{any::type_name, marker::PhantomData, sync::Arc};
-
+use crate::{
+    action::{Action, ActionValue},
+    agent::{Agent, Control},
+    episode::{Episode, EpisodeEnded, StartEpisode},
+    fault::Faults,
+    systems::PlaybotSystems,
+    virtual_input::{
+        InputRoute,
+        claims::{check_claims, is_virtual},
+    },
+};
 use bevy::{prelude::*, reflect::utility::GenericTypePathCell};
 use bevy_enhanced_input::prelude::{
     Action as InputActionOf, ActionMock, ActionValue as InputValue, EnhancedInputSystems, InputAction, MockSpan,
     TriggerState,
 };
-
-use super::{
-    claims::{check_claims, is_virtual},
-    route::InputRoute,
-};
-use crate::{
-    action::{Action, ActionValue},
-    agent::Agent,
-    control::Control,
-    episode::{Episode, EpisodeEnded, StartEpisode},
-    fault::Faults,
-    systems::PlaybotSystems,
-};
+use std::{any::type_name, marker::PhantomData, sync::Arc};
 
 /// On an agent: the value that its action gives to the input action `A` of the game.
 ///
@@ -32,7 +29,7 @@ use crate::{
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_enhanced_input::prelude::*;
-/// use bevy_playbot::virtual_input::enhanced_input::EnhancedAction;
+/// use EnhancedAction;
 ///
 /// #[derive(InputAction)]
 /// #[action_output(Vec2)]
@@ -104,7 +101,7 @@ impl<A: InputAction> EnhancedAction<A> {
 /// default; for fixed ticks use `add_input_context_to::<FixedPreUpdate, _>()`.
 #[derive(Clone, Copy, Debug)]
 pub struct EnhancedActionPlugin<A> {
-    /// The route, as for [`VirtualInputPlugin`](super::VirtualInputPlugin).
+    /// The route, as for [`VirtualInputPlugin`](crate::virtual_input::VirtualInputPlugin).
     pub route: InputRoute,
     marker: PhantomData<fn() -> A>,
 }
@@ -149,6 +146,7 @@ type Agents<'w, 's, A> = Query<
     's,
     (&'static Agent, &'static Action, &'static Control, &'static Episode, &'static mut EnhancedAction<A>),
 >;
+
 type Mocks<'w, 's, A> =
     Query<'w, 's, (Entity, &'static mut ActionMock, &'static mut TriggerState), With<InputActionOf<A>>>;
 

@@ -4,23 +4,21 @@
 //! have no keys, or where fixed ticks need an action in the tick that decides it: an `ActionState` reads its keys
 //! before the first fixed tick of a frame.
 
-use bevy::prelude::*;
-use leafwing_input_manager::{
-    Actionlike, InputControlKind, action_state::ActionState, buttonlike::ButtonState, plugin::InputManagerSystem,
-};
-
-use super::{
-    claims::{check_claims, is_virtual},
-    route::InputRoute,
-};
 use crate::{
     action::{Action, ActionValue},
-    agent::Agent,
-    control::Control,
+    agent::{Agent, Control},
     episode::{Episode, EpisodeEnded, StartEpisode},
     fault::Faults,
     placement::is_tick,
     systems::PlaybotSystems,
+    virtual_input::{
+        InputRoute,
+        claims::{check_claims, is_virtual},
+    },
+};
+use bevy::prelude::*;
+use leafwing_input_manager::{
+    Actionlike, InputControlKind, action_state::ActionState, buttonlike::ButtonState, plugin::InputManagerSystem,
 };
 
 /// On an agent: the actions of the game that its own actions press and push.
@@ -30,7 +28,7 @@ use crate::{
 ///
 /// ```
 /// use bevy::prelude::*;
-/// use bevy_playbot::virtual_input::leafwing::LeafwingActions;
+/// use LeafwingActions;
 /// use leafwing_input_manager::prelude::*;
 ///
 /// #[derive(Actionlike, Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
@@ -107,7 +105,7 @@ impl<A: Actionlike> LeafwingActions<A> {
 /// Drives the actions `A` of agents with [`LeafwingActions`], in ticks that are frames or fixed, as the route says.
 #[derive(Clone, Copy, Debug)]
 pub struct LeafwingActionsPlugin<A> {
-    /// The route, as for [`VirtualInputPlugin`](super::VirtualInputPlugin).
+    /// The route, as for [`VirtualInputPlugin`](crate::virtual_input::VirtualInputPlugin).
     pub route: InputRoute,
     marker: std::marker::PhantomData<fn() -> A>,
 }
@@ -154,6 +152,7 @@ type Agents<'w, 's, A> = Query<
     's,
     (Entity, &'static Agent, &'static Action, &'static Control, &'static Episode, &'static mut LeafwingActions<A>),
 >;
+
 type States<'w, 's, A> = Query<'w, 's, (Entity, &'static mut ActionState<A>)>;
 
 /// Returns the entity whose `ActionState` an agent drives.

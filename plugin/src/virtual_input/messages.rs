@@ -1,24 +1,29 @@
 //! Bevy's messages about keys, mouse and gamepads, as a window and a gamepad driver would send them.
 
+use crate::{
+    agent::Agent,
+    virtual_input::{
+        VirtualInput,
+        button::{VirtualAxis, VirtualButton},
+        devices::{Change, Reading},
+        input_state::{Switch, logical_key},
+    },
+};
 use bevy::{
     ecs::system::SystemParam,
     input::{
         ButtonState,
-        gamepad::{GamepadConnection, GamepadConnectionEvent},
+        gamepad::{
+            AxisSettings, ButtonAxisSettings, GamepadAxisChangedEvent, GamepadButtonChangedEvent,
+            GamepadButtonStateChangedEvent, GamepadConnection, GamepadConnectionEvent, GamepadEvent,
+            RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent, RawGamepadEvent,
+        },
         keyboard::KeyboardInput,
         mouse::{MouseButtonInput, MouseMotion, MouseScrollUnit, MouseWheel},
         touch::TouchPhase,
     },
     prelude::*,
     window::PrimaryWindow,
-};
-
-use super::{
-    button::VirtualButton,
-    devices::{Change, Reading},
-    gamepad_messages::{GamepadMessages, of_driver},
-    input_state::Switch,
-    logical_key::logical_key,
 };
 
 /// The writers of messages.
@@ -49,7 +54,7 @@ impl InputMessages<'_, '_> {
 
     /// Sends the messages of a change that is already in the state, in its own tick, with the state before and after.
     ///
-    /// Messages for keys and mouse affect only the state, which [`settle`](super::direct::settle) restores. A
+    /// Messages for keys and mouse affect only the state, which [`settle`](crate::virtual_input::act::settle) restores. A
     /// `RawGamepadEvent` is left out: Bevy's system for gamepads would read it in the next frame, when it may be
     /// outdated, and would press and announce everything again.
     pub fn tell(&mut self, change: Change, before: Reading, after: Reading) {
@@ -103,5 +108,165 @@ impl InputMessages<'_, '_> {
     pub fn send_connection(&mut self, pad: Entity, name: String) {
         let connection = GamepadConnection::Connected { name, vendor_id: None, product_id: None };
         self.pads.send(GamepadConnectionEvent::new(pad, connection).into());
+    }
+}
+
+// Messages about gamepads: those of a driver, and those that Bevy's own system derives from them.
+
+/// The writers of messages about gamepads.
+#[derive(SystemParam)]
+pub(super) struct GamepadMessages<'w, 's> {
+    connections: MessageWriter<'w, GamepadConnectionEvent>,
+    raw: MessageWriter<'w, RawGamepadEvent>,
+    raw_buttons: MessageWriter<'w, RawGamepadButtonChangedEvent>,
+    raw_axes: MessageWriter<'w, RawGamepadAxisChangedEvent>,
+    processed: MessageWriter<'w, GamepadEvent>,
+    buttons: MessageWriter<'w, GamepadButtonChangedEvent>,
+    button_states: MessageWriter<'w, GamepadButtonStateChangedEvent>,
+    axes: MessageWriter<'w, GamepadAxisChangedEvent>,
+    settings: Query<'w, 's, &'static GamepadSettings>,
+}
+
+impl GamepadMessages<'_, '_> {
+    /// Sends a message as a driver would: Bevy's own system reads it in its next run.
+    pub fn send(&mut self, event: RawGamepadEvent) {
+        self.send_part(&event);
+        self.raw.write(event);
+    }
+
+    /// Sends the part of [`send`](Self::send) that Bevy's own system for buttons and sticks does not read.
+    pub fn send_part(&mut self, event: &RawGamepadEvent) {
+        match event {
+            RawGamepadEvent::Connection(connection) => {
+                self.connections.write(connection.clone());
+            }
+            RawGamepadEvent::Button(button) => {
+                self.raw_buttons.write(*button);
+            }
+            RawGamepadEvent::Axis(axis) => {
+                self.raw_axes.write(*axis);
+            }
+        }
+    }
+
+    /// Sends the derived messages as Bevy's own system would, with the state before and after the change. Small
+    /// changes are sent too, because the state has them. A disconnected gamepad sends nothing.
+    pub fn process(&mut self, event: &RawGamepadEvent, before: Reading, after: Reading) {
+        match *event {
+            RawGamepadEvent::Connection(_) => {}
+            RawGamepadEvent::Button(RawGamepadButtonChangedEvent { gamepad, button, value }) => {
+                let Ok(settings) = self.settings.get(gamepad) else { return };
+                let state = if after.is_down { ButtonState::Pressed } else { ButtonState::Released };
+                if before.is_down != after.is_down {
+                    self.button_states.write(GamepadButtonStateChangedEvent::new(gamepad, button, state));
+                }
+                let value = scaled_button(settings.get_button_axis_settings(button), value);
+                let event = GamepadButtonChangedEvent::new(gamepad, button, state, value);
+                self.buttons.write(event);
+                self.processed.write(event.into());
+            }
+            RawGamepadEvent::Axis(RawGamepadAxisChangedEvent { gamepad, axis, value }) => {
+                let Ok(settings) = self.settings.get(gamepad) else { return };
+                let value = scaled_axis(settings.get_axis_settings(axis), value);
+                let event = GamepadAxisChangedEvent::new(gamepad, axis, value);
+                self.axes.write(event);
+                self.processed.write(event.into());
+            }
+        }
+    }
+}
+
+/// Returns the driver's message for this change, if it is one of a gamepad.
+pub(super) fn of_driver(change: Change) -> Option<RawGamepadEvent> {
+    match change {
+        Change::Button { switch: Switch { button: VirtualButton::Gamepad(button), pad: Some(pad) }, down } => {
+            Some(RawGamepadButtonChangedEvent::new(pad, button, if down { 1.0 } else { 0.0 }).into())
+        }
+        Change::Axis { pad, axis: VirtualAxis::Trigger(button), value } => {
+            Some(RawGamepadButtonChangedEvent::new(pad, button, value).into())
+        }
+        Change::Axis { pad, axis: VirtualAxis::Stick(axis), value } => {
+            Some(RawGamepadAxisChangedEvent::new(pad, axis, value).into())
+        }
+        // Keys, mouse buttons and motions.
+        Change::Button { .. } | Change::Axis { .. } => None,
+    }
+}
+
+/// Scales a button's value to 0 to 1 between the values that count as untouched and fully pressed.
+fn scaled_button(settings: &ButtonAxisSettings, value: f32) -> f32 {
+    if value <= settings.low {
+        0.0
+    } else if value >= settings.high {
+        1.0
+    } else {
+        (value - settings.low) / (settings.high - settings.low)
+    }
+}
+
+/// Scales a stick's value to -1 to 1 between its dead zone and the values that count as fully pushed.
+fn scaled_axis(settings: &AxisSettings, value: f32) -> f32 {
+    let value = settings.clamp(value);
+    if value > 0.0 {
+        let (from, to) = (settings.deadzone_upperbound(), settings.livezone_upperbound());
+        ((value - from) / (to - from)).min(1.0)
+    } else if value < 0.0 {
+        let (from, to) = (settings.livezone_lowerbound(), settings.deadzone_lowerbound());
+        ((value - from) / (to - from) - 1.0).max(-1.0)
+    } else {
+        0.0
+    }
+}
+
+// Gamepads of the agents that use one.
+
+/// The gamepad of an agent. Games see it as one that is plugged in.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Component)]
+pub struct VirtualGamepad {
+    /// The agent.
+    pub agent: Entity,
+}
+
+/// Plugs in the gamepads of agents that have none yet, and unplugs those whose agents are gone.
+///
+/// Runs before Bevy's own input systems, which make them gamepads in the same frame.
+pub(super) fn connect_gamepads(
+    agents: Query<(Entity, &Agent, &VirtualInput)>,
+    pads: Query<(Entity, &VirtualGamepad)>,
+    mut messages: InputMessages,
+    mut commands: Commands,
+) {
+    for (pad, owner) in &pads {
+        if !agents.get(owner.agent).is_ok_and(|(.., input)| input.uses_gamepad()) {
+            commands.entity(pad).despawn();
+        }
+    }
+    for (entity, agent, input) in &agents {
+        if input.uses_gamepad() && !pads.iter().any(|(_, owner)| owner.agent == entity) {
+            let pad = commands.spawn(VirtualGamepad { agent: entity }).id();
+            messages.send_connection(pad, format!("gamepad of agent {}", agent.index));
+        }
+    }
+}
+
+#[cfg(test)]
+mod gamepad_messages_tests {
+    use super::*;
+
+    #[test]
+    fn values_are_scaled_as_bevy_scales_them() {
+        let stick = AxisSettings::default();
+        for (value, scaled) in [(0.0, 0.0), (0.05, 0.0), (0.525, 0.5), (1.0, 1.0), (-0.525, -0.5), (-1.0, -1.0)] {
+            assert!((scaled_axis(&stick, value) - scaled).abs() < 1e-6, "{value}: {}", scaled_axis(&stick, value));
+        }
+        let button = ButtonAxisSettings::default();
+        for (value, scaled) in [(0.0, 0.0), (0.05, 0.0), (0.5, 0.5), (0.96, 1.0), (1.0, 1.0)] {
+            assert!(
+                (scaled_button(&button, value) - scaled).abs() < 1e-6,
+                "{value}: {}",
+                scaled_button(&button, value)
+            );
+        }
     }
 }

@@ -1,22 +1,17 @@
 //! Composition of observations from frames.
 
-use bevy::prelude::*;
-use thiserror::Error;
-
-use super::{
-    Frame, ImageOptions, ImageSensor, PaintedVelocity, VisionError,
-    blank::BlankEpisodes,
-    planes,
-    stack::{Moment, PictureStack},
-};
 use crate::{
-    agent::{Agent, AgentOrder},
-    control::Control,
-    episode::{Episode, EpisodeCount},
+    agent::{Agent, AgentOrder, Control},
+    episode::{Episode, EpisodeCount, Tick},
     fault::Faults,
     observation::Observation,
-    tick::Tick,
+    vision::{
+        Frame, ImageOptions, ImageSensor, PaintedVelocity, VisionError, options,
+        options::{BlankEpisodes, Moment, PictureStack},
+    },
 };
+use bevy::prelude::*;
+use thiserror::Error;
 
 /// The reason why a frame cannot become an observation.
 #[derive(Debug, Error)]
@@ -104,14 +99,33 @@ fn write_image(
     image: &mut Vec<u8>,
 ) {
     let paint = |bytes: &mut [u8]| {
-        planes::write_planes(&frame.pixels, options, bytes);
+        options::write_planes(&frame.pixels, options, bytes);
         if let (true, Some(velocity)) = (options.paint_velocity, velocity) {
-            planes::paint_velocity(velocity.0.to_array(), options, bytes);
+            options::paint_velocity(velocity.0.to_array(), options, bytes);
         }
     };
     image.resize(options.shape().numbers(), 0);
     match options.stack {
         1 => paint(image),
         count => stack.push(moment, count as usize, paint, image),
+    }
+}
+
+// Checks of the images that sensors produce.
+
+/// Reports images of the wrong length, with agent and tick.
+pub(crate) fn check_images(
+    agents: Query<(&Agent, &ImageSensor, &Observation, &Control, &Episode)>,
+    mut faults: ResMut<Faults>,
+) {
+    for (agent, sensor, observation, control, episode) in &agents {
+        let (expected, got) = (sensor.0.shape().numbers(), observation.image.len());
+        if is_observed(control, episode) && got != expected {
+            faults.report(format!(
+                "{}: the observation's image has {got} bytes, its sensor makes {expected}; add the sensor and its \
+                 plugin, and leave the image to them",
+                episode.moment(agent)
+            ));
+        }
     }
 }

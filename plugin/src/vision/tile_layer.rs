@@ -1,6 +1,6 @@
 //! A grid of tiles that is drawn as one.
 
-use bevy::prelude::*;
+use bevy::{asset::AssetId, prelude::*};
 
 /// A grid of square tiles with side 1 in its own coordinates; its `Transform` positions and scales
 /// it. Cell (0, 0) has its bottom left corner at the origin.
@@ -42,4 +42,17 @@ impl TileLayer {
         let inside = (0..self.columns as i32).contains(&column) && (0..self.rows as i32).contains(&row);
         if inside { self.cells[row as usize * self.columns as usize + column as usize] } else { self.outside }
     }
+}
+
+// Detection of sprites without an image.
+
+/// Advice for a sprite that [lacks an image](lacks_image).
+pub(crate) const NO_IMAGE: &str = "set `Sprite::image`, or `custom_size` for a rectangle of one colour";
+
+/// Returns whether a sprite shows nothing because it has no image. A sprite with a size of its own
+/// is a rectangle of one colour, as [`Sprite::from_color`] makes them, and needs no image.
+///
+/// Bevy keeps a white texel under the handle of no image, and so draws a sprite of neither kind as a white dot.
+pub(crate) fn lacks_image(sprite: &Sprite) -> bool {
+    sprite.custom_size.is_none() && sprite.image.id() == AssetId::default()
 }

@@ -2,12 +2,12 @@
 
 use std::process::ExitCode;
 
-use playbot_lab::game::Game;
+use playbot_harness::game::Game;
 use playbot_tests::foreign::catch::catch_game;
 
 fn main() -> ExitCode {
     let count = std::env::var("GAMES").ok().and_then(|count| count.parse().ok()).unwrap_or(1);
     let game = catch_game();
     let games: Vec<&dyn Game> = vec![&game; count];
-    playbot_cli::main(&games)
+    playbot::main(&games)
 }

@@ -1,10 +1,8 @@
 //! A game of catching in `Update`, spawned in `Startup`, with a global score.
 
 use bevy::prelude::*;
-use playbot_lab::{
-    foreign::{ForeignGame, LevelSeed, Restart},
-    prelude::*,
-};
+use playbot::prelude::*;
+use playbot_harness::foreign::{ForeignGame, LevelSeed, Restart};
 
 /// The paddle, at one of the columns 0 to 8.
 #[derive(Component)]

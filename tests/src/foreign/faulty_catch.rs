@@ -3,7 +3,7 @@
 use std::hash::{BuildHasher, Hasher, RandomState};
 
 use bevy::{prelude::*, time::Real};
-use playbot_lab::foreign::ForeignGame;
+use playbot_harness::foreign::ForeignGame;
 
 use super::catch::{Apple, adapted, game};
 

@@ -2,10 +2,8 @@
 //! rate.
 
 use bevy::prelude::*;
-use playbot_lab::{
-    foreign::{ForeignGame, LevelSeed, Restart},
-    prelude::*,
-};
+use playbot::prelude::*;
+use playbot_harness::foreign::{ForeignGame, LevelSeed, Restart};
 
 /// State of the game.
 #[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

@@ -1,10 +1,8 @@
 //! A ball in the wind, with a memory: a game whose later episodes do not begin like the first one.
 
 use bevy::prelude::*;
-use playbot_lab::{
-    foreign::{ForeignGame, LevelSeed, Restart},
-    prelude::*,
-};
+use playbot::prelude::*;
+use playbot_harness::foreign::{ForeignGame, LevelSeed, Restart};
 
 /// The ball, on a line.
 #[derive(Component)]

@@ -1,6 +1,7 @@
 //! Traces of a game's episodes.
 
-use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_world};
+use playbot::prelude::*;
+use playbot_harness::{foreign::ForeignGame, worlds::build_world};
 
 /// Returns the state hashes of the episodes of one agent with a constant action, on one level after the other in one
 /// World.

@@ -67,8 +67,8 @@ mod tests {
     #[test]
     fn warnings_of_this_workspace_are_heard_and_nothing_else_is() {
         let (done, words) = heard(|| {
-            tracing::warn!(target: "playbot_lab::train", "line {} is damaged", 3);
-            tracing::info!(target: "playbot_lab::train", "all is well");
+            tracing::warn!(target: "playbot_train", "line {} is damaged", 3);
+            tracing::info!(target: "playbot_train", "all is well");
             tracing::warn!(target: "bevy_asset", "no such file");
             7
         });

@@ -9,13 +9,13 @@ use std::{
 
 use bevy::prelude::*;
 use bevy_playbot::demo::file::DemoWriter;
-use playbot_lab::{
+use playbot::prelude::*;
+use playbot_harness::{
+    detector::LevelProof,
     eval::Player,
-    findings::list_findings,
     game::{BotTools, LevelTools},
-    prelude::*,
-    proof::LevelProof,
 };
+use playbot_test::findings::list_findings;
 use playbot_tests::{Cell, Corridor, Drift, as_corridor, corridor_plugin, recording::record_random};
 
 /// The corridor with bots that walk to the right and to the left, and perhaps with a fault.

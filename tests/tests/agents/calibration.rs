@@ -6,7 +6,7 @@ use std::{
 };
 
 use bevy_playbot::demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoWriter, EpisodeActions};
-use playbot_lab::calibration::{Agreement, Calibration, CalibrationError, Measure, Numbers, RankCorrelation};
+use playbot_mutation::calibration::{Agreement, Calibration, CalibrationError, Measure, Numbers, RankCorrelation};
 
 const WON: DemoEnd = DemoEnd::Terminated { success: true };
 const LOST: DemoEnd = DemoEnd::Terminated { success: false };

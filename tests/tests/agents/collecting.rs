@@ -4,12 +4,10 @@ use std::path::Path;
 
 use bevy::prelude::*;
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{
-    prelude::*,
-    train::{collect::Collector, config_file::parse_experiment, trainer::Trainer},
-};
+use playbot::prelude::*;
 use playbot_learner::{DeviceKind, PpoConfig};
 use playbot_tests::{as_corridor, corridor_plugin, training::untrained};
+use playbot_train::{collect::Collector, experiment::file::parse_experiment, trainer::Trainer};
 
 /// A corridor that once replaces a decided action by one of another kind.
 struct Meddling;

@@ -4,13 +4,15 @@ use std::collections::BTreeSet;
 
 use bevy::prelude::*;
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{
+use playbot::prelude::*;
+use playbot_harness::{
     detector::{Detector, EachTick, Moment},
-    detectors::{DetectorChoice, Detectors},
     eval::Player,
     floor_plan::FloorPlan,
     game::{LevelTools, StateTools, TestTools},
-    prelude::*,
+};
+use playbot_test::{
+    detectors::{DetectorChoice, Detectors},
     verdict::{Finding, LevelVerdict, TestError, TestPlan, TestWatch, Tester, TesterRecord, run_tests},
 };
 use playbot_tests::{Cell, as_corridor, corridor_plugin};

@@ -4,16 +4,14 @@
 use std::{fs, path::Path};
 
 use bevy_playbot::{streams::AgentStreams, vision::ObservationConfig};
-use playbot_lab::{
-    prelude::*,
-    train::{Experiment, collect::Collector, config_file::parse_experiment},
-};
+use playbot::prelude::*;
 use playbot_learner::{
     DeviceKind, Learner, Observations, PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillModel,
     rng::{ChaCha8Rng, normal},
 };
 use playbot_shell::json_lines;
 use playbot_tests::{Corridor, recording::record_random, training::learn_skills};
+use playbot_train::{Experiment, collect::Collector, experiment::file::parse_experiment};
 
 const SEED: u64 = 3;
 const AGENTS: usize = 8;

@@ -1,12 +1,10 @@
 //! Tests of detectors on games with planted defects, and on unmutated ones.
 
+use playbot::prelude::*;
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
-use playbot_lab::{
-    bugs::{Mutant, defect_kinds},
-    detectors::{DetectorChoice, Detectors},
-    eval::Player,
-    prelude::*,
-};
+use playbot_harness::eval::Player;
+use playbot_mutation::bugs::{Mutant, defect_kinds};
+use playbot_test::detectors::{DetectorChoice, Detectors};
 use playbot_tests::{Corridor, faulty::Fault as Garden};
 
 use crate::corridor_defects::{Defect, always, assert_silent, findings, only, random, tester, verdicts};

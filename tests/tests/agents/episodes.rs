@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_playbot::test_app::{PlaybotTestExt, test_app};
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 use playbot_tests::{Cell, PoisonAt, corridor_plugin, spawn_walker};
 
 #[derive(Resource, Default)]

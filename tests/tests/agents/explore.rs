@@ -10,19 +10,14 @@ use bevy_playbot::{
     demo::file::{DemoReader, DemoWriter},
     vision::ObservationConfig,
 };
+use playbot::prelude::*;
 use playbot_games::registry::GAMES;
-use playbot_lab::{
-    demo::verify::verify_file,
-    explore::{
-        Cell as ExploredCell, Exploration, ExploreError, ExplorePlan, Explorer, Stop, Until, explore, follow_route,
-        record_route,
-    },
-    foreign::Restart,
-    game::StateTools,
-    games::Games,
-    prelude::*,
-};
+use playbot_harness::{demo::verify_file, foreign::Restart, game::StateTools, games::Games};
 use playbot_learner::{Actions, PpoConfig, Prior, SkillDraw};
+use playbot_test::explore::{
+    Cell as ExploredCell, Exploration, ExploreError, ExplorePlan, Explorer, Stop, Until, explore, follow_route,
+    record_route,
+};
 use playbot_tests::{
     Cell, Corridor, Drift, as_corridor, corridor_plugin, foreign::stubborn::stubborn_game, spawn_walker,
     training::untrained,

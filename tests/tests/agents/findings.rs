@@ -12,15 +12,14 @@ use std::{
 
 use bevy::prelude::*;
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{
+use playbot::prelude::*;
+use playbot_harness::{eval::Player, games::Games};
+use playbot_test::{
     detectors::Detectors,
-    eval::Player,
     findings::{
         Budget, Check, Checks, Date, FINDINGS, FindingFiles, FindingHead, FindingStatus, Minimised, Moment, PINS,
-        Regress, Regression, StoredFinding, Watcher, list_findings, minimise, recheck, regress, regress_until,
+        Regress, Regression, StoredFinding, Watcher, keep::recheck, list_findings, minimise, regress, regress_until,
     },
-    games::Games,
-    prelude::*,
     verdict::{LevelVerdict, TestError, TestPlan, TestWatch, Tester, TesterRecord, run_tests_keeping},
 };
 use playbot_tests::{Cell, Corridor, as_corridor, corridor_plugin};

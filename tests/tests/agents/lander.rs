@@ -2,7 +2,7 @@
 //! alone.
 #![allow(clippy::duplicate_mod, reason = "two examples share the rules of their game")]
 
-#[path = "../../../plugin/lab/examples/lander.rs"]
+#[path = "../../../plugin/cli/examples/lander.rs"]
 #[allow(dead_code, reason = "its `main` is for those who run the example")]
 mod lander_example;
 
@@ -16,10 +16,10 @@ use bevy_playbot::{
     policy_file::{PolicyFile, check_policy, install_policy},
     prelude::*,
 };
-use playbot_lab::game::Game;
+use playbot_harness::game::Game;
 use playbot_learner::DeviceKind;
 
-use lander_example::lander_rules::rules::{TICK_HZ, add_rules, capsule};
+use lander_example::lander_rules::{TICK_HZ, add_rules, capsule};
 
 /// As the example's, but small.
 const TINY: &str = r#"(
@@ -55,7 +55,7 @@ fn the_lander_goes_the_whole_road() {
 fn shipped() -> App {
     let mut app = headless_app();
     set_tick_rate(&mut app, TICK_HZ);
-    lander_window::lander_rules::rules::add_rules(&mut app);
+    lander_window::lander_rules::add_rules(&mut app);
     lander_window::add_shipped_policy(&mut app).expect("made for these rules");
     app
 }
@@ -64,7 +64,7 @@ fn shipped() -> App {
 fn the_policy_that_is_shipped_lands_softly_on_levels_that_it_has_not_seen() {
     let mut app = shipped();
     let levels = LevelQueue::list((64..128).collect::<Vec<_>>());
-    let capsule = lander_window::lander_rules::rules::capsule(0);
+    let capsule = lander_window::lander_rules::capsule(0);
     let agent = app.world_mut().spawn((capsule, Control::Policy, levels)).id();
     while app.world().get::<Control>(agent) != Some(&Control::Idle) {
         app.tick().expect("the policy acts as the game allows");
@@ -82,7 +82,7 @@ fn f9_gives_the_controls_and_takes_them_back() {
     let mut keys = ButtonInput::default();
     keys.press(KeyCode::F9);
     app.insert_resource(keys);
-    let capsule = lander_window::lander_rules::rules::capsule(0);
+    let capsule = lander_window::lander_rules::capsule(0);
     let agent = app.world_mut().spawn((capsule, Control::Policy, LevelQueue::Always(64))).id();
     for wanted in [Control::Human, Control::Policy] {
         // The keys are not cleared here: it is pressed anew in every tick.
@@ -94,7 +94,8 @@ fn f9_gives_the_controls_and_takes_them_back() {
 /// The recordings of the experiment are good enough.
 #[test]
 fn the_pilot_lands_softly() {
-    use playbot_lab::{eval::Player, pipeline, train::config_file::parse_experiment};
+    use playbot_harness::eval::Player;
+    use playbot_train::{experiment::file::parse_experiment, pipeline};
     let experiment = parse_experiment(lander_example::EXPERIMENT, "lander.ron".as_ref()).expect("valid");
     let measured = pipeline::evaluate(&lander_example::Lander, &experiment, "pilot", &Player::Demonstrator, 2);
     let measured = measured.expect("the pilot can fly");

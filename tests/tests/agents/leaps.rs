@@ -3,12 +3,12 @@
 use std::ops::ControlFlow;
 
 use bevy::prelude::*;
-use playbot_lab::{
-    explore::{Cell as ExploredCell, ExploreError, ExplorePlan, Stop, Until, check_cell, explore},
+use playbot::prelude::*;
+use playbot_harness::{
     floor_plan::FloorPlan,
     game::{LevelTools, StateTools},
-    prelude::*,
 };
+use playbot_test::explore::{Cell as ExploredCell, ExploreError, ExplorePlan, Stop, Until, explore, round::check_cell};
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
 
 /// The corridor, whose cells are two squares apart: every other one of its 13 squares is only passed.

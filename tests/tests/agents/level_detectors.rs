@@ -1,9 +1,9 @@
 //! Tests of detectors of whole levels and of logs, and of the replay of their findings.
 
-use playbot_lab::{
-    eval::Player,
-    findings::{Checks, FindingHead, FindingStatus, StoredFinding, recheck},
-    prelude::*,
+use playbot::prelude::*;
+use playbot_harness::eval::Player;
+use playbot_test::{
+    findings::{Checks, FindingHead, FindingStatus, StoredFinding, keep::recheck},
     verdict::Tester,
 };
 use playbot_tests::{Corridor, faulty::Fault as Garden};

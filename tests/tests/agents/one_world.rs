@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use playbot_lab::train::{Experiment, Trainer, config_file::parse_experiment};
 use playbot_learner::DeviceKind;
 use playbot_tests::Corridor;
+use playbot_train::{Experiment, Trainer, experiment::file::parse_experiment};
 
 const SEEDS: u64 = 6;
 

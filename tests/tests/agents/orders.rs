@@ -3,9 +3,8 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    headless::set_tick_rate,
-    headless_plugins::HeadlessPlugins,
-    system_order::leave_open,
+    headless::{HeadlessPlugins, set_tick_rate},
+    systems::leave_open,
     test_app::PlaybotTestExt,
     virtual_input::{
         InputRoute, VirtualInput, VirtualInputPlugin,
@@ -14,11 +13,9 @@ use bevy_playbot::{
     },
     vision::{ObservationConfig, ObservationKind},
 };
+use playbot::prelude::*;
 use playbot_games::registry::GAMES;
-use playbot_lab::{
-    prelude::*,
-    worlds::{build_observing_world, build_world},
-};
+use playbot_harness::worlds::{build_observing_world, build_world};
 use playbot_tests::{
     corridor_plugin,
     foreign::{catch::catch_game, rooms::rooms_game},
@@ -26,7 +23,8 @@ use playbot_tests::{
 };
 
 /// Crates whose systems are checked.
-const OURS: [&str; 3] = ["bevy_playbot", "playbot_lab", "playbot_games"];
+const OURS: [&str; 6] =
+    ["bevy_playbot", "playbot_games", "playbot_harness", "playbot_mutation", "playbot_test", "playbot_train"];
 
 const NONE: [&str; 0] = [];
 

@@ -6,22 +6,19 @@ use std::path::Path;
 
 use bevy::prelude::*;
 use bevy_playbot::demo::file::{DemoFault, DemoReader, DemoWriter};
-use playbot_lab::prelude::*;
-use playbot_lab::{
-    demo::demonstration::DemonstrationPlan,
-    eval::Player,
-    game::BotTools,
-    pipeline::{self, PipelineError},
-    train::{
-        Algorithm, Experiment, UpdateReport,
-        config_file::parse_experiment,
-        recordings::RecordingsError,
-        run_observer::{AfterUpdate, RunEvent, RunObserver, Unobserved},
-        train_run::TrainingSetup,
-    },
-};
+use playbot::prelude::*;
+use playbot_harness::{demo::demonstration::DemonstrationPlan, eval::Player, game::BotTools};
 use playbot_learner::{DeviceKind, PolicyFile};
 use playbot_tests::{Corridor, as_corridor};
+use playbot_train::{
+    Algorithm, Experiment, UpdateReport,
+    experiment::file::parse_experiment,
+    pipeline,
+    pipeline::PipelineError,
+    recordings::RecordingsError,
+    run_observer::{AfterUpdate, RunEvent, RunObserver, Unobserved},
+    train_run::TrainingSetup,
+};
 
 const EXPERIMENT: &str = r#"(
     game: "corridor", train: "plain:0..7", test: "plain:8..15",
@@ -98,7 +95,7 @@ fn the_whole_road_leads_from_a_demonstrator_to_a_policy_file() {
     assert!(file.skills.is_some(), "SCORE acts with skills");
     assert_eq!(seen(&file), ["plain:0..7", "plain:16..35"], "what it has played, and what its skills were shown");
     let path = folder.path().join("corridor.policy");
-    playbot_lab::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
+    playbot_train::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
     let shipped = PolicyFile::load(&path, DeviceKind::Flex).expect("it answers as it did");
 
     let measure = |file| {
@@ -128,7 +125,7 @@ fn what_chooses_skills_is_shipped_with_what_it_has_learned_of_them() {
         assert_eq!((file.card.algorithm.as_str(), file.skills.is_some()), (algorithm.name(), skills.is_some()));
         assert_eq!(seen(&file), ["plain:0..7", "plain:16..35"], "{algorithm}");
         let path = folder.path().join(algorithm.name());
-        playbot_lab::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
+        playbot_train::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
         let shipped = PolicyFile::load(&path, DeviceKind::Flex).expect("it answers as it did");
         let measure = |file| {
             let player = Player::of_file(file, ActionDraw::Sample);

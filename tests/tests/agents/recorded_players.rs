@@ -8,8 +8,8 @@ use bevy_playbot::{
     prelude::*,
     vision::ObservationConfig,
 };
-use playbot_lab::{
-    demo::{demonstration::DemonstrationPlan, verify::verify_file},
+use playbot_harness::{
+    demo::{demonstration::DemonstrationPlan, verify_file},
     eval::Player,
 };
 use playbot_tests::Corridor;

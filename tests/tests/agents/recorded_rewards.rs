@@ -10,12 +10,11 @@ use bevy_playbot::{
     },
     vision::ObservationConfig,
 };
-use playbot_lab::{
-    demo::{dataset::Demonstrations, verify::VerifyError},
-    prelude::*,
-};
+use playbot::prelude::*;
+use playbot_harness::demo::VerifyError;
 use playbot_learner::Rollout;
 use playbot_tests::{Corridor, recording::record_random};
+use playbot_train::demo::Demonstrations;
 
 /// Writes a recording of a random walker, with each episode changed.
 fn recorded(path: &Path, change: impl Fn(usize, &mut DemoEpisode)) {

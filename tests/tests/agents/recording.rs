@@ -11,15 +11,13 @@ use bevy_playbot::{
     },
     vision::ObservationConfig,
 };
-use playbot_lab::prelude::*;
-use playbot_lab::{
-    demo::{
-        dataset::Demonstrations,
-        verify::{EpisodeReplayer, verify_file},
-    },
+use playbot::prelude::*;
+use playbot_harness::{
+    demo::{EpisodeReplayer, verify_file},
     worlds::build_world,
 };
 use playbot_tests::{Corridor, Drift, recording};
+use playbot_train::demo::Demonstrations;
 
 fn header() -> DemoHeader {
     Corridor.demo_header("plain")

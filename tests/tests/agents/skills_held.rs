@@ -2,9 +2,11 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{streams::AgentStreams, vision::ObservationConfig};
-use playbot_lab::{prelude::*, train::collect::Collector, worlds::build_world};
+use playbot::prelude::*;
+use playbot_harness::worlds::build_world;
 use playbot_learner::{PpoConfig, Prior, SkillDraw, rng::normal};
 use playbot_tests::{Corridor, training::untrained};
+use playbot_train::collect::Collector;
 
 /// Seed of the Worlds.
 const SEED: u64 = 7;

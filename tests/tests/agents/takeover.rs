@@ -12,11 +12,11 @@ use bevy::{
 };
 use bevy_playbot::{
     demo::file::{Decider, DemoEnd, DemoReader, merge_demos},
+    episode::Tick,
     fault::FaultOccurred,
     headless::set_fixed_step,
     prelude::*,
     takeover::{GameIdentity, Takeover, TakeoverPlugin, TakeoverRequest},
-    tick::Tick,
 };
 use playbot_learner::{DeviceKind, Learner as _, ObsKind, PolicyCard, PolicyFile, PolicySpec, PpoConfig, PpoLearner};
 use playbot_tests::{Cell, Drift, corridor_plugin, spawn_walker};

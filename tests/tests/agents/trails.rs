@@ -2,16 +2,16 @@
 
 use bevy::math::{Rect, Vec2};
 use playbot_games::{
-    maze::{Cell, Planner, fixed},
+    maze::{Cell, Planner},
     registry::GAMES,
 };
-use playbot_lab::{
+use playbot_harness::{
     drawing::Shape,
     eval::{EvalPlan, Player, Trail, evaluate, evaluate_with_trails},
     floor_plan::FloorPlan,
     game::Game,
     games::Games,
-    report::{Floor, TrailChart, Visits, Walker},
+    trails::{Floor, TrailChart, Walker, visits::Visits},
 };
 use playbot_tests::measuring::plan;
 
@@ -68,7 +68,7 @@ fn cells(trail: &Trail) -> Vec<Cell> {
 
 #[test]
 fn the_planners_ball_is_seen_in_every_cell_of_its_way_and_in_no_wall() {
-    let maze = fixed::maze2d::medium();
+    let maze = playbot_games::maze::fixed::maze2d::medium();
     let way = Planner::new(&maze, maze.goal()).path(maze.start()).expect("a way");
     for trail in trails("maze2d", &Player::Demonstrator, "medium+fixed-start+end-at-goal:0..3") {
         assert!(trail.result.end.is_success(), "level {}", trail.result.level);
@@ -85,7 +85,7 @@ fn the_ants_plan_has_its_start_at_the_origin_and_the_goal_of_the_original() {
     assert_eq!((plan.start, plan.goal), (Vec2::ZERO, Vec2::new(32.0, 24.0)));
     assert_eq!((plan.bounds.min, plan.bounds.max), (Vec2::splat(-6.0), Vec2::new(42.0, 30.0)));
     let in_wall = |place: Vec2| plan.walls.iter().any(|wall| wall.contains(place));
-    let maze = fixed::antmaze::large();
+    let maze = playbot_games::maze::fixed::antmaze::large();
     let centre = |cell: Cell| Vec2::new(4.0 * (cell.col as f32 - 1.0), 4.0 * (cell.row as f32 - 1.0));
     assert!(maze.wall_cells().all(|cell| in_wall(centre(cell))));
     assert!(maze.free_cells().all(|cell| !in_wall(centre(cell))));

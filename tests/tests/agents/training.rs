@@ -2,22 +2,20 @@
 
 use std::path::Path;
 
+use playbot::prelude::*;
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::prelude::*;
-use playbot_lab::{
-    demo::dataset::Demonstrations,
-    train::{
-        Algorithm, Experiment, TrainError, Trainer,
-        config_file::parse_experiment,
-        run_dir::{RunDir, RunError},
-    },
-    worlds::build_world,
-};
+use playbot_harness::worlds::build_world;
 use playbot_learner::{DeviceKind, Rollout, SkillModel};
 use playbot_tests::{
     Corridor,
     recording::record_random,
     training::{check_resuming, last_success_rate, learn_skills, run_info, train, written},
+};
+use playbot_train::{
+    Algorithm, Experiment, TrainError, Trainer,
+    demo::Demonstrations,
+    experiment::file::parse_experiment,
+    run_dir::{RunDir, RunError},
 };
 
 const EXPERIMENT: &str = r#"(

@@ -2,9 +2,10 @@
 //! is valued.
 
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{prelude::*, train::collect::Collector};
+use playbot::prelude::*;
 use playbot_learner::{Actions, Observations, Policy, PpoConfig, Prior, Rollout, SkillDraw};
 use playbot_tests::{Corridor, training::untrained};
+use playbot_train::collect::Collector;
 
 const AGENTS: usize = 8;
 const TICKS: usize = 400;

@@ -4,11 +4,10 @@ use std::collections::BTreeSet;
 
 use bevy::prelude::*;
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{
+use playbot::prelude::*;
+use playbot_harness::{eval::Player, foreign::Restart};
+use playbot_test::{
     detectors::Detectors,
-    eval::Player,
-    foreign::Restart,
-    prelude::*,
     verdict::{LevelOutcome, LevelVerdict, TestEnd, TestError, TestPlan, TestWatch, Tester, TesterRecord, run_tests},
 };
 use playbot_tests::{as_corridor, corridor_plugin, faulty::Fault as Planted, foreign::stubborn::stubborn_game};

@@ -5,16 +5,16 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::{
+    episode::Tick,
     headless::into_world,
-    tick::Tick,
     vision::{
         BlankEpisodes, Frame, ImageOptions, ImageSensor, ObservationConfig, ObservationKind, PaintedVelocity,
         VisionPlugin, VisionSystems,
     },
 };
+use playbot::prelude::*;
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::prelude::*;
-use playbot_lab::{parallel::on_threads, worlds::build_observing_world};
+use playbot_harness::{parallel::on_threads, worlds::build_observing_world};
 use playbot_tests::{Cell, corridor_plugin, spawn_walker};
 
 /// The fault of the test's sensor.

@@ -3,17 +3,19 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use bevy::prelude::*;
-use playbot_lab::{
-    detectors::Detectors,
+use playbot::prelude::*;
+use playbot_harness::{
     eval::Player,
     floor_plan::FloorPlan,
     game::{LevelTools, StateTools},
-    prelude::*,
+};
+use playbot_learner::{DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearner, Prior, SkillDraw};
+use playbot_test::{
+    detectors::Detectors,
     verdict::{
         EndPlace, FailureWay, LevelMaps, LevelVerdict, Places, TestError, TestPlan, TestWatch, Tester, run_tests,
     },
 };
-use playbot_learner::{DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearner, Prior, SkillDraw};
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
 
 use crate::corridor_defects::tester;

@@ -2,16 +2,16 @@
 
 use std::path::Path;
 
-use playbot_lab::train::{
-    Algorithm, Experiment, Trainer,
-    run_dir::{OpenedRun, RunDir, RunError},
-};
 use playbot_learner::{DeviceKind, disk::DiskRecording};
 use playbot_tests::{
     Corridor,
     power_cut::{PaperDisk, PowerCut, power_cuts},
     small,
     training::{run_info, written},
+};
+use playbot_train::{
+    Algorithm, Experiment, Trainer,
+    run_dir::{OpenedRun, RunDir, RunError},
 };
 
 use super::{runs::train_on, tree::tree};

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use bevy_playbot::demo::file::{DemoEpisode, DemoReader, DemoWriter, repair};
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 use playbot_learner::disk::{DiskOperation, DiskRecording};
 use playbot_tests::{
     Corridor,

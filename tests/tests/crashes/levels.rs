@@ -3,13 +3,13 @@
 use std::path::Path;
 
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{
+use playbot::prelude::*;
+use playbot_harness::eval::Player;
+use playbot_learner::disk::DiskRecording;
+use playbot_test::{
     detectors::Detectors,
-    eval::Player,
-    prelude::*,
     verdict::{Earlier, RESULTS, TestEnd, TestError, TestFolder, TestPlan, TestWatch, Tester, TesterRecord, run_tests},
 };
-use playbot_learner::disk::DiskRecording;
 use playbot_tests::{
     Corridor,
     power_cut::{PaperDisk, power_cuts},

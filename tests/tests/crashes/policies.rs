@@ -3,15 +3,15 @@
 use std::{fs, path::Path};
 
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{
-    policy_export::{Provenance, export_policy, policy_file},
-    train::Algorithm,
-};
 use playbot_learner::{DeviceKind, PolicyFile, disk::DiskRecording};
 use playbot_tests::{
     Corridor,
     power_cut::{PaperDisk, power_cuts},
     small,
+};
+use playbot_train::{
+    Algorithm,
+    policy_export::{Provenance, export_policy, policy_file},
 };
 
 use super::tree::tree;

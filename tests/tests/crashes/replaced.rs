@@ -2,12 +2,12 @@
 
 use std::path::Path;
 
-use playbot_lab::train::{checkpoint::CheckpointChoice, run_dir::RunDir};
 use playbot_learner::disk::DiskRecording;
 use playbot_tests::{
     power_cut::{PaperDisk, power_cuts},
     training::{run_info, train, written},
 };
+use playbot_train::{checkpoint::CheckpointChoice, run_dir::RunDir};
 
 use super::{
     runs::{experiment, fresh},

@@ -2,12 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use playbot_lab::train::{
-    Algorithm, Experiment, Trainer,
-    checkpoint::CheckpointChoice,
-    config_file::parse_experiment,
-    run_dir::{RunDir, RunError},
-};
 use playbot_learner::{
     DeviceKind,
     disk::{DiskOperation, DiskRecording},
@@ -16,6 +10,12 @@ use playbot_tests::{
     Corridor,
     power_cut::{PaperDisk, PowerCut, power_cuts},
     training::{run_info, train, written},
+};
+use playbot_train::{
+    Algorithm, Experiment, Trainer,
+    checkpoint::CheckpointChoice,
+    experiment::file::parse_experiment,
+    run_dir::{RunDir, RunError},
 };
 
 use super::tree::tree;

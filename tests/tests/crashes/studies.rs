@@ -2,16 +2,7 @@
 
 use std::{fs, path::Path};
 
-use playbot_lab::{
-    report::{StudyResult, TestResult, TrainingResult},
-    sealed_file::{read_sealed, write_sealed},
-    train::{
-        Algorithm, Experiment, Trainer,
-        checkpoint::CheckpointChoice,
-        run_dir::{RunDir, end_replacement, is_unstarted},
-        run_lock::RunLock,
-    },
-};
+use playbot_harness::sealed_file::{read_sealed, write_sealed};
 use playbot_learner::{
     DeviceKind, SkillModel,
     disk::{self, DiskRecording},
@@ -21,6 +12,13 @@ use playbot_tests::{
     power_cut::{PaperDisk, power_cuts},
     small,
     training::{run_info, train, written},
+};
+use playbot_train::{
+    Algorithm, Experiment, Trainer,
+    checkpoint::CheckpointChoice,
+    run_dir::{RunDir, end_replacement, is_unstarted},
+    run_lock::RunLock,
+    study::{StudyResult, TestResult, TrainingResult},
 };
 
 use super::{skills::learn, tree::tree};

@@ -1,7 +1,7 @@
 //! Tests of the doctor on foreign games: each planted fault is found and named as precisely as possible.
 
 use bevy::prelude::*;
-use playbot_lab::{
+use playbot_harness::{
     doctor::{CauseKind, Comparison, Difference, DifferenceKind, DoctorOptions, DoctorReport, Finding, examine},
     foreign::ForeignGame,
 };

@@ -1,7 +1,7 @@
 //! Tests of the doctor: it finds and names each planted fault, and finds nothing in healthy games.
 
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
-use playbot_lab::{
+use playbot_harness::{
     doctor::{
         CauseKind, Comparison, DifferenceKind, DoctorOptions, DoctorReport, Finding, FindingKind, NonFiniteValue,
         examine,

@@ -106,7 +106,7 @@ fn a_command_that_does_not_exist_is_found() {
     for (line, word) in
         [("playbot trian --run a", "trian"), ("playbot train --rnu a", "--rnu"), ("playbot train", "--run")]
     {
-        let error = playbot_cli::check_usage(words(line)).expect_err(line);
+        let error = playbot::check_usage(words(line)).expect_err(line);
         assert!(error.contains(word), "{error}");
     }
 }
@@ -145,7 +145,7 @@ fn every_command_can_be_called() {
         for words in shown.flat_map(for_each_game) {
             let Some(arguments) = arguments(&words) else { continue };
             let line = words.join(" ");
-            playbot_cli::check_usage(&arguments).unwrap_or_else(|error| panic!("{path}: {line}\n{error}"));
+            playbot::check_usage(&arguments).unwrap_or_else(|error| panic!("{path}: {line}\n{error}"));
             assert_eq!(missing_game(&words), None, "{path}: {line}");
             let experiment = arguments.iter().skip_while(|word| *word != "--experiment").nth(1);
             if let Some(file) = experiment.filter(|file| file.starts_with("assets/") || file.starts_with("tests/")) {

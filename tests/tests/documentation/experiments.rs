@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use playbot_lab::train::config_file::parse_experiment;
+use playbot_train::experiment::file::parse_experiment;
 
 use super::blocks::{Document, blocks, documents, read, workspace};
 

@@ -1,10 +1,10 @@
 //! Tests that level files in documents are levels that bots solve.
 
+use playbot::prelude::*;
 use playbot_games::{coinrun::CoinRun, maze2d::Maze2d};
-use playbot_lab::{
+use playbot_harness::{
     eval::{EvalPlan, Player, evaluate},
     level_files::level_files_mode,
-    prelude::*,
 };
 use playbot_tests::measuring::plan;
 

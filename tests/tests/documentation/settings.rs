@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use playbot_lab::train::settings_page::settings_page;
+use playbot_train::experiment::keys::settings_page;
 
 use super::blocks::workspace;
 

@@ -3,20 +3,22 @@
 use std::{panic::catch_unwind, path::Path};
 
 use bevy::prelude::{Res, ResMut};
-use playbot_lab::{
+use playbot::prelude::*;
+use playbot_harness::{
     doctor::{DoctorOptions, examine},
     eval::{EvalSummary, Player, evaluate, summarize},
     foreign::{ForeignGame, LevelSeed},
     games::Games,
-    pipeline,
-    prelude::*,
-    train::{
-        Experiment, config_file::parse_experiment, default_experiment::default_experiment, run_observer::Unobserved,
-        train_run::TrainingSetup,
-    },
 };
 use playbot_learner::DeviceKind;
 use playbot_tests::measuring::plan;
+use playbot_train::{
+    Experiment,
+    experiment::{default_experiment, file::parse_experiment},
+    pipeline,
+    run_observer::Unobserved,
+    train_run::TrainingSetup,
+};
 
 use super::{
     blocks::read,

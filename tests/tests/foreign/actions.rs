@@ -2,7 +2,8 @@
 
 use bevy::{input::mouse::AccumulatedMouseMotion, prelude::*};
 use bevy_playbot::virtual_input::ActionAxis;
-use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_world};
+use playbot::prelude::*;
+use playbot_harness::{foreign::ForeignGame, worlds::build_world};
 use playbot_tests::foreign::catch::{Paddle, game};
 
 /// Returns the position of the paddle after three ticks of this action.

@@ -5,7 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use playbot_lab::{split::LevelSplit, train::config_file::read_experiment};
+use playbot_harness::split::LevelSplit;
+use playbot_train::experiment::file::read_experiment;
 
 /// Returns every `experiment.ron` below `foreign`, with the name of its folder.
 fn experiments() -> Vec<(String, PathBuf)> {
@@ -42,7 +43,7 @@ fn the_demonstrations_of_an_experiment_are_made_as_it_says() {
         let program = format!("foreign_{game}");
         let mut commands = comments(&text).filter(|line| line.starts_with(&program));
         let words: Vec<&str> = commands.next().expect("a command that records").split_whitespace().collect();
-        playbot_cli::check_usage(&words).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
+        playbot::check_usage(&words).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
         let after = |word: &str| words[words.iter().position(|other| *other == word).expect(word) + 1];
         let experiment = read_experiment(&file).unwrap_or_else(|error| panic!("{error}"));
         assert_eq!((after("record"), Some(Path::new(after("--out")))), (game.as_str(), experiment.demos.as_deref()));

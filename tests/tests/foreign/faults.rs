@@ -5,12 +5,11 @@ use bevy::{
     prelude::*,
     winit::EventLoopProxyWrapper,
 };
-use playbot_lab::{
-    demo::verify::verify_file,
+use playbot::prelude::*;
+use playbot_harness::{
+    demo::verify_file,
     eval::{Player, evaluate},
     foreign::{ForeignGame, Restart},
-    prelude::*,
-    train::{Trainer, config_file::parse_experiment},
     worlds::build_world,
 };
 use playbot_learner::DeviceKind;
@@ -18,6 +17,7 @@ use playbot_tests::{
     foreign::catch::{Paddle, Score, catch_game, game},
     measuring::plan,
 };
+use playbot_train::{Trainer, experiment::file::parse_experiment};
 
 /// Plays until the first fault, for at most this many ticks.
 fn fault(game: &ForeignGame, ticks: u64) -> String {

@@ -1,9 +1,9 @@
 //! Tests of a game without its window: a picture from the disk, states, text, a mesh and a material.
 
 use bevy::prelude::*;
-use playbot_lab::{
+use playbot::prelude::*;
+use playbot_harness::{
     foreign::{ForeignGame, Restart},
-    prelude::*,
     worlds::build_world,
 };
 

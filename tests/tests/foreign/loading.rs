@@ -3,7 +3,8 @@
 use std::time::Duration;
 
 use bevy::prelude::*;
-use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_world};
+use playbot::prelude::*;
+use playbot_harness::{foreign::ForeignGame, worlds::build_world};
 
 /// Frames that the level still takes.
 #[derive(Resource)]

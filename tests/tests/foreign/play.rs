@@ -3,17 +3,12 @@
 use std::path::Path;
 
 use bevy::prelude::*;
-use bevy_playbot::{tick::Tick, vision::ObservationConfig};
-use playbot_lab::{
-    demo::{dataset::Demonstrations, verify::verify_file},
+use bevy_playbot::{episode::Tick, vision::ObservationConfig};
+use playbot::prelude::*;
+use playbot_harness::{
+    demo::verify_file,
     eval::{EvalPlan, Player, evaluate, summarize},
     foreign::ForeignGame,
-    prelude::*,
-    train::{
-        Trainer,
-        config_file::parse_experiment,
-        run_dir::{OpenedRun, RunDir},
-    },
     worlds::build_world,
 };
 use playbot_learner::DeviceKind;
@@ -26,6 +21,12 @@ use playbot_tests::{
     measuring::plan,
     recording::record_demonstrator,
     training::{check_resuming, train},
+};
+use playbot_train::{
+    Trainer,
+    demo::Demonstrations,
+    experiment::file::parse_experiment,
+    run_dir::{OpenedRun, RunDir},
 };
 
 fn measure(game: &ForeignGame, player: Player, threads: usize) -> Vec<(u64, u32, f64)> {

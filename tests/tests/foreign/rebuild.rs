@@ -10,12 +10,11 @@ use bevy_playbot::{
     },
     renewal::Renewal,
 };
-use playbot_lab::{
-    demo::verify::{EpisodeReplayer, verify_file},
+use playbot::prelude::*;
+use playbot_harness::{
+    demo::{EpisodeReplayer, verify_file},
     eval::{EpisodeResult, EvalPlan, Player, evaluate},
     foreign::{ForeignGame, Restart},
-    prelude::*,
-    train::{Trainer, config_file::parse_experiment},
     worlds::build_world,
 };
 use playbot_learner::DeviceKind;
@@ -28,6 +27,7 @@ use playbot_tests::{
     recording::record_demonstrator,
     training::check_resuming,
 };
+use playbot_train::{Trainer, experiment::file::parse_experiment};
 
 #[test]
 fn an_episode_is_the_same_whenever_it_is_played() {
@@ -67,7 +67,7 @@ fn each_episode_has_a_world_of_its_own_with_the_same_agent() {
     }
     assert_eq!((ticks, seen.len()), (61, 3), "20 ticks in each World; the last tick has nobody to play");
     assert_eq!(world.resource::<Ends>().0, 3);
-    assert_eq!(world.resource::<bevy_playbot::tick::Tick>().0, 61);
+    assert_eq!(world.resource::<bevy_playbot::episode::Tick>().0, 61);
     assert_eq!(world.get::<EpisodeCount>(agents[0]).expect("an agent").finished, 3);
 }
 

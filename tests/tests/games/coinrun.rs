@@ -4,13 +4,13 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 use bevy_rapier2d::prelude::*;
+use playbot::prelude::*;
 use playbot_games::coinrun::{
     Body, CoinRun, Mode, Outcome, Sim,
     components::{ArenaBody, Crate, InArena, LastOutcome, PlayerBody, PlaysIn, Saw},
-    generate,
+    generator::generate,
 };
-use playbot_lab::prelude::*;
-use playbot_lab::worlds::build_world;
+use playbot_harness::worlds::build_world;
 
 /// Random numbers without a crate: a linear congruential generator is plenty for choosing buttons.
 struct Buttons(u64);

@@ -7,17 +7,17 @@ use bevy_playbot::{
     test_app::{PlaybotTestExt, test_app},
 };
 use bevy_rapier2d::rapier::prelude::{QueryFilter, Ray, Vector};
+use playbot::prelude::*;
 use playbot_games::maze2d::{
     Maze2d, Maze2dLevel, Maze2dMode, Maze2dPlugin,
+    arena::{MazeBall, PlaysIn},
     ball::clip_action,
-    components::{MazeBall, PlaysIn},
-    game::spawn_agent,
     physics::MazePhysics,
     sim::{BallSim, hash_state, reward},
+    spawn_agent,
 };
-use playbot_lab::prelude::*;
-use playbot_lab::{
-    demo::verify::verify_file,
+use playbot_harness::{
+    demo::verify_file,
     eval::{EvalPlan, Player, evaluate, summarize},
     parallel::on_threads,
     worlds::build_world,
@@ -109,7 +109,7 @@ fn a_hundred_thousand_steps_are_the_same_on_one_and_on_two_threads() {
 }
 
 /// Returns the ends of the first `episodes` episodes of the demonstrator.
-fn evaluated(text: &str, player: &Player, levels: u64) -> Vec<playbot_lab::eval::EpisodeResult> {
+fn evaluated(text: &str, player: &Player, levels: u64) -> Vec<playbot_harness::eval::EpisodeResult> {
     let plan = EvalPlan { arenas: 8, ..plan(&format!("{text}:0..{}", levels - 1)) };
     evaluate(&GAME, player, &plan, |_| {}).expect("sound")
 }

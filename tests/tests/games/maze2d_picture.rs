@@ -5,9 +5,9 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind};
-use playbot_games::maze2d::{Maze2d, Maze2dLevel, Maze2dMode, components::MazeBall};
-use playbot_lab::prelude::*;
-use playbot_lab::worlds::build_observing_world;
+use playbot::prelude::*;
+use playbot_games::maze2d::{Maze2d, Maze2dLevel, Maze2dMode, arena::MazeBall};
+use playbot_harness::worlds::build_observing_world;
 
 const GAME: Maze2d = Maze2d { physics: false };
 const SIDE: usize = 64;
@@ -106,7 +106,7 @@ fn drawing_changes_nothing_in_the_game_and_has_one_order() {
     GAME.build(&mut app, "medium");
     GAME.tools().pictures.build_picture(&mut app);
     let drawn = GAME.spawn_agent(app.world_mut(), 0);
-    let (mut plain, agents) = playbot_lab::worlds::build_world(&GAME, "medium", 0, 0, 1);
+    let (mut plain, agents) = playbot_harness::worlds::build_world(&GAME, "medium", 0, 0, 1);
     for (world, agent) in [(app.world_mut(), drawn), (&mut plain, agents[0])] {
         world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Uniform { first: 0, last: 9 }));
         world.ticks(700).expect("sound");

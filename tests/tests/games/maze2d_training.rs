@@ -3,15 +3,15 @@
 use std::path::Path;
 
 use bevy_playbot::{demo::file::DemoWriter, policy::ActionDraw};
+use playbot::prelude::*;
 use playbot_games::maze2d::Maze2d;
-use playbot_lab::prelude::*;
-use playbot_lab::{
+use playbot_harness::{
     eval::{EvalPlan, Player, evaluate, summarize},
-    train::{Algorithm, Experiment, LearnerKind, Trainer, config_file::parse_experiment},
     worlds::build_world,
 };
 use playbot_learner::{DeviceKind, SkillModel};
 use playbot_tests::{measuring::plan, training::learn_skills};
+use playbot_train::{Algorithm, Experiment, LearnerKind, Trainer, experiment::file::parse_experiment};
 
 const GAME: Maze2d = Maze2d { physics: false };
 

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use playbot_lab::{
+use playbot_harness::{
     game::Game,
     games::{Artifact, Games, GamesError},
 };

@@ -7,12 +7,12 @@ use bevy_playbot::{
     test_app::{PlaybotTestExt, test_app},
     vision::{ObservationConfig, ObservationKind},
 };
+use playbot::prelude::*;
 use playbot_games::{
     antmaze::{AntMaze, AntMazeWithMap, AntMazeWithRays, AntMazeWithWaves},
     maze2d::{Maze2d, Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves},
 };
-use playbot_lab::prelude::*;
-use playbot_lab::{
+use playbot_harness::{
     parallel::on_threads,
     worlds::{add_game, build_observing_world, build_world, spawn_agents},
 };

@@ -2,7 +2,8 @@
 
 use bevy::prelude::*;
 use bevy_playbot::virtual_input::{ActionAxis, VirtualInput};
-use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_world};
+use playbot::prelude::*;
+use playbot_harness::{foreign::ForeignGame, worlds::build_world};
 
 fn bare() -> ForeignGame {
     ForeignGame::new("bare", 1, |_: &mut App| {}).observe(["nothing"], || [0.0])

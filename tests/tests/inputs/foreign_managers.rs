@@ -6,9 +6,9 @@ use bevy_playbot::virtual_input::{
     enhanced_input::{EnhancedAction, EnhancedActionPlugin},
     leafwing::{LeafwingActions, LeafwingActionsPlugin},
 };
-use playbot_lab::{
+use playbot::prelude::*;
+use playbot_harness::{
     foreign::{ForeignGame, Restart},
-    prelude::*,
     worlds::build_world,
 };
 

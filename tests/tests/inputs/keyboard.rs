@@ -8,8 +8,8 @@ use bevy::{
     prelude::*,
     time::TimeUpdateStrategy,
 };
-use bevy_playbot::{headless::set_fixed_step, keyboard::KeyboardPlugin, tick::Tick};
-use playbot_lab::prelude::*;
+use bevy_playbot::{episode::Tick, headless::set_fixed_step, key_bindings::KeyboardPlugin};
+use playbot::prelude::*;
 use playbot_tests::{Cell, corridor_plugin, spawn_walker};
 
 /// Actions of the corridor.

@@ -9,11 +9,11 @@ use bevy_playbot::{
     raster::{RasterPlugin, RasterSensor},
     vision::{Difference, Frame, ImageOptions, TileLayer},
 };
+use playbot::prelude::*;
 use playbot_games::{
     ant::{Ant, walk::Walker},
     coinrun::{CoinRun, picture::VIEW},
 };
-use playbot_lab::prelude::*;
 use playbot_tests::scene::{camera_world, draw, image, spawn_eye};
 
 /// Returns a World with a camera and a raster with the same view, each an agent.

@@ -8,9 +8,6 @@ use bevy::{
 };
 use bevy_playbot::headless::headless_app;
 // Linked, so that what they register is there.
-use playbot_cli as _;
-use playbot_games as _;
-use playbot_lab as _;
 
 use crate::{
     files::{files, shown},
@@ -20,7 +17,15 @@ use crate::{
 };
 
 /// The crates that are looked at. Types of tests, and of games that are not ours, are their own affair.
-const CRATES: [&str; 4] = ["bevy_playbot", "playbot_cli", "playbot_games", "playbot_lab"];
+const CRATES: [&str; 7] = [
+    "bevy_playbot",
+    "playbot",
+    "playbot_games",
+    "playbot_harness",
+    "playbot_mutation",
+    "playbot_test",
+    "playbot_train",
+];
 
 /// rapier's worlds, of which reflection sees nothing. Without `ReflectComponent` they are among those that `playbot doctor`
 /// says it cannot compare; with it they would count as compared.

@@ -93,7 +93,11 @@ fn files_are_neither_long_nor_splinters() {
     fail_if_any(&long, &format!("At most {MAX_LINES} lines without tests: find the second concept, give it a file."));
     let small: Vec<String> = files.iter().filter(|(_, lines)| *lines < SMALL).map(line).collect();
     assert!(small.len() <= MAX_SMALL, "{} files of less than {SMALL} lines:\n{}", small.len(), small.join("\n"));
-    assert!(files.len() <= MAX_FILES, "{} product files, at most {MAX_FILES}: merge what is read together", files.len());
+    assert!(
+        files.len() <= MAX_FILES,
+        "{} product files, at most {MAX_FILES}: merge what is read together",
+        files.len()
+    );
     assert!(files.len() > 300, "only {} product files are seen: does the reader still find them?", files.len());
 }
 

@@ -1,22 +1,19 @@
 //! Episodes under the detectors, for tests.
 
-use std::{
-    ops::Range,
-    sync::{Arc, Mutex},
+use crate::{
+    coinrun::{CoinRun, DemonstratorBot, detectors::detectors, spawn_agent},
+    watched,
 };
-
 use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
-use playbot_lab::{
+use playbot_harness::{
     defect::ChangeRules,
     detector::{LevelAhead, Moment, NoProofs, Watch},
     prelude::*,
 };
-
-use super::detectors;
-use crate::{
-    coinrun::{CoinRun, DemonstratorBot, game::spawn_agent},
-    watched,
+use std::{
+    ops::Range,
+    sync::{Arc, Mutex},
 };
 
 /// A player of the tests.

@@ -1,8 +1,8 @@
 //! Ground and obstacles around a player.
 
-use super::{near_crates::NearCrates, swept::Swept};
 use crate::coinrun::{
-    rules::{Body, CORNER},
+    paths::sweep::Swept,
+    rules::{Body, CORNER, OVERLAP_MARGIN},
     tile::{Corners, TileGrid},
 };
 
@@ -33,6 +33,68 @@ impl<'a> Ground<'a> {
             low: swept.y[0] - self.corner_y,
             high: swept.y[1] + self.corner_y,
         }
+    }
+}
+
+// The buttons of paths, and the values of each path.
+
+/// Buttons that are tried: right and jump, right, jump, nothing, left, left and jump.
+pub const HELD: [u8; 6] = [8, 7, 5, 4, 1, 2];
+
+/// A path is followed for at most this many steps: a jump on flat ground takes 16.
+pub const STEPS: u32 = 20;
+
+/// Values per path.
+pub const VALUES: usize = 6;
+
+/// Names of the values of one path.
+pub const NAMES: [&str; VALUES] = ["dies", "coin", "lands", "steps", "dx", "dy"];
+
+// The crates that paths can meet.
+
+/// A crate, with the quantities that decide whether it holds the player.
+#[derive(Clone, Copy, Debug)]
+struct Holder {
+    x: f32,
+    y: f32,
+    reach: [f32; 2],
+    /// Height from which the player's centre has to come.
+    top: f32,
+}
+
+/// Crates near a player.
+#[derive(Debug, Default)]
+pub(super) struct NearCrates {
+    bodies: Vec<Body>,
+    holders: Vec<Holder>,
+}
+
+impl NearCrates {
+    /// Replaces the crates, for this player.
+    pub fn replace<'a>(&mut self, player: &Body, crates: impl Iterator<Item = &'a Body>) {
+        self.bodies.clear();
+        self.holders.clear();
+        for block in crates {
+            self.bodies.push(*block);
+            self.holders.push(Holder {
+                x: block.x,
+                y: block.y,
+                reach: [(player.rx + block.rx) + OVERLAP_MARGIN, (player.ry + block.ry) + OVERLAP_MARGIN],
+                top: block.y + block.ry + player.ry,
+            });
+        }
+    }
+
+    /// Returns true if one may hold a player who falls from height `from` through these places.
+    #[inline]
+    pub fn may_hold(&self, from: f32, swept: &Swept) -> bool {
+        self.holders.iter().any(|block| from >= block.top && swept.comes_near([block.x; 2], block.y, block.reach))
+    }
+
+    /// Returns the crates in creation order; empty if no crate can hold a player who falls from height `from`.
+    #[inline]
+    pub fn below(&self, from: f32) -> &[Body] {
+        if self.holders.iter().any(|block| from >= block.top) { &self.bodies } else { &[] }
     }
 }
 

@@ -1,15 +1,15 @@
 //! The paths without short cuts, step by step by the rules: the reference of the fast ones, which must equal it to the
 //! bit.
 
+use crate::coinrun::{
+    Level, Mode, Sim, Tile, TileGrid, generator,
+    generator::generate,
+    paths::{HELD, STEPS, Surroundings, VALUES},
+    rules::{ACTIONS, Body, Outcome, PlayerState, begin_step, is_supported, motion, motion::touch, move_player},
+    tile::REACH,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-
-use super::{HELD, STEPS, Surroundings, VALUES};
-use crate::coinrun::{
-    Level, Mode, Sim, Tile, TileGrid, generate,
-    rules::{ACTIONS, Body, Outcome, PlayerState, begin_step, is_supported, move_player, touch},
-    view_size::REACH,
-};
 
 /// An arena at one moment.
 struct Scene {

@@ -1,25 +1,26 @@
 //! The drawings, which come with the program, and the positions of figures on them.
 
-use std::sync::LazyLock;
-
+use crate::coinrun::{Tile, picture::puffs};
 use bevy::{
     asset::RenderAssetUsages,
     image::{CompressedImageFormats, ImageSampler, ImageType},
     prelude::*,
 };
 use playbot_assets::coinrun;
-
-use super::puffs;
-use crate::coinrun::Tile;
+use std::sync::LazyLock;
 
 /// Side of a tile on the drawings, texels.
 const SIDE: f32 = 16.0;
+
 /// Texels of a backdrop to one tile.
 const BACKDROP_TEXELS: f32 = 4.0;
+
 /// Width of a backdrop, tiles.
 const BACKDROP_WIDTH: f32 = 96.0;
+
 /// Number of Procgen's backgrounds with landscapes; the others show space.
 const LANDSCAPES: u8 = 49;
+
 /// The same of ours.
 const OUR_LANDSCAPES: usize = 12;
 

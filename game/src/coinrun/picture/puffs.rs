@@ -7,23 +7,32 @@
 use bevy::{image::ImageSampler, prelude::*};
 
 /// Visible puffs of an enemy, and ticks for which each is visible.
-pub const PUFFS: usize = 8;
+pub(crate) const PUFFS: usize = 8;
+
 /// Half of the width and of the height of a new puff, tiles, and the factor by which it grows in each tick.
 const NEW: Vec2 = Vec2::new(0.3, 0.2);
+
 const GROWTH: f32 = 1.05;
+
 /// Opacity of a new puff, and the factor by which it fades.
 const ALPHA: f32 = 0.5;
+
 const FADING: f32 = 0.8;
+
 /// Tiles by which a puff rises in each tick.
 const RISE: f32 = 0.01;
 
 /// Tiles between two puffs of the drawing: enemies walk as fast as this until they turn at inner ground.
 const STEP: f32 = 0.15;
+
 /// Distance from the middle of a new puff to the upper edge of the drawing, and height of the drawing, tiles.
 const TOP: f32 = 0.35;
+
 const HEIGHT: f32 = 0.5625;
+
 /// Texels to the tile.
 const TEXELS: f32 = 16.0;
+
 /// Texels of the cell of each row of puffs.
 const CELL: (u32, u32) = (32, 10);
 
@@ -86,7 +95,7 @@ impl Row {
 }
 
 /// Returns all rows of puffs.
-pub fn drawing() -> Image {
+pub(crate) fn drawing() -> Image {
     let (width, height) = (PUFFS as u32 * CELL.0, PUFFS as u32 * CELL.1);
     let texel = |x: u32, y: u32| {
         let row = Row { first: (y / CELL.1) as usize, count: (x / CELL.0) as usize + 1 };

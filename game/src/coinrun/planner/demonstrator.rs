@@ -1,7 +1,9 @@
 //! A player that follows plans and makes a new one after each disturbance.
 
-use super::{config::PlannerConfig, plan::plan_or_progress, search::Found};
-use crate::coinrun::sim::Sim;
+use crate::coinrun::{
+    planner::{PlannerConfig, plan_or_progress, search::Found},
+    sim::Sim,
+};
 
 /// An actor in a closed loop: ask it for an action, play that action or another one, ask again.
 #[derive(Clone, Debug)]
@@ -64,8 +66,8 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
-    use crate::coinrun::generator::generate;
     use crate::coinrun::level::{Level, Mode};
+    use crate::coinrun::{generator, generator::generate};
 
     #[test]
     fn an_undisturbed_plan_is_made_once() {

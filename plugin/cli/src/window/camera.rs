@@ -1,18 +1,17 @@
 //! The person's camera: the bots' square view, enlarged, with the player in the middle.
 
+use crate::window::seats::Seats;
 use bevy::{
     camera::{ScalingMode, Viewport},
     prelude::*,
     transform::helper::TransformHelper,
     window::PrimaryWindow,
 };
-
 use bevy_playbot::camera::TileBorder;
-
-use super::seats::Seats;
 
 /// Factor of the view for each zoom key, and the most steps.
 const ZOOM_STEP: f32 = 1.25;
+
 const MOST_STEPS: i32 = 8;
 
 pub(super) fn build(app: &mut App, width: f32) {

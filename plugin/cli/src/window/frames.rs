@@ -3,25 +3,25 @@
 //! While the game stands still, none of its systems may run: a frame without a tick would still move it, and a
 //! recording would lack that.
 
+use crate::window::{
+    devices,
+    devices::Devices,
+    error, keys,
+    seats::{OwnKeys, Seats},
+    title,
+    title::Pace,
+};
 use bevy::{
     ecs::schedule::{ScheduleLabel, SingleThreadedExecutor},
     prelude::*,
     time::TimeReceiver,
 };
 use bevy_playbot::{
-    action::Action, control::Control, episode::Episode, fault::Faults, headless::run_on_one_thread,
-    key_bindings::KeyBindings, placement::TickSchedules, system_errors,
+    action::Action, agent::Control, demo::file::DemoEpisode, episode::Episode, fault::Faults,
+    headless::run_on_one_thread, key_bindings::KeyBindings, placement::TickSchedules, system_errors,
 };
-use playbot_lab::prelude::*;
-
-use super::{
-    devices::{self, Devices},
-    ending, gamepads, keys,
-    own_keys::OwnKeys,
-    pace::Pace,
-    seats::Seats,
-    title,
-};
+use playbot_harness::prelude::*;
+use std::sync::Arc;
 
 /// The schedule of a frame of the window.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -47,7 +47,7 @@ struct FrameRate(f64);
 /// Runs the game of an app, with `hz` frames a second, one in each frame of the window.
 pub(super) fn build(app: &mut App, game: &'static str, hz: f64) {
     devices::build(app);
-    gamepads::build(app);
+    devices::build_gamepads(app);
     app.insert_resource(FrameRate(hz))
         .insert_resource(Devices::Open)
         .init_resource::<Pace>()
@@ -58,7 +58,7 @@ pub(super) fn build(app: &mut App, game: &'static str, hz: f64) {
         .add_systems(WindowStart, keys::systems())
         .add_systems(StandStill, title::show)
         .add_systems(WindowFrame, run_frame);
-    ending::listen_in(app, StandStill);
+    error::listen_in(app, StandStill);
     title::build(app, game, WindowEnd);
     let decide = TickSchedules::of(app).decide;
     app.add_systems(decide, decide_by_hand.in_set(PlaybotSystems::Decide));
@@ -118,5 +118,46 @@ fn decide_by_hand(keys: Res<OwnKeys>, mut agents: Query<(&Control, &KeyBindings,
         if *control == Control::Human && episode.is_running() {
             action.0 = bindings.action(|key| keys.pressed(key) || keys.just_pressed(key));
         }
+    }
+}
+
+// Replay of an episode before the person plays.
+
+/// Hands the agent over to a recorded episode.
+pub(super) fn build_replayed(app: &mut App, agent: Entity, episode: DemoEpisode) {
+    let judge = TickSchedules::of(app).judge;
+    Replay::begin(Arc::new(episode), &mut app.world_mut().entity_mut(agent));
+    app.add_systems(judge, hand_over.in_set(PlaybotSystems::Reset));
+}
+
+/// Gives the person control after the last recorded tick.
+fn hand_over(mut agents: Query<(&mut Control, &Replay)>) {
+    for (mut control, replay) in &mut agents {
+        if *control == Control::Replay && replay.is_finished() {
+            *control = Control::Human;
+        }
+    }
+}
+
+#[cfg(test)]
+mod replayed_tests {
+    use bevy_playbot::demo::file::{Decider, DemoActions, EpisodeActions};
+
+    use super::*;
+
+    #[test]
+    fn the_person_goes_on_behind_the_last_tick() {
+        let mut episode = DemoEpisode::new(7, DemoActions::Discrete(2));
+        episode.actions = EpisodeActions::Discrete(vec![1, 0, 1]);
+        (episode.rewards, episode.state_hashes) = (vec![0.0; 3], vec![0; 3]);
+        episode.deciders = vec![Decider::Bot; 3];
+        let mut app = headless_app();
+        let agent = app.world_mut().spawn(Agent::new(0, ActionSpace::Discrete(2))).id();
+        build_replayed(&mut app, agent, episode);
+        app.ticks(2).expect("no agent broke its contract");
+        assert_eq!(Control::of(app.world(), agent), Control::Replay);
+        app.tick().expect("no agent broke its contract");
+        assert_eq!(Control::of(app.world(), agent), Control::Human);
+        assert_eq!(app.world().get::<Episode>(agent).map(|episode| (episode.level, episode.tick)), Some((7, 3)));
     }
 }

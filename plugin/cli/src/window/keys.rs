@@ -1,22 +1,21 @@
 //! The window's own keys. The game's are in its [`KeyBindings`](bevy_playbot::key_bindings::KeyBindings).
 
+use crate::window::{
+    Playlist,
+    camera::Zoom,
+    error::Ending,
+    seats::{OwnKeys, OwnKeysRead, Seats},
+    title::{Notice, Pace},
+};
 use bevy::{
-    ecs::schedule::{IntoScheduleConfigs, ScheduleConfigs},
-    ecs::system::ScheduleSystem,
+    ecs::{
+        schedule::{IntoScheduleConfigs, ScheduleConfigs},
+        system::ScheduleSystem,
+    },
     prelude::*,
 };
 use bevy_playbot::{demo::recorder::flush_unfinished, fault::Faults};
-use playbot_lab::prelude::*;
-
-use super::{
-    Playlist,
-    camera::Zoom,
-    ending::Ending,
-    own_keys::{OwnKeys, OwnKeysRead},
-    pace::Pace,
-    seats::Seats,
-    title::Notice,
-};
+use playbot_harness::prelude::*;
 
 pub(super) fn build(app: &mut App) {
     app.add_systems(PreUpdate, systems().after(OwnKeysRead));

@@ -1,19 +1,18 @@
 //! A view in space for games that have one, and the key that switches between it and the view from above.
 
+use crate::window::{
+    camera::Zoom,
+    seats::{OwnKeys, OwnKeysRead, Seats},
+};
 use bevy::{
     camera::RenderTarget, core_pipeline::tonemapping::Tonemapping, prelude::*, transform::helper::TransformHelper,
 };
-
-use super::{
-    camera::Zoom,
-    own_keys::{OwnKeys, OwnKeysRead},
-    seats::Seats,
-};
-use playbot_lab::{game::Game, space_view::CameraFocus};
+use playbot_harness::{game::Game, inspect::CameraFocus};
 
 /// Offset of the camera from its target at the nearest zoom, metres. It is so steep that the wall behind an agent does
 /// not hide it.
 const BEHIND: Vec3 = Vec3::new(0.0, -3.2, 8.0);
+
 /// Speed of the camera: in a second it covers the share 1 - exp(-HASTE) of its distance to the agent.
 const HASTE: f32 = 6.0;
 

@@ -1,11 +1,13 @@
 //! An open file that is written through [the recording layer](super).
 
-use std::fs::{self, File, OpenOptions};
-use std::io::{self, Read, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
-
-use super::DiskOperation;
-use super::recording::{is_recorded, note};
+use crate::disk::{DiskOperation, is_recorded, note};
+use std::{
+    fs,
+    fs::{File, OpenOptions},
+    io,
+    io::{Read, Seek, SeekFrom, Write},
+    path::{Path, PathBuf},
+};
 
 /// A [`File`] to write, with the path it was opened at.
 #[derive(Debug)]
@@ -71,12 +73,12 @@ impl DiskFile {
         Ok(())
     }
 
-    /// Renames the file; a file at the new name is replaced. See [`rename`](super::rename).
+    /// Renames the file; a file at the new name is replaced. See [`rename`](crate::disk::rename).
     ///
     /// # Errors
     /// The system's error; the file has its old name then.
     pub fn rename_to(&mut self, path: &Path) -> io::Result<()> {
-        super::rename(&self.path, path)?;
+        crate::disk::rename(&self.path, path)?;
         self.path = path.into();
         Ok(())
     }

@@ -1,23 +1,28 @@
 //! The Adam optimizer over named parameters.
 
-use super::grads::NamedGrads;
-use super::moments::{FlatMoments, Moments};
-use super::params::{ParamVisitor, Parameters};
-use crate::{LearnError, are_awake};
-use burn::tensor::{Tensor, TensorData};
+use crate::{
+    LearnError,
+    nn::{
+        grads::NamedGrads,
+        params::{ParamVisitor, Parameters, host, vector},
+    },
+};
+use burn::tensor::{Device, Gradients, Tensor, TensorData};
 use macerator::Simd;
+use playbot_kernels::among_workers::are_awake;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
-use std::collections::BTreeMap;
-use std::iter::Peekable;
+use std::{borrow::Cow, collections::BTreeMap, iter::Peekable};
 
 /// Numbers that one thread updates at a time.
 const CHUNK: usize = 1 << 14;
+
 /// Numbers up to which a second thread costs more than it saves.
 const FEW: usize = 1 << 16;
+
 /// The same where other threads are awake.
 const FEW_AWAKE: usize = 1 << 15;
+
 /// Numbers that are updated side by side.
 const LANES: usize = 16;
 
@@ -253,6 +258,139 @@ fn update<S: Simd>(
     }
 }
 
+// Adam on the device of the parameters: on a graphics card, without reading anything back.
+
+impl Adam {
+    /// Does [`Adam::step`] after clipping by the global norm, which is returned, `[1]`. The moments stay on the
+    /// network's device.
+    ///
+    /// If a gradient is not finite, the returned norm is not finite, and the weights are lost.
+    pub(crate) fn step_on_device<M: Parameters>(
+        &mut self,
+        network: &mut M,
+        mut grads: Gradients,
+        lr: f64,
+        max_norm: f64,
+    ) -> Tensor<1> {
+        let mut read = Flatten { grads: &mut grads, parts: Vec::new(), layout: Vec::new() };
+        network.visit("", &mut read);
+        let Flatten { parts, layout, .. } = read;
+        let grad = Tensor::cat(parts, 0);
+        let FlatMoments { m, v, .. } = match self.flat.take() {
+            Some(moments) => moments,
+            None => FlatMoments::send(&self.moments, layout.clone(), &grad.device()),
+        };
+        self.steps += 1;
+        let t = self.steps.min(i32::MAX as u64) as i32;
+        let (b1, b2) = (self.config.beta1, self.config.beta2);
+        let norm = grad.clone().square().sum().sqrt();
+        let scale = ((norm.clone() + 1e-6).recip() * max_norm).clamp_max(1.0);
+        let grad = grad * scale;
+        let m = m * b1 + grad.clone() * (1.0 - b1);
+        let v = v * b2 + grad.square() * (1.0 - b2);
+        let root = (v.clone() / (1.0 - b2.powi(t))).sqrt() + self.config.eps;
+        let change = m.clone() * (lr / (1.0 - b1.powi(t))) / root;
+        let decay = 1.0 - lr * self.config.weight_decay;
+        network.visit("", &mut Apply { change, at: 0, decay });
+        self.flat = Some(FlatMoments { m, v, layout });
+        norm
+    }
+}
+
+struct Flatten<'a> {
+    grads: &'a mut Gradients,
+    parts: Vec<Tensor<1>>,
+    layout: Vec<(String, Vec<usize>)>,
+}
+
+impl ParamVisitor for Flatten<'_> {
+    fn visit<const D: usize>(&mut self, name: &str, tensor: &mut Tensor<D>) {
+        let dims = tensor.dims();
+        let size = dims.iter().product::<usize>();
+        self.layout.push((name.to_owned(), dims.to_vec()));
+        self.parts.push(match tensor.grad_remove(self.grads) {
+            Some(grad) => grad.reshape([size]),
+            None => Tensor::zeros([size], &tensor.device().inner()),
+        });
+    }
+}
+
+struct Apply {
+    change: Tensor<1>,
+    at: usize,
+    decay: f64,
+}
+
+impl ParamVisitor for Apply {
+    fn visit<const D: usize>(&mut self, _: &str, tensor: &mut Tensor<D>) {
+        let dims = tensor.dims();
+        let size = dims.iter().product::<usize>();
+        let change = self.change.clone().narrow(0, self.at, size).reshape(dims);
+        self.at += size;
+        *tensor = (tensor.clone().inner() * self.decay - change).autodiff().require_grad();
+    }
+}
+
+// The moments of Adam, in host memory or on a graphics card.
+
+/// First and second moment of one parameter, without bias correction.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Moments {
+    pub(crate) shape: Vec<usize>,
+    pub(crate) m: Vec<f32>,
+    pub(crate) v: Vec<f32>,
+}
+
+/// Moments of all parameters, one after the other in the order of the network.
+#[derive(Clone, Debug)]
+pub(super) struct FlatMoments {
+    pub(super) m: Tensor<1>,
+    pub(super) v: Tensor<1>,
+    pub(super) layout: Vec<(String, Vec<usize>)>,
+}
+
+impl FlatMoments {
+    /// Copies `moments` to `device`; zeros for parameters that have none.
+    pub(super) fn send(
+        moments: &BTreeMap<String, Moments>,
+        layout: Vec<(String, Vec<usize>)>,
+        device: &Device,
+    ) -> Self {
+        let (mut m, mut v) = (Vec::new(), Vec::new());
+        for (name, shape) in &layout {
+            match moments.get(name) {
+                Some(moments) => {
+                    m.extend_from_slice(&moments.m);
+                    v.extend_from_slice(&moments.v);
+                }
+                None => {
+                    let end = m.len() + shape.iter().product::<usize>();
+                    m.resize(end, 0.0);
+                    v.resize(end, 0.0);
+                }
+            }
+        }
+        Self { m: vector(m, device), v: vector(v, device), layout }
+    }
+
+    /// Returns the moments in host memory, by the names of the parameters.
+    ///
+    /// # Errors
+    /// [`LearnError::Device`] if they cannot be read.
+    pub(super) fn by_name(&self) -> Result<BTreeMap<String, Moments>, LearnError> {
+        let (m, v) = (host(self.m.clone())?, host(self.v.clone())?);
+        let (mut m, mut v) = (m.as_slice(), v.as_slice());
+        let mut found = BTreeMap::new();
+        for (name, shape) in &self.layout {
+            let size = shape.iter().product();
+            let ((own_m, rest_m), (own_v, rest_v)) = (m.split_at(size), v.split_at(size));
+            (m, v) = (rest_m, rest_v);
+            found.insert(name.clone(), Moments { shape: shape.clone(), m: own_m.to_vec(), v: own_v.to_vec() });
+        }
+        Ok(found)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -295,5 +433,47 @@ mod tests {
         assert!((numbers(&pair.1) - 0.9).abs() < 1e-3);
         let error = adam.step(&mut pair, "other", &grads, 0.1, 1.0).expect_err("no `other.b`").to_string();
         assert!(error.contains("`b`"), "{error}");
+    }
+}
+
+#[cfg(test)]
+mod flat_adam_tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::{Mlp, NamedGrads, host, matrix, tracked};
+    use crate::rng::{Streams, normal};
+    use playbot_kernels::elementwise::Activation;
+
+    #[test]
+    fn it_goes_where_the_other_goes_and_leaves_the_same_moments() {
+        for kind in DeviceKind::BUILT.iter().filter(|kind| kind.check().is_ok()) {
+            let device = kind.plain();
+            let mut rng = Streams::new(3).stream("adam", 0);
+            let mut one = tracked(&Mlp::new(5, &[7], 3, Activation::Tanh, 1.0, &mut rng, &device));
+            let mut other = one.clone();
+            let x = matrix((0..20).map(|_| normal(&mut rng)).collect(), 4, 5, &device);
+            let (mut host_adam, mut adam) = (Adam::new(AdamConfig::default()), Adam::new(AdamConfig::default()));
+            for _ in 0..5 {
+                let loss = |net: &Mlp| net.forward(x.clone()).square().sum();
+                let (grads, others) = (loss(&one).backward(), loss(&other).backward());
+                let grads = NamedGrads::take(&mut one, "", grads).expect("readable");
+                let (norm, scale) = grads.clip_factor(0.5, 0).expect("finite");
+                host_adam.step(&mut one, "", &grads, 1e-2, scale).expect("fits");
+                let found = adam.step_on_device(&mut other, others, 1e-2, 0.5);
+                let found = f64::from(host(found).expect("readable")[0]);
+                assert!((found - norm).abs() < 1e-4 * norm, "{kind}: {found} for {norm}");
+            }
+            let moments = adam.host_moments().expect("readable");
+            for (name, want) in host_adam.host_moments().expect("there").iter() {
+                let found = &moments[name];
+                assert_eq!(found.shape, want.shape);
+                for (found, want) in found.m.iter().chain(&found.v).zip(want.m.iter().chain(&want.v)) {
+                    assert!((found - want).abs() < 1e-5, "{kind} {name}: {found} for {want}");
+                }
+            }
+            let (one, other) = (one.forward(x.clone()), other.forward(x));
+            let far = host((one - other).inner().abs().max()).expect("readable")[0];
+            assert!(far < 1e-4, "{kind}: outputs differ by {far}");
+        }
     }
 }

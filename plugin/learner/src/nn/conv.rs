@@ -1,13 +1,20 @@
 //! Convolution and pooling over images `[n, channels, height, width]`.
 
-use super::cpu::trunk::Conv;
-pub use super::cpu::trunk::window_places;
-use super::params::{ParamVisitor, Parameters, path};
-use super::source::{Init, ParamSource, RandomInit};
-use burn::tensor::module::{conv2d, max_pool2d};
-use burn::tensor::ops::{ConvOptions, MaxPoolOptions};
-use burn::tensor::{Device, Tensor};
+use crate::{
+    ObsKind, Observations,
+    nn::{
+        matrix,
+        params::{Init, ParamSource, ParamVisitor, Parameters, RandomInit, path},
+    },
+};
+use burn::tensor::{
+    Device, Int, Tensor, TensorData,
+    module::{conv2d, max_pool2d},
+    ops::{ConvOptions, MaxPoolOptions},
+};
+use playbot_kernels::{host_numbers::is_host, trunk::Conv};
 use rand::Rng;
+use rayon::prelude::*;
 
 /// A two-dimensional convolution (cross-correlation) with a square kernel.
 #[derive(Clone, Debug)]
@@ -70,7 +77,7 @@ impl Conv2d {
         Conv { weight: &self.weight, bias: &self.bias, stride: self.stride, padding: self.padding }
     }
 
-    /// Maps `[n, inputs, height, width]` to `[n, outputs, height', width']`, each side by [`window_places`].
+    /// Maps `[n, inputs, height, width]` to `[n, outputs, height', width']`, each side by [`window_places`](crate::nn::window_places).
     pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
         let options = ConvOptions::new([self.stride; 2], [self.padding; 2], [1; 2], 1);
         conv2d(x, self.weight.clone(), Some(self.bias.clone()), options)
@@ -90,11 +97,129 @@ pub fn max_pool(x: Tensor<4>, kernel: usize, stride: usize, padding: usize) -> T
     max_pool2d(x, options)
 }
 
+// Pixels on a graphics card: sent as bytes, which saves transfer time, and converted to numbers when a network reads
+// them.
+
+/// Bytes in a word; cards without a byte type have words of 32 bits.
+const BYTES: usize = 4;
+
+/// Images of bytes, four to a word.
+#[derive(Clone, Debug)]
+pub(crate) struct PackedPixels {
+    /// `[n, words]`; the last word of an image may have unused bytes.
+    words: Tensor<2, Int>,
+    sides: [usize; 3],
+}
+
+impl PackedPixels {
+    /// Sends images `[n, channels, height, width]` of `sides` = `[channels, height, width]` to `device`.
+    pub(crate) fn send(pixels: &[u8], sides: [usize; 3], device: &Device) -> Self {
+        let size = sides.iter().product::<usize>().max(1);
+        let word = |bytes: &[u8]| {
+            let mut whole = [0; BYTES];
+            whole[..bytes.len()].copy_from_slice(bytes);
+            i32::from_le_bytes(whole)
+        };
+        let words: Vec<i32> = pixels.chunks(size).flat_map(|image| image.chunks(BYTES).map(word)).collect();
+        let shape = [pixels.len() / size, size.div_ceil(BYTES)];
+        Self { words: Tensor::from_data(TensorData::new(words, shape), device), sides }
+    }
+
+    /// Returns some of the images, which may repeat.
+    pub(crate) fn select(&self, rows: Tensor<1, Int>) -> Self {
+        Self { words: self.words.clone().select(0, rows), sides: self.sides }
+    }
+
+    /// Returns numbers in 0..1, `[n, channels, height, width]`.
+    pub(crate) fn numbers(self) -> Tensor<4> {
+        let ([n, words], [channels, height, width]) = (self.words.dims(), self.sides);
+        let byte = |place: usize| -> Tensor<3, Int> {
+            let shifted = self.words.clone().bitwise_right_shift_scalar((8 * place) as i64);
+            shifted.bitwise_and_scalar(255).unsqueeze_dim(2)
+        };
+        let bytes = Tensor::cat((0..BYTES).map(byte).collect(), 2).reshape([n, words * BYTES]);
+        let bytes = bytes.narrow(1, 0, channels * height * width);
+        bytes.float().reshape([n, channels, height, width]) / 255.0
+    }
+}
+
+// Observations on a device.
+
+/// A batch of observations on a device, one per row.
+#[derive(Clone, Debug)]
+pub enum ObsBatch {
+    /// `[n, width]`.
+    Vector(Tensor<2>),
+    /// Pixels divided by 255, `[n, channels, height, width]`.
+    Image(Tensor<4>),
+}
+
+impl ObsBatch {
+    /// Moves whole observations of `kind` to `device`.
+    pub(crate) fn new(observations: Observations, kind: &ObsKind, device: &Device) -> Self {
+        let rows = observations.numbers() / kind.numbers().max(1);
+        match (observations, kind) {
+            (Observations::Vector(values), _) => Self::Vector(matrix(values, rows, kind.numbers(), device)),
+            (Observations::Image(pixels), ObsKind::Image(shape)) => {
+                Self::pixels(pixels, [rows, shape.channels, shape.height, shape.width], device)
+            }
+            (Observations::Image(_), ObsKind::Vector(_)) => {
+                unreachable!("observations are checked to be of their kind")
+            }
+        }
+    }
+
+    /// Creates images from their pixels, row-major in `shape` = `[n, channels, height, width]`.
+    ///
+    /// # Panics
+    /// If the number of pixels does not match the shape.
+    pub fn pixels(pixels: Vec<u8>, shape: [usize; 4], device: &Device) -> Self {
+        let [rows, sides @ ..] = shape;
+        Self::Image(Self::gather(&pixels, sides, &(0..rows).collect::<Vec<_>>(), device))
+    }
+
+    /// Returns the tensor of [`Self::pixels`] for some `rows` of many images of `sides` = `[channels, height,
+    /// width]`: from the bytes to the numbers in one pass.
+    ///
+    /// # Panics
+    /// If a row does not exist.
+    pub(crate) fn gather(pixels: &[u8], sides: [usize; 3], rows: &[usize], device: &Device) -> Tensor<4> {
+        let [channels, height, width] = sides;
+        let size = channels * height * width;
+        if !is_host(device) {
+            let bytes: Vec<u8> = rows.iter().flat_map(|&row| &pixels[row * size..(row + 1) * size]).copied().collect();
+            return PackedPixels::send(&bytes, sides, device).numbers();
+        }
+        let mut numbers = vec![0.0f32; rows.len() * size];
+        numbers.par_chunks_mut(size.max(1)).zip(rows).for_each(|(image, &row)| {
+            let bytes = &pixels[row * size..(row + 1) * size];
+            image.iter_mut().zip(bytes).for_each(|(x, &byte)| *x = f32::from(byte) / 255.0);
+        });
+        Tensor::from_data(TensorData::new(numbers, [rows.len(), channels, height, width]), device)
+    }
+
+    /// Returns the number of observations.
+    pub fn rows(&self) -> usize {
+        match self {
+            Self::Vector(x) => x.dims()[0],
+            Self::Image(x) => x.dims()[0],
+        }
+    }
+
+    /// Returns the first `n` observations.
+    pub fn first(&self, n: usize) -> Self {
+        match self {
+            Self::Vector(x) => Self::Vector(x.clone().narrow(0, 0, n)),
+            Self::Image(x) => Self::Image(x.clone().narrow(0, 0, n)),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::DeviceKind;
-    use crate::nn::{host, vector};
+    use crate::nn::{host, vector, window_places};
     use crate::rng::Streams;
     use burn::tensor::TensorData;
 
@@ -121,5 +246,50 @@ mod tests {
         assert_eq!(window_places(64, 3, 2, 1), Some(32));
         assert_eq!(window_places(7, 8, 4, 0), None);
         assert_eq!(window_places(8, 8, 4, 0), Some(1));
+    }
+}
+
+#[cfg(test)]
+mod packed_pixels_tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::host;
+
+    #[test]
+    fn bytes_come_back_as_numbers_on_every_device() {
+        for kind in DeviceKind::BUILT.iter().filter(|kind| kind.check().is_ok()) {
+            let device = kind.plain();
+            let pixels: Vec<u8> = (0..3 * 15).map(|i| (i * 91 % 256) as u8).collect();
+            let packed = PackedPixels::send(&pixels, [3, 1, 5], &device);
+            let rows = Tensor::from_data(TensorData::new(vec![2i32, 0], [2]), &device);
+            let images = packed.select(rows).numbers();
+            assert_eq!(images.dims(), [2, 3, 1, 5]);
+            let want = pixels[30..].iter().chain(&pixels[..15]).map(|&byte| f32::from(byte) / 255.0);
+            for (found, want) in host(images).expect("readable").into_iter().zip(want) {
+                assert!((found - want).abs() < 1e-6, "{kind}: {found} for {want}");
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod obs_batch_tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::host;
+
+    #[test]
+    fn rows_of_bytes_become_numbers_from_0_to_1() {
+        let bytes: Vec<u8> = (0..=255).collect();
+        for kind in DeviceKind::CPU {
+            let device = kind.plain();
+            let x = ObsBatch::gather(&bytes, [2, 4, 8], &[3, 0, 3], &device);
+            assert_eq!(x.dims(), [3, 2, 4, 8]);
+            let want: Vec<f32> =
+                [3, 0, 3].iter().flat_map(|row| row * 64..row * 64 + 64).map(|i| i as f32 / 255.0).collect();
+            assert_eq!(host(x).expect("readable"), want);
+            let whole = ObsBatch::pixels(bytes.clone(), [4, 2, 4, 8], &device);
+            assert_eq!(whole.rows(), 4);
+        }
     }
 }

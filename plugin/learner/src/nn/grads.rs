@@ -1,9 +1,11 @@
 //! Gradients by parameter name.
 
-use super::cpu::KeptMemory;
-use super::params::{ParamVisitor, Parameters};
-use crate::LearnError;
+use crate::{
+    LearnError,
+    nn::params::{ParamVisitor, Parameters},
+};
 use burn::tensor::{Gradients, Tensor, TensorData};
+use playbot_kernels::KeptMemory;
 use rayon::prelude::*;
 
 /// Size up to which a second thread costs more than it saves.

@@ -1,10 +1,8 @@
 //! A stack of gated recurrent layers, in one or both directions.
 
-use super::cpu::kernels::{self, GruInput};
-use super::params::{ParamVisitor, Parameters, path};
-use super::source::{Init, ParamSource, RandomInit};
-use crate::device::is_host;
+use crate::nn::params::{Init, ParamSource, ParamVisitor, Parameters, RandomInit, path};
 use burn::tensor::{Device, Tensor, activation::sigmoid};
+use playbot_kernels::{host_numbers::is_host, kernels, kernels::GruInput};
 use rand::Rng;
 
 /// One recurrent layer. The directions lie side by side in the first dimension.
@@ -136,7 +134,7 @@ impl GruLayer {
 }
 
 /// Applies a layer in tensor operations, for devices without a kernel and as a reference for the kernel: the same as
-/// [`kernels::gru`].
+/// [`playbot_kernels::kernels::gru`].
 fn gru_steps(input: GruInput) -> Tensor<2> {
     let GruInput { x, weight_ih, weight_hh: weight, bias_ih, bias_hh, initial } = input;
     let [directions, batch, hidden] = initial.dims();

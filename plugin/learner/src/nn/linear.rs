@@ -1,11 +1,13 @@
 //! A linear layer.
 
-use super::Activation;
-use super::cpu::dense::{Dense, dense};
-use super::params::{ParamVisitor, Parameters, path};
-use super::source::{Init, ParamSource, RandomInit};
+use crate::nn::params::{Init, ParamSource, ParamVisitor, Parameters, RandomInit, path};
 use burn::tensor::{Device, Tensor, module::linear};
+use playbot_kernels::{
+    dense::{Dense, dense},
+    elementwise::Activation,
+};
 use rand::Rng;
+use std::f64::consts::SQRT_2;
 
 /// y = x W + b.
 #[derive(Clone, Debug)]
@@ -88,5 +90,150 @@ impl Parameters for Linear {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
         visitor.visit(&path(prefix, "weight"), &mut self.weight);
         visitor.visit(&path(prefix, "bias"), &mut self.bias);
+    }
+}
+
+// Layer normalisation.
+
+/// Added to the variance.
+const EPS: f64 = 1e-6;
+
+/// Brings each row to mean 0 and deviation 1, then scales and shifts each column (Ba et al. 2016, "Layer normalization"):
+/// y = (x - mean) / √(var + 1e-6) · scale + shift.
+#[derive(Clone, Debug)]
+pub struct LayerNorm {
+    /// `[width]`, ones at first.
+    pub scale: Tensor<1>,
+    /// `[width]`, zeros at first.
+    pub shift: Tensor<1>,
+}
+
+impl LayerNorm {
+    pub(crate) fn build<S: ParamSource>(source: &mut S, prefix: &str, width: usize) -> Result<Self, S::Error> {
+        Ok(Self {
+            scale: source.param(&path(prefix, "scale"), [width], Init::Ones)?,
+            shift: source.param(&path(prefix, "shift"), [width], Init::Zeros)?,
+        })
+    }
+
+    /// Maps `[n, width]` to `[n, width]`.
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        let centred = x.clone() - x.mean_dim(1);
+        let deviation = (centred.clone().square().mean_dim(1) + EPS).sqrt();
+        centred / deviation * self.scale.clone().unsqueeze::<2>() + self.shift.clone().unsqueeze::<2>()
+    }
+}
+
+impl Parameters for LayerNorm {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        visitor.visit(&path(prefix, "scale"), &mut self.scale);
+        visitor.visit(&path(prefix, "shift"), &mut self.shift);
+    }
+}
+
+// A multi-layer perceptron.
+
+/// Hidden layers `l0`, `l1`, ... with an activation after each, then a linear `head`.
+#[derive(Clone, Debug)]
+pub struct Mlp {
+    /// The hidden layers.
+    pub layers: Vec<Linear>,
+    /// The output layer.
+    pub head: Linear,
+    /// The function after each hidden layer.
+    pub activation: Activation,
+}
+
+impl Mlp {
+    /// Creates a network with orthogonal weights: gain √2 in the hidden layers, `head_gain` in the head; biases 0.
+    pub fn new<R: Rng + ?Sized>(
+        inputs: usize,
+        hidden: &[usize],
+        outputs: usize,
+        activation: Activation,
+        head_gain: f64,
+        rng: &mut R,
+        device: &Device,
+    ) -> Self {
+        let source = &mut RandomInit { rng, device };
+        let Ok(net) = Self::build(source, "", inputs, hidden, outputs, activation, head_gain);
+        net
+    }
+
+    /// Creates a network as [`Self::new`], with parameters out of `source`.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        inputs: usize,
+        hidden: &[usize],
+        outputs: usize,
+        activation: Activation,
+        head_gain: f64,
+    ) -> Result<Self, S::Error> {
+        let mut width = inputs;
+        let mut layers = Vec::with_capacity(hidden.len());
+        for (i, &next) in hidden.iter().enumerate() {
+            layers.push(Linear::build(source, &path(prefix, &format!("l{i}")), width, next, SQRT_2)?);
+            width = next;
+        }
+        Ok(Self { layers, head: Linear::build(source, &path(prefix, "head"), width, outputs, head_gain)?, activation })
+    }
+
+    /// Returns the input width.
+    pub fn inputs(&self) -> usize {
+        self.layers.first().unwrap_or(&self.head).weight.dims()[0]
+    }
+
+    /// Returns the last hidden layer's activations, `[n, inputs]` to `[n, hidden]`.
+    pub fn features(&self, x: Tensor<2>) -> Tensor<2> {
+        Linear::chain(x, &self.hidden().collect::<Vec<_>>())
+    }
+
+    /// Returns the hidden layers with their activations.
+    fn hidden(&self) -> impl Iterator<Item = (&Linear, Option<Activation>)> {
+        self.layers.iter().map(|layer| (layer, Some(self.activation)))
+    }
+
+    /// Returns [`Self::features`] of `[held, x]` joined, where row `b` of `held` `[B, H]` goes with the rows `t * B +
+    /// b` of `x` `[steps * B, inputs - H]`.
+    pub fn features_held(&self, held: Tensor<2>, x: Tensor<2>, steps: usize) -> Tensor<2> {
+        let Some(first) = self.layers.first() else {
+            return Tensor::cat(vec![held.repeat_dim(0, steps), x], 1);
+        };
+        let first = self.activation.forward(first.forward_held(held, x, steps));
+        Linear::chain(first, &self.hidden().skip(1).collect::<Vec<_>>())
+    }
+
+    /// Maps `[n, inputs]` to `[n, outputs]`.
+    pub fn forward(&self, x: Tensor<2>) -> Tensor<2> {
+        Linear::chain(x, &self.hidden().chain([(&self.head, None)]).collect::<Vec<_>>())
+    }
+}
+
+impl Parameters for Mlp {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        for (i, layer) in self.layers.iter_mut().enumerate() {
+            layer.visit(&path(prefix, &format!("l{i}")), visitor);
+        }
+        self.head.visit(&path(prefix, "head"), visitor);
+    }
+}
+
+#[cfg(test)]
+mod layer_norm_tests {
+    use super::*;
+    use crate::DeviceKind;
+    use crate::nn::{host, matrix, vector};
+
+    #[test]
+    fn by_hand() {
+        let device = DeviceKind::Flex.plain();
+        let norm =
+            LayerNorm { scale: vector(vec![1.0, 2.0, 1.0], &device), shift: vector(vec![0.0, 0.5, 0.0], &device) };
+        let rows = norm.forward(matrix(vec![1.0, 2.0, 3.0, 5.0, 5.0, 5.0], 2, 3, &device));
+        let side = (1.5f32).sqrt();
+        let expected = [-side, 0.5, side, 0.0, 0.5, 0.0];
+        let found = host(rows.reshape([6])).expect("readable");
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-4), "{found:?}");
     }
 }

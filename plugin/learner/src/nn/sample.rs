@@ -1,7 +1,12 @@
 //! Sampling of actions from plain numbers, row by row.
 
-use crate::rng::{normal, unit};
+use crate::{
+    nn::HostDist,
+    rng::{normal, unit},
+};
+use burn::tensor::{Device, Tensor};
 use rand::Rng;
+use std::f64::consts::LN_2;
 
 /// Draws an index with probabilities softmax(`logits`), by inverting the cumulative distribution with one draw.
 ///
@@ -77,6 +82,118 @@ fn max(values: &[f32]) -> f64 {
     f64::from(values.iter().copied().fold(f32::NEG_INFINITY, f32::max))
 }
 
+// The squashed Gaussian: an action is the tanh of a normal number, stretched to the action's range.
+
+/// ln(2π)/2.
+const HALF_LN_TAU: f64 = 0.918_938_533_204_672_8;
+
+/// Keeps the logarithm of [`LogProbForm::Eps`] finite.
+const EPS: f64 = 1e-6;
+
+/// Returns ln σ = low + ½ (high - low) (tanh(raw) + 1): bounded, with a gradient everywhere.
+pub fn bounded_log_std<const D: usize>(raw: Tensor<D>, (low, high): (f64, f64)) -> Tensor<D> {
+    (raw.tanh() + 1.0) * (0.5 * (high - low)) + low
+}
+
+/// The form of the change of volume under tanh in a log-density.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum LogProbForm {
+    /// ln(scale (1 - tanh² x) + 1e-6), as most implementations have it: flat where tanh saturates.
+    Eps,
+    /// ln(scale) + 2 (ln 2 - x - softplus(-2x)), without loss of digits.
+    Exact,
+}
+
+/// One action per row and its log-density.
+#[derive(Clone, Debug)]
+pub struct SquashedDraw {
+    /// The normal numbers x, `[n, dim]`.
+    pub pre_tanh: Tensor<2>,
+    /// tanh(x) · scale + bias, `[n, dim]`.
+    pub action: Tensor<2>,
+    /// ln of the action's density, summed over dimensions, `[n]`.
+    pub log_prob: Tensor<1>,
+}
+
+/// A batch of squashed Gaussians over actions in [bias - scale, bias + scale] (Haarnoja et al. 2018, "Soft
+/// actor-critic", appendix C).
+#[derive(Clone, Debug)]
+pub struct SquashedGaussian {
+    /// Mean of the normal number x, `[n, dim]`.
+    pub mean: Tensor<2>,
+    /// Logarithm of its standard deviation, `[n, dim]`.
+    pub log_std: Tensor<2>,
+    /// Half the width of each dimension's range, `[1, dim]`.
+    pub scale: Tensor<2>,
+    /// The middle of each dimension's range, `[1, dim]`.
+    pub bias: Tensor<2>,
+}
+
+impl SquashedGaussian {
+    /// Creates squashed Gaussians over actions in [-1, 1].
+    pub fn unit(mean: Tensor<2>, log_std: Tensor<2>, device: &Device) -> Self {
+        let [_, dim] = mean.dims();
+        Self { mean, log_std, scale: Tensor::ones([1, dim], device), bias: Tensor::zeros([1, dim], device) }
+    }
+
+    /// Draws x = mean + σ · noise squashed into an action, differentiable in mean and σ (the reparameterisation
+    /// trick). `noise` is standard normal, `[n, dim]`.
+    pub fn draw(&self, noise: Tensor<2>, form: LogProbForm) -> SquashedDraw {
+        let x = self.mean.clone() + self.log_std.clone().exp() * noise.clone();
+        let tanh = x.clone().tanh();
+        let slope = match form {
+            LogProbForm::Eps => (((tanh.clone().square().neg() + 1.0) * self.scale.clone()) + EPS).log(),
+            LogProbForm::Exact => {
+                // Even in x, and the exponential of a number that is not positive cannot overflow.
+                let distance = x.clone().abs();
+                let rest = (distance.clone() * -2.0).exp().log1p();
+                ((distance + rest).neg() + LN_2) * 2.0 + self.scale.clone().log()
+            }
+        };
+        let normal = (noise.square() * 0.5 + self.log_std.clone() + HALF_LN_TAU).neg();
+        SquashedDraw {
+            pre_tanh: x,
+            action: tanh * self.scale.clone() + self.bias.clone(),
+            log_prob: (normal - slope).sum_dim(1).squeeze_dim(1),
+        }
+    }
+}
+
+// A Gaussian decoder in the coordinates of a squashed Gaussian policy.
+
+/// Bound within which actions are clamped before the inverse of tanh is applied.
+const EDGE: f64 = 0.999;
+
+/// Maps a Gaussian over actions in [-1, 1] back through tanh, to be compared with a squashed policy before its tanh.
+///
+/// The inverse image is not normal, so this is an approximation. The inverse of tanh is monotone and maps quantiles
+/// to quantiles: the median m goes to atanh(m), and σ to half the distance of the images of m ± σ, with m and m ± σ
+/// clamped to ±0.999. For small σ this is the tangent's σ / (1 - m²). Near the edges, where that explodes, it stays a
+/// width that a policy can have. Categorical distributions are unchanged.
+pub fn unsquashed(decoder: &HostDist) -> HostDist {
+    let Some(stds) = &decoder.log_std else { return decoder.clone() };
+    let before = |action: f64| action.clamp(-EDGE, EDGE).atanh();
+    let mut out = HostDist { dim: decoder.dim, head: Vec::new(), log_std: None };
+    let mut log_std = Vec::with_capacity(stds.len());
+    for (&mean, &log) in decoder.head.iter().zip(stds) {
+        let mean = f64::from(mean).clamp(-EDGE, EDGE);
+        let std = f64::from(log).exp();
+        let spread = 0.5 * (before(mean + std) - before(mean - std));
+        out.head.push(before(mean) as f32);
+        // The smallest ln σ that a state-dependent decoder can have; guards against σ that rounding makes 0.
+        log_std.push(spread.ln().max(-10.0) as f32);
+    }
+    out.log_std = Some(log_std);
+    out
+}
+
+/// Returns the normal number whose tanh is `action`. An action beyond ±(1 - 1e-6), which single precision cannot
+/// resolve, is clamped there.
+pub(crate) fn unsquashed_action(action: f32) -> f32 {
+    let edge = 1.0 - 1e-6;
+    f64::from(action).clamp(-edge, edge).atanh() as f32
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -108,5 +225,48 @@ mod tests {
     fn gaussian_log_density_of_the_mean() {
         let got = gaussian_log_prob(&[1.0, 2.0], &[0.0, 1.0], &[1.0, 2.0]);
         assert!((got - (-1.0 - std::f32::consts::TAU.ln())).abs() < 1e-6);
+    }
+}
+
+#[cfg(test)]
+mod unsquash_tests {
+    use super::*;
+
+    fn of(mean: f32, std: f32) -> (f32, f32) {
+        let decoder = HostDist { dim: 1, head: vec![mean], log_std: Some(vec![std.ln()]) };
+        let mapped = unsquashed(&decoder);
+        (mapped.head[0], mapped.log_std.expect("continuous")[0].exp())
+    }
+
+    #[test]
+    fn narrow_ones_follow_the_tangent() {
+        let (mean, std) = of(0.5, 0.001);
+        assert!((mean - 0.5f32.atanh()).abs() < 1e-6);
+        assert!((std / (0.001 / (1.0 - 0.25)) - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn wide_ones_keep_their_quantiles() {
+        let (mean, std) = of(-0.2, 0.5);
+        assert!((mean - (-0.2f32).atanh()).abs() < 1e-6);
+        assert!((std - 0.5 * (0.3f32.atanh() + 0.7f32.atanh())).abs() < 1e-6);
+    }
+
+    #[test]
+    fn means_beyond_the_edge_stay_finite_and_usable() {
+        for sign in [-1.0, 1.0] {
+            let (mean, std) = of(7.0 * sign, 0.3);
+            assert!((mean - sign * 3.8002).abs() < 1e-3);
+            // Half of atanh(0.999) - atanh(0.699).
+            assert!((std - 0.5 * (3.8002 - 0.8653)).abs() < 1e-2, "{std}");
+        }
+        let (_, std) = of(1.0, 1e-30);
+        assert!(std > 0.0);
+    }
+
+    #[test]
+    fn choices_are_left_alone() {
+        let choices = HostDist { dim: 2, head: vec![-0.5, -0.9], log_std: None };
+        assert_eq!(unsquashed(&choices), choices);
     }
 }

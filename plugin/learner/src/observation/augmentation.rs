@@ -1,8 +1,10 @@
 //! Image augmentations: random changes that do not matter to the task, so that networks become insensitive to them.
 
-use super::{ImageShape, ObsKind};
-use crate::{LearnError, SettingError};
-use crate::rng::unit;
+use crate::{
+    LearnError, SettingError,
+    observation::{ImageShape, ObsKind},
+    rng::unit,
+};
 use rand::{Rng, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;

@@ -1,9 +1,12 @@
 //! Inputs of networks: skills joined with observations.
 
-use crate::nn::{OF_A_MOVE, ObsBatch, matrix, share};
-use crate::norm::ObsStats;
-use crate::{ObsKind, ObsSlice};
+use crate::{
+    ObsKind, ObsSlice,
+    nn::{ObsBatch, matrix},
+    norm::ObsStats,
+};
 use burn::tensor::{Device, Tensor};
+use playbot_kernels::kept_memory::{OF_A_MOVE, share};
 
 /// Rows that a thread joins at a time.
 const ROWS: usize = 64;

@@ -1,18 +1,24 @@
 //! The data of an update: a rollout with its advantages, and its minibatches in host memory.
 
-use super::PpoConfig;
-use super::objective::{PpoBatch, normalize_advantages};
-use super::step::Minibatch;
-use crate::nn::{ActionBatch, ImageNet, ObsBatch, vector};
-use crate::norm::ObsStats;
-use crate::observation::augmented;
-use crate::policy::{InputBuilder, NetInput, joined_rows};
-use crate::rng::{ChaCha8Rng, shuffle};
-use crate::score::{PenaltyForm, ScoreConfig, TeacherOutput};
-use crate::{Augmentation, ObsKind, ObsSlice, Observations, Rollout};
+use crate::{
+    Augmentation, ObsKind, ObsSlice, Observations, Rollout,
+    nn::{ActionBatch, ImageNet, ObsBatch, vector},
+    norm::ObsStats,
+    observation::augmented,
+    policy::{InputBuilder, NetInput, joined_rows},
+    ppo::{
+        PpoConfig,
+        objective::{PpoBatch, normalize_advantages},
+        step::Minibatch,
+    },
+    rng::{ChaCha8Rng, shuffle},
+    score::{PenaltyForm, ScoreConfig, TeacherOutput},
+};
 use burn::tensor::Device;
-use std::cell::{Cell, RefCell};
-use std::time::{Duration, Instant};
+use std::{
+    cell::{Cell, RefCell},
+    time::{Duration, Instant},
+};
 
 /// A rollout with all other data that an update reads, one entry per row.
 #[derive(Debug)]

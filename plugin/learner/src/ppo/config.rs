@@ -1,9 +1,13 @@
 //! Settings of PPO.
 
-use crate::nn::{Activation, CnnKind};
-use crate::norm::{RewardNormalizer, RewardReset};
-use crate::settings::{Range, Reader, Settings};
-use crate::{Augmentation, LearnError, ObsKind, SettingError, TimeLimit, settings};
+use crate::{
+    Augmentation, LearnError, ObsKind, SettingError, TimeLimit,
+    nn::CnnKind,
+    norm::{RewardNormalizer, RewardReset},
+    settings,
+    settings::{Range, Reader, Settings},
+};
+use playbot_kernels::elementwise::Activation;
 
 /// The algorithms that learn by PPO.
 const PPO: &[Reader] = &[Reader::SCORE_PPO, Reader::PPO, Reader::SPIRL_PPO, Reader::SPIRL_SAC_DECODER];

@@ -1,9 +1,7 @@
 //! Metrics of a gradient step and of an update.
 
+use crate::{LearnError, nn::check_loss};
 use serde::{Deserialize, Serialize};
-
-use crate::LearnError;
-use crate::nn::check_loss;
 
 /// Means over all minibatches of an update.
 #[derive(Serialize, Deserialize, Clone, Copy, Debug, Default, PartialEq)]

@@ -1,7 +1,9 @@
 //! The formulas of PPO: generalised advantage estimation on the host, and the losses as pure functions of tensors.
 
-use crate::nn::{ActionBatch, Dist};
-use crate::{LearnError, Rollout, TimeLimit};
+use crate::{
+    LearnError, Rollout, TimeLimit,
+    nn::{ActionBatch, Dist},
+};
 use burn::tensor::Tensor;
 
 /// Advantages and returns, one per row of the rollout.

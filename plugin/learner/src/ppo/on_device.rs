@@ -1,14 +1,17 @@
 //! An update on a graphics card: the rollout is sent once, and the numbers of all steps are read back together.
 
-use super::augmented::augmentation_loss;
-use super::batch::Batch;
-use super::objective::{PpoBatch, PpoLoss};
-use super::step::{Losses, Minibatch, Moment, outputs};
-use super::{PpoConfig, PpoNets, StepMetrics};
-use crate::nn::{ActionBatch, Adam, Dist, PackedPixels, host, matrix, vector};
-use crate::policy::NetInput;
-use crate::score::TeacherBatch;
-use crate::{LearnError, ObsKind, ObsSlice};
+use crate::{
+    LearnError, ObsKind, ObsSlice,
+    nn::{ActionBatch, Adam, Dist, PackedPixels, host, matrix, vector},
+    policy::NetInput,
+    ppo::{
+        PpoConfig, PpoNets, StepMetrics,
+        batch::Batch,
+        objective::{PpoBatch, PpoLoss},
+        step::{Losses, Minibatch, Moment, augmentation_loss, outputs},
+    },
+    score::TeacherBatch,
+};
 use burn::tensor::{Device, Int, Tensor, TensorData};
 
 /// A whole rollout on a device.
@@ -79,7 +82,7 @@ impl<'a> SentRollout<'a> {
     }
 }
 
-/// Normalises advantages as [`super::normalize_advantages`] does.
+/// Normalises advantages as [`crate::ppo::normalize_advantages`] does.
 fn normalized(advantages: Tensor<1>) -> Tensor<1> {
     let [n] = advantages.dims();
     let centred = advantages.clone() - advantages.mean();
@@ -131,7 +134,7 @@ enum Metric {
 }
 
 impl Reports {
-    /// Does [`super::gradient_step`] with all results left on the device.
+    /// Does [`crate::ppo::gradient_step`] with all results left on the device.
     pub(super) fn step(
         &mut self,
         nets: &mut PpoNets,

@@ -1,15 +1,25 @@
 //! One gradient step: minibatch → loss → gradient → Adam.
 
-use super::augmented::augmentation_loss;
-use super::host_loss::HostLoss;
-use super::objective::{PpoBatch, PpoLoss, ppo_loss};
-use super::{PpoConfig, PpoNets, StepMetrics, ratio_stats};
-use crate::LearnError;
-use crate::device::is_host;
-use crate::nn::{Adam, Dist, NamedGrads, finite, host, scalar};
-use crate::policy::NetInput;
-use crate::score::{Penalty, ScoreConfig, TeacherBatch, penalty};
+#[cfg(test)]
+mod host_loss_tests;
+
+use crate::{
+    Actions, LearnError,
+    nn::{Adam, CategoricalRows, Dist, DistRows, GaussianRows, HostDist, NamedGrads, RowTerms, finite, host, scalar},
+    policy::NetInput,
+    ppo::{
+        PpoConfig, PpoNets, StepMetrics,
+        objective::{PpoBatch, PpoLoss, ppo_loss},
+        ratio_stats,
+    },
+    score::{KlDirection, Penalty, PenaltyForm, ScoreConfig, TeacherBatch, penalty},
+};
 use burn::tensor::Tensor;
+use playbot_kernels::{
+    host_numbers::{is_host, known_gradient},
+    kept_memory::share_each,
+};
+use std::ops::Range;
 
 /// One minibatch on the device.
 #[derive(Clone, Debug)]
@@ -178,4 +188,248 @@ pub(super) fn step_in_parts(
     metrics.grad_norm = norm;
     adam.step(nets, "", &sum, moment.lr, scale)?;
     Ok(metrics)
+}
+
+// The loss that makes actor and critic insensitive to image augmentations (Raileanu et al. 2021, "Automatic data
+// augmentation for generalization in reinforcement learning", DrAC). It grows with the difference between their
+// outputs for a changed picture and for the original. The rollout itself is never changed.
+
+/// Returns mean(KL(π(s) ‖ π(s'))) + mean((V(s') - V(s))²) for the changed pictures s' of a minibatch, `[1]`; `None`
+/// without any, and while the critic warms up. The outputs for the originals, `dist` and `values`, are constants.
+///
+/// # Errors
+/// [`LearnError::Config`] if the networks do not read such observations.
+pub(super) fn augmentation_loss(
+    nets: &PpoNets,
+    dist: &Dist,
+    values: &Tensor<1>,
+    batch: &Minibatch,
+    config: &PpoConfig,
+    moment: &Moment<'_>,
+) -> Result<Option<Tensor<1>>, LearnError> {
+    // While only the critic learns the actor must not change.
+    let Some(changed) = batch.augmented.as_ref().filter(|_| !moment.is_warming_up) else { return Ok(None) };
+    let (dist_of_changed, values_of_changed) = outputs(nets, changed, batch, config, moment)?;
+    let divergence = dist.clone().detach().kl(&dist_of_changed)?.mean();
+    let difference = (values_of_changed - values.clone().detach()).square().mean();
+    Ok(Some(divergence + difference))
+}
+
+// The loss of a minibatch with its gradient in host memory, row by row: the formulas of `objective.rs` and of the
+// mean penalty. A graph of small operations would be slower than this arithmetic.
+
+/// Rows that a thread takes at a time.
+const ROWS: usize = 64;
+
+/// Number of products that take as long as the work for each number of a distribution.
+const OF_A_NUMBER: usize = 64;
+
+/// A loss and its derivatives.
+#[derive(Debug)]
+pub(super) struct HostLoss {
+    pub(super) metrics: StepMetrics,
+    /// By log-probabilities or means, `[n, dim]`.
+    of_head: Vec<f32>,
+    /// By ln σ, `[n, dim]`; empty for choices.
+    of_log_std: Vec<f32>,
+    /// By values, `[n]`.
+    of_values: Vec<f32>,
+}
+
+/// The data that the loss of each row depends on.
+struct Rows<'a> {
+    config: &'a PpoConfig,
+    moment: &'a Moment<'a>,
+    policy: HostDist,
+    decoder: Option<HostDist>,
+    /// Confidence of the decoder; empty without it.
+    confidence: Vec<f32>,
+    actions: Actions,
+    values: Vec<f32>,
+    old_log_probs: Vec<f32>,
+    old_values: Vec<f32>,
+    advantages: Vec<f32>,
+    returns: Vec<f32>,
+}
+
+/// Some rows, and the memory for their derivatives.
+struct Piece<'a> {
+    rows: Range<usize>,
+    of_head: &'a mut [f32],
+    of_log_std: &'a mut [f32],
+    of_values: &'a mut [f32],
+    sums: StepMetrics,
+}
+
+impl HostLoss {
+    /// Returns whether the loss is a mean over rows; it is, except for the penalties of the released code.
+    pub(super) fn is_for(moment: &Moment<'_>) -> bool {
+        moment.score.is_none_or(|score| score.penalty == PenaltyForm::Mean)
+    }
+
+    /// Computes the loss for the outputs of actor and critic on `batch`, with the mean penalty if there is one.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] if policy, decoder and actions differ in kind; [`LearnError::NotFinite`] and
+    /// [`LearnError::Exploded`] name the first term that diverged after so many steps of the optimizer.
+    pub(super) fn of(
+        dist: &Dist,
+        values: &Tensor<1>,
+        batch: &Minibatch,
+        config: &PpoConfig,
+        moment: &Moment<'_>,
+        steps: u64,
+    ) -> Result<Self, LearnError> {
+        let rows = Rows::read(dist, values, batch, config, moment)?;
+        let loss = rows.loss()?;
+        loss.metrics.check_losses(steps)?;
+        Ok(loss)
+    }
+
+    /// Returns the loss as the end of the graph that leads to `dist` and `values`.
+    pub(super) fn tensor(self, dist: &Dist, values: Tensor<1>) -> Tensor<1> {
+        let total = known_gradient(values, self.metrics.total_loss as f32, self.of_values);
+        match dist {
+            Dist::Categorical { log_probs } => total + known_gradient(log_probs.clone(), 0.0, self.of_head),
+            Dist::Gaussian { mean, log_std } => {
+                let [rows, dim] = log_std.dims();
+                let of_log_std = if rows == 1 { column_sums(&self.of_log_std, dim) } else { self.of_log_std };
+                let of_mean = known_gradient(mean.clone(), 0.0, self.of_head);
+                total + of_mean + known_gradient(log_std.clone(), 0.0, of_log_std)
+            }
+        }
+    }
+}
+
+fn column_sums(numbers: &[f32], columns: usize) -> Vec<f32> {
+    let mut sums = vec![0.0; columns];
+    for row in numbers.chunks_exact(columns) {
+        sums.iter_mut().zip(row).for_each(|(sum, x)| *sum += x);
+    }
+    sums
+}
+
+impl<'a> Rows<'a> {
+    fn read(
+        dist: &Dist,
+        values: &Tensor<1>,
+        batch: &Minibatch,
+        config: &'a PpoConfig,
+        moment: &'a Moment<'a>,
+    ) -> Result<Self, LearnError> {
+        let teacher = batch.teacher.as_ref().filter(|_| moment.score.is_some());
+        let column = |tensor: &Tensor<1>| host(tensor.clone());
+        Ok(Self {
+            config,
+            moment,
+            policy: dist.clone().to_host()?,
+            decoder: teacher.map(|teacher| teacher.dist.clone().to_host()).transpose()?,
+            confidence: teacher.map_or_else(|| Ok(Vec::new()), |teacher| column(&teacher.confidence))?,
+            actions: batch.ppo.actions.to_host()?,
+            values: host(values.clone().inner())?,
+            old_log_probs: column(&batch.ppo.old_log_probs)?,
+            old_values: column(&batch.ppo.old_values)?,
+            advantages: column(&batch.ppo.advantages)?,
+            returns: column(&batch.ppo.returns)?,
+        })
+    }
+
+    fn loss(&self) -> Result<HostLoss, LearnError> {
+        let from_these = self.moment.score.is_some_and(|score| score.kl_direction == KlDirection::PolicyDecoder);
+        let (policy, decoder) = (&self.policy, self.decoder.as_ref());
+        match (&policy.log_std, &self.actions, decoder.map(|decoder| &decoder.log_std)) {
+            (None, Actions::Discrete(actions), None | Some(None)) => {
+                Ok(self.by_pieces(0, |rows| CategoricalRows::new(policy, actions, decoder, rows, from_these)))
+            }
+            (Some(_), Actions::Continuous { values, .. }, None | Some(Some(_))) => {
+                Ok(self.by_pieces(policy.dim, |rows| GaussianRows::new(policy, values, decoder, rows, from_these)))
+            }
+            _ => Err(LearnError::Action("policy, decoder and actions differ in kind".to_owned())),
+        }
+    }
+
+    /// Computes the loss piece by piece; with `stds` derivatives by ln σ in each row.
+    fn by_pieces<D: DistRows>(&self, stds: usize, dist_of: impl Fn(Range<usize>) -> D + Sync) -> HostLoss {
+        let (n, dim) = (self.values.len(), self.policy.dim);
+        let (mut of_head, mut of_log_std, mut of_values) = (vec![0.0; n * dim], vec![0.0; n * stds], vec![0.0; n]);
+        let mut std_rows = of_log_std.chunks_mut((ROWS * stds).max(1));
+        let pieces = of_head.chunks_mut(ROWS * dim).zip(of_values.chunks_mut(ROWS)).enumerate();
+        let mut pieces: Vec<_> = pieces
+            .map(|(piece, (of_head, of_values))| Piece {
+                rows: piece * ROWS..piece * ROWS + of_values.len(),
+                of_head,
+                of_log_std: std_rows.next().unwrap_or_default(),
+                of_values,
+                sums: StepMetrics::default(),
+            })
+            .collect();
+        share_each(&mut pieces, n * dim * OF_A_NUMBER, |_, piece| self.compute(&dist_of(piece.rows.clone()), piece));
+        let mut metrics = StepMetrics::default();
+        pieces.iter().for_each(|piece| metrics.add(&piece.sums, 1.0 / n as f64));
+        metrics.total_loss = self.total(&metrics);
+        HostLoss { metrics, of_head, of_log_std, of_values }
+    }
+
+    fn total(&self, means: &StepMetrics) -> f64 {
+        let PpoConfig { ent_coef, vf_coef, .. } = self.config;
+        let of_critic = means.value_loss * vf_coef;
+        match self.moment.score {
+            _ if self.moment.is_warming_up => of_critic,
+            None => means.policy_loss - means.entropy * ent_coef + of_critic,
+            Some(score) => means.policy_loss - means.entropy * ent_coef + of_critic + means.kl_penalty * score.kl_coef,
+        }
+    }
+
+    fn compute(&self, dist: &impl DistRows, piece: &mut Piece<'_>) {
+        let (dim, stds) = (self.policy.dim, piece.of_log_std.len() / piece.rows.len());
+        for (i, row) in piece.rows.clone().enumerate() {
+            let terms = dist.terms(i);
+            let by = self.add_policy_row(row, terms, &mut piece.sums);
+            piece.of_values[i] = self.add_value_row(row, &mut piece.sums);
+            if !self.moment.is_warming_up {
+                let (head, log_std) = (i * dim..(i + 1) * dim, i * stds..(i + 1) * stds);
+                dist.gradient(i, by, &mut piece.of_head[head], &mut piece.of_log_std[log_std]);
+            }
+        }
+    }
+
+    /// Adds the terms of a row, and returns the derivatives of the loss by these.
+    fn add_policy_row(&self, row: usize, terms: RowTerms, sums: &mut StepMetrics) -> RowTerms {
+        let (n, clip) = (self.values.len() as f64, self.config.clip as f32);
+        let log_ratio = terms.log_prob - self.old_log_probs[row];
+        let (ratio, gain) = (log_ratio.exp(), -self.advantages[row]);
+        let (free, clipped) = (gain * ratio, gain * ratio.clamp(1.0 - clip, 1.0 + clip));
+        sums.policy_loss += f64::from(free.max(clipped));
+        sums.entropy += f64::from(terms.entropy);
+        let moved = f64::from(log_ratio).exp_m1();
+        sums.approx_kl += moved - f64::from(log_ratio);
+        sums.clip_fraction += f64::from(u8::from(moved.abs() > self.config.clip));
+        let mut by = RowTerms {
+            // Where clipping decides, the gradient is 0.
+            log_prob: if free < clipped { 0.0 } else { free / n as f32 },
+            entropy: (-self.config.ent_coef / n) as f32,
+            kl: 0.0,
+        };
+        if let (Some(score), Some(&weight)) = (self.moment.score, self.confidence.get(row)) {
+            sums.decoder_kl += f64::from(terms.kl);
+            sums.kl_penalty += f64::from(weight * terms.kl);
+            sums.confidence += f64::from(weight);
+            by.kl = (score.kl_coef / n) as f32 * weight;
+        }
+        by
+    }
+
+    /// Adds the critic's error in a row, and returns the derivative of the loss by the value.
+    fn add_value_row(&self, row: usize, sums: &mut StepMetrics) -> f32 {
+        let (value, old, wanted) = (self.values[row], self.old_values[row], self.returns[row]);
+        let (error, clip) = (value - wanted, self.config.clip as f32);
+        let change = (value - old).clamp(-clip, clip);
+        let clipped = old + change - wanted;
+        let is_clipped = self.config.clip_value_loss && clipped * clipped > error * error;
+        let worst = if is_clipped { clipped } else { error };
+        sums.value_loss += 0.5 * f64::from(worst * worst);
+        let moves = !is_clipped || change == value - old;
+        let scale = (self.config.vf_coef / self.values.len() as f64) as f32;
+        if moves { worst * scale } else { 0.0 }
+    }
 }

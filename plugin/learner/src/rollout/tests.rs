@@ -1,7 +1,6 @@
 //! Tests of rollouts that are joined, and of rollouts that do not fit.
 
-use super::*;
-use crate::{ActionSpace, Actions, ObsKind};
+use crate::{ActionSpace, Actions, ObsKind, rollout::*};
 
 fn part(envs: usize, base: f32) -> Rollout {
     let mut rollout = Rollout::new(envs, 1, 0, &ActionSpace::Discrete(9));

@@ -1,11 +1,12 @@
 //! Batches of transitions from the replay buffer, prepared for a gradient step.
 
-use super::SacLearner;
-use super::buffer::ReplayBuffer;
-use crate::LearnError;
-use crate::nn::{ActionBatch, Dist, matrix, vector};
-use crate::policy::{StateBatch, joined_rows};
-use crate::score::TeacherBatch;
+use crate::{
+    LearnError,
+    nn::{ActionBatch, Dist, matrix, vector},
+    policy::{StateBatch, joined_rows},
+    sac::{SacLearner, buffer::ReplayBuffer},
+    score::TeacherBatch,
+};
 use burn::tensor::Tensor;
 
 /// One batch of transitions on the device.
@@ -118,10 +119,10 @@ impl SacLearner {
 
 #[cfg(test)]
 mod tests {
-    use super::super::SacConfig;
-    use super::super::demos::tests::{SPEC, episodes};
     use super::*;
     use crate::DeviceKind;
+    use crate::sac::SacConfig;
+    use crate::sac::buffer::demos_tests::{SPEC, episodes};
 
     /// Returns observations, next observations that count, and rewards of a batch of one whole episode, with
     /// observations 1, 2, 3, 4 and a reward of 1 for its last action.

@@ -1,8 +1,9 @@
 //! The replay buffer.
 
-use super::transitions::{slice, transitions};
-use crate::rng::below;
-use crate::{ActionSpace, Actions, LearnError, Rollout, TimeLimit};
+use crate::{
+    ActionSpace, Actions, FileError, LearnError, Observations, PolicySpec, Rollout, TimeLimit, file::TensorFile,
+    nn::path, rng::below, sac::SacConfig,
+};
 use rand::Rng;
 
 /// Number of values of each kind in a transition.
@@ -169,12 +170,210 @@ fn write<T: Copy>(to: &mut Vec<T>, at: usize, from: &[T]) {
     }
 }
 
+// The replay buffer in the file of a checkpoint.
+
+impl ReplayBuffer {
+    /// Adds all transitions to a file, under names that begin with `prefix`.
+    pub(super) fn put(&self, file: &mut TensorFile, prefix: &str) {
+        let (n, Widths { obs, latent, clock, weight }) = (self.len(), self.widths);
+        file.put(&path(prefix, "obs"), &[n, obs], &self.obs);
+        file.put(&path(prefix, "z"), &[n, latent], &self.z);
+        file.put(&path(prefix, "next_obs"), &[n, obs], &self.next_obs);
+        file.put(&path(prefix, "next_z"), &[n, latent], &self.next_z);
+        if clock > 0 {
+            file.put(&path(prefix, "left"), &[n], &self.left);
+            file.put(&path(prefix, "next_left"), &[n], &self.next_left);
+        }
+        if weight > 0 {
+            file.put(&path(prefix, "weights"), &[n], &self.weights);
+        }
+        match &self.actions {
+            Actions::Discrete(values) => file.put_u32(&path(prefix, "actions"), values),
+            Actions::Continuous { dim, values } => file.put(&path(prefix, "actions"), &[n, *dim], values),
+        }
+        file.put(&path(prefix, "rewards"), &[n], &self.rewards);
+        file.put_flags(&path(prefix, "terminated"), &self.terminated);
+        file.put_flags(&path(prefix, "truncated"), &self.truncated);
+    }
+
+    /// Takes all transitions out of a file, of which `seen` were ever added.
+    pub(super) fn take(&mut self, file: &mut TensorFile, prefix: &str, seen: u64) -> Result<(), FileError> {
+        self.seen = seen;
+        let (n, Widths { obs, latent, clock, weight }) = (self.len(), self.widths);
+        self.obs = file.take(&path(prefix, "obs"), &[n, obs])?;
+        self.z = file.take(&path(prefix, "z"), &[n, latent])?;
+        self.next_obs = file.take(&path(prefix, "next_obs"), &[n, obs])?;
+        self.next_z = file.take(&path(prefix, "next_z"), &[n, latent])?;
+        if clock > 0 {
+            self.left = file.take(&path(prefix, "left"), &[n])?;
+            self.next_left = file.take(&path(prefix, "next_left"), &[n])?;
+        }
+        let weights = path(prefix, "weights");
+        self.weights = match weight {
+            0 => Vec::new(),
+            // The first checkpoints of SPiRL discounted all skills alike.
+            _ if !file.has(&weights) => vec![1.0; n],
+            _ => file.take(&weights, &[n])?,
+        };
+        match &mut self.actions {
+            Actions::Discrete(values) => *values = file.take_u32(&path(prefix, "actions"), n)?,
+            Actions::Continuous { dim, values } => *values = file.take(&path(prefix, "actions"), &[n, *dim])?,
+        }
+        self.rewards = file.take(&path(prefix, "rewards"), &[n])?;
+        self.terminated = file.take_flags(&path(prefix, "terminated"), n)?;
+        self.truncated = file.take_flags(&path(prefix, "truncated"), n)?;
+        Ok(())
+    }
+}
+
+// Conversion of rollouts to transitions.
+
+/// One step of one environment: row `row` of a rollout and its next state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Transition<'a> {
+    /// The rollout's row, for everything but the next state.
+    pub(super) row: usize,
+    /// The observation after the action; `None` after a termination, where there is none.
+    pub(super) next_obs: Option<&'a [f32]>,
+    /// The skill under which that observation is valued; `None` likewise.
+    pub(super) next_z: Option<&'a [f32]>,
+    /// The remaining share of that skill's ticks; `None` likewise, and if the rollout does not have it.
+    pub(super) next_left: Option<f32>,
+}
+
+/// Checks that a checked rollout holds the states where episodes were cut off and where it stops.
+///
+/// # Errors
+/// [`LearnError::Shape`] names the first length that does not fit; [`LearnError::Config`] names a row.
+pub(crate) fn check_ends(rollout: &Rollout) -> Result<(), LearnError> {
+    let ends = &rollout.ends;
+    let mut listed = ends.cut_rows.iter().copied();
+    for row in (0..rollout.rows()).filter(|&row| is_cut(rollout, row)) {
+        if listed.next() != Some(row) {
+            let text = format!("rollout ends: row {row} cuts an episode off, but its last observation is missing");
+            return Err(LearnError::Config(text));
+        }
+    }
+    if let Some(row) = listed.next() {
+        return Err(LearnError::Config(format!("rollout ends: row {row} is listed but cuts no episode off")));
+    }
+    ends.next_obs.as_slice().check_size("rollout ends next_obs", &rollout.obs_kind, rollout.envs)?;
+    LearnError::check("rollout ends next_z", rollout.envs * rollout.latent, ends.next_z.len())
+}
+
+/// Returns the transitions of a checked rollout, in order of its rows.
+///
+/// The next state is the same environment's next row. Where the episode was cut off it is the episode's own last
+/// state, and behind the last row the state where the rollout stopped. A row with both flags terminated.
+///
+/// # Errors
+/// [`LearnError::Config`] if the observations are images.
+pub(super) fn transitions(rollout: &Rollout) -> Result<impl Iterator<Item = Transition<'_>>, LearnError> {
+    let ends = &rollout.ends;
+    let width = rollout.obs_kind.numbers();
+    let (obs, cut_obs, next_obs) = (vectors(&rollout.obs)?, vectors(&ends.cut_obs)?, vectors(&ends.next_obs)?);
+    let mut cut = 0;
+    Ok((0..rollout.rows()).map(move |row| {
+        let next = |obs, z, left: &[f32], at: usize| Transition {
+            row,
+            next_obs: Some(slice(obs, width, at)),
+            next_z: Some(slice(z, rollout.latent, at)),
+            next_left: left.get(at).copied(),
+        };
+        let following = row + rollout.envs;
+        if rollout.terminated[row] {
+            Transition { row, next_obs: None, next_z: None, next_left: None }
+        } else if is_cut(rollout, row) {
+            cut += 1;
+            next(cut_obs, &ends.cut_z, &ends.cut_left, cut - 1)
+        } else if following < rollout.rows() {
+            next(obs, &rollout.z, &rollout.left, following)
+        } else {
+            next(next_obs, &ends.next_z, &ends.next_left, following - rollout.rows())
+        }
+    }))
+}
+
+fn is_cut(rollout: &Rollout, row: usize) -> bool {
+    rollout.truncated[row] && !rollout.terminated[row]
+}
+
+fn vectors(observations: &Observations) -> Result<&[f32], LearnError> {
+    observations.as_slice().vectors("SAC")
+}
+
+/// Returns row `at` of a flat matrix.
+pub(super) fn slice(values: &[f32], width: usize, at: usize) -> &[f32] {
+    &values[at * width..(at + 1) * width]
+}
+
+// Recordings in a replay buffer of their own.
+
+/// Recorded transitions, and their share of each batch.
+#[derive(Debug)]
+pub(super) struct Demos {
+    pub(super) buffer: ReplayBuffer,
+    pub(super) share: f64,
+}
+
+impl Demos {
+    /// Creates the buffer from all transitions of `episodes`, each a rollout of one environment. Actions are clamped
+    /// to [-1, 1], as the actor's are.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if there is nothing to learn from; else as [`Rollout::check`].
+    pub(super) fn new(
+        episodes: &[Rollout],
+        share: f64,
+        obs_dim: usize,
+        space: &ActionSpace,
+    ) -> Result<Self, LearnError> {
+        let rows: usize = episodes.iter().map(Rollout::rows).sum();
+        if rows == 0 {
+            return Err(LearnError::Config("the recordings hold no steps to learn from".to_owned()));
+        }
+        if !episodes.iter().any(Rollout::is_rewarded) {
+            let text = "the recordings hold no reward, but this algorithm learns from rewards: learn skills from them \
+                        instead";
+            return Err(LearnError::Config(text.to_owned()));
+        }
+        let mut buffer = ReplayBuffer::new(rows, Widths { obs: obs_dim, ..Widths::default() }, space);
+        for episode in episodes {
+            buffer.push(episode, &[])?;
+        }
+        if let Actions::Continuous { values, .. } = &mut buffer.actions {
+            values.iter_mut().for_each(|value| *value = value.clamp(-1.0, 1.0));
+        }
+        Ok(Self { buffer, share })
+    }
+
+    /// Reads the recordings of a checkpoint.
+    ///
+    /// # Errors
+    /// [`FileError`] names the first tensor that is missing or misshapen.
+    pub(super) fn stored(file: &mut TensorFile, rows: u64, share: f64, spec: &PolicySpec) -> Result<Self, FileError> {
+        if rows == 0 || !(share > 0.0 && share < 1.0) {
+            return Err(file.format(format!("a share of {share} of each batch from {rows} recorded steps")));
+        }
+        let widths = Widths { obs: spec.obs.numbers(), ..Widths::default() };
+        let mut buffer = ReplayBuffer::new(rows as usize, widths, &spec.action_space);
+        buffer.take(file, "demos", rows)?;
+        spec.action_space.check(&buffer.actions).map_err(|error| file.learner(error))?;
+        Ok(Self { buffer, share })
+    }
+
+    /// Returns the number of recorded transitions in a batch.
+    pub(super) fn of_batch(&self, config: &SacConfig) -> usize {
+        (self.share * config.batch as f64).round() as usize
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::transitions::tests::rollout;
     use super::*;
     use crate::ActionSpace;
     use crate::rng::Streams;
+    use crate::sac::buffer::transitions_tests::rollout;
 
     const PLAIN: Widths = Widths { obs: 1, latent: 1, clock: 0, weight: 0 };
 
@@ -233,5 +432,184 @@ mod tests {
         let flags = |limit| (0..6).map(|slot| buffer.continues(slot, limit)).collect::<Vec<f32>>();
         assert_eq!(flags(TimeLimit::Bootstrap), [2.0, 1.0, 1.0, 0.0, 0.5, 1.0]);
         assert_eq!(flags(TimeLimit::Legacy), [0.0, 1.0, 1.0, 0.0, 0.5, 1.0]);
+    }
+}
+
+#[cfg(test)]
+mod buffer_file_tests {
+    use super::*;
+    use crate::ActionSpace;
+    use crate::file::FileKind;
+    use crate::sac::buffer::transitions_tests::rollout;
+    use std::path::Path;
+
+    #[test]
+    fn files_from_before_there_were_weights_hold_transitions_that_all_count_alike() {
+        let plain_widths = Widths { obs: 1, latent: 1, ..Widths::default() };
+        let actions = ActionSpace::Discrete(3);
+        let mut plain = ReplayBuffer::new(6, plain_widths, &actions);
+        plain.push(&rollout(), &[]).expect("it fits");
+        let kind = FileKind { name: "buffer", version: 1 };
+        let mut file = TensorFile::new(Path::new("buffer"), kind, &serde_json::json!({})).expect("a header");
+        plain.put(&mut file, "old");
+        let mut loaded = ReplayBuffer::new(6, Widths { weight: 1, ..plain_widths }, &actions);
+        loaded.take(&mut file, "old", plain.seen).expect("read");
+        assert_eq!((loaded.weights.as_slice(), &loaded.obs), (&[1.0; 6][..], &plain.obs));
+    }
+}
+
+#[cfg(test)]
+pub(super) mod transitions_tests {
+    use super::*;
+    use crate::{ActionSpace, Actions, EndStates};
+
+    /// Returns a rollout of two environments, three steps, observations 0 to 5 and skills 10 to 15. Environment 0 is
+    /// cut off at step 0 (its last observation is 50), environment 1 terminates at step 1 with both flags set.
+    pub(in crate::sac) fn rollout() -> Rollout {
+        let numbers = |base: f32| (0..6u8).map(|i| base + f32::from(i)).collect::<Vec<f32>>();
+        let at = |rows: &[usize]| (0..6).map(|row| rows.contains(&row)).collect::<Vec<bool>>();
+        Rollout {
+            steps: 3,
+            obs: numbers(0.0).into(),
+            z: numbers(10.0),
+            actions: Actions::Discrete(vec![0, 1, 2, 0, 1, 2]),
+            log_probs: vec![0.0; 6],
+            values: vec![0.0; 6],
+            rewards: numbers(20.0),
+            terminated: at(&[3]),
+            truncated: at(&[0, 3]),
+            final_values: vec![0.0; 6],
+            next_values: vec![0.0; 2],
+            left: vec![1.0, 0.5, 1.0, 1.0, 0.5, 0.5],
+            ends: EndStates {
+                cut_left: vec![0.25],
+                next_left: vec![1.0, 0.75],
+                cut_rows: vec![0],
+                cut_obs: vec![50.0].into(),
+                cut_z: vec![60.0],
+                next_obs: vec![70.0, 71.0].into(),
+                next_z: vec![80.0, 81.0],
+            },
+            ..Rollout::new(2, 1, 1, &ActionSpace::Discrete(3))
+        }
+    }
+
+    #[test]
+    fn every_row_leads_to_its_own_next_state() {
+        let rollout = rollout();
+        rollout.check().expect("it fits");
+        check_ends(&rollout).expect("it fits");
+        let next: Vec<_> = transitions(&rollout)
+            .expect("vectors")
+            .map(|t| t.next_obs.zip(t.next_z).zip(t.next_left).map(|((obs, z), left)| (obs[0], z[0], left)))
+            .collect();
+        let expected = [
+            Some((50.0, 60.0, 0.25)), // cut off: not the row below, which belongs to the next episode
+            Some((3.0, 13.0, 1.0)),
+            Some((4.0, 14.0, 0.5)),
+            None, // terminated, though also cut off
+            Some((70.0, 80.0, 1.0)),
+            Some((71.0, 81.0, 0.75)),
+        ];
+        assert_eq!(next, expected);
+        assert!(transitions(&rollout).expect("vectors").map(|t| t.row).eq(0..6));
+    }
+
+    #[test]
+    fn ends_that_do_not_fit_are_named() {
+        let after = |change: fn(&mut Rollout)| {
+            let mut rollout = rollout();
+            change(&mut rollout);
+            rollout.check().and_then(|()| check_ends(&rollout)).expect_err("does not fit").to_string()
+        };
+        assert!(after(|r| r.ends = EndStates::new(&r.obs_kind)).contains("row 0"));
+        assert!(
+            after(|r| {
+                r.ends.cut_rows.push(3);
+                r.ends.cut_obs.push(&[0.0]).expect("vectors");
+                r.ends.cut_z.push(0.0);
+                r.ends.cut_left.push(0.0);
+            })
+            .contains("row 3")
+        );
+        assert!(after(|r| r.truncated[4] = true).contains("row 4"));
+        assert!(after(|r| r.ends.cut_obs.clear()).contains("cut_obs"));
+        assert!(after(|r| r.ends.next_z.clear()).contains("next_z"));
+    }
+}
+
+#[cfg(test)]
+pub(super) mod demos_tests {
+    use super::*;
+    use crate::sac::{RlpdConfig, SacLearner};
+    use crate::{DeviceKind, EndStates, ObsKind};
+
+    pub const SPEC: PolicySpec =
+        PolicySpec { obs: ObsKind::Vector(1), latent: 0, action_space: ActionSpace::Discrete(2) };
+
+    /// Returns episodes of this many environments, with observations `sign` times 1, 2, 3, ..., which end together.
+    pub fn episodes(envs: usize, sign: f32, action: u32, rewards: &[f32]) -> Rollout {
+        let rows = rewards.len();
+        let zeros = || vec![0.0; rows];
+        Rollout {
+            steps: rows / envs,
+            obs: (1..=rows).map(|row| sign * row as f32).collect::<Vec<f32>>().into(),
+            actions: Actions::Discrete(vec![action; rows]),
+            log_probs: zeros(),
+            values: zeros(),
+            final_values: zeros(),
+            rewards: rewards.to_vec(),
+            terminated: (0..rows).map(|row| row >= rows - envs).collect(),
+            truncated: vec![false; rows],
+            next_values: vec![0.0; envs],
+            ends: EndStates { next_obs: vec![0.0; envs].into(), ..EndStates::new(&SPEC.obs) },
+            ..Rollout::new(envs, SPEC.obs, 0, &SPEC.action_space)
+        }
+    }
+
+    /// Returns a learner that only observes, with these recordings.
+    fn looking_on(config: SacConfig, demo_share: f64, demos: &[Rollout]) -> SacLearner {
+        let config = SacConfig { hidden: vec![4], learning_starts: 1000, ..config };
+        let rlpd = RlpdConfig { demo_share, critics: 2, ..RlpdConfig::default() };
+        SacLearner::with_demos(config, &rlpd, demos, SPEC, 1, DeviceKind::Flex).expect("good settings")
+    }
+
+    #[test]
+    fn the_share_of_each_batch_is_recorded() {
+        for (share, batch, expected) in [(0.5, 64, 32), (0.25, 64, 16), (0.5, 7, 4)] {
+            let demos = [episodes(1, 1.0, 1, &[5.0; 4]), episodes(1, 1.0, 1, &[5.0; 6])];
+            let mut learner = looking_on(SacConfig { batch, ..SacConfig::default() }, share, &demos);
+            learner.update(&episodes(2, -1.0, 0, &[0.0; 8])).expect("finite");
+            let mut seen: Vec<f32> = Vec::new();
+            for number in 0..60 {
+                let drawn = learner.draw(number).expect("played and recorded");
+                let Actions::Discrete(actions) = &drawn.actions else { panic!("choices") };
+                let recorded = |row: &usize| drawn.obs[*row] > 0.0;
+                assert_eq!((drawn.len(), (0..batch).filter(recorded).count()), (batch, expected));
+                // Observation, action and reward belong together.
+                for (row, paid) in actions.iter().zip(&drawn.rewards).enumerate() {
+                    let whole = if recorded(&row) { (&1, &5.0) } else { (&0, &0.0) };
+                    assert_eq!(paid, whole);
+                }
+                seen.extend_from_slice(&drawn.obs);
+            }
+            seen.sort_by(f32::total_cmp);
+            seen.dedup();
+            let all: Vec<f32> = (-8..=6).filter(|&number| number != 0).map(|number| number as f32).collect();
+            assert_eq!(seen, all, "every step is drawn some time");
+        }
+    }
+
+    #[test]
+    fn recorded_rewards_have_their_scale_from_the_start_and_keep_it() {
+        let paid = episodes(1, 1.0, 1, &[0.0, 0.0, 0.0, 1.0]);
+        let config = SacConfig { norm_reward: true, gamma: 0.5, ..SacConfig::default() };
+        let mut learner = looking_on(config, 0.5, &[paid.clone(), paid]);
+        let scaled = |learner: &SacLearner| learner.base.rewards.as_ref().expect("normalised").scale(1.0);
+        // Six returns of 0 and two of 1 have the variance 3/16.
+        assert!((scaled(&learner) - (16.0f32 / 3.0).sqrt()).abs() < 1e-3, "{}", scaled(&learner));
+        learner.update(&episodes(2, -1.0, 0, &[0.0; 8])).expect("another number of environments");
+        // Fourteen of 0 and two of 1: 7/64.
+        assert!((scaled(&learner) - (64.0f32 / 7.0).sqrt()).abs() < 1e-3, "{}", scaled(&learner));
     }
 }

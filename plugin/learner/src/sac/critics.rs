@@ -1,10 +1,19 @@
 //! The critics of SAC: two, or an ensemble.
 
-use crate::ActionSpace;
-use crate::nn::{ActionBatch, LayerNorm, Mlp, ParamSource, ParamVisitor, Parameters, RandomInit, path};
-use crate::policy::NetShape;
+use crate::{
+    ActionSpace, FileError, LearnError,
+    file::TensorFile,
+    learner::LearnerBase,
+    nn::{
+        ActionBatch, Init, LayerNorm, Mlp, ParamSource, ParamVisitor, Parameters, RandomInit, frozen, path, tracked,
+        vector,
+    },
+    policy::{Actor, ActorShape, NetShape, StdShape},
+    sac::{EntropyCoef, SacConfig},
+};
 use burn::tensor::{Device, Tensor};
 use rand::Rng;
+use std::vec::IntoIter;
 
 /// The shape of an ensemble of critics.
 #[derive(Clone, Debug)]
@@ -149,12 +158,160 @@ impl Pool {
     }
 }
 
+// The networks of SAC: an actor, critics and their targets, and the temperature.
+
+/// The logarithm of the temperature, `[1]`; `log_alpha` in files.
+#[derive(Clone, Debug)]
+pub struct LogTemperature(pub Tensor<1>);
+
+impl Parameters for LogTemperature {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        visitor.visit(&path(prefix, "log_alpha"), &mut self.0);
+    }
+}
+
+/// All networks that SAC trains.
+#[derive(Clone, Debug)]
+pub struct SacNets {
+    /// The policy, tracked.
+    pub actor: Actor,
+    /// The critics, tracked.
+    pub critics: Critics,
+    /// Their slow copies, not tracked.
+    pub targets: Critics,
+    /// The logarithm of the temperature, tracked; unused if that is fixed.
+    pub log_temperature: LogTemperature,
+}
+
+impl SacNets {
+    /// Creates a copy of the decoder, or starting weights from the stream `sac.actor`, and critics with some from
+    /// `sac.critics`.
+    ///
+    /// # Errors
+    /// Does not fail as long as observations are vectors.
+    pub(super) fn fresh(config: &SacConfig, base: &LearnerBase) -> Result<Self, LearnError> {
+        let (shape, device) = (actor_shape(config, base), base.device.plain());
+        let actor = match base.copied_teacher() {
+            Some(teacher) => teacher.origin().clone(),
+            None => shape.fresh(&base.spec, &base.streams, "sac.actor", &device)?,
+        };
+        let mut rng = base.streams.stream("sac.critics", 0);
+        let source = &mut RandomInit { rng: &mut rng, device: &device };
+        let Ok(critics) = Critics::build(source, "", &ensemble(config, base));
+        let initial = match config.entropy {
+            EntropyCoef::Auto { initial, .. } => initial,
+            EntropyCoef::Fixed(_) => 1.0,
+        };
+        let log_temperature = LogTemperature(vector(vec![initial.ln() as f32], &device));
+        Ok(Self::tracked(&actor, &critics, &critics, &log_temperature))
+    }
+
+    /// Reads the networks of a checkpoint.
+    ///
+    /// # Errors
+    /// [`FileError`] names the first tensor that is missing or misshapen.
+    pub(super) fn stored(config: &SacConfig, base: &LearnerBase, file: &mut TensorFile) -> Result<Self, FileError> {
+        let device = base.device.plain();
+        let actor = actor_shape(config, base).stored(&base.spec, file, "actor", &device)?;
+        let (shape, source) = (ensemble(config, base), &mut file.params(&device));
+        let critics = Critics::build(source, "", &shape)?;
+        let targets = Critics::build(source, "target", &shape)?;
+        let log_temperature = LogTemperature(source.param("log_alpha", [1], Init::Zeros)?);
+        Ok(Self::tracked(&actor, &critics, &targets, &log_temperature))
+    }
+
+    fn tracked(actor: &Actor, critics: &Critics, targets: &Critics, log_temperature: &LogTemperature) -> Self {
+        Self {
+            actor: tracked(actor),
+            critics: tracked(critics),
+            targets: frozen(targets),
+            log_temperature: tracked(log_temperature),
+        }
+    }
+
+    /// Returns the present weight of entropy.
+    ///
+    /// # Errors
+    /// [`LearnError::Device`] if it cannot be read.
+    pub fn temperature(&self) -> Result<f64, LearnError> {
+        Ok(f64::from(crate::nn::scalar(self.log_temperature.0.clone().inner())?).exp())
+    }
+}
+
+/// Returns the layers of the network that it copies, if it is a copy, else those of the settings.
+fn actor_shape(config: &SacConfig, base: &LearnerBase) -> ActorShape {
+    let (low, high) = config.log_std;
+    match base.copied_teacher() {
+        Some(teacher) => teacher.shape(),
+        None => ActorShape { net: actors_net(config, base), std: StdShape::Squashed(low, high), cnn: None },
+    }
+}
+
+/// Returns the critics that the settings describe.
+fn ensemble(config: &SacConfig, base: &LearnerBase) -> EnsembleShape {
+    let (shape, space) = (actors_net(config, base), base.spec.action_space);
+    // Critics that count ticks read one number more.
+    let net = NetShape { obs_dim: shape.obs_dim.saturating_add(clock_width(base)), ..shape };
+    EnsembleShape { net, space, critics: config.critics, layer_norm: config.layer_norm }
+}
+
+/// Returns 1 if the critics read the remaining share of a skill's ticks, else 0.
+pub(super) fn clock_width(base: &LearnerBase) -> usize {
+    usize::from(base.score_config().is_some_and(|score| score.critic_clock))
+}
+
+/// Returns the input of the actor, and the hidden layers of all networks.
+fn actors_net(config: &SacConfig, base: &LearnerBase) -> NetShape {
+    NetShape {
+        obs_dim: base.spec.obs.numbers(),
+        latent: base.spec.latent,
+        hidden: config.hidden.clone(),
+        activation: config.activation,
+    }
+}
+
+// Slow copies of networks.
+
+/// Sets target = tau · source + (1 - tau) · target, parameter by parameter (Polyak averaging; a plain copy for tau =
+/// 1).
+///
+/// `target` stays untracked. Both must be of one architecture.
+pub fn soft_update<M: Parameters + Clone>(target: &mut M, source: &M, tau: f64) {
+    let mut flat = Flat(Vec::new());
+    source.clone().visit("", &mut flat);
+    target.visit("", &mut Mix { source: flat.0.into_iter(), tau });
+}
+
+struct Flat(Vec<Tensor<1>>);
+
+impl ParamVisitor for Flat {
+    fn visit<const D: usize>(&mut self, _: &str, tensor: &mut Tensor<D>) {
+        let len = tensor.dims().iter().product::<usize>();
+        self.0.push(tensor.clone().inner().reshape([len]));
+    }
+}
+
+struct Mix {
+    source: IntoIter<Tensor<1>>,
+    tau: f64,
+}
+
+impl ParamVisitor for Mix {
+    fn visit<const D: usize>(&mut self, _: &str, tensor: &mut Tensor<D>) {
+        let source = self.source.next().expect("one architecture, so as many parameters");
+        let source = source.reshape(tensor.dims());
+        let slow = tensor.clone().inner();
+        *tensor = if self.tau < 1.0 { slow * (1.0 - self.tau) + source * self.tau } else { source };
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::DeviceKind;
-    use crate::nn::{Activation, host, matrix};
+    use crate::nn::{host, matrix};
     use crate::rng::Streams;
+    use playbot_kernels::elementwise::Activation;
 
     /// Width of the hidden layers.
     const WIDTH: usize = 16;

@@ -1,6 +1,6 @@
 //! Metrics of an update.
 
-use super::{ActorStep, CriticStep, TemperatureStep};
+use crate::sac::{ActorStep, CriticStep, TemperatureStep};
 use serde::{Deserialize, Serialize};
 
 /// Means over all gradient steps of an update; `None` if not done or not measured.

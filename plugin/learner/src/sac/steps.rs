@@ -1,11 +1,17 @@
 //! The gradient steps of SAC: critics, actor, temperature.
 
-use super::critics::Pool;
-use super::{Critics, SacBatch, SacNets, critic_loss, q_target, soft_value, soft_value_of_choices, temperature_loss};
-use crate::LearnError;
-use crate::nn::{Adam, Dist, LogProbForm, NamedGrads, Parameters, SquashedDraw, SquashedGaussian, finite, frozen};
-use crate::score::{Penalty, ScoreConfig, penalty};
-use burn::tensor::{Gradients, Tensor};
+use crate::{
+    ActionSpace, LearnError,
+    nn::{
+        Adam, Dist, Linear, LogProbForm, Mlp, NamedGrads, Parameters, SquashedDraw, SquashedGaussian, finite, frozen,
+        matrix, vector,
+    },
+    policy::{Actor, LogStd},
+    sac::{Critics, SacBatch, SacNets, critics::Pool},
+    score::{Penalty, ScoreConfig, penalty},
+};
+use burn::tensor::{Device, Gradients, Tensor};
+use playbot_kernels::elementwise::Activation;
 
 /// Metrics of a step of the critics, before it was taken.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -227,4 +233,96 @@ fn descend<M: Parameters>(
     let (norm, scale) = grads.clip_factor(f64::INFINITY, adam.steps())?;
     adam.step(network, prefix, &grads, lr, scale)?;
     Ok(norm)
+}
+
+// The losses of SAC, as pure functions of tensors, `[n]` per row.
+//
+// Continuous and discrete actions share one form. With V = E\[Q - α ln π\], where Q is the least of the critics (or
+// another reduction) and α the temperature, the actor maximises mean(V), and critics learn y = r + γ V'. For
+// continuous actions the expectation is one draw; for discrete ones it is the sum over all choices (Christodoulou
+// 2019, "Soft actor-critic for discrete action settings").
+
+/// Returns V of one draw per row: Q - α ln π(a).
+pub fn soft_value(log_prob: Tensor<1>, q: Tensor<1>, temperature: f64) -> Tensor<1> {
+    q - log_prob * temperature
+}
+
+/// Returns V over all choices: Σ π (Q - α ln π), all inputs `[n, choices]`. The gradient flows through π and ln π.
+pub fn soft_value_of_choices(log_probs: Tensor<2>, q: Tensor<2>, temperature: f64) -> Tensor<1> {
+    let values = q - log_probs.clone() * temperature;
+    (log_probs.exp() * values).sum_dim(1).squeeze_dim(1)
+}
+
+/// Returns y = r + γ V', where `continues` is 1 for rows whose next state counts and 0 for the others.
+pub fn q_target(rewards: Tensor<1>, continues: Tensor<1>, next_values: Tensor<1>, gamma: f64) -> Tensor<1> {
+    rewards + continues * next_values * gamma
+}
+
+/// Returns mean((Q - y)²), `[1]`.
+pub fn critic_loss(q: Tensor<1>, target: Tensor<1>) -> Tensor<1> {
+    (q - target).square().mean()
+}
+
+/// Returns mean(-α (ln π + target entropy)), `[1]`, where `log_prob` is ln π of a draw or E\[ln π\], and constant.
+pub fn temperature_loss(log_temperature: Tensor<1>, log_prob: Tensor<1>, target_entropy: f64) -> Tensor<1> {
+    (log_prob + target_entropy).mean() * log_temperature.exp().neg()
+}
+
+// The policy of play before the first gradient step: random actions.
+
+/// σ at which the tanh of a normal number is nearly uniform: that of the logistic distribution whose tanh is exactly
+/// uniform, π/(2√3). The density in [-0.98, 0.98] lies between 0.44 and 0.62 instead of at 0.5.
+const NEARLY_UNIFORM: f64 = 0.906_899_682_117_108_9;
+
+/// Returns a policy that ignores the `inputs` numbers of its observation: uniform over choices, nearly uniform over
+/// vectors in [-1, 1].
+pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Actor {
+    let dim = space.dim();
+    let zeros = || Linear {
+        weight: matrix(vec![0.0; inputs * dim], inputs, dim, device),
+        bias: vector(vec![0.0; dim], device),
+    };
+    let log_std = match space {
+        ActionSpace::Discrete(_) => LogStd::None,
+        ActionSpace::Continuous(_) => {
+            // In the middle of the range, to which the zeros lead.
+            let middle = NEARLY_UNIFORM.ln();
+            LogStd::Squashed { layer: zeros(), range: (middle - 1.0, middle + 1.0) }
+        }
+    };
+    Actor { cnn: None, net: Mlp { layers: Vec::new(), head: zeros(), activation: Activation::Relu }, log_std }
+}
+
+#[cfg(test)]
+mod explore_tests {
+    use super::*;
+    use crate::policy::Policy;
+    use crate::rng::Streams;
+    use crate::{Action, DeviceKind, PolicySpec};
+
+    /// Counts how 20,000 actions fall into five bins.
+    fn counts(space: ActionSpace) -> [usize; 5] {
+        let device = DeviceKind::Flex.plain();
+        let spec = PolicySpec { obs: 2.into(), latent: 1, action_space: space };
+        let policy = Policy::new(&explorer(space, 3, &device), None, None, spec, device);
+        let output = policy.forward(&[5.0], &[-3.0, 4.0], 1).expect("finite");
+        let mut rng = Streams::new(1).stream("draw", 0);
+        let mut counts = [0; 5];
+        for _ in 0..20_000 {
+            let bin = match output.sample(0, &mut rng).0 {
+                Action::Discrete(choice) => choice as usize,
+                Action::Continuous(vector) => ((vector[1] + 1.0) * 2.5) as usize,
+            };
+            counts[bin.min(4)] += 1;
+        }
+        counts
+    }
+
+    #[test]
+    fn choices_are_equally_likely_and_vectors_nearly() {
+        let choices = counts(ActionSpace::Discrete(5));
+        assert!(choices.iter().all(|n| (3800..4200).contains(n)), "{choices:?}");
+        let vectors = counts(ActionSpace::Continuous(2));
+        assert!(vectors.iter().all(|n| (3300..4700).contains(n)), "{vectors:?}");
+    }
 }

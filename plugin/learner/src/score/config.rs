@@ -1,8 +1,10 @@
 //! Settings of SCORE.
 
-use crate::settings::{Range, Reader, Settings};
-use crate::skill::SkillDraw;
-use crate::{ActionSpace, LearnError, SettingError, settings};
+use crate::{
+    ActionSpace, LearnError, SettingError, settings,
+    settings::{Range, Reader, Settings},
+    skill::SkillDraw,
+};
 use serde::{Deserialize, Serialize};
 
 /// The penalised divergence.

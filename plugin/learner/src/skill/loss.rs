@@ -1,7 +1,9 @@
 //! The loss of the skill model, J = NLL + β KL(q ‖ p).
 
-use super::{Reduction, SkillConfig, SkillForward};
-use crate::nn::Dist;
+use crate::{
+    nn::Dist,
+    skill::{Reduction, SkillConfig, SkillForward},
+};
 use burn::tensor::Tensor;
 
 /// Bound of the legacy clamps.

@@ -1,12 +1,20 @@
 //! The three networks of the skill model together.
 
-use super::{Encoder, SkillConfig, SkillDescription, StateHeads};
-use crate::file::TensorFile;
-use crate::nn::{ActionBatch, Dist, ObsBatch, ParamVisitor, Parameters, path};
-use crate::policy::Actor;
-use crate::rng::Streams;
-use crate::{ActionSpace, FileError, LearnError, ObsKind};
+use crate::{
+    ActionSpace, FileError, LearnError, ObsKind,
+    file::TensorFile,
+    nn::{
+        ActionBatch, Dist, Gru, ImageNet, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, RandomInit,
+        path,
+    },
+    policy::Actor,
+    rng::Streams,
+    skill::{Dataset, SkillConfig, SkillDescription},
+};
 use burn::tensor::{Device, Tensor};
+use playbot_kernels::elementwise::Activation;
+use rand::Rng;
+use std::sync::Arc;
 
 /// Encoder, decoder and prior.
 #[derive(Clone, Debug)]
@@ -82,7 +90,7 @@ impl SkillNets {
     /// Runs a batch of B windows through all three networks.
     ///
     /// `states`, `steps * B` rows, are time-major, so that the first B rows are those of the first step;
-    /// `encoded_actions` are the actions as the encoder reads them ([`ActionInput`](super::ActionInput)), and `noise`
+    /// `encoded_actions` are the actions as the encoder reads them ([`ActionInput`](crate::skill::ActionInput)), and `noise`
     /// `[B, latent]` is standard normal: z = mean + noise · σ.
     ///
     /// # Errors
@@ -157,5 +165,207 @@ impl Parameters for SkillNets {
         if let Some(heads) = &mut self.state_heads {
             heads.visit(&path(prefix, "state_heads"), visitor);
         }
+    }
+}
+
+// The encoder q(z | τ): from a window of states and actions to a latent skill.
+
+/// The network over each step's observation.
+#[derive(Clone, Debug)]
+pub enum StateNet {
+    /// Three layers over a vector, ReLU between them; `state` in names.
+    Vector(Mlp),
+    /// Convolutions over an image; `cnn` in names.
+    Image(ImageNet),
+}
+
+/// The features of each step's observation, joined with the action, read in both directions by recurrent layers; from
+/// the two last outputs, linear heads for the mean and ln σ of z.
+#[derive(Clone, Debug)]
+pub struct Encoder {
+    /// Per-step layers over the observation.
+    pub state: StateNet,
+    /// The recurrent layers.
+    pub gru: Gru,
+    /// Head of the mean.
+    pub mean: Linear,
+    /// Head of ln σ, not clamped.
+    pub log_std: Linear,
+}
+
+impl Encoder {
+    /// Creates starting weights: orthogonal, recurrent layers uniform. `action_width` is that of an action as the
+    /// encoder reads it.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if images are too small for the convolutions.
+    pub fn new<R: Rng + ?Sized>(
+        config: &SkillConfig,
+        observation: ObsKind,
+        action_width: usize,
+        rng: &mut R,
+        device: &Device,
+    ) -> Result<Self, LearnError> {
+        if let ObsKind::Image(image) = observation {
+            config.cnn.check_image(image)?;
+        }
+        let Ok(encoder) = Self::build(&mut RandomInit { rng, device }, "", config, observation, action_width);
+        Ok(encoder)
+    }
+
+    /// Creates an encoder as [`Self::new`], with parameters out of `source`.
+    pub(crate) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        config: &SkillConfig,
+        observation: ObsKind,
+        action_width: usize,
+    ) -> Result<Self, S::Error> {
+        let (state, features) = match observation {
+            ObsKind::Vector(obs_dim) => {
+                let (name, width) = (path(prefix, "state"), config.encoder_hidden);
+                let net = Mlp::build(source, &name, obs_dim, &[width; 2], width, Activation::Relu, 1.0)?;
+                (StateNet::Vector(net), width)
+            }
+            ObsKind::Image(image) => {
+                let net = ImageNet::build(source, &path(prefix, "cnn"), &config.cnn, image)?;
+                (StateNet::Image(net), config.cnn.features())
+            }
+        };
+        let inputs = features.saturating_add(action_width);
+        let gru = Gru::build(source, &path(prefix, "gru"), inputs, config.gru_hidden, config.gru_layers, true)?;
+        let summary = config.gru_hidden.saturating_mul(2);
+        Ok(Self {
+            state,
+            gru,
+            mean: Linear::build(source, &path(prefix, "mean"), summary, config.latent, 1.0)?,
+            log_std: Linear::build(source, &path(prefix, "log_std"), summary, config.latent, 0.01)?,
+        })
+    }
+
+    /// Returns the Gaussian over z, before any squashing, for each of B windows of `steps` steps.
+    ///
+    /// `states`, `steps * B` rows, and `actions` `[steps * B, action_width]`
+    /// ([`ActionInput`](crate::skill::ActionInput)) are time-major: row `t * B + b`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the observations are of the other kind than the network.
+    pub fn forward(&self, states: &ObsBatch, actions: Tensor<2>, steps: usize) -> Result<Dist, LearnError> {
+        let summary = self.summary(states, actions, steps)?;
+        Ok(Dist::Gaussian { mean: self.mean.forward(summary.clone()), log_std: self.log_std.forward(summary) })
+    }
+
+    /// Returns the recurrent layers' summary of each window, `[B, 2 * gru_hidden]`; inputs and errors as
+    /// [`Self::forward`].
+    pub fn summary(&self, states: &ObsBatch, actions: Tensor<2>, steps: usize) -> Result<Tensor<2>, LearnError> {
+        let joined = Tensor::cat(vec![self.state.forward(states)?, actions], 1);
+        Ok(self.gru.summary(joined, steps))
+    }
+}
+
+impl StateNet {
+    /// Returns the features of each observation, `[n, features]`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if the observations are of the other kind than the network.
+    pub fn forward(&self, states: &ObsBatch) -> Result<Tensor<2>, LearnError> {
+        match (self, states) {
+            (Self::Vector(net), ObsBatch::Vector(x)) => Ok(net.forward(x.clone())),
+            (Self::Image(net), ObsBatch::Image(x)) => Ok(net.forward(x.clone())),
+            _ => Err(LearnError::Config("the encoder got observations of the other kind".to_owned())),
+        }
+    }
+}
+
+impl Parameters for Encoder {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        match &mut self.state {
+            StateNet::Vector(net) => net.visit(&path(prefix, "state"), visitor),
+            StateNet::Image(net) => net.visit(&path(prefix, "cnn"), visitor),
+        }
+        self.gru.visit(&path(prefix, "gru"), visitor);
+        self.mean.visit(&path(prefix, "mean"), visitor);
+        self.log_std.visit(&path(prefix, "log_std"), visitor);
+    }
+}
+
+// An auxiliary task for learning from pictures: the trunks of decoder and prior predict the game's state.
+//
+// A recorded action carries little information about a picture. The vector that the game fills for its vector sensor
+// carries much: the positions of walls and of the coin. Recordings are replayed through both sensors, and a linear
+// layer over a trunk's features learns the vector, with its gradient reaching the trunk. The layers are dropped
+// after training: the model reads pictures alone. (An auxiliary task as in Jaderberg et al. 2017, "Reinforcement
+// learning with unsupervised auxiliary tasks", with data that only the simulator knows as its target.)
+
+/// One linear layer for each of the two trunks.
+#[derive(Clone, Debug)]
+pub struct StateHeads {
+    /// From the decoder's features.
+    pub decoder: Linear,
+    /// From the prior's.
+    pub prior: Linear,
+}
+
+impl StateHeads {
+    /// Creates starting weights from the stream `skill.state_heads`, for trunks of `features` and states of
+    /// `numbers`.
+    pub(super) fn new(features: usize, numbers: usize, streams: &Streams, device: &Device) -> Self {
+        let mut rng = streams.stream("skill.state_heads", 0);
+        let Ok(heads) = Self::build(&mut RandomInit { rng: &mut rng, device }, "", features, numbers);
+        heads
+    }
+
+    pub(super) fn build<S: ParamSource>(
+        source: &mut S,
+        prefix: &str,
+        features: usize,
+        numbers: usize,
+    ) -> Result<Self, S::Error> {
+        let mut layer = |name| Linear::build(source, &path(prefix, name), features, numbers, 1.0);
+        Ok(Self { decoder: layer("decoder")?, prior: layer("prior")? })
+    }
+
+    /// Returns the mean squared error, over the state's numbers, with which features predict `states` `[steps * B,
+    /// numbers]`, time-major: summed over a window's steps, and for the prior its first, and the mean over B windows,
+    /// `[1]`. Predicting the mean of normalised states costs steps + 1.
+    pub(super) fn error(&self, forward: &SkillForward, states: &Tensor<2>) -> Tensor<1> {
+        let [windows, _] = forward.decoder_latent.dims();
+        let error = |head: &Linear, features: &Tensor<2>, states: Tensor<2>| {
+            let [_, numbers] = states.dims();
+            (head.forward(features.clone()) - states).square().sum() / (numbers * windows) as f32
+        };
+        let first = states.clone().narrow(0, 0, windows);
+        error(&self.decoder, &forward.decoder_features, states.clone())
+            + error(&self.prior, &forward.prior_features, first)
+    }
+}
+
+/// Returns the number of values predicted from each picture, if any.
+pub(super) fn told_numbers(config: &SkillConfig, dataset: &Dataset) -> Option<usize> {
+    let states = dataset.states.as_ref().filter(|_| config.tells_states())?;
+    Some(states.obs_dim())
+}
+
+impl Parameters for StateHeads {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        self.decoder.visit(&path(prefix, "decoder"), visitor);
+        self.prior.visit(&path(prefix, "prior"), visitor);
+    }
+}
+
+impl Dataset {
+    /// Adds the vectors of the game's vector sensor for the same steps, for [`SkillConfig::state_weight`].
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if `states` holds no vectors, [`LearnError::Shape`] if it holds other episodes.
+    pub fn with_states(self, states: Self) -> Result<Self, LearnError> {
+        if !matches!(states.observation(), ObsKind::Vector(_)) {
+            return Err(LearnError::Config("states are vectors".to_owned()));
+        }
+        LearnError::check("episodes of states", self.episodes(), states.episodes())?;
+        for (seen, state) in self.episodes.iter().zip(states.episodes.iter()) {
+            LearnError::check("states of an episode", seen.actions.len(), state.actions.len())?;
+        }
+        Ok(Self { states: Some(Arc::new(states)), ..self })
     }
 }

@@ -1,10 +1,12 @@
 //! The prior p(z | s₀) in use.
 
-use crate::device::guarded;
-use crate::nn::frozen;
-use crate::norm::ObsStats;
-use crate::policy::{Actor, InputBuilder};
-use crate::{LearnError, ObsKind, ObsSlice};
+use crate::{
+    LearnError, ObsKind, ObsSlice,
+    device::guarded,
+    nn::frozen,
+    norm::ObsStats,
+    policy::{Actor, InputBuilder},
+};
 use burn::tensor::Device;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -1,21 +1,25 @@
 //! Training of the skill model.
 
-use super::held_out::{Best, HeldOut};
-use super::metrics::{MetricSums, accuracy};
-use super::state_heads::told_numbers;
-use super::{
-    Dataset, SkillConfig, SkillDescription, SkillForward, SkillMetrics, SkillModel, SkillNets, StateHeads, Window,
-    skill_loss,
+use crate::{
+    Actions, DeviceKind, FileError, LearnError, ObsKind, Observations,
+    device::update_on,
+    file::{FileKind, TensorFile},
+    nn::{
+        ActionBatch, Adam, AdamConfig, Dist, NamedGrads, ObsBatch, argmax, check_loss, frozen, host, matrix, scalar,
+        tracked,
+    },
+    norm::{ObsStats, put_obs_stats, take_obs_stats},
+    observation::augmented,
+    rng::{ChaCha8Rng, Streams, normal, shuffle},
+    skill::{
+        Dataset, SkillConfig, SkillDescription, SkillForward, SkillModel, SkillNets, StateHeads, Window,
+        nets::told_numbers, skill_loss,
+    },
 };
-use crate::device::{is_host, update_on};
-use crate::nn::{ActionBatch, Adam, AdamConfig, NamedGrads, ObsBatch, check_loss, host, matrix, scalar, tracked};
-use crate::norm::ObsStats;
-use crate::observation::augmented;
-use crate::rng::{ChaCha8Rng, Streams, normal};
-use crate::{Actions, DeviceKind, LearnError, ObsKind, Observations};
 use burn::tensor::Tensor;
-use std::ops::ControlFlow;
-use std::sync::Arc;
+use playbot_kernels::host_numbers::is_host;
+use serde::{Deserialize, Serialize};
+use std::{collections::BTreeSet, ops::ControlFlow, path::Path, sync::Arc};
 
 /// Progress of training, after each batch.
 #[derive(Clone, Copy, Debug)]
@@ -311,5 +315,320 @@ impl SkillTrainer {
         let rows = steps * windows.len();
         let states = matrix(stats.normalize(&values), rows, states.obs_dim(), &self.device.plain());
         Ok(Some(heads.error(forward, &states)))
+    }
+}
+
+// Held-out demonstrations, which show when a skill model begins to overfit.
+
+/// Metrics of a skill model on held-out demonstrations: means over their windows.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct HeldOutMetrics {
+    /// The whole loss.
+    pub loss: f32,
+    /// Negative log-likelihood of a window's actions, in nats.
+    pub nll: f32,
+    /// KL from the encoder to the prior, in nats.
+    pub kl: f32,
+    /// As [`SkillMetrics::state_error`].
+    pub state_error: Option<f32>,
+}
+
+/// Held-out demonstrations, with a fixed set of windows.
+#[derive(Debug)]
+pub(super) struct HeldOut {
+    dataset: Dataset,
+    windows: Vec<Window>,
+}
+
+/// The networks after the best epoch on the held-out demonstrations.
+#[derive(Clone, Debug)]
+pub(super) struct Best {
+    /// Epochs done by then.
+    pub(super) epoch: u64,
+    /// The NLL on them.
+    pub(super) nll: f32,
+    pub(super) nets: SkillNets,
+}
+
+impl Dataset {
+    /// Returns the episodes to learn from and the held-out ones: all episodes of a share of the levels, which is
+    /// drawn from `streams`, at least one. Whole levels are held out because episodes of the same level are alike.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if no episode would be left to learn from.
+    pub(super) fn without_held_out(
+        self,
+        config: &SkillConfig,
+        streams: &Streams,
+    ) -> Result<(Self, Option<HeldOut>), LearnError> {
+        if config.held_out == 0.0 {
+            return Ok((self, None));
+        }
+        let distinct: BTreeSet<usize> = self.levels.iter().copied().collect();
+        // With a single level there are only episodes to choose from.
+        let groups = if distinct.len() > 1 { self.levels.to_vec() } else { (0..self.episodes.len()).collect() };
+        let mut order: Vec<usize> = groups.iter().copied().collect::<BTreeSet<_>>().into_iter().collect();
+        let (all, what) = (order.len(), if distinct.len() > 1 { "levels" } else { "episodes" });
+        let count = ((config.held_out * all as f64).round() as usize).max(1);
+        if count >= all {
+            let text = format!(
+                "skill held_out takes {count} of {all} {what}, which leaves none to learn from: record more, or set \
+                 it to 0"
+            );
+            return Err(LearnError::Config(text));
+        }
+        shuffle(&mut order, &mut streams.stream("skill.held_out", 0));
+        let apart: BTreeSet<usize> = order[..count].iter().copied().collect();
+        let some = |is_apart: bool| {
+            let numbers = (0..groups.len()).filter(|&episode| apart.contains(&groups[episode]) == is_apart);
+            self.subset(&numbers.collect::<Vec<_>>())
+        };
+        let dataset = some(true);
+        let windows = dataset.windows(config.window, config.windows, streams, 0)?;
+        Ok((some(false), Some(HeldOut { dataset, windows })))
+    }
+}
+
+impl SkillTrainer {
+    /// Measures the networks on the held-out demonstrations, if there are any, and keeps the networks if their NLL is
+    /// the lowest so far. The rest of the loss does not count: it measures how skills are told apart, not how well
+    /// they are played. The draws of skills are the same each time.
+    pub(super) fn measure_held_out(&mut self) -> Result<Option<HeldOutMetrics>, LearnError> {
+        let Some(held_out) = &self.held_out else { return Ok(None) };
+        let mut sums = [0.0f64; 4];
+        for (number, windows) in held_out.windows.chunks(self.config.batch).enumerate() {
+            let mut rng = self.streams.stream("skill.held_out.noise", number as u64);
+            let (forward, _) = self.forward_of(&held_out.dataset, windows, None, &mut rng)?;
+            let loss = skill_loss(&forward, &self.config);
+            let mut parts = vec![loss.total, loss.nll, loss.kl];
+            parts.extend(self.state_error(&held_out.dataset, windows, &forward)?);
+            let numbers = host(Tensor::cat(parts.into_iter().map(Tensor::inner).collect(), 0))?;
+            sums.iter_mut().zip(numbers).for_each(|(sum, x)| *sum += f64::from(x) * windows.len() as f64);
+        }
+        let [loss, nll, kl, state_error] = sums.map(|sum| (sum / held_out.windows.len() as f64) as f32);
+        if !loss.is_finite() {
+            return Err(LearnError::NotFinite {
+                tensor: "the loss on demonstrations kept apart".to_owned(),
+                steps: None,
+            });
+        }
+        if self.config.patience.is_some() && self.best.as_ref().is_none_or(|best| nll < best.nll) {
+            let nets = SkillNets { state_heads: None, ..frozen(&self.nets) };
+            self.best = Some(Best { epoch: self.epoch, nll, nets });
+        }
+        let state_error = self.nets.state_heads.as_ref().map(|_| state_error);
+        Ok(Some(HeldOutMetrics { loss, nll, kl, state_error }))
+    }
+
+    /// Returns whether [`SkillConfig::patience`] is exhausted: more epochs would overfit.
+    pub fn is_over(&self) -> bool {
+        let best = self.best.as_ref().zip(self.config.patience);
+        best.is_some_and(|(best, patience)| self.epoch >= best.epoch + patience as u64)
+    }
+
+    /// Returns the epoch after which the networks had the least NLL on the held-out demonstrations; `None` without
+    /// any.
+    pub fn best_epoch(&self) -> Option<u64> {
+        self.best.as_ref().map(|best| best.epoch)
+    }
+
+    /// Returns the NLL on the held-out demonstrations after [`Self::best_epoch`].
+    pub fn best_nll(&self) -> Option<f32> {
+        self.best.as_ref().map(|best| best.nll)
+    }
+
+    /// Returns the networks of the model: the best ones, or the present ones.
+    pub(super) fn nets_of_model(&self) -> SkillNets {
+        self.best.as_ref().map_or_else(|| self.nets.clone(), |best| tracked(&best.nets))
+    }
+}
+
+impl SkillMetrics {
+    /// Returns the NLL on held-out demonstrations, if there are any.
+    pub fn held_out_nll(&self) -> Option<f32> {
+        self.held_out.map(|held_out| held_out.nll)
+    }
+}
+
+// Metrics of a skill model's training.
+
+/// Metrics of one batch, or their mean over an epoch's batches.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SkillMetrics {
+    /// The whole loss.
+    pub loss: f32,
+    /// Negative log-likelihood of a window's actions, in nats (see [`crate::skill::Reduction`]).
+    pub nll: f32,
+    /// KL from the encoder to the prior, in nats.
+    pub kl: f32,
+    /// Mean Euclidean norm of the decoder's latent.
+    pub latent_norm: f32,
+    /// Share of steps whose action is the decoder's most likely one; `None` for continuous actions.
+    pub accuracy: Option<f32>,
+    /// Norm of the gradient before clipping.
+    pub grad_norm: f32,
+    /// Squared error of the predicted state, the mean over its numbers and summed over a window, with
+    /// [`state_weight`](crate::skill::SkillConfig::state_weight); it starts near the number of steps of a window plus 1.
+    pub state_error: Option<f32>,
+    /// Metrics of an epoch's networks on held-out demonstrations; `None` for a single batch, and without any.
+    pub held_out: Option<HeldOutMetrics>,
+}
+
+/// Sums over the running epoch's batches.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct MetricSums {
+    pub(super) count: usize,
+    pub(super) total: [f64; 7],
+}
+
+impl MetricSums {
+    pub(super) fn add(&mut self, m: &SkillMetrics) {
+        let optional = [m.accuracy, m.state_error].map(|x| x.unwrap_or(0.0));
+        let values = [m.loss, m.nll, m.kl, m.latent_norm, optional[0], m.grad_norm, optional[1]];
+        self.count += 1;
+        self.total.iter_mut().zip(values).for_each(|(sum, x)| *sum += f64::from(x));
+    }
+
+    /// Returns the means over those metrics that `last`, the last batch, has.
+    pub(super) fn mean(self, last: &SkillMetrics) -> SkillMetrics {
+        let [loss, nll, kl, latent_norm, hits, grad_norm, state_error] =
+            self.total.map(|sum| (sum / self.count.max(1) as f64) as f32);
+        let (accuracy, state_error) = (last.accuracy.map(|_| hits), last.state_error.map(|_| state_error));
+        SkillMetrics { loss, nll, kl, latent_norm, accuracy, grad_norm, state_error, held_out: None }
+    }
+}
+
+/// Returns the share of the actions that are the most likely ones; `None` for continuous actions.
+pub(super) fn accuracy(decoded: &Dist, actions: &Actions) -> Result<Option<f32>, LearnError> {
+    let (Dist::Categorical { log_probs }, Actions::Discrete(actions)) = (decoded, actions) else {
+        return Ok(None);
+    };
+    let [rows, dim] = log_probs.dims();
+    let log_probs = host(log_probs.clone().inner())?;
+    let hits = log_probs.chunks_exact(dim).zip(actions).filter(|(row, a)| argmax(row) == **a).count();
+    Ok(Some(hits as f32 / rows as f32))
+}
+
+// A trainer's complete state in one file.
+
+const FILE: FileKind = FileKind { name: "skill checkpoint", version: 1 };
+
+/// The JSON in the file's header.
+///
+/// The trainer's generators are streams of `seed` numbered by the epoch and by `adam_steps`.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    skill: SkillDescription,
+    seed: u64,
+    epoch: u64,
+    windows_done: usize,
+    adam_steps: u64,
+    batches: usize,
+    demo_episodes: usize,
+    demo_steps: usize,
+    /// A hash of the demonstrations; the first checkpoints had none.
+    #[serde(default)]
+    demo_hash: Option<u64>,
+    /// The best epoch on the held-out demonstrations, and the NLL there; the first checkpoints had the whole loss.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    best: Option<(u64, f32)>,
+}
+
+impl SkillTrainer {
+    /// Writes the complete state except the demonstrations, so that training continues bit for bit. The file gets a
+    /// temporary name first, so a checkpoint is complete or absent.
+    ///
+    /// # Errors
+    /// [`FileError::Io`] if it cannot be written.
+    pub fn save(&self, path: &Path) -> Result<(), FileError> {
+        let header = Header {
+            skill: self.description(),
+            seed: self.streams.seed(),
+            epoch: self.epoch,
+            windows_done: self.next,
+            adam_steps: self.adam.steps,
+            batches: self.sums.count,
+            demo_episodes: self.extent.0,
+            demo_steps: self.extent.1,
+            demo_hash: Some(self.fingerprint),
+            best: self.best.as_ref().map(|best| (best.epoch, best.nll)),
+        };
+        let mut file = TensorFile::new(path, FILE, &header)?;
+        file.put_network("", &self.nets)?;
+        file.put_adam(&self.adam)?;
+        if let Some(stats) = &self.stats {
+            put_obs_stats(&mut file, "obs_norm", stats);
+        }
+        if let Some(best) = &self.best {
+            file.put_network("best", &best.nets)?;
+        }
+        file.put_f64("epoch_sums", &self.sums.total);
+        file.write()
+    }
+
+    /// Reads a file that [`Self::save`] wrote; `dataset` must be the one of that run.
+    ///
+    /// # Errors
+    /// [`FileError`] describes the problem of the file, or does not fit the demonstrations.
+    pub fn load(path: &Path, dataset: Dataset, device: DeviceKind) -> Result<Self, FileError> {
+        let mut file = TensorFile::read(path)?;
+        let header: Header = file.header(FILE)?;
+        device.check().map_err(|e| file.learner(e))?;
+        let skill = header.skill;
+        for (what, expected, found) in [
+            ("episodes of the demonstrations", header.demo_episodes, dataset.episodes()),
+            ("steps of the demonstrations", header.demo_steps, dataset.steps()),
+        ] {
+            LearnError::check(what, expected, found).map_err(|e| file.learner(e))?;
+        }
+        if skill.observation != dataset.observation() {
+            let (reads, found) = (skill.observation, dataset.observation());
+            return Err(file.format(format!("reads {reads}, the demonstrations are {found}")));
+        }
+        if skill.action_space != dataset.action_space() {
+            return Err(file.format(format!(
+                "acts with {}, the demonstrations with {}",
+                skill.action_space,
+                dataset.action_space()
+            )));
+        }
+        let mut nets = SkillNets::stored(&skill, &mut file, "", &device.plain())?;
+        if let Some(numbers) = told_numbers(&skill.config, &dataset) {
+            let features = skill.config.cnn.features();
+            let heads = StateHeads::build(&mut file.params(&device.plain()), "state_heads", features, numbers)?;
+            nets.state_heads = Some(heads);
+        }
+        let best = match header.best {
+            None => None,
+            Some((epoch, nll)) => {
+                let nets = SkillNets::stored(&skill, &mut file, "best", &device.plain())?;
+                Some(Best { epoch, nll, nets })
+            }
+        };
+        let trainer = Self::with_nets(skill.config, dataset, &nets, header.seed, device);
+        let mut trainer = trainer.map_err(|e| file.learner(e))?;
+        if header.demo_hash.is_some_and(|hash| hash != trainer.fingerprint) {
+            let text = "the demonstrations are not those of this run: their episodes differ in content";
+            return Err(file.format(text.to_owned()));
+        }
+        file.take_adam(&mut trainer.adam, "", &mut trainer.nets, header.adam_steps)?;
+        if let Some(stats) = &mut trainer.stats {
+            *stats = Arc::new(take_obs_stats(&mut file, "obs_norm", trainer.dataset.obs_dim())?);
+        }
+        trainer.sums.count = header.batches;
+        // Older checkpoints have no error of states.
+        let sums = file.take_f64("epoch_sums", None)?;
+        trainer.sums.total.iter_mut().zip(sums).for_each(|(total, sum)| *total = sum);
+        trainer.best = best;
+        trainer.epoch = header.epoch;
+        let windows = trainer.cut_windows(header.epoch);
+        trainer.windows = windows.map_err(|e| file.learner(e))?;
+        if header.windows_done >= trainer.windows.len() {
+            return Err(file.format("is behind the end of its epoch".to_owned()));
+        }
+        trainer.next = header.windows_done;
+        file.finish()?;
+        Ok(trainer)
     }
 }

@@ -1,15 +1,19 @@
 //! The learner of π(z | s): PPO or SAC, tied to the prior.
 
-use super::SpirlConfig;
-use super::skill_steps::{SkillRollout, skill_rollout};
-use crate::file::TensorFile;
-use crate::learner::Learner;
-use crate::nn::unsquashed_action;
-use crate::norm::RewardNormalizer;
-use crate::policy::Policy;
-use crate::score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig, Teacher};
-use crate::skill::{Prior, SkillDraw};
-use crate::{Action, Actions, FileError, LearnError, PpoLearner, Rollout, SacLearner};
+use crate::{
+    Action, Actions, FileError, LearnError, PpoLearner, Rollout, SacLearner,
+    file::TensorFile,
+    learner::Learner,
+    nn::unsquashed_action,
+    norm::RewardNormalizer,
+    policy::Policy,
+    score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig, Teacher},
+    skill::{Prior, SkillDraw},
+    spirl::{
+        SpirlConfig,
+        skill_steps::{SkillRollout, skill_rollout},
+    },
+};
 use std::path::Path;
 
 /// The learner of π(z | s).

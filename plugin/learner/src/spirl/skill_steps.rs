@@ -1,7 +1,6 @@
 //! Conversion of a rollout of ticks to one of skills.
 
-use crate::sac::check_ends;
-use crate::{ActionSpace, Actions, EndStates, LearnError, Rollout};
+use crate::{ActionSpace, Actions, EndStates, LearnError, Rollout, sac::check_ends};
 
 /// The state after a skill.
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -223,7 +223,10 @@ fn settings_that_cannot_work_are_named() {
         ("gamma", SacConfig { gamma: -0.1, ..config() }),
         ("log_std", SacConfig { log_std: (2.0, -5.0), ..config() }),
         ("updates_per_step", SacConfig { updates_per_step: 0.0, ..config() }),
-        ("`sac.entropy` initial", SacConfig { entropy: EntropyCoef::Auto { initial: 0.0, target_scale: None }, ..config() }),
+        (
+            "`sac.entropy` initial",
+            SacConfig { entropy: EntropyCoef::Auto { initial: 0.0, target_scale: None }, ..config() },
+        ),
         ("entropy", SacConfig { entropy: EntropyCoef::Fixed(-1.0), ..config() }),
     ] {
         let error = SacLearner::new(config, SPEC, 1, DeviceKind::Flex).expect_err("bad settings");

@@ -1,9 +1,23 @@
 //! Little-endian reading and writing of the values inside a frame.
+//!
+//! # Frames: one episode each, found and checked without knowledge of the frames before it
+//!
+//! ```text
+//! magic (4 bytes) | payload length (u32) | payload | CRC-32 of length and payload (u32)
+//! ```
 
-use super::episode_fault::EpisodeFault;
+use crate::{
+    demo::file::{
+        episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions},
+        error::EpisodeFault,
+        header::{DemoActions, DemoHeader, LEVEL_FILES_FORMAT},
+    },
+    level::LevelFile,
+};
 
 /// Encodings of a list; the shorter one is used.
 const PLAIN: u8 = 0;
+
 const RUNS: u8 = 1;
 
 pub(super) fn malformed(why: impl Into<String>) -> EpisodeFault {
@@ -39,6 +53,7 @@ macro_rules! scalar {
         }
     )*};
 }
+
 scalar!(u8, u16, u32, u64, f32);
 
 /// Writes the values one after the other, without their number.
@@ -127,6 +142,208 @@ impl<'a> Cursor<'a> {
     }
 }
 
+/// First bytes of a frame. The first byte is not ASCII and not valid UTF-8, so no header contains it.
+pub(super) const FRAME_MAGIC: [u8; 4] = [0xfe, b'E', b'P', 0xff];
+
+/// Bytes before the payload.
+pub(super) const FRAME_HEAD: usize = 8;
+
+/// Bytes of a frame beside its payload.
+pub(super) const FRAME_EXTRA: usize = FRAME_HEAD + 4;
+
+/// Largest payload, in bytes: about four days of ticks at 60 Hz with two observation values.
+pub(super) const MAX_PAYLOAD: usize = 1 << 28;
+
+/// Returns the whole frame of an episode.
+pub(super) fn encode(episode: &DemoEpisode, header: &DemoHeader) -> Result<Vec<u8>, EpisodeFault> {
+    let mut bytes = FRAME_MAGIC.to_vec();
+    bytes.extend_from_slice(&[0; 4]);
+    encode_payload(episode, header, &mut bytes)?;
+    let length = bytes.len() - FRAME_HEAD;
+    if length > MAX_PAYLOAD {
+        return Err(EpisodeFault::TooLarge { bytes: length, limit: MAX_PAYLOAD });
+    }
+    bytes[4..FRAME_HEAD].copy_from_slice(&(length as u32).to_le_bytes());
+    let crc = crc32fast::hash(&bytes[4..]);
+    bytes.extend_from_slice(&crc.to_le_bytes());
+    Ok(bytes)
+}
+
+/// Returns the payload length that a frame head announces; `None` when no frame begins here.
+pub(super) fn payload_length(head: &[u8]) -> Option<usize> {
+    let rest = head.strip_prefix(&FRAME_MAGIC)?.first_chunk::<4>()?;
+    Some(u32::from_le_bytes(*rest) as usize)
+}
+
+/// Returns the payload of a whole frame; `None` when its checksum does not hold.
+pub(super) fn payload(frame: &[u8]) -> Option<&[u8]> {
+    let (body, crc) = frame.split_last_chunk::<4>()?;
+    let intact = crc32fast::hash(body.get(4..)?) == u32::from_le_bytes(*crc);
+    intact.then_some(&body[FRAME_HEAD..])
+}
+
+// The bytes of one episode inside its frame.
+//
+// | Field | Coding |
+// |---|---|
+// | steps | `u32` |
+// | state hashes | `steps` × `u32` |
+// | level seed | `u64` |
+// | end | `u8`: 0 terminated without, 1 with success, 2 truncated, 3 aborted |
+// | kind of actions | `u8`: 1, 2 or 4 bytes for a discrete action; 0 for continuous ones, then `u32` dimensions |
+// | actions | discrete: list; continuous: `steps` × dimensions × `f32` |
+// | rewards | list of `f32` |
+// | deciders | list of `u8`: 0 human, 1 bot, 2 policy, 3 replay, 4 idle |
+// | observation width | `u32` |
+// | observations | `steps` × width × `f32` |
+// | level file | from format 2 on: `u32` bytes of its path, 0 for none; the path in UTF-8; the level's hash, `u64` |
+//
+// All numbers are little-endian. A list is one byte and then either the plain values (byte 0) or runs
+// of a count (seven bits a byte, lowest first) and a value (byte 1), whichever is shorter.
+// The hashes come first: they bound the number of steps by the size of the frame.
+
+/// Appends the episode to `out`, after [`DemoEpisode::check`] against the header.
+pub(super) fn encode_payload(
+    episode: &DemoEpisode,
+    header: &DemoHeader,
+    out: &mut Vec<u8>,
+) -> Result<(), EpisodeFault> {
+    episode.check(header)?;
+    let steps = u32::try_from(episode.len()).map_err(|_| malformed("more steps than 32 bits count"))?;
+    put_plain(&[steps], out);
+    put_plain(&episode.state_hashes, out);
+    put_plain(&[episode.level_seed], out);
+    out.push(match episode.end {
+        DemoEnd::Terminated { success: false } => 0,
+        DemoEnd::Terminated { success: true } => 1,
+        DemoEnd::Truncated => 2,
+        DemoEnd::Aborted => 3,
+    });
+    match &episode.actions {
+        EpisodeActions::Discrete(actions) => {
+            // The actions were checked to be below the header's count, so the casts lose nothing.
+            let size = action_size(header.actions);
+            out.push(size);
+            match size {
+                1 => put_list(&actions.iter().map(|&a| a as u8).collect::<Vec<_>>(), out),
+                2 => put_list(&actions.iter().map(|&a| a as u16).collect::<Vec<_>>(), out),
+                _ => put_list(actions, out),
+            }
+        }
+        EpisodeActions::Continuous { dim, values } => {
+            out.push(0);
+            put_plain(&[*dim as u32], out);
+            put_plain(values, out);
+        }
+    }
+    put_list(&episode.rewards, out);
+    put_list(&episode.deciders.iter().map(|&d| decider_code(d)).collect::<Vec<_>>(), out);
+    put_plain(&[header.observation_names.len() as u32], out);
+    put_plain(&episode.observations, out);
+    put_level_file(episode.level_file.as_ref(), header, out)
+}
+
+fn put_level_file(file: Option<&LevelFile>, header: &DemoHeader, out: &mut Vec<u8>) -> Result<(), EpisodeFault> {
+    match (file, header.format < LEVEL_FILES_FORMAT) {
+        (None, true) => {}
+        (Some(file), true) => {
+            let (path, format) = (&file.path, header.format);
+            return Err(malformed(format!("level {path} is a file, which recordings in format {format} cannot name")));
+        }
+        (None, false) => put_plain(&[0u32], out),
+        (Some(LevelFile { path, hash }), false) => {
+            let length = u32::try_from(path.len()).ok().filter(|&length| length > 0);
+            put_plain(&[length.ok_or_else(|| malformed("the path of the level file is empty or too long"))?], out);
+            out.extend_from_slice(path.as_bytes());
+            put_plain(&[*hash], out);
+        }
+    }
+    Ok(())
+}
+
+fn level_file(cursor: &mut Cursor, header: &DemoHeader) -> Result<Option<LevelFile>, EpisodeFault> {
+    if header.format < LEVEL_FILES_FORMAT {
+        return Ok(None);
+    }
+    let what = "the level file";
+    let length = cursor.scalar::<u32>(what)? as usize;
+    if length == 0 {
+        return Ok(None);
+    }
+    let path = String::from_utf8(cursor.plain(length, what)?);
+    let path = path.map_err(|_| malformed("the path of the level file is not text"))?;
+    Ok(Some(LevelFile { path, hash: cursor.scalar(what)? }))
+}
+
+/// Reads an episode and checks it against the header.
+pub(super) fn decode(payload: &[u8], header: &DemoHeader) -> Result<DemoEpisode, EpisodeFault> {
+    let mut cursor = Cursor(payload);
+    let steps = cursor.scalar::<u32>("the number of steps")? as usize;
+    let state_hashes = cursor.plain(steps, "state hashes")?;
+    let level_seed = cursor.scalar("the level seed")?;
+    let end = match cursor.scalar::<u8>("the end reason")? {
+        0 => DemoEnd::Terminated { success: false },
+        1 => DemoEnd::Terminated { success: true },
+        2 => DemoEnd::Truncated,
+        3 => DemoEnd::Aborted,
+        other => return Err(malformed(format!("unknown end reason {other}"))),
+    };
+    let actions = match cursor.scalar::<u8>("the kind of actions")? {
+        0 => {
+            let dim = cursor.scalar::<u32>("the number of dimensions")? as usize;
+            let count = steps.checked_mul(dim).ok_or_else(|| malformed("too many action values"))?;
+            EpisodeActions::Continuous { dim, values: cursor.plain(count, "action values")? }
+        }
+        1 => EpisodeActions::Discrete(cursor.list::<u8>(steps, "actions")?.into_iter().map(u32::from).collect()),
+        2 => EpisodeActions::Discrete(cursor.list::<u16>(steps, "actions")?.into_iter().map(u32::from).collect()),
+        4 => EpisodeActions::Discrete(cursor.list(steps, "actions")?),
+        other => return Err(malformed(format!("unknown kind of actions {other}"))),
+    };
+    let rewards = cursor.list(steps, "rewards")?;
+    let deciders = cursor.list(steps, "deciders")?.into_iter().map(decider).collect::<Result<_, _>>()?;
+    let width = cursor.scalar::<u32>("the observation width")? as usize;
+    let count = steps.checked_mul(width).ok_or_else(|| malformed("too many observation values"))?;
+    let observations = cursor.plain(count, "observation values")?;
+    let level_file = level_file(&mut cursor, header)?;
+    if !cursor.0.is_empty() {
+        return Err(malformed(format!("{} bytes after the last field", cursor.0.len())));
+    }
+    let episode = DemoEpisode { level_seed, level_file, actions, rewards, state_hashes, deciders, end, observations };
+    episode.check(header)?;
+    Ok(episode)
+}
+
+/// Bytes of a discrete action; 0 for continuous ones.
+fn action_size(actions: DemoActions) -> u8 {
+    match actions {
+        DemoActions::Discrete(0..=0x100) => 1,
+        DemoActions::Discrete(0x101..=0x1_0000) => 2,
+        DemoActions::Discrete(_) => 4,
+        DemoActions::Continuous(_) => 0,
+    }
+}
+
+fn decider_code(decider: Decider) -> u8 {
+    match decider {
+        Decider::Human => 0,
+        Decider::Bot => 1,
+        Decider::Policy => 2,
+        Decider::Replay => 3,
+        Decider::Idle => 4,
+    }
+}
+
+fn decider(code: u8) -> Result<Decider, EpisodeFault> {
+    Ok(match code {
+        0 => Decider::Human,
+        1 => Decider::Bot,
+        2 => Decider::Policy,
+        3 => Decider::Replay,
+        4 => Decider::Idle,
+        other => return Err(malformed(format!("unknown decider {other}"))),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -160,5 +377,45 @@ mod tests {
         assert!(Cursor(&[RUNS; 40]).list::<u8>(3, "actions").is_ok());
         assert!(Cursor(&[0x80; 40][..]).varint("actions").is_err());
         assert!(Cursor(&[]).plain::<u64>(usize::MAX, "hashes").is_err());
+    }
+}
+
+#[cfg(test)]
+mod payload_tests {
+    use super::*;
+    use crate::demo::file::testing::{episode, header};
+
+    fn coded(episode: &DemoEpisode, header: &DemoHeader) -> Result<Vec<u8>, EpisodeFault> {
+        let mut bytes = Vec::new();
+        encode_payload(episode, header, &mut bytes).map(|()| bytes)
+    }
+
+    #[test]
+    fn level_files_are_kept_from_format_2_on_and_cost_older_recordings_nothing() {
+        let plain = episode(3, 5);
+        let file = LevelFile { path: "levels/höhle.json".to_owned(), hash: u64::MAX - 1 };
+        let drawn = DemoEpisode { level_file: Some(file), ..plain.clone() };
+        let with_files = header().with_level_files();
+        for episode in [&plain, &drawn] {
+            let bytes = coded(episode, &with_files).expect("writable");
+            assert_eq!(decode(&bytes, &with_files).as_ref(), Ok(episode));
+        }
+        let bytes = coded(&plain, &header()).expect("writable");
+        assert_eq!(coded(&plain, &with_files).expect("writable").len(), bytes.len() + 4);
+        assert_eq!(decode(&bytes, &header()), Ok(plain));
+        let refused = coded(&drawn, &header()).expect_err("format 1").to_string();
+        assert!(refused.contains("levels/höhle.json") && refused.contains("format 1"), "{refused}");
+    }
+
+    #[test]
+    fn a_level_file_that_is_cut_off_or_no_text_is_malformed() {
+        let with_files = header().with_level_files();
+        let file = LevelFile { path: "ab".to_owned(), hash: 7 };
+        let bytes = coded(&DemoEpisode { level_file: Some(file), ..episode(3, 2) }, &with_files).expect("writable");
+        assert!(decode(&bytes[..bytes.len() - 1], &with_files).is_err());
+        let mut bad = bytes.clone();
+        let path = bytes.len() - 10;
+        bad[path] = 0xff;
+        assert!(decode(&bad, &with_files).expect_err("no text").to_string().contains("not text"));
     }
 }

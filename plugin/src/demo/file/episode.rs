@@ -1,12 +1,14 @@
 //! One recorded episode in memory.
 
-use std::collections::BTreeMap;
-
+use crate::{
+    demo::file::{
+        error::EpisodeFault,
+        header::{DemoActions, DemoHeader},
+    },
+    level::LevelFile,
+};
 use serde::{Deserialize, Serialize};
-
-use super::episode_fault::EpisodeFault;
-use super::header::{DemoActions, DemoHeader};
-use crate::level_files::LevelFile;
+use std::collections::BTreeMap;
 
 /// The source of a tick's action.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]

@@ -1,13 +1,14 @@
 //! The header of a recording: its contents and conditions.
 
+use crate::demo::file::error::DemoFault;
 use serde::{Deserialize, Serialize};
-
-use super::error::DemoFault;
 
 /// Newest format that this version of the crate reads and writes.
 pub const DEMO_FORMAT: u32 = LEVEL_FILES_FORMAT;
+
 /// Format of recordings that name no level files. Written where possible, since older programs read it too.
 const PLAIN_FORMAT: u32 = 1;
+
 /// First format in which every episode names its level file.
 pub(super) const LEVEL_FILES_FORMAT: u32 = 2;
 
@@ -83,8 +84,6 @@ impl DemoHeader {
     }
 
     /// Changes the format to that of level files, which the episodes name.
-    // For playbot_lab; games need none of it.
-    #[doc(hidden)]
     pub fn with_level_files(self) -> Self {
         Self { format: LEVEL_FILES_FORMAT, ..self }
     }

@@ -16,18 +16,20 @@
 //! RON text in bytes and its CRC-32. It is the same in all formats, so that an older program can report that a file
 //! is too new for it.
 
-use std::io::Read;
-
+use crate::demo::file::{
+    bytes::FRAME_MAGIC,
+    error::DemoFault,
+    header::{DEMO_FORMAT, DemoHeader},
+};
 use serde::Deserialize;
-
-use super::error::DemoFault;
-use super::header::{DEMO_FORMAT, DemoHeader};
-use super::second_header;
+use std::io::Read;
 
 /// First bytes of every recording.
 pub const DEMO_MAGIC: &str = "playbot-demo ";
+
 /// Length of the magic line in bytes, with its line feed.
 const LINE_LENGTH: usize = "playbot-demo header=00000000 crc32=00000000\n".len();
+
 /// Longest header that is read, in bytes, to guard the memory against a damaged length.
 const MAX_HEADER: usize = 1 << 20;
 
@@ -49,7 +51,7 @@ pub(super) fn encode(header: &DemoHeader) -> Result<Vec<u8>, DemoFault> {
         .map_err(|e| DemoFault::HeaderValue { field: "header", why: e.to_string() })?;
     text.push('\n');
     let top = format!("{}{text}", magic_line(text.len(), crc32fast::hash(text.as_bytes())));
-    text.push_str(&second_header::copy_of(&top));
+    text.push_str(&copy_of(&top));
     if text.len() > MAX_HEADER {
         let why = format!("{} bytes of text, but at most {MAX_HEADER} are read back", text.len());
         return Err(DemoFault::HeaderValue { field: "header", why });
@@ -124,10 +126,52 @@ fn parse_text(text: &[u8], intact: bool) -> Result<DemoHeader, DemoFault> {
     ron::de::from_bytes(text).map_err(syntax)
 }
 
+// The second copy of a header, so that damage to one copy loses no episode.
+//
+// The copy follows the header as comments of RON: the magic line and the text once more. The magic line at the top
+// of the file gives length and checksum of both together, so older programs skip the copy.
+
+/// Start of a comment line.
+const COMMENT: &str = "// ";
+
+/// Returns the copy of the text at the top of a file.
+pub(super) fn copy_of(top: &str) -> String {
+    top.lines().flat_map(|line| [COMMENT, line, "\n"]).collect()
+}
+
+/// Returns the header of a file whose header is damaged in one copy, and the offset at which to search for frames.
+/// `None` if neither copy is valid, or no frame follows.
+pub(super) fn recover(input: &[u8]) -> Option<(DemoHeader, usize)> {
+    let frames = input.windows(FRAME_MAGIC.len()).position(|bytes| bytes == FRAME_MAGIC)?;
+    let top = &input[..frames];
+    let header = second(top).or_else(|| first(top))?;
+    Some((header, frames))
+}
+
+/// Returns the header of the copy.
+fn second(top: &[u8]) -> Option<DemoHeader> {
+    let begin = [COMMENT, DEMO_MAGIC].concat();
+    // Bytes that are no text belong to the damage of another line.
+    let text = String::from_utf8_lossy(top);
+    let lines = text.lines().skip(1).skip_while(|line| !line.starts_with(&begin));
+    let copy: String = lines.map_while(|line| line.strip_prefix(COMMENT)).flat_map(|line| [line, "\n"]).collect();
+    decode(copy.as_bytes()).ok().map(|(header, _)| header)
+}
+
+/// Returns the header above a damaged copy, if it matches the magic line at the top once it is written again.
+fn first(top: &[u8]) -> Option<DemoHeader> {
+    let text = String::from_utf8_lossy(top);
+    let (line, rest) = text.split_once('\n')?;
+    let end = rest.find("\n)")? + "\n)".len();
+    let header: DemoHeader = ron::de::from_str(&rest[..end]).ok()?;
+    let written = encode(&header).ok()?;
+    written.starts_with(format!("{line}\n").as_bytes()).then_some(header)
+}
+
 #[cfg(test)]
 mod tests {
-    use super::super::header::DemoActions;
     use super::*;
+    use crate::demo::file::header::DemoActions;
 
     fn header() -> DemoHeader {
         DemoHeader {
@@ -190,5 +234,51 @@ mod tests {
         assert!(matches!(decode(b"playbot-de".as_slice()), Err(DemoFault::TruncatedHeader { length: 10 })));
         let huge = b"playbot-demo header=99999999 crc32=00000000\n";
         assert!(matches!(decode(huge.as_slice()), Err(DemoFault::HeaderLine { .. })));
+    }
+}
+
+#[cfg(test)]
+mod second_header_tests {
+    use crate::demo::file::testing::{episode, header, write};
+    use crate::demo::file::{DemoReader, repair};
+    use std::fs;
+
+    #[test]
+    fn one_flipped_bit_in_a_header_loses_no_episode() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = write(folder.path(), "a.demo", &[episode(1, 3), episode(2, 3)]);
+        let whole = fs::read(&path).expect("written");
+        let frames = DemoReader::open(&path).expect("opens").offset() as usize;
+        let (damaged, out) = (folder.path().join("damaged.demo"), folder.path().join("mended.demo"));
+        for at in 0..frames {
+            let mut bytes = whole.clone();
+            bytes[at] ^= 1 << (at % 8);
+            fs::write(&damaged, bytes).expect("written");
+            assert!(DemoReader::open(&damaged).is_err(), "byte {at}");
+            let report = repair(&damaged, &out, None).expect("its other copy is sound");
+            assert_eq!((report.kept_episodes, report.header_from.is_some()), (2, true), "byte {at}");
+            assert!(fs::read(&out).expect("written") == whole, "byte {at}");
+            fs::remove_file(&out).expect("removed");
+        }
+    }
+
+    #[test]
+    fn a_file_whose_copies_are_both_damaged_takes_the_header_of_another_one() {
+        let folder = tempfile::tempdir().expect("temporary folder");
+        let path = write(folder.path(), "a.demo", &[episode(1, 3)]);
+        let other = write(folder.path(), "b.demo", &[]);
+        let mut bytes = fs::read(&path).expect("written");
+        let frames = DemoReader::open(&path).expect("opens").offset() as usize;
+        bytes[..frames].fill(b'x');
+        fs::write(&path, bytes).expect("written");
+        let out = folder.path().join("mended.demo");
+        let error = repair(&path, &out, None).expect_err("nothing says what it is").to_string();
+        let advice = format!("`playbot demo repair {} --header-from OTHER`", path.display());
+        assert!(error.contains("not a recording: ") && error.contains(&advice), "{error}");
+        assert_eq!(error.matches("demo repair").count(), 1, "what was tried is not advised again: {error}");
+        assert_eq!(repair(&path, &out, Some(&other)).expect("it fits").kept_episodes, 1);
+        let read = DemoReader::open(&out).and_then(DemoReader::read_all).expect("sound");
+        assert_eq!(read, [episode(1, 3)]);
+        assert_eq!(DemoReader::open(&out).expect("opens").header(), &header());
     }
 }

@@ -1,14 +1,18 @@
 //! The reader of recordings.
 
-use std::fs::File;
-use std::io::{BufReader, Read, Seek, SeekFrom};
-use std::path::{Path, PathBuf};
-
-use super::episode::DemoEpisode;
-use super::error::{DemoFault, DemoFileError};
-use super::frame::{self, FRAME_EXTRA, FRAME_HEAD, MAX_PAYLOAD};
-use super::header::DemoHeader;
-use super::{payload, preamble};
+use crate::demo::file::{
+    bytes,
+    bytes::{FRAME_EXTRA, FRAME_HEAD, MAX_PAYLOAD},
+    episode::DemoEpisode,
+    error::{DemoFault, DemoFileError},
+    header::DemoHeader,
+    preamble,
+};
+use std::{
+    fs::File,
+    io::{BufReader, Read, Seek, SeekFrom},
+    path::{Path, PathBuf},
+};
 
 /// Reads the episodes of a recording one after the other.
 ///
@@ -16,7 +20,7 @@ use super::{payload, preamble};
 /// the first error.
 ///
 /// ```no_run
-/// # use bevy_playbot::demo::file::{DemoFileError, DemoReader};
+/// # use crate::demo::file::{DemoFileError, DemoReader};
 /// # fn main() -> Result<(), DemoFileError> {
 /// let mut reader = DemoReader::open("demos/coinrun/easy.demo")?;
 /// let game = reader.header().game.clone();
@@ -125,11 +129,11 @@ impl DemoReader {
         }
         let cut = |missing| DemoFault::TruncatedFrame { offset, episode, missing };
         let head = self.read(left.min(FRAME_HEAD as u64))?;
-        let magic = &head[..head.len().min(frame::FRAME_MAGIC.len())];
-        if !frame::FRAME_MAGIC.starts_with(magic) {
+        let magic = &head[..head.len().min(bytes::FRAME_MAGIC.len())];
+        if !bytes::FRAME_MAGIC.starts_with(magic) {
             return Err(DemoFault::BadFrameMagic { offset, episode });
         }
-        let Some(length) = frame::payload_length(&head) else {
+        let Some(length) = bytes::payload_length(&head) else {
             return Err(cut(FRAME_EXTRA as u64 - head.len() as u64));
         };
         let size = (length + FRAME_EXTRA) as u64;
@@ -144,9 +148,9 @@ impl DemoReader {
         if (bytes.len() as u64) < size {
             return Err(cut(size - bytes.len() as u64));
         }
-        let payload = frame::payload(&bytes).ok_or(DemoFault::FrameChecksum { offset, episode })?;
+        let payload = bytes::payload(&bytes).ok_or(DemoFault::FrameChecksum { offset, episode })?;
         let decoded =
-            payload::decode(payload, &self.header).map_err(|fault| DemoFault::BadEpisode { offset, episode, fault })?;
+            bytes::decode(payload, &self.header).map_err(|fault| DemoFault::BadEpisode { offset, episode, fault })?;
         self.offset += size;
         self.episodes += 1;
         Ok(Some(decoded))

@@ -1,17 +1,22 @@
 //! Recovery of the intact parts of a damaged recording.
 
-use std::fs::{self, File};
-use std::io::{Read, Write};
-use std::path::{Path, PathBuf};
-
+use crate::demo::file::{
+    bytes,
+    bytes::{FRAME_EXTRA, FRAME_MAGIC, MAX_PAYLOAD},
+    error::{DemoFault, DemoFileError},
+    header::DemoHeader,
+    preamble,
+    reader::DemoReader,
+    writer,
+};
 use playbot_learner::disk::{DiskFile, hard_link, remove_file, rename};
 use serde::Serialize;
-
-use super::error::{DemoFault, DemoFileError};
-use super::frame::{self, FRAME_EXTRA, FRAME_MAGIC, MAX_PAYLOAD};
-use super::header::DemoHeader;
-use super::reader::DemoReader;
-use super::{payload, preamble, second_header, store};
+use std::{
+    fs,
+    fs::File,
+    io::{Read, Write},
+    path::{Path, PathBuf},
+};
 
 /// A stretch of the input without an intact frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -67,7 +72,7 @@ pub fn repair(
         _ => false,
     };
     if in_place {
-        store::lock(&file).map_err(at_input)?;
+        writer::lock(&file).map_err(at_input)?;
     }
     let Loaded { input, header, top, start, header_from } = load(&file, path, header_from)?;
     let mut output = top;
@@ -114,7 +119,7 @@ fn load(mut file: &File, path: &Path, header_from: Option<&Path>) -> Result<Load
         }
         Err(fault) => fault,
     };
-    let (header, start, from) = match (second_header::recover(&input), header_from) {
+    let (header, start, from) = match (preamble::recover(&input), header_from) {
         (Some((header, start)), _) => (header, start, path.to_owned()),
         (None, Some(other)) => (DemoReader::open(other)?.header().clone(), 0, other.to_owned()),
         (None, None) => return Err(at_input(fault.without_copy())),
@@ -158,9 +163,9 @@ fn find_magic(bytes: &[u8]) -> Option<usize> {
 
 /// Returns the frame at the start of `bytes` and the steps of its episode, if it is intact.
 fn sound_frame<'a>(bytes: &'a [u8], header: &DemoHeader) -> Option<(&'a [u8], usize)> {
-    let length = frame::payload_length(bytes).filter(|&n| n <= MAX_PAYLOAD)?;
+    let length = bytes::payload_length(bytes).filter(|&n| n <= MAX_PAYLOAD)?;
     let frame = bytes.get(..length + FRAME_EXTRA)?;
-    let episode = payload::decode(frame::payload(frame)?, header).ok()?;
+    let episode = bytes::decode(bytes::payload(frame)?, header).ok()?;
     Some((frame, episode.len()))
 }
 
@@ -195,9 +200,9 @@ fn beside(path: &Path, suffix: &str) -> PathBuf {
 
 #[cfg(test)]
 mod tests {
-    use super::super::DemoWriter;
-    use super::super::testing::{episode, header, write};
     use super::*;
+    use crate::demo::file::DemoWriter;
+    use crate::demo::file::testing::{episode, header, write};
 
     fn seeds(path: &Path) -> Vec<u64> {
         let episodes = DemoReader::open(path).and_then(DemoReader::read_all).expect("sound");
@@ -216,7 +221,7 @@ mod tests {
         let report = repair(&path, &out, None).expect("repaired");
         assert_eq!(seeds(&out), [1, 3]);
         assert_eq!(fs::read(&path).expect("read"), bytes, "the input is not touched");
-        let frame = frame::encode(&episode(2, 9), &header()).expect("valid").len() as u64;
+        let frame = bytes::encode(&episode(2, 9), &header()).expect("valid").len() as u64;
         let regions = vec![DroppedRegion { offset: second, bytes: frame }];
         let expected = RepairReport {
             kept_episodes: 2,

@@ -1,8 +1,7 @@
 //! Small recordings for the tests of this module.
 
+use crate::demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoWriter, EpisodeActions};
 use std::path::{Path, PathBuf};
-
-use super::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoWriter, EpisodeActions};
 
 /// Returns a small header with two observation values.
 pub(super) fn header() -> DemoHeader {

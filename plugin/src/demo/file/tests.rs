@@ -1,12 +1,14 @@
 //! Tests of whole files: round trips, cuts at every byte, flips of every bit, hostile lengths.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-
+use crate::demo::file::{
+    testing::{episode, header, write},
+    *,
+};
 use proptest::prelude::*;
-
-use super::testing::{episode, header, write};
-use super::*;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 fn three(folder: &Path) -> (PathBuf, Vec<u8>, Vec<DemoEpisode>, Vec<u64>) {
     let episodes = vec![episode(1, 6), episode(2, 1), episode(3, 9)];
@@ -29,9 +31,9 @@ fn put(path: &Path, bytes: &[u8]) {
 
 /// Returns the output and report of `repair`, without waiting for the disk.
 fn repair_in_memory(bytes: &[u8]) -> (Vec<u8>, RepairReport) {
-    let (header, start) = super::preamble::decode(bytes).expect("the header is sound");
+    let (header, start) = crate::demo::file::preamble::decode(bytes).expect("the header is sound");
     let mut output = bytes[..start as usize].to_vec();
-    let report = super::repair::salvage(bytes, start as usize, &header, &mut output);
+    let report = crate::demo::file::repair::salvage(bytes, start as usize, &header, &mut output);
     (output, report)
 }
 
@@ -119,7 +121,7 @@ fn a_flipped_bit_is_never_believed() {
 
 /// Returns a frame with a valid checksum around any payload.
 fn sealed(payload: &[u8]) -> Vec<u8> {
-    let mut bytes = frame::FRAME_MAGIC.to_vec();
+    let mut bytes = crate::demo::file::bytes::FRAME_MAGIC.to_vec();
     bytes.extend_from_slice(&(payload.len() as u32).to_le_bytes());
     bytes.extend_from_slice(payload);
     let crc = crc32fast::hash(&bytes[4..]);
@@ -143,7 +145,7 @@ fn hostile_lengths_and_values_are_errors() {
     let nan = f32::NAN.to_le_bytes();
     let last = sound.len() - 4;
     for (frame, words) in [
-        ([&frame::FRAME_MAGIC[..], &[0xff; 4], &[0; 64]].concat(), "is cut off"),
+        ([&crate::demo::file::bytes::FRAME_MAGIC[..], &[0xff; 4], &[0; 64]].concat(), "is cut off"),
         (sealed(&[0xff; 4]), "it ends inside state hashes"),
         (sealed(&[]), "it ends inside the number of steps"),
         (with(0, &u32::MAX.to_le_bytes()), "it ends inside state hashes"),
@@ -218,7 +220,7 @@ fn a_tick_takes_about_five_bytes() {
         one.actions =
             EpisodeActions::Discrete((0..steps as u32).map(|t| t.wrapping_mul(2_654_435_761) >> 7 & 7).collect());
         one.observations.clear();
-        bytes += frame::encode(&one, &header).expect("valid").len();
+        bytes += crate::demo::file::bytes::encode(&one, &header).expect("valid").len();
     }
     assert!(bytes <= 510_000, "100,000 steps take {bytes} bytes");
 }
@@ -282,12 +284,12 @@ proptest! {
 
     #[test]
     fn arbitrary_payloads_never_panic(payload in prop::collection::vec(any::<u8>(), 0..200)) {
-        let _ = super::payload::decode(&payload, &header());
+        let _ = crate::demo::file::bytes::decode(&payload, &header());
     }
 
     #[test]
     fn arbitrary_files_never_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-        let _ = super::preamble::decode(bytes.as_slice());
-        let _ = super::preamble::decode([DEMO_MAGIC.as_bytes(), &bytes].concat().as_slice());
+        let _ = crate::demo::file::preamble::decode(bytes.as_slice());
+        let _ = crate::demo::file::preamble::decode([DEMO_MAGIC.as_bytes(), &bytes].concat().as_slice());
     }
 }

@@ -1,17 +1,21 @@
 //! The writer of recordings, one whole episode at a time.
 
-use std::fs::{self, OpenOptions};
-use std::io::{self, Seek, SeekFrom, Write};
-use std::path::{Path, PathBuf};
-
+use crate::demo::file::{
+    bytes,
+    episode::DemoEpisode,
+    error::{DemoFault, DemoFileError},
+    header::DemoHeader,
+    preamble,
+    reader::DemoReader,
+};
 use playbot_learner::disk::{DiskFile, remove_file, temporary_name};
-
-use super::episode::DemoEpisode;
-use super::error::{DemoFault, DemoFileError};
-use super::header::DemoHeader;
-use super::reader::DemoReader;
-use super::store::{Store, lock};
-use super::{frame, preamble};
+use std::{
+    fs,
+    fs::{File, OpenOptions, TryLockError},
+    io,
+    io::{Seek, SeekFrom, Write},
+    path::{Path, PathBuf},
+};
 
 /// Appends episodes to a recording.
 ///
@@ -121,7 +125,7 @@ impl DemoWriter {
     ///
     /// [`DemoFault::HeaderDiffers`] when `header` is not that of the file (only the note may differ),
     /// [`DemoFault::Locked`], or an error of [`DemoReader`]: repair a damaged file first, see
-    /// [`repair`](super::repair::repair).
+    /// [`repair`](crate::demo::file::repair::repair).
     pub fn append(path: impl AsRef<Path>, header: &DemoHeader) -> Result<Self, DemoFileError> {
         let path = path.as_ref();
         let fault = |fault| DemoFileError::new(path, fault);
@@ -164,7 +168,7 @@ impl DemoWriter {
         if self.torn {
             return Err(DemoFault::Torn);
         }
-        let bytes = frame::encode(episode, &self.header).map_err(DemoFault::RefusedEpisode)?;
+        let bytes = bytes::encode(episode, &self.header).map_err(DemoFault::RefusedEpisode)?;
         let written = self.store.write_all(&bytes).and_then(|()| self.store.sync());
         let Err(source) = written else {
             self.length += bytes.len() as u64;
@@ -202,19 +206,51 @@ impl DemoWriter {
     }
 }
 
+// The file operations of the writer: writing, synchronising, truncating, locking.
+
+/// The file operations of the writer; tests substitute a disk that fills up.
+pub(super) trait Store: Write + Send + Sync {
+    fn sync(&mut self) -> io::Result<()>;
+    fn cut(&mut self, length: u64) -> io::Result<()>;
+}
+
+impl Store for DiskFile {
+    fn sync(&mut self) -> io::Result<()> {
+        match DiskFile::sync(self) {
+            // Devices and pipes cannot be synchronised, and need not be.
+            Err(e) if e.kind() == io::ErrorKind::InvalidInput => Ok(()),
+            other => other,
+        }
+    }
+
+    fn cut(&mut self, length: u64) -> io::Result<()> {
+        self.set_len(length)?;
+        self.seek(SeekFrom::Start(length)).map(drop)
+    }
+}
+
+/// Locks the file against other writers, where the file system can.
+pub(super) fn lock(file: &File) -> Result<(), DemoFault> {
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(DemoFault::Locked),
+        // File systems without locks are used without them.
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::sync::{Arc, Mutex};
 
-    use super::super::header::DemoActions;
-    use super::super::store::tests::SmallDisk;
-    use super::super::testing::{episode, header};
     use super::*;
+    use crate::demo::file::header::DemoActions;
+    use crate::demo::file::testing::{episode, header};
+    use crate::demo::file::writer::store_tests::SmallDisk;
 
     fn on_small_disk(can_cut: bool) -> (DemoWriter, Arc<Mutex<Vec<u8>>>) {
         let preamble = preamble::encode(&header()).expect("valid");
         let length = preamble.len() as u64;
-        let frame = frame::encode(&episode(1, 20), &header()).expect("valid").len();
+        let frame = bytes::encode(&episode(1, 20), &header()).expect("valid").len();
         let disk =
             SmallDisk { room: preamble.len() + frame + frame / 2, bytes: Arc::new(Mutex::new(preamble)), can_cut };
         let bytes = disk.bytes.clone();
@@ -279,5 +315,47 @@ mod tests {
         };
         let error = writer.push(&episode(1, 5)).expect_err("full");
         assert!(error.to_string().contains("No space left on device"), "{error}");
+    }
+}
+
+#[cfg(test)]
+pub(super) mod store_tests {
+    use std::sync::{Arc, Mutex};
+
+    use super::*;
+
+    /// A disk with limited room.
+    #[derive(Clone)]
+    pub(in crate::demo::file) struct SmallDisk {
+        pub bytes: Arc<Mutex<Vec<u8>>>,
+        pub room: usize,
+        pub can_cut: bool,
+    }
+
+    impl Write for SmallDisk {
+        fn write(&mut self, data: &[u8]) -> io::Result<usize> {
+            let mut bytes = self.bytes.lock().expect("one thread");
+            let fits = data.len().min(self.room - bytes.len());
+            bytes.extend_from_slice(&data[..fits]);
+            if fits == 0 { Err(io::ErrorKind::StorageFull.into()) } else { Ok(fits) }
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Store for SmallDisk {
+        fn sync(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+
+        fn cut(&mut self, length: u64) -> io::Result<()> {
+            if !self.can_cut {
+                return Err(io::ErrorKind::PermissionDenied.into());
+            }
+            self.bytes.lock().expect("one thread").truncate(length as usize);
+            Ok(())
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bevy::prelude::*;
-use playbot_lab::{defect::DefectKind, foreign::ForeignGame};
+use playbot::harness::{defect::DefectKind, foreign::ForeignGame};
 
 use super::{Game, GameState};
 
@@ -72,8 +72,9 @@ fn add<M>(app: &mut App, system: impl IntoScheduleConfigs<bevy::ecs::system::Sch
 mod tests {
     use std::sync::Arc;
 
-    use playbot_lab::prelude::{Control, LevelQueue, PlaybotAppExt, Reward, StateHash};
-    use playbot_lab::{bugs::Mutant, foreign::Restart, game::Game as PlayedGame, worlds::build_world};
+    use playbot::harness::{foreign::Restart, game::Game as PlayedGame, worlds::build_world};
+    use playbot::mutation::bugs::Mutant;
+    use playbot::prelude::{Control, LevelQueue, PlaybotAppExt, Reward, StateHash};
 
     use super::*;
     use crate::{game, refresh};

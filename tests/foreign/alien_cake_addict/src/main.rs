@@ -10,13 +10,11 @@ mod rules;
 use std::process::ExitCode;
 
 use KeyCode::{ArrowDown, ArrowLeft, ArrowRight, ArrowUp};
-use playbot_lab::{
-    foreign::{ForeignGame, LevelSeed, Restart},
-    prelude::EpisodeEnd,
-};
+use playbot::harness::foreign::{ForeignGame, LevelSeed, Restart};
+use playbot::prelude::EpisodeEnd;
 
 fn main() -> ExitCode {
-    playbot_cli::main(&[&rules::add_to(ForeignGame::new("alien_cake_addict", 1, game))
+    playbot::main(&[&rules::add_to(ForeignGame::new("alien_cake_addict", 1, game))
         .hz(20.0)
         .keys([vec![ArrowUp], vec![ArrowDown], vec![ArrowRight], vec![ArrowLeft], vec![]])
         .observe(["i", "j", "cake_i", "cake_j", "cake"], |g: Res<Game>| {

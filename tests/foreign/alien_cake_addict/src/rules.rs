@@ -1,7 +1,7 @@
 //! Detector of the game's rules for its cakes. Playing needs none of it.
 
 use bevy::math::UVec2;
-use playbot_lab::{
+use playbot::harness::{
     detector::{EachTick, Moment},
     foreign::ForeignGame,
 };
@@ -34,7 +34,8 @@ fn broken_rule(moment: &Moment<'_>) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use bevy::prelude::*;
-    use playbot_lab::{detector::NoProofs, prelude::ActionValue};
+    use playbot::harness::detector::NoProofs;
+    use playbot::prelude::ActionValue;
 
     use super::*;
 

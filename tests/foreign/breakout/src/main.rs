@@ -6,10 +6,8 @@ include!(concat!(env!("OUT_DIR"), "/game.rs"));
 
 use std::process::ExitCode;
 
-use playbot_lab::{
-    foreign::{ForeignGame, LevelSeed, Restart},
-    prelude::EpisodeEnd,
-};
+use playbot::harness::foreign::{ForeignGame, LevelSeed, Restart};
+use playbot::prelude::EpisodeEnd;
 
 fn main() -> ExitCode {
     let breakout = ForeignGame::new("breakout", 1, game)
@@ -24,7 +22,7 @@ fn main() -> ExitCode {
             let off = ball.translation.x - paddle.translation.x;
             u32::from(off < -10.0) + 2 * u32::from(off > 10.0)
         });
-    playbot_cli::main(&[&breakout])
+    playbot::main(&[&breakout])
 }
 
 fn see(ball: Single<(&Transform, &Velocity)>, paddle: Single<&Transform, With<Paddle>>) -> [f32; 5] {

@@ -1,7 +1,7 @@
 //! Defects that the benchmark of testers plants into the game. Playing and testing it needs none of them.
 
 use bevy::prelude::*;
-use playbot_lab::{defect::DefectKind, foreign::ForeignGame};
+use playbot::harness::{defect::DefectKind, foreign::ForeignGame};
 
 use crate::game::{Hero, Run, Screen};
 
@@ -70,12 +70,12 @@ fn kinds() -> [DefectKind; 4] {
 mod tests {
     use std::sync::Arc;
 
-    use playbot_lab::{
-        bugs::Mutant,
+    use playbot::harness::{
         foreign::{LevelSeed, Restart},
-        prelude::*,
         worlds::build_world,
     };
+    use playbot::mutation::bugs::Mutant;
+    use playbot::prelude::*;
 
     use super::*;
     use crate::game::{self, Level, Map};

@@ -10,13 +10,11 @@ use KeyCode::{ArrowLeft, ArrowRight, Space};
 use Screen::{Loading, Lost, Playing, Won};
 use bevy::prelude::*;
 use game::{Hero, Level, Map, Run, Screen};
-use playbot_lab::{
-    foreign::{ForeignGame, LevelSeed},
-    prelude::EpisodeEnd,
-};
+use playbot::harness::foreign::{ForeignGame, LevelSeed};
+use playbot::prelude::EpisodeEnd;
 
 fn main() -> ExitCode {
-    playbot_cli::main(&[&defects::add_to(ForeignGame::new("gem_hop", 1, game::game))
+    playbot::main(&[&defects::add_to(ForeignGame::new("gem_hop", 1, game::game))
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
         .observe("x y vx vy coyote".split(' ').map(String::from).chain((0..24).map(|i| format!("ahead {i}"))), see)
         .place(|at: Single<&Transform, With<Hero>>| at.translation.truncate())

@@ -6,11 +6,9 @@ mod game;
 
 use bevy::prelude::*;
 use game::{Hero, Level, Map, Screen, game};
-use playbot_lab::{
-    foreign::{ForeignGame, LevelSeed, Restart},
-    prelude::{EpisodeEnd, LevelTest, assert_deterministic, assert_levels_solvable},
-    verdict::LevelOutcome,
-};
+use playbot::harness::foreign::{ForeignGame, LevelSeed, Restart};
+use playbot::prelude::{EpisodeEnd, LevelTest, assert_deterministic, assert_levels_solvable};
+use playbot::test::verdict::LevelOutcome;
 
 /// Returns the game with a bot that runs and hops, as in `src/main.rs`, and with smaller observations.
 fn gem_hop() -> ForeignGame {

@@ -2,13 +2,10 @@
 
 use std::{fs, path::Path};
 
+use playbot::prelude::*;
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun};
-use playbot_lab::{
-    inspect::LevelRequest,
-    level_files::LevelDesigns,
-    prelude::*,
-    train::{Algorithm, config_file::read_experiment},
-};
+use playbot_harness::{inspect::LevelRequest, level_files::LevelDesigns};
+use playbot_train::{Algorithm, experiment::file::read_experiment};
 
 use crate::{
     Corridor,

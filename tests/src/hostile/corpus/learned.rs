@@ -3,11 +3,9 @@
 use std::{fs, path::Path};
 
 use bevy_playbot::policy_file::check_policy;
-use playbot_lab::{
-    prelude::*,
-    train::{Algorithm, TrainedLearner, checkpoint::CheckpointChoice, run_dir::RunDir},
-};
+use playbot::prelude::*;
 use playbot_learner::{DeviceKind, FileError, PolicyCard, PolicyFile, SkillModel, SkillTrainer};
+use playbot_train::{Algorithm, TrainedLearner, checkpoint::CheckpointChoice, run_dir::RunDir};
 
 use crate::{
     Corridor,

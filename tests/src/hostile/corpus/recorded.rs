@@ -5,11 +5,9 @@ use std::{fs, path::Path};
 use bevy_playbot::demo::file::{
     Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoReader, DemoSummary, DemoWriter, EpisodeActions, repair,
 };
-use bevy_playbot::level_files::LevelFile;
-use playbot_lab::{
-    findings::{FindingHead, StoredFinding},
-    prelude::*,
-};
+use bevy_playbot::level::LevelFile;
+use playbot::prelude::*;
+use playbot_test::findings::{FindingHead, StoredFinding};
 
 use crate::{
     Corridor,

@@ -2,20 +2,20 @@
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use bevy_playbot::level_files::LevelFile;
+use bevy_playbot::level::LevelFile;
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::{
-    bugs::{
-        BugGame, BugSet, PlantedBug, PlantedPart, SoundLevels,
-        score::{
-            ClockKind, ContestantRecord, Found, GameRecord, JobFinding, JobResult, SCORE_FORMAT, Score, ScoreBudget,
-            ScoreJournal, ScoreRecord, ScoreTable, ScoredJob, SetRecord, Subject, SubjectKind, judge,
-        },
+use playbot_harness::sealed_file::{read_sealed, write_sealed};
+use playbot_mutation::{
+    bugs::{BugGame, BugSet, PlantedBug, PlantedPart, SoundLevels},
+    score::{
+        ClockKind, ContestantRecord, Found, GameRecord, JobFinding, JobResult, SCORE_FORMAT, Score, ScoreBudget,
+        ScoreJournal, ScoreRecord, ScoreTable, ScoredJob, SetRecord, Subject, SubjectKind, judge,
     },
-    report::{StudyResult, TestResult, TrainingResult},
-    sealed_file::{read_sealed, write_sealed},
-    train::Algorithm,
-    verdict::Earlier,
+};
+use playbot_test::verdict::Earlier;
+use playbot_train::{
+    Algorithm,
+    study::{StudyResult, TestResult, TrainingResult},
 };
 
 use crate::hostile::{

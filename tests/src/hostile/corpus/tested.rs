@@ -2,10 +2,10 @@
 
 use std::{collections::BTreeMap, fs, path::Path};
 
+use playbot::prelude::*;
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::{
-    prelude::*,
-    proof::LevelProof,
+use playbot_harness::detector::LevelProof;
+use playbot_test::{
     verdict::{
         Comparison, Earlier, EndPlace, FailureWay, Finding, FinishTime, LevelMaps, LevelOutcome, LevelVerdict,
         MapScope, Overview, Places, RESULTS, ResultLines, Score, Shard, SkillTicks, TestFolder, TestRecord,

@@ -2,11 +2,8 @@
 
 use std::{fs, path::Path};
 
-use playbot_lab::{
-    runs::RunCurves,
-    train::{Algorithm, checkpoint, run_dir::RunDir},
-};
 use playbot_learner::DeviceKind;
+use playbot_train::{Algorithm, checkpoint, run_dir::RunDir, runs::RunCurves};
 
 use crate::{
     Corridor,

@@ -1,7 +1,7 @@
 //! Tests of impossible actions and positions.
 
 use bevy::prelude::*;
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 
 use super::arena::{act, put, world_with};
 

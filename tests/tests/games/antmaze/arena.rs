@@ -1,12 +1,13 @@
 //! One ant in one level.
 
 use bevy::prelude::*;
+use playbot::prelude::*;
 use playbot_games::antmaze::{
     AntMaze, AntMazeLevel,
-    components::{InMaze, MazeAnt},
+    arena::{InMaze, MazeAnt},
     generate,
 };
-use playbot_lab::{prelude::*, worlds::build_world};
+use playbot_harness::worlds::build_world;
 
 pub fn level(mode: &str, seed: u64) -> AntMazeLevel {
     generate(&mode.parse().expect("a mode"), seed).expect("a level")

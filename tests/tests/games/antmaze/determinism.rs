@@ -2,8 +2,9 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{demo::file::DemoReader, test_app::PlaybotTestExt};
+use playbot::prelude::*;
 use playbot_games::antmaze::AntMaze;
-use playbot_lab::{demo::verify::verify_file, parallel::on_threads, prelude::*, worlds::build_world};
+use playbot_harness::{demo::verify_file, parallel::on_threads, worlds::build_world};
 use playbot_tests::recording::record_random;
 
 use super::arena::{act, world_with};

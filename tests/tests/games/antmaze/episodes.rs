@@ -1,7 +1,7 @@
 //! Tests of observations, rewards and ends of episodes.
 
-use playbot_games::antmaze::{AntMaze, components::MazeAnt, geometry::distance};
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
+use playbot_games::antmaze::{AntMaze, arena::MazeAnt, geometry::distance};
 
 use super::arena::{ended, level, place, put, world_with};
 

@@ -4,8 +4,9 @@ use std::sync::Arc;
 
 use bevy::prelude::*;
 use bevy_playbot::vision::{ObservationConfig, ObservationKind};
+use playbot::prelude::*;
 use playbot_games::{ant::Ant, antmaze::AntMaze};
-use playbot_lab::{prelude::*, worlds::build_observing_world};
+use playbot_harness::worlds::build_observing_world;
 
 use super::arena::put;
 

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use bevy::prelude::*;
 use bevy_playbot::policy::ActionDraw;
+use playbot::prelude::*;
 use playbot_games::{
     ant::{Ant, walk::Walker},
     antmaze::{AntMaze, DemonstratorBot},
 };
-use playbot_lab::{
+use playbot_harness::{
     eval::{EvalPlan, Player, evaluate, summarize},
-    prelude::*,
     worlds::build_world,
 };
 use playbot_learner::{DeviceKind, PolicyFile};

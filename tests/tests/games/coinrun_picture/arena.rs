@@ -4,8 +4,8 @@ use bevy::{
     ecs::schedule::{LogLevel, ScheduleBuildSettings},
     prelude::*,
 };
+use playbot::prelude::*;
 use playbot_games::coinrun::CoinRun;
-use playbot_lab::prelude::*;
 
 pub const RIGHT: u32 = 7;
 

@@ -6,12 +6,13 @@ use bevy_playbot::{
     test_app::PlaybotTestExt,
     vision::{Stage, TileLayer},
 };
+use playbot::prelude::*;
 use playbot_games::coinrun::{
     Body, CoinRun, Mode,
     components::{ArenaBody, Crate, Enemy, InArena, PlaysIn, Saw},
-    generate,
+    generator::generate,
 };
-use playbot_lab::{prelude::*, worlds::build_world};
+use playbot_harness::worlds::build_world;
 
 use super::arena::{NOTHING, drawn, play, press};
 

@@ -1,11 +1,11 @@
 //! Tests of puffs behind enemies.
 
 use bevy::prelude::*;
+use playbot::prelude::*;
 use playbot_games::coinrun::{
     Body,
     components::{ArenaBody, Enemy, PlayerBody},
 };
-use playbot_lab::prelude::*;
 
 use super::arena::{NOTHING, drawn, play, press, sprite, update_picture};
 

@@ -2,13 +2,13 @@
 
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::{PaintedVelocity, Stage, TileLayer};
+use playbot::prelude::*;
 use playbot_games::coinrun::{
     Mode, Tile,
     components::{ArenaBody, Coin, Enemy, InArena, PlayerBody, PlaysIn, Saw},
-    generate,
+    generator::generate,
     picture::{Art, Pose},
 };
-use playbot_lab::prelude::*;
 
 use super::arena::{JUMP, LEFT, NOTHING, RIGHT, drawn, play, press, sprite, update_picture};
 

@@ -9,7 +9,7 @@ use bevy_playbot::{
     camera::CameraSensor,
     vision::{BlankEpisodes, ImageOptions, TileLayer},
 };
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 use playbot_tests::scene::{camera_world, image, pixel, player, spawn_eye};
 
 #[track_caller]
@@ -60,7 +60,7 @@ fn a_target_that_is_gone_is_named() {
     let fault = fault(&mut world);
     assert!(fault.contains("agent 6") && fault.contains(&format!("the target {gone}")), "{fault}");
     let frame = world.get::<bevy_playbot::vision::Frame>(other).expect("a frame");
-    assert_eq!(frame.tick, Some(world.resource::<bevy_playbot::tick::Tick>().0), "others go on seeing");
+    assert_eq!(frame.tick, Some(world.resource::<bevy_playbot::episode::Tick>().0), "others go on seeing");
 }
 
 /// The renderer of Bevy would stop for good at an image without pixels.

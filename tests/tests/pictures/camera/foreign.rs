@@ -2,7 +2,8 @@
 
 use bevy::{camera::ScalingMode, prelude::*};
 use bevy_playbot::vision::{Frame, ImageOptions, ObservationConfig, ObservationKind};
-use playbot_lab::{foreign::ForeignGame, prelude::*, worlds::build_observing_world};
+use playbot::prelude::*;
+use playbot_harness::{foreign::ForeignGame, worlds::build_observing_world};
 use playbot_tests::{
     foreign::catch::{Paddle, game},
     scene::pixel,

@@ -5,7 +5,7 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::{camera::CameraSensor, vision::ImageOptions};
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 use playbot_tests::scene::{camera_world, image, pixel, player, spawn_eye};
 
 fn agent(world: &mut World, index: u32, camera: Entity, size: [u32; 2]) -> Entity {

@@ -2,7 +2,7 @@
 
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::TileLayer;
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 use playbot_tests::scene::{camera_world, image, pixel, spawn_eye};
 
 const RED: [u8; 4] = [200, 10, 30, 255];

@@ -3,10 +3,10 @@
 use bevy::prelude::*;
 use bevy_playbot::{
     camera::{CameraSensor, ReadbackDelay},
-    tick::Tick,
+    episode::Tick,
     vision::{Frame, ImageOptions, Stage, TileLayer, VisionSystems},
 };
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 use playbot_tests::scene::{camera_world, draw, image, pixel, player, spawn_eye};
 
 /// The walking entity, and its position at the observation.

@@ -3,12 +3,9 @@
 use std::path::Path;
 
 use bevy_playbot::vision::ObservationConfig;
-use playbot_lab::{
-    demo::dataset::Demonstrations,
-    train::{Experiment, config_file::parse_experiment},
-};
 use playbot_learner::{DeviceKind, SkillModel};
 use playbot_tests::{Corridor, PaintedCorridor, recording::record_random, training::learn_skills};
+use playbot_train::{Experiment, demo::Demonstrations, experiment::file::parse_experiment};
 
 const EXPERIMENT: &str = r#"(
     game: "corridor", train: "plain:0..7", test: "plain:8..15", demos: "unused",

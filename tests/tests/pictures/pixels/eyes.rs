@@ -1,13 +1,11 @@
 //! Tests of sensors that fit and of sensors that do not.
 
 use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind, VisionError};
-use playbot_lab::{
-    prelude::*,
-    train::{Experiment, TrainError, Trainer, collect::Collector},
-    worlds::build_observing_world,
-};
+use playbot::prelude::*;
+use playbot_harness::worlds::build_observing_world;
 use playbot_learner::{DeviceKind, Observations};
 use playbot_tests::{Corridor, PaintedCorridor, training::untrained};
+use playbot_train::{Experiment, TrainError, Trainer, collect::Collector};
 
 use super::corridor::{experiment, record, skills};
 

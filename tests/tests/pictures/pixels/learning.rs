@@ -1,21 +1,19 @@
 //! Tests of runs, their files and their results.
 
 use bevy_playbot::policy_file::{PolicyMisfit, check_policy, policy_observation};
-use playbot_lab::{
-    eval::{EpisodeResult, EvalPlan, Player, evaluate},
-    policy_export::{Provenance, export_policy, policy_file},
-    prelude::*,
-    train::{
-        Algorithm, Experiment, TrainedLearner, Trainer,
-        checkpoint::CheckpointChoice,
-        run_dir::{OpenedRun, RunDir},
-    },
-};
+use playbot::prelude::*;
+use playbot_harness::eval::{EpisodeResult, EvalPlan, Player, evaluate};
 use playbot_learner::{DeviceKind, Policy, PolicyFile, SkillModel};
 use playbot_tests::{
     Corridor, PaintedCorridor,
     measuring::plan,
     training::{last_success_rate, train, written},
+};
+use playbot_train::{
+    Algorithm, Experiment, TrainedLearner, Trainer,
+    checkpoint::CheckpointChoice,
+    policy_export::{Provenance, export_policy, policy_file},
+    run_dir::{OpenedRun, RunDir},
 };
 
 use super::corridor::{experiment, record, skills};

@@ -9,7 +9,7 @@ use bevy_playbot::{
     raster::{RasterPlugin, RasterSensor},
     vision::{Frame, ImageOptions},
 };
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 use playbot_tests::scene::{image, pixel};
 
 pub const RED: [u8; 4] = [255, 0, 0, 255];

@@ -5,7 +5,7 @@ use bevy_playbot::{
     raster::RasterSensor,
     vision::{ImageOptions, TileLayer},
 };
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 use playbot_tests::scene::image;
 
 use super::eye::{GREEN, RED, add, fault, four, looking};

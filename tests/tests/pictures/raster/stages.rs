@@ -5,7 +5,7 @@ use bevy_playbot::{
     raster::RasterSensor,
     vision::{Frame, ImageOptions, Stage},
 };
-use playbot_lab::prelude::*;
+use playbot::prelude::*;
 
 use super::eye::{BLUE, GREEN, RED, WHITE, four, frame, looking, raster_world, spawn_eye};
 

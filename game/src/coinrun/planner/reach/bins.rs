@@ -1,16 +1,17 @@
 //! Sets of positions along x.
 
-use std::ops::{BitAnd, BitOr, BitOrAssign, Not};
-
 use crate::coinrun::tile::SIZE;
+use std::ops::{BitAnd, BitOr, BitOrAssign, Not};
 
 /// Number of bins over the width of a level. A bin is a little wider than an eighth of a tile, the longest displacement
 /// of one part of a step. Four bins are a little wider than that of a whole step: rounding never leads further.
-pub const BINS: usize = 508;
+pub(crate) const BINS: usize = 508;
+
 /// Width of a bin, tiles.
-pub const WIDTH: f32 = SIZE as f32 / BINS as f32;
+pub(crate) const WIDTH: f32 = SIZE as f32 / BINS as f32;
+
 /// Bins that full speed crosses in a step.
-pub const STEP_BINS: usize = 4;
+pub(crate) const STEP_BINS: usize = 4;
 
 const WORDS: usize = BINS.div_ceil(64);
 

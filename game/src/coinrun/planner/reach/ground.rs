@@ -1,14 +1,12 @@
 //! Answers about a level at one height: room, obstacles, hazards and the coin.
 
-use std::{collections::HashMap, sync::LazyLock};
-
-use super::bins::{BINS, Bins};
 use crate::coinrun::{
-    level::Level,
+    level::{Level, Spawn},
+    planner::reach::bins::{BINS, Bins},
     rules::{Body, FOOT_MARGIN, OVERLAP_MARGIN, corners},
-    spawn::Spawn,
     tile::{Corners, Tile},
 };
+use std::{collections::HashMap, sync::LazyLock};
 
 /// Shift of a bin's ends when its columns are computed: more than rounding does.
 const SLACK: f32 = 1e-4;
@@ -32,7 +30,9 @@ pub(super) struct Ground<'a> {
 
 /// A player at the left border, at the bottom.
 static PLAYER: LazyLock<Body> = LazyLock::new(|| Body { x: 0.0, y: 0.0, ..Body::player() });
+
 static CORNER_COLUMNS: LazyLock<Columns> = LazyLock::new(|| columns(corners(&PLAYER, 0.0, 0.0).right));
+
 static BODY_COLUMNS: LazyLock<Columns> = LazyLock::new(|| columns(PLAYER.rx + OVERLAP_MARGIN));
 
 /// A question about a level. Corners are the same corners in both rows of a question: a player free in one row and

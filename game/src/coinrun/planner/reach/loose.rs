@@ -3,26 +3,33 @@
 //! Their height is known by a tenth of a tile, and of their speed the upper limit upwards. Within a step they may go to
 //! every height between that and the fastest fall.
 
-use std::collections::BTreeMap;
-
-use super::{
-    bins::{Bins, STEP_BINS},
-    ground::{Ground, Touched},
-    state::{Exact, Loose, State, put},
+use crate::coinrun::{
+    planner::reach::{
+        Exact, Loose, State,
+        bins::{Bins, STEP_BINS},
+        ground::{Ground, Touched},
+        put,
+    },
+    rules::{GRAVITY, JUMP_SPEED, PLAYER_HALF_HEIGHT},
 };
-use crate::coinrun::rules::{GRAVITY, JUMP_SPEED, PLAYER_HALF_HEIGHT};
+use std::collections::BTreeMap;
 
 /// Heights and speeds are counted in tenths of a tile.
 const TENTHS: f32 = 10.0;
+
 /// The largest fall and rise of a player in a step, tenths of a tile.
 pub(super) const FASTEST: i32 = (JUMP_SPEED * TENTHS) as i32;
+
 /// Loss of speed in a step, tenths of a tile.
 const SLOWED: i32 = (GRAVITY * TENTHS) as i32;
+
 /// A standing player is in the middle of a tenth.
 const OFFSET: f32 = PLAYER_HALF_HEIGHT - 0.55;
+
 /// Bins that a player with a corner in a wall may move before all are free again: a tile, an eighth of one for a part
 /// of a step, and some more.
 const WALL_REACH: usize = 12;
+
 /// Largest depth below a crate's top of a player that overlaps it, tenths of a tile.
 const CRATE_DEPTH: i32 = 22;
 

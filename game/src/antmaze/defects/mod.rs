@@ -1,8 +1,0 @@
-//! Defects that can be planted into AntMaze, to measure testers: see [`bugs`](playbot_lab::bugs).
-
-mod catalogue;
-mod goal;
-mod motion;
-mod walls;
-
-pub(super) use catalogue::defects;

@@ -1,0 +1,356 @@
+//! Options of computing that several verbs have: threads and device.
+
+pub(crate) mod experiment;
+pub(crate) mod open;
+pub(crate) mod player;
+
+use crate::{error::CliError, output::prepare};
+use bevy_playbot::demo::file::{DemoFault, DemoFileError, DemoHeader, DemoWriter};
+use playbot_harness::{
+    game::Game,
+    machine::usable_threads,
+    parallel::default_threads,
+    split::{LevelSplit, check_level},
+};
+use playbot_learner::DeviceKind;
+use playbot_train::{
+    Experiment,
+    experiment::{experiment_of, file::parse_experiment},
+    train_run::TrainingSetup,
+};
+use std::path::{Path, PathBuf};
+
+/// More threads than any machine has cores.
+pub(crate) const MOST_THREADS: usize = 1024;
+
+/// The number of threads.
+#[derive(clap::Args, Clone, Copy, Debug)]
+pub struct Threads {
+    /// Threads. The result does not depend on their number.
+    #[arg(long, default_value_t = usual_threads(), value_parser = number_of_threads)]
+    threads: usize,
+}
+
+impl Threads {
+    /// Returns the number of threads: the requested one, or as many as the system's limits allow.
+    pub fn count(self) -> usize {
+        usable_threads(self.threads)
+    }
+}
+
+/// Returns the revision of playbot that this program was built from.
+pub(crate) fn revision() -> &'static str {
+    env!("PLAYBOT_REVISION")
+}
+
+/// Returns one for each core.
+fn usual_threads() -> usize {
+    default_threads().min(MOST_THREADS)
+}
+
+/// Parses a number of threads.
+///
+/// # Errors
+///
+/// It is 0, no number, or more than [`MOST_THREADS`].
+fn number_of_threads(text: &str) -> Result<usize, String> {
+    match at_least_one(text)? {
+        threads if threads > MOST_THREADS => {
+            Err(format!("it must be at most {MOST_THREADS}: more threads than a machine has cores make nothing faster"))
+        }
+        threads => Ok(threads),
+    }
+}
+
+impl Default for Threads {
+    fn default() -> Self {
+        Self { threads: usual_threads() }
+    }
+}
+
+/// The device that computes networks.
+#[derive(clap::Args, Clone, Copy, Debug, Default)]
+pub struct Device {
+    /// Device: flex or ndarray on the CPU, wgpu or cuda on a graphics card in programs built with these features.
+    #[arg(long, default_value_t)]
+    pub device: DeviceKind,
+}
+
+/// Threads and device, for verbs that learn or measure.
+#[derive(clap::Args, Clone, Copy, Debug)]
+pub struct Compute {
+    #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
+    device: Device,
+}
+
+impl Compute {
+    /// Returns the number of threads: the requested one, or as many as the system's limits allow.
+    pub fn threads(&self) -> usize {
+        self.threads.count()
+    }
+
+    /// Returns the device that computes networks.
+    pub fn device(&self) -> DeviceKind {
+        self.device.device
+    }
+
+    /// Returns the setup of trainings, whose recordings are where `recordings` finds them.
+    pub fn setup<'a>(&self, recordings: &'a dyn Fn(&Path) -> PathBuf) -> TrainingSetup<'a> {
+        let (device, threads) = (self.device(), self.threads());
+        TrainingSetup { device, threads, revision: revision(), recordings }
+    }
+}
+
+// Numbers on the command line, and their wording in messages.
+
+/// Parses a number of at least one.
+///
+/// # Errors
+///
+/// It is 0 or no number.
+pub(crate) fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(0) => Err("it must be at least 1".to_owned()),
+        Ok(number) => Ok(number),
+        Err(_) => Err("it must be a whole number, at least 1".to_owned()),
+    }
+}
+
+/// Formats `1 step`, `2 steps`.
+pub(crate) fn counted(number: u64, what: &str) -> String {
+    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+}
+
+// Options for one level of a game.
+
+/// The level of verbs that play a single one.
+#[derive(clap::Args, Clone, Debug)]
+pub struct LevelsArg {
+    /// Levels, as mode:first..last or files:pattern, such as "files:levels/*.json". The first of them is taken, or the
+    /// one of --level.
+    #[arg(long, conflicts_with = "mode")]
+    levels: Option<LevelSplit>,
+    /// Number of the level (default: 0, or the first of the levels).
+    #[arg(long, value_name = "N")]
+    level: Option<u64>,
+}
+
+/// Returns the number of the level. Up to version 0.1 it was named by --seed in verbs that play a single level: alone
+/// it still is, with a warning.
+pub(crate) fn level_number(level: Option<u64>, seed: Option<u64>) -> Option<u64> {
+    if let (None, Some(seed)) = (level, seed) {
+        tell!(
+            "warning: --seed {seed} is taken as the level, which the next version will not do: --seed names the random \
+             seed; for a level use --level {seed}"
+        );
+    }
+    level.or(seed)
+}
+
+impl LevelsArg {
+    /// Returns true if levels are named, and with them their mode.
+    pub fn is_named(&self) -> bool {
+        self.levels.is_some()
+    }
+
+    /// Returns the number of the level if one is named: by --level, or by `seed`, the value of --seed.
+    pub fn number(&self, seed: Option<u64>) -> Option<u64> {
+        level_number(self.level, seed)
+    }
+
+    /// Returns the random seed for the value of --seed, which names the level instead where no --level is given.
+    pub fn random_seed(&self, seed: Option<u64>) -> u64 {
+        self.level.and(seed).unwrap_or(0)
+    }
+
+    /// Returns the mode and the level to play. Without levels these are `mode`, and level 0 unless another one is
+    /// named by --level, or by `seed`, the value of --seed.
+    ///
+    /// # Errors
+    ///
+    /// The game does not have these levels, or the named level is none of them.
+    pub fn choose<'a>(
+        &'a self,
+        game: &dyn Game,
+        mode: Option<&'a str>,
+        seed: Option<u64>,
+    ) -> Result<(Option<&'a str>, u64), CliError> {
+        let Some(levels) = &self.levels else {
+            let level = self.number(seed).unwrap_or(0);
+            check_level(game, mode.unwrap_or_else(|| usual_mode(game)), level)?;
+            return Ok((mode, level));
+        };
+        levels.check(game)?;
+        let level = self.number(seed).unwrap_or(levels.first);
+        if levels.contains(&levels.mode, level) {
+            return Ok((Some(levels.mode.as_str()), level));
+        }
+        Err(CliError::Usage(format!("--level {level} is none of the levels {levels}")))
+    }
+}
+
+// Opening of a recording to write.
+
+/// Options for an existing recording.
+#[derive(clap::Args, Clone, Copy, Debug, Default)]
+pub struct OverwriteArgs {
+    /// Add to an existing recording.
+    #[arg(long, conflicts_with = "force")]
+    append: bool,
+    /// Overwrite an existing recording.
+    #[arg(long)]
+    force: bool,
+}
+
+impl OverwriteArgs {
+    /// Opens the file, and makes its folder.
+    ///
+    /// # Errors
+    ///
+    /// The file exists without --append or --force, was recorded under other conditions, or cannot be written.
+    pub fn open(self, path: &Path, header: DemoHeader) -> Result<DemoWriter, CliError> {
+        let grows = self.append && path.is_file();
+        if !grows {
+            prepare(path)?;
+        }
+        let opened = match self {
+            Self { append: true, .. } => DemoWriter::append(path, &header),
+            Self { force: true, .. } => DemoWriter::replace(path, header),
+            _ => DemoWriter::create(path, header),
+        };
+        opened.map_err(explain)
+    }
+}
+
+/// Explains the error of a recording that was not opened, with the options that would open it.
+fn explain(error: DemoFileError) -> CliError {
+    match error.fault {
+        DemoFault::Exists => CliError::Usage(format!(
+            "{error}: add to it with --append, overwrite it with --force, or name another file"
+        )),
+        DemoFault::HeaderDiffers { .. } => CliError::Usage(format!("{error}, or overwrite this one with --force")),
+        _ => error.into(),
+    }
+}
+
+// Default mode and levels of every verb: those that `train` uses without options. The default mode of a game is that
+// of the training levels of its experiment. The default held-out levels are the experiment's.
+
+/// The default experiment of a game.
+pub struct UsualExperiment {
+    /// Its origin, in words or as a path.
+    pub origin: String,
+    /// All its values.
+    pub experiment: Experiment,
+}
+
+/// Returns the default experiment of a game; `None` if the game brings one that cannot be read.
+pub(crate) fn usual_experiment(game: &dyn Game) -> Option<UsualExperiment> {
+    let text = experiment_of(game);
+    let experiment = parse_experiment(&text.text, Path::new(&*text.origin)).ok()?;
+    Some(UsualExperiment { origin: text.origin.into_owned(), experiment })
+}
+
+/// Returns the default mode of every verb: the one of the training levels, without its options.
+pub(crate) fn usual_mode(game: &dyn Game) -> &'static str {
+    let modes = game.modes();
+    let trained = usual_experiment(game).map(|usual| usual.experiment.train.mode).unwrap_or_default();
+    let name = trained.split('+').next().unwrap_or_default();
+    let known = |wanted: &str| modes.iter().copied().find(|mode| *mode == wanted);
+    known(&trained).or_else(|| known(name)).or(modes.first().copied()).unwrap_or_default()
+}
+
+/// Returns the default held-out levels; `None` if the game brings none that it has.
+pub(crate) fn usual_held_out(game: &dyn Game) -> Option<LevelSplit> {
+    let test = usual_experiment(game)?.experiment.test;
+    game.check_mode(&test.mode).is_ok().then_some(test)
+}
+
+/// Returns levels 0 to `last` of the [`usual_mode`].
+pub(crate) fn first_levels(game: &dyn Game, last: u64) -> LevelSplit {
+    LevelSplit { mode: usual_mode(game).to_owned(), first: 0, last }
+}
+
+#[cfg(test)]
+mod one_level_tests {
+    use playbot_harness::foreign::ForeignGame;
+
+    use super::*;
+
+    #[test]
+    fn the_first_level_is_meant_unless_another_one_is_named() {
+        let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
+        let named =
+            |levels: Option<&str>, level| LevelsArg { levels: levels.map(|it| it.parse().expect("levels")), level };
+        let chosen = |levels, level, seed| {
+            let args = named(levels, level);
+            args.choose(&game, None, seed)
+                .map(|(mode, level)| (mode.map(str::to_owned), level))
+                .map_err(|it| it.to_string())
+        };
+        let (range, default) = (Some("default:4..9"), Some("default".to_owned()));
+        assert_eq!(chosen(range, None, None), Ok((default.clone(), 4)));
+        assert_eq!(chosen(range, Some(7), None), Ok((default.clone(), 7)));
+        assert_eq!(chosen(range, None, Some(7)), Ok((default.clone(), 7)), "as it was up to version 0.1");
+        assert_eq!(chosen(range, Some(8), Some(7)), Ok((default, 8)));
+        assert_eq!(chosen(range, Some(3), None), Err("--level 3 is none of the levels default:4..9".to_owned()));
+        assert_eq!(named(None, None).choose(&game, Some("x"), Some(3)).expect("a level"), (Some("x"), 3));
+        assert_eq!(chosen(None, None, None), Ok((None, 0)));
+        assert!(chosen(Some("other:0..1"), None, None).is_err(), "the game has no such mode");
+        assert_eq!(named(None, Some(3)).random_seed(Some(7)), 7);
+        assert_eq!(named(None, Some(3)).random_seed(None), 0);
+        assert_eq!(named(None, None).random_seed(Some(7)), 0, "it names the level");
+    }
+}
+
+#[cfg(test)]
+mod recording_tests {
+    use bevy_playbot::demo::file::DemoActions;
+
+    use super::*;
+
+    #[test]
+    fn what_is_in_the_way_is_named_with_the_options_that_help() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("new/a.demo");
+        let said = |args: OverwriteArgs, game: &str, path: &Path| {
+            let header = DemoHeader::new(game, 1, "easy", 60.0, DemoActions::Discrete(3));
+            args.open(path, header).map(|_| ()).map_err(|error| (error.exit_code(), error.to_string()))
+        };
+        let (plain, append) = (OverwriteArgs::default(), OverwriteArgs { append: true, force: false });
+        said(plain, "runner", &path).expect("nothing is there yet");
+        let (code, words) = said(plain, "runner", &path).expect_err("there already");
+        assert_eq!(code, 3);
+        assert!(words.contains("exists already; nothing was written: add to it with --append"), "{words}");
+        assert!(words.contains("--force"), "{words}");
+        let (code, words) = said(append, "maze", &path).expect_err("another game");
+        assert_eq!(code, 3);
+        assert!(words.contains("record to another file, or overwrite this one with --force"), "{words}");
+        said(append, "runner", &path).expect("of the same game");
+        let (code, words) = said(plain, "runner", folder.path()).expect_err("a folder");
+        assert!(code == 3 && words.contains("is a folder: name a file"), "{words}");
+        let (code, words) = said(plain, "runner", &path.join("b.demo")).expect_err("below a file");
+        assert!(code == 2 && words.contains("name a file in another folder"), "{words}");
+    }
+}
+
+#[cfg(test)]
+mod defaults_tests {
+    use playbot_harness::foreign::ForeignGame;
+
+    use super::*;
+
+    #[test]
+    fn a_game_without_an_experiment_has_its_first_mode_and_other_levels_held_out() {
+        let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
+        let usual = usual_experiment(&game).expect("the plainest");
+        assert_eq!(usual.origin, "the experiment of runner");
+        assert_eq!(usual_mode(&game), game.modes()[0]);
+        let held_out = usual_held_out(&game).expect("a mode of the game");
+        assert_eq!(held_out, usual.experiment.test);
+        assert!(!held_out.overlaps(&usual.experiment.train));
+        assert_eq!(first_levels(&game, 9).to_string(), "default:0..9");
+    }
+}

@@ -1,0 +1,412 @@
+//! Players named on the command line.
+
+use crate::{
+    arguments::{Device, experiment::ExperimentArgs, open},
+    error::{CliError, print_line},
+    progress,
+};
+use bevy_playbot::{
+    policy::ActionDraw,
+    policy_file::{PolicyMisfit, check_policy, policy_observation},
+    skill_prior::SkillPrior,
+    unknown_name::UnknownName,
+    vision::ObservationConfig,
+};
+use playbot_harness::{
+    eval::{
+        EpisodeResult, EvalError, EvalPlan, EvalSummary, Player, Trail, blind_bots, evaluate, evaluate_with_trails,
+        summarize,
+    },
+    game::Game,
+    games::Games,
+    sensors::GameSensors,
+    split::{HeldOut, LevelSplit, seen_by_training},
+};
+use playbot_learner::{DeviceKind, SeenLevels, SkillModel};
+use playbot_report::{ResultRow, whole};
+use playbot_train::{
+    Experiment,
+    checkpoint::CheckpointChoice,
+    run_dir::{OpenedRun, RunDir, RunInfo},
+};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+/// Options for a policy, a run or a bot.
+#[derive(clap::Args, Clone, Debug)]
+#[command(mut_arg("device", |device| device.help("Device of the policy: flex or ndarray, or wgpu or cuda if built in")))]
+pub struct PlayerArgs {
+    /// Policy file, as written by `playbot policy export`.
+    #[arg(long, value_name = "FILE", group = "player")]
+    policy: Option<PathBuf>,
+    /// Folder of a run.
+    #[arg(long, value_name = "DIR", group = "player")]
+    run: Option<PathBuf>,
+    /// Bot of the game, such as random. An unknown name lists all.
+    #[arg(long, value_name = "NAME", group = "player")]
+    bot: Option<String>,
+    /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
+    #[arg(long, default_value = "last", requires = "run")]
+    checkpoint: CheckpointChoice,
+    /// The policy takes its most probable action instead of drawing one.
+    #[arg(long)]
+    greedy: bool,
+    #[command(flatten)]
+    device: Device,
+}
+
+/// A player, its name and its observation.
+pub struct Chosen {
+    /// Its name in messages.
+    pub name: String,
+    /// The player.
+    pub player: Player,
+    /// The observation that it was trained with; vectors for bots.
+    pub observation_config: ObservationConfig,
+    /// The levels that it has learned from, if noted; `None` for bots.
+    pub seen: Option<SeenLevels>,
+}
+
+impl Chosen {
+    /// Returns a bot of the game by its name.
+    ///
+    /// # Errors
+    ///
+    /// The game has no such bot.
+    pub fn bot(game: &dyn Game, name: &str) -> Result<Self, CliError> {
+        Ok(Self {
+            name: name.to_owned(),
+            player: bot(game, name)?,
+            observation_config: ObservationConfig::default(),
+            seen: None,
+        })
+    }
+
+    /// Returns the demonstrator, or else the first of the game's bots.
+    ///
+    /// # Errors
+    ///
+    /// The game has none.
+    pub fn usual(game: &dyn Game) -> Result<Self, CliError> {
+        let bots = bot_names(game);
+        let name = game.tools().bots.demonstrator().or(bots.first().copied());
+        let nobody = || CliError::Usage(format!("`{}` has no bot: name a --policy or a --run", game.name()));
+        Self::bot(game, name.ok_or_else(nobody)?)
+    }
+
+    /// Loads the policy in a file, under the name of its algorithm.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be loaded, or was made for another game.
+    pub fn policy_file(game: &dyn Game, path: &Path, draw: ActionDraw, device: DeviceKind) -> Result<Self, CliError> {
+        let file = open::policy(path, device)?;
+        check_policy(&game.card(), &file).map_err(|misfit| does_not_fit(path, &misfit))?;
+        let (player, observation_config) = (Player::of_file(&file, draw), policy_observation(&file)?);
+        Ok(Self { name: file.card.algorithm, player, observation_config, seen: file.card.seen })
+    }
+
+    /// Loads the policy of a run, under the name of its algorithm. Reports it if the training has not ended.
+    ///
+    /// # Errors
+    ///
+    /// The checkpoint cannot be loaded.
+    pub fn run(
+        game: &dyn Game,
+        opened: &OpenedRun,
+        choice: CheckpointChoice,
+        draw: ActionDraw,
+        device: DeviceKind,
+    ) -> Result<Self, CliError> {
+        let OpenedRun { run, experiment, info } = opened;
+        let checkpoint = open::checkpoint(run, info.algorithm, choice)?;
+        let (done, wanted) = (checkpoint.summary.step, experiment.whole_steps());
+        if choice == CheckpointChoice::Last && done < wanted {
+            let path = run.path().display();
+            tell!("{path} is not trained to its end: it has {} of {} steps", whole(done as f64), whole(wanted as f64));
+        }
+        let learner = open::learner(run, info.algorithm, &checkpoint, device)?;
+        let prior = learner.skills().as_ref().map(SkillPrior::from);
+        Ok(Self {
+            name: info.algorithm.name().to_owned(),
+            player: Player::Policy { policy: learner.policy(), prior, draw },
+            observation_config: experiment.observation_config(),
+            seen: Some(seen_by_run(game, experiment, info)),
+        })
+    }
+
+    /// Checks that a policy's observation and actions are the game's; bots always fit.
+    ///
+    /// # Errors
+    ///
+    /// The difference, in words.
+    pub fn check_fit(&self, game: &dyn Game) -> Result<(), CliError> {
+        let Player::Policy { policy, .. } = &self.player else { return Ok(()) };
+        self.observation_config.check(game)?;
+        let (seen, acts) = (self.observation_config.obs_kind(game), game.actions());
+        if (policy.observation(), policy.action_space()) == (seen, acts) {
+            return Ok(());
+        }
+        Err(CliError::Usage(format!(
+            "the policy {} was made for {} and {}, but `{}` has {} and {}: use one that was trained for this game and \
+             this version",
+            self.name,
+            policy.observation().describe(),
+            policy.action_space(),
+            game.name(),
+            seen.describe(),
+            acts
+        )))
+    }
+}
+
+/// Explains the misfit of a policy file that was made for another game, or another version of it.
+fn does_not_fit(path: &Path, misfit: &PolicyMisfit) -> CliError {
+    let path = path.display();
+    CliError::Usage(match misfit {
+        PolicyMisfit::Game { made_for, game } => format!("{path}: {misfit}: {}", way_out("policy", made_for, game)),
+        _ => format!("{path}: {misfit}"),
+    })
+}
+
+/// Checks that a run is of the named game.
+///
+/// # Errors
+///
+/// It is of another game.
+pub(crate) fn check_run_of(path: &Path, own: &str, named: &str) -> Result<(), CliError> {
+    if own == named {
+        return Ok(());
+    }
+    let path = path.display();
+    Err(CliError::Usage(format!("{path}: a run of the game `{own}`, not of `{named}`: {}", way_out("run", own, named))))
+}
+
+/// Returns the advice about a file of one game where another one was named.
+fn way_out(what: &str, found: &str, named: &str) -> String {
+    format!("name a {what} of `{named}`, or name the game `{found}`, in a program that has it")
+}
+
+impl PlayerArgs {
+    /// Loads the player; `None` if none is named.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be loaded, or was made for another game.
+    pub fn load(&self, game: &dyn Game) -> Result<Option<Chosen>, CliError> {
+        let draw = if self.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+        if let Some(name) = &self.bot {
+            return Ok(Some(Chosen::bot(game, name)?));
+        }
+        if let Some(path) = &self.policy {
+            return Ok(Some(Chosen::policy_file(game, path, draw, self.device.device)?));
+        }
+        let Some(path) = &self.run else { return Ok(None) };
+        let opened = RunDir::open(path)?;
+        check_run_of(path, &opened.experiment.game, game.name())?;
+        let chosen = Chosen::run(game, &opened, self.checkpoint, draw, self.device.device)?;
+        chosen.check_fit(game)?;
+        Ok(Some(chosen))
+    }
+
+    /// Returns true if a player is named.
+    #[cfg(feature = "window")]
+    pub fn is_named(&self) -> bool {
+        self.policy.is_some() || self.run.is_some() || self.bot.is_some()
+    }
+}
+
+// Players by name, and their measurement for `eval` and `quickstart`.
+
+/// Returns the bot of a game with this name: one of its blind bots, chaos, or its demonstrator.
+///
+/// # Errors
+///
+/// [`UnknownName`] with the game's bots.
+pub(crate) fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
+    if game.tools().bots.demonstrator() == Some(name) {
+        return Ok(Player::Demonstrator);
+    }
+    let bots = blind_bots(game);
+    match bots.iter().find(|(bot, _)| *bot == name) {
+        Some((_, bot)) => Ok(Player::Blind(bot.clone())),
+        None => Err(UnknownName::new("bot", name, &bot_names(game))),
+    }
+}
+
+/// Returns the names of all bots of a game.
+pub(crate) fn bot_names(game: &dyn Game) -> Vec<&'static str> {
+    blind_bots(game).into_iter().map(|(name, _)| name).chain(game.tools().bots.demonstrator()).collect()
+}
+
+/// A measured player: its row of the result table, its episodes and its speed.
+pub struct Measured {
+    /// The row.
+    pub summary: EvalSummary,
+    /// Environment steps per second.
+    pub steps_per_s: f64,
+}
+
+impl Measured {
+    /// Returns the row in the form of reports.
+    pub fn into_row(self) -> ResultRow {
+        let summary = self.summary;
+        ResultRow {
+            method: summary.method,
+            split: summary.split,
+            episodes: summary.episodes as usize,
+            return_mean: summary.return_mean,
+            return_se: summary.return_se,
+            level_returns: summary.level_returns,
+            success: summary.success,
+            length_mean: summary.length_mean,
+            steps_per_s: Some(self.steps_per_s),
+        }
+    }
+}
+
+/// Measures one player, with a progress bar.
+///
+/// # Errors
+///
+/// The game broke its contract.
+pub(crate) fn measure(game: &dyn Game, name: &str, player: &Player, plan: &EvalPlan) -> Result<Measured, CliError> {
+    timed(name, plan, |progress| evaluate(game, player, plan, progress), |episode| episode)
+        .map(|(measured, _)| measured)
+}
+
+/// As [`measure`], with the trail of every episode.
+///
+/// # Errors
+///
+/// The game broke its contract.
+pub(crate) fn follow(
+    game: &dyn Game,
+    name: &str,
+    player: &Player,
+    plan: &EvalPlan,
+) -> Result<(Measured, Vec<Trail>), CliError> {
+    timed(name, plan, |progress| evaluate_with_trails(game, player, plan, progress), |trail| &trail.result)
+}
+
+fn timed<T>(
+    name: &str,
+    plan: &EvalPlan,
+    play: impl FnOnce(&(dyn Fn(u64) + Sync)) -> Result<Vec<T>, EvalError>,
+    result: impl Fn(&T) -> &EpisodeResult,
+) -> Result<(Measured, Vec<T>), CliError> {
+    let total = plan.split.len() * u64::from(plan.episodes_per_level);
+    let bar = progress::bar(&format!("test {name}"), total, "episodes");
+    let start = std::time::Instant::now();
+    let played = play(&|n| bar.inc(n))?;
+    let seconds = start.elapsed().as_secs_f64();
+    bar.finish_and_clear();
+    let episodes: Vec<_> = played.iter().map(|episode| *result(episode)).collect();
+    let steps: u64 = episodes.iter().map(|episode| u64::from(episode.ticks)).sum();
+    let summary = summarize(name, &plan.split, &episodes);
+    tell_clipped(&summary);
+    Ok((Measured { summary, steps_per_s: steps as f64 / seconds }, played))
+}
+
+/// Reports it if actions of a measured player were clipped.
+pub(crate) fn tell_clipped(summary: &EvalSummary) {
+    if summary.clipped > 0.0 {
+        tell!(
+            "{} on {}: {:.1} % of the actions lay outside the game's range and were clipped",
+            summary.method,
+            summary.split,
+            100.0 * summary.clipped
+        );
+    }
+}
+
+/// Prints a row as one line of JSON.
+///
+/// # Errors
+///
+/// Standard output is closed.
+pub(crate) fn print_json(summary: &EvalSummary) -> Result<(), CliError> {
+    print_line(json!(summary))
+}
+
+// Behaviour cloning: a skill model that plays by itself.
+
+/// Checks that a skill model was learned for a game, and returns its observation. Files of older versions do not name
+/// their game.
+///
+/// # Errors
+///
+/// The model's observations or actions do not fit the game. The message names the game that they fit.
+pub(crate) fn check_skills(
+    path: &Path,
+    model: &SkillModel,
+    game: &dyn Game,
+    from: &ExperimentArgs,
+    games: &Games,
+) -> Result<ObservationConfig, CliError> {
+    let observation_config = ObservationConfig::from_card(model.picture(), &model.observation())?;
+    let fits = |game: &dyn Game| {
+        let can_see = observation_config.check(game).is_ok();
+        can_see && (model.observation(), model.action_space()) == (observation_config.obs_kind(game), game.actions())
+    };
+    if fits(game) {
+        return Ok(observation_config);
+    }
+    let others: Vec<_> = games.iter().filter(|game| fits(*game)).map(|game| game.name()).collect();
+    let whose = if others.is_empty() { "no game here".to_owned() } else { others.join(" or ") };
+    let advice = match others.first() {
+        None => "use the program that has the game they were learned for".to_owned(),
+        Some(_) if from.names_game() => "name another one".to_owned(),
+        Some(game) => format!("name its experiment with --experiment, or its game, `{game}`, behind the verb"),
+    };
+    Err(CliError::Usage(format!(
+        "{} holds skills for {} and {}, which are those of {whose}, not of `{}`: {advice}",
+        path.display(),
+        model.observation().describe(),
+        model.action_space(),
+        game.name()
+    )))
+}
+
+// Check that measured levels were not learned from.
+
+/// The levels that players are measured on.
+pub struct MeasuredLevels<'a> {
+    splits: Vec<HeldOut<'a>>,
+    /// The levels were named; else they are the held-out ones of the experiment.
+    are_named: bool,
+}
+
+impl<'a> MeasuredLevels<'a> {
+    /// Takes ranges of levels that the game [has](LevelSplit::check).
+    pub fn new(game: &'a dyn Game, splits: &'a [LevelSplit], are_named: bool) -> Self {
+        Self { splits: splits.iter().map(|split| HeldOut::new(game, split)).collect(), are_named }
+    }
+
+    /// Checks that the policy in `path` has not learned from these levels. Levels that were named are only reported.
+    ///
+    /// # Errors
+    ///
+    /// It has seen held-out levels.
+    pub fn check(&self, path: &Path, seen: Option<&SeenLevels>) -> Result<(), CliError> {
+        for levels in &self.splits {
+            let Some(own) = levels.shown_by(seen) else { continue };
+            let (path, split) = (path.display(), levels.split());
+            if !self.are_named {
+                return Err(CliError::Usage(format!(
+                    "{path} has learned from {own}, and the held-out levels {split} have some of these: choose \
+                     levels that no player has seen, or measure there on purpose, with --levels"
+                )));
+            }
+            tell!(
+                "{path} has learned from {own}, and the levels {split} have some of these: not all of them are unseen"
+            );
+        }
+        Ok(())
+    }
+}
+
+/// Returns the levels that a run has seen; for runs without a note, its training levels.
+pub(crate) fn seen_by_run(game: &dyn Game, experiment: &Experiment, info: &RunInfo) -> SeenLevels {
+    info.seen.clone().unwrap_or_else(|| seen_by_training(game, &experiment.train))
+}

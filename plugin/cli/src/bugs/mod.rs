@@ -1,9 +1,0 @@
-//! `playbot bugs`.
-
-mod make;
-mod score;
-mod table;
-mod testers;
-mod verb;
-
-pub use verb::{Args, run};

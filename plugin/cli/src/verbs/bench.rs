@@ -1,0 +1,286 @@
+//! `playbot bench`: steps per second of the whole and microseconds of its parts.
+
+use crate::{
+    arguments::{Device, MOST_THREADS, experiment::ExperimentArgs},
+    error::{CliError, Outcome, print_line},
+};
+use bevy::prelude::World;
+use bevy_playbot::vision::{ObservationConfig, ObservationKind, VisionError};
+use playbot_harness::{
+    arrangement::Arrangement,
+    benchmark::Benchmark,
+    game::Game,
+    games::Games,
+    parallel::{default_threads, on_threads},
+    prelude::*,
+    worlds::{StageClock, build_observing_world},
+};
+use playbot_learner::waited;
+use playbot_train::Trainer;
+use serde_json::{Value, json};
+use std::time::Instant;
+
+/// Measure speed.
+///
+/// Numbers hold for this machine and this moment. Nothing is tested. The parts of a step are measured by the clock, for
+/// all threads together. Idle is the share of the threads' time in which this program did not compute: it waited, or
+/// other programs had the cores.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot bench --list
+  playbot bench --json
+  playbot bench --case sim/GAME --threads 1
+  playbot bench --case train/GAME/raster --seconds 20 --set 'ppo.cnn=Impala()' --set ppo.num_steps=256")]
+pub struct Args {
+    /// Measure only cases whose name contains this.
+    #[arg(long, default_value = "")]
+    case: String,
+    /// Arenas.
+    #[arg(long, default_value_t = 64)]
+    arenas: u32,
+    /// Threads. Each has a World of its own.
+    #[arg(long, default_value_t = usual_threads())]
+    threads: usize,
+    /// Least seconds to measure each case for.
+    #[arg(long, default_value_t = 5.0)]
+    seconds: f64,
+    /// Change a setting of the training cases, such as ppo.cnn=Impala() (repeatable).
+    #[arg(long = "set", value_name = "KEY=VALUE")]
+    set: Vec<String>,
+    #[command(flatten)]
+    device: Device,
+    /// One line of JSON per case.
+    #[arg(long)]
+    json: bool,
+    /// List the cases and measure nothing.
+    #[arg(long)]
+    list: bool,
+}
+
+/// Returns the largest power of two that the cores and the default 64 arenas allow.
+fn usual_threads() -> usize {
+    1 << default_threads().min(64).ilog2()
+}
+
+pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    if args.seconds <= 0.0 {
+        return Err(CliError::Usage("--seconds must be more than 0".to_owned()));
+    }
+    let (arenas, threads) = (args.arenas, args.threads);
+    if arenas == 0 || threads == 0 {
+        let which = if arenas == 0 { "--arenas" } else { "--threads" };
+        return Err(CliError::Usage(format!("{which} must be at least 1")));
+    }
+    if threads > MOST_THREADS {
+        return Err(CliError::Usage(format!("--threads must be at most {MOST_THREADS}")));
+    }
+    if !(arenas as usize).is_multiple_of(threads) {
+        return Err(CliError::Usage(format!(
+            "each thread has a World with as many arenas: {arenas} arenas cannot be shared by {threads} threads; try \
+             `--arenas {}`",
+            (arenas as usize).next_multiple_of(threads)
+        )));
+    }
+    let all: Vec<_> = games.iter().flat_map(cases).collect();
+    let wanted: Vec<_> = all.iter().filter(|case| case.name.contains(&args.case)).collect();
+    if wanted.is_empty() {
+        let names: Vec<_> = all.iter().map(|case| case.name.as_str()).collect();
+        return Err(CliError::Usage(format!("no case has `{}` in its name; cases: {}", args.case, names.join(", "))));
+    }
+    if args.list {
+        return wanted.iter().try_for_each(|case| print_line(&case.name)).map(|()| Outcome::Pass);
+    }
+    for (number, Case { name, game, benchmark }) in wanted.iter().enumerate() {
+        tell!("{name}: case {} of {}, {} s at least", number + 1, wanted.len(), args.seconds);
+        let measure = if benchmark.train { train } else { simulate };
+        let measured = match measure(*game, benchmark.mode, benchmark.observation, &args, games) {
+            Err(error) if args.case.is_empty() && error.is::<VisionError>() => {
+                tell!("{name}: {error}");
+                continue;
+            }
+            measured => measured?,
+        };
+        if args.json {
+            print_line(measured.to_json(name, &args))?;
+        } else {
+            print_line(format!(
+                "{name}: {:.0} steps/s with {} arenas on {} threads{}; peak memory {:.0} MiB; in a step {}",
+                measured.steps_per_s,
+                args.arenas,
+                args.threads,
+                measured.idle.map_or(String::new(), |idle| format!(", {:.0} % idle", 100.0 * idle)),
+                peak_rss_mib(),
+                measured.parts_in_words()
+            ))?;
+        }
+    }
+    Ok(Outcome::Pass)
+}
+
+/// One measurement.
+struct Case<'a> {
+    name: String,
+    /// Game to play.
+    game: &'a dyn Game,
+    /// Mode and observation to play it with.
+    benchmark: Benchmark,
+}
+
+/// Returns the measurements of a game.
+fn cases(game: &dyn Game) -> Vec<Case<'_>> {
+    let tools = game.tools().benchmarks;
+    let of = |benchmark: Benchmark| Case {
+        name: benchmark.name(game.name()),
+        game: tools.benchmarked(&benchmark).unwrap_or(game),
+        benchmark,
+    };
+    let vector = |mode| vec![Benchmark::simulate("vector", mode), Benchmark::train("vector", mode)];
+    let default = || game.modes().first().copied().map_or_else(Vec::new, vector);
+    tools.benchmarks().unwrap_or_else(default).into_iter().map(of).collect()
+}
+
+struct Measure {
+    steps_per_s: f64,
+    /// Microseconds per step of the parts, over all threads together.
+    parts: Value,
+    /// Share of the threads' time in which they did nothing. `None` where the system does not report it.
+    idle: Option<f64>,
+}
+
+impl Measure {
+    fn to_json(&self, case: &str, args: &Args) -> Value {
+        json!({
+            "case": case, "arenas": args.arenas, "threads": args.threads, "steps_per_s": self.steps_per_s.round(),
+            "peak_rss_mib": peak_rss_mib(), "us_per_step": self.parts, "idle_share": self.idle,
+            "seconds": args.seconds, "device": args.device.device.to_string(), "set": args.set,
+            "version": env!("CARGO_PKG_VERSION"),
+        })
+    }
+
+    /// Returns the parts in the order in which they happen.
+    fn parts_in_words(&self) -> String {
+        let part = |name: &&str| Some(format!("{name} {} µs", self.parts.get(*name)?.as_f64()?));
+        ["simulate", "observe", "infer", "record", "gather", "learn"]
+            .iter()
+            .filter_map(part)
+            .collect::<Vec<_>>()
+            .join(", ")
+    }
+}
+
+/// Measures random actions on 64 levels, with observations filled every tick.
+fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
+    let observation_config = ObservationConfig { kind, ..ObservationConfig::default() };
+    let arrangement = Arrangement::new(game, args.arenas, args.threads as u32);
+    let mut worlds = Vec::new();
+    for first in arrangement.first_agents() {
+        let (mut world, agents) = build_observing_world(game, mode, &observation_config, 1, first, arrangement.arenas)?;
+        for agent in agents {
+            let queue = LevelQueue::Uniform { first: 0, last: 63 };
+            world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
+        }
+        worlds.push(world);
+    }
+    if observation_config.is_image() {
+        // The first pictures are late: shaders and textures are prepared.
+        worlds.iter_mut().try_for_each(|world| world.ticks(10))?;
+    }
+    worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
+    const TICKS: u64 = 100;
+    let (start, mut ticks, busy) = (Instant::now(), 0, busy_s());
+    while start.elapsed().as_secs_f64() < args.seconds {
+        for done in on_threads(&mut worlds, args.threads, |world| world.ticks(TICKS)) {
+            done?;
+        }
+        ticks += TICKS;
+    }
+    let steps = (ticks * u64::from(arrangement.total())) as f64;
+    let seconds = start.elapsed().as_secs_f64();
+    let idle = idle_share(busy_s() - busy, seconds, args.threads);
+    Ok(Measure { steps_per_s: steps / seconds, parts: stages(worlds.iter_mut(), steps), idle })
+}
+
+/// Measures PPO with 3 epochs and 8 minibatches. State vectors take 256 steps a rollout, pictures 32 and the
+/// Nature-CNN, unless `--set` changes that.
+fn train(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, games: &Games) -> Result<Measure, CliError> {
+    let experiment = training(game, mode, kind, args).load(games, [])?;
+    let mut trainer = Trainer::new(game, &experiment, None, args.device.device, args.threads)?;
+    trainer.update()?;
+    trainer.worlds_mut().for_each(|world| world.insert_resource(StageClock::default()));
+    let (start, before, gathered, busy) = (Instant::now(), trainer.steps(), trainer.gathering(), busy_s());
+    let mut learn_s = 0.0;
+    while start.elapsed().as_secs_f64() < args.seconds {
+        learn_s += trainer.update()?.timing.learn_s;
+    }
+    let steps = (trainer.steps() - before) as f64;
+    let seconds = start.elapsed().as_secs_f64();
+    let gather_s = (trainer.gathering() - gathered).as_secs_f64();
+    let mut parts = stages(trainer.worlds_mut(), steps);
+    parts["gather"] = json!(microseconds(gather_s * args.threads as f64, steps));
+    parts["learn"] = json!(microseconds((learn_s - gather_s) * args.threads as f64, steps));
+    Ok(Measure { steps_per_s: steps / seconds, parts, idle: idle_share(busy_s() - busy, seconds, args.threads) })
+}
+
+/// Returns the experiment of a training case: the settings of the case, overridden by the command line.
+fn training(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args) -> ExperimentArgs {
+    let config = ObservationConfig { kind, ..ObservationConfig::default() };
+    let known = [
+        format!("game={}", game.name()),
+        format!("train={mode}:0..63"),
+        format!("test={mode}:64..127"),
+        format!("observation={kind:?}"),
+        format!("arenas={}", args.arenas),
+        format!("worlds={}", args.threads),
+        "algorithm=ppo".to_owned(),
+        format!("ppo.num_steps={}", if config.is_image() { 32 } else { 256 }),
+        "ppo.cnn=Nature(feature:256)".to_owned(),
+        "ppo.epochs=3".to_owned(),
+        "ppo.minibatches=8".to_owned(),
+    ];
+    ExperimentArgs { set: args.set.clone(), ..Default::default() }.over(known)
+}
+
+/// Returns the microseconds per step that the Worlds' threads spent in each part of their ticks.
+fn stages<'a>(worlds: impl Iterator<Item = &'a mut World>, steps: f64) -> Value {
+    let mut sum = StageClock::default();
+    for world in worlds {
+        let clock = world.resource::<StageClock>();
+        sum.simulate_s += clock.simulate_s;
+        sum.observe_s += clock.observe_s;
+        sum.infer_s += clock.infer_s;
+        sum.record_s += clock.record_s;
+    }
+    json!({
+        "simulate": microseconds(sum.simulate_s, steps), "observe": microseconds(sum.observe_s, steps),
+        "infer": microseconds(sum.infer_s, steps), "record": microseconds(sum.record_s, steps),
+    })
+}
+
+fn microseconds(seconds: f64, steps: f64) -> f64 {
+    (1e8 * seconds / steps).round() / 100.0
+}
+
+/// Returns the largest resident memory of this process so far, MiB; 0 where the system does not report it.
+fn peak_rss_mib() -> f64 {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    let kib = line.and_then(|rest| rest.split_whitespace().next()?.parse::<f64>().ok());
+    (kib.unwrap_or(0.0) / 1024.0).round()
+}
+
+/// Returns the seconds of processor time used so far, all threads together; 0 where the system does not report it.
+/// Workers that wait awake use it for nothing.
+fn busy_s() -> f64 {
+    // A hundredth of a second on every Linux.
+    const TICKS_PER_S: f64 = 100.0;
+    let stat = std::fs::read_to_string("/proc/self/stat").unwrap_or_default();
+    // The name of the program, in brackets, may hold anything.
+    let numbers = stat.rsplit(')').next().unwrap_or_default();
+    let ticks: f64 = numbers.split_whitespace().skip(11).take(2).filter_map(|word| word.parse::<f64>().ok()).sum();
+    (ticks / TICKS_PER_S - waited().as_secs_f64()).max(0.0)
+}
+
+fn idle_share(busy_s: f64, seconds: f64, threads: usize) -> Option<f64> {
+    let share = 1.0 - busy_s / (seconds * threads as f64);
+    (busy_s > 0.0).then_some((1000.0 * share.max(0.0)).round() / 1000.0)
+}

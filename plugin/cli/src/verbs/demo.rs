@@ -1,0 +1,281 @@
+//! `playbot demo ls|show|verify|repair|merge`.
+
+mod show;
+
+use crate::{
+    arguments::{counted, open},
+    error::{CliError, Outcome, print_line},
+    interrupt,
+    interrupt::NothingToSave,
+    output,
+    output::prepare,
+    progress,
+    verbs::demo::show::show,
+};
+use bevy_playbot::demo::file::{DemoSummary, find_demos, merge_demos, repair};
+use playbot_harness::{
+    demo::{VerifyReport, verify_file},
+    games::{Artifact, Games},
+};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+
+pub use crate::verbs::demo::show::deciders;
+
+/// Look at, check, repair and join recordings.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot demo ls
+  playbot demo show my.demo --episode 0
+  playbot demo verify demos/GAME
+  playbot demo verify a.demo b.demo --json
+  playbot demo repair torn.demo --out whole.demo
+  playbot demo repair torn.demo --header-from other.demo
+  playbot demo merge --out all.demo alice.demo bob.demo")]
+pub struct Args {
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+#[derive(clap::Subcommand)]
+enum Verb {
+    /// List recordings.
+    Ls {
+        /// Files or folders.
+        #[arg(default_value = "demos")]
+        paths: Vec<PathBuf>,
+        /// One line of JSON per recording.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Show the header and the episodes of a recording.
+    Show {
+        /// The file.
+        file: PathBuf,
+        /// Show every tick of this episode, counted from 0.
+        #[arg(long)]
+        episode: Option<usize>,
+        /// One line of JSON per episode, or per tick.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Replay recordings; exit code 1 if one diverges, is damaged or cannot be replayed.
+    Verify {
+        /// Files or folders.
+        #[arg(default_value = "demos")]
+        paths: Vec<PathBuf>,
+        /// One line of JSON per recording.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Recover the whole episodes of a damaged recording.
+    Repair {
+        /// The damaged file.
+        file: PathBuf,
+        /// File to write (default: the damaged file itself, which is then kept beside it as FILE.bak).
+        #[arg(long)]
+        out: Option<PathBuf>,
+        /// Another recording of the same game, mode and version. Its header is taken if both copies in the damaged file
+        /// are damaged.
+        #[arg(long, value_name = "FILE")]
+        header_from: Option<PathBuf>,
+        /// Print the result as a line of JSON.
+        #[arg(long)]
+        json: bool,
+    },
+    /// Join recordings of one game, one version of its rules and one mode into a new one.
+    Merge {
+        /// The recordings, in the order of their episodes in the new one.
+        #[arg(required = true, value_name = "FILE")]
+        files: Vec<PathBuf>,
+        /// File to write, which must not exist.
+        #[arg(long)]
+        out: PathBuf,
+        /// Print the result as a line of JSON.
+        #[arg(long)]
+        json: bool,
+    },
+}
+
+pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    match args.verb {
+        Verb::Ls { paths, json } => ls(&paths, json),
+        Verb::Show { file, episode, json } => show(&file, episode, json),
+        Verb::Verify { paths, json } => verify(&paths, json, games),
+        Verb::Repair { file, out, header_from, json } => {
+            mend(&file, out.as_deref().unwrap_or(&file), header_from.as_deref(), json)
+        }
+        Verb::Merge { files, out, json } => merge(&files, &out, json),
+    }
+}
+
+fn ls(paths: &[PathBuf], as_json: bool) -> Result<Outcome, CliError> {
+    let mut outcome = Outcome::Pass;
+    for file in all_demos(paths)? {
+        let summary = match DemoSummary::read(&file) {
+            Ok(summary) => summary,
+            Err(error) => {
+                tell!("{}", output::named(&error.to_string()));
+                outcome = Outcome::Findings;
+                continue;
+            }
+        };
+        if as_json {
+            print_line(json!(summary))?;
+        } else {
+            print_line(format!(
+                "{}: {} {}, {}, {}, {}, {}, {} KiB, by {}, decided by {}",
+                file.display(),
+                summary.header.game,
+                summary.header.mode,
+                counted(summary.episodes as u64, "episode"),
+                counted(summary.steps as u64, "step"),
+                success(&summary),
+                counted(summary.levels as u64, "level"),
+                summary.bytes / 1024,
+                summary.header.demonstrator,
+                deciders(&summary.steps_by_decider),
+            ))?;
+        }
+    }
+    Ok(outcome)
+}
+
+/// Returns the share of successes in words, empty if there are no successes: many games have no goal. Recordings do not
+/// note whether the goal was reached in time. Episodes that were cut off at the end of the recording do not count.
+fn success(summary: &DemoSummary) -> String {
+    let share = match summary.success_share {
+        None => "no episode ended".to_owned(),
+        Some(_) if summary.successes == 0 => "no episode ended in a win".to_owned(),
+        Some(share) => format!("{:.1} % success", 100.0 * share),
+    };
+    let notes: Vec<String> = [(summary.truncated, "until time was up"), (summary.aborted, "cut off")]
+        .into_iter()
+        .filter(|(count, _)| *count > 0)
+        .map(|(count, how)| format!("{count} {how}"))
+        .collect();
+    if notes.is_empty() { share } else { format!("{share} ({})", notes.join(", ")) }
+}
+
+/// Returns the recordings of all files and folders.
+fn all_demos(paths: &[PathBuf]) -> Result<Vec<PathBuf>, CliError> {
+    let mut files = Vec::new();
+    for path in paths {
+        files.extend(find_demos(path).map_err(open::missing_recording)?);
+    }
+    Ok(files)
+}
+
+fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, CliError> {
+    let files = all_demos(paths)?;
+    let mut outcome = Outcome::Pass;
+    let _replaying = NothingToSave::listen();
+    for (done, file) in files.iter().enumerate() {
+        interrupt::leave(format!("{done} of {} checked: name the others", counted(files.len() as u64, "recording")));
+        let checked = replay(file, games);
+        // A verdict is never vacuous: without a replay nothing is proved.
+        if !checked.as_ref().is_ok_and(|report| report.divergences.is_empty() && report.episodes > 0) {
+            outcome = Outcome::Findings;
+        }
+        if as_json {
+            let error = checked.as_ref().err().map(|error| named(file, error));
+            print_line(json!({ "file": file, "report": checked.ok(), "error": error }))?;
+        } else {
+            print_report(file, checked)?;
+        }
+    }
+    Ok(outcome)
+}
+
+/// Replays a file with a progress bar.
+fn replay(file: &Path, games: &Games) -> Result<VerifyReport, CliError> {
+    // The whole file is read before any of it is played, so that damage shows at once.
+    let summary = DemoSummary::read(file)?;
+    let game = games.of_file(Artifact::Recording, file, &summary.header.game)?;
+    let bar = progress::bar("replay", summary.episodes as u64, "episodes");
+    let report = verify_file(game, file, |done| bar.set_position(done));
+    bar.finish_and_clear();
+    Ok(report?)
+}
+
+/// Formats an error with its file.
+fn named(file: &Path, error: &CliError) -> String {
+    let (file, words) = (file.display().to_string(), output::named(&error.to_string()));
+    if words.contains(&file) { words } else { format!("{file}: {words}") }
+}
+
+fn print_report(file: &Path, checked: Result<VerifyReport, CliError>) -> Result<(), CliError> {
+    let report = match checked {
+        Ok(report) => report,
+        Err(error) => return print_line(named(file, &error)),
+    };
+    for (episode, divergence) in &report.divergences {
+        print_line(format!("{}: episode {episode}: {divergence}", file.display()))?;
+    }
+    let verdict = match report.divergences.len() {
+        0 if report.episodes == 0 => "nothing to replay".to_owned(),
+        0 => "all as recorded".to_owned(),
+        n => format!("{n} diverge"),
+    };
+    let replayed = format!("{}, {} replayed", counted(report.episodes, "episode"), counted(report.ticks, "tick"));
+    print_line(format!("{}: {replayed}, {verdict}", file.display()))
+}
+
+/// Repairs a file. A file without a whole episode is a finding.
+fn mend(file: &Path, out: &Path, header_from: Option<&Path>, as_json: bool) -> Result<Outcome, CliError> {
+    let report = repair(file, out, header_from).map_err(open::missing_or_taken)?;
+    if as_json {
+        print_line(json!(report))?;
+    } else {
+        let kept = match report.kept_episodes {
+            0 => "no episode is whole, so nothing is kept and there is nothing to replay or to learn from".to_owned(),
+            episodes => format!("kept {} with {} steps", counted(episodes as u64, "episode"), report.kept_steps),
+        };
+        let places = counted(report.dropped_regions.len() as u64, "place");
+        print_line(format!("{}: {kept}; dropped {} bytes in {places}", out.display(), report.dropped_bytes))?;
+        if let Some(from) = &report.header_from {
+            let from = if from == file { "its second copy".to_owned() } else { from.display().to_string() };
+            print_line(format!("its header was damaged, and is taken from {from}"))?;
+        }
+        if let Some(backup) = &report.backup {
+            print_line(format!("the damaged file is kept as {}", backup.display()))?;
+        }
+    }
+    Ok(if report.kept_episodes == 0 { Outcome::Findings } else { Outcome::Pass })
+}
+
+// `playbot demo merge`: joins recordings of many testers into one.
+
+/// Writes the episodes of all files into a new one, and reports them. A recording without a single episode is a
+/// finding.
+///
+/// # Errors
+///
+/// They are of different games or rules, one is damaged, or there is a file at `out` already. Nothing is left at `out`
+/// then.
+pub(crate) fn merge(files: &[PathBuf], out: &Path, as_json: bool) -> Result<Outcome, CliError> {
+    prepare(out)?;
+    let report = merge_demos(files, out).map_err(open::missing_or_taken)?;
+    if as_json {
+        let parts: Vec<_> =
+            report.files.iter().map(|(file, episodes)| json!({ "file": file, "episodes": episodes })).collect();
+        print_line(json!({
+            "file": out, "header": report.header, "episodes": report.episodes(), "steps": report.steps, "files": parts,
+        }))?;
+    } else {
+        for (file, episodes) in &report.files {
+            print_line(format!("{}: {}", file.display(), counted(*episodes as u64, "episode")))?;
+        }
+        print_line(format!(
+            "{}: {} {}, {} with {} from {}, by {}",
+            out.display(),
+            report.header.game,
+            report.header.mode,
+            counted(report.episodes() as u64, "episode"),
+            counted(report.steps as u64, "step"),
+            counted(report.files.len() as u64, "recording"),
+            report.header.demonstrator,
+        ))?;
+    }
+    Ok(if report.episodes() == 0 { Outcome::Findings } else { Outcome::Pass })
+}

@@ -1,0 +1,103 @@
+//! `playbot doctor`.
+
+use crate::{
+    arguments::{at_least_one, level_number, usual_mode},
+    error::{CliError, Outcome, print_line},
+    interrupt,
+    interrupt::NothingToSave,
+};
+use playbot_harness::{
+    doctor::{DoctorOptions, examine},
+    game::Game,
+    games::Games,
+    prelude::*,
+    split::check_level,
+    worlds::build_world,
+};
+use std::time::Instant;
+
+/// Check that a game plays the same when it is given the same actions, and find the first difference.
+///
+/// Recording, replay, resume and training in many arenas depend on it. Copies of the game play the same random actions:
+/// twice in one thread, with another wall clock, with more archetypes in the World, on two threads, two arenas in one
+/// World against each alone, and the same level again after a restart. The first difference is printed with its tick
+/// and with advice. A clean result holds for the ticks and the level that were played, so try more ticks and other
+/// levels too. Exit code 1 if something was found.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot doctor GAME
+  playbot doctor GAME --ticks 10000 --level 1
+  playbot doctor maze2d --mode medium --ticks 1000 --json
+  playbot doctor GAME --ignore HighScore")]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Mode of the game (default: the one that `train` trains in).
+    #[arg(long)]
+    mode: Option<String>,
+    /// Ticks of each comparison. More of them find rare and late differences.
+    #[arg(long, default_value = "300", value_parser = at_least_one)]
+    ticks: usize,
+    /// Number of the level to play (default: 0).
+    #[arg(long, value_name = "N")]
+    level: Option<u64>,
+    /// Random seed of the actions (default: 0).
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Leave out components and resources whose type path contains this, such as a high score that is meant to last
+    /// (repeatable).
+    #[arg(long, value_name = "TYPE")]
+    ignore: Vec<String>,
+    /// One line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Seconds of the speed measurement.
+const SPEED_SECONDS: f64 = 0.5;
+
+pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let mode = args.mode.unwrap_or_else(|| usual_mode(game).to_owned());
+    let level = level_number(args.level, args.seed).unwrap_or(0);
+    check_level(game, &mode, level)?;
+    let options = DoctorOptions {
+        ticks: u32::try_from(args.ticks).map_err(|_| CliError::Usage("--ticks has too many digits".to_owned()))?,
+        level,
+        seed: args.seed.unwrap_or(0),
+        ignored: args.ignore,
+        ..DoctorOptions::new(mode)
+    };
+    interrupt::leave("no comparison is kept: call it again, or with fewer --ticks".to_owned());
+    let examining = NothingToSave::listen();
+    let mut report = examine(game, &options, |comparison| tell!("comparing: {}", comparison.describe()))?;
+    let has_fault = report.comparisons.iter().any(|report| report.fault.is_some());
+    if !has_fault {
+        report.ticks_per_second = Some(speed(game, &options)?);
+    }
+    drop(examining);
+    if args.json {
+        let line = serde_json::to_string(&report)
+            .map_err(|error| CliError::Io(format!("the report cannot be written as JSON: {error}")))?;
+        print_line(line)?;
+    } else {
+        print_line(&report)?;
+    }
+    Ok(if report.is_healthy() { Outcome::Pass } else { Outcome::Findings })
+}
+
+/// Returns the ticks per second of one arena under random actions, by the clock.
+fn speed(game: &dyn Game, options: &DoctorOptions) -> Result<f64, CliError> {
+    let (mut world, agents) = build_world(game, &options.mode, options.seed, 0, 1);
+    for agent in agents {
+        let queue = LevelQueue::Always(options.level);
+        world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
+    }
+    world.tick()?;
+    let (start, mut ticks) = (Instant::now(), 0_u32);
+    while start.elapsed().as_secs_f64() < SPEED_SECONDS {
+        world.tick()?;
+        ticks += 1;
+    }
+    Ok(f64::from(ticks) / start.elapsed().as_secs_f64())
+}

@@ -1,0 +1,268 @@
+//! `playbot eval`.
+
+use crate::{
+    arguments::{
+        Compute,
+        experiment::{ExperimentArgs, option},
+        first_levels, open, player,
+        player::{Chosen, MeasuredLevels, check_run_of, check_skills},
+        usual_held_out,
+    },
+    error::{CliError, Outcome, print_line},
+    interrupt,
+    interrupt::NothingToSave,
+    plot::Footprints,
+};
+use bevy_playbot::{
+    policy::ActionDraw,
+    vision::{ObservationConfig, ObservationKind},
+};
+use playbot_harness::{
+    eval::{EvalPlan, Player},
+    game::Game,
+    games::{Artifact, Games},
+    mode::ModeError,
+    split::LevelSplit,
+};
+use playbot_report::to_text_table;
+use playbot_train::{Experiment, checkpoint::CheckpointChoice, learn_skills::cloning, run_dir::RunDir};
+use std::{
+    cell::LazyCell,
+    path::{Path, PathBuf},
+};
+
+/// Measure policies and baselines, every level equally often.
+///
+/// Measured are trained runs, behaviour cloning, policy files and bots, on the held-out levels. The table's ± is one
+/// standard error of the mean return over levels. More levels make it smaller, more episodes on the same levels make
+/// little difference.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot eval --run runs/first
+  playbot eval --bot BOT --bot random --levels MODE:0..63 --json
+  playbot eval --bot BOT --levels 'files:levels/**/*.json'
+  playbot eval GAME --bot BOT --levels MODE:0..63
+  playbot eval --skills skills.safetensors
+  playbot eval --run runs/pixels --observation camera
+  playbot eval --run runs/first --bot random --levels MODE:64..66 --plot where.png
+  playbot eval --run runs/first --bot BOT --levels MODE:64..127 --levels MODE:500..599")]
+pub struct Args {
+    /// Folder of a run (repeatable).
+    #[arg(long)]
+    run: Vec<PathBuf>,
+    /// Checkpoint of the runs: last, best (highest return in training), or its number of environment steps.
+    #[arg(long, default_value = "last")]
+    checkpoint: CheckpointChoice,
+    /// Skill model: measures behaviour cloning, the decoder under the prior.
+    #[arg(long)]
+    skills: Vec<PathBuf>,
+    /// Policy file, as written by `playbot policy export`. It names its game (repeatable).
+    #[arg(long)]
+    policy: Vec<PathBuf>,
+    /// Bot of the game, such as random. An unknown name lists all. Repeatable, or separated by commas.
+    #[arg(long, value_delimiter = ',')]
+    bot: Vec<String>,
+    /// Sensor for policies that read pictures: camera or raster (default: the one that the policy was trained with).
+    #[arg(long)]
+    observation: Option<ObservationKind>,
+    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/**/*.json". Default: the
+    /// experiment's held-out levels, or those of the game's own experiment if a policy file is of another game than the
+    /// experiment.
+    #[arg(long)]
+    levels: Vec<LevelSplit>,
+    /// Episodes on each level, instead of the experiment's.
+    #[arg(long, visible_alias = "episodes")]
+    episodes_per_level: Option<u32>,
+    /// Take the most probable action instead of drawing one.
+    #[arg(long)]
+    greedy: bool,
+    #[command(flatten)]
+    from: ExperimentArgs,
+    /// Random seed of the players' draws, instead of the experiment's.
+    #[arg(long)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    compute: Compute,
+    /// Also draw the players' paths, and how often they were at each position, into this .png or .svg.
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+    /// One line of JSON per player and range of levels.
+    #[arg(long)]
+    json: bool,
+}
+
+/// The part of a stopped measurement that remains.
+const KEPT_LINES: &str = "the printed rows are complete, and nothing else is kept: measure the rest again";
+
+const KEPT_NOTHING: &str = "no measurement is kept: call it again";
+
+pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    if args.run.is_empty() && args.skills.is_empty() && args.policy.is_empty() && args.bot.is_empty() {
+        return Err(CliError::Usage(
+            "no player to measure: name a --run, a --skills file, a --policy or a --bot (see `playbot eval --help`)"
+                .to_owned(),
+        ));
+    }
+    let experiment = read_experiment(&args, games)?;
+    let game = match (&args.from.experiment, args.run.first()) {
+        (None, Some(run)) => games.of_file(Artifact::Run, run, &experiment.game)?,
+        _ => open::game(games, &args.from, &experiment)?,
+    };
+    let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
+    if args.levels.is_empty() {
+        let or_levels = |error| CliError::Usage(format!("{error}, or with --levels"));
+        experiment.check_test(game).map_err(or_levels)?;
+    }
+    splits.iter().try_for_each(|split| split.check(game).map_err(|error| misfit(&error, split, games)))?;
+    // Checked before anything is measured.
+    let plan_of = |split| experiment.eval_plan(split, args.compute.threads());
+    splits.iter().try_for_each(|split| plan_of(split).check_memory())?;
+    let players = players(game, &experiment, &splits, &args, games)?;
+    let kept = if args.json { KEPT_LINES } else { KEPT_NOTHING };
+    interrupt::leave(kept.to_owned());
+    let measuring = NothingToSave::listen();
+    let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
+    let mut rows = Vec::new();
+    for split in &splits {
+        for Chosen { name, player, observation_config, .. } in &players {
+            let plan = EvalPlan { observation_config: *observation_config, ..plan_of(split) };
+            let measured = match &mut footprints {
+                Some(footprints) => {
+                    let (measured, trails) = player::follow(game, name, player, &plan)?;
+                    footprints.add(game, split, name, trails);
+                    measured
+                }
+                None => player::measure(game, name, player, &plan)?,
+            };
+            if args.json {
+                player::print_json(&measured.summary)?;
+            }
+            rows.push(measured.into_row());
+        }
+    }
+    drop(measuring);
+    if !args.json {
+        print_line(to_text_table(&rows))?;
+    }
+    // Last, so that a measurement is not lost because it cannot be drawn.
+    if let Some(footprints) = footprints {
+        footprints.write(game)?;
+    }
+    Ok(Outcome::Pass)
+}
+
+/// Returns the error of levels of a mode that the game does not have. It names the games that have it.
+fn misfit(error: &ModeError, split: &LevelSplit, games: &Games) -> CliError {
+    let others: Vec<_> = games.iter().filter(|other| split.check(*other).is_ok()).map(Game::name).collect();
+    CliError::Usage(match others.first() {
+        Some(first) => {
+            let others = others.join(", ");
+            format!("{error}; it is one of {others}: name the game, as in `playbot eval {first}`")
+        }
+        None => error.to_string(),
+    })
+}
+
+fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
+    let of_sight = |set: &&String| ["observation", "image"].iter().any(|key| set.trim_start().starts_with(key));
+    if let Some(set) = args.from.set.iter().find(of_sight) {
+        return Err(CliError::Usage(format!(
+            "`{set}`: a policy keeps its observation; take another sensor for the same pictures with \
+             --observation camera or --observation raster"
+        )));
+    }
+    let options = [option("seed", &args.seed), option("eval.episodes_per_level", &args.episodes_per_level)];
+    match (&args.from.experiment, args.run.first()) {
+        (None, Some(run)) => {
+            let own = RunDir::open(run)?.experiment;
+            if let Some(game) = &args.from.game {
+                check_run_of(run, &own.game, game)?;
+            }
+            let experiment = own.with_set(&args.from.sets(options))?;
+            experiment.check()?;
+            Ok(experiment)
+        }
+        _ => Ok(args.from.over(of_policy(args, games)?).load(games, options)?),
+    }
+}
+
+/// Returns settings for the game and levels of the first policy file, where the command line names neither. The
+/// experiment may be of another game.
+fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
+    let Some(path) = args.policy.first().filter(|_| !args.from.names_game()) else { return Ok(Vec::new()) };
+    let file = open::policy(path, args.compute.device())?;
+    let game = games.of_file(Artifact::Policy, path, &file.card.game)?;
+    if args.from.load(games, [])?.game == game.name() {
+        return Ok(Vec::new());
+    }
+    let levels = usual_held_out(game).unwrap_or_else(|| first_levels(game, 63));
+    Ok(vec![format!("game={}", game.name()), format!("test={levels}")])
+}
+
+fn players(
+    game: &dyn Game,
+    experiment: &Experiment,
+    splits: &[LevelSplit],
+    args: &Args,
+    games: &Games,
+) -> Result<Vec<Chosen>, CliError> {
+    let device = args.compute.device();
+    let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+    // Reads all levels, which bots do not need.
+    let measured = LazyCell::new(|| MeasuredLevels::new(game, splits, !args.levels.is_empty()));
+    let mut players = Vec::new();
+    for path in &args.run {
+        let opened = RunDir::open(path)?;
+        check_run_of(path, &opened.experiment.game, &experiment.game)?;
+        let chosen = Chosen::run(game, &opened, args.checkpoint, draw, device)?;
+        measured.check(path, chosen.seen.as_ref())?;
+        players.push(named(chosen, path, args.run.len()));
+    }
+    for path in &args.skills {
+        let model = open::skills(path, device, &args.from)?;
+        let observation_config = check_skills(path, &model, game, &args.from, games)?;
+        let (player, seen) = (cloning(&model, experiment, draw), model.demos().cloned());
+        measured.check(path, seen.as_ref())?;
+        let chosen = Chosen { name: "bc".to_owned(), player, observation_config, seen };
+        players.push(named(chosen, path, args.skills.len()));
+    }
+    for path in &args.policy {
+        let chosen = Chosen::policy_file(game, path, draw, device)?;
+        measured.check(path, chosen.seen.as_ref())?;
+        players.push(named(chosen, path, args.policy.len()));
+    }
+    for name in &args.bot {
+        players.push(Chosen::bot(game, name)?);
+    }
+    for chosen in &mut players {
+        if matches!(chosen.player, Player::Policy { .. }) {
+            look_through(&mut chosen.observation_config, args.observation, &chosen.name)?;
+        }
+        chosen.check_fit(game)?;
+    }
+    Ok(players)
+}
+
+/// Replaces the sensor that a policy was trained with by another one of the same observation form.
+fn look_through(
+    observation_config: &mut ObservationConfig,
+    eyes: Option<ObservationKind>,
+    name: &str,
+) -> Result<(), CliError> {
+    let Some(kind) = eyes else { return Ok(()) };
+    let other = ObservationConfig { kind, ..*observation_config };
+    if other.is_image() != observation_config.is_image() {
+        let offered = if observation_config.is_image() { "vectors" } else { "pictures" };
+        return Err(CliError::Usage(format!(
+            "the policy {name} reads {observation_config}, and --observation {kind} gives {offered}: leave --observation out, or \
+             measure it by itself"
+        )));
+    }
+    *observation_config = other;
+    Ok(())
+}
+
+/// Names a player, with its path if there are several of its kind.
+fn named(chosen: Chosen, path: &Path, of: usize) -> Chosen {
+    if of > 1 { Chosen { name: format!("{} {}", chosen.name, path.display()), ..chosen } } else { chosen }
+}

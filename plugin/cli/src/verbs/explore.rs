@@ -1,0 +1,295 @@
+//! `playbot explore`.
+
+mod recorded;
+
+use crate::{
+    arguments::{Compute, counted, first_levels},
+    error::{CliError, Outcome, print_line},
+    interrupt, output,
+    plot::PlotFile,
+    progress,
+    verbs::explore::recorded::{RecordingFile, chart},
+};
+use bevy_playbot::vision::ObservationConfig;
+use playbot_harness::{
+    game::Game,
+    games::Games,
+    split::{LevelSplit, SplitError},
+};
+use playbot_test::explore::{
+    Cell, Exploration, ExplorationSummary, ExplorePlan, Explorer, Route, Stop, Until, explore, round::check_cell,
+};
+use serde_json::json;
+use std::{ops::ControlFlow, path::PathBuf};
+
+pub use crate::verbs::explore::recorded::Talents;
+
+// Run of `playbot explore`.
+
+/// Explore a level without training: print the reachable cells and the actions that lead there.
+///
+/// The method is Go-Explore (Ecoffet et al. 2021): return to seldom seen cells by the same actions, and explore from
+/// there. Cells are squares of the level where the game gives positions of agents, else observations that are alike.
+/// Skills or a policy explore instead of random actions if given. If the game does not play the same by the same
+/// actions, the first tick that differs is printed.
+///
+/// Exit code 1 if the level has a goal and no path to it was found, or if the cell of --cell was not reached.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot explore GAME
+  playbot explore GAME --level MODE:7 --steps 1000000 --png reached.png
+  playbot explore GAME --level MODE:7 --until solved --out solution.demo
+  playbot explore GAME --level MODE:7 --skills skills.safetensors --json
+  playbot explore GAME --level MODE:7 --until spent --cell 3,4 --out there.demo")]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Level, as mode:number (default: level 0 of the mode that `train` trains in).
+    #[arg(long, value_name = "MODE:N", value_parser = one_level)]
+    level: Option<LevelSplit>,
+    /// Environment steps to use, including returns to known cells. The last visits may take some more.
+    #[arg(long, default_value_t = 500_000, value_parser = clap::value_parser!(u64).range(1..))]
+    steps: u64,
+    /// End earlier: solved (a path to the goal is found), covered (and every open cell is reached, where their number
+    /// is known), or spent (never, to find shorter paths).
+    #[arg(long, default_value_t, value_name = "WHEN")]
+    until: Until,
+    /// Skill model: explores with skills drawn from its prior.
+    #[arg(long, value_name = "FILE", group = "explorer")]
+    skills: Option<PathBuf>,
+    /// Policy file, as written by `playbot policy export`: explores with the policy.
+    #[arg(long, value_name = "FILE", group = "explorer")]
+    policy: Option<PathBuf>,
+    /// Ticks without anything new after which a visit ends.
+    #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
+    explore_ticks: u32,
+    /// Probability that a random action is repeated in the next tick.
+    #[arg(long, default_value_t = 0.95)]
+    sticky: f64,
+    /// Side of a cell in units of the level (default: one tile). For cells of observations, the step to which values
+    /// are rounded (default: 1/8).
+    #[arg(long, value_name = "LENGTH")]
+    cell_size: Option<f32>,
+    /// Visits between two updates of the known cells.
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
+    batch: u32,
+    /// Random seed.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    #[command(flatten)]
+    compute: Compute,
+    /// Record the shortest solution, or the path to --cell, into this .demo, once it has been replayed.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Record and draw the path to this cell instead of the solution. Cells are named by their numbers, such as 3,4.
+    #[arg(long, value_name = "CELL", allow_hyphen_values = true)]
+    cell: Option<Cell>,
+    /// Overwrite an existing recording.
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// Draw the reached cells, and how often each was reached, on the floor plan of the level.
+    #[arg(long, value_name = "FILE", value_parser = output::png)]
+    png: Option<PathBuf>,
+    /// One line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let split = level(game, args.level.as_ref())?;
+    split.check(game)?;
+    let device = args.compute.device();
+    let Talents { explorer, observation_config } = match (&args.skills, &args.policy) {
+        (Some(path), _) => Talents::skills(path, game, games, device)?,
+        (None, Some(path)) => Talents::policy(path, game, device)?,
+        (None, None) => Talents::none(),
+    };
+    let plan = plan(&args, &split, explorer, observation_config);
+    plan.check(game)?;
+    if let Some(cell) = &args.cell {
+        check_cell(game, &plan, cell)?;
+    }
+    let recording = args.out.as_deref().map(|path| RecordingFile::new(path, args.force)).transpose()?;
+    let floor = match &args.png {
+        None => None,
+        Some(path) => {
+            let missing = || {
+                CliError::Usage(format!(
+                    "`{}` has no floor plan of level {}: leave --png out",
+                    game.name(),
+                    shown(&split)
+                ))
+            };
+            let floor_plan = game.tools().levels.floor_plan(&split.mode, split.first).ok_or_else(missing)?;
+            Some((PlotFile::new(path)?, floor_plan))
+        }
+    };
+    let exploration = search(game, &plan)?;
+    let to_cell = args.cell.as_ref().map(|cell| (cell, exploration.route_to(cell)));
+    print(&exploration.summary(game), to_cell.as_ref(), args.json)?;
+    let is_missed = matches!(to_cell, Some((_, None)));
+    let way = match to_cell {
+        Some((_, way)) => way,
+        None => exploration.solution(),
+    };
+    let way = way.filter(|route| !route.is_empty());
+    // Last, so that the result is not lost because it cannot be written.
+    if let Some(recording) = recording {
+        match &way {
+            Some(route) => {
+                recording.write(game, &exploration, route)?;
+                tell!("recorded: {}, {} ticks", recording.path().display(), route.len());
+            }
+            None => tell!("nothing is recorded: {}", why_nothing(args.cell.as_ref(), is_missed)),
+        }
+    }
+    if let Some((file, floor_plan)) = floor {
+        file.write(&chart(game, floor_plan, &exploration, way.as_ref())?.draw())?;
+        tell!("drawn: {}", file.path().display());
+    }
+    Ok(match (exploration.stop, exploration.solution_ticks()) {
+        (Stop::Asked, _) => Outcome::Stopped,
+        (_, None) if exploration.has_goal => Outcome::Findings,
+        _ if is_missed => Outcome::Findings,
+        _ => Outcome::Pass,
+    })
+}
+
+/// Prints the result, and for the cell of `--cell` how soon it is reached.
+fn print(
+    summary: &ExplorationSummary,
+    to_cell: Option<&(&Cell, Option<Route>)>,
+    as_json: bool,
+) -> Result<(), CliError> {
+    let ticks = to_cell.map(|(cell, way)| (cell, way.as_ref().map(|route| route.len())));
+    if as_json {
+        let mut line = serde_json::to_value(summary)
+            .map_err(|error| CliError::Io(format!("the summary cannot be written as JSON: {error}")))?;
+        if let Some((cell, ticks)) = ticks {
+            line["cell"] = json!({ "cell": cell.to_string(), "ticks": ticks });
+        }
+        return print_line(line);
+    }
+    print_line(summary)?;
+    match ticks {
+        None => Ok(()),
+        Some((cell, Some(ticks))) => print_line(format!("cell {cell} is reached in {}", counted(ticks as u64, "tick"))),
+        Some((cell, None)) => {
+            print_line(format!("cell {cell} was not reached: a larger --steps or --until spent looks for it longer"))
+        }
+    }
+}
+
+/// Returns the named level, or the first one.
+fn level(game: &dyn Game, named: Option<&LevelSplit>) -> Result<LevelSplit, CliError> {
+    match named {
+        None => {
+            let usual = first_levels(game, 0);
+            tell!("no --level is named: {}", shown(&usual));
+            Ok(usual)
+        }
+        Some(split) if split.len() == 1 => Ok(split.clone()),
+        Some(split) => Err(CliError::Usage(format!(
+            "--level is {split}, which are {} levels: one at a time is explored, such as {}:{}",
+            split.len(),
+            split.mode,
+            split.first
+        ))),
+    }
+}
+
+fn shown(split: &LevelSplit) -> String {
+    format!("{}:{}", split.mode, split.first)
+}
+
+fn plan(args: &Args, split: &LevelSplit, explorer: Explorer, observation_config: ObservationConfig) -> ExplorePlan {
+    ExplorePlan {
+        steps: args.steps,
+        until: args.until,
+        explorer,
+        observation_config,
+        explore_ticks: args.explore_ticks,
+        sticky: args.sticky,
+        cell_size: args.cell_size,
+        batch: args.batch,
+        seed: args.seed,
+        threads: args.compute.threads(),
+        ..ExplorePlan::new(split.mode.clone(), split.first)
+    }
+}
+
+/// Explores, with a progress bar, until it is done or Ctrl-C is pressed.
+fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> {
+    interrupt::listen();
+    let bar = progress::bar("explore", plan.steps, "steps");
+    let explored = explore(
+        game,
+        plan,
+        |ticks| bar.inc(ticks),
+        |round| {
+            let solved = round.solution.map_or_else(String::new, |ticks| format!(", solved in {ticks} ticks"));
+            bar.set_message(format!("{} cells{solved}", round.cells));
+            if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+        },
+    );
+    bar.finish_and_clear();
+    Ok(explored?)
+}
+
+fn why_nothing(cell: Option<&Cell>, is_missed: bool) -> String {
+    match cell {
+        Some(cell) if is_missed => format!("cell {cell} was not reached"),
+        Some(cell) => format!("the level starts in cell {cell}"),
+        None => "no solution was found; with --cell the path to a cell is recorded".to_owned(),
+    }
+}
+
+// The level argument of `playbot explore`.
+
+/// Parses a level.
+///
+/// # Errors
+///
+/// The text is no level; the message shows the form of one.
+pub(crate) fn one_level(text: &str) -> Result<LevelSplit, String> {
+    text.parse::<LevelSplit>().map_err(|error| match error {
+        SplitError::NotARange(_) => {
+            // Numbers and files are no modes.
+            let is_file = text.contains(['.', '/', '\\']);
+            let is_mode = |mode: &&str| mode.starts_with(char::is_alphabetic) && !is_file;
+            let mode = text.split(':').next().filter(is_mode).unwrap_or("MODE");
+            let file = match (is_file, text.ends_with(".json")) {
+                (_, true) => format!(", or files:{text}"),
+                (true, false) => ", or a level file, which is JSON, such as files:levels/a.json".to_owned(),
+                (false, false) => String::new(),
+            };
+            format!("`{text}` names no level: write its mode and its number, such as {mode}:7{file}")
+        }
+        other => other.to_string(),
+    })
+}
+
+#[cfg(test)]
+mod one_level_tests {
+    use super::*;
+
+    #[test]
+    fn levels_are_read_and_others_are_told_how_to_write_one() {
+        assert_eq!(one_level("plain:7").map(|level| (level.first, level.len())), Ok((7, 1)));
+        for (text, example) in [
+            ("plain", "plain:7"),
+            ("plain:x", "plain:7"),
+            ("", "MODE:7"),
+            (":3", "MODE:7"),
+            ("7", "MODE:7"),
+            ("levels/a.json", "MODE:7, or files:levels/a.json"),
+            ("C:\\levels\\a.json", "MODE:7, or files:C:\\levels\\a.json"),
+            ("a.txt", "MODE:7, or a level file, which is JSON, such as files:levels/a.json"),
+        ] {
+            let error = one_level(text).expect_err(text);
+            assert!(error.contains(&format!("`{text}` names no level")) && error.ends_with(example), "{error}");
+        }
+        assert!(one_level("plain:9..3").is_err_and(|error| error.contains("write plain:3..9")));
+    }
+}

@@ -1,0 +1,165 @@
+//! Recording of a path that was found.
+
+use crate::{
+    arguments::{
+        experiment::ExperimentArgs,
+        player::{Chosen, check_skills},
+        usual_experiment,
+    },
+    error::CliError,
+    output::{beside, prepare},
+};
+use bevy_playbot::{demo::file::DemoWriter, policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
+use playbot_harness::{
+    demo::verify_file, eval::Player, floor_plan::FloorPlan, game::Game, games::Games, trails::cells::CellChart,
+};
+use playbot_learner::{DeviceKind, ScoreConfig, SkillDraw, SkillModel, SkillSource, disk};
+use playbot_test::explore::{Cell, Exploration, Explorer, Route, follow_route, record_route};
+use std::path::{Path, PathBuf};
+
+/// A file for a recording, tested before the work whose result it holds.
+pub struct RecordingFile(PathBuf);
+
+impl RecordingFile {
+    /// Checks that a file may be written.
+    ///
+    /// # Errors
+    ///
+    /// It exists without `--force`, or nothing can be written there.
+    pub fn new(path: &Path, force: bool) -> Result<Self, CliError> {
+        if path.is_file() && !force {
+            return Err(CliError::Usage(format!(
+                "{} exists: name another file, or overwrite it with --force",
+                path.display()
+            )));
+        }
+        prepare(path)?;
+        Ok(Self(path.to_owned()))
+    }
+
+    /// Returns its path.
+    pub fn path(&self) -> &Path {
+        &self.0
+    }
+
+    /// Plays a path under the recorder, replays the recording, and moves it to its file if both agree.
+    ///
+    /// # Errors
+    ///
+    /// The game breaks its contract or does not replay, or the disk fails. An earlier file stays.
+    pub fn write(&self, game: &dyn Game, exploration: &Exploration, route: &Route) -> Result<(), CliError> {
+        let fresh = beside(&self.0, ".fresh");
+        let written = self.record(game, exploration, route, &fresh);
+        if written.is_err() {
+            // It is of no use, and the error says why.
+            let _ = disk::remove_file(&fresh);
+        }
+        written
+    }
+
+    fn record(&self, game: &dyn Game, exploration: &Exploration, route: &Route, fresh: &Path) -> Result<(), CliError> {
+        let (mode, level, path) = (exploration.mode.as_str(), exploration.level, self.0.display());
+        let mut header = game.demo_header(mode);
+        header.demonstrator = "explorer".to_owned();
+        header.note = format!("found by {} with seed {}", exploration.explorer, exploration.seed);
+        record_route(game, mode, level, &route.actions, DemoWriter::replace(fresh, header)?)?;
+        let report = verify_file(game, fresh, |_| {})?;
+        if report.episodes != 1 || report.ticks != route.len() as u64 {
+            return Err(CliError::Io(format!(
+                "{path}: the path that was found has {} ticks, and only {} of them could be played again",
+                route.len(),
+                report.ticks
+            )));
+        }
+        if let Some((_, divergence)) = report.divergences.first() {
+            return Err(CliError::Io(format!(
+                "{path}: the path that was found does not replay ({divergence}): `playbot doctor {} --mode {mode} --level \
+                 {level}` names what differs",
+                game.name()
+            )));
+        }
+        disk::rename(fresh, &self.0).map_err(|error| CliError::Io(format!("cannot write {path}: {error}")))
+    }
+}
+
+// Picture of the cells that an explorer reached.
+
+/// Draws the cells of an exploration on the level's floor plan, with a path through them.
+///
+/// # Errors
+///
+/// The game breaks its contract when the path is played again.
+pub(crate) fn chart(
+    game: &dyn Game,
+    plan: FloorPlan,
+    exploration: &Exploration,
+    way: Option<&Route>,
+) -> Result<CellChart, CliError> {
+    let Exploration { mode, level, grid, .. } = exploration;
+    let mut places = Vec::new();
+    if let Some(route) = way {
+        places.push(plan.start);
+        places.extend(follow_route(game, mode, *level, &route.actions)?);
+    }
+    let area = |cell: &Cell| grid.as_ref()?.area(cell);
+    let cells = exploration.cells().iter();
+    let reached = cells.filter_map(|(cell, reached)| Some((area(cell)?, reached.visits))).collect();
+    let summary = exploration.summary(game).to_string();
+    Ok(CellChart {
+        title: format!("Cells that an explorer reached in {} {mode}:{level}", game.name()),
+        captions: summary
+            .lines()
+            .chain(["cells: few to many visits, logarithmic; crossed: not reached"])
+            .map(str::to_owned)
+            .collect(),
+        plan,
+        reached,
+        missed: exploration.missed().filter_map(area).collect(),
+        way: places,
+    })
+}
+
+// Explorers of `playbot explore`, from the command line.
+
+/// An explorer and its observation.
+pub struct Talents {
+    pub explorer: Explorer,
+    pub observation_config: ObservationConfig,
+}
+
+impl Talents {
+    /// Returns an explorer with random actions.
+    pub fn none() -> Self {
+        Self { explorer: Explorer::Random, observation_config: ObservationConfig::default() }
+    }
+
+    /// Skills of a model, drawn from its prior, with the skill interval of the game's experiment.
+    ///
+    /// # Errors
+    ///
+    /// The model cannot be read, or was learned for another game.
+    pub fn skills(path: &Path, game: &dyn Game, games: &Games, device: DeviceKind) -> Result<Self, CliError> {
+        let model = SkillModel::load(path, device)?;
+        // The game is named, so that errors do not ask for an experiment.
+        let named = ExperimentArgs::of_game(game.name());
+        let observation_config = check_skills(path, &model, game, &named, games)?;
+        let horizon = usual_experiment(game).map_or_else(ScoreConfig::default, |usual| usual.experiment.score).horizon;
+        let source = SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw: SkillDraw::Sample };
+        Ok(Self { explorer: Explorer::skills(SkillPrior::from(&source), source.decoder), observation_config })
+    }
+
+    /// Returns the policy of a file, whose actions are drawn.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be loaded, or was made for another game.
+    pub fn policy(path: &Path, game: &dyn Game, device: DeviceKind) -> Result<Self, CliError> {
+        let chosen = Chosen::policy_file(game, path, ActionDraw::Sample, device)?;
+        chosen.check_fit(game)?;
+        let explorer = match chosen.player {
+            Player::Policy { policy, prior, draw } => Explorer::Policy { policy, prior, draw },
+            Player::Blind(_) | Player::Demonstrator => Explorer::Random,
+        };
+        Ok(Self { explorer, observation_config: chosen.observation_config })
+    }
+}

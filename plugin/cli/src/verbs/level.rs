@@ -1,0 +1,99 @@
+//! `playbot level`.
+
+use crate::{
+    arguments::{LevelsArg, usual_mode},
+    error::{CliError, Outcome, print_line},
+    plot,
+    plot::PlotFile,
+};
+use playbot_harness::{
+    game::Game,
+    games::Games,
+    inspect::{InspectError, LevelRequest, LevelView},
+};
+use std::path::PathBuf;
+
+/// Show the layout of a level.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot level GAME --mode MODE --level 7
+  playbot level GAME --levels MODE:7
+  playbot level GAME --level 0 --json
+  playbot level GAME --level 7 --png level.png
+  playbot level GAME --file my-level.json
+  playbot level antmaze --map large
+  playbot level maze2d --mode medium --level 7 --json
+  playbot level maze2d --map random+size=21x21+loops=0.2 --level 7
+  playbot level antmaze --mode medium+goals=random+random-start --level 7
+  playbot level maze2d --map my-maze.txt --png my-maze.png
+
+A file of rows is a map as this command prints it: # is a wall, S the start, G the goal, a blank, a point or O a free cell.
+The rows end at the first empty line.")]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Mode of the game (default: the one that `train` trains in).
+    #[arg(long)]
+    mode: Option<String>,
+    /// Map, for games whose levels are maps: its name, with options where it takes any, or a file of rows. --mode also
+    /// takes the start and goal of the level.
+    #[arg(long, value_name = "MAP", conflicts_with_all = ["mode", "levels"])]
+    map: Option<String>,
+    /// Level file to show, in the form that --json prints.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["mode", "levels", "map", "level", "seed"])]
+    file: Option<PathBuf>,
+    #[command(flatten)]
+    levels: LevelsArg,
+    /// Old spelling of --level.
+    #[arg(long, hide = true, conflicts_with = "level")]
+    seed: Option<u64>,
+    /// Print one line of JSON instead of a picture.
+    #[arg(long)]
+    json: bool,
+    /// Also draw the whole level into this .png (maps also into a .svg).
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
+}
+
+pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let file = args.png.as_deref().map(PlotFile::new).transpose()?;
+    let level = show(game, &args, file.is_some())?;
+    if let (Some(file), Some(picture)) = (file, &level.picture) {
+        plot::write(&file, picture, game.tick_hz())?;
+        tell!("picture: {}", file.path().display());
+    }
+    print_line(if args.json { level.json } else { level.text })?;
+    Ok(Outcome::Pass)
+}
+
+/// Shows the requested level. Without a mode and a map it is one of the default mode.
+fn show(game: &dyn Game, args: &Args, picture: bool) -> Result<LevelView, CliError> {
+    let (map, file) = (args.map.as_deref(), args.file.as_deref());
+    let show = |request: &LevelRequest| game.show_level(request).map_err(|error| explain(game, error));
+    if map.is_some() || file.is_some() {
+        return show(&LevelRequest { mode: None, map, file, level: args.levels.number(args.seed), picture });
+    }
+    let (named, level) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
+    let mode = named.unwrap_or_else(|| usual_mode(game));
+    let shown = show(&LevelRequest { mode: Some(mode), map, file, level: Some(level), picture })?;
+    if named.is_none() {
+        tell!("no --mode is named: {mode}, which is trained in, level {level}");
+    }
+    Ok(shown)
+}
+
+/// Returns true if a game can show levels: its own default level is tried.
+pub(crate) fn shows_levels(game: &dyn Game) -> bool {
+    game.show_level(&LevelRequest::default()).is_ok()
+}
+
+/// Explains an error of showing a level. For a game that can show none, it names the verbs that can.
+fn explain(game: &dyn Game, error: InspectError) -> CliError {
+    match error {
+        InspectError::Usage(why) if !shows_levels(game) => {
+            CliError::Usage(format!("{why}; `playbot view {} --level N` shows the observation in a level", game.name()))
+        }
+        error => error.into(),
+    }
+}

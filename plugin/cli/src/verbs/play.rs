@@ -1,0 +1,65 @@
+//! `playbot play`.
+
+#[cfg(not(feature = "window"))]
+pub(crate) mod no_window;
+#[cfg(feature = "window")]
+mod window;
+
+use crate::arguments::{OverwriteArgs, player::PlayerArgs};
+use std::path::PathBuf;
+
+#[cfg(not(feature = "window"))]
+pub use crate::verbs::play::no_window::{no_window, run};
+#[cfg(feature = "window")]
+pub use crate::verbs::play::window::run;
+
+// Options of `playbot play`.
+
+/// Play in a window, record, and hand over to a policy and back.
+#[derive(clap::Args)]
+#[command(after_help = "Keys:
+  those of the game, printed at the start
+  Tab        hand over to the policy or bot, and take over again
+  R, N       play the level again, go to the next one
+  P          pause
+  -, =       see more, see less
+  V          from above or in space, if the game has that view and the program the feature view3d
+  Escape     end, as do Ctrl-Q and closing the window
+
+A won level is followed by the next one, a lost one is played again. Every finished episode is on disk at once.
+
+Examples:
+  playbot play GAME --level 7
+  playbot play GAME --levels 0..63 --record my.demo
+  playbot play GAME --levels 'files:levels/*.json'
+  playbot play GAME --run runs/first --record mixed.demo
+  playbot play GAME --mode MODE --bot BOT")]
+#[cfg_attr(not(feature = "window"), allow(dead_code, reason = "read by the window only"))]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Mode of the game (default: that of the levels, or else the one that `train` trains in).
+    #[arg(long)]
+    mode: Option<String>,
+    /// Number of the level to begin with (default: the first of the levels).
+    #[arg(long, value_name = "N")]
+    level: Option<u64>,
+    /// Random seed of the autopilot's draws (default: 0).
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Levels, as first..last or mode:first..last, both included, or files:pattern, such as "files:levels/*.json"
+    /// (default: all).
+    #[arg(long)]
+    levels: Option<String>,
+    /// Recording to write.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
+    /// Name of the player, for the recording.
+    #[arg(long, default_value = "human")]
+    name: String,
+    /// The autopilot, which takes over with Tab.
+    #[command(flatten)]
+    autopilot: PlayerArgs,
+}

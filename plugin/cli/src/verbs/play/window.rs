@@ -1,0 +1,103 @@
+//! `playbot play` in a program that was built with a window.
+
+use crate::{
+    arguments::{counted, level_number, player::Chosen, usual_mode},
+    error::{CliError, Outcome},
+    interrupt, output,
+    verbs::{demo::deciders, play::Args},
+    window::{Autopilot, GameWindow, Playlist, WindowSetup},
+};
+use bevy_playbot::{
+    demo::file::{DemoHeader, DemoSummary},
+    placement::TickPlacement,
+    vision::ObservationConfig,
+};
+use playbot_harness::{game::Game, games::Games, level_files::is_level_files, split::LevelSplit};
+use std::path::Path;
+
+/// The last level where the game does not limit them: levels have 32 bits.
+const LAST_LEVEL: u64 = u32::MAX as u64;
+
+pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let playlist = playlist(game, &args)?;
+    let (autopilot, observation_config) = autopilot(game, &args)?;
+    let header = header(game, playlist.mode(), &args);
+    let seed = args.seed.unwrap_or(0);
+    let mut window =
+        GameWindow::open(WindowSetup { game, playlist, autopilot, observation_config, seed, stop: interrupt::asked })?;
+    // Only once there is a window: a recording without one would only be in the way.
+    if let Some(path) = &args.record {
+        window.check_recording()?;
+        window.record(args.overwrite.open(path, header)?);
+    }
+    interrupt::listen();
+    announce(game, &args);
+    window.run()?;
+    args.record.as_deref().map_or(Ok(Outcome::Pass), conclude)
+}
+
+fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
+    let named = args.mode.as_deref();
+    let mode = named.unwrap_or_else(|| usual_mode(game));
+    let levels = match args.levels.as_deref() {
+        Some(text) if text.contains(':') => text.parse()?,
+        Some(text) => format!("{mode}:{text}").parse()?,
+        None if is_level_files(mode) => mode.parse()?,
+        None => LevelSplit { mode: mode.to_owned(), first: 0, last: LAST_LEVEL },
+    };
+    levels.check(game)?;
+    if named.is_some_and(|mode| mode != levels.mode) {
+        return Err(CliError::Usage(format!(
+            "--mode and --levels name different modes: leave out --mode, or {levels}"
+        )));
+    }
+    let first = level_number(args.level, args.seed).unwrap_or(levels.first);
+    if !levels.contains(&levels.mode, first) {
+        return Err(CliError::Usage(format!("--level {first} is none of the levels {levels}")));
+    }
+    Ok(Playlist::new(levels, first))
+}
+
+/// Returns the autopilot and its observation.
+fn autopilot(game: &dyn Game, args: &Args) -> Result<(Option<Autopilot>, ObservationConfig), CliError> {
+    Ok(match args.autopilot.load(game)? {
+        Some(Chosen { name, player, observation_config, .. }) => (Some(Autopilot { name, player }), observation_config),
+        None => (None, ObservationConfig::default()),
+    })
+}
+
+fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
+    let header = game.demo_header(mode);
+    DemoHeader { demonstrator: args.name.clone(), ..header }
+}
+
+fn announce(game: &dyn Game, args: &Args) {
+    if let Some(keys) = game.tools().input.key_bindings() {
+        let zoom = if game.tools().host.placement() == TickPlacement::Fixed { ", - and = zoom" } else { "" };
+        tell!("{}; R again, N next level, P pause{zoom}, Escape ends", keys.help());
+    } else {
+        tell!("the game's own keys and mouse; R again, N next level, P pause, Escape ends");
+    }
+    if args.autopilot.is_named() {
+        tell!("Tab hands over and takes over again");
+    } else {
+        tell!("there is no autopilot to hand over to: name a --policy, a --run or a --bot");
+    }
+}
+
+/// Prints the path of the recording, its contents and the next commands.
+fn conclude(path: &Path) -> Result<Outcome, CliError> {
+    let summary = DemoSummary::read(path)?;
+    let file = path.display();
+    tell!(
+        "{file}: {}, {}, decided by {}",
+        counted(summary.episodes as u64, "episode"),
+        counted(summary.steps as u64, "step"),
+        deciders(&summary.steps_by_decider)
+    );
+    let program = output::name();
+    tell!("  {program} demo verify {file}   proves that it replays");
+    tell!("  {program} learn-skills --set demos={file} --out skills.safetensors   learns from it");
+    Ok(Outcome::Pass)
+}

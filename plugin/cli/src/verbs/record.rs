@@ -1,0 +1,246 @@
+//! `playbot record`.
+
+use crate::{
+    arguments::{
+        OverwriteArgs, counted, first_levels,
+        player::{Chosen, PlayerArgs},
+        usual_held_out,
+    },
+    error::{CliError, Outcome},
+    interrupt, progress,
+};
+use bevy_playbot::demo::recorder::{Recorder, flush_unfinished};
+use playbot_harness::{demo::demonstration::DemonstrationPlan, game::Game, games::Games, prelude::*, split::HeldOut};
+use std::path::PathBuf;
+
+/// Record the game's demonstrator, or another player.
+///
+/// The demonstrator is a bot of the game's own. --policy, --run and --bot name others, such as a policy that has
+/// learned the game from vectors and demonstrates it for one that sees pixels. --noise replaces some of the actions, so
+/// that recordings also show recoveries.
+///
+/// Recordings may show training levels and any others, but no held-out level, on which bots are tested. `learn-skills`
+/// refuses those, and any level that looks like one. Held-out levels are the experiment's `test`, and --hold-out leaves
+/// them out.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot record GAME --levels MODE:0..9 --out my.demo
+  playbot record GAME --levels MODE:2000..2999 --noise 0.2 --steps 100000 --out demos/GAME/noisy.demo
+  playbot record antmaze --levels random+size=9x9:1000..1999 --hold-out random+size=9x9:64..127 --steps 20000 --out mazes.demo
+  playbot record maze2d --levels medium+retarget:0..9999 --noise 0.5 --steps 1000000 --out medium.demo
+  playbot record GAME --run runs/first --checkpoint best --levels MODE:1000..1999 --noise 0.1 --out learned.demo")]
+pub struct Args {
+    /// Name of the game.
+    game: String,
+    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json". They are played in
+    /// order, again and again until --steps is reached. Default: levels 0 to 499 of the mode that `train` trains in,
+    /// but for the held-out ones of the game's own experiment.
+    #[arg(long)]
+    levels: Option<LevelSplit>,
+    /// Leave out these levels, and any that look like one of them (repeatable).
+    #[arg(long, value_name = "LEVELS")]
+    hold_out: Vec<LevelSplit>,
+    /// File to write.
+    #[arg(long)]
+    out: PathBuf,
+    #[command(flatten)]
+    player: PlayerArgs,
+    /// Noise of the actions. Discrete actions: probability with which one is replaced by a uniformly random one.
+    /// Continuous actions: standard deviation of the normal noise on each value, before it is clipped.
+    #[arg(long, default_value_t = 0.0)]
+    noise: f64,
+    /// Stop after exactly this many steps, not counting those that --append finds (default: one round of the levels).
+    #[arg(long)]
+    steps: Option<u64>,
+    /// Random seed of the noise.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Keep the observation vectors too. The file is larger, and replays restore them anyway.
+    #[arg(long)]
+    observations: bool,
+    #[command(flatten)]
+    overwrite: OverwriteArgs,
+}
+
+/// The last of the default levels, which begin with 0.
+const LAST_LEVEL: u64 = 499;
+
+/// Warns that policies learned from this recording depend on the levels of its player, which it does not note.
+fn warn_of_pupils(player: &Chosen) {
+    if let Some(seen) = &player.seen {
+        tell!(
+            "the player has learned from {seen}: hold none of these out from learners of its recordings, which do not note them"
+        );
+    }
+}
+
+pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let game = games.get(&args.game)?;
+    let levels = args.levels.clone().unwrap_or_else(|| first_levels(game, LAST_LEVEL));
+    levels.check(game)?;
+    let chosen_player = args.player.load(game)?;
+    if chosen_player.is_none() {
+        check_demonstrator(game)?;
+    }
+    check_noise(game, args.noise)?;
+    if args.steps == Some(0) {
+        return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));
+    }
+    let left_out = usual_held_out(game).filter(|_| args.levels.is_none());
+    let held_out: Vec<_> = args.hold_out.iter().chain(&left_out).cloned().collect();
+    let chosen = choose_levels(game, &levels, &held_out)?;
+    match &left_out {
+        Some(held_out) => tell!("no --levels are named: recording {levels}, but for the held-out levels {held_out}"),
+        None if args.levels.is_none() => tell!("no --levels are named: recording {levels}"),
+        None => warn_of_held_out(game, &levels, &chosen),
+    }
+    let count = chosen.len() as u64;
+    let plan = DemonstrationPlan {
+        mode: levels.mode.clone(),
+        levels: chosen,
+        noise: args.noise,
+        seed: args.seed,
+        steps: args.steps,
+        keep_observations: args.observations,
+    };
+    let mut header = plan.header(game);
+    if let Some(chosen) = &chosen_player {
+        header.demonstrator.clone_from(&chosen.name);
+        warn_of_pupils(chosen);
+    }
+    let writer = args.overwrite.open(&args.out, header)?;
+    let (mut world, agent) = match &chosen_player {
+        Some(Chosen { player, observation_config, .. }) => {
+            plan.build_world_of(game, player, observation_config, writer)?
+        }
+        None => plan.build_world(game, writer),
+    };
+    let finished = play(&mut world, agent, count, args.steps);
+    let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
+    let counts = format!("{}, {}", counted(episodes, "episode"), counted(steps, "step"));
+    let finished = finished.inspect_err(|_| {
+        tell!("{}: the part recorded before the error is kept: {counts}", args.out.display());
+    })?;
+    let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
+    let wins = match ended.successes {
+        // Not every game has a goal.
+        0 => String::new(),
+        n => format!(", {:.1} % reached the goal", 100.0 * n as f64 / ended.finished as f64),
+    };
+    tell!("{}: {counts}{wins}", args.out.display());
+    if finished {
+        return Ok(Outcome::Pass);
+    }
+    let level = world.get::<Episode>(agent).filter(|_| episodes <= count).map(|episode| episode.level);
+    let stopped = StoppedRecording { level, steps, left_out };
+    tell!("stopped, so the recording is incomplete: {}", stopped.how_to_go_on(&args, &levels));
+    Ok(Outcome::Stopped)
+}
+
+/// Position at which a recording was stopped.
+struct StoppedRecording {
+    /// The level that was being played, unless every level has been played already.
+    level: Option<u64>,
+    /// Steps that this call has recorded.
+    steps: u64,
+    /// Held-out levels that were left out because no levels were named.
+    left_out: Option<LevelSplit>,
+}
+
+impl StoppedRecording {
+    /// Returns the changes of the call that resumes the recording. Each call begins with the first of its levels,
+    /// counts its own steps, and draws the same noise from the same seed.
+    fn how_to_go_on(&self, args: &Args, levels: &LevelSplit) -> String {
+        let mut changes = "--append".to_owned();
+        if let Some(first) = self.level {
+            changes += &format!(" --levels {}", LevelSplit { first, ..levels.clone() });
+            changes.extend(self.left_out.iter().map(|held_out| format!(" --hold-out {held_out}")));
+        }
+        if let Some(steps) = args.steps {
+            changes += &format!(" --steps {}", steps.saturating_sub(self.steps));
+        }
+        if args.noise > 0.0 {
+            changes += &format!(" --seed {}", args.seed.wrapping_add(1));
+        }
+        format!("add the rest with the same command and `{changes}`")
+    }
+}
+
+/// Checks that there is a player.
+fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
+    if game.tools().bots.demonstrator().is_some() {
+        return Ok(());
+    }
+    let name = game.name();
+    let mut advice = "train a policy without recordings (`playbot train --algorithm ppo --run runs/first`)".to_owned();
+    if game.tools().input.key_bindings().is_some() {
+        advice += &format!(", or play and record it yourself: `playbot play {name} --record FILE`");
+    }
+    Err(CliError::Usage(format!("`{name}` has no demonstrator that could be recorded: {advice}")))
+}
+
+/// Checks the noise: a probability for discrete actions, a standard deviation for continuous ones.
+fn check_noise(game: &dyn Game, noise: f64) -> Result<(), CliError> {
+    let (fits, wanted) = match game.actions() {
+        ActionSpace::Discrete(_) => ((0.0..=1.0).contains(&noise), "a probability lies between 0 and 1"),
+        ActionSpace::Continuous(_) => {
+            (noise.is_finite() && noise >= 0.0, "a standard deviation is a finite number, 0 or more")
+        }
+    };
+    if fits { Ok(()) } else { Err(CliError::Usage(format!("--noise is {noise}; {wanted}"))) }
+}
+
+/// Returns the levels but for those that are held out.
+fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) -> Result<Vec<u64>, CliError> {
+    held_out.iter().try_for_each(|split| split.check(game))?;
+    let hidden: Vec<_> = held_out.iter().map(|split| HeldOut::new(game, split)).collect();
+    let chosen: Vec<u64> =
+        levels.levels().filter(|&level| !hidden.iter().any(|hidden| hidden.contains(&levels.mode, level))).collect();
+    if chosen.is_empty() {
+        return Err(CliError::Usage(format!("every one of the levels {levels} is held out: record others")));
+    }
+    Ok(chosen)
+}
+
+/// Warns if requested levels are held out by the game's own experiment. Another experiment may hold out others.
+fn warn_of_held_out(game: &dyn Game, levels: &LevelSplit, chosen: &[u64]) {
+    let Some(split) = usual_held_out(game) else { return };
+    let hidden = HeldOut::new(game, &split);
+    if hidden.first_of(levels).is_none() {
+        return;
+    }
+    if let Some(level) = chosen.iter().find(|level| hidden.contains(&levels.mode, **level)) {
+        tell!(
+            "warning: level {level} is, or looks like, one of the held-out levels {split}; learn-skills refuses recordings \
+             of them, unless your experiment holds out others: leave them out with --hold-out {split}"
+        );
+    }
+}
+
+/// Plays until enough is recorded. Returns false if Ctrl-C stopped it before.
+fn play(
+    world: &mut bevy::prelude::World,
+    agent: bevy::prelude::Entity,
+    levels: u64,
+    steps: Option<u64>,
+) -> Result<bool, CliError> {
+    interrupt::listen();
+    let (length, unit) = steps.map_or((levels, "levels"), |steps| (steps, "steps"));
+    let bar = progress::bar("record", length, unit);
+    let finished = loop {
+        world.tick()?;
+        let recorder = world.resource::<Recorder>();
+        let done = if steps.is_some() { recorder.steps() } else { recorder.episodes() };
+        bar.set_position(done);
+        let idle = !Control::of(world, agent).is_active();
+        if idle || steps.is_some_and(|steps| done >= steps) {
+            break true;
+        }
+        if interrupt::asked() {
+            break false;
+        }
+    };
+    bar.finish_and_clear();
+    flush_unfinished(world)?;
+    Ok(finished)
+}

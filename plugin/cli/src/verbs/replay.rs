@@ -1,0 +1,256 @@
+//! `playbot replay`.
+
+#[cfg(not(feature = "window"))]
+mod no_window;
+mod picture;
+#[cfg(feature = "window")]
+mod window;
+
+use crate::{
+    arguments::counted,
+    error::{CliError, Outcome, print_line},
+    interrupt, output, progress,
+    verbs::replay::picture::Pictures,
+};
+use playbot_harness::{
+    game::Game,
+    games::{Artifact, Games},
+};
+use playbot_test::findings::{
+    Budget, Checks, FindingStatus, Minimised, Recheck, StoredFinding, keep::recheck, list_findings, minimise,
+};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+#[cfg(not(feature = "window"))]
+use crate::verbs::replay::no_window::show;
+#[cfg(feature = "window")]
+use crate::verbs::replay::window::show;
+
+// Run of `playbot replay`.
+
+/// Findings of a folder to list in the error about the folder.
+const MOST_NAMED: usize = 3;
+
+/// Play a finding again: check that it still happens, and show it.
+///
+/// Findings are files that `playbot test` writes. Each holds a level, the actions that lead to the finding, and what
+/// was found, with its tick and the state of the game. Detectors have the settings with which they found it. A level
+/// file that is missing as seen from the current folder is looked for in each folder above the finding. Exit code 0 if
+/// the same happens again, 1 if not.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot replay runs/test/findings/NAME.finding
+  playbot replay runs/test/findings/NAME.finding --apng failure.png
+  playbot replay runs/test/findings/NAME.finding --png failure.png --scale 4 --json
+  playbot replay runs/test/findings/NAME.finding --minimise --out short.finding
+  playbot replay short.finding --window
+
+Animated PNGs play in browsers and in most viewers of pictures.")]
+pub struct Args {
+    /// File of the finding.
+    finding: PathBuf,
+    /// Write a picture of the last tick, a .png.
+    #[arg(long, value_name = "FILE", value_parser = output::png)]
+    png: Option<PathBuf>,
+    /// Write an animation of all ticks, a .png (at most the last 3600 ticks).
+    #[arg(long, value_name = "FILE", value_parser = output::png)]
+    apng: Option<PathBuf>,
+    /// Enlargement of the bots' picture.
+    #[arg(long, default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=32))]
+    scale: u32,
+    /// Show it in a window, where you play on after the last tick.
+    #[arg(long)]
+    window: bool,
+    /// Leave out actions that it does not need, and write the shorter finding to --out. Pictures then show that one.
+    #[arg(long, requires = "out")]
+    minimise: bool,
+    /// File for the shorter finding.
+    #[arg(long, value_name = "FILE", requires = "minimise")]
+    out: Option<PathBuf>,
+    /// Most replays for shortening.
+    #[arg(long, default_value_t = 500, requires = "minimise", value_parser = clap::value_parser!(u32).range(1..))]
+    replays: u32,
+    /// Overwrite an existing finding.
+    #[arg(long, requires = "out")]
+    force: bool,
+    /// One line of JSON.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
+    if args.finding.is_dir() {
+        return Err(instead_of(&args.finding));
+    }
+    let stored = StoredFinding::read(&args.finding)?;
+    let game = games.of_file(Artifact::Finding, &args.finding, &stored.header.game)?;
+    let finding = stored.clone().seen_from(game, &args.finding);
+    let pictures = Pictures { still: args.png.as_deref(), animated: args.apng.as_deref(), scale: args.scale };
+    pictures.prepare()?;
+    check_out(args)?;
+    let again = play_again(game, &finding)?;
+    let status = again.status(&finding);
+    let shorter = match &args.out {
+        Some(out) if status != FindingStatus::Gone => {
+            Some((write_shorter(game, &finding, &stored, args.replays, out)?, out.as_path()))
+        }
+        _ => None,
+    };
+    let told = Told {
+        path: &args.finding,
+        finding: &stored,
+        again: &again,
+        shorter: shorter.as_ref().map(|(shorter, path)| (shorter, *path)),
+    };
+    told.tell(args.json)?;
+    let shown = shorter.as_ref().map_or(&finding, |(Minimised { finding, .. }, _)| finding);
+    pictures.write(game, shown)?;
+    if args.window {
+        show(game, shown)?;
+    }
+    Ok(if status == FindingStatus::StillThere { Outcome::Pass } else { Outcome::Findings })
+}
+
+/// Returns the error of a folder, with findings in it.
+fn instead_of(folder: &Path) -> CliError {
+    let found = match list_findings(folder) {
+        Ok(found) => found,
+        Err(error) => return error.into(),
+    };
+    let names: Vec<String> = found.iter().take(MOST_NAMED).map(|(_, path)| path.display().to_string()).collect();
+    let folder = folder.display();
+    CliError::Usage(format!(
+        "{folder} is a folder with {}: name one, such as {}, or play all of them with `{} test --regress {folder}`",
+        counted(found.len() as u64, "finding"),
+        names.join(", "),
+        output::name()
+    ))
+}
+
+fn check_out(args: &Args) -> Result<(), CliError> {
+    let Some(out) = &args.out else { return Ok(()) };
+    if out.is_file() && !args.force {
+        return Err(CliError::Usage(format!(
+            "{} exists: name another file, or overwrite it with --force",
+            out.display()
+        )));
+    }
+    output::prepare(out)
+}
+
+fn play_again(game: &dyn Game, finding: &StoredFinding) -> Result<Recheck, CliError> {
+    let bar = progress::bar("replay", finding.episode.len() as u64, "ticks");
+    let again = recheck(game, finding, &Checks::of_game(game));
+    bar.finish_and_clear();
+    Ok(again?)
+}
+
+// Report of a finding that was played again.
+
+/// A finding and the result of its replay.
+pub struct Told<'a> {
+    /// Its file.
+    pub path: &'a Path,
+    /// The finding as stored.
+    pub finding: &'a StoredFinding,
+    /// The result of playing it again.
+    pub again: &'a Recheck,
+    /// The shorter one, and its file.
+    pub shorter: Option<(&'a Minimised, &'a Path)>,
+}
+
+impl Told<'_> {
+    /// Prints it: as a line of JSON, or as text.
+    ///
+    /// # Errors
+    ///
+    /// Standard output is closed.
+    pub fn tell(&self, as_json: bool) -> Result<(), CliError> {
+        if as_json {
+            return print_line(self.json());
+        }
+        print_line(self.sentence())?;
+        self.shorter_sentence().map_or(Ok(()), print_line)
+    }
+
+    fn json(&self) -> Value {
+        let StoredFinding { header, head, episode } = self.finding;
+        let shorter = self.shorter.map(|(shorter, path)| {
+            json!({
+                "path": path.display().to_string(), "ticks": shorter.finding.episode.len(), "replays": shorter.replays,
+                "is_minimal": shorter.is_minimal,
+            })
+        });
+        json!({
+            "finding": self.path.display().to_string(), "game": header.game, "mode": header.mode, "level": head.level,
+            "detector": head.detector, "tester": head.tester, "message": head.message, "tick": head.tick,
+            "state_hash": head.state_hash, "ticks": episode.len(), "original_ticks": head.original_ticks,
+            "status": self.again.status(self.finding), "seen": self.again.sighting, "minimised": shorter,
+        })
+    }
+
+    fn sentence(&self) -> String {
+        let StoredFinding { header, head, episode } = self.finding;
+        let who = head.tester.as_ref().map_or_else(String::new, |tester| format!(", played by {tester}"));
+        let at = |tick: Option<u32>| tick.map_or_else(String::new, |tick| format!(" at tick {tick}"));
+        let now = match self.again.status(self.finding) {
+            FindingStatus::StillThere => format!("it happens again{}, with the same state", at(head.tick)),
+            FindingStatus::Changed => {
+                let seen = self.again.sighting.and_then(|seen| seen.tick);
+                format!(
+                    "it happens again, but not as stored:{} instead of{}, or in another state",
+                    at(seen),
+                    at(head.tick)
+                )
+            }
+            FindingStatus::Gone | FindingStatus::Unplayable => "it does not happen any more".to_owned(),
+        };
+        let ticks =
+            if episode.is_empty() { String::new() } else { format!(" ({})", counted(episode.len() as u64, "tick")) };
+        format!("{} {}{who}{ticks}: {}: {}\n{now}", header.game, head.level, head.detector, head.message)
+    }
+
+    fn shorter_sentence(&self) -> Option<String> {
+        let (shorter, path) = self.shorter?;
+        let (now, original) = (shorter.finding.episode.len(), self.finding.head.original_ticks);
+        let [before, after] = shorter.efforts;
+        let percent = 100.0 * now as f64 / f64::from(original.max(1));
+        let end =
+            if shorter.is_minimal { "" } else { "; the budget was used up before nothing more could be left out" };
+        Some(format!(
+            "{}: {} of {original} ({percent:.0} %), {} of {before} that do something, after {}{end}",
+            path.display(),
+            counted(now as u64, "tick"),
+            counted(after.into(), "action"),
+            counted(shorter.replays.into(), "replay")
+        ))
+    }
+}
+
+// Shortened findings, in files of their own.
+
+/// Leaves out needless actions, with a progress bar, and writes the rest. Its level is named as in `stored`: it may
+/// have been found in another folder. Ctrl-C ends it with the best so far.
+///
+/// # Errors
+///
+/// The finding does not happen any more, or the file cannot be written.
+pub(crate) fn write_shorter(
+    game: &dyn Game,
+    finding: &StoredFinding,
+    stored: &StoredFinding,
+    replays: u32,
+    out: &Path,
+) -> Result<Minimised, CliError> {
+    interrupt::listen();
+    let bar = progress::bar("minimise", replays.into(), "replays");
+    let budget = Budget { replays, ..Budget::default() };
+    let hear = |replays: u32| bar.set_position(replays.into());
+    let shorter = minimise(game, finding, &Checks::of_game(game), budget, &hear, &interrupt::asked);
+    bar.finish_and_clear();
+    let shorter = shorter?;
+    output::make_folder_of(out)?;
+    shorter.finding.clone().with_level_of(stored).write(out)?;
+    Ok(shorter)
+}

@@ -1,0 +1,139 @@
+//! Pictures of a finding: its last tick, or an animation.
+
+use crate::{
+    error::CliError,
+    output,
+    pictures::{
+        Film,
+        caption::{Numbers, Reach},
+        episode_world::{EpisodeStep, EpisodeWorld},
+    },
+    plot,
+    plot::PlotFile,
+    progress,
+};
+use bevy_playbot::{
+    fault::Fault,
+    vision::{ObservationConfig, ObservationKind},
+};
+use playbot_harness::{
+    game::Game,
+    inspect::{LevelPicture, LevelRequest},
+    sensors::GameSensors,
+};
+use playbot_test::findings::StoredFinding;
+use std::{collections::VecDeque, path::Path};
+
+/// Most ticks to draw, counted from the end.
+const MOST_TICKS: usize = 3600;
+
+/// The requested pictures.
+pub struct Pictures<'a> {
+    /// File for a picture of the last tick.
+    pub still: Option<&'a Path>,
+    /// File for an animated picture.
+    pub animated: Option<&'a Path>,
+    /// Enlargement of the bots' picture.
+    pub scale: u32,
+}
+
+impl Pictures<'_> {
+    /// Tests whether the files can be written.
+    ///
+    /// # Errors
+    ///
+    /// One of them cannot.
+    pub fn prepare(&self) -> Result<(), CliError> {
+        self.still.into_iter().chain(self.animated).try_for_each(output::prepare)
+    }
+
+    /// Draws and writes them.
+    ///
+    /// # Errors
+    ///
+    /// The game cannot be drawn, the pictures are too large, or the disk fails.
+    pub fn write(&self, game: &dyn Game, finding: &StoredFinding) -> Result<(), CliError> {
+        if self.still.is_none() && self.animated.is_none() {
+            return Ok(());
+        }
+        let seen_as = seen_as(game);
+        let (steps, reach) = play(game, finding, &seen_as)?;
+        let Some(last) = steps.last() else { return self.write_level(game, finding) };
+        let film = if seen_as.is_image() {
+            Film::new(seen_as.image, self.scale, game.tick_hz())?
+        } else {
+            Film::of_numbers(Numbers::new(game.observation().names, self.scale, &reach), game.tick_hz())
+        };
+        if let Some(path) = self.still {
+            output::write(path, &film.captioned(last)?.0)?;
+            tell!("{} shows tick {}", path.display(), last.tick);
+        }
+        if let Some(path) = self.animated {
+            let bar = progress::bar("draw", steps.len() as u64, "frames");
+            let drawn = film.animated(&steps, || bar.inc(1));
+            bar.finish_and_clear();
+            output::write(path, &drawn?.0)?;
+            tell!("{} shows ticks {} to {}", path.display(), steps[0].tick, last.tick);
+        }
+        Ok(())
+    }
+
+    /// Writes the level, for a finding before the end of the first tick, such as an unsolvable level.
+    fn write_level(&self, game: &dyn Game, finding: &StoredFinding) -> Result<(), CliError> {
+        let why = "it was found before the first tick was over";
+        let Some(level) = picture_of(game, &finding.header.mode, finding.episode.level_seed) else {
+            tell!("nothing is drawn: {why}");
+            return Ok(());
+        };
+        for path in self.still.into_iter().chain(self.animated) {
+            plot::write(&PlotFile::new(path)?, &level, game.tick_hz())?;
+            tell!("{} shows the level: {why}", path.display());
+        }
+        Ok(())
+    }
+}
+
+/// Returns a level as the game draws it; `None` if it draws none.
+fn picture_of(game: &dyn Game, mode: &str, level: u64) -> Option<LevelPicture> {
+    let request = LevelRequest { mode: Some(mode), level: Some(level), picture: true, ..LevelRequest::default() };
+    game.show_level(&request).ok()?.picture
+}
+
+/// Returns the pictures that a game has, or else its numbers.
+fn seen_as(game: &dyn Game) -> ObservationConfig {
+    let of = |kind| ObservationConfig { kind, ..ObservationConfig::default() };
+    if game.tools().pictures.picture().is_some() {
+        return of(ObservationKind::Raster);
+    }
+    let camera = of(ObservationKind::Camera);
+    if game.tools().pictures.has_camera() && camera.check(game).is_ok() { camera } else { of(ObservationKind::Vector) }
+}
+
+/// Plays the last ticks up to the finding. A game that breaks ends it.
+fn play(
+    game: &dyn Game,
+    finding: &StoredFinding,
+    seen_as: &ObservationConfig,
+) -> Result<(Vec<EpisodeStep>, Reach), CliError> {
+    let mut world = EpisodeWorld::replaying(game, &finding.header.mode, seen_as, finding.episode.clone())?;
+    world.keep_no_panic_files();
+    let (mut steps, mut reach) = (VecDeque::new(), Reach::default());
+    let bar = progress::bar("play", finding.episode.len() as u64, "ticks");
+    loop {
+        match world.next() {
+            Ok(Some(step)) => {
+                reach.include(&step.vector);
+                steps.push_back(step);
+                if steps.len() > MOST_TICKS {
+                    steps.pop_front();
+                }
+                bar.inc(1);
+            }
+            Ok(None) => break,
+            Err(error) if error.is::<Fault>() => break,
+            Err(error) => return Err(error),
+        }
+    }
+    bar.finish_and_clear();
+    Ok((steps.into(), reach))
+}

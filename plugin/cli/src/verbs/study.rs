@@ -1,0 +1,330 @@
+//! `playbot study`.
+
+use crate::{
+    arguments::{
+        Compute,
+        experiment::{ExperimentArgs, Options, in_words, quoted, sets_key, tell_unread},
+        open,
+    },
+    console::Console,
+    error::{CliError, Outcome, print_line},
+    interrupt, output, progress,
+    verbs::learn_skills,
+};
+use bevy_playbot::unknown_name::UnknownName;
+use indicatif::ProgressBar;
+use playbot_harness::{games::Games, sealed_file::read_sealed};
+use playbot_learner::DeviceKind;
+use playbot_train::{
+    Experiment,
+    run_dir::is_unstarted,
+    run_observer::{CountedWork, Counter, RunEvent, RunObserver},
+    study::{StudyError, StudyReport, StudyRun, study_runs, study_variants},
+    study_runner::{RESULTS, StudyRunError, StudyRunner, rewrite_table, write_cost, write_report},
+    train_run::{never_learns, rounded},
+};
+use serde_json::json;
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
+
+/// Compare variants of an experiment over several seeds.
+///
+/// Every variant with every seed learns skills, trains, and is measured on the held-out levels. The tables and the plot
+/// do not depend on the machine: the same study gives the same files. Only cost.md reports time.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot study GAME --seeds 1,2,3 --out study
+  playbot study --experiment my.ron --out study
+  playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study
+  playbot study --experiment my.ron --variant full --variant no-kl --out study
+  playbot study --experiment my.ron --seeds 1,2,3,4,5 --set steps=200000 --out study --resume
+  playbot study --out study --rewrite")]
+pub struct Args {
+    #[command(flatten)]
+    from: ExperimentArgs,
+    /// Run only this variant of the experiment's (default: all; repeatable).
+    #[arg(long, value_name = "NAME")]
+    variant: Vec<String>,
+    /// Random seeds, instead of the experiment's.
+    #[arg(long, value_delimiter = ',')]
+    seeds: Vec<u64>,
+    /// Folder for table.md, curves.svg, results.json and cost.md, which are replaced.
+    #[arg(long, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Folder of the runs (default: `runs/` and the name of the experiment file, or else of the game).
+    #[arg(long, value_name = "FOLDER")]
+    runs: Option<PathBuf>,
+    /// Resume existing runs. Finished ones are not repeated.
+    #[arg(long)]
+    resume: bool,
+    /// Replace existing runs.
+    #[arg(long, conflicts_with = "resume")]
+    force: bool,
+    /// Run nothing. Write table.md anew from the results.json in the folder.
+    #[arg(long, conflicts_with_all = ["game", "experiment", "set", "variant", "seeds", "runs", "resume", "force", "json"])]
+    rewrite: bool,
+    #[command(flatten)]
+    compute: Compute,
+    /// One line of JSON per run instead of the table.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    if args.rewrite {
+        rewrite_table(&args.out)?;
+        tell!("written to {}: table.md, from its results.json", args.out.display());
+        return Ok(Outcome::Pass);
+    }
+    let seeds = (!args.seeds.is_empty()).then(|| format!("seeds={:?}", args.seeds));
+    let mut experiment = args.from.load(games, [seeds])?;
+    keep(&mut experiment, &args.variant)?;
+    let runs = study_runs(&experiment)?;
+    check_games(&runs, &args.from, games)?;
+    tell_taken_back(&experiment, &args.from.set);
+    tell_idle_settings(&experiment, &runs, &args.from.set);
+    let folder = runs_folder(&args, &experiment);
+    check_folder(&folder, &runs, &args)?;
+    check_results(&runs, &args)?;
+    for path in [&folder, &args.out] {
+        output::make_folder(path)?;
+    }
+    let trained = runs.iter().filter(|run| run.experiment.algorithm.is_trained());
+    let lengths: BTreeSet<String> = trained.filter_map(|run| rounded(&run.experiment)).collect();
+    lengths.iter().for_each(|words| tell!("{words}"));
+    let idle: BTreeSet<String> = runs
+        .iter()
+        .filter_map(|run| Some((&run.variant, never_learns(&run.experiment)?)))
+        .map(|(variant, words)| format!("{variant}: {words}"))
+        .collect();
+    idle.iter().for_each(|words| tell!("warning: {words}"));
+    interrupt::listen();
+    interrupt::go_on_with(format!("`{} --resume`", restart(&args)));
+    let locate = |path: &Path| args.from.find_recordings(path, games);
+    let setup = args.compute.setup(&locate);
+    let mut console = StudyConsole::new(&runs);
+    let mut runner = StudyRunner::new(games, &folder, args.force, setup);
+    let explained = |error| explain(error, &args.from);
+    runner.check_folders(&runs)?;
+    runner.check_recordings(&runs, &mut console).map_err(explained)?;
+    console.begin();
+    let ended = runner.run_all(&runs, command(&args), experiment, &mut console).map_err(explained)?;
+    let Some(report) = ended else {
+        drop(console);
+        tell!(
+            "stopped and saved; the study is incomplete, and its tables are not written: go on with `{} --resume`",
+            restart(&args)
+        );
+        return Ok(Outcome::Stopped);
+    };
+    console.end();
+    write_report(&args.out, &report)?;
+    write_cost(&args.out, &runs, &folder, &command(&args), setup.threads)?;
+    if args.json {
+        report.results.iter().try_for_each(|result| print_line(json!(result)))?;
+    } else {
+        print_line(report.summary().trim_end())?;
+    }
+    tell!("written to {}: table.md, curves.svg, results.json, cost.md", args.out.display());
+    Ok(Outcome::Pass)
+}
+
+/// Explains an error of a study. Other settings than those of an existing run are named with the options that set them.
+fn explain(error: StudyRunError, from: &ExperimentArgs) -> CliError {
+    let options = Options { from, own: &[] };
+    match error {
+        StudyRunError::OtherSettings { folder, wanted, saved } => CliError::Usage(format!(
+            "{} holds a run with other settings: {}; ask for the same, choose another folder with --runs, or replace all \
+             with --force",
+            folder.display(),
+            in_words(options.differences(&wanted, &saved, "the run", &[]))
+        )),
+        StudyRunError::Skills(error) => learn_skills::explain(*error, &options),
+        other => other.into(),
+    }
+}
+
+/// Reports the progress of a study: that of its runs, and of all together.
+struct StudyConsole {
+    console: Console<'static>,
+    /// The bar of all runs, once the first begins.
+    whole: Option<ProgressBar>,
+    /// Number of runs.
+    runs: usize,
+    /// Steps of all runs, and of those that have ended.
+    steps: u64,
+    done: u64,
+    /// Steps of the present run.
+    present: u64,
+}
+
+impl StudyConsole {
+    fn new(runs: &[StudyRun]) -> Self {
+        let steps = runs.iter().map(trained_steps).sum();
+        Self { console: Console::default(), whole: None, runs: runs.len(), steps, done: 0, present: 0 }
+    }
+
+    fn begin(&mut self) {
+        self.whole = Some(progress::bar("study", self.steps, "steps"));
+    }
+
+    fn end(self) {
+        self.whole.iter().for_each(ProgressBar::finish_and_clear);
+    }
+}
+
+impl RunObserver for StudyConsole {
+    fn stopped(&self) -> bool {
+        self.console.stopped()
+    }
+
+    fn observe(&mut self, event: RunEvent<'_>) {
+        let Some(whole) = &self.whole else { return self.console.observe(event) };
+        match event {
+            RunEvent::StudyRunBegun { index, run } => {
+                whole.set_message(format!("run {} of {}", index + 1, self.runs));
+                self.console.set_title(run.id());
+                self.present = trained_steps(run);
+            }
+            RunEvent::StudyRunEnded { run, result } => {
+                self.done += self.present;
+                whole.set_position(self.done);
+                let test = &result.test;
+                let line = format!("{}: held-out return {:.2} ± {:.2}", run.id(), test.return_mean, test.return_se);
+                whole.suspend(|| tell!("{line}"));
+            }
+            RunEvent::Updated { report, .. } => {
+                whole.set_position(self.done + report.step.min(self.present));
+                self.console.observe(event);
+            }
+            other => self.console.observe(other),
+        }
+    }
+
+    fn counter(&mut self, work: CountedWork<'_>) -> Counter {
+        self.console.counter(work)
+    }
+}
+
+/// Returns the steps of a run's training.
+fn trained_steps(run: &StudyRun) -> u64 {
+    if run.experiment.algorithm.is_trained() { run.experiment.whole_steps() } else { 0 }
+}
+
+/// Keeps the named variants, in the order of the experiment; all of them by default. A `--set` that does not fit the
+/// others does no harm.
+fn keep(experiment: &mut Experiment, named: &[String]) -> Result<(), CliError> {
+    let known = study_variants(experiment)?;
+    let names: Vec<&str> = known.iter().map(|variant| variant.name.as_str()).collect();
+    if let Some(unknown) = named.iter().find(|name| !names.contains(&name.as_str())) {
+        return Err(UnknownName::new("variant", unknown, &names).into());
+    }
+    experiment.variants.retain(|variant| named.is_empty() || named.contains(&variant.name));
+    Ok(())
+}
+
+fn check_games(runs: &[StudyRun], from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
+    for StudyRun { variant, experiment } in runs {
+        let game = open::game(games, from, experiment)?;
+        let of_variant = |source| StudyError::Values { variant: variant.clone(), source };
+        experiment.check_game(game).map_err(of_variant)?;
+        experiment.check_memory(game).map_err(of_variant)?;
+    }
+    Ok(())
+}
+
+/// Reports `--set` values that variants override.
+fn tell_taken_back(experiment: &Experiment, sets: &[String]) {
+    for (key, value) in sets.iter().filter_map(|set| set.split_once('=')) {
+        let variants = experiment.variants.iter();
+        let own = variants.filter(|variant| variant.set.iter().any(|set| sets_key(set, key.trim())));
+        let names: Vec<&str> = own.map(|variant| variant.name.as_str()).collect();
+        if !names.is_empty() {
+            tell!("warning: --set {key}={value} does not change {}: their own value comes last", names.join(", "));
+        }
+    }
+}
+
+/// Reports settings without effect: of `--set` in no run, and of a variant in none of its runs.
+fn tell_idle_settings(experiment: &Experiment, runs: &[StudyRun], sets: &[String]) {
+    let of = |is_meant: &dyn Fn(&StudyRun) -> bool| -> Vec<&Experiment> {
+        runs.iter().filter(|run| is_meant(run)).map(|run| &run.experiment).collect()
+    };
+    tell_unread("--set ", sets, &of(&|_| true));
+    for variant in &experiment.variants {
+        tell_unread(&format!("{}: ", variant.name), &variant.set, &of(&|run| run.variant == variant.name));
+    }
+}
+
+/// Returns the folder of the runs: runs of different games lie apart.
+fn runs_folder(args: &Args, experiment: &Experiment) -> PathBuf {
+    let usual = if args.from.names_game() { &experiment.game } else { "study" };
+    let name = args.from.experiment.as_deref().and_then(Path::file_stem).unwrap_or(usual.as_ref());
+    args.runs.clone().unwrap_or_else(|| Path::new("runs").join(name))
+}
+
+/// Refuses existing runs without `--resume` or `--force`; those of other variants and seeds may lie beside them.
+fn check_folder(folder: &Path, runs: &[StudyRun], args: &Args) -> Result<(), CliError> {
+    let begun = runs.iter().map(|run| folder.join(run.id())).find(|run| run.exists() && !is_unstarted(run));
+    let Some(begun) = begun.filter(|_| !args.resume && !args.force) else { return Ok(()) };
+    Err(CliError::Usage(format!(
+        "{} is there already: go on with --resume, replace all runs of this study with --force, or choose another folder \
+         with --runs",
+        begun.display()
+    )))
+}
+
+/// Refuses to replace the results of other runs without `--force`.
+fn check_results(runs: &[StudyRun], args: &Args) -> Result<(), CliError> {
+    let path = args.out.join(RESULTS);
+    let Some((there, _)) = read_sealed::<StudyReport>(&path).ok().filter(|_| !args.force) else {
+        return Ok(());
+    };
+    let is_new = |variant: &str, seed| runs.iter().any(|run| run.variant == variant && run.experiment.seed == seed);
+    let lost: Vec<String> = there
+        .results
+        .iter()
+        .filter(|result| !is_new(&result.variant, result.seed))
+        .map(|result| format!("{} with seed {}", result.variant, result.seed))
+        .collect();
+    if lost.is_empty() {
+        return Ok(());
+    }
+    Err(CliError::Usage(format!(
+        "{} holds results that this study lacks: {}; choose another folder with --out, or remove the file first",
+        path.display(),
+        lost.join(", ")
+    )))
+}
+
+/// Returns the command that gives the same files, without options that do not change them.
+fn command(args: &Args) -> String {
+    let game = args.from.game.iter().map(|game| quoted(game));
+    let mut words: Vec<String> = [format!("{} study", output::name())].into_iter().chain(game).collect();
+    let mut push = |name: &str, value: String| words.push(format!("--{name} {}", quoted(&value)));
+    if let Some(path) = &args.from.experiment {
+        push("experiment", path.display().to_string());
+    }
+    for set in &args.from.set {
+        push("set", set.clone());
+    }
+    for variant in &args.variant {
+        push("variant", variant.clone());
+    }
+    if !args.seeds.is_empty() {
+        push("seeds", args.seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(","));
+    }
+    if args.compute.device() != DeviceKind::default() {
+        push("device", args.compute.device().to_string());
+    }
+    push("out", args.out.display().to_string());
+    words.join(" ")
+}
+
+/// Returns the command with the options that find its runs again.
+fn restart(args: &Args) -> String {
+    let runs = args.runs.as_ref().map(|path| format!(" --runs {}", quoted(&path.display().to_string())));
+    command(args) + &runs.unwrap_or_default()
+}

@@ -1,0 +1,228 @@
+//! `playbot test`.
+
+mod regress;
+mod testers;
+mod told;
+
+use crate::{
+    arguments::{Compute, at_least_one, first_levels, usual_held_out},
+    error::{CliError, Outcome},
+    interrupt, progress,
+    verbs::test::{
+        regress::{DetectorArgs, RegressArgs, forget_slow_ticks, list_detectors, tell_slow_ticks},
+        testers::TesterArgs,
+    },
+};
+use playbot_harness::{game::Game, games::Games, split::LevelSplit};
+use playbot_test::{
+    detectors::Detectors,
+    findings::{Budget, Checks, FindingFiles, list_findings},
+    verdict::{
+        Comparison, Earlier, LevelVerdict, Shard, TestEnd, TestFolder, TestPlan, TestWatch, results_folder,
+        run_tests_keeping,
+    },
+};
+use std::path::{Path, PathBuf};
+
+pub use crate::verbs::test::told::{Results, tell_results};
+
+// Run of `playbot test`.
+
+/// Test levels: report which of them bots and policies solve, and which are unsolvable.
+///
+/// Each level is solved, or no tester solved it, or it is proved unsolvable. A game that panics or breaks its contract
+/// on a level is a finding of that level, and the other levels go on. DIR/results.json has every level, with 95 %
+/// intervals, and is the same on any number of threads. DIR/report.html shows it with pictures of the worst,
+/// DIR/junit.xml is for build servers and DIR/summary.md for a pull request.
+///
+/// Each finding of an episode is a file in DIR/findings, which `playbot replay` shows. With --regress, such files are
+/// played again instead.
+///
+/// Exit code 1 if a level was not solved or something was found. With --against, exit code 1 if a level is solved less
+/// often than before, can no longer be solved, or has a new finding.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot test GAME --levels MODE:0..99 --out runs/test
+  playbot test GAME --levels MODE:0..99 --bot BOT,random --episodes 5 --out runs/test
+  playbot test GAME --levels MODE:0..99 --policy bot.policy --out runs/test --resume
+  playbot test GAME --levels MODE:0..99 --policy ppo=old/bot.policy --against runs/before --out runs/after
+  playbot test GAME --levels MODE:0..99 --against runs/before --out runs/after
+  playbot test GAME --levels MODE:0..99 --detect reward-loop --detector stuck.ticks=200 --out runs/test
+  playbot test GAME --levels MODE:0..99 --par pars.json --out runs/test
+  playbot test GAME --levels MODE:0..99999 --shard 0/4 --out runs/shard-0   one of four machines")]
+pub struct Args {
+    /// Name of the game (not with --regress).
+    game: Option<String>,
+    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json" (default: the
+    /// held-out levels of the game's experiment).
+    #[arg(long)]
+    levels: Option<LevelSplit>,
+    #[command(flatten)]
+    testers: TesterArgs,
+    /// Episodes of each tester on each level.
+    #[arg(long, visible_alias = "episodes-per-level", default_value = "1", value_parser = at_least_one)]
+    episodes: usize,
+    /// Random seed of the testers' draws.
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Test only one part of the levels, as index/count, counted from 0. `playbot report merge` joins the results.
+    #[arg(long, value_name = "INDEX/COUNT")]
+    shard: Option<Shard>,
+    /// Folder of earlier results of the same version of the game, to report changes.
+    #[arg(long, value_name = "DIR")]
+    against: Option<PathBuf>,
+    /// Folder for the results (not with --regress).
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Go on with a test that was stopped or killed, or begin it if there is none.
+    #[arg(long, conflicts_with = "force")]
+    resume: bool,
+    /// Replace existing results.
+    #[arg(long)]
+    force: bool,
+    #[command(flatten)]
+    detectors: DetectorArgs,
+    #[command(flatten)]
+    findings: FindingArgs,
+    #[command(flatten)]
+    regress: RegressArgs,
+    #[command(flatten)]
+    compute: Compute,
+    /// Print one line of JSON per level instead of a table.
+    #[arg(long)]
+    json: bool,
+}
+
+pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
+    if args.detectors.list_detectors {
+        let game = args.game.as_ref().map_or_else(|| Ok(games.first()), |name| games.get(name))?;
+        return list_detectors(game, args.json);
+    }
+    if let Some(outcome) = args.regress.run(games, &args.detectors, args.compute.threads(), args.json) {
+        return outcome;
+    }
+    let Some(name) = &args.game else {
+        let names: Vec<&str> = games.iter().map(|game| game.name()).collect();
+        return Err(CliError::Usage(format!(
+            "name the game to test ({}), or a folder of findings with --regress",
+            names.join(", ")
+        )));
+    };
+    let Some(out) = &args.out else {
+        return Err(CliError::Usage(format!("name a folder for the results with --out, such as --out runs/{name}")));
+    };
+    let game = games.get(name)?;
+    let plan = plan(args, game)?;
+    let record = plan.record(game);
+    let against = args.against.as_deref().map(results_folder);
+    let results = Results { folder: out, against, game: Some(game), json: args.json };
+    results.check_folders()?;
+    if let Some(before) = results.against {
+        Comparison::check(before, &record)?;
+    }
+    let earlier = match (args.resume, args.force) {
+        (true, _) => Earlier::Resume,
+        (false, true) => Earlier::Replace,
+        (false, false) => Earlier::Keep,
+    };
+    let (mut folder, message) = TestFolder::open(out, &record, earlier)?;
+    message.iter().for_each(|message| tell!("warning: {message}"));
+    interrupt::listen();
+    if !args.resume {
+        forget_slow_ticks(out)?;
+    }
+    let end = test(game, &plan, &mut folder, &args.findings.files(out, &plan.detectors))?;
+    tell_slow_ticks(&plan.detectors, out)?;
+    match end {
+        TestEnd::Stopped => {
+            tell!(
+                "stopped; {} of {} levels are finished: go on with the same command and --resume",
+                folder.finished().len(),
+                plan.places().len()
+            );
+            Ok(Outcome::Stopped)
+        }
+        TestEnd::Done => {
+            folder.finish()?;
+            let outcome = tell_results(&results)?;
+            args.findings.tell_missing(out);
+            Ok(outcome)
+        }
+    }
+}
+
+fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
+    let split = match &args.levels {
+        Some(split) => split.clone(),
+        None => {
+            let usual = usual_held_out(game).unwrap_or_else(|| first_levels(game, 63));
+            tell!("no --levels are named: {usual}");
+            usual
+        }
+    };
+    split.check(game)?;
+    let episodes = u32::try_from(args.episodes)
+        .map_err(|_| CliError::Usage("--episodes has too many digits: choose fewer".to_owned()))?;
+    let detectors = args.detectors.choose(game, &split)?;
+    let plan = TestPlan {
+        split,
+        testers: args.testers.load(game, args.compute.device())?,
+        episodes,
+        seed: args.seed,
+        detectors,
+        shard: args.shard,
+        threads: args.compute.threads(),
+    };
+    plan.check()?;
+    Ok(plan)
+}
+
+/// Tests the unfinished levels, with a progress bar.
+fn test(game: &dyn Game, plan: &TestPlan, folder: &mut TestFolder, files: &FindingFiles) -> Result<TestEnd, CliError> {
+    let finished = folder.finished();
+    let levels = plan.places().len().saturating_sub(finished.len()) as u64;
+    let total = levels * plan.testers.len() as u64 * u64::from(plan.episodes);
+    let bar = progress::bar(&format!("test {}", game.name()), total, "episodes");
+    let progress = |episodes: u64| bar.inc(episodes);
+    let watch = TestWatch { progress: &progress, stop: &interrupt::asked };
+    let mut keep = |verdict: LevelVerdict| folder.keep(&verdict);
+    let end = run_tests_keeping(game, plan, &finished, &mut keep, &watch, Some(files));
+    bar.finish_and_clear();
+    Ok(end?)
+}
+
+// Options for the findings of a test.
+
+/// Findings as files.
+#[derive(clap::Args, Clone, Debug)]
+pub struct FindingArgs {
+    /// Leave out actions that findings do not need, with up to 500 replays each. `playbot replay` does it for a single
+    /// one.
+    #[arg(long)]
+    minimise: bool,
+    /// Also write a failed episode of each level that no tester solved, if a deterministic tester failed there.
+    #[arg(long)]
+    keep_failures: bool,
+}
+
+impl FindingArgs {
+    /// Returns the folder of findings and the options for them.
+    pub fn files(&self, folder: &Path, detectors: &Detectors) -> FindingFiles {
+        FindingFiles {
+            folder: folder.to_owned(),
+            minimise: self.minimise.then(Budget::default),
+            keep_failures: self.keep_failures,
+            checks: Checks::default().with_detectors(detectors),
+        }
+    }
+
+    /// Explains a missing failed episode, where one was requested.
+    pub fn tell_missing(&self, folder: &Path) {
+        if self.keep_failures && list_findings(folder).is_err() {
+            tell!(
+                "no failed episode is kept: it takes a level that no tester solved, and a tester that failed there and leaves \
+                 nothing to chance, such as a policy with --greedy"
+            );
+        }
+    }
+}

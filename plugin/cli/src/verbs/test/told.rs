@@ -1,0 +1,187 @@
+//! Report of results, and the files that go with them.
+
+use crate::{
+    arguments::counted,
+    error::{CliError, Outcome, print_line},
+    output,
+};
+use playbot_harness::{brief::shell_word, game::Game};
+use playbot_report::{PlainTable, ticks, whole};
+use playbot_test::{
+    findings::{FINDINGS, list_findings},
+    verdict::{
+        AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, ResultLines, SUMMARY, TesterTotal,
+        Trials, wilson, write_reports,
+    },
+    verdict_report::{HtmlReport, REPORT, write_html},
+};
+use std::{fs, path::Path};
+
+/// Most findings whose replay command is printed.
+const MOST_REPLAYS: usize = 3;
+
+/// Results and the form of their report.
+pub struct Results<'a> {
+    /// Their folder.
+    pub folder: &'a Path,
+    /// Folder of earlier ones.
+    pub against: Option<&'a Path>,
+    /// The game that was tested, if the program has it: it draws the levels of the report.
+    pub game: Option<&'a dyn Game>,
+    /// The levels are printed as JSON instead of tables.
+    pub json: bool,
+}
+
+impl Results<'_> {
+    /// Checks that earlier results are not overwritten by those that are compared with them.
+    ///
+    /// # Errors
+    ///
+    /// Both folders are the same.
+    pub fn check_folders(&self) -> Result<(), CliError> {
+        let is_same = |before: &Path| match (fs::canonicalize(before), fs::canonicalize(self.folder)) {
+            (Ok(before), Ok(folder)) => before == folder,
+            _ => before == self.folder,
+        };
+        match self.against {
+            Some(before) if is_same(before) => Err(CliError::Usage(format!(
+                "--against and --out are both {}: results cannot be compared with themselves; choose another --out",
+                before.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+}
+
+/// Compares results if requested, writes the files that go with them, and prints them. The outcome is that of the
+/// comparison if there is one, else that of the results.
+pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
+    let comparison = results.against.map(|before| Comparison::read(before, results.folder)).transpose()?;
+    let folder = results.folder.display();
+    let next = format!(
+        "the results in {folder} are whole: make room or rights there, and make their page with `{} report html {folder}`",
+        output::name()
+    );
+    let not_written = |error| output::told(error, &next);
+    let overview = write_reports(results.folder, comparison.as_ref(), output::name()).map_err(not_written)?;
+    let report = HtmlReport { game: results.game, comparison: comparison.as_ref(), program: output::name() };
+    write_html(results.folder, &results.folder.join(REPORT), &report).map_err(not_written)?;
+    if results.json {
+        let mut lines = ResultLines::open(results.folder)?;
+        while let Some(line) = lines.next_line()? {
+            print_line(line)?;
+        }
+    } else {
+        print_line(testers(&overview).to_text().trim_end())?;
+        if !overview.worst.is_empty() {
+            print_line(format!("\n{}", worst(&overview).to_text().trim_end()))?;
+        }
+    }
+    tell!("{}", counts(&overview));
+    replays(results.folder, &overview).iter().for_each(|line| tell!("{line}"));
+    if let Some(comparison) = &comparison {
+        tell_comparison(comparison);
+    }
+    let names = [RESULTS, REPORT, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
+    tell!("{folder}: {}", names.collect::<Vec<_>>().join(", "));
+    let is_sound = comparison.as_ref().map_or(overview.is_sound(), |comparison| !comparison.has_alarms());
+    Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
+}
+
+/// Returns the commands that show findings of the worst levels, and the list of other files.
+fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
+    let findings = overview.worst.iter().flat_map(|level| &level.findings);
+    let files: Vec<_> = findings.filter_map(|finding| finding.file.as_ref()).map(|file| folder.join(file)).collect();
+    let mut lines: Vec<_> = files.iter().take(MOST_REPLAYS).map(|file| seen_with(file)).collect();
+    let kept: Vec<_> = list_findings(folder).unwrap_or_default();
+    let more = kept.len().saturating_sub(lines.len());
+    match kept.first() {
+        Some((_, first)) if lines.is_empty() => {
+            let failures = counted(kept.len() as u64, "failed episode");
+            lines.push(format!("{failures} kept in {}; {}", folder.join(FINDINGS).display(), seen_with(first)));
+        }
+        _ if more > 0 => lines.push(format!("and {more} more in {}", folder.join(FINDINGS).display())),
+        _ => {}
+    }
+    lines
+}
+
+/// Returns the command that shows a finding.
+fn seen_with(file: &Path) -> String {
+    format!("see it: {} replay {}", output::name(), shell_word(&file.display().to_string()))
+}
+
+fn counts(overview: &Overview) -> String {
+    format!(
+        "{}: {} solved, {} unsolved with nothing proved, {} proved unsolvable; {}",
+        counted(overview.levels, "level"),
+        overview.solved,
+        overview.bot_failed,
+        overview.proved_unsolvable,
+        counted(overview.findings, "finding")
+    )
+}
+
+fn testers(overview: &Overview) -> PlainTable {
+    let share = |of: Trials| {
+        let [low, high] = wilson(of.successes, of.trials).map(|share| 100.0 * share);
+        format!("{} of {} ({low:.1} to {high:.1} %)", whole(of.successes as f64), whole(of.trials as f64))
+    };
+    let row = |tester: &TesterTotal| {
+        vec![tester.name.clone(), share(tester.levels), share(tester.episodes), tester.places.describe()]
+    };
+    PlainTable {
+        caption: format!("{} {}", overview.record.game, overview.record.range),
+        columns: ["tester", "levels solved", "episodes solved", "squares visited"].map(str::to_owned).to_vec(),
+        rows: overview.testers.iter().map(row).collect(),
+    }
+}
+
+fn worst(overview: &Overview) -> PlainTable {
+    let row = |level: &LevelVerdict| {
+        let score = &level.score;
+        let median = score.ticks.map_or(f64::NAN, |ticks| ticks.median);
+        let finding = level.findings.first().map_or_else(String::new, |finding| finding.detector.clone());
+        vec![
+            level.level.clone(),
+            level.outcome.name().to_owned(),
+            format!("{} of {}", score.solved, score.episodes),
+            ticks(median),
+            whole(score.lost as f64),
+            whole(score.timed_out as f64),
+            level.places.unwrap_or_default().describe(),
+            finding,
+        ]
+    };
+    PlainTable {
+        caption: match overview.worst.len() {
+            MOST_WORST => format!("levels to look at, the worst {MOST_WORST}"),
+            _ => "levels to look at".to_owned(),
+        },
+        columns: ["level", "outcome", "solved", "ticks", "lost", "timed out", "visited", "finding"]
+            .map(str::to_owned)
+            .to_vec(),
+        rows: overview.worst.iter().map(row).collect(),
+    }
+}
+
+fn tell_comparison(comparison: &Comparison) {
+    comparison.left_out.iter().for_each(|why| tell!("left out of the comparison: {why}"));
+    let lists = [
+        ("unsolvable", texts(&comparison.unsolvable)),
+        ("harder", texts(&comparison.harder)),
+        ("easier", texts(&comparison.easier)),
+        ("new finding", texts(&comparison.new_findings)),
+        ("gone finding", texts(&comparison.gone_findings)),
+    ];
+    for (what, changes) in &lists {
+        changes.iter().for_each(|change| tell!("{what}: {change}"));
+    }
+    if lists.iter().all(|(_, changes)| changes.is_empty()) {
+        tell!("nothing has changed by more than chance in {}", counted(comparison.levels, "level"));
+    }
+}
+
+fn texts(changes: &[impl ToString]) -> Vec<String> {
+    changes.iter().map(ToString::to_string).collect()
+}

@@ -1,0 +1,224 @@
+//! `playbot train`.
+
+mod repeated;
+
+use crate::{
+    arguments::{
+        Compute,
+        experiment::{ExperimentArgs, Options, in_words, sets_key, tell_unread},
+        open,
+    },
+    console::Console,
+    error::{CliError, Outcome},
+    interrupt, output,
+    verbs::train::repeated::resumed,
+};
+use bevy_playbot::unknown_name::UnknownName;
+use playbot_harness::games::{Artifact, Games};
+use playbot_learner::SkillModel;
+use playbot_train::{
+    Algorithm, Experiment, LearnerKind, TrainError,
+    run_dir::{OpenedRun, RunDir},
+    train_run::{NewRun, Training, TrainingError, TrainingSetup, never_learns, rounded},
+};
+use std::path::{Path, PathBuf};
+
+/// Train a policy, headless, over the experiment's training levels.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot train GAME --skills skills.safetensors --run runs/first
+  playbot train --algorithm ppo --run runs/baseline --steps 200000
+  playbot train --skills skills.safetensors --run runs/weak --set score.kl_coef=0.01 --set ppo.lr=0.0003
+  playbot train --run runs/first --resume
+  playbot train --run runs/first --resume --steps 1000000")]
+pub struct Args {
+    #[command(flatten)]
+    from: ExperimentArgs,
+    /// Algorithm instead of the experiment's: score-ppo, ppo, score-sac, sac, spirl-ppo, spirl-sac or rlpd.
+    #[arg(long, value_parser = trained)]
+    algorithm: Option<Algorithm>,
+    /// Skill model, as written by `playbot learn-skills --out FILE`. Needed by score-ppo, score-sac, spirl-ppo and
+    /// spirl-sac.
+    #[arg(long, value_name = "FILE")]
+    skills: Option<PathBuf>,
+    /// Folder of the run.
+    #[arg(long)]
+    run: PathBuf,
+    /// Resume from the last checkpoint of the run, with its settings. Other options may be given again with the same
+    /// values, --steps and --checkpoint-every with new ones.
+    #[arg(long)]
+    resume: bool,
+    /// Delete the folder of the run first if it exists.
+    #[arg(long, conflicts_with = "resume")]
+    force: bool,
+    /// Environment steps from the beginning, instead of the experiment's, rounded up to whole updates.
+    #[arg(long)]
+    steps: Option<u64>,
+    /// Random seed, instead of the experiment's.
+    #[arg(long)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    compute: Compute,
+    /// Save a checkpoint every this many updates, instead of the experiment's.
+    #[arg(long)]
+    checkpoint_every: Option<u64>,
+}
+
+/// Parses an algorithm that can be trained.
+fn trained(name: &str) -> Result<Algorithm, String> {
+    let names = Algorithm::TRAINED.map(Algorithm::name);
+    match name.parse::<Algorithm>() {
+        Ok(algorithm) if algorithm.is_trained() => Ok(algorithm),
+        Ok(algorithm) => {
+            let why = output::named(&TrainError::NotTrained(algorithm).to_string());
+            Err(format!("{why}; those that are: {}", names.join(", ")))
+        }
+        Err(_) => Err(UnknownName::new("algorithm", name, &names).to_string()),
+    }
+}
+
+pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
+    let mut console = Console::new("train");
+    let locate = |path: &Path| args.from.find_recordings(path, games);
+    let setup = args.compute.setup(&locate);
+    let mut training = match args.resume {
+        true => resume(&args, games, &setup)?,
+        false => start(&args, games, &setup, &mut console)?,
+    };
+    let (path, program) = (args.run.display(), output::name());
+    let (steps, wanted) = (training.trainer.steps(), training.trainer.experiment().whole_steps());
+    if training.trainer.is_done() {
+        tell!(
+            "{path} is finished: it was trained for {steps} steps. Train it further with `{program} train --run {path} --resume \
+             --steps N`, where N is more than {steps}, or test it with `{program} eval --run {path}`"
+        );
+        return Ok(Outcome::Pass);
+    }
+    // A resumed training reported it at its beginning.
+    let is_new_length = args.steps.is_some() || args.from.set.iter().any(|set| sets_key(set, "steps"));
+    if !args.resume || is_new_length {
+        tell_length(training.trainer.experiment());
+    }
+    interrupt::go_on_with(format!("`{program} train --run {path} --resume`"));
+    if training.drive(&mut console)? {
+        tell!("done: test it with `{program} eval --run {path}`");
+        return Ok(Outcome::Pass);
+    }
+    tell!(
+        "stopped and saved after {} of {wanted} steps, so the training is incomplete: go on with \
+         `{program} train --run {path} --resume`",
+        training.trainer.steps()
+    );
+    Ok(Outcome::Stopped)
+}
+
+/// Reports it if a training will have more steps than requested.
+pub(crate) fn tell_length(experiment: &Experiment) {
+    if let Some(words) = rounded(experiment) {
+        tell!("{words}");
+    }
+    if let Some(words) = never_learns(experiment) {
+        tell!("warning: {words}");
+    }
+}
+
+fn start(
+    args: &Args,
+    games: &Games,
+    setup: &TrainingSetup<'_>,
+    console: &mut Console<'_>,
+) -> Result<Training, CliError> {
+    let experiment = args.from.load(games, args.settings())?;
+    tell_unread("--set ", &args.from.set, &[&experiment]);
+    let game = open::game(games, &args.from, &experiment)?;
+    let skills = match &args.skills {
+        Some(path) if experiment.algorithm.needs_skills() => {
+            Some(open::skills(path, args.compute.device(), &args.from)?)
+        }
+        Some(path) => {
+            tell!("{} learns without skills, so {} is not used", experiment.algorithm, path.display());
+            None
+        }
+        None => None,
+    };
+    skills.iter().try_for_each(|model| check_asked(args, &experiment, model))?;
+    interrupt::leave("nothing is trained yet".to_owned());
+    let (path, skill_file) = (args.run.as_path(), args.skills.as_deref());
+    let new = NewRun { path, experiment: &experiment, skills: skills.as_ref(), skill_file, force: args.force };
+    let training = Training::begin(game, &new, setup, console).map_err(|error| match error {
+        TrainingError::Train(error) => explain(*error, args, &experiment, games),
+        other => other.into(),
+    })?;
+    if args.from.experiment.is_none() {
+        tell!("no --experiment is named: training on {}, held out for the test {}", experiment.train, experiment.test);
+    }
+    Ok(training)
+}
+
+/// Refuses settings of skills that differ from the model's, which was learned before. Settings of a file are not
+/// checked: they were those of `learn-skills` at that time.
+fn check_asked(args: &Args, experiment: &Experiment, model: &SkillModel) -> Result<(), CliError> {
+    let learned = Experiment { skills: model.config().clone(), ..experiment.clone() };
+    let asked = Experiment { skills: learned.with_set(&args.from.set)?.skills, ..experiment.clone() };
+    let options = Options { from: &args.from, own: &[] };
+    let differences = options.differences(&asked, &learned, "the skill model", &[]);
+    if differences.is_empty() {
+        return Ok(());
+    }
+    Err(CliError::Usage(format!(
+        "the skills were learned with other settings: {}; drop the option, or learn other skills with it, \
+         `playbot learn-skills`",
+        in_words(differences)
+    )))
+}
+
+/// Explains an error before a training: with the position of the faulty key, and where skills are missing, with the
+/// commands that make and use them.
+fn explain(error: TrainError, args: &Args, experiment: &Experiment, games: &Games) -> CliError {
+    let algorithm = match error {
+        TrainError::NoSkills(algorithm) => algorithm,
+        TrainError::Experiment(error) => return args.from.locate(games, args.settings(), error).into(),
+        TrainError::ForeignSkills { .. } | TrainError::SkillObservation { .. } | TrainError::SeenSkills { .. } => {
+            let file = args.skills.iter().map(|path| format!("{}: ", path.display())).collect::<String>();
+            return CliError::Usage(format!("{file}{error}"));
+        }
+        other => return other.into(),
+    };
+    let plain = match experiment.algorithm.learner() {
+        LearnerKind::Ppo => Algorithm::Ppo,
+        LearnerKind::Sac => Algorithm::Sac,
+    };
+    CliError::Usage(format!(
+        "{algorithm} needs a skill model: learn one with `playbot learn-skills{} --out skills.safetensors`, then give the \
+         same command again with `--skills skills.safetensors`; or train without skills, with `--algorithm {plain}`",
+        args.from.words()
+    ))
+}
+
+fn resume(args: &Args, games: &Games, setup: &TrainingSetup<'_>) -> Result<Training, CliError> {
+    let opened = RunDir::open_to_write(&args.run)?;
+    let OpenedRun { experiment: saved, info, .. } = &opened;
+    let game = games.of_file(Artifact::Run, &args.run, &saved.game)?;
+    if !info.algorithm.is_trained() {
+        return Err(open::untrained(&args.run, info.algorithm));
+    }
+    let experiment = resumed(args, saved, info, games)?;
+    let (whole, begun_on) = (saved.whole_steps(), info.device);
+    let training = Training::resume(game, opened, &experiment, setup)?;
+    let steps = training.trainer.steps();
+    if training.trainer.is_done() {
+        if steps < whole {
+            return Err(CliError::Usage(format!(
+                "{} has {steps} steps already, and no fewer can be asked for: leave --steps out to go on to {whole}",
+                args.run.display()
+            )));
+        }
+        // Nothing is left to train, so the run stays as it is.
+        return Ok(training);
+    }
+    tell!("going on at step {steps} of {}", experiment.whole_steps());
+    if setup.device != begun_on {
+        tell!("it was begun on {begun_on} and goes on on {}: the result will be similar, but not equal", setup.device);
+    }
+    Ok(training)
+}

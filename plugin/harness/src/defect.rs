@@ -1,0 +1,68 @@
+//! The kinds of planted defects: see [`bugs`](crate::bugs).
+
+use bevy::prelude::*;
+use playbot_learner::rng::ChaCha8Rng;
+use std::{fmt, sync::Arc};
+
+/// Turns the text of an unmutated level into a broken one; `None` if this level has no place for the defect.
+pub type ChangeLevel = dyn Fn(&str, &mut ChaCha8Rng) -> Option<String> + Send + Sync;
+
+/// Breaks the rules of a game that has been built into this app, in one of the defect's variants.
+pub type ChangeRules = dyn Fn(&mut App, u32) + Send + Sync;
+
+/// A kind of defect that can be planted into a game.
+#[derive(Clone)]
+pub struct DefectKind {
+    /// Its class, in small letters and hyphens: `walled-goal`.
+    pub class: &'static str,
+    /// The defect, in one line.
+    pub about: &'static str,
+    /// Its change of a level or of the rules.
+    pub plant: Plant,
+}
+
+/// The change that plants a defect.
+#[derive(Clone)]
+pub enum Plant {
+    /// Changes a level: takes the JSON text of an unmutated level, as `playbot level GAME --json` prints it, and a
+    /// random stream. Returns the changed text, or `None` if this level has no place for the defect.
+    Level(Arc<ChangeLevel>),
+    /// Changes the rules of a game, after the game's own [`build`](crate::game::Game::build).
+    Rules {
+        /// Number of variants, from 0. They differ in strength, in time, or in distance from the start.
+        variants: u32,
+        /// Plants one of them.
+        plant: Arc<ChangeRules>,
+    },
+}
+
+impl DefectKind {
+    /// Creates a defect of levels: see [`Plant::Level`].
+    pub fn level(
+        class: &'static str,
+        about: &'static str,
+        change: impl Fn(&str, &mut ChaCha8Rng) -> Option<String> + Send + Sync + 'static,
+    ) -> Self {
+        Self { class, about, plant: Plant::Level(Arc::new(change)) }
+    }
+
+    /// Creates a defect of rules: see [`Plant::Rules`].
+    pub fn rules(
+        class: &'static str,
+        about: &'static str,
+        variants: u32,
+        plant: impl Fn(&mut App, u32) + Send + Sync + 'static,
+    ) -> Self {
+        Self { class, about, plant: Plant::Rules { variants, plant: Arc::new(plant) } }
+    }
+}
+
+impl fmt::Debug for DefectKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let how = match &self.plant {
+            Plant::Level(_) => "level".to_owned(),
+            Plant::Rules { variants, .. } => format!("rules, {variants} variants"),
+        };
+        f.debug_struct("DefectKind").field("class", &self.class).field("plant", &how).finish_non_exhaustive()
+    }
+}

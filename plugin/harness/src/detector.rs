@@ -1,0 +1,283 @@
+//! The contract of a detector, which looks for one kind of defect while testers play.
+//!
+//! ```
+//! use playbot_harness::detector::{Detector, EachTick, Moment};
+//!
+//! /// A game's own detector: no agent may owe money.
+//! fn debt() -> Box<dyn Detector> {
+//!     Box::new(EachTick::new("debt", "an agent owes money", |moment: &Moment<'_>| {
+//!         let purse = moment.observation.first().copied().unwrap_or_default();
+//!         (purse < 0.0).then(|| format!("the purse holds {purse}"))
+//!     }))
+//! }
+//! assert_eq!(debt().name(), "debt");
+//! ```
+//!
+//! [`TestTools::detectors`](crate::game::TestTools::detectors) names a game's own; [`detectors`](crate::detectors) has
+//! those that every game gets.
+
+use crate::floor_plan::FloorPlan;
+use bevy::prelude::*;
+use bevy_playbot::{action::ActionValue, episode::EpisodeResult, state_hash::StateHash};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+// The traits of a detector.
+
+/// A search for one kind of defect in every episode of a test.
+///
+/// Findings must depend on the episode alone, not on the clock and not on earlier episodes. Then results are the same
+/// on any number of threads and shards.
+pub trait Detector: Send + Sync {
+    /// Returns its name, in small letters and hyphens, as findings and the command line have it.
+    fn name(&self) -> &'static str;
+
+    /// Returns the defect that it finds, in one line.
+    fn describe(&self) -> &'static str;
+
+    /// Returns whether it is a default detector: cheap, and without false alarms in an unmutated game.
+    fn is_usual(&self) -> bool {
+        true
+    }
+
+    /// Returns its settings, which may be changed before the test starts.
+    fn settings(&mut self) -> Vec<Setting<'_>> {
+        Vec::new()
+    }
+
+    /// Starts to watch an episode; `None` if there is nothing to watch.
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+        None
+    }
+
+    /// Starts to watch a World; `None` if it watches agents only.
+    fn watch_world(&self) -> Option<Box<dyn WorldWatch>> {
+        None
+    }
+}
+
+/// The level of an episode that starts.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LevelAhead {
+    /// Number of the level.
+    pub level: u64,
+    /// The level from above, if the game has such plans.
+    pub plan: Option<FloorPlan>,
+}
+
+/// A detector's view of one agent during one episode.
+pub trait Watch {
+    /// Examines the tick that was just played, the last one included. Returns a message if something is wrong: the
+    /// finding of this tick, and the only one of the episode.
+    fn tick(&mut self, moment: &Moment<'_>) -> Option<String>;
+
+    /// Examines the end of the episode, after its last tick.
+    fn end(&mut self, _moment: &Moment<'_>, _result: &EpisodeResult) -> Option<String> {
+        None
+    }
+}
+
+/// A detector's view of a World after each of its ticks.
+///
+/// If it finds something while several agents play there, their episodes are replayed, each alone in a World of its
+/// own, to see whose finding it is.
+pub trait WorldWatch {
+    /// Returns whether it reads the errors of the log.
+    fn hears_errors(&self) -> bool {
+        false
+    }
+
+    /// Returns a message if something is wrong.
+    fn tick(&mut self, moment: &WorldMoment<'_>) -> Option<String>;
+}
+
+// Detectors with one question, asked after each tick.
+
+/// A detector that asks one question after each tick of each episode: the short form of a game's own detector.
+pub struct EachTick<F> {
+    name: &'static str,
+    describe: &'static str,
+    question: Arc<F>,
+}
+
+struct Asking<F>(Arc<F>);
+
+impl<F> EachTick<F>
+where
+    F: Fn(&Moment<'_>) -> Option<String> + Send + Sync + 'static,
+{
+    /// Creates a detector with this name and one line about it. The question returns a message if something is wrong.
+    pub fn new(name: &'static str, describe: &'static str, question: F) -> Self {
+        Self { name, describe, question: Arc::new(question) }
+    }
+}
+
+impl<F> Detector for EachTick<F>
+where
+    F: Fn(&Moment<'_>) -> Option<String> + Send + Sync + 'static,
+{
+    fn name(&self) -> &'static str {
+        self.name
+    }
+
+    fn describe(&self) -> &'static str {
+        self.describe
+    }
+
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+        Some(Box::new(Asking(Arc::clone(&self.question))))
+    }
+}
+
+impl<F: Fn(&Moment<'_>) -> Option<String>> Watch for Asking<F> {
+    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+        (self.0)(moment)
+    }
+}
+
+// The data of a tick that detectors examine.
+
+/// A tick of an episode that was just played, with the World after it.
+#[derive(Clone, Copy)]
+pub struct Moment<'a> {
+    /// The World: to be read only. Other agents may play in it.
+    pub world: &'a World,
+    /// The agent.
+    pub agent: Entity,
+    /// Level of the episode.
+    pub level: u64,
+    /// The tick, counted from 0.
+    pub tick: u32,
+    /// The agent's action.
+    pub action: &'a ActionValue,
+    /// The observation before the action; may be empty.
+    pub observation: &'a [f32],
+    /// The game's hash of the state; 0 if it has none.
+    pub state_hash: u64,
+    /// The reward.
+    pub reward: f32,
+    /// Position of the agent on its level's plan, if the game reports it.
+    pub place: Option<Vec2>,
+    /// Whether the level's goal was reached, now or before.
+    pub is_success: bool,
+    /// The game's proofs.
+    pub proofs: &'a dyn Proofs,
+}
+
+/// A tick of a World.
+#[derive(Clone, Copy)]
+pub struct WorldMoment<'a> {
+    /// The World: to be read only.
+    pub world: &'a World,
+    /// Errors that were logged in this tick, except by the engine. Only for detectors that
+    /// [read the log](WorldWatch::hears_errors).
+    pub errors: &'a [String],
+}
+
+impl Moment<'_> {
+    /// Returns a hash of the known state: the game's own hash, the observation and the position.
+    pub fn fingerprint(&self) -> u64 {
+        let place = self.place.map_or([0.0; 2], |place| place.to_array());
+        let numbers = self.observation.iter().copied().chain(place).map(|number| u64::from(number.to_bits()));
+        StateHash::of([self.state_hash].into_iter().chain(numbers)).0
+    }
+
+    /// Returns the agent's height: its position on the plan, or else its transform.
+    pub fn height(&self) -> Option<f32> {
+        let transform = || self.world.get::<Transform>(self.agent).map(|transform| transform.translation.y);
+        self.place.map(|place| place.y).or_else(transform)
+    }
+}
+
+// Proofs about a level and about the state of an episode.
+
+/// The game's proofs, on request. One may take a millisecond, so a detector must not ask in each tick.
+pub trait Proofs {
+    /// Returns the proof about the level, from its start: [`LevelTools::prove`](crate::game::LevelTools::prove).
+    fn of_level(&self) -> LevelProof {
+        LevelProof::Unknown
+    }
+
+    /// Returns the proof about the World's current state:
+    /// [`StateTools::prove_from`](crate::game::StateTools::prove_from).
+    fn of_state(&self) -> LevelProof {
+        LevelProof::Unknown
+    }
+}
+
+/// A game without proofs.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct NoProofs;
+
+impl Proofs for NoProofs {}
+
+// Settings of detectors.
+
+/// A setting of a detector.
+pub struct Setting<'a> {
+    /// Its name, in small letters.
+    pub key: &'static str,
+    /// Its value.
+    pub value: &'a mut f64,
+    /// The least valid value.
+    pub least: f64,
+    /// Its meaning, with its unit.
+    pub what: &'static str,
+}
+
+impl<'a> Setting<'a> {
+    /// Creates a setting that is at least 0.
+    pub fn new(key: &'static str, value: &'a mut f64, what: &'static str) -> Self {
+        Self { key, value, least: 0.0, what }
+    }
+
+    /// Replaces the least value.
+    pub fn at_least(self, least: f64) -> Self {
+        Self { least, ..self }
+    }
+}
+
+// Proofs about levels, found without play.
+
+/// Proof about the goal of a level: whether it can be reached.
+///
+/// A search that gave up proves nothing and gives [`Unknown`](Self::Unknown).
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LevelProof {
+    /// A path to the goal exists. It may take longer than an episode.
+    Solvable,
+    /// The goal cannot be reached by any sequence of actions.
+    Unsolvable {
+        /// Description of the exhausted search.
+        why: String,
+    },
+    /// Nothing is proved.
+    #[default]
+    Unknown,
+}
+
+impl LevelProof {
+    /// Returns the reason why the goal cannot be reached, if that is proved.
+    pub fn why_unsolvable(&self) -> Option<&str> {
+        match self {
+            Self::Unsolvable { why } => Some(why),
+            Self::Solvable | Self::Unknown => None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod proof_tests {
+    use super::*;
+
+    #[test]
+    fn files_say_it_in_small_letters() {
+        let text = |proof: &LevelProof| serde_json::to_string(proof).expect("serialises");
+        assert_eq!(text(&LevelProof::Unknown), r#""unknown""#);
+        let walled = LevelProof::Unsolvable { why: "walled in".to_owned() };
+        assert_eq!(text(&walled), r#"{"unsolvable":{"why":"walled in"}}"#);
+        assert_eq!(serde_json::from_str::<LevelProof>(&text(&walled)).expect("reads back"), walled);
+        assert_eq!((walled.why_unsolvable(), LevelProof::Solvable.why_unsolvable()), (Some("walled in"), None));
+    }
+}

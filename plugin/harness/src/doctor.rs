@@ -1,0 +1,490 @@
+//! The examination of a game: does it play the same for the same actions? If not, it names the first difference, its
+//! tick, and advice.
+//!
+//! Recording, replay, resume and training in many arenas need games that are a function of their level and their
+//! actions. [`examine`] plays copies of a game with the same random actions and compares them after every tick, by
+//! reflection: see [`Comparison`] for the pairs. No finding in some ticks of one level is no proof: more ticks and
+//! other levels show more. Components and resources that are `Reflect` and have `#[reflect(Component)]` or
+//! `#[reflect(Resource)]` are compared field by field. The rest shows only in observations, rewards and ends of
+//! episodes.
+
+mod cause;
+mod compare;
+mod field;
+mod game_copy;
+mod observed;
+mod text;
+mod trial;
+
+use crate::{
+    doctor::{
+        cause::causes,
+        game_copy::{KnownTypes, Plan, bare_world},
+        observed::{ObservationMonitor, assess_safety},
+        trial::Trial,
+    },
+    game::Game,
+    mode::ModeError,
+};
+use serde::Serialize;
+
+pub use crate::doctor::{
+    cause::{Cause, CauseKind},
+    game_copy::TypesReport,
+    observed::{ConstantValue, NonFiniteValue, ObservationReport, Safety, Verdict},
+};
+
+// The whole examination.
+
+/// The settings of an examination.
+#[derive(Clone, Debug)]
+pub struct DoctorOptions {
+    /// Mode of the game.
+    pub mode: String,
+    /// Ticks that each comparison plays.
+    pub ticks: u32,
+    /// The level.
+    pub level: u64,
+    /// Random seed of the World and of the actions.
+    pub seed: u64,
+    /// Components and resources whose path contains one of these are ignored, such as a high score that should last.
+    pub ignored: Vec<String>,
+}
+
+impl DoctorOptions {
+    /// Creates options for 300 ticks of a mode.
+    pub fn new(mode: impl Into<String>) -> Self {
+        Self { mode: mode.into(), ticks: 300, level: 0, seed: 0, ignored: Vec::new() }
+    }
+}
+
+/// Plays copies of a game with the same random actions, compares them after every tick, and reports the differences.
+/// `progress` receives the next comparison.
+///
+/// # Errors
+///
+/// The game has no such mode. Every other problem of the game is in the report.
+pub fn examine(
+    game: &dyn Game,
+    options: &DoctorOptions,
+    mut progress: impl FnMut(Comparison),
+) -> Result<DoctorReport, ModeError> {
+    game.check_mode(&options.mode)?;
+    let plan = Plan { mode: &options.mode, level: options.level, seed: options.seed };
+    let mut known_types = KnownTypes::new(&bare_world());
+    let mut comparisons: Vec<ComparisonReport> = Vec::new();
+    let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
+    let mut suspicions = Vec::new();
+    for comparison in Comparison::ALL {
+        if let Some(why) = reason_to_skip(comparison, game, &comparisons) {
+            comparisons.push(skipped(comparison, why));
+            continue;
+        }
+        progress(comparison);
+        let mut trial = Trial::new(comparison, game, &plan, options.ticks);
+        let is_first = comparison == Comparison::Repeat;
+        let mut monitor = is_first.then(|| ObservationMonitor::new(trial.copies[0].observed_names()));
+        let result = trial.run(options.ticks, &mut known_types, &options.ignored, monitor.as_mut());
+        if let Some(monitor) = monitor {
+            observation = monitor.report();
+            types = known_types.report(&trial.copies[0], &result.incomparable);
+            suspicions = known_types.suspicions(&trial.copies[0]);
+        }
+        comparisons.push(result.report);
+    }
+    Ok(DoctorReport {
+        game: game.name().to_owned(),
+        version: game.version(),
+        mode: options.mode.clone(),
+        level: options.level,
+        seed: options.seed,
+        ticks: options.ticks,
+        safety: assess_safety(&comparisons, &observation),
+        findings: findings(&comparisons, &observation, &suspicions),
+        comparisons,
+        observation,
+        types,
+        ticks_per_second: None,
+    })
+}
+
+/// A game that differs from itself differs in every comparison, and no comparison could name a cause.
+fn reason_to_skip(comparison: Comparison, game: &dyn Game, done: &[ComparisonReport]) -> Option<String> {
+    if comparison == Comparison::Arenas && game.tools().host.arenas_per_world() == Some(1) {
+        return Some("a World of this game holds only one arena (its `arenas_per_world` is 1)".to_owned());
+    }
+    let broken = done.iter().find(|of| of.comparison == Comparison::Repeat && of.same() == Some(false))?;
+    Some(match broken.fault.is_some() {
+        true => "the game has a fault, which must be repaired first".to_owned(),
+        false => "the game already differs from itself without this, which must be repaired first".to_owned(),
+    })
+}
+
+fn skipped(comparison: Comparison, why: String) -> ComparisonReport {
+    ComparisonReport {
+        comparison,
+        skipped: Some(why),
+        ticks: 0,
+        episodes: 0,
+        first: None,
+        others: Vec::new(),
+        effect: None,
+        unmatched: 0,
+        fault: None,
+    }
+}
+
+// The report of an examination, for people and for programs.
+
+/// The copies of the game that are compared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Comparison {
+    /// Two Worlds on one thread, one after the other in every tick.
+    Repeat,
+    /// Two Worlds. In one of them Bevy's `Time<Real>` runs slower, as on a slow machine.
+    Clock,
+    /// A default World, and some with more archetypes, as a recorder, a window or another plugin adds them. A
+    /// difference counts only if agents notice it: another order alone does no harm.
+    Archetypes,
+    /// A World on this thread, and two that are ticked at the same time on two threads.
+    Threads,
+    /// Two arenas in one World, and each of them alone in a World.
+    Arenas,
+    /// The first episode of a World, and the second episode of the same level in another one.
+    Restart,
+}
+
+impl Comparison {
+    /// All comparisons, in the order in which they are made.
+    pub const ALL: [Self; 6] =
+        [Self::Repeat, Self::Archetypes, Self::Clock, Self::Threads, Self::Arenas, Self::Restart];
+
+    /// Returns the comparison in words.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Repeat => "twice in one thread",
+            Self::Clock => "with another wall clock",
+            Self::Archetypes => "with more archetypes",
+            Self::Threads => "on two threads",
+            Self::Arenas => "two arenas in one World",
+            Self::Restart => "again after a restart",
+        }
+    }
+
+    /// Returns the names of the left and the right copy.
+    pub fn sides(self) -> (&'static str, &'static str) {
+        match self {
+            Self::Repeat => ("first copy", "second copy"),
+            Self::Clock => ("normal clock", "slower clock"),
+            Self::Archetypes => ("default World", "more archetypes"),
+            Self::Threads => ("one thread", "two threads"),
+            Self::Arenas => ("alone", "with another arena"),
+            Self::Restart => ("first episode", "second episode"),
+        }
+    }
+}
+
+/// The kind of value that differs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DifferenceKind {
+    /// A resource.
+    Resource,
+    /// A component of an entity.
+    Component,
+    /// The number of entities of a kind.
+    Entities,
+    /// A value that the agent observes.
+    Observation,
+    /// The agent's reward.
+    Reward,
+    /// Whether and how the agent's episode ends.
+    End,
+    /// The game's own hash of its state.
+    StateHash,
+}
+
+/// A difference between two copies of the game.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Difference {
+    /// The tick of the comparison, from 0.
+    pub tick: u32,
+    /// The kind of value.
+    pub kind: DifferenceKind,
+    /// Path of the component's or resource's type; the name of other values, such as `reward`.
+    pub name: String,
+    /// The entity: its name, or how the two were matched.
+    pub entity: Option<String>,
+    /// The field, such as `.position.x`; empty if the whole differs.
+    pub field: String,
+    /// The value in the left copy, see [`Comparison::sides`].
+    pub left: String,
+    /// The value in the right copy.
+    pub right: String,
+}
+
+/// The result of one comparison.
+#[derive(Clone, Debug, Serialize)]
+pub struct ComparisonReport {
+    /// The comparison.
+    pub comparison: Comparison,
+    /// Why it was skipped, if it was.
+    pub skipped: Option<String>,
+    /// Ticks compared.
+    pub ticks: u32,
+    /// Episodes that started in these ticks, in the copy on the left; the last one may be unfinished.
+    pub episodes: u32,
+    /// The first difference, the one nearest to its cause if a tick has several.
+    pub first: Option<Difference>,
+    /// A few further differences of that tick.
+    pub others: Vec<Difference>,
+    /// The first difference in observations, rewards or ends of episodes, if there is one.
+    pub effect: Option<Difference>,
+    /// Entities without a match in the other copy.
+    pub unmatched: usize,
+    /// The fault or panic of the game that ended the comparison early.
+    pub fault: Option<String>,
+}
+
+impl ComparisonReport {
+    /// Returns whether the copies played the same game to the end; `None` if they were not compared.
+    pub fn same(&self) -> Option<bool> {
+        self.skipped.is_none().then(|| self.first.is_none() && self.effect.is_none() && self.fault.is_none())
+    }
+
+    /// Returns the first difference of any kind.
+    pub fn difference(&self) -> Option<&Difference> {
+        self.first.as_ref().or(self.effect.as_ref())
+    }
+}
+
+/// The result of an examination.
+#[derive(Clone, Debug, Serialize)]
+pub struct DoctorReport {
+    /// Name of the game.
+    pub game: String,
+    /// Version of its rules.
+    pub version: u32,
+    /// Its mode.
+    pub mode: String,
+    /// The level.
+    pub level: u64,
+    /// Random seed of the World and of the actions.
+    pub seed: u64,
+    /// Ticks that each comparison was to play.
+    pub ticks: u32,
+    /// The comparisons.
+    pub comparisons: Vec<ComparisonReport>,
+    /// The observations of agents.
+    pub observation: ObservationReport,
+    /// The types that could be compared.
+    pub types: TypesReport,
+    /// The uses that the game is safe for.
+    pub safety: Safety,
+    /// The findings, worst first.
+    pub findings: Vec<Finding>,
+    /// Ticks per second of one arena, if they were measured: the examination itself reads no clock.
+    pub ticks_per_second: Option<f64>,
+}
+
+impl DoctorReport {
+    /// Returns whether there is no finding.
+    pub fn is_healthy(&self) -> bool {
+        self.findings.is_empty()
+    }
+
+    /// Returns the report of a comparison.
+    pub fn of(&self, comparison: Comparison) -> Option<&ComparisonReport> {
+        self.comparisons.iter().find(|report| report.comparison == comparison)
+    }
+}
+
+// The findings of an examination.
+
+/// The kind of a finding.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FindingKind {
+    /// Two copies did not play the same game.
+    Differs,
+    /// The game broke its contract, or panicked.
+    Fault,
+    /// An observed value was not a finite number.
+    NotFinite,
+    /// The number of observed values changed.
+    LengthChanges,
+    /// No observed value ever changed.
+    Blind,
+}
+
+/// A finding.
+#[derive(Clone, Debug, Serialize)]
+pub struct Finding {
+    /// The kind.
+    pub kind: FindingKind,
+    /// The message, in a sentence.
+    pub what: String,
+    /// The comparison that showed it.
+    pub comparison: Option<Comparison>,
+    /// The first difference.
+    pub difference: Option<Difference>,
+    /// Causes that fit, likeliest first.
+    pub causes: Vec<Cause>,
+}
+
+/// Returns all findings, worst first.
+fn findings(
+    comparisons: &[ComparisonReport],
+    observation: &ObservationReport,
+    suspicions: &[(CauseKind, String)],
+) -> Vec<Finding> {
+    let mut findings = of_observation(observation);
+    let is_of_observation = !findings.is_empty();
+    for report in comparisons {
+        if let Some(difference) = report.difference() {
+            findings.push(Finding {
+                kind: FindingKind::Differs,
+                what: sentence(report.comparison, difference),
+                comparison: Some(report.comparison),
+                difference: Some(difference.clone()),
+                causes: causes(report.comparison, Some(difference), suspicions),
+            });
+        }
+        let Some(fault) = &report.fault else { continue };
+        // A bad observation has its own message already, and one fault shows in every comparison.
+        let is_known = findings.iter().any(|finding| finding.kind == FindingKind::Fault && finding.what == *fault);
+        if !is_of_observation && !is_known {
+            findings.push(plain(FindingKind::Fault, fault.clone(), Some(report.comparison)));
+        }
+    }
+    findings
+}
+
+fn plain(kind: FindingKind, what: String, comparison: Option<Comparison>) -> Finding {
+    Finding { kind, what, comparison, difference: None, causes: Vec::new() }
+}
+
+fn of_observation(seen: &ObservationReport) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    if let Some(NonFiniteValue { tick, name, value }) = &seen.not_finite {
+        let what = format!("observation `{name}` is {value} at tick {tick}: no policy can read that");
+        findings.push(plain(FindingKind::NotFinite, what, None));
+    }
+    if let Some((tick, got)) = seen.length {
+        let what = format!(
+            "the observation has {got} values at tick {tick}, its sensor names {}: every value must be there in every tick",
+            seen.values
+        );
+        findings.push(plain(FindingKind::LengthChanges, what, None));
+    }
+    if seen.is_blind() {
+        let what = format!(
+            "none of the {} observed values changed in {} ticks: the agent sees nothing",
+            seen.values, seen.ticks
+        );
+        findings.push(plain(FindingKind::Blind, what, None));
+    }
+    findings
+}
+
+fn sentence(comparison: Comparison, difference: &Difference) -> String {
+    use self::DifferenceKind::{Component, End, Entities, Observation, Resource, Reward, StateHash};
+    let Difference { kind, name, entity, field, tick, .. } = difference;
+    let thing = match kind {
+        Resource => format!("resource `{name}{field}`"),
+        Component => format!("component `{name}{field}` of {}", entity.as_deref().unwrap_or("an entity")),
+        Entities => format!("the number of {name}"),
+        Observation => format!("observation `{name}` of {}", entity.as_deref().unwrap_or("the agent")),
+        Reward | End | StateHash => format!("the {name} of {}", entity.as_deref().unwrap_or("the agent")),
+    };
+    format!("{}: {thing} differs at tick {tick}", comparison.describe())
+}
+
+// The scope of comparisons: the game's state, without the engine's housekeeping.
+
+/// Path prefixes of the plugin's own types, and of types that the engine creates for itself: on other threads, for the
+/// screen, or whenever a file happens to be loaded.
+const HOUSEKEEPING: [&str; 34] = [
+    "accesskit",
+    "bevy_a11y::",
+    "bevy_anti_alias::",
+    "bevy_app::",
+    "bevy_asset::",
+    "bevy_audio::",
+    "bevy_camera::",
+    "bevy_clipboard::",
+    "bevy_core_pipeline::",
+    "bevy_diagnostic::",
+    "bevy_gilrs::",
+    "bevy_gizmos",
+    "bevy_image::",
+    "bevy_input_focus::",
+    "bevy_log::",
+    "bevy_pbr::",
+    "bevy_picking::",
+    "bevy_playbot::",
+    "bevy_post_process::",
+    "bevy_render::",
+    "bevy_shader::",
+    "bevy_sprite_render::",
+    "bevy_text::",
+    "bevy_ui",
+    "bevy_window::",
+    "bevy_winit::",
+    "playbot::",
+    "playbot_harness::",
+    "playbot_learner::",
+    "playbot_mutation::",
+    "playbot_test::",
+    "playbot_train::",
+    "wgpu",
+    "winit::",
+];
+
+/// The parts of the engine's entity system that belong to the game.
+const HIERARCHY: [&str; 2] = ["bevy_ecs::hierarchy::ChildOf", "bevy_ecs::hierarchy::Children"];
+
+/// Clocks and keys go on from one episode to the next.
+const GOES_ON: [&str; 4] = ["bevy_time::", "bevy_input::", "leafwing_input_manager::", "bevy_enhanced_input::"];
+
+/// Bevy's real-time clock. Without a window it is a mock; [`Comparison::Clock`] reveals its readers.
+const WALL_CLOCK: &str = "bevy_time::time::Time<bevy_time::real::Real>";
+
+/// Returns whether a type is the engine's or the plugin's, so that it says little about the cause of a difference.
+fn is_engine(path: &str) -> bool {
+    path.starts_with("bevy_") || HOUSEKEEPING.iter().any(|prefix| path.starts_with(prefix))
+}
+
+/// Returns whether components and resources of this type are compared at all.
+fn is_compared(path: &str) -> bool {
+    let is_housekeeping = HOUSEKEEPING.iter().any(|prefix| path.starts_with(prefix)) || path == WALL_CLOCK;
+    !is_housekeeping && (!path.starts_with("bevy_ecs::") || HIERARCHY.contains(&path))
+}
+
+/// Returns whether they are part of this comparison.
+fn is_compared_in(comparison: Comparison, path: &str) -> bool {
+    comparison != Comparison::Restart || !GOES_ON.iter().any(|prefix| path.starts_with(prefix))
+}
+
+#[cfg(test)]
+mod scope_tests {
+    use super::*;
+
+    #[test]
+    fn the_games_state_is_compared_and_the_engines_housekeeping_is_not() {
+        for path in ["breakout::Score", "bevy_transform::components::transform::Transform", HIERARCHY[0]] {
+            assert!(is_compared(path), "{path}");
+        }
+        for path in [WALL_CLOCK, "bevy_render::sync_world::RenderEntity", "bevy_playbot::control::Control"] {
+            assert!(!is_compared(path), "{path}");
+        }
+    }
+
+    #[test]
+    fn clocks_are_no_state_that_a_restart_resets() {
+        let clock = "bevy_time::time::Time<bevy_time::fixed::Fixed>";
+        assert!(is_compared(clock) && is_compared_in(Comparison::Repeat, clock));
+        assert!(!is_compared_in(Comparison::Restart, clock));
+    }
+}

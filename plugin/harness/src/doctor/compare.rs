@@ -1,0 +1,391 @@
+//! The comparison of two copies of a game after the same tick, component by component and resource by resource.
+
+use crate::{
+    doctor,
+    doctor::{
+        Comparison, Difference, DifferenceKind,
+        field::{FieldComparison, FieldDifference, each_entity},
+        game_copy::{GameCopy, GroupKey, Groups, KnownType, KnownTypes, types_of},
+    },
+};
+use bevy::{
+    ecs::{
+        component::ComponentId,
+        entity::{EntityHashMap, EntityHashSet},
+    },
+    prelude::{Entity, *},
+};
+use std::{
+    any::TypeId,
+    collections::{BTreeMap, BTreeSet},
+};
+
+/// The settings of a comparison.
+pub(super) struct Comparer<'a> {
+    pub known_types: &'a KnownTypes,
+    pub comparison: Comparison,
+    /// Parts of type paths that are ignored.
+    pub ignored: &'a [String],
+    /// Types of fields that could not be compared.
+    pub incomparable: BTreeSet<String>,
+}
+
+/// The differences after a tick.
+#[derive(Default)]
+pub(super) struct Found {
+    pub differences: Vec<Difference>,
+    pub unmatched: usize,
+}
+
+/// Group and index of an entity.
+type Places = EntityHashMap<(usize, usize)>;
+
+impl Comparer<'_> {
+    /// Returns all differences, nearest to their cause first: types of the game before those of the engine, and
+    /// resources before components, whose values often come from them.
+    pub fn compare(&mut self, left: &GameCopy, right: &GameCopy, tick: u32) -> Found {
+        let mut found = Found::default();
+        let pairs = self.pair_up(left, right, tick, &mut found);
+        let places = |side: fn(&Pairs) -> &Vec<Entity>| -> Places {
+            let numbered = pairs.iter().enumerate();
+            let placed = numbered
+                .flat_map(|(group, pairs)| side(pairs).iter().enumerate().map(move |(at, e)| (*e, (group, at))));
+            placed.collect()
+        };
+        let (left_places, right_places) = (places(|pairs| &pairs.left), places(|pairs| &pairs.right));
+        let loose = self.is_loose();
+        let same_entity = |a: Entity, b: Entity| match (left_places.get(&a), right_places.get(&b)) {
+            // A list of entities has the order of their spawning, which may differ from that of a first episode.
+            (Some(a), Some(b)) => {
+                if loose {
+                    a.0 == b.0
+                } else {
+                    a == b
+                }
+            }
+            // Entities outside of the game, such as observers, have no partner and are not compared.
+            _ => true,
+        };
+        self.compare_resources(left, right, tick, &same_entity, &mut found);
+        for group in &pairs {
+            found.differences.extend(self.compare_group(left, right, tick, group, &same_entity));
+        }
+        // After a restart, a surplus of entities is itself the cause, so it comes early. In other comparisons it is the
+        // effect of another difference, and comes last.
+        let is_cause = self.comparison == Comparison::Restart;
+        let rank = |difference: &Difference| match difference.kind {
+            DifferenceKind::Entities => (false, if is_cause { 1 } else { 3 }),
+            DifferenceKind::Resource => (doctor::is_engine(&difference.name), 0),
+            _ => (doctor::is_engine(&difference.name), 2),
+        };
+        found.differences.sort_by_key(rank);
+        found
+    }
+
+    /// Returns whether entities of one kind may have another order.
+    fn is_loose(&self) -> bool {
+        matches!(self.comparison, Comparison::Archetypes | Comparison::Restart | Comparison::Arenas)
+    }
+
+    fn is_wanted(&self, known: &KnownType) -> bool {
+        let path = known.path.as_deref().unwrap_or_default();
+        known.is_compared()
+            && doctor::is_compared_in(self.comparison, path)
+            && !self.ignored.iter().any(|part| path.contains(part.as_str()))
+    }
+
+    fn compare_resources(
+        &mut self,
+        left: &GameCopy,
+        right: &GameCopy,
+        tick: u32,
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+        found: &mut Found,
+    ) {
+        // Lists in resources contain both agents of a shared World, so the second one has another index than alone.
+        if self.comparison == Comparison::Arenas && left.number(0) != right.number(0) {
+            return;
+        }
+        let (lefts, rights) = (self.resources(left), self.resources(right));
+        let all: BTreeSet<TypeId> = lefts.keys().chain(rights.keys()).copied().collect();
+        for id in all {
+            let Some(known) = self.known_types.get(id).filter(|known| self.is_wanted(known)) else { continue };
+            let name = known.path.clone().unwrap_or_default();
+            let difference = match (lefts.get(&id), rights.get(&id)) {
+                (Some(&a), Some(&b)) => self.field(known, (&left.world, a), (&right.world, b), same_entity),
+                (a, b) => presence(a.is_some(), b.is_some()),
+            };
+            found.differences.extend(difference.map(|field| Difference {
+                tick,
+                kind: DifferenceKind::Resource,
+                name,
+                entity: None,
+                field: field.path,
+                left: field.left,
+                right: field.right,
+            }));
+        }
+    }
+
+    fn resources(&self, copy: &GameCopy) -> BTreeMap<TypeId, Entity> {
+        let typed =
+            |(id, entity): (ComponentId, Entity)| Some((copy.world.components().get_info(id)?.type_id()?, entity));
+        copy.world.resource_entities().iter().filter_map(typed).collect()
+    }
+
+    /// Returns the first field in which a component or resource of two entities differs.
+    fn field(
+        &mut self,
+        known: &KnownType,
+        left: (&World, Entity),
+        right: (&World, Entity),
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+    ) -> Option<FieldDifference> {
+        let reflect = known.reflect.as_ref()?;
+        let (a, b) = (reflect.reflect(left.0.entity(left.1)), reflect.reflect(right.0.entity(right.1)));
+        let (Some(a), Some(b)) = (a, b) else { return presence(a.is_some(), b.is_some()) };
+        let mut comparison = FieldComparison {
+            same_entity,
+            handles: !self.is_loose(),
+            right_may_hold_more: self.comparison == Comparison::Arenas,
+            incomparable: &mut self.incomparable,
+        };
+        comparison.first(a.as_partial_reflect(), b.as_partial_reflect())
+    }
+
+    fn compare_group(
+        &mut self,
+        left: &GameCopy,
+        right: &GameCopy,
+        tick: u32,
+        group: &Pairs,
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+    ) -> Vec<Difference> {
+        let mut differences = Vec::new();
+        for (place, (&a, &b)) in group.left.iter().zip(&group.right).enumerate() {
+            for (name, field) in self.components(left, a, right, b, same_entity) {
+                let entity = self.describe(group, place, a);
+                let (kind, FieldDifference { path, left, right }) = (DifferenceKind::Component, field);
+                differences.push(Difference { tick, kind, name, entity: Some(entity), field: path, left, right });
+            }
+        }
+        let in_another_order =
+            self.is_loose() && !differences.is_empty() && self.is_reordered(left, right, group, same_entity);
+        if in_another_order { Vec::new() } else { differences }
+    }
+
+    /// Returns whether every entity on the left has an equal one on the right, in any order.
+    fn is_reordered(
+        &mut self,
+        left: &GameCopy,
+        right: &GameCopy,
+        group: &Pairs,
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+    ) -> bool {
+        let mut free = group.right.clone();
+        group.left.iter().all(|&a| {
+            let equal = free.iter().position(|&b| self.components(left, a, right, b, same_entity).is_empty());
+            equal.map(|at| free.remove(at)).is_some()
+        })
+    }
+
+    /// Returns the components of two entities that differ, and the first field in which they do. Components that only
+    /// one of them has are the engine's: those of the game decided the matching.
+    fn components(
+        &mut self,
+        left: &GameCopy,
+        a: Entity,
+        right: &GameCopy,
+        b: Entity,
+        same_entity: &dyn Fn(Entity, Entity) -> bool,
+    ) -> Vec<(String, FieldDifference)> {
+        let types = types_of(&left.world, left.world.entity(a).archetype().components());
+        let shared = types.into_iter().filter(|id| right.world.entity(b).contains_type_id(*id));
+        let known_types = self.known_types;
+        let mut differences = Vec::new();
+        for known in shared.filter_map(|id| known_types.get(id)) {
+            if self.is_wanted(known)
+                && let Some(field) = self.field(known, (&left.world, a), (&right.world, b), same_entity)
+            {
+                differences.push((known.path.clone().unwrap_or_default(), field));
+            }
+        }
+        differences
+    }
+}
+
+fn presence(left: bool, right: bool) -> Option<FieldDifference> {
+    let word = |there: bool| if there { "there" } else { "not there" }.to_owned();
+    (left != right).then(|| FieldDifference { path: String::new(), left: word(left), right: word(right) })
+}
+
+// The pairs of corresponding entities in two copies.
+
+/// Entities of one kind, pair by pair.
+pub(super) struct Pairs {
+    pub key: GroupKey,
+    pub left: Vec<Entity>,
+    pub right: Vec<Entity>,
+}
+
+impl Comparer<'_> {
+    /// Finds the partners of all entities. Kinds with more entities on one side are reported and left out.
+    pub(super) fn pair_up(&self, left: &GameCopy, right: &GameCopy, tick: u32, found: &mut Found) -> Vec<Pairs> {
+        let lefts = left.census.groups(&left.world, self.known_types);
+        let mut rights = right.census.groups(&right.world, self.known_types);
+        if self.comparison == Comparison::Arenas {
+            return self.pair_with_share(left, right, lefts, &rights, found);
+        }
+        let mut pairs = Vec::new();
+        for (key, left) in lefts {
+            let right = rights.remove(&key).unwrap_or_default();
+            if left.len() == right.len() {
+                pairs.push(Pairs { key, left, right });
+            } else {
+                found.differences.extend(self.of_counts(&key, left.len(), right.len(), tick));
+            }
+        }
+        let only_right = rights.iter().filter_map(|(key, right)| self.of_counts(key, 0, right.len(), tick));
+        found.differences.extend(only_right);
+        pairs
+    }
+
+    fn pair_with_share(
+        &self,
+        left: &GameCopy,
+        right: &GameCopy,
+        lefts: Groups,
+        rights: &Groups,
+        found: &mut Found,
+    ) -> Vec<Pairs> {
+        let owners = owners(self.known_types, right, rights.values().flatten().copied());
+        let number = left.number(0);
+        let mut pairs = Vec::new();
+        for (key, left) in lefts {
+            let all = rights.get(&key).map_or(&[][..], Vec::as_slice);
+            match share_of(&owners, number, left.len(), all) {
+                Some(right) => pairs.push(Pairs { key, left, right }),
+                None => found.unmatched += left.len(),
+            }
+        }
+        pairs
+    }
+
+    fn of_counts(&self, key: &GroupKey, left: usize, right: usize, tick: u32) -> Option<Difference> {
+        let ignored = |id: &TypeId| {
+            let path = self.known_types.get(*id).and_then(|known| known.path.as_deref()).unwrap_or_default();
+            self.ignored.iter().any(|part| path.contains(part.as_str()))
+        };
+        (!key.types.iter().any(ignored)).then(|| Difference {
+            tick,
+            kind: DifferenceKind::Entities,
+            name: self.describe_kind(key),
+            entity: None,
+            field: String::new(),
+            left: left.to_string(),
+            right: right.to_string(),
+        })
+    }
+
+    /// Returns the kind, such as `"Paddle" [Velocity, Collider]`.
+    fn describe_kind(&self, key: &GroupKey) -> String {
+        let types = key.types.iter().filter_map(|id| self.known_types.get(*id)?.short_name());
+        let types: Vec<_> = types.collect();
+        let is_nameless = types.is_empty();
+        let types = format!("[{}]", types.join(", "));
+        match (&key.agent, &key.name) {
+            (Some(number), _) => format!("agent {number}"),
+            (None, Some(name)) => format!("\"{name}\" {types}"),
+            (None, None) if is_nameless => "entities without components of the game that have a name".to_owned(),
+            (None, None) => types,
+        }
+    }
+
+    /// Returns the entity, such as `entity 3v0, number 2 of 5 [Brick]`.
+    pub(super) fn describe(&self, group: &Pairs, place: usize, entity: Entity) -> String {
+        let kind = self.describe_kind(&group.key);
+        match group.left.len() {
+            1 => kind,
+            count => format!("{kind}, number {} of {count} in the order of spawning (entity {entity})", place + 1),
+        }
+    }
+}
+
+// The assignment of entities to agents, in a World with several arenas.
+
+/// The number of the agent that an entity is tied to, or `None` if several are.
+pub(super) type Owners = EntityHashMap<Option<u32>>;
+
+/// Follows the entities that components name, from every agent outwards, in both directions. An entity that two agents
+/// reach at the same distance belongs to neither, and the search stops there.
+pub(super) fn owners(known_types: &KnownTypes, copy: &GameCopy, entities: impl Iterator<Item = Entity>) -> Owners {
+    let mut ties: EntityHashMap<EntityHashSet> = EntityHashMap::default();
+    for entity in entities {
+        for named in named_by(known_types, &copy.world, entity) {
+            ties.entry(entity).or_default().insert(named);
+            ties.entry(named).or_default().insert(entity);
+        }
+    }
+    let mut owners = Owners::default();
+    let mut frontier: Vec<(Entity, u32)> = Vec::new();
+    for (row, &agent) in copy.agents.iter().enumerate() {
+        owners.insert(agent, Some(copy.number(row)));
+        frontier.push((agent, copy.number(row)));
+    }
+    while !frontier.is_empty() {
+        let mut reached = Owners::default();
+        for (entity, number) in frontier.drain(..) {
+            for &next in ties.get(&entity).into_iter().flatten() {
+                if !owners.contains_key(&next) {
+                    let owner = reached.entry(next).or_insert(Some(number));
+                    *owner = owner.filter(|other| *other == number);
+                }
+            }
+        }
+        frontier.extend(reached.iter().filter_map(|(&entity, owner)| Some((entity, (*owner)?))));
+        owners.extend(reached);
+    }
+    owners
+}
+
+fn named_by(known_types: &KnownTypes, world: &World, entity: Entity) -> Vec<Entity> {
+    let entity = world.entity(entity);
+    let mut named = Vec::new();
+    for id in types_of(world, entity.archetype().components()) {
+        let known = known_types.get(id).filter(|known| known.is_compared());
+        if let Some(value) = known.and_then(|known| known.reflect.as_ref()?.reflect(entity)) {
+            each_entity(value.as_partial_reflect(), &mut |other| named.push(other));
+        }
+    }
+    named
+}
+
+/// Returns the entities of one kind in the shared World that correspond to the `wanted` ones of agent `number` alone.
+/// `None` if that is ambiguous.
+pub(super) fn share_of(owners: &Owners, number: u32, wanted: usize, all: &[Entity]) -> Option<Vec<Entity>> {
+    let own = |entity: &&Entity| owners.get(*entity) == Some(&Some(number));
+    let common = |entity: &&Entity| owners.get(*entity).copied().flatten().is_none();
+    let picks: [&dyn Fn(&&Entity) -> bool; 3] = [&own, &common, &|entity| own(entity) || common(entity)];
+    let mut shares = picks.iter().map(|pick| all.iter().filter(|entity| pick(entity)).copied().collect::<Vec<_>>());
+    shares.find(|share| share.len() == wanted)
+}
+
+#[cfg(test)]
+mod arenas_tests {
+    use super::*;
+
+    fn entities(count: u32) -> Vec<Entity> {
+        let mut world = World::new();
+        (0..count).map(|_| world.spawn_empty().id()).collect()
+    }
+
+    #[test]
+    fn an_agents_share_is_its_own_or_what_all_have_in_common() {
+        let all = entities(4);
+        let owners: Owners = [(all[0], Some(0)), (all[1], Some(1)), (all[2], None)].into_iter().collect();
+        assert_eq!(share_of(&owners, 1, 1, &all), Some(vec![all[1]]), "its own");
+        assert_eq!(share_of(&owners, 1, 2, &all), Some(vec![all[2], all[3]]), "the common ones");
+        assert_eq!(share_of(&owners, 0, 3, &all), Some(vec![all[0], all[2], all[3]]), "both together");
+        assert_eq!(share_of(&owners, 0, 4, &all), None);
+    }
+}

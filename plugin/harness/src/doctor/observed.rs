@@ -1,0 +1,211 @@
+//! The observations of agents: values that are not numbers, that are sometimes missing, or that never change.
+
+use crate::doctor::{Comparison, ComparisonReport, game_copy::Outcome};
+use serde::Serialize;
+
+/// A value that never changed while it was watched.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ConstantValue {
+    /// Its name.
+    pub name: String,
+    /// The value.
+    pub value: f32,
+}
+
+/// An observed value that was not a finite number.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct NonFiniteValue {
+    /// The tick, from 0.
+    pub tick: u32,
+    /// Name of the value.
+    pub name: String,
+    /// The value: `NaN`, `inf` or `-inf`.
+    pub value: String,
+}
+
+/// The observations of one agent.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct ObservationReport {
+    /// Number of values that the game's sensor names.
+    pub values: usize,
+    /// Ticks that were watched.
+    pub ticks: u32,
+    /// Values that were the same in all of them.
+    pub constant: Vec<ConstantValue>,
+    /// The first value that was not a finite number.
+    pub not_finite: Option<NonFiniteValue>,
+    /// The first tick, from 0, with another number of values, and that number.
+    pub length: Option<(u32, usize)>,
+    /// Whether the game writes a state hash.
+    pub state_hash: bool,
+}
+
+/// Monitors one agent's observations.
+pub(super) struct ObservationMonitor {
+    names: Vec<String>,
+    first: Option<Outcome>,
+    changed: Vec<bool>,
+    image_changed: bool,
+    report: ObservationReport,
+}
+
+impl ObservationMonitor {
+    /// Creates a monitor for values with these names.
+    pub fn new(names: Vec<String>) -> Self {
+        let report = ObservationReport { values: names.len(), ..Default::default() };
+        Self { changed: vec![false; names.len()], names, first: None, image_changed: false, report }
+    }
+
+    /// Adds the outcome of a tick.
+    pub fn note(&mut self, tick: u32, seen: &Outcome) {
+        self.report.ticks += 1;
+        self.report.state_hash |= seen.hash != 0;
+        let (wanted, got) = (self.names.len(), seen.observation.len());
+        if got != wanted && self.report.length.is_none() {
+            self.report.length = Some((tick, got));
+        }
+        let bad = seen.observation.iter().position(|value| !value.is_finite());
+        if let (Some(at), None) = (bad, &self.report.not_finite) {
+            let name = self.names.get(at).cloned().unwrap_or_else(|| format!("value {at}"));
+            self.report.not_finite = Some(NonFiniteValue { tick, name, value: seen.observation[at].to_string() });
+        }
+        let first = self.first.get_or_insert_with(|| seen.clone());
+        for ((now, then), changed) in seen.observation.iter().zip(&first.observation).zip(&mut self.changed) {
+            *changed |= now.to_bits() != then.to_bits();
+        }
+        self.image_changed |= seen.image != first.image;
+    }
+
+    /// Returns the report. A value that was seen only once does not count as constant.
+    pub fn report(mut self) -> ObservationReport {
+        if self.report.ticks > 1 {
+            let values = self.first.map(|first| first.observation).unwrap_or_default();
+            let all = self.names.into_iter().zip(self.changed).enumerate();
+            let constant = all.filter(|(_, (_, changed))| !changed).map(|(at, (name, _))| ConstantValue {
+                name,
+                // A value that was missing at first is unknown, and the report says so elsewhere.
+                value: values.get(at).copied().unwrap_or(f32::NAN),
+            });
+            self.report.constant = constant.collect();
+        }
+        self.report
+    }
+}
+
+impl ObservationReport {
+    /// Returns whether there were values, and none of them ever changed.
+    pub fn is_blind(&self) -> bool {
+        self.values > 0 && self.ticks > 1 && self.constant.len() == self.values
+    }
+}
+
+// The uses that a game is safe for.
+
+/// Whether the game is safe for a use, as far as a few ticks can show.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Verdict {
+    /// `None` if it was not compared.
+    pub safe: Option<bool>,
+    /// The reason, or the condition.
+    pub why: String,
+    /// The comparisons behind it: the game is safe if they found no difference in their ticks.
+    pub comparisons: Vec<Comparison>,
+}
+
+/// The uses that the game is safe for.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Safety {
+    /// Recording: whether a recording replays.
+    pub recording: Verdict,
+    /// Resume: whether a stopped run can go on.
+    pub resume: Verdict,
+    /// Many arenas in one World.
+    pub arenas: Verdict,
+    /// Several Worlds on several threads.
+    pub threads: Verdict,
+    /// Play in a window, where frames take the time they take.
+    pub window: Verdict,
+}
+
+impl Safety {
+    /// Returns all uses, with their names.
+    pub fn all(&self) -> [(&'static str, &Verdict); 5] {
+        [
+            ("recording and replay", &self.recording),
+            ("resume of a run", &self.resume),
+            ("many arenas per World", &self.arenas),
+            ("several threads", &self.threads),
+            ("a window", &self.window),
+        ]
+    }
+}
+
+/// Judges the uses by the results of the comparisons.
+pub(super) fn assess_safety(comparisons: &[ComparisonReport], observation: &ObservationReport) -> Safety {
+    let verdict = |needed: &[Comparison]| verdict(comparisons, needed);
+    let mut resume = verdict(&[Comparison::Repeat, Comparison::Restart]);
+    let mut recording = verdict(&[Comparison::Repeat, Comparison::Archetypes, Comparison::Restart]);
+    for verdict in [&mut recording, &mut resume] {
+        if verdict.safe == Some(true) && !observation.state_hash {
+            verdict.why = "but the game writes no StateHash, so that a replay compares little".to_owned();
+        }
+    }
+    Safety {
+        recording,
+        resume,
+        arenas: verdict(&[Comparison::Repeat, Comparison::Arenas]),
+        threads: verdict(&[Comparison::Repeat, Comparison::Threads]),
+        window: verdict(&[Comparison::Repeat, Comparison::Clock, Comparison::Archetypes]),
+    }
+}
+
+/// Returns safe if all these comparisons found nothing, unsafe if one of them did.
+fn verdict(reports: &[ComparisonReport], needed: &[Comparison]) -> Verdict {
+    let comparisons = needed.to_vec();
+    let mut of_needed = reports.iter().filter(|report| needed.contains(&report.comparison));
+    if let Some(bad) = of_needed.clone().find(|report| report.same() == Some(false)) {
+        let why = format!("differs {}", bad.comparison.describe());
+        let why =
+            if bad.fault.is_some() && bad.difference().is_none() { "the game has a fault".to_owned() } else { why };
+        return Verdict { safe: Some(false), why, comparisons };
+    }
+    match of_needed.find_map(|report| report.skipped.clone()) {
+        Some(why) => Verdict { safe: None, why, comparisons },
+        None => Verdict { safe: Some(true), why: String::new(), comparisons },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn report_on(rows: &[&[f32]]) -> ObservationReport {
+        let mut monitor = ObservationMonitor::new(vec!["x".to_owned(), "y".to_owned()]);
+        for (tick, row) in rows.iter().enumerate() {
+            let seen = Outcome { observation: row.to_vec(), image: Vec::new(), reward: 0.0, hash: 0, end: None };
+            monitor.note(tick as u32, &seen);
+        }
+        monitor.report()
+    }
+
+    #[test]
+    fn constant_values_are_named() {
+        let report = report_on(&[&[1.0, 5.0], &[2.0, 5.0]]);
+        let always_five = ConstantValue { name: "y".to_owned(), value: 5.0 };
+        assert_eq!((report.constant.as_slice(), report.is_blind()), (&[always_five][..], false));
+        assert!(report_on(&[&[1.0, 5.0], &[1.0, 5.0]]).is_blind());
+        assert!(!report_on(&[&[1.0, 5.0]]).is_blind(), "one tick proves nothing");
+    }
+
+    #[test]
+    fn the_first_value_that_is_no_number_is_named_with_its_tick() {
+        let report = report_on(&[&[1.0, 5.0], &[2.0, f32::NAN], &[f32::INFINITY, 5.0]]);
+        let first = NonFiniteValue { tick: 1, name: "y".to_owned(), value: "NaN".to_owned() };
+        assert_eq!(report.not_finite, Some(first));
+    }
+
+    #[test]
+    fn another_number_of_values_is_noticed() {
+        assert_eq!(report_on(&[&[1.0, 5.0], &[2.0], &[]]).length, Some((1, 1)));
+    }
+}

@@ -1,0 +1,213 @@
+//! The report for people.
+
+use crate::doctor::{
+    Comparison, ComparisonReport, Difference, DoctorReport, Finding,
+    game_copy::TypesReport,
+    observed::{NonFiniteValue, ObservationReport, Verdict},
+};
+use std::{
+    fmt,
+    fmt::{Display, Formatter},
+};
+
+impl Display for DoctorReport {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { game, version, mode, level, ticks, .. } = self;
+        writeln!(f, "{game} (version {version}), mode {mode}, level {level}\n")?;
+        writeln!(f, "Copies of the game played this level for {ticks} ticks with the same random actions, and were")?;
+        writeln!(f, "compared after each tick. When an episode ended, the same level began again.")?;
+        for report in &self.comparisons {
+            writeln!(f, "  {:<26}{}", report.comparison.describe(), outcome(report))?;
+        }
+        writeln!(f)?;
+        for (number, finding) in self.findings.iter().enumerate() {
+            self.write_finding(f, number + 1, finding)?;
+        }
+        self.write_safety(f)?;
+        write!(f, "{}{}", self.observation, self.types)?;
+        if let Some(speed) = self.ticks_per_second {
+            writeln!(f, "Speed: {speed:.0} ticks per second of one arena in one World")?;
+        }
+        let end = match self.findings.len() {
+            0 => format!("No findings: the same actions played the same game for {ticks} ticks."),
+            1 => "1 finding.".to_owned(),
+            count => format!("{count} findings."),
+        };
+        write!(f, "{end}")
+    }
+}
+
+impl DoctorReport {
+    fn write_safety(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { level, seed, ticks, .. } = self;
+        writeln!(f, "Safe for")?;
+        let verdicts = self.safety.all();
+        for (what, verdict) in verdicts {
+            writeln!(f, "  {what:<26}{}", in_words(verdict))?;
+        }
+        if verdicts.iter().any(|(_, verdict)| verdict.safe == Some(true)) {
+            let (longer, level, seed) = (ticks.saturating_mul(10), level.wrapping_add(1), seed.wrapping_add(1));
+            writeln!(
+                f,
+                "  \"yes\" means that no difference was found in {ticks} ticks of this one level, not that there"
+            )?;
+            writeln!(
+                f,
+                "  is none: `--ticks {longer}` plays longer, `--level {level}` another level, `--seed {seed}` other actions."
+            )?;
+        }
+        Ok(())
+    }
+
+    fn write_finding(&self, f: &mut Formatter<'_>, number: usize, finding: &Finding) -> fmt::Result {
+        writeln!(f, "{number}. {}", finding.what)?;
+        let report = finding.comparison.and_then(|comparison| self.of(comparison));
+        if let (Some(difference), Some(report)) = (&finding.difference, report) {
+            let (left, right) = report.comparison.sides();
+            writeln!(f, "     {left}: {}\n     {right}: {}", difference.left, difference.right)?;
+            for other in &report.others {
+                writeln!(f, "     in the same tick: {}", in_one_line(other))?;
+            }
+            match report.effect.as_ref().filter(|effect| *effect != difference) {
+                Some(effect) => writeln!(f, "     agents notice it at tick {}: {}", effect.tick, in_one_line(effect))?,
+                None if report.effect.is_none() => {
+                    writeln!(f, "     agents have noticed nothing of it in {} ticks", report.ticks)?;
+                }
+                None => {}
+            }
+        }
+        for cause in &finding.causes {
+            writeln!(f, "   common cause: {}", cause.kind.describe())?;
+            for evidence in &cause.evidence {
+                writeln!(f, "     a hint: {evidence}")?;
+            }
+            writeln!(f, "     what to do: {}", cause.advice)?;
+        }
+        writeln!(f)
+    }
+}
+
+fn outcome(report: &ComparisonReport) -> String {
+    let unmatched = match report.unmatched {
+        0 => String::new(),
+        count => format!(" ({count} entities could not be matched, and were left out)"),
+    };
+    match (&report.skipped, report.difference(), &report.fault) {
+        (Some(why), ..) => format!("not compared: {why}"),
+        (_, Some(difference), _) => format!("DIFFERS at tick {}{unmatched}", difference.tick),
+        (_, _, Some(_)) => format!("ended by a fault at tick {}", report.ticks),
+        _ => {
+            let episodes = if report.episodes == 1 { "episode" } else { "episodes" };
+            format!("no difference in {} ticks, {} {episodes}{unmatched}", report.ticks, report.episodes)
+        }
+    }
+}
+
+/// Returns whether it is safe, with the comparisons.
+fn in_words(verdict: &Verdict) -> String {
+    let Verdict { safe, why, comparisons } = verdict;
+    match safe {
+        None => format!("not compared: {why}"),
+        Some(false) => format!("NO: {why}"),
+        Some(true) => {
+            let compared: Vec<_> = comparisons.iter().map(|comparison: &Comparison| comparison.describe()).collect();
+            let but = if why.is_empty() { String::new() } else { format!("; {why}") };
+            format!("yes (compared: {}){but}", compared.join(", "))
+        }
+    }
+}
+
+fn in_one_line(difference: &Difference) -> String {
+    let Difference { name, entity, field, left, right, .. } = difference;
+    let of = entity.as_ref().map_or_else(String::new, |entity| format!(" of {entity}"));
+    format!("`{name}{field}`{of}: {left} against {right}")
+}
+
+// The report's lists of observations and of types.
+
+/// Most lines of one list; a longer one ends with the number of further lines.
+const LISTED: usize = 8;
+
+impl Display for ObservationReport {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { values, ticks, constant, .. } = self;
+        match constant.len() {
+            0 => writeln!(f, "Observation: {values} values, all of which changed in {ticks} ticks")?,
+            count => writeln!(f, "Observation: {values} values, {count} of which never changed in {ticks} ticks")?,
+        }
+        if let Some(NonFiniteValue { tick, name, value }) = &self.not_finite {
+            writeln!(f, "  {:<26}{value} at tick {tick}: not a number that a policy can read", quoted(name))?;
+        }
+        if let Some((tick, count)) = self.length {
+            writeln!(f, "  number of values          {count} at tick {tick}, where its sensor names {values}")?;
+        }
+        let lines = constant.iter().map(|it| format!("{:<26}always {}", quoted(&it.name), it.value));
+        write_list(f, "  ", lines)
+    }
+}
+
+impl Display for TypesReport {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        writeln!(f, "State: {} types of components and resources were compared field by field", self.compared.len())?;
+        let hidden = self.not_reflected.len() + self.unnamed;
+        if hidden > 0 {
+            writeln!(f, "  {hidden} types of the game were not, since they are not reflected:")?;
+            write_list(f, "    ", self.not_reflected.iter().map(|path| quoted(path)))?;
+            if self.unnamed > 0 {
+                writeln!(f, "    {} whose names are known only to a Bevy with its feature `debug`", self.unnamed)?;
+            }
+            writeln!(
+                f,
+                "  A difference in them shows only later, in what agents observe, get and end with, and in the state hash.\n  \
+                 Derive `Reflect` with `#[reflect(Component)]` or `#[reflect(Resource)]` to have it found where it begins,\n  \
+                 or let the state hash depend on it (`StateHash`, or `.state_hash` of a `ForeignGame`)."
+            )?;
+        }
+        if !self.incomparable.is_empty() {
+            writeln!(f, "  Fields of these types cannot be compared:")?;
+            write_list(f, "    ", self.incomparable.iter().map(|path| quoted(path)))?;
+        }
+        Ok(())
+    }
+}
+
+fn quoted(name: &str) -> String {
+    format!("`{name}`")
+}
+
+fn write_list(f: &mut Formatter<'_>, indent: &str, lines: impl ExactSizeIterator<Item = String>) -> fmt::Result {
+    let more = lines.len().saturating_sub(LISTED);
+    for line in lines.take(LISTED) {
+        writeln!(f, "{indent}{line}")?;
+    }
+    if more > 0 { writeln!(f, "{indent}and {more} more") } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod listing_tests {
+    use super::*;
+    use crate::doctor::observed::ConstantValue;
+
+    fn constant(count: usize) -> ObservationReport {
+        let constant = (0..count).map(|number| ConstantValue { name: format!("wall_{number}"), value: 0.5 }).collect();
+        ObservationReport { values: 20, ticks: 300, constant, ..Default::default() }
+    }
+
+    #[test]
+    fn each_observation_with_a_problem_has_a_line_of_its_own() {
+        let value = NonFiniteValue { tick: 7, name: "x".to_owned(), value: "inf".to_owned() };
+        let report = ObservationReport { not_finite: Some(value), ..constant(1) };
+        let text = report.to_string();
+        let lines: Vec<Vec<&str>> = text.lines().map(|line| line.split_whitespace().collect()).collect();
+        assert_eq!(lines.len(), 3, "{text}");
+        assert_eq!(lines[1][..4], ["`x`", "inf", "at", "tick"], "{text}");
+        assert_eq!(lines[2], ["`wall_0`", "always", "0.5"], "{text}");
+    }
+
+    #[test]
+    fn a_long_list_ends_with_how_many_more_there_are() {
+        let text = constant(11).to_string();
+        assert!(text.ends_with("`wall_7`                  always 0.5\n  and 3 more\n"), "{text}");
+        assert!(!constant(LISTED).to_string().contains("more"));
+    }
+}

@@ -1,0 +1,175 @@
+//! One comparison: copies of the game that play the same actions, tick by tick.
+
+use crate::{
+    doctor::{
+        Comparison, ComparisonReport, Difference, DifferenceKind,
+        compare::Comparer,
+        game_copy::{GameCopy, KnownTypes, Outcome, Plan, VARIANTS, add_archetypes, add_wall_clock},
+        observed::ObservationMonitor,
+    },
+    game::Game,
+    parallel::on_threads,
+};
+
+/// Further differences of a tick that a report names.
+const OTHERS: usize = 5;
+
+/// Copies of a game that are compared.
+pub(super) struct Trial {
+    comparison: Comparison,
+    /// The copies. The observations of the first one are monitored.
+    pub copies: Vec<GameCopy>,
+    /// Indices of the copies that are compared with each other.
+    pairs: Vec<(usize, usize)>,
+    /// Number of the last copies that are ticked on threads of their own.
+    on_threads: usize,
+}
+
+impl Trial {
+    /// Builds the copies.
+    pub fn new(comparison: Comparison, game: &dyn Game, plan: &Plan, ticks: u32) -> Self {
+        let one = |number: u32| GameCopy::new(game, plan, number, 1);
+        let (mut copies, pairs) = match comparison {
+            Comparison::Repeat | Comparison::Clock | Comparison::Restart => (vec![one(0), one(0)], vec![(0, 1)]),
+            Comparison::Archetypes => {
+                ((0..=VARIANTS).map(|_| one(0)).collect(), (1..=VARIANTS as usize).map(|right| (0, right)).collect())
+            }
+            Comparison::Threads => (vec![one(0), one(0), one(0)], vec![(0, 1), (0, 2)]),
+            Comparison::Arenas => (vec![one(0), one(1), GameCopy::new(game, plan, 0, 2)], vec![(0, 2), (1, 2)]),
+        };
+        match comparison {
+            // Both get the same resource and systems, so that they differ in the clock alone.
+            Comparison::Clock => {
+                copies.iter_mut().zip([false, true]).for_each(|(copy, slow)| add_wall_clock(&mut copy.world, slow));
+            }
+            Comparison::Archetypes => {
+                copies.iter_mut().zip(0..).for_each(|(copy, count)| add_archetypes(&mut copy.world, count));
+            }
+            Comparison::Restart => copies[1].play_prelude(ticks),
+            _ => {}
+        }
+        let on_threads = if comparison == Comparison::Threads { 2 } else { 0 };
+        Self { comparison, copies, pairs, on_threads }
+    }
+
+    /// Plays, and compares after every tick.
+    pub fn run(
+        &mut self,
+        ticks: u32,
+        known_types: &mut KnownTypes,
+        ignored: &[String],
+        mut monitor: Option<&mut ObservationMonitor>,
+    ) -> TrialResult {
+        let mut report = ComparisonReport {
+            comparison: self.comparison,
+            skipped: None,
+            ticks: 0,
+            episodes: 0,
+            first: None,
+            others: Vec::new(),
+            effect: None,
+            unmatched: 0,
+            fault: None,
+        };
+        let mut incomparable = Default::default();
+        let mut is_over = true;
+        for tick in 0..ticks {
+            self.tick();
+            if let Some(monitor) = &mut monitor {
+                monitor.note(tick, &self.copies[0].outcome(0));
+            }
+            report.fault = self.copies.iter().find_map(|copy| copy.fault.clone());
+            if report.fault.is_some() {
+                break;
+            }
+            report.ticks += 1;
+            report.episodes += u32::from(is_over);
+            is_over = self.copies[0].end(0).is_some();
+            self.copies.iter().for_each(|copy| known_types.learn(&copy.world));
+            if report.first.is_none() {
+                let mut comparer = Comparer { known_types, comparison: self.comparison, ignored, incomparable };
+                self.compare(tick, &mut comparer, &mut report);
+                incomparable = comparer.incomparable;
+            }
+            if report.effect.is_none() {
+                let mut pairs = self.pairs.iter();
+                report.effect = pairs.find_map(|&(left, right)| effect(&self.copies[left], &self.copies[right], tick));
+            }
+        }
+        if self.comparison == Comparison::Archetypes && report.effect.is_none() {
+            report.first = None;
+            report.others.clear();
+        }
+        TrialResult { report, incomparable }
+    }
+
+    fn tick(&mut self) {
+        let here = self.copies.len() - self.on_threads;
+        let (here, threaded) = self.copies.split_at_mut(here);
+        here.iter_mut().for_each(GameCopy::tick);
+        on_threads(threaded, self.on_threads, GameCopy::tick);
+    }
+
+    fn compare(&self, tick: u32, comparer: &mut Comparer, report: &mut ComparisonReport) {
+        for &(left, right) in &self.pairs {
+            let found = comparer.compare(&self.copies[left], &self.copies[right], tick);
+            report.unmatched = report.unmatched.max(found.unmatched);
+            let mut differences = found.differences.into_iter();
+            if let Some(first) = differences.next() {
+                report.first = Some(first);
+                report.others = differences.take(OTHERS).collect();
+                return;
+            }
+        }
+    }
+}
+
+/// The result of a trial.
+pub(super) struct TrialResult {
+    pub report: ComparisonReport,
+    /// Types of fields that could not be compared.
+    pub incomparable: std::collections::BTreeSet<String>,
+}
+
+/// Returns the first difference in the observation, reward or end of the left copy's agent and its double on the right.
+fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<Difference> {
+    let number = left.number(0);
+    let double = (0..right.agents.len()).find(|&agent| right.number(agent) == number)?;
+    let differs = |kind, name: &str, left: String, right: String| {
+        let (name, entity, field) = (name.to_owned(), Some(format!("agent {number}")), String::new());
+        Difference { tick, kind, name, entity, field, left, right }
+    };
+    first_of_outcomes(&left.outcome(0), &right.outcome(double), &left.observed_names(), differs)
+}
+
+/// Returns the first difference of two outcomes, made with `differs`.
+fn first_of_outcomes(
+    a: &Outcome,
+    b: &Outcome,
+    names: &[String],
+    differs: impl Fn(DifferenceKind, &str, String, String) -> Difference,
+) -> Option<Difference> {
+    let differs = |kind, name: &str, left, right| Some(differs(kind, name, left, right));
+    let same = |a: &f32, b: &f32| a.to_bits() == b.to_bits();
+    if let Some(at) = a.observation.iter().zip(&b.observation).position(|(a, b)| !same(a, b)) {
+        let name = names.get(at).cloned().unwrap_or_else(|| format!("value {at}"));
+        let (left, right) = (a.observation[at].to_string(), b.observation[at].to_string());
+        return differs(DifferenceKind::Observation, &name, left, right);
+    }
+    let (left, right) = (a.observation.len(), b.observation.len());
+    if left != right {
+        return differs(DifferenceKind::Observation, "number of values", left.to_string(), right.to_string());
+    }
+    if let Some(at) = (a.image != b.image).then(|| a.image.iter().zip(&b.image).position(|(a, b)| a != b)) {
+        let byte = |image: &[u8]| at.and_then(|at| image.get(at)).map_or("none".to_owned(), u8::to_string);
+        return differs(DifferenceKind::Observation, "image", byte(&a.image), byte(&b.image));
+    }
+    if !same(&a.reward, &b.reward) {
+        return differs(DifferenceKind::Reward, "reward", a.reward.to_string(), b.reward.to_string());
+    }
+    if a.end != b.end {
+        return differs(DifferenceKind::End, "end of the episode", format!("{:?}", a.end), format!("{:?}", b.end));
+    }
+    let hash = |hash: u64| format!("{hash:016x}");
+    if a.hash == b.hash { None } else { differs(DifferenceKind::StateHash, "state hash", hash(a.hash), hash(b.hash)) }
+}

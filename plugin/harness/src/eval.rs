@@ -1,0 +1,421 @@
+//! Evaluation: each level equally often, every episode counted once.
+
+use crate::{
+    arrangement::Arrangement,
+    game::Game,
+    machine::{MemoryError, check_bytes},
+    parallel::on_threads,
+    split::LevelSplit,
+    worlds::{EndedEpisodes, build_observing_world},
+};
+use bevy::prelude::*;
+use bevy_playbot::{
+    agent::{Agent, Control},
+    bot::BlindBot,
+    episode::Episode,
+    fault::Fault,
+    headless::tick_world,
+    level::LevelQueue,
+    policy::{ActionDraw, ActivePolicy},
+    skill_prior::SkillPrior,
+    vision::{ObservationConfig, VisionError},
+};
+use playbot_learner::{HasExitCode, Policy, PolicyFile};
+use serde::Serialize;
+use std::collections::{BTreeMap, HashMap};
+use thiserror::Error;
+
+pub use bevy_playbot::episode::EpisodeResult;
+
+/// The player that is evaluated.
+#[derive(Clone)]
+#[allow(clippy::large_enum_variant, reason = "one per measurement")]
+pub enum Player {
+    /// A learned policy, with its skills if it has any.
+    Policy {
+        /// The policy.
+        policy: Policy,
+        /// The source of its skills.
+        prior: Option<SkillPrior>,
+        /// How actions are drawn.
+        draw: ActionDraw,
+    },
+    /// A bot without sensors.
+    Blind(BlindBot),
+    /// The game's own demonstrator, without noise.
+    Demonstrator,
+}
+
+/// The reason why an evaluation failed.
+#[derive(Debug, Error)]
+pub enum EvalError {
+    /// The pictures cannot be drawn.
+    #[error(transparent)]
+    Vision(#[from] VisionError),
+    /// The game broke its contract.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// The results of the episodes do not fit into memory.
+    #[error(transparent)]
+    Memory(#[from] MemoryError),
+}
+
+impl HasExitCode for EvalError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Fault(_) => 2,
+            Self::Vision(_) | Self::Memory(_) => 3,
+        }
+    }
+}
+
+impl Player {
+    /// Creates a player from the policy of a file, with its skills.
+    pub fn of_file(file: &PolicyFile, draw: ActionDraw) -> Self {
+        Self::Policy { policy: file.policy.clone(), prior: file.skills.as_ref().map(SkillPrior::from), draw }
+    }
+
+    /// Installs the player's networks and its source of skills in a World, once.
+    pub fn install(&self, world: &mut World) {
+        if let Self::Policy { policy, prior, draw } = self {
+            ActivePolicy { policy: policy.clone(), draw: *draw }.install(world, prior.clone());
+        }
+    }
+
+    /// Prepares an agent for the player, and returns the control under which the player decides for it.
+    pub fn seat(&self, game: &dyn Game, world: &mut World, agent: Entity) -> Control {
+        match self {
+            Self::Policy { .. } => Control::Policy,
+            Self::Blind(bot) => {
+                world.entity_mut(agent).insert(bot.clone());
+                Control::Bot
+            }
+            Self::Demonstrator => {
+                game.tools().bots.attach_demonstrator(world, agent, 0.0);
+                Control::Bot
+            }
+        }
+    }
+}
+
+/// The settings of an evaluation.
+#[derive(Clone, Debug)]
+pub struct EvalPlan {
+    /// Levels.
+    pub split: LevelSplit,
+    /// The observation of a learned policy. Bots have vectors, which are cheaper.
+    pub observation_config: ObservationConfig,
+    /// Episodes on each level.
+    pub episodes_per_level: u32,
+    /// Random seed of the players.
+    pub seed: u64,
+    /// Arenas, spread evenly over the Worlds.
+    pub arenas: u32,
+    /// Worlds. Their number is part of the plan, as in training.
+    pub worlds: u32,
+    /// Threads. They change no result.
+    pub threads: usize,
+}
+
+impl EvalPlan {
+    /// Checks that the Worlds and the results of all episodes fit into free memory.
+    ///
+    /// # Errors
+    ///
+    /// [`MemoryError`].
+    pub fn check_memory(&self) -> Result<(), MemoryError> {
+        let (levels, episodes) = (self.split.len(), u64::from(self.episodes_per_level));
+        // The result of each episode, and its number in the list of those to play.
+        let bytes = levels.saturating_mul(episodes).saturating_mul((size_of::<Trail>() + size_of::<u64>()) as u64);
+        let what = format!("the results of {levels} levels × {episodes} episodes");
+        let worlds = Arrangement { worlds: self.worlds, arenas: self.arenas / self.worlds.max(1) };
+        check_bytes(what, bytes, "the number of levels, or `eval.episodes_per_level`", worlds)
+    }
+}
+
+/// An evaluated episode with its path.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Trail {
+    /// The episode.
+    pub result: EpisodeResult,
+    /// Position of the agent after each tick, on the game's [`FloorPlan`](crate::floor_plan::FloorPlan). Empty if the
+    /// game does not report it.
+    pub places: Vec<Vec2>,
+}
+
+/// Plays every level of the plan and returns all episodes, sorted by level. `progress` receives each finished episode,
+/// from several threads.
+///
+/// # Errors
+///
+/// The game broke its contract, or cannot be observed this way.
+pub fn evaluate(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<EpisodeResult>, EvalError> {
+    let trails = play(game, player, plan, false, progress)?;
+    Ok(trails.into_iter().map(|trail| trail.result).collect())
+}
+
+/// Evaluates as [`evaluate`] does, and also returns the path of every episode. The results are the same.
+///
+/// # Errors
+///
+/// The game broke its contract, or cannot be observed this way.
+pub fn evaluate_with_trails(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<Trail>, EvalError> {
+    play(game, player, plan, true, progress)
+}
+
+fn play(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    follow: bool,
+    progress: impl Fn(u64) + Sync,
+) -> Result<Vec<Trail>, EvalError> {
+    if let Some(problem) = game.problem() {
+        return Err(Fault(problem).into());
+    }
+    plan.check_memory()?;
+    let arrangement = Arrangement::new(game, plan.arenas, plan.worlds);
+    let worlds: Result<Vec<_>, _> =
+        arrangement.first_agents().map(|first| build_eval_world(game, player, plan, arrangement, first)).collect();
+    let mut worlds = worlds?;
+    let followed = follow.then_some(game);
+    let parts = on_threads(&mut worlds, plan.threads, |world| play_out(world, followed, &progress));
+    let mut trails = Vec::new();
+    for part in parts {
+        trails.extend(part?);
+    }
+    trails.sort_by_key(|trail| trail.result.level);
+    Ok(trails)
+}
+
+/// Builds a World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
+fn build_eval_world(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    arrangement: Arrangement,
+    first: u32,
+) -> Result<World, VisionError> {
+    let (per_world, total) = (arrangement.arenas, arrangement.total() as usize);
+    let observation_config =
+        if matches!(player, Player::Policy { .. }) { plan.observation_config } else { ObservationConfig::default() };
+    let (mut world, agents) =
+        build_observing_world(game, &plan.split.mode, &observation_config, plan.seed, first, per_world)?;
+    EndedEpisodes::note_in(&mut world);
+    let all: Vec<u64> = (0..plan.episodes_per_level).flat_map(|_| plan.split.levels()).collect();
+    for (offset, &agent) in agents.iter().enumerate() {
+        let levels: Vec<u64> = all.iter().skip(first as usize + offset).step_by(total).copied().collect();
+        world.entity_mut(agent).insert(LevelQueue::list(levels));
+        let control = player.seat(game, &mut world, agent);
+        world.entity_mut(agent).insert(control);
+    }
+    player.install(&mut world);
+    Ok(world)
+}
+
+/// Ticks until every agent has played its list. With a game, stores the position of each agent after each tick.
+fn play_out(
+    world: &mut World,
+    followed: Option<&dyn Game>,
+    progress: &(impl Fn(u64) + Sync),
+) -> Result<Vec<Trail>, Fault> {
+    let everybody = world.query_filtered::<Entity, With<Agent>>().iter(world).collect::<Vec<_>>();
+    let mut places: HashMap<Entity, Vec<Vec2>> = HashMap::new();
+    let mut trails = Vec::new();
+    while everybody.iter().any(|&agent| Control::of(world, agent).is_active()) {
+        tick_world(world)?;
+        let ended = EndedEpisodes::take(world);
+        for (game, &agent) in followed.iter().flat_map(|game| everybody.iter().map(move |agent| (game, agent))) {
+            let is_playing = world.get::<Episode>(agent).is_some_and(Episode::is_running);
+            let is_seen = is_playing || ended.iter().any(|(entity, _)| *entity == agent);
+            if let Some(place) = is_seen.then(|| game.tools().state.position(world, agent)).flatten() {
+                places.entry(agent).or_default().push(place);
+            }
+        }
+        if !ended.is_empty() {
+            progress(ended.len() as u64);
+        }
+        let trail = |(agent, result)| Trail { result, places: places.remove(&agent).unwrap_or_default() };
+        trails.extend(ended.into_iter().map(trail));
+    }
+    Ok(trails)
+}
+
+// Summaries of evaluated episodes.
+
+/// The summary of an evaluation: one row of a result table.
+///
+/// Standard errors estimate the distance of the means from those of all levels like these, see [`error_over_levels`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct EvalSummary {
+    /// Name of the player.
+    pub method: String,
+    /// Levels, as `mode:first..last`.
+    pub split: String,
+    /// Levels that were played.
+    pub levels: u64,
+    /// Episodes.
+    pub episodes: u64,
+    /// Mean return.
+    pub return_mean: f64,
+    /// Its standard error, over levels.
+    pub return_se: f64,
+    /// Share of episodes that reached the level's goal.
+    pub success: f64,
+    /// Its standard error, over levels.
+    pub success_se: f64,
+    /// Mean length, ticks.
+    pub length_mean: f64,
+    /// Share of all ticks whose action was clipped to the game's range.
+    pub clipped: f64,
+    /// Mean return on each level, in ascending order of levels, for comparisons level by level. It is not part of a
+    /// table's JSON.
+    #[serde(skip)]
+    pub level_returns: Vec<f64>,
+}
+
+/// Summarises the episodes of one player on one split.
+pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) -> EvalSummary {
+    let by_level = |value: fn(&EpisodeResult) -> f64| -> Vec<(u64, f64)> {
+        results.iter().map(|result| (result.level, value(result))).collect()
+    };
+    let returns = by_level(|result| result.total_reward);
+    let successes = by_level(|result| f64::from(u8::from(result.success)));
+    let lengths = by_level(|result| f64::from(result.ticks));
+    let clipped = by_level(|result| f64::from(result.clipped));
+    let level_returns = means_of_levels(&returns);
+    EvalSummary {
+        method: method.to_owned(),
+        split: split.to_string(),
+        levels: level_returns.len() as u64,
+        episodes: results.len() as u64,
+        return_mean: mean(&returns),
+        return_se: error_over_levels(&returns),
+        success: mean(&successes),
+        success_se: error_over_levels(&successes),
+        length_mean: mean(&lengths),
+        clipped: mean(&clipped) / mean(&lengths).max(1.0),
+        level_returns,
+    }
+}
+
+/// Returns the standard error of the mean of values that come in clusters, the levels: s / √L, with s the sample
+/// standard deviation of the L level means.
+///
+/// Episodes of one level are alike, and those of a player without randomness are equal. Repeats of a level say nothing
+/// about other levels, so they must not reduce the error. Every level counts as if it had equally many values. With a
+/// single level the error is that over its episodes, and 0 for a single episode.
+pub fn error_over_levels(values: &[(u64, f64)]) -> f64 {
+    match &means_of_levels(values)[..] {
+        [_] => standard_error(&values.iter().map(|(_, value)| *value).collect::<Vec<_>>()),
+        levels => standard_error(levels),
+    }
+}
+
+fn means_of_levels(values: &[(u64, f64)]) -> Vec<f64> {
+    let mut levels: BTreeMap<u64, (f64, f64)> = BTreeMap::new();
+    for (level, value) in values {
+        let (sum, count) = levels.entry(*level).or_default();
+        (*sum, *count) = (*sum + value, *count + 1.0);
+    }
+    levels.into_values().map(|(sum, count)| sum / count).collect()
+}
+
+fn mean(values: &[(u64, f64)]) -> f64 {
+    values.iter().map(|(_, value)| value).sum::<f64>() / values.len() as f64
+}
+
+fn standard_error(values: &[f64]) -> f64 {
+    if values.len() < 2 {
+        return 0.0;
+    }
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (squares / (n - 1.0) / n).sqrt()
+}
+
+// Bots without sensors, by name.
+
+/// Name of the bot that every game has in addition to its own: [`BlindBot::Chaos`].
+pub const CHAOS: &str = "chaos";
+
+/// Returns the blind bots that can play a game: [its own](crate::game::BotTools::blind_bots), and [`CHAOS`].
+pub fn blind_bots(game: &dyn Game) -> Vec<(&'static str, BlindBot)> {
+    let mut bots = game.tools().bots.blind_bots();
+    if bots.iter().all(|(name, _)| *name != CHAOS) {
+        bots.push((CHAOS, BlindBot::Chaos));
+    }
+    bots
+}
+
+#[cfg(test)]
+mod summary_tests {
+    use bevy_playbot::episode::EpisodeEnd;
+
+    use super::*;
+
+    /// Levels 0, 1 and 2 with the returns 0, 3 and 6, each repeated `times` times.
+    fn repeated(times: usize) -> Vec<(u64, f64)> {
+        [(0, 0.0), (1, 3.0), (2, 6.0)].into_iter().flat_map(|value| std::iter::repeat_n(value, times)).collect()
+    }
+
+    #[test]
+    fn repeats_of_a_level_do_not_make_the_error_smaller() {
+        // Deviations from 3: -3, 0, 3; squares 18 over n - 1 = 2 and n = 3.
+        assert_eq!(error_over_levels(&repeated(1)), 3f64.sqrt());
+        assert_eq!(error_over_levels(&repeated(16)), 3f64.sqrt());
+    }
+
+    #[test]
+    fn what_differs_within_a_level_counts_by_its_mean() {
+        let values = [(7, 1.0), (3, 4.0), (7, 3.0), (3, 6.0)];
+        // Level means 5 and 2: squares 4.5 over n - 1 = 1 and n = 2.
+        assert_eq!(error_over_levels(&values), 1.5);
+    }
+
+    #[test]
+    fn a_single_level_has_the_error_of_its_episodes() {
+        assert_eq!(error_over_levels(&[(5, 1.0), (5, 3.0)]), 1.0);
+        assert_eq!(error_over_levels(&[(5, 1.0)]), 0.0);
+        assert_eq!(error_over_levels(&[]), 0.0);
+    }
+
+    #[test]
+    fn a_summary_counts_levels_and_episodes() {
+        let split: LevelSplit = "plain:0..1".parse().expect("valid");
+        let end = EpisodeEnd::LOST;
+        let result =
+            |level, success, total_reward| EpisodeResult { level, end, success, ticks: 10, clipped: 1, total_reward };
+        let results = [result(0, true, 2.0), result(0, true, 2.0), result(1, false, 0.0), result(1, true, 0.0)];
+        let summary = summarize("bot", &split, &results);
+        assert_eq!((summary.levels, summary.episodes), (2, 4));
+        assert_eq!((summary.return_mean, summary.return_se), (1.0, 1.0));
+        assert_eq!((summary.success, summary.success_se), (0.75, 0.25));
+        assert_eq!((summary.length_mean, summary.clipped), (10.0, 0.1));
+    }
+}
+
+#[cfg(test)]
+mod blind_tests {
+    use super::*;
+    use crate::foreign::ForeignGame;
+
+    #[test]
+    fn every_game_has_chaos_behind_its_own_bots() {
+        let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {});
+        let bots = blind_bots(&game);
+        assert_eq!(bots.last(), Some(&(CHAOS, BlindBot::Chaos)));
+        assert_eq!(bots.len(), game.tools().bots.blind_bots().len() + 1);
+    }
+}

@@ -1,0 +1,708 @@
+//! Games that are not written for this plugin.
+//!
+//! A [`ForeignGame`] wraps the function that adds a game to an app, as it is, and declares the agent's actions,
+//! observations and rewards. In such a game one tick is one frame of a fixed length, headless and in a window: the
+//! game's own schedules run as always. The agent's action presses keys before Bevy's own input systems run; reward and
+//! end are read in `Last`.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use playbot_harness::{foreign::{ForeignGame, Restart}, prelude::*};
+//!
+//! #[derive(Component)]
+//! struct Walker;
+//!
+//! /// The game, which is not changed.
+//! fn game(app: &mut App) {
+//!     app.add_systems(Startup, |mut commands: Commands| {
+//!         commands.spawn((Walker, Transform::default()));
+//!     })
+//!     .add_systems(Update, |keys: Res<ButtonInput<KeyCode>>, mut walker: Single<&mut Transform, With<Walker>>| {
+//!         walker.translation.x += f32::from(u8::from(keys.pressed(KeyCode::ArrowRight)));
+//!     });
+//! }
+//!
+//! fn walk() -> impl Game {
+//!     ForeignGame::new("walk", 1, game)
+//!         .keys([vec![], vec![KeyCode::ArrowRight]])
+//!         .observe(["x"], |walker: Single<&Transform, With<Walker>>| [walker.translation.x])
+//!         .reward_delta(|walker: Single<&Transform, With<Walker>>| walker.translation.x)
+//!         .end(|walker: Single<&Transform, With<Walker>>| (walker.translation.x >= 5.0).then_some(EpisodeEnd::WON))
+//!         .time_limit(20)
+//!         .restart(Restart::Startup)
+//! }
+//!
+//! let (mut world, agents) = playbot_harness::worlds::build_world(&walk(), "default", 0, 0, 1);
+//! let right = BlindBot::Constant(ActionValue::Discrete(1));
+//! world.entity_mut(agents[0]).insert((Control::Bot, right, LevelQueue::list([7])));
+//! while world.get::<Control>(agents[0]) != Some(&Control::Idle) {
+//!     world.tick().expect("the game keeps its contract");
+//! }
+//! let count = world.get::<EpisodeCount>(agents[0]).expect("an agent");
+//! assert_eq!((count.finished, count.successes), (1, 1));
+//! ```
+
+mod input;
+mod observe;
+mod paths;
+mod restart;
+mod runtime;
+
+use crate::{
+    defect::DefectKind,
+    detector::Detector,
+    floor_plan::FloorPlan,
+    foreign::{
+        input::{ForeignBot, Input},
+        observe::ForeignPlace,
+        paths::ObservedPath,
+        runtime::{Baseline, Foreign, ForeignCell, Sensor, SystemFactory},
+    },
+    game::{BotTools, Game, GameTools, HostTools, InputTools, LevelTools, PictureTools, StateTools, TestTools},
+};
+use bevy::{
+    app::{MainScheduleOrder, PluginGroupBuilder},
+    ecs::schedule::ScheduleLabel,
+    prelude::*,
+};
+use bevy_playbot::{
+    action::{ActionSpace, ActionValue, check_actions},
+    agent::{Agent, has_no_actions},
+    episode::EpisodeEnd,
+    fault::Faults,
+    headless::HeadlessPlugins,
+    key_bindings::KeyBindings,
+    observation::{ObservationSpace, VectorSensor},
+    panics,
+    panics::note_actions,
+    placement::{TickPlacement, TickSchedules, is_tick},
+    renewal::Renewal,
+    systems::PlaybotSystems,
+    virtual_input::{ActionAxis, InputRoute, VirtualInput, VirtualInputPlugin},
+};
+use std::sync::Arc;
+
+pub use crate::foreign::{
+    paths::PathError,
+    runtime::{IntoActionValue, IntoValues, LevelSeed, Restart},
+};
+
+// The description of a foreign game, as a `Game`.
+
+/// A game without this plugin, with the actions, observations and rewards of its agent: see the
+/// [module](self).
+///
+/// Its player and its resources are global, so each World has one arena with one agent. An experiment with more arenas
+/// gets more Worlds. Its mode is called `default`.
+#[derive(Clone)]
+pub struct ForeignGame {
+    description: Arc<Description>,
+}
+
+/// The settings of the builder.
+#[derive(Clone)]
+struct Description {
+    name: &'static str,
+    version: u32,
+    plugin: Arc<dyn Fn(&mut App) + Send + Sync>,
+    hz: f64,
+    levels: Option<u64>,
+    input: Input,
+    act: Option<SystemFactory<()>>,
+    /// Functions that prepare an agent when it is spawned.
+    agent: Vec<Arc<dyn Fn(&mut EntityWorldMut) + Send + Sync>>,
+    /// Names of the values that `observe` returns.
+    names: Vec<String>,
+    observe: Option<SystemFactory<Vec<f32>>>,
+    paths: Vec<String>,
+    has_camera: bool,
+    /// Position of the agent on the plan of its level.
+    place: Option<SystemFactory<Vec2>>,
+    /// The plan of a level.
+    plan: Option<Arc<dyn Fn(u64) -> FloorPlan + Send + Sync>>,
+    /// Reward systems; the flag says whether the growth of the value is paid.
+    rewards: Vec<(SystemFactory<f32>, bool)>,
+    end: Option<SystemFactory<Option<EpisodeEnd>>>,
+    /// Ticks after which an episode is truncated.
+    limit: Option<u32>,
+    restart: Restart,
+    ready: Option<SystemFactory<bool>>,
+    /// Frames that a level may take to load.
+    patience: u32,
+    level: Option<SystemFactory<()>>,
+    demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
+    hash: Option<SystemFactory<u64>>,
+    plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
+    /// Factories of the game's own detectors.
+    detectors: Vec<Arc<dyn Fn() -> Box<dyn Detector> + Send + Sync>>,
+    /// Defects that can be planted into it.
+    defects: Vec<DefectKind>,
+}
+
+impl Description {
+    fn sensor(&self) -> Sensor {
+        match &self.observe {
+            Some(system) => Sensor::System(system.make()),
+            None if self.paths.is_empty() => Sensor::Nothing,
+            None => Sensor::Paths(self.paths.iter().map(|path| ObservedPath::new(path)).collect()),
+        }
+    }
+
+    /// Returns the name of the system that observes, for messages.
+    fn sensor_name(&self) -> &'static str {
+        self.observe.as_ref().map_or("of the paths", SystemFactory::name)
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        let names = if self.observe.is_some() { &self.names } else { &self.paths };
+        ObservationSpace { names: names.clone() }
+    }
+}
+
+impl ForeignGame {
+    /// Returns the number of levels, if the game declares it.
+    pub fn level_count(&self) -> Option<u64> {
+        self.description.levels
+    }
+
+    /// Returns the level that is played for this number.
+    fn level_of(&self, level: u64) -> u64 {
+        self.level_count().map_or(level, |levels| level % levels.max(1))
+    }
+}
+
+/// Returns the reason why a game without vector observations cannot be observed. `has_feature` says whether this crate
+/// is built with cameras.
+fn nothing_seen(name: &str, has_camera: bool, has_feature: bool) -> Option<String> {
+    match (has_camera, has_feature) {
+        (true, true) => None,
+        (true, false) => Some(format!(
+            "the game `{name}` is seen through its camera alone, which needs the feature `camera` of \
+             `playbot`: build with it, or add `.observe` or `.observe_paths`"
+        )),
+        (false, _) => {
+            Some(format!("nothing of the game `{name}` is seen: add `.observe`, `.observe_paths` or `.camera`"))
+        }
+    }
+}
+
+impl Game for ForeignGame {
+    fn name(&self) -> &'static str {
+        self.description.name
+    }
+
+    fn version(&self) -> u32 {
+        self.description.version
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        &["default"]
+    }
+
+    fn tick_hz(&self) -> f64 {
+        self.description.hz
+    }
+
+    fn built_anew(&self) -> Option<Arc<dyn Game>> {
+        matches!(self.description.restart, Restart::Rebuild).then(|| Arc::new(self.clone()) as Arc<dyn Game>)
+    }
+
+    fn actions(&self) -> ActionSpace {
+        self.description.input.space()
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        self.description.observation()
+    }
+
+    fn build(&self, app: &mut App, _mode: &str) {
+        app.add_plugins(ForeignPlugin(self.clone()));
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        let sensor = VectorSensor::new(self.description.observation().names);
+        let mut agent = world.spawn((Agent::new(index, self.actions()), sensor));
+        if let Some(input) = self.description.input.pressed() {
+            agent.insert(input);
+        }
+        self.description.agent.iter().for_each(|equip| equip(&mut agent));
+        agent.id()
+    }
+
+    fn tools(&self) -> GameTools<'_> {
+        GameTools {
+            host: self,
+            levels: self,
+            state: self,
+            pictures: self,
+            input: self,
+            bots: self,
+            tests: self,
+            ..GameTools::default()
+        }
+    }
+}
+
+impl HostTools for ForeignGame {
+    fn placement(&self) -> TickPlacement {
+        TickPlacement::Frame
+    }
+
+    fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
+        match &self.description.plugins {
+            Some(change) => change(plugins),
+            None => plugins.build(),
+        }
+    }
+
+    fn arenas_per_world(&self) -> Option<u32> {
+        Some(1)
+    }
+
+    fn unplayable(&self) -> Option<String> {
+        let Description { name, input, observe, paths, has_camera, names, .. } = &*self.description;
+        if let Some(problem) = input.problem() {
+            return Some(format!("the game `{name}` {problem}"));
+        }
+        if has_no_actions(&input.space()) {
+            return Some(format!(
+                "the game `{name}` has no actions: say what an agent can do, for instance with `.keys`"
+            ));
+        }
+        if observe.is_none() && paths.is_empty() {
+            let unseen = nothing_seen(name, *has_camera, cfg!(feature = "camera"));
+            if unseen.is_some() {
+                return unseen;
+            }
+        }
+        if observe.is_some() && names.is_empty() {
+            return Some(format!("`.observe` of the game `{name}` names no values"));
+        }
+        let is_sound = self.description.hz.is_finite() && self.description.hz > 0.0;
+        (!is_sound).then(|| format!("`.hz` of the game `{name}` is {}, not a number of frames", self.description.hz))
+    }
+}
+
+impl LevelTools for ForeignGame {
+    fn floor_plan(&self, _mode: &str, level: u64) -> Option<FloorPlan> {
+        self.description.plan.as_ref().map(|plan| plan(self.level_of(level)))
+    }
+}
+
+impl StateTools for ForeignGame {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<ForeignPlace>(agent).map(|place| place.0)
+    }
+}
+
+impl PictureTools for ForeignGame {
+    fn has_camera(&self) -> bool {
+        self.description.has_camera
+    }
+}
+
+impl InputTools for ForeignGame {
+    fn action_names(&self) -> Vec<String> {
+        self.description.input.names()
+    }
+
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        self.description.input.bindings()
+    }
+}
+
+impl BotTools for ForeignGame {
+    fn demonstrator(&self) -> Option<&'static str> {
+        self.description.demonstrator.as_ref().map(|(name, _)| *name)
+    }
+
+    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+        Renewal::carry_component::<ForeignBot>(world);
+        world.entity_mut(agent).insert(ForeignBot { noise });
+    }
+}
+
+impl TestTools for ForeignGame {
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        self.description.detectors.iter().map(|make| make()).collect()
+    }
+
+    fn defects(&self) -> Vec<DefectKind> {
+        self.description.defects.clone()
+    }
+}
+
+// The builder methods of a foreign game.
+
+/// Default number of frames that a level may take to load.
+const PATIENCE: u32 = 3600;
+
+fn lists<T>(sets: impl IntoIterator<Item = impl IntoIterator<Item = T>>) -> Vec<Vec<T>> {
+    sets.into_iter().map(|set| set.into_iter().collect()).collect()
+}
+
+impl ForeignGame {
+    /// Creates a game that `plugin` adds to an app with Bevy's `DefaultPlugins`. Raise the version whenever old
+    /// recordings no longer replay.
+    pub fn new(name: &'static str, version: u32, plugin: impl Fn(&mut App) + Send + Sync + 'static) -> Self {
+        let description = Description {
+            name,
+            version,
+            plugin: Arc::new(plugin),
+            hz: 60.0,
+            levels: None,
+            input: Input::default(),
+            act: None,
+            agent: Vec::new(),
+            names: Vec::new(),
+            observe: None,
+            paths: Vec::new(),
+            has_camera: false,
+            place: None,
+            plan: None,
+            rewards: Vec::new(),
+            end: None,
+            limit: None,
+            restart: Restart::Startup,
+            ready: None,
+            patience: PATIENCE,
+            level: None,
+            demonstrator: None,
+            hash: None,
+            plugins: None,
+            detectors: Vec::new(),
+            defects: Vec::new(),
+        };
+        Self { description: Arc::new(description) }
+    }
+
+    fn with(mut self, change: impl FnOnce(&mut Description)) -> Self {
+        change(Arc::make_mut(&mut self.description));
+        self
+    }
+
+    /// Sets the frames, and so ticks, in a second of game time. Default: 60.
+    pub fn hz(self, hz: f64) -> Self {
+        self.with(|description| description.hz = hz)
+    }
+
+    /// Declares discrete actions, by the keys that each of them holds.
+    pub fn keys(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>) -> Self {
+        self.with(|description| description.input.set_keys(sets))
+    }
+
+    /// Declares discrete actions as [`keys`](Self::keys) does, by the names of keys, such as those in a settings file:
+    /// `ArrowLeft`, `KeyW`, `Space`, and those that [`VirtualButton`](bevy_playbot::virtual_input::VirtualButton) has
+    /// for buttons of mouse and gamepad. With a name that does not exist the game has a
+    /// [`problem`](crate::game::Game::problem), and cannot be played.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// let game = |key: &str| {
+    ///     let game = ForeignGame::new("walk", 1, |_: &mut App| {}).observe(["x"], || [0.0]);
+    ///     game.keys_by_name([vec![], vec![key]])
+    /// };
+    /// assert_eq!(game("ArrowRight").problem(), None);
+    /// let problem = game("ArowRight").problem().expect("there is no such key");
+    /// assert!(problem.contains("in action 1") && problem.contains("did you mean `ArrowRight`?"));
+    /// ```
+    pub fn keys_by_name(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = impl AsRef<str>>>) -> Self {
+        self.with(|description| description.input.name_keys(sets))
+    }
+
+    /// Adds mouse buttons that discrete actions hold, in the order of the actions.
+    pub fn mouse_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = MouseButton>>) -> Self {
+        self.with(|description| description.input.mouse = lists(sets))
+    }
+
+    /// Adds gamepad buttons that discrete actions hold, in the order of the actions.
+    pub fn gamepad_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = GamepadButton>>) -> Self {
+        self.with(|description| description.input.pads = lists(sets))
+    }
+
+    /// Declares continuous actions, by the axis that each of their values moves. Buttons belong to them by
+    /// [`ActionAxis::buttons`].
+    pub fn axes(self, axes: impl IntoIterator<Item = ActionAxis>) -> Self {
+        self.with(|description| description.input.axes = Some(axes.into_iter().collect()))
+    }
+
+    /// Declares actions that press this input.
+    pub fn input(self, input: VirtualInput) -> Self {
+        self.with(|description| description.input.whole = Some(input))
+    }
+
+    /// Declares actions that a system passes on to the game. It reads the agent's
+    /// [`Action`](bevy_playbot::action::Action) and runs in every tick before the game, unless a person plays.
+    pub fn actions<M: 'static>(
+        self,
+        space: ActionSpace,
+        system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| {
+            description.input.space = Some(space);
+            description.act = Some(SystemFactory::new(system, |()| ()));
+        })
+    }
+
+    /// Gives the agent components, whenever it is spawned: in each World, and in each that [`Restart::Rebuild`] builds.
+    /// Several calls add up.
+    ///
+    /// This is how an agent drives actions of an input manager that no key is bound to: with the feature
+    /// `leafwing-input-manager` of this crate by `LeafwingActions`, with `bevy_enhanced_input` by an `EnhancedAction`.
+    /// The game's function adds their plugins, for `InputRoute::Messages`. [`actions`](Self::actions) with a system
+    /// that does nothing declares how many actions the agent has.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*, worlds::build_world};
+    ///
+    /// /// The length of the agent's next step.
+    /// #[derive(Component, Debug, PartialEq)]
+    /// struct Stride(f32);
+    ///
+    /// let game = ForeignGame::new("walk", 1, |_: &mut App| {})
+    ///     .actions(ActionSpace::Discrete(2), || {})
+    ///     .observe(["x"], || [0.0])
+    ///     .agent(|agent| {
+    ///         agent.insert(Stride(0.5));
+    ///     });
+    /// let (world, agents) = build_world(&game, "default", 0, 0, 1);
+    /// assert_eq!(world.get::<Stride>(agents[0]), Some(&Stride(0.5)));
+    /// ```
+    pub fn agent(self, equip: impl Fn(&mut EntityWorldMut) + Send + Sync + 'static) -> Self {
+        self.with(|description| description.agent.push(Arc::new(equip)))
+    }
+
+    /// Adds a detector of the game's own, which looks for defects in tests: see [`detector`](crate::detector). Each
+    /// test creates a new one.
+    pub fn detector<D: Detector + 'static>(self, make: impl Fn() -> D + Send + Sync + 'static) -> Self {
+        let make = move || -> Box<dyn Detector> { Box::new(make()) };
+        self.with(|description| description.detectors.push(Arc::new(make)))
+    }
+
+    /// Adds a defect that can be planted into the game: see [`bugs`](playbot_mutation::bugs).
+    pub fn defect(self, kind: DefectKind) -> Self {
+        self.with(|description| description.defects.push(kind))
+    }
+
+    /// Sets the names of the actions, for people. Actions of keys have names by default.
+    pub fn action_names(self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.with(|description| description.input.names = names.into_iter().map(Into::into).collect())
+    }
+
+    /// Declares the observation: one value per name. The system may run more than once in a tick, so it must change
+    /// nothing.
+    pub fn observe<Values: IntoValues, M: 'static>(
+        self,
+        names: impl IntoIterator<Item = impl Into<String>>,
+        system: impl IntoSystem<(), Values, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| {
+            description.names = names.into_iter().map(Into::into).collect();
+            description.observe = Some(SystemFactory::new(system, Values::into_values));
+        })
+    }
+
+    /// Declares the observation by paths of numbers. `Paddle.Transform.translation.x` is the field of a component of
+    /// the one entity that has another component or this `Name`. `Score.0` is the field of a resource, or of the only
+    /// component of its type. Types that are read must derive `Reflect`. A component that only finds an entity need
+    /// not, if Bevy is built with its feature `debug`.
+    pub fn observe_paths(self, paths: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.with(|description| description.paths = paths.into_iter().map(Into::into).collect())
+    }
+
+    /// Lets agents see pictures (`observation: Camera` of an experiment) through the game's own camera: of several
+    /// active ones, the one that draws first. It needs the feature `camera` of this crate. Without the feature, a game
+    /// with no other observation is refused.
+    pub fn camera(self) -> Self {
+        self.with(|description| description.has_camera = true)
+    }
+
+    /// Declares the position of the agent, from above or from the side, in any units, for detectors of progress, for
+    /// explorers and for pictures. The system may run more than once in a tick, so it must change nothing. While it is
+    /// skipped, because an entity that it asks for does not exist, the position is unknown.
+    pub fn place<M: 'static>(self, system: impl IntoSystem<(), Vec2, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.place = Some(SystemFactory::new(system, |place| place)))
+    }
+
+    /// Declares the plan of a level by its number, in the units of [`place`](Self::place): for pictures of paths, and
+    /// for detectors that need walls, bounds or the goal.
+    pub fn plan(self, plan: impl Fn(u64) -> FloorPlan + Send + Sync + 'static) -> Self {
+        self.with(|description| description.plan = Some(Arc::new(plan)))
+    }
+
+    /// Adds a reward of each tick to other rewards.
+    pub fn reward<M: 'static>(self, system: impl IntoSystem<(), f32, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.rewards.push((SystemFactory::new(system, |reward| reward), false)))
+    }
+
+    /// Adds a reward by the growth of a value, such as a score, since the last tick. The value need not begin at 0 in
+    /// an episode.
+    pub fn reward_delta<M: 'static>(self, system: impl IntoSystem<(), f32, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.rewards.push((SystemFactory::new(system, |value| value), true)))
+    }
+
+    /// Declares whether and how the game is over after a tick. The system runs in `Last`.
+    pub fn end<M: 'static>(
+        self,
+        system: impl IntoSystem<(), Option<EpisodeEnd>, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| description.end = Some(SystemFactory::new(system, |end| end)))
+    }
+
+    /// Ends episodes after this many ticks, as [`Truncated`](EpisodeEnd::Truncated).
+    pub fn time_limit(self, ticks: u32) -> Self {
+        self.with(|description| description.limit = Some(ticks))
+    }
+
+    /// Sets how the game restarts. Default: [`Restart::Startup`].
+    pub fn restart(self, restart: Restart) -> Self {
+        self.with(|description| description.restart = restart)
+    }
+
+    /// Declares whether a level can be played. The system runs in each frame from the second one after the restart, and
+    /// no tick passes until it returns true. The clock of the first tick is always two frames after the restart, for
+    /// any number of frames. So timers are unchanged, and a time that the game stored meanwhile may lie ahead.
+    pub fn ready<M: 'static>(self, system: impl IntoSystem<(), bool, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.ready = Some(SystemFactory::new(system, |is_ready| is_ready)))
+    }
+
+    /// Sets the frames that a level may take to load. Default: 3600.
+    pub fn ready_within(self, frames: u32) -> Self {
+        self.with(|description| description.patience = frames)
+    }
+
+    /// Creates the level after the restart, with a system that runs once. It finds the level's number in
+    /// [`LevelSeed`](LevelSeed), to seed the game's generator, and to reset what the restart leaves unchanged.
+    pub fn level<M: 'static>(self, system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.level = Some(SystemFactory::new(system, |()| ())))
+    }
+
+    /// Sets the number of levels: level n is the same as level 0, and so on. Default: endless.
+    pub fn levels(self, number: u64) -> Self {
+        self.with(|description| description.levels = Some(number))
+    }
+
+    /// Declares a scripted bot that reads the whole World: a system that returns the action of each tick.
+    pub fn demonstrator<Wanted: IntoActionValue, M: 'static>(
+        self,
+        name: &'static str,
+        system: impl IntoSystem<(), Wanted, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| {
+            description.demonstrator = Some((name, SystemFactory::new(system, Wanted::into_action)));
+        })
+    }
+
+    /// Sets the hash that a replay compares after each tick, instead of the transforms of all entities that the game
+    /// has spawned. It is for games that spawn or move some of them by the real-time clock, or when a file is loaded.
+    /// Observation and reward are always compared.
+    pub fn state_hash<M: 'static>(self, system: impl IntoSystem<(), u64, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.hash = Some(SystemFactory::new(system, |hash| hash)))
+    }
+
+    /// Changes Bevy's plugins for headless Worlds, to leave out some default ones:
+    /// `|usual| usual.build().disable::<AudioPlugin>()`.
+    pub fn headless(self, plugins: impl Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync + 'static) -> Self {
+        self.with(|description| description.plugins = Some(Arc::new(plugins)))
+    }
+}
+
+// The plugin that adds a foreign game to an app.
+
+/// Runs before everything that the game does when the program starts.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct BeforeGame;
+
+/// The game, with the systems between it and its agent.
+struct ForeignPlugin(ForeignGame);
+
+impl Plugin for ForeignPlugin {
+    fn build(&self, app: &mut App) {
+        let description = &self.0.description;
+        add_game(app, description.name, &*description.plugin);
+        if !app.is_plugin_added::<VirtualInputPlugin>() {
+            app.add_plugins(VirtualInputPlugin { route: InputRoute::Messages });
+        }
+        app.init_resource::<LevelSeed>()
+            .add_observer(restart::start)
+            .add_observer(restart::announce)
+            .init_schedule(BeforeGame)
+            .add_systems(BeforeGame, note_baseline);
+        let TickSchedules { decide, judge, .. } = TickSchedules::of(app);
+        app.add_systems(
+            decide,
+            (
+                restart::check.in_set(PlaybotSystems::Load),
+                // Each agent has one controller, so the order of the controllers does not matter.
+                input::decide.in_set(PlaybotSystems::Decide).ambiguous_with(PlaybotSystems::Decide),
+                // No other system presses the inputs of the game's own system.
+                input::act
+                    .in_set(PlaybotSystems::Act)
+                    .after(check_actions)
+                    .after(note_actions)
+                    .ambiguous_with(PlaybotSystems::Act),
+            ),
+        )
+        .add_systems(judge, observe::read_outcome.before(PlaybotSystems::Judge).run_if(is_tick));
+        observe::build(app);
+        if description.place.is_some() {
+            observe::build_place(app);
+        }
+    }
+
+    fn finish(&self, app: &mut App) {
+        let mut order = app.world_mut().resource_mut::<MainScheduleOrder>();
+        let startup = order.startup_labels.clone();
+        order.startup_labels.insert(0, BeforeGame.intern());
+        app.insert_resource(ForeignCell::new(Foreign::new(&self.0, startup)));
+    }
+}
+
+/// Adds the game. Its panic becomes a fault of the first tick, so that it is reported as the game's.
+fn add_game(app: &mut App, name: &str, plugin: &dyn Fn(&mut App)) {
+    let Err(words) = panics::hear(|| plugin(app)) else { return };
+    let mut fault = format!("the game `{name}` panicked when it was added to the app: {words}");
+    if words.contains("plugin was already added") {
+        fault += ". Playbot adds Bevy's own plugins: leave `DefaultPlugins`, or this one of them, out of the function that \
+                  is given to `ForeignGame::new`";
+    }
+    app.world_mut().resource_mut::<Faults>().report(fault);
+}
+
+/// Marks all current entities as not the game's.
+fn note_baseline(world: &mut World) {
+    let baseline = Baseline::of(world);
+    if let Some(cell) = world.get_resource::<ForeignCell>().cloned() {
+        cell.lock().baseline = Some(baseline);
+    }
+}
+
+#[cfg(test)]
+mod game_tests {
+    use super::*;
+
+    /// A game with actions, and no observation yet.
+    fn deaf() -> ForeignGame {
+        ForeignGame::new("mole", 1, |_: &mut App| {}).keys([vec![], vec![KeyCode::Space]])
+    }
+
+    #[test]
+    fn a_camera_stays_said_and_names_the_feature_that_it_needs() {
+        let problem = deaf().camera().problem();
+        assert!(deaf().camera().tools().pictures.has_camera());
+        assert_eq!(problem.is_none(), cfg!(feature = "camera"), "{problem:?}");
+        let missing = nothing_seen("mole", true, false).expect("cannot look");
+        assert!(missing.contains("`mole`") && missing.contains("the feature `camera` of `playbot`"), "{missing}");
+        assert!(nothing_seen("mole", false, true).is_some_and(|text| text.contains("`.camera`")));
+        assert_eq!(nothing_seen("mole", true, true), None);
+    }
+
+    #[test]
+    fn a_game_that_tells_numbers_needs_no_camera_feature() {
+        let both = deaf().observe(["x"], || [0.0]).camera();
+        assert_eq!(both.problem(), None);
+    }
+}

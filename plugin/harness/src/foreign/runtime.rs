@@ -1,0 +1,425 @@
+//! A foreign game in one World.
+
+use crate::foreign::{ForeignGame, paths::ObservedPath};
+use bevy::{
+    ecs::{
+        component::ComponentId,
+        entity::EntityHashSet,
+        resource::IsResource,
+        schedule::InternedScheduleLabel,
+        system::{BoxedSystem, RunSystemError, SystemIdMarker},
+    },
+    input::gamepad::Gamepad,
+    prelude::*,
+    state::state::FreelyMutableState,
+    window::{Monitor, Window},
+};
+use bevy_playbot::{
+    action::ActionValue,
+    agent::{Agent, Control},
+    episode::{Episode, EpisodeEnd},
+    fault::Faults,
+    system_errors,
+};
+use std::{
+    any::{TypeId, type_name},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+};
+
+/// The level that is played, for a game that seeds its generator by it. Inserted before every restart.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
+pub struct LevelSeed(pub u64);
+
+/// The source of the observation.
+pub(super) enum Sensor {
+    System(OwnedSystem<Vec<f32>>),
+    Paths(Vec<ObservedPath>),
+    Nothing,
+}
+
+/// A part of the reward.
+pub(super) struct RewardPart {
+    pub(super) system: OwnedSystem<f32>,
+    /// Whether the growth of the value since the last tick is paid.
+    pub(super) is_delta: bool,
+    pub(super) last: Option<f32>,
+}
+
+/// The [`Foreign`] of a World. It is shared, so that it can be used while its systems have the whole World.
+#[derive(Resource, Clone, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone)]
+pub(super) struct ForeignCell(Arc<Mutex<Foreign>>);
+
+impl ForeignCell {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Foreign> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    pub(super) fn new(foreign: Foreign) -> Self {
+        Self(Arc::new(Mutex::new(foreign)))
+    }
+}
+
+/// The plugin's state of a foreign game in its World.
+pub(super) struct Foreign {
+    pub(super) game: ForeignGame,
+    pub(super) sensor: Sensor,
+    pub(super) place: Option<OwnedSystem<Vec2>>,
+    pub(super) rewards: Vec<RewardPart>,
+    pub(super) end: Option<OwnedSystem<Option<EpisodeEnd>>>,
+    pub(super) ready: Option<OwnedSystem<bool>>,
+    pub(super) level: Option<OwnedSystem<()>>,
+    pub(super) restart: Option<OwnedSystem<()>>,
+    pub(super) act: Option<OwnedSystem<()>>,
+    pub(super) bot: Option<OwnedSystem<ActionValue>>,
+    pub(super) hash: Option<OwnedSystem<u64>>,
+    /// The World before the game started.
+    pub(super) baseline: Option<Baseline>,
+    /// The schedules that run once when a program starts, in order.
+    pub(super) startup: Vec<InternedScheduleLabel>,
+    /// Frames since the last restart.
+    pub(super) frames: u32,
+    /// Whether an episode has started in this World, if each has its own World.
+    pub(super) has_begun: bool,
+}
+
+impl Foreign {
+    pub(super) fn new(game: &ForeignGame, startup: Vec<InternedScheduleLabel>) -> Self {
+        let description = &game.description;
+        let restart = match &description.restart {
+            Restart::Own(own) => match &own.0 {
+                OwnRestartKind::System(system) => Some(system.make()),
+                OwnRestartKind::State(_) => None,
+            },
+            Restart::Startup | Restart::Rebuild => None,
+        };
+        let part = |(system, is_delta): &(SystemFactory<f32>, bool)| RewardPart {
+            system: system.make(),
+            is_delta: *is_delta,
+            last: None,
+        };
+        Self {
+            sensor: description.sensor(),
+            place: description.place.as_ref().map(|system| system.make()),
+            rewards: description.rewards.iter().map(part).collect(),
+            end: description.end.as_ref().map(|system| system.make()),
+            ready: description.ready.as_ref().map(|system| system.make()),
+            level: description.level.as_ref().map(|system| system.make()),
+            restart,
+            act: description.act.as_ref().map(|system| system.make()),
+            bot: description.demonstrator.as_ref().map(|(_, system)| system.make()),
+            hash: description.hash.as_ref().map(|system| system.make()),
+            game: game.clone(),
+            baseline: None,
+            startup,
+            frames: 0,
+            has_begun: false,
+        }
+    }
+
+    /// Returns the level that is played for this number.
+    pub(super) fn level_of(&self, level: u64) -> u64 {
+        self.game.level_of(level)
+    }
+}
+
+/// Returns the agent of the World, if it has a controller.
+pub(super) fn active_agent(world: &mut World) -> Option<Entity> {
+    let mut agents = world.query_filtered::<(Entity, &Control), With<Agent>>();
+    agents.iter(world).find(|(_, control)| control.is_active()).map(|(entity, _)| entity)
+}
+
+/// Returns the agent of the World, if it is playing.
+pub(super) fn playing_agent(world: &mut World) -> Option<Entity> {
+    let agent = active_agent(world)?;
+    world.get::<Episode>(agent).filter(|episode| episode.is_running()).map(|_| agent)
+}
+
+/// Runs a part of the game's description. An error is a fault, and stops the agent.
+pub(super) fn with_foreign<T>(
+    world: &mut World,
+    agent: Entity,
+    work: impl FnOnce(&mut World, &mut Foreign) -> Result<T, String>,
+) -> Option<T> {
+    let cell = world.get_resource::<ForeignCell>()?.clone();
+    let mut foreign = cell.lock();
+    let result = work(world, &mut foreign);
+    let name = foreign.game.description.name;
+    match result {
+        Ok(value) => Some(value),
+        Err(why) => {
+            report(world, agent, name, &why);
+            None
+        }
+    }
+}
+
+/// Reports a fault of the game, and stops its agent.
+fn report(world: &mut World, agent: Entity, game: &str, why: &str) {
+    let index = world.get::<Agent>(agent).map_or(0, |agent| agent.index);
+    let (level, tick) = world.get::<Episode>(agent).map_or((0, 0), |episode| (episode.level, episode.tick));
+    world
+        .resource_mut::<Faults>()
+        .report(format!("agent {index}, level {level}, tick {tick}: the game `{game}`: {why}"));
+    if let Some(mut control) = world.get_mut::<Control>(agent) {
+        *control = Control::Idle;
+    }
+}
+
+// The distinction of the game's entities from those that were there before it, or belong to the plugin.
+
+/// A World before its game has started. Later entities belong to the game.
+pub(super) struct Baseline {
+    entities: EntityHashSet,
+    /// Components of entities that never belong to the game, if they exist.
+    kept: Vec<TypeId>,
+    /// Components of roots of scenes. The entities below them appear when their file is loaded, not in a fixed tick.
+    scenes: Vec<ComponentId>,
+}
+
+impl Baseline {
+    /// Creates the baseline. Call it before the first systems of the game run.
+    pub(super) fn of(world: &mut World) -> Self {
+        let kept = vec![
+            TypeId::of::<Agent>(),
+            TypeId::of::<IsResource>(),
+            TypeId::of::<SystemIdMarker>(),
+            TypeId::of::<Gamepad>(),
+            TypeId::of::<Window>(),
+            TypeId::of::<Monitor>(),
+            #[cfg(feature = "camera")]
+            TypeId::of::<bevy_playbot::camera::SensorCamera>(),
+        ];
+        Self { entities: all(world).collect(), kept, scenes: scene_roots(world) }
+    }
+
+    /// Returns all entities that the game has spawned, in the order of their storage.
+    pub(super) fn spawned(&self, world: &World) -> Vec<Entity> {
+        let kept: Vec<ComponentId> = self.kept.iter().filter_map(|id| world.components().get_id(*id)).collect();
+        let is_kept = |entity: Entity| kept.iter().any(|&component| world.entity(entity).contains_id(component));
+        all(world).filter(|entity| !self.entities.contains(entity) && !is_kept(*entity)).collect()
+    }
+
+    /// Returns whether the game itself decides when and where an entity appears. Parts of a scene do not count: they
+    /// appear when their file is loaded.
+    pub(super) fn is_placed(&self, world: &World, entity: Entity) -> bool {
+        let mut entity = entity;
+        while let Some(parent) = world.get::<ChildOf>(entity).map(ChildOf::parent) {
+            if self.scenes.iter().any(|&scene| world.entity(parent).contains_id(scene)) {
+                return false;
+            }
+            entity = parent;
+        }
+        true
+    }
+}
+
+fn all(world: &World) -> impl Iterator<Item = Entity> + '_ {
+    let archetypes = world.archetypes().iter();
+    archetypes.flat_map(|archetype| archetype.entities().iter().map(|entity| entity.id()))
+}
+
+/// Returns the components of the roots of Bevy's scenes, if this build has them.
+fn scene_roots(world: &mut World) -> Vec<ComponentId> {
+    let Some(registry) = world.get_resource::<AppTypeRegistry>().cloned() else { return Vec::new() };
+    let registry = registry.read();
+    let names = ["WorldAssetRoot", "DynamicWorldRoot"];
+    let roots = names.iter().filter_map(|name| {
+        let component = registry.get_with_short_type_path(name)?.data::<ReflectComponent>()?.clone();
+        Some(component.register_component(world))
+    });
+    roots.collect()
+}
+
+// The ways to restart a foreign game.
+
+/// The way in which a foreign game restarts for each episode.
+#[derive(Clone)]
+#[non_exhaustive]
+pub enum Restart {
+    /// Despawns everything that the game has spawned since the program started, resets the clock to 0, and runs
+    /// `PreStartup`, `Startup` and `PostStartup` again. Resources stay unchanged, unless those systems insert them:
+    /// reset them in [`ForeignGame::level`](crate::foreign::ForeignGame::level).
+    Startup,
+    /// Rebuilds the World, as if the program were started again for each episode. It is the last resort, for games
+    /// whose resources, `Local`s or timers survive [`Startup`](Self::Startup). It takes far longer, loads assets again,
+    /// and works only in Worlds without a window. `Startup` already finds the level in [`LevelSeed`](crate::foreign::LevelSeed).
+    Rebuild,
+    /// The game's own restart: see [`Restart::system`] and [`Restart::state`].
+    Own(OwnRestart),
+}
+
+/// A game's own restart.
+#[derive(Clone)]
+pub struct OwnRestart(pub(super) OwnRestartKind);
+
+#[derive(Clone)]
+pub(super) enum OwnRestartKind {
+    System(SystemFactory<()>),
+    State(Arc<dyn Fn(&mut World) -> Result<(), String> + Send + Sync>),
+}
+
+impl Restart {
+    /// Restarts the game with a system. The clock is reset to 0 before it.
+    pub fn system<M: 'static>(system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static) -> Self {
+        Self::Own(OwnRestart(OwnRestartKind::System(SystemFactory::new(system, |()| ()))))
+    }
+
+    /// Restarts the game by a state: the state is left, if the game is in it, and entered again, with all systems of
+    /// these transitions. The clock is reset to 0 before it.
+    pub fn state<S: FreelyMutableState + Clone>(state: S) -> Self {
+        Self::Own(OwnRestart(OwnRestartKind::State(Arc::new(move |world: &mut World| enter(world, state.clone())))))
+    }
+}
+
+fn enter<S: FreelyMutableState>(world: &mut World, state: S) -> Result<(), String> {
+    let Some(mut next) = world.get_resource_mut::<NextState<S>>() else {
+        return Err(format!("the game has no state of the type `{}`: it must call `init_state`", type_name::<S>()));
+    };
+    next.set(state);
+    world.try_run_schedule(StateTransition).map_err(|_| "the game has no `StatesPlugin`".to_owned())
+}
+
+// Factories of the systems in a game's description, with one system for each World.
+
+/// A factory of copies of a system.
+pub(super) struct SystemFactory<Out: 'static> {
+    name: &'static str,
+    make: Arc<dyn Fn() -> BoxedSystem<(), Out> + Send + Sync>,
+}
+
+impl<Out: 'static> Clone for SystemFactory<Out> {
+    fn clone(&self) -> Self {
+        Self { name: self.name, make: self.make.clone() }
+    }
+}
+
+impl<Out: 'static> SystemFactory<Out> {
+    /// Creates a factory of copies of `system`, whose output is converted.
+    pub(super) fn new<S, Given, M>(system: S, convert: fn(Given) -> Out) -> Self
+    where
+        S: IntoSystem<(), Given, M> + Clone + Send + Sync + 'static,
+        Given: 'static,
+        M: 'static,
+    {
+        let make = move || -> BoxedSystem<(), Out> {
+            Box::new(IntoSystem::into_system(IntoSystem::<(), Given, M>::map(system.clone(), convert)))
+        };
+        Self { name: type_name::<S>(), make: Arc::new(make) }
+    }
+
+    /// Returns the name of the system, for messages.
+    pub(super) fn name(&self) -> &'static str {
+        self.name
+    }
+
+    /// Creates a system for one World.
+    pub(super) fn make(&self) -> OwnedSystem<Out> {
+        OwnedSystem { name: self.name, system: (self.make)(), is_initialized: false }
+    }
+}
+
+/// A system of one World.
+pub(super) struct OwnedSystem<Out: 'static> {
+    name: &'static str,
+    system: BoxedSystem<(), Out>,
+    is_initialized: bool,
+}
+
+impl<Out: 'static> OwnedSystem<Out> {
+    /// Runs the system; `None` if it is skipped, because an entity that it asks for does not exist.
+    ///
+    /// # Errors
+    ///
+    /// The reason why it cannot run, in words.
+    pub(super) fn run(&mut self, world: &mut World) -> Result<Option<Out>, String> {
+        if !self.is_initialized {
+            self.system.initialize(world);
+            self.is_initialized = true;
+        }
+        match self.system.run((), world) {
+            Ok(out) => Ok(Some(out)),
+            Err(RunSystemError::Skipped(_)) => Ok(None),
+            Err(RunSystemError::Failed(error)) => {
+                Err(system_errors::explain(&format!("system `{}`", self.name), &error))
+            }
+        }
+    }
+
+    /// Runs the system as [`run`](Self::run) does, where skipping is an error.
+    ///
+    /// # Errors
+    ///
+    /// The reason why it cannot run, in words.
+    pub(super) fn demand(&mut self, world: &mut World) -> Result<Out, String> {
+        let name = self.name;
+        self.run(world)?.ok_or_else(|| {
+            format!("system `{name}` was skipped: an entity that it asks for does not exist, or there are several")
+        })
+    }
+}
+
+// The return types of a game's own systems.
+
+/// Values of an observation.
+pub trait IntoValues: 'static {
+    /// Returns the values in their order.
+    fn into_values(self) -> Vec<f32>;
+}
+
+impl<const N: usize> IntoValues for [f32; N] {
+    fn into_values(self) -> Vec<f32> {
+        self.into()
+    }
+}
+
+impl IntoValues for Vec<f32> {
+    fn into_values(self) -> Vec<f32> {
+        self
+    }
+}
+
+/// The action of a demonstrator.
+pub trait IntoActionValue: 'static {
+    /// Returns the action.
+    fn into_action(self) -> ActionValue;
+}
+
+impl IntoActionValue for ActionValue {
+    fn into_action(self) -> ActionValue {
+        self
+    }
+}
+
+impl IntoActionValue for u32 {
+    fn into_action(self) -> ActionValue {
+        ActionValue::Discrete(self)
+    }
+}
+
+impl IntoActionValue for usize {
+    fn into_action(self) -> ActionValue {
+        // An invalid number is refused as an action that does not exist.
+        ActionValue::Discrete(u32::try_from(self).unwrap_or(u32::MAX))
+    }
+}
+
+impl IntoActionValue for i32 {
+    fn into_action(self) -> ActionValue {
+        ActionValue::Discrete(u32::try_from(self).unwrap_or(u32::MAX))
+    }
+}
+
+impl<const N: usize> IntoActionValue for [f32; N] {
+    fn into_action(self) -> ActionValue {
+        ActionValue::Continuous(self.into())
+    }
+}
+
+impl IntoActionValue for Vec<f32> {
+    fn into_action(self) -> ActionValue {
+        ActionValue::Continuous(self)
+    }
+}

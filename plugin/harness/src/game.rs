@@ -1,0 +1,488 @@
+//! The contract of a game: what every game has, and the optional tools that it can bring along.
+//!
+//! [`Game`] has what a game needs in order to be built headless and played by bots. [`GameTools`] has everything beyond that,
+//! in groups that are traits of their own: level files and floor plans ([`LevelTools`]), pictures ([`PictureTools`]), bots
+//! ([`BotTools`]) and so on. A game implements the groups it has something for and names them in [`Game::tools`]:
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use playbot_harness::{game::{BotTools, GameTools}, prelude::*};
+//!
+//! struct Coin;
+//!
+//! impl Game for Coin {
+//!     fn name(&self) -> &'static str { "coin" }
+//!     fn version(&self) -> u32 { 1 }
+//!     fn modes(&self) -> &'static [&'static str] { &["default"] }
+//!     fn tick_hz(&self) -> f64 { 60.0 }
+//!     fn actions(&self) -> ActionSpace { ActionSpace::Discrete(2) }
+//!     fn observation(&self) -> ObservationSpace { ObservationSpace { names: vec!["side".into()] } }
+//!     fn build(&self, _app: &mut App, _mode: &str) {}
+//!     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+//!         world.spawn((Agent::new(index, self.actions()), VectorSensor::new(["side"]))).id()
+//!     }
+//!     fn tools(&self) -> GameTools<'_> {
+//!         GameTools { bots: self, ..GameTools::default() }
+//!     }
+//! }
+//!
+//! impl BotTools for Coin {
+//!     fn demonstrator(&self) -> Option<&'static str> {
+//!         Some("tosser")
+//!     }
+//! }
+//!
+//! assert_eq!(Coin.tools().bots.demonstrator(), Some("tosser"));
+//! assert!(Coin.tools().levels.floor_plan("default", 0).is_none());
+//! ```
+//!
+//! A game that wraps another one copies its tools and replaces the groups in which it differs:
+//! `GameTools { benchmarks: self, ..self.0.tools() }`.
+
+use crate::{
+    benchmark::Benchmark,
+    defect::DefectKind,
+    detector::{Detector, LevelProof},
+    floor_plan::FloorPlan,
+    inspect::{ExperimentText, InspectError, LevelRequest, LevelView, Print, TraceRequest},
+    level_files::{LevelDesign, LevelDesigns, LevelFileError, LevelTextError, is_level_files},
+    mode::ModeError,
+};
+use bevy::{app::PluginGroupBuilder, prelude::*};
+use bevy_playbot::{
+    action::ActionSpace,
+    agent::has_no_actions,
+    bot::BlindBot,
+    demo::{file::DemoHeader, recorder::demo_actions},
+    headless::HeadlessPlugins,
+    key_bindings::KeyBindings,
+    observation::{Observation, ObservationSpace},
+    placement::TickPlacement,
+    policy_file::GameCard,
+    unknown_name::UnknownName,
+    vision::Picture,
+};
+use std::sync::Arc;
+
+/// A game that can be trained on and tested without a window.
+///
+/// The first eight methods describe the game. [`tools`](Self::tools) names what it has beyond that, and
+/// [`built_anew`](Self::built_anew) copies a game that cannot be reset. The others follow from these: a game leaves them as
+/// they are.
+pub trait Game: Send + Sync {
+    /// Name in files and on the command line.
+    fn name(&self) -> &'static str;
+
+    /// Version of the rules; raise it whenever an old recording would no longer replay.
+    fn version(&self) -> u32;
+
+    /// Modes, such as difficulties. At least one. Where modes take options, these are the names in front of them.
+    fn modes(&self) -> &'static [&'static str];
+
+    /// Ticks per second of game time.
+    fn tick_hz(&self) -> f64;
+
+    /// Actions of every agent.
+    fn actions(&self) -> ActionSpace;
+
+    /// Observation of every agent.
+    fn observation(&self) -> ObservationSpace;
+
+    /// Adds the game's plugins to a headless app, in a mode that [`check_mode`](Self::check_mode) accepts.
+    fn build(&self, app: &mut App, mode: &str);
+
+    /// Adds one arena with one agent, which must carry [`Agent`](bevy_playbot::agent::Agent) with this number and its sensor,
+    /// under [`Control::Idle`](bevy_playbot::agent::Control::Idle).
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity;
+
+    /// The optional part of the game; by default nothing.
+    fn tools(&self) -> GameTools<'_> {
+        GameTools::default()
+    }
+
+    /// The game again, if its Worlds must be built anew for each episode, because it keeps state that cannot be reset. `None`
+    /// for a game that restarts in the World it has.
+    fn built_anew(&self) -> Option<Arc<dyn Game>> {
+        None
+    }
+
+    /// Checks that there is such a mode: one of [`modes`](Self::modes); or a mode with options that
+    /// [`LevelTools::check_options`] accepts; or level files, each of which [`parse_level`](Self::parse_level) can read.
+    ///
+    /// # Errors
+    ///
+    /// [`ModeError`] with what is valid.
+    fn check_mode(&self, mode: &str) -> Result<(), ModeError> {
+        if is_level_files(mode) {
+            read_level_designs(self, mode)?;
+            return Ok(());
+        }
+        self.tools().levels.check_options(mode).unwrap_or_else(|| {
+            let valid = self.modes();
+            if valid.contains(&mode) { Ok(()) } else { Err(UnknownName::new("mode", mode, valid).into()) }
+        })
+    }
+
+    /// Reads a level that somebody drew, in the game's own format, with [`LevelTools::parse`].
+    ///
+    /// # Errors
+    ///
+    /// The text is no level of the game: what is wrong, and on which line. Or the game has no level files.
+    fn parse_level(&self, text: &str) -> Result<LevelDesign, LevelTextError> {
+        self.tools().levels.parse(text).unwrap_or_else(|| {
+            Err(LevelTextError::whole(format!("`{}` has no level files: name one of its modes", self.name())))
+        })
+    }
+
+    /// A hash of the layout of a level, where different seeds can draw the same one: [`LevelTools::layout_hash`]. For a level
+    /// file it is the hash of the level in it.
+    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
+        if is_level_files(mode) {
+            return level_designs(self, mode).ok()?.hash(level);
+        }
+        self.tools().levels.layout_hash(mode, level)
+    }
+
+    /// Shows a level with [`LevelTools::show`].
+    ///
+    /// # Errors
+    ///
+    /// There is no such level, or the game cannot show any.
+    fn show_level(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
+        self.tools()
+            .levels
+            .show(request)
+            .unwrap_or_else(|| Err(InspectError::Usage(format!("`{}` has no levels to show", self.name()))))
+    }
+
+    /// Why the game cannot be played at all, if so: [`HostTools::unplayable`], or that it has no actions.
+    fn problem(&self) -> Option<String> {
+        self.tools().host.unplayable().or_else(|| {
+            has_no_actions(&self.actions())
+                .then(|| format!("the game `{}` has no actions: say what an agent can do", self.name()))
+        })
+    }
+
+    /// The head of a recording of the game in this mode.
+    fn demo_header(&self, mode: &str) -> DemoHeader {
+        let header = DemoHeader::new(self.name(), self.version(), mode, self.tick_hz(), demo_actions(&self.actions()));
+        if is_level_files(mode) { header.with_level_files() } else { header }
+    }
+
+    /// What policy files say of the game.
+    fn card(&self) -> GameCard<'_> {
+        let GameTools { input, pictures, .. } = self.tools();
+        GameCard {
+            name: self.name(),
+            version: self.version(),
+            observations: self.observation().names,
+            actions: self.actions(),
+            action_names: input.action_names(),
+            has_picture: pictures.picture().is_some() || pictures.has_camera(),
+        }
+    }
+}
+
+/// The optional part of a game, in groups. By default each group is the one of a game that has nothing of the kind.
+///
+/// It holds references only: [`Game::tools`] is cheap enough to be called in every tick.
+#[derive(Clone, Copy)]
+pub struct GameTools<'a> {
+    /// How Worlds are set up.
+    pub host: &'a dyn HostTools,
+    /// Levels without agents: modes with options, files, floor plans, proofs.
+    pub levels: &'a dyn LevelTools,
+    /// The state of an agent that plays.
+    pub state: &'a dyn StateTools,
+    /// Steps as lines of numbers.
+    pub trace: &'a dyn TraceTools,
+    /// Pictures for agents and windows.
+    pub pictures: &'a dyn PictureTools,
+    /// Actions for people.
+    pub input: &'a dyn InputTools,
+    /// Bots that come with the game.
+    pub bots: &'a dyn BotTools,
+    /// Detectors and planted defects.
+    pub tests: &'a dyn TestTools,
+    /// The experiment that is the default.
+    pub training: &'a dyn TrainTools,
+    /// Measurements of speed.
+    pub benchmarks: &'a dyn BenchmarkTools,
+}
+
+/// No tools: all groups with their defaults.
+struct NoTools;
+
+impl HostTools for NoTools {}
+
+impl LevelTools for NoTools {}
+
+impl StateTools for NoTools {}
+
+impl TraceTools for NoTools {}
+
+impl PictureTools for NoTools {}
+
+impl InputTools for NoTools {}
+
+impl BotTools for NoTools {}
+
+impl TestTools for NoTools {}
+
+impl TrainTools for NoTools {}
+
+impl BenchmarkTools for NoTools {}
+
+impl Default for GameTools<'_> {
+    fn default() -> Self {
+        Self {
+            host: &NoTools,
+            levels: &NoTools,
+            state: &NoTools,
+            trace: &NoTools,
+            pictures: &NoTools,
+            input: &NoTools,
+            bots: &NoTools,
+            tests: &NoTools,
+            training: &NoTools,
+            benchmarks: &NoTools,
+        }
+    }
+}
+
+/// How the Worlds of a game are set up.
+pub trait HostTools: Send + Sync {
+    /// Where ticks run. Under [`TickPlacement::Frame`] the game is built into a World with [`HeadlessPlugins`], as
+    /// [`headless_plugins`](Self::headless_plugins) returns them; otherwise into one with time and nothing more.
+    fn placement(&self) -> TickPlacement {
+        TickPlacement::Fixed
+    }
+
+    /// Bevy's plugins for a headless World under [`TickPlacement::Frame`]: all of these, unless the game leaves some out.
+    fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
+        plugins.build()
+    }
+
+    /// The most arenas that one World can hold: 1 for a game with one player or with global resources. `None` for any number.
+    /// More arenas are spread over more Worlds; one agent too many is a fault.
+    fn arenas_per_world(&self) -> Option<u32> {
+        None
+    }
+
+    /// Why the game cannot be played at all, if so. That it has no actions is checked for every game.
+    fn unplayable(&self) -> Option<String> {
+        None
+    }
+}
+
+/// Levels without agents in them.
+pub trait LevelTools: Send + Sync {
+    /// Checks a mode with options behind its name. `None`, by default, for a game whose modes are [`Game::modes`] as they
+    /// are. Level files are no concern of it.
+    fn check_options(&self, _mode: &str) -> Option<Result<(), ModeError>> {
+        None
+    }
+
+    /// The family of a mode: in all modes of a family one seed draws the same level or a related one, so that an agent that
+    /// has trained on it in one mode has seen it in all of them. The mode itself, unless the game has options that change
+    /// rules only.
+    fn family(&self, mode: &str) -> String {
+        mode.to_owned()
+    }
+
+    /// The largest number that a level which the game draws itself can have, in any mode; `None` if every number is one.
+    fn last_level(&self) -> Option<u64> {
+        None
+    }
+
+    /// A hash of the layout of a level that the game draws itself. `None` if different seeds cannot draw the same layout, or
+    /// if all levels of the mode have the same one.
+    fn layout_hash(&self, _mode: &str, _level: u64) -> Option<u64> {
+        None
+    }
+
+    /// Reads a level in the game's own format, or says what is wrong with it and on which line. `None`, by default: the game
+    /// has no level files.
+    ///
+    /// Worlds of level files have the result as the resource [`LevelDesigns`] before the game is built, and the game plays
+    /// its level number i instead of making one.
+    fn parse(&self, _text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
+        None
+    }
+
+    /// A level from above, for pictures of agents' paths; `None` if there is no such picture.
+    fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
+        None
+    }
+
+    /// What is certain about a level: whether its goal can be reached at all. Called for levels that no bot has solved, so
+    /// it may take some milliseconds. Only a search to its end is a proof; a search that gave up proves nothing. By default
+    /// nothing is proved.
+    fn prove(&self, _mode: &str, _level: u64) -> LevelProof {
+        LevelProof::Unknown
+    }
+
+    /// A level for people and programs, or why there is none. `None`, by default: the game cannot show levels.
+    fn show(&self, _request: &LevelRequest) -> Option<Result<LevelView, InspectError>> {
+        None
+    }
+}
+
+/// What can be read from the state of an agent that plays.
+pub trait StateTools: Send + Sync {
+    /// The position of an agent on the [floor plan](LevelTools::floor_plan); `None` if there is no plan, or no level is
+    /// played.
+    fn position(&self, _world: &World, _agent: Entity) -> Option<Vec2> {
+        None
+    }
+
+    /// Why the episode of an agent has just ended without the goal, for people, such as `saw` or `lava`. Called after its last
+    /// tick, before the next episode begins.
+    fn end_cause(&self, _world: &World, _agent: Entity) -> Option<&'static str> {
+        None
+    }
+
+    /// The state of an agent in a few whole numbers, for an explorer that treats states with the same numbers as the same: see
+    /// [`explore`](playbot_test::explore). `None`, by default, for squares of the grid by [`position`](Self::position), or, if that
+    /// is not known, for the downscaled observation.
+    fn explore_cell(&self, _world: &World, _agent: Entity) -> Option<Vec<i32>> {
+        None
+    }
+
+    /// What is certain about the state of an agent that plays: whether its goal can still be reached. Called now and then
+    /// during an episode, so it takes a millisecond at most. By default nothing is proved.
+    fn prove_from(&self, _world: &World, _agent: Entity) -> LevelProof {
+        LevelProof::Unknown
+    }
+}
+
+/// Steps of an agent as lines of numbers: see [`trace_actions`](crate::trace::trace_actions).
+pub trait TraceTools: Send + Sync {
+    /// Names of the numbers that a trace prints after each step. `None`, by default, for the names of the observation.
+    fn columns(&self) -> Option<Vec<String>> {
+        None
+    }
+
+    /// These numbers for an agent; by default its observation.
+    fn row(&self, world: &World, agent: Entity) -> Vec<f32> {
+        world.get::<Observation>(agent).map_or_else(Vec::new, |observation| observation.vector.clone())
+    }
+
+    /// The game's own way of playing given actions and printing the state after each. Returns a last remark, if there is one.
+    /// `None` where [`trace_actions`](crate::trace::trace_actions) does it.
+    fn run(&self, _request: &TraceRequest, _print: Print) -> Option<Result<Option<String>, InspectError>> {
+        None
+    }
+}
+
+/// Pictures of a game, for agents that see them and for windows.
+pub trait PictureTools: Send + Sync {
+    /// How the game is drawn for agents that see pictures; `None` if it cannot be drawn.
+    fn picture(&self) -> Option<Picture> {
+        None
+    }
+
+    /// Adds what is drawn to an app, after [`Game::build`]: sprites, tiles and transforms for everything that the game spawns,
+    /// brought up to date in [`VisionSystems::Sync`](bevy_playbot::vision::VisionSystems::Sync). Needs a
+    /// [`picture`](Self::picture).
+    fn build_picture(&self, _app: &mut App) {}
+
+    /// Whether agents can see the game through a camera of its own, without a [`picture`](Self::picture).
+    fn has_camera(&self) -> bool {
+        false
+    }
+
+    /// Whether windows can show the game in three dimensions, too.
+    fn has_space_view(&self) -> bool {
+        false
+    }
+
+    /// Adds the three-dimensional view to a window's app, with a [`CameraFocus`](crate::inspect::CameraFocus) on agents.
+    fn build_space_view(&self, _app: &mut App) {}
+}
+
+/// Actions for people.
+pub trait InputTools: Send + Sync {
+    /// Names of the discrete choices, or of the dimensions of continuous actions; may be empty.
+    fn action_names(&self) -> Vec<String> {
+        Vec::new()
+    }
+
+    /// The keys with which a person plays; `None` if the game cannot be played by hand.
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        None
+    }
+}
+
+/// Bots that come with a game.
+pub trait BotTools: Send + Sync {
+    /// Bots that every learner is compared with, by name.
+    fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
+        vec![("random", BlindBot::Uniform)]
+    }
+
+    /// Name of the bot that demonstrates the game, if there is one.
+    fn demonstrator(&self) -> Option<&'static str> {
+        None
+    }
+
+    /// Hands an agent over to the demonstrator. `noise` is the probability with which a discrete action is replaced by a
+    /// uniformly random one, or the standard deviation of the normal noise on each value of a continuous one.
+    fn attach_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
+}
+
+/// Detectors and planted defects of a game.
+pub trait TestTools: Send + Sync {
+    /// The game's own detectors, which look for defects in tests beside [those that all games have](playbot_test::detectors). A
+    /// detector with the name of another one takes its place.
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        Vec::new()
+    }
+
+    /// Defects that can be planted into this game, beside [those of all games](playbot_mutation::bugs). A defect with the class of
+    /// another one takes its place.
+    fn defects(&self) -> Vec<DefectKind> {
+        Vec::new()
+    }
+}
+
+/// The experiment of a game.
+pub trait TrainTools: Send + Sync {
+    /// The experiment that is the default of the game; `None` for the plainest one, see
+    /// [`default_experiment`](playbot_train::experiment::default_experiment).
+    fn experiment(&self) -> Option<ExperimentText> {
+        None
+    }
+}
+
+/// Measurements of a game's speed.
+pub trait BenchmarkTools: Send + Sync {
+    /// What is measured. `None`, by default, for random actions and PPO, on state vectors, in the game's first mode.
+    fn benchmarks(&self) -> Option<Vec<Benchmark>> {
+        None
+    }
+
+    /// Another game that is played for one of the [`benchmarks`](Self::benchmarks), such as the same one with physics; `None`
+    /// for the game itself.
+    fn benchmarked(&self, _benchmark: &Benchmark) -> Option<&dyn Game> {
+        None
+    }
+}
+
+/// The level files of a mode, as they were when they were read last: [`LevelDesigns::of`] this game.
+///
+/// # Errors
+///
+/// The mode names no files, or one of them cannot be read or is no level of this game.
+pub fn level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDesigns, LevelFileError> {
+    LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text))
+}
+
+/// The level files of a mode, as they are on disk now: [`LevelDesigns::read`] for this game.
+///
+/// # Errors
+///
+/// As for [`level_designs`].
+pub fn read_level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDesigns, LevelFileError> {
+    LevelDesigns::read(game.name(), mode, &|text| game.parse_level(text))
+}

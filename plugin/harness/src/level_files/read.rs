@@ -1,0 +1,219 @@
+//! Level files, read once for all Worlds of a verb.
+
+use crate::level_files::{
+    DrawnLevel, LevelDesign,
+    error::{LevelFileError, LevelTextError},
+    find_level_files,
+};
+use std::{
+    collections::BTreeMap,
+    fs,
+    fs::File,
+    io,
+    io::Read,
+    path::Path,
+    sync::{Arc, Mutex, PoisonError},
+};
+use thiserror::Error;
+
+/// Largest size of a level file, bytes: the largest levels with some white space.
+const MOST_BYTES: u64 = 32 << 20;
+
+/// All levels of a pattern, in order.
+pub(super) type DrawnLevels = Arc<Vec<DrawnLevel>>;
+
+/// A game's parser of levels.
+pub(super) type Parse<'a> = &'a dyn Fn(&str) -> Result<LevelDesign, LevelTextError>;
+
+/// The files of a pattern as last read.
+struct Snapshot {
+    /// Path and text of each.
+    texts: Vec<(String, String)>,
+    /// Parsed levels by the game's name.
+    designs: Mutex<BTreeMap<String, DrawnLevels>>,
+}
+
+/// Snapshots by pattern. All Worlds of a verb play the same levels even if a file is saved meanwhile, and each file
+/// is read and parsed once.
+static READ: Mutex<BTreeMap<String, Arc<Snapshot>>> = Mutex::new(BTreeMap::new());
+
+/// Reads the files from the disk.
+pub(super) fn read_now(game: &str, pattern: &str, parse: Parse) -> Result<DrawnLevels, LevelFileError> {
+    let texts: Result<Vec<_>, _> =
+        find_level_files(pattern)?.into_iter().map(|path| read_text(&path).map(|text| (path, text))).collect();
+    let snapshot = Arc::new(Snapshot { texts: texts?, designs: Mutex::default() });
+    let designs = snapshot.designs(game, parse)?;
+    READ.lock().unwrap_or_else(PoisonError::into_inner).insert(pattern.to_owned(), snapshot);
+    Ok(designs)
+}
+
+/// Returns the files as last read, and reads them first if needed.
+pub(super) fn as_read(game: &str, pattern: &str, parse: Parse) -> Result<DrawnLevels, LevelFileError> {
+    let known = READ.lock().unwrap_or_else(PoisonError::into_inner).get(pattern).cloned();
+    match known {
+        Some(snapshot) => snapshot.designs(game, parse),
+        None => read_now(game, pattern, parse),
+    }
+}
+
+impl Snapshot {
+    fn designs(&self, game: &str, parse: Parse) -> Result<DrawnLevels, LevelFileError> {
+        let mut known = self.designs.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(designs) = known.get(game) {
+            return Ok(designs.clone());
+        }
+        let designs = Arc::new(understand_all(&self.texts, parse)?);
+        known.insert(game.to_owned(), designs.clone());
+        Ok(designs)
+    }
+}
+
+/// Parses all levels. If several are invalid, the error names them all.
+fn understand_all(texts: &[(String, String)], parse: Parse) -> Result<Vec<DrawnLevel>, LevelFileError> {
+    let (mut drawn, mut first, mut others) = (Vec::new(), None, Vec::new());
+    for (path, text) in texts {
+        match understand(path, text, parse) {
+            Ok(level) => drawn.push(level),
+            Err(error) if first.is_none() => first = Some(error),
+            Err(_) => others.push(path.clone()),
+        }
+    }
+    match first {
+        None => Ok(drawn),
+        Some(error) if others.is_empty() => Err(error),
+        Some(error) => Err(LevelFileError::Several { first: Box::new(error), others }),
+    }
+}
+
+/// Reads the level in a file.
+pub(super) fn read_one(path: &str, parse: Parse) -> Result<DrawnLevel, LevelFileError> {
+    understand(path, &read_text(path)?, parse)
+}
+
+fn understand(path: &str, text: &str, parse: Parse) -> Result<DrawnLevel, LevelFileError> {
+    match parse(text) {
+        Ok(design) => Ok(DrawnLevel { path: path.to_owned(), design }),
+        Err(error) => Err(LevelFileError::Text { path: path.to_owned(), error }),
+    }
+}
+
+fn read_text(path: &str) -> Result<String, LevelFileError> {
+    let path = path.to_owned();
+    read_text_file(Path::new(&path), MOST_BYTES).map_err(|error| match error {
+        TextFileError::Unreadable(error) => LevelFileError::Unreadable { path, why: error.to_string() },
+        TextFileError::NotAFile => LevelFileError::NotAFile { path },
+        TextFileError::TooLarge { bytes, most } => LevelFileError::TooLarge { path, bytes, most },
+        TextFileError::NoText { line, byte } => LevelFileError::NoText { path, line, byte },
+    })
+}
+
+// Safe reading of text files of unknown origin.
+
+/// Failure to read a file as text.
+#[derive(Debug, Error)]
+pub enum TextFileError {
+    /// The operating system refused.
+    #[error(transparent)]
+    Unreadable(#[from] io::Error),
+    /// Not a regular file.
+    #[error("it is a folder, a pipe or a device, not a regular file")]
+    NotAFile,
+    /// The file is larger than any file of its kind.
+    #[error("it has {bytes} bytes, and such a file has at most {most}: name another file")]
+    TooLarge {
+        /// Size, as far as it was read.
+        bytes: u64,
+        /// Largest size of a file of its kind, bytes.
+        most: u64,
+    },
+    /// The file is not UTF-8.
+    #[error("line {line}: byte {byte} of the line is not UTF-8: save it as UTF-8, or name another file")]
+    NoText {
+        /// Line, from 1.
+        line: usize,
+        /// Byte of the line, from 1.
+        byte: usize,
+    },
+}
+
+impl From<TextFileError> for io::Error {
+    fn from(error: TextFileError) -> Self {
+        match error {
+            TextFileError::Unreadable(error) => error,
+            other => Self::new(io::ErrorKind::InvalidData, other.to_string()),
+        }
+    }
+}
+
+/// Returns the text of a regular file of at most `most` bytes. Neither waits nor takes more memory, whatever the path
+/// is.
+///
+/// # Errors
+///
+/// [`TextFileError`].
+pub fn read_text_file(path: &Path, most: u64) -> Result<String, TextFileError> {
+    // Opening a pipe would wait for a writer.
+    if !fs::metadata(path)?.is_file() {
+        return Err(TextFileError::NotAFile);
+    }
+    let file = File::open(path)?;
+    let bytes = file.metadata()?.len();
+    if bytes > most {
+        return Err(TextFileError::TooLarge { bytes, most });
+    }
+    let mut read = Vec::new();
+    // Some files report no size.
+    file.take(most.saturating_add(1)).read_to_end(&mut read)?;
+    if read.len() as u64 > most {
+        return Err(TextFileError::TooLarge { bytes: read.len() as u64, most });
+    }
+    String::from_utf8(read).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
+        let byte = 1 + before.iter().rev().take_while(|&&byte| byte != b'\n').count();
+        TextFileError::NoText { line, byte }
+    })
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
+        Ok(LevelDesign::new((), text))
+    }
+
+    #[test]
+    fn what_is_no_regular_file_is_refused_and_not_waited_for() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let pipe = folder.path().join("pipe.json");
+        let made = std::process::Command::new("mkfifo").arg(&pipe).status();
+        let mut refused = vec!["/dev/null".to_owned(), folder.path().display().to_string()];
+        if made.is_ok_and(|status| status.success()) {
+            refused.push(pipe.display().to_string());
+        }
+        for path in refused {
+            let error = read_one(&path, &parse).map(drop).expect_err("no file");
+            assert_eq!(error, LevelFileError::NotAFile { path: path.clone() });
+        }
+    }
+}
+
+#[cfg(test)]
+mod text_file_tests {
+    use super::*;
+
+    #[test]
+    fn a_text_is_read_up_to_its_limit_and_not_beyond() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("a.txt");
+        fs::write(&path, "four").expect("writable");
+        assert_eq!(read_text_file(&path, 4).expect("four bytes"), "four");
+        let error = read_text_file(&path, 3).expect_err("too long").to_string();
+        assert_eq!(error, "it has 4 bytes, and such a file has at most 3: name another file");
+        fs::write(&path, b"a\nbc\xff").expect("writable");
+        let error = read_text_file(&path, 100).expect_err("no text").to_string();
+        assert!(error.starts_with("line 2: byte 3 of the line"), "{error}");
+        assert!(matches!(read_text_file(folder.path(), 100), Err(TextFileError::NotAFile)));
+    }
+}

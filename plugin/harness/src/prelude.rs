@@ -1,0 +1,8 @@
+//! What a game needs that is trained and tested, also in its own `cargo test`, and the prelude of [`bevy_playbot`].
+
+pub use crate::{
+    game::{Game, GameTools},
+    sensors::GameSensors,
+    split::LevelSplit,
+};
+pub use bevy_playbot::prelude::*;

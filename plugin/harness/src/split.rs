@@ -1,0 +1,338 @@
+//! Named ranges of levels, which keep training levels and held-out levels apart.
+
+use crate::{
+    game::{Game, level_designs},
+    level_files::{LevelFileError, find_level_files, is_level_files, level_file_pattern},
+    mode::ModeError,
+};
+use bevy_playbot::level::LevelFile;
+use playbot_learner::{HasExitCode, SeenLevels};
+use serde::{Deserialize, Serialize};
+use std::{collections::BTreeSet, fmt, str::FromStr};
+use thiserror::Error;
+
+/// Largest number of levels in a split: more would not fit in memory as a list.
+const MAX_LEVELS: u64 = 1 << 24;
+
+/// Levels `first..=last` of one mode of a game. Written `hard:64..127`, both ends included.
+///
+/// Levels from files are written `files:levels/**/*.json`, which counts the matching files when it is read. A range
+/// may follow: `files:levels/**/*.json:0..9`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct LevelSplit {
+    /// Mode of the game, such as `easy` or `hard`.
+    pub mode: String,
+    /// First level.
+    pub first: u64,
+    /// Last level, included.
+    pub last: u64,
+}
+
+impl LevelSplit {
+    /// Returns the number of levels, at least 1.
+    pub fn len(&self) -> u64 {
+        self.last - self.first + 1
+    }
+
+    /// Returns false: a split has at least one level.
+    pub fn is_empty(&self) -> bool {
+        false
+    }
+
+    /// Iterates over all levels in order.
+    pub fn levels(&self) -> impl Iterator<Item = u64> + use<> {
+        self.first..=self.last
+    }
+
+    /// Returns whether it has this level of this mode.
+    pub fn contains(&self, mode: &str, level: u64) -> bool {
+        self.mode == mode && (self.first..=self.last).contains(&level)
+    }
+
+    /// Checks that a game has all of these levels, and reads those from files.
+    ///
+    /// # Errors
+    ///
+    /// [`ModeError`] with the valid values.
+    pub fn check(&self, game: &dyn Game) -> Result<(), ModeError> {
+        game.check_mode(&self.mode)?;
+        check_level(game, &self.mode, self.last)
+    }
+
+    /// Returns the fewest ranges that hold exactly these levels of a mode, which ascend.
+    pub fn ranges(mode: &str, levels: &[u64]) -> Vec<Self> {
+        let runs = levels.chunk_by(|one, next| one + 1 == *next);
+        let range = |run: &[u64]| Some(Self { mode: mode.to_owned(), first: *run.first()?, last: *run.last()? });
+        runs.filter_map(range).collect()
+    }
+
+    /// Returns whether a level belongs to both.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        self.mode == other.mode && self.first <= other.last && other.first <= self.last
+    }
+}
+
+impl fmt::Display for LevelSplit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}:{}..{}", self.mode, self.first, self.last)
+    }
+}
+
+/// Checks that a [valid](Game::check_mode) mode has a level, and reads levels from files.
+///
+/// # Errors
+///
+/// [`ModeError`] with the last level of the mode.
+pub fn check_level(game: &dyn Game, mode: &str, level: u64) -> Result<(), ModeError> {
+    let mode = mode.to_owned();
+    if is_level_files(&mode) {
+        let count = level_designs(game, &mode)?.count();
+        return if level < count { Ok(()) } else { Err(LevelFileError::NoLevel { mode, level, count }.into()) };
+    }
+    match game.tools().levels.last_level() {
+        Some(last) if level > last => Err(ModeError::NoLevel { mode, level, last }),
+        _ => Ok(()),
+    }
+}
+
+/// Returns the level files that a text probably means.
+fn files_like(text: &str) -> &str {
+    if text.ends_with(".json") { text } else { "levels/*.json" }
+}
+
+/// Text that is not a valid split.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum SplitError {
+    /// The text has another form.
+    #[error(
+        "`{}` is not a range of levels: write mode:first..last, both ends included, such as hard:64..127, or name level files, \
+         as in files:{}", .0, files_like(.0)
+    )]
+    NotARange(String),
+    /// The range goes backwards.
+    #[error("`{text}`: first level {first} is after last level {last}; write {mode}:{last}..{first}")]
+    Reversed {
+        /// The text.
+        text: String,
+        /// Mode of the range.
+        mode: String,
+        /// First level of the range.
+        first: u64,
+        /// Last level of the range.
+        last: u64,
+    },
+    /// Too many levels.
+    #[error("`{0}` has too many levels: a range has at most 16,777,216")]
+    TooMany(String),
+    /// Missing level files.
+    #[error(transparent)]
+    Files(#[from] LevelFileError),
+}
+
+impl HasExitCode for SplitError {}
+
+/// Parses `4..9` or `4`.
+fn range(text: &str) -> Option<(u64, u64)> {
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    Some((first.parse().ok()?, last.parse().ok()?))
+}
+
+impl FromStr for LevelSplit {
+    type Err = SplitError;
+
+    fn from_str(text: &str) -> Result<Self, SplitError> {
+        let parse = || {
+            let (mode, levels) = if is_level_files(text) { text.rsplit_once(':') } else { text.split_once(':') }?;
+            let (first, last) = range(levels)?;
+            let is_whole = !mode.is_empty() && is_level_files(mode) == is_level_files(text);
+            is_whole.then(|| (mode.to_owned(), first, last))
+        };
+        if let (Some(pattern), None) = (level_file_pattern(text), parse()) {
+            let count = find_level_files(pattern)?.len() as u64;
+            return Ok(Self { mode: text.to_owned(), first: 0, last: count - 1 });
+        }
+        let (mode, first, last) = parse().ok_or_else(|| SplitError::NotARange(text.to_owned()))?;
+        if first > last {
+            return Err(SplitError::Reversed { text: text.to_owned(), mode, first, last });
+        }
+        if last - first >= MAX_LEVELS {
+            return Err(SplitError::TooMany(text.to_owned()));
+        }
+        Ok(Self { mode, first, last })
+    }
+}
+
+impl TryFrom<String> for LevelSplit {
+    type Error = SplitError;
+
+    fn try_from(text: String) -> Result<Self, SplitError> {
+        text.parse()
+    }
+}
+
+impl From<LevelSplit> for String {
+    fn from(split: LevelSplit) -> Self {
+        split.to_string()
+    }
+}
+
+// Held-out levels, and checks that other levels do not show them.
+
+/// Largest number of levels that are drawn and compared, which bounds the time for a range from a file.
+const MOST_COMPARED: u64 = 1 << 18;
+
+/// Held-out levels, kept unseen before the test: also under another mode's rules, or under another seed that draws
+/// the same level.
+pub struct HeldOut<'a> {
+    game: &'a dyn Game,
+    split: &'a LevelSplit,
+    family: String,
+    fingerprints: BTreeSet<u64>,
+}
+
+impl<'a> HeldOut<'a> {
+    /// Holds out a split of a game whose mode has been checked with [`Game::check_mode`].
+    pub fn new(game: &'a dyn Game, split: &'a LevelSplit) -> Self {
+        let fingerprints = split.levels().filter_map(|level| game.fingerprint(&split.mode, level)).collect();
+        Self { game, split, family: game.tools().levels.family(&split.mode), fingerprints }
+    }
+
+    /// Returns the levels as they were named.
+    pub fn split(&self) -> &LevelSplit {
+        self.split
+    }
+
+    /// Returns whether this level is held out, or looks like one that is.
+    pub fn contains(&self, mode: &str, level: u64) -> bool {
+        let is_named =
+            self.split.contains(&self.split.mode, level) && self.game.tools().levels.family(mode) == self.family;
+        is_named || self.game.fingerprint(mode, level).is_some_and(|print| self.fingerprints.contains(&print))
+    }
+
+    /// Returns whether the level in this file is held out, under any number.
+    pub fn contains_file(&self, file: &LevelFile) -> bool {
+        self.fingerprints.contains(&file.hash)
+    }
+
+    /// Returns the first of these levels that is held out.
+    pub fn first_of(&self, levels: &LevelSplit) -> Option<u64> {
+        self.first_by_number(levels).or_else(|| self.first_by_look(levels))
+    }
+
+    fn first_by_number(&self, levels: &LevelSplit) -> Option<u64> {
+        let (first, last) = (levels.first.max(self.split.first), levels.last.min(self.split.last));
+        (first <= last && self.game.tools().levels.family(&levels.mode) == self.family).then_some(first)
+    }
+
+    fn first_by_look(&self, levels: &LevelSplit) -> Option<u64> {
+        if self.fingerprints.is_empty() {
+            return None;
+        }
+        levels.levels().find(|&level| self.contains(&levels.mode, level))
+    }
+
+    /// Describes the levels of `seen` that are held out; `None` if there are no such levels, or if the seen levels
+    /// are unknown.
+    ///
+    /// All levels of all ranges are compared by their numbers, and those of the first ranges by their looks.
+    pub fn shown_by(&self, seen: Option<&SeenLevels>) -> Option<String> {
+        let seen = seen.filter(|seen| seen.game == self.game.name())?;
+        // Files are compared by their content: a pattern from an unknown source is not looked up on the disk.
+        let ranges = seen.levels.iter().filter(|range| !is_level_files(range));
+        let ranges = ranges.filter_map(|range| range.parse::<LevelSplit>().ok());
+        // Ranges of a mode that the game no longer has are skipped.
+        let known: Vec<_> = ranges.filter(|range| self.game.check_mode(&range.mode).is_ok()).collect();
+        let by_number = || known.iter().find(|range| self.first_by_number(range).is_some());
+        let by_look = || {
+            let mut left = MOST_COMPARED;
+            let mut near = known.iter().take_while(|range| {
+                let is_near = range.len() <= left;
+                left = left.saturating_sub(range.len());
+                is_near
+            });
+            near.find(|range| self.first_by_look(range).is_some())
+        };
+        let shown = by_number().or_else(by_look).map(|range| range.to_string());
+        let shown = shown.or_else(|| self.file_of(&seen.level_files))?;
+        let is_all = seen.levels.len() + seen.level_files.len() == 1;
+        Some(if is_all { shown } else { format!("{shown}, among others") })
+    }
+
+    /// Returns the first held-out file whose hash is among these.
+    fn file_of(&self, hashes: &[u64]) -> Option<String> {
+        if !hashes.iter().any(|hash| self.fingerprints.contains(hash)) {
+            return None;
+        }
+        let mode = &self.split.mode;
+        let is_shown = |level: &u64| {
+            let fingerprint = self.game.fingerprint(mode, *level);
+            fingerprint.is_some_and(|print| hashes.contains(&print))
+        };
+        self.split.levels().find(is_shown).map(|level| format!("{mode}:{level}"))
+    }
+}
+
+/// Returns the levels that training on `train` shows. Files are noted by their present content.
+pub fn seen_by_training(game: &dyn Game, train: &LevelSplit) -> SeenLevels {
+    let game_name = game.name().to_owned();
+    if is_level_files(&train.mode) {
+        let level_files = train.levels().filter_map(|level| game.fingerprint(&train.mode, level)).collect();
+        return SeenLevels { game: game_name, levels: Vec::new(), level_files };
+    }
+    SeenLevels { game: game_name, levels: vec![train.to_string()], level_files: Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_form_reads_back() {
+        let split: LevelSplit = "hard:64..127".parse().expect("a split");
+        assert_eq!((split.first, split.last, split.len()), (64, 127, 64));
+        assert_eq!(split.to_string(), "hard:64..127");
+        assert_eq!("easy:7".parse::<LevelSplit>().expect("one level").len(), 1);
+        for bad in ["", "hard", "hard:9..3", ":1..2", "hard:a..b", "hard:-1..2", "easy:0..18446744073709551615"] {
+            assert!(bad.parse::<LevelSplit>().is_err(), "{bad} was taken");
+        }
+        let words = |text: &str| text.parse::<LevelSplit>().expect_err("no split").to_string();
+        assert_eq!(words("easy:9..3"), "`easy:9..3`: first level 9 is after last level 3; write easy:3..9");
+        assert!(words("easy:0..16777216").contains("at most 16,777,216"));
+        assert_eq!("easy:0..16777215".parse::<LevelSplit>().expect("just as many").len(), MAX_LEVELS);
+    }
+
+    #[test]
+    fn files_are_counted_unless_there_are_numbers_behind_them() {
+        let split: LevelSplit = "files:no/such/*.json:3..9".parse().expect("nothing is looked for");
+        assert_eq!((split.mode.as_str(), split.first, split.last), ("files:no/such/*.json", 3, 9));
+        assert_eq!(split.to_string(), "files:no/such/*.json:3..9");
+        assert_eq!("files:a.json:2".parse::<LevelSplit>().expect("one file").len(), 1);
+        let folder = tempfile::tempdir().expect("a folder");
+        for name in ["b.json", "a.json"] {
+            std::fs::write(folder.path().join(name), "").expect("writable");
+        }
+        let text = format!("files:{}/*.json", folder.path().display());
+        let counted: LevelSplit = text.parse().expect("two files");
+        assert_eq!(counted.to_string(), format!("{text}:0..1"));
+        assert_eq!(counted.to_string().parse(), Ok(counted));
+        let words = "files:no/such/*.json".parse::<LevelSplit>().expect_err("no files").to_string();
+        assert!(words.contains("files:no/such/*.json matches no file"), "{words}");
+        assert!("files:a.json:9..3".parse::<LevelSplit>().is_err());
+    }
+
+    #[test]
+    fn a_level_belongs_to_a_split_of_its_mode() {
+        let split: LevelSplit = "hard:64..127".parse().expect("a split");
+        assert!(split.contains("hard", 64) && split.contains("hard", 127));
+        assert!(!split.contains("hard", 63) && !split.contains("hard", 128) && !split.contains("easy", 64));
+    }
+
+    #[test]
+    fn overlap_needs_the_same_mode() {
+        let split = |text: &str| text.parse::<LevelSplit>().expect("a split");
+        assert!(split("hard:0..63").overlaps(&split("hard:63..80")));
+        assert!(!split("hard:0..63").overlaps(&split("hard:64..127")));
+        assert!(!split("hard:0..63").overlaps(&split("easy:0..63")));
+    }
+}

@@ -1,0 +1,199 @@
+//! The layout of one image's pixels in memory.
+
+use crate::tile::LANES;
+
+/// Unused numbers after the last one of every image: vectors and tiles may read, but never use, numbers behind a row.
+const SLACK: usize = 16;
+
+/// An image with its channels last, in a border of zeros.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Grid {
+    pub(super) channels: usize,
+    pub(super) height: usize,
+    pub(super) width: usize,
+    pub(super) border: usize,
+}
+
+impl Grid {
+    /// Numbers from one row to the next.
+    pub(super) fn row(self) -> usize {
+        (self.width + 2 * self.border) * self.channels
+    }
+
+    /// Returns the numbers of the image with its border and the readable numbers behind it.
+    pub(super) fn len(self) -> usize {
+        (self.height + 2 * self.border) * self.row() + SLACK
+    }
+
+    /// Numbers without the border.
+    pub(super) fn numbers(self) -> usize {
+        self.channels * self.height * self.width
+    }
+
+    /// Returns the position at which a pixel begins.
+    pub(super) fn at(self, y: usize, x: usize) -> usize {
+        (y + self.border) * self.row() + (x + self.border) * self.channels
+    }
+
+    /// Returns the position at which each pixel begins, row by row.
+    pub(super) fn places(self) -> Vec<usize> {
+        (0..self.height).flat_map(|y| (0..self.width).map(move |x| self.at(y, x))).collect()
+    }
+
+    /// Writes zeros into the border, and behind the image.
+    pub(super) fn clear_border(self, values: &mut [f32]) {
+        let (side, row) = (self.border * self.channels, self.row());
+        let inside = self.border * row..(self.border + self.height) * row;
+        values[..inside.start].fill(0.0);
+        values[inside.end..self.len()].fill(0.0);
+        for row in values[inside].chunks_exact_mut(row.max(1)) {
+            row[..side].fill(0.0);
+            row[side + self.width * self.channels..].fill(0.0);
+        }
+    }
+
+    /// Returns the rows without the border.
+    pub(super) fn rows(self, values: &[f32]) -> impl Iterator<Item = &[f32]> {
+        (0..self.height).map(move |y| &values[self.at(y, 0)..][..self.width * self.channels])
+    }
+
+    /// Returns the rows without the border.
+    pub(super) fn rows_mut(self, values: &mut [f32]) -> impl Iterator<Item = &mut [f32]> {
+        let from = self.border * (self.row() + self.channels);
+        let rows = values[from..].chunks_mut(self.row().max(1)).take(self.height);
+        rows.map(move |row| &mut row[..self.width * self.channels])
+    }
+
+    /// Reads an image `[channels, height, width]`; the border is unchanged.
+    pub(super) fn read(self, image: &[f32], values: &mut [f32]) {
+        for (y, row) in self.rows_mut(values).enumerate() {
+            for c in 0..self.channels {
+                let from = &image[(c * self.height + y) * self.width..][..self.width];
+                row.iter_mut().skip(c).step_by(self.channels).zip(from).for_each(|(to, from)| *to = *from);
+            }
+        }
+    }
+
+    /// Writes the image as `[channels, height, width]`, each number after `change`.
+    pub(super) fn write(self, values: &[f32], image: &mut [f32], change: impl Fn(f32) -> f32) {
+        for (y, row) in self.rows(values).enumerate() {
+            for c in 0..self.channels {
+                let to = &mut image[(c * self.height + y) * self.width..][..self.width];
+                to.iter_mut().zip(row.iter().skip(c).step_by(self.channels)).for_each(|(to, from)| *to = change(*from));
+            }
+        }
+    }
+}
+
+// Sizes of a convolution, and the orders of its weights.
+
+/// Returns the number of positions of a kernel or pooling window along a side of `size` pixels; `None` if it does not
+/// fit.
+pub fn window_places(size: usize, kernel: usize, stride: usize, padding: usize) -> Option<usize> {
+    let room = size.saturating_add(2 * padding).checked_sub(kernel)?;
+    Some(room / stride + 1)
+}
+
+/// Sizes of a convolution with a square kernel.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct ConvShape {
+    pub(super) inputs: usize,
+    pub(super) outputs: usize,
+    pub(super) kernel: usize,
+    pub(super) stride: usize,
+    pub(super) padding: usize,
+}
+
+impl ConvShape {
+    /// Returns the number of weights and biases.
+    pub(super) fn params(self) -> usize {
+        self.outputs * (self.inputs * self.kernel * self.kernel + 1)
+    }
+
+    /// Returns whether the output is as large as the input: the gradient of the input is then a convolution, too.
+    pub(super) fn same(self) -> bool {
+        self.stride == 1 && 2 * self.padding + 1 == self.kernel
+    }
+
+    /// Visits each weight's number and position, in the order `[outputs, inputs, kernel, kernel]`.
+    pub(super) fn each_weight(self, mut visit: impl FnMut(usize, Place)) {
+        let side = self.kernel;
+        let mut number = 0;
+        for o in 0..self.outputs {
+            for i in 0..self.inputs {
+                for y in 0..side {
+                    for x in 0..side {
+                        visit(number, Place { o, i, y, x });
+                        number += 1;
+                    }
+                }
+            }
+        }
+    }
+
+    /// Returns row and lane of a weight in the order for [`correlate`](crate::tile::correlate).
+    pub(super) fn forward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
+        let rows = self.kernel * self.kernel * self.inputs;
+        (o / LANES * rows + (y * self.kernel + x) * self.inputs + i, o % LANES)
+    }
+
+    /// Returns the rows in the order for [`correlate`](crate::tile::correlate).
+    pub(super) fn forward_rows(self) -> usize {
+        self.outputs.div_ceil(LANES) * self.kernel * self.kernel * self.inputs
+    }
+
+    /// Returns row and lane of a weight in the order for the gradient of the input.
+    pub(super) fn backward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
+        if self.same() {
+            let rows = self.kernel * self.kernel * self.outputs;
+            let turned = (self.kernel - 1 - y) * self.kernel + self.kernel - 1 - x;
+            (i / LANES * rows + turned * self.outputs + o, i % LANES)
+        } else {
+            let (tiles, at) = ((self.kernel * self.inputs).div_ceil(LANES), x * self.inputs + i);
+            ((y * tiles + at / LANES) * self.outputs + o, at % LANES)
+        }
+    }
+
+    /// Returns the rows in the order for the gradient of the input.
+    pub(super) fn backward_rows(self) -> usize {
+        if self.same() {
+            self.inputs.div_ceil(LANES) * self.kernel * self.kernel * self.outputs
+        } else {
+            (self.kernel * self.inputs).div_ceil(LANES) * self.kernel * self.outputs
+        }
+    }
+}
+
+/// A weight's output and input channel, row and column.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place {
+    pub(super) o: usize,
+    pub(super) i: usize,
+    pub(super) y: usize,
+    pub(super) x: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_image_comes_back_and_its_border_stays() {
+        let grid = Grid { channels: 2, height: 3, width: 4, border: 1 };
+        let image: Vec<f32> = (1..=24).map(|i| i as f32).collect();
+        let mut values = vec![0.0; grid.len()];
+        grid.read(&image, &mut values);
+        assert_eq!(values.iter().sum::<f32>(), 300.0);
+        // The second channel of the pixel in row 1, column 2.
+        assert_eq!(values[grid.at(1, 2) + 1], 19.0);
+        let mut dirty = vec![7.0; grid.len()];
+        grid.clear_border(&mut dirty);
+        grid.read(&image, &mut dirty);
+        assert_eq!(dirty, values, "whatever was there before");
+        let inside: f32 = grid.places().iter().map(|&at| values[at] + values[at + 1]).sum();
+        assert_eq!(inside, 300.0);
+        let mut back = vec![0.0; 24];
+        grid.write(&values, &mut back, |x| x);
+        assert_eq!(back, image);
+    }
+}

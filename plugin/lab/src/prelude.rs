@@ -1,9 +1,0 @@
-//! What a game needs that is trained and tested, also in its own `cargo test`, and the prelude of [`bevy_playbot`].
-
-pub use bevy_playbot::prelude::*;
-
-pub use crate::{
-    game::{Game, GameTools},
-    sensors::GameSensors,
-    split::LevelSplit,
-};

@@ -1,0 +1,451 @@
+//! Policies: networks that act, networks that estimate values, and the frozen snapshot of both.
+
+mod actor;
+mod inputs;
+
+use crate::{
+    Action, ActionSpace, LearnError, ObsKind, ObsSlice, PolicySpec,
+    device::guarded,
+    nn::{
+        CnnKind, HostDist, ImageNet, argmax, categorical_log_prob, frozen, gaussian_log_prob, host, sample_categorical,
+        sample_gaussian, squashed_log_prob, unsquashed_action, vector,
+    },
+    norm::ObsStats,
+};
+use burn::tensor::{Device, Tensor};
+use playbot_kernels::host_numbers::is_host;
+use rand::Rng;
+use std::sync::Arc;
+
+pub use crate::policy::{
+    actor::{Actor, Critic, LogStd, NetShape, StdKind},
+    inputs::NetInput,
+};
+pub(crate) use crate::policy::{
+    actor::{ActorShape, InputWidths, StdShape},
+    inputs::{InputBuilder, StateBatch, joined_rows},
+};
+
+// A frozen policy for play.
+
+/// Number of rows that the networks read at a time. The result of a row does not depend on the others.
+pub(crate) const VECTORS_AT_A_TIME: usize = 2048;
+
+/// The same for images, whose activations are many times as large.
+const IMAGES_AT_A_TIME: usize = 256;
+
+/// An inference snapshot of an actor and, if there is one, its critic.
+///
+/// Clones share the weights. A clone per thread needs no locks. A row's numbers do not depend on the other rows of
+/// the batch or on the number of threads.
+#[derive(Clone, Debug)]
+pub struct Policy {
+    pub(crate) actor: Actor,
+    pub(crate) critic: Option<Critic>,
+    pub(crate) stats: Option<Arc<ObsStats>>,
+    spec: PolicySpec,
+    device: Device,
+}
+
+impl Policy {
+    /// Creates a snapshot of `actor` and `critic`, which must match `spec`.
+    pub(crate) fn new(
+        actor: &Actor,
+        critic: Option<&Critic>,
+        stats: Option<Arc<ObsStats>>,
+        spec: PolicySpec,
+        device: Device,
+    ) -> Self {
+        Self { actor: frozen(actor), critic: critic.map(frozen), stats, spec, device }
+    }
+
+    /// Returns its inputs and outputs.
+    pub fn spec(&self) -> PolicySpec {
+        self.spec
+    }
+
+    /// Returns its action space.
+    pub fn action_space(&self) -> ActionSpace {
+        self.spec.action_space
+    }
+
+    /// Returns the width of the skill it reads; 0 if it ignores skills.
+    pub fn latent(&self) -> usize {
+        self.spec.latent
+    }
+
+    /// Returns the kind of its observations.
+    pub fn observation(&self) -> ObsKind {
+        self.spec.obs
+    }
+
+    /// Numbers in the observation it reads.
+    pub fn obs_dim(&self) -> usize {
+        self.spec.obs.numbers()
+    }
+
+    /// Returns whether its networks see normalised observations. Its inputs are raw all the same.
+    pub fn normalises(&self) -> bool {
+        self.stats.is_some()
+    }
+
+    /// Returns whether it computes on the CPU.
+    pub fn is_on_host(&self) -> bool {
+        is_host(&self.device)
+    }
+
+    /// Returns the convolutions that read its images; `None` for vectors.
+    pub fn cnn(&self) -> Option<CnnKind> {
+        self.actor.cnn.as_ref().map(ImageNet::kind)
+    }
+
+    /// Distributions and values for `n` observations.
+    ///
+    /// `z` is `n * latent` (ignored if [`Self::latent`] is 0), `obs` is `n * obs_dim`.
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`] for inputs of the wrong length; [`LearnError::Config`] for vectors in place of images,
+    /// or the other way round; [`LearnError::NotFinite`] if an output is NaN or infinite.
+    pub fn forward<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<PolicyOutput, LearnError> {
+        self.forward_held(z, &[], obs, n)
+    }
+
+    /// Does [`Self::forward`] for skills with the remaining shares `left`, `n` or empty, as in
+    /// [`Rollout::left`](crate::Rollout::left), for critics that count ticks.
+    ///
+    /// # Errors
+    /// As [`Self::forward`].
+    pub fn forward_held<'a>(
+        &self,
+        z: &[f32],
+        left: &[f32],
+        obs: impl Into<ObsSlice<'a>>,
+        n: usize,
+    ) -> Result<PolicyOutput, LearnError> {
+        let (mut head, mut log_std, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        let dim = self.spec.action_space.dim();
+        self.for_each_chunk(StateBatch { z, left, obs: obs.into(), n }, |x, left, rows| {
+            let dist = self.actor.forward(x.clone()).to_host()?;
+            head.extend_from_slice(&dist.head[..rows * dim]);
+            if let Some(stds) = dist.log_std {
+                log_std.extend_from_slice(&stds[..rows * dim]);
+            }
+            self.append_values(x, left, rows, &mut values)
+        })?;
+        for (name, numbers) in [("actor output", &head), ("actor log_std", &log_std), ("critic output", &values)] {
+            // A log-probability may be -infinity without harm.
+            if numbers.iter().any(|x| x.is_nan() || *x == f32::INFINITY) {
+                return Err(LearnError::NotFinite { tensor: name.to_owned(), steps: None });
+            }
+        }
+        Ok(PolicyOutput { space: self.spec.action_space, squashed: self.actor.is_squashed(), head, log_std, values })
+    }
+
+    /// Returns only the values of [`Self::forward`]; zeros if there is no critic.
+    ///
+    /// # Errors
+    /// As [`Self::forward`].
+    pub fn values<'a>(&self, z: &[f32], obs: impl Into<ObsSlice<'a>>, n: usize) -> Result<Vec<f32>, LearnError> {
+        self.values_held(z, &[], obs, n)
+    }
+
+    /// Returns only the values of [`Self::forward_held`]; zeros if there is no critic.
+    ///
+    /// # Errors
+    /// As [`Self::forward`].
+    pub fn values_held<'a>(
+        &self,
+        z: &[f32],
+        left: &[f32],
+        obs: impl Into<ObsSlice<'a>>,
+        n: usize,
+    ) -> Result<Vec<f32>, LearnError> {
+        if self.critic.is_none() {
+            return Ok(vec![0.0; n]);
+        }
+        let mut values = Vec::with_capacity(n);
+        let states = StateBatch { z, left, obs: obs.into(), n };
+        self.for_each_chunk(states, |x, left, rows| self.append_values(x, left, rows, &mut values))?;
+        Ok(values)
+    }
+
+    /// Adds the values of the first `rows` joined inputs.
+    fn append_values(
+        &self,
+        x: Tensor<2>,
+        left: Option<Tensor<1>>,
+        rows: usize,
+        values: &mut Vec<f32>,
+    ) -> Result<(), LearnError> {
+        match &self.critic {
+            Some(critic) => values.extend_from_slice(&host(critic.forward(x, left))?[..rows]),
+            None => values.resize(values.len() + rows, 0.0),
+        }
+        Ok(())
+    }
+
+    /// Calls `read` with the joined inputs of some states at a time, the remaining shares of their skills, and their
+    /// number, until all were read.
+    ///
+    /// The inputs have at least two rows. Matrix libraries sum a single row in another order than the rows of a
+    /// matrix, and a lone agent must act like one of many.
+    fn for_each_chunk(
+        &self,
+        states: StateBatch<'_>,
+        mut read: impl FnMut(Tensor<2>, Option<Tensor<1>>, usize) -> Result<(), LearnError>,
+    ) -> Result<(), LearnError> {
+        let StateBatch { z, left, obs, n } = states;
+        if n == 0 {
+            return Ok(());
+        }
+        let PolicySpec { obs: kind, latent, .. } = &self.spec;
+        obs.check_size("observations", kind, n)?;
+        if *latent > 0 {
+            LearnError::check("skills", n * latent, z.len())?;
+        }
+        if !left.is_empty() {
+            LearnError::check("remaining shares of skills", n, left.len())?;
+        }
+        let inputs = InputBuilder { z, latent: *latent, obs, kind, stats: self.stats.as_deref() };
+        let chunk = match kind {
+            ObsKind::Vector(_) => VECTORS_AT_A_TIME,
+            ObsKind::Image(_) => IMAGES_AT_A_TIME,
+        };
+        guarded(&self.device, || {
+            for start in (0..n).step_by(chunk) {
+                let rows: Vec<usize> = (start..(start + chunk).min(n)).collect();
+                let len = rows.len();
+                let x = self.actor.join(&inputs.input(&rows, &self.device))?;
+                let left = left.get(rows[0]..rows[0] + len).map(|left| vector(left.to_vec(), &self.device));
+                match len {
+                    1 => read(x.repeat_dim(0, 2), left.map(|left| left.repeat_dim(0, 2)), len)?,
+                    _ => read(x, left, len)?,
+                }
+            }
+            Ok(())
+        })
+    }
+}
+
+// The outputs of a policy for a batch of observations.
+
+/// Action distributions and values, one row per observation, in host memory.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PolicyOutput {
+    /// The action space of the rows.
+    pub space: ActionSpace,
+    /// True if a continuous action is the tanh of a normal number, which `head` and `log_std` then describe.
+    pub squashed: bool,
+    /// Normalised log-probabilities (discrete) or means (continuous), `n * dim`.
+    pub head: Vec<f32>,
+    /// Logarithms of the standard deviations, `n * dim`; empty if discrete.
+    pub log_std: Vec<f32>,
+    /// Estimated returns, `n`; zeros if the policy has no critic.
+    pub values: Vec<f32>,
+}
+
+impl PolicyOutput {
+    /// Returns the number of rows.
+    pub fn len(&self) -> usize {
+        self.values.len()
+    }
+
+    /// Returns whether there are no rows.
+    pub fn is_empty(&self) -> bool {
+        self.values.is_empty()
+    }
+
+    /// Draws an action for `row` and returns it with its log-probability (or log-density).
+    ///
+    /// Takes one draw from `rng` for a discrete action, one per dimension for a continuous one.
+    ///
+    /// # Panics
+    /// If `row` is not below [`Self::len`].
+    pub fn sample<R: Rng + ?Sized>(&self, row: usize, rng: &mut R) -> (Action, f32) {
+        let head = self.head(row);
+        match self.space {
+            ActionSpace::Discrete(_) => {
+                let index = sample_categorical(head, rng);
+                (Action::Discrete(index), categorical_log_prob(head, index))
+            }
+            ActionSpace::Continuous(_) => {
+                let action = sample_gaussian(head, self.stds(row), rng);
+                if self.squashed {
+                    let log_prob = squashed_log_prob(head, self.stds(row), &action);
+                    return (Action::Continuous(squash(&action)), log_prob);
+                }
+                let log_prob = gaussian_log_prob(head, self.stds(row), &action);
+                (Action::Continuous(action), log_prob)
+            }
+        }
+    }
+
+    /// Returns the most likely action of `row`: the first of the most likely choices, or the mean (squashed: its
+    /// tanh, the median).
+    ///
+    /// # Panics
+    /// If `row` is not below [`Self::len`].
+    pub fn greedy(&self, row: usize) -> Action {
+        match self.space {
+            ActionSpace::Discrete(_) => Action::Discrete(argmax(self.head(row))),
+            ActionSpace::Continuous(_) if self.squashed => Action::Continuous(squash(self.head(row))),
+            ActionSpace::Continuous(_) => Action::Continuous(self.head(row).to_vec()),
+        }
+    }
+
+    /// Returns the log-probability (or log-density) of `action` in `row`. A squashed action beyond ±(1 - 1e-6), where
+    /// single precision cannot resolve the normal number, is clamped there; one beyond ±1 has density 0.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] if the action is not in the space.
+    ///
+    /// # Panics
+    /// If `row` is not below [`Self::len`].
+    pub fn log_prob(&self, row: usize, action: &Action) -> Result<f32, LearnError> {
+        match (self.space, action) {
+            (ActionSpace::Discrete(n), Action::Discrete(a)) if (*a as usize) < n => {
+                Ok(categorical_log_prob(self.head(row), *a))
+            }
+            (ActionSpace::Continuous(n), Action::Continuous(a)) if a.len() == n && self.squashed => {
+                if a.iter().any(|x| x.abs() > 1.0) {
+                    return Ok(f32::NEG_INFINITY);
+                }
+                Ok(squashed_log_prob(self.head(row), self.stds(row), &unsquash(a)))
+            }
+            (ActionSpace::Continuous(n), Action::Continuous(a)) if a.len() == n => {
+                Ok(gaussian_log_prob(self.head(row), self.stds(row), a))
+            }
+            (space, action) => Err(LearnError::Action(format!("{action:?} among {space}"))),
+        }
+    }
+
+    /// Splits the outputs into these numbers of rows, in order.
+    ///
+    /// # Panics
+    /// If there are more rows in `sizes` than [`Self::len`].
+    pub fn split(mut self, sizes: &[usize]) -> Vec<Self> {
+        let (dim, stds) = (self.space.dim(), self.log_std.len().checked_div(self.len()).unwrap_or_default());
+        let parts = sizes.iter().map(|&rows| Self {
+            space: self.space,
+            squashed: self.squashed,
+            head: self.head.drain(..rows * dim).collect(),
+            log_std: self.log_std.drain(..rows * stds).collect(),
+            values: self.values.drain(..rows).collect(),
+        });
+        parts.collect()
+    }
+
+    /// Returns the distributions alone.
+    pub(crate) fn into_dist(self) -> HostDist {
+        let log_std = (!self.log_std.is_empty()).then_some(self.log_std);
+        HostDist { dim: self.space.dim(), head: self.head, log_std }
+    }
+
+    fn head(&self, row: usize) -> &[f32] {
+        let dim = self.space.dim();
+        &self.head[row * dim..(row + 1) * dim]
+    }
+
+    fn stds(&self, row: usize) -> &[f32] {
+        let dim = self.space.dim();
+        &self.log_std[row * dim..(row + 1) * dim]
+    }
+}
+
+fn squash(numbers: &[f32]) -> Vec<f32> {
+    numbers.iter().map(|x| x.tanh()).collect()
+}
+
+fn unsquash(action: &[f32]) -> Vec<f32> {
+    action.iter().map(|&a| unsquashed_action(a)).collect()
+}
+
+#[cfg(test)]
+mod output_tests {
+    use super::*;
+    use crate::rng::Streams;
+
+    fn output(mean: f32, std: f32) -> PolicyOutput {
+        PolicyOutput {
+            space: ActionSpace::Continuous(1),
+            squashed: true,
+            head: vec![mean],
+            log_std: vec![std.ln()],
+            values: vec![0.0],
+        }
+    }
+
+    #[test]
+    fn squashed_densities_add_up_to_one() {
+        let output = output(0.4, 0.7);
+        let n = 20_000;
+        let width = 2.0 / n as f32;
+        let density = |i: usize| {
+            let action = -1.0 + (i as f32 + 0.5) * width;
+            f64::from(output.log_prob(0, &Action::Continuous(vec![action])).expect("fits")).exp()
+        };
+        let total: f64 = (0..n).map(density).sum::<f64>() * f64::from(width);
+        assert!((total - 1.0).abs() < 1e-3, "{total}");
+        assert_eq!(output.log_prob(0, &Action::Continuous(vec![1.5])).expect("fits"), f32::NEG_INFINITY);
+    }
+
+    #[test]
+    fn squashed_draws_carry_their_own_density() {
+        let output = output(-0.3, 0.5);
+        let mut rng = Streams::new(1).stream("draw", 0);
+        let mut below = 0;
+        for _ in 0..4000 {
+            let (action, log_prob) = output.sample(0, &mut rng);
+            assert!((output.log_prob(0, &action).expect("fits") - log_prob).abs() < 1e-3);
+            let Action::Continuous(a) = action else { panic!("continuous") };
+            assert!(a[0].abs() <= 1.0);
+            below += usize::from(a[0] < (-0.3f32).tanh());
+        }
+        assert!((1850..2150).contains(&below), "half of the draws lie below the median: {below}");
+        let Action::Continuous(median) = output.greedy(0) else { panic!("continuous") };
+        assert!((median[0] - (-0.3f32).tanh()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn gaussian_draws_carry_their_own_density_beyond_the_range_too() {
+        let output = PolicyOutput { squashed: false, ..output(0.9, 0.5) };
+        let mut rng = Streams::new(1).stream("draw", 0);
+        let mut beyond = 0;
+        for _ in 0..1000 {
+            let (action, log_prob) = output.sample(0, &mut rng);
+            let Action::Continuous(a) = &action else { panic!("continuous") };
+            beyond += usize::from(a[0] > 1.0);
+            let density = (-0.5 * ((a[0] - 0.9) / 0.5).powi(2)).exp() / (0.5 * std::f32::consts::TAU.sqrt());
+            assert!((log_prob - density.ln()).abs() < 1e-4, "{a:?}");
+            assert_eq!(output.log_prob(0, &action).expect("fits"), log_prob);
+        }
+        // P(z > 0.2) = 0.42.
+        assert!((370..470).contains(&beyond), "{beyond} of 1000 lie beyond 1");
+    }
+
+    #[test]
+    fn parts_are_rows_of_the_whole() {
+        let whole = |rows: std::ops::Range<usize>| PolicyOutput {
+            head: rows.clone().map(|row| row as f32).collect(),
+            log_std: rows.clone().map(|row| -(row as f32)).collect(),
+            values: rows.map(|row| 10.0 * row as f32).collect(),
+            ..output(0.0, 1.0)
+        };
+        assert_eq!(whole(0..6).split(&[1, 0, 3, 2]), [whole(0..1), whole(1..1), whole(1..4), whole(4..6)]);
+        let discrete = PolicyOutput {
+            space: ActionSpace::Discrete(2),
+            head: vec![1.0, 2.0, 3.0, 4.0],
+            log_std: Vec::new(),
+            values: vec![5.0, 6.0],
+            squashed: false,
+        };
+        let parts = discrete.split(&[1, 1]);
+        assert_eq!((&parts[1].head[..], &parts[1].values[..]), (&[3.0, 4.0][..], &[6.0][..]));
+    }
+
+    #[test]
+    fn the_edge_of_a_squashed_action_has_a_finite_density() {
+        let output = output(9.0, 1.0);
+        assert!(output.log_prob(0, &Action::Continuous(vec![1.0])).expect("fits").is_finite());
+    }
+}

@@ -1,0 +1,361 @@
+//! Proximal policy optimisation (Schulman et al. 2017), with or without a skill decoder.
+
+mod batch;
+mod config;
+mod metrics;
+mod objective;
+mod on_device;
+mod step;
+
+use crate::{
+    DeviceKind, FileError, LearnError, ObsKind, ObsSlice, Observations, PolicySpec, Rollout,
+    device::{guarded, update_on},
+    file::{FileKind, TensorFile},
+    learner::{Checkpoint, Learner, LearnerBase, LearnerMetrics},
+    nn::{Adam, AdamConfig, ParamVisitor, Parameters, RandomInit, path, tracked},
+    policy::{Actor, ActorShape, Critic, NetShape, Policy, StateBatch, StdShape},
+    ppo::{
+        batch::{Batch, JoinedRows, minibatches},
+        metrics::Has,
+        on_device::{Reports, SentRollout},
+        step::{Moment, step_in_parts},
+    },
+    rng::ChaCha8Rng,
+    score::{ScoreConfig, Teacher, TeacherOutput, TiedTo},
+    skill::SkillModel,
+};
+use playbot_kernels::host_numbers::is_host;
+use serde::{Deserialize, Serialize};
+use std::{cell::Cell, path::Path, time::Instant};
+
+pub use crate::ppo::{
+    config::PpoConfig,
+    metrics::{RatioStats, StepMetrics, UpdateMetrics, explained_variance, ratio_stats},
+    objective::{Advantages, PpoBatch, PpoLoss, gae, normalize_advantages, ppo_loss},
+    step::{Minibatch, gradient_step},
+};
+
+// The PPO learner, which is SCORE-PPO if it is given a skill model.
+
+const FILE: FileKind = FileKind { name: "ppo checkpoint", version: 1 };
+
+/// Improves a policy from rollouts.
+///
+/// Without a skill model this is PPO; with one it is SCORE-PPO (see [`crate::score`]). The numbers depend only on the
+/// settings, the seed and the rollouts.
+#[derive(Debug)]
+pub struct PpoLearner {
+    config: PpoConfig,
+    pub(crate) base: LearnerBase,
+    pub(crate) nets: PpoNets,
+    adam: Adam,
+}
+
+/// The counters in a checkpoint.
+#[derive(Serialize, Deserialize, Debug)]
+struct Counters {
+    adam_steps: u64,
+}
+
+impl PpoLearner {
+    /// Creates plain PPO with starting weights from `seed`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] for impossible settings.
+    pub fn new(config: PpoConfig, spec: PolicySpec, seed: u64, device: DeviceKind) -> Result<Self, LearnError> {
+        Self::fresh(config, spec, None, seed, device)
+    }
+
+    /// Creates SCORE-PPO: tied to `model`'s decoder by the settings of `score`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] for impossible settings.
+    pub fn with_skill(
+        config: PpoConfig,
+        score: ScoreConfig,
+        model: &SkillModel,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
+        let teacher = Teacher::new(score, TiedTo::Decoder, model, device)?;
+        Self::fresh(config, teacher.policy_spec(), Some(teacher), seed, device)
+    }
+
+    /// Creates PPO with starting weights, tied to `teacher` if there is one.
+    pub(crate) fn fresh(
+        config: PpoConfig,
+        spec: PolicySpec,
+        teacher: Option<Teacher>,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<Self, LearnError> {
+        let base = Self::new_base(&config, spec, teacher, seed, device)?;
+        let nets = guarded(&base.device.plain(), || PpoNets::fresh(&config, &base))?;
+        Ok(Self::with_nets(config, base, &nets))
+    }
+
+    fn new_base(
+        config: &PpoConfig,
+        spec: PolicySpec,
+        teacher: Option<Teacher>,
+        seed: u64,
+        device: DeviceKind,
+    ) -> Result<LearnerBase, LearnError> {
+        config.validate()?;
+        if config.norm_obs && matches!(spec.obs, ObsKind::Image(_)) {
+            let text = "ppo norm_obs is for vectors: the pixels of images are divided by 255 instead";
+            return Err(LearnError::Config(text.to_owned()));
+        }
+        config.check_observation(&spec.obs)?;
+        let rewards = config.norm_reward.then(|| config.reward_normalizer());
+        LearnerBase::new(spec, teacher, rewards, config.norm_obs, seed, device)
+    }
+
+    fn with_nets(config: PpoConfig, base: LearnerBase, nets: &PpoNets) -> Self {
+        let PpoConfig { adam_eps: eps, weight_decay, .. } = config;
+        let adam = Adam::new(AdamConfig { eps, weight_decay, ..AdamConfig::default() });
+        Self { config, base, nets: tracked(nets), adam }
+    }
+
+    /// Returns the settings.
+    pub fn config(&self) -> &PpoConfig {
+        &self.config
+    }
+
+    /// Reads a file that [`Learner::save`] wrote. The learner continues exactly as the saved one would have.
+    ///
+    /// # Errors
+    /// [`FileError`] describes the problem of the file, or names the tensor that is missing, superfluous or
+    /// misshapen.
+    pub fn load(path: &Path, device: DeviceKind) -> Result<Self, FileError> {
+        Self::stored(TensorFile::read(path)?, device)
+    }
+
+    /// Reads a file in memory as [`Self::load`] does.
+    pub(crate) fn stored(file: TensorFile, device: DeviceKind) -> Result<Self, FileError> {
+        let mut saved = Checkpoint::<PpoConfig, Counters>::of(file, FILE, device)?;
+        let base = Self::new_base(&saved.config, saved.spec, saved.teacher.take(), saved.seed, device);
+        let base = base.map_err(|e| saved.file.learner(e))?;
+        let nets = PpoNets::stored(&saved.config, &base, &mut saved.file)?;
+        let mut learner = Self::with_nets(saved.config.clone(), base, &nets);
+        saved.file.take_adam(&mut learner.adam, "", &mut learner.nets, saved.counters.adam_steps)?;
+        saved.finish(&mut learner.base)?;
+        Ok(learner)
+    }
+
+    /// Returns the file that [`Learner::save`] writes.
+    pub(crate) fn checkpoint(&self, path: &Path) -> Result<TensorFile, FileError> {
+        let counters = Counters { adam_steps: self.adam.steps };
+        self.base.checkpoint(path, FILE, &self.config, &counters, |file| {
+            file.put_network("", &self.nets)?;
+            file.put_adam(&self.adam)?;
+            Ok(())
+        })
+    }
+}
+
+impl Learner for PpoLearner {
+    fn base(&self) -> &LearnerBase {
+        &self.base
+    }
+
+    /// Returns the policy that plays, with its critic.
+    fn policy(&self) -> Policy {
+        self.base.snapshot(&self.nets.actor, Some(&self.nets.critic))
+    }
+
+    fn learn(&mut self, rollout: &Rollout) -> Result<LearnerMetrics, LearnError> {
+        Ok(LearnerMetrics::new(self.update(rollout)?.scalars()))
+    }
+
+    fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
+        self.base.initial_kl(&self.policy(), self.base.updates == 0, StateBatch { z, left: &[], obs, n })
+    }
+
+    /// Saves the learner. Weights are called `actor.l0.weight` (`[inputs, outputs]`), moments
+    /// `adam.m.actor.l0.weight`.
+    fn save(&self, path: &Path) -> Result<(), FileError> {
+        self.checkpoint(path)?.write()
+    }
+
+    fn set_total_updates(&mut self, total: Option<u64>) {
+        self.config.total_updates = total;
+    }
+}
+
+// One update from top to bottom: rollout → advantages → minibatches → loss → step. Its formulas are in
+// `objective.rs`.
+
+impl PpoLearner {
+    /// Trains on a rollout: epochs × minibatches gradient steps.
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, and
+    /// [`LearnError::Input`] if it holds numbers that are not finite, before anything is changed.
+    /// [`LearnError::NotFinite`] and [`LearnError::Exploded`] name the number that diverged; the learner is unusable
+    /// then, as after [`LearnError::DeviceFailed`].
+    pub fn update(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
+        update_on(&self.base.device.plain(), || self.update_here(rollout))
+    }
+
+    fn update_here(&mut self, rollout: &Rollout) -> Result<UpdateMetrics, LearnError> {
+        rollout.check_for(&self.base.spec, self.base.rollout_latent())?;
+        let rewards = match &mut self.base.rewards {
+            Some(normalizer) => normalizer.normalize(&rollout.rewards, &rollout.done(), rollout.envs)?,
+            None => rollout.rewards.clone(),
+        };
+        let config = &self.config;
+        let estimate = gae(rollout, &rewards, config.gamma, config.lambda, config.time_limit);
+        let explained_variance = explained_variance(&rollout.values, &estimate.returns);
+        let latent = self.base.spec.latent;
+        let teacher = self.teacher_output(rollout)?;
+        let start = Instant::now();
+        let joined = JoinedRows::of(rollout, latent, self.base.obs_stats().as_deref());
+        let batch = Batch {
+            rollout,
+            advantages: estimate.advantages,
+            returns: estimate.returns,
+            teacher,
+            latent,
+            joined,
+            norm_adv: config.norm_adv,
+            augment: (config.augment.clone(), self.base.streams.stream("ppo.augment", self.base.updates).into()),
+            gathering: Cell::new(start.elapsed()),
+        };
+        let lr = config.lr_at(self.base.updates);
+        let score = self.base.score_config().map(|score| score.at(self.base.updates, config.total_updates));
+        let is_warming_up = self.base.updates < config.critic_warmup;
+        self.prepare_adam(is_warming_up);
+        let moment = Moment { lr, score: score.as_ref(), is_warming_up };
+        let mut rng = self.base.streams.stream("ppo.minibatches", self.base.updates);
+        let sum = if is_host(&self.base.device.plain()) {
+            self.steps(&batch, &mut rng, &moment)?
+        } else {
+            self.steps_on_device(&batch, &mut rng, &moment)?
+        };
+        self.base.updates += 1;
+        self.base.gathering += batch.gathering.get();
+        if let (Some(normalizer), Observations::Vector(values)) = (&mut self.base.observations, &rollout.obs) {
+            normalizer.update(values);
+        }
+        let steps = self.config.epochs * self.config.minibatches.min(rollout.rows());
+        let has = Has { penalty: batch.teacher.is_some(), augmentation: !self.config.augment.is_empty() };
+        Ok(UpdateMetrics::mean(&sum, steps, has, explained_variance, lr))
+    }
+
+    /// Restarts Adam when the policy begins to learn. While the critic warms up the policy's gradients are zero: the
+    /// moments stay 0 while their bias correction wears off, so its first steps would be several times too long.
+    /// Before that there is no weight decay, either.
+    fn prepare_adam(&mut self, is_warming_up: bool) {
+        let PpoConfig { critic_warmup, weight_decay, .. } = self.config;
+        let config = AdamConfig { weight_decay: if is_warming_up { 0.0 } else { weight_decay }, ..self.adam.config };
+        if critic_warmup > 0 && self.base.updates == critic_warmup {
+            self.adam = Adam::new(config);
+        }
+        self.adam.config = config;
+    }
+
+    fn steps(
+        &mut self,
+        batch: &Batch<'_>,
+        rng: &mut ChaCha8Rng,
+        moment: &Moment<'_>,
+    ) -> Result<StepMetrics, LearnError> {
+        let device = self.base.device.plain();
+        let mut sum = StepMetrics::default();
+        for rows in minibatches(&self.config, batch.rollout.rows(), rng) {
+            let parts = batch.parts(&rows, self.nets.actor.cnn.as_ref(), moment.score, &device);
+            let step = step_in_parts(&mut self.nets, &mut self.adam, parts, &self.config, moment)?;
+            sum.add(&step, 1.0);
+        }
+        Ok(sum)
+    }
+
+    fn steps_on_device(
+        &mut self,
+        batch: &Batch<'_>,
+        rng: &mut ChaCha8Rng,
+        moment: &Moment<'_>,
+    ) -> Result<StepMetrics, LearnError> {
+        let start = Instant::now();
+        let sent = SentRollout::send(batch, &self.base.device.plain());
+        batch.gathered(start);
+        let (mut reports, before) = (Reports::default(), self.adam.steps());
+        for rows in minibatches(&self.config, batch.rollout.rows(), rng) {
+            let minibatch = sent.minibatch(&rows);
+            reports.step(&mut self.nets, &mut self.adam, &minibatch, &self.config, moment)?;
+        }
+        reports.sum(before)
+    }
+
+    /// Returns the decoder's outputs for the whole rollout: it is frozen, so once per update is enough.
+    fn teacher_output(&self, rollout: &Rollout) -> Result<Option<TeacherOutput>, LearnError> {
+        let Some(teacher) = &self.base.teacher else { return Ok(None) };
+        let mut rng = self.base.streams.stream("score.own_samples", self.base.updates);
+        let states = StateBatch { z: &rollout.z, left: &[], obs: rollout.obs.as_slice(), n: rollout.rows() };
+        teacher.output(states, &rollout.actions, false, &mut rng, self.base.device)
+    }
+}
+
+// Actor and critic as one set of parameters.
+
+/// The networks of PPO: the parameters `actor.*` and `critic.*`, whose gradients are clipped together. The trunk of
+/// images, `actor.cnn.*`, is the critic's too.
+#[derive(Clone, Debug)]
+pub struct PpoNets {
+    /// The policy.
+    pub actor: Actor,
+    /// The value function.
+    pub critic: Critic,
+}
+
+impl PpoNets {
+    /// Creates a copy of the decoder, or starting weights from the stream `ppo.actor`, and a critic with some from
+    /// `ppo.critic`.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] if images are too small for the convolutions.
+    fn fresh(config: &PpoConfig, base: &LearnerBase) -> Result<Self, LearnError> {
+        let (shape, device) = (actor_shape(config, base), base.device.plain());
+        let actor = match base.copied_teacher() {
+            Some(teacher) => teacher.origin().clone(),
+            None => shape.fresh(&base.spec, &base.streams, "ppo.actor", &device)?,
+        };
+        let mut rng = base.streams.stream("ppo.critic", 0);
+        let critic = Critic::new(&critic_shape(config, &shape), &mut rng, &device);
+        let counts = base.score_config().is_some_and(|score| score.critic_clock);
+        let Ok(critic) =
+            if counts { critic.with_clock(&mut RandomInit { rng: &mut rng, device: &device }, "") } else { Ok(critic) };
+        Ok(Self { actor, critic })
+    }
+
+    /// Reads the networks of a checkpoint.
+    ///
+    /// # Errors
+    /// [`FileError`] names the first tensor that is missing or misshapen.
+    fn stored(config: &PpoConfig, base: &LearnerBase, file: &mut TensorFile) -> Result<Self, FileError> {
+        let (shape, device) = (actor_shape(config, base), base.device.plain());
+        let actor = shape.stored(&base.spec, file, "actor", &device)?;
+        Ok(Self { actor, critic: critic_shape(config, &shape).stored_critic(file, "critic", &device)? })
+    }
+}
+
+/// Returns the layers of the network that it copies, if it is a copy, else those of the settings.
+fn actor_shape(config: &PpoConfig, base: &LearnerBase) -> ActorShape {
+    match base.copied_teacher() {
+        Some(teacher) => teacher.shape(),
+        None => ActorShape::new(&base.spec, &config.cnn, &config.hidden, config.activation, StdShape::Vector),
+    }
+}
+
+/// Returns the shape of the critic, which reads the same inputs as the actor's layers, through layers of its own.
+fn critic_shape(config: &PpoConfig, actor: &ActorShape) -> NetShape {
+    NetShape { hidden: config.hidden.clone(), activation: config.activation, ..actor.net }
+}
+
+impl Parameters for PpoNets {
+    fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
+        self.actor.visit(&path(prefix, "actor"), visitor);
+        self.critic.visit(&path(prefix, "critic"), visitor);
+    }
+}

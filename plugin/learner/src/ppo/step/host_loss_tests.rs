@@ -1,0 +1,143 @@
+//! Tests against the loss as a graph of tensors.
+
+use crate::{
+    DeviceKind,
+    nn::{ActionBatch, matrix, vector},
+    policy::NetInput,
+    ppo::{
+        objective::PpoBatch,
+        step::{Losses, *},
+    },
+    rng::{ChaCha8Rng, Streams, normal},
+    score::{ScoreConfig, TeacherBatch},
+};
+use burn::tensor::Device;
+use rand::RngExt;
+
+fn numbers(rng: &mut ChaCha8Rng, n: usize, scale: f32) -> Vec<f32> {
+    (0..n).map(|_| normal(rng) * scale).collect()
+}
+
+/// Returns a policy or decoder: choices, or a Gaussian with ln σ for all rows or for each.
+fn dist(rng: &mut ChaCha8Rng, kind: u8, n: usize, dim: usize, device: &Device) -> Dist {
+    let head = matrix(numbers(rng, n * dim, 0.7), n, dim, device);
+    let std_rows = if kind == 1 { 1 } else { n };
+    match kind {
+        0 => Dist::categorical(head),
+        _ => Dist::Gaussian { mean: head, log_std: matrix(numbers(rng, std_rows * dim, 0.3), std_rows, dim, device) },
+    }
+}
+
+fn tracked(dist: Dist) -> Dist {
+    match dist {
+        Dist::Categorical { log_probs } => Dist::Categorical { log_probs: log_probs.require_grad() },
+        Dist::Gaussian { mean, log_std } => {
+            Dist::Gaussian { mean: mean.require_grad(), log_std: log_std.require_grad() }
+        }
+    }
+}
+
+/// Returns the gradients by all numbers of the distribution and by the values, where there are any.
+fn gradients(loss: Tensor<1>, dist: &Dist, values: &Tensor<1>) -> Vec<Option<Vec<f32>>> {
+    let grads = loss.backward();
+    let of = |grad: Option<Tensor<2>>| grad.map(|grad| host(grad).expect("readable"));
+    let mut all = match dist {
+        Dist::Categorical { log_probs } => vec![of(log_probs.grad(&grads))],
+        Dist::Gaussian { mean, log_std } => vec![of(mean.grad(&grads)), of(log_std.grad(&grads))],
+    };
+    all.push(values.grad(&grads).map(|grad| host(grad).expect("readable")));
+    all
+}
+
+fn close(got: f64, want: f64) -> bool {
+    (got - want).abs() <= 2e-5 * want.abs().max(0.05)
+}
+
+#[test]
+fn loss_metrics_and_gradient_are_those_of_the_tensors() {
+    for case in 0..96 {
+        let device = DeviceKind::Flex.plain();
+        let mut rng = Streams::new(7).stream("loss", case);
+        let (kind, n, dim) = ((case % 3) as u8, rng.random_range(1..150), rng.random_range(1..17));
+        let [penalised, from_policy, clip_value] = [(); 3].map(|()| rng.random::<bool>());
+        let policy = tracked(dist(&mut rng, kind, n, dim, &device.clone().autodiff()));
+        let decoder = dist(&mut rng, kind, n, dim, &device);
+        let actions = match kind {
+            0 => Actions::Discrete((0..n).map(|i| (i % dim) as u32).collect()),
+            _ => Actions::Continuous { dim, values: numbers(&mut rng, n * dim, 1.0) },
+        };
+        let actions = ActionBatch::new(&actions, &device);
+        let near = host(policy.log_prob(&actions).expect("fits").inner()).expect("readable");
+        let mut column = |scale: f32| numbers(&mut rng, n, scale);
+        let old_log_probs = near.iter().zip(column(0.2)).map(|(new, by)| new + by).collect();
+        let confidence = column(1.0).iter().map(|x| x.abs()).collect();
+        let [advantages, old_values, returns] = [1.0, 0.3, 1.0].map(|scale| vector(column(scale), &device));
+        let values = vector(column(0.3), &device.clone().autodiff()).require_grad();
+        let batch = Minibatch {
+            augmented: None,
+            left: None,
+            inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
+            ppo: PpoBatch { actions, old_log_probs: vector(old_log_probs, &device), advantages, old_values, returns },
+            teacher: penalised.then(|| TeacherBatch {
+                dist: decoder,
+                confidence: vector(confidence, &device),
+                mean_confidence: 0.0,
+            }),
+        };
+        let direction = if from_policy { KlDirection::PolicyDecoder } else { KlDirection::DecoderPolicy };
+        let score = ScoreConfig { kl_coef: 0.3, kl_direction: direction, ..ScoreConfig::default() };
+        let config = PpoConfig { clip_value_loss: clip_value, ent_coef: 0.02, ..PpoConfig::default() };
+        let moment = Moment { lr: 1e-3, score: penalised.then_some(&score), is_warming_up: rng.random_ratio(1, 4) };
+
+        let ours = HostLoss::of(&policy, &values, &batch, &config, &moment, 0).expect("finite");
+        let theirs = Losses::of(&policy, values.clone(), &batch, &config, &moment).expect("fits");
+        let (got, want) = (ours.metrics, theirs.metrics(&batch, &config, 0).expect("finite"));
+        for (name, got, want) in [
+            ("policy_loss", got.policy_loss, want.policy_loss),
+            ("value_loss", got.value_loss, want.value_loss),
+            ("entropy", got.entropy, want.entropy),
+            ("approx_kl", got.approx_kl, want.approx_kl),
+            ("clip_fraction", got.clip_fraction, want.clip_fraction),
+            ("decoder_kl", got.decoder_kl, want.decoder_kl),
+            ("kl_penalty", got.kl_penalty, want.kl_penalty),
+            ("total_loss", got.total_loss, want.total_loss),
+        ] {
+            assert!(close(got, want), "case {case}: {name} {got}, expected {want}");
+        }
+        let got = gradients(ours.tensor(&policy, values.clone()), &policy, &values);
+        let want = gradients(theirs.total, &policy, &values);
+        for (got, want) in got.iter().zip(&want) {
+            let want = want.clone().unwrap_or_else(|| vec![0.0; got.as_ref().map_or(0, Vec::len)]);
+            let got = got.clone().unwrap_or_else(|| vec![0.0; want.len()]);
+            let largest = want.iter().fold(1e-3f32, |most, x| most.max(x.abs()));
+            for (got, want) in got.iter().zip(&want) {
+                assert!((got - want).abs() <= 1e-4 * largest, "case {case}: {got}, expected {want}");
+            }
+        }
+    }
+}
+
+#[test]
+fn actions_of_the_other_kind_are_refused() {
+    let device = DeviceKind::Flex.plain();
+    let mut rng = Streams::new(1).stream("loss", 0);
+    let column = || vector(vec![0.0; 2], &device);
+    let actions = ActionBatch::new(&Actions::Discrete(vec![0, 1]), &device);
+    let batch = Minibatch {
+        augmented: None,
+        left: None,
+        inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
+        ppo: PpoBatch {
+            actions,
+            old_log_probs: column(),
+            advantages: column(),
+            old_values: column(),
+            returns: column(),
+        },
+        teacher: None,
+    };
+    let moment = Moment { lr: 1e-3, score: None, is_warming_up: false };
+    let gaussian = dist(&mut rng, 1, 2, 3, &device);
+    let error = HostLoss::of(&gaussian, &column(), &batch, &PpoConfig::default(), &moment, 0);
+    assert!(error.expect_err("another kind").to_string().contains("differ in kind"));
+}

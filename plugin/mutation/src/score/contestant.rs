@@ -1,0 +1,204 @@
+//! The testers that are scored.
+
+use bevy_playbot::{
+    action::{ActionSpace, ActionValue},
+    bot::BlindBot,
+    vision::ObservationConfig,
+};
+use playbot_harness::{
+    eval::{CHAOS, Player, blind_bots},
+    game::Game,
+};
+use playbot_test::explore::Explorer;
+use serde::{Deserialize, Serialize};
+use std::time::Instant;
+
+/// Name of the bot with random actions.
+pub const RANDOM: &str = "random";
+
+/// Name of the bot that holds an action.
+pub const HOLD: &str = "hold";
+
+/// Name of the explorer without skills.
+pub const EXPLORE: &str = "explore";
+
+/// Name of the explorer with a skill model or a policy.
+pub const EXPLORE_SKILLS: &str = "explore-skills";
+
+/// A tester of one game.
+#[derive(Clone)]
+pub struct Contestant {
+    /// The tester as files store it.
+    pub record: ContestantRecord,
+    /// The means of testing.
+    pub means: Means,
+    /// Observation of a policy; bots have vectors.
+    pub observation_config: ObservationConfig,
+}
+
+/// The means of testing.
+#[derive(Clone)]
+#[allow(clippy::large_enum_variant, reason = "a few per measurement")]
+pub enum Means {
+    /// Plays episodes.
+    Plays(Player),
+    /// Explores. Some of the paths that it finds are replayed under the detectors.
+    Explores(Explorer),
+}
+
+/// A tester, as files store it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct ContestantRecord {
+    /// Its name, unique within the game. Testers of several games with the same name are counted together.
+    pub name: String,
+    /// Checksum of the tester's file, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checksum: Option<String>,
+    /// Whether a policy takes its most probable action instead of drawing one.
+    #[serde(default)]
+    pub greedy: bool,
+    /// Whether it acts with learned skills.
+    pub skilled: bool,
+}
+
+impl ContestantRecord {
+    /// Creates a tester without a file and without skills.
+    pub fn bot(name: impl Into<String>) -> Self {
+        Self { name: name.into(), checksum: None, greedy: false, skilled: false }
+    }
+}
+
+impl Contestant {
+    /// Returns the game's bots and the explorer without skills: [`RANDOM`], [`HOLD`], [`CHAOS`], [`EXPLORE`] and, under
+    /// its own name, the demonstrator, if there is one.
+    pub fn usual(game: &dyn Game) -> Vec<Self> {
+        let bots = blind_bots(game);
+        let is_constant = |bot: &BlindBot| matches!(bot, BlindBot::Constant(_));
+        let constant = bots.into_iter().map(|(_, bot)| bot).find(is_constant);
+        let hold = constant.unwrap_or_else(|| BlindBot::Constant(last_action(game)));
+        let mut all = vec![
+            Self::bot(RANDOM, Player::Blind(BlindBot::Uniform)),
+            Self::bot(HOLD, Player::Blind(hold)),
+            Self::bot(CHAOS, Player::Blind(BlindBot::Chaos)),
+            Self::of(ContestantRecord::bot(EXPLORE), Means::Explores(Explorer::Random)),
+        ];
+        all.extend(game.tools().bots.demonstrator().map(|name| Self::bot(name, Player::Demonstrator)));
+        all
+    }
+
+    /// Creates a tester from a bot of the game.
+    pub fn bot(name: &str, player: Player) -> Self {
+        Self::of(ContestantRecord::bot(name), Means::Plays(player))
+    }
+
+    /// Creates a tester with vectors as observations.
+    pub fn of(record: ContestantRecord, means: Means) -> Self {
+        Self { record, means, observation_config: ObservationConfig::default() }
+    }
+}
+
+/// Returns the last of the discrete actions, or all values at their highest.
+fn last_action(game: &dyn Game) -> ActionValue {
+    match game.actions() {
+        ActionSpace::Discrete(count) => ActionValue::Discrete(count.saturating_sub(1) as u32),
+        ActionSpace::Continuous(count) => ActionValue::Continuous(vec![1.0; count]),
+    }
+}
+
+// Clocks for the time of jobs.
+
+/// The clock that jobs are timed with. It is no part of the other results.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ClockKind {
+    /// CPU time of the job's thread, as the system counts it.
+    ThreadCpu,
+    /// Wall time, which includes whatever else the machine does.
+    Wall,
+}
+
+impl ClockKind {
+    /// Returns CPU time where the system reports it, else wall time.
+    pub fn here() -> Self {
+        if thread_cpu_seconds().is_some() { Self::ThreadCpu } else { Self::Wall }
+    }
+
+    /// Returns the clock's name for reports.
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::ThreadCpu => "CPU time of the job's thread",
+            Self::Wall => "wall time of the job's thread",
+        }
+    }
+}
+
+/// Measures a job from its start, on its own thread.
+pub(super) struct JobClock {
+    kind: ClockKind,
+    cpu: f64,
+    begun: Instant,
+}
+
+impl JobClock {
+    pub fn start(kind: ClockKind) -> Self {
+        Self { kind, cpu: thread_cpu_seconds().unwrap_or(0.0), begun: Instant::now() }
+    }
+
+    /// Returns the seconds since the start, to the microsecond.
+    pub fn seconds(&self) -> f64 {
+        let wall = || self.begun.elapsed().as_secs_f64();
+        let seconds = match self.kind {
+            ClockKind::ThreadCpu => thread_cpu_seconds().map_or_else(wall, |cpu| cpu - self.cpu),
+            ClockKind::Wall => wall(),
+        };
+        (seconds * 1e6).round() / 1e6
+    }
+}
+
+/// Returns the CPU time of this thread since it started. The first number of the file is in nanoseconds.
+#[cfg(target_os = "linux")]
+fn thread_cpu_seconds() -> Option<f64> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat").ok()?;
+    let nanoseconds: u64 = text.split_whitespace().next()?.parse().ok()?;
+    Some(nanoseconds as f64 / 1e9)
+}
+
+#[cfg(not(target_os = "linux"))]
+fn thread_cpu_seconds() -> Option<f64> {
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use playbot_corridor::Corridor;
+
+    #[test]
+    fn a_game_without_a_bot_that_holds_an_action_holds_its_last() {
+        let all = Contestant::usual(&Corridor::default());
+        let names: Vec<&str> = all.iter().map(|contestant| contestant.record.name.as_str()).collect();
+        assert_eq!(names, [RANDOM, HOLD, CHAOS, EXPLORE, "guide"]);
+        let hold = BlindBot::Constant(ActionValue::Discrete(2));
+        assert!(matches!(&all[1].means, Means::Plays(Player::Blind(bot)) if *bot == hold));
+        assert!(matches!(all[3].means, Means::Explores(Explorer::Random)));
+        assert!(all.iter().all(|contestant| !contestant.record.skilled));
+    }
+}
+
+#[cfg(test)]
+mod clock_tests {
+    use super::*;
+
+    #[test]
+    fn work_takes_time_by_either_clock() {
+        for kind in [ClockKind::here(), ClockKind::Wall] {
+            let clock = JobClock::start(kind);
+            let mut number = 1_u64;
+            // Longer than the system takes to update its count.
+            while clock.begun.elapsed().as_millis() < 50 {
+                number = number.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            }
+            assert!(clock.seconds() > 0.0 && clock.seconds() < 600.0, "{number}");
+        }
+    }
+}

@@ -1,0 +1,48 @@
+//! The parts for programs that train and test bots: Worlds that are driven tick by tick, on many threads, over many episodes.
+//!
+//! A game that ships a bot needs none of them. [`playbot_harness`](https://docs.rs/playbot_harness) builds its Worlds with
+//! them; a harness of your own can do the same. They are stable within a version of the plugin, and change with less
+//! notice than the rest.
+//!
+//! | to | use |
+//! |---|---|
+//! | drive a World without an app | [`headless_frame_app`], [`into_world`], [`run_on_one_thread`], [`tick_world`] |
+//! | begin an episode in a World as new | [`Renewal`], [`EpisodeAhead`] |
+//! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
+//! | decide for many agents at once | [`PolicyBatch`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
+//! | keep systems in one order | [`put_in_order`], [`leave_open`], [`FaultSystems`], [`run_observe_schedule`] |
+//! | check what agents see and do | [`check_actions`], [`check_observations`], [`misfit`] |
+//! | record and replay | [`record_ticks`], [`flush_unfinished`], [`demo_actions`], [`recorded_action`] |
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_playbot::engine::{into_world, tick_world};
+//! use bevy_playbot::prelude::*;
+//!
+//! #[derive(Resource, Default)]
+//! struct Ticks(u32);
+//!
+//! let mut app = headless_app();
+//! app.init_resource::<Ticks>().add_systems(FixedUpdate, |mut ticks: ResMut<Ticks>| ticks.0 += 1);
+//! let mut world = into_world(app);
+//! tick_world(&mut world).expect("no system fails");
+//! assert_eq!(world.resource::<Ticks>().0, 1);
+//! ```
+
+#[doc(no_inline)]
+pub use crate::{
+    action::{check_actions, misfit},
+    demo::{
+        recorder::{demo_actions, flush_unfinished, record_ticks},
+        replay::recorded_action,
+    },
+    fault::FaultSystems,
+    headless::{headless_frame_app, into_world, run_on_one_thread, tick_world},
+    observation::check_observations,
+    panics,
+    policy_batch::{Playing, PolicyBatch, SharedBatch},
+    renewal::{EpisodeAhead, Renewal},
+    skill_prior::draw_skills,
+    system_errors,
+    systems::{leave_open, put_in_order, run_observe_schedule},
+};

@@ -1,0 +1,371 @@
+//! Virtual input: an agent's action presses keys, mouse buttons and gamepads, through Bevy's own input.
+//!
+//! A game that reads `ButtonInput<KeyCode>`, mouse, gamepad or an input manager needs no change to be played by a
+//! bot. Its agent carries a [`VirtualInput`]: the inputs that each action holds down. In
+//! [`PlaybotSystems::Act`](crate::systems::PlaybotSystems::Act) the plugin presses the new inputs of this tick's
+//! action, keeps holding those it still needs, and releases the rest.
+//!
+//! - It plays for [`Control::Policy`](crate::control::Control::Policy), [`Bot`](crate::control::Control::Bot) and
+//!   [`Replay`](crate::control::Control::Replay), never for people: under `Human` and `Idle` everything is released.
+//!   The exception are agents with [`PressesForPeople`], for people whose own devices do not reach the game.
+//! - Everything is released at the end of an episode and at the start of the next. An episode begins with nothing
+//!   held, and replays the same alone.
+//! - A World has one keyboard and one mouse: two agents that claim the same key or motion are a fault. Every agent has a
+//!   gamepad of its own.
+//! - The route is a setting: see [`InputRoute`].
+//! - With the features `leafwing-input-manager` and `bevy_enhanced_input`, actions of these input managers can also be
+//!   driven without any key. Keys drive them without these features.
+//!
+//! ```
+//! use bevy::{input::InputPlugin, prelude::*};
+//! use bevy_playbot::{prelude::*, virtual_input::{VirtualInput, VirtualInputPlugin}};
+//!
+//! /// A game without any knowledge of agents.
+//! fn walk(keys: Res<ButtonInput<KeyCode>>, mut player: Single<&mut Transform, With<Agent>>) {
+//!     if keys.pressed(KeyCode::ArrowRight) {
+//!         player.translation.x += 1.0;
+//!     }
+//! }
+//!
+//! let mut app = headless_app();
+//! app.add_plugins((InputPlugin, VirtualInputPlugin::default())).add_systems(FixedUpdate, walk);
+//! let input = VirtualInput::keys([vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]]);
+//! let bot = BlindBot::Constant(ActionValue::Discrete(2));
+//! let agent = (Agent::new(0, input.space()), input, Control::Bot, bot, Transform::default());
+//! let agent = app.world_mut().spawn(agent).id();
+//! app.ticks(3).expect("no agent broke its contract");
+//! assert_eq!(app.world().get::<Transform>(agent).expect("spawned with it").translation.x, 3.0);
+//! ```
+
+mod act;
+mod button;
+mod claims;
+mod devices;
+#[cfg(feature = "bevy_enhanced_input")]
+pub mod enhanced_input;
+mod input_state;
+#[cfg(feature = "leafwing-input-manager")]
+pub mod leafwing;
+mod messages;
+
+use crate::{
+    action::{ActionSpace, ActionValue, check_actions},
+    episode::{EpisodeEnded, StartEpisode},
+    fault::Faults,
+    panics::note_actions,
+    systems::PlaybotSystems,
+    virtual_input::{
+        act::{DirectInput, InputReleaser},
+        claims::check_claims,
+        messages::connect_gamepads,
+    },
+};
+use bevy::{
+    input::{
+        InputPlugin, InputSystems,
+        gamepad::{
+            GamepadAxisChangedEvent, GamepadButtonChangedEvent, GamepadButtonStateChangedEvent, GamepadConnectionEvent,
+            GamepadEvent, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent, RawGamepadEvent,
+            gamepad_connection_system, gamepad_event_processing_system,
+        },
+        keyboard::{Key, KeyboardInput, keyboard_input_system},
+        mouse::{
+            AccumulatedMouseMotion, AccumulatedMouseScroll, MouseButtonInput, MouseMotion, MouseWheel,
+            accumulate_mouse_motion_system, accumulate_mouse_scroll_system, mouse_button_input_system,
+        },
+    },
+    prelude::*,
+};
+
+pub use crate::virtual_input::{
+    button::{UnknownInput, VirtualAxis, VirtualButton},
+    devices::{ActionAxis, HeldInput, VirtualDevices},
+    messages::VirtualGamepad,
+};
+
+// The mapping from an agent's actions to the inputs that they hold down.
+
+/// The inputs that each action of an agent holds down. It maps the agent's [`Action`](crate::action::Action) to the
+/// input that a game reads from Bevy.
+///
+/// Discrete actions name a set of keys each, continuous ones an [`ActionAxis`] for each value.
+///
+/// ```
+/// use bevy::prelude::*;
+/// use bevy_playbot::{prelude::*, virtual_input::{ActionAxis, VirtualInput}};
+///
+/// let walk = VirtualInput::keys([vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]])
+///     .mouse_buttons([vec![], vec![], vec![MouseButton::Left]]);
+/// assert_eq!(walk.space(), ActionSpace::Discrete(3));
+/// assert_eq!(walk.held(&ActionValue::Discrete(2)).buttons.len(), 2);
+///
+/// let fly = VirtualInput::axes([
+///     ActionAxis::stick(GamepadAxis::LeftStickX),
+///     ActionAxis::keys([KeyCode::KeyS], [KeyCode::KeyW]),
+/// ]);
+/// assert_eq!(fly.space(), ActionSpace::Continuous(2));
+/// ```
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Component)]
+pub struct VirtualInput {
+    mapping: Mapping,
+    /// True if sets of buttons were added to continuous actions, where they have no meaning.
+    is_mixed: bool,
+}
+
+#[derive(Clone, Debug, PartialEq, Reflect)]
+enum Mapping {
+    /// The inputs that each discrete action holds.
+    Discrete(Vec<HeldInput>),
+    /// The inputs that each value of a continuous action moves.
+    Continuous(Vec<ActionAxis>),
+}
+
+impl VirtualInput {
+    /// Creates a mapping with a set of keys for each discrete action; an empty set presses nothing.
+    pub fn keys(sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>) -> Self {
+        Self::discrete(sets.into_iter().map(HeldInput::new))
+    }
+
+    /// Creates a mapping with inputs of any device for each discrete action.
+    pub fn discrete(actions: impl IntoIterator<Item = HeldInput>) -> Self {
+        Self { mapping: Mapping::Discrete(actions.into_iter().collect()), is_mixed: false }
+    }
+
+    /// Creates a mapping with an axis for each value of a continuous action.
+    pub fn axes(axes: impl IntoIterator<Item = ActionAxis>) -> Self {
+        Self { mapping: Mapping::Continuous(axes.into_iter().collect()), is_mixed: false }
+    }
+
+    /// Adds a set of mouse buttons to each discrete action, in order. For continuous actions use
+    /// [`ActionAxis::buttons`]; an agent with sets as well is a fault.
+    pub fn mouse_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = MouseButton>>) -> Self {
+        self.also(sets)
+    }
+
+    /// Adds a set of gamepad buttons to each discrete action, in order, as [`mouse_buttons`](Self::mouse_buttons) does.
+    pub fn gamepad_buttons(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = GamepadButton>>) -> Self {
+        self.also(sets)
+    }
+
+    fn also<B: Into<VirtualButton>>(mut self, sets: impl IntoIterator<Item = impl IntoIterator<Item = B>>) -> Self {
+        let Mapping::Discrete(actions) = &mut self.mapping else {
+            self.is_mixed |= sets.into_iter().next().is_some();
+            return self;
+        };
+        for (index, set) in sets.into_iter().enumerate() {
+            if index == actions.len() {
+                actions.push(HeldInput::default());
+            }
+            actions[index] = std::mem::take(&mut actions[index]).hold(set);
+        }
+        self
+    }
+
+    /// Returns the actions that it can express: as many as it names.
+    pub fn space(&self) -> ActionSpace {
+        match &self.mapping {
+            Mapping::Discrete(actions) => ActionSpace::Discrete(actions.len()),
+            Mapping::Continuous(axes) => ActionSpace::Continuous(axes.len()),
+        }
+    }
+
+    /// Returns the inputs that this action holds down; empty for an action outside [`space`](Self::space).
+    pub fn held(&self, action: &ActionValue) -> HeldInput {
+        match (&self.mapping, action) {
+            (Mapping::Discrete(actions), ActionValue::Discrete(index)) => {
+                actions.get(*index as usize).cloned().unwrap_or_default()
+            }
+            (Mapping::Continuous(axes), ActionValue::Continuous(values)) => {
+                axes.iter().zip(values).fold(HeldInput::default(), |held, (axis, &value)| axis.add_to(held, value))
+            }
+            _ => HeldInput::default(),
+        }
+    }
+
+    /// Returns whether sets of buttons were added to continuous actions.
+    fn is_mixed(&self) -> bool {
+        self.is_mixed
+    }
+
+    /// Returns all inputs that any of its actions may hold or move.
+    fn reach(&self) -> HeldInput {
+        let join = |all: HeldInput, part: HeldInput| {
+            let all = all.hold(part.buttons);
+            part.axes.into_iter().fold(all, |all, (axis, _)| all.push(axis, 0.0))
+        };
+        match &self.mapping {
+            Mapping::Discrete(actions) => actions.iter().cloned().fold(HeldInput::default(), join),
+            Mapping::Continuous(axes) => axes.iter().map(ActionAxis::reach).fold(HeldInput::default(), join),
+        }
+    }
+
+    /// Returns whether any of its actions uses the gamepad.
+    fn uses_gamepad(&self) -> bool {
+        let reach = self.reach();
+        let is_pad_button = |button: &VirtualButton| matches!(button, VirtualButton::Gamepad(_));
+        reach.buttons.iter().any(is_pad_button) || reach.axes.iter().any(|(axis, _)| axis.is_gamepad())
+    }
+}
+
+// The plugin of virtual input.
+
+/// Lets the actions of agents with a [`VirtualInput`](VirtualInput) play through Bevy's own input. Needs
+/// [`InputPlugin`], which is part of Bevy's `DefaultPlugins`.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct VirtualInputPlugin {
+    /// The route from an action to the game.
+    pub route: InputRoute,
+}
+
+impl Plugin for VirtualInputPlugin {
+    fn build(&self, app: &mut App) {
+        let route = self.route;
+        add_what_is_written(app);
+        app.init_resource::<VirtualDevices>()
+            .init_resource::<DirectInput>()
+            // Releases everything at the end of an episode, and at the start of one, so that it begins with nothing
+            // held.
+            .add_observer(move |event: On<StartEpisode>, mut releaser: InputReleaser| {
+                releaser.release(event.entity, route)
+            })
+            .add_observer(move |event: On<EpisodeEnded>, mut releaser: InputReleaser| {
+                releaser.release(event.entity, route)
+            })
+            .add_systems(PreUpdate, connect_gamepads.before(InputSystems).before(act::send_messages));
+        match route {
+            InputRoute::Messages => {
+                app.add_systems(
+                    PreUpdate,
+                    (check_claims.before(note_actions), act::send_messages)
+                        .chain()
+                        .after(check_actions)
+                        .in_set(PlaybotSystems::Act)
+                        .before(InputSystems),
+                );
+            }
+            InputRoute::Direct => {
+                app.add_systems(
+                    FixedPreUpdate,
+                    (check_claims.before(note_actions), act::write_directly)
+                        .chain()
+                        .after(check_actions)
+                        .in_set(PlaybotSystems::Act),
+                )
+                .add_systems(RunFixedMainLoop, act::show_frame.in_set(RunFixedMainLoopSystems::AfterFixedMainLoop))
+                .add_systems(
+                    PreUpdate,
+                    act::settle
+                        .in_set(InputSystems)
+                        .after(keyboard_input_system)
+                        .after(mouse_button_input_system)
+                        .after(accumulate_mouse_motion_system)
+                        .after(accumulate_mouse_scroll_system)
+                        .after(gamepad_connection_system)
+                        .after(gamepad_event_processing_system),
+                );
+            }
+        }
+    }
+
+    fn finish(&self, app: &mut App) {
+        if !app.is_plugin_added::<InputPlugin>()
+            && let Some(mut faults) = app.world_mut().get_resource_mut::<Faults>()
+        {
+            faults.report(
+                "virtual input needs Bevy's `InputPlugin`: add it, or `DefaultPlugins`, which bring it".to_owned(),
+            );
+        }
+    }
+}
+
+/// Adds the resources that the systems write, even without Bevy's plugin: an app without it gets an error instead of
+/// a panic.
+fn add_what_is_written(app: &mut App) {
+    app.add_message::<KeyboardInput>()
+        .add_message::<MouseButtonInput>()
+        .add_message::<MouseMotion>()
+        .add_message::<MouseWheel>()
+        .add_message::<GamepadConnectionEvent>()
+        .add_message::<RawGamepadEvent>()
+        .add_message::<RawGamepadButtonChangedEvent>()
+        .add_message::<RawGamepadAxisChangedEvent>()
+        .add_message::<GamepadEvent>()
+        .add_message::<GamepadButtonChangedEvent>()
+        .add_message::<GamepadButtonStateChangedEvent>()
+        .add_message::<GamepadAxisChangedEvent>()
+        .init_resource::<ButtonInput<KeyCode>>()
+        .init_resource::<ButtonInput<Key>>()
+        .init_resource::<ButtonInput<MouseButton>>()
+        .init_resource::<AccumulatedMouseMotion>()
+        .init_resource::<AccumulatedMouseScroll>();
+}
+
+// The two routes from an action to the game.
+
+/// The route from an action to the game.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
+pub enum InputRoute {
+    /// For ticks that are frames. In `PreUpdate`, before [`InputSystems`](bevy::input::InputSystems), messages are
+    /// sent as a window would. Bevy's own systems, input managers and the game do the rest in the same frame.
+    Messages,
+    /// For fixed ticks. In `FixedPreUpdate` the state that games read is written at once. A game in `FixedUpdate`
+    /// sees `just_pressed` in the same tick, and exactly once, however many ticks a frame runs. Systems in `Update`
+    /// see everything that happened in the frame.
+    ///
+    /// Messages are sent in the same tick. Only `RawGamepadEvent` is left out, except for the connection of a
+    /// gamepad: Bevy's own system would read it in the next frame and play everything a second time. A driver's
+    /// values are in `RawGamepadButtonChangedEvent` and `RawGamepadAxisChangedEvent`; most games read `GamepadEvent`
+    /// and its parts.
+    #[default]
+    Direct,
+}
+
+// People whose own keys do not reach the game.
+
+/// Presses keys for the agent under [`Control::Human`](crate::agent::Control::Human), too, by its
+/// [`Action`](crate::action::Action). For windows that keep a person's own devices from the game and turn them into
+/// an action: the game then sees exactly the keys that a replay of these actions presses.
+#[derive(Component, Clone, Copy, Debug, Default, Reflect)]
+#[reflect(Component)]
+pub struct PressesForPeople;
+
+#[cfg(test)]
+mod component_tests {
+    use super::*;
+    use crate::virtual_input::button::VirtualAxis;
+
+    #[test]
+    fn discrete_actions_hold_their_sets() {
+        let input = VirtualInput::keys([vec![], vec![KeyCode::KeyA]])
+            .mouse_buttons([vec![], vec![MouseButton::Left]])
+            .gamepad_buttons([vec![], vec![], vec![GamepadButton::South]]);
+        assert_eq!(input.space(), ActionSpace::Discrete(3));
+        let held = |index| input.held(&ActionValue::Discrete(index)).buttons;
+        assert!(held(0).is_empty() && held(9).is_empty());
+        assert_eq!(held(1), [KeyCode::KeyA.into(), MouseButton::Left.into()]);
+        assert_eq!(held(2), [GamepadButton::South.into()]);
+        assert!(input.held(&ActionValue::Continuous(vec![1.0])).buttons.is_empty(), "of another kind");
+        assert!(input.uses_gamepad());
+    }
+
+    #[test]
+    fn values_press_beyond_their_threshold_and_push_by_their_scale() {
+        let input = VirtualInput::axes([
+            ActionAxis::keys([KeyCode::KeyA], [KeyCode::KeyD]).with_threshold(0.25),
+            ActionAxis::mouse_x(8.0),
+            ActionAxis::stick(GamepadAxis::LeftStickY),
+            ActionAxis::trigger(GamepadButton::RightTrigger2),
+        ]);
+        let held = input.held(&ActionValue::Continuous(vec![-0.3, 0.5, 7.0, -1.0]));
+        assert_eq!(held.buttons, [KeyCode::KeyA.into()]);
+        let axes = [
+            (VirtualAxis::MouseX, 4.0),
+            (VirtualAxis::Stick(GamepadAxis::LeftStickY), 1.0),
+            (VirtualAxis::Trigger(GamepadButton::RightTrigger2), 0.0),
+        ];
+        assert_eq!(held.axes, axes);
+        assert!(input.held(&ActionValue::Continuous(vec![0.25, 0.0, 0.0, 0.0])).buttons.is_empty(), "not beyond it");
+        assert_eq!(input.reach().buttons.len(), 2);
+    }
+}

@@ -1,0 +1,285 @@
+//! Errors that a game logs.
+
+use playbot_harness::detector::{Detector, WorldMoment, WorldWatch};
+use std::{
+    fmt,
+    sync::{Arc, Mutex, PoisonError},
+};
+use tracing::{
+    Dispatch, Event, Level, Metadata, Subscriber, dispatcher,
+    field::{Field, Visit},
+    level_filters::LevelFilter,
+    span,
+    subscriber::Interest,
+};
+
+/// A finding for games that log an error. Errors of the engine and of missing files are not the game's code and do not
+/// count.
+#[derive(Default)]
+pub struct ErrorLog;
+
+impl Detector for ErrorLog {
+    fn name(&self) -> &'static str {
+        "error-log"
+    }
+
+    fn describe(&self) -> &'static str {
+        "the game logs an error"
+    }
+
+    fn watch_world(&self) -> Option<Box<dyn WorldWatch>> {
+        Some(Box::new(Self))
+    }
+}
+
+impl WorldWatch for ErrorLog {
+    fn hears_errors(&self) -> bool {
+        true
+    }
+
+    fn tick(&mut self, moment: &WorldMoment<'_>) -> Option<String> {
+        moment.errors.first().map(|error| format!("the game logged an error: {error}"))
+    }
+}
+
+// The reader of a game's log of errors.
+
+/// Crates whose errors are not the game's: the engine, its dependencies, and the plugin. Crates of the same name
+/// followed by an underscore belong to these as well, except for `bevy`, which many games have in their names.
+const ENGINE: [&str; 18] = [
+    "wgpu",
+    "naga",
+    "winit",
+    "gilrs",
+    "cosmic_text",
+    "calloop",
+    "alsa",
+    "rodio",
+    "parley",
+    "log",
+    "offset_allocator",
+    "playbot_harness",
+    "playbot_kernels",
+    "playbot_learner",
+    "playbot_mutation",
+    "playbot_report",
+    "playbot_test",
+    "playbot_train",
+];
+
+/// Parts of the engine, after `bevy_`.
+const BEVY: [&str; 41] = [
+    "a11y",
+    "animation",
+    "anti_alias",
+    "app",
+    "asset",
+    "audio",
+    "camera",
+    "color",
+    "core_pipeline",
+    "core_widgets",
+    "ecs",
+    "feathers",
+    "gilrs",
+    "gizmos",
+    "gltf",
+    "image",
+    "input",
+    "input_focus",
+    "light",
+    "log",
+    "mesh",
+    "pbr",
+    "picking",
+    "playbot",
+    "post_process",
+    "reflect",
+    "render",
+    "scene",
+    "shader",
+    "sprite",
+    "sprite_render",
+    "state",
+    "tasks",
+    "text",
+    "time",
+    "transform",
+    "ui",
+    "ui_render",
+    "window",
+    "winit",
+    "world_serialization",
+];
+
+/// Collects the errors of a thread, for any log filter. All events go on to the previous subscriber.
+pub struct Ear {
+    listener: Dispatch,
+    heard: Arc<Mutex<Vec<String>>>,
+}
+
+struct Listener {
+    outer: Dispatch,
+    most: LevelFilter,
+    heard: Arc<Mutex<Vec<String>>>,
+}
+
+impl Ear {
+    /// Creates an ear for this thread.
+    pub fn new() -> Self {
+        let heard = Arc::<Mutex<Vec<String>>>::default();
+        let outer = dispatcher::get_default(Clone::clone);
+        let most = LevelFilter::current().max(LevelFilter::ERROR);
+        let listener = Dispatch::new(Listener { outer, most, heard: Arc::clone(&heard) });
+        Self { listener, heard }
+    }
+
+    /// Runs some work and collects its errors.
+    pub fn listen<T>(&self, work: impl FnOnce() -> T) -> T {
+        dispatcher::with_default(&self.listener, work)
+    }
+
+    /// Returns the errors since the last call.
+    pub fn take(&self) -> Vec<String> {
+        std::mem::take(&mut *self.heard.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
+
+impl Default for Ear {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Returns whether the message is not the game's.
+fn is_of_engine(target: &str) -> bool {
+    let name = target.split("::").next().unwrap_or_default();
+    if let Some(part) = name.strip_prefix("bevy") {
+        return part.is_empty() || part.strip_prefix('_').is_some_and(|part| BEVY.contains(&part));
+    }
+    // Not by its prefix: games are called `playbot_games`.
+    name == "playbot"
+        || ENGINE
+            .iter()
+            .any(|engine| name.strip_prefix(engine).is_some_and(|rest| rest.is_empty() || rest.starts_with('_')))
+}
+
+/// The text of an event.
+#[derive(Default)]
+struct Message(String);
+
+impl Visit for Message {
+    fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
+        if field.name() == "message" {
+            self.0 = format!("{value:?}");
+        }
+    }
+}
+
+impl Subscriber for Listener {
+    /// The previous subscriber may want to be asked each time.
+    fn register_callsite(&self, _: &'static Metadata<'static>) -> Interest {
+        Interest::sometimes()
+    }
+
+    fn enabled(&self, metadata: &Metadata<'_>) -> bool {
+        *metadata.level() == Level::ERROR || self.outer.enabled(metadata)
+    }
+
+    fn max_level_hint(&self) -> Option<LevelFilter> {
+        Some(self.most)
+    }
+
+    fn event(&self, event: &Event<'_>) {
+        let metadata = event.metadata();
+        if *metadata.level() == Level::ERROR && !is_of_engine(metadata.target()) {
+            let mut message = Message::default();
+            event.record(&mut message);
+            self.heard.lock().unwrap_or_else(PoisonError::into_inner).push(message.0);
+        }
+        if self.outer.enabled(metadata) {
+            self.outer.event(event);
+        }
+    }
+
+    fn new_span(&self, span: &span::Attributes<'_>) -> span::Id {
+        self.outer.new_span(span)
+    }
+
+    fn record(&self, span: &span::Id, values: &span::Record<'_>) {
+        self.outer.record(span, values);
+    }
+
+    fn record_follows_from(&self, span: &span::Id, follows: &span::Id) {
+        self.outer.record_follows_from(span, follows);
+    }
+
+    fn enter(&self, span: &span::Id) {
+        self.outer.enter(span);
+    }
+
+    fn exit(&self, span: &span::Id) {
+        self.outer.exit(span);
+    }
+
+    fn clone_span(&self, id: &span::Id) -> span::Id {
+        self.outer.clone_span(id)
+    }
+
+    fn try_close(&self, id: span::Id) -> bool {
+        self.outer.try_close(id)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::prelude::World;
+
+    use super::*;
+
+    #[test]
+    fn the_first_error_is_told_and_silence_is_sound() {
+        let world = World::new();
+        let errors = ["no such door".to_owned(), "no such key".to_owned()];
+        let mut watch = ErrorLog.watch_world().expect("it looks at Worlds");
+        let told = watch.tick(&WorldMoment { world: &world, errors: &errors });
+        assert_eq!(told.as_deref(), Some("the game logged an error: no such door"));
+        assert_eq!(watch.tick(&WorldMoment { world: &world, errors: &[] }), None);
+    }
+}
+
+#[cfg(test)]
+mod ear_tests {
+    use super::*;
+
+    #[test]
+    fn errors_of_the_game_are_heard_and_others_are_not() {
+        let ear = Ear::new();
+        let value = ear.listen(|| {
+            tracing::error!(target: "my_game::doors", "door {} has no key", 3);
+            tracing::warn!(target: "my_game", "it is late");
+            tracing::error!(target: "bevy_asset::server", "Path not found: cake.glb");
+            7
+        });
+        assert_eq!((value, ear.take()), (7, vec!["door 3 has no key".to_owned()]));
+        tracing::error!(target: "my_game", "nobody listens");
+        assert!(ear.take().is_empty());
+    }
+
+    #[test]
+    fn whoever_listened_before_still_hears_them() {
+        let outer = Ear::new();
+        outer.listen(|| Ear::new().listen(|| tracing::error!(target: "my_game", "twice")));
+        assert_eq!(outer.take(), ["twice"]);
+    }
+
+    #[test]
+    fn the_engine_is_told_from_games_with_names_like_it() {
+        for engine in ["bevy_ecs::world", "bevy", "playbot_harness::eval", "wgpu_core"] {
+            assert!(is_of_engine(engine), "{engine}");
+        }
+        for game in ["bevyland", "bevy_jam_5", "my_bevy_game", "logs", "garden"] {
+            assert!(!is_of_engine(game), "{game}");
+        }
+    }
+}

@@ -1,0 +1,503 @@
+//! The archive of reached cells, with the paths to them.
+
+use crate::explore::{
+    cell::{Cell, Spotted},
+    ways::{Route, Way, Ways},
+};
+use bevy::prelude::*;
+use bevy_playbot::{
+    action::{Action, ActionValue},
+    agent::Control,
+    bot::uniform,
+    demo::replay::Divergence,
+    episode::{Episode, EpisodeResult},
+    level::LevelQueue,
+    skill_prior::ActiveSkill,
+    state_hash::StateHash,
+    streams::AgentStreams,
+};
+use playbot_learner::{
+    ActionSpace, Streams,
+    rng::{ChaCha8Rng, unit},
+};
+use std::{collections::BTreeMap, iter};
+
+/// A cell that was reached.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReachedCell {
+    way: Way,
+    /// Whether the episode was over on arrival, on every path there, so that no path goes on from it.
+    pub is_over: bool,
+    /// Whether every path there only passes it between two ticks. The path then ends with the tick after the cell.
+    pub is_passed: bool,
+    /// Visits in which it was seen.
+    pub visits: u64,
+}
+
+impl ReachedCell {
+    /// Returns the ticks of the shortest known path to it. A path on which the episode goes on comes before a shorter
+    /// one on which it ends. One that ends in the cell comes before a shorter one that passes it.
+    pub fn ticks(&self) -> u32 {
+        self.way.ticks
+    }
+
+    fn sight(&self) -> Sight {
+        Sight { ticks: self.ticks(), is_over: self.is_over, is_passed: self.is_passed }
+    }
+}
+
+/// The destination of a visit.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Destination {
+    /// The cell; `None` for the start of the level, which needs no path.
+    pub cell: Option<Cell>,
+    pub way: Way,
+    /// Whether the path only passes the cell, with the agent behind it at the end.
+    pub is_passed: bool,
+}
+
+impl Destination {
+    /// The start of the level.
+    pub const START: Self = Self { cell: None, way: Way::START, is_passed: false };
+}
+
+/// All cells, with their paths.
+pub(super) struct Archive {
+    start: ReachedCell,
+    cells: BTreeMap<Cell, ReachedCell>,
+    ways: Ways,
+    solution: Option<Way>,
+}
+
+impl Archive {
+    /// Creates an archive with the start of a level alone.
+    pub fn new(space: ActionSpace) -> Self {
+        let start = ReachedCell { way: Way::START, is_over: false, is_passed: false, visits: 0 };
+        Self { start, cells: BTreeMap::new(), ways: Ways::new(space), solution: None }
+    }
+
+    /// Returns all cells, in their order.
+    pub fn cells(&self) -> &BTreeMap<Cell, ReachedCell> {
+        &self.cells
+    }
+
+    /// Returns the shortest path on which the level's goal was reached.
+    pub fn solution(&self) -> Option<Way> {
+        self.solution
+    }
+
+    /// Returns a whole path.
+    pub fn route(&self, way: Way) -> Route {
+        self.ways.route(way)
+    }
+
+    /// Returns the path to a cell.
+    pub fn route_to(&self, cell: &Cell) -> Option<Route> {
+        self.cells.get(cell).map(|reached| self.route(reached.way))
+    }
+
+    /// Returns whether a cell is new, or reached sooner than before.
+    pub fn is_news(&self, cell: &Cell, sight: &Sight) -> bool {
+        self.cells.get(cell).is_none_or(|known| sight.is_better_than(&known.sight()))
+    }
+
+    /// Draws cells to explore from, with the weights of the paper's version without knowledge of the game:
+    /// 1/√(visits + 1).
+    pub fn choose(&self, count: usize, rng: &mut ChaCha8Rng) -> Vec<Destination> {
+        let all = iter::once((None, &self.start)).chain(self.cells.iter().map(|(cell, reached)| (Some(cell), reached)));
+        let open: Vec<_> = all.filter(|(_, reached)| !reached.is_over).collect();
+        let mut sum = 0.0;
+        let mut ends = Vec::with_capacity(open.len());
+        for (_, reached) in &open {
+            sum += 1.0 / ((reached.visits + 1) as f64).sqrt();
+            ends.push(sum);
+        }
+        let mut draw = || {
+            let at = unit(rng) * sum;
+            let (cell, reached) = open[ends.partition_point(|end| *end <= at).min(open.len() - 1)];
+            Destination { cell: cell.cloned(), way: reached.way, is_passed: reached.is_passed }
+        };
+        (0..count).map(|_| draw()).collect()
+    }
+
+    /// Adds the cells of a visit.
+    pub fn merge(&mut self, visit: Visited) {
+        let Visited { destination, piece, seen, solved, .. } = visit;
+        if destination.cell.is_none() {
+            self.start.visits += 1;
+        }
+        let solved = solved.filter(|ticks| self.solution.is_none_or(|known| *ticks < known.ticks));
+        let news = seen.iter().filter(|(cell, sight)| self.is_news(cell, sight)).map(|(_, sight)| sight.ticks);
+        let farthest = news.chain(solved).max();
+        let way = farthest.map(|ticks| self.ways.extend(destination.way, &piece, ticks));
+        for (cell, sight) in seen {
+            let is_news = self.is_news(&cell, &sight);
+            let found = ReachedCell {
+                way: way.map_or(destination.way, |way| way.cut(sight.ticks)),
+                is_over: sight.is_over,
+                is_passed: sight.is_passed,
+                visits: 0,
+            };
+            let reached = self.cells.entry(cell).or_insert(found);
+            if is_news {
+                *reached = ReachedCell { visits: reached.visits, ..found };
+            }
+            reached.visits += 1;
+        }
+        if let (Some(ticks), Some(way)) = (solved, way) {
+            self.solution = Some(way.cut(ticks));
+        }
+    }
+}
+
+// The task of one visit.
+
+/// A path back to a cell, and the ticks to explore there.
+pub(super) struct Job {
+    /// Number of the visit in the whole exploration. Its random numbers are derived from it, so that any World may make
+    /// it.
+    pub number: u64,
+    pub destination: Destination,
+    /// The path back.
+    pub route: Route,
+    /// Ticks to explore without a find.
+    pub patience: u32,
+    /// Most ticks to explore.
+    pub most: u32,
+}
+
+// The visit of an agent: its path back to a cell, and the exploration from there.
+
+/// The moment at which a cell was seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Sight {
+    /// Ticks of the episode until then.
+    pub ticks: u32,
+    /// Whether the episode was over.
+    pub is_over: bool,
+    /// Whether the agent had passed the cell between two ticks, and was behind it.
+    pub is_passed: bool,
+}
+
+impl Sight {
+    /// Returns whether it is a better path to a cell than another one.
+    pub fn is_better_than(&self, other: &Self) -> bool {
+        let rank = |sight: &Self| (sight.is_over, sight.is_passed, sight.ticks);
+        rank(self) < rank(other)
+    }
+}
+
+/// The result of a visit.
+pub(super) struct Visited {
+    pub destination: Destination,
+    /// The actions after the path to the destination.
+    pub piece: Route,
+    /// The cells that were seen from the destination on, each by its best path.
+    pub seen: BTreeMap<Cell, Sight>,
+    /// Ticks after which the level's goal was reached.
+    pub solved: Option<u32>,
+    /// Ticks played, with the path back.
+    pub steps: u64,
+    /// The result of the episode, if it ended.
+    pub end: Option<EpisodeResult>,
+}
+
+/// The random numbers of actions.
+#[derive(Clone, Copy)]
+pub(super) struct Draws {
+    pub streams: Streams,
+    pub sticky: f64,
+    /// Whether a policy decides instead.
+    pub is_policy: bool,
+    pub space: ActionSpace,
+}
+
+/// A visit in progress.
+pub(super) struct Visit {
+    level: u64,
+    job: Job,
+    visited: Visited,
+    /// Ticks of the episode so far.
+    ticks: u32,
+    /// Ticks left, unless something new is found.
+    left: u32,
+    /// Position of the agent after the last tick, from the destination on.
+    place: Option<Vec2>,
+    rng: ChaCha8Rng,
+    /// The last random action that was played.
+    last: Option<ActionValue>,
+    /// The next action.
+    next: Option<ActionValue>,
+    /// Whether the goal was reached on the path back.
+    was_solved: bool,
+}
+
+impl Visit {
+    /// Starts the level for an agent. Its current episode is dropped.
+    pub fn begin(job: Job, level: u64, draws: &Draws, agent: &mut EntityWorldMut) -> Self {
+        if let Some(mut running) = agent.get_mut::<Episode>() {
+            running.abandon();
+        }
+        // The streams of replays, for games that draw from the streams of their agents.
+        agent.insert((Control::Bot, LevelQueue::Always(level), AgentStreams::new(0, 0)));
+        let destination = job.destination.clone();
+        let sight = Sight { ticks: destination.way.ticks, is_over: false, is_passed: destination.is_passed };
+        let here = destination.cell.clone().map(|cell| (cell, sight));
+        let piece = Route::empty(&draws.space);
+        let seen = here.into_iter().collect();
+        let visited = Visited { destination, piece, seen, solved: None, steps: 0, end: None };
+        let rng = draws.streams.stream("explore", job.number);
+        let (ticks, left) = (0, job.patience);
+        Self { level, job, visited, ticks, left, place: None, rng, last: None, next: None, was_solved: false }
+    }
+
+    /// Sets the agent's next action, or lets the policy decide.
+    pub fn act(&mut self, draws: &Draws, agent: &mut EntityWorldMut) {
+        let way = self.job.route.len();
+        if let Some(action) = self.job.route.actions.get(self.ticks as usize) {
+            agent.insert(Action(action));
+        } else if draws.is_policy {
+            if self.ticks as usize == way && agent.get::<Control>() != Some(&Control::Policy) {
+                let stream = |name| draws.streams.stream(name, self.job.number);
+                let [level, action, skill] = ["explore/level", "explore/action", "explore/skill"].map(stream);
+                agent.insert((Control::Policy, AgentStreams::restored(level, action, skill), ActiveSkill::default()));
+            }
+        } else {
+            // Drawn once, even if the level takes several ticks to load.
+            let action = match self.next.take() {
+                Some(action) => action,
+                None => self.draw(draws),
+            };
+            agent.insert(Action(action.clone()));
+            self.next = Some(action);
+        }
+    }
+
+    fn draw(&mut self, draws: &Draws) -> ActionValue {
+        let is_kept = unit(&mut self.rng) < draws.sticky;
+        match self.last.take().filter(|_| is_kept) {
+            Some(action) => action,
+            None => uniform(&draws.space, &mut self.rng),
+        }
+    }
+
+    /// Updates the visit after a tick; true if the visit is over. `spot` returns the cell of the agent after this many
+    /// ticks, and the cells that it has passed since a position.
+    ///
+    /// # Errors
+    ///
+    /// The path back differs from the known one.
+    pub fn note(
+        &mut self,
+        world: &World,
+        agent: Entity,
+        end: Option<EpisodeResult>,
+        archive: &Archive,
+        spot: impl FnOnce(u32, Option<Vec2>) -> Option<Spotted>,
+    ) -> Result<bool, Divergence> {
+        let episode = world.get::<Episode>(agent);
+        let ticks = end.map_or_else(|| episode.map_or(0, |episode| episode.tick), |end| end.ticks);
+        if ticks == self.ticks {
+            // The level is still loading.
+            return Ok(false);
+        }
+        self.ticks = ticks;
+        self.visited.steps += 1;
+        self.visited.end = end;
+        let is_success = end.map_or_else(|| episode.is_some_and(Episode::is_success), |end| end.success);
+        let hash = world.get::<StateHash>(agent).copied().unwrap_or_default().folded();
+        let is_on_its_way = ticks as usize <= self.job.route.len();
+        if is_on_its_way {
+            self.check_way(hash, end)?;
+            self.was_solved = is_success;
+        } else {
+            let action = world.get::<Action>(agent).cloned().unwrap_or_default().0;
+            self.visited.piece.actions.push(&action).expect("actions are checked before they are played");
+            self.visited.piece.hashes.push(hash);
+            (self.last, self.next) = (Some(action), None);
+            self.left = self.left.saturating_sub(1);
+            if is_success && !self.was_solved && self.visited.solved.is_none() {
+                self.visited.solved = Some(ticks);
+            }
+        }
+        if ticks >= self.visited.destination.way.ticks
+            && let Some(spotted) = spot(ticks, self.place.take())
+        {
+            self.look(spotted, end.is_some(), archive)?;
+        }
+        let explored = self.visited.piece.len();
+        let is_spent = !is_on_its_way && (self.left == 0 || explored >= self.job.most as usize);
+        Ok(end.is_some() || is_spent)
+    }
+
+    /// Checks that this tick equals that of the known path.
+    fn check_way(&self, hash: u32, end: Option<EpisodeResult>) -> Result<(), Divergence> {
+        let tick = self.ticks - 1;
+        let known = self.job.route.hashes[tick as usize];
+        if hash != known {
+            return Err(self.divergence(tick, format!("the state hash is {hash:08x}, and it was {known:08x} before")));
+        }
+        match end {
+            Some(end) => {
+                Err(self.divergence(tick, format!("the episode ended ({:?}), and it did not before", end.end)))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Adds the cell of the agent, and those that it has passed.
+    fn look(&mut self, spotted: Spotted, is_last: bool, archive: &Archive) -> Result<(), Divergence> {
+        let Spotted { ticks, cell, place, passed } = spotted;
+        let Destination { cell: wanted, way, is_passed } = &self.visited.destination;
+        if ticks < way.ticks {
+            return Ok(());
+        }
+        // After passing a cell the agent is in another one. The state hash has confirmed the path.
+        let is_there = ticks == way.ticks && !is_passed;
+        if let Some(wanted) = wanted.as_ref().filter(|wanted| is_there && **wanted != cell) {
+            let what = format!("the agent is in cell {cell}, and the same actions led to cell {wanted} before");
+            return Err(self.divergence(ticks.saturating_sub(1), what));
+        }
+        // An earlier sighting was not the end.
+        let is_over = is_last && ticks == self.ticks;
+        for cell in passed {
+            self.see(cell, Sight { ticks, is_over, is_passed: true }, archive);
+        }
+        self.see(cell, Sight { ticks, is_over, is_passed: false }, archive);
+        self.place = place;
+        Ok(())
+    }
+
+    /// Adds a cell, unless the visit has a better path to it.
+    fn see(&mut self, cell: Cell, sight: Sight, archive: &Archive) {
+        if self.visited.seen.get(&cell).is_some_and(|known| !sight.is_better_than(known)) {
+            return;
+        }
+        if archive.is_news(&cell, &sight) {
+            self.left = self.job.patience;
+        }
+        self.visited.seen.insert(cell, sight);
+    }
+
+    fn divergence(&self, tick: u32, what: String) -> Divergence {
+        Divergence { level: self.level, tick, what }
+    }
+
+    /// Returns the result, with the number of the visit.
+    pub fn finish(self) -> (u64, Visited) {
+        (self.job.number, self.visited)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use playbot_learner::{Actions, Streams};
+
+    use super::*;
+
+    fn cell(number: i32) -> Cell {
+        Cell(vec![number])
+    }
+
+    /// A visit from a cell of the archive, with the actions after it, and the cells by the tick in which they were
+    /// seen.
+    fn visit(archive: &Archive, from: Option<i32>, actions: &[u32], seen: &[(i32, u32, bool)]) -> Visited {
+        let from = from.map(cell);
+        let way = from.as_ref().map_or(Way::START, |from| archive.cells[from].way);
+        let seen =
+            seen.iter().map(|&(number, ticks, is_over)| (cell(number), Sight { ticks, is_over, is_passed: false }));
+        Visited {
+            destination: Destination { cell: from, way, is_passed: false },
+            piece: Route { actions: Actions::Discrete(actions.to_vec()), hashes: actions.to_vec() },
+            seen: seen.collect(),
+            solved: None,
+            steps: u64::from(way.ticks) + actions.len() as u64,
+            end: None,
+        }
+    }
+
+    fn archive() -> Archive {
+        let mut archive = Archive::new(ActionSpace::Discrete(10));
+        archive.merge(visit(&archive, None, &[1, 2, 3], &[(1, 1, false), (2, 2, false), (3, 3, true)]));
+        archive
+    }
+
+    fn actions(archive: &Archive, number: i32) -> Vec<u32> {
+        archive.route_to(&cell(number)).expect("reached").hashes
+    }
+
+    #[test]
+    fn a_shorter_way_takes_the_place_of_a_longer_one_and_others_keep_theirs() {
+        let mut archive = archive();
+        archive.merge(visit(&archive, Some(2), &[4, 5], &[(2, 2, false), (4, 4, false)]));
+        assert_eq!(actions(&archive, 4), [1, 2, 4, 5]);
+        archive.merge(visit(&archive, None, &[7, 8], &[(2, 1, false), (4, 2, false)]));
+        assert_eq!((actions(&archive, 2), actions(&archive, 4)), (vec![7], vec![7, 8]));
+        archive.merge(visit(&archive, None, &[6, 6, 6], &[(4, 3, false)]));
+        assert_eq!(actions(&archive, 4), [7, 8], "a longer one is forgotten");
+        assert_eq!(archive.cells[&cell(4)].visits, 3);
+        assert_eq!(archive.start.visits, 3, "the visit from cell 2 is none of the start");
+    }
+
+    #[test]
+    fn a_way_on_which_the_episode_goes_on_counts_more() {
+        let mut archive = archive();
+        assert!(archive.cells[&cell(3)].is_over);
+        archive.merge(visit(&archive, Some(2), &[5, 5], &[(2, 2, false), (3, 4, false)]));
+        assert_eq!(actions(&archive, 3), [1, 2, 5, 5]);
+        archive.merge(visit(&archive, None, &[9], &[(3, 1, true)]));
+        assert_eq!(actions(&archive, 3).len(), 4);
+    }
+
+    #[test]
+    fn a_way_that_ends_in_a_cell_counts_more_than_one_that_passes_it() {
+        let mut archive = archive();
+        let passing = |archive: &Archive, actions: &[u32]| {
+            let mut visit = visit(archive, None, actions, &[]);
+            let ticks = actions.len() as u32;
+            visit.seen.insert(cell(7), Sight { ticks, is_over: false, is_passed: true });
+            visit
+        };
+        archive.merge(passing(&archive, &[4, 4]));
+        assert_eq!((actions(&archive, 7), archive.cells[&cell(7)].is_passed), (vec![4, 4], true));
+        assert!(archive.choose(99, &mut Streams::new(1).stream("test", 0)).iter().any(|chosen| chosen.is_passed));
+        archive.merge(visit(&archive, None, &[5, 5, 5], &[(7, 3, false)]));
+        assert_eq!((actions(&archive, 7), archive.cells[&cell(7)].is_passed), (vec![5, 5, 5], false));
+        archive.merge(passing(&archive, &[6]));
+        assert_eq!(actions(&archive, 7), [5, 5, 5]);
+        assert_eq!(archive.cells[&cell(7)].visits, 3);
+    }
+
+    #[test]
+    fn the_shortest_solution_is_kept() {
+        let mut archive = archive();
+        let solved = |archive: &Archive, actions: &[u32], ticks| Visited {
+            solved: Some(ticks),
+            ..visit(archive, None, actions, &[(1, 1, false)])
+        };
+        archive.merge(solved(&archive, &[4, 4, 4, 4], 3));
+        assert_eq!(archive.solution().map(|way| archive.route(way).hashes), Some(vec![4, 4, 4]));
+        archive.merge(solved(&archive, &[5, 5, 5, 5], 4));
+        archive.merge(solved(&archive, &[6, 6], 2));
+        assert_eq!(archive.solution().map(|way| archive.route(way).hashes), Some(vec![6, 6]));
+    }
+
+    #[test]
+    fn cells_that_were_seen_less_are_chosen_more_and_those_where_it_is_over_never() {
+        let mut archive = archive();
+        for _ in 0..98 {
+            archive.merge(visit(&archive, None, &[1], &[(1, 1, false)]));
+        }
+        let chosen = archive.choose(20_000, &mut Streams::new(1).stream("test", 0));
+        let share = |cell: Option<Cell>| {
+            chosen.iter().filter(|destination| destination.cell == cell).count() as f64 / chosen.len() as f64
+        };
+        // Weights: the start and cell 1 have 99 visits, 1/10 each; cell 2 has one, 1/√2.
+        let sum = 0.2 + 0.5_f64.sqrt();
+        assert!((share(None) - 0.1 / sum).abs() < 0.01, "{}", share(None));
+        assert!((share(Some(cell(1))) - 0.1 / sum).abs() < 0.01);
+        assert!((share(Some(cell(2))) - 0.5_f64.sqrt() / sum).abs() < 0.01);
+        assert_eq!(share(Some(cell(3))), 0.0);
+        assert_eq!(archive.choose(9, &mut Streams::new(1).stream("test", 0)), chosen[..9]);
+    }
+}

@@ -1,0 +1,366 @@
+//! Paths to cells. They share their beginnings: each is a piece of its own after a path that was known before.
+
+use crate::explore::{EndCounts, Exploration, ExploreError, Stop};
+use bevy::prelude::*;
+use bevy_playbot::{
+    action::Action,
+    agent::Control,
+    demo::{
+        file::DemoWriter,
+        recorder::{Recorder, Recording, flush_unfinished},
+    },
+    episode::{Episode, EpisodeCount},
+    fault::Fault,
+    headless::tick_world,
+    level::LevelQueue,
+    streams::AgentStreams,
+};
+use playbot_harness::{game::Game, worlds::build_world};
+use playbot_learner::{ActionSpace, Actions};
+use serde::Serialize;
+use std::{collections::BTreeSet, fmt};
+
+/// Actions from the start of a level, with the state hash after each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Route {
+    /// The action of each tick.
+    pub actions: Actions,
+    /// The folded [state hash](bevy_playbot::state_hash::StateHash::folded) after each tick.
+    pub hashes: Vec<u32>,
+}
+
+impl Route {
+    /// Creates a route without a tick.
+    pub(super) fn empty(space: &ActionSpace) -> Self {
+        Self { actions: Actions::empty(space), hashes: Vec::new() }
+    }
+
+    /// Returns the number of ticks.
+    pub fn len(&self) -> usize {
+        self.hashes.len()
+    }
+
+    /// Returns whether it has no ticks, as the path to the start.
+    pub fn is_empty(&self) -> bool {
+        self.hashes.is_empty()
+    }
+
+    /// Appends the first ticks of another route.
+    fn extend(&mut self, piece: &Self, ticks: usize) {
+        let ticks = ticks.min(piece.len());
+        self.actions.extend_rows(&piece.actions, 0, ticks).expect("all actions are those of one game");
+        self.hashes.extend_from_slice(&piece.hashes[..ticks]);
+    }
+}
+
+/// A path: the first ticks up to the end of a segment, or up to a tick within it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Way {
+    segment: usize,
+    /// Its length, from the start of the level.
+    pub ticks: u32,
+}
+
+impl Way {
+    /// The path to the start of the level.
+    pub const START: Self = Self { segment: 0, ticks: 0 };
+
+    /// Returns the first ticks of this path.
+    pub fn cut(self, ticks: u32) -> Self {
+        Self { ticks: ticks.min(self.ticks), ..self }
+    }
+}
+
+/// The actions after a path that was known before.
+struct Segment {
+    parent: Way,
+    piece: Route,
+}
+
+/// All paths of an exploration. Segments stay when a shorter path is found, since other paths may go through them.
+pub(super) struct Ways {
+    space: ActionSpace,
+    segments: Vec<Segment>,
+}
+
+impl Ways {
+    /// Creates it with the path to the start alone.
+    pub fn new(space: ActionSpace) -> Self {
+        let start = Segment { parent: Way::START, piece: Route::empty(&space) };
+        Self { space, segments: vec![start] }
+    }
+
+    /// Adds a path of this many ticks, which extends a known one by the beginning of a piece.
+    pub fn extend(&mut self, parent: Way, piece: &Route, ticks: u32) -> Way {
+        if ticks <= parent.ticks {
+            return parent.cut(ticks);
+        }
+        let mut kept = Route::empty(&self.space);
+        kept.extend(piece, (ticks - parent.ticks) as usize);
+        self.segments.push(Segment { parent, piece: kept });
+        Way { segment: self.segments.len() - 1, ticks }
+    }
+
+    /// Returns a whole path.
+    pub fn route(&self, way: Way) -> Route {
+        let mut pieces = Vec::new();
+        let mut rest = way;
+        while rest.ticks > 0 {
+            let Segment { parent, piece } = &self.segments[rest.segment];
+            if rest.ticks > parent.ticks {
+                pieces.push((piece, (rest.ticks - parent.ticks) as usize));
+            }
+            rest = parent.cut(rest.ticks);
+        }
+        let mut route = Route::empty(&self.space);
+        for (piece, ticks) in pieces.into_iter().rev() {
+            route.extend(piece, ticks);
+        }
+        route
+    }
+}
+
+// The replay of a path, alone: for recordings and for pictures.
+
+/// Plays actions on a level under the recorder. An episode that goes on after them is recorded as aborted. A replay of
+/// the recording, for instance with [`verify_file`](playbot_harness::demo::verify_file), checks that the path is the
+/// same.
+///
+/// # Errors
+///
+/// The game broke its contract, or the recording cannot be written.
+pub fn record_route(
+    game: &dyn Game,
+    mode: &str,
+    level: u64,
+    actions: &Actions,
+    writer: DemoWriter,
+) -> Result<(), ExploreError> {
+    let (mut world, agent) = world_of(game, mode, level);
+    world.insert_resource(Recorder::new(writer));
+    world.entity_mut(agent).insert(Recording::default());
+    play(&mut world, agent, actions, |_| {})?;
+    flush_unfinished(&mut world)?;
+    Ok(())
+}
+
+/// Returns the position of an agent after each tick of these actions, on the game's floor plan. Empty if the game does
+/// not report positions.
+///
+/// # Errors
+///
+/// The game broke its contract.
+pub fn follow_route(game: &dyn Game, mode: &str, level: u64, actions: &Actions) -> Result<Vec<Vec2>, Fault> {
+    let (mut world, agent) = world_of(game, mode, level);
+    let mut places = Vec::new();
+    play(&mut world, agent, actions, |world| places.extend(game.tools().state.position(world, agent)))?;
+    Ok(places)
+}
+
+/// Builds a World with an agent that plays the level once.
+fn world_of(game: &dyn Game, mode: &str, level: u64) -> (World, Entity) {
+    let (mut world, agents) = build_world(game, mode, 0, 0, 1);
+    let agent = agents[0];
+    world.entity_mut(agent).insert((Control::Bot, LevelQueue::list([level]), AgentStreams::new(0, 0)));
+    (world, agent)
+}
+
+/// Plays the actions, or those up to the end of the episode.
+fn play(world: &mut World, agent: Entity, actions: &Actions, mut after_tick: impl FnMut(&World)) -> Result<(), Fault> {
+    let mut ticks = 0;
+    while let Some(action) = actions.get(ticks) {
+        world.entity_mut(agent).insert(Action(action));
+        tick_world(world)?;
+        let is_over = world.get::<EpisodeCount>(agent).is_some_and(|count| count.finished > 0);
+        let played = world.get::<Episode>(agent).map_or(0, |episode| episode.tick as usize);
+        // Levels that are still loading have no tick.
+        if is_over || played != ticks {
+            after_tick(world);
+        }
+        if is_over {
+            break;
+        }
+        ticks = played;
+    }
+    Ok(())
+}
+
+// The summary of an exploration.
+
+/// The summary of an exploration, for people and as JSON.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ExplorationSummary {
+    /// Name of the game.
+    pub game: &'static str,
+    /// Mode of the game.
+    pub mode: String,
+    /// Number of the level.
+    pub level: u64,
+    /// Name of the explorer.
+    pub explorer: &'static str,
+    /// Random seed.
+    pub seed: u64,
+    /// Environment steps, with the paths back.
+    pub steps: u64,
+    /// Visits.
+    pub visits: u64,
+    /// The reason why it ended.
+    pub stop: Stop,
+    /// Cells that were reached, open or not.
+    pub cells: usize,
+    /// Cells that no wall cuts off from the start, if there is a floor plan.
+    pub open_cells: Option<usize>,
+    /// Number of these that were reached.
+    pub open_cells_reached: Option<usize>,
+    /// The share of these that were reached.
+    pub coverage: Option<f64>,
+    /// Cells that were reached and are not among these, such as those above the level.
+    pub other_cells: Option<usize>,
+    /// Whether the level is known to have a goal.
+    pub has_goal: bool,
+    /// Ticks of the shortest solution.
+    pub solution_ticks: Option<u32>,
+    /// Ends of episodes.
+    pub ends: EndCounts,
+    /// Steps and cells after each round.
+    pub curve: Vec<(u64, u64)>,
+}
+
+impl Exploration {
+    /// Returns the summary.
+    pub fn summary(&self, game: &dyn Game) -> ExplorationSummary {
+        ExplorationSummary {
+            game: game.name(),
+            mode: self.mode.clone(),
+            level: self.level,
+            explorer: self.explorer,
+            seed: self.seed,
+            steps: self.steps,
+            visits: self.visits,
+            stop: self.stop,
+            cells: self.cells().len(),
+            open_cells: self.open.as_ref().map(BTreeSet::len),
+            open_cells_reached: self.open_reached(),
+            coverage: self.coverage(),
+            other_cells: self.open_reached().map(|open| self.cells().len() - open),
+            has_goal: self.has_goal,
+            solution_ticks: self.solution_ticks(),
+            ends: self.ends,
+            curve: self.curve.clone(),
+        }
+    }
+}
+
+impl fmt::Display for ExplorationSummary {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { game, mode, level, explorer, steps, visits, cells, ends, .. } = self;
+        writeln!(f, "{game} {mode}:{level}, explored by {explorer} in {steps} steps and {visits} visits")?;
+        match (self.open_cells, self.open_cells_reached, self.coverage) {
+            (Some(open), Some(reached), Some(coverage)) => {
+                write!(f, "cells     {reached} of {open} open cells ({:.1} %)", 100.0 * coverage)?;
+                match self.other_cells {
+                    Some(others) if others > 0 => writeln!(f, ", {others} more")?,
+                    _ => writeln!(f)?,
+                }
+            }
+            _ => writeln!(f, "cells     {cells}")?,
+        }
+        match (self.solution_ticks, self.has_goal) {
+            (Some(ticks), _) if ends.won == 0 => writeln!(f, "solution  {ticks} ticks; episodes go on after it")?,
+            (Some(ticks), _) => writeln!(f, "solution  {ticks} ticks")?,
+            (None, true) => writeln!(f, "solution  none was found")?,
+            (None, false) => writeln!(f, "solution  none was found, and no goal is known")?,
+        }
+        if *ends == EndCounts::default() {
+            return write!(f, "episodes  none has ended");
+        }
+        write!(f, "episodes  {} won, {} lost, {} out of time", ends.won, ends.lost, ends.out_of_time)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn piece(actions: &[u32]) -> Route {
+        Route { actions: Actions::Discrete(actions.to_vec()), hashes: actions.iter().map(|a| a + 100).collect() }
+    }
+
+    #[test]
+    fn ways_go_on_behind_others_and_are_whole_again() {
+        let mut ways = Ways::new(ActionSpace::Discrete(10));
+        let first = ways.extend(Way::START, &piece(&[1, 2, 3, 4]), 3);
+        assert_eq!(ways.route(first), piece(&[1, 2, 3]));
+        let second = ways.extend(first.cut(2), &piece(&[7, 8, 9]), 4);
+        assert_eq!(ways.route(second), piece(&[1, 2, 7, 8]), "what is not needed is not kept");
+        let third = ways.extend(second, &piece(&[5]), 5);
+        assert_eq!(ways.route(third), piece(&[1, 2, 7, 8, 5]));
+        assert_eq!(ways.route(third.cut(1)), piece(&[1]));
+        assert_eq!(ways.route(first), piece(&[1, 2, 3]), "others change nothing");
+        assert!(ways.route(Way::START).is_empty());
+    }
+
+    #[test]
+    fn a_way_that_is_no_longer_than_its_beginning_needs_no_segment() {
+        let mut ways = Ways::new(ActionSpace::Continuous(2));
+        let actions = Actions::Continuous { dim: 2, values: vec![0.5, -0.5, 1.0, 0.0] };
+        let first = ways.extend(Way::START, &Route { actions, hashes: vec![1, 2] }, 2);
+        assert_eq!(ways.extend(first, &Route::empty(&ActionSpace::Continuous(2)), 1), first.cut(1));
+        assert_eq!(ways.segments.len(), 2);
+        assert_eq!(ways.route(first.cut(1)).hashes, [1]);
+    }
+}
+
+#[cfg(test)]
+mod summary_tests {
+    use super::*;
+
+    fn summary() -> ExplorationSummary {
+        ExplorationSummary {
+            game: "walk",
+            mode: "easy".to_owned(),
+            level: 7,
+            explorer: "random actions",
+            seed: 1,
+            steps: 3000,
+            visits: 32,
+            stop: Stop::Spent,
+            cells: 30,
+            open_cells: Some(40),
+            open_cells_reached: Some(24),
+            coverage: Some(0.6),
+            other_cells: Some(6),
+            has_goal: true,
+            solution_ticks: None,
+            ends: EndCounts { won: 0, lost: 2, out_of_time: 1 },
+            curve: vec![(3000, 30)],
+        }
+    }
+
+    #[test]
+    fn people_read_coverage_and_solution() {
+        let text = summary().to_string();
+        for words in [
+            "walk easy:7",
+            "cells     24 of 40 open cells (60.0 %), 6 more\n",
+            "none was found\n",
+            "0 won, 2 lost, 1 out of time",
+        ] {
+            assert!(text.contains(words), "`{words}` is missing in: {text}");
+        }
+        let none_else = ExplorationSummary { other_cells: Some(0), ..summary() }.to_string();
+        assert!(none_else.contains("24 of 40 open cells (60.0 %)\n"), "{none_else}");
+        let bare = ExplorationSummary { open_cells: None, coverage: None, has_goal: false, ..summary() }.to_string();
+        assert!(bare.contains("cells     30\n") && bare.contains("no goal is known"), "{bare}");
+    }
+
+    #[test]
+    fn a_solution_does_not_contradict_how_episodes_ended() {
+        let solved = |ends| ExplorationSummary { solution_ticks: Some(12), ends, ..summary() }.to_string();
+        let won = solved(EndCounts { won: 3, ..EndCounts::default() });
+        assert!(won.contains("solution  12 ticks\n") && won.contains("3 won, 0 lost"), "{won}");
+        let endless = solved(EndCounts::default());
+        assert!(endless.contains("solution  12 ticks; episodes go on after it\n"), "{endless}");
+        assert!(endless.ends_with("episodes  none has ended"), "{endless}");
+    }
+}

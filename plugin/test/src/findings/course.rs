@@ -1,0 +1,242 @@
+//! The course of an episode tick by tick, and its comparison with another one.
+
+use crate::{
+    detectors::ShownBy,
+    findings::{
+        FindingHead, StoredFinding,
+        checks::{Check, message_of, watcher as detector_watcher},
+        play::{Replayed, Setting, Solo, play_actions, play_player},
+    },
+};
+use bevy_playbot::{action::ActionValue, vision::ObservationConfig};
+use playbot_harness::{
+    eval::Player,
+    game::{Game, level_designs, read_level_designs},
+    level_files::{is_level_files, level_files_mode},
+};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+};
+
+/// Returns the course of the episode of a bot with this seed.
+pub fn course_of(game: &dyn Game, (mode, level): (&str, u64), seed: u64, bot: &Player) -> Replayed {
+    let played = play_player(Setting { game, mode, level, seed }, bot, &ObservationConfig::default());
+    let (_, course) = played.expect("nothing can be wrong with a vector");
+    course
+}
+
+/// Returns whether a bot's episode is the same as before: the same rewards and states in each tick, and the same end.
+/// It is played up to the first difference.
+pub fn keeps_course(game: &dyn Game, (mode, level): (&str, u64), seed: u64, bot: &Player, course: &Replayed) -> bool {
+    let built = Solo::new(Setting { game, mode, level, seed }, &ObservationConfig::default());
+    let mut solo = built.expect("nothing can be wrong with a vector");
+    solo.seat(bot);
+    let mut ticks = 0;
+    loop {
+        match solo.tick() {
+            Err(broken) => return course.broken.as_ref() == Some(&broken),
+            Ok(false) => continue,
+            Ok(true) => {}
+        }
+        let (reward, hash) = solo.outcome();
+        let before = course.rewards.get(ticks).zip(course.state_hashes.get(ticks));
+        let is_same = |(paid, state): (&f32, &u32)| paid.to_bits() == reward.to_bits() && *state == hash;
+        if !before.is_some_and(is_same) {
+            return false;
+        }
+        ticks += 1;
+        match solo.end() {
+            Some(end) => return course.end == Some(end),
+            // The other one was over.
+            None if course.end.is_some() && ticks == course.rewards.len() => return false,
+            None => {}
+        }
+    }
+}
+
+// Findings on level files that are replayed from another folder than that of the test.
+
+impl StoredFinding {
+    /// Returns the finding of this file with the right path of its level file. Level files are named relative to the
+    /// folder of the test. A level file that is not in the current folder is searched for in each folder above the
+    /// finding. It is accepted if it has the recorded level. Otherwise nothing changes.
+    #[must_use]
+    pub fn seen_from(mut self, game: &dyn Game, file: &Path) -> Self {
+        if let Some(mode) = self.mode_above(game, file) {
+            self.header.mode = mode;
+            self.episode.level_seed = 0;
+        }
+        self
+    }
+
+    /// Replaces mode, number and file of the level by those of another finding, so that the level has the name from the
+    /// test.
+    #[must_use]
+    pub fn with_level_of(mut self, other: &Self) -> Self {
+        self.header.mode.clone_from(&other.header.mode);
+        self.episode.level_seed = other.episode.level_seed;
+        self.episode.level_file.clone_from(&other.episode.level_file);
+        self
+    }
+
+    /// Returns the mode of the level file in a folder above this file.
+    fn mode_above(&self, game: &dyn Game, file: &Path) -> Option<String> {
+        let recorded = self.episode.level_file.as_ref().filter(|_| is_level_files(&self.header.mode))?;
+        let path = Path::new(&recorded.path);
+        if path.is_absolute() || path.exists() {
+            return None;
+        }
+        let file = std::path::absolute(file).ok()?;
+        let candidates = file.ancestors().skip(1).map(|folder| folder.join(path));
+        candidates.filter(|candidate| candidate.is_file()).find_map(|candidate: PathBuf| {
+            let mode = level_files_mode(candidate.to_str()?);
+            let designs = read_level_designs(game, &mode).ok()?;
+            // A file of that name may contain another level.
+            (designs.hash(0) == Some(recorded.hash)).then_some(mode)
+        })
+    }
+}
+
+// The replay of actions in search of a finding.
+
+/// The result of a replay.
+pub(super) struct Look {
+    /// Whether the finding is there.
+    pub is_there: bool,
+    /// Its tick, if it needs play.
+    pub tick: Option<u32>,
+    /// The replayed episode.
+    pub replayed: Replayed,
+    /// Its current message, if it is known.
+    pub message: Option<String>,
+}
+
+/// Plays the actions, unless the check needs no play, and runs the check.
+pub(super) fn look(setting: Setting, head: &FindingHead, actions: &[ActionValue], check: &Check) -> Look {
+    match check {
+        Check::Level(is_there) => in_level(setting, *is_there),
+        Check::Episode(check) => {
+            let found = in_episode(setting, actions, |replayed| check(head, replayed));
+            let message = message_of(&head.detector, &found.replayed);
+            Look { message, ..found }
+        }
+        Check::Ticks(watcher) => {
+            let replayed = play_actions(setting, actions, Some(watcher(head)));
+            let tick = replayed.noticed;
+            Look { is_there: tick.is_some(), tick, replayed, message: None }
+        }
+        Check::Detector(detector) => {
+            let (watcher, said) = detector_watcher(Arc::clone(detector));
+            let replayed = play_actions(setting, actions, Some(watcher));
+            let tick = replayed.noticed;
+            Look { is_there: tick.is_some(), tick, replayed, message: said.take() }
+        }
+        Check::WholeLevel(detector) => match detector.shown_by() {
+            ShownBy::Nothing => Look { is_there: false, tick: None, replayed: Replayed::default(), message: None },
+            ShownBy::Level => in_level(setting, |game, mode, level| detector.is_in_level(game, mode, level)),
+            ShownBy::Episode => in_episode(setting, actions, |replayed| {
+                let end = replayed.end.filter(|end| detector.is_in_episode(end, head.tick))?;
+                end.ticks.checked_sub(1)
+            }),
+        },
+    }
+}
+
+/// Runs the check on the level, without play.
+fn in_level(setting: Setting, is_there: impl Fn(&dyn Game, &str, u64) -> bool) -> Look {
+    let Setting { game, mode, level, .. } = setting;
+    let designs = is_level_files(mode).then(|| level_designs(game, mode).ok());
+    let level_file = designs.flatten().and_then(|designs| designs.files().of(level).cloned());
+    let replayed = Replayed { level_file, ..Replayed::default() };
+    Look { is_there: is_there(game, mode, level), tick: None, replayed, message: None }
+}
+
+/// Plays, and runs the check on the result of the episode.
+fn in_episode(setting: Setting, actions: &[ActionValue], tick: impl Fn(&Replayed) -> Option<u32>) -> Look {
+    let replayed = play_actions(setting, actions, None);
+    let tick = tick(&replayed);
+    Look { is_there: tick.is_some(), tick, replayed, message: None }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy_playbot::{action::ActionValue, bot::BlindBot};
+
+    use super::*;
+    use playbot_corridor::{Corridor, Rule};
+
+    #[test]
+    fn the_same_game_keeps_its_course_and_a_broken_one_does_not() {
+        let level = ("plain", 3);
+        for bot in [Player::Demonstrator, Player::Blind(BlindBot::Uniform)] {
+            let course = course_of(&Corridor::default(), level, 5, &bot);
+            assert!(course.end.is_some() && !course.rewards.is_empty());
+            assert!(keeps_course(&Corridor::default(), level, 5, &bot, &course));
+        }
+        let guided = course_of(&Corridor::default(), level, 0, &Player::Demonstrator);
+        let burning = Corridor { rule: Rule::Panics };
+        assert!(!keeps_course(&burning, level, 0, &Player::Demonstrator, &guided));
+        let idle = Player::Blind(BlindBot::Constant(ActionValue::Discrete(2)));
+        assert!(!keeps_course(&Corridor::default(), level, 0, &idle, &guided), "another player goes another way");
+        let broken = course_of(&burning, level, 0, &Player::Demonstrator);
+        assert!(broken.broken.is_some() && keeps_course(&burning, level, 0, &Player::Demonstrator, &broken));
+    }
+}
+
+#[cfg(test)]
+mod seen_from_tests {
+    use std::fs;
+
+    use bevy_playbot::{demo::file::DemoEpisode, level::LevelFile};
+
+    use super::*;
+    use crate::findings::{Checks, FindingHead, keep::recheck};
+    use playbot_corridor::{Corridor, to_the_goal};
+    use playbot_harness::level_files::LevelDesign;
+
+    /// A path without a file, relative to the folder of this test.
+    const LEVEL: &str = "lv-of-another-folder/a.json";
+
+    #[test]
+    fn a_level_is_found_above_its_finding_if_it_is_the_same_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let level = folder.path().join(LEVEL);
+        fs::create_dir_all(level.parent().expect("a folder")).expect("writable");
+        // Behind the wall.
+        fs::write(&level, "9").expect("writable");
+        let game = Corridor::default();
+        let mode = level_files_mode(level.to_str().expect("text"));
+        let head = FindingHead::new(LEVEL, "unreachable-goal", "walled in");
+        let checks = Checks::default();
+        let there = StoredFinding::of_actions(&game, &mode, 0, head, &to_the_goal(), &checks).expect("it is there");
+        let hash = LevelDesign::new((), "9").hash();
+        let mut stored = there.clone();
+        stored.header.mode = level_files_mode(LEVEL);
+        stored.episode.level_file = Some(LevelFile { path: LEVEL.to_owned(), hash });
+        let file = folder.path().join("runs/test/findings/a.finding");
+        let words = recheck(&game, &stored, &checks).expect_err("seen from elsewhere").to_string();
+        assert!(words.contains("from the folder where the test was run") && !words.contains("remove"), "{words}");
+        let seen = stored.clone().seen_from(&game, &file);
+        assert_eq!(seen.header.mode, mode);
+        assert!(recheck(&game, &seen, &checks).expect("it is found").is_same(&stored));
+        assert_eq!(seen.with_level_of(&stored), stored, "what is written names no folder of a machine");
+        assert_eq!(there.clone().seen_from(&game, &file), there, "what is found needs no search");
+        // Another level under the name.
+        fs::write(&level, "2").expect("writable");
+        assert_eq!(stored.clone().seen_from(&game, &file), stored);
+        fs::write(&level, "no level").expect("writable");
+        assert_eq!(stored.clone().seen_from(&game, &file), stored);
+    }
+
+    #[test]
+    fn levels_that_are_no_files_stay() {
+        let stored = crate::findings::testing::stored();
+        let file = Path::new("runs/a.finding");
+        assert_eq!(stored.clone().seen_from(&Corridor::default(), file), stored);
+        let mut drawn = stored;
+        drawn.header.mode = level_files_mode(LEVEL);
+        drawn.episode = DemoEpisode::new(0, drawn.header.actions);
+        assert_eq!(drawn.clone().seen_from(&Corridor::default(), file), drawn, "it names no level file");
+    }
+}

@@ -1,0 +1,293 @@
+//! The replay of all findings of a folder.
+
+use crate::findings::{
+    FindingError, FindingStatus, StoredFinding,
+    checks::Checks,
+    folder::{Date, ENDING, list_findings},
+    io_error,
+    keep::{Sighting, recheck},
+};
+use playbot_harness::{game::Game, games::Games, parallel::on_threads};
+use serde::{Deserialize, Serialize};
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+/// The folder of findings, and the settings of their replay.
+pub struct Regress<'a> {
+    /// Folder with findings.
+    pub folder: &'a Path,
+    /// The games of the program.
+    pub games: &'a Games<'a>,
+    /// Checks of the detectors of a game.
+    pub checks: &'a (dyn Fn(&dyn Game) -> Checks + Sync),
+    /// The day on which pins must hold.
+    pub today: Date,
+    /// Threads. They change no result.
+    pub threads: usize,
+}
+
+/// A replayed finding.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct RegressRow {
+    /// Its name: that of its file, without the ending.
+    pub finding: String,
+    /// Its file.
+    pub path: PathBuf,
+    /// The game; `None` for a file that cannot be read, here and below.
+    pub game: Option<String>,
+    /// The level.
+    pub level: Option<String>,
+    /// Name of the detector.
+    pub detector: Option<String>,
+    /// The tester, if the finding needs one.
+    pub tester: Option<String>,
+    /// Its status.
+    pub status: FindingStatus,
+    /// The reason or the message.
+    pub message: String,
+    /// The new sighting.
+    pub seen: Option<Sighting>,
+    /// Its pin, if it has one.
+    pub pin: Option<PinState>,
+}
+
+impl RegressRow {
+    /// Returns whether it is an alarm: it still happens or cannot be played, and no pin holds.
+    pub fn is_alarm(&self) -> bool {
+        let is_pinned = self.pin.as_ref().is_some_and(|pin| !pin.expired);
+        self.status != FindingStatus::Gone && !is_pinned
+    }
+}
+
+/// The results of all findings of a folder.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Regression {
+    /// Each finding, in the order of their names.
+    pub rows: Vec<RegressRow>,
+    /// Names of pins that no finding has.
+    pub unknown_pins: Vec<String>,
+    /// Findings that were not replayed, because the caller stopped.
+    pub left: u64,
+}
+
+impl Regression {
+    /// Returns whether there are alarms.
+    pub fn has_alarms(&self) -> bool {
+        self.rows.iter().any(RegressRow::is_alarm)
+    }
+}
+
+/// Replays all findings of a folder, on several threads. `progress` receives each one that is done.
+///
+/// # Errors
+///
+/// There are no findings, or the pins cannot be parsed. Errors of a single finding are in its row.
+pub fn regress(request: &Regress, progress: &(dyn Fn(u64) + Sync)) -> Result<Regression, FindingError> {
+    regress_until(request, progress, &|| false)
+}
+
+/// Replays as [`regress`] does, until the caller stops. The rows are then those of the findings that were replayed by
+/// then.
+///
+/// # Errors
+///
+/// As for [`regress`].
+pub fn regress_until(
+    request: &Regress,
+    progress: &(dyn Fn(u64) + Sync),
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Regression, FindingError> {
+    let pins = Pins::read(request.folder)?;
+    let mut found = list_findings(request.folder)?;
+    let played = on_threads(&mut found, request.threads, |(name, path)| {
+        if stop() {
+            return None;
+        }
+        let row = row(request, name, path);
+        progress(1);
+        Some(row)
+    });
+    let mut rows: Vec<RegressRow> = played.into_iter().flatten().collect();
+    for row in &mut rows {
+        row.pin = pins.of(&row.finding, request.today);
+    }
+    let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+    let (unknown_pins, left) = (pins.unknown(&names), (found.len() - rows.len()) as u64);
+    Ok(Regression { rows, unknown_pins, left })
+}
+
+fn row(request: &Regress, name: &str, path: &Path) -> RegressRow {
+    let row = RegressRow {
+        finding: name.to_owned(),
+        path: path.to_owned(),
+        game: None,
+        level: None,
+        detector: None,
+        tester: None,
+        status: FindingStatus::Unplayable,
+        message: String::new(),
+        seen: None,
+        pin: None,
+    };
+    let finding = match StoredFinding::read(path) {
+        Ok(finding) => finding,
+        Err(error) => return RegressRow { message: error.to_string(), ..row },
+    };
+    let StoredFinding { header, head, .. } = &finding;
+    let row = RegressRow {
+        game: Some(header.game.clone()),
+        level: Some(head.level.clone()),
+        detector: Some(head.detector.clone()),
+        tester: head.tester.clone(),
+        ..row
+    };
+    let Some(game) = request.games.iter().find(|game| game.name() == header.game) else {
+        let names: Vec<&str> = request.games.iter().map(|game| game.name()).collect();
+        let message = format!("this program has no game `{}`, only {}", header.game, names.join(", "));
+        return RegressRow { message, ..row };
+    };
+    let finding = finding.seen_from(game, path);
+    let head = &finding.head;
+    match recheck(game, &finding, &(request.checks)(game)) {
+        Err(why) => RegressRow { message: why.to_string(), ..row },
+        Ok(again) => {
+            let message = match again.sighting {
+                None => "it does not happen any more".to_owned(),
+                Some(_) if again.is_same(&finding) => head.message.clone(),
+                Some(seen) => format!("{}{}", head.message, elsewhere(seen, &finding)),
+            };
+            let status = again.status(&finding);
+            RegressRow { status, message, seen: again.sighting, ..row }
+        }
+    }
+}
+
+/// Returns the difference to the stored finding, as the end of a message.
+fn elsewhere(seen: Sighting, finding: &StoredFinding) -> String {
+    match (seen.tick, finding.head.tick) {
+        (Some(now), Some(stored)) if now != stored => format!(" (at tick {now}, stored was {stored})"),
+        _ => " (in another state than stored)".to_owned(),
+    }
+}
+
+// Pins: known findings that are accepted for a while.
+
+/// Name of the file with pins, beside the findings.
+pub const PINS: &str = "pins.ron";
+
+/// A known finding, with a reason and a last day.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Pin {
+    /// Name of the finding's file, with its ending or without.
+    pub finding: String,
+    /// Why it is accepted.
+    pub reason: String,
+    /// The last day on which it is accepted.
+    pub until: Date,
+}
+
+/// The state of a pin on a day.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct PinState {
+    /// Why the finding is accepted.
+    pub reason: String,
+    /// The last day on which it is accepted.
+    pub until: Date,
+    /// Whether that day has passed.
+    pub expired: bool,
+}
+
+/// The pins of a folder.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Pins(Vec<Pin>);
+
+impl Pins {
+    /// Reads a folder's `pins.ron`; there are no pins if there is no such file.
+    ///
+    /// # Errors
+    ///
+    /// [`FindingError::Pins`] with line and column, or the file cannot be read.
+    pub fn read(folder: &Path) -> Result<Self, FindingError> {
+        let path = folder.join(PINS);
+        let text = match fs::read_to_string(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
+            text => text.map_err(io_error("read", &path))?,
+        };
+        let pins: Vec<Pin> = ron::from_str(&text).map_err(|error| FindingError::Pins {
+            path: path.clone(),
+            line: error.span.start.line,
+            column: error.span.start.col,
+            message: error.code.to_string(),
+        })?;
+        if let Some(pin) = pins.iter().find(|pin| pin.reason.trim().is_empty()) {
+            let line = 1 + text.lines().position(|line| line.contains(&pin.finding)).unwrap_or(0);
+            let message = format!("`{}` is pinned without a reason", pin.finding);
+            return Err(FindingError::Pins { path, line, column: 1, message });
+        }
+        Ok(Self(pins))
+    }
+
+    /// Returns the pin of a finding, by its name without ending. Of several it is the one with the last date.
+    pub fn of(&self, finding: &str, today: Date) -> Option<PinState> {
+        let pin = self.0.iter().filter(|pin| name(pin) == finding).max_by_key(|pin| pin.until)?;
+        Some(PinState { reason: pin.reason.clone(), until: pin.until, expired: pin.until < today })
+    }
+
+    /// Returns the names of pins without a finding.
+    pub fn unknown(&self, findings: &[&str]) -> Vec<String> {
+        self.0.iter().map(name).filter(|name| !findings.contains(name)).map(str::to_owned).collect()
+    }
+}
+
+fn name(pin: &Pin) -> &str {
+    let ending = pin.finding.strip_suffix(ENDING).and_then(|name| name.strip_suffix('.'));
+    ending.unwrap_or(&pin.finding)
+}
+
+#[cfg(test)]
+mod pins_tests {
+    use playbot_learner::HasExitCode as _;
+
+    use super::*;
+
+    fn read(text: &str) -> Result<Pins, FindingError> {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join(PINS), text).expect("writable");
+        Pins::read(folder.path())
+    }
+
+    #[test]
+    fn a_pin_holds_up_to_its_last_day() {
+        let pins = read(
+            r#"[
+                // Known since the last release.
+                (finding: "a", reason: "the artist is ill", until: "2027-01-31"),
+                (finding: "b.finding", reason: "new rules come", until: "2026-12-01"),
+            ]"#,
+        )
+        .expect("pins");
+        let expired = |name: &str, day: &str| pins.of(name, day.parse().expect("a day")).map(|pin| pin.expired);
+        assert_eq!((expired("a", "2027-01-31"), expired("a", "2027-02-01")), (Some(false), Some(true)));
+        assert_eq!((expired("b", "2026-01-01"), expired("c", "2026-01-01")), (Some(false), None));
+        assert_eq!(pins.unknown(&["a", "c"]), ["b"]);
+        let folder = tempfile::tempdir().expect("a folder");
+        assert_eq!(Pins::read(folder.path()).expect("none"), Pins::default());
+    }
+
+    #[test]
+    fn what_is_no_pin_is_told_with_its_line() {
+        for (text, parts) in [
+            ("[\n(finding: \"a\", reason: \"b\", until: \"soon\")]", ["line 2", "`soon` is not a date"]),
+            ("[(finding: \"a\", until: \"2027-01-31\")]", ["line 1", "reason"]),
+            ("[(finding: \"a\", reason: \" \", until: \"2027-01-31\")]", ["line 1", "`a` is pinned without a reason"]),
+            ("[(finding: \"a\", why: \"b\", until: \"2027-01-31\")]", ["line 1", "why"]),
+            ("a", ["pins.ron, line 1", "write [(finding: "]),
+        ] {
+            let error = read(text).expect_err(text);
+            assert!(error.is_usage() && parts.iter().all(|part| error.to_string().contains(part)), "{error}");
+        }
+    }
+}

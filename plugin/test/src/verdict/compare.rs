@@ -1,0 +1,318 @@
+//! Comparison with earlier results, separating changes from noise.
+
+mod common_levels;
+#[cfg(test)]
+mod tests;
+
+use crate::verdict::{
+    LevelVerdict, TesterVerdict,
+    compare::common_levels::{may_have_common_levels, no_common_level},
+    error::TestError,
+    plan::TestRecord,
+    results::ResultLines,
+    statistics::{Trials, benjamini_hochberg, fisher_exact},
+};
+use serde::Serialize;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt,
+    path::Path,
+};
+
+/// Expected share of false alarms among the levels reported as easier or harder.
+pub const FALSE_DISCOVERY_RATE: f64 = 0.05;
+
+/// Comparison of two results, level by level.
+///
+/// A tester that drew no random number on a level, before and now, would repeat its episode exactly. So if it newly
+/// solves the level, or no longer does, the level has changed, even with a single episode.
+///
+/// The episodes of all other testers are pooled and compared by Fisher's exact test. Over all levels, at most one
+/// alarm in twenty is false on average (Benjamini and Hochberg). A new proof that a level cannot be solved is always
+/// reported.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Comparison {
+    /// Levels in both.
+    pub levels: u64,
+    /// Levels that were not tested before.
+    pub only_now: u64,
+    /// Levels that are no longer tested.
+    pub only_before: u64,
+    /// Testers that are left out, with reasons.
+    pub left_out: Vec<String>,
+    /// Levels that became unsolvable, or newly proved so.
+    pub unsolvable: Vec<Change>,
+    /// Levels that are solved less often.
+    pub harder: Vec<Change>,
+    /// Levels that are solved more often.
+    pub easier: Vec<Change>,
+    /// Findings that are new.
+    pub new_findings: Vec<FindingChange>,
+    /// Findings that are gone.
+    pub gone_findings: Vec<FindingChange>,
+}
+
+/// Results of an earlier level that are kept in memory.
+struct Known {
+    testers: Vec<TesterVerdict>,
+    total: Trials,
+    is_unsolvable: bool,
+    findings: BTreeSet<(String, Option<String>)>,
+}
+
+/// A level whose difference may be chance.
+struct Doubtful {
+    change: Change,
+    probability: f64,
+}
+
+impl Comparison {
+    /// Compares the results in a folder with earlier ones.
+    ///
+    /// # Errors
+    ///
+    /// [`TestError::Incomparable`] for results of another game or version, or without a common level or tester;
+    /// another [`TestError`] if they cannot be read.
+    pub fn read(before: &Path, now: &Path) -> Result<Self, TestError> {
+        let mut lines = ResultLines::open_whole(now)?;
+        let Comparable { mut earlier, common, other_detectors, left_out } = comparable(before, lines.record())?;
+        let mut known = BTreeMap::new();
+        while let Some(level) = earlier.next_level()? {
+            known.insert(level.level.clone(), Known::of(level, &common, &other_detectors));
+        }
+        let (mut comparison, mut doubtful) = (Self { left_out, ..Self::default() }, Vec::new());
+        while let Some(level) = lines.next_level()? {
+            match known.remove(&level.level) {
+                Some(known) => {
+                    let name = level.level.clone();
+                    comparison.compare(&known, &name, &Known::of(level, &common, &other_detectors), &mut doubtful)
+                }
+                None => comparison.only_now += 1,
+            }
+        }
+        if comparison.levels == 0 {
+            let differences = vec![no_common_level(earlier.record(), lines.record())];
+            return Err(TestError::Incomparable { folder: before.into(), differences });
+        }
+        comparison.only_before = known.len() as u64;
+        comparison.judge(doubtful);
+        Ok(comparison)
+    }
+
+    /// Checks before a test that its results can be compared with those in a folder.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read`](Self::read), as far as known in advance.
+    pub fn check(before: &Path, record: &TestRecord) -> Result<(), TestError> {
+        comparable(before, record).map(drop)
+    }
+
+    /// Returns whether something has become worse.
+    pub fn has_alarms(&self) -> bool {
+        !(self.unsolvable.is_empty() && self.harder.is_empty() && self.new_findings.is_empty())
+    }
+
+    fn compare(&mut self, known: &Known, level: &str, now: &Known, doubtful: &mut Vec<Doubtful>) {
+        self.levels += 1;
+        let changes = |these: &Known, those: &Known| {
+            let added = these.findings.difference(&those.findings);
+            let change = |(detector, tester): &(String, Option<String>)| FindingChange {
+                level: level.to_owned(),
+                detector: detector.clone(),
+                tester: tester.clone(),
+            };
+            added.map(change).collect::<Vec<_>>()
+        };
+        self.new_findings.extend(changes(now, known));
+        self.gone_findings.extend(changes(known, now));
+        let change = |before: Trials, now: Trials| Change {
+            level: level.to_owned(),
+            tester: None,
+            before,
+            now,
+            probability: None,
+            proof: None,
+        };
+        if known.is_unsolvable != now.is_unsolvable {
+            let words = if now.is_unsolvable { "proved unsolvable" } else { "no longer proved unsolvable" };
+            let change = Change { proof: Some(words.to_owned()), ..change(known.total, now.total) };
+            if now.is_unsolvable {
+                self.unsolvable.push(change)
+            } else {
+                self.easier.push(change)
+            }
+            return;
+        }
+        let (mut pooled_before, mut pooled_now) = (Trials::default(), Trials::default());
+        for (before, now) in known.testers.iter().zip(&now.testers) {
+            let (was, is) = (before.score.trials(), now.score.trials());
+            if !(before.exact && now.exact) {
+                add(&mut pooled_before, was);
+                add(&mut pooled_now, is);
+                continue;
+            }
+            // All its episodes are equal.
+            let (solved, solves) = (was.successes > 0, is.successes > 0);
+            if solved != solves {
+                let change = Change { tester: Some(before.tester.clone()), ..change(was, is) };
+                if solves {
+                    self.easier.push(change)
+                } else {
+                    self.harder.push(change)
+                }
+                return;
+            }
+        }
+        if pooled_before.trials > 0 && pooled_now.trials > 0 {
+            let probability = fisher_exact(pooled_before, pooled_now);
+            let change = Change { probability: Some(probability), ..change(pooled_before, pooled_now) };
+            doubtful.push(Doubtful { change, probability });
+        }
+    }
+
+    /// Keeps the changes of those levels that differ by more than chance.
+    fn judge(&mut self, doubtful: Vec<Doubtful>) {
+        let probabilities: Vec<f64> = doubtful.iter().map(|level| level.probability).collect();
+        let alarms = benjamini_hochberg(&probabilities, FALSE_DISCOVERY_RATE);
+        for (Doubtful { change, .. }, _) in doubtful.into_iter().zip(alarms).filter(|(_, is_alarm)| *is_alarm) {
+            let Change { before, now, .. } = &change;
+            let times = |one: u64, other: u64| u128::from(one) * u128::from(other);
+            let (was, is) = (times(before.successes, now.trials), times(now.successes, before.trials));
+            match is.cmp(&was) {
+                std::cmp::Ordering::Greater => self.easier.push(change),
+                std::cmp::Ordering::Less => self.harder.push(change),
+                // Equal shares have probability 1.
+                std::cmp::Ordering::Equal => {}
+            }
+        }
+    }
+}
+
+impl Known {
+    /// Keeps the results of the testers with these names, and of all detectors except these.
+    fn of(level: LevelVerdict, testers: &[String], other_detectors: &[String]) -> Self {
+        let is_unsolvable = level.proof.why_unsolvable().is_some();
+        let is_common = |name: &Option<String>| name.as_ref().is_none_or(|name| testers.contains(name));
+        let findings = level
+            .findings
+            .into_iter()
+            .filter(|finding| is_common(&finding.tester) && !other_detectors.contains(&finding.detector));
+        let findings = findings.map(|finding| (finding.detector, finding.tester)).collect();
+        let mut verdicts = level.testers;
+        let own: Vec<TesterVerdict> = testers
+            .iter()
+            .filter_map(|name| {
+                let place = verdicts.iter().position(|verdict| verdict.tester == *name)?;
+                Some(verdicts.swap_remove(place))
+            })
+            .collect();
+        let mut total = Trials::default();
+        own.iter().for_each(|tester| add(&mut total, tester.score.trials()));
+        Self { testers: own, total, is_unsolvable, findings }
+    }
+}
+
+fn add(sum: &mut Trials, more: Trials) {
+    sum.successes = sum.successes.saturating_add(more.successes);
+    sum.trials = sum.trials.saturating_add(more.trials);
+}
+
+/// Earlier results, and the names in common with others.
+struct Comparable {
+    earlier: ResultLines,
+    common: Vec<String>,
+    /// Detectors that looked only before or only now, or with other settings.
+    other_detectors: Vec<String>,
+    left_out: Vec<String>,
+}
+
+fn comparable(before: &Path, record: &TestRecord) -> Result<Comparable, TestError> {
+    let earlier = ResultLines::open_whole(before)?;
+    let mut differences = earlier.record().differences_of_game(record);
+    if differences.is_empty() && !may_have_common_levels(earlier.record(), record) {
+        differences.push(no_common_level(earlier.record(), record));
+    }
+    let (common, mut left_out) = common_testers(earlier.record(), record);
+    let other_detectors = other_detectors(earlier.record(), record);
+    left_out.extend(other_detectors.iter().map(|name| format!("the detector `{name}` is not the same in both tests")));
+    let differences = match (differences.is_empty(), common.is_empty()) {
+        (true, false) => return Ok(Comparable { earlier, common, other_detectors, left_out }),
+        (true, true) => left_out,
+        (false, _) => differences,
+    };
+    Err(TestError::Incomparable { folder: before.into(), differences })
+}
+
+/// Returns the names of the detectors that differ between both.
+fn other_detectors(before: &TestRecord, now: &TestRecord) -> Vec<String> {
+    let only = |these: &TestRecord, those: &TestRecord| {
+        let alone = these.detectors.iter().filter(|detector| !those.detectors.contains(*detector));
+        alone.filter_map(|detector| detector.split(' ').next().map(str::to_owned)).collect::<BTreeSet<_>>()
+    };
+    only(before, now).union(&only(now, before)).cloned().collect()
+}
+
+/// Returns the names of the testers that are equal in both, and the reasons for leaving others out.
+fn common_testers(before: &TestRecord, now: &TestRecord) -> (Vec<String>, Vec<String>) {
+    let (mut common, mut left_out) = (Vec::new(), Vec::new());
+    for tester in &now.testers {
+        match before.testers.iter().find(|known| known.name == tester.name) {
+            Some(known) if known == tester => common.push(tester.name.clone()),
+            Some(known) => left_out.push(format!("another tester `{}` and `{}`", known.describe(), tester.describe())),
+            None => left_out.push(format!("the tester `{}` was not there before", tester.name)),
+        }
+    }
+    (common, left_out)
+}
+
+// Differences of a level from earlier results.
+
+/// A level that has changed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// The level.
+    pub level: String,
+    /// The tester that shows the change; `None` for several together.
+    pub tester: Option<String>,
+    /// Solved episodes before.
+    pub before: Trials,
+    /// Solved episodes now.
+    pub now: Trials,
+    /// Probability of such a difference by chance, by Fisher's exact test; `None` without randomness.
+    pub probability: Option<f64>,
+    /// Change of the level's proof, described.
+    pub proof: Option<String>,
+}
+
+impl fmt::Display for Change {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { level, before, now, .. } = self;
+        let (was, is) = (before.successes, now.successes);
+        write!(f, "{level}: solved {was} of {}, now {is} of {}", before.trials, now.trials)?;
+        match (&self.proof, self.probability, &self.tester) {
+            (Some(proof), ..) => write!(f, " ({proof})"),
+            (None, Some(probability), _) => write!(f, " (p = {probability:.1e})"),
+            (None, None, Some(tester)) => write!(f, " ({tester}, which draws no random numbers)"),
+            (None, None, None) => Ok(()),
+        }
+    }
+}
+
+/// A finding that is new or gone.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub struct FindingChange {
+    /// The level.
+    pub level: String,
+    /// Its detector.
+    pub detector: String,
+    /// The tester that played.
+    pub tester: Option<String>,
+}
+
+impl fmt::Display for FindingChange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}: {}", self.level, self.detector)?;
+        self.tester.iter().try_for_each(|tester| write!(f, " ({tester})"))
+    }
+}

@@ -1,0 +1,178 @@
+use crate::verdict::{
+    Finding, LevelOutcome, MapScope, TesterRecord,
+    compare::*,
+    folder::{Earlier, TestFolder},
+    results::RESULTS,
+    testing::{tester, verdict},
+};
+use playbot_harness::detector::LevelProof;
+
+fn record(testers: &[&str]) -> TestRecord {
+    TestRecord {
+        game: "garden".to_owned(),
+        game_version: 1,
+        range: "hard:0..499".parse().expect("a split"),
+        files: None,
+        seed: 0,
+        testers: testers.iter().map(|name| TesterRecord::bot(*name)).collect(),
+        episodes: 1,
+        detectors: Vec::new(),
+        options: Vec::new(),
+        maps: MapScope::default(),
+        shard: None,
+    }
+}
+
+fn written(folder: &Path, record: &TestRecord, levels: &[LevelVerdict]) {
+    let (mut open, _) = TestFolder::open(folder, record, Earlier::Replace).expect("writable");
+    levels.iter().for_each(|level| open.keep(level).expect("writable"));
+    open.finish().expect("writable");
+}
+
+/// Compares these levels, tested by `testers` before and now.
+fn compared(before: &[LevelVerdict], now: &[LevelVerdict], testers: &[&str]) -> Comparison {
+    let parent = tempfile::tempdir().expect("a folder");
+    let (one, other) = (parent.path().join("before"), parent.path().join("now"));
+    written(&one, &record(testers), before);
+    written(&other, &TestRecord { seed: 9, ..record(testers) }, now);
+    Comparison::read(&one, &other).expect("comparable")
+}
+
+/// Makes a level that a tester without randomness plays once.
+fn exact(index: u64, solved: u64) -> LevelVerdict {
+    LevelVerdict { testers: vec![tester("plan", solved, 1, true)], ..verdict(index, solved, 1) }
+}
+
+fn names(changes: &[Change]) -> Vec<&str> {
+    changes.iter().map(|change| change.level.as_str()).collect()
+}
+
+#[test]
+fn one_episode_is_enough_where_nothing_is_left_to_chance() {
+    let before: Vec<_> = (0..500).map(|index| exact(index, u64::from(index != 9))).collect();
+    let now: Vec<_> = (0..500).map(|index| exact(index, u64::from(![3, 77, 410].contains(&index)))).collect();
+    let comparison = compared(&before, &now, &["plan"]);
+    assert_eq!(names(&comparison.harder), ["hard:3", "hard:77", "hard:410"]);
+    assert_eq!(names(&comparison.easier), ["hard:9"]);
+    assert_eq!((comparison.levels, comparison.harder[0].probability), (500, None));
+    assert!(comparison.has_alarms());
+    let words = comparison.harder[0].to_string();
+    assert_eq!(words, "hard:3: solved 1 of 1, now 0 of 1 (plan, which draws no random numbers)");
+    let same = compared(&before, &before, &["plan"]);
+    assert!(!same.has_alarms() && same.easier.is_empty(), "{same:?}");
+}
+
+#[test]
+fn chance_gives_no_alarm_and_what_is_more_does() {
+    // 500 levels of which each is solved 10 times of 20, give or take a few.
+    let level = |index, solved| verdict(index, solved, 20);
+    let before: Vec<_> = (0..500).map(|index| level(index, 8 + index % 5)).collect();
+    let mut now: Vec<_> = (0..500).map(|index| level(index, 8 + (index + 2) % 5)).collect();
+    assert!(!compared(&before, &now, &["random"]).has_alarms());
+    // 0 or 20 of 20 instead of 8 to 12 survives 500 tests; 2 of 20 does not.
+    (now[4], now[5], now[7]) = (level(4, 0), level(5, 20), level(7, 2));
+    let comparison = compared(&before, &now, &["random"]);
+    assert_eq!((names(&comparison.harder), names(&comparison.easier)), (vec!["hard:4"], vec!["hard:5"]));
+    assert!(comparison.harder[0].probability.is_some_and(|p| p < 1e-4), "{comparison:?}");
+    // A single episode of a tester that draws is not significant.
+    assert!(!compared(&[verdict(0, 1, 1)], &[verdict(0, 0, 1)], &["random"]).has_alarms());
+}
+
+#[test]
+fn a_new_proof_and_a_new_finding_are_always_told() {
+    let why = "walled in".to_owned();
+    let finding = |tester: Option<&str>| Finding {
+        detector: "panic".to_owned(),
+        tester: tester.map(str::to_owned),
+        episode: Some(0),
+        tick: Some(4),
+        message: "words".to_owned(),
+        file: None,
+        settings: Vec::new(),
+    };
+    let walled = LevelVerdict {
+        outcome: LevelOutcome::ProvedUnsolvable,
+        proof: LevelProof::Unsolvable { why },
+        ..verdict(0, 0, 1)
+    };
+    let broken = LevelVerdict { findings: vec![finding(Some("random")), finding(Some("gone"))], ..verdict(1, 1, 1) };
+    let (before, now) = ([verdict(0, 1, 1), verdict(1, 1, 1)], [walled, broken]);
+    let comparison = compared(&before, &now, &["random"]);
+    assert_eq!((names(&comparison.unsolvable), comparison.harder.len()), (vec!["hard:0"], 0));
+    let found: Vec<String> = comparison.new_findings.iter().map(ToString::to_string).collect();
+    assert_eq!(found, ["hard:1: panic (random)"]);
+    let back = compared(&now, &before, &["random"]);
+    assert_eq!((names(&back.easier), back.gone_findings.len()), (vec!["hard:0"], 1));
+    assert!(!back.has_alarms());
+}
+
+#[test]
+fn what_cannot_be_compared_is_refused_by_name() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let (one, other) = (parent.path().join("before"), parent.path().join("now"));
+    written(&one, &record(&["random"]), &[verdict(0, 1, 1), verdict(1, 1, 1)]);
+    let said = |record: &TestRecord, index| {
+        written(&other, record, &[verdict(index, 1, 1)]);
+        Comparison::read(&one, &other).map(|comparison| comparison.left_out).map_err(|error| error.to_string())
+    };
+    let newer = TestRecord { game_version: 2, ..record(&["random"]) };
+    assert!(said(&newer, 0).expect_err("newer").contains("versions 1 and 2 of `garden`"));
+    let stranger = said(&record(&["jumper"]), 0).expect_err("a stranger");
+    assert!(stranger.contains("the tester `jumper` was not there before"), "{stranger}");
+    assert!(said(&record(&["random"]), 7).expect_err("other levels").contains("no level is in"));
+    // Ranges are known before any play.
+    let elsewhere = TestRecord { range: "easy:0..9".parse().expect("a split"), ..record(&["random"]) };
+    let words = Comparison::check(&one, &elsewhere).expect_err("another mode").to_string();
+    assert!(words.contains("no level is in hard:0..499 and in easy:0..9; name results"), "{words}");
+    Comparison::check(&one, &record(&["random"])).expect("the same levels");
+    let left_out = said(&record(&["random", "jumper"]), 0).expect("one in common");
+    assert_eq!(left_out, ["the tester `jumper` was not there before"]);
+    let retrained = TesterRecord { checksum: Some("1".to_owned()), ..TesterRecord::bot("random") };
+    let retrained = TestRecord { testers: vec![retrained], ..record(&[]) };
+    assert!(said(&retrained, 0).expect_err("another policy").contains("random (file 1)"));
+}
+
+#[test]
+fn findings_of_detectors_that_did_not_look_before_are_no_news() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let (one, other) = (parent.path().join("before"), parent.path().join("now"));
+    let finding = |detector: &str| Finding {
+        detector: detector.to_owned(),
+        tester: Some("random".to_owned()),
+        episode: Some(0),
+        tick: Some(4),
+        message: "words".to_owned(),
+        file: None,
+        settings: Vec::new(),
+    };
+    let looked = |detectors: &[&str]| {
+        let detectors = detectors.iter().map(|detector| (*detector).to_owned()).collect();
+        TestRecord { detectors, ..record(&["random"]) }
+    };
+    written(&one, &looked(&["stuck ticks=300", "runaway"]), &[verdict(0, 1, 1)]);
+    let all = ["stuck", "runaway", "late", "panic"].map(finding).to_vec();
+    let now = LevelVerdict { findings: all, ..verdict(0, 1, 1) };
+    written(&other, &looked(&["stuck ticks=200", "runaway", "late"]), &[now]);
+    let comparison = Comparison::read(&one, &other).expect("they can be compared");
+    let found: Vec<&str> = comparison.new_findings.iter().map(|finding| finding.detector.as_str()).collect();
+    assert_eq!(found, ["panic", "runaway"]);
+    assert_eq!(comparison.left_out.len(), 2, "{:?}", comparison.left_out);
+}
+
+#[test]
+fn earlier_results_with_a_flipped_bit_are_refused_before_anybody_plays() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let before = folder.path().join("before");
+    written(&before, &record(&["random"]), &[verdict(0, 1, 1)]);
+    let path = before.join(RESULTS);
+    let whole = std::fs::read(&path).expect("results");
+    Comparison::check(&before, &record(&["random"])).expect("the same levels");
+    for at in 0..whole.len() * 8 {
+        let mut bytes = whole.clone();
+        bytes[at / 8] ^= 1 << (at % 8);
+        std::fs::write(&path, bytes).expect("writable");
+        let error = Comparison::check(&before, &record(&["random"])).expect_err("damaged");
+        let is_of_file = matches!(error, TestError::Damaged { .. } | TestError::Io { .. });
+        assert!(is_of_file && error.to_string().contains(RESULTS), "bit {at}: {error}");
+    }
+}

@@ -1,0 +1,357 @@
+//! Errors of tests and their results.
+
+use crate::findings::FindingError;
+use playbot_harness::eval::EvalError;
+use playbot_learner::HasExitCode;
+use serde::{Deserialize, Serialize};
+use std::{
+    fmt, io,
+    path::{Path, PathBuf},
+    str::FromStr,
+};
+use thiserror::Error;
+
+/// Name of the journal in the folder of a test.
+pub(super) const JOURNAL: &str = "levels.jsonl";
+
+/// Failure to test levels, or to use results.
+#[derive(Debug, Error)]
+pub enum TestError {
+    /// The game cannot be played, or does not support the observations of a policy.
+    #[error(transparent)]
+    Eval(#[from] EvalError),
+    /// The test has no tester.
+    #[error("the test has no tester: name a bot or a policy")]
+    NoTester,
+    /// Two testers share a name.
+    #[error("two testers are called `{0}`: give each file or folder a name of its own, and name each bot once")]
+    SameName(String),
+    /// A shard without levels.
+    #[error("shard {shard} has no level, since {range} has only {length}: use at most {}", shards_of(*length))]
+    EmptyShard {
+        /// The shard.
+        shard: Shard,
+        /// The range of levels.
+        range: String,
+        /// Number of levels.
+        length: u64,
+    },
+    /// The folder already has results.
+    #[error(
+        "{} has results already: go on with --resume, choose another --out, or replace them with --force", .0.display()
+    )]
+    Exists(PathBuf),
+    /// A file is at the path of the folder.
+    #[error("{} is a file, and results need a folder: name another --out", .0.display())]
+    NotAFolder(PathBuf),
+    /// Another process tests into the folder.
+    #[error("{} is in use by another test: wait for it or stop it, or choose another --out", .0.display())]
+    Busy(PathBuf),
+    /// The folder holds results of another test.
+    #[error(
+        "{} holds another test, which differs (there and here) in {}; use its options, or choose another --out",
+        folder.display(), differences.join(", ")
+    )]
+    OtherPlan {
+        /// The folder.
+        folder: PathBuf,
+        /// The differences, described.
+        differences: Vec<String>,
+    },
+    /// The folder has no results.
+    #[error("{} has no results.json{}", .0.display(), no_results(.0))]
+    NoResults(PathBuf),
+    /// A file is damaged.
+    #[error("{}, line {line}: {message}; make it again with `playbot test`", path.display())]
+    Damaged {
+        /// The file.
+        path: PathBuf,
+        /// Line, from 1.
+        line: usize,
+        /// The damage.
+        message: String,
+    },
+    /// Results that cannot be joined.
+    #[error(
+        "{} and {} cannot be joined: {}; name shards of one test, and test the other shards again",
+        first.display(), second.display(), differences.join(", ")
+    )]
+    Unlike {
+        /// One folder.
+        first: PathBuf,
+        /// The other one.
+        second: PathBuf,
+        /// The differences, described.
+        differences: Vec<String>,
+    },
+    /// Results of a whole range cannot be joined.
+    #[error("{} holds results of a whole range, not of a shard: name folders of `playbot test --shard`", .0.display())]
+    NotAShard(PathBuf),
+    /// Two folders hold the same levels.
+    #[error("{} and {} overlap: both are shard {shard}; name each shard once", first.display(), second.display())]
+    Overlap {
+        /// One folder.
+        first: PathBuf,
+        /// The other one.
+        second: PathBuf,
+        /// Their shard.
+        shard: Shard,
+    },
+    /// Missing shards.
+    #[error("missing {} with `playbot test --shard`", shards(.0))]
+    Missing(Vec<Shard>),
+    /// Results that cannot be compared.
+    #[error(
+        "{} and this test cannot be compared: {}; name results of the same version of the game with a level and a tester in common, or \
+         leave --against out", folder.display(), differences.join(", ")
+    )]
+    Incomparable {
+        /// The folder of the earlier results.
+        folder: PathBuf,
+        /// The differences, described.
+        differences: Vec<String>,
+    },
+    /// JUnit XML could not be written.
+    #[error("the results cannot be written as JUnit XML: {0}")]
+    Junit(String),
+    /// A finding could not be written.
+    #[error(transparent)]
+    Finding(#[from] FindingError),
+    /// The operating system refused.
+    #[error("cannot {action} {}: {source}; {}", path.display(), next_step(source))]
+    Io {
+        /// The failed action.
+        action: &'static str,
+        /// Its file.
+        path: PathBuf,
+        /// The system's answer.
+        source: io::Error,
+    },
+    /// The verdict of a level could not be written.
+    #[error(
+        "cannot write {}: {source}; the {finished} finished levels in it are whole: make room or grant write access there, \
+         and go on with --resume", path.display()
+    )]
+    NotKept {
+        /// The journal.
+        path: PathBuf,
+        /// Levels in it.
+        finished: u64,
+        /// The system's answer.
+        source: io::Error,
+    },
+}
+
+impl HasExitCode for TestError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Eval(EvalError::Fault(_))
+            | Self::Finding(_)
+            | Self::Io { .. }
+            | Self::NotKept { .. }
+            | Self::Junit(_) => 2,
+            _ => 3,
+        }
+    }
+}
+
+pub(super) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> TestError {
+    move |source| TestError::Io { action, path: path.into(), source }
+}
+
+/// Returns serde's message about a line, with its column only: serde always counts the line as 1.
+pub(super) fn json_fault(error: &serde_json::Error) -> String {
+    let (words, column) = (error.to_string(), error.column());
+    let place = format!(" at line {} column {column}", error.line());
+    match words.strip_suffix(&place) {
+        Some(what) => format!("{what} (column {column})"),
+        None => words,
+    }
+}
+
+/// Returns the remedy for a failure of the system.
+fn next_step(source: &io::Error) -> &'static str {
+    use io::ErrorKind::{
+        FileTooLarge, IsADirectory, NotADirectory, NotFound, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem,
+        StorageFull,
+    };
+    match source.kind() {
+        StorageFull | QuotaExceeded | FileTooLarge => "make room there and run this again",
+        PermissionDenied | ReadOnlyFilesystem => "grant write access there or name another folder, and run this again",
+        NotFound | NotADirectory | IsADirectory => "name another folder, or move the file that blocks it",
+        _ => "run this again, and check the disk if that does not help",
+    }
+}
+
+fn shards_of(levels: u64) -> String {
+    if levels == 1 { "1 shard".to_owned() } else { format!("{levels} shards") }
+}
+
+fn no_results(folder: &Path) -> &'static str {
+    if folder.join(JOURNAL).exists() {
+        ": its test is not done, finish it with `playbot test --resume`"
+    } else if folder.exists() {
+        ": name the --out of a `playbot test`"
+    } else {
+        ", since there is no such folder: name the --out of a `playbot test`"
+    }
+}
+
+fn shards(missing: &[Shard]) -> String {
+    const SHOWN: usize = 8;
+    let names: Vec<String> = missing.iter().take(SHOWN).map(Shard::to_string).collect();
+    let more = missing.len().saturating_sub(SHOWN);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let (shards, next) = match missing.len() {
+        1 => ("shard", "name its folder too, or test it"),
+        _ => ("shards", "name their folders too, or test them"),
+    };
+    format!("{shards} {}{more}: {next}", names.join(", "))
+}
+
+// Shards: parts of a test for several machines.
+
+/// Part `index` of `count`, counted from 0: the levels whose index in the range, divided by `count`, has the
+/// remainder `index`. Written `0/4` to `3/4`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct Shard {
+    /// Index of the part.
+    pub index: u64,
+    /// Number of parts.
+    pub count: u64,
+}
+
+impl Shard {
+    /// Returns the indices of its levels in a range of this length.
+    pub fn places(self, length: u64) -> impl Iterator<Item = u64> + use<> {
+        (self.index..length).step_by(usize::try_from(self.count).unwrap_or(usize::MAX))
+    }
+}
+
+impl fmt::Display for Shard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+/// Text that is not a valid shard.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum ShardError {
+    /// The text has another form.
+    #[error("`{0}` is not a shard: write index/count, such as 0/4, 1/4, 2/4 and 3/4 for four machines")]
+    NotAShard(String),
+    /// The index is too large.
+    #[error("`{index}/{count}`: shards are counted from 0, so the last one is {}/{count}", count - 1)]
+    Beyond {
+        /// The requested index.
+        index: u64,
+        /// Number of parts, at least 1.
+        count: u64,
+    },
+}
+
+impl FromStr for Shard {
+    type Err = ShardError;
+
+    fn from_str(text: &str) -> Result<Self, ShardError> {
+        let parse = || {
+            let (index, count) = text.split_once('/')?;
+            Some((index.parse().ok()?, count.parse().ok()?))
+        };
+        match parse() {
+            None | Some((_, 0)) => Err(ShardError::NotAShard(text.to_owned())),
+            Some((index, count)) if index >= count => Err(ShardError::Beyond { index, count }),
+            Some((index, count)) => Ok(Self { index, count }),
+        }
+    }
+}
+
+impl TryFrom<String> for Shard {
+    type Error = ShardError;
+
+    fn try_from(text: String) -> Result<Self, ShardError> {
+        text.parse()
+    }
+}
+
+impl From<Shard> for String {
+    fn from(shard: Shard) -> Self {
+        shard.to_string()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn missing_shards_are_named_up_to_a_few() {
+        let shard = |index| Shard { index, count: 20 };
+        let one = TestError::Missing(vec![shard(3)]).to_string();
+        assert_eq!(one, "missing shard 3/20: name its folder too, or test it with `playbot test --shard`");
+        let words = TestError::Missing((0..10).map(shard).collect()).to_string();
+        assert!(words.starts_with("missing shards 0/20, 1/20,") && words.contains("7/20 and 2 more: "), "{words}");
+    }
+
+    #[test]
+    fn what_the_system_refuses_has_a_next_step() {
+        use io::ErrorKind::{NotFound, Other, PermissionDenied, StorageFull};
+        for (kind, next) in
+            [(StorageFull, "make room"), (PermissionDenied, "make rights"), (NotFound, "name another"), (Other, "call")]
+        {
+            let words = io_error("write", Path::new("a/junit.xml"))(kind.into()).to_string();
+            let (what, then) = words.rsplit_once("; ").expect("two parts");
+            assert!(what.starts_with("cannot write a/junit.xml: ") && then.starts_with(next), "{words}");
+        }
+    }
+
+    #[test]
+    fn what_does_not_go_together_has_a_next_step_and_one_is_no_plural() {
+        let differences = || vec!["games `a` and `b`".to_owned()];
+        let other = TestError::Incomparable { folder: "before".into(), differences: differences() }.to_string();
+        assert!(
+            other.starts_with("before and this test cannot be compared: games `a` and `b`; name results"),
+            "{other}"
+        );
+        let unlike = TestError::Unlike { first: "a".into(), second: "b".into(), differences: differences() };
+        assert!(unlike.to_string().contains("games `a` and `b`; name shards of one test"), "{unlike}");
+        let empty = |length| {
+            let shard = Shard { index: 3, count: 7 };
+            TestError::EmptyShard { shard, range: "hard:0..9".to_owned(), length }.to_string()
+        };
+        assert!(empty(1).ends_with("use at most 1 shard") && empty(2).ends_with("use at most 2 shards"));
+    }
+
+    #[test]
+    fn an_unfinished_test_is_told_from_a_folder_without_one() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let words = || TestError::NoResults(folder.path().into()).to_string();
+        assert!(words().contains("has no results.json: name the --out"), "{}", words());
+        let none = TestError::NoResults(folder.path().join("none")).to_string();
+        assert!(none.contains("no such folder"), "{none}");
+        std::fs::write(folder.path().join(JOURNAL), "").expect("writable");
+        assert!(words().contains("--resume"), "{}", words());
+    }
+}
+
+#[cfg(test)]
+mod shard_tests {
+    use super::*;
+
+    #[test]
+    fn shards_are_counted_from_0_and_share_out_every_level_once() {
+        let shard = |text: &str| text.parse::<Shard>();
+        let mut all: Vec<u64> =
+            ["0/3", "1/3", "2/3"].iter().flat_map(|text| shard(text).expect("valid").places(8)).collect();
+        assert_eq!(all[..3], [0, 3, 6]);
+        all.sort_unstable();
+        assert_eq!(all, (0..8).collect::<Vec<_>>());
+        assert_eq!(shard("4/7").expect("valid").places(3).count(), 0);
+        assert_eq!(shard("2/7").expect("valid").to_string(), "2/7");
+        for bad in ["", "1", "1/0", "a/2", "-1/2", "1/2/3"] {
+            assert_eq!(shard(bad), Err(ShardError::NotAShard(bad.to_owned())), "{bad}");
+        }
+        assert!(shard("3/3").expect_err("too many").to_string().contains("the last one is 2/3"));
+    }
+}

@@ -1,0 +1,397 @@
+//! The plan of a test: levels, testers and settings.
+
+use crate::{
+    detectors::Detectors,
+    verdict::{
+        error::{Shard, TestError},
+        maps::{MapScope, hash_of_files},
+    },
+};
+use bevy_playbot::{state_hash::StateHash, vision::ObservationConfig};
+use playbot_harness::{
+    eval::{EvalError, Player},
+    game::Game,
+    split::LevelSplit,
+};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// Plan of a test.
+#[derive(Clone)]
+pub struct TestPlan {
+    /// Levels.
+    pub split: LevelSplit,
+    /// Testers with distinct names, at least one.
+    pub testers: Vec<Tester>,
+    /// Episodes of each tester on each level; at least 1.
+    pub episodes: u32,
+    /// Seed of the testers' random streams.
+    pub seed: u64,
+    /// The detectors at work during play.
+    pub detectors: Detectors,
+    /// Shard of the levels; all levels if `None`.
+    pub shard: Option<Shard>,
+    /// Number of threads, which does not affect the results.
+    pub threads: usize,
+}
+
+/// Description of a plan in files: everything that the results depend on.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TestRecord {
+    /// Name of the game.
+    pub game: String,
+    /// Version of its rules.
+    pub game_version: u32,
+    /// The levels, as `mode:first..last`.
+    pub range: LevelSplit,
+    /// Hash of the levels, if they are files.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub files: Option<String>,
+    /// Seed of the testers' random streams.
+    pub seed: u64,
+    /// The testers, in the order in which results have them.
+    pub testers: Vec<TesterRecord>,
+    /// Episodes of each tester on each level.
+    pub episodes: u32,
+    /// The detectors, each with its settings.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub detectors: Vec<String>,
+    /// The detectors as words of a command line: all options that differ from the default. Files are named as the
+    /// test named them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub options: Vec<String>,
+    /// Levels whose results have maps of where agents went.
+    #[serde(default, skip_serializing_if = "MapScope::is_none")]
+    pub maps: MapScope,
+    /// Shard of the levels; all levels if `None`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shard: Option<Shard>,
+}
+
+impl TestPlan {
+    /// Checks that the plan has testers with distinct names and levels, and that memory suffices.
+    ///
+    /// # Errors
+    ///
+    /// [`TestError::NoTester`], [`TestError::SameName`], [`TestError::EmptyShard`], or [`TestError::Eval`] with what
+    /// to lower.
+    pub fn check(&self) -> Result<(), TestError> {
+        if self.testers.is_empty() {
+            return Err(TestError::NoTester);
+        }
+        for (index, tester) in self.testers.iter().enumerate() {
+            if self.testers[..index].iter().any(|other| other.record.name == tester.record.name) {
+                return Err(TestError::SameName(tester.record.name.clone()));
+            }
+        }
+        match self.shard {
+            Some(shard) if shard.places(self.split.len()).next().is_none() => {
+                Err(TestError::EmptyShard { shard, range: self.split.to_string(), length: self.split.len() })
+            }
+            _ => self.check_memory().map_err(|error| EvalError::from(error).into()),
+        }
+    }
+
+    /// Returns its description for files.
+    pub fn record(&self, game: &dyn Game) -> TestRecord {
+        TestRecord {
+            game: game.name().to_owned(),
+            game_version: game.version(),
+            range: self.split.clone(),
+            files: hash_of_files(game, &self.split),
+            seed: self.seed,
+            testers: self.testers.iter().map(|tester| tester.record.clone()).collect(),
+            episodes: self.episodes.max(1),
+            detectors: self.detectors.record().to_vec(),
+            options: self.detectors.options().to_vec(),
+            maps: self.maps(),
+            shard: self.shard,
+        }
+    }
+
+    /// Returns the scope of the maps in results. The whole range decides, not the shard.
+    pub fn maps(&self) -> MapScope {
+        MapScope::of(self.split.len())
+    }
+
+    /// Returns the indices in the range of the levels to test.
+    pub fn places(&self) -> Vec<u64> {
+        match self.shard {
+            Some(shard) => shard.places(self.split.len()).collect(),
+            None => (0..self.split.len()).collect(),
+        }
+    }
+
+    /// Returns the seed of an episode, from the plan's seed, the names of tester and level, and the number of the
+    /// episode. So the episode is the same beside any other levels and testers, and on any machine.
+    pub fn episode_seed(&self, tester: &TesterRecord, level: &str, episode: u32) -> u64 {
+        let bytes = |text: &str| text.bytes().map(u64::from).chain([u64::from(u8::MAX) + 1]).collect::<Vec<_>>();
+        let names = bytes(&tester.name).into_iter().chain(bytes(level));
+        StateHash::of([self.seed].into_iter().chain(names).chain([u64::from(episode)])).0
+    }
+}
+
+impl TestRecord {
+    /// Describes the differences between two tests, without their shards.
+    pub fn differences(&self, other: &Self) -> Vec<String> {
+        let mut found = self.differences_of_game(other);
+        let mut compare = |what: &str, one: String, other: String| {
+            if one != other {
+                found.push(format!("{what} {one} and {other}"));
+            }
+        };
+        compare("levels", self.range.to_string(), other.range.to_string());
+        let hash = |record: &Self| record.files.clone().unwrap_or_else(|| "none".to_owned());
+        compare("hashes of the level files", hash(self), hash(other));
+        compare("seeds", self.seed.to_string(), other.seed.to_string());
+        compare("episodes per level", self.episodes.to_string(), other.episodes.to_string());
+        compare("testers", self.describe_testers(), other.describe_testers());
+        compare("detectors", self.describe_detectors(), other.describe_detectors());
+        compare("levels with maps", self.maps.name().to_owned(), other.maps.name().to_owned());
+        found
+    }
+
+    /// Describes the differences between the games and their versions.
+    pub fn differences_of_game(&self, other: &Self) -> Vec<String> {
+        if self.game != other.game {
+            return vec![format!("games `{}` and `{}`", self.game, other.game)];
+        }
+        let (one, another) = (self.game_version, other.game_version);
+        if one == another { Vec::new() } else { vec![format!("versions {one} and {another} of `{}`", self.game)] }
+    }
+
+    fn describe_detectors(&self) -> String {
+        if self.detectors.is_empty() { "none".to_owned() } else { self.detectors.join(" + ") }
+    }
+
+    fn describe_testers(&self) -> String {
+        self.testers.iter().map(TesterRecord::describe).collect::<Vec<_>>().join(" + ")
+    }
+}
+
+// Testers: players with names and observations.
+
+/// A player with a name and its observations.
+#[derive(Clone)]
+pub struct Tester {
+    /// Its description for files.
+    pub record: TesterRecord,
+    /// The player.
+    pub player: Player,
+    /// Observations of a learned policy; bots keep vectors.
+    pub observation_config: ObservationConfig,
+}
+
+/// Description of a tester in files.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct TesterRecord {
+    /// Its name, unique in the test.
+    pub name: String,
+    /// Checksum of a policy's file: another file is another tester.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checksum: Option<String>,
+    /// True if a policy takes its most probable action instead of drawing one.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub greedy: bool,
+    /// The policy's file, if it differs from the tester's name.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// The policy's run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub run: Option<TestedRun>,
+}
+
+/// A checkpoint of a run.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct TestedRun {
+    /// The run's folder.
+    pub folder: String,
+    /// The checkpoint's number of environment steps.
+    pub step: u64,
+}
+
+/// The path of a policy's file does not identify the tester.
+impl PartialEq for TesterRecord {
+    fn eq(&self, other: &Self) -> bool {
+        (&self.name, &self.checksum, self.greedy) == (&other.name, &other.checksum, other.greedy)
+    }
+}
+
+impl Eq for TesterRecord {}
+
+impl TesterRecord {
+    /// Makes the tester of a bot of the game.
+    pub fn bot(name: impl Into<String>) -> Self {
+        Self { name: name.into(), checksum: None, greedy: false, file: None, run: None }
+    }
+
+    /// Makes the tester of a policy's file, under its own name or else the file's.
+    pub fn policy(name: Option<String>, path: &Path, checksum: String) -> Self {
+        let of_file = || path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
+        let name = name.unwrap_or_else(of_file);
+        let file = (path != Path::new(&name)).then(|| path.display().to_string());
+        Self { checksum: Some(checksum), file, ..Self::bot(name) }
+    }
+
+    /// Describes the tester.
+    pub fn describe(&self) -> String {
+        let checksum = self.checksum.as_ref().map_or_else(String::new, |sum| format!(" (file {sum})"));
+        format!("{}{checksum}{}", self.name, if self.greedy { ", greedy" } else { "" })
+    }
+}
+
+// Names for skills that are points of a continuous space.
+//
+// A skill is named after the nearest of several fixed directions: the positive and the negative half of each axis of
+// z. That is the number of z that is furthest from 0, and its sign. So a name is independent of levels and draws,
+// and is the same in every test of a policy.
+
+/// Largest number of axes with a name: further ones are left out.
+const MOST_NUMBERS: usize = 16;
+
+/// Returns the number of names for skills of this length; 0 without a skill.
+pub(super) fn skill_count(z: &[f32]) -> usize {
+    2 * z.len().min(MOST_NUMBERS)
+}
+
+/// Returns the number of a skill's name, below [`skill_count`]; of equally large numbers the first counts.
+pub(super) fn skill_number(z: &[f32]) -> Option<usize> {
+    let mut nearest: Option<(usize, f32)> = None;
+    for (number, value) in z.iter().take(MOST_NUMBERS).enumerate() {
+        if nearest.is_none_or(|(_, longest)| value.abs() > longest.abs()) {
+            nearest = Some((number, *value));
+        }
+    }
+    nearest.map(|(number, value)| 2 * number + usize::from(value < 0.0))
+}
+
+/// Returns the name: `z3+` for a skill whose third number is furthest from 0, and is positive.
+pub(super) fn skill_name(number: usize) -> String {
+    format!("z{}{}", number / 2 + 1, if number.is_multiple_of(2) { '+' } else { '-' })
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy_playbot::{bot::BlindBot, vision::ObservationConfig};
+
+    use super::*;
+    use playbot_harness::eval::Player;
+
+    fn plan(testers: &[&str], shard: Option<&str>) -> TestPlan {
+        let tester = |name: &&str| Tester {
+            record: TesterRecord::bot(*name),
+            player: Player::Blind(BlindBot::Uniform),
+            observation_config: ObservationConfig::default(),
+        };
+        TestPlan {
+            split: "hard:5..9".parse().expect("a split"),
+            testers: testers.iter().map(tester).collect(),
+            episodes: 2,
+            seed: 3,
+            detectors: Detectors::default(),
+            shard: shard.map(|shard| shard.parse().expect("a shard")),
+            threads: 1,
+        }
+    }
+
+    #[test]
+    fn a_plan_needs_testers_and_levels() {
+        assert!(plan(&["a", "b"], Some("4/5")).check().is_ok());
+        assert!(matches!(plan(&[], None).check(), Err(TestError::NoTester)));
+        assert!(matches!(plan(&["a", "b", "a"], None).check(), Err(TestError::SameName(name)) if name == "a"));
+        let error = plan(&["a"], Some("5/6")).check().expect_err("five levels").to_string();
+        assert!(error.contains("5/6") && error.contains("hard:5..9 has only 5"), "{error}");
+        let shard = plan(&["a"], Some("1/2"));
+        assert_eq!((shard.places(), shard.maps()), (vec![1, 3], MapScope::All));
+        let many = TestPlan { split: "hard:0..4001".parse().expect("a split"), ..shard };
+        assert_eq!((many.places().len(), many.maps()), (2001, MapScope::Failed));
+    }
+
+    #[test]
+    fn the_seed_of_an_episode_comes_from_names_and_numbers_alone() {
+        let (all, shard) = (plan(&["a", "b"], None), plan(&["b"], Some("0/2")));
+        let tester = TesterRecord::bot("b");
+        assert_eq!(all.episode_seed(&tester, "hard:7", 1), shard.episode_seed(&tester, "hard:7", 1));
+        let mut seeds: Vec<u64> = [("a", "7", 0), ("b", "7", 0), ("b", "8", 0), ("b", "7", 1), ("b", "70", 1)]
+            .map(|(name, level, episode)| all.episode_seed(&TesterRecord::bot(name), level, episode))
+            .to_vec();
+        seeds.push(TestPlan { seed: 4, ..all }.episode_seed(&tester, "7", 0));
+        seeds.sort_unstable();
+        seeds.dedup();
+        assert_eq!(seeds.len(), 6);
+    }
+
+    #[test]
+    fn what_differs_is_named() {
+        let record = TestRecord {
+            game: "a".to_owned(),
+            game_version: 1,
+            range: "hard:5..9".parse().expect("a split"),
+            files: None,
+            seed: 0,
+            testers: vec![TesterRecord::bot("search")],
+            episodes: 1,
+            detectors: Vec::new(),
+            options: Vec::new(),
+            maps: MapScope::default(),
+            shard: None,
+        };
+        let trained = TesterRecord { checksum: Some("0f".to_owned()), greedy: true, ..TesterRecord::bot("ppo") };
+        let other = TestRecord { seed: 7, testers: vec![trained], game_version: 2, ..record.clone() };
+        let expected = ["versions 1 and 2 of `a`", "seeds 0 and 7", "testers search and ppo (file 0f), greedy"];
+        assert_eq!(record.differences(&other), expected);
+        assert_eq!(record.differences(&TestRecord { game: "b".to_owned(), ..record.clone() }), ["games `a` and `b`"]);
+        assert!(record.differences(&record).is_empty());
+        let mapped = TestRecord { maps: MapScope::All, ..record.clone() };
+        assert_eq!(record.differences(&mapped), ["levels with maps none and all"]);
+    }
+}
+
+#[cfg(test)]
+mod tester_tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_told_where_it_is_not_the_name() {
+        let told = |name: Option<&str>, path: &str| {
+            let record = TesterRecord::policy(name.map(str::to_owned), Path::new(path), "0f".to_owned());
+            (record.name, record.file)
+        };
+        let wanted = |name: &str, file: Option<&str>| (name.to_owned(), file.map(str::to_owned));
+        assert_eq!(told(None, "a.policy"), wanted("a.policy", None));
+        assert_eq!(told(None, "new/a.policy"), wanted("a.policy", Some("new/a.policy")));
+        assert_eq!(told(Some("ppo"), "a.policy"), wanted("ppo", Some("a.policy")));
+    }
+
+    #[test]
+    fn a_policy_is_known_by_name_and_checksum_and_not_by_its_place() {
+        let here = TesterRecord { checksum: Some("0f".to_owned()), ..TesterRecord::bot("ppo") };
+        let there = TesterRecord { file: Some("runs/new.policy".to_owned()), ..here.clone() };
+        assert_eq!(here, there);
+        assert_ne!(here, TesterRecord { checksum: Some("1f".to_owned()), ..there.clone() });
+        assert_ne!(here, TesterRecord { greedy: true, ..there.clone() });
+        assert_ne!(here, TesterRecord { name: "bot".to_owned(), ..there.clone() });
+        assert_eq!(there.describe(), "ppo (file 0f)");
+        let text = serde_json::to_string(&there).expect("JSON");
+        assert_eq!(text, r#"{"name":"ppo","checksum":"0f","file":"runs/new.policy"}"#);
+        assert_eq!(serde_json::to_string(&here).expect("JSON"), r#"{"name":"ppo","checksum":"0f"}"#);
+    }
+}
+
+#[cfg(test)]
+mod skill_name_tests {
+    use super::*;
+
+    #[test]
+    fn a_skill_is_called_by_its_number_furthest_from_zero() {
+        let name = |z: &[f32]| skill_number(z).map(skill_name);
+        assert_eq!(name(&[0.1, -0.2, 1.5]).as_deref(), Some("z3+"));
+        assert_eq!(name(&[0.1, -2.0, 1.5]).as_deref(), Some("z2-"));
+        assert_eq!(name(&[1.0, -1.0]).as_deref(), Some("z1+"));
+        assert_eq!(name(&[]), None);
+        let mut long = [0.5; 40];
+        long[30] = 9.0;
+        assert_eq!((name(&long).as_deref(), skill_count(&long)), (Some("z1+"), 32));
+        assert_eq!((skill_count(&[0.0; 3]), skill_count(&[])), (6, 0));
+    }
+}

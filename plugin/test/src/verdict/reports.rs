@@ -1,0 +1,454 @@
+//! Summary of results in a page of Markdown, short enough for a pull request.
+
+use crate::{
+    detectors::compares_testers,
+    findings::{FindingFiles, Played, SeenFinding, SeenLevel},
+    verdict::{
+        Finding, LevelOutcome, LevelVerdict,
+        compare::Comparison,
+        error::{TestError, io_error},
+        maps::level_argument,
+        plan::{TestPlan, TestRecord, Tester, TesterRecord},
+        results::{Overview, ResultLines},
+        statistics::{Trials, wilson},
+    },
+};
+use playbot_harness::{brief::shell_word, game::Game};
+use playbot_report::markdown_cell;
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+use std::{fmt::Display, path::Path};
+
+/// Most changes of a kind that are listed.
+const MOST_CHANGES: usize = 20;
+
+/// Writes the page.
+pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, program: &str) -> String {
+    let record = &overview.record;
+    let mut lines = vec![format!("# {} {}", record.game, markdown_cell(&record.range.to_string())), String::new()];
+    let solved = Trials { successes: overview.solved, trials: overview.levels };
+    lines.push(format!(
+        "**{} level{}**: {} solved{}, {} unsolved with nothing proved, {} proved unsolvable; {} finding{}.",
+        overview.levels,
+        if overview.levels == 1 { "" } else { "s" },
+        overview.solved,
+        interval(solved),
+        overview.bot_failed,
+        overview.proved_unsolvable,
+        overview.findings,
+        if overview.findings == 1 { "" } else { "s" }
+    ));
+    if overview.places.percent().is_some() {
+        lines.push(format!("{} of the open squares were visited.", overview.places.describe()));
+    }
+    let head = ["", "| tester | levels solved | episodes solved | squares visited |", "|---|---:|---:|---:|"];
+    lines.extend(head.map(str::to_owned));
+    for tester in &overview.testers {
+        let share = |of: Trials| format!("{} of {}{}", of.successes, of.trials, interval(of));
+        let (levels, episodes, places) = (share(tester.levels), share(tester.episodes), tester.places.describe());
+        lines.push(format!("| {} | {levels} | {episodes} | {places} |", markdown_cell(&tester.name)));
+    }
+    if let Some(comparison) = comparison {
+        lines.extend(compared(comparison));
+    }
+    if !overview.worst.is_empty() {
+        lines.extend(
+            ["", "## Levels to look at", "", "| level | outcome | problem |", "|---|---|---|"].map(str::to_owned),
+        );
+        for level in &overview.worst {
+            let what = markdown_cell(&message(level));
+            lines.push(format!("| {} | {} | {what} |", markdown_cell(&level.level), level.outcome.name()));
+        }
+        let shown = overview.worst.first().map(|level| rerun_commands(program, record, level)).unwrap_or_default();
+        if !shown.is_empty() {
+            lines.extend(["", "To play the first one again:", "", "```sh"].map(str::to_owned));
+            lines.extend(shown);
+            lines.push("```".to_owned());
+        }
+    }
+    lines.push(String::new());
+    lines.join("\n")
+}
+
+/// Formats the 95 % interval of a share, in percent.
+pub(super) fn interval(of: Trials) -> String {
+    let [low, high] = wilson(of.successes, of.trials).map(|share| 100.0 * share);
+    format!(" ({low:.1} to {high:.1} %)")
+}
+
+fn compared(comparison: &Comparison) -> Vec<String> {
+    let mut lines = vec![String::new(), "## Since the earlier results".to_owned(), String::new()];
+    let Comparison { levels, only_now, only_before, .. } = comparison;
+    lines.push(format!("{levels} levels in both, {only_now} only now, {only_before} only before."));
+    lines.extend(comparison.left_out.iter().map(|why| format!("Left out: {}.", markdown_cell(why))));
+    let mut list = |title: &str, changes: Vec<String>| {
+        if changes.is_empty() {
+            return;
+        }
+        lines.extend([String::new(), format!("{title} ({}):", changes.len()), String::new()]);
+        let more = changes.len().saturating_sub(MOST_CHANGES);
+        lines.extend(changes.into_iter().take(MOST_CHANGES).map(|change| format!("- {}", markdown_cell(&change))));
+        lines.extend((more > 0).then(|| format!("- and {more} more")));
+    };
+    list("Unsolvable", texts(&comparison.unsolvable));
+    list("Harder", texts(&comparison.harder));
+    list("Easier", texts(&comparison.easier));
+    list("New findings", texts(&comparison.new_findings));
+    list("Gone findings", texts(&comparison.gone_findings));
+    if !comparison.has_alarms() && comparison.easier.is_empty() && comparison.gone_findings.is_empty() {
+        lines.extend([String::new(), "Nothing has changed by more than chance.".to_owned()]);
+    }
+    lines
+}
+
+fn texts(changes: &[impl Display]) -> Vec<String> {
+    changes.iter().map(ToString::to_string).collect()
+}
+
+// Reports of results for people and other programs.
+
+/// Name of the file with JUnit XML.
+pub const JUNIT: &str = "junit.xml";
+
+/// Name of the file with a short summary, in Markdown.
+pub const SUMMARY: &str = "summary.md";
+
+/// Name of the file with the comparison, in JSON.
+pub const AGAINST: &str = "against.json";
+
+/// Writes `junit.xml`, `summary.md` and, with a comparison, `against.json` beside the results in a folder.
+///
+/// `program` is the name of the program in the commands that they show. [`verdict_report`](crate::verdict_report)
+/// makes `report.html`, whose pictures need the game.
+///
+/// # Errors
+///
+/// The folder has no results, they are damaged, or the files cannot be written.
+pub fn write_reports(folder: &Path, comparison: Option<&Comparison>, program: &str) -> Result<Overview, TestError> {
+    let overview = Overview::read(folder)?;
+    write(&folder.join(JUNIT), &junit(folder, program)?)?;
+    write(&folder.join(SUMMARY), &summary(&overview, comparison, program))?;
+    if let Some(comparison) = comparison {
+        let path = folder.join(AGAINST);
+        let text = serde_json::to_string(comparison).map_err(|error| io_error("write", &path)(error.into()))?;
+        write(&path, &format!("{text}\n"))?;
+    }
+    Ok(overview)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), TestError> {
+    playbot_learner::write_atomically(path, text.as_bytes()).map_err(io_error("write", path))
+}
+
+// Files of the findings of a level.
+
+/// Writes the findings of a level to files, and notes the files' names in it.
+pub(super) fn keep_findings(
+    game: &dyn Game,
+    plan: &TestPlan,
+    files: &FindingFiles,
+    verdict: &mut LevelVerdict,
+) -> Result<(), TestError> {
+    let LevelVerdict { level: name, index, outcome, testers, findings, .. } = verdict;
+    let level = SeenLevel { mode: &plan.split.mode, level: plan.split.first + *index, name };
+    let played = |tester: &str, episode: u32| {
+        let tester = plan.testers.iter().find(|known| known.record.name == tester)?;
+        Some(played_by(tester, plan.episode_seed(&tester.record, level.name, episode)))
+    };
+    for finding in findings {
+        let who = finding.tester.as_deref().zip(finding.episode);
+        let played = who.and_then(|(tester, episode)| played(tester, episode));
+        let Finding { detector, message, settings, .. } = finding;
+        let seen = SeenFinding { detector, message, settings, played };
+        finding.file = files.keep(game, level, &seen)?;
+    }
+    if files.keep_failures && *outcome == LevelOutcome::BotFailed {
+        let failed = testers.iter().find(|tester| tester.exact && tester.score.lost + tester.score.timed_out > 0);
+        if let Some(played) = failed.and_then(|tester| played(&tester.tester, 0)) {
+            files.keep_failure(game, level, played)?;
+        }
+    }
+    Ok(())
+}
+
+fn played_by(tester: &Tester, seed: u64) -> Played<'_> {
+    let Tester { record, player, observation_config } = tester;
+    Played { tester: &record.name, player, observation_config, seed }
+}
+
+// Results as JUnit XML for build servers: a test case for each level.
+
+/// Converts the results in a folder. A level that was not solved, or that has a finding, has failed.
+pub(super) fn junit(folder: &Path, program: &str) -> Result<String, TestError> {
+    let mut lines = ResultLines::open(folder)?;
+    let record = lines.record().clone();
+    let name = format!("{} {}", record.game, record.range);
+    let mut suite = TestSuite::new(name.as_str());
+    while let Some(level) = lines.next_level()? {
+        suite.add_test_case(test_case(&record, &level, program));
+    }
+    let mut report = Report::new(name.as_str());
+    report.add_test_suite(suite);
+    report.to_string().map_err(|error| TestError::Junit(error.to_string()))
+}
+
+fn test_case(record: &TestRecord, level: &LevelVerdict, program: &str) -> TestCase {
+    let status = if level.is_sound() {
+        TestCaseStatus::success()
+    } else {
+        let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+        status.set_type(kind(level)).set_message(message(level));
+        status.set_description(description(record, level, program));
+        status
+    };
+    let mut case = TestCase::new(level.level.as_str(), status);
+    case.set_classname(record.game.as_str());
+    case
+}
+
+/// Returns the kind of a failure, in a word.
+fn kind(level: &LevelVerdict) -> &str {
+    match level.outcome {
+        LevelOutcome::Solved => level.findings.first().map_or("finding", |finding| finding.detector.as_str()),
+        outcome => outcome.name(),
+    }
+}
+
+/// Describes the failure of a level in one line.
+pub(super) fn message(level: &LevelVerdict) -> String {
+    let solved = format!("solved {} of {} episodes", level.score.solved, level.score.episodes);
+    let finding = level.findings.first().map(|finding| format!("{}: {}", finding.detector, finding.message));
+    let more = level.findings.len().saturating_sub(1);
+    let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };
+    format!("{solved}{}{more}", finding.map_or_else(String::new, |finding| format!("; {finding}")))
+}
+
+fn description(record: &TestRecord, level: &LevelVerdict, program: &str) -> String {
+    let mut lines = vec![format!("{}: {}", level.level, level.outcome.name())];
+    for tester in &level.testers {
+        let score = &tester.score;
+        lines.push(format!(
+            "{}: solved {} of {}, lost {}, timed out {}, broken {}",
+            tester.tester, score.solved, score.episodes, score.lost, score.timed_out, score.broken
+        ));
+    }
+    for finding in &level.findings {
+        let tester = finding.tester.as_ref().map_or_else(String::new, |tester| format!(" ({tester})"));
+        let tick = finding.tick.map_or_else(String::new, |tick| format!(", tick {tick}"));
+        lines.push(format!("{}{tester}{tick}: {}", finding.detector, finding.message));
+    }
+    lines.extend(rerun_commands(program, record, level));
+    lines.join("\n")
+}
+
+// Commands that show a level of results again.
+
+/// Largest number of findings that are shown by their files.
+const MOST_FILES: usize = 3;
+
+/// Comment on the folder for the replay of findings: their files are named as in the results.
+const OF_RESULTS: &str = "# from the folder of the results:";
+
+/// Comment on the folder for all other commands: recordings, policies and level files are named as the test named
+/// them.
+const OF_TEST: &str = "# from the folder where the test was run:";
+
+/// Returns the commands that replay a level's findings, play its failed episodes again, and show them, for the
+/// program of this name. If they belong to different folders, shell comments name these.
+pub fn rerun_commands(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec<String> {
+    let files = level.findings.iter().filter_map(|finding| finding.file.as_ref());
+    let replays: Vec<String> = files.take(MOST_FILES).map(|file| format!("{program} replay {file}")).collect();
+    let again = played_again(program, record, level);
+    let [of_results, of_test] = match (replays.is_empty(), again.is_empty()) {
+        (true, _) => [None, None],
+        (false, true) => [Some(OF_RESULTS), None],
+        (false, false) => [Some(OF_RESULTS), Some(OF_TEST)],
+    };
+    let comment = |words: Option<&str>| words.map(str::to_owned);
+    comment(of_results).into_iter().chain(replays).chain(comment(of_test)).chain(again).collect()
+}
+
+/// Returns the command for the episodes of the tester that has a finding or else failed, if any. If the finding
+/// compares testers, the command is for all of them. Adds a picture if the tester repeats itself exactly.
+fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec<String> {
+    let found = level.findings.iter().find_map(|finding| finding.tester.as_ref());
+    let failed = || level.testers.iter().find(|tester| tester.score.solved < tester.score.episodes);
+    let Some(name) = found.or_else(|| failed().map(|tester| &tester.tester)) else { return Vec::new() };
+    let Some(tester) = record.testers.iter().find(|tester| tester.name == *name) else { return Vec::new() };
+    let compares = level.findings.iter().any(|finding| compares_testers(&finding.detector));
+    let played = if compares { testers(&record.testers) } else { testers(std::slice::from_ref(tester)) };
+    let shown = seen(tester);
+    let (game, seed, episodes) = (&record.game, record.seed, record.episodes);
+    let levels = level_argument(&record.range, &level.level);
+    let detectors: String = record.options.iter().map(|word| format!(" {}", shell_word(word))).collect();
+    // The same episodes: they depend on seed, tester and level alone.
+    let again = format!(
+        "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{detectors} --out again"
+    );
+    // A tester that draws random numbers draws others in a picture.
+    let exact = level.testers.iter().any(|tester| tester.tester == *name && tester.exact);
+    let picture = format!("{program} view {game} --levels {levels} {shown} --episode --out again.png");
+    [again].into_iter().chain(exact.then_some(picture)).collect()
+}
+
+/// Returns the testers as arguments of `playbot test`. The draws of a policy depend on its name, so the name is
+/// included.
+fn testers(testers: &[TesterRecord]) -> String {
+    let bots: Vec<&str> =
+        testers.iter().filter(|tester| tester.checksum.is_none()).map(|tester| tester.name.as_str()).collect();
+    let bots = (!bots.is_empty()).then(|| format!("--bot {}", bots.join(",")));
+    let policies = testers.iter().filter(|tester| tester.checksum.is_some() && tester.run.is_none());
+    let policies = policies.map(|TesterRecord { name, file, .. }| {
+        let given = file.as_ref().map_or_else(|| name.clone(), |file| format!("{name}={file}"));
+        format!("--policy {}", shell_word(&given))
+    });
+    let greedy = testers.iter().any(|tester| tester.greedy).then(|| "--greedy".to_owned());
+    bots.into_iter().chain(policies).chain(runs(testers)).chain(greedy).collect::<Vec<_>>().join(" ")
+}
+
+/// Returns the arguments for runs among testers. One checkpoint applies to all, so runs with different checkpoints
+/// get none.
+fn runs(testers: &[TesterRecord]) -> Vec<String> {
+    let runs: Vec<_> = testers.iter().filter_map(|tester| tester.run.as_ref()).collect();
+    let folders = runs.iter().map(|run| format!("--run {}", shell_word(&run.folder)));
+    let step = runs.first().map(|run| run.step).filter(|step| runs.iter().all(|run| run.step == *step));
+    folders.chain(step.map(|step| format!("--checkpoint {step}"))).collect()
+}
+
+/// Returns a tester as an argument of `playbot view`, which takes the files of policies only.
+fn seen(tester: &TesterRecord) -> String {
+    let unnamed =
+        TesterRecord { name: tester.file.clone().unwrap_or_else(|| tester.name.clone()), file: None, ..tester.clone() };
+    testers(&[unnamed])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verdict::{
+        LevelVerdict, MapScope, Places, TestRecord, TesterRecord,
+        folder::{Earlier, TestFolder},
+        testing::verdict,
+    };
+
+    #[test]
+    fn the_share_of_visited_places_is_told_where_it_is_known() {
+        let record = TestRecord {
+            game: "garden".to_owned(),
+            game_version: 1,
+            range: "hard:0..0".parse().expect("a split"),
+            files: None,
+            seed: 0,
+            testers: vec![TesterRecord::bot("random")],
+            episodes: 2,
+            detectors: Vec::new(),
+            options: Vec::new(),
+            maps: MapScope::default(),
+            shard: None,
+        };
+        let said = |level: &LevelVerdict| {
+            let parent = tempfile::tempdir().expect("a folder");
+            let (mut folder, _) = TestFolder::open(parent.path(), &record, Earlier::Keep).expect("new");
+            folder.keep(level).expect("writable");
+            folder.finish().expect("writable");
+            summary(&Overview::read(parent.path()).expect("results"), None, "playbot")
+        };
+        let plain = said(&verdict(0, 2, 2));
+        assert!(plain.contains("| random | 1 of 1") && plain.contains(" | – |"), "{plain}");
+        assert!(!plain.contains("open squares"), "{plain}");
+        let mut level = LevelVerdict { places: Some(Places { visited: 3, open: 4 }), ..verdict(0, 2, 2) };
+        level.testers[0].places = Some(Places { visited: 1, open: 4 });
+        let mapped = said(&level);
+        assert!(mapped.contains("75.0 % of the open squares") && mapped.contains(" | 25.0 % |"), "{mapped}");
+    }
+}
+
+#[cfg(test)]
+mod rerun_tests {
+    use super::*;
+    use crate::verdict::{
+        Finding, MapScope, TestedRun, TesterRecord,
+        testing::{tester, verdict},
+    };
+
+    #[test]
+    fn runs_are_named_by_their_folders_with_the_checkpoint_that_they_share() {
+        let run = |folder: &str, step| TesterRecord {
+            checksum: Some("0f".to_owned()),
+            run: Some(TestedRun { folder: folder.to_owned(), step }),
+            ..TesterRecord::bot(folder.rsplit('/').next().expect("a name"))
+        };
+        let [first, second] = [run("my runs/a", 4096), run("runs/b", 8192)];
+        assert_eq!(testers(std::slice::from_ref(&first)), "--run 'my runs/a' --checkpoint 4096");
+        assert_eq!(seen(&first), "--run 'my runs/a' --checkpoint 4096");
+        let all = [TesterRecord::bot("random"), TesterRecord { greedy: true, ..first }, second];
+        assert_eq!(testers(&all), "--bot random --run 'my runs/a' --run runs/b --greedy", "no checkpoint is theirs");
+    }
+
+    #[test]
+    fn the_tester_that_failed_plays_again() {
+        let trained = TesterRecord { checksum: Some("0f".to_owned()), greedy: true, ..TesterRecord::bot("ppo.policy") };
+        let record = TestRecord {
+            game: "garden".to_owned(),
+            game_version: 1,
+            range: "bed:5..9".parse().expect("a split"),
+            files: None,
+            seed: 3,
+            testers: vec![TesterRecord::bot("random"), trained],
+            episodes: 2,
+            detectors: Vec::new(),
+            options: Vec::new(),
+            maps: MapScope::default(),
+            shard: None,
+        };
+        let testers = vec![tester("random", 2, 2, true), tester("ppo.policy", 1, 2, true)];
+        let level = LevelVerdict { level: "bed:6".to_owned(), testers, ..verdict(1, 3, 4) };
+        let again = "jump test garden --levels bed:6 --policy ppo.policy --greedy --episodes 2 --seed 3 --out again";
+        let shown = "jump view garden --levels bed:6 --policy ppo.policy --greedy --episode --out again.png";
+        assert_eq!(rerun_commands("jump", &record, &level), [again, shown]);
+        let mut named = record.clone();
+        named.testers[1].file = Some("my runs/a.policy".to_owned());
+        let again = again.replace("ppo.policy", "'ppo.policy=my runs/a.policy'");
+        let shown = shown.replace("ppo.policy", "'my runs/a.policy'");
+        assert_eq!(rerun_commands("jump", &named, &level), [again.clone(), shown.clone()]);
+        named.options = ["--no-detect", "stuck", "--par", "my pars.json"].map(str::to_owned).to_vec();
+        let again = again.replace(" --out", " --no-detect stuck --par 'my pars.json' --out");
+        assert_eq!(rerun_commands("jump", &named, &level), [again, shown]);
+        let mut drawn = level.clone();
+        drawn.testers[1].exact = false;
+        assert_eq!(rerun_commands("jump", &named, &drawn).len(), 1, "a picture would show another episode");
+        let farmed = Finding {
+            detector: "reward-farm".to_owned(),
+            tester: Some("random".to_owned()),
+            episode: Some(1),
+            tick: Some(9),
+            message: "paid for nothing".to_owned(),
+            file: None,
+            settings: Vec::new(),
+        };
+        let compared = LevelVerdict { findings: vec![farmed], ..level.clone() };
+        let again = "jump test garden --levels bed:6 --bot random --policy ppo.policy --greedy --episodes 2 --seed 3 --out again";
+        let shown = "jump view garden --levels bed:6 --bot random --episode --out again.png";
+        assert_eq!(rerun_commands("jump", &record, &compared), [again, shown], "all are compared");
+        let perfect = LevelVerdict { testers: vec![tester("random", 2, 2, false)], ..verdict(1, 2, 2) };
+        assert!(rerun_commands("jump", &record, &perfect).is_empty());
+        let finding = |name: &str| Finding {
+            detector: "unreachable-goal".to_owned(),
+            tester: None,
+            episode: None,
+            tick: None,
+            message: "walled in".to_owned(),
+            file: Some(format!("findings/{name}.finding")),
+            settings: Vec::new(),
+        };
+        let findings = ["a", "b", "c", "d"].map(finding).to_vec();
+        let walled = LevelVerdict { findings, ..perfect };
+        let shown = ["a", "b", "c"].map(|name| format!("jump replay findings/{name}.finding"));
+        let commands = rerun_commands("jump", &record, &walled);
+        assert_eq!((commands[0].as_str(), &commands[1..]), (OF_RESULTS, &shown[..]), "three of them");
+        let failed = LevelVerdict { testers: level.testers.clone(), ..walled };
+        let commands = rerun_commands("jump", &record, &failed);
+        assert_eq!(commands[1..4], shown);
+        assert_eq!(commands[4], OF_TEST);
+        assert!(commands[5].starts_with("jump test garden ") && commands[6].starts_with("jump view garden "));
+    }
+}

@@ -1,0 +1,435 @@
+//! The file `results.json`: the description of a test, and a line for each level.
+//!
+//! The file is one JSON object whose levels stand one to a line. So files of any length are read and joined without
+//! holding them in memory.
+
+#[cfg(test)]
+mod tests;
+
+use crate::verdict::{
+    LevelOutcome, LevelVerdict, Places,
+    error::{TestError, io_error, json_fault},
+    plan::TestRecord,
+    statistics::Trials,
+};
+use crc32fast::Hasher;
+use playbot_learner::BrokenSeal;
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::{
+    fs::File,
+    io,
+    io::{BufRead, BufReader, Write},
+    path::{Path, PathBuf},
+};
+
+/// Name of the file in the folder of a test.
+pub const RESULTS: &str = "results.json";
+
+/// Text between the description and the first level.
+const LEVELS: &str = ",\"levels\":[";
+
+/// Text after the last level in files of older versions.
+const END: &str = "]}";
+
+/// Returns the text after the last level, with the checksum of all bytes of the lines before.
+fn end(hasher: &Hasher) -> String {
+    format!("],\"crc32\":\"{:08x}\"}}", hasher.clone().finalize())
+}
+
+/// Returns the folder of results, given the folder or the file in it.
+pub fn results_folder(named: &Path) -> &Path {
+    let is_file = named.file_name().is_some_and(|name| name == RESULTS) && named.is_file();
+    match named.parent() {
+        Some(folder) if is_file && folder.as_os_str().is_empty() => Path::new("."),
+        Some(folder) if is_file => folder,
+        _ => named,
+    }
+}
+
+/// Writer of results, a level at a time.
+pub(super) struct ResultWriter<W> {
+    out: W,
+    is_first: bool,
+    hasher: Hasher,
+}
+
+impl<W: Write> ResultWriter<W> {
+    /// Begins with the description of the test.
+    pub fn begin(out: W, record: &TestRecord) -> io::Result<Self> {
+        let head = serde_json::to_string(record)?;
+        let mut results = Self { out, is_first: true, hasher: Hasher::new() };
+        // The record is an object that is not empty, and goes on.
+        results.write(&format!("{}{LEVELS}\n", head.strip_suffix('}').unwrap_or(&head)))?;
+        Ok(results)
+    }
+
+    /// Adds a level, as a line of JSON without line feed.
+    pub fn push(&mut self, line: &str) -> io::Result<()> {
+        let separator = if self.is_first { "" } else { ",\n" };
+        self.is_first = false;
+        self.write(&format!("{separator}{line}"))
+    }
+
+    /// Ends the file.
+    pub fn end(mut self) -> io::Result<()> {
+        let line_feed = if self.is_first { "" } else { "\n" };
+        self.write(line_feed)?;
+        let end = end(&self.hasher);
+        writeln!(self.out, "{end}")
+    }
+
+    fn write(&mut self, text: &str) -> io::Result<()> {
+        self.hasher.update(text.as_bytes());
+        self.out.write_all(text.as_bytes())
+    }
+}
+
+/// The levels of a `results.json`, in their order, as lines of JSON.
+pub struct ResultLines {
+    path: PathBuf,
+    record: TestRecord,
+    lines: io::Lines<BufReader<File>>,
+    /// Number of lines read so far.
+    number: usize,
+    is_over: bool,
+    /// Checksum of the lines read so far.
+    hasher: Hasher,
+}
+
+impl ResultLines {
+    /// Opens the results in a folder.
+    ///
+    /// # Errors
+    ///
+    /// [`TestError::NoResults`] without results; [`TestError::Damaged`] if they differ from the form of
+    /// [`TestFolder`](crate::verdict::TestFolder).
+    pub fn open(folder: &Path) -> Result<Self, TestError> {
+        let path = folder.join(RESULTS);
+        let file = File::open(&path).map_err(|source| match source.kind() {
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => TestError::NoResults(folder.into()),
+            _ => TestError::Io { action: "read", path: path.clone(), source },
+        })?;
+        let mut lines = BufReader::new(file).lines();
+        let head = lines.next().transpose().map_err(io_error("read", &path))?.unwrap_or_default();
+        let mut hasher = Hasher::new();
+        hash_line(&mut hasher, &head);
+        let record = head.strip_suffix(LEVELS).map(|record| serde_json::from_str(&format!("{record}}}")));
+        let record = match record {
+            Some(Ok(record)) => record,
+            Some(Err(error)) => return Err(TestError::Damaged { path, line: 1, message: json_fault(&error) }),
+            None => {
+                let message = "this is not the head of results".to_owned();
+                return Err(TestError::Damaged { path, line: 1, message });
+            }
+        };
+        Ok(Self { path, record, lines, number: 1, is_over: false, hasher })
+    }
+
+    /// Opens the results as [`open`](Self::open) does, after a check of the checksum over the whole file.
+    ///
+    /// # Errors
+    ///
+    /// As for [`open`](Self::open); and the file is incomplete, or its checksum is wrong.
+    pub fn open_whole(folder: &Path) -> Result<Self, TestError> {
+        let mut lines = Self::open(folder)?;
+        while lines.next_line()?.is_some() {}
+        Self::open(folder)
+    }
+
+    /// Returns the description of the test.
+    pub fn record(&self) -> &TestRecord {
+        &self.record
+    }
+
+    /// Returns the line of the next level; `None` after the last one.
+    ///
+    /// # Errors
+    ///
+    /// The file is incomplete, or cannot be read.
+    pub fn next_line(&mut self) -> Result<Option<String>, TestError> {
+        if self.is_over {
+            return Ok(None);
+        }
+        let line = self.lines.next().transpose().map_err(io_error("read", &self.path))?;
+        self.number += 1;
+        match line {
+            // No level begins so.
+            Some(line) if line.starts_with(']') => {
+                if line != END && line != end(&self.hasher) {
+                    return Err(self.damaged(&BrokenSeal.to_string()));
+                }
+                if self.lines.next().is_some() {
+                    self.number += 1;
+                    return Err(self.damaged("the file goes on after its end"));
+                }
+                self.is_over = true;
+                Ok(None)
+            }
+            Some(line) => {
+                hash_line(&mut self.hasher, &line);
+                Ok(Some(line.strip_suffix(',').unwrap_or(&line).to_owned()))
+            }
+            None => Err(self.damaged("the file ends in the middle")),
+        }
+    }
+
+    /// Returns the next level; `None` after the last one.
+    ///
+    /// # Errors
+    ///
+    /// The file is incomplete, is malformed, or cannot be read.
+    pub fn next_level(&mut self) -> Result<Option<LevelVerdict>, TestError> {
+        let Some(line) = self.next_line()? else { return Ok(None) };
+        serde_json::from_str(&line).map(Some).map_err(|error| self.damaged(&json_fault(&error)))
+    }
+
+    /// Returns the line of the next level, which must have this index in the range.
+    ///
+    /// # Errors
+    ///
+    /// The next level is another one, or missing.
+    pub(super) fn line_of(&mut self, index: u64) -> Result<String, TestError> {
+        let line = self.next_line()?.ok_or_else(|| self.damaged("levels are missing"))?;
+        let found = serde_json::from_str::<Value>(&line).map_err(|error| self.damaged(&json_fault(&error)))?;
+        match found["index"].as_u64() {
+            Some(found) if found == index => Ok(line),
+            _ => Err(self.damaged(&format!("this is not the level with index {index}"))),
+        }
+    }
+
+    /// Reads the end, which nothing may follow: the checksum there confirms the levels before it.
+    ///
+    /// # Errors
+    ///
+    /// Another level follows, or the checksum is wrong.
+    pub(super) fn expect_end(&mut self) -> Result<(), TestError> {
+        match self.next_line()? {
+            None => Ok(()),
+            Some(_) => Err(self.damaged("there are more levels than were tested")),
+        }
+    }
+
+    fn damaged(&self, message: &str) -> TestError {
+        TestError::Damaged { path: self.path.clone(), line: self.number, message: message.to_owned() }
+    }
+}
+
+fn hash_line(hasher: &mut Hasher, line: &str) {
+    hasher.update(line.as_bytes());
+    hasher.update(b"\n");
+}
+
+// Totals of results, and the worst levels.
+
+/// Largest number of worst levels that are reported.
+pub const MOST_WORST: usize = 20;
+
+/// Totals of a tester over all levels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TesterTotal {
+    /// Its name.
+    pub name: String,
+    /// Levels that it solved at least once, among all.
+    pub levels: Trials,
+    /// Episodes that it solved, among all.
+    pub episodes: Trials,
+    /// Open squares that it visited, over all levels with maps.
+    pub places: Places,
+}
+
+/// Totals of all results, and the worst levels.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Overview {
+    /// Description of the test.
+    pub record: TestRecord,
+    /// Number of levels.
+    pub levels: u64,
+    /// Levels that were solved.
+    pub solved: u64,
+    /// Levels without a success and without a proof.
+    pub bot_failed: u64,
+    /// Levels whose goal cannot be reached.
+    pub proved_unsolvable: u64,
+    /// Findings of all levels.
+    pub findings: u64,
+    /// Open squares that any tester visited, over all levels with maps.
+    pub places: Places,
+    /// The testers, in the order of the test.
+    pub testers: Vec<TesterTotal>,
+    /// At most 20 levels that were not solved each time, or that have a finding, the worst ones first.
+    pub worst: Vec<LevelVerdict>,
+}
+
+impl Overview {
+    /// Reads the results in a folder.
+    ///
+    /// # Errors
+    ///
+    /// The folder has no results, or they are damaged.
+    pub fn read(folder: &Path) -> Result<Self, TestError> {
+        let mut lines = ResultLines::open(folder)?;
+        let mut overview = Self::empty(lines.record().clone());
+        while let Some(level) = lines.next_level()? {
+            overview.add(level);
+        }
+        Ok(overview)
+    }
+
+    fn empty(record: TestRecord) -> Self {
+        let places = Places::default();
+        let total = |name: &String| TesterTotal {
+            name: name.clone(),
+            levels: Trials::default(),
+            episodes: Trials::default(),
+            places,
+        };
+        let testers = record.testers.iter().map(|tester| total(&tester.name)).collect();
+        let worst = Vec::new();
+        Self { record, levels: 0, solved: 0, bot_failed: 0, proved_unsolvable: 0, findings: 0, places, testers, worst }
+    }
+
+    fn add(&mut self, level: LevelVerdict) {
+        self.levels += 1;
+        self.findings += level.findings.len() as u64;
+        self.places.add(level.places);
+        *match level.outcome {
+            LevelOutcome::Solved => &mut self.solved,
+            LevelOutcome::BotFailed => &mut self.bot_failed,
+            LevelOutcome::ProvedUnsolvable => &mut self.proved_unsolvable,
+        } += 1;
+        for (total, tester) in self.testers.iter_mut().zip(&level.testers) {
+            total.levels.trials += 1;
+            total.levels.successes += u64::from(tester.score.solved > 0);
+            let Trials { successes, trials } = &mut total.episodes;
+            *trials = trials.saturating_add(tester.score.episodes);
+            *successes = successes.saturating_add(tester.score.solved);
+            total.places.add(tester.places);
+        }
+        if !level.is_perfect() {
+            let place = self.worst.partition_point(|other| is_worse(other, &level));
+            if place < MOST_WORST {
+                self.worst.insert(place, level);
+                self.worst.truncate(MOST_WORST);
+            }
+        }
+    }
+
+    /// Returns whether every level was solved and has no finding.
+    pub fn is_sound(&self) -> bool {
+        self.findings == 0 && self.solved == self.levels
+    }
+}
+
+/// Returns whether a level is at least as bad as a later one of the range.
+fn is_worse(level: &LevelVerdict, later: &LevelVerdict) -> bool {
+    let rank = |level: &LevelVerdict| (level.outcome, level.findings.is_empty());
+    let (one, other) = (level.score.trials(), later.score.trials());
+    let shares = (u128::from(one.successes) * u128::from(other.trials))
+        .cmp(&(u128::from(other.successes) * u128::from(one.trials)));
+    rank(level).cmp(&rank(later)).then(shares).is_le()
+}
+
+// Times of solved episodes.
+
+/// Ticks of solved episodes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FinishTime {
+    /// A quarter of the episodes took at most so many ticks.
+    pub lower_quartile: f64,
+    /// Half of the episodes took at most so many ticks.
+    pub median: f64,
+    /// Three quarters of the episodes took at most so many ticks.
+    pub upper_quartile: f64,
+}
+
+impl FinishTime {
+    /// Computes the quartiles of these episodes; `None` without episodes. Interpolates between two values (type 7 of
+    /// Hyndman and Fan 1996, as in R's `quantile`).
+    pub fn of(mut ticks: Vec<u32>) -> Option<Self> {
+        ticks.sort_unstable();
+        let last = ticks.len().checked_sub(1)?;
+        let at = |share: f64| {
+            let place = share * last as f64;
+            let below = place.floor() as usize;
+            let (low, high) = (f64::from(ticks[below]), f64::from(ticks[last.min(below + 1)]));
+            low + (place - below as f64) * (high - low)
+        };
+        Some(Self { lower_quartile: at(0.25), median: at(0.5), upper_quartile: at(0.75) })
+    }
+}
+
+#[cfg(test)]
+mod overview_tests {
+    use super::*;
+    use crate::verdict::{Finding, MapScope, TesterRecord, testing::verdict};
+    use playbot_harness::detector::LevelProof;
+
+    #[test]
+    fn the_worst_come_first_and_perfect_ones_not_at_all() {
+        let record = TestRecord {
+            game: "garden".to_owned(),
+            game_version: 1,
+            range: "hard:0..99".parse().expect("a split"),
+            files: None,
+            seed: 0,
+            testers: vec![TesterRecord::bot("random")],
+            episodes: 4,
+            detectors: Vec::new(),
+            options: Vec::new(),
+            maps: MapScope::default(),
+            shard: None,
+        };
+        let mut overview = Overview::empty(record);
+        for (index, solved) in [4, 3, 0, 1, 0].into_iter().enumerate() {
+            let mut level =
+                LevelVerdict { places: Some(Places { visited: 3, open: 4 }), ..verdict(index as u64, solved, 4) };
+            level.testers[0].places = Some(Places { visited: 1, open: 4 });
+            overview.add(level);
+        }
+        let why = "walled in".to_owned();
+        let finding = Finding {
+            detector: "unreachable-goal".to_owned(),
+            tester: None,
+            episode: None,
+            tick: None,
+            message: why.clone(),
+            file: None,
+            settings: Vec::new(),
+        };
+        let proved = LevelVerdict {
+            outcome: LevelOutcome::ProvedUnsolvable,
+            proof: LevelProof::Unsolvable { why },
+            findings: vec![finding],
+            ..verdict(5, 0, 4)
+        };
+        overview.add(proved);
+        let worst: Vec<u64> = overview.worst.iter().map(|level| level.index).collect();
+        assert_eq!(worst, [5, 2, 4, 3, 1]);
+        assert_eq!((overview.solved, overview.bot_failed, overview.proved_unsolvable), (3, 2, 1));
+        assert_eq!(overview.testers[0].levels, Trials { successes: 3, trials: 6 });
+        assert_eq!(overview.testers[0].episodes, Trials { successes: 8, trials: 24 });
+        assert_eq!(overview.places, Places { visited: 15, open: 20 }, "the sixth level has no maps");
+        assert_eq!(overview.testers[0].places.percent(), Some(25.0));
+        assert!(!overview.is_sound());
+        for index in 6..60 {
+            overview.add(verdict(index, 0, 4));
+        }
+        assert_eq!((overview.worst.len(), overview.worst[0].index), (20, 5));
+    }
+}
+
+#[cfg(test)]
+mod finish_time_tests {
+    use super::*;
+
+    #[test]
+    fn quartiles_lie_between_the_values() {
+        let of = |ticks: &[u32]| FinishTime::of(ticks.to_vec());
+        let time = |lower_quartile, median, upper_quartile| FinishTime { lower_quartile, median, upper_quartile };
+        assert_eq!(of(&[4, 1, 3, 2]), Some(time(1.75, 2.5, 3.25)));
+        assert_eq!(of(&[30, 10, 20, 50, 40]), Some(time(20.0, 30.0, 40.0)));
+        assert_eq!(of(&[7]), Some(time(7.0, 7.0, 7.0)));
+        assert_eq!(of(&[]), None);
+    }
+}

@@ -1,0 +1,119 @@
+use crate::verdict::{MapScope, TesterRecord, results::*};
+use std::fs;
+
+fn record() -> TestRecord {
+    TestRecord {
+        game: "garden".to_owned(),
+        game_version: 3,
+        range: "bed:2..3".parse().expect("a split"),
+        files: None,
+        seed: 5,
+        testers: vec![TesterRecord::bot("random")],
+        episodes: 2,
+        detectors: Vec::new(),
+        options: Vec::new(),
+        maps: MapScope::default(),
+        shard: Some("0/2".parse().expect("a shard")),
+    }
+}
+
+fn written(lines: &[&str]) -> String {
+    let mut bytes = Vec::new();
+    let mut writer = ResultWriter::begin(&mut bytes, &record()).expect("writable");
+    lines.iter().for_each(|line| writer.push(line).expect("writable"));
+    writer.end().expect("writable");
+    String::from_utf8(bytes).expect("text")
+}
+
+#[test]
+fn the_file_is_one_object_and_reads_back_line_by_line() {
+    let text = written(&[r#"{"index":0,"a":1}"#, r#"{"index":1}"#]);
+    let value: Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!((value["game"].as_str(), value["range"].as_str()), (Some("garden"), Some("bed:2..3")));
+    assert_eq!(value["levels"].as_array().map(Vec::len), Some(2));
+    serde_json::from_str::<Value>(&written(&[])).expect("without levels too");
+
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join(RESULTS), &text).expect("writable");
+    let mut lines = ResultLines::open(folder.path()).expect("whole");
+    assert_eq!(*lines.record(), record());
+    assert_eq!(lines.line_of(0).expect("the first"), r#"{"index":0,"a":1}"#);
+    assert!(lines.line_of(2).is_err(), "the next one has index 1");
+    assert_eq!(lines.next_line().expect("the end"), None);
+    assert_eq!(lines.next_line().expect("still the end"), None);
+}
+
+#[test]
+fn what_is_no_result_is_named_with_its_line() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let open = || ResultLines::open(folder.path());
+    assert!(matches!(open(), Err(TestError::NoResults(path)) if path == folder.path()));
+    let text = written(&[r#"{"index":0}"#]);
+    let head = text.lines().next().expect("a head");
+    let cut = format!("{head}\n{{\"index\":0}}");
+    for (text, line) in [("{}", 1), ("{\"a\":1,\"levels\":[", 1), (head, 2), (cut.as_str(), 3)] {
+        fs::write(folder.path().join(RESULTS), text).expect("writable");
+        let all = open().and_then(|mut lines| {
+            while lines.next_line()?.is_some() {}
+            Ok(())
+        });
+        let found = all.expect_err(text).to_string();
+        assert!(found.contains(&format!("{RESULTS}, line {line}: ")), "{found}");
+    }
+    fs::write(folder.path().join(RESULTS), written(&[r#"{"index":0}"#, r#"{"index":1,]"#])).expect("writable");
+    let mut lines = open().expect("a head");
+    lines.next_line().expect("a level");
+    let found = lines.next_level().expect_err("no level").to_string();
+    assert!(found.contains(&format!("{RESULTS}, line 3: ")) && found.contains("(column 1"), "{found}");
+    assert!(!found.contains("at line"), "one line is enough: {found}");
+}
+
+#[test]
+fn the_file_stands_for_its_folder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = folder.path().join(RESULTS);
+    assert_eq!(results_folder(&file), file, "there is none");
+    fs::write(&file, "").expect("writable");
+    assert_eq!(results_folder(&file), folder.path());
+    assert_eq!(results_folder(folder.path()), folder.path());
+}
+
+#[test]
+fn what_was_tested_is_not_relied_on_if_a_bit_of_the_file_was_flipped() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(RESULTS);
+    let whole = written(&[r#"{"index":0,"a":1}"#, r#"{"index":1}"#]).into_bytes();
+    fs::write(&path, &whole).expect("writable");
+    let mut lines = ResultLines::open_whole(folder.path()).expect("whole");
+    assert!(lines.line_of(0).is_ok() && lines.line_of(1).is_ok() && lines.expect_end().is_ok());
+    for at in 0..whole.len() * 8 {
+        let mut bytes = whole.clone();
+        bytes[at / 8] ^= 1 << (at % 8);
+        fs::write(&path, bytes).expect("writable");
+        assert!(ResultLines::open_whole(folder.path()).is_err(), "bit {at}");
+    }
+    // Without the last line feed nothing is missing.
+    for length in 0..whole.len() - 1 {
+        fs::write(&path, &whole[..length]).expect("writable");
+        assert!(ResultLines::open_whole(folder.path()).is_err(), "{length} bytes");
+    }
+}
+
+#[test]
+fn nothing_may_follow_the_last_level_or_the_end() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join(RESULTS);
+    let text = written(&[r#"{"index":0}"#, r#"{"index":1}"#]);
+    fs::write(&path, &text).expect("writable");
+    let mut lines = ResultLines::open(folder.path()).expect("a head");
+    lines.line_of(0).expect("the first");
+    let error = lines.expect_end().expect_err("there is another").to_string();
+    assert!(error.contains("results.json, line 3: there are more levels than were tested"), "{error}");
+    fs::write(&path, format!("{text}]}}\n")).expect("writable");
+    let error = ResultLines::open_whole(folder.path()).map(drop).expect_err("another end").to_string();
+    assert!(error.contains("results.json, line 5: the file goes on after its end"), "{error}");
+    // The end as older versions wrote it.
+    let (levels, _) = text.rsplit_once("],").expect("an end");
+    fs::write(&path, format!("{levels}]}}\n")).expect("writable");
+    assert_eq!(*ResultLines::open_whole(folder.path()).expect("an older file").record(), record());
+}

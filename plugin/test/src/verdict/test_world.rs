@@ -1,0 +1,662 @@
+//! Worlds in which testers play their episodes.
+
+use self::EpisodeObserver as WatchOfTest;
+use crate::{
+    detectors::{Detectors, Ear, GameProofs, SlowTick, TickTime},
+    findings::detector_of,
+    verdict::{
+        plan::{TestPlan, Tester},
+        walk::{Walk, WalkCounter},
+    },
+};
+use bevy::prelude::*;
+use bevy_playbot::{
+    action::Action,
+    agent::{Agent, Control},
+    episode::{Episode, EpisodeResult},
+    fault::Fault,
+    headless::tick_world,
+    level::LevelQueue,
+    observation::Observation,
+    panics::PanicReports,
+    reward::Reward,
+    state_hash::StateHash,
+    streams::{AgentStreams, EpisodeSeeds},
+    vision::{ObservationConfig, VisionError},
+};
+use playbot_harness::{
+    arrangement::{Arrangement, at_most},
+    detector::{Detector, LevelAhead, Moment, Watch, WorldMoment, WorldWatch},
+    eval::Player,
+    game::Game,
+    machine::{MemoryError, check_bytes},
+    worlds::{EndedEpisodes, build_observing_world},
+};
+use std::{sync::Arc, time::Instant};
+
+/// Ticks after which an episode counts as endless: more than four hours at 60 a second.
+const MOST_TICKS: u32 = 1_000_000;
+
+/// Text before the message of a game's panic, after its position.
+const PANICKED: &str = "the game panicked: ";
+
+/// An agent and its tasks, in order.
+struct Seat {
+    agent: Entity,
+    /// Indices of its tasks, with the seeds of their episodes.
+    tasks: Vec<(usize, u64)>,
+    done: usize,
+    /// Walk of the agent.
+    walk: WalkCounter,
+}
+
+impl Seat {
+    /// Returns the present or next task, and the seed of its episode.
+    fn current(&self) -> Option<(usize, u64)> {
+        self.tasks.get(self.done).copied()
+    }
+}
+
+/// A World and the agents in it.
+pub(super) struct TestWorld {
+    world: World,
+    seats: Vec<Seat>,
+    /// Findings in the only episode, if it broke the World.
+    pub found: Vec<EpisodeFinding>,
+}
+
+impl TestWorld {
+    /// Builds a World for the waiting tasks, shared out evenly over its agents, at most this many.
+    pub fn build(
+        game: &dyn Game,
+        mode: &str,
+        tester: &Tester,
+        tasks: &[Task],
+        waiting: &[usize],
+        arenas: usize,
+    ) -> Result<Self, VisionError> {
+        let player = &tester.player;
+        let sees = matches!(player, Player::Policy { .. });
+        let observation_config = if sees { tester.observation_config } else { ObservationConfig::default() };
+        let count = at_most(game, arenas.min(waiting.len()));
+        // Agents have the seeds of their episodes; the seed of the World is for the game, and always the same.
+        let (mut world, agents) = build_observing_world(game, mode, &observation_config, 0, 0, count as u32)?;
+        EndedEpisodes::note_in(&mut world);
+        if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
+            // The episode can be played again by its level and its seed.
+            reports.keep_no_files();
+        }
+        let mut seats = Vec::new();
+        for (offset, agent) in agents.into_iter().enumerate() {
+            let own = waiting.iter().skip(offset).step_by(count).map(|&task| (task, tasks[task].seed));
+            let own: Vec<(usize, u64)> = own.collect();
+            let levels: Vec<u64> = own.iter().map(|(task, _)| tasks[*task].level).collect();
+            let seeds: Vec<u64> = own.iter().map(|(_, seed)| *seed).collect();
+            world.entity_mut(agent).insert((LevelQueue::list(levels), EpisodeSeeds::new(seeds)));
+            let control = player.seat(game, &mut world, agent);
+            world.entity_mut(agent).insert(control);
+            seats.push(Seat { agent, tasks: own, done: 0, walk: WalkCounter::new(agent, game.tick_hz()) });
+        }
+        player.install(&mut world);
+        Ok(Self { world, seats, found: Vec::new() })
+    }
+
+    /// Returns ticks until all tasks are played, and notes their results.
+    pub fn play_out(
+        &mut self,
+        game: &dyn Game,
+        played: &mut [Option<Played>],
+        watch: &EpisodeObserver,
+    ) -> Result<(), Interruption> {
+        let is_alone = self.seats.iter().map(|seat| seat.tasks.len()).sum::<usize>() <= 1;
+        let mut watched = Watched::new(game, watch, self.seats.iter().map(|seat| seat.agent), is_alone);
+        while self.seats.iter().any(|seat| Control::of(&self.world, seat.agent).is_active()) {
+            if (watch.stop)() {
+                return Err(Interruption::Stopped);
+            }
+            if let Err(fault) = watched.tick(&mut self.world, tick_world) {
+                let message = fault.to_string();
+                let detector = detector_of(&message);
+                self.found = watched.take_found(0);
+                return Err(Interruption::Broken { detector, message });
+            }
+            // Play of each episode alone shows which episode it belongs to.
+            if let Some((detector, message)) = watched.look(&self.world, EndedEpisodes::of(&self.world)) {
+                return Err(Interruption::Broken { detector, message });
+            }
+            self.count_places(game, watch);
+            self.note_ends(game, played, watch, &mut watched);
+            if self.longest() >= MOST_TICKS {
+                self.found = watched.take_found(0);
+                let message = format!("the episode has not ended after {MOST_TICKS} ticks: give the game a time limit");
+                return Err(Interruption::Broken { detector: "endless", message });
+            }
+        }
+        Ok(())
+    }
+
+    /// Counts the positions of the agents after this tick.
+    fn count_places(&mut self, game: &dyn Game, watch: &EpisodeObserver) {
+        let ended = EndedEpisodes::of(&self.world);
+        for seat in &mut self.seats {
+            let has_ended = ended.iter().any(|(agent, _)| *agent == seat.agent);
+            seat.walk.tick(game, watch.mode, &self.world, has_ended);
+        }
+    }
+
+    /// Returns the walk of an agent in the episode that is over.
+    pub fn take_walk(&mut self, seat: usize) -> Option<Walk> {
+        self.seats.get_mut(seat)?.walk.take()
+    }
+
+    fn note_ends(
+        &mut self,
+        game: &dyn Game,
+        played: &mut [Option<Played>],
+        watch: &EpisodeObserver,
+        watched: &mut Watched,
+    ) {
+        let ended = EndedEpisodes::take(&mut self.world);
+        for (agent, result) in ended {
+            let Some(seat) = self.seats.iter().position(|seat| seat.agent == agent) else { continue };
+            let walk = self.take_walk(seat);
+            let Some((task, seed)) = self.seats[seat].current() else { continue };
+            let place = game.tools().state.position(&self.world, agent);
+            let cause = if result.success { None } else { game.tools().state.end_cause(&self.world, agent) };
+            let exact = self.is_untouched(seat, seed);
+            let found = watched.take_found(seat);
+            let end = PlayedEnd::Ended { result, place, cause };
+            played[task] = Some(Played { end, exact, found, walk });
+            self.seats[seat].done += 1;
+            (watch.progress)(1);
+        }
+    }
+
+    /// Returns the ticks of the longest current episode.
+    fn longest(&self) -> u32 {
+        let ticks = |seat: &Seat| self.world.get::<Episode>(seat.agent).map_or(0, |episode| episode.tick);
+        let playing = self.seats.iter().filter(|seat| is_playing(&self.world, seat.agent));
+        playing.map(ticks).max().unwrap_or(0)
+    }
+
+    /// Returns the tasks that may have broken the World: those that were being played or have just ended, or else the
+    /// next ones.
+    pub fn suspects(&self) -> Vec<usize> {
+        self.suspected().into_iter().map(|(_, task)| task).collect()
+    }
+
+    fn suspected(&self) -> Vec<(&Seat, usize)> {
+        let ended = EndedEpisodes::of(&self.world);
+        let is_begun =
+            |seat: &Seat| is_playing(&self.world, seat.agent) || ended.iter().any(|(agent, _)| *agent == seat.agent);
+        let seats = || self.seats.iter().filter_map(|seat| seat.current().map(|(task, _)| (seat, task)));
+        let begun: Vec<(&Seat, usize)> = seats().filter(|(seat, _)| is_begun(seat)).collect();
+        if begun.is_empty() { seats().collect() } else { begun }
+    }
+
+    /// Returns the message about a broken World that no episode breaks alone. It is a finding of the suspect whose
+    /// agent the game names, or else of the first one.
+    pub fn left_behind(&self, detector: &'static str, message: &str) -> Option<(usize, EpisodeFinding)> {
+        let told = |seat: &Seat| {
+            let (agent, episode) = (self.world.get::<Agent>(seat.agent)?, self.world.get::<Episode>(seat.agent)?);
+            told_tick(message, agent.index, episode.level)
+        };
+        let (seat, task) = self.suspected().into_iter().min_by_key(|(seat, _)| told(seat).is_none())?;
+        let played = || self.world.get::<Episode>(seat.agent).map_or(0, |episode| episode.tick.saturating_sub(1));
+        let (tick, words) = told(seat).unwrap_or_else(|| (played(), message));
+        let words = words.strip_prefix(PANICKED).unwrap_or(words);
+        // A World with a single episode breaks by that episode.
+        let is_shared = self.seats.iter().map(|seat| seat.tasks.len()).sum::<usize>() > 1;
+        let when = if is_shared {
+            "not when the episode is played alone: other episodes in the same World may have left state behind"
+        } else {
+            "not when the episode is played again: the game is not deterministic"
+        };
+        Some((task, EpisodeFinding { detector, tick, message: format!("{words} ({when})") }))
+    }
+
+    /// Returns whether nothing was drawn from a player's streams in the episode with this seed.
+    pub fn is_untouched(&self, seat: usize, seed: u64) -> bool {
+        let streams = self.seats.get(seat).and_then(|seat| self.world.get::<AgentStreams>(seat.agent));
+        streams.is_some_and(|streams| *streams == EpisodeSeeds::streams(seed))
+    }
+
+    /// Returns the tick in which the only agent broke the World, and the game's message without its position: reports
+    /// of a level name that anyway.
+    pub fn without_moment(&self, message: &str) -> (Option<u32>, String) {
+        let agent = self.seats.first().map(|seat| seat.agent);
+        let parts = agent.and_then(|agent| Some((self.world.get::<Agent>(agent)?, self.world.get::<Episode>(agent)?)));
+        let Some((agent, episode)) = parts else { return (None, message.to_owned()) };
+        let told = told_tick(message, agent.index, episode.level);
+        let is_begun = episode.is_running() || episode.is_loading();
+        let (tick, rest) = told.map_or((is_begun.then_some(episode.tick), message), |(tick, rest)| (Some(tick), rest));
+        (tick, rest.strip_prefix(PANICKED).unwrap_or(rest).to_owned())
+    }
+}
+
+/// Parses the tick at the start of a message such as `agent 0, level 3, tick 7: words`, and returns it with the
+/// words.
+fn told_tick(message: &str, agent: u32, level: u64) -> Option<(u32, &str)> {
+    let rest = message.strip_prefix(&format!("agent {agent}, level {level}, tick "))?;
+    let (tick, words) = rest.split_once(": ")?;
+    Some((tick.parse().ok()?, words))
+}
+
+/// Returns whether an agent has an episode that is not over.
+fn is_playing(world: &World, agent: Entity) -> bool {
+    let is_begun = |episode: &Episode| episode.is_running() || episode.is_loading();
+    Control::of(world, agent).is_active() && world.get::<Episode>(agent).is_some_and(is_begun)
+}
+
+// Least memory of a test, checked before it begins.
+
+/// Bytes of a listed level, and of its entry in the journal.
+const LEVEL: usize = size_of::<u64>() + size_of::<(u64, (u64, usize))>();
+
+/// Data in memory: description, bytes, and the option to lower.
+type Kept = (String, u64, &'static str);
+
+impl TestPlan {
+    /// Checks that the list of levels and the episodes on one of them fit into the free memory.
+    ///
+    /// # Errors
+    ///
+    /// [`MemoryError`].
+    pub(super) fn check_memory(&self) -> Result<(), MemoryError> {
+        let worlds = Arrangement { worlds: 1, arenas: 1 };
+        self.kept().into_iter().try_for_each(|(what, bytes, options)| check_bytes(what, bytes, options, worlds))
+    }
+
+    fn kept(&self) -> [Kept; 2] {
+        let levels = self.shard.map_or(self.split.len(), |shard| shard.places(self.split.len()).count() as u64);
+        let (testers, episodes) = (self.testers.len() as u64, u64::from(self.episodes.max(1)));
+        let of_levels = levels.saturating_mul(LEVEL as u64);
+        // A level is judged when all testers have played all of their episodes on it.
+        let one_tester = episodes.saturating_mul(size_of::<Task>() as u64);
+        let all_testers = episodes.saturating_mul(testers).saturating_mul(size_of::<Played>() as u64);
+        [
+            (format!("the places of the results of {levels} levels"), of_levels, "`--levels`"),
+            (
+                format!("the results of testers × episodes = {testers} × {episodes} on a level"),
+                one_tester.saturating_add(all_testers),
+                "`--episodes`",
+            ),
+        ]
+    }
+}
+
+// Play of a few episodes to their end, whatever the game does in them.
+
+/// Plays episodes and returns their results in order; `None` if `stop` returned true.
+///
+/// Many are played in one World. If it breaks, its current episodes are played again, each alone in a World of its
+/// own. An episode that breaks its World again is the broken one; all others are played as if nothing had happened.
+///
+/// If no episode does, the break depends on state that other episodes left in the World. It is then a finding of the
+/// episode in which it occurred.
+///
+/// # Errors
+///
+/// The game does not support the tester's observations.
+pub(super) fn play_tasks(
+    game: &dyn Game,
+    mode: &str,
+    tester: &Tester,
+    tasks: &[Task],
+    watch: &EpisodeObserver,
+) -> Result<Option<Vec<Played>>, VisionError> {
+    let mut played: Vec<Option<Played>> = vec![None; tasks.len()];
+    let mut waiting: Vec<usize> = (0..tasks.len()).collect();
+    while !waiting.is_empty() {
+        let mut test_world = TestWorld::build(game, mode, tester, tasks, &waiting, watch.arenas)?;
+        match test_world.play_out(game, &mut played, watch) {
+            Ok(()) => {}
+            Err(Interruption::Stopped) => return Ok(None),
+            Err(Interruption::Broken { detector, message }) => {
+                let mut is_seen = false;
+                for suspect in test_world.suspects() {
+                    let Some(alone) = play_alone(game, mode, tester, tasks[suspect], watch)? else { return Ok(None) };
+                    is_seen |= alone.shows(detector);
+                    played[suspect] = Some(alone);
+                }
+                if let Some((suspect, finding)) = test_world.left_behind(detector, &message).filter(|_| !is_seen)
+                    && let Some(played) = &mut played[suspect]
+                {
+                    played.found.push(finding);
+                }
+            }
+        }
+        waiting.retain(|&task| played[task].is_none());
+    }
+    Ok(Some(played.into_iter().flatten().collect()))
+}
+
+/// Plays one episode in a World of its own.
+fn play_alone(
+    game: &dyn Game,
+    mode: &str,
+    tester: &Tester,
+    task: Task,
+    watch: &EpisodeObserver,
+) -> Result<Option<Played>, VisionError> {
+    let mut test_world = TestWorld::build(game, mode, tester, &[task], &[0], 1)?;
+    let mut played = [None];
+    let end = match test_world.play_out(game, &mut played, watch) {
+        Ok(()) => return Ok(played[0].take()),
+        Err(Interruption::Stopped) => return Ok(None),
+        Err(Interruption::Broken { detector, message }) => {
+            (watch.progress)(1);
+            let (tick, message) = test_world.without_moment(&message);
+            PlayedEnd::Broken { detector, tick, message }
+        }
+    };
+    let found = std::mem::take(&mut test_world.found);
+    let walk = test_world.take_walk(0);
+    Ok(Some(Played { end, exact: test_world.is_untouched(0, task.seed), found, walk }))
+}
+
+// Episodes to play, and their results.
+
+/// An episode to play.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Task {
+    /// The level.
+    pub level: u64,
+    /// Seed of the player's streams.
+    pub seed: u64,
+}
+
+/// Result of an episode.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Played {
+    /// Its end.
+    pub end: PlayedEnd,
+    /// True if the player drew no random number.
+    pub exact: bool,
+    /// The detectors' findings in it.
+    pub found: Vec<EpisodeFinding>,
+    /// Walk of its agent, if the game reports positions.
+    pub walk: Option<Walk>,
+}
+
+impl Played {
+    /// Returns whether this detector has a finding in it, or the game broke this way.
+    pub fn shows(&self, detector: &str) -> bool {
+        let is_broken = matches!(&self.end, PlayedEnd::Broken { detector: how, .. } if *how == detector);
+        is_broken || self.found.iter().any(|finding| finding.detector == detector)
+    }
+}
+
+/// A detector's finding in an episode.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct EpisodeFinding {
+    /// The detector.
+    pub detector: &'static str,
+    /// Tick of the episode.
+    pub tick: u32,
+    /// The message.
+    pub message: String,
+}
+
+/// The end of an episode.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum PlayedEnd {
+    /// An end by the game.
+    Ended {
+        /// The result.
+        result: EpisodeResult,
+        /// Last position of the agent, if the game reports it.
+        place: Option<Vec2>,
+        /// Cause of an end without the goal, if the game reports it.
+        cause: Option<&'static str>,
+    },
+    /// The game broke.
+    Broken {
+        /// `panic`, `fault` or `endless`.
+        detector: &'static str,
+        /// Tick of the episode, if it had begun.
+        tick: Option<u32>,
+        /// The game's message.
+        message: String,
+    },
+}
+
+/// Interruption of the episodes of a World.
+pub(super) enum Interruption {
+    /// `stop` returned true.
+    Stopped,
+    /// The World cannot go on.
+    Broken {
+        /// `panic`, `fault` or `endless`.
+        detector: &'static str,
+        /// The game's message.
+        message: String,
+    },
+}
+
+/// Observers of an episode during play.
+pub(super) struct EpisodeObserver<'a> {
+    /// Called with the number of newly finished episodes.
+    pub progress: &'a (dyn Fn(u64) + Sync),
+    /// Returns whether to stop.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+    /// The detectors at work.
+    pub detectors: &'a Detectors,
+    /// Mode of the levels.
+    pub mode: &'a str,
+    /// Name of the tester.
+    pub tester: &'a str,
+    /// Largest number of arenas of a World. It does not change the results of a game that keeps no state between
+    /// episodes.
+    pub arenas: usize,
+}
+
+// Detectors at work in a World in which testers play.
+
+/// A detector's watch of an agent, under the detector's name.
+type NamedWatch = (&'static str, Box<dyn Watch>);
+
+/// A detector's watch of a World, under the detector's name.
+type NamedWorldWatch = (&'static str, Box<dyn WorldWatch>);
+
+/// The watches of a World.
+pub(super) struct Watched<'a> {
+    game: &'a dyn Game,
+    watch: &'a WatchOfTest<'a>,
+    seats: Vec<WatchedSeat>,
+    worlds: Vec<NamedWorldWatch>,
+    ear: Option<Ear>,
+    /// True if the World plays a single episode.
+    is_alone: bool,
+}
+
+/// The watches of an agent's episode.
+struct WatchedSeat {
+    agent: Entity,
+    /// `None` between two episodes.
+    watches: Option<Vec<NamedWatch>>,
+    found: Vec<EpisodeFinding>,
+}
+
+impl<'a> Watched<'a> {
+    /// Makes the watches of the test's detectors for these agents.
+    pub fn new(
+        game: &'a dyn Game,
+        watch: &'a WatchOfTest<'a>,
+        agents: impl Iterator<Item = Entity>,
+        is_alone: bool,
+    ) -> Self {
+        let detectors = &watch.detectors.ticks;
+        let world = |detector: &Arc<dyn Detector>| detector.watch_world().map(|watch| (detector.name(), watch));
+        let worlds: Vec<NamedWorldWatch> = detectors.iter().filter_map(world).collect();
+        let ear = worlds.iter().any(|(_, watch)| watch.hears_errors()).then(Ear::new);
+        let seat = |agent| WatchedSeat { agent, watches: None, found: Vec::new() };
+        Self { game, watch, seats: agents.map(seat).collect(), worlds, ear, is_alone }
+    }
+
+    /// Lets the World do a tick, with its log and duration recorded if a detector needs them.
+    pub fn tick(&self, world: &mut World, tick: impl FnOnce(&mut World) -> Result<(), Fault>) -> Result<(), Fault> {
+        let clock = self.watch.detectors.clock();
+        let begun = clock.map(|_| Instant::now());
+        let ticked = match &self.ear {
+            Some(ear) => ear.listen(|| tick(world)),
+            None => tick(world),
+        };
+        if let (Some(clock), Some(begun)) = (clock, begun) {
+            self.time(clock, begun, world);
+        }
+        ticked
+    }
+
+    fn time(&self, clock: &TickTime, begun: Instant, world: &World) {
+        let took = begun.elapsed();
+        if !clock.is_slow(took, self.seats.len(), self.game.tick_hz()) {
+            return;
+        }
+        let episodes = self.seats.iter().filter_map(|seat| world.get::<Episode>(seat.agent));
+        let (levels, ticks) = episodes.map(|episode| (episode.level, episode.tick)).unzip();
+        let (detector, tester) = (TickTime::NAME, self.watch.tester.to_owned());
+        clock.note(SlowTick { detector, tester, levels, ticks, milliseconds: took.as_secs_f64() * 1000.0 });
+    }
+
+    /// Inspects the tick that was just played. In a World with several episodes, returns a defect of the World, with
+    /// the name of its detector.
+    pub fn look(&mut self, world: &World, ended: &[(Entity, EpisodeResult)]) -> Option<(&'static str, String)> {
+        let errors = self.ear.as_ref().map(Ear::take).unwrap_or_default();
+        let moment = WorldMoment { world, errors: &errors };
+        let mut wrong = Vec::new();
+        self.worlds.retain_mut(|(detector, watch)| match watch.tick(&moment) {
+            Some(message) => {
+                wrong.push((*detector, message));
+                false
+            }
+            None => true,
+        });
+        if !self.is_alone && !wrong.is_empty() {
+            return wrong.into_iter().next();
+        }
+        for seat in &mut self.seats {
+            let result = ended.iter().find(|(agent, _)| *agent == seat.agent).map(|(_, result)| *result);
+            seat.look(self.game, self.watch, world, result);
+        }
+        if let Some(seat) = self.seats.first_mut() {
+            let tick = world.get::<Episode>(seat.agent).map_or(0, |episode| episode.tick.saturating_sub(1));
+            let finding = |(detector, message)| EpisodeFinding { detector, tick, message };
+            seat.found.extend(wrong.into_iter().map(finding));
+        }
+        None
+    }
+
+    /// Returns the findings in the episode of an agent.
+    pub fn take_found(&mut self, seat: usize) -> Vec<EpisodeFinding> {
+        self.seats.get_mut(seat).map(|seat| std::mem::take(&mut seat.found)).unwrap_or_default()
+    }
+}
+
+impl WatchedSeat {
+    /// Inspects the episode's last tick; `result` is the episode's result if it is over.
+    fn look(&mut self, game: &dyn Game, watch: &WatchOfTest, world: &World, result: Option<EpisodeResult>) {
+        if watch.detectors.ticks.is_empty() {
+            return;
+        }
+        let parts =
+            (world.get::<Episode>(self.agent), world.get::<Action>(self.agent), world.get::<Reward>(self.agent));
+        let (Some(episode), Some(action), Some(reward)) = parts else { return };
+        if episode.tick == 0 || !(episode.is_running() || result.is_some()) {
+            return;
+        }
+        let watches = self.watches.get_or_insert_with(|| begin(game, watch, episode.level));
+        let observation = world.get::<Observation>(self.agent);
+        let proofs = GameProofs { game, mode: watch.mode, level: episode.level, world, agent: self.agent };
+        let moment = Moment {
+            world,
+            agent: self.agent,
+            level: episode.level,
+            tick: episode.tick - 1,
+            action: &action.0,
+            observation: observation.map_or(&[][..], |observation| observation.vector.as_slice()),
+            state_hash: world.get::<StateHash>(self.agent).map_or(0, |hash| hash.0),
+            reward: reward.get(),
+            place: if watches.is_empty() { None } else { game.tools().state.position(world, self.agent) },
+            is_success: result.map_or_else(|| episode.is_success(), |result| result.success),
+            proofs: &proofs,
+        };
+        watches.retain_mut(|(detector, watch)| {
+            let message = watch.tick(&moment).or_else(|| result.and_then(|result| watch.end(&moment, &result)));
+            let is_silent = message.is_none();
+            let finding = message.map(|message| EpisodeFinding { detector, tick: moment.tick, message });
+            self.found.extend(finding);
+            is_silent
+        });
+        if result.is_some() {
+            self.watches = None;
+        }
+    }
+}
+
+/// Makes the watches of an episode on this level.
+fn begin(game: &dyn Game, watch: &WatchOfTest, level: u64) -> Vec<NamedWatch> {
+    let ahead = LevelAhead { level, plan: game.tools().levels.floor_plan(watch.mode, level) };
+    let named = |detector: &Arc<dyn Detector>| detector.watch(&ahead).map(|watch| (detector.name(), watch));
+    watch.detectors.ticks.iter().filter_map(named).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_moment_is_taken_from_the_words() {
+        assert_eq!(told_tick("agent 0, level 3, tick 7: it burns: hot", 0, 3), Some((7, "it burns: hot")));
+        assert_eq!(told_tick("agent 0, level 3, after tick 7: late", 0, 3), None);
+        assert_eq!(told_tick("the policy cannot decide", 0, 3), None);
+    }
+}
+
+#[cfg(test)]
+mod plan_memory_tests {
+    use bevy_playbot::{bot::BlindBot, vision::ObservationConfig};
+    use playbot_learner::HasExitCode as _;
+
+    use super::*;
+    use crate::detectors::Detectors;
+    use crate::verdict::{TestError, Tester, TesterRecord};
+    use playbot_harness::eval::Player;
+
+    fn plan(levels: &str, testers: usize, episodes: u32) -> TestPlan {
+        let tester = |number: usize| Tester {
+            record: TesterRecord::bot(number.to_string()),
+            player: Player::Blind(BlindBot::Uniform),
+            observation_config: ObservationConfig::default(),
+        };
+        TestPlan {
+            split: levels.parse().expect("a split"),
+            testers: (0..testers).map(tester).collect(),
+            episodes,
+            seed: 0,
+            detectors: Detectors::default(),
+            shard: None,
+            threads: 1,
+        }
+    }
+
+    #[test]
+    fn what_no_machine_has_room_for_is_refused_by_the_name_of_its_option() {
+        assert!(plan("hard:0..9", 64, 100).check().is_ok());
+        let error = plan("hard:0..9", 64, u32::MAX).check().expect_err("terabytes");
+        let words = error.to_string();
+        assert!(error.is_usage() && matches!(error, TestError::Eval(_)), "{words}");
+        assert!(words.starts_with("the results of testers × episodes = 64 × 4294967295 on a level need "), "{words}");
+        assert!(words.ends_with(": lower `--episodes`"), "{words}");
+    }
+
+    #[test]
+    fn levels_are_counted_without_those_of_other_shards() {
+        let whole = plan("hard:0..16777215", 1, 1);
+        let [(what, bytes, option), _] = whole.kept();
+        assert_eq!((what.as_str(), option), ("the places of the results of 16777216 levels", "`--levels`"));
+        assert_eq!(bytes, (LEVEL as u64) << 24);
+        let part = TestPlan { shard: Some("1/4".parse().expect("a shard")), ..whole };
+        assert_eq!(part.kept()[0].1, (LEVEL as u64) << 22);
+    }
+}

@@ -1,0 +1,41 @@
+//! Verdicts for unit tests.
+
+use crate::verdict::{LevelOutcome, LevelVerdict, Score, TesterVerdict, results::FinishTime, statistics::wilson};
+use playbot_harness::detector::LevelProof;
+use std::collections::BTreeMap;
+
+/// Makes a score with so many solved episodes.
+pub(super) fn score(solved: u64, episodes: u64) -> Score {
+    let ticks = FinishTime::of(vec![40; solved as usize]);
+    Score {
+        solved,
+        episodes,
+        interval: wilson(solved, episodes),
+        ticks,
+        lost: episodes - solved,
+        timed_out: 0,
+        broken: 0,
+    }
+}
+
+/// Makes the verdict on the level with this index of `hard:0..`, tested by `random` alone.
+pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
+    LevelVerdict {
+        level: format!("hard:{index}"),
+        index,
+        outcome: if solved > 0 { LevelOutcome::Solved } else { LevelOutcome::BotFailed },
+        proof: if solved > 0 { LevelProof::Solvable } else { LevelProof::Unknown },
+        score: score(solved, episodes),
+        ends: Vec::new(),
+        causes: BTreeMap::new(),
+        places: None,
+        maps: None,
+        testers: vec![tester("random", solved, episodes, false)],
+        findings: Vec::new(),
+    }
+}
+
+/// Makes the verdict of a tester.
+pub(super) fn tester(name: &str, solved: u64, episodes: u64, exact: bool) -> TesterVerdict {
+    TesterVerdict { tester: name.to_owned(), score: score(solved, episodes), exact, places: None }
+}

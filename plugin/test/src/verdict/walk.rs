@@ -1,0 +1,384 @@
+//! Positions of an agent in an episode, counted tick by tick.
+
+use crate::{
+    explore::{Cell, CellGrid, cells_between, reach, round::open_cells},
+    verdict::plan::{skill_count, skill_number},
+};
+use bevy::{math::Vec2, prelude::*};
+use bevy_playbot::{episode::Episode, skill_prior::ActiveSkill};
+use playbot_harness::{floor_plan::FloorPlan, game::Game};
+use std::collections::BTreeSet;
+
+/// Seconds without a square that is new in the episode, after which time counts as lost.
+const PATIENCE: f64 = 2.0;
+
+/// Largest number of squares of a path that are kept: the last ones.
+const MOST_STEPS: usize = 200;
+
+/// Squares of an agent's walk.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Walk {
+    /// The squares of the level.
+    pub squares: LevelSquares,
+    /// The visited squares, in their order.
+    pub counts: Vec<SquareCount>,
+    /// The end of its path: squares in order, with the ticks spent in each.
+    pub trail: Vec<[u64; 2]>,
+}
+
+/// Counts of a square.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct SquareCount {
+    pub square: usize,
+    /// Ticks; one for a square that was only passed between two of them.
+    pub ticks: u32,
+    /// Ticks that were lost.
+    pub lost: u32,
+    /// Ticks under each skill that was active there.
+    pub skills: Vec<(usize, u32)>,
+}
+
+/// Counts for one agent, episode after episode, in reused memory.
+pub(super) struct WalkCounter {
+    agent: Entity,
+    /// Ticks after which time is lost.
+    patience: u32,
+    /// The present level, and its squares.
+    level: Option<(u64, Option<LevelSquares>)>,
+    /// The floor plan of the level, until its open squares are computed.
+    plan: Option<FloorPlan>,
+    /// The level's open squares, computed when a square is first passed.
+    open: Option<BTreeSet<usize>>,
+    /// Position of the agent after the last tick of this episode.
+    last: Option<Vec2>,
+    /// Ticks of each square.
+    ticks: Vec<u32>,
+    lost: Vec<u32>,
+    /// Ticks of each square and each name of a skill.
+    skills: Vec<u32>,
+    names: usize,
+    /// Squares that were visited in this episode.
+    visited: Vec<usize>,
+    /// Ticks since the last of these was new.
+    since_new: u32,
+    trail: Vec<[u64; 2]>,
+}
+
+impl WalkCounter {
+    /// Makes a counter for an agent of a game with so many ticks per second.
+    pub fn new(agent: Entity, tick_hz: f64) -> Self {
+        Self {
+            agent,
+            patience: (PATIENCE * tick_hz).ceil() as u32,
+            level: None,
+            plan: None,
+            open: None,
+            last: None,
+            ticks: Vec::new(),
+            lost: Vec::new(),
+            skills: Vec::new(),
+            names: 0,
+            visited: Vec::new(),
+            since_new: 0,
+            trail: Vec::new(),
+        }
+    }
+
+    /// Counts the tick that was just played; `has_ended` if it was the last one of an episode.
+    pub fn tick(&mut self, game: &dyn Game, mode: &str, world: &World, has_ended: bool) {
+        let Some(episode) = world.get::<Episode>(self.agent) else { return };
+        if episode.tick == 0 || !(episode.is_running() || has_ended) {
+            return;
+        }
+        if self.level.is_none_or(|(level, _)| level != episode.level) {
+            (self.plan, self.open) = (game.tools().levels.floor_plan(mode, episode.level), None);
+            self.level = Some((episode.level, self.plan.as_ref().and_then(LevelSquares::of)));
+        }
+        let Some((_, Some(squares))) = self.level else { return };
+        let before = self.last.take().filter(|_| episode.tick > 1);
+        let Some(place) = game.tools().state.position(world, self.agent) else { return };
+        let Some(square) = squares.at(place) else { return };
+        let skill = world.get::<ActiveSkill>(self.agent);
+        let z = skill.map_or(&[][..], |skill| skill.z.as_slice());
+        if let Some(before) = before.filter(|before| squares.between(*before, place).next().is_some()) {
+            if self.open.is_none() {
+                self.open = Some(self.plan.take().and_then(|plan| squares.open(&plan)).unwrap_or_default());
+            }
+            self.pass(squares, before, place, z);
+        }
+        self.count(squares.count(), square, z);
+        self.last = Some(place);
+    }
+
+    /// Counts the open squares that were passed between two positions, as one tick each if they are new in the
+    /// episode. At least one tick has been counted before.
+    fn pass(&mut self, squares: LevelSquares, from: Vec2, to: Vec2, z: &[f32]) {
+        let Some(open) = &self.open else { return };
+        for square in squares.between(from, to).filter(|square| open.contains(square)) {
+            if self.ticks[square] > 0 {
+                continue;
+            }
+            self.visited.push(square);
+            self.since_new = 0;
+            self.ticks[square] = 1;
+            if let Some(skill) = skill_number(z).filter(|skill| *skill < self.names) {
+                self.skills[square * self.names + skill] += 1;
+            }
+        }
+    }
+
+    /// Counts a tick in one of so many squares, under a skill, which may be empty.
+    fn count(&mut self, squares: usize, square: usize, z: &[f32]) {
+        if self.visited.is_empty() {
+            self.names = skill_count(z);
+            self.since_new = 0;
+            grow(&mut self.ticks, squares);
+            grow(&mut self.lost, squares);
+            grow(&mut self.skills, squares * self.names);
+        }
+        if self.ticks[square] == 0 {
+            self.visited.push(square);
+            self.since_new = 0;
+        } else {
+            self.since_new = self.since_new.saturating_add(1);
+        }
+        self.ticks[square] += 1;
+        if self.since_new > self.patience {
+            self.lost[square] += 1;
+        }
+        if let Some(skill) = skill_number(z).filter(|skill| *skill < self.names) {
+            self.skills[square * self.names + skill] += 1;
+        }
+        match self.trail.last_mut() {
+            Some([last, ticks]) if *last == square as u64 => *ticks += 1,
+            _ => {
+                if self.trail.len() >= 2 * MOST_STEPS {
+                    self.trail.drain(..MOST_STEPS);
+                }
+                self.trail.push([square as u64, 1]);
+            }
+        }
+    }
+
+    /// Returns the counts of the episode, which is over, and resets them; `None` if the game does not report
+    /// positions.
+    pub fn take(&mut self) -> Option<Walk> {
+        self.last = None;
+        let (_, squares) = self.level?;
+        let squares = squares?;
+        self.visited.sort_unstable();
+        let mut counts = Vec::with_capacity(self.visited.len());
+        for square in self.visited.drain(..) {
+            let mut skills = Vec::new();
+            let own = square * self.names..(square + 1) * self.names;
+            for (skill, ticks) in self.skills[own].iter_mut().enumerate().filter(|(_, ticks)| **ticks > 0) {
+                skills.push((skill, std::mem::take(ticks)));
+            }
+            let (ticks, lost) = (std::mem::take(&mut self.ticks[square]), std::mem::take(&mut self.lost[square]));
+            counts.push(SquareCount { square, ticks, lost, skills });
+        }
+        let mut trail = std::mem::take(&mut self.trail);
+        trail.drain(..trail.len().saturating_sub(MOST_STEPS));
+        (!counts.is_empty()).then_some(Walk { squares, counts, trail })
+    }
+}
+
+/// Makes room for so many counters.
+fn grow(counters: &mut Vec<u32>, wanted: usize) {
+    if counters.len() < wanted {
+        counters.resize(wanted, 0);
+    }
+}
+
+// The squares of a level in which events are counted.
+
+/// Most squares along the longer side of a level.
+const MOST: f32 = 64.0;
+
+/// Part of a square by which a level may be longer than its squares, through rounding.
+const SLACK: f32 = 1e-3;
+
+/// The squares of a level: its own tiles, or several of them in larger levels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct LevelSquares {
+    pub grid: CellGrid,
+    pub columns: usize,
+    pub rows: usize,
+    /// Largest distance of an agent's step in a tick.
+    reach: f32,
+}
+
+impl LevelSquares {
+    /// Returns the squares of a level; `None` for one without extent.
+    pub fn of(plan: &FloorPlan) -> Option<Self> {
+        let size = plan.bounds.size();
+        if !(plan.bounds.min.is_finite() && size.is_finite() && size.min_element() > 0.0) {
+            return None;
+        }
+        let tile = CellGrid::new(Some(plan), None).size;
+        let side = tile * (size.max_element() / (tile * MOST) - SLACK).ceil().max(1.0);
+        if !side.is_finite() {
+            return None;
+        }
+        let count = (size / side - SLACK).ceil().max(Vec2::ONE);
+        let grid = CellGrid::new(Some(plan), Some(side));
+        Some(Self { grid, columns: count.x as usize, rows: count.y as usize, reach: reach(tile) })
+    }
+
+    /// Returns the number of squares.
+    pub fn count(&self) -> usize {
+        self.columns * self.rows
+    }
+
+    /// Returns the square around a position, counted row by row from below; `None` outside the level.
+    pub fn at(&self, place: Vec2) -> Option<usize> {
+        let at = (place - self.grid.origin) / self.grid.size;
+        // Positions that are not numbers count as outside.
+        let is_inside = at.x >= 0.0 && at.y >= 0.0 && at.x < self.columns as f32 && at.y < self.rows as f32;
+        is_inside.then(|| at.y as usize * self.columns + at.x as usize)
+    }
+
+    /// Returns the squares between two positions of an agent in consecutive ticks; no squares if it has been put
+    /// there.
+    pub fn between(self, from: Vec2, to: Vec2) -> impl Iterator<Item = usize> {
+        cells_between(self.grid, from, to, self.reach).filter_map(move |cell| self.index(cell))
+    }
+
+    /// Returns the squares that walls do not cut off from the start, if the plan has a start.
+    pub fn open(&self, plan: &FloorPlan) -> Option<BTreeSet<usize>> {
+        let cells = open_cells(plan, &self.grid)?;
+        Some(cells.iter().filter_map(|cell| self.of_cell(cell)).collect())
+    }
+
+    fn of_cell(&self, cell: &Cell) -> Option<usize> {
+        let &[column, row] = cell.0.as_slice() else { return None };
+        self.index([column, row])
+    }
+
+    fn index(&self, [column, row]: [i32; 2]) -> Option<usize> {
+        let (column, row) = (usize::try_from(column).ok()?, usize::try_from(row).ok()?);
+        (column < self.columns && row < self.rows).then_some(row * self.columns + column)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::math::Rect;
+
+    use super::*;
+    use playbot_harness::floor_plan::FloorPlan;
+
+    /// Makes a counter for ten squares in a row whose patience is four ticks.
+    fn counter() -> WalkCounter {
+        let plan = FloorPlan { bounds: Rect::new(0.0, 0.0, 16.0, 1.0), ..FloorPlan::default() };
+        let squares = LevelSquares::of(&plan).expect("it has an extent");
+        WalkCounter { level: Some((7, Some(squares))), ..WalkCounter::new(Entity::PLACEHOLDER, 2.0) }
+    }
+
+    fn walked(counter: &mut WalkCounter, squares: &[usize], z: &[f32]) -> Walk {
+        squares.iter().for_each(|square| counter.count(16, *square, z));
+        counter.take().expect("it went somewhere")
+    }
+
+    fn lost(walk: &Walk) -> Vec<(usize, u32, u32)> {
+        walk.counts.iter().map(|count| (count.square, count.ticks, count.lost)).collect()
+    }
+
+    #[test]
+    fn time_is_lost_two_seconds_after_the_last_new_square() {
+        let mut counter = counter();
+        // Rests: of the six ticks after the first one in square 3, the last two are lost.
+        let resting = walked(&mut counter, &[2, 3, 3, 3, 3, 3, 3, 3, 4], &[]);
+        assert_eq!(lost(&resting), [(2, 1, 0), (3, 7, 2), (4, 1, 0)]);
+        // Goes back and forth.
+        let turning = walked(&mut counter, &[0, 1, 0, 1, 0, 1, 0, 1], &[]);
+        assert_eq!(lost(&turning), [(0, 4, 1), (1, 4, 1)]);
+        assert_eq!(turning.trail.len(), 8);
+        let walking = walked(&mut counter, &[0, 1, 2, 3, 4, 5, 6, 7], &[]);
+        assert!(walking.counts.iter().all(|count| count.lost == 0 && count.ticks == 1), "{walking:?}");
+        assert_eq!(counter.take(), None, "nothing is left of earlier episodes");
+    }
+
+    #[test]
+    fn skills_are_counted_where_they_are_active() {
+        let mut counter = counter();
+        counter.count(16, 5, &[0.1, -2.0]);
+        counter.count(16, 5, &[0.1, -2.0]);
+        counter.count(16, 5, &[1.0, 0.0]);
+        let walk = walked(&mut counter, &[6], &[-1.0, 0.0]);
+        assert_eq!(walk.counts[0].skills, [(0, 1), (3, 2)]);
+        assert_eq!(walk.counts[1].skills, [(1, 1)]);
+        let without = walked(&mut counter, &[5, 6], &[]);
+        assert!(without.counts.iter().all(|count| count.skills.is_empty()), "{without:?}");
+    }
+
+    #[test]
+    fn open_squares_between_two_ticks_are_passed() {
+        let mut counter = counter();
+        let (_, squares) = counter.level.expect("a level");
+        let squares = squares.expect("it has an extent");
+        counter.open = Some(BTreeSet::from([0, 1, 2, 4, 5]));
+        let place = |square: usize| Vec2::new(square as f32 + 0.5, 0.5);
+        for (from, to) in [(0, 0), (0, 4), (4, 0), (0, 5)] {
+            counter.pass(squares, place(from), place(to), &[0.1, -2.0]);
+            counter.count(16, to, &[0.1, -2.0]);
+        }
+        let walk = counter.take().expect("it went somewhere");
+        // Square 3 is closed, and the last leap is too far for an agent: it has been put there.
+        assert_eq!(lost(&walk), [(0, 2, 0), (1, 1, 0), (2, 1, 0), (4, 1, 0), (5, 1, 0)]);
+        assert!(walk.counts.iter().all(|count| count.skills == [(3, count.ticks)]), "{walk:?}");
+        assert_eq!(walk.trail, [[0, 1], [4, 1], [0, 1], [5, 1]]);
+    }
+
+    #[test]
+    fn of_a_long_way_the_end_is_kept() {
+        let mut counter = counter();
+        let squares: Vec<usize> = (0..1_000).map(|tick| tick / 2 % 16).collect();
+        let walk = walked(&mut counter, &squares, &[]);
+        assert_eq!(walk.trail.len(), MOST_STEPS);
+        // The last pair of ticks is number 499.
+        assert_eq!(walk.trail.last(), Some(&[499 % 16, 2]));
+        assert_eq!(walk.counts.iter().map(|count| count.ticks).sum::<u32>(), 1_000);
+    }
+}
+
+#[cfg(test)]
+mod squares_tests {
+    use bevy::math::Rect;
+
+    use super::*;
+
+    fn plan(width: f32, height: f32, tile: f32) -> FloorPlan {
+        FloorPlan {
+            bounds: Rect::new(-1.0, 2.0, width - 1.0, height + 2.0),
+            walls: vec![Rect::new(1.0, 2.0, 1.0 + tile, height + 2.0)],
+            start: Vec2::new(-0.5, 2.5),
+            ..FloorPlan::default()
+        }
+    }
+
+    #[test]
+    fn squares_are_tiles_counted_from_below() {
+        let squares = LevelSquares::of(&plan(4.0, 3.0, 1.0)).expect("it has an extent");
+        assert_eq!((squares.columns, squares.rows, squares.grid.size, squares.count()), (4, 3, 1.0, 12));
+        assert_eq!(squares.at(Vec2::new(-0.9, 2.1)), Some(0));
+        assert_eq!(squares.at(Vec2::new(2.5, 4.5)), Some(2 * 4 + 3));
+        for outside in [Vec2::new(-1.1, 2.5), Vec2::new(3.1, 2.5), Vec2::new(0.0, 5.0), Vec2::NAN] {
+            assert_eq!(squares.at(outside), None, "{outside}");
+        }
+        let passed = |to| squares.between(Vec2::new(-0.5, 2.5), to).collect::<Vec<_>>();
+        assert_eq!(passed(Vec2::new(2.5, 2.5)), [1, 2]);
+        assert!(passed(Vec2::new(3.75, 4.5)).is_empty(), "farther than four tiles");
+        // The wall in the third column cuts the fourth off.
+        let open = squares.open(&plan(4.0, 3.0, 1.0)).expect("the start is free");
+        assert_eq!(open.into_iter().collect::<Vec<_>>(), [0, 1, 4, 5, 8, 9]);
+    }
+
+    #[test]
+    fn large_levels_have_coarser_squares_and_flat_ones_none() {
+        let squares = LevelSquares::of(&plan(640.0, 30.0, 1.0)).expect("it has an extent");
+        assert_eq!((squares.columns, squares.rows, squares.grid.size), (64, 3, 10.0));
+        assert_eq!(LevelSquares::of(&plan(0.0, 3.0, 1.0)), None);
+        assert_eq!(LevelSquares::of(&plan(f32::NAN, 3.0, 1.0)), None);
+    }
+}

@@ -1,0 +1,198 @@
+//! Maps and visits of a level from the walks of all episodes.
+
+use crate::verdict::{
+    Finding, Places,
+    maps::{FailureWay, LevelMaps, SkillTicks},
+    plan::skill_name,
+    test_world::{Played, PlayedEnd},
+    walk::{LevelSquares, Walk},
+};
+use playbot_harness::floor_plan::FloorPlan;
+use std::{
+    cmp::Reverse,
+    collections::{BTreeMap, BTreeSet},
+};
+
+/// Visits and maps of a level.
+pub(super) struct Walked {
+    /// Open squares that each tester visited, if known.
+    pub testers: Vec<Option<Places>>,
+    /// Open squares that any tester visited.
+    pub places: Option<Places>,
+    /// Maps of where they were.
+    pub maps: LevelMaps,
+}
+
+/// Ticks in a square.
+#[derive(Default)]
+struct Sum {
+    ticks: u64,
+    lost: u64,
+    skills: BTreeMap<usize, u64>,
+}
+
+impl Walked {
+    /// Sums up the walks in a level with this plan. `played` has the episodes of each tester, `names` the testers'
+    /// names. `None` if positions are unknown.
+    pub fn of(plan: &FloorPlan, names: &[&str], played: &[&[Played]], findings: &[Finding]) -> Option<Self> {
+        let squares = LevelSquares::of(plan)?;
+        let is_known = played.iter().any(|episodes| episodes.iter().any(|episode| episode.walk.is_some()));
+        if !is_known {
+            return None;
+        }
+        let open = squares.open(plan);
+        let places = |visited: &BTreeSet<usize>| {
+            open.as_ref()
+                .map(|open| Places { visited: open.intersection(visited).count() as u64, open: open.len() as u64 })
+        };
+        let mut sums: BTreeMap<usize, Sum> = BTreeMap::new();
+        let mut testers = Vec::new();
+        for episodes in played {
+            let mut visited = BTreeSet::new();
+            let walks = episodes.iter().filter_map(|episode| episode.walk.as_ref());
+            for walk in walks.filter(|walk| walk.squares == squares) {
+                for count in &walk.counts {
+                    visited.insert(count.square);
+                    let sum = sums.entry(count.square).or_default();
+                    sum.ticks += u64::from(count.ticks);
+                    sum.lost += u64::from(count.lost);
+                    for (skill, ticks) in &count.skills {
+                        *sum.skills.entry(*skill).or_default() += u64::from(*ticks);
+                    }
+                }
+            }
+            testers.push(places(&visited));
+        }
+        let all = places(&sums.keys().copied().collect());
+        let mut maps = maps(&squares, &sums);
+        maps.failure = failure(names, played, findings);
+        Some(Self { testers, places: all, maps })
+    }
+}
+
+fn maps(squares: &LevelSquares, sums: &BTreeMap<usize, Sum>) -> LevelMaps {
+    let mut totals: BTreeMap<usize, u64> = BTreeMap::new();
+    for (skill, ticks) in sums.values().flat_map(|sum| &sum.skills) {
+        *totals.entry(*skill).or_default() += ticks;
+    }
+    let mut order: Vec<(usize, u64)> = totals.into_iter().collect();
+    // Of equally frequent ones the first stays first.
+    order.sort_by_key(|(_, ticks)| Reverse(*ticks));
+    let place = |skill: usize| order.iter().position(|(known, _)| *known == skill);
+    let most =
+        |sum: &Sum| sum.skills.iter().max_by_key(|(skill, ticks)| (**ticks, Reverse(**skill))).map(|(skill, _)| *skill);
+    let skill_at = sums.iter().filter_map(|(square, sum)| Some([*square as u64, place(most(sum)?)? as u64]));
+    LevelMaps {
+        x: squares.grid.origin.x,
+        y: squares.grid.origin.y,
+        side: squares.grid.size,
+        columns: squares.columns as u64,
+        rows: squares.rows as u64,
+        visits: sums.iter().map(|(square, sum)| [*square as u64, sum.ticks]).collect(),
+        lost: sums.iter().filter(|(_, sum)| sum.lost > 0).map(|(square, sum)| [*square as u64, sum.lost]).collect(),
+        skill_at: skill_at.collect(),
+        skills: order.iter().map(|(skill, ticks)| SkillTicks { skill: skill_name(*skill), ticks: *ticks }).collect(),
+        failure: None,
+    }
+}
+
+/// Returns the path to the first finding from play, or else the path of the first episode that failed.
+fn failure(names: &[&str], played: &[&[Played]], findings: &[Finding]) -> Option<FailureWay> {
+    let way = |tester: usize, episode: usize| {
+        let Walk { trail, .. } = played.get(tester)?.get(episode)?.walk.as_ref()?;
+        let tester = (*names.get(tester)?).to_owned();
+        Some(FailureWay { tester, episode: u32::try_from(episode).ok()?, way: trail.clone() })
+    };
+    let found = findings.iter().find_map(|finding| {
+        let tester = names.iter().position(|name| Some(*name) == finding.tester.as_deref())?;
+        way(tester, finding.episode? as usize)
+    });
+    found.or_else(|| {
+        let all = played.iter().enumerate().flat_map(|(tester, episodes)| {
+            episodes.iter().enumerate().map(move |(number, episode)| (tester, number, episode))
+        });
+        all.filter(|(.., episode)| has_failed(episode)).find_map(|(tester, number, _)| way(tester, number))
+    })
+}
+
+fn has_failed(episode: &Played) -> bool {
+    match &episode.end {
+        PlayedEnd::Ended { result, .. } => !result.success,
+        PlayedEnd::Broken { .. } => true,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::math::{Rect, Vec2};
+    use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
+
+    use super::*;
+    use crate::verdict::walk::SquareCount;
+
+    /// Makes a plan of four squares in a row and a wall.
+    fn plan() -> FloorPlan {
+        FloorPlan {
+            bounds: Rect::new(0.0, 0.0, 5.0, 1.0),
+            walls: vec![Rect::new(4.0, 0.0, 5.0, 1.0)],
+            start: Vec2::splat(0.5),
+            ..FloorPlan::default()
+        }
+    }
+
+    /// Makes an episode with these squares, and the lost ticks and the skills of each.
+    fn episode(success: bool, counts: &[(usize, u32, u32, &[(usize, u32)])]) -> Played {
+        let end = EpisodeEnd::Terminated { success };
+        let result = EpisodeResult { level: 0, end, success, ticks: 9, clipped: 0, total_reward: 0.0 };
+        let squares = LevelSquares::of(&plan()).expect("it has an extent");
+        let trail = counts.iter().map(|(square, ticks, ..)| [*square as u64, u64::from(*ticks)]).collect();
+        let count = |(square, ticks, lost, skills): &(usize, u32, u32, &[(usize, u32)])| SquareCount {
+            square: *square,
+            ticks: *ticks,
+            lost: *lost,
+            skills: skills.to_vec(),
+        };
+        let walk = Some(Walk { squares, counts: counts.iter().map(count).collect(), trail });
+        Played { end: PlayedEnd::Ended { result, place: None, cause: None }, exact: true, found: Vec::new(), walk }
+    }
+
+    #[test]
+    fn walks_of_all_testers_are_added_up() {
+        let one = [episode(true, &[(0, 2, 0, &[(3, 2)]), (1, 5, 1, &[(0, 2), (3, 3)])])];
+        let other = [episode(false, &[(1, 1, 0, &[]), (2, 1, 1, &[(0, 1)]), (4, 1, 0, &[])])];
+        let walked = Walked::of(&plan(), &["a", "b"], &[&one, &other], &[]).expect("walks are known");
+        let places = |visited| Some(Places { visited, open: 4 });
+        // Square 4 lies in the wall, so it is not an open square.
+        assert_eq!((walked.testers, walked.places), (vec![places(2), places(2)], places(3)));
+        let maps = walked.maps;
+        assert_eq!(maps.visits, [[0, 2], [1, 6], [2, 1], [4, 1]]);
+        assert_eq!(maps.lost, [[1, 1], [2, 1]]);
+        assert_eq!((maps.columns, maps.rows, maps.side), (5, 1, 1.0));
+        let skill = |skill: &str, ticks| SkillTicks { skill: skill.to_owned(), ticks };
+        assert_eq!(maps.skills, [skill("z2-", 5), skill("z1+", 3)]);
+        assert_eq!(maps.skill_at, [[0, 0], [1, 0], [2, 1]]);
+        let failure = maps.failure.expect("one has failed");
+        assert_eq!((failure.tester.as_str(), failure.episode), ("b", 0));
+        assert_eq!(failure.way, [[1, 1], [2, 1], [4, 1]]);
+    }
+
+    #[test]
+    fn the_way_to_a_finding_comes_before_that_of_a_failure() {
+        let episodes = [episode(false, &[(0, 1, 0, &[])]), episode(true, &[(3, 1, 0, &[])])];
+        let finding = Finding {
+            detector: "stuck".to_owned(),
+            tester: Some("a".to_owned()),
+            episode: Some(1),
+            tick: Some(3),
+            message: String::new(),
+            file: None,
+            settings: Vec::new(),
+        };
+        let found = Walked::of(&plan(), &["a"], &[&episodes], &[finding]).and_then(|walked| walked.maps.failure);
+        assert_eq!(found.map(|failure| (failure.episode, failure.way)), Some((1, vec![[3, 1]])));
+        let solved = Walked::of(&plan(), &["a"], &[&episodes[1..]], &[]).expect("walks are known");
+        assert_eq!(solved.maps.failure, None);
+        let unknown = [Played { walk: None, ..episodes[0].clone() }];
+        assert!(Walked::of(&plan(), &["a"], &[&unknown], &[]).is_none());
+    }
+}

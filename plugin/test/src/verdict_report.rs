@@ -1,0 +1,277 @@
+//! Results of a test as one HTML file: every level in a table with sorting and filtering, and pictures of the worst
+//! levels.
+//!
+//! [`write_html`] makes `report.html` of the results in a folder. The file loads no network resources and no fonts,
+//! and without its few lines of script it is a plain table. It follows the reader's light or dark setting.
+//!
+//! The page is a function of the results, of the results compared with, and of the game, which draws the pictures.
+//! The results of a whole range and those joined from shards give the same bytes.
+
+mod clip;
+mod drawn;
+mod heat;
+mod level_table;
+mod picture;
+#[cfg(test)]
+mod testing;
+#[cfg(test)]
+mod tests;
+
+use crate::{
+    verdict::{Comparison, LevelVerdict, Overview, Score, TestError, Trials, wilson},
+    verdict_report::{
+        drawn::Plans,
+        level_table::{Selection, level_table},
+    },
+};
+use playbot_harness::game::Game;
+use playbot_report::{escape::escape, whole};
+use std::{
+    cmp::Reverse,
+    collections::BTreeMap,
+    fmt::{Display, Write},
+    path::Path,
+};
+
+// Writer of the page from the results in a folder.
+
+/// Name of the file in the folder of a test.
+pub const REPORT: &str = "report.html";
+
+/// Content of a report besides the results.
+#[derive(Clone, Copy)]
+pub struct HtmlReport<'a> {
+    /// The tested game, which draws its levels; without it, the page has no pictures.
+    pub game: Option<&'a dyn Game>,
+    /// Changes since earlier results.
+    pub comparison: Option<&'a Comparison>,
+    /// Name of the program in the commands that the report shows.
+    pub program: &'a str,
+}
+
+/// Makes the report of the results in a folder.
+///
+/// # Errors
+///
+/// The folder has no results, or they are damaged.
+pub fn html(results: &Path, report: &HtmlReport) -> Result<String, TestError> {
+    let overview = Overview::read(results)?;
+    let selection = Selection::read(results)?;
+    let plans = Plans::of(report.game, &overview.record);
+    let page = Page {
+        overview: &overview,
+        comparison: report.comparison,
+        selection: &selection,
+        plans: &plans,
+        program: report.program,
+    };
+    Ok(page.to_html())
+}
+
+/// Makes the report of the results in a folder, and writes it to a file.
+///
+/// # Errors
+///
+/// The folder has no results, they are damaged, or the file cannot be written.
+pub fn write_html(results: &Path, file: &Path, report: &HtmlReport) -> Result<(), TestError> {
+    let html = html(results, report)?;
+    let written = playbot_learner::write_atomically(file, html.as_bytes());
+    written.map_err(|source| TestError::Io { action: "write", path: file.to_owned(), source })
+}
+
+// The whole page.
+
+/// Style of all reports.
+use playbot_report::PAGE_STYLE;
+
+/// Additional style of this report.
+pub(crate) const STYLE: &str = include_str!("verdict_report/levels.css");
+
+/// Script that sorts and filters the table of levels.
+const SCRIPT: &str = include_str!("verdict_report/levels.js");
+
+/// Content of the page.
+pub struct Page<'a> {
+    /// Numbers of all levels.
+    pub overview: &'a Overview,
+    /// Changes, if there are earlier results.
+    pub comparison: Option<&'a Comparison>,
+    /// The levels of the table.
+    pub selection: &'a Selection,
+    /// Their floor plans.
+    pub plans: &'a Plans<'a>,
+    /// Name of the program in commands.
+    pub program: &'a str,
+}
+
+impl Page<'_> {
+    /// Returns the HTML file.
+    pub fn to_html(&self) -> String {
+        let record = &self.overview.record;
+        let title = text(&format!("{} {}", record.game, record.range));
+        let shard = record.shard.map_or_else(String::new, |shard| format!(", shard {shard}"));
+        let subtitle = format!(
+            "Version {} of the game{shard}, {} of each tester on each level, seed {}",
+            record.game_version,
+            if record.episodes == 1 { "1 episode".to_owned() } else { format!("{} episodes", record.episodes) },
+            record.seed
+        );
+        let body = numbers(self.overview)
+            + &self.comparison.map_or_else(String::new, compared)
+            + &level_table(record, self.selection, self.plans, self.program);
+        format!(
+            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta name=\"color-scheme\" content=\"light dark\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
+             script-src 'unsafe-inline'; img-src data:\">\n\
+             <title>{title}</title>\n<style>\n{PAGE_STYLE}{STYLE}</style>\n</head>\n<body>\n<main>\n<header>\n\
+             <h1>{title}</h1>\n<p class=\"subtitle\">{subtitle}</p>\n</header>\n{body}</main>\n\
+             <script>\n{SCRIPT}</script>\n</body>\n</html>\n"
+        )
+    }
+}
+
+// Texts and numbers of the page.
+
+/// Most letters of a foreign text, such as the message of a broken game.
+const MOST_LETTERS: usize = 400;
+
+/// Largest number of causes that are named.
+const MOST_CAUSES: usize = 8;
+
+/// Escapes text for the page; a long one is cut.
+pub(crate) fn text(words: &str) -> String {
+    match words.char_indices().nth(MOST_LETTERS) {
+        Some((end, _)) => format!("{} …", escape(&words[..end])),
+        None => escape(words),
+    }
+}
+
+/// Formats a 95 % interval of a share, in percent.
+pub(crate) fn interval([low, high]: [f64; 2]) -> String {
+    format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high)
+}
+
+/// Formats the 95 % Wilson interval of a share, in percent.
+pub(crate) fn interval_of(share: Trials) -> String {
+    interval(wilson(share.successes, share.trials))
+}
+
+/// Describes the failure of a level in one line of escaped text.
+pub(crate) fn what(level: &LevelVerdict) -> String {
+    let Some(finding) = level.findings.first() else {
+        let causes = causes(level);
+        let causes = if causes.is_empty() { String::new() } else { format!(" ({causes})") };
+        return format!("{}{causes}", ends(&level.score));
+    };
+    let more = level.findings.len() - 1;
+    let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };
+    format!("{}: {}{more}", escape(&finding.detector), text(&finding.message))
+}
+
+/// Describes the ends of the episodes that were not solved.
+pub(crate) fn ends(score: &Score) -> String {
+    let counts = [("lost", score.lost), ("timed out", score.timed_out), ("broken", score.broken)];
+    let told = counts.iter().filter(|(_, count)| *count > 0).map(|(what, count)| format!("{what} {count}"));
+    let told: Vec<String> = told.collect();
+    if told.is_empty() { "solved each time".to_owned() } else { told.join(", ") }
+}
+
+/// Describes how often each cause ended an episode, as a short escaped text.
+pub(crate) fn causes(level: &LevelVerdict) -> String {
+    let told: Vec<String> =
+        most_frequent(&level.causes).map(|(cause, count)| format!("{} {count}", text(cause))).collect();
+    told.join(", ")
+}
+
+/// Returns causes with their numbers of ends, the most frequent ones first.
+pub(crate) fn most_frequent(causes: &BTreeMap<String, u64>) -> impl Iterator<Item = (&str, u64)> {
+    let mut sorted: Vec<(&str, u64)> = causes.iter().map(|(cause, count)| (cause.as_str(), *count)).collect();
+    // Equally frequent ones stay in the order of their names.
+    sorted.sort_by_key(|(_, count)| Reverse(*count));
+    sorted.into_iter().take(MOST_CAUSES)
+}
+
+// Numbers of the whole test.
+
+/// Writes the outcomes of the levels, and the totals of each tester.
+pub(crate) fn numbers(overview: &Overview) -> String {
+    let levels = overview.levels;
+    let mut out = String::from("<section>\n<h2>Outcome</h2>\n<dl class=\"numbers\">\n");
+    let mut number = |class: &str, what: &str, count: u64, note: &str| {
+        let count = whole(count as f64);
+        let _ = writeln!(out, "<div><dt>{what}</dt><dd class=\"{class}\">{count}</dd><dd>{note}</dd></div>");
+    };
+    number("levels-all", "levels", levels, "");
+    for (class, what, count) in [
+        ("solved", "solved", overview.solved),
+        ("bot-failed", "unsolved, nothing proved", overview.bot_failed),
+        ("proved-unsolvable", "proved unsolvable", overview.proved_unsolvable),
+    ] {
+        number(class, what, count, &interval_of(Trials { successes: count, trials: levels }));
+    }
+    number("found", if overview.findings == 1 { "finding" } else { "findings" }, overview.findings, "");
+    if overview.places.percent().is_some() {
+        let [visited, open] = [overview.places.visited, overview.places.open].map(|count| whole(count as f64));
+        let (share, note) = (overview.places.describe(), format!("{visited} of {open}"));
+        let _ =
+            writeln!(out, "<div><dt>open squares visited</dt><dd class=\"places\">{share}</dd><dd>{note}</dd></div>");
+    }
+    out += "</dl>\n</section>\n<section>\n<h2>Testers</h2>\n<div class=\"table\" role=\"region\" \
+            aria-label=\"Testers\" tabindex=\"0\"><table>\n<thead><tr><th scope=\"col\">tester</th>\
+            <th scope=\"col\">levels solved</th><th scope=\"col\">95 % interval</th><th scope=\"col\">episodes solved</th>\
+            <th scope=\"col\">95 % interval</th><th scope=\"col\">open squares visited</th></tr></thead>\n<tbody>\n";
+    for (record, total) in overview.record.testers.iter().zip(&overview.testers) {
+        let cells = |of: Trials| {
+            let [successes, trials] = [of.successes, of.trials].map(|count| whole(count as f64));
+            format!("<td>{successes} of {trials}</td><td>{}</td>", interval_of(of))
+        };
+        let name = text(&record.describe());
+        let (levels, episodes, places) = (cells(total.levels), cells(total.episodes), total.places.describe());
+        let _ = writeln!(out, "<tr><th scope=\"row\">{name}</th>{levels}{episodes}<td>{places}</td></tr>");
+    }
+    out + "</tbody></table></div>\n<p class=\"key\">Intervals are 95 % Wilson intervals.</p>\n</section>\n"
+}
+
+// Section of the changes since earlier results.
+
+/// Largest number of changes of a kind that are listed; all are in `against.json`.
+const MOST_CHANGES: usize = 100;
+
+/// Writes the section of the page.
+pub(crate) fn compared(comparison: &Comparison) -> String {
+    let Comparison { levels, only_now, only_before, left_out, .. } = comparison;
+    let [both, now, before] = [levels, only_now, only_before].map(|count| whole(*count as f64));
+    let mut out = String::from("<section>\n<h2>Since the earlier results</h2>\n");
+    let _ = writeln!(out, "<p>{both} levels in both, {now} only now, {before} only before.</p>");
+    for why in left_out {
+        let _ = writeln!(out, "<p>Left out: {}.</p>", text(why));
+    }
+    let lists = [
+        list("Unsolvable", &comparison.unsolvable),
+        list("Harder", &comparison.harder),
+        list("New findings", &comparison.new_findings),
+        list("Easier", &comparison.easier),
+        list("Gone findings", &comparison.gone_findings),
+    ];
+    if lists.iter().all(String::is_empty) {
+        out += "<p>Nothing has changed by more than chance.</p>\n";
+    }
+    out + &lists.concat() + "</section>\n"
+}
+
+fn list(title: &str, changes: &[impl Display]) -> String {
+    if changes.is_empty() {
+        return String::new();
+    }
+    let mut out = format!("<h3>{title} ({})</h3>\n<ul>\n", changes.len());
+    for change in changes.iter().take(MOST_CHANGES) {
+        let _ = writeln!(out, "<li>{}</li>", text(&change.to_string()));
+    }
+    let more = changes.len().saturating_sub(MOST_CHANGES);
+    if more > 0 {
+        let _ = writeln!(out, "<li>and {more} more in against.json</li>");
+    }
+    out + "</ul>\n"
+}

@@ -1,0 +1,272 @@
+//! The table of levels, with the text above it.
+
+use crate::{
+    verdict::{Finding, LevelVerdict, ResultLines, TestError, TestRecord, TesterVerdict, rerun_commands},
+    verdict_report::{
+        drawn::{Drawer, Drawn, Plans, walks},
+        interval,
+        picture::{map_legend, map_scope},
+        text, what,
+    },
+};
+use playbot_report::{escape::escape, ticks, whole};
+use std::{cmp::Ordering, fmt::Write, path::Path};
+
+/// Shown by the script, which does the filtering.
+const FILTER: &str = "\
+<form id=\"filter\" class=\"filter\" hidden>
+<label>Find <input type=\"search\" name=\"words\" placeholder=\"level, detector, tester\"></label>
+<label>Show <select name=\"kind\"><option value=\"\">all levels</option><option value=\"findings\">with findings</option>\
+<option>proved-unsolvable</option><option>bot-failed</option><option>solved</option></select></label>
+<output id=\"count\" aria-live=\"polite\"></output>
+</form>
+";
+
+const HEAD: &str = "\
+<div class=\"levels\" role=\"region\" aria-labelledby=\"levels-heading\" tabindex=\"0\"><table id=\"levels\">
+<thead><tr><th scope=\"col\">level</th><th scope=\"col\">outcome</th><th scope=\"col\">solved</th>\
+<th scope=\"col\">95 % interval</th><th scope=\"col\">median ticks</th>\
+<th scope=\"col\">visited</th><th scope=\"col\">found by</th></tr></thead>
+";
+
+/// Writes the section of the page.
+pub(crate) fn level_table(record: &TestRecord, selection: &Selection, plans: &Plans, program: &str) -> String {
+    let mut rows = String::new();
+    let mut drawer = Drawer::new(plans);
+    for level in &selection.levels {
+        let drawn = drawer.draw(level);
+        rows += &level_row(record, level, program, drawn.as_ref());
+    }
+    let pictures = drawer.pictures;
+    let mut out = String::from("<section>\n<h2 id=\"levels-heading\">Levels</h2>\n<p>The worst levels come first: ");
+    out += "most findings first, then the least solved, then the slowest.";
+    if selection.left_out > 0 {
+        let left_out = whole(selection.left_out as f64);
+        let _ = write!(out, " {left_out} other levels are not worse than the last one here; all are in results.json.");
+    }
+    if let Some(problem) = plans.problem() {
+        let _ = write!(out, " There are no pictures: {}.", escape(problem));
+    } else if pictures == 0 {
+        out += " There are no pictures of these levels.";
+    } else if selection.levels.len() > pictures {
+        let _ = write!(out, " {pictures} of them have a picture.");
+    }
+    out += map_scope(record.maps);
+    out += "</p>\n";
+    if pictures > 0 {
+        out += &map_legend(drawer.maps > 0);
+    }
+    out + FILTER + HEAD + &rows + "</table></div>\n</section>\n"
+}
+
+// Rows of a level in the table.
+
+/// Sort key of an unknown share: before all others.
+const UNKNOWN: f64 = -1.0;
+
+/// Sort key of a missing finish time: after all others.
+const NEVER: f64 = 1e12;
+
+/// Writes the rows of a level: its numbers, and below them its details, if it has findings or a picture. `data-v` is
+/// the sort key of a column, `data-k` the filter key of a level.
+pub(crate) fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str, drawn: Option<&Drawn>) -> String {
+    let LevelVerdict { score, findings, .. } = level;
+    let outcome = level.outcome.name();
+    let kinds = if findings.is_empty() { outcome.to_owned() } else { format!("{outcome} findings") };
+    let share = score.solved as f64 / score.episodes.max(1) as f64;
+    let median = score.ticks.map(|ticks| ticks.median);
+    let places = level.places.unwrap_or_default();
+    let mut out = format!(
+        "<tbody data-k=\"{kinds}\"><tr><th scope=\"row\" data-v=\"{}\">{}</th><td data-v=\"{}\" class=\"{outcome}\">\
+         {outcome}</td><td data-v=\"{share:.4}\">{} of {}</td><td data-v=\"{:.4}\">{}</td><td data-v=\"{}\">{}</td>\
+         <td data-v=\"{:.1}\">{}</td><td data-v=\"{}\">{}</td></tr>\n",
+        level.index,
+        text(&level.level),
+        level.outcome as u8,
+        score.solved,
+        score.episodes,
+        score.interval[0],
+        interval(score.interval),
+        median.unwrap_or(NEVER),
+        median.map_or_else(|| "–".to_owned(), ticks),
+        places.percent().unwrap_or(UNKNOWN),
+        places.describe(),
+        findings.len(),
+        detectors(level),
+    );
+    if !level.is_perfect() || drawn.is_some() {
+        let _ = writeln!(
+            out,
+            "<tr><td colspan=\"7\"><details><summary>{}</summary>\n<div class=\"card\">\n{}</div></details></td></tr>",
+            what(level),
+            details(record, level, program, drawn)
+        );
+    }
+    out + "</tbody>\n"
+}
+
+/// Returns the names of the detectors with findings, each once.
+fn detectors(level: &LevelVerdict) -> String {
+    let mut names: Vec<&str> = level.findings.iter().map(|finding| finding.detector.as_str()).collect();
+    names.sort_unstable();
+    names.dedup();
+    if names.is_empty() { "–".to_owned() } else { escape(&names.join(", ")) }
+}
+
+// Details of one level: findings, picture, testers, and commands to see it again.
+
+/// Largest number of findings and testers of a level that are listed, which keeps the page fast.
+const MOST_LISTED: usize = 10;
+
+/// Writes the details of a level, with its picture if it has one.
+pub(crate) fn details(record: &TestRecord, level: &LevelVerdict, program: &str, drawn: Option<&Drawn>) -> String {
+    let mut out = String::new();
+    if !level.findings.is_empty() {
+        let more = level.findings.len().saturating_sub(MOST_LISTED);
+        let listed: String = level.findings.iter().take(MOST_LISTED).map(finding).collect();
+        let more = if more > 0 { format!("<li>and {more} more</li>\n") } else { String::new() };
+        let _ = write!(out, "<ul class=\"findings\">\n{listed}{more}</ul>\n");
+    }
+    if let Some(Drawn { picture, clip }) = drawn {
+        let clip = clip.as_ref().map_or_else(String::new, |clip| {
+            format!("<button type=\"button\" class=\"clip\" data-clip=\"{clip}\" hidden>Play the failure</button>")
+        });
+        let _ = writeln!(out, "<figure>{picture}{clip}</figure>");
+    }
+    out += &walks(level);
+    out += &testers(&level.testers);
+    let commands = rerun_commands(program, record, level);
+    if !commands.is_empty() {
+        let _ = writeln!(out, "<pre><code>{}</code></pre>", escape(&commands.join("\n")));
+    }
+    out
+}
+
+fn finding(finding: &Finding) -> String {
+    let tester = finding.tester.as_ref().map(|tester| escape(tester));
+    let episode = finding.episode.map(|episode| format!("episode {episode}"));
+    let tick = finding.tick.map(|tick| format!("tick {tick}"));
+    let place: Vec<String> = [tester, episode, tick].into_iter().flatten().collect();
+    let place = if place.is_empty() { String::new() } else { format!(" ({})", place.join(", ")) };
+    let file = finding.file.as_ref().map_or_else(String::new, |file| format!(" <code>{}</code>", escape(file)));
+    format!("<li><b>{}</b>{place}: {}{file}</li>\n", escape(&finding.detector), text(&finding.message))
+}
+
+fn testers(testers: &[TesterVerdict]) -> String {
+    let mut out = String::from(
+        "<div class=\"table\" role=\"group\" aria-label=\"Testers\" tabindex=\"0\"><table class=\"testers\">\
+         <thead><tr><th scope=\"col\">tester</th><th scope=\"col\">solved</th>\
+         <th scope=\"col\">95 % interval</th><th scope=\"col\">ticks (quartiles)</th><th scope=\"col\">lost</th>\
+         <th scope=\"col\">timed out</th><th scope=\"col\">broken</th></tr></thead><tbody>\n",
+    );
+    for tester in testers.iter().take(MOST_LISTED) {
+        let score = &tester.score;
+        let ticks = score.ticks.map_or_else(
+            || "–".to_owned(),
+            |ticks| {
+                let [lower, median, upper] =
+                    [ticks.lower_quartile, ticks.median, ticks.upper_quartile].map(playbot_report::ticks);
+                format!("{median} ({lower} to {upper})")
+            },
+        );
+        let _ = writeln!(
+            out,
+            "<tr><th scope=\"row\">{}</th><td>{} of {}</td><td>{}</td><td>{ticks}</td><td>{}</td><td>{}</td><td>{}</td></tr>",
+            text(&tester.tester),
+            score.solved,
+            score.episodes,
+            interval(score.interval),
+            score.lost,
+            score.timed_out,
+            score.broken
+        );
+    }
+    let more = testers.len().saturating_sub(MOST_LISTED);
+    if more > 0 {
+        let _ = writeln!(out, "<tr><td colspan=\"7\">and {more} more in results.json</td></tr>");
+    }
+    out + "</tbody></table></div>\n"
+}
+
+// Selection of the levels that the page shows.
+
+/// Largest number of levels in the table: a longer page would open slowly. All levels are in `results.json`.
+const MOST_LEVELS: usize = 2_000;
+
+/// Levels of a test, the worst ones first.
+pub struct Selection {
+    /// The levels of the table.
+    pub levels: Vec<LevelVerdict>,
+    /// Number of the other levels, which are not worse.
+    pub left_out: u64,
+}
+
+impl Selection {
+    /// Reads the results in a folder. Memory does not grow with their number.
+    pub fn read(folder: &Path) -> Result<Self, TestError> {
+        let mut lines = ResultLines::open(folder)?;
+        let (mut levels, mut all) = (Vec::new(), 0_u64);
+        while let Some(level) = lines.next_level()? {
+            all += 1;
+            levels.push(level);
+            if levels.len() >= 2 * MOST_LEVELS {
+                keep_worst(&mut levels);
+            }
+        }
+        keep_worst(&mut levels);
+        let left_out = all - levels.len() as u64;
+        Ok(Self { levels, left_out })
+    }
+}
+
+fn keep_worst(levels: &mut Vec<LevelVerdict>) {
+    levels.sort_by(worst_first);
+    levels.truncate(MOST_LEVELS);
+}
+
+/// Orders by more findings, then fewer solved episodes, then slower ones, then the order in the range.
+fn worst_first(one: &LevelVerdict, other: &LevelVerdict) -> Ordering {
+    let share = |a: &LevelVerdict, b: &LevelVerdict| u128::from(a.score.solved) * u128::from(b.score.episodes);
+    let ticks = |level: &LevelVerdict| level.score.ticks.map_or(0.0, |ticks| ticks.median);
+    let findings = other.findings.len().cmp(&one.findings.len());
+    findings
+        .then_with(|| one.outcome.cmp(&other.outcome))
+        .then_with(|| share(one, other).cmp(&share(other, one)))
+        .then_with(|| ticks(other).total_cmp(&ticks(one)))
+        .then_with(|| one.index.cmp(&other.index))
+}
+
+#[cfg(test)]
+mod selection_tests {
+    use super::*;
+    use crate::verdict_report::testing::{finding, level, record, tested};
+
+    #[test]
+    fn findings_come_first_then_unsolved_levels_then_slow_ones() {
+        let found = LevelVerdict { findings: vec![finding("panic", "index out of bounds")], ..level(4, 2, 2, 10) };
+        let levels =
+            [level(0, 2, 2, 30), level(1, 2, 2, 90), level(2, 0, 2, 0), level(3, 1, 2, 10), found, level(5, 2, 2, 30)];
+        let parent = tempfile::tempdir().expect("a folder");
+        let folder = tested(parent.path(), "whole", &record("hard:0..5", None), &levels);
+        let selection = Selection::read(&folder).expect("results");
+        let order: Vec<u64> = selection.levels.iter().map(|level| level.index).collect();
+        assert_eq!((order, selection.left_out), (vec![4, 2, 3, 1, 0, 5], 0));
+    }
+
+    #[test]
+    fn of_many_levels_the_worst_are_kept() {
+        let (mut levels, most) = (Vec::new(), MOST_LEVELS as u64);
+        for index in 0..4 * most + 7 {
+            // Every 100th is not solved.
+            levels.push(level(index, u64::from(index % 100 != 99), 1, 20));
+            if levels.len() >= 2 * MOST_LEVELS {
+                keep_worst(&mut levels);
+            }
+        }
+        keep_worst(&mut levels);
+        let order: Vec<u64> = levels.iter().map(|level| level.index).collect();
+        let failed = (0..80).map(|number| 100 * number + 99);
+        let solved = (0..).filter(|index| index % 100 != 99);
+        assert_eq!(order, failed.chain(solved).take(MOST_LEVELS).collect::<Vec<u64>>());
+    }
+}

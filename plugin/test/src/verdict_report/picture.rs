@@ -1,0 +1,236 @@
+//! Small drawings of levels: floor plan, ends of episodes, and maps.
+
+use crate::{
+    verdict::{END_SQUARES, EndPlace, LevelVerdict, MapScope},
+    verdict_report::{
+        ends,
+        heat::{Block, Grid, layers, path, shape, stacked},
+    },
+};
+use bevy::math::{Rect, Vec2};
+use playbot_harness::floor_plan::FloorPlan;
+use playbot_report::escape::escape;
+use std::{cmp::Reverse, fmt::Write};
+
+/// Largest size of a drawing without the maps, bytes: a page has up to 200 of them.
+const MOST_BYTES: usize = 8_000;
+
+/// Largest number of squares with ends, those with the most ends.
+const MOST_SQUARES: usize = 40;
+
+/// Opacities of squares, from few to many ends.
+const STRENGTHS: [&str; 4] = [".3", ".5", ".7", ".9"];
+
+/// Returns the drawing as an SVG element in the colours of the page. `None` for a plan without extent, or with too
+/// many parts for a page with many levels.
+pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<String> {
+    let side = plan.bounds.size().max_element() / END_SQUARES;
+    let extent = extent(plan.bounds, side, &level.ends);
+    let grid = Grid::new(extent)?;
+    let [width, height] = grid.size();
+    let label = format!("{}: solved {}, {}", level.level, level.score.solved, ends(&level.score));
+    let mut svg = format!(
+        "<svg class=\"level\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">",
+        escape(&label)
+    );
+    for (class, areas) in [("wall", &plan.walls), ("platform", &plan.platforms), ("hazard", &plan.hazards)] {
+        let blocks = areas.iter().filter(|area| is_finite(area)).filter_map(|area| grid.block(*area));
+        shape(class, None, &path(&stacked(blocks.collect())), &mut svg);
+    }
+    let mut squares: Vec<(Block, &EndPlace)> =
+        level.ends.iter().filter_map(|end| Some((square(&grid, extent, side, end)?, end))).collect();
+    squares.sort_by_key(|(_, end)| Reverse(end.lost.saturating_add(end.timed_out)));
+    squares.truncate(MOST_SQUARES);
+    svg += "<g class=\"map ends\">";
+    heat("lost", squares.iter().map(|(block, end)| (*block, end.lost)), &mut svg);
+    heat("late", squares.iter().map(|(block, end)| (*block, end.timed_out)), &mut svg);
+    marks(&squares, &mut svg);
+    svg += "</g>";
+    let maps = level.maps.as_ref().map_or_else(String::new, |maps| layers(&grid, maps));
+    svg += &maps;
+    if let Some([x, y]) = grid.place(plan.start) {
+        let _ = write!(svg, "<circle class=\"start\" cx=\"{x}\" cy=\"{y}\" r=\"7\"/>");
+    }
+    if let Some([x, y]) = grid.place(plan.goal) {
+        shape("goal", None, &format!("M{x} {}l9 9l-9 9l-9-9z", y - 9), &mut svg);
+    }
+    svg += "</svg>";
+    (svg.len() - maps.len() <= MOST_BYTES).then_some(svg)
+}
+
+/// Returns the drawn area: the bounds of the plan, with room for agents that fell out of it.
+fn extent(bounds: Rect, side: f32, ends: &[EndPlace]) -> Rect {
+    let is_inside = |end: &EndPlace| bounds.contains(Vec2::new(end.x, end.y));
+    if ends.iter().all(is_inside) { bounds } else { bounds.inflate(2.0 * side) }
+}
+
+/// Returns the square of an end. Ends far away are at the border.
+fn square(grid: &Grid, extent: Rect, side: f32, end: &EndPlace) -> Option<Block> {
+    let (middle, half) = (Vec2::new(end.x, end.y), Vec2::splat(side / 2.0));
+    if !middle.is_finite() {
+        return None;
+    }
+    let seen = middle.max(extent.min + half).min(extent.max - half);
+    grid.block(Rect::from_center_size(seen, Vec2::splat(side)))
+}
+
+/// Draws squares in the colour of a class, stronger for more ends.
+fn heat(class: &str, squares: impl Iterator<Item = (Block, u64)> + Clone, svg: &mut String) {
+    let most = squares.clone().map(|(_, count)| count).max().unwrap_or(0).max(1);
+    let mut steps: [Vec<Block>; STRENGTHS.len()] = Default::default();
+    for (block, count) in squares.filter(|(_, count)| *count > 0) {
+        let step = count.saturating_mul(STRENGTHS.len() as u64).div_ceil(most).clamp(1, STRENGTHS.len() as u64);
+        steps[step as usize - 1].push(block);
+    }
+    for (blocks, strength) in steps.iter().zip(STRENGTHS) {
+        shape(class, Some(strength), &path(blocks), svg);
+    }
+}
+
+/// Draws a cross for lost episodes, a bar for those whose time was up: readers may not see colours.
+fn marks(squares: &[(Block, &EndPlace)], svg: &mut String) {
+    let (mut crosses, mut bars) = (String::new(), String::new());
+    for (Block { left, right, top, bottom }, end) in squares {
+        let (x, y) = ((left + right) / 2, (top + bottom) / 2);
+        if end.lost > 0 {
+            let _ = write!(crosses, "M{} {}l10 10m0-10l-10 10", x - 5, y - 5);
+        }
+        if end.timed_out > 0 {
+            let _ = write!(bars, "M{} {y}h10", x - 5);
+        }
+    }
+    shape("mark", None, &crosses, svg);
+    shape("mark", None, &bars, svg);
+}
+
+fn is_finite(area: &Rect) -> bool {
+    area.min.is_finite() && area.max.is_finite()
+}
+
+// Legend of the pictures, and the control that switches their layers.
+
+/// Legend of the marks of all pictures.
+const MARKS: &str = "\
+<ul class=\"legend\">
+<li><svg class=\"level\" viewBox=\"0 0 20 20\"><circle class=\"start\" cx=\"10\" cy=\"10\" r=\"7\"/></svg>start</li>
+<li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"goal\" d=\"M10 1l9 9l-9 9l-9-9z\"/></svg>goal</li>
+<li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"hazard\" d=\"M0 0h20v20h-20z\"/></svg>hazards</li>
+<li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"platform\" d=\"M0 0h20v20h-20z\"/></svg>crates and the \
+like</li>
+<li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"lost\" opacity=\".7\" d=\"M0 0h20v20h-20z\"/>\
+<path class=\"mark\" d=\"M5 5l10 10m0-10l-10 10\"/></svg>lost here</li>
+<li><svg class=\"level\" viewBox=\"0 0 20 20\"><path class=\"late\" opacity=\".7\" d=\"M0 0h20v20h-20z\"/>\
+<path class=\"mark\" d=\"M5 10h10\"/></svg>time was up here</li>
+</ul>
+";
+
+/// Shown by the script; without it, pictures show the ends.
+const SWITCH: &str = "\
+<form id=\"maps\" class=\"filter\" hidden><fieldset><legend>Pictures show</legend>
+<label><input type=\"radio\" name=\"map\" value=\"ends\" checked> ends</label>
+<label><input type=\"radio\" name=\"map\" value=\"visits\"> visits</label>
+<label><input type=\"radio\" name=\"map\" value=\"lost-time\"> lost time</label>
+<label><input type=\"radio\" name=\"map\" value=\"skills\"> skills</label>
+</fieldset></form>
+";
+
+/// Legend of the maps.
+const MAPS: &str = "\
+<ul class=\"legend words\">
+<li><b>ends</b>: the stronger a square, the more episodes ended there</li>
+<li><b>visits</b>: ticks that agents were in a square; each stronger colour means at least four times as many</li>
+<li><b>lost time</b>: ticks more than two seconds after an agent last came to a square that was new in its episode, since it \
+rested or went back and forth; the stronger, the more</li>
+<li><b>skills</b>: the skill that was active longest in a square; the colours are named below each picture</li>
+</ul>
+";
+
+/// Returns the legend of pictures, with the switch if some have maps.
+pub(crate) fn map_legend(has_maps: bool) -> String {
+    if has_maps { format!("{MARKS}{SWITCH}{MAPS}") } else { MARKS.to_owned() }
+}
+
+/// Returns a sentence that names the levels with maps; empty for results that are older than maps.
+pub(crate) fn map_scope(scope: MapScope) -> &'static str {
+    match scope {
+        MapScope::None => "",
+        MapScope::Failed => {
+            " Maps of where agents went are kept for levels that were not solved each time or that have findings, since \
+             there are many levels."
+        }
+        MapScope::All => " Maps of where agents went are kept for all levels.",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        verdict::LevelMaps,
+        verdict_report::testing::{garden, level},
+    };
+
+    fn drawn(ends: &[(f32, f32, u64, u64)]) -> String {
+        let end =
+            |&(x, y, lost, timed_out): &(f32, f32, u64, u64)| EndPlace { x, y, lost, timed_out, ..EndPlace::default() };
+        let level = LevelVerdict { ends: ends.iter().map(end).collect(), ..level(0, 0, 9, 0) };
+        picture(&garden(), &level).expect("small")
+    }
+
+    #[test]
+    fn ends_are_squares_that_are_stronger_where_there_are_more_of_them() {
+        let svg = drawn(&[(11.0, 3.0, 8, 0), (13.0, 3.0, 1, 0), (31.0, 5.0, 0, 2)]);
+        assert!(svg.contains("viewBox=\"0 0 640 160\""), "{svg}");
+        // A square is 64 / 32 = 2 long, and a unit 10 of the grid.
+        assert!(svg.contains("<path class=\"lost\" opacity=\".9\" d=\"M100 120h20v20h-20z\"/>"), "{svg}");
+        assert!(svg.contains("<path class=\"lost\" opacity=\".3\" d=\"M120 120h20v20h-20z\"/>"), "{svg}");
+        assert!(svg.contains("<path class=\"late\" opacity=\".9\" d=\"M300 100h20v20h-20z\"/>"), "{svg}");
+        assert_eq!(svg.matches("l10 10m0-10l-10 10").count(), 2, "{svg}");
+        assert!(svg.contains("d=\"M305 110h10\""), "{svg}");
+        assert!(svg.contains("class=\"wall\"") && svg.contains("class=\"hazard\""), "{svg}");
+        assert!(!svg.contains("class=\"platform\""), "there are none: {svg}");
+    }
+
+    #[test]
+    fn ends_and_maps_are_groups_of_which_one_is_shown() {
+        let plain = drawn(&[(11.0, 3.0, 8, 0)]);
+        assert!(
+            plain.contains("<g class=\"map ends\"><path class=\"lost\"") && !plain.contains("map visits"),
+            "{plain}"
+        );
+        let maps = LevelMaps { side: 1.0, columns: 64, rows: 16, visits: vec![[70, 9]], ..LevelMaps::default() };
+        let level = LevelVerdict { maps: Some(maps), ..level(0, 0, 9, 0) };
+        let svg = picture(&garden(), &level).expect("small");
+        for class in ["ends", "visits", "lost-time", "skills"] {
+            assert_eq!(svg.matches(&format!("<g class=\"map {class}\">")).count(), 1, "{class} in {svg}");
+        }
+        assert!(svg.contains("<path class=\"visit\" opacity=\".85\" d=\"M60 140h10v10h-10z\"/>"), "{svg}");
+    }
+
+    #[test]
+    fn who_fell_out_of_the_level_is_at_its_border() {
+        let svg = drawn(&[(11.0, -1.0, 1, 0), (1e9, -1e9, 1, 0), (f32::NAN, 0.0, 1, 0)]);
+        assert!(svg.contains("viewBox=\"0 0 640 "), "{svg}");
+        assert_eq!(svg.matches("l10 10m0-10l-10 10").count(), 2, "what is no place is left out: {svg}");
+        assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
+    }
+
+    #[test]
+    fn of_many_ends_the_most_frequent_are_drawn() {
+        let svg = drawn(&Vec::from_iter((0..60_u8).map(|x| (f32::from(x) + 0.5, 3.0, u64::from(x) + 1, 0))));
+        assert_eq!(svg.matches("l10 10m0-10l-10 10").count(), MOST_SQUARES);
+        assert!(svg.contains("d=\"M585 120h20v20h-20z") && !svg.contains("M0 120h"), "{svg}");
+    }
+
+    #[test]
+    fn a_level_with_too_many_parts_has_no_picture() {
+        let speck = |number: usize| {
+            let corner = Vec2::new((number % 60) as f32, (number / 60) as f32);
+            Rect::from_corners(corner, corner + 0.5)
+        };
+        let plan = FloorPlan { walls: (0..900).map(speck).collect(), ..garden() };
+        assert_eq!(picture(&plan, &level(0, 0, 1, 0)), None);
+        let flat = FloorPlan { bounds: Rect::default(), ..garden() };
+        assert_eq!(picture(&flat, &level(0, 0, 1, 0)), None);
+    }
+}

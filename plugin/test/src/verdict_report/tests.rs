@@ -1,0 +1,255 @@
+//! Tests of the whole page.
+
+use crate::{
+    verdict::{
+        Comparison, EndPlace, FailureWay, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard, SkillTicks,
+        TestError, TestRecord, TesterVerdict, merge,
+    },
+    verdict_report::{
+        HtmlReport, REPORT, STYLE, html,
+        testing::{Garden, finding, level, record, tested},
+        write_html,
+    },
+};
+use std::{collections::BTreeMap, fs, path::PathBuf};
+
+const PLAIN: HtmlReport<'static> = HtmlReport { game: Some(&Garden), comparison: None, program: "playbot" };
+
+/// Makes the page of these levels of `hard:0..`.
+fn page(levels: &[LevelVerdict], report: &HtmlReport) -> String {
+    let parent = tempfile::tempdir().expect("a folder");
+    let range = format!("hard:0..{}", levels.len() - 1);
+    html(&tested(parent.path(), "whole", &record(&range, None), levels), report).expect("results")
+}
+
+/// Makes maps of a level with agents everywhere, and a failure path all over it.
+fn full_maps() -> LevelMaps {
+    let often = |square: u64| [square, 1 + square * square * 7919 % 997];
+    let way = (0..200).map(|step| [step * 389 % 1024, 40]).collect();
+    LevelMaps {
+        side: 1.0,
+        columns: 64,
+        rows: 16,
+        visits: (0..1024).map(often).collect(),
+        lost: (0..1024).map(|square| often(square + 3)).map(|[square, ticks]| [square - 3, ticks]).collect(),
+        skills: (1..9).map(|number| SkillTicks { skill: format!("z{number}+"), ticks: 7 }).collect(),
+        skill_at: (0..1024).map(|square| [square, often(square)[1] % 8]).collect(),
+        failure: Some(FailureWay { tester: "random".to_owned(), episode: 3, way }),
+        ..LevelMaps::default()
+    }
+}
+
+/// Makes a level with everything that makes a page long.
+fn long(index: u64) -> LevelVerdict {
+    let end = |number: u16| EndPlace {
+        x: f32::from(2 * number) + 1.0,
+        y: 3.0,
+        lost: 3,
+        timed_out: 2,
+        causes: [("saw".to_owned(), 3), ("time".to_owned(), 2)].into(),
+    };
+    let short = level(index, 1, 9, 1234);
+    let tester = |number: u32| TesterVerdict { tester: format!("tester-{number}"), ..short.testers[0].clone() };
+    LevelVerdict {
+        ends: (0..32).map(end).collect(),
+        causes: [("saw".to_owned(), 96), ("time".to_owned(), 64)].into(),
+        places: Some(Places { visited: 800, open: 1_000 }),
+        // Further levels would not be drawn.
+        maps: (index < 200).then(full_maps),
+        testers: (0..40).map(tester).collect(),
+        findings: (0..3).map(|_| finding("panic", &"index out of bounds ".repeat(100))).collect(),
+        ..short
+    }
+}
+
+#[test]
+fn a_thousand_long_levels_are_less_than_ten_megabytes() {
+    let levels: Vec<LevelVerdict> = (0..1000).map(long).collect();
+    let html = page(&levels, &PLAIN);
+    assert!(html.len() < 10_000_000, "{} bytes", html.len());
+    assert_eq!(html.matches("<tbody data-k=").count(), 1000);
+    assert_eq!(html.matches("viewBox=\"0 0 640 160\"").count(), 200, "the worst ones have pictures");
+    assert_eq!(html.matches("playbot test garden --levels hard:").count(), 1000, "all say how to see them");
+    assert_eq!(html.matches("<g class=\"map visits\"><path").count(), 200, "and maps");
+    let clips = html.matches("data-clip=\"iVBORw0KGgo").count();
+    assert!((20..=60).contains(&clips), "{clips} clips");
+    assert!(html.contains(" 200 of them have a picture.") && html.contains("and 30 more in results.json"));
+}
+
+#[test]
+fn joined_shards_give_the_page_of_the_whole() {
+    let parent = tempfile::tempdir().expect("a folder");
+    let levels: Vec<LevelVerdict> = (0..11).map(|index| level(index, index % 3, 9, 40 + index as u32)).collect();
+    let whole = tested(parent.path(), "whole", &record("hard:0..10", None), &levels);
+    let shards: Vec<PathBuf> = ["0/2", "1/2"]
+        .map(|name| {
+            let shard: Shard = name.parse().expect("a shard");
+            let own: Vec<LevelVerdict> = shard.places(11).map(|place| levels[place as usize].clone()).collect();
+            tested(parent.path(), &name.replace('/', "-"), &record("hard:0..10", Some(name)), &own)
+        })
+        .to_vec();
+    let joined = parent.path().join("joined");
+    merge(&shards, &joined).expect("all are there");
+    let files = [&whole, &joined].map(|folder| {
+        let file = folder.join(REPORT);
+        write_html(folder, &file, &PLAIN).expect("writable");
+        fs::read(file).expect("it is there")
+    });
+    assert!(files[0] == files[1] && !files[0].is_empty());
+    let part = html(&shards[1], &PLAIN).expect("results");
+    assert!(part.contains("shard 1/2") && part.contains("hard:9") && !part.contains("hard:8<"));
+    let none = write_html(parent.path(), &parent.path().join(REPORT), &PLAIN);
+    assert!(matches!(none, Err(TestError::NoResults(_))));
+}
+
+#[test]
+fn nothing_of_what_files_and_games_say_becomes_markup() {
+    let nasty = LevelVerdict {
+        level: "levels/<b>.json".to_owned(),
+        findings: vec![finding("<u>", "</details></script><script>alert('x')</script>")],
+        testers: vec![TesterVerdict { tester: "<i>".to_owned(), ..level(0, 0, 9, 0).testers[0].clone() }],
+        ends: vec![EndPlace { x: 1.0, y: 1.0, lost: 9, ..EndPlace::default() }],
+        ..level(0, 0, 9, 0)
+    };
+    let changed = FindingChange { level: "<em>".to_owned(), detector: "panic".to_owned(), tester: None };
+    let comparison = Comparison { levels: 1, new_findings: vec![changed], ..Comparison::default() };
+    let html = page(&[nasty], &HtmlReport { comparison: Some(&comparison), ..PLAIN });
+    for markup in ["<b>.json", "<i>", "<u>", "<em>", "</script><script>", "alert('x')"] {
+        assert!(!html.contains(markup), "{markup} in {html}");
+    }
+    assert!(html.contains("levels/&lt;b&gt;.json") && html.contains("<h3>New findings (1)</h3>"), "{html}");
+    assert_eq!(html.matches("<script>").count(), 1);
+}
+
+#[test]
+fn the_page_loads_nothing() {
+    let html = page(&[long(0), level(1, 9, 9, 5)], &PLAIN);
+    for words in ["http:", "https:", "src=\"", "href=", "url(", "@import", "import("] {
+        assert!(!html.contains(words), "{words}");
+    }
+    // Clips are in the page, and shown by the script.
+    assert!(html.contains("default-src 'none'") && html.contains("img-src data:") && html.contains("data-clip=\""));
+}
+
+#[test]
+fn a_level_has_its_numbers_in_cells_that_can_be_sorted() {
+    let levels = [
+        level(0, 9, 9, 40),
+        level(1, 3, 9, 50),
+        LevelVerdict { findings: vec![finding("a", "b")], ..level(2, 0, 9, 0) },
+    ];
+    let html = page(&levels, &PLAIN);
+    let row = "<tr><th scope=\"row\" data-v=\"1\">hard:1</th><td data-v=\"2\" class=\"solved\">solved</td>\
+               <td data-v=\"0.3333\">3 of 9</td><td data-v=\"0.1206\">12.1 to 64.6 %</td><td data-v=\"50\">50</td>\
+               <td data-v=\"-1.0\">–</td><td data-v=\"0\">–</td></tr>";
+    assert!(html.contains(row), "{html}");
+    let place = |words: &str| html.find(words).unwrap_or_else(|| panic!("{words} in {html}"));
+    assert!(place(">hard:2</th>") < place(">hard:1</th>") && place(">hard:1</th>") < place(">hard:0</th>"));
+    assert!(html.contains("data-k=\"bot-failed findings\"") && html.contains("<summary>a: b</summary>"), "{html}");
+    assert!(html.contains("<summary>lost 6</summary>") && html.contains("<summary>solved each time</summary>"));
+    // Two of three.
+    assert!(html.contains("<dd class=\"solved\">2</dd><dd>20.8 to 93.9 %</dd>"), "{html}");
+    let without = page(&levels, &HtmlReport { game: None, ..PLAIN });
+    assert!(without.contains("There are no pictures: this program does not have the game `garden`."), "{without}");
+    assert!(!without.contains("<svg") && !without.contains("<summary>solved each time"));
+}
+
+#[test]
+fn wide_tables_scroll_within_themselves_and_keep_their_first_column() {
+    let html = page(&[long(0), level(1, 3, 9, 5)], &PLAIN);
+    let frames: Vec<&str> = html
+        .match_indices("<table")
+        .map(|(start, _)| {
+            let before = &html[..start];
+            &before[before.rfind('<').expect("it is in something")..]
+        })
+        .collect();
+    let own = "<div class=\"table\" role=\"group\" aria-label=\"Testers\" tabindex=\"0\">";
+    let [all, levels] =
+        ["table\" role=\"region\" aria-label=\"Testers", "levels\" role=\"region\" aria-labelledby=\"levels-heading"]
+            .map(|words| format!("<div class=\"{words}\" tabindex=\"0\">"));
+    assert_eq!(frames, [all.as_str(), levels.as_str(), own, own], "all testers, levels, and the testers of each level");
+    assert_eq!(html.matches("<div").count(), html.matches("</div>").count());
+    for rule in
+        [".table { overflow-x: auto;", ".levels { overflow-x: auto;", "th:first-child { position: sticky; left: 0;"]
+    {
+        assert!(html.contains(rule), "{rule}");
+    }
+}
+
+#[test]
+fn maps_are_switched_and_explained_in_words() {
+    let html = page(&[long(0), level(1, 9, 9, 5)], &PLAIN);
+    for words in [
+        "<form id=\"maps\"",
+        "<li><b>lost time</b>: ticks more than two seconds after",
+        "<g class=\"map ends\">",
+        "<g class=\"map lost-time\">",
+        "<p>Ended by saw 96 (at ",
+        "<p>Visited 80.0 % of the open squares",
+        "<td data-v=\"80.0\">80.0 %</td>",
+        "<dt>open squares visited</dt><dd class=\"places\">80.0 %</dd><dd>800 of 1,000</dd>",
+    ] {
+        assert!(html.contains(words), "{words}");
+    }
+    for kind in ["ends", "visits", "lost-time", "skills"] {
+        assert!(html.contains(&format!("name=\"map\" value=\"{kind}\"")), "{kind}");
+        assert!(STYLE.contains(&format!("#levels[data-map=\"{kind}\"] .map.{kind}")), "{kind}");
+    }
+    let without = page(&[level(0, 1, 9, 5)], &PLAIN);
+    assert!(without.contains("<g class=\"map ends\">") && !without.contains("<form id=\"maps\""), "{without}");
+    assert!(without.contains("<summary>lost 8</summary>") && !without.contains("Maps of where agents went"));
+}
+
+#[test]
+fn the_page_says_of_which_levels_there_are_maps() {
+    let parent = tempfile::tempdir().expect("a folder");
+    for (maps, words) in [(MapScope::All, "kept for all levels."), (MapScope::Failed, "since there are many levels.")] {
+        let folder = tested(parent.path(), maps.name(), &TestRecord { maps, ..record("hard:0..0", None) }, &[long(0)]);
+        let results = fs::read_to_string(folder.join("results.json")).expect("results");
+        assert!(results.contains(&format!("\"maps\":\"{}\"", maps.name())), "{}", maps.name());
+        assert!(html(&folder, &PLAIN).expect("results").contains(words), "{words}");
+    }
+}
+
+/// Returns the colours of a style sheet by name.
+fn colours(css: &str) -> BTreeMap<&str, [f64; 3]> {
+    fn is_name(name: &str) -> bool {
+        name.chars().all(|letter| letter.is_ascii_alphanumeric() || letter == '-')
+    }
+    css.split("--")
+        .filter_map(|part| {
+            let (name, rest) = part.split_once(": #").filter(|(name, _)| is_name(name))?;
+            let bits = u32::from_str_radix(rest.get(..6)?, 16).ok()?;
+            Some((name, [bits >> 16, (bits >> 8) & 255, bits & 255].map(|channel| f64::from(channel) / 255.0)))
+        })
+        .collect()
+}
+
+/// Returns the contrast of two colours, as the Web Content Accessibility Guidelines define it.
+fn contrast(one: [f64; 3], other: [f64; 3]) -> f64 {
+    let linear = |c: f64| if c <= 0.040_45 { c / 12.92 } else { ((c + 0.055) / 1.055).powf(2.4) };
+    let light =
+        |[red, green, blue]: [f64; 3]| 0.2126 * linear(red) + 0.7152 * linear(green) + 0.0722 * linear(blue) + 0.05;
+    let (one, other) = (light(one), light(other));
+    one.max(other) / one.min(other)
+}
+
+#[test]
+fn all_text_can_be_read_on_light_and_on_dark_paper() {
+    let dark = "@media (prefers-color-scheme: dark)";
+    let sheets = [playbot_report::PAGE_STYLE, STYLE].map(|css| {
+        let screen = css.split("@media print").next().expect("the first part");
+        screen.split_once(dark).expect("both themes")
+    });
+    for theme in [sheets.map(|(light, _)| light), sheets.map(|(_, dark)| dark)] {
+        let mut all = colours(theme[0]);
+        all.extend(colours(theme[1]));
+        for text in ["text", "quiet", "solved", "failed", "unsolvable"] {
+            for paper in ["page", "block"] {
+                let found = contrast(all[text], all[paper]);
+                assert!(found >= 4.5, "{text} on {paper}: {found:.2}");
+            }
+        }
+    }
+}

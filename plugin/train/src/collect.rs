@@ -1,0 +1,548 @@
+//! Collection of rollouts: a World that plays with the current policy.
+
+use bevy::prelude::*;
+use bevy_playbot::{
+    action::{Action, ActionSpace, ActionValue},
+    agent::{Agent, AgentOrder, Control},
+    demo::recorder,
+    episode::{Episode, EpisodeEnd, EpisodeEnded},
+    fault::{Fault, Faults},
+    headless::tick_world,
+    level::LevelQueue,
+    observation::Observation,
+    placement::TickSchedules,
+    policy::{ActionDraw, ActivePolicy, Decision},
+    policy_batch::{PolicyBatch, SharedBatch},
+    renewal::Renewal,
+    reward::Reward,
+    skill_prior::{ActiveSkill, SkillPrior, draw_skills},
+    state_hash::StateHash,
+    streams::AgentStreams,
+    systems::{ObserveSchedule, PlaybotSystems},
+    vision::{ObservationConfig, VisionError},
+};
+use playbot_harness::{game::Game, sensors::GameSensors, split::LevelSplit, worlds::build_observing_world};
+use playbot_learner::{
+    Actions, LearnError, ObsColumns, ObsKind, Observations, Policy, RngState, Rollout, RolloutStep, rng::normal,
+};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A World of arenas that fills rollouts.
+pub struct Collector {
+    world: World,
+    agents: Vec<Entity>,
+}
+
+/// Rows of the rollout under construction.
+#[derive(Resource, Reflect)]
+#[reflect(from_reflect = false)]
+#[reflect(Component)]
+struct Collecting {
+    #[reflect(ignore)]
+    rollout: Rollout,
+    #[reflect(ignore)]
+    kind: ObsKind,
+}
+
+/// Episodes that ended during the rollout, in the order of ticks and agents.
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
+struct Finished(Vec<EpisodeEnded>);
+
+fn note_finished(event: On<EpisodeEnded>, mut finished: ResMut<Finished>) {
+    finished.0.push(*event);
+}
+
+/// Actions of the current episode.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+pub(crate) struct ActionLog(pub(crate) Vec<ActionValue>);
+
+impl ActionLog {
+    /// Notes the action of this tick; the log is emptied after the last tick of an episode.
+    fn note(&mut self, episode: &Episode, action: &ActionValue) {
+        if episode.tick <= 1 || episode.end().is_some() {
+            self.0.clear();
+        }
+        if episode.end().is_none() {
+            self.0.push(action.clone());
+        }
+    }
+}
+
+impl Collector {
+    /// Makes a collector of agents `first..first + count` on the levels of a split, with skills if there is a prior.
+    ///
+    /// # Errors
+    ///
+    /// The game does not support the observations.
+    pub fn new(
+        game: &dyn Game,
+        split: &LevelSplit,
+        observation_config: &ObservationConfig,
+        seed: u64,
+        first: u32,
+        count: u32,
+        prior: Option<SkillPrior>,
+    ) -> Result<Self, VisionError> {
+        let (mut world, agents) = build_observing_world(game, &split.mode, observation_config, seed, first, count)?;
+        let kind = observation_config.obs_kind(game);
+        Renewal::set_up(&mut world, |world| {
+            world.init_resource::<Finished>();
+            world.add_observer(note_finished);
+            let judge = world.resource::<TickSchedules>().judge;
+            world.schedule_scope(judge, |_, schedule| {
+                schedule.add_systems(collect_tick.in_set(PlaybotSystems::Record).after(recorder::record_ticks));
+            });
+        });
+        Renewal::carry_resource::<Finished>(&mut world);
+        Renewal::carry_resource::<Collecting>(&mut world);
+        Renewal::carry_resource::<SharedBatch>(&mut world);
+        Renewal::carry_component::<ActionLog>(&mut world);
+        world.insert_resource(Collecting { rollout: Rollout::new(0, kind, 0, &game.actions()), kind });
+        if let Some(prior) = prior {
+            world.insert_resource(prior);
+        }
+        for (&agent, index) in agents.iter().zip(first..) {
+            world.entity_mut(agent).insert((
+                AgentStreams::new(seed, index),
+                Control::Policy,
+                LevelQueue::Uniform { first: split.first, last: split.last },
+                ActionLog::default(),
+            ));
+        }
+        Ok(Self { world, agents })
+    }
+
+    /// Plays `steps` ticks with this policy; `latent` is the width of the skills to keep, 0 for no skills.
+    ///
+    /// Returns the rollout, `[steps, agents]`, and the episodes that ended in it.
+    ///
+    /// # Errors
+    ///
+    /// The game's first breach of contract, with agent, level and tick.
+    pub fn collect(
+        &mut self,
+        policy: &Policy,
+        latent: usize,
+        steps: usize,
+    ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
+        let kind = self.world.resource::<Collecting>().kind;
+        let mut obs = Observations::empty(&kind);
+        // One share has one column.
+        let mut columns = obs.columns(&kind, steps, &[self.agents.len()]).remove(0);
+        let (rollout, ended) = self.collect_into(&mut columns, policy, latent, steps)?;
+        Ok((Rollout { obs, ..rollout }, ended))
+    }
+
+    /// Collects as [`collect_into`](Self::collect_into) does, and decides together with the Worlds on the other
+    /// seats, each of which runs on its own thread.
+    ///
+    /// # Errors
+    ///
+    /// As for [`collect`](Self::collect).
+    pub fn collect_at(
+        &mut self,
+        seat: &SharedBatch,
+        columns: &mut ObsColumns<'_>,
+        policy: &Policy,
+        latent: usize,
+        steps: usize,
+    ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
+        let _playing = seat.play();
+        self.world.insert_resource(seat.clone());
+        let collected = self.collect_into(columns, policy, latent, steps);
+        self.world.remove_resource::<SharedBatch>();
+        collected
+    }
+
+    /// Collects as [`collect`](Self::collect) does, with the observations in these columns instead of the rollout.
+    /// The policy decides for them.
+    ///
+    /// # Errors
+    ///
+    /// As for [`collect`](Self::collect).
+    pub fn collect_into(
+        &mut self,
+        columns: &mut ObsColumns<'_>,
+        policy: &Policy,
+        latent: usize,
+        steps: usize,
+    ) -> Result<(Rollout, Vec<EpisodeEnded>), Fault> {
+        let world = &mut self.world;
+        world.insert_resource(ActivePolicy { policy: policy.clone(), draw: ActionDraw::Sample });
+        let kind = world.resource::<Collecting>().kind;
+        let empty = Rollout::new(self.agents.len(), kind, latent, &policy.action_space());
+        world.resource_mut::<Collecting>().rollout = empty.clone();
+        for _ in 0..steps {
+            tick_world(world)?;
+            let seen = world.resource::<PolicyBatch>().observations();
+            columns.fill_next(seen.as_slice()).map_err(|error| Fault(error.to_string()))?;
+        }
+        let mut rollout = std::mem::replace(&mut world.resource_mut::<Collecting>().rollout, empty);
+        bootstrap_values(world, policy, &mut rollout).map_err(|error| Fault(error.to_string()))?;
+        world.resource_mut::<Faults>().take()?;
+        Ok((rollout, std::mem::take(&mut world.resource_mut::<Finished>().0)))
+    }
+
+    /// Returns the World, for saving and restoring its arenas.
+    pub(crate) fn world_mut(&mut self) -> &mut World {
+        &mut self.world
+    }
+
+    /// Returns the agents, in the order of their numbers.
+    pub fn agents(&self) -> &[Entity] {
+        &self.agents
+    }
+}
+
+/// Adds the states in which the rollout stopped, with the skills active there, and their values.
+///
+/// Agents between two episodes have no such state. Their row is 0 and is never used, since their last row ended an
+/// episode.
+fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -> Result<(), LearnError> {
+    world.run_schedule(ObserveSchedule);
+    if world.contains_resource::<SkillPrior>()
+        && let Err(error) = world.run_system_cached(draw_skills)
+    {
+        world.resource_mut::<Faults>().report(error.to_string());
+    }
+    let entities = world.resource::<AgentOrder>().entities().to_vec();
+    let running: Vec<_> = (0..entities.len())
+        .filter(|&row| world.get::<Episode>(entities[row]).is_some_and(Episode::is_running))
+        .collect();
+    let kind = rollout.obs_kind;
+    let (mut skills, mut left, mut observations) = (Vec::new(), Vec::new(), Observations::empty(&kind));
+    for &row in &running {
+        push_state(world, entities[row], &mut skills, &mut left, &mut observations);
+    }
+    let values = policy.values_held(&skills, &left, &observations, running.len())?;
+    let latent = rollout.latent;
+    rollout.next_values = vec![0.0; entities.len()];
+    rollout.ends.next_obs = Observations::zeros(&kind, entities.len());
+    rollout.ends.next_z = vec![0.0; entities.len() * latent];
+    // A prior may exist without running agents.
+    let counted = if world.contains_resource::<SkillPrior>() { entities.len() } else { 0 };
+    rollout.ends.next_left = vec![1.0; counted];
+    for (i, (&row, value)) in running.iter().zip(values).enumerate() {
+        rollout.next_values[row] = value;
+        if let Some(&left) = left.get(i) {
+            rollout.ends.next_left[row] = left;
+        }
+        rollout.ends.next_obs.set_row(row, observations.row(i, kind.numbers()))?;
+        rollout.ends.next_z[row * latent..(row + 1) * latent].copy_from_slice(&skills[i * latent..(i + 1) * latent]);
+    }
+    Ok(())
+}
+
+/// Appends one row per agent to the rollout.
+fn collect_tick(world: &mut World) {
+    let Some(policy) = world.get_resource::<ActivePolicy>().map(|active| active.policy.clone()) else {
+        // Arenas are being restored, not played.
+        return;
+    };
+    // The rollout is put back even if the tick fails.
+    let pushed = world.try_resource_scope(|world, mut collecting: Mut<Collecting>| {
+        let entities = world.resource::<AgentOrder>().entities().to_vec();
+        let kind = collecting.kind;
+        let cut = cut_episodes(world, &entities, &policy, &kind)?;
+        let mut final_values = vec![0.0; entities.len()];
+        for (&row, &value) in cut.agents.iter().zip(&cut.values) {
+            final_values[row] = value;
+        }
+        let tick = tick_of(world, &entities, AgentsTick::new(&policy, &kind))?;
+        collecting.rollout.push_left(world.resource::<PolicyBatch>().left());
+        push_tick(&mut collecting.rollout, &tick, &final_values, &cut)
+    });
+    if let Some(Err(error)) = pushed {
+        world.resource_mut::<Faults>().report(error.to_string());
+    }
+}
+
+/// Adds the actions and results of each agent to `tick`.
+fn tick_of(world: &mut World, entities: &[Entity], mut tick: AgentsTick) -> Result<AgentsTick, LearnError> {
+    let mut query =
+        world.query_filtered::<(&ActiveSkill, &Action, &Decision, &Reward, &Episode, &mut ActionLog), With<Agent>>();
+    for &entity in entities {
+        let Ok((skill, action, decision, reward, episode, mut log)) = query.get_mut(world, entity) else {
+            continue;
+        };
+        tick.z.extend_from_slice(&skill.z);
+        tick.actions.push(&action.0)?;
+        tick.log_probs.push(decision.log_prob);
+        tick.values.push(decision.value);
+        tick.rewards.push(reward.get());
+        tick.terminated.push(matches!(episode.end(), Some(EpisodeEnd::Terminated { .. })));
+        tick.truncated.push(episode.end() == Some(EpisodeEnd::Truncated));
+        log.note(episode, &action.0);
+    }
+    Ok(tick)
+}
+
+fn push_tick(
+    rollout: &mut Rollout,
+    tick: &AgentsTick,
+    final_values: &[f32],
+    cut: &CutEpisodes,
+) -> Result<(), LearnError> {
+    rollout.push_step(tick.as_step(final_values))?;
+    let (width, latent) = (rollout.obs_kind.numbers(), rollout.latent);
+    for (i, &row) in cut.agents.iter().enumerate() {
+        let z = cut.z.get(i * latent..(i + 1) * latent).unwrap_or_default();
+        rollout.push_cut(row, cut.obs.row(i, width), z)?;
+        rollout.ends.cut_left.extend(cut.left.get(i));
+    }
+    Ok(())
+}
+
+// Data of one tick of all agents of a World, before it joins the rollout.
+
+/// Actions and results of each agent in a tick; for the shapes see [`RolloutStep`]. Observations are kept elsewhere.
+pub(crate) struct AgentsTick {
+    no_obs: Observations,
+    pub(crate) z: Vec<f32>,
+    pub(crate) actions: Actions,
+    pub(crate) log_probs: Vec<f32>,
+    pub(crate) values: Vec<f32>,
+    pub(crate) rewards: Vec<f32>,
+    pub(crate) terminated: Vec<bool>,
+    pub(crate) truncated: Vec<bool>,
+}
+
+impl AgentsTick {
+    pub(crate) fn new(policy: &Policy, kind: &ObsKind) -> Self {
+        let empty = Vec::new;
+        Self {
+            no_obs: Observations::empty(kind),
+            z: empty(),
+            actions: Actions::empty(&policy.action_space()),
+            log_probs: empty(),
+            values: empty(),
+            rewards: empty(),
+            terminated: Vec::new(),
+            truncated: Vec::new(),
+        }
+    }
+
+    pub(crate) fn as_step<'a>(&'a self, final_values: &'a [f32]) -> RolloutStep<'a> {
+        RolloutStep {
+            obs: self.no_obs.as_slice(),
+            z: &self.z,
+            actions: &self.actions,
+            log_probs: &self.log_probs,
+            values: &self.values,
+            rewards: &self.rewards,
+            terminated: &self.terminated,
+            truncated: &self.truncated,
+            final_values,
+        }
+    }
+}
+
+// Episodes that ran out of time: their last states, and the values of these.
+
+/// The last states of the episodes that ran out of time in one tick.
+pub(crate) struct CutEpisodes {
+    pub(crate) agents: Vec<usize>,
+    pub(crate) obs: Observations,
+    pub(crate) z: Vec<f32>,
+    /// Remaining ticks of these skills; empty without a prior.
+    pub(crate) left: Vec<f32>,
+    pub(crate) values: Vec<f32>,
+}
+
+impl CutEpisodes {
+    pub(crate) fn new(agents: Vec<usize>, kind: &ObsKind) -> Self {
+        Self { agents, obs: Observations::empty(kind), z: Vec::new(), left: Vec::new(), values: Vec::new() }
+    }
+}
+
+/// Returns the last state of each episode that ran out of time in this tick, with its value.
+///
+/// The skill is the agent's present one. If it has just run out, the next one is drawn from a copy of the agent's
+/// stream. The next draw of the stream itself belongs to the next episode.
+pub(crate) fn cut_episodes(
+    world: &mut World,
+    entities: &[Entity],
+    policy: &Policy,
+    kind: &ObsKind,
+) -> Result<CutEpisodes, LearnError> {
+    let agents: Vec<_> = (0..entities.len())
+        .filter(|&row| {
+            world.get::<Episode>(entities[row]).is_some_and(|episode| episode.end() == Some(EpisodeEnd::Truncated))
+        })
+        .collect();
+    let mut cut = CutEpisodes::new(agents, kind);
+    if cut.agents.is_empty() {
+        return Ok(cut);
+    }
+    let before: Vec<_> = entities.iter().map(|&entity| world.get::<Observation>(entity).cloned()).collect();
+    world.run_schedule(ObserveSchedule);
+    for (i, &row) in cut.agents.iter().enumerate() {
+        let skill_from = cut.z.len();
+        push_state(world, entities[row], &mut cut.z, &mut cut.left, &mut cut.obs);
+        let held = world.get::<ActiveSkill>(entities[row]).is_some_and(|skill| skill.ticks_left > 0);
+        let streams = world.get::<AgentStreams>(entities[row]);
+        if let (false, Some(prior), Some(streams)) = (held, world.get_resource::<SkillPrior>(), streams) {
+            let (last, mut stream) = (cut.obs.row(i, kind.numbers()), streams.skill.clone());
+            let drawn = prior.prior.sample(last, 1, prior.draw, &mut |_| normal(&mut stream))?;
+            cut.z.truncate(skill_from);
+            cut.z.extend(drawn);
+        }
+    }
+    cut.values = policy.values_held(&cut.z, &cut.left, &cut.obs, cut.agents.len())?;
+    // The current row belongs to the state before the action.
+    for (&entity, before) in entities.iter().zip(before) {
+        if let (Some(before), Some(mut observation)) = (before, world.get_mut::<Observation>(entity)) {
+            *observation = before;
+        }
+    }
+    Ok(cut)
+}
+
+/// Adds an agent's present observation, its skill, and the skill's remaining ticks.
+pub(crate) fn push_state(
+    world: &World,
+    entity: Entity,
+    skills: &mut Vec<f32>,
+    left: &mut Vec<f32>,
+    observations: &mut Observations,
+) {
+    if let (Some(skill), Some(observation)) = (world.get::<ActiveSkill>(entity), world.get::<Observation>(entity)) {
+        skills.extend_from_slice(&skill.z);
+        left.extend(world.get_resource::<SkillPrior>().map(|prior| skill.left(prior.horizon)));
+        observation.push_to(observations);
+    }
+}
+
+// Saved arenas in the middle of their episodes.
+//
+// Games do not store their state: they are deterministic, so level and past actions restore it.
+
+/// Saved state of one arena.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ArenaState {
+    /// Level of the current episode; `None` between two episodes.
+    level: Option<u64>,
+    actions: Actions,
+    state_hash: u64,
+    skill: Vec<f32>,
+    skill_ticks_left: u32,
+    streams: [RngState; 3],
+}
+
+/// Failure to restore an arena.
+#[derive(Debug, Error)]
+pub enum RestoreError {
+    /// The game broke its contract while the arenas were replayed.
+    #[error(transparent)]
+    Fault(#[from] Fault),
+    /// The replayed arena differs from the saved one.
+    #[error(
+        "arena {0} did not replay to its saved state: the game's rules have changed since the checkpoint, or the game keeps \
+         state from one episode to the next. Look for resources that a restart does not reset, elapsed time (`Time`), a \
+         `Local` of a system, a `static`, a random generator that is not seeded from the level, or the order of stored \
+         entities. `playbot doctor` names such state. In a `Local`, a `static`, an asset, a type without `Reflect` or a \
+         field with `#[reflect(ignore)]`, it sees only the effects on agents. If a foreign game cannot reset its state, use \
+         `Restart::Rebuild`, which builds a new World for each episode"
+    )]
+    Diverged(usize),
+    /// The checkpoint has another number of arenas.
+    #[error("the checkpoint has {saved} arenas, the experiment {wanted}")]
+    Count {
+        /// Arenas in the checkpoint.
+        saved: usize,
+        /// Arenas of the experiment.
+        wanted: usize,
+    },
+    /// Unreadable generator state, or an action outside the game's space.
+    #[error(transparent)]
+    Stream(#[from] playbot_learner::LearnError),
+}
+
+/// Reads the state of every arena, in the order of the agents.
+pub fn save_arenas(collector: &mut Collector) -> Vec<ArenaState> {
+    let agents = collector.agents().to_vec();
+    let world = collector.world_mut();
+    let mut query = world.query::<(&Agent, &Episode, &ActionLog, &ActiveSkill, &AgentStreams, &StateHash)>();
+    agents
+        .iter()
+        .filter_map(|&agent| query.get(world, agent).ok())
+        .map(|(agent, episode, log, skill, streams, hash)| ArenaState {
+            level: episode.is_running().then_some(episode.level),
+            actions: collect_actions(&agent.actions, &log.0),
+            state_hash: hash.0,
+            skill: skill.z.clone(),
+            skill_ticks_left: skill.ticks_left,
+            streams: [&streams.level, &streams.action, &streams.skill].map(RngState::of),
+        })
+        .collect()
+}
+
+fn collect_actions(space: &ActionSpace, log: &[ActionValue]) -> Actions {
+    let mut actions = Actions::empty(space);
+    for action in log {
+        // The log holds the agent's action, which was checked against its space.
+        if let Err(error) = actions.push(action) {
+            tracing::error!("an action is missing from the checkpoint: {error}");
+        }
+    }
+    actions
+}
+
+/// Brings every arena of a fresh collector to its saved state.
+///
+/// # Errors
+///
+/// [`RestoreError`] if the arenas differ in number or do not replay.
+pub fn restore_arenas(collector: &mut Collector, saved: &[ArenaState]) -> Result<(), RestoreError> {
+    let agents = collector.agents().to_vec();
+    if agents.len() != saved.len() {
+        return Err(RestoreError::Count { saved: saved.len(), wanted: agents.len() });
+    }
+    let world = collector.world_mut();
+    for (&agent, state) in agents.iter().zip(saved) {
+        if let Some(agent) = world.get::<Agent>(agent) {
+            // A game gets only actions of its own space, even from a damaged file.
+            agent.actions.check(&state.actions)?;
+        }
+    }
+    let queues: Vec<_> = agents.iter().map(|&agent| world.get::<LevelQueue>(agent).cloned()).collect();
+    for (&agent, state) in agents.iter().zip(saved) {
+        let control = if state.level.is_some() { Control::Replay } else { Control::Idle };
+        world.entity_mut(agent).insert((control, LevelQueue::Always(state.level.unwrap_or_default())));
+    }
+    replay(world, &agents, saved)?;
+    for (row, (&agent, state)) in agents.iter().zip(saved).enumerate() {
+        let mut entity = world.entity_mut(agent);
+        if state.level.is_some() && entity.get::<StateHash>().is_none_or(|hash| hash.0 != state.state_hash) {
+            return Err(RestoreError::Diverged(row));
+        }
+        let [level, action, skill] = &state.streams;
+        let streams = AgentStreams::restored(level.restore()?, action.restore()?, skill.restore()?);
+        let active = ActiveSkill { z: state.skill.clone(), ticks_left: state.skill_ticks_left };
+        let log = ActionLog((0..state.actions.len()).filter_map(|tick| state.actions.get(tick)).collect());
+        entity.insert((Control::Policy, streams, active, log));
+        if let Some(queue) = &queues[row] {
+            entity.insert(queue.clone());
+        }
+    }
+    Ok(())
+}
+
+/// Plays the saved actions; arenas at their saved tick stand still.
+fn replay(world: &mut World, agents: &[Entity], saved: &[ArenaState]) -> Result<(), Fault> {
+    let longest = saved.iter().map(|state| state.actions.len()).max().unwrap_or(0);
+    for tick in 0..longest {
+        for (&agent, state) in agents.iter().zip(saved) {
+            match state.actions.get(tick) {
+                Some(action) => world.entity_mut(agent).insert(bevy_playbot::action::Action(action)),
+                None => world.entity_mut(agent).insert(Control::Idle),
+            };
+        }
+        tick_world(world)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,254 @@
+//! Studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again.
+
+use crate::study::{StudyReport, StudyResult, TrainingResult};
+use playbot_report::{
+    number::{UNKNOWN, fixed, mean_and_error},
+    statistics::mean_and_sd,
+};
+use std::fmt::Write;
+
+impl StudyReport {
+    /// Returns the page: command, tables, the plot `curves.svg`, the changes of each variant, and the experiment.
+    ///
+    /// # Errors
+    ///
+    /// The path of the demonstrations is not Unicode.
+    pub fn to_markdown(&self) -> Result<String, ron::Error> {
+        let experiment = &self.experiment;
+        let mut page = format!("# {}: {}\n\n", experiment.game, self.variants().join(", "));
+        let _ = write!(page, "```sh\n{}\n```\n\n{}\n\n{}\n", self.command, self.conditions(), self.summary());
+        page += &self.differences();
+        page += &self.intervals();
+        page += "![Learning curves](curves.svg)\n\n## Each seed\n\n";
+        let _ = write!(page, "± is the standard error of a measurement, over its levels.\n\n{}\n", self.every_seed());
+        page += "## The experiment\n\n";
+        for variant in &experiment.variants {
+            let changes = variant.set.iter().map(|set| format!("`{set}`")).collect::<Vec<_>>();
+            let changes = if changes.is_empty() { "as below".to_owned() } else { changes.join(", ") };
+            let _ = writeln!(page, "- **{}**: {changes}", variant.name);
+        }
+        let blank = if experiment.variants.is_empty() { "" } else { "\n" };
+        let _ = write!(page, "{blank}```ron\n{}\n```\n", experiment.without_study().to_ron()?);
+        Ok(page)
+    }
+
+    /// Returns the table of means over the seeds, one row for each variant.
+    pub fn summary(&self) -> String {
+        let threshold = format!("steps to {} success", rate_cell(self.experiment.study.threshold));
+        let headings =
+            ["variant", &threshold, "training success", "training return", "held-out success", "held-out return"];
+        let rows = self.variants().into_iter().map(|variant| {
+            let runs = self.of(variant);
+            let trained = |value: fn(&TrainingResult) -> Option<f64>| {
+                let values: Vec<f64> = runs.iter().filter_map(|run| value(run.training.as_ref()?)).collect();
+                values
+            };
+            let tested = |value: fn(&StudyResult) -> f64| runs.iter().map(|run| value(run)).collect::<Vec<f64>>();
+            vec![
+                variant.to_owned(),
+                steps_cell(&runs),
+                share_cell(&trained(|training| training.success)),
+                mean_cell(&trained(|training| training.episodic_return), 2),
+                share_cell(&tested(|run| run.test.success)),
+                mean_cell(&tested(|run| run.test.return_mean), 2),
+            ]
+        });
+        markdown_table(&headings, rows)
+    }
+
+    fn every_seed(&self) -> String {
+        let headings = [
+            "variant",
+            "seed",
+            "steps to threshold",
+            "training success",
+            "training return",
+            "held-out success",
+            "held-out return",
+            "held-out length",
+        ];
+        let rows = self.results.iter().map(|run| {
+            let training = |value: fn(&TrainingResult) -> Option<f64>| run.training.as_ref().and_then(value);
+            let test = &run.test;
+            vec![
+                run.variant.clone(),
+                run.seed.to_string(),
+                steps_cell(&[run]),
+                training(|training| training.success).map_or(UNKNOWN.to_owned(), rate_cell),
+                fixed(training(|training| training.episodic_return).unwrap_or(f64::NAN), 2),
+                format!("{}%", mean_and_error(100.0 * test.success, 100.0 * test.success_se, 1)),
+                mean_and_error(test.return_mean, test.return_se, 2),
+                fixed(test.length_mean, 1),
+            ]
+        });
+        markdown_table(&headings, rows)
+    }
+}
+
+/// Formats the steps to the threshold of the runs that reached it, with their number if some did not.
+fn steps_cell(runs: &[&StudyResult]) -> String {
+    let trained: Vec<&TrainingResult> = runs.iter().filter_map(|run| run.training.as_ref()).collect();
+    let reached: Vec<f64> = trained.iter().filter_map(|run| run.steps_to_threshold).map(|step| step as f64).collect();
+    match (trained.len(), reached.len()) {
+        (0, _) => UNKNOWN.to_owned(),
+        (_, 0) => "not reached".to_owned(),
+        (all, n) if n < all => format!("{} ({n} of {all})", mean_cell(&reached, 0)),
+        _ => mean_cell(&reached, 0),
+    }
+}
+
+/// Formats mean and standard deviation; a single value has no deviation.
+fn mean_cell(values: &[f64], decimals: usize) -> String {
+    let (mean, sd) = mean_and_sd(values);
+    mean_and_error(mean, if values.len() > 1 { sd } else { f64::NAN }, decimals)
+}
+
+/// Formats a success rate as in the cells below it, `70.0 ± 14.1%`: a blank before the sign would widen every column.
+pub fn rate_cell(share: f64) -> String {
+    format!("{}%", fixed(100.0 * share, 1))
+}
+
+fn share_cell(values: &[f64]) -> String {
+    if values.is_empty() {
+        return UNKNOWN.to_owned();
+    }
+    let percents: Vec<f64> = values.iter().map(|share| 100.0 * share).collect();
+    format!("{}%", mean_cell(&percents, 1))
+}
+
+/// Formats a table with its first column to the left and the others to the right, padded to be readable as text.
+pub fn markdown_table(headings: &[&str], rows: impl Iterator<Item = Vec<String>>) -> String {
+    let mut lines = vec![headings.iter().map(|heading| (*heading).to_owned()).collect::<Vec<_>>()];
+    lines.extend(rows);
+    let width = |column: usize| lines.iter().map(|line| line[column].chars().count()).max().unwrap_or(0);
+    let widths: Vec<usize> = (0..headings.len()).map(width).collect();
+    let mut table = String::new();
+    for (index, line) in lines.iter().enumerate() {
+        for (column, (cell, &width)) in line.iter().zip(&widths).enumerate() {
+            let _ = if column == 0 { write!(table, "| {cell:<width$} ") } else { write!(table, "| {cell:>width$} ") };
+        }
+        table += "|\n";
+        if index == 0 {
+            for (column, &width) in widths.iter().enumerate() {
+                let dashes = "-".repeat(width + 1);
+                let _ = if column == 0 { write!(table, "|:{dashes}") } else { write!(table, "|{dashes}:") };
+            }
+            table += "|\n";
+        }
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{
+        Algorithm,
+        experiment::file::parse_experiment,
+        study::{LearningCurves, TestResult},
+    };
+
+    /// Makes learning curves with points at 512 and 1,024 steps.
+    fn learned(success: [f64; 2], returns: [f64; 2]) -> LearningCurves {
+        let over = |values: [f64; 2]| [512, 1024].into_iter().zip(values).collect();
+        LearningCurves { success: over(success), returns: over(returns) }
+    }
+
+    fn report() -> StudyReport {
+        let text = r#"(game: "corridor", train: "plain:0..7", test: "plain:8..15", demos: "unused", steps: 2048,
+            variants: [(name: "full"), (name: "cloned", set: ["algorithm=bc"])])"#;
+        let run = |variant: &str, seed, reached, success, return_mean| StudyResult {
+            variant: variant.into(),
+            algorithm: if variant == "full" { Algorithm::ScorePpo } else { Algorithm::BehaviourCloning },
+            seed,
+            training: (variant == "full").then_some(TrainingResult {
+                steps: 2048,
+                steps_to_threshold: reached,
+                success: Some(success),
+                episodic_return: Some(return_mean),
+            }),
+            test: TestResult {
+                episodes: 100,
+                success,
+                success_se: (success * (1.0 - success) / 100.0f64).sqrt(),
+                return_mean,
+                return_se: 0.25,
+                length_mean: 12.0,
+                level_returns: vec![return_mean - 1.0, return_mean + 1.0],
+            },
+        };
+        StudyReport {
+            command: "playbot study --out x".into(),
+            experiment: parse_experiment(text, Path::new("x.ron")).expect("valid"),
+            results: vec![
+                run("full", 1, Some(1024), 0.8, 8.0),
+                run("full", 2, None, 0.6, 6.0),
+                run("cloned", 1, None, 0.5, 5.0),
+                run("cloned", 2, None, 0.5, 5.0),
+            ],
+            curves: vec![
+                learned([0.2, 0.8], [2.0, 8.0]),
+                learned([0.4, 0.6], [4.0, 6.0]),
+                LearningCurves::default(),
+                LearningCurves::default(),
+            ],
+        }
+    }
+
+    #[test]
+    fn means_and_deviations_are_over_the_seeds() {
+        let summary = report().summary();
+        let rows: Vec<Vec<&str>> =
+            summary.lines().map(|line| line.split('|').map(str::trim).filter(|c| !c.is_empty()).collect()).collect();
+        assert_eq!(rows[0][1], "steps to 80.0% success");
+        // Deviation of 80 and 60 per cent: 10 √2.
+        assert_eq!(rows[2], ["full", "1,024 (1 of 2)", "70.0 ± 14.1%", "7.00 ± 1.41", "70.0 ± 14.1%", "7.00 ± 1.41"]);
+        assert_eq!(rows[3], ["cloned", "–", "–", "–", "50.0 ± 0.0%", "5.00 ± 0.00"]);
+    }
+
+    #[test]
+    fn the_page_has_the_command_every_seed_and_what_variants_change() {
+        let page = report().to_markdown().expect("Unicode");
+        assert!(page.contains("```sh\nplaybot study --out x\n```"), "{page}");
+        let seed = page.lines().find(|line| line.contains("| full ") && line.contains("not reached"));
+        assert!(seed.is_some_and(|line| line.contains("60.0 ± 4.9%") && line.contains("6.00 ± 0.25")), "{page}");
+        // The seeds differ by 3 and 1, the levels by nothing: a mean square of 2 · 2, over four cells.
+        let difference = page.lines().find(|line| line.starts_with("| cloned ") && line.contains("2.00 ± 1.00"));
+        assert!(difference.is_some_and(|line| line.contains("no difference that is clear")), "{page}");
+        // The middle half of the seeds' 8 and 6; and each run of the first is above those of the other on both levels.
+        let middle = page.lines().find(|line| line.starts_with("| full ") && line.contains(" 7.00 ["));
+        assert!(middle.is_some(), "{page}");
+        assert!(page.lines().any(|line| line.starts_with("| cloned ") && line.contains("1.00 [1.00, 1.00]")), "{page}");
+        assert!(page.contains("- **cloned**: `algorithm=bc`") && page.contains("variants: []"), "{page}");
+    }
+
+    #[test]
+    fn a_single_seed_has_no_interval() {
+        let alone = |variants: &[&str]| {
+            let mut report = report();
+            report.results.retain(|run| run.seed == 1 || !variants.contains(&run.variant.as_str()));
+            report.to_markdown().expect("Unicode")
+        };
+        let page = alone(&["full", "cloned"]);
+        assert!(!page.contains("95 %") && !page.contains("interquartile"), "{page}");
+        assert!(page.contains("one seed is too few"), "{page}");
+        let page = alone(&["cloned"]);
+        assert!(page.lines().any(|line| line.starts_with("| full ") && line.contains(" 7.00 [")), "{page}");
+        assert!(!page.lines().any(|line| line.starts_with("| cloned ") && line.contains('[')), "{page}");
+    }
+
+    #[test]
+    fn the_charts_have_the_trained_variants_with_their_spread() {
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        for (chart, scale) in report().charts().iter().zip([1.0, 10.0]) {
+            let [full] = &chart.curves[..] else { panic!("one curve, not {}", chart.curves.len()) };
+            assert_eq!(full.label, "full");
+            let means = [(512.0, 0.3 * scale), (1024.0, 0.7 * scale)];
+            assert!(full.points.iter().zip(means).all(|(a, b)| near(a.0, b.0) && near(a.1, b.1)), "{:?}", full.points);
+            let (low, high) = full.band.as_ref().expect("two seeds")[1];
+            assert!(near(low, 0.6 * scale) && near(high, 0.8 * scale), "{low} to {high}");
+        }
+    }
+}

@@ -1,0 +1,723 @@
+//! The runs of a study: skills, training and measurement, each resumed where it was stopped.
+
+use crate::{
+    checkpoint::CheckpointChoice,
+    error::{TrainError, io_error},
+    experiment::{Experiment, ExperimentError},
+    learn_skills,
+    learn_skills::{LearnSkillsError, cloning},
+    metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
+    recordings::{Recorded, RecordingsError, check_recordings, find_recordings, read_dataset, read_rollouts},
+    run_dir::{OpenedRun, RunDir, RunError, RunInfo, check_replaceable, end_replacement, is_unstarted},
+    run_lock::RunLock,
+    run_observer::{CountedWork, RunEvent, RunObserver},
+    runs::{RunCurves, RunsError, settings_that_differ},
+    study::{LearningCurves, StudyReport, StudyResult, StudyRun, TestResult, TrainingResult, table::markdown_table},
+    train_run::{NewRun, Training, TrainingError, TrainingSetup, run_info},
+    trainer::Trainer,
+};
+use bevy_playbot::{policy::ActionDraw, unknown_name::UnknownName, vision::ObservationConfig};
+use playbot_harness::{
+    eval::{EvalError, EvalPlan, EvalSummary, Player, evaluate, summarize},
+    game::Game,
+    games::Games,
+    sealed_file::{SealedFileError, read_sealed, write_atomically, write_sealed},
+    split::{HeldOut, LevelSplit},
+};
+use playbot_learner::{Dataset, FileError, HasExitCode, SeenLevels, SkillModel, disk};
+use playbot_report::{statistics::steps_to_reach, to_svg};
+use serde::{Deserialize, Serialize};
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+    time::{Duration, Instant},
+};
+use thiserror::Error;
+
+/// The file of a run's result.
+const RESULT: &str = "result.json";
+
+/// Failure of a study's run.
+#[derive(Debug, Error)]
+pub enum StudyRunError {
+    /// The program lacks the game.
+    #[error(transparent)]
+    Game(#[from] UnknownName),
+    /// The experiment does not go together.
+    #[error(transparent)]
+    Experiment(#[from] ExperimentError),
+    /// The folder holds a run of other settings.
+    #[error(
+        "{} holds a run with other settings: {}; use the same settings or another folder", folder.display(),
+        settings_that_differ(wanted, saved)
+    )]
+    OtherSettings {
+        /// The folder.
+        folder: PathBuf,
+        /// The experiment of the study's run.
+        wanted: Box<Experiment>,
+        /// The experiment of the run in the folder.
+        saved: Box<Experiment>,
+    },
+    /// The file of a skill model has no name.
+    #[error("{0}")]
+    SkillFile(ron::Error),
+    /// A skill model in the folder has seen held-out levels.
+    #[error(
+        "{} was learned from demonstrations of {seen}, and the held-out levels {test} have some of these: keep the runs of \
+         this study in a folder of their own, with --runs", file.display()
+    )]
+    SeenSkills {
+        /// Its file.
+        file: PathBuf,
+        /// Levels of its demonstrations.
+        seen: String,
+        /// The held-out levels.
+        test: LevelSplit,
+    },
+    /// The recordings cannot be learned from.
+    #[error(transparent)]
+    Recordings(Box<RecordingsError>),
+    /// The skills cannot be learned.
+    #[error(transparent)]
+    Skills(Box<LearnSkillsError>),
+    /// A skill model cannot be read or written.
+    #[error(transparent)]
+    Model(#[from] FileError),
+    /// The training fails.
+    #[error(transparent)]
+    Training(#[from] TrainingError),
+    /// The folder of the run cannot be used.
+    #[error(transparent)]
+    Run(Box<RunError>),
+    /// The metrics of the run cannot be read.
+    #[error(transparent)]
+    Metrics(#[from] RunsError),
+    /// The policy cannot be measured.
+    #[error(transparent)]
+    Measure(#[from] EvalError),
+}
+
+impl From<RecordingsError> for StudyRunError {
+    fn from(error: RecordingsError) -> Self {
+        Self::Recordings(error.into())
+    }
+}
+
+impl From<LearnSkillsError> for StudyRunError {
+    fn from(error: LearnSkillsError) -> Self {
+        Self::Skills(error.into())
+    }
+}
+
+impl From<RunError> for StudyRunError {
+    fn from(error: RunError) -> Self {
+        Self::Run(error.into())
+    }
+}
+
+impl HasExitCode for StudyRunError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Game(error) => error.exit_code(),
+            Self::Experiment(error) => error.exit_code(),
+            Self::OtherSettings { .. } | Self::SkillFile(_) | Self::SeenSkills { .. } => 3,
+            Self::Recordings(error) => error.exit_code(),
+            Self::Skills(error) => error.exit_code(),
+            Self::Model(error) => error.exit_code(),
+            Self::Training(error) => error.exit_code(),
+            Self::Run(error) => error.exit_code(),
+            Self::Metrics(error) => error.exit_code(),
+            Self::Measure(error) => error.exit_code(),
+        }
+    }
+}
+
+impl From<TrainError> for StudyRunError {
+    fn from(error: TrainError) -> Self {
+        Self::Training(error.into())
+    }
+}
+
+impl From<SealedFileError> for StudyRunError {
+    fn from(error: SealedFileError) -> Self {
+        RunError::from(error).into()
+    }
+}
+
+/// The runs of a study in one folder, and what they share: skill models and recordings.
+pub struct StudyRunner<'a> {
+    games: &'a Games<'a>,
+    /// Folder of all runs.
+    folder: PathBuf,
+    /// Replace existing runs instead of resuming them.
+    force: bool,
+    setup: TrainingSetup<'a>,
+    /// Skill models that were learned already.
+    learned: BTreeSet<PathBuf>,
+    /// Recordings that proved readable.
+    checked: Vec<RecordingsKey>,
+    /// The last recordings that were read.
+    last: Option<(RecordingsKey, Dataset)>,
+}
+
+/// The folder of a run, locked.
+enum RunFolder {
+    /// An existing run is resumed.
+    Begun(RunDir),
+    /// An existing folder, if any, is replaced.
+    New(RunLock),
+}
+
+/// A run whose training is over.
+struct TrainedRun {
+    dir: RunDir,
+    player: Player,
+    training: Option<TrainingResult>,
+    curves: LearningCurves,
+}
+
+/// Result of a run; `None` if the observer stopped it.
+pub type Ended = Option<(StudyResult, LearningCurves)>;
+
+impl<'a> StudyRunner<'a> {
+    /// Makes a runner of runs in `folder`. With `force`, existing runs are replaced instead of resumed.
+    pub fn new(games: &'a Games<'a>, folder: &Path, force: bool, setup: TrainingSetup<'a>) -> Self {
+        let (learned, checked, last) = (BTreeSet::new(), Vec::new(), None);
+        Self { games, folder: folder.into(), force, setup, learned, checked, last }
+    }
+
+    /// Brings all runs to their ends, one after the other, and returns the report with their results. `None` if the
+    /// observer stopped a run.
+    ///
+    /// # Errors
+    ///
+    /// As for [`run`](Self::run).
+    pub fn run_all(
+        &mut self,
+        runs: &[StudyRun],
+        command: String,
+        experiment: Experiment,
+        observer: &mut dyn RunObserver,
+    ) -> Result<Option<StudyReport>, StudyRunError> {
+        let mut report = StudyReport { command, experiment, results: Vec::new(), curves: Vec::new() };
+        for (index, run) in runs.iter().enumerate() {
+            observer.observe(RunEvent::StudyRunBegun { index, run });
+            let ended = self.run(run, observer)?;
+            let is_last = index + 1 == runs.len();
+            let Some((result, curves)) = ended.filter(|_| is_last || !observer.stopped()) else { return Ok(None) };
+            observer.observe(RunEvent::StudyRunEnded { run, result: &result });
+            report.results.push(result);
+            report.curves.push(curves);
+        }
+        Ok(Some(report))
+    }
+
+    /// Brings a run to its end.
+    ///
+    /// # Errors
+    ///
+    /// The folder holds a run with other settings, or learning, training, measuring or saving fails.
+    pub fn run(&mut self, run: &StudyRun, observer: &mut dyn RunObserver) -> Result<Ended, StudyRunError> {
+        let game = self.games.get(&run.experiment.game)?;
+        let folder = self.folder.join(run.id());
+        end_replacement(&folder)?;
+        let is_saved = self.is_saved(run, &folder)?;
+        if is_saved && let Some(result) = known_result(&folder.join(RESULT)) {
+            return Ok(Some((result, learning_curves(&folder)?)));
+        }
+        disk::create_dir_all(&folder).map_err(io_error("create", &folder))?;
+        let lock = RunLock::take(&folder)?;
+        let dir = if is_saved { RunFolder::Begun(RunDir::open_with(lock)?.run) } else { RunFolder::New(lock) };
+        let clock = CostClock::start();
+        // The folder is locked until the result is written.
+        let trained = self.train(game, run, dir, observer)?;
+        clock.note(&folder)?;
+        let Some(TrainedRun { dir: _dir, player, training, curves }) = trained else { return Ok(None) };
+        let experiment = &run.experiment;
+        let plan = experiment.eval_plan(&experiment.test, self.setup.threads);
+        let summary = measure(game, &run.id(), &player, &plan, observer)?;
+        let result = StudyResult {
+            variant: run.variant.clone(),
+            algorithm: experiment.algorithm,
+            seed: experiment.seed,
+            training,
+            test: TestResult::from(&summary),
+        };
+        write_sealed(&folder.join(RESULT), &result)?;
+        Ok(Some((result, curves)))
+    }
+
+    /// Checks the folders of all existing runs, so that nothing is begun if one of them is in use, or is no run and
+    /// would have to be replaced.
+    ///
+    /// # Errors
+    ///
+    /// The folder, and its contents.
+    pub fn check_folders(&self, runs: &[StudyRun]) -> Result<(), RunError> {
+        for folder in runs.iter().map(|run| self.folder.join(run.id())).filter(|folder| folder.exists()) {
+            if self.force {
+                check_replaceable(&folder)?;
+            }
+            if RunLock::is_known(&folder) {
+                RunLock::take(&folder)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Opens the recordings of all runs that have yet to learn, so that nothing is begun if those of another run cannot
+    /// be read. With `force`, recordings are also replayed.
+    ///
+    /// # Errors
+    ///
+    /// Recordings cannot be read, belong to another game, or show held-out levels.
+    pub fn check_recordings(&mut self, runs: &[StudyRun], observer: &mut dyn RunObserver) -> Result<(), StudyRunError> {
+        for run in runs {
+            if self.wants_recordings(run)? {
+                self.check_recordings_of(&run.experiment, observer)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Returns whether a run has yet to learn from recordings.
+    fn wants_recordings(&self, run: &StudyRun) -> Result<bool, StudyRunError> {
+        let algorithm = run.experiment.algorithm;
+        let is_measured = !self.force && self.folder.join(run.id()).join(RESULT).exists();
+        let has_skills = algorithm.needs_skills() && !self.force && self.skill_file(run)?.exists();
+        Ok(algorithm.learns_from_demos() && !is_measured && !has_skills)
+    }
+
+    /// Checks recordings, unless they were checked already.
+    fn check_recordings_of(
+        &mut self,
+        experiment: &Experiment,
+        observer: &mut dyn RunObserver,
+    ) -> Result<(), StudyRunError> {
+        let key = self.recordings_key(experiment)?;
+        if self.checked.contains(&key) {
+            return Ok(());
+        }
+        let (game, setup) = (self.games.get(&experiment.game)?, self.setup);
+        match (self.force, key.with_rewards) {
+            (false, _) => {
+                let path = find_recordings(experiment, setup.recordings, observer)?;
+                check_recordings(game, experiment, &path)?;
+            }
+            (true, false) => drop(self.dataset(game, experiment, observer)?),
+            (true, true) => drop(read_rollouts(game, experiment, setup.recordings, setup.threads, observer)?),
+        }
+        self.checked.push(key);
+        Ok(())
+    }
+
+    /// Reads recordings, or returns the last ones if they are the same.
+    fn dataset(
+        &mut self,
+        game: &dyn Game,
+        experiment: &Experiment,
+        observer: &mut dyn RunObserver,
+    ) -> Result<Dataset, StudyRunError> {
+        let key = self.recordings_key(experiment)?;
+        if let Some((known, dataset)) = &self.last
+            && *known == key
+        {
+            return Ok(dataset.clone());
+        }
+        let path = find_recordings(experiment, self.setup.recordings, observer)?;
+        let dataset = read_dataset(game, experiment, &path, self.setup.threads, observer)?;
+        self.last = Some((key, dataset.clone()));
+        Ok(dataset)
+    }
+
+    fn recordings_key(&self, experiment: &Experiment) -> Result<RecordingsKey, ExperimentError> {
+        Ok(RecordingsKey {
+            game: experiment.game.clone(),
+            path: (self.setup.recordings)(experiment.recordings()?),
+            held_out: experiment.test.clone(),
+            observation_config: experiment.observation_config(),
+            steps: experiment.demo_steps,
+            wins: experiment.demo_wins,
+            with_states: experiment.skills.tells_states(),
+            with_rewards: experiment.algorithm.trains_on_demos(),
+        })
+    }
+
+    /// Returns whether the folder holds this run, to be resumed.
+    fn is_saved(&self, run: &StudyRun, folder: &Path) -> Result<bool, StudyRunError> {
+        if self.force || !folder.exists() || is_unstarted(folder) {
+            return Ok(false);
+        }
+        let OpenedRun { experiment: saved, info, .. } = RunDir::open(folder)?;
+        if saved == run.experiment {
+            self.warn_of_others(folder, &info);
+            return Ok(true);
+        }
+        let (wanted, saved) = (Box::new(run.experiment.clone()), Box::new(saved));
+        Err(StudyRunError::OtherSettings { folder: folder.into(), wanted, saved })
+    }
+
+    /// Warns if another program or device made a run whose results go into the same table.
+    fn warn_of_others(&self, folder: &Path, info: &RunInfo) {
+        let TrainingSetup { revision, device, .. } = self.setup;
+        let folder = folder.display();
+        if info.revision != revision {
+            tracing::warn!("{folder} was made by revision {} of playbot; this is {revision}", info.revision);
+        }
+        if info.device != device {
+            tracing::warn!("{folder} was made on {}, not on {device}", info.device);
+        }
+    }
+
+    /// Makes the folder of a run, in place of an existing one.
+    fn begin(
+        &self,
+        game: &dyn Game,
+        run: &StudyRun,
+        lock: RunLock,
+        skills: Option<&SkillModel>,
+        recorded: Option<SeenLevels>,
+    ) -> Result<RunDir, StudyRunError> {
+        let (file, path, experiment) = (self.skill_file(run)?, lock.folder().to_owned(), &run.experiment);
+        let new = NewRun { path: &path, experiment, skills, skill_file: Some(&file), force: true };
+        let info = run_info(game, &new, recorded, &self.setup)?;
+        Ok(RunDir::begin(lock, experiment, &info)?)
+    }
+
+    /// Trains a run that needs it. A folder to be replaced stays until its skills and recordings are there.
+    fn train(
+        &mut self,
+        game: &dyn Game,
+        run: &StudyRun,
+        run_folder: RunFolder,
+        observer: &mut dyn RunObserver,
+    ) -> Result<Option<TrainedRun>, StudyRunError> {
+        let (experiment, setup) = (&run.experiment, self.setup);
+        let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+        let begun = matches!(&run_folder, RunFolder::Begun(dir) if dir.checkpoint(CheckpointChoice::Last).is_ok());
+        let skills = match experiment.algorithm.needs_skills() && !begun {
+            true => match self.skills(game, run, observer)? {
+                Some(skills) => Some(skills),
+                None => return Ok(None),
+            },
+            false => None,
+        };
+        let Recorded { rollouts, seen } = match begun {
+            true => Recorded::default(),
+            false => read_rollouts(game, experiment, setup.recordings, setup.threads, observer)?,
+        };
+        let dir = match run_folder {
+            RunFolder::Begun(dir) => dir,
+            RunFolder::New(lock) => self.begin(game, run, lock, skills.as_ref(), seen)?,
+        };
+        if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
+            let player = cloning(skills, experiment, draw);
+            return Ok(Some(TrainedRun { dir, player, training: None, curves: LearningCurves::default() }));
+        }
+        let trainer = if begun {
+            dir.resume(game, experiment, setup.device, setup.threads)?
+        } else {
+            Trainer::with_demos(game, experiment, skills.as_ref(), &rollouts, setup.device, setup.threads)?
+        };
+        let mut training = Training { run: dir, trainer };
+        if !training.drive(observer)? {
+            return Ok(None);
+        }
+        let Training { run: dir, trainer } = training;
+        let player = Player::Policy { policy: trainer.policy(), prior: trainer.skill_prior(), draw };
+        let training = Some(training_result(dir.path(), experiment, trainer.steps())?);
+        let curves = learning_curves(dir.path())?;
+        Ok(Some(TrainedRun { dir, player, training, curves }))
+    }
+
+    /// Returns the skill model of a run, learned once for all runs that share it; `None` if the observer stopped that.
+    fn skills(
+        &mut self,
+        game: &dyn Game,
+        run: &StudyRun,
+        observer: &mut dyn RunObserver,
+    ) -> Result<Option<SkillModel>, StudyRunError> {
+        let (file, experiment) = (self.skill_file(run)?, &run.experiment);
+        let is_new = self.force && !self.learned.contains(&file);
+        if is_new || !file.exists() {
+            let dataset = self.dataset(game, experiment, observer)?;
+            if is_new {
+                learn_skills::remove_checkpoint(&learn_skills::checkpoint_of(&file))?;
+            }
+            let learned = learn_skills::learn_into(&file, experiment, dataset, self.setup.device, observer)?;
+            if learned.is_none() {
+                return Ok(None);
+            }
+            self.learned.insert(file.clone());
+        }
+        let model = SkillModel::load(&file, self.setup.device)?;
+        match HeldOut::new(game, &experiment.test).shown_by(model.demos()) {
+            Some(seen) => Err(StudyRunError::SeenSkills { file, seen, test: experiment.test.clone() }),
+            None => Ok(Some(model)),
+        }
+    }
+
+    fn skill_file(&self, run: &StudyRun) -> Result<PathBuf, StudyRunError> {
+        Ok(self.folder.join(run.skill_file().map_err(StudyRunError::SkillFile)?))
+    }
+}
+
+/// The settings that determine the contents of a dataset or of training recordings.
+#[derive(PartialEq)]
+struct RecordingsKey {
+    game: String,
+    path: PathBuf,
+    /// Levels that must not be among them.
+    held_out: LevelSplit,
+    observation_config: ObservationConfig,
+    /// Most steps.
+    steps: Option<u64>,
+    /// Lost episodes are left out.
+    wins: bool,
+    /// The game's state is read beside the pictures.
+    with_states: bool,
+    /// Rewards are read, for which all recordings are replayed.
+    with_rewards: bool,
+}
+
+/// Reads the result of a measured run. A damaged one is measured again.
+fn known_result(path: &Path) -> Option<StudyResult> {
+    let read = path.exists().then(|| read_sealed(path))?;
+    Some(read.inspect_err(|error| tracing::warn!("{error}; the run is measured again")).ok()?.0)
+}
+
+/// Measures a player on the levels of a plan.
+fn measure(
+    game: &dyn Game,
+    name: &str,
+    player: &Player,
+    plan: &EvalPlan,
+    observer: &mut dyn RunObserver,
+) -> Result<EvalSummary, EvalError> {
+    let episodes = plan.split.len() * u64::from(plan.episodes_per_level);
+    let counter = observer.counter(CountedWork::Measure { name, episodes });
+    let summary = summarize(name, &plan.split, &evaluate(game, player, plan, counter)?);
+    observer.observe(RunEvent::Measured(&summary));
+    Ok(summary)
+}
+
+/// Returns the training result of a run, from its metrics.
+fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<TrainingResult, RunsError> {
+    let curves = RunCurves::read(run)?;
+    Ok(TrainingResult {
+        steps,
+        steps_to_threshold: steps_to_reach(curves.settled(SUCCESS_RATE), experiment.study.threshold),
+        success: curves.last(SUCCESS_RATE),
+        episodic_return: curves.last(EPISODIC_RETURN),
+    })
+}
+
+/// Returns the learning curves of a run, from its metrics.
+fn learning_curves(run: &Path) -> Result<LearningCurves, RunsError> {
+    let curves = RunCurves::read(run)?;
+    let of = |tag| curves.curve(tag).to_vec();
+    Ok(LearningCurves { success: of(SUCCESS_RATE), returns: of(EPISODIC_RETURN) })
+}
+
+// The files of a study: its tables and curves, and the cost of its runs, which differs from machine to machine.
+
+/// The file of results.
+pub const RESULTS: &str = "results.json";
+
+const TABLE: &str = "table.md";
+
+/// The file of the cost in the folder of a run.
+const COST: &str = "cost.json";
+
+/// Failure to write the files of a study.
+#[derive(Debug, Error)]
+pub enum StudyOutputError {
+    /// The experiment cannot be written as text.
+    #[error("cannot write the experiment: {0}")]
+    Experiment(String),
+    /// The results of an earlier study cannot be written as a table.
+    #[error("{file}: {message}")]
+    Results {
+        /// Their file.
+        file: String,
+        /// The problem.
+        message: String,
+    },
+    /// A file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] SealedFileError),
+}
+
+impl HasExitCode for StudyOutputError {
+    fn exit_code(&self) -> u8 {
+        match self {
+            Self::Experiment(_) | Self::Results { .. } => 3,
+            Self::File(error) => error.exit_code(),
+        }
+    }
+}
+
+/// Writes `table.md`, `curves.svg` and `results.json`.
+///
+/// # Errors
+///
+/// A file cannot be written.
+pub fn write_report(folder: &Path, report: &StudyReport) -> Result<(), StudyOutputError> {
+    let table = report.to_markdown().map_err(|error| StudyOutputError::Experiment(error.to_string()))?;
+    let json = report.to_json().map_err(|error| StudyOutputError::Experiment(error.to_string()))?;
+    write_atomically(&folder.join(TABLE), table.as_bytes())?;
+    write_atomically(&folder.join("curves.svg"), to_svg(&report.charts()).as_bytes())?;
+    Ok(write_atomically(&folder.join(RESULTS), json.as_bytes())?)
+}
+
+/// Writes `table.md` again from `results.json`. Learning curves are not in there, so `curves.svg` stays as it is.
+///
+/// # Errors
+///
+/// There are no results, or they are damaged.
+pub fn rewrite_table(folder: &Path) -> Result<(), StudyOutputError> {
+    let path = folder.join(RESULTS);
+    let refused = |message: String| StudyOutputError::Results { file: path.display().to_string(), message };
+    if !path.exists() {
+        let message = "there is no such file: run the study, or name the folder of one that is done";
+        return Err(refused(message.to_owned()));
+    }
+    let (report, _) = read_sealed::<StudyReport>(&path)?;
+    let table = report.to_markdown().map_err(|error| refused(error.to_string()))?;
+    Ok(write_atomically(&folder.join(TABLE), table.as_bytes())?)
+}
+
+/// Writes `cost.md`: the cost of each variant, over its seeds, and the command.
+///
+/// # Errors
+///
+/// It cannot be written.
+pub fn write_cost(
+    folder: &Path,
+    runs: &[StudyRun],
+    runs_folder: &Path,
+    command: &str,
+    threads: usize,
+) -> Result<(), SealedFileError> {
+    write_atomically(&folder.join("cost.md"), cost_table(runs, runs_folder, command, threads).as_bytes())
+}
+
+/// Time that was spent on a run, over all resumptions.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Cost {
+    /// Seconds of all processors together; `None` where the system does not report it.
+    cpu_s: Option<f64>,
+    /// Seconds by the clock.
+    wall_s: f64,
+}
+
+/// A clock that runs while a run is worked on.
+pub(crate) struct CostClock {
+    begun: Instant,
+    cpu: Option<Duration>,
+}
+
+impl CostClock {
+    pub(crate) fn start() -> Self {
+        Self { begun: Instant::now(), cpu: cpu_time() }
+    }
+
+    /// Adds the elapsed time to the cost of the run in `folder`.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be written.
+    pub(crate) fn note(&self, folder: &Path) -> Result<(), SealedFileError> {
+        let spent = self.cpu.zip(cpu_time()).map(|(before, now)| now.saturating_sub(before).as_secs_f64());
+        let before = Cost::of(folder);
+        let cost = Cost {
+            cpu_s: match before {
+                Some(before) => before.cpu_s.zip(spent).map(|(before, spent)| before + spent),
+                None => spent,
+            },
+            wall_s: before.unwrap_or_default().wall_s + self.begun.elapsed().as_secs_f64(),
+        };
+        write_sealed(&folder.join(COST), &cost)
+    }
+}
+
+impl Cost {
+    /// Reads the cost of the run in `folder` so far; `None` if there is no note, or the note is damaged.
+    fn of(folder: &Path) -> Option<Self> {
+        let file = folder.join(COST);
+        if !file.exists() {
+            return None;
+        }
+        read_sealed(&file)
+            .inspect_err(|error| tracing::warn!("{error}; the earlier cost of the run is unknown"))
+            .map_or(None, |(cost, _)| Some(cost))
+    }
+}
+
+/// Formats a table of the cost of each variant, over its seeds, and the command.
+fn cost_table(runs: &[StudyRun], folder: &Path, command: &str, threads: usize) -> String {
+    let mut rows = Vec::new();
+    let mut total = (0.0, 0.0, true);
+    let mut variants: Vec<&str> = runs.iter().map(|run| run.variant.as_str()).collect();
+    variants.dedup();
+    for variant in variants {
+        let of_variant: Vec<&StudyRun> = runs.iter().filter(|run| run.variant == variant).collect();
+        let costs: Vec<Option<Cost>> = of_variant.iter().map(|run| Cost::of(&folder.join(run.id()))).collect();
+        let sum = |of: fn(&Cost) -> Option<f64>| -> Option<f64> {
+            costs.iter().map(|cost| cost.as_ref().and_then(of)).sum::<Option<f64>>()
+        };
+        let (cpu, wall) = (sum(|cost| cost.cpu_s), sum(|cost| Some(cost.wall_s)));
+        let trained = of_variant.iter().filter(|run| run.experiment.algorithm.is_trained());
+        let steps: u64 = trained.map(|run| run.experiment.whole_steps()).sum();
+        total = (total.0 + cpu.unwrap_or(0.0), total.1 + wall.unwrap_or(0.0), total.2 && cpu.is_some());
+        rows.push(vec![variant.to_owned(), of_variant.len().to_string(), steps.to_string(), hours(cpu), hours(wall)]);
+    }
+    let cpu = if total.2 { hours(Some(total.0)) } else { format!("at least {}", hours(Some(total.0))) };
+    format!(
+        "# What the study has cost\n\n```sh\n{command} --threads {threads}\n```\n\n{}\n{cpu} CPU hours in all, {} by the clock, with \
+         {}. A skill model is learned within the first run that needs it.\n",
+        markdown_table(&["variant", "runs", "environment steps", "CPU hours", "hours"], rows.into_iter()),
+        hours(Some(total.1)),
+        if threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") },
+    )
+}
+
+fn hours(seconds: Option<f64>) -> String {
+    seconds.map_or("–".to_owned(), |seconds| format!("{:.3}", seconds / 3600.0))
+}
+
+/// Returns the time that all processors have spent on this process, where Linux reports it.
+fn cpu_time() -> Option<Duration> {
+    // The name in brackets may hold anything.
+    let stat = fs::read_to_string("/proc/self/stat").ok()?;
+    let mut fields = stat.rsplit_once(')')?.1.split_ascii_whitespace().skip(11);
+    let ticks: u64 = fields.next()?.parse::<u64>().ok()? + fields.next()?.parse::<u64>().ok()?;
+    // The kernel counts these in hundredths of a second for every program, whatever its own clock does.
+    Some(Duration::from_millis(ticks * 10))
+}
+
+#[cfg(test)]
+mod study_output_tests {
+    use super::*;
+
+    #[test]
+    fn what_is_gone_on_with_costs_more() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let clock = CostClock::start();
+        let mut sum = 0u64;
+        while clock.begun.elapsed() < Duration::from_millis(60) {
+            sum = sum.wrapping_add(1);
+        }
+        assert!(sum > 0);
+        clock.note(folder.path()).expect("writable");
+        let once = Cost::of(folder.path()).expect("noted");
+        clock.note(folder.path()).expect("writable");
+        let twice = Cost::of(folder.path()).expect("noted");
+        assert!(once.wall_s >= 0.06 && twice.wall_s >= 2.0 * once.wall_s, "{once:?}, {twice:?}");
+        if cfg!(target_os = "linux") {
+            assert!(twice.cpu_s.expect("Linux says it") >= 2.0 * once.cpu_s.expect("Linux says it"));
+        }
+    }
+}
