@@ -1,6 +1,6 @@
 //! Tests that the drawings in `assets` match their sources.
 
-#[path = "../examples/draw_coinrun/art.rs"]
+#[path = "../examples/draw_coinrun/art/mod.rs"]
 mod art;
 #[path = "../examples/draw_maze2d/art.rs"]
 mod maze2d_art;

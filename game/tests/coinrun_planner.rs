@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use playbot_games::coinrun::{
-    Demonstrator, Mode, Outcome, Plan, PlannerConfig, Sim, generator, generator::generate, planner, planner::plan,
+    Demonstrator, Mode, Outcome, Plan, PlannerConfig, Sim, generator::generate, planner::plan,
 };
 use rand_mt::Mt;
 

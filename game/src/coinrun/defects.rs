@@ -184,8 +184,8 @@ mod catalogue_tests {
 
     use super::*;
     use crate::coinrun::{
-        CoinRun, Mode, Plan, PlannerConfig, Sim, generator, generator::generate, level::Level, level_text, planner,
-        planner::plan, proof::prove, spawn_agent,
+        CoinRun, Mode, Plan, PlannerConfig, Sim, generator::generate, level::Level, level_text, planner::plan,
+        proof::prove, spawn_agent,
     };
 
     fn rng(seed: u64) -> ChaCha8Rng {
@@ -311,7 +311,7 @@ mod catalogue_tests {
 #[cfg(test)]
 mod cells_tests {
     use super::*;
-    use crate::coinrun::{Mode, generator, generator::generate};
+    use crate::coinrun::{Mode, generator::generate};
 
     #[test]
     fn what_is_changed_lies_between_start_and_coin_and_is_another_tile() {

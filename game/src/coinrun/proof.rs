@@ -76,7 +76,7 @@ fn cell_of(body: &Body) -> Option<[i32; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coinrun::{Tile, components::build, generator, generator::generate, level::Mode};
+    use crate::coinrun::{Tile, components::build, generator::generate, level::Mode};
 
     #[test]
     fn generated_levels_are_not_called_unsolvable() {

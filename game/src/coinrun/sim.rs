@@ -128,8 +128,8 @@ impl Sim {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coinrun::generator::generate;
     use crate::coinrun::level::Mode;
-    use crate::coinrun::{generator, generator::generate};
 
     #[test]
     fn steps_after_the_end_change_nothing() {

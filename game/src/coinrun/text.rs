@@ -194,7 +194,7 @@ impl Reader {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coinrun::{generator, generator::generate};
+    use crate::coinrun::generator::generate;
 
     #[test]
     fn pictures_read_back() {

@@ -153,7 +153,7 @@ impl Scene<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coinrun::{Level, Mode, generator, generator::generate};
+    use crate::coinrun::{Level, Mode, generator::generate};
 
     /// Returns a level with a player and no other body.
     fn empty<'a>(level: &'a Level, player: &'a Body) -> Scene<'a> {

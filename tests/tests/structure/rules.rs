@@ -101,12 +101,14 @@ fn files_are_neither_long_nor_splinters() {
     assert!(files.len() > 300, "only {} product files are seen: does the reader still find them?", files.len());
 }
 
-/// A folder's door is the file beside it that has its name.
+/// A folder's door is the file beside it that has its name. Examples are left out: Cargo takes a file beside theirs for a
+/// program.
 #[test]
 fn modules_have_one_style() {
     let found: Vec<String> = files(&workspace(), "mod.rs")
         .iter()
         .filter(|file| file.file_name().is_some_and(|name| name == "mod.rs"))
+        .filter(|file| !file.components().any(|part| part.as_os_str() == "examples"))
         .map(|file| shown(&workspace(), file).to_string())
         .collect();
     fail_if_any(&found, "Call `folder/mod.rs` `folder.rs`.");

@@ -215,10 +215,9 @@ mod trap_tests {
 
     use super::*;
     use crate::coinrun::{
-        Mode, Plan, PlannerConfig, Sim, generator,
+        Mode, Plan, PlannerConfig, Sim,
         generator::generate,
         level::Level,
-        planner,
         planner::plan,
         rules::{Body, PlayerState},
     };

@@ -196,7 +196,7 @@ pub(super) fn after_each_tick(
 #[cfg(test)]
 mod way_tests {
     use super::*;
-    use crate::coinrun::{Mode, generator, generator::generate};
+    use crate::coinrun::{Mode, generator::generate};
 
     #[test]
     fn variants_go_through_the_places() {

@@ -2,10 +2,10 @@
 //! bit.
 
 use crate::coinrun::{
-    Level, Mode, Sim, Tile, TileGrid, generator,
+    Level, Mode, Sim, Tile, TileGrid,
     generator::generate,
     paths::{HELD, STEPS, Surroundings, VALUES},
-    rules::{ACTIONS, Body, Outcome, PlayerState, begin_step, is_supported, motion, motion::touch, move_player},
+    rules::{ACTIONS, Body, Outcome, PlayerState, begin_step, is_supported, motion::touch, move_player},
     tile::REACH,
 };
 use rand::{RngExt, SeedableRng};

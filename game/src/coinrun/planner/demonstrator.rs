@@ -66,8 +66,8 @@ mod tests {
     use super::*;
     use std::sync::Arc;
 
+    use crate::coinrun::generator::generate;
     use crate::coinrun::level::{Level, Mode};
-    use crate::coinrun::{generator, generator::generate};
 
     #[test]
     fn an_undisturbed_plan_is_made_once() {

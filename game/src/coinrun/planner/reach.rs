@@ -180,10 +180,8 @@ mod fill_tests {
     use rand_chacha::ChaCha8Rng;
 
     use crate::coinrun::{
-        generator,
         generator::generate,
         level::{Level, LevelParts, Mode, Spawn},
-        planner,
         planner::{Plan, PlannerConfig, plan},
         rules::{CORNER, FOOT_MARGIN, PLAYER_HALF_WIDTH},
         tile::{Tile, TileGrid},

@@ -9,8 +9,8 @@ use playbot_learner::nn::{
 use playbot_learner::policy::{Actor, NetShape};
 use playbot_learner::rng::Streams;
 use playbot_learner::sac::{
-    Critics, LogTemperature, SacBatch, SacNets, actor_step, critic_loss, critic_step, critics, critics::soft_update,
-    q_target, soft_value_of_choices, target_of, temperature_loss, temperature_step,
+    Critics, LogTemperature, SacBatch, SacNets, actor_step, critic_loss, critic_step, critics::soft_update, q_target,
+    soft_value_of_choices, target_of, temperature_loss, temperature_step,
 };
 use playbot_learner::{ActionSpace, DeviceKind, EntropyCoef, SacConfig};
 
