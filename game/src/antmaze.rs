@@ -3,7 +3,7 @@
 //! The task is D4RL's, on its maps and on generated ones; the body is [`ant`](crate::ant)'s. A mode ([`AntMazeMode`])
 //! and a seed make a level ([`generate`]); each agent has a physics world of its own. Episodes end at the goal or at
 //! the time limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game with rays to the walls
-//! and the direction of the goal, [`AntMazeWithMap`] with a map, and [`AntMazeWithWaves`] with positional encoding.
+//! and the direction of the goal, [`AntMazeWithMap`] with a map, and [`AntMazeWithPositionalEncoding`] with positional encoding.
 
 mod against_rules;
 pub mod arena;
@@ -52,7 +52,7 @@ pub use crate::antmaze::{
     geometry::wall_boxes,
     level::{AntMazeLevel, generate},
     mode::{AntMazeMode, GoalNoise, Goals, Pay},
-    senses::{AntMazeWithMap, AntMazeWithRays, AntMazeWithWaves},
+    senses::{AntMazeWithMap, AntMazeWithPositionalEncoding, AntMazeWithRays},
 };
 
 // AntMaze as a game for training, evaluation and replay.

@@ -4,7 +4,7 @@
 //! original (MuJoCo 3.1.6) to within rounding; with [`Contact::Rapier`] rapier2d solves the contacts ([`physics`]). A
 //! [`Maze2dMode`] names the map and the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is made from it and
 //! a seed. [`Maze2dWithRays`] is the same game with rays to the walls and the direction of the goal, [`Maze2dWithMap`]
-//! with a map, and [`Maze2dWithWaves`] with positional encoding.
+//! with a map, and [`Maze2dWithPositionalEncoding`] with positional encoding.
 
 mod against_rules;
 pub mod arena;
@@ -34,7 +34,7 @@ use crate::{
         level_text::LevelText,
         picture::{Maze2dPicturePlugin, VIEW, point},
     },
-    senses::{Mapped, Placed, Sighted, WithSenses},
+    senses::{WithMap, WithObservations, WithPositionalEncoding, WithRays},
 };
 use bevy::prelude::*;
 use bevy_playbot::vision::{ObservationKind, Picture, VisionSystems};
@@ -59,7 +59,7 @@ pub use crate::maze2d::{
     demonstrator::{Demonstrator, DemonstratorBot},
     level::Maze2dLevel,
     mode::{Contact, Maze2dMode},
-    senses::{Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves},
+    senses::{Maze2dWithMap, Maze2dWithPositionalEncoding, Maze2dWithRays},
 };
 
 // Maze2D as a game for training, evaluation and replay.
@@ -260,9 +260,9 @@ impl BenchmarkTools for Maze2d {
     fn benchmarked(&self, benchmark: &Benchmark) -> Option<&dyn Game> {
         match benchmark.case {
             "physics" => Some(&Maze2d { physics: true }),
-            "sighted" => Some(&WithSenses(Maze2d { physics: false }, Sighted)),
-            "mapped" => Some(&WithSenses(Maze2d { physics: false }, Mapped)),
-            "placed" => Some(&WithSenses(Maze2d { physics: false }, Placed)),
+            "sighted" => Some(&WithObservations(Maze2d { physics: false }, WithRays)),
+            "mapped" => Some(&WithObservations(Maze2d { physics: false }, WithMap)),
+            "placed" => Some(&WithObservations(Maze2d { physics: false }, WithPositionalEncoding)),
             _ => None,
         }
     }

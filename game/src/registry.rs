@@ -5,7 +5,7 @@ use crate::{
     antmaze::AntMaze,
     coinrun::CoinRun,
     maze2d::Maze2d,
-    senses::{Mapped, Placed, Sighted, WithSenses},
+    senses::{WithMap, WithObservations, WithPositionalEncoding, WithRays},
 };
 use playbot_harness::game::Game;
 
@@ -13,12 +13,12 @@ use playbot_harness::game::Game;
 pub const GAMES: [&dyn Game; 10] = [
     &CoinRun { physics: false },
     &Maze2d { physics: false },
-    &WithSenses(Maze2d { physics: false }, Sighted),
-    &WithSenses(Maze2d { physics: false }, Mapped),
-    &WithSenses(Maze2d { physics: false }, Placed),
+    &WithObservations(Maze2d { physics: false }, WithRays),
+    &WithObservations(Maze2d { physics: false }, WithMap),
+    &WithObservations(Maze2d { physics: false }, WithPositionalEncoding),
     &Ant,
     &AntMaze,
-    &WithSenses(AntMaze, Sighted),
-    &WithSenses(AntMaze, Mapped),
-    &WithSenses(AntMaze, Placed),
+    &WithObservations(AntMaze, WithRays),
+    &WithObservations(AntMaze, WithMap),
+    &WithObservations(AntMaze, WithPositionalEncoding),
 ];

@@ -2,9 +2,9 @@
 //! detail.
 //!
 //! In the originals an agent observes its own state only. That is enough on one map, which can be learned by heart. In
-//! an unknown maze it leaves nothing but wandering about. [`Sighted`] agents observe the direction of the goal and the
-//! distances of walls. They still have to look into dead ends, where a policy without memory stays. [`Mapped`] agents
-//! also observe the cells around them. [`Placed`] agents get no new information: positional encoding only separates
+//! an unknown maze it leaves nothing but wandering about. [`WithRays`] agents observe the direction of the goal and the
+//! distances of walls. They still have to look into dead ends, where a policy without memory stays. [`WithMap`] agents
+//! also observe the cells around them. [`WithPositionalEncoding`] agents get no new information: positional encoding only separates
 //! positions better, which helps on large maps.
 
 use bevy::prelude::*;
@@ -30,7 +30,7 @@ pub trait Senses<G>: Told {
 
 /// A game with senses: the inner one in everything but its name and what its agents observe.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct WithSenses<G, S>(pub G, pub S);
+pub struct WithObservations<G, S>(pub G, pub S);
 
 /// No measurements: speed is measured beside the game without these senses.
 struct Unmeasured;
@@ -41,7 +41,7 @@ impl BenchmarkTools for Unmeasured {
     }
 }
 
-impl<G: Game, S: Senses<G>> Game for WithSenses<G, S> {
+impl<G: Game, S: Senses<G>> Game for WithObservations<G, S> {
     fn name(&self) -> &'static str {
         S::NAME
     }
@@ -89,14 +89,14 @@ impl<G: Game, S: Senses<G>> Game for WithSenses<G, S> {
 /// Cells of the map to each side: in a maze of 9 × 9 cells all free ones, from all but the outermost of them.
 pub const REACH: i32 = 5;
 
-/// Adds the observations of [`Sighted`], and the walls among the 11 × 11 cells around the agent.
+/// Adds the observations of [`WithRays`], and the walls among the 11 × 11 cells around the agent.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Mapped;
+pub struct WithMap;
 
-impl Told for Mapped {
+impl Told for WithMap {
     fn names(self) -> Vec<String> {
         let cells = around().map(|[east, north]| format!("cell {east:+} east {north:+} north"));
-        Sighted.names().into_iter().chain(cells).collect()
+        WithRays.names().into_iter().chain(cells).collect()
     }
 }
 
@@ -120,9 +120,9 @@ pub const LENGTHS: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
 /// Adds sine and cosine of the position along x and y, as [positional encoding](Observation::waves) of [`LENGTHS`].
 /// They carry no more information than x and y.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Placed;
+pub struct WithPositionalEncoding;
 
-impl Told for Placed {
+impl Told for WithPositionalEncoding {
     fn names(self) -> Vec<String> {
         ["x", "y"].into_iter().flat_map(|axis| ObservationSpace::wave_names(axis, LENGTHS)).collect()
     }
@@ -137,9 +137,9 @@ pub fn push_waves(observation: &mut Observation, place: [f64; 2]) {
 
 /// Adds the direction of the goal and the distances of the walls around.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Sighted;
+pub struct WithRays;
 
-impl Told for Sighted {
+impl Told for WithRays {
     fn names(self) -> Vec<String> {
         let goal = ["goal x", "goal y"].map(str::to_owned);
         let walls = WAYS.map(|(way, _)| format!("wall {way}"));
@@ -174,8 +174,8 @@ pub fn push_rays(observation: &mut Observation, to_goal: [f32; 2], wall: impl Fn
 #[cfg(test)]
 mod with_senses_tests {
     use crate::{
-        antmaze::{AntMazeWithMap, AntMazeWithRays, AntMazeWithWaves},
-        maze2d::{Maze2d, Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves},
+        antmaze::{AntMazeWithMap, AntMazeWithPositionalEncoding, AntMazeWithRays},
+        maze2d::{Maze2d, Maze2dWithMap, Maze2dWithPositionalEncoding, Maze2dWithRays},
     };
     use playbot_harness::game::Game;
 
@@ -186,8 +186,8 @@ mod with_senses_tests {
             (&Maze2dWithRays::default(), ["vy", "goal x", "wall east"], 14),
             (&AntMazeWithMap::default(), ["ankle 4 velocity", "goal x", "wall east"], 160),
             (&Maze2dWithMap::default(), ["vy", "goal x", "wall east"], 135),
-            (&AntMazeWithWaves::default(), ["ankle 4 velocity", "x sine of 8", "x sine of 4"], 45),
-            (&Maze2dWithWaves::default(), ["vy", "x sine of 8", "x sine of 4"], 20),
+            (&AntMazeWithPositionalEncoding::default(), ["ankle 4 velocity", "x sine of 8", "x sine of 4"], 45),
+            (&Maze2dWithPositionalEncoding::default(), ["vy", "x sine of 8", "x sine of 4"], 20),
         ];
         for (game, [last, first, third], all) in games {
             let names = game.observation().names;
@@ -225,7 +225,7 @@ mod mapped_tests {
         push_map(&mut observation, |[east, north]| (east, north) == (-5, 5) || (east, north) == (1, 0));
         let walls: Vec<usize> = (0..121).filter(|&at| observation.vector[at] > 0.5).collect();
         assert_eq!((observation.vector.len(), walls.as_slice()), (121, &[0, 61][..]));
-        assert_eq!((&*Mapped.names()[10], &*Mapped.names()[71]), ("cell -5 east +5 north", "cell +1 east +0 north"));
+        assert_eq!((&*WithMap.names()[10], &*WithMap.names()[71]), ("cell -5 east +5 north", "cell +1 east +0 north"));
     }
 }
 

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use bevy_playbot::test_app::test_app;
 use playbot_harness::{
     defect::{ChangeRules, Plant},
-    detector::{Detector, LevelAhead, Moment, NoProofs},
+    detector::{Detector, DetectorTick, LevelAhead, NoProofs},
     prelude::*,
 };
 use std::sync::Arc;
@@ -45,7 +45,7 @@ pub(crate) fn first_finding(
         app.tick().expect("sound");
         let world = app.world();
         let is_over = world.get::<EpisodeCount>(agent)?.finished > 0;
-        let moment = Moment {
+        let moment = DetectorTick {
             world,
             agent,
             level,

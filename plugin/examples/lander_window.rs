@@ -12,7 +12,7 @@ pub mod lander_rules;
 use bevy::prelude::*;
 use bevy_playbot::{
     headless::set_fixed_step,
-    policy_file::{DeviceKind, GameCard, PolicyFile, check_policy, install_policy},
+    policy_file::{DeviceKind, GameMetadata, PolicyFile, check_policy, install_policy},
     prelude::*,
     takeover::{GameIdentity, TakeoverPlugin, TakeoverRequest},
 };
@@ -61,7 +61,7 @@ fn main() -> AppExit {
 /// The file is damaged, or was made for other rules.
 pub fn add_shipped_policy(app: &mut App) -> Result<(), Box<dyn std::error::Error>> {
     let file = PolicyFile::from_bytes("lander.policy".as_ref(), SHIPPED, DeviceKind::default())?;
-    let card = GameCard {
+    let card = GameMetadata {
         name: "lander",
         version: 1,
         observations: OBSERVATION.map(String::from).into(),

@@ -7,7 +7,7 @@
 //! | to | use |
 //! |---|---|
 //! | drive a World without an app | [`headless_frame_app`], [`into_world`], [`run_on_one_thread`], [`tick_world`] |
-//! | begin an episode in a World as new | [`Renewal`], [`EpisodeAhead`] |
+//! | begin an episode in a World as new | [`Renewal`], [`NextEpisode`] |
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
 //! | decide for many agents at once | [`PolicyBatch`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
 //! | keep systems in one order | [`put_in_order`], [`leave_open`], [`FaultSystems`], [`run_observe_schedule`] |
@@ -41,7 +41,7 @@ pub use crate::{
     observation::check_observations,
     panics,
     policy_batch::{Playing, PolicyBatch, SharedBatch},
-    renewal::{EpisodeAhead, Renewal},
+    renewal::{NextEpisode, Renewal},
     skill_prior::draw_skills,
     system_errors,
     systems::{leave_open, put_in_order, run_observe_schedule},

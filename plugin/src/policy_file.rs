@@ -2,7 +2,7 @@
 //!
 //! ```
 //! use bevy_playbot::{
-//!     policy_file::{GameCard, PolicyCard, PolicyFile, check_policy, install_policy},
+//!     policy_file::{GameMetadata, PolicyMetadata, PolicyFile, check_policy, install_policy},
 //!     prelude::*,
 //! };
 //! use playbot_learner::DeviceKind;
@@ -10,12 +10,12 @@
 //! # let spec = PolicySpec { obs: 1.into(), latent: 0, action_space: ActionSpace::Discrete(3) };
 //! # let policy = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex)?.policy();
 //! # let observations = vec!["x".into()];
-//! # let card = PolicyCard { game: "walk".into(), game_version: 1, observations, ..PolicyCard::default() };
+//! # let card = PolicyMetadata { game: "walk".into(), game_version: 1, observations, ..PolicyMetadata::default() };
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("walker.policy");
 //! # PolicyFile { card, policy, skills: None }.save(&path, &[0.5_f32], &[], 1)?;
 //!
-//! let walk = GameCard {
+//! let walk = GameMetadata {
 //!     name: "walk",
 //!     version: 1,
 //!     observations: vec!["x".into()],
@@ -30,7 +30,7 @@
 //! install_policy(app.world_mut(), &file, ActionDraw::Sample);
 //! assert!(app.world().contains_resource::<ActivePolicy>());
 //!
-//! let error = check_policy(&GameCard { version: 2, ..walk }, &file).expect_err("the rules have changed");
+//! let error = check_policy(&GameMetadata { version: 2, ..walk }, &file).expect_err("the rules have changed");
 //! assert!(error.to_string().contains("version 1 of `walk`, whose rules are at version 2"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
@@ -45,12 +45,12 @@ use bevy::prelude::*;
 use playbot_learner::HasExitCode;
 use thiserror::Error;
 
-pub use playbot_learner::{DeviceKind, PolicyCard, PolicyFile, SkillSource};
+pub use playbot_learner::{DeviceKind, PolicyFile, PolicyMetadata, SkillSource};
 
 /// Metadata of a game. A policy that was made for another game, or another version of this one,
 /// does not fit.
 #[derive(Clone, Debug, PartialEq)]
-pub struct GameCard<'a> {
+pub struct GameMetadata<'a> {
     /// Name of the game.
     pub name: &'a str,
     /// Version of its rules.
@@ -177,7 +177,7 @@ pub fn policy_observation(file: &PolicyFile) -> Result<ObservationConfig, Unknow
 /// # Errors
 ///
 /// [`PolicyMisfit`] with the first difference.
-pub fn check_policy(game: &GameCard<'_>, file: &PolicyFile) -> Result<(), PolicyMisfit> {
+pub fn check_policy(game: &GameMetadata<'_>, file: &PolicyFile) -> Result<(), PolicyMisfit> {
     let (card, name) = (&file.card, game.name.to_owned());
     if card.game != name {
         return Err(PolicyMisfit::Game { made_for: card.game.clone(), game: name });
@@ -204,7 +204,7 @@ pub fn check_policy(game: &GameCard<'_>, file: &PolicyFile) -> Result<(), Policy
 }
 
 /// Compares the names of the values that the policy reads with those of the game.
-fn check_names(game: &GameCard<'_>, file: &PolicyFile) -> Result<(), PolicyMisfit> {
+fn check_names(game: &GameMetadata<'_>, file: &PolicyFile) -> Result<(), PolicyMisfit> {
     let (card, names) = (&file.card, &game.observations);
     let reads = file.policy.obs_dim();
     if reads != card.observations.len() {

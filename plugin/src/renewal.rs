@@ -65,7 +65,7 @@ pub struct Renewal {
 /// The level of the first episode of a World that has not begun to run. Triggered before anything
 /// of the game runs, in Worlds with a [`Renewal`].
 #[derive(EntityEvent, Clone, Copy, Debug, Reflect)]
-pub struct EpisodeAhead {
+pub struct NextEpisode {
     /// The agent.
     pub entity: Entity,
     /// Number of the level.
@@ -125,7 +125,7 @@ pub(crate) fn renew_if_due(world: &mut World) -> Result<bool, Fault> {
 }
 
 /// Returns the episodes that begin in the next tick; empty while another one is being played.
-fn episodes_ahead(world: &mut World) -> Vec<EpisodeAhead> {
+fn episodes_ahead(world: &mut World) -> Vec<NextEpisode> {
     let seed = world.get_resource::<PlaybotSeed>().copied().unwrap_or_default();
     let mut agents = world.query::<(Entity, &Agent, &Control, &Episode, &LevelQueue, &AgentStreams)>();
     let mut ahead = Vec::new();
@@ -137,7 +137,7 @@ fn episodes_ahead(world: &mut World) -> Vec<EpisodeAhead> {
         let mut streams = streams.clone();
         streams.seed(seed, agent.index);
         let level = queue.clone().next_level(&mut streams.level);
-        ahead.extend(level.filter(|_| control.is_active()).map(|level| EpisodeAhead { entity, level }));
+        ahead.extend(level.filter(|_| control.is_active()).map(|level| NextEpisode { entity, level }));
     }
     ahead
 }

@@ -27,13 +27,13 @@ type Hinges = [[f64; 2]; LEGS];
 
 /// Positions: the integrals of velocities.
 #[derive(Clone, Copy, Debug, Reflect)]
-struct Place {
+struct JointPositions {
     position: DVec3,
     orientation: DQuat,
     joints: Hinges,
 }
 
-impl Place {
+impl JointPositions {
     fn moved(&self, h: f64, rates: &Rates) -> Self {
         Self {
             position: self.position + h * rates.centre,
@@ -88,7 +88,7 @@ pub struct AntBody {
     #[reflect(ignore)]
     walls: Walls,
     gravity: f64,
-    place: Place,
+    place: JointPositions,
     rates: Rates,
     /// Accelerations of the last solution, the first guess of the next.
     warm: Coordinates,
@@ -111,7 +111,7 @@ impl AntBody {
             solids,
             walls: Walls::new(walls),
             gravity: GRAVITY,
-            place: Place { position: DVec3::ZERO, orientation: DQuat::IDENTITY, joints: Hinges::default() },
+            place: JointPositions { position: DVec3::ZERO, orientation: DQuat::IDENTITY, joints: Hinges::default() },
             rates: Rates::default(),
             warm: Coordinates::default(),
             near: Vec::new(),
@@ -132,7 +132,7 @@ impl AntBody {
     /// Sets the ant's state and forgets earlier steps.
     pub fn set_state(&mut self, state: &AntState) {
         let (q, v) = (state.qpos.map(f64::from), state.qvel.map(f64::from));
-        self.place = Place {
+        self.place = JointPositions {
             position: DVec3::new(q[0], q[1], q[2]),
             orientation: DQuat::from_xyzw(q[4], q[5], q[6], q[3]).normalize(),
             joints: std::array::from_fn(|leg| [q[7 + 2 * leg], q[8 + 2 * leg]]),
@@ -213,11 +213,11 @@ impl AntBody {
         self.rates = rates.plus(h, &slope);
     }
 
-    fn pose(&self, place: &Place) -> Pose {
+    fn pose(&self, place: &JointPositions) -> Pose {
         Pose::new(place.position, place.orientation, &place.joints)
     }
 
-    fn acceleration(&mut self, place: &Place, rates: &Rates, torques: &Hinges) -> Rates {
+    fn acceleration(&mut self, place: &JointPositions, rates: &Rates, torques: &Hinges) -> Rates {
         let pose = self.pose(place);
         let legs = pose.legs.map(|leg| self.solids.leg(&leg));
         let (spin, centre) = (rates.spin, pose.rotation.transpose() * rates.centre);
@@ -232,7 +232,7 @@ impl AntBody {
         Rates { spin: DVec3::new(a, b, c), centre: pose.rotation * DVec3::new(d, e, f), joints: self.warm.legs }
     }
 
-    fn constrain(&mut self, place: &Place, pose: &Pose, velocity: &Coordinates) {
+    fn constrain(&mut self, place: &JointPositions, pose: &Pose, velocity: &Coordinates) {
         self.rows.clear();
         constraint::limits(&place.joints, velocity, &self.mobility, &mut self.rows);
         contact::find(pose, &self.near, &mut self.contacts);

@@ -1,6 +1,6 @@
 //! The look of ants and of the ground they walk on, for every game with ants.
 //!
-//! A game describes its scene with [`AntPose`], [`GoalMark`] and [`OnGround`] on its agents and [`Ground`] on their
+//! A game describes its scene with [`AntPose`], [`GoalMark`] and [`OnGround`] on its agents and [`ArenaGround`] on their
 //! arenas, in [`AntViewSystems::Show`]. It is drawn from above with sprites, for sensors and windows, and with the
 //! feature `view3d` also in space with meshes, for windows.
 
@@ -57,7 +57,7 @@ pub struct GoalMark {
     pub radius: f32,
 }
 
-/// The arena in which an agent's ant walks: an entity with a [`Ground`].
+/// The arena in which an agent's ant walks: an entity with a [`ArenaGround`].
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Component)]
 pub struct OnGround(pub Entity);
@@ -66,7 +66,7 @@ pub struct OnGround(pub Entity);
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]
-pub struct Ground {
+pub struct ArenaGround {
     /// Side of a cell, metres.
     pub cell: f32,
     /// The corner of the first cell, `[x, y]` in metres: cells go from there along x, and rows of them along y.
@@ -81,7 +81,7 @@ pub struct Ground {
     pub boxes: Vec<WallBox>,
 }
 
-impl Ground {
+impl ArenaGround {
     /// Returns a floor without walls.
     pub fn open() -> Self {
         Self { cell: 4.0, corner: [0.0; 2], columns: 0, is_wall: Vec::new(), walled: false, boxes: Vec::new() }
@@ -116,7 +116,7 @@ impl Plugin for AntPicturePlugin {
 /// Gives each ant a floor of its own.
 fn lay_floors(new: Query<Entity, (With<Walker>, Without<OnGround>)>, mut commands: Commands) {
     for agent in &new {
-        let floor = commands.spawn(Ground::open()).id();
+        let floor = commands.spawn(ArenaGround::open()).id();
         commands.entity(agent).insert(OnGround(floor));
     }
 }

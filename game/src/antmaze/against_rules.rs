@@ -11,7 +11,7 @@ use crate::{
     maze::paid_otherwise,
 };
 use playbot_harness::{
-    detector::{Detector, LevelAhead, Moment, Setting, Watch},
+    detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting},
     prelude::*,
 };
 
@@ -56,13 +56,13 @@ impl Detector for AgainstRules {
         vec![Setting::new("every", &mut self.every, what).at_least(1.0)]
     }
 
-    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         Some(Box::new(Following { every: self.every as u32, body: None, is_ready: false }))
     }
 }
 
-impl Watch for Following {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Following {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let ant = &moment.world.get::<MazeAnt>(moment.agent)?.0;
         let level = &moment.world.get::<InMaze>(moment.agent)?.0;
         let ActionValue::Continuous(action) = moment.action else { return None };

@@ -68,7 +68,7 @@ impl AntMazeMode {
     /// on the smallest map for 700.
     pub fn on(map: Map) -> Self {
         let (pay, goals, goal_noise) = (Pay::default(), Goals::default(), GoalNoise::default());
-        Self { limit: usual_limit(&map), map, pay, goals, goal_noise, random_start: false }
+        Self { limit: default_limit(&map), map, pay, goals, goal_noise, random_start: false }
     }
 
     /// Returns the goals of the demonstrations on this map; empty on a generated one.
@@ -114,7 +114,7 @@ impl AntMazeMode {
     }
 }
 
-fn usual_limit(map: &Map) -> u32 {
+fn default_limit(map: &Map) -> u32 {
     if *map == Map::Umaze { 700 } else { 1000 }
 }
 
@@ -157,7 +157,7 @@ impl fmt::Display for AntMazeMode {
             GoalNoise::D4rl => "+goal-noise=d4rl",
         })?;
         f.write_str(if self.random_start { "+random-start" } else { "" })?;
-        if self.limit == usual_limit(&self.map) { Ok(()) } else { write!(f, "+limit={}", self.limit) }
+        if self.limit == default_limit(&self.map) { Ok(()) } else { write!(f, "+limit={}", self.limit) }
     }
 }
 

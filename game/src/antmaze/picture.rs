@@ -1,7 +1,7 @@
 //! The picture of AntMaze.
 
 use crate::{
-    ant::view::{AntPose, AntViewPlugin, AntViewSystems, GoalMark, Ground, OnGround},
+    ant::view::{AntPose, AntViewPlugin, AntViewSystems, ArenaGround, GoalMark, OnGround},
     antmaze::{
         arena::{GOAL_RADIUS, InMaze, MazeAnt, PlaysIn},
         geometry::{CELL, centre_of, wall_boxes},
@@ -47,10 +47,10 @@ fn show_ants(mut ants: Query<(Entity, &MazeAnt, Option<&mut AntPose>)>, mut comm
     }
 }
 
-fn ground(maze: &Maze) -> Ground {
+fn ground(maze: &Maze) -> ArenaGround {
     let first = centre_of(maze, Cell::default());
     let cells = (0..maze.rows()).flat_map(|row| (0..maze.columns()).map(move |col| Cell { row, col }));
-    Ground {
+    ArenaGround {
         cell: CELL,
         corner: first.map(|x| x - CELL / 2.0),
         columns: maze.columns() as u32,

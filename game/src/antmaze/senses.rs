@@ -7,7 +7,7 @@ use crate::{
         arena::{InMaze, MazeAnt},
         geometry::{CELL, cell_at},
     },
-    senses::{Mapped, Placed, Senses, Sighted, WithSenses, push_map, push_rays, push_waves},
+    senses::{Senses, WithMap, WithObservations, WithPositionalEncoding, WithRays, push_map, push_rays, push_waves},
 };
 use bevy::{math::Vec3, prelude::*};
 use bevy_playbot::vision::VisionSystems;
@@ -21,15 +21,15 @@ pub const RAY_LENGTH: f32 = 8.0;
 const RAY_HEIGHTS: std::ops::RangeInclusive<f32> = 0.1..=1.9;
 
 /// AntMaze with rays, under its name `antmaze-sighted`. East is x and north is y.
-pub type AntMazeWithRays = WithSenses<AntMaze, Sighted>;
+pub type AntMazeWithRays = WithObservations<AntMaze, WithRays>;
 
 /// AntMaze with rays and a map, under its name `antmaze-mapped`.
-pub type AntMazeWithMap = WithSenses<AntMaze, Mapped>;
+pub type AntMazeWithMap = WithObservations<AntMaze, WithMap>;
 
 /// AntMaze with positional encoding, under its name `antmaze-placed`.
-pub type AntMazeWithWaves = WithSenses<AntMaze, Placed>;
+pub type AntMazeWithPositionalEncoding = WithObservations<AntMaze, WithPositionalEncoding>;
 
-impl Senses<AntMaze> for Sighted {
+impl Senses<AntMaze> for WithRays {
     const NAME: &'static str = "antmaze-sighted";
 
     fn build(self, app: &mut App) {
@@ -37,7 +37,7 @@ impl Senses<AntMaze> for Sighted {
     }
 }
 
-impl Senses<AntMaze> for Mapped {
+impl Senses<AntMaze> for WithMap {
     const NAME: &'static str = "antmaze-mapped";
 
     fn build(self, app: &mut App) {
@@ -46,7 +46,7 @@ impl Senses<AntMaze> for Mapped {
     }
 }
 
-impl Senses<AntMaze> for Placed {
+impl Senses<AntMaze> for WithPositionalEncoding {
     const NAME: &'static str = "antmaze-placed";
 
     fn build(self, app: &mut App) {
@@ -143,7 +143,7 @@ mod tests {
 
     #[test]
     fn waves_are_of_the_place_that_is_told_in_metres() {
-        let game = AntMazeWithWaves::default();
+        let game = AntMazeWithPositionalEncoding::default();
         for level in 0..4 {
             let (mut world, agents) = build_world(&game, "xl+random-start", 0, 0, 1);
             world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Always(level)));

@@ -14,7 +14,7 @@ use crate::coinrun::{
 use bevy::prelude::*;
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
 use playbot_harness::{
-    detector::{Detector, EachTick, LevelAhead, Moment, Watch},
+    detector::{Detector, DetectorTick, EachTick, EpisodeWatcher, LevelAhead},
     prelude::*,
 };
 
@@ -35,7 +35,7 @@ pub(super) fn detectors() -> Vec<Box<dyn Detector>> {
 
 /// Finds a player that touches the coin in an episode that goes on.
 fn goal_ignored() -> impl Detector {
-    EachTick::new("goal-ignored", "the coin is touched and the episode goes on", |moment: &Moment<'_>| {
+    EachTick::new("goal-ignored", "the coin is touched and the episode goes on", |moment: &DetectorTick<'_>| {
         let is_ignored = goes_on(moment) && touched(moment) == Some(Outcome::Coin);
         is_ignored.then(|| format!("touches the coin at {}, and the episode goes on", place(moment)))
     })
@@ -45,7 +45,7 @@ fn goal_ignored() -> impl Detector {
 
 /// Returns the contact of the player by the rules, without the clock; `None` too without a player of CoinRun. Saws are
 /// those of the level and added ones; every hazard fills a tile, whatever its body.
-fn touched(moment: &Moment<'_>) -> Option<Outcome> {
+fn touched(moment: &DetectorTick<'_>) -> Option<Outcome> {
     let world = moment.world;
     let player = world.get::<PlayerBody>(moment.agent)?.0;
     let arena = world.get::<PlaysIn>(moment.agent)?.0;
@@ -64,13 +64,13 @@ fn touched(moment: &Moment<'_>) -> Option<Outcome> {
 }
 
 /// Returns true if the episode goes on after this tick.
-fn goes_on(moment: &Moment<'_>) -> bool {
+fn goes_on(moment: &DetectorTick<'_>) -> bool {
     let episode = moment.world.get::<Episode>(moment.agent);
     episode.is_some_and(|episode| episode.is_running() && episode.end().is_none())
 }
 
 /// Describes the position of the player, for messages.
-fn place(moment: &Moment<'_>) -> String {
+fn place(moment: &DetectorTick<'_>) -> String {
     let body = moment.world.get::<PlayerBody>(moment.agent).map(|body| body.0).unwrap_or_default();
     format!("({:.1}, {:.1})", body.x, body.y)
 }
@@ -80,7 +80,7 @@ fn place(moment: &Moment<'_>) -> String {
 /// Finds a player whose middle is in ground with more ground below it. By the rules a player's corners stay out of
 /// walls, and it can be in one only across a ledge one tile thick.
 fn inside_ground() -> impl Detector {
-    EachTick::new("inside-ground", "a player is inside of ground", |moment: &Moment<'_>| {
+    EachTick::new("inside-ground", "a player is inside of ground", |moment: &DetectorTick<'_>| {
         let body = moment.world.get::<PlayerBody>(moment.agent)?.0;
         let arena = moment.world.get::<PlaysIn>(moment.agent)?.0;
         let tiles = &moment.world.get::<Arena>(arena)?.level.tiles;
@@ -119,13 +119,13 @@ impl Detector for StrayEnemy {
         "an enemy is outside of the row or of the walls between which it started"
     }
 
-    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         Some(Box::new(Looking::default()))
     }
 }
 
-impl Watch for Looking {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Looking {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let world = moment.world;
         let arena = world.get::<PlaysIn>(moment.agent)?.0;
         let level = &world.get::<Arena>(arena)?.level;
@@ -162,7 +162,7 @@ fn harmless_hazard() -> impl Detector {
     EachTick::new(
         "harmless-hazard",
         "a saw, an enemy or lava is touched and the episode goes on",
-        |moment: &Moment<'_>| {
+        |moment: &DetectorTick<'_>| {
             if !goes_on(moment) {
                 return None;
             }
@@ -191,17 +191,17 @@ impl Detector for FarHazard {
         "an episode is lost without touching a hazard"
     }
 
-    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         Some(Box::new(LookingForLethal))
     }
 }
 
-impl Watch for LookingForLethal {
-    fn tick(&mut self, _moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for LookingForLethal {
+    fn tick(&mut self, _moment: &DetectorTick<'_>) -> Option<String> {
         None
     }
 
-    fn end(&mut self, moment: &Moment<'_>, result: &EpisodeResult) -> Option<String> {
+    fn end(&mut self, moment: &DetectorTick<'_>, result: &EpisodeResult) -> Option<String> {
         let is_unfounded = result.end == EpisodeEnd::LOST && touched(moment).is_none_or(Outcome::is_success);
         is_unfounded.then(|| format!("lost at {} without touching a hazard", place(moment)))
     }
@@ -218,7 +218,7 @@ mod catalogue_tests {
     fn names_are_different_and_all_are_usual() {
         let names: BTreeSet<_> = detectors().iter().map(|detector| detector.name()).collect();
         assert_eq!(names.len(), 5);
-        assert!(detectors().iter().all(|detector| detector.is_usual()));
+        assert!(detectors().iter().all(|detector| detector.is_default()));
     }
 
     #[test]

@@ -21,7 +21,7 @@ mod sweep;
 
 use crate::coinrun::{
     paths::{
-        ground::{Ground, NearCrates},
+        ground::{NearCrates, PathGround},
         sweep::Swept,
     },
     rules::{Body, OVERLAP_MARGIN, Outcome, PlayerState, is_supported, motion::touch},
@@ -58,7 +58,7 @@ impl Course {
     ///
     /// Hands the course to `fork` before the first step in which the jump button makes a difference.
     #[inline(always)]
-    pub fn go_on<const JUMPS: bool>(&mut self, ground: &Ground, ax: i8, mut fork: impl FnMut(&Course)) {
+    pub fn go_on<const JUMPS: bool>(&mut self, ground: &PathGround, ax: i8, mut fork: impl FnMut(&Course)) {
         let (mut walker, [x, y], mut is_alike) = (self.walker, self.start, true);
         while self.steps < STEPS as usize && (walker.x - x).abs() < HALF_VIEW && (walker.y - y).abs() < HALF_VIEW {
             if is_alike && walker.supported {
@@ -240,7 +240,7 @@ impl Surroundings {
         let is_near = |body: &&Body| (body.x - player.x).abs() < FAR;
         self.crates.replace(player, crates.iter().filter(is_near));
         self.dangers.replace(player, STEPS, saws.iter().filter(is_near), enemies.iter().filter(is_near));
-        let ground = Ground::new(tiles, &self.crates, player);
+        let ground = PathGround::new(tiles, &self.crates, player);
         let start = Course::new(Walker::new(player, memory, &ground));
         for (ax, with_jump, without) in PAIRS {
             let (mut course, mut fork) = (start.clone(), None);
@@ -278,7 +278,7 @@ impl Surroundings {
 
 // A player on a path.
 
-/// A player on a path. Its size is that of the [`Ground`].
+/// A player on a path. Its size is that of the [`PathGround`].
 #[derive(Clone, Copy, PartialEq, Debug)]
 struct Walker {
     /// Centre, tiles from the left.
@@ -295,14 +295,14 @@ struct Walker {
 
 impl Walker {
     /// Returns a player at the beginning of a path.
-    pub fn new(body: &Body, memory: &PlayerState, ground: &Ground) -> Self {
+    pub fn new(body: &Body, memory: &PlayerState, ground: &PathGround) -> Self {
         let supported = is_supported(body, memory, ground.tiles);
         Self { x: body.x, y: body.y, vx: body.vx, vy: body.vy, supported }
     }
 
     /// Returns the player's body by the rules.
     #[inline]
-    pub fn body(&self, ground: &Ground) -> Body {
+    pub fn body(&self, ground: &PathGround) -> Body {
         Body { x: self.x, y: self.y, vx: self.vx, vy: self.vy, rx: ground.rx, ry: ground.ry }
     }
 }

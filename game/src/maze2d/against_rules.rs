@@ -11,7 +11,7 @@ use crate::{
     },
 };
 use playbot_harness::{
-    detector::{Detector, LevelAhead, Moment, Watch},
+    detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead},
     prelude::*,
 };
 
@@ -51,13 +51,13 @@ impl Detector for AgainstRules {
         "the ball does not move, or is not paid, as the rules say"
     }
 
-    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         Some(Box::<Following>::default())
     }
 }
 
-impl Watch for Following {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Following {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let world = moment.world;
         let ball = world.get::<MazeBall>(moment.agent)?.0;
         let MazeArena { level, rules, .. } = world.get::<MazeArena>(world.get::<PlaysIn>(moment.agent)?.0)?;

@@ -61,7 +61,7 @@ impl Maze2dMode {
 
     /// Returns D4RL's rules on a map: random start, dense reward, its time limit (version 1).
     pub fn new(map: Map) -> Self {
-        let limit = usual_limit(&map);
+        let limit = default_limit(&map);
         Self {
             map,
             sparse: false,
@@ -145,7 +145,7 @@ impl Maze2dMode {
 }
 
 /// Returns D4RL's limits, version 1; for other maps, time for the longest paths at the demonstrator's pace.
-fn usual_limit(map: &Map) -> u32 {
+fn default_limit(map: &Map) -> u32 {
     match map {
         Map::Umaze => 300,
         Map::Medium => 600,

@@ -6,7 +6,7 @@ use crate::{
         arena::{MazeArena, MazeBall, PlaysIn},
         ball::sub,
     },
-    senses::{Mapped, Placed, Senses, Sighted, WithSenses, push_map, push_rays, push_waves},
+    senses::{Senses, WithMap, WithObservations, WithPositionalEncoding, WithRays, push_map, push_rays, push_waves},
 };
 use bevy::prelude::*;
 use bevy_playbot::vision::VisionSystems;
@@ -17,15 +17,15 @@ pub const RAY_LENGTH: f64 = 4.0;
 
 /// Maze2D with rays, under its name `maze2d-sighted`. As in the picture, east is along the columns, y, and north is up
 /// the rows, against x.
-pub type Maze2dWithRays = WithSenses<Maze2d, Sighted>;
+pub type Maze2dWithRays = WithObservations<Maze2d, WithRays>;
 
 /// Maze2D with rays and a map, under its name `maze2d-mapped`.
-pub type Maze2dWithMap = WithSenses<Maze2d, Mapped>;
+pub type Maze2dWithMap = WithObservations<Maze2d, WithMap>;
 
 /// Maze2D with positional encoding, under its name `maze2d-placed`.
-pub type Maze2dWithWaves = WithSenses<Maze2d, Placed>;
+pub type Maze2dWithPositionalEncoding = WithObservations<Maze2d, WithPositionalEncoding>;
 
-impl Senses<Maze2d> for Sighted {
+impl Senses<Maze2d> for WithRays {
     const NAME: &'static str = "maze2d-sighted";
 
     fn build(self, app: &mut App) {
@@ -33,7 +33,7 @@ impl Senses<Maze2d> for Sighted {
     }
 }
 
-impl Senses<Maze2d> for Mapped {
+impl Senses<Maze2d> for WithMap {
     const NAME: &'static str = "maze2d-mapped";
 
     fn build(self, app: &mut App) {
@@ -42,7 +42,7 @@ impl Senses<Maze2d> for Mapped {
     }
 }
 
-impl Senses<Maze2d> for Placed {
+impl Senses<Maze2d> for WithPositionalEncoding {
     const NAME: &'static str = "maze2d-placed";
 
     fn build(self, app: &mut App) {
@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn waves_are_of_the_place_in_cells() {
         // A whole wavelength of a cell along x and a quarter of one along y.
-        let seen = seen(&Maze2dWithWaves::default(), "medium+no-offset", [2.0, 2.25]);
+        let seen = seen(&Maze2dWithPositionalEncoding::default(), "medium+no-offset", [2.0, 2.25]);
         assert_near(&seen[..4], &[2.0, 2.25, 0.0, 0.0]);
         assert_near(&[seen[10], seen[11], seen[18], seen[19]], &[0.0, 1.0, 1.0, 0.0]);
         // A quarter of eight cells along x.

@@ -4,9 +4,9 @@ use std::path::Path;
 
 use playbot::prelude::*;
 use playbot_games::{
-    antmaze::{AntMaze, AntMazeWithMap, AntMazeWithRays, AntMazeWithWaves},
+    antmaze::{AntMaze, AntMazeWithMap, AntMazeWithPositionalEncoding, AntMazeWithRays},
     coinrun::CoinRun,
-    maze2d::{Maze2d, Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves},
+    maze2d::{Maze2d, Maze2dWithMap, Maze2dWithPositionalEncoding, Maze2dWithRays},
 };
 use playbot_harness::{
     inspect::{LevelRequest, LevelView},
@@ -94,7 +94,7 @@ proptest! {
         ]),
         seed in 0u64..1000,
     ) {
-        assert_mazes_read_back([(&MAZE2D, 80), (&Maze2dWithRays::default(), 20), (&Maze2dWithMap::default(), 20), (&Maze2dWithWaves::default(), 20)], mode, level, seed);
+        assert_mazes_read_back([(&MAZE2D, 80), (&Maze2dWithRays::default(), 20), (&Maze2dWithMap::default(), 20), (&Maze2dWithPositionalEncoding::default(), 20)], mode, level, seed);
     }
 
     #[test]
@@ -108,7 +108,7 @@ proptest! {
         ]),
         seed in 0u64..1000,
     ) {
-        assert_mazes_read_back([(&AntMaze, 20), (&AntMazeWithRays::default(), 5), (&AntMazeWithMap::default(), 5), (&AntMazeWithWaves::default(), 5)], mode, level, seed);
+        assert_mazes_read_back([(&AntMaze, 20), (&AntMazeWithRays::default(), 5), (&AntMazeWithMap::default(), 5), (&AntMazeWithPositionalEncoding::default(), 5)], mode, level, seed);
     }
 }
 

@@ -179,7 +179,7 @@ impl LevelsArg {
     ) -> Result<(Option<&'a str>, u64), CliError> {
         let Some(levels) = &self.levels else {
             let level = self.number(seed).unwrap_or(0);
-            check_level(game, mode.unwrap_or_else(|| usual_mode(game)), level)?;
+            check_level(game, mode.unwrap_or_else(|| default_mode(game)), level)?;
             return Ok((mode, level));
         };
         levels.check(game)?;
@@ -239,7 +239,7 @@ fn explain(error: DemoFileError) -> CliError {
 // of the training levels of its experiment. The default held-out levels are the experiment's.
 
 /// The default experiment of a game.
-pub struct UsualExperiment {
+pub struct DefaultExperiment {
     /// Its origin, in words or as a path.
     pub origin: String,
     /// All its values.
@@ -247,30 +247,30 @@ pub struct UsualExperiment {
 }
 
 /// Returns the default experiment of a game; `None` if the game brings one that cannot be read.
-pub(crate) fn usual_experiment(game: &dyn Game) -> Option<UsualExperiment> {
+pub(crate) fn default_experiment_of(game: &dyn Game) -> Option<DefaultExperiment> {
     let text = experiment_of(game);
     let experiment = parse_experiment(&text.text, Path::new(&*text.origin)).ok()?;
-    Some(UsualExperiment { origin: text.origin.into_owned(), experiment })
+    Some(DefaultExperiment { origin: text.origin.into_owned(), experiment })
 }
 
 /// Returns the default mode of every verb: the one of the training levels, without its options.
-pub(crate) fn usual_mode(game: &dyn Game) -> &'static str {
+pub(crate) fn default_mode(game: &dyn Game) -> &'static str {
     let modes = game.modes();
-    let trained = usual_experiment(game).map(|usual| usual.experiment.train.mode).unwrap_or_default();
+    let trained = default_experiment_of(game).map(|usual| usual.experiment.train.mode).unwrap_or_default();
     let name = trained.split('+').next().unwrap_or_default();
     let known = |wanted: &str| modes.iter().copied().find(|mode| *mode == wanted);
     known(&trained).or_else(|| known(name)).or(modes.first().copied()).unwrap_or_default()
 }
 
 /// Returns the default held-out levels; `None` if the game brings none that it has.
-pub(crate) fn usual_held_out(game: &dyn Game) -> Option<LevelSplit> {
-    let test = usual_experiment(game)?.experiment.test;
+pub(crate) fn default_held_out(game: &dyn Game) -> Option<LevelSplit> {
+    let test = default_experiment_of(game)?.experiment.test;
     game.check_mode(&test.mode).is_ok().then_some(test)
 }
 
-/// Returns levels 0 to `last` of the [`usual_mode`].
+/// Returns levels 0 to `last` of the [`default_mode`].
 pub(crate) fn first_levels(game: &dyn Game, last: u64) -> LevelSplit {
-    LevelSplit { mode: usual_mode(game).to_owned(), first: 0, last }
+    LevelSplit { mode: default_mode(game).to_owned(), first: 0, last }
 }
 
 #[cfg(test)]
@@ -345,10 +345,10 @@ mod defaults_tests {
     #[test]
     fn a_game_without_an_experiment_has_its_first_mode_and_other_levels_held_out() {
         let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
-        let usual = usual_experiment(&game).expect("the plainest");
+        let usual = default_experiment_of(&game).expect("the plainest");
         assert_eq!(usual.origin, "the experiment of runner");
-        assert_eq!(usual_mode(&game), game.modes()[0]);
-        let held_out = usual_held_out(&game).expect("a mode of the game");
+        assert_eq!(default_mode(&game), game.modes()[0]);
+        let held_out = default_held_out(&game).expect("a mode of the game");
         assert_eq!(held_out, usual.experiment.test);
         assert!(!held_out.overlaps(&usual.experiment.train));
         assert_eq!(first_levels(&game, 9).to_string(), "default:0..9");

@@ -21,7 +21,7 @@ use std::{
 
 /// Playtesting bots that learn from demonstrations.
 #[derive(Parser)]
-#[command(name = output::USUAL, version, after_help = EXAMPLES)]
+#[command(name = output::DEFAULT_NAME, version, after_help = EXAMPLES)]
 pub(crate) struct Cli {
     /// Verb to run; `quickstart` if left out.
     #[command(subcommand)]
@@ -184,7 +184,7 @@ fn is_help(error: &clap::Error) -> bool {
 /// Returns the command line under the name of this program.
 fn with_own_name(command: Command) -> Command {
     let command = with_negative_numbers(command).name(output::name());
-    if output::name() == output::USUAL {
+    if output::name() == output::DEFAULT_NAME {
         return command;
     }
     // The version is this crate's, since the game's is not known here.

@@ -5,8 +5,8 @@
 //! out.
 
 use crate::{
-    arguments::usual_mode,
-    output::{USUAL, with_name},
+    arguments::default_mode,
+    output::{DEFAULT_NAME, with_name},
     verbs::level::shows_levels,
 };
 use clap::{Arg, Command};
@@ -51,7 +51,7 @@ fn of_argument(argument: Arg, program: &str) -> Arg {
 /// Returns the text below a command's options. `plays` tells whether the command takes the name of a game.
 fn examples(text: &str, plays: bool, program: &str, games: &[&dyn Game]) -> String {
     let first = games.first();
-    let mode = first.map(|game| usual_mode(*game));
+    let mode = first.map(|game| default_mode(*game));
     let bot = first.and_then(|game| game.tools().bots.demonstrator());
     let names = [
         ("GAME", first.map_or("GAME", |game| game.name())),
@@ -60,7 +60,7 @@ fn examples(text: &str, plays: bool, program: &str, games: &[&dyn Game]) -> Stri
     ];
     let mut lines = Vec::new();
     for line in text.lines() {
-        match line.strip_prefix("  ").filter(|line| line.starts_with(USUAL)) {
+        match line.strip_prefix("  ").filter(|line| line.starts_with(DEFAULT_NAME)) {
             Some(example) if works(example, plays, games) => lines.push(own_example(example, program, &names)),
             Some(_) => {}
             None => lines.push(line.to_owned()),
@@ -95,7 +95,7 @@ fn works(example: &str, plays: bool, games: &[&dyn Game]) -> bool {
 fn own_example(example: &str, program: &str, names: &[(&str, &str)]) -> String {
     let own = |text: &str| names.iter().fold(text.to_owned(), |text, (word, name)| text.replace(word, name));
     let (command, explanation) = example.split_once("   ").unwrap_or((example, ""));
-    let (command, explanation) = (own(&command.replacen(USUAL, program, 1)) + "  ", own(explanation));
+    let (command, explanation) = (own(&command.replacen(DEFAULT_NAME, program, 1)) + "  ", own(explanation));
     format!("  {command:<COLUMN$} {}", explanation.trim_start()).trim_end().to_owned()
 }
 

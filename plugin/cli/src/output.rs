@@ -105,12 +105,12 @@ fn picture(text: &str, kind: &str) -> Result<PathBuf, String> {
 // The program's name: that of its file, whatever games are in it.
 
 /// The name in texts that do not know their program, such as the errors of libraries.
-pub(crate) const USUAL: &str = "playbot";
+pub(crate) const DEFAULT_NAME: &str = "playbot";
 
 /// Returns the program's name, for commands in messages.
 pub(crate) fn name() -> &'static str {
     static NAME: OnceLock<String> = OnceLock::new();
-    NAME.get_or_init(|| env::args_os().next().as_deref().and_then(of_file).unwrap_or(USUAL).to_owned())
+    NAME.get_or_init(|| env::args_os().next().as_deref().and_then(of_file).unwrap_or(DEFAULT_NAME).to_owned())
 }
 
 fn of_file(path: &OsStr) -> Option<&str> {
@@ -124,7 +124,7 @@ pub(crate) fn named(text: &str) -> String {
 
 /// Puts a program's name into the commands that a text quotes.
 pub(crate) fn with_name(text: &str, program: &str) -> String {
-    text.replace(&format!("`{USUAL} "), &format!("`{program} "))
+    text.replace(&format!("`{DEFAULT_NAME} "), &format!("`{program} "))
 }
 
 // Wording of the contents of files.

@@ -199,11 +199,11 @@ pub(crate) fn write(file: &PlotFile, picture: &LevelPicture, tick_hz: f64) -> Re
 /// Trails as they come in, by floor and player.
 pub struct Footprints {
     file: PlotFile,
-    grounds: Vec<Ground>,
+    grounds: Vec<TestedGround>,
 }
 
 /// A floor and its levels.
-struct Ground {
+struct TestedGround {
     mode: String,
     levels: Vec<u64>,
     floor: Floor,
@@ -254,7 +254,7 @@ impl Footprints {
 
     /// Returns the index of a level's floor in the list.
     fn ground(&mut self, mode: &str, level: u64, plan: FloorPlan) -> usize {
-        let is_same = |ground: &Ground| {
+        let is_same = |ground: &TestedGround| {
             let known = &ground.floor.plan;
             let tiles = |plan: &FloorPlan| [&plan.walls, &plan.hazards, &plan.platforms].map(Vec::clone);
             ground.mode == mode && known.bounds == plan.bounds && tiles(known) == tiles(&plan)
@@ -262,10 +262,10 @@ impl Footprints {
         let (start, goal) = (plan.start, plan.goal);
         let at = self.grounds.iter().position(is_same).unwrap_or_else(|| {
             let floor = Floor { name: String::new(), plan, starts: vec![], goals: vec![], walkers: vec![] };
-            self.grounds.push(Ground { mode: mode.to_owned(), levels: Vec::new(), floor });
+            self.grounds.push(TestedGround { mode: mode.to_owned(), levels: Vec::new(), floor });
             self.grounds.len() - 1
         });
-        let Ground { levels, floor, .. } = &mut self.grounds[at];
+        let TestedGround { levels, floor, .. } = &mut self.grounds[at];
         for (list, place) in [(&mut floor.starts, start), (&mut floor.goals, goal)] {
             if !list.contains(&place) {
                 list.push(place);
@@ -281,7 +281,7 @@ impl Footprints {
     ///
     /// The file cannot be written.
     pub fn write(self, game: &dyn Game) -> Result<(), CliError> {
-        let floors = self.grounds.into_iter().map(Ground::named).collect();
+        let floors = self.grounds.into_iter().map(TestedGround::named).collect();
         let chart = TrailChart { title: format!("Paths of players in {}", game.name()), floors };
         self.file.write(&chart.draw())?;
         tell!("plot: {}", self.file.path().display());
@@ -289,7 +289,7 @@ impl Footprints {
     }
 }
 
-impl Ground {
+impl TestedGround {
     fn named(self) -> Floor {
         let first = self.levels.iter().min().copied().unwrap_or_default();
         let last = self.levels.iter().max().copied().unwrap_or_default();

@@ -1,11 +1,11 @@
 //! The contract of a detector, which looks for one kind of defect while testers play.
 //!
 //! ```
-//! use playbot_harness::detector::{Detector, EachTick, Moment};
+//! use playbot_harness::detector::{Detector, EachTick, DetectorTick};
 //!
 //! /// A game's own detector: no agent may owe money.
 //! fn debt() -> Box<dyn Detector> {
-//!     Box::new(EachTick::new("debt", "an agent owes money", |moment: &Moment<'_>| {
+//!     Box::new(EachTick::new("debt", "an agent owes money", |moment: &DetectorTick<'_>| {
 //!         let purse = moment.observation.first().copied().unwrap_or_default();
 //!         (purse < 0.0).then(|| format!("the purse holds {purse}"))
 //!     }))
@@ -36,7 +36,7 @@ pub trait Detector: Send + Sync {
     fn describe(&self) -> &'static str;
 
     /// Returns whether it is a default detector: cheap, and without false alarms in an unmutated game.
-    fn is_usual(&self) -> bool {
+    fn is_default(&self) -> bool {
         true
     }
 
@@ -46,12 +46,12 @@ pub trait Detector: Send + Sync {
     }
 
     /// Starts to watch an episode; `None` if there is nothing to watch.
-    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         None
     }
 
     /// Starts to watch a World; `None` if it watches agents only.
-    fn watch_world(&self) -> Option<Box<dyn WorldWatch>> {
+    fn watch_world(&self) -> Option<Box<dyn WorldWatcher>> {
         None
     }
 }
@@ -66,13 +66,13 @@ pub struct LevelAhead {
 }
 
 /// A detector's view of one agent during one episode.
-pub trait Watch {
+pub trait EpisodeWatcher {
     /// Examines the tick that was just played, the last one included. Returns a message if something is wrong: the
     /// finding of this tick, and the only one of the episode.
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String>;
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String>;
 
     /// Examines the end of the episode, after its last tick.
-    fn end(&mut self, _moment: &Moment<'_>, _result: &EpisodeResult) -> Option<String> {
+    fn end(&mut self, _moment: &DetectorTick<'_>, _result: &EpisodeResult) -> Option<String> {
         None
     }
 }
@@ -81,14 +81,14 @@ pub trait Watch {
 ///
 /// If it finds something while several agents play there, their episodes are replayed, each alone in a World of its
 /// own, to see whose finding it is.
-pub trait WorldWatch {
+pub trait WorldWatcher {
     /// Returns whether it reads the errors of the log.
     fn hears_errors(&self) -> bool {
         false
     }
 
     /// Returns a message if something is wrong.
-    fn tick(&mut self, moment: &WorldMoment<'_>) -> Option<String>;
+    fn tick(&mut self, moment: &WorldTick<'_>) -> Option<String>;
 }
 
 // Detectors with one question, asked after each tick.
@@ -104,7 +104,7 @@ struct Asking<F>(Arc<F>);
 
 impl<F> EachTick<F>
 where
-    F: Fn(&Moment<'_>) -> Option<String> + Send + Sync + 'static,
+    F: Fn(&DetectorTick<'_>) -> Option<String> + Send + Sync + 'static,
 {
     /// Creates a detector with this name and one line about it. The question returns a message if something is wrong.
     pub fn new(name: &'static str, describe: &'static str, question: F) -> Self {
@@ -114,7 +114,7 @@ where
 
 impl<F> Detector for EachTick<F>
 where
-    F: Fn(&Moment<'_>) -> Option<String> + Send + Sync + 'static,
+    F: Fn(&DetectorTick<'_>) -> Option<String> + Send + Sync + 'static,
 {
     fn name(&self) -> &'static str {
         self.name
@@ -124,13 +124,13 @@ where
         self.describe
     }
 
-    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         Some(Box::new(Asking(Arc::clone(&self.question))))
     }
 }
 
-impl<F: Fn(&Moment<'_>) -> Option<String>> Watch for Asking<F> {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl<F: Fn(&DetectorTick<'_>) -> Option<String>> EpisodeWatcher for Asking<F> {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         (self.0)(moment)
     }
 }
@@ -139,7 +139,7 @@ impl<F: Fn(&Moment<'_>) -> Option<String>> Watch for Asking<F> {
 
 /// A tick of an episode that was just played, with the World after it.
 #[derive(Clone, Copy)]
-pub struct Moment<'a> {
+pub struct DetectorTick<'a> {
     /// The World: to be read only. Other agents may play in it.
     pub world: &'a World,
     /// The agent.
@@ -166,15 +166,15 @@ pub struct Moment<'a> {
 
 /// A tick of a World.
 #[derive(Clone, Copy)]
-pub struct WorldMoment<'a> {
+pub struct WorldTick<'a> {
     /// The World: to be read only.
     pub world: &'a World,
     /// Errors that were logged in this tick, except by the engine. Only for detectors that
-    /// [read the log](WorldWatch::hears_errors).
+    /// [read the log](WorldWatcher::hears_errors).
     pub errors: &'a [String],
 }
 
-impl Moment<'_> {
+impl DetectorTick<'_> {
     /// Returns a hash of the known state: the game's own hash, the observation and the position.
     pub fn fingerprint(&self) -> u64 {
         let place = self.place.map_or([0.0; 2], |place| place.to_array());

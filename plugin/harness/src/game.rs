@@ -58,7 +58,7 @@ use bevy_playbot::{
     key_bindings::KeyBindings,
     observation::{Observation, ObservationSpace},
     placement::TickPlacement,
-    policy_file::GameCard,
+    policy_file::GameMetadata,
     unknown_name::UnknownName,
     vision::Picture,
 };
@@ -170,9 +170,9 @@ pub trait Game: Send + Sync {
     }
 
     /// What policy files say of the game.
-    fn card(&self) -> GameCard<'_> {
+    fn card(&self) -> GameMetadata<'_> {
         let GameTools { input, pictures, .. } = self.tools();
-        GameCard {
+        GameMetadata {
             name: self.name(),
             version: self.version(),
             observations: self.observation().names,

@@ -345,7 +345,7 @@ impl<'a, const N: usize> From<&'a [f32; N]> for ObsSlice<'a> {
 /// Their size is that of the policy's observation, and the network that reads them is part of the policy.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
 #[serde(deny_unknown_fields)]
-pub struct PictureCard {
+pub struct PictureMetadata {
     /// Name of the sensor that made them.
     pub sensor: String,
     /// Number of successive pictures in an image, oldest first.
@@ -356,7 +356,7 @@ pub struct PictureCard {
     pub paint_velocity: bool,
 }
 
-impl PictureCard {
+impl PictureMetadata {
     /// Channels of an image.
     pub fn channels(&self) -> usize {
         self.stack * if self.grayscale { 1 } else { 3 }

@@ -1,7 +1,7 @@
 //! Policies that a game ships with, each in one self-describing file.
 
 use crate::{
-    ActionSpace, DeviceKind, FileError, ImageShape, LearnError, ObsKind, ObsSlice, Observations, PictureCard,
+    ActionSpace, DeviceKind, FileError, ImageShape, LearnError, ObsKind, ObsSlice, Observations, PictureMetadata,
     PolicySpec, SeenLevels,
     file::{FileKind, TensorFile},
     nn::CnnKind,
@@ -26,7 +26,7 @@ const AGAIN: &str = ": export the policy again";
 #[derive(Clone, Debug)]
 pub struct PolicyFile {
     /// Its metadata.
-    pub card: PolicyCard,
+    pub card: PolicyMetadata,
     /// The policy.
     pub policy: Policy,
     /// Its skills, if it reads any.
@@ -36,7 +36,7 @@ pub struct PolicyFile {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Header {
-    card: PolicyCard,
+    card: PolicyMetadata,
     policy: PolicyShape,
     skills: Option<SkillsShape>,
     examples: usize,
@@ -131,7 +131,7 @@ impl PolicyFile {
 /// Metadata of a policy: its purpose and origin.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug, Default)]
 #[serde(deny_unknown_fields)]
-pub struct PolicyCard {
+pub struct PolicyMetadata {
     /// Name of the game.
     pub game: String,
     /// Version of the game's rules.
@@ -140,7 +140,7 @@ pub struct PolicyCard {
     pub observations: Vec<String>,
     /// Metadata of the images that it observes; `None` for vectors.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub picture: Option<PictureCard>,
+    pub picture: Option<PictureMetadata>,
     /// Names of the discrete choices or of the action vector's dimensions; may be empty.
     pub actions: Vec<String>,
     /// Name of the algorithm.

@@ -18,7 +18,7 @@ use crate::{
         batch::{Batch, JoinedRows, minibatches},
         metrics::Has,
         on_device::{Reports, SentRollout},
-        step::{Moment, step_in_parts},
+        step::{UpdateSettings, step_in_parts},
     },
     rng::ChaCha8Rng,
     score::{ScoreConfig, Teacher, TeacherOutput, TiedTo},
@@ -226,7 +226,7 @@ impl PpoLearner {
         let score = self.base.score_config().map(|score| score.at(self.base.updates, config.total_updates));
         let is_warming_up = self.base.updates < config.critic_warmup;
         self.prepare_adam(is_warming_up);
-        let moment = Moment { lr, score: score.as_ref(), is_warming_up };
+        let moment = UpdateSettings { lr, score: score.as_ref(), is_warming_up };
         let mut rng = self.base.streams.stream("ppo.minibatches", self.base.updates);
         let sum = if is_host(&self.base.device.plain()) {
             self.steps(&batch, &mut rng, &moment)?
@@ -259,7 +259,7 @@ impl PpoLearner {
         &mut self,
         batch: &Batch<'_>,
         rng: &mut ChaCha8Rng,
-        moment: &Moment<'_>,
+        moment: &UpdateSettings<'_>,
     ) -> Result<StepMetrics, LearnError> {
         let device = self.base.device.plain();
         let mut sum = StepMetrics::default();
@@ -275,7 +275,7 @@ impl PpoLearner {
         &mut self,
         batch: &Batch<'_>,
         rng: &mut ChaCha8Rng,
-        moment: &Moment<'_>,
+        moment: &UpdateSettings<'_>,
     ) -> Result<StepMetrics, LearnError> {
         let start = Instant::now();
         let sent = SentRollout::send(batch, &self.base.device.plain());

@@ -19,7 +19,7 @@ mod prior;
 mod trainer;
 
 use crate::{
-    ActionSpace, DeviceKind, FileError, ObsKind, PictureCard, PolicySpec, SeenLevels,
+    ActionSpace, DeviceKind, FileError, ObsKind, PictureMetadata, PolicySpec, SeenLevels,
     file::{FileKind, TensorFile},
     nn::frozen,
     norm::{ObsStats, put_obs_stats, take_obs_stats},
@@ -47,7 +47,7 @@ pub use crate::skill::{
 struct Header {
     skill: SkillDescription,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    picture: Option<PictureCard>,
+    picture: Option<PictureMetadata>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     demos: Option<SeenLevels>,
 }
@@ -65,7 +65,7 @@ pub struct SkillModel {
     pub(crate) nets: SkillNets,
     pub(crate) stats: Option<Arc<ObsStats>>,
     pub(crate) device: DeviceKind,
-    picture: Option<PictureCard>,
+    picture: Option<PictureMetadata>,
     demos: Option<SeenLevels>,
 }
 
@@ -81,12 +81,12 @@ impl SkillModel {
     }
 
     /// Adds metadata of the images that the model observes; `None` for vectors.
-    pub fn with_picture(self, picture: Option<PictureCard>) -> Self {
+    pub fn with_picture(self, picture: Option<PictureMetadata>) -> Self {
         Self { picture, ..self }
     }
 
     /// Returns the metadata of the images that it observes, if known.
-    pub fn picture(&self) -> Option<&PictureCard> {
+    pub fn picture(&self) -> Option<&PictureMetadata> {
         self.picture.as_ref()
     }
 

@@ -26,9 +26,9 @@ use thiserror::Error;
 
 pub use crate::bugs::{
     general::general_defects,
-    make::{Made, MakePlan, NoPlace, Source, make_bugs},
+    make::{Made, MakePlan, MissingMutants, Source, make_bugs},
     mutant::{Mutant, PlantedRules},
-    set::{BugGame, BugSet, PlantedBug, PlantedPart, SoundLevels},
+    set::{BugGame, BugSet, PlantedBug, PlantedPart, UnmutatedLevels},
 };
 
 // The defects that can be planted into a game.

@@ -57,7 +57,7 @@ pub use crate::score::{
 // The run of all testers on all subjects, on all cores.
 
 /// The callbacks of a running score.
-pub struct ScoreWatch<'a> {
+pub struct ScoreCallbacks<'a> {
     /// Receives how many more jobs have finished; called from several threads.
     pub progress: &'a (dyn Fn(u64) + Sync),
     /// Returns true to stop; finished jobs are kept.
@@ -102,7 +102,7 @@ impl<'a> ScoreRun<'a> {
     /// # Errors
     ///
     /// A tester cannot play at all, or the journal cannot be written.
-    pub fn run(&self, journal: &mut ScoreJournal, watch: &ScoreWatch) -> Result<Option<Score>, ScoreError> {
+    pub fn run(&self, journal: &mut ScoreJournal, watch: &ScoreCallbacks) -> Result<Option<Score>, ScoreError> {
         let is_open = |(case, contestant): &(&Case, &Contestant)| {
             let key = (case.subject.id.clone(), contestant.record.name.clone());
             !journal.finished().contains_key(&key)
@@ -140,7 +140,7 @@ impl<'a> ScoreRun<'a> {
     }
 
     /// Runs job after job on one thread.
-    fn work(&self, open: &[(&Case, &Contestant)], shared: &Mutex<Shared>, watch: &ScoreWatch) {
+    fn work(&self, open: &[(&Case, &Contestant)], shared: &Mutex<Shared>, watch: &ScoreCallbacks) {
         loop {
             let (case, contestant) = {
                 let mut shared = lock(shared);
@@ -170,7 +170,12 @@ impl<'a> ScoreRun<'a> {
         }
     }
 
-    fn job(&self, case: &Case, contestant: &Contestant, watch: &ScoreWatch) -> Result<Option<JobResult>, ScoreError> {
+    fn job(
+        &self,
+        case: &Case,
+        contestant: &Contestant,
+        watch: &ScoreCallbacks,
+    ) -> Result<Option<JobResult>, ScoreError> {
         if (watch.stop)() {
             return Ok(None);
         }

@@ -13,7 +13,7 @@ use crate::{
     observation::VectorSensor,
     placement::{TickPlacement, TickSchedules},
     policy::ActionDraw,
-    policy_file::{GameCard, check_policy, install_policy},
+    policy_file::{GameMetadata, check_policy, install_policy},
     skill_prior::ActiveSkill,
     streams::AgentStreams,
     takeover::{GameIdentity, TakeoverError},
@@ -53,10 +53,10 @@ pub(super) fn stop(world: &mut World, seats: Vec<Seat>) {
 
 /// Returns the metadata that a policy must match to play this agent. Names of actions are not known
 /// here, and pictures are checked when the policy first reads one.
-fn card(world: &World, agent: Entity) -> Option<GameCard<'_>> {
+fn card(world: &World, agent: Entity) -> Option<GameMetadata<'_>> {
     let game = world.resource::<GameIdentity>();
     let names = world.get::<VectorSensor>(agent).map(|sensor| sensor.space().names.clone());
-    Some(GameCard {
+    Some(GameMetadata {
         name: &game.name,
         version: game.version,
         observations: names.unwrap_or_default(),

@@ -4,7 +4,7 @@ use crate::{
     unknown_name::UnknownName,
     vision::{ImageOptions, ObservationConfig, ObservationKind},
 };
-use playbot_learner::{HasExitCode, ObsKind, PictureCard};
+use playbot_learner::{HasExitCode, ObsKind, PictureMetadata};
 use serde::Serialize;
 use thiserror::Error;
 
@@ -21,9 +21,9 @@ impl HasExitCode for UnknownObservation {}
 
 impl ObservationConfig {
     /// Returns the metadata for a file; `None` for vectors, whose names are kept.
-    pub fn card(&self) -> Option<PictureCard> {
+    pub fn card(&self) -> Option<PictureMetadata> {
         let ImageOptions { stack, grayscale, paint_velocity, .. } = self.image;
-        let card = PictureCard { sensor: self.kind.to_string(), stack: stack as usize, grayscale, paint_velocity };
+        let card = PictureMetadata { sensor: self.kind.to_string(), stack: stack as usize, grayscale, paint_velocity };
         self.is_image().then_some(card)
     }
 
@@ -33,7 +33,7 @@ impl ObservationConfig {
     ///
     /// [`UnknownObservation`] if the metadata is missing, not understood, or of pictures of another
     /// shape.
-    pub fn from_card(card: Option<&PictureCard>, observation: &ObsKind) -> Result<Self, UnknownObservation> {
+    pub fn from_card(card: Option<&PictureMetadata>, observation: &ObsKind) -> Result<Self, UnknownObservation> {
         let unknown = |why: String| Err(UnknownObservation { why });
         let (card, shape) = match (card, observation) {
             (None, ObsKind::Vector(_)) => return Ok(Self::default()),
@@ -104,7 +104,7 @@ mod tests {
             ObservationConfig::from_card(ObservationConfig::default().card().as_ref(), &ObsKind::Vector(3)),
             Ok(ObservationConfig::default())
         );
-        let other = |sensor: &str| card.clone().map(|card| PictureCard { sensor: sensor.to_owned(), ..card });
+        let other = |sensor: &str| card.clone().map(|card| PictureMetadata { sensor: sensor.to_owned(), ..card });
         for (card, observation, words) in [
             (None, image.obs_kind(), "has no metadata"),
             (card.clone(), ObsKind::Vector(3), "vectors of 3"),

@@ -7,7 +7,7 @@ use crate::{
     observation::Observation,
     vision::{
         Frame, ImageOptions, ImageSensor, PaintedVelocity, VisionError, options,
-        options::{BlankEpisodes, Moment, PictureStack},
+        options::{BlankEpisodes, PictureKey, PictureStack},
     },
 };
 use bevy::prelude::*;
@@ -61,7 +61,7 @@ pub(super) fn compose(
             continue;
         }
         blank.note(&frame.pixels, episode.tick == 0);
-        let moment = Moment { episode: count.finished, level: episode.level, tick: episode.tick };
+        let moment = PictureKey { episode: count.finished, level: episode.level, tick: episode.tick };
         write_image(&sensor.0, frame, velocity, moment, &mut stack, &mut observation.image);
     }
 }
@@ -94,7 +94,7 @@ fn write_image(
     options: &ImageOptions,
     frame: &Frame,
     velocity: Option<&PaintedVelocity>,
-    moment: Moment,
+    moment: PictureKey,
     stack: &mut PictureStack,
     image: &mut Vec<u8>,
 ) {

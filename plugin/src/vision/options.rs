@@ -172,7 +172,7 @@ pub(super) fn paint_velocity(velocity: [f32; 2], options: &ImageOptions, planes:
 
 /// The state of the game that a picture shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Reflect)]
-pub(super) struct Moment {
+pub(super) struct PictureKey {
     /// Number of the episode of this agent.
     pub episode: u64,
     /// Its level.
@@ -189,12 +189,12 @@ pub(crate) struct PictureStack {
     /// Bytes of a picture.
     size: usize,
     newest: usize,
-    shown: Option<Moment>,
+    shown: Option<PictureKey>,
 }
 
 impl PictureStack {
     /// Adds the picture of a moment, which `paint` writes, and writes all pictures, oldest first.
-    pub(super) fn push(&mut self, moment: Moment, count: usize, paint: impl FnOnce(&mut [u8]), out: &mut [u8]) {
+    pub(super) fn push(&mut self, moment: PictureKey, count: usize, paint: impl FnOnce(&mut [u8]), out: &mut [u8]) {
         let size = out.len() / count;
         let goes_on = self.goes_on(moment) && (self.size, self.ring.len()) == (size, out.len());
         if !goes_on {
@@ -218,7 +218,7 @@ impl PictureStack {
 
     /// Returns whether the moment belongs to the episode of the last one. The first moment always
     /// starts anew.
-    fn goes_on(&self, moment: Moment) -> bool {
+    fn goes_on(&self, moment: PictureKey) -> bool {
         self.shown.is_some_and(|last| {
             (last.episode, last.level) == (moment.episode, moment.level) && moment.tick > 0 && moment.tick >= last.tick
         })
@@ -357,7 +357,7 @@ mod stack_tests {
 
     fn shown(stack: &mut PictureStack, episode: u64, tick: u32, picture: u8) -> [u8; 6] {
         let mut out = [0; 6];
-        stack.push(Moment { episode, level: 0, tick }, 3, |bytes| bytes.fill(picture), &mut out);
+        stack.push(PictureKey { episode, level: 0, tick }, 3, |bytes| bytes.fill(picture), &mut out);
         out
     }
 

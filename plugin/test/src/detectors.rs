@@ -42,7 +42,7 @@ use std::collections::BTreeMap;
 
 pub use crate::detectors::{
     clocks::{SlowTick, TIMING, TickTime, forget_timing},
-    error_log::Ear,
+    error_log::ErrorLogReader,
     goals::{FarGoal, GoalIgnored},
     par::{ParError, Pars},
     positions::ThroughWall,
@@ -86,10 +86,10 @@ impl Known {
         }
     }
 
-    pub fn is_usual(&self) -> bool {
+    pub fn is_default(&self) -> bool {
         match self {
-            Self::Ticks(detector) => detector.is_usual(),
-            Self::Level(detector) => detector.is_usual(),
+            Self::Ticks(detector) => detector.is_default(),
+            Self::Level(detector) => detector.is_default(),
             Self::Clock(_) => false,
         }
     }
@@ -165,7 +165,7 @@ pub struct DetectorInfo {
     /// The defect that it finds, in one line.
     pub about: &'static str,
     /// Whether it is a default detector.
-    pub is_usual: bool,
+    pub is_default: bool,
     /// Its settings: name, value and meaning.
     pub settings: Vec<(&'static str, f64, &'static str)>,
 }
@@ -175,7 +175,7 @@ pub fn list(game: &dyn Game) -> Vec<DetectorInfo> {
     let info = |mut known: Known| DetectorInfo {
         name: known.name(),
         about: known.describe(),
-        is_usual: known.is_usual(),
+        is_default: known.is_default(),
         settings: known.settings().into_iter().map(|setting| (setting.key, *setting.value, setting.what)).collect(),
     };
     all(game).into_iter().map(info).collect()
@@ -195,7 +195,7 @@ pub trait LevelDetector: Send + Sync {
     fn describe(&self) -> &'static str;
 
     /// Returns whether it is a default detector.
-    fn is_usual(&self) -> bool {
+    fn is_default(&self) -> bool {
         false
     }
 

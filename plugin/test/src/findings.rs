@@ -47,7 +47,7 @@ pub use crate::findings::{
     folder::{Date, DateError, FINDINGS, clear_findings, gather_findings, list_findings},
     keep::{FindingFiles, Played, Recheck, SeenFinding, SeenLevel, Sighting, recheck},
     minimise::{Budget, Lengths, Minimised, actions_of, lengths, minimise},
-    play::{Breakage, Moment, Replayed, Unplayable, Watcher},
+    play::{Breakage, CheckTick, Replayed, Unplayable, Watcher},
     regress::{PINS, Pin, PinState, Pins, Regress, RegressRow, Regression, regress, regress_until},
     scan::scan,
 };

@@ -28,7 +28,7 @@ mod walked;
 use crate::verdict::{
     run::{inspect, seen},
     test_world::{Played, PlayedEnd},
-    walked::Walked,
+    walked::LevelVisits,
 };
 use bevy::math::{Rect, Vec2};
 use bevy_playbot::episode::EpisodeEnd;
@@ -45,7 +45,7 @@ pub use crate::verdict::{
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
     reports::{AGAINST, JUNIT, SUMMARY, rerun_commands, write_reports},
     results::{FinishTime, MOST_WORST, Overview, RESULTS, ResultLines, TesterTotal, results_folder},
-    run::{TestEnd, TestWatch, run_tests, run_tests_keeping, test_in_turn},
+    run::{TestEnd, TestObserver, run_tests, run_tests_keeping, test_in_turn},
     statistics::{Trials, benjamini_hochberg, fisher_exact, wilson},
 };
 
@@ -118,7 +118,7 @@ fn judge(
     verdict.ends = end_places(floor.bounds, &failed);
     if has_maps {
         let names: Vec<&str> = plan.testers.iter().map(|tester| tester.record.name.as_str()).collect();
-        if let Some(walked) = Walked::of(&floor, &names, played, &verdict.findings) {
+        if let Some(walked) = LevelVisits::of(&floor, &names, played, &verdict.findings) {
             verdict.places = walked.places;
             verdict.maps = Some(walked.maps);
             for (tester, places) in verdict.testers.iter_mut().zip(walked.testers) {
@@ -238,7 +238,7 @@ impl Score {
 
 /// Ends of episodes without the goal in one square of the level's floor plan.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct EndPlace {
+pub struct SquareEnds {
     /// Middle of the square, in the units of the floor plan.
     pub x: f32,
     /// Middle of the square.
@@ -304,7 +304,7 @@ pub struct LevelVerdict {
     #[serde(flatten)]
     pub score: Score,
     /// Positions of episodes that ended without the goal, if the game reports them.
-    pub ends: Vec<EndPlace>,
+    pub ends: Vec<SquareEnds>,
     /// How often each cause ended an episode without the goal, if the game reports causes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub causes: BTreeMap<String, u64>,
@@ -334,7 +334,7 @@ impl LevelVerdict {
 
 // Positions and causes of episodes that ended without the goal.
 
-/// Squares along the longer side of a floor plan to which [`EndPlace`]s are rounded.
+/// Squares along the longer side of a floor plan to which [`SquareEnds`]s are rounded.
 pub const END_SQUARES: f32 = 32.0;
 
 /// The end of an episode without the goal.
@@ -350,20 +350,20 @@ struct FailedEnd {
 
 /// Returns the squares of a floor plan in which episodes ended, row by row from below. Positions outside the plan
 /// belong to squares outside; positions that are not finite are left out.
-fn end_places(bounds: Rect, ended: &[FailedEnd]) -> Vec<EndPlace> {
+fn end_places(bounds: Rect, ended: &[FailedEnd]) -> Vec<SquareEnds> {
     let side = bounds.width().max(bounds.height()) / END_SQUARES;
     if !(side.is_finite() && side > 0.0) {
         return Vec::new();
     }
-    let mut counts: BTreeMap<(i32, i32), EndPlace> = BTreeMap::new();
+    let mut counts: BTreeMap<(i32, i32), SquareEnds> = BTreeMap::new();
     for end in ended {
         let Some(place) = end.place.filter(|place| place.is_finite()) else { continue };
         let square = ((place - bounds.min) / side).floor();
         let (column, row) = (square.x as i32, square.y as i32);
-        let counted = counts.entry((row, column)).or_insert_with(|| EndPlace {
+        let counted = counts.entry((row, column)).or_insert_with(|| SquareEnds {
             x: bounds.min.x + (column as f32 + 0.5) * side,
             y: bounds.min.y + (row as f32 + 0.5) * side,
-            ..EndPlace::default()
+            ..SquareEnds::default()
         });
         *(if end.is_timed_out { &mut counted.timed_out } else { &mut counted.lost }) += 1;
         add_cause(&mut counted.causes, end.cause);
@@ -451,7 +451,7 @@ mod ends_tests {
             at(f32::NAN, 0.0, false, None),
             nowhere,
         ];
-        let place = |x, y, lost, timed_out, cause: &str| EndPlace {
+        let place = |x, y, lost, timed_out, cause: &str| SquareEnds {
             x,
             y,
             lost,

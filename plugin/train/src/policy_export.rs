@@ -8,7 +8,9 @@ use bevy_playbot::{
     vision::{ObservationConfig, UnknownObservation, VisionError},
 };
 use playbot_harness::{arrangement::at_most, game::Game, split::LevelSplit};
-use playbot_learner::{FileError, HasExitCode, Observations, Policy, PolicyCard, PolicyFile, SeenLevels, SkillSource};
+use playbot_learner::{
+    FileError, HasExitCode, Observations, Policy, PolicyFile, PolicyMetadata, SeenLevels, SkillSource,
+};
 use std::path::Path;
 use thiserror::Error;
 
@@ -69,7 +71,7 @@ pub fn policy_file(
     provenance: Provenance,
 ) -> PolicyFile {
     let Provenance { algorithm, training, seen, code } = provenance;
-    let card = PolicyCard {
+    let card = PolicyMetadata {
         game: game.name().to_owned(),
         game_version: game.version(),
         observations: if observation_config.is_image() { Vec::new() } else { game.observation().names },

@@ -6,14 +6,14 @@ use bevy::prelude::*;
 use bevy_playbot::vision::ObservationConfig;
 use playbot::prelude::*;
 use playbot_harness::{
-    detector::{Detector, EachTick, Moment},
+    detector::{Detector, DetectorTick, EachTick},
     eval::Player,
     floor_plan::FloorPlan,
     game::{LevelTools, StateTools, TestTools},
 };
 use playbot_test::{
     detectors::{DetectorChoice, Detectors},
-    verdict::{Finding, LevelVerdict, TestError, TestPlan, TestWatch, Tester, TesterRecord, run_tests},
+    verdict::{Finding, LevelVerdict, TestError, TestObserver, TestPlan, Tester, TesterRecord, run_tests},
 };
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
 
@@ -94,7 +94,7 @@ impl StateTools for Defect {
 
 impl TestTools for Defect {
     fn detectors(&self) -> Vec<Box<dyn Detector>> {
-        vec![Box::new(EachTick::new("late", "somebody is still there after ten ticks", |moment: &Moment<'_>| {
+        vec![Box::new(EachTick::new("late", "somebody is still there after ten ticks", |moment: &DetectorTick<'_>| {
             (moment.tick == 10).then(|| "it takes too long".to_owned())
         }))]
     }
@@ -135,7 +135,7 @@ pub fn verdicts(
         found.push(verdict);
         Ok(())
     };
-    let watch = TestWatch { progress: &|_| {}, stop: &|| false };
+    let watch = TestObserver { progress: &|_| {}, stop: &|| false };
     run_tests(game, &plan, &BTreeSet::new(), &mut keep, &watch).expect("it can be played");
     found.sort_by_key(|verdict| verdict.index);
     found

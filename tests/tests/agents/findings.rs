@@ -17,10 +17,10 @@ use playbot_harness::{eval::Player, games::Games};
 use playbot_test::{
     detectors::Detectors,
     findings::{
-        Budget, Check, Checks, Date, FINDINGS, FindingFiles, FindingHead, FindingStatus, Minimised, Moment, PINS,
+        Budget, Check, CheckTick, Checks, Date, FINDINGS, FindingFiles, FindingHead, FindingStatus, Minimised, PINS,
         Regress, Regression, StoredFinding, Watcher, keep::recheck, list_findings, minimise, regress, regress_until,
     },
-    verdict::{LevelVerdict, TestError, TestPlan, TestWatch, Tester, TesterRecord, run_tests_keeping},
+    verdict::{LevelVerdict, TestError, TestObserver, TestPlan, Tester, TesterRecord, run_tests_keeping},
 };
 use playbot_tests::{Cell, Corridor, as_corridor, corridor_plugin};
 
@@ -113,7 +113,7 @@ fn a_death_and_what_a_detector_of_ones_own_sees_are_made_shorter_too() {
     is_shortened_to(&Corridor, &finding, &checks, 3);
 
     let watch = |_: &FindingHead| -> Watcher {
-        Box::new(|moment: &Moment| (moment.world.get::<Cell>(moment.agent)?.0 == 5).then_some(moment.tick))
+        Box::new(|moment: &CheckTick| (moment.world.get::<Cell>(moment.agent)?.0 == 5).then_some(moment.tick))
     };
     let checks = Checks::default().with("near-the-end", Check::Ticks(Arc::new(watch)));
     let finding = stored(&Corridor, "near-the-end", "cell 5", &after_wandering(5, &[1, 2, 1, 0, 0]), &checks);
@@ -147,7 +147,7 @@ fn test(game: &dyn Game, testers: Vec<Tester>, folder: &Path, threads: usize) ->
         found.push(verdict);
         Ok(())
     };
-    let watch = TestWatch { progress: &|_| {}, stop: &|| false };
+    let watch = TestObserver { progress: &|_| {}, stop: &|| false };
     run_tests_keeping(game, &plan, &BTreeSet::new(), &mut keep, &watch, Some(&files)).expect("it can be played");
     found.sort_by_key(|verdict| verdict.index);
     found

@@ -18,7 +18,9 @@ use bevy_playbot::{
     prelude::*,
     takeover::{GameIdentity, Takeover, TakeoverPlugin, TakeoverRequest},
 };
-use playbot_learner::{DeviceKind, Learner as _, ObsKind, PolicyCard, PolicyFile, PolicySpec, PpoConfig, PpoLearner};
+use playbot_learner::{
+    DeviceKind, Learner as _, ObsKind, PolicyFile, PolicyMetadata, PolicySpec, PpoConfig, PpoLearner,
+};
 use playbot_tests::{Cell, Drift, corridor_plugin, spawn_walker};
 
 #[derive(Resource, Default)]
@@ -161,7 +163,7 @@ fn a_recording_plays_and_the_seat_is_given_back() {
 }
 
 /// Writes an untrained policy.
-fn policy(folder: &Path, card: PolicyCard, values: usize) -> std::path::PathBuf {
+fn policy(folder: &Path, card: PolicyMetadata, values: usize) -> std::path::PathBuf {
     let spec = PolicySpec { obs: ObsKind::Vector(values), latent: 0, action_space: ActionSpace::Discrete(3) };
     let learner = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex).expect("good settings");
     let path = folder.join("bot.policy");
@@ -170,9 +172,9 @@ fn policy(folder: &Path, card: PolicyCard, values: usize) -> std::path::PathBuf 
     path
 }
 
-fn card() -> PolicyCard {
+fn card() -> PolicyMetadata {
     let observations = vec!["x".into(), "time".into()];
-    PolicyCard { game: "corridor".into(), game_version: 3, observations, ..PolicyCard::default() }
+    PolicyMetadata { game: "corridor".into(), game_version: 3, observations, ..PolicyMetadata::default() }
 }
 
 #[test]
@@ -196,10 +198,10 @@ fn what_cannot_be_done_is_said_and_the_game_goes_on() {
     let path = policy(folder.path(), card(), 2);
     let foreign = folder.path().join("foreign");
     std::fs::create_dir_all(&foreign).expect("writable");
-    let of = |card: PolicyCard| TakeoverRequest::Policy(policy(&foreign, card, 2));
+    let of = |card: PolicyMetadata| TakeoverRequest::Policy(policy(&foreign, card, 2));
     let missing = folder.path().join("missing");
     for (request, words) in [
-        (of(PolicyCard { game: "maze".into(), ..card() }), "for the game `maze`, not for `corridor`"),
+        (of(PolicyMetadata { game: "maze".into(), ..card() }), "for the game `maze`, not for `corridor`"),
         (TakeoverRequest::Replay(path.clone()), "not a recording"),
         (TakeoverRequest::Policy(missing.clone()), "missing"),
         (TakeoverRequest::Record(missing.join("ada.demo")), "cannot create the file"),
@@ -211,11 +213,11 @@ fn what_cannot_be_done_is_said_and_the_game_goes_on() {
         assert_eq!(app.world().get::<Control>(agent), Some(&Control::Human));
         assert!(!app.world().resource::<Takeover>().is_running());
     }
-    let names = PolicyCard { observations: vec!["x".into(), "heat".into()], ..card() };
+    let names = PolicyMetadata { observations: vec!["x".into(), "heat".into()], ..card() };
     let (mut app, _) = build(plugin(Some(of(names))));
     frames(&mut app, 6);
     assert!(heard(&app)[0].contains("number 1: `heat` there, `time` here"), "{:?}", heard(&app));
-    let (mut app, _) = build(plugin(Some(of(PolicyCard { observations: vec!["x".into()], ..card() }))));
+    let (mut app, _) = build(plugin(Some(of(PolicyMetadata { observations: vec!["x".into()], ..card() }))));
     frames(&mut app, 6);
     assert!(heard(&app)[0].contains("reads 2 observation values, but 1 are named"), "{:?}", heard(&app));
     let wrong = TakeoverPlugin { request: Some("rekord:x".parse()), ..plugin(None) };

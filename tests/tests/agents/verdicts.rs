@@ -8,7 +8,9 @@ use playbot::prelude::*;
 use playbot_harness::{eval::Player, foreign::Restart};
 use playbot_test::{
     detectors::Detectors,
-    verdict::{LevelOutcome, LevelVerdict, TestEnd, TestError, TestPlan, TestWatch, Tester, TesterRecord, run_tests},
+    verdict::{
+        LevelOutcome, LevelVerdict, TestEnd, TestError, TestObserver, TestPlan, Tester, TesterRecord, run_tests,
+    },
 };
 use playbot_tests::{as_corridor, corridor_plugin, faulty::Fault as Planted, foreign::stubborn::stubborn_game};
 
@@ -38,7 +40,7 @@ fn verdicts(game: &dyn Game, plan: &TestPlan) -> Vec<LevelVerdict> {
         found.push(verdict);
         Ok(())
     };
-    let watch = TestWatch { progress: &|_| {}, stop: &|| false };
+    let watch = TestObserver { progress: &|_| {}, stop: &|| false };
     let end = run_tests(game, plan, &BTreeSet::new(), &mut keep, &watch).expect("it can be played");
     assert_eq!(end, TestEnd::Done);
     found.sort_by_key(|verdict| verdict.index);

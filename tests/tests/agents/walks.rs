@@ -13,7 +13,7 @@ use playbot_learner::{DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearne
 use playbot_test::{
     detectors::Detectors,
     verdict::{
-        EndPlace, FailureWay, LevelMaps, LevelVerdict, Places, TestError, TestPlan, TestWatch, Tester, run_tests,
+        FailureWay, LevelMaps, LevelVerdict, Places, SquareEnds, TestError, TestObserver, TestPlan, Tester, run_tests,
     },
 };
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
@@ -96,7 +96,7 @@ fn verdicts(plan: &TestPlan) -> Vec<LevelVerdict> {
         found.push(verdict);
         Ok(())
     };
-    let watch = TestWatch { progress: &|_| {}, stop: &|| false };
+    let watch = TestObserver { progress: &|_| {}, stop: &|| false };
     run_tests(&Charted, plan, &BTreeSet::new(), &mut keep, &watch).expect("it can be played");
     found.sort_by_key(|verdict| verdict.index);
     found
@@ -126,7 +126,7 @@ fn visits_lost_time_causes_and_places_are_counted() {
     let abyss = BTreeMap::from([("abyss".to_owned(), 1)]);
     assert_eq!(level.causes, abyss);
     let told: Vec<(u64, u64, &BTreeMap<String, u64>)> =
-        level.ends.iter().map(|EndPlace { lost, timed_out, causes, .. }| (*lost, *timed_out, causes)).collect();
+        level.ends.iter().map(|SquareEnds { lost, timed_out, causes, .. }| (*lost, *timed_out, causes)).collect();
     assert_eq!(told, [(1, 0, &abyss), (0, 1, &BTreeMap::new())]);
 }
 

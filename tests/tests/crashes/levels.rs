@@ -8,7 +8,9 @@ use playbot_harness::eval::Player;
 use playbot_learner::disk::DiskRecording;
 use playbot_test::{
     detectors::Detectors,
-    verdict::{Earlier, RESULTS, TestEnd, TestError, TestFolder, TestPlan, TestWatch, Tester, TesterRecord, run_tests},
+    verdict::{
+        Earlier, RESULTS, TestEnd, TestError, TestFolder, TestObserver, TestPlan, Tester, TesterRecord, run_tests,
+    },
 };
 use playbot_tests::{
     Corridor,
@@ -40,7 +42,7 @@ fn test(folder: &Path, seed: u64, earlier: Earlier) -> Result<Vec<u8>, TestError
     let plan = plan(seed);
     let (mut opened, _) = TestFolder::open(folder, &plan.record(&Corridor), earlier)?;
     let finished = opened.finished();
-    let watch = TestWatch { progress: &|_| {}, stop: &|| false };
+    let watch = TestObserver { progress: &|_| {}, stop: &|| false };
     assert_eq!(run_tests(&Corridor, &plan, &finished, &mut |verdict| opened.keep(&verdict), &watch)?, TestEnd::Done);
     opened.finish()?;
     Ok(std::fs::read(folder.join(RESULTS)).expect("written"))

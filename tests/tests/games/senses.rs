@@ -9,8 +9,8 @@ use bevy_playbot::{
 };
 use playbot::prelude::*;
 use playbot_games::{
-    antmaze::{AntMaze, AntMazeWithMap, AntMazeWithRays, AntMazeWithWaves},
-    maze2d::{Maze2d, Maze2dWithMap, Maze2dWithRays, Maze2dWithWaves},
+    antmaze::{AntMaze, AntMazeWithMap, AntMazeWithPositionalEncoding, AntMazeWithRays},
+    maze2d::{Maze2d, Maze2dWithMap, Maze2dWithPositionalEncoding, Maze2dWithRays},
 };
 use playbot_harness::{
     parallel::on_threads,
@@ -26,10 +26,10 @@ fn games() -> [(Arc<dyn Game>, usize, Arc<dyn Game>, &'static str); 6] {
     [
         (Arc::new(Maze2dWithRays::default()), 10, Arc::new(Maze2d::default()), ball),
         (Arc::new(Maze2dWithMap::default()), 131, Arc::new(Maze2d::default()), ball),
-        (Arc::new(Maze2dWithWaves::default()), 16, Arc::new(Maze2d::default()), ball),
+        (Arc::new(Maze2dWithPositionalEncoding::default()), 16, Arc::new(Maze2d::default()), ball),
         (Arc::new(AntMazeWithRays::default()), 10, Arc::new(AntMaze), ant),
         (Arc::new(AntMazeWithMap::default()), 131, Arc::new(AntMaze), ant),
-        (Arc::new(AntMazeWithWaves::default()), 16, Arc::new(AntMaze), ant),
+        (Arc::new(AntMazeWithPositionalEncoding::default()), 16, Arc::new(AntMaze), ant),
     ]
 }
 

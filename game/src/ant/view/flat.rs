@@ -3,7 +3,7 @@
 use crate::{
     ant::{
         body::Part,
-        view::{AntPose, AntViewSystems, GoalMark, Ground, OnGround},
+        view::{AntPose, AntViewSystems, ArenaGround, GoalMark, OnGround},
     },
     arena_grid::ArenaGrid,
 };
@@ -109,7 +109,7 @@ pub struct Tiling(Entity);
 
 /// Makes new arenas into stages.
 pub(crate) fn stages(
-    new: Query<Entity, (With<Ground>, Without<Tiling>)>,
+    new: Query<Entity, (With<ArenaGround>, Without<Tiling>)>,
     mut grid: ResMut<ArenaGrid>,
     mut commands: Commands,
 ) {
@@ -121,7 +121,7 @@ pub(crate) fn stages(
 
 /// Lays the tiles of new grounds.
 pub(crate) fn tiles(
-    changed: Query<(&Ground, &Tiling), Or<(Changed<Ground>, Added<Tiling>)>>,
+    changed: Query<(&ArenaGround, &Tiling), Or<(Changed<ArenaGround>, Added<Tiling>)>>,
     art: Res<Art>,
     mut commands: Commands,
 ) {
@@ -144,7 +144,7 @@ pub(crate) fn tiles(
 /// invisible, and the floor has no visible edge.
 pub(crate) fn follow(
     ants: Query<(&AntPose, &OnGround)>,
-    grounds: Query<(&Ground, &Tiling)>,
+    grounds: Query<(&ArenaGround, &Tiling)>,
     mut tilings: Query<&mut Transform, With<TileLayer>>,
 ) {
     for (pose, on_ground) in &ants {

@@ -2,7 +2,7 @@
 
 use crate::ant::{
     body::{PARTS, Part},
-    view::{AntPose, AntViewSystems, GoalMark, Ground, OnGround, flat, flat::floor_tile},
+    view::{AntPose, AntViewSystems, ArenaGround, GoalMark, OnGround, flat, flat::floor_tile},
 };
 use bevy::{
     image::{ImageAddressMode, ImageSampler, ImageSamplerDescriptor},
@@ -192,7 +192,7 @@ pub(crate) fn matt(colour: Color) -> StandardMaterial {
 
 /// Builds floors and walls of new grounds.
 pub(crate) fn grounds(
-    changed: Query<(Entity, &Ground, Option<&Built>), Changed<Ground>>,
+    changed: Query<(Entity, &ArenaGround, Option<&Built>), Changed<ArenaGround>>,
     paints: Res<Paints>,
     mut meshes: ResMut<Assets<Mesh>>,
     mut materials: ResMut<Assets<StandardMaterial>>,
@@ -220,7 +220,7 @@ pub(crate) fn grounds(
 }
 
 /// Returns the middle and size of a floor: whole cells, so its squares match the cells.
-fn extent(ground: &Ground) -> (Vec2, Vec2) {
+fn extent(ground: &ArenaGround) -> (Vec2, Vec2) {
     if ground.columns == 0 {
         return (Vec2::ZERO, Vec2::splat(OPEN));
     }

@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
 use playbot_harness::{
     defect::ChangeRules,
-    detector::{LevelAhead, Moment, NoProofs, Watch},
+    detector::{DetectorTick, EpisodeWatcher, LevelAhead, NoProofs},
     prelude::*,
 };
 use std::{
@@ -57,14 +57,14 @@ pub(super) fn findings(rules: &Rules, level: u64, bot: Bot, ticks: u32) -> Vec<(
     app.add_observer(move |event: On<EpisodeEnded>| *heard.lock().expect("nobody panics") = Some(event.result));
     let ahead = LevelAhead { level, plan: None };
     let all = detectors();
-    let mut watches: Vec<(&'static str, Box<dyn Watch>)> =
+    let mut watches: Vec<(&'static str, Box<dyn EpisodeWatcher>)> =
         all.iter().filter_map(|detector| detector.watch(&ahead).map(|watch| (detector.name(), watch))).collect();
     let mut found = Vec::new();
     for tick in 0..ticks {
         app.tick().expect("sound");
         let world = app.world();
         let result = *ended.lock().expect("nobody panics");
-        let moment = Moment {
+        let moment = DetectorTick {
             world,
             agent,
             level,

@@ -1,4 +1,4 @@
-//! Ground and obstacles around a player.
+//! PathGround and obstacles around a player.
 
 use crate::coinrun::{
     paths::sweep::Swept,
@@ -7,7 +7,7 @@ use crate::coinrun::{
 };
 
 /// Tiles and crates around a player of a certain size.
-pub(super) struct Ground<'a> {
+pub(super) struct PathGround<'a> {
     pub tiles: &'a TileGrid,
     pub crates: &'a NearCrates,
     /// Half width and half height of the player.
@@ -18,7 +18,7 @@ pub(super) struct Ground<'a> {
     pub corner_y: f32,
 }
 
-impl<'a> Ground<'a> {
+impl<'a> PathGround<'a> {
     pub fn new(tiles: &'a TileGrid, crates: &'a NearCrates, player: &Body) -> Self {
         let Body { rx, ry, .. } = *player;
         Self { tiles, crates, rx, ry, corner_x: rx * CORNER, corner_y: ry * CORNER }

@@ -146,13 +146,13 @@ fn bodies(draw: &mut ChaCha8Rng, player: &Body) -> Vec<Body> {
 /// Returns a level, some of it replaced at random, and a player anywhere in it: in walls, on edges, outside.
 fn odd_scene(draw: &mut ChaCha8Rng, level: &Level) -> Scene {
     let mut tiles = level.tiles.clone();
-    let is_usual = draw.random_bool(0.8);
+    let is_default = draw.random_bool(0.8);
     let mut player = Body::player();
-    if !is_usual {
+    if !is_default {
         (player.rx, player.ry) = (draw.random_range(0.1..1.6), draw.random_range(0.1..2.1));
     }
-    player.x = coordinate(draw, if is_usual { [0.5, 40.0] } else { [-1.0, 65.0] }, player.rx);
-    player.y = coordinate(draw, if is_usual { [0.5, 14.0] } else { [-1.0, 65.0] }, player.ry);
+    player.x = coordinate(draw, if is_default { [0.5, 40.0] } else { [-1.0, 65.0] }, player.rx);
+    player.y = coordinate(draw, if is_default { [0.5, 14.0] } else { [-1.0, 65.0] }, player.ry);
     (player.vx, player.vy) = (speed(draw, 0.5), speed(draw, 1.5));
     let kinds = [Tile::Empty, Tile::Empty, Tile::Wall, Tile::WallTop, Tile::Lava, Tile::Coin, Tile::Barrier];
     for _ in 0..draw.random_range(0..30) {

@@ -3,7 +3,7 @@
 use crate::coinrun::{
     paths::{
         Walker,
-        ground::Ground,
+        ground::PathGround,
         sweep::{Sweep, Swept},
     },
     rules::{PlayerState, PlayerStep, fall, is_supported, move_player, walk},
@@ -90,7 +90,7 @@ impl Axis {
 /// Let the wall beside be solid over all passed rows, and the ground over all passed columns. Then each axis is blocked
 /// or not regardless of the other one. No crate may be near.
 #[inline]
-pub(super) fn slide(walker: &Walker, ground: &Ground, sweep: &Sweep) -> Option<Walker> {
+pub(super) fn slide(walker: &Walker, ground: &PathGround, sweep: &Sweep) -> Option<Walker> {
     let Sweep { parts, by: [dx, dy], end: [end_x, end_y] } = *sweep;
     let x = Axis::new(walker.x, dx, end_x, ground.rx, ground.corner_x)?;
     let y = Axis::new(walker.y, dy, end_y, ground.ry, ground.corner_y)?;
@@ -129,7 +129,7 @@ fn part(axis: &Axis, at: f32, edge: Option<i32>) -> Option<(f32, bool)> {
 
 /// Returns the column and the row that block. `None` if these are not straight edges.
 #[inline(always)]
-fn edges(x: &Axis, y: &Axis, ground: &Ground, swept: &mut Swept) -> Option<(Option<i32>, Option<i32>)> {
+fn edges(x: &Axis, y: &Axis, ground: &PathGround, swept: &mut Swept) -> Option<(Option<i32>, Option<i32>)> {
     let rows = ground.tiles.wall_rows();
     let row = |at: i32| rows[at as usize & 63];
     let [low, high] = y.cells;
@@ -190,7 +190,7 @@ fn edges(x: &Axis, y: &Axis, ground: &Ground, swept: &mut Swept) -> Option<(Opti
 impl Walker {
     /// Returns the player after one step with a direction held (-1, 0 or 1), and perhaps the jump button.
     #[inline(always)]
-    pub fn step(self, ground: &Ground, ax: i8, jumps: bool) -> Self {
+    pub fn step(self, ground: &PathGround, ax: i8, jumps: bool) -> Self {
         let ay = i8::from(jumps && self.supported);
         let (vx, vy) = (walk(self.vx, ax, self.supported), fall(self.vy, ay, self.supported));
         let begun = Self { vx, vy, ..self };
@@ -213,7 +213,7 @@ impl Walker {
     ///
     /// Unblocked parts of a step only add to x and y, in any order of the axes, and leave the velocity as it is.
     #[inline(always)]
-    fn fly(self, ground: &Ground, sweep: &Sweep) -> Option<Self> {
+    fn fly(self, ground: &PathGround, sweep: &Sweep) -> Option<Self> {
         let [x, y] = sweep.end;
         let swept = Swept::between([self.x, self.y], [x, y]);
         let is_free = ground.tiles.is_clear(&ground.corners(&swept));
@@ -221,7 +221,7 @@ impl Walker {
     }
 
     /// Computes the step by the rules.
-    fn obey(self, ground: &Ground, ax: i8, ay: i8) -> Self {
+    fn obey(self, ground: &PathGround, ax: i8, ay: i8) -> Self {
         let (mut body, mut memory) = (self.body(ground), PlayerState::default());
         let step = PlayerStep { ax, ay, vy: self.vy, y: self.y, ry: ground.ry };
         move_player(&mut body, &mut memory, ground.tiles, ground.crates.below(self.y), &step, true);

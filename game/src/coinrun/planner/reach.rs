@@ -11,7 +11,7 @@ mod loose;
 mod step;
 
 use crate::coinrun::{
-    planner::reach::{bins::Bins, ground::Ground, loose::out_of_wall, step::step},
+    planner::reach::{bins::Bins, ground::ReachableGround, loose::out_of_wall, step::step},
     rules::corners,
     sim::Sim,
 };
@@ -32,7 +32,7 @@ const MOST_STEPS: usize = 100_000;
 /// player may turn at full speed. The search includes walls, crates, lava and saws, and neither enemies nor the time.
 pub fn coin_is_unreachable(sim: &Sim) -> bool {
     let (level, player, memory) = (sim.level(), sim.player(), sim.player_state());
-    let mut ground = Ground::new(level);
+    let mut ground = ReachableGround::new(level);
     let mut known = Known::default();
     let (place, coin) = (Bins::at(player.x), level.coin[0] as f32 + 0.5);
     let mut after = Vec::new();

@@ -125,8 +125,8 @@ impl ExperimentArgs {
     /// folder.
     pub fn find_recordings(&self, path: &Path, games: &Games) -> PathBuf {
         let beside = sources().join(path);
-        let is_usual = self.experiment.is_none() && !self.set.iter().any(|set| sets_key(set, "demos"));
-        let is_beside = is_usual && !path.exists() && beside.exists();
+        let is_default = self.experiment.is_none() && !self.set.iter().any(|set| sets_key(set, "demos"));
+        let is_beside = is_default && !path.exists() && beside.exists();
         if is_beside && is_shipped(path, &unnamed(games, &self.sets([]))) { beside } else { path.into() }
     }
 

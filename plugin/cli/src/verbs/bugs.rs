@@ -4,14 +4,14 @@ mod score;
 pub(crate) mod testers;
 
 use crate::{
-    arguments::{Threads, usual_experiment, usual_mode},
+    arguments::{Threads, default_experiment_of, default_mode},
     error::{CliError, Outcome, print_line},
     output, progress,
     verbs::bugs::score::as_json,
 };
 use playbot_harness::{brief::shell_word, game::Game, games::Games, split::LevelSplit};
 use playbot_mutation::{
-    bugs::{BugError, BugSet, MakePlan, NoPlace, PlantedPart, Source, make_bugs},
+    bugs::{BugError, BugSet, MakePlan, MissingMutants, PlantedPart, Source, make_bugs},
     score::{Score, ScoreTable},
 };
 use serde_json::json;
@@ -205,13 +205,13 @@ fn sources<'a>(args: &MakeArgs, games: &Games<'a>) -> Result<Vec<Source<'a>>, Cl
 
 fn source<'a>(args: &MakeArgs, game: &'a dyn Game) -> Result<Source<'a>, CliError> {
     let named = args.levels.iter().find(|levels| levels.game == game.name());
-    let usual = usual_experiment(game).map(|usual| usual.experiment);
+    let usual = default_experiment_of(game).map(|usual| usual.experiment);
     let is_mode = |split: &LevelSplit| game.check_mode(&split.mode).is_ok();
     let levels = match named {
         Some(named) => named.levels.clone(),
         None => {
             let held_out = usual.as_ref().map(|usual| &usual.test).filter(|split| is_mode(split));
-            let mode = held_out.map_or_else(|| usual_mode(game).to_owned(), |split| split.mode.clone());
+            let mode = held_out.map_or_else(|| default_mode(game).to_owned(), |split| split.mode.clone());
             LevelSplit { mode, first: FIRST, last: LAST }
         }
     };
@@ -220,7 +220,7 @@ fn source<'a>(args: &MakeArgs, game: &'a dyn Game) -> Result<Source<'a>, CliErro
 }
 
 /// Prints how many defects of each class were planted.
-fn print(set: &BugSet, without_place: &[NoPlace], json: bool) -> Result<(), CliError> {
+fn print(set: &BugSet, without_place: &[MissingMutants], json: bool) -> Result<(), CliError> {
     let mut classes: BTreeMap<(&str, &str), (u64, u64)> = BTreeMap::new();
     for bug in &set.mutants {
         let (levels, rules) = classes.entry((bug.game.as_str(), bug.class.as_str())).or_default();
@@ -232,8 +232,8 @@ fn print(set: &BugSet, without_place: &[NoPlace], json: bool) -> Result<(), CliE
     let sound: u64 = set.sound.iter().map(|sound| sound.range.len()).sum();
     if json {
         let class = |(&(game, class), &(levels, rules)): (&(&str, &str), &(u64, u64))| json!({ "game": game, "class": class, "levels": levels, "rules": rules });
-        let missing = |missing: &NoPlace| {
-            let NoPlace { game, class, planted, wanted, without_effect } = missing;
+        let missing = |missing: &MissingMutants| {
+            let MissingMutants { game, class, planted, wanted, without_effect } = missing;
             json!({
                 "game": game, "class": class, "planted": planted, "wanted": wanted, "without_effect": without_effect,
             })

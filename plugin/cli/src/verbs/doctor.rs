@@ -1,7 +1,7 @@
 //! `playbot doctor`.
 
 use crate::{
-    arguments::{at_least_one, level_number, usual_mode},
+    arguments::{at_least_one, default_mode, level_number},
     error::{CliError, Outcome, print_line},
     interrupt,
     interrupt::NothingToSave,
@@ -58,7 +58,7 @@ const SPEED_SECONDS: f64 = 0.5;
 
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    let mode = args.mode.unwrap_or_else(|| usual_mode(game).to_owned());
+    let mode = args.mode.unwrap_or_else(|| default_mode(game).to_owned());
     let level = level_number(args.level, args.seed).unwrap_or(0);
     check_level(game, &mode, level)?;
     let options = DoctorOptions {

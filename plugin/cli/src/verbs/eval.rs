@@ -2,11 +2,10 @@
 
 use crate::{
     arguments::{
-        Compute,
+        Compute, default_held_out,
         experiment::{ExperimentArgs, option},
         first_levels, open, player,
         player::{Chosen, MeasuredLevels, check_run_of, check_skills},
-        usual_held_out,
     },
     error::{CliError, Outcome, print_line},
     interrupt,
@@ -195,7 +194,7 @@ fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
     if args.from.load(games, [])?.game == game.name() {
         return Ok(Vec::new());
     }
-    let levels = usual_held_out(game).unwrap_or_else(|| first_levels(game, 63));
+    let levels = default_held_out(game).unwrap_or_else(|| first_levels(game, 63));
     Ok(vec![format!("game={}", game.name()), format!("test={levels}")])
 }
 

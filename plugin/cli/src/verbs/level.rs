@@ -1,7 +1,7 @@
 //! `playbot level`.
 
 use crate::{
-    arguments::{LevelsArg, usual_mode},
+    arguments::{LevelsArg, default_mode},
     error::{CliError, Outcome, print_line},
     plot,
     plot::PlotFile,
@@ -75,7 +75,7 @@ fn show(game: &dyn Game, args: &Args, picture: bool) -> Result<LevelView, CliErr
         return show(&LevelRequest { mode: None, map, file, level: args.levels.number(args.seed), picture });
     }
     let (named, level) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
-    let mode = named.unwrap_or_else(|| usual_mode(game));
+    let mode = named.unwrap_or_else(|| default_mode(game));
     let shown = show(&LevelRequest { mode: Some(mode), map, file, level: Some(level), picture })?;
     if named.is_none() {
         tell!("no --mode is named: {mode}, which is trained in, level {level}");

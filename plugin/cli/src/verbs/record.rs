@@ -2,9 +2,8 @@
 
 use crate::{
     arguments::{
-        OverwriteArgs, counted, first_levels,
+        OverwriteArgs, counted, default_held_out, first_levels,
         player::{Chosen, PlayerArgs},
-        usual_held_out,
     },
     error::{CliError, Outcome},
     interrupt, progress,
@@ -86,7 +85,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if args.steps == Some(0) {
         return Err(CliError::Usage("--steps is 0: a recording has at least one step".to_owned()));
     }
-    let left_out = usual_held_out(game).filter(|_| args.levels.is_none());
+    let left_out = default_held_out(game).filter(|_| args.levels.is_none());
     let held_out: Vec<_> = args.hold_out.iter().chain(&left_out).cloned().collect();
     let chosen = choose_levels(game, &levels, &held_out)?;
     match &left_out {
@@ -204,7 +203,7 @@ fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) 
 
 /// Warns if requested levels are held out by the game's own experiment. Another experiment may hold out others.
 fn warn_of_held_out(game: &dyn Game, levels: &LevelSplit, chosen: &[u64]) {
-    let Some(split) = usual_held_out(game) else { return };
+    let Some(split) = default_held_out(game) else { return };
     let hidden = HeldOut::new(game, &split);
     if hidden.first_of(levels).is_none() {
         return;

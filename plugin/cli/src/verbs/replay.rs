@@ -97,7 +97,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         }
         _ => None,
     };
-    let told = Told {
+    let told = ReplayReport {
         path: &args.finding,
         finding: &stored,
         again: &again,
@@ -149,7 +149,7 @@ fn play_again(game: &dyn Game, finding: &StoredFinding) -> Result<Recheck, CliEr
 // Report of a finding that was played again.
 
 /// A finding and the result of its replay.
-pub struct Told<'a> {
+pub struct ReplayReport<'a> {
     /// Its file.
     pub path: &'a Path,
     /// The finding as stored.
@@ -160,7 +160,7 @@ pub struct Told<'a> {
     pub shorter: Option<(&'a Minimised, &'a Path)>,
 }
 
-impl Told<'_> {
+impl ReplayReport<'_> {
     /// Prints it: as a line of JSON, or as text.
     ///
     /// # Errors

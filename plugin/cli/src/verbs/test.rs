@@ -5,7 +5,7 @@ mod testers;
 mod told;
 
 use crate::{
-    arguments::{Compute, at_least_one, first_levels, usual_held_out},
+    arguments::{Compute, at_least_one, default_held_out, first_levels},
     error::{CliError, Outcome},
     interrupt, progress,
     verbs::test::{
@@ -18,7 +18,7 @@ use playbot_test::{
     detectors::Detectors,
     findings::{Budget, Checks, FindingFiles, list_findings},
     verdict::{
-        Comparison, Earlier, LevelVerdict, Shard, TestEnd, TestFolder, TestPlan, TestWatch, results_folder,
+        Comparison, Earlier, LevelVerdict, Shard, TestEnd, TestFolder, TestObserver, TestPlan, results_folder,
         run_tests_keeping,
     },
 };
@@ -155,7 +155,7 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
     let split = match &args.levels {
         Some(split) => split.clone(),
         None => {
-            let usual = usual_held_out(game).unwrap_or_else(|| first_levels(game, 63));
+            let usual = default_held_out(game).unwrap_or_else(|| first_levels(game, 63));
             tell!("no --levels are named: {usual}");
             usual
         }
@@ -184,7 +184,7 @@ fn test(game: &dyn Game, plan: &TestPlan, folder: &mut TestFolder, files: &Findi
     let total = levels * plan.testers.len() as u64 * u64::from(plan.episodes);
     let bar = progress::bar(&format!("test {}", game.name()), total, "episodes");
     let progress = |episodes: u64| bar.inc(episodes);
-    let watch = TestWatch { progress: &progress, stop: &interrupt::asked };
+    let watch = TestObserver { progress: &progress, stop: &interrupt::asked };
     let mut keep = |verdict: LevelVerdict| folder.keep(&verdict);
     let end = run_tests_keeping(game, plan, &finished, &mut keep, &watch, Some(files));
     bar.finish_and_clear();

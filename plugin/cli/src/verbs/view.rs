@@ -4,9 +4,8 @@ mod written_picture;
 
 use crate::{
     arguments::{
-        LevelsArg, open,
+        LevelsArg, default_mode, open,
         player::{Chosen, PlayerArgs},
-        usual_mode,
     },
     error::{CliError, Outcome},
     interrupt, output,
@@ -172,7 +171,7 @@ fn open_episode(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, C
         return Ok(Opened { episode_world, observation_config, mode, player: "recording".to_owned() });
     }
     let (mode, level) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
-    let mode = mode.unwrap_or_else(|| usual_mode(game));
+    let mode = mode.unwrap_or_else(|| default_mode(game));
     game.check_mode(mode)?;
     let chosen = match args.player.load(game)? {
         Some(chosen) => chosen,

@@ -7,7 +7,7 @@ use crate::foreign::{
 use bevy::prelude::*;
 use bevy_playbot::{
     episode::{Episode, StartEpisode},
-    renewal::{EpisodeAhead, Renewal},
+    renewal::{NextEpisode, Renewal},
 };
 
 /// Restarts the game as soon as the schedule allows it.
@@ -75,7 +75,7 @@ fn demand_a_new_world(world: &mut World, foreign: &mut Foreign) -> Result<(), St
 }
 
 /// Stores the level for the systems of the game's start.
-pub(super) fn announce(event: On<EpisodeAhead>, cell: Res<ForeignCell>, mut seed: ResMut<LevelSeed>) {
+pub(super) fn announce(event: On<NextEpisode>, cell: Res<ForeignCell>, mut seed: ResMut<LevelSeed>) {
     seed.0 = cell.lock().level_of(event.level);
 }
 

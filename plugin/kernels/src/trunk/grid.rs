@@ -116,14 +116,14 @@ impl ConvShape {
     }
 
     /// Visits each weight's number and position, in the order `[outputs, inputs, kernel, kernel]`.
-    pub(super) fn each_weight(self, mut visit: impl FnMut(usize, Place)) {
+    pub(super) fn each_weight(self, mut visit: impl FnMut(usize, KernelIndex)) {
         let side = self.kernel;
         let mut number = 0;
         for o in 0..self.outputs {
             for i in 0..self.inputs {
                 for y in 0..side {
                     for x in 0..side {
-                        visit(number, Place { o, i, y, x });
+                        visit(number, KernelIndex { o, i, y, x });
                         number += 1;
                     }
                 }
@@ -132,7 +132,7 @@ impl ConvShape {
     }
 
     /// Returns row and lane of a weight in the order for [`correlate`](crate::tile::correlate).
-    pub(super) fn forward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
+    pub(super) fn forward_at(self, KernelIndex { o, i, y, x }: KernelIndex) -> (usize, usize) {
         let rows = self.kernel * self.kernel * self.inputs;
         (o / LANES * rows + (y * self.kernel + x) * self.inputs + i, o % LANES)
     }
@@ -143,7 +143,7 @@ impl ConvShape {
     }
 
     /// Returns row and lane of a weight in the order for the gradient of the input.
-    pub(super) fn backward_at(self, Place { o, i, y, x }: Place) -> (usize, usize) {
+    pub(super) fn backward_at(self, KernelIndex { o, i, y, x }: KernelIndex) -> (usize, usize) {
         if self.same() {
             let rows = self.kernel * self.kernel * self.outputs;
             let turned = (self.kernel - 1 - y) * self.kernel + self.kernel - 1 - x;
@@ -166,7 +166,7 @@ impl ConvShape {
 
 /// A weight's output and input channel, row and column.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Place {
+pub(super) struct KernelIndex {
     pub(super) o: usize,
     pub(super) i: usize,
     pub(super) y: usize,

@@ -10,7 +10,7 @@ use crate::{
     elementwise::Store,
     tile::{LANES, Lanes, lanes_at},
     trunk::{
-        grid::{ConvShape, Grid, Place},
+        grid::{ConvShape, Grid, KernelIndex},
         products::{Matrices, add_products, products},
     },
 };
@@ -52,8 +52,8 @@ pub(super) fn points(shape: ConvShape, weights: &[f32], turned: bool) -> Vec<Lan
 }
 
 /// Returns the gradient of a weight from sums of [`add_gradients`]: Gᵀ S G at its position in the kernel.
-pub(super) fn gradient(shape: ConvShape, sums: &[Lanes], place: Place) -> f32 {
-    let Place { o, i, y, x } = place;
+pub(super) fn gradient(shape: ConvShape, sums: &[Lanes], place: KernelIndex) -> f32 {
+    let KernelIndex { o, i, y, x } = place;
     let rows = shape.inputs * shape.outputs / LANES;
     let at = |point: usize| f64::from(sums[point * rows + o / LANES * shape.inputs + i][o % LANES]);
     let row = |a: usize| (0..4).map(|b| at(4 * a + b) * G[b][x]).sum::<f64>();

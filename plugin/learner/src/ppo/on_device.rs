@@ -8,7 +8,7 @@ use crate::{
         PpoConfig, PpoNets, StepMetrics,
         batch::Batch,
         objective::{PpoBatch, PpoLoss},
-        step::{Losses, Minibatch, Moment, augmentation_loss, outputs},
+        step::{Losses, Minibatch, UpdateSettings, augmentation_loss, outputs},
     },
     score::TeacherBatch,
 };
@@ -141,7 +141,7 @@ impl Reports {
         adam: &mut Adam,
         batch: &Minibatch,
         config: &PpoConfig,
-        moment: &Moment<'_>,
+        moment: &UpdateSettings<'_>,
     ) -> Result<(), LearnError> {
         use Metric::{Known, OnDevice};
         let (dist, values) = outputs(nets, &batch.inputs, batch, config, moment)?;

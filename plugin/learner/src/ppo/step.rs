@@ -56,7 +56,7 @@ impl Losses {
         values: Tensor<1>,
         batch: &Minibatch,
         config: &PpoConfig,
-        &Moment { score, is_warming_up, .. }: &Moment<'_>,
+        &UpdateSettings { score, is_warming_up, .. }: &UpdateSettings<'_>,
     ) -> Result<Self, LearnError> {
         let ppo = ppo_loss(dist, values, &batch.ppo, config.clip, config.clip_value_loss)?;
         let of_critic = ppo.value_loss.clone() * config.vf_coef;
@@ -114,12 +114,12 @@ pub fn gradient_step(
     lr: f64,
 ) -> Result<StepMetrics, LearnError> {
     let part = std::iter::once((batch.clone(), 1.0));
-    step_in_parts(nets, adam, part, config, &Moment { lr, score, is_warming_up: false })
+    step_in_parts(nets, adam, part, config, &UpdateSettings { lr, score, is_warming_up: false })
 }
 
 /// Settings that change from update to update.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Moment<'a> {
+pub(super) struct UpdateSettings<'a> {
     /// Learning rate.
     pub(super) lr: f64,
     /// Settings of SCORE, with the present weight of the penalty.
@@ -133,7 +133,7 @@ fn loss(
     nets: &PpoNets,
     batch: &Minibatch,
     config: &PpoConfig,
-    moment: &Moment<'_>,
+    moment: &UpdateSettings<'_>,
     steps: u64,
 ) -> Result<(Tensor<1>, StepMetrics), LearnError> {
     let (dist, values) = outputs(nets, &batch.inputs, batch, config, moment)?;
@@ -159,7 +159,7 @@ pub(super) fn outputs(
     inputs: &NetInput,
     batch: &Minibatch,
     config: &PpoConfig,
-    moment: &Moment<'_>,
+    moment: &UpdateSettings<'_>,
 ) -> Result<(Dist, Tensor<1>), LearnError> {
     let inputs = nets.actor.join(inputs)?;
     let dist = nets.actor.forward(inputs.clone());
@@ -173,7 +173,7 @@ pub(super) fn step_in_parts(
     adam: &mut Adam,
     parts: impl Iterator<Item = (Minibatch, f64)>,
     config: &PpoConfig,
-    moment: &Moment<'_>,
+    moment: &UpdateSettings<'_>,
 ) -> Result<StepMetrics, LearnError> {
     let (mut metrics, mut sum) = (StepMetrics::default(), NamedGrads::default());
     let steps = adam.steps();
@@ -205,7 +205,7 @@ pub(super) fn augmentation_loss(
     values: &Tensor<1>,
     batch: &Minibatch,
     config: &PpoConfig,
-    moment: &Moment<'_>,
+    moment: &UpdateSettings<'_>,
 ) -> Result<Option<Tensor<1>>, LearnError> {
     // While only the critic learns the actor must not change.
     let Some(changed) = batch.augmented.as_ref().filter(|_| !moment.is_warming_up) else { return Ok(None) };
@@ -239,7 +239,7 @@ pub(super) struct HostLoss {
 /// The data that the loss of each row depends on.
 struct Rows<'a> {
     config: &'a PpoConfig,
-    moment: &'a Moment<'a>,
+    moment: &'a UpdateSettings<'a>,
     policy: HostDist,
     decoder: Option<HostDist>,
     /// Confidence of the decoder; empty without it.
@@ -263,7 +263,7 @@ struct Piece<'a> {
 
 impl HostLoss {
     /// Returns whether the loss is a mean over rows; it is, except for the penalties of the released code.
-    pub(super) fn is_for(moment: &Moment<'_>) -> bool {
+    pub(super) fn is_for(moment: &UpdateSettings<'_>) -> bool {
         moment.score.is_none_or(|score| score.penalty == PenaltyForm::Mean)
     }
 
@@ -277,7 +277,7 @@ impl HostLoss {
         values: &Tensor<1>,
         batch: &Minibatch,
         config: &PpoConfig,
-        moment: &Moment<'_>,
+        moment: &UpdateSettings<'_>,
         steps: u64,
     ) -> Result<Self, LearnError> {
         let rows = Rows::read(dist, values, batch, config, moment)?;
@@ -315,7 +315,7 @@ impl<'a> Rows<'a> {
         values: &Tensor<1>,
         batch: &Minibatch,
         config: &'a PpoConfig,
-        moment: &'a Moment<'a>,
+        moment: &'a UpdateSettings<'a>,
     ) -> Result<Self, LearnError> {
         let teacher = batch.teacher.as_ref().filter(|_| moment.score.is_some());
         let column = |tensor: &Tensor<1>| host(tensor.clone());

@@ -3,7 +3,7 @@
 use crate::files::{Contents, Load, files};
 use crate::toy::OBS;
 use playbot_learner::{
-    ActionSpace, DeviceKind, FileError, Learner, PolicyCard, PolicyFile, PolicySpec, SacConfig, SacLearner,
+    ActionSpace, DeviceKind, FileError, Learner, PolicyFile, PolicyMetadata, PolicySpec, SacConfig, SacLearner,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ fn all_kinds(folder: &Path) -> Vec<(PathBuf, Load)> {
     let path = folder.join("sac");
     sac.save(&path).expect("written");
     kinds.push((path, |path| SacLearner::load(path, DeviceKind::Flex).map(drop)));
-    let policy = PolicyFile { card: PolicyCard::default(), policy: sac.policy().clone(), skills: None };
+    let policy = PolicyFile { card: PolicyMetadata::default(), policy: sac.policy().clone(), skills: None };
     let path = folder.join("policy");
     policy.save(&path, &vec![0.5; OBS * 2][..], &[], 2).expect("written");
     kinds.push((path, |path| PolicyFile::load(path, DeviceKind::Flex).map(drop)));

@@ -5,7 +5,7 @@ use crate::score::model;
 use crate::skill::{config, corridor_demos};
 use crate::toy::OBS;
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, Learner, PolicyCard, PolicyFile, PpoLearner,
+    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, Learner, PolicyFile, PolicyMetadata, PpoLearner,
     ScoreConfig, SkillModel, SkillTrainer,
 };
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
@@ -202,7 +202,7 @@ fn sizes_that_the_file_does_not_hold_are_refused_before_anything_is_made() {
 pub fn policy_file(path: &Path, condition: bool) {
     let score = ScoreConfig { condition, init_from_decoder: condition, ..ScoreConfig::default() };
     let learner = PpoLearner::with_skill(ppo_config(), score, &model(1), 1, DeviceKind::Flex).expect("good settings");
-    let file = PolicyFile { card: PolicyCard::default(), policy: learner.policy(), skills: learner.skills() };
+    let file = PolicyFile { card: PolicyMetadata::default(), policy: learner.policy(), skills: learner.skills() };
     let (obs, z) = (vec![0.5; 3 * OBS], vec![0.25; 3 * learner.rollout_latent()]);
     assert!(file.save(path, &obs, &z, 0).expect_err("no examples").to_string().contains("at least one row"));
     file.save(path, &obs, &z, 3).expect("written");

@@ -6,19 +6,19 @@ use crate::pixels::{ppo, score};
 use crate::score::model as vector_model;
 use playbot_learner::rng::Streams;
 use playbot_learner::{
-    DeviceKind, FileError, Learner, PictureCard, PolicyCard, PolicyFile, PpoLearner, ScoreConfig, SkillDraw,
+    DeviceKind, FileError, Learner, PictureMetadata, PolicyFile, PolicyMetadata, PpoLearner, ScoreConfig, SkillDraw,
     SkillSource,
 };
 use safetensors::tensor::Dtype;
 use serde_json::json;
 use std::path::Path;
 
-fn picture() -> PictureCard {
-    PictureCard { sensor: "eye".to_owned(), stack: 1, grayscale: true, paint_velocity: false }
+fn picture() -> PictureMetadata {
+    PictureMetadata { sensor: "eye".to_owned(), stack: 1, grayscale: true, paint_velocity: false }
 }
 
 fn file(learner: &PpoLearner) -> PolicyFile {
-    let card = PolicyCard { picture: Some(picture()), ..PolicyCard::default() };
+    let card = PolicyMetadata { picture: Some(picture()), ..PolicyMetadata::default() };
     PolicyFile { card, policy: learner.policy(), skills: learner.skills() }
 }
 
@@ -56,7 +56,7 @@ fn a_policy_comes_back_from_its_file_as_it_was() {
     }
     // Behaviour cloning.
     let skills = SkillSource { prior: model.prior(), decoder: model.policy(), horizon: 4, draw: SkillDraw::Sample };
-    let cloned = PolicyFile { card: PolicyCard::default(), policy: model.policy(), skills: Some(skills) };
+    let cloned = PolicyFile { card: PolicyMetadata::default(), policy: model.policy(), skills: Some(skills) };
     save(&cloned, &path).expect("written");
     load_policy(&path).expect("whole");
 }
@@ -66,7 +66,7 @@ fn a_card_that_tells_of_other_pictures_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("policy");
     let learner = ppo(config(), 1);
-    for card in [PictureCard { grayscale: false, ..picture() }, PictureCard { stack: 2, ..picture() }] {
+    for card in [PictureMetadata { grayscale: false, ..picture() }, PictureMetadata { stack: 2, ..picture() }] {
         let mut wrong = file(&learner);
         wrong.card.picture = Some(card);
         let error = save(&wrong, &path).expect_err("other channels").to_string();

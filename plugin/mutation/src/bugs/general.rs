@@ -65,14 +65,14 @@ enum When {
 
 impl When {
     /// The default moments: early, after an action was held, in later episodes, and late.
-    const USUAL: [Self; 4] = [Self::Tick(25), Self::Held(7), Self::Later { episode: 2, tick: 10 }, Self::Tick(60)];
+    const DEFAULTS: [Self; 4] = [Self::Tick(25), Self::Held(7), Self::Later { episode: 2, tick: 10 }, Self::Tick(60)];
 
-    /// The number of default moments, [`USUAL`](Self::USUAL).
-    const VARIANTS: u32 = Self::USUAL.len() as u32;
+    /// The number of default moments, [`DEFAULTS`](Self::DEFAULTS).
+    const VARIANTS: u32 = Self::DEFAULTS.len() as u32;
 
     /// Returns the moment of a variant.
     fn of(variant: u32) -> Self {
-        one_of(&Self::USUAL, variant)
+        one_of(&Self::DEFAULTS, variant)
     }
 
     /// Returns whether the defect shows in this tick of an episode.

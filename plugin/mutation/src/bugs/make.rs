@@ -6,7 +6,7 @@ mod tests;
 use crate::bugs::{
     BugError, defect_kinds,
     mutant::{Mutant, plant_level},
-    set::{BugGame, BugSet, PlantedBug, PlantedPart, SoundLevels, level_path},
+    set::{BugGame, BugSet, PlantedBug, PlantedPart, UnmutatedLevels, level_path},
 };
 use bevy_playbot::{bot::BlindBot, episode::EpisodeEnd, level::LevelFile, vision::ObservationConfig};
 use playbot_harness::{
@@ -63,12 +63,12 @@ pub struct Made {
     /// Texts of the levels that a defect was planted into, by the names of their mutants.
     pub levels: Vec<(String, String)>,
     /// Kinds of defects that no level, or not enough levels, have a place for, and those without an effect.
-    pub without_place: Vec<NoPlace>,
+    pub without_place: Vec<MissingMutants>,
 }
 
 /// A kind of defect that not enough levels have a place for, or with a variant that changes nothing.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct NoPlace {
+pub struct MissingMutants {
     /// The game.
     pub game: String,
     /// The class of the defect.
@@ -81,7 +81,7 @@ pub struct NoPlace {
     pub without_effect: BTreeSet<u32>,
 }
 
-impl NoPlace {
+impl MissingMutants {
     /// Returns a message that says how many are missing, and why.
     pub fn describe(&self) -> String {
         let Self { game, class, planted, wanted, without_effect } = self;
@@ -206,7 +206,7 @@ fn plant(
     }
     if planted < plan.per_kind {
         let (game, class) = (game.name().to_owned(), kind.class.to_owned());
-        made.without_place.push(NoPlace { game, class, planted, wanted: plan.per_kind, without_effect });
+        made.without_place.push(MissingMutants { game, class, planted, wanted: plan.per_kind, without_effect });
     }
     Ok(())
 }
@@ -409,9 +409,9 @@ fn play(source: &Source, chunk: &LevelSplit, threads: usize) -> Result<Vec<Episo
 }
 
 /// Groups ordered numbers into ranges without gaps.
-pub(super) fn ranges(game: &str, mode: &str, numbers: &[u64]) -> Vec<SoundLevels> {
+pub(super) fn ranges(game: &str, mode: &str, numbers: &[u64]) -> Vec<UnmutatedLevels> {
     let ranges = LevelSplit::ranges(mode, numbers).into_iter();
-    ranges.map(|range| SoundLevels { game: game.to_owned(), range }).collect()
+    ranges.map(|range| UnmutatedLevels { game: game.to_owned(), range }).collect()
 }
 
 #[cfg(test)]

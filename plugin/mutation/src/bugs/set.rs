@@ -41,7 +41,7 @@ pub struct BugSet {
     /// The defects, by game and class.
     pub mutants: Vec<PlantedBug>,
     /// Unmutated levels.
-    pub sound: Vec<SoundLevels>,
+    pub sound: Vec<UnmutatedLevels>,
 }
 
 /// A game with planted defects.
@@ -89,7 +89,7 @@ pub enum PlantedPart {
 /// Unmutated levels of a game.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct SoundLevels {
+pub struct UnmutatedLevels {
     /// Name of the game.
     pub game: String,
     /// The levels.
@@ -267,7 +267,7 @@ pub(super) struct SetText {
     pub(super) seed: u64,
     pub(super) games: Vec<BugGame>,
     pub(super) mutants: Vec<PlantedBug>,
-    pub(super) sound: Vec<SoundLevels>,
+    pub(super) sound: Vec<UnmutatedLevels>,
 }
 
 /// A mutant.

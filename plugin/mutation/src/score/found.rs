@@ -92,7 +92,7 @@ enum Failure {
 /// Returns for each result how the tester failed, if it does not fail in this way on unmutated levels.
 fn failures(subjects: &BTreeMap<&str, &Subject>, results: &[JobResult]) -> Vec<Option<Failure>> {
     let reliable = reliable(subjects, results);
-    let usual = UsualRewards::new(subjects, results);
+    let usual = TypicalRewards::new(subjects, results);
     let failure = |result: &JobResult| {
         let game = subjects.get(result.subject.as_str()).map_or("", |subject| subject.game.as_str());
         if reliable.contains(&(game.to_owned(), result.tester.clone())) {
@@ -199,12 +199,12 @@ pub const FAR: f64 = 4.0;
 ///
 /// In a game that cannot be won, no tester fails by missing the goal. It may still collect far more or far less reward
 /// than elsewhere.
-pub(super) struct UsualRewards<'a> {
+pub(super) struct TypicalRewards<'a> {
     /// By game and tester: the mean reward of the tester's episodes on each unmutated level.
     known: BTreeMap<(&'a str, &'a str), Vec<(&'a str, f64)>>,
 }
 
-impl<'a> UsualRewards<'a> {
+impl<'a> TypicalRewards<'a> {
     /// Collects the rewards of these results.
     pub fn new(subjects: &BTreeMap<&'a str, &'a Subject>, results: &'a [JobResult]) -> Self {
         let mut known: BTreeMap<_, Vec<_>> = BTreeMap::new();
@@ -358,7 +358,7 @@ mod usual_reward_tests {
         let results: Vec<JobResult> =
             levels.iter().zip(sound_rewards).map(|(level, reward)| played(level, *reward)).collect();
         let subjects = levels.iter().map(|level| (level.id.as_str(), level)).collect();
-        let usual = UsualRewards::new(&subjects, &results);
+        let usual = TypicalRewards::new(&subjects, &results);
         let broken = mutant("garden", "m", "panic");
         let of_mutant = rewards.iter().map(|reward| usual.is_unusual("garden", &played(&broken, *reward))).collect();
         let of_sound = (0..results.len()).filter(|place| usual.is_unusual("garden", &results[*place])).collect();
@@ -394,7 +394,7 @@ mod usual_reward_tests {
         let results: Vec<JobResult> =
             (0_u32..).zip(&levels).map(|(place, level)| played(level, f64::from(20 + place % 5))).collect();
         let subjects = levels.iter().map(|level| (level.id.as_str(), level)).collect();
-        let usual = UsualRewards::new(&subjects, &results);
+        let usual = TypicalRewards::new(&subjects, &results);
         let far = played(&mutant("garden", "m", "panic"), 99.0);
         assert!(usual.is_unusual("garden", &far) && !usual.is_unusual("forest", &far));
         assert!(!usual.is_unusual("garden", &JobResult { reward: None, ..far.clone() }));

@@ -9,10 +9,10 @@ use playbot_harness::{
     worlds::idle_action,
 };
 use playbot_test::{
-    detectors::{Detectors, Ear, TestedBy, TestedLevel},
+    detectors::{Detectors, ErrorLogReader, TestedBy, TestedLevel},
     explore::{Cell, Exploration, ExploreError, ExplorePlan, Explorer, ReachedCell, Route, Stop, explore},
     findings::{Breakage, Checks, FindingHead, Lengths, actions_of, minimise::lengths, scan},
-    verdict::{Finding, LevelVerdict, TestError, TestPlan, TestWatch, Tester, TesterRecord, test_in_turn},
+    verdict::{Finding, LevelVerdict, TestError, TestObserver, TestPlan, Tester, TesterRecord, test_in_turn},
 };
 use std::{
     ops::ControlFlow,
@@ -31,7 +31,7 @@ pub(super) fn play(trial: &Trial, player: &Player) -> Result<Option<JobResult>, 
     let plan = plan(trial, player);
     let times = Mutex::new(Vec::new());
     let progress = |_: u64| times.lock().unwrap_or_else(PoisonError::into_inner).push(trial.clock.seconds());
-    let watch = TestWatch { progress: &progress, stop: trial.stop };
+    let watch = TestObserver { progress: &progress, stop: trial.stop };
     let tested = match test_in_turn(trial.game, &plan, trial.name, &watch) {
         Ok(Some(tested)) => tested,
         Ok(None) => return Ok(None),
@@ -147,7 +147,7 @@ impl Sightings {
 /// The explorer cannot explore the game at all.
 pub(super) fn search(trial: &Trial, explorer: &Explorer) -> Result<Option<JobResult>, ScoreError> {
     let mut sightings = Sightings { findings: Vec::new(), first: None, playable: Vec::new() };
-    let ear = Ear::new();
+    let ear = ErrorLogReader::new();
     let explored = ear.listen(|| explore(trial.game, &exploration_plan(trial, explorer), |_| {}, |_| go_on(trial)));
     hear_errors(trial, &ear, &mut sightings);
     let found = match explored {
@@ -215,7 +215,7 @@ fn finding_of(error: ExploreError) -> Result<JobFinding, ScoreError> {
 }
 
 /// Adds the errors that were logged during the exploration, if a detector reads them.
-fn hear_errors(trial: &Trial, ear: &Ear, sightings: &mut Sightings) {
+fn hear_errors(trial: &Trial, ear: &ErrorLogReader, sightings: &mut Sightings) {
     let mut ticks = trial.detectors.ticks.iter();
     let listening = ticks.find(|it| it.watch_world().is_some_and(|watch| watch.hears_errors()));
     let error = ear.take().into_iter().next();

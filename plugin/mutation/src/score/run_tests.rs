@@ -57,7 +57,7 @@ fn scored(plan: &ScorePlan, file: &Path, earlier: Earlier, most: u64) -> (Option
     let progress = |jobs: u64| {
         done.fetch_add(jobs, Ordering::SeqCst);
     };
-    let watch = ScoreWatch { progress: &progress, stop: &|| done.load(Ordering::SeqCst) >= most };
+    let watch = ScoreCallbacks { progress: &progress, stop: &|| done.load(Ordering::SeqCst) >= most };
     let score = run.run(&mut journal, &watch).expect("it can be scored");
     (score, journal.finished().len() as u64)
 }

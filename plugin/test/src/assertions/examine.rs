@@ -8,7 +8,7 @@ use crate::{
     detectors::{DetectorChoice, Detectors},
     findings::{Budget, Checks, FindingError, FindingFiles, Played, SeenFinding, SeenLevel},
     verdict::{
-        Finding, LevelVerdict, TestError, TestPlan, TestRecord, TestWatch, Tester, TesterVerdict, rerun_commands,
+        Finding, LevelVerdict, TestError, TestObserver, TestPlan, TestRecord, Tester, TesterVerdict, rerun_commands,
         run_tests,
     },
 };
@@ -73,7 +73,7 @@ impl LevelTest<'_> {
             }
             Ok(())
         };
-        let watch = TestWatch { progress: &|_| {}, stop: &|| false };
+        let watch = TestObserver { progress: &|_| {}, stop: &|| false };
         run_tests(self.game, plan, &BTreeSet::new(), &mut keep, &watch)?;
         broken.sort_by_key(|level| level.index);
         Ok(broken)

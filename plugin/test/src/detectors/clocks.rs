@@ -6,7 +6,7 @@ use crate::{
 };
 use bevy::math::Vec2;
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
-use playbot_harness::detector::{Detector, LevelAhead, Moment, Setting, Watch};
+use playbot_harness::detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting};
 use playbot_learner::{disk, disk::DiskFile};
 use serde::Serialize;
 use std::{
@@ -141,7 +141,7 @@ impl Detector for ShortTime {
         "time is up before the agent could have come to the goal at its fastest pace"
     }
 
-    fn is_usual(&self) -> bool {
+    fn is_default(&self) -> bool {
         false
     }
 
@@ -152,7 +152,7 @@ impl Detector for ShortTime {
         ]
     }
 
-    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let plan = level.plan.as_ref()?;
         let tile = CellGrid::new(Some(plan), None).size;
         Some(Box::new(Going {
@@ -168,8 +168,8 @@ impl Detector for ShortTime {
     }
 }
 
-impl Watch for Going {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Going {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let place = moment.place.filter(|place| place.is_finite())?;
         if let Some(first) = self.first {
             self.fastest = self.fastest.max((place - self.last).abs());
@@ -181,7 +181,7 @@ impl Watch for Going {
         None
     }
 
-    fn end(&mut self, _moment: &Moment<'_>, result: &EpisodeResult) -> Option<String> {
+    fn end(&mut self, _moment: &DetectorTick<'_>, result: &EpisodeResult) -> Option<String> {
         if result.end != EpisodeEnd::Truncated || result.success {
             return None;
         }

@@ -88,7 +88,7 @@ impl LevelDetector for EntityLeak {
         "every episode leaves entities behind"
     }
 
-    fn is_usual(&self) -> bool {
+    fn is_default(&self) -> bool {
         true
     }
 

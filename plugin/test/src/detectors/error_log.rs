@@ -1,6 +1,6 @@
 //! Errors that a game logs.
 
-use playbot_harness::detector::{Detector, WorldMoment, WorldWatch};
+use playbot_harness::detector::{Detector, WorldTick, WorldWatcher};
 use std::{
     fmt,
     sync::{Arc, Mutex, PoisonError},
@@ -27,17 +27,17 @@ impl Detector for ErrorLog {
         "the game logs an error"
     }
 
-    fn watch_world(&self) -> Option<Box<dyn WorldWatch>> {
+    fn watch_world(&self) -> Option<Box<dyn WorldWatcher>> {
         Some(Box::new(Self))
     }
 }
 
-impl WorldWatch for ErrorLog {
+impl WorldWatcher for ErrorLog {
     fn hears_errors(&self) -> bool {
         true
     }
 
-    fn tick(&mut self, moment: &WorldMoment<'_>) -> Option<String> {
+    fn tick(&mut self, moment: &WorldTick<'_>) -> Option<String> {
         moment.errors.first().map(|error| format!("the game logged an error: {error}"))
     }
 }
@@ -113,7 +113,7 @@ const BEVY: [&str; 41] = [
 ];
 
 /// Collects the errors of a thread, for any log filter. All events go on to the previous subscriber.
-pub struct Ear {
+pub struct ErrorLogReader {
     listener: Dispatch,
     heard: Arc<Mutex<Vec<String>>>,
 }
@@ -124,7 +124,7 @@ struct Listener {
     heard: Arc<Mutex<Vec<String>>>,
 }
 
-impl Ear {
+impl ErrorLogReader {
     /// Creates an ear for this thread.
     pub fn new() -> Self {
         let heard = Arc::<Mutex<Vec<String>>>::default();
@@ -145,7 +145,7 @@ impl Ear {
     }
 }
 
-impl Default for Ear {
+impl Default for ErrorLogReader {
     fn default() -> Self {
         Self::new()
     }
@@ -242,9 +242,9 @@ mod tests {
         let world = World::new();
         let errors = ["no such door".to_owned(), "no such key".to_owned()];
         let mut watch = ErrorLog.watch_world().expect("it looks at Worlds");
-        let told = watch.tick(&WorldMoment { world: &world, errors: &errors });
+        let told = watch.tick(&WorldTick { world: &world, errors: &errors });
         assert_eq!(told.as_deref(), Some("the game logged an error: no such door"));
-        assert_eq!(watch.tick(&WorldMoment { world: &world, errors: &[] }), None);
+        assert_eq!(watch.tick(&WorldTick { world: &world, errors: &[] }), None);
     }
 }
 
@@ -254,7 +254,7 @@ mod ear_tests {
 
     #[test]
     fn errors_of_the_game_are_heard_and_others_are_not() {
-        let ear = Ear::new();
+        let ear = ErrorLogReader::new();
         let value = ear.listen(|| {
             tracing::error!(target: "my_game::doors", "door {} has no key", 3);
             tracing::warn!(target: "my_game", "it is late");
@@ -268,8 +268,8 @@ mod ear_tests {
 
     #[test]
     fn whoever_listened_before_still_hears_them() {
-        let outer = Ear::new();
-        outer.listen(|| Ear::new().listen(|| tracing::error!(target: "my_game", "twice")));
+        let outer = ErrorLogReader::new();
+        outer.listen(|| ErrorLogReader::new().listen(|| tracing::error!(target: "my_game", "twice")));
         assert_eq!(outer.take(), ["twice"]);
     }
 

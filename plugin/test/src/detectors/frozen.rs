@@ -3,7 +3,7 @@
 use crate::detectors::Efforts;
 use bevy::{ecs::world::WorldId, prelude::*};
 use bevy_playbot::{agent::AgentOrder, vision::BlankEpisodes};
-use playbot_harness::detector::{Detector, LevelAhead, Moment, Setting, Watch, WorldMoment, WorldWatch};
+use playbot_harness::detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting, WorldTick, WorldWatcher};
 
 /// A finding for games in which nothing changes for any action: not the state and not the observations.
 pub struct FrozenWorld {
@@ -36,13 +36,13 @@ impl Detector for FrozenWorld {
         vec![Setting::new("ticks", &mut self.ticks, "ticks in a row without any change").at_least(1.0)]
     }
 
-    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         Some(Box::new(Still { ticks: self.ticks as u32, state: None, same: 0, efforts: Efforts::default() }))
     }
 }
 
-impl Watch for Still {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Still {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let state = moment.fingerprint();
         self.efforts.note(moment.action);
         if self.state == Some(state) {
@@ -76,13 +76,13 @@ impl Detector for BlankPicture {
         "every picture that the agent sees in an episode is of a single colour"
     }
 
-    fn watch_world(&self) -> Option<Box<dyn WorldWatch>> {
+    fn watch_world(&self) -> Option<Box<dyn WorldWatcher>> {
         Some(Box::<Counted>::default())
     }
 }
 
-impl WorldWatch for Counted {
-    fn tick(&mut self, moment: &WorldMoment<'_>) -> Option<String> {
+impl WorldWatcher for Counted {
+    fn tick(&mut self, moment: &WorldTick<'_>) -> Option<String> {
         let agents = moment.world.get_resource::<AgentOrder>()?.entities();
         let count = agents.iter().filter_map(|agent| moment.world.get::<BlankEpisodes>(*agent));
         let count = count.map(|blank| blank.episodes).sum();
@@ -129,17 +129,17 @@ impl Detector for Runaway {
         vec![Setting::new("distance", &mut self.distance, "distance from the origin that is too far")]
     }
 
-    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         Some(Box::new(Numbers { most: self.distance as f32 }))
     }
 
-    fn watch_world(&self) -> Option<Box<dyn WorldWatch>> {
+    fn watch_world(&self) -> Option<Box<dyn WorldWatcher>> {
         Some(Box::new(Transforms { most: self.distance as f32, query: None }))
     }
 }
 
-impl Watch for Numbers {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Numbers {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         if let Some(index) = moment.observation.iter().position(|number| !number.is_finite()) {
             return Some(format!("value {index} of the observation is {}", moment.observation[index]));
         }
@@ -155,8 +155,8 @@ impl Transforms {
     }
 }
 
-impl WorldWatch for Transforms {
-    fn tick(&mut self, moment: &WorldMoment<'_>) -> Option<String> {
+impl WorldWatcher for Transforms {
+    fn tick(&mut self, moment: &WorldTick<'_>) -> Option<String> {
         let world = moment.world;
         let (id, mut query) = match self.query.take() {
             Some((id, query)) if id == world.id() => (id, query),
@@ -209,7 +209,7 @@ mod blank_picture_tests {
         let agent: Entity = app.world_mut().spawn(Agent::new(0, ActionSpace::Discrete(2))).id();
         app.tick().expect("one agent");
         let mut watch = BlankPicture.watch_world().expect("it looks at Worlds");
-        let mut told = |app: &bevy::app::App| watch.tick(&WorldMoment { world: app.world(), errors: &[] });
+        let mut told = |app: &bevy::app::App| watch.tick(&WorldTick { world: app.world(), errors: &[] });
         assert_eq!(told(&app), None, "who has no eyes is not blind");
         app.world_mut().entity_mut(agent).insert(BlankEpisodes::default());
         assert_eq!(told(&app), None);

@@ -7,7 +7,7 @@ use crate::{
 use bevy::math::Vec2;
 use bevy_playbot::{episode::EpisodeResult, vision::ObservationConfig};
 use playbot_harness::{
-    detector::{Detector, LevelAhead, Moment, Setting, Watch},
+    detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting},
     eval::{EvalPlan, Player, evaluate},
     game::Game,
     split::LevelSplit,
@@ -20,12 +20,12 @@ use std::ops::ControlFlow;
 /// [the distance of their goals](Self::beyond).
 pub struct FarGoal {
     distance: f64,
-    is_usual: bool,
+    is_default: bool,
 }
 
 impl Default for FarGoal {
     fn default() -> Self {
-        Self { distance: 3.0, is_usual: false }
+        Self { distance: 3.0, is_default: false }
     }
 }
 
@@ -33,7 +33,7 @@ impl FarGoal {
     /// Creates the detector for [a game's own detectors](playbot_harness::game::TestTools::detectors): no agent farther from the
     /// goal than this, in tiles, can reach it.
     pub fn beyond(distance: f64) -> Self {
-        Self { distance, is_usual: true }
+        Self { distance, is_default: true }
     }
 }
 
@@ -52,23 +52,23 @@ impl Detector for FarGoal {
         "the agent succeeds far from the goal"
     }
 
-    fn is_usual(&self) -> bool {
-        self.is_usual
+    fn is_default(&self) -> bool {
+        self.is_default
     }
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
         vec![Setting::new("distance", &mut self.distance, "how far the goal may reach, in tiles")]
     }
 
-    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let plan = level.plan.as_ref()?;
         let distance = self.distance as f32 * CellGrid::new(Some(plan), None).size;
         Some(Box::new(Away { goal: plan.goal, distance, was_success: false }))
     }
 }
 
-impl Watch for Away {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Away {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let is_first = moment.is_success && !self.was_success;
         self.was_success |= moment.is_success;
         let away = moment.place.filter(|_| is_first)?.distance(self.goal);
@@ -85,12 +85,12 @@ impl Watch for Away {
 pub struct GoalIgnored {
     distance: f64,
     ticks: f64,
-    is_usual: bool,
+    is_default: bool,
 }
 
 impl Default for GoalIgnored {
     fn default() -> Self {
-        Self { distance: 0.1, ticks: 10.0, is_usual: false }
+        Self { distance: 0.1, ticks: 10.0, is_default: false }
     }
 }
 
@@ -98,7 +98,7 @@ impl GoalIgnored {
     /// Creates the detector for [a game's own detectors](playbot_harness::game::TestTools::detectors): an agent within this
     /// distance of the goal after a tick, in tiles, has reached it in this tick.
     pub fn within(distance: f64) -> Self {
-        Self { distance, ticks: 1.0, is_usual: true }
+        Self { distance, ticks: 1.0, is_default: true }
     }
 }
 
@@ -118,8 +118,8 @@ impl Detector for GoalIgnored {
         "the agent is at the goal and that is no success"
     }
 
-    fn is_usual(&self) -> bool {
-        self.is_usual
+    fn is_default(&self) -> bool {
+        self.is_default
     }
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
@@ -129,15 +129,15 @@ impl Detector for GoalIgnored {
         ]
     }
 
-    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let plan = level.plan.as_ref()?;
         let distance = self.distance as f32 * CellGrid::new(Some(plan), None).size;
         Some(Box::new(Near { goal: plan.goal, distance, ticks: self.ticks as u32, stayed: 0 }))
     }
 }
 
-impl Watch for Near {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Near {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let away = moment.place?.distance(self.goal);
         self.stayed = if away <= self.distance && !moment.is_success { self.stayed + 1 } else { 0 };
         (self.stayed >= self.ticks)
@@ -339,7 +339,7 @@ mod tests {
         assert_eq!(found(&FarGoal::default(), &room(), &leave(2)), None);
         assert_eq!(found(&FarGoal::default(), &room(), &leave(99)), None, "no success");
         assert_eq!(found(&FarGoal::default(), &LevelAhead::default(), &leave(8)), None, "no plan");
-        assert!(!FarGoal::default().is_usual() && FarGoal::beyond(1.0).is_usual());
+        assert!(!FarGoal::default().is_default() && FarGoal::beyond(1.0).is_default());
     }
 }
 
@@ -372,7 +372,7 @@ mod goal_ignored_tests {
         let by: Vec<Step> = (0..60).map(|tick| Step::at(tick, 0.5 * (tick % 18) as f32, 8.5)).collect();
         assert_eq!(found(&GoalIgnored::default(), &room(), &by), None, "one tick in 18");
         assert_eq!(found(&GoalIgnored::default(), &LevelAhead::default(), &arrive(false)), None, "no plan");
-        assert!(!GoalIgnored::default().is_usual() && GoalIgnored::within(0.3).is_usual());
+        assert!(!GoalIgnored::default().is_default() && GoalIgnored::within(0.3).is_default());
     }
 }
 

@@ -6,7 +6,7 @@ use bevy::{
     prelude::Transform,
 };
 use playbot_harness::{
-    detector::{Detector, LevelAhead, Moment, Setting, Watch},
+    detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting},
     floor_plan::FloorPlan,
 };
 
@@ -51,7 +51,7 @@ impl Detector for Stuck {
         ]
     }
 
-    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let size = CellGrid::new(level.plan.as_ref(), None).size;
         let goal = level.plan.as_ref().map(|plan| (plan.goal, AT_GOAL * size));
         let (ticks, distance) = (self.ticks as u32, self.distance as f32 * size);
@@ -59,8 +59,8 @@ impl Detector for Stuck {
     }
 }
 
-impl Watch for Staying {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Staying {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let place = moment.place.filter(|place| place.is_finite())?;
         self.efforts.note(moment.action);
         let is_at_goal = self.goal.is_some_and(|(goal, near)| place.distance(goal) <= near);
@@ -106,15 +106,15 @@ impl Detector for OutOfBounds {
         vec![Setting::new("margin", &mut self.margin, "tiles around the level that still belong to it")]
     }
 
-    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let plan = level.plan.as_ref().filter(|plan| !plan.walls.is_empty())?;
         let margin = self.margin as f32 * CellGrid::new(Some(plan), None).size;
         Some(Box::new(Inside(plan.bounds.inflate(margin))))
     }
 }
 
-impl Watch for Inside {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Inside {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let place = moment.place.filter(|place| place.is_finite() && !self.0.contains(*place))?;
         Some(format!("the agent is at {:.1}, {:.1}, outside the level", place.x, place.y))
     }
@@ -159,7 +159,7 @@ impl Detector for FellThrough {
         ]
     }
 
-    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let plan = level.plan.as_ref().filter(|plan| !plan.walls.is_empty());
         let lowest = plan.map(|plan| plan.bounds.min.y);
         let (ticks, depth) = (self.ticks as u32, self.depth as f32);
@@ -167,8 +167,8 @@ impl Detector for FellThrough {
     }
 }
 
-impl Watch for Falling {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Falling {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let height = moment.height()?;
         let lowest = *self.lowest.get_or_insert(height - self.depth);
         self.fallen = if height < self.last { self.fallen + 1 } else { 0 };
@@ -221,14 +221,14 @@ impl Detector for ThroughWall {
         vec![Setting::new("depth", &mut self.depth, "wall on all sides of the agent that is too much, in tiles")]
     }
 
-    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let solid = SolidTiles::of(level.plan.as_ref()?)?;
         Some(Box::new(InsideWall { solid, depth: self.depth as f32 }))
     }
 }
 
-impl Watch for InsideWall {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for InsideWall {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let place = moment.place?;
         let is_deep = self.solid.surround(place, self.depth);
         is_deep.then(|| format!("the agent is at {:.1}, {:.1}, deep inside a wall", place.x, place.y))
@@ -264,7 +264,7 @@ impl Detector for PhysicsExplosion {
         "the agent is flung through half its level in one tick"
     }
 
-    fn is_usual(&self) -> bool {
+    fn is_default(&self) -> bool {
         false
     }
 
@@ -275,15 +275,15 @@ impl Detector for PhysicsExplosion {
         ]
     }
 
-    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let side = |plan: &FloorPlan| self.share as f32 * plan.bounds.size().max_element();
         let most = level.plan.as_ref().map_or(self.distance as f32, side);
         Some(Box::new(Leaping { most, last: None }))
     }
 }
 
-impl Watch for Leaping {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Leaping {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let transform = || moment.world.get::<Transform>(moment.agent).map(|transform| transform.translation);
         let place = moment.place.map(|place| place.extend(0.0)).or_else(transform)?;
         let way = self.last.replace(place).map(|last| last.distance(place))?;

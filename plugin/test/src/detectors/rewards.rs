@@ -5,7 +5,7 @@ use crate::{
     explore::CellGrid,
 };
 use bevy_playbot::episode::EpisodeEnd;
-use playbot_harness::detector::{Detector, LevelAhead, Moment, Setting, Watch};
+use playbot_harness::detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting};
 use std::collections::BTreeMap;
 
 /// A finding for episodes with more reward at the time limit than any solved one.
@@ -100,7 +100,7 @@ impl Detector for RewardLoop {
         "the agent is paid again and again for coming back to the same spot or staying there"
     }
 
-    fn is_usual(&self) -> bool {
+    fn is_default(&self) -> bool {
         false
     }
 
@@ -111,15 +111,15 @@ impl Detector for RewardLoop {
         ]
     }
 
-    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let tile = CellGrid::new(level.plan.as_ref(), None).size;
         let grid = CellGrid::new(level.plan.as_ref(), Some(self.spot as f32 * tile));
         Some(Box::new(Earning { times: self.times as u32, grid, sum: 0.0, spots: BTreeMap::new() }))
     }
 }
 
-impl Watch for Earning {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Earning {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         if moment.is_success {
             return None;
         }

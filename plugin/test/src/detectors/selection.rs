@@ -78,7 +78,7 @@ pub enum DetectorError {
 impl Detectors {
     /// Selects the default detectors: those that cost little and give no false alarm in an unmutated game.
     pub fn usual(game: &dyn Game) -> Self {
-        Self::of(all(game).into_iter().filter(Known::is_usual).collect())
+        Self::of(all(game).into_iter().filter(Known::is_default).collect())
     }
 
     /// Selects the detectors of a choice.
@@ -164,7 +164,7 @@ impl DetectorChoice {
         if names(&self.without, known.name()) || names(&self.without, ALL) {
             return false;
         }
-        known.is_usual() || names(&self.with, ALL)
+        known.is_default() || names(&self.with, ALL)
     }
 }
 
@@ -179,7 +179,7 @@ fn options(known: &mut [Known], choice: &DetectorChoice, usual: &mut [Known]) ->
             words.extend([option.to_owned(), names.join(",")]);
         }
     };
-    let is_implied = |it: &Known| if leaves_all { false } else { adds_all || it.is_usual() };
+    let is_implied = |it: &Known| if leaves_all { false } else { adds_all || it.is_default() };
     let counts = |it: &&Known| !matches!(it, Known::Clock(_));
     let chosen =
         |is: bool| known.iter().filter(counts).filter(move |it| choice.takes(it) == is && is_implied(it) != is);

@@ -3,7 +3,7 @@
 use crate::explore::{Cell, CellGrid};
 use bevy::math::Vec2;
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
-use playbot_harness::detector::{Detector, LevelAhead, Moment, Setting, Watch};
+use playbot_harness::detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting};
 use std::collections::BTreeMap;
 
 /// A finding for episodes that go on after the game [proves](playbot_harness::game::StateTools::prove_from) that their agent can
@@ -60,7 +60,7 @@ impl Detector for SoftLock {
         ]
     }
 
-    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn Watch>> {
+    fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let every = self.every as u32;
         Some(Box::new(Asking {
             every,
@@ -77,7 +77,7 @@ impl Detector for SoftLock {
 
 impl Asking {
     /// Returns whether this position was never asked about, or so long ago that the answer may have changed.
-    fn is_unknown(&mut self, moment: &Moment<'_>, rests: bool) -> bool {
+    fn is_unknown(&mut self, moment: &DetectorTick<'_>, rests: bool) -> bool {
         let Some(cell) = moment.place.and_then(|place| self.grid.cell_at(place)) else { return true };
         let place = (cell, rests);
         let stale = self.every.saturating_mul(STALE);
@@ -88,7 +88,7 @@ impl Asking {
         !is_known
     }
 
-    fn ask(&mut self, moment: &Moment<'_>) {
+    fn ask(&mut self, moment: &DetectorTick<'_>) {
         // A locked agent stays locked, so rarer questions are enough later.
         self.next = moment.tick.checked_add(self.every.max(moment.tick / 2));
         let proof = moment.proofs.of_state();
@@ -101,14 +101,14 @@ impl Asking {
     }
 
     /// Returns the message once the episode has gone on for this many ticks.
-    fn told(&self, moment: &Moment<'_>, ticks: u32) -> Option<String> {
+    fn told(&self, moment: &DetectorTick<'_>, ticks: u32) -> Option<String> {
         let (since, why) = self.locked.as_ref()?;
         (moment.tick >= since.saturating_add(ticks)).then(|| format!("since tick {since} at the latest {why}"))
     }
 }
 
-impl Watch for Asking {
-    fn tick(&mut self, moment: &Moment<'_>) -> Option<String> {
+impl EpisodeWatcher for Asking {
+    fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let rests = moment.place.is_some() && moment.place == self.last;
         self.last = moment.place;
         if moment.is_success {
@@ -124,7 +124,7 @@ impl Watch for Asking {
     }
 
     /// The time limit came while the goal was out of reach. Half the ticks are enough then, since nothing kills there.
-    fn end(&mut self, moment: &Moment<'_>, result: &EpisodeResult) -> Option<String> {
+    fn end(&mut self, moment: &DetectorTick<'_>, result: &EpisodeResult) -> Option<String> {
         let is_late = result.end == EpisodeEnd::Truncated && !result.success;
         is_late.then(|| self.told(moment, self.ticks / 2)).flatten()
     }

@@ -8,7 +8,7 @@ use bevy_playbot::{
     vision::ObservationConfig,
 };
 use playbot_harness::{
-    detector::{Detector, LevelAhead, Moment, NoProofs, Proofs, WorldMoment},
+    detector::{Detector, DetectorTick, LevelAhead, NoProofs, Proofs, WorldTick},
     eval::Player,
     floor_plan::FloorPlan,
     foreign::ForeignGame,
@@ -81,7 +81,7 @@ fn play(
     (0..).zip(steps).find_map(|(tick, step)| {
         let action = ActionValue::Discrete(step.action);
         let observation = [step.seen];
-        let moment = Moment {
+        let moment = DetectorTick {
             world: &world,
             agent,
             level: level.level,
@@ -111,7 +111,7 @@ fn play(
 
 /// The message of a detector about a World.
 pub(crate) fn found_in(detector: &dyn Detector, world: &World) -> Option<String> {
-    detector.watch_world()?.tick(&WorldMoment { world, errors: &[] })
+    detector.watch_world()?.tick(&WorldTick { world, errors: &[] })
 }
 
 /// The end of a won episode.

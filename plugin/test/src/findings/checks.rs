@@ -4,7 +4,7 @@ use crate::{
     detectors::{DetectorChoice, Detectors, GameProofs, LevelDetector, ShownBy},
     findings::{
         FindingHead,
-        play::{Moment, Replayed, Watcher, say_the_same},
+        play::{CheckTick, Replayed, Watcher, say_the_same},
     },
 };
 use bevy_playbot::{
@@ -16,7 +16,7 @@ use bevy_playbot::{
 };
 use playbot_harness::{
     detector,
-    detector::{Detector, LevelAhead, Watch, WorldMoment, WorldWatch},
+    detector::{Detector, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher},
     game::Game,
 };
 use std::{cell::RefCell, rc::Rc, sync::Arc};
@@ -177,7 +177,7 @@ impl Checks {
 pub(super) fn watcher(detector: Arc<dyn Detector>) -> (Watcher, Rc<RefCell<Option<String>>>) {
     let said = Rc::<RefCell<Option<String>>>::default();
     let (mut looking, heard) = (Looking::new(detector), Rc::clone(&said));
-    let watcher: Watcher = Box::new(move |moment: &Moment| {
+    let watcher: Watcher = Box::new(move |moment: &CheckTick| {
         let words = looking.look(moment)?;
         *heard.borrow_mut() = Some(words);
         Some(moment.tick)
@@ -188,9 +188,9 @@ pub(super) fn watcher(detector: Arc<dyn Detector>) -> (Watcher, Rc<RefCell<Optio
 /// A detector at work in the World of one episode.
 pub(super) struct Looking {
     detector: Arc<dyn Detector>,
-    worlds: Option<Box<dyn WorldWatch>>,
+    worlds: Option<Box<dyn WorldWatcher>>,
     /// `None` before the first tick.
-    begun: Option<Option<Box<dyn Watch>>>,
+    begun: Option<Option<Box<dyn EpisodeWatcher>>>,
 }
 
 impl Looking {
@@ -200,14 +200,14 @@ impl Looking {
     }
 
     /// Examines a tick. Returns a message if something is wrong.
-    pub fn look(&mut self, moment: &Moment) -> Option<String> {
-        let Moment { game, mode, world, agent, tick, end, errors } = *moment;
+    pub fn look(&mut self, moment: &CheckTick) -> Option<String> {
+        let CheckTick { game, mode, world, agent, tick, end, errors } = *moment;
         let (episode, action) = (world.get::<Episode>(agent)?, world.get::<Action>(agent)?);
         let level = episode.level;
         let ahead = || LevelAhead { level, plan: game.tools().levels.floor_plan(mode, level) };
         let watch = self.begun.get_or_insert_with(|| self.detector.watch(&ahead()));
         let proofs = GameProofs { game, mode, level, world, agent };
-        let seen = detector::Moment {
+        let seen = detector::DetectorTick {
             world,
             agent,
             level,
@@ -224,7 +224,7 @@ impl Looking {
             let now = watch.tick(&seen);
             now.or_else(|| end.and_then(|end| watch.end(&seen, &end)))
         });
-        in_episode.or_else(|| self.worlds.as_mut()?.tick(&WorldMoment { world, errors }))
+        in_episode.or_else(|| self.worlds.as_mut()?.tick(&WorldTick { world, errors }))
     }
 }
 

@@ -1,6 +1,6 @@
 //! The replay of an episode, by its actions or by its player.
 
-use crate::{detectors::Ear, findings::StoredFinding};
+use crate::{detectors::ErrorLogReader, findings::StoredFinding};
 use bevy::prelude::*;
 use bevy_playbot::{
     action::{Action, ActionSpace, ActionValue, misfit},
@@ -221,7 +221,7 @@ pub(super) struct Solo<'a> {
     /// Ticks and frames of the World: a level may never be ready.
     runs: u32,
     /// Collects errors of the log, if they are needed.
-    ear: Option<Ear>,
+    ear: Option<ErrorLogReader>,
     /// The errors of the last tick, and of the level's loading before it.
     errors: Vec<String>,
     /// Whether the last run was a tick of the episode.
@@ -247,7 +247,7 @@ impl<'a> Solo<'a> {
 
     /// Collects errors of the log from now on.
     pub fn listen(&mut self) {
-        self.ear = Some(Ear::new());
+        self.ear = Some(ErrorLogReader::new());
     }
 
     /// Hands the agent over to a player.
@@ -275,7 +275,7 @@ impl<'a> Solo<'a> {
             Some(ear) => ear.listen(|| tick_world(&mut self.world)),
             None => tick_world(&mut self.world),
         };
-        self.errors.extend(self.ear.as_ref().map(Ear::take).unwrap_or_default());
+        self.errors.extend(self.ear.as_ref().map(ErrorLogReader::take).unwrap_or_default());
         ticked.map_err(|fault| Breakage::of_fault(&fault, self.ticks))?;
         let played = match self.end() {
             Some(end) => end.ticks,
@@ -320,10 +320,10 @@ impl<'a> Solo<'a> {
     }
 
     /// Returns the World after its last tick.
-    pub fn moment(&self) -> Moment<'_> {
+    pub fn moment(&self) -> CheckTick<'_> {
         let (tick, end) = (self.ticks.saturating_sub(1), self.end());
         let (game, mode, world, agent) = (self.game, self.mode, &self.world, self.agent);
-        Moment { game, mode, world, agent, tick, end, errors: &self.errors }
+        CheckTick { game, mode, world, agent, tick, end, errors: &self.errors }
     }
 }
 
@@ -363,7 +363,7 @@ pub(super) fn recorded(actions: &[ActionValue], space: &ActionSpace) -> EpisodeA
 
 /// An episode after one of its ticks.
 #[derive(Clone, Copy)]
-pub struct Moment<'a> {
+pub struct CheckTick<'a> {
     /// The game.
     pub game: &'a dyn Game,
     /// Its mode.
@@ -381,7 +381,7 @@ pub struct Moment<'a> {
 }
 
 /// A function that receives every tick of an episode in order, and returns the tick of the finding, once it was seen.
-pub type Watcher = Box<dyn FnMut(&Moment) -> Option<u32>>;
+pub type Watcher = Box<dyn FnMut(&CheckTick) -> Option<u32>>;
 
 // Panics and faults of a game during an episode.
 

@@ -5,7 +5,7 @@ use crate::{
     findings::{
         FindingHead,
         checks::{Check, Checks, Looking},
-        play::{Moment, Setting, Watcher, play_actions},
+        play::{CheckTick, Setting, Watcher, play_actions},
     },
 };
 use bevy_playbot::{action::ActionValue, episode::EpisodeResult};
@@ -45,7 +45,7 @@ pub fn scan(
     let mut looking: Vec<(&'static str, Looking)> =
         detectors.ticks.iter().map(|detector| (detector.name(), Looking::new(Arc::clone(detector)))).collect();
     let notes = Rc::clone(&seen);
-    let watcher: Watcher = Box::new(move |moment: &Moment| {
+    let watcher: Watcher = Box::new(move |moment: &CheckTick| {
         looking.retain_mut(|(detector, looking)| {
             let message = looking.look(moment);
             let is_silent = message.is_none();

@@ -155,7 +155,7 @@ pub(super) struct Journal {
 
 /// Index of a level in the range.
 #[derive(Deserialize)]
-struct Place {
+struct LevelIndex {
     index: u64,
 }
 
@@ -259,7 +259,7 @@ fn whole_lines(file: &mut DiskFile) -> io::Result<(BTreeMap<u64, (u64, usize)>, 
         reader.read_until(b'\n', &mut line)?;
         let Some(text) = line.strip_suffix(b"\n") else { break };
         let Some(line_text) = unsealed_line(text).map(|line| line.text) else { break };
-        let Ok(place) = serde_json::from_str::<Place>(&line_text) else { break };
+        let Ok(place) = serde_json::from_str::<LevelIndex>(&line_text) else { break };
         lines.entry(place.index).or_insert((length, text.len()));
         length += line.len() as u64;
     }

@@ -46,7 +46,7 @@ pub enum TestEnd {
 }
 
 /// Observers of a test.
-pub struct TestWatch<'a> {
+pub struct TestObserver<'a> {
     /// Called with the number of newly finished episodes, from several threads.
     pub progress: &'a (dyn Fn(u64) + Sync),
     /// Returns whether to stop; finished levels are kept.
@@ -78,7 +78,7 @@ pub fn run_tests(
     plan: &TestPlan,
     finished: &BTreeSet<u64>,
     keep: &mut (dyn FnMut(LevelVerdict) -> Result<(), TestError> + Send),
-    watch: &TestWatch,
+    watch: &TestObserver,
 ) -> Result<TestEnd, TestError> {
     run_tests_keeping(game, plan, finished, keep, watch, None)
 }
@@ -93,7 +93,7 @@ pub fn run_tests_keeping(
     plan: &TestPlan,
     finished: &BTreeSet<u64>,
     keep: &mut (dyn FnMut(LevelVerdict) -> Result<(), TestError> + Send),
-    watch: &TestWatch,
+    watch: &TestObserver,
     files: Option<&FindingFiles>,
 ) -> Result<TestEnd, TestError> {
     plan.check()?;
@@ -143,7 +143,7 @@ fn work(
     plan: &TestPlan,
     portions: &[&[u64]],
     shared: &Mutex<Shared>,
-    watch: &TestWatch,
+    watch: &TestObserver,
     files: Option<&FindingFiles>,
 ) {
     let testers = plan.testers.len();
@@ -198,7 +198,7 @@ fn play_portion(
     plan: &TestPlan,
     tester: usize,
     places: &[u64],
-    watch: &TestWatch,
+    watch: &TestObserver,
 ) -> Result<Option<Vec<Played>>, TestError> {
     let tester = &plan.testers[tester];
     let mode = plan.split.mode.as_str();
@@ -273,7 +273,7 @@ pub fn test_in_turn(
     game: &dyn Game,
     plan: &TestPlan,
     name: &str,
-    watch: &TestWatch,
+    watch: &TestObserver,
 ) -> Result<Option<TestedInTurn>, TestError> {
     plan.check()?;
     if let Some(problem) = game.problem() {
@@ -284,7 +284,7 @@ pub fn test_in_turn(
     let task = |episode| Task { level, seed: plan.episode_seed(&tester.record, name, episode) };
     let tasks: Vec<Task> = (0..plan.episodes.max(1)).map(task).collect();
     let (detectors, tester_name) = (&plan.detectors, tester.record.name.as_str());
-    let TestWatch { progress, stop } = *watch;
+    let TestObserver { progress, stop } = *watch;
     let watch = EpisodeObserver { progress, stop, detectors, mode, tester: tester_name, arenas: 1 };
     let played = play_tasks(game, mode, tester, &tasks, &watch).map_err(EvalError::from)?;
     let Some(played) = played else { return Ok(None) };

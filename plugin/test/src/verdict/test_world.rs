@@ -2,7 +2,7 @@
 
 use self::EpisodeObserver as WatchOfTest;
 use crate::{
-    detectors::{Detectors, Ear, GameProofs, SlowTick, TickTime},
+    detectors::{Detectors, ErrorLogReader, GameProofs, SlowTick, TickTime},
     findings::detector_of,
     verdict::{
         plan::{TestPlan, Tester},
@@ -26,7 +26,7 @@ use bevy_playbot::{
 };
 use playbot_harness::{
     arrangement::{Arrangement, at_most},
-    detector::{Detector, LevelAhead, Moment, Watch, WorldMoment, WorldWatch},
+    detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher},
     eval::Player,
     game::Game,
     machine::{MemoryError, check_bytes},
@@ -109,7 +109,7 @@ impl TestWorld {
         watch: &EpisodeObserver,
     ) -> Result<(), Interruption> {
         let is_alone = self.seats.iter().map(|seat| seat.tasks.len()).sum::<usize>() <= 1;
-        let mut watched = Watched::new(game, watch, self.seats.iter().map(|seat| seat.agent), is_alone);
+        let mut watched = EpisodeWatchers::new(game, watch, self.seats.iter().map(|seat| seat.agent), is_alone);
         while self.seats.iter().any(|seat| Control::of(&self.world, seat.agent).is_active()) {
             if (watch.stop)() {
                 return Err(Interruption::Stopped);
@@ -154,7 +154,7 @@ impl TestWorld {
         game: &dyn Game,
         played: &mut [Option<Played>],
         watch: &EpisodeObserver,
-        watched: &mut Watched,
+        watched: &mut EpisodeWatchers,
     ) {
         let ended = EndedEpisodes::take(&mut self.world);
         for (agent, result) in ended {
@@ -454,18 +454,18 @@ pub(super) struct EpisodeObserver<'a> {
 // Detectors at work in a World in which testers play.
 
 /// A detector's watch of an agent, under the detector's name.
-type NamedWatch = (&'static str, Box<dyn Watch>);
+type NamedWatch = (&'static str, Box<dyn EpisodeWatcher>);
 
 /// A detector's watch of a World, under the detector's name.
-type NamedWorldWatch = (&'static str, Box<dyn WorldWatch>);
+type NamedWorldWatch = (&'static str, Box<dyn WorldWatcher>);
 
 /// The watches of a World.
-pub(super) struct Watched<'a> {
+pub(super) struct EpisodeWatchers<'a> {
     game: &'a dyn Game,
     watch: &'a WatchOfTest<'a>,
     seats: Vec<WatchedSeat>,
     worlds: Vec<NamedWorldWatch>,
-    ear: Option<Ear>,
+    ear: Option<ErrorLogReader>,
     /// True if the World plays a single episode.
     is_alone: bool,
 }
@@ -478,7 +478,7 @@ struct WatchedSeat {
     found: Vec<EpisodeFinding>,
 }
 
-impl<'a> Watched<'a> {
+impl<'a> EpisodeWatchers<'a> {
     /// Makes the watches of the test's detectors for these agents.
     pub fn new(
         game: &'a dyn Game,
@@ -489,7 +489,7 @@ impl<'a> Watched<'a> {
         let detectors = &watch.detectors.ticks;
         let world = |detector: &Arc<dyn Detector>| detector.watch_world().map(|watch| (detector.name(), watch));
         let worlds: Vec<NamedWorldWatch> = detectors.iter().filter_map(world).collect();
-        let ear = worlds.iter().any(|(_, watch)| watch.hears_errors()).then(Ear::new);
+        let ear = worlds.iter().any(|(_, watch)| watch.hears_errors()).then(ErrorLogReader::new);
         let seat = |agent| WatchedSeat { agent, watches: None, found: Vec::new() };
         Self { game, watch, seats: agents.map(seat).collect(), worlds, ear, is_alone }
     }
@@ -522,8 +522,8 @@ impl<'a> Watched<'a> {
     /// Inspects the tick that was just played. In a World with several episodes, returns a defect of the World, with
     /// the name of its detector.
     pub fn look(&mut self, world: &World, ended: &[(Entity, EpisodeResult)]) -> Option<(&'static str, String)> {
-        let errors = self.ear.as_ref().map(Ear::take).unwrap_or_default();
-        let moment = WorldMoment { world, errors: &errors };
+        let errors = self.ear.as_ref().map(ErrorLogReader::take).unwrap_or_default();
+        let moment = WorldTick { world, errors: &errors };
         let mut wrong = Vec::new();
         self.worlds.retain_mut(|(detector, watch)| match watch.tick(&moment) {
             Some(message) => {
@@ -568,7 +568,7 @@ impl WatchedSeat {
         let watches = self.watches.get_or_insert_with(|| begin(game, watch, episode.level));
         let observation = world.get::<Observation>(self.agent);
         let proofs = GameProofs { game, mode: watch.mode, level: episode.level, world, agent: self.agent };
-        let moment = Moment {
+        let moment = DetectorTick {
             world,
             agent: self.agent,
             level: episode.level,

@@ -14,7 +14,7 @@ use std::{
 };
 
 /// Visits and maps of a level.
-pub(super) struct Walked {
+pub(super) struct LevelVisits {
     /// Open squares that each tester visited, if known.
     pub testers: Vec<Option<Places>>,
     /// Open squares that any tester visited.
@@ -31,7 +31,7 @@ struct Sum {
     skills: BTreeMap<usize, u64>,
 }
 
-impl Walked {
+impl LevelVisits {
     /// Sums up the walks in a level with this plan. `played` has the episodes of each tester, `names` the testers'
     /// names. `None` if positions are unknown.
     pub fn of(plan: &FloorPlan, names: &[&str], played: &[&[Played]], findings: &[Finding]) -> Option<Self> {
@@ -160,7 +160,7 @@ mod tests {
     fn walks_of_all_testers_are_added_up() {
         let one = [episode(true, &[(0, 2, 0, &[(3, 2)]), (1, 5, 1, &[(0, 2), (3, 3)])])];
         let other = [episode(false, &[(1, 1, 0, &[]), (2, 1, 1, &[(0, 1)]), (4, 1, 0, &[])])];
-        let walked = Walked::of(&plan(), &["a", "b"], &[&one, &other], &[]).expect("walks are known");
+        let walked = LevelVisits::of(&plan(), &["a", "b"], &[&one, &other], &[]).expect("walks are known");
         let places = |visited| Some(Places { visited, open: 4 });
         // Square 4 lies in the wall, so it is not an open square.
         assert_eq!((walked.testers, walked.places), (vec![places(2), places(2)], places(3)));
@@ -188,11 +188,11 @@ mod tests {
             file: None,
             settings: Vec::new(),
         };
-        let found = Walked::of(&plan(), &["a"], &[&episodes], &[finding]).and_then(|walked| walked.maps.failure);
+        let found = LevelVisits::of(&plan(), &["a"], &[&episodes], &[finding]).and_then(|walked| walked.maps.failure);
         assert_eq!(found.map(|failure| (failure.episode, failure.way)), Some((1, vec![[3, 1]])));
-        let solved = Walked::of(&plan(), &["a"], &[&episodes[1..]], &[]).expect("walks are known");
+        let solved = LevelVisits::of(&plan(), &["a"], &[&episodes[1..]], &[]).expect("walks are known");
         assert_eq!(solved.maps.failure, None);
         let unknown = [Played { walk: None, ..episodes[0].clone() }];
-        assert!(Walked::of(&plan(), &["a"], &[&unknown], &[]).is_none());
+        assert!(LevelVisits::of(&plan(), &["a"], &[&unknown], &[]).is_none());
     }
 }

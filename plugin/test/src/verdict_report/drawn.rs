@@ -259,18 +259,18 @@ mod plans_tests {
 mod walks_tests {
     use super::*;
     use crate::{
-        verdict::{EndPlace, LevelMaps, Places},
+        verdict::{LevelMaps, Places, SquareEnds},
         verdict_report::testing::level,
     };
 
     #[test]
     fn causes_places_lost_time_and_skills_are_told() {
-        let ended = |x: f32, cause: &str, count| EndPlace {
+        let ended = |x: f32, cause: &str, count| SquareEnds {
             x,
             y: 3.0,
             lost: count,
             causes: [(cause.to_owned(), count)].into(),
-            ..EndPlace::default()
+            ..SquareEnds::default()
         };
         let skill = |skill: &str| SkillTicks { skill: skill.to_owned(), ticks: 25 };
         let maps = LevelMaps {

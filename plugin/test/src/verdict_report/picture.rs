@@ -1,7 +1,7 @@
 //! Small drawings of levels: floor plan, ends of episodes, and maps.
 
 use crate::{
-    verdict::{END_SQUARES, EndPlace, LevelVerdict, MapScope},
+    verdict::{END_SQUARES, LevelVerdict, MapScope, SquareEnds},
     verdict_report::{
         ends,
         heat::{Block, Grid, layers, path, shape, stacked},
@@ -37,7 +37,7 @@ pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<String> 
         let blocks = areas.iter().filter(|area| is_finite(area)).filter_map(|area| grid.block(*area));
         shape(class, None, &path(&stacked(blocks.collect())), &mut svg);
     }
-    let mut squares: Vec<(Block, &EndPlace)> =
+    let mut squares: Vec<(Block, &SquareEnds)> =
         level.ends.iter().filter_map(|end| Some((square(&grid, extent, side, end)?, end))).collect();
     squares.sort_by_key(|(_, end)| Reverse(end.lost.saturating_add(end.timed_out)));
     squares.truncate(MOST_SQUARES);
@@ -59,13 +59,13 @@ pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<String> 
 }
 
 /// Returns the drawn area: the bounds of the plan, with room for agents that fell out of it.
-fn extent(bounds: Rect, side: f32, ends: &[EndPlace]) -> Rect {
-    let is_inside = |end: &EndPlace| bounds.contains(Vec2::new(end.x, end.y));
+fn extent(bounds: Rect, side: f32, ends: &[SquareEnds]) -> Rect {
+    let is_inside = |end: &SquareEnds| bounds.contains(Vec2::new(end.x, end.y));
     if ends.iter().all(is_inside) { bounds } else { bounds.inflate(2.0 * side) }
 }
 
 /// Returns the square of an end. Ends far away are at the border.
-fn square(grid: &Grid, extent: Rect, side: f32, end: &EndPlace) -> Option<Block> {
+fn square(grid: &Grid, extent: Rect, side: f32, end: &SquareEnds) -> Option<Block> {
     let (middle, half) = (Vec2::new(end.x, end.y), Vec2::splat(side / 2.0));
     if !middle.is_finite() {
         return None;
@@ -88,7 +88,7 @@ fn heat(class: &str, squares: impl Iterator<Item = (Block, u64)> + Clone, svg: &
 }
 
 /// Draws a cross for lost episodes, a bar for those whose time was up: readers may not see colours.
-fn marks(squares: &[(Block, &EndPlace)], svg: &mut String) {
+fn marks(squares: &[(Block, &SquareEnds)], svg: &mut String) {
     let (mut crosses, mut bars) = (String::new(), String::new());
     for (Block { left, right, top, bottom }, end) in squares {
         let (x, y) = ((left + right) / 2, (top + bottom) / 2);
@@ -171,8 +171,13 @@ mod tests {
     };
 
     fn drawn(ends: &[(f32, f32, u64, u64)]) -> String {
-        let end =
-            |&(x, y, lost, timed_out): &(f32, f32, u64, u64)| EndPlace { x, y, lost, timed_out, ..EndPlace::default() };
+        let end = |&(x, y, lost, timed_out): &(f32, f32, u64, u64)| SquareEnds {
+            x,
+            y,
+            lost,
+            timed_out,
+            ..SquareEnds::default()
+        };
         let level = LevelVerdict { ends: ends.iter().map(end).collect(), ..level(0, 0, 9, 0) };
         picture(&garden(), &level).expect("small")
     }

@@ -2,8 +2,8 @@
 
 use crate::{
     verdict::{
-        Comparison, EndPlace, FailureWay, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard, SkillTicks,
-        TestError, TestRecord, TesterVerdict, merge,
+        Comparison, FailureWay, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard, SkillTicks,
+        SquareEnds, TestError, TestRecord, TesterVerdict, merge,
     },
     verdict_report::{
         HtmlReport, REPORT, STYLE, html,
@@ -41,7 +41,7 @@ fn full_maps() -> LevelMaps {
 
 /// Makes a level with everything that makes a page long.
 fn long(index: u64) -> LevelVerdict {
-    let end = |number: u16| EndPlace {
+    let end = |number: u16| SquareEnds {
         x: f32::from(2 * number) + 1.0,
         y: 3.0,
         lost: 3,
@@ -108,7 +108,7 @@ fn nothing_of_what_files_and_games_say_becomes_markup() {
         level: "levels/<b>.json".to_owned(),
         findings: vec![finding("<u>", "</details></script><script>alert('x')</script>")],
         testers: vec![TesterVerdict { tester: "<i>".to_owned(), ..level(0, 0, 9, 0).testers[0].clone() }],
-        ends: vec![EndPlace { x: 1.0, y: 1.0, lost: 9, ..EndPlace::default() }],
+        ends: vec![SquareEnds { x: 1.0, y: 1.0, lost: 9, ..SquareEnds::default() }],
         ..level(0, 0, 9, 0)
     };
     let changed = FindingChange { level: "<em>".to_owned(), detector: "panic".to_owned(), tester: None };

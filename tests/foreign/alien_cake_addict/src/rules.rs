@@ -2,7 +2,7 @@
 
 use bevy::math::UVec2;
 use playbot::harness::{
-    detector::{EachTick, Moment},
+    detector::{DetectorTick, EachTick},
     foreign::ForeignGame,
 };
 
@@ -17,7 +17,7 @@ pub fn add_to(game: ForeignGame) -> ForeignGame {
     })
 }
 
-fn broken_rule(moment: &Moment<'_>) -> Option<String> {
+fn broken_rule(moment: &DetectorTick<'_>) -> Option<String> {
     let at = moment.place?.as_uvec2();
     // The observation before the tick, in tens: see the adapter.
     let &[i, j, cake_i, cake_j, cakes] = moment.observation else { return None };
@@ -45,7 +45,7 @@ mod tests {
         let (world, action) = (World::new(), ActionValue::Discrete(0));
         let ([i, j], [cake_i, cake_j]) = (before, cake.unwrap_or([0.0; 2]));
         let seen = [i, j, cake_i, cake_j, f32::from(u8::from(cake.is_some()))].map(|number| number / 10.0);
-        broken_rule(&Moment {
+        broken_rule(&DetectorTick {
             world: &world,
             agent: Entity::PLACEHOLDER,
             level: 0,

@@ -4,7 +4,7 @@ use std::{fs, path::Path};
 
 use bevy_playbot::policy_file::check_policy;
 use playbot::prelude::*;
-use playbot_learner::{DeviceKind, FileError, PolicyCard, PolicyFile, SkillModel, SkillTrainer};
+use playbot_learner::{DeviceKind, FileError, PolicyFile, PolicyMetadata, SkillModel, SkillTrainer};
 use playbot_train::{Algorithm, TrainedLearner, checkpoint::CheckpointChoice, run_dir::RunDir};
 
 use crate::{
@@ -53,8 +53,11 @@ fn save_policy(path: &Path) {
     let trainer = small::trainer(Algorithm::ScorePpo);
     let policy = trainer.policy();
     let z = vec![0.25; 2 * policy.latent()];
-    let card =
-        PolicyCard { game: Corridor.name().to_owned(), game_version: Corridor.version(), ..PolicyCard::default() };
+    let card = PolicyMetadata {
+        game: Corridor.name().to_owned(),
+        game_version: Corridor.version(),
+        ..PolicyMetadata::default()
+    };
     let file = PolicyFile { card, policy, skills: trainer.skill_source() };
     file.save(path, &[0.5; 4][..], &z, 2).expect("written");
 }

@@ -6,7 +6,7 @@ use bevy_playbot::level::LevelFile;
 use playbot_games::coinrun::CoinRun;
 use playbot_harness::sealed_file::{read_sealed, write_sealed};
 use playbot_mutation::{
-    bugs::{BugGame, BugSet, PlantedBug, PlantedPart, SoundLevels},
+    bugs::{BugGame, BugSet, PlantedBug, PlantedPart, UnmutatedLevels},
     score::{
         ClockKind, ContestantRecord, Found, GameRecord, JobFinding, JobResult, SCORE_FORMAT, Score, ScoreBudget,
         ScoreJournal, ScoreRecord, ScoreTable, ScoredJob, SetRecord, Subject, SubjectKind, judge,
@@ -145,7 +145,7 @@ fn bugs() -> BugSet {
             bug("coinrun-wall-01", PlantedPart::Level(level)),
             bug("coinrun-rule-01", PlantedPart::Rules { variant: 0 }),
         ],
-        sound: vec![SoundLevels { game: "coinrun".to_owned(), range: "hard:0..3".parse().expect("levels") }],
+        sound: vec![UnmutatedLevels { game: "coinrun".to_owned(), range: "hard:0..3".parse().expect("levels") }],
     }
 }
 

@@ -7,8 +7,8 @@ use playbot_games::coinrun::CoinRun;
 use playbot_harness::detector::LevelProof;
 use playbot_test::{
     verdict::{
-        Comparison, Earlier, EndPlace, FailureWay, Finding, FinishTime, LevelMaps, LevelOutcome, LevelVerdict,
-        MapScope, Overview, Places, RESULTS, ResultLines, Score, Shard, SkillTicks, TestFolder, TestRecord,
+        Comparison, Earlier, FailureWay, Finding, FinishTime, LevelMaps, LevelOutcome, LevelVerdict, MapScope,
+        Overview, Places, RESULTS, ResultLines, Score, Shard, SkillTicks, SquareEnds, TestFolder, TestRecord,
         TesterRecord, TesterVerdict, merge, wilson, write_reports,
     },
     verdict_report::{HtmlReport, html},
@@ -106,7 +106,7 @@ fn verdict(index: u64) -> LevelVerdict {
         outcome: if solved > 0 { LevelOutcome::Solved } else { LevelOutcome::BotFailed },
         proof: if solved > 0 { LevelProof::Solvable } else { LevelProof::Unknown },
         score: score(2 * solved, 8),
-        ends: vec![EndPlace { x: 3.5, y: 2.5, lost: 2, timed_out: 1, causes: causes.clone() }],
+        ends: vec![SquareEnds { x: 3.5, y: 2.5, lost: 2, timed_out: 1, causes: causes.clone() }],
         causes,
         places,
         maps: Some(maps()),

@@ -18,7 +18,7 @@ type Columns = Vec<Vec<[i32; 2]>>;
 pub(super) type Rows = [i32; 2];
 
 /// A level for the search, with cached answers.
-pub(super) struct Ground<'a> {
+pub(super) struct ReachableGround<'a> {
     level: &'a Level,
     answers: HashMap<Question, Bins>,
     /// Crates, and the bins in which a player may overlap each.
@@ -57,7 +57,7 @@ pub(super) struct Touched {
     pub coin: Bins,
 }
 
-impl<'a> Ground<'a> {
+impl<'a> ReachableGround<'a> {
     pub fn new(level: &'a Level) -> Self {
         let blocks = |kind: fn(&Spawn) -> Option<Body>| level.spawns.iter().filter_map(kind);
         let crates: Vec<_> = blocks(Spawn::solid_crate).map(|block| (block, beside(&block, &PLAYER, true))).collect();
@@ -171,7 +171,7 @@ mod tests {
     #[test]
     fn there_is_room_between_walls_and_none_in_them() {
         let level = ground("#..#..\n#A.#.C\n######\n");
-        let mut ground = Ground::new(&level);
+        let mut ground = ReachableGround::new(&level);
         let rows = ground.rows(Body::player().y);
         assert_eq!(rows, [1, 2]);
         let room = ground.room(rows);
@@ -186,7 +186,7 @@ mod tests {
     #[test]
     fn what_certainly_kills_is_not_survived() {
         let level = ground("#......\n#A..^.C\n#######\n");
-        let Touched { alive, coin } = Ground::new(&level).touched(Body::player().y);
+        let Touched { alive, coin } = ReachableGround::new(&level).touched(Body::player().y);
         let is_in = |bins: Bins, x: f32| !(bins & Bins::at(x)).is_empty();
         assert!(is_in(alive, 2.0) && is_in(alive, 3.4) && is_in(alive, 5.7));
         assert!(!is_in(alive, 4.0) && !is_in(alive, 5.0));

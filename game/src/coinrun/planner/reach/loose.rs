@@ -7,7 +7,7 @@ use crate::coinrun::{
     planner::reach::{
         Exact, Loose, State,
         bins::{Bins, STEP_BINS},
-        ground::{Ground, Touched},
+        ground::{ReachableGround, Touched},
         put,
     },
     rules::{GRAVITY, JUMP_SPEED, PLAYER_HALF_HEIGHT},
@@ -53,7 +53,7 @@ impl Loose {
 /// Follows a player with a corner in a wall: one that starts there, or has stood across a ledge and moved up or down.
 /// Until all corners are free again, such a player stays in the same columns, or one beside, and at two heights between
 /// two rows; it may have any speed then.
-pub(super) fn out_of_wall(ground: &mut Ground, y: f32, places: Bins, after: &mut Vec<(State, Bins)>) {
+pub(super) fn out_of_wall(ground: &mut ReachableGround, y: f32, places: Bins, after: &mut Vec<(State, Bins)>) {
     let row = y.floor();
     let heights = [row + 1.0 - PLAYER_HALF_HEIGHT, row + PLAYER_HALF_HEIGHT];
     // A part of a step makes at most a quarter of a tile.
@@ -66,7 +66,7 @@ pub(super) fn out_of_wall(ground: &mut Ground, y: f32, places: Bins, after: &mut
 }
 
 /// Returns the bins with possible room at a level.
-fn room(ground: &mut Ground, level: i32) -> Bins {
+fn room(ground: &mut ReachableGround, level: i32) -> Bins {
     ends(level).into_iter().fold(Bins::NONE, |room, y| {
         let rows = ground.rows(y);
         room | ground.room(rows)
@@ -74,7 +74,7 @@ fn room(ground: &mut Ground, level: i32) -> Bins {
 }
 
 /// Returns the bins in which a player may stand at a level, and the exact height.
-fn standing(ground: &mut Ground, level: i32) -> (f32, Bins) {
+fn standing(ground: &mut ReachableGround, level: i32) -> (f32, Bins) {
     let [low, high] = ends(level);
     let y = (high - PLAYER_HALF_HEIGHT).floor() + PLAYER_HALF_HEIGHT;
     if y < low {
@@ -85,13 +85,13 @@ fn standing(ground: &mut Ground, level: i32) -> (f32, Bins) {
 }
 
 /// Returns the contacts of a player at a level.
-pub(super) fn touched(ground: &mut Ground, level: i32) -> Touched {
+pub(super) fn touched(ground: &mut ReachableGround, level: i32) -> Touched {
     let [low, high] = ends(level).map(|y| ground.touched(y));
     Touched { alive: low.alive | high.alive, coin: low.coin | high.coin }
 }
 
 /// Adds all states after a step from these positions, with any action.
-pub(super) fn step(ground: &mut Ground, state: Loose, places: Bins, after: &mut Vec<(State, Bins)>) {
+pub(super) fn step(ground: &mut ReachableGround, state: Loose, places: Bins, after: &mut Vec<(State, Bins)>) {
     let lift = (state.lift - SLOWED).max(-FASTEST);
     let reached = reached(ground, state.level, lift, places);
     let lends = ground.enemies_lend;
@@ -116,7 +116,7 @@ pub(super) fn step(ground: &mut Ground, state: Loose, places: Bins, after: &mut 
 }
 
 /// Returns the positions of a player at the end of a step, by level.
-fn reached(ground: &mut Ground, from: i32, lift: i32, places: Bins) -> BTreeMap<i32, Bins> {
+fn reached(ground: &mut ReachableGround, from: i32, lift: i32, places: Bins) -> BTreeMap<i32, Bins> {
     let (lowest, highest) = (from - FASTEST, from + lift.max(0));
     let mut reached = BTreeMap::from([(from, places)]);
     for _ in 0..=STEP_BINS {
@@ -139,7 +139,7 @@ fn reached(ground: &mut Ground, from: i32, lift: i32, places: Bins) -> BTreeMap<
 }
 
 /// Returns the bins in which corners may be free at both of two levels.
-fn passes(ground: &mut Ground, here: i32, there: i32) -> Bins {
+fn passes(ground: &mut ReachableGround, here: i32, there: i32) -> Bins {
     let mut passes = Bins::NONE;
     for one in ends(here) {
         for other in ends(there) {
@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn who_falls_comes_to_stand_and_does_not_rise() {
         let level = Level::from_text("#......\n#......\n#A....C\n#======\n").expect("a valid picture");
-        let mut ground = Ground::new(&level);
+        let mut ground = ReachableGround::new(&level);
         let start = Loose::at(Body::player().y + 0.4, -0.35);
         let mut after = Vec::new();
         step(&mut ground, start, Bins::at(3.5), &mut after);

@@ -4,7 +4,7 @@ use crate::coinrun::{
     planner::reach::{
         Exact, Loose, State,
         bins::{Bins, STEP_BINS},
-        ground::Ground,
+        ground::ReachableGround,
         loose::out_of_wall,
         put,
     },
@@ -31,7 +31,7 @@ struct Act {
 }
 
 /// Returns all states after a step from these positions, with any action.
-pub(super) fn step(ground: &mut Ground, state: Exact, places: Bins, after: &mut Vec<(State, Bins)>) {
+pub(super) fn step(ground: &mut ReachableGround, state: Exact, places: Bins, after: &mut Vec<(State, Bins)>) {
     let supported = supported(ground, state, places);
     // A player that presses down in the air falls as usual, and past crates, as if it missed them.
     let actions = [(0, false, places), (1, true, supported), (-1, true, supported)];
@@ -51,7 +51,7 @@ pub(super) fn step(ground: &mut Ground, state: Exact, places: Bins, after: &mut 
 }
 
 /// Returns the positions from which a player can jump.
-fn supported(ground: &mut Ground, state: Exact, places: Bins) -> Bins {
+fn supported(ground: &mut ReachableGround, state: Exact, places: Bins) -> Bins {
     if state.vy != 0.0 {
         return Bins::NONE;
     }
@@ -63,7 +63,7 @@ fn supported(ground: &mut Ground, state: Exact, places: Bins) -> Bins {
 }
 
 /// Makes a step of so many parts.
-fn play(ground: &mut Ground, act: &Act, parts: u32, after: &mut Vec<(State, Bins)>) {
+fn play(ground: &mut ReachableGround, act: &Act, parts: u32, after: &mut Vec<(State, Bins)>) {
     let held_from = (act.is_held && !ground.crates.is_empty()).then_some(act.y);
     let share = 1.0 / parts as f32;
     let first = Part { y: act.y, free: 0, is_caught: false };
@@ -97,12 +97,12 @@ fn play(ground: &mut Ground, act: &Act, parts: u32, after: &mut Vec<(State, Bins
 }
 
 /// Returns the positions after one part of a step along x, or none.
-fn sideways(ground: &mut Ground, y: f32, places: Bins) -> Bins {
+fn sideways(ground: &mut ReachableGround, y: f32, places: Bins) -> Bins {
     let rows = ground.rows(y);
     places | places.spread(1) & ground.room(rows)
 }
 
-fn end(ground: &Ground, act: &Act, parts: u32, part: Part, places: Bins, after: &mut Vec<(State, Bins)>) {
+fn end(ground: &ReachableGround, act: &Act, parts: u32, part: Part, places: Bins, after: &mut Vec<(State, Bins)>) {
     let share = part.free as f32 / parts as f32;
     // Zero is never negative.
     let vy = if part.is_caught { 0.0 } else { act.vy * share + 0.0 };
@@ -137,13 +137,27 @@ pub(super) type Led = (f32, Stopped, Bins);
 
 /// Displaces players with all corners free by `dy`, by the rules. `held_from` is the height at the start of the step,
 /// for a player that crates hold.
-pub(super) fn displace(ground: &mut Ground, places: Bins, y: f32, dy: f32, held_from: Option<f32>) -> Vec<Led> {
+pub(super) fn displace(
+    ground: &mut ReachableGround,
+    places: Bins,
+    y: f32,
+    dy: f32,
+    held_from: Option<f32>,
+) -> Vec<Led> {
     let mut all = Vec::new();
     push(ground, places, y, dy, held_from, 0, &mut all);
     all
 }
 
-fn push(ground: &mut Ground, places: Bins, y: f32, dy: f32, held_from: Option<f32>, pushes: u32, all: &mut Vec<Led>) {
+fn push(
+    ground: &mut ReachableGround,
+    places: Bins,
+    y: f32,
+    dy: f32,
+    held_from: Option<f32>,
+    pushes: u32,
+    all: &mut Vec<Led>,
+) {
     for (height, stopped, places) in at_walls(ground, places, y, dy) {
         if places.is_empty() {
             continue;
@@ -172,7 +186,7 @@ fn push(ground: &mut Ground, places: Bins, y: f32, dy: f32, held_from: Option<f3
 }
 
 /// Returns the effects of walls on a displacement: none, or an end flush with them.
-fn at_walls(ground: &mut Ground, places: Bins, y: f32, dy: f32) -> [Led; 3] {
+fn at_walls(ground: &mut ReachableGround, places: Bins, y: f32, dy: f32) -> [Led; 3] {
     let target = y + dy;
     let flushed = flush(target, ground.body(y).ry, dy > 0.0);
     let (here, there) = (ground.rows(y), ground.rows(target));

@@ -10,7 +10,7 @@ use playbot_harness::{game::Game, games::Games};
 use playbot_mutation::{
     bugs::BugSet,
     score::{
-        ClockKind, Score, ScoreBudget, ScoreError, ScoreJournal, ScorePlan, ScoreRun, ScoreTable, ScoreWatch,
+        ClockKind, Score, ScoreBudget, ScoreCallbacks, ScoreError, ScoreJournal, ScorePlan, ScoreRun, ScoreTable,
         TestedGame,
     },
 };
@@ -126,7 +126,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     interrupt::listen();
     let bar = progress::bar("bugs score", total.saturating_sub(finished), "jobs");
     let progress = |jobs: u64| bar.inc(jobs);
-    let watch = ScoreWatch { progress: &progress, stop: &interrupt::asked };
+    let watch = ScoreCallbacks { progress: &progress, stop: &interrupt::asked };
     let scored = score_run.run(&mut journal, &watch);
     bar.finish_and_clear();
     let Some(score) = scored? else {

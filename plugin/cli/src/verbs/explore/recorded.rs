@@ -2,9 +2,9 @@
 
 use crate::{
     arguments::{
+        default_experiment_of,
         experiment::ExperimentArgs,
         player::{Chosen, check_skills},
-        usual_experiment,
     },
     error::CliError,
     output::{beside, prepare},
@@ -143,7 +143,8 @@ impl Talents {
         // The game is named, so that errors do not ask for an experiment.
         let named = ExperimentArgs::of_game(game.name());
         let observation_config = check_skills(path, &model, game, &named, games)?;
-        let horizon = usual_experiment(game).map_or_else(ScoreConfig::default, |usual| usual.experiment.score).horizon;
+        let horizon =
+            default_experiment_of(game).map_or_else(ScoreConfig::default, |usual| usual.experiment.score).horizon;
         let source = SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw: SkillDraw::Sample };
         Ok(Self { explorer: Explorer::skills(SkillPrior::from(&source), source.decoder), observation_config })
     }

@@ -1,7 +1,7 @@
 //! `playbot play` in a program that was built with a window.
 
 use crate::{
-    arguments::{counted, level_number, player::Chosen, usual_mode},
+    arguments::{counted, default_mode, level_number, player::Chosen},
     error::{CliError, Outcome},
     interrupt, output,
     verbs::{demo::deciders, play::Args},
@@ -39,7 +39,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 
 fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
     let named = args.mode.as_deref();
-    let mode = named.unwrap_or_else(|| usual_mode(game));
+    let mode = named.unwrap_or_else(|| default_mode(game));
     let levels = match args.levels.as_deref() {
         Some(text) if text.contains(':') => text.parse()?,
         Some(text) => format!("{mode}:{text}").parse()?,

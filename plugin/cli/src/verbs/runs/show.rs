@@ -1,7 +1,7 @@
 //! `playbot runs show`.
 
 use crate::{
-    arguments::usual_experiment,
+    arguments::default_experiment_of,
     error::{CliError, Outcome, print_line},
     output,
     verbs::runs::{UNKNOWN, age_s, duration, to_json, write_plot},
@@ -129,8 +129,8 @@ fn rating(summary: &CheckpointSummary, curves: &RunCurves) -> String {
 /// Describes the changed settings of an experiment: against the program's experiment, the game's, or the defaults of
 /// all keys, whichever is nearest. A run does not note its base.
 fn describe_settings(experiment: &Experiment, games: &Games) -> String {
-    let own = games.get(&experiment.game).ok().and_then(usual_experiment);
-    let usual = usual_experiment(games.first()).into_iter().chain(own);
+    let own = games.get(&experiment.game).ok().and_then(default_experiment_of);
+    let usual = default_experiment_of(games.first()).into_iter().chain(own);
     let defaults = ("the defaults".to_owned(), with_defaults(experiment));
     let bases = usual.map(|usual| (usual.origin, usual.experiment)).chain([defaults]);
     let nearest = bases

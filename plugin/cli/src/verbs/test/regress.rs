@@ -232,7 +232,7 @@ pub(crate) fn list_detectors(game: &dyn Game, json: bool) -> Result<Outcome, Cli
         }
     }
     for detector in list(game) {
-        let looks = if detector.is_usual { "usual" } else { "chosen" };
+        let looks = if detector.is_default { "usual" } else { "chosen" };
         if json {
             print_line(as_json(&detector, looks))?;
             continue;

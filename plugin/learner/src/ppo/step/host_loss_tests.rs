@@ -87,7 +87,8 @@ fn loss_metrics_and_gradient_are_those_of_the_tensors() {
         let direction = if from_policy { KlDirection::PolicyDecoder } else { KlDirection::DecoderPolicy };
         let score = ScoreConfig { kl_coef: 0.3, kl_direction: direction, ..ScoreConfig::default() };
         let config = PpoConfig { clip_value_loss: clip_value, ent_coef: 0.02, ..PpoConfig::default() };
-        let moment = Moment { lr: 1e-3, score: penalised.then_some(&score), is_warming_up: rng.random_ratio(1, 4) };
+        let moment =
+            UpdateSettings { lr: 1e-3, score: penalised.then_some(&score), is_warming_up: rng.random_ratio(1, 4) };
 
         let ours = HostLoss::of(&policy, &values, &batch, &config, &moment, 0).expect("finite");
         let theirs = Losses::of(&policy, values.clone(), &batch, &config, &moment).expect("fits");
@@ -136,7 +137,7 @@ fn actions_of_the_other_kind_are_refused() {
         },
         teacher: None,
     };
-    let moment = Moment { lr: 1e-3, score: None, is_warming_up: false };
+    let moment = UpdateSettings { lr: 1e-3, score: None, is_warming_up: false };
     let gaussian = dist(&mut rng, 1, 2, 3, &device);
     let error = HostLoss::of(&gaussian, &column(), &batch, &PpoConfig::default(), &moment, 0);
     assert!(error.expect_err("another kind").to_string().contains("differ in kind"));

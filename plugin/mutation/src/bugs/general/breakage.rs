@@ -99,7 +99,7 @@ pub(super) fn nan() -> DefectKind {
 mod tests {
     use super::*;
     use crate::bugs::general::testing::play;
-    use playbot_test::detectors::Ear;
+    use playbot_test::detectors::ErrorLogReader;
 
     #[test]
     fn a_panic_is_a_fault_at_its_moment() {
@@ -114,7 +114,7 @@ mod tests {
 
     #[test]
     fn an_error_is_logged_once_in_an_episode() {
-        let ear = Ear::new();
+        let ear = ErrorLogReader::new();
         let played = ear.listen(|| play(&error_log(), 0, 60, |_| 1));
         assert_eq!(played.episodes.len(), 2);
         // Two episodes, in a game with fixed ticks and in one whose ticks are frames.

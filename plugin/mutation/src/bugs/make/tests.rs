@@ -167,7 +167,7 @@ fn every_kind_is_planted_into_levels_that_the_bot_solves() {
     assert_eq!(set.games, [BugGame { name: "dash".to_owned(), version: 3 }]);
     let kinds = defect_kinds(&Dash).len();
     assert_eq!(set.mutants.len(), 3 * (kinds - 2) - 1);
-    let missing = |class: &str, planted, without_effect: &[u32]| NoPlace {
+    let missing = |class: &str, planted, without_effect: &[u32]| MissingMutants {
         game: "dash".into(),
         class: class.into(),
         planted,

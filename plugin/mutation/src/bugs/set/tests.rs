@@ -18,7 +18,7 @@ fn set() -> BugSet {
             bug("track-panic-00", PlantedPart::Rules { variant: 2 }),
             bug("track-hole-00", PlantedPart::Level(file)),
         ],
-        sound: vec![SoundLevels { game: "track".to_owned(), range: "plain:3..9".parse().expect("a split") }],
+        sound: vec![UnmutatedLevels { game: "track".to_owned(), range: "plain:3..9".parse().expect("a split") }],
     }
 }
 
