@@ -260,7 +260,7 @@ fn shown(level: &AntMazeLevel) -> Result<ShownMaze, InspectError> {
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct AntMazeSystems;
 
-/// Adds the rules of AntMaze. Agents are made by [`spawn_agent`](spawn_agent).
+/// Adds the rules of AntMaze. Agents are made by [`spawn_agent`].
 #[derive(Clone, Debug)]
 pub struct AntMazePlugin {
     /// Mode of the levels.

@@ -271,7 +271,7 @@ impl BenchmarkTools for CoinRun {
 
 // CoinRun as a Bevy plugin.
 
-/// Adds the rules of CoinRun. Agents are made by [`spawn_agent`](spawn_agent).
+/// Adds the rules of CoinRun. Agents are made by [`spawn_agent`].
 #[derive(Clone, Copy, Debug)]
 pub struct CoinRunPlugin {
     /// Difficulty of the generated levels.

@@ -30,8 +30,6 @@ pub use crate::maze::{
     text::read_maze,
 };
 
-// A maze: walls, a start and a goal.
-
 /// Walls and free cells in rows, closed all around, with a start and a goal.
 ///
 /// The goal can be reached from the start, except in mazes from files: see [`parse_drawn`](Self::parse_drawn).

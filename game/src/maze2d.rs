@@ -293,7 +293,7 @@ fn shown(level: &Maze2dLevel, rules: &Maze2dMode) -> Result<ShownMaze, InspectEr
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Maze2dSystems;
 
-/// Adds the rules of Maze2D. Agents are made by [`spawn_agent`](spawn_agent).
+/// Adds the rules of Maze2D. Agents are made by [`spawn_agent`].
 #[derive(Clone, Debug)]
 pub struct Maze2dPlugin {
     /// Map and rules.

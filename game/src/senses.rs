@@ -4,8 +4,8 @@
 //! In the originals an agent observes its own state only. That is enough on one map, which can be learned by heart. In
 //! an unknown maze it leaves nothing but wandering about. [`WithRays`] agents observe the direction of the goal and the
 //! distances of walls. They still have to look into dead ends, where a policy without memory stays. [`WithMap`] agents
-//! also observe the cells around them. [`WithPositionalEncoding`] agents get no new information: positional encoding only separates
-//! positions better, which helps on large maps.
+//! also observe the cells around them. [`WithPositionalEncoding`] agents get no new information: positional encoding
+//! only separates positions better, which helps on large maps.
 
 use bevy::prelude::*;
 use bevy_playbot::prelude::{Observation, ObservationSpace};

@@ -63,7 +63,7 @@ fn prepared() -> tempfile::TempDir {
 /// Returns all files that a study writes for its readers.
 fn written(folder: &Path) -> Vec<String> {
     let read = |name| fs::read_to_string(folder.join("out").join(name)).expect("written");
-    ["table.md", "curves.svg", "results.json"].map(read).into()
+    ["table.md", "curves.svg", "results.json", "experiment.ron"].map(read).into()
 }
 
 #[test]
@@ -78,6 +78,15 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
         expected[0].contains(table.trim()) && expected[0].contains("playbot study --experiment tiny.ron --out out")
     );
 
+    assert!(expected[0].ends_with("\nAll values are in [experiment.ron](experiment.ron).\n"), "{}", expected[0]);
+    let drawn = &expected[1];
+    assert!(
+        !drawn.contains("var(") && drawn.contains("Curves begin once 100 training episodes have ended."),
+        "{drawn}"
+    );
+    let file = &expected[3];
+    assert!(file.contains("`playbot study --experiment out/experiment.ron`\n// repeats it."), "{file}");
+    assert!(file.contains("    seeds: [1, 2],\n") && file.contains("(name: \"full\", set: []),\n"), "{file}");
     let results: Value = serde_json::from_str(&expected[2]).expect("JSON");
     let rows = results["results"].as_array().expect("rows");
     let names: Vec<_> = rows.iter().filter_map(|row| Some((row["variant"].as_str()?, row["seed"].as_u64()?))).collect();
@@ -229,12 +238,30 @@ fn the_table_follows_from_the_results() {
     let folder = prepared();
     let folder = folder.path();
     ok(study(folder, "runs", &["--variant", "full", "--variant", "cloned"]));
-    let table = folder.join("out/table.md");
-    let written = fs::read(&table).expect("written");
-    fs::remove_file(&table).expect("there");
+    let (table, experiment) = (folder.join("out/table.md"), folder.join("out/experiment.ron"));
+    let written = [&table, &experiment].map(|file| fs::read(file).expect("written"));
+    // Studies of older versions have no file of the experiment.
+    for file in [&table, &experiment] {
+        fs::remove_file(file).expect("there");
+    }
     let rewrite = || playbot(folder, &["study", "--out", "out", "--rewrite"]);
     ok(rewrite());
-    assert!(fs::read(&table).expect("written again") == written);
+    assert!([&table, &experiment].map(|file| fs::read(file).expect("written again")) == written);
+    // The file repeats the study: its runs are those that are there.
+    let again = ["study", "--experiment", "out/experiment.ron", "--out", "again", "--runs", "runs", "--resume"];
+    ok(playbot(folder, &again));
+    let results = |out: &str| -> Value {
+        serde_json::from_slice(&fs::read(folder.join(out).join("results.json")).expect("written")).expect("JSON")
+    };
+    assert_eq!(results("again")["results"], results("out")["results"]);
+    assert_eq!(results("again")["experiment"], results("out")["experiment"]);
+    // Somebody else's file of that name is not replaced, neither by a study nor by a table.
+    fs::rename(&experiment, folder.join("kept")).expect("there");
+    fs::copy(folder.join("tiny.ron"), &experiment).expect("writable");
+    refused(&rewrite(), "experiment.ron is not from a study");
+    refused(&study(folder, "runs", &["--variant", "full", "--variant", "cloned", "--resume"]), "rename it, or choose");
+    assert_eq!(fs::read_to_string(&experiment).expect("kept"), TINY);
+    fs::rename(folder.join("kept"), &experiment).expect("writable");
     // Behaviour cloning trains nothing: an error names the file of its policy.
     let cloned = playbot(folder, &["eval", "--run", "runs/cloned-seed1"]);
     let words = errors(&cloned);

@@ -2,12 +2,12 @@
 //!
 //! Give an agent a [`CameraSensor`] and add the [`CameraSensorPlugin`]. In each tick its
 //! [`Frame`](crate::vision::Frame) then holds the World of that tick, after
-//! [`VisionSystems::Sync`](crate::vision::VisionSystems::Sync).
+//! [`VisionSystems::Sync`].
 //!
 //! # How it is drawn
 //!
 //! The renderer is taken out of Bevy's loop and run by hand, in
-//! [`VisionSystems::Render`](crate::vision::VisionSystems::Render). The scene is extracted, drawn and read back
+//! [`VisionSystems::Render`]. The scene is extracted, drawn and read back
 //! before any agent decides, so no frame is late.
 //!
 //! A Bevy camera costs about half a millisecond, however little it sees. Sensors that follow a target therefore share
@@ -64,9 +64,7 @@ pub(crate) use crate::camera::renderer::{RenderListPlugin, creation as drawing, 
 pub use crate::camera::tiles::TileLayerPlugin;
 pub use crate::camera::{sensor_view::SensorCamera, tiles::TileBorder};
 
-// The plugin of `CameraSensor`s.
-
-/// Adds [`CameraSensor`](CameraSensor)s to a game.
+/// Adds [`CameraSensor`]s to a game.
 ///
 /// In an app without a renderer, [`headless`](Self::headless) adds Bevy's. In a game with a window, add the plugin
 /// after `DefaultPlugins` and disable `PipelinedRenderingPlugin` if it exists (Bevy's feature `multi_threaded`). The

@@ -7,12 +7,17 @@
 //! | to | use |
 //! |---|---|
 //! | drive a World without an app | [`headless_frame_app`], [`into_world`], [`run_on_one_thread`], [`tick_world`] |
-//! | begin an episode in a World as new | [`Renewal`], [`NextEpisode`] |
+//! | begin an episode in a World as new | [`Renewal`], [`NextEpisode`], [`EpisodeSeeds`], [`LevelFiles`] |
+//! | find the tick of a game, whatever its frames | [`TickSchedules`], [`is_tick`], [`set_tick_rate`] |
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
 //! | decide for many agents at once | [`PolicyBatch`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
 //! | keep systems in one order | [`put_in_order`], [`leave_open`], [`FaultSystems`], [`run_observe_schedule`] |
-//! | check what agents see and do | [`check_actions`], [`check_observations`], [`misfit`] |
+//! | check what agents see and do | [`check_actions`], [`check_observations`], [`misfit`], [`has_no_actions`], [`AgentLimit`] |
+//! | compare two pictures of a state | [`Difference`], [`CLOSE`], [`BlankEpisodes`] |
 //! | record and replay | [`record_ticks`], [`flush_unfinished`], [`demo_actions`], [`recorded_action`] |
+//! | read, join and repair recordings | [`find_demos`], [`merge_demos`], [`repair()`] |
+//! | read what a policy file sees | [`policy_observation`] |
+//! | let a person play in a window | [`PressesForPeople`], [`TappedKeys`] |
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -32,17 +37,26 @@
 #[doc(no_inline)]
 pub use crate::{
     action::{check_actions, misfit},
+    agent::{AgentLimit, has_no_actions},
     demo::{
+        file::{find_demos, merge_demos, repair::repair},
         recorder::{demo_actions, flush_unfinished, record_ticks},
         replay::recorded_action,
     },
     fault::FaultSystems,
-    headless::{headless_frame_app, into_world, run_on_one_thread, tick_world},
+    headless::{headless_frame_app, into_world, run_on_one_thread, set_tick_rate, tick_world},
+    key_bindings::TappedKeys,
+    level::LevelFiles,
     observation::check_observations,
     panics,
+    placement::{TickSchedules, is_tick},
     policy_batch::{Playing, PolicyBatch, SharedBatch},
+    policy_file::policy_observation,
     renewal::{NextEpisode, Renewal},
     skill_prior::draw_skills,
+    streams::EpisodeSeeds,
     system_errors,
     systems::{leave_open, put_in_order, run_observe_schedule},
+    virtual_input::PressesForPeople,
+    vision::{BlankEpisodes, CLOSE, Difference},
 };

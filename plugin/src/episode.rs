@@ -25,7 +25,7 @@
 //! # The count of ticks
 //!
 //! ```
-//! use bevy_playbot::{prelude::*, tick::Tick};
+//! use bevy_playbot::{episode::Tick, prelude::*};
 //!
 //! let mut app = headless_app();
 //! app.ticks(3).expect("no agent broke its contract");

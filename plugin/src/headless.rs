@@ -20,7 +20,7 @@
 //!
 //! ```
 //! use bevy::{prelude::*, window::PrimaryWindow};
-//! use bevy_playbot::{headless_plugins::HeadlessPlugins, prelude::*};
+//! use bevy_playbot::{headless::HeadlessPlugins, prelude::*};
 //!
 //! let mut app = App::new();
 //! app.add_plugins((HeadlessPlugins::default(), PlaybotPlugin { placement: TickPlacement::Frame }));
@@ -89,7 +89,7 @@ pub fn set_frame_rate(app: &mut App, hz: f64) {
 }
 
 /// Creates an app for games in which a frame is a tick, with all of Bevy but a screen. It has
-/// [`HeadlessPlugins`](HeadlessPlugins), with or without a renderer, and
+/// [`HeadlessPlugins`], with or without a renderer, and
 /// [`PlaybotPlugin`] under [`TickPlacement::Frame`].
 pub fn headless_frame_app(plugins: PluginGroupBuilder, hz: f64) -> App {
     let mut app = App::new();

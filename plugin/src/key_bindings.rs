@@ -16,7 +16,7 @@
 //!
 //! ```
 //! use bevy::{input::InputPlugin, prelude::*};
-//! use bevy_playbot::{keyboard::KeyboardPlugin, prelude::*};
+//! use bevy_playbot::{key_bindings::KeyboardPlugin, prelude::*};
 //!
 //! let mut app = headless_app();
 //! app.add_plugins((InputPlugin, KeyboardPlugin));
@@ -66,8 +66,8 @@ impl KeyAxis {
 /// The keys of an agent that a person plays. Each axis has a value of -1, 0 or 1, and all values
 /// together are an action.
 ///
-/// Works on agents under [`Control::Human`](crate::agent::Control::Human) in an app with
-/// [`KeyboardPlugin`](KeyboardPlugin).
+/// Works on agents under [`Control::Human`] in an app with
+/// [`KeyboardPlugin`].
 #[derive(Component, Clone, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug)]

@@ -4,7 +4,7 @@
 //!
 //! - An [`Agent`](agent::Agent) is an entity that acts in the game. Each fixed tick its sensors
 //!   fill an [`Observation`](observation::Observation), and the source that its
-//!   [`Control`](control::Control) names writes its [`Action`](action::Action). The game answers
+//!   [`Control`](agent::Control) names writes its [`Action`](action::Action). The game answers
 //!   with a [`Reward`](reward::Reward) and eventually with the end of the
 //!   [`Episode`](episode::Episode).
 //! - A *level* is identified by a number. The plugin takes it from the agent's

@@ -161,7 +161,7 @@ impl Observation {
     ///
     /// ```
     /// use bevy::prelude::*;
-    /// use crate::prelude::*;
+    /// use bevy_playbot::prelude::*;
     ///
     /// /// In metres: four corridors, two and one.
     /// const LENGTHS: [f64; 3] = [16.0, 8.0, 4.0];

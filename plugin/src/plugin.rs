@@ -2,7 +2,7 @@
 //!
 //! ```
 //! use bevy::{prelude::*, time::TimePlugin};
-//! use bevy_playbot::{prelude::*, tick::Tick};
+//! use bevy_playbot::{episode::Tick, prelude::*};
 //!
 //! let mut app = App::new();
 //! // A game with a window adds `DefaultPlugins`, which include time.
@@ -149,7 +149,7 @@ fn add_outcome_systems(app: &mut App, schedule: impl ScheduleLabel) {
 ///
 /// ```
 /// use bevy::{input::InputPlugin, prelude::*, time::TimePlugin};
-/// use bevy_playbot::{plugins::PlaybotPlugins, prelude::*};
+/// use bevy_playbot::{plugin::PlaybotPlugins, prelude::*};
 ///
 /// let mut app = App::new();
 /// // A game with a window adds `DefaultPlugins` instead of these two.

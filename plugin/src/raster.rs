@@ -216,7 +216,7 @@ fn rank(z: f32) -> u32 {
 
 // The plugin of `RasterSensor`s.
 
-/// Adds [`RasterSensor`](RasterSensor)s to a game.
+/// Adds [`RasterSensor`]s to a game.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RasterPlugin;
 

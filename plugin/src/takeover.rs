@@ -1,6 +1,6 @@
 //! Taking over a shipped build: recording testers, letting a policy play, replaying a recording, without another program.
 //!
-//! A game with [`PlaybotPlugins`](crate::plugins::PlaybotPlugins) reads the environment variable
+//! A game with [`PlaybotPlugins`](crate::plugin::PlaybotPlugins) reads the environment variable
 //! `PLAYBOT` when it starts:
 //!
 //! ```text
@@ -338,7 +338,7 @@ pub enum TakeoverError {
 /// refused.
 ///
 /// ```
-/// use GameIdentity;
+/// use bevy_playbot::takeover::GameIdentity;
 ///
 /// let game = GameIdentity::new("breakout", 3).with_mode("endless");
 /// assert_eq!((game.version, game.mode.as_str()), (3, "endless"));

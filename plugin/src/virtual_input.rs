@@ -2,11 +2,11 @@
 //!
 //! A game that reads `ButtonInput<KeyCode>`, mouse, gamepad or an input manager needs no change to be played by a
 //! bot. Its agent carries a [`VirtualInput`]: the inputs that each action holds down. In
-//! [`PlaybotSystems::Act`](crate::systems::PlaybotSystems::Act) the plugin presses the new inputs of this tick's
+//! [`PlaybotSystems::Act`] the plugin presses the new inputs of this tick's
 //! action, keeps holding those it still needs, and releases the rest.
 //!
-//! - It plays for [`Control::Policy`](crate::control::Control::Policy), [`Bot`](crate::control::Control::Bot) and
-//!   [`Replay`](crate::control::Control::Replay), never for people: under `Human` and `Idle` everything is released.
+//! - It plays for [`Control::Policy`](crate::agent::Control::Policy), [`Bot`](crate::agent::Control::Bot) and
+//!   [`Replay`](crate::agent::Control::Replay), never for people: under `Human` and `Idle` everything is released.
 //!   The exception are agents with [`PressesForPeople`], for people whose own devices do not reach the game.
 //! - Everything is released at the end of an episode and at the start of the next. An episode begins with nothing
 //!   held, and replays the same alone.
@@ -82,8 +82,6 @@ pub use crate::virtual_input::{
     devices::{ActionAxis, HeldInput, VirtualDevices},
     messages::VirtualGamepad,
 };
-
-// The mapping from an agent's actions to the inputs that they hold down.
 
 /// The inputs that each action of an agent holds down. It maps the agent's [`Action`](crate::action::Action) to the
 /// input that a game reads from Bevy.
@@ -210,7 +208,7 @@ impl VirtualInput {
 
 // The plugin of virtual input.
 
-/// Lets the actions of agents with a [`VirtualInput`](VirtualInput) play through Bevy's own input. Needs
+/// Lets the actions of agents with a [`VirtualInput`] play through Bevy's own input. Needs
 /// [`InputPlugin`], which is part of Bevy's `DefaultPlugins`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct VirtualInputPlugin {

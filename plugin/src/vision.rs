@@ -8,7 +8,7 @@
 //! | [`TileLayer`] | a grid of tiles, drawn at once |
 //!
 //! A sensor fills [`Frame`] in [`VisionSystems::Render`]. [`VisionSystems::Compose`] checks its
-//! tick and makes [`Observation::image`](crate::observation::Observation::image) from it. Idle
+//! tick and makes [`Observation::image`] from it. Idle
 //! agents and agents between two episodes are skipped.
 //!
 //! ```
@@ -169,12 +169,12 @@ impl Plugin for VisionPlugin {
 
 // System sets for agents that see pictures.
 
-/// Parts of [`ObserveSchedule`](crate::systems::ObserveSchedule) for agents that see pictures, in this order.
+/// Parts of [`ObserveSchedule`] for agents that see pictures, in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VisionSystems {
     /// The game updates the drawn components: transforms, sprites, tiles.
     Sync,
-    /// Sensors fill each agent's [`Frame`](Frame).
+    /// Sensors fill each agent's [`Frame`].
     Render,
     /// The frame's tick is checked, and the observation made from it.
     Compose,

@@ -23,7 +23,7 @@ pub const DENSITY: f64 = 5.0;
 /// Height of the torso's centre in the nominal pose, in metres.
 pub const NOMINAL_HEIGHT: f64 = 0.75;
 
-/// DetectorTick of inertia of each hinge's rotor, in kg·m². It dwarfs that of the limbs.
+/// Moment of inertia of each hinge's rotor, in kg·m². It dwarfs that of the limbs.
 pub const ARMATURE: f64 = 1.0;
 
 /// Friction of each hinge, in N·m·s.
@@ -72,9 +72,9 @@ pub const ACTUATED: [usize; JOINTS] = [6, 7, 0, 1, 2, 3, 4, 5];
 pub struct Solid {
     /// Mass, in kg.
     pub mass: f64,
-    /// DetectorTick of inertia about the long axis, in kg·m².
+    /// Moment of inertia about the long axis, in kg·m².
     pub along: f64,
-    /// DetectorTick of inertia about any axis across it, in kg·m².
+    /// Moment of inertia about any axis across it, in kg·m².
     pub across: f64,
 }
 

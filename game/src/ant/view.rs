@@ -90,7 +90,7 @@ impl ArenaGround {
 
 // System sets of drawing ants.
 
-/// Parts of [`VisionSystems::Sync`](bevy_playbot::vision::VisionSystems::Sync) for games with ants, in this order.
+/// Parts of [`VisionSystems::Sync`] for games with ants, in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum AntViewSystems {
     /// The game updates poses, goals and grounds.

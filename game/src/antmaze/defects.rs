@@ -14,8 +14,6 @@ use crate::{
 use bevy::prelude::*;
 use playbot_harness::{defect::DefectKind, prelude::*};
 
-// All defects of AntMaze.
-
 /// Returns the defects of the game, those of levels first.
 pub(super) fn defects() -> Vec<DefectKind> {
     let levels = of_levels(|text| level_text::parse(text).is_ok());

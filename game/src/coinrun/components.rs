@@ -51,7 +51,7 @@ pub struct InArena(pub Entity);
 #[relationship_target(relationship = InArena, linked_spawn)]
 pub struct ArenaEntities(Vec<Entity>);
 
-/// The agent's body and its memory between steps. Belongs to the entity with the [`Agent`](bevy_playbot::agent::Agent).
+/// The agent's body and its memory between steps. Belongs to the entity with the [`Agent`].
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! Defects that can be planted into CoinRun, to measure testers: see `playbot_mutation`.
 //!
 //! Defects of levels change the text of a level, which makes it broken by construction. Defects of rules are systems
-//! around [`CoinRunSystems`](super::CoinRunSystems) that change the data which the rules read and write.
+//! around [`CoinRunSystems`] that change the data which the rules read and write.
 
 mod hazards;
 mod walls;
@@ -21,8 +21,6 @@ use crate::{
 use bevy::prelude::*;
 use playbot_harness::defect::DefectKind;
 use playbot_learner::rng::{ChaCha8Rng, below};
-
-// All defects of CoinRun.
 
 /// Returns the defects of the game, those of levels first.
 pub(super) fn defects() -> Vec<DefectKind> {

@@ -18,8 +18,6 @@ use playbot_harness::{
     prelude::*,
 };
 
-// All detectors of CoinRun.
-
 /// Returns the detectors of the game.
 pub(super) fn detectors() -> Vec<Box<dyn Detector>> {
     vec![

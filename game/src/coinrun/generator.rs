@@ -10,8 +10,6 @@ use crate::coinrun::{
 };
 use rand_mt::Mt;
 
-// A level from its mode and seed.
-
 /// Returns the level of this mode and seed. Equal arguments give equal levels.
 pub fn generate(mode: Mode, seed: u32) -> Level {
     let mut draw = Draw::new(seed);
@@ -287,8 +285,6 @@ impl Draw {
         bits
     }
 }
-
-// Numbers of pictures in the original.
 
 /// Number of background pictures that the original draws from.
 pub const BACKGROUNDS: u32 = 62;

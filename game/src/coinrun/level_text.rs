@@ -30,7 +30,7 @@ pub(super) struct LevelText {
     crate_sprites: Option<Vec<u8>>,
     #[serde(default)]
     enemy_sprites: Option<Vec<u8>>,
-    /// A letter for each body; see [`creation_order`].
+    /// A letter for each body, in creation order; see [`components::to_text`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     order: Option<String>,
     #[serde(default)]

@@ -212,7 +212,7 @@ fn touched(body: &Body, swept: &Swept) -> Corners {
 /// Bodies farther away than this (tiles, along x) cannot be met on a path: half a view, and an enemy's walk.
 const FAR: f32 = 10.0;
 
-/// A direction, and the indices in [`HELD`](HELD) of its actions with and without a jump.
+/// A direction, and the indices in [`HELD`] of its actions with and without a jump.
 const PAIRS: [(i8, usize, usize); 3] = [(1, 0, 1), (0, 2, 3), (-1, 5, 4)];
 
 /// The bodies near a player. Made once and used again, since it holds memory.
@@ -223,7 +223,7 @@ pub struct Surroundings {
 }
 
 impl Surroundings {
-    /// Follows the path of every held action, in the order of [`HELD`](HELD), and writes for each `[dies, coin,
+    /// Follows the path of every held action, in the order of [`HELD`], and writes for each `[dies, coin,
     /// lands, steps, dx, dy]`: three flags, the share of [`STEPS`] that was made, and the displacement in half views.
     ///
     /// A path ends with death, with the coin, where a flight ends on firm ground, and at the edge of the view.
@@ -275,8 +275,6 @@ impl Surroundings {
         ]
     }
 }
-
-// A player on a path.
 
 /// A player on a path. Its size is that of the [`PathGround`].
 #[derive(Clone, Copy, PartialEq, Debug)]

@@ -21,7 +21,7 @@ pub(super) const MAX_PUSHES: u32 = 5;
 pub struct PlayerState {
     /// The top of a crate held the player in the last step.
     pub on_crate: bool,
-    /// An enemy on a crate made the player count as standing on one; see [`patrol`](patrol).
+    /// An enemy on a crate made the player count as standing on one; see [`patrol`].
     pub lent_support: bool,
     /// The player had support at the start of the last step.
     pub supported: bool,

@@ -61,7 +61,7 @@ pub(super) fn start_episode(
 #[reflect(Resource, Clone, Debug, PartialEq)]
 pub struct Maze2dRules(pub Maze2dMode);
 
-/// One running copy of a level. With a physics context it also has [`MazePhysics`](crate::maze2d::physics::MazePhysics).
+/// One running copy of a level. With a physics context it also has [`MazePhysics`].
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(from_reflect = false)]
 #[reflect(Component)]
@@ -76,7 +76,7 @@ pub struct MazeArena {
     pub player: Entity,
 }
 
-/// The ball of an agent. Belongs to the entity with the [`Agent`](bevy_playbot::agent::Agent).
+/// The ball of an agent. Belongs to the entity with the [`Agent`].
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]

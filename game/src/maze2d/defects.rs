@@ -18,8 +18,6 @@ use bevy::prelude::*;
 use playbot_harness::{defect::DefectKind, prelude::*};
 use std::sync::Arc;
 
-// All defects of Maze2D.
-
 /// Returns the defects of the game, those of levels first.
 pub(super) fn defects() -> Vec<DefectKind> {
     let levels = of_levels(|text| level_text::parse(text).is_ok());

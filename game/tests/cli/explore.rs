@@ -68,7 +68,7 @@ fn mistakes_are_told_before_anything_is_explored() {
             &["coinrun", "--level", "hard:0", "--cell", "900,4"],
             "cell 900,4 lies outside of the level: its cells go from 0,0",
         ),
-        (&["coinrun", "--level", "hard:0", "--cell", "4"], "theirs is 2, such as"),
+        (&["coinrun", "--level", "hard:0", "--cell", "4"], "cells of this level have 2, such as"),
         (&["coinrun", "--sticky", "2"], "write a number from 0 to 1"),
         (&["coinrun", "--cell-size", "0"], "the size of a cell is 0"),
         (&["coinrun", "--steps", "0"], "--steps"),

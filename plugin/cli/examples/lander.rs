@@ -39,7 +39,7 @@ pub const EXPERIMENT: &str = r#"(
     score: (horizon: 5),
 )"#;
 
-/// The game, as the laboratory knows it.
+/// The game, as the harness knows it.
 #[derive(Clone, Copy)]
 pub struct Lander;
 

@@ -1,4 +1,10 @@
-//! Options of computing that several verbs have: threads and device.
+//! Options that several verbs have: threads and device, levels, and overwriting of recordings; numbers on the command
+//! line; and the default mode and levels.
+//!
+//! - `experiment`: reading of experiments, from a path or from those that come with the program, with the changes of
+//!   the command line.
+//! - `open`: opening of files that the command line names, with advice for missing ones.
+//! - `player`: players named on the command line.
 
 pub(crate) mod experiment;
 pub(crate) mod open;

@@ -1,6 +1,52 @@
-//! The command line: one file per verb. Data goes to standard output, everything else to standard error.
+//! Bots that test the levels of Bevy games: the crate of a game's tests and of its bots.
+//!
+//! A program that describes its game and calls [`main`](main()) has every verb of the command line: `playbot test` as
+//! `cargo run -- test`, and so on.
+//!
+//! ```no_run
+//! use bevy::prelude::*;
+//! use playbot::ForeignGame;
+//!
+//! /// The game's own plugins.
+//! fn game(app: &mut App) {
+//!     app.add_systems(Startup, |mut commands: Commands| {
+//!         commands.spawn(Name::new("hero"));
+//!     });
+//! }
+//!
+//! fn my_game() -> ForeignGame {
+//!     ForeignGame::new("my-game", 1, game)
+//!         .keys([vec![], vec![KeyCode::Space]])
+//!         .observe(["time"], |time: Res<Time>| [time.elapsed_secs()])
+//!         .time_limit(600)
+//! }
+//!
+//! fn main() -> std::process::ExitCode {
+//!     playbot::main(&[&my_game()])
+//! }
+//!
+//! #[test]
+//! fn levels_can_be_solved() {
+//!     playbot::assert_levels_solvable(&my_game(), "default:0..9");
+//! }
+//! ```
+//!
+//! # Contents, in reading order
+//!
+//! - [`prelude`]: the imports of a game's bots and tests.
+//! - [`ForeignGame`] wraps a game as it is. [`Game`] is the contract behind it, for games that want more.
+//! - [`assert_levels_solvable`], [`assert_deterministic`] and [`LevelTest`]: assertions for `cargo test`.
+//! - [`main`](main()): the command line. [`check_usage`] checks a command line, [`mod@reference`] describes all verbs.
+//! - [`harness`], [`mod@test`], [`train`], [`mutation`], [`learner`], [`report`]: the crates behind it, for programs that
+//!   call them directly.
+//! - [`pictures`]: steps of an episode as PNGs. `window` (a feature): a window for people.
+//!
+//! Inside, each verb is a file in `verbs/`. Verbs share their options (`arguments`), errors with exit codes (`error`),
+//! output files (`output`), progress (`progress`, `console`) and messages (`tell!`, `log`). Data goes to standard output,
+//! everything else to standard error.
 
 #![allow(clippy::print_stdout, reason = "a command line prints")]
+#![allow(clippy::test_attr_in_doctest, reason = "the example shows a game's own test, and need only compile")]
 
 #[macro_use]
 mod tell;
@@ -17,6 +63,7 @@ mod output;
 pub mod pictures;
 mod plot;
 mod progress;
+pub mod reference;
 mod verbs;
 #[cfg(feature = "window")]
 pub mod window;

@@ -67,7 +67,8 @@ where
     N: for<'a> FormatFields<'a> + 'static,
 {
     fn format_event(&self, context: &FmtContext<'_, S, N>, mut writer: Writer<'_>, event: &Event<'_>) -> fmt::Result {
-        let is_ours = ["playbot_", "bevy_playbot"].iter().any(|name| event.metadata().target().starts_with(name));
+        let krate = event.metadata().target().split("::").next().unwrap_or_default();
+        let is_ours = krate == "playbot" || krate == "bevy_playbot" || krate.starts_with("playbot_");
         if !(self.is_plain && is_ours) {
             return self.full.format_event(context, writer, event);
         }

@@ -1,4 +1,4 @@
-//! Output files: tested before the work whose result they hold.
+//! Output files, tested before the work whose result they hold, the program's name, and wording for both.
 
 use crate::error::CliError;
 use playbot_harness::sealed_file::write_atomically;

@@ -1,4 +1,7 @@
 //! Steps of an episode as PNGs, still or animated.
+//!
+//! - `caption`: caption of a picture: tick, action, value, and the skill as bars.
+//! - `episode_world`: the World of the shown episode.
 
 pub mod caption;
 pub mod episode_world;

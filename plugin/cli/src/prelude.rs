@@ -1,4 +1,4 @@
-//! What the bots and tests of a game need, in one import.
+//! The items that the bots and tests of a game need, in one import.
 
 pub use bevy_playbot::episode::EpisodeEnd;
 pub use playbot_harness::floor_plan::FloorPlan;

@@ -1,4 +1,14 @@
-//! The verbs of the command line, one module each.
+//! The verbs of the command line: a module each, with its options (`Args`) and its `run`.
+//!
+//! - Test levels: [`mod@test`], [`doctor`], [`replay`], [`explore`], [`report`], [`bugs`].
+//! - See levels and episodes: [`level`], [`trace`], [`view`], [`eyes`], [`play`].
+//! - Record: [`record`], [`demo`].
+//! - Learn: [`quickstart`], [`learn_skills`], [`train`], [`study`], [`eval`], [`config`], [`runs`], [`policy`],
+//!   [`bench`].
+//!
+//! A verb reads its options, opens what they name, calls the library, and prints what comes back. Options that several
+//! verbs have are in [`arguments`](crate::arguments), errors with their exit codes in [`error`](crate::error). A new verb is a
+//! module here, a variant of the command line's `Verb`, and a word in a group of [`reference`](crate::reference).
 
 pub(crate) mod bench;
 pub(crate) mod bugs;

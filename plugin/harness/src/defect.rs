@@ -1,4 +1,4 @@
-//! The kinds of planted defects: see [`bugs`](crate::bugs).
+//! The kinds of planted defects: see `playbot_mutation::bugs`.
 
 use bevy::prelude::*;
 use playbot_learner::rng::ChaCha8Rng;

@@ -1,4 +1,6 @@
 //! Recordings: making them with a demonstrator, verifying them by replay, and reading them for learning.
+//!
+//! - `demonstration`: the recording of a game's demonstrator, or of another player.
 
 pub mod demonstration;
 

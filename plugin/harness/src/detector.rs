@@ -13,7 +13,7 @@
 //! assert_eq!(debt().name(), "debt");
 //! ```
 //!
-//! [`TestTools::detectors`](crate::game::TestTools::detectors) names a game's own; [`detectors`](crate::detectors) has
+//! [`TestTools::detectors`](crate::game::TestTools::detectors) names a game's own; `playbot_test::detectors` has
 //! those that every game gets.
 
 use crate::floor_plan::FloorPlan;
@@ -210,8 +210,6 @@ pub trait Proofs {
 pub struct NoProofs;
 
 impl Proofs for NoProofs {}
-
-// Settings of detectors.
 
 /// A setting of a detector.
 pub struct Setting<'a> {

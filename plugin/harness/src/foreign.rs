@@ -482,7 +482,7 @@ impl ForeignGame {
         self.with(|description| description.detectors.push(Arc::new(make)))
     }
 
-    /// Adds a defect that can be planted into the game: see [`bugs`](playbot_mutation::bugs).
+    /// Adds a defect that can be planted into the game: see `playbot_mutation::bugs`.
     pub fn defect(self, kind: DefectKind) -> Self {
         self.with(|description| description.defects.push(kind))
     }
@@ -575,7 +575,7 @@ impl ForeignGame {
     }
 
     /// Creates the level after the restart, with a system that runs once. It finds the level's number in
-    /// [`LevelSeed`](LevelSeed), to seed the game's generator, and to reset what the restart leaves unchanged.
+    /// [`LevelSeed`], to seed the game's generator, and to reset what the restart leaves unchanged.
     pub fn level<M: 'static>(self, system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static) -> Self {
         self.with(|description| description.level = Some(SystemFactory::new(system, |()| ())))
     }

@@ -343,7 +343,7 @@ pub trait StateTools: Send + Sync {
     }
 
     /// The state of an agent in a few whole numbers, for an explorer that treats states with the same numbers as the same: see
-    /// [`explore`](playbot_test::explore). `None`, by default, for squares of the grid by [`position`](Self::position), or, if that
+    /// `playbot_test::explore`. `None`, by default, for squares of the grid by [`position`](Self::position), or, if that
     /// is not known, for the downscaled observation.
     fn explore_cell(&self, _world: &World, _agent: Entity) -> Option<Vec<i32>> {
         None
@@ -433,14 +433,14 @@ pub trait BotTools: Send + Sync {
 
 /// Detectors and planted defects of a game.
 pub trait TestTools: Send + Sync {
-    /// The game's own detectors, which look for defects in tests beside [those that all games have](playbot_test::detectors). A
-    /// detector with the name of another one takes its place.
+    /// The game's own detectors, which look for defects in tests beside those that all games have
+    /// (`playbot_test::detectors`). A detector with the name of another one takes its place.
     fn detectors(&self) -> Vec<Box<dyn Detector>> {
         Vec::new()
     }
 
-    /// Defects that can be planted into this game, beside [those of all games](playbot_mutation::bugs). A defect with the class of
-    /// another one takes its place.
+    /// Defects that can be planted into this game, beside those of all games (`playbot_mutation::bugs`). A defect with
+    /// the class of another one takes its place.
     fn defects(&self) -> Vec<DefectKind> {
         Vec::new()
     }
@@ -449,7 +449,7 @@ pub trait TestTools: Send + Sync {
 /// The experiment of a game.
 pub trait TrainTools: Send + Sync {
     /// The experiment that is the default of the game; `None` for the plainest one, see
-    /// [`default_experiment`](playbot_train::experiment::default_experiment).
+    /// `playbot_train::experiment::default_experiment`.
     fn experiment(&self) -> Option<ExperimentText> {
         None
     }

@@ -17,8 +17,6 @@ use std::{any::Any, path::Path, sync::Arc};
 
 pub use crate::level_files::error::{JsonStep, LevelFileError, LevelTextError, read_json, read_json_object};
 
-// The levels of a World that come from files.
-
 /// Levels from files, by number.
 ///
 /// Worlds whose mode names files hold them as a resource before the game is built. When an episode starts, a game

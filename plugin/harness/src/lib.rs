@@ -1,4 +1,46 @@
-//! How a game of [`bevy_playbot`] runs headless: games, Worlds, levels, sensors, players and the doctor.
+//! Headless play of a game of [`bevy_playbot`]: games, Worlds, levels, sensors, players and the doctor.
+//!
+//! A program describes its game once, as a [`Game`](game::Game), or wraps the function that adds it to an app in a
+//! [`ForeignGame`](foreign::ForeignGame). Everything else builds Worlds of it, as many as the cores can play, and ticks
+//! them without a window. An episode depends on the level, the player and the random seed, and on nothing else. Most
+//! programs use this crate through `playbot`, as `playbot::harness`.
+//!
+//! The modules, in reading order:
+//!
+//! - a game: [`game`], the contract of games and their optional tools; [`foreign`], games that are not written for this
+//!   plugin; [`games`], the games of a program; [`mode`], errors of modes; [`prelude`], the imports of a game.
+//! - its levels: [`split`], named ranges of levels; [`level_files`], levels from files; [`floor_plan`], their plans.
+//! - its Worlds: [`worlds`], headless Worlds with any number of agents; [`sensors`], what their agents see;
+//!   [`arrangement`], the distribution of arenas over Worlds.
+//! - its players: [`eval`], evaluation of players on levels; [`demo`], recordings made and verified; [`detector`], the
+//!   contract of detectors of defects; [`defect`], the kinds of planted defects.
+//! - views: [`doctor`], the examination of a game's determinism; [`inspect`], single levels and steps; [`trace`], given
+//!   actions tick by tick; [`drawing`], shapes as SVG or pixels; [`trails`], charts of where agents went.
+//! - the machine: [`parallel`], work on a few threads; [`machine`], memory and threads that are left; [`benchmark`],
+//!   the benchmarks of a game; [`sealed_file`], files with a checksum; [`brief`], texts for error messages.
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use playbot_harness::{foreign::ForeignGame, prelude::*, worlds::build_world};
+//!
+//! /// The game's own plugins.
+//! fn game(app: &mut App) {
+//!     app.add_systems(Startup, |mut commands: Commands| {
+//!         commands.spawn(Name::new("hero"));
+//!     });
+//! }
+//!
+//! let game = ForeignGame::new("wait", 1, game)
+//!     .keys([vec![], vec![KeyCode::Space]])
+//!     .observe(["time"], |time: Res<Time>| [time.elapsed_secs()])
+//!     .time_limit(3);
+//! let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+//! world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::list([7])));
+//! while world.get::<Control>(agents[0]) != Some(&Control::Idle) {
+//!     world.tick().expect("the game keeps its contract");
+//! }
+//! assert_eq!(world.get::<EpisodeCount>(agents[0]).expect("an agent").finished, 1);
+//! ```
 
 pub mod arrangement;
 pub mod benchmark;

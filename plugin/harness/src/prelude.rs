@@ -1,4 +1,4 @@
-//! What a game needs that is trained and tested, also in its own `cargo test`, and the prelude of [`bevy_playbot`].
+//! The items that a trained and tested game needs, also in its own `cargo test`, and the prelude of [`bevy_playbot`].
 
 pub use crate::{
     game::{Game, GameTools},

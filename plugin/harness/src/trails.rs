@@ -1,4 +1,7 @@
 //! Charts of where agents went: trajectories on the floor plan, and a map of visits.
+//!
+//! - `cells`: chart of the cells of a floor that were reached, by number of visits.
+//! - `visits`: number of visits of each square.
 
 pub mod cells;
 pub mod visits;
@@ -13,8 +16,6 @@ use bevy::math::{Rect, Vec2};
 use playbot_report::text_table::text_width;
 
 pub use crate::trails::{cells::CellChart, visits::Visits};
-
-// Chart of where agents went.
 
 /// Trajectories and visits of one or more players on one or more floors.
 #[derive(Clone, Debug, PartialEq)]

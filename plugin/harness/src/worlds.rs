@@ -214,8 +214,6 @@ fn after_recording(mut clock: ResMut<StageClock>) {
     clock.record_s += clock.lap();
 }
 
-// Actions that do nothing.
-
 /// Words that begin the names of actions that do nothing.
 const NAMES: [&str; 8] = ["none", "nothing", "noop", "no-op", "idle", "stay", "wait", "stand"];
 

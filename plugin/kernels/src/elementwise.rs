@@ -1,4 +1,5 @@
-//! tanh and the logistic function over slices, in a form that compilers turn into vector instructions.
+//! Functions of single numbers and rows, in a form that compilers turn into vector instructions: tanh, the logistic
+//! function, exp, the rectifier, log-probabilities, and destinations for the sums of convolutions.
 //!
 //! Only sums, products, quotients and bit operations are used, in a fixed order for each element. A number has the
 //! same result at any index of a slice, on any number of threads, and with any vector instructions. The coefficients
@@ -61,7 +62,7 @@ pub(crate) fn exp_into(values: &[f32], to: &mut [f32]) {
     to.iter_mut().zip(values).for_each(|(to, &x)| *to = exp(if x < -87.0 { -87.0 } else { x }));
 }
 
-/// Returns exp of each number, as [`exp_into`] does.
+/// Returns exp of each number up to 88; below -87 the result stays e^-87. NaN stays NaN.
 pub fn exp_of(values: &[f32]) -> Vec<f32> {
     let mut exps = vec![0.0; values.len()];
     vectorized(|| exp_into(values, &mut exps));

@@ -4,7 +4,7 @@
 //! are one product over all steps. The two directions are computed at the same time; within a direction nothing
 //! depends on the number of threads.
 //!
-//! With a = x W_i + b_i and c = h W_h + b_h for each gate (see [`crate::nn::Gru`]): r = σ(a_r + c_r), z = σ(a_z + c_z),
+//! With a = x W_i + b_i and c = h W_h + b_h for each gate (see `Gru` in `playbot_learner`): r = σ(a_r + c_r), z = σ(a_z + c_z),
 //! n = tanh(a_n + r c_n), h' = n + z (h - n).
 
 use crate::{

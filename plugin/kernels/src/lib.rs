@@ -1,5 +1,18 @@
-//! Kernels for the backends whose numbers are in host memory: tanh, probabilities of choices and recurrent layers;
-//! and, for flex alone, dense layers and the convolutions of an image encoder.
+//! Layers of neural networks on CPUs, as operations of [burn](https://burn.dev).
+//!
+//! The operations are for the backends whose numbers are in host memory (flex and ndarray). Other backends, such as
+//! graphics cards, compute the same layers by burn's own tensors, which are also the oracle of the tests. Sums are made
+//! in an order that does not depend on the number of threads.
+//!
+//! The modules, in reading order:
+//!
+//! - [`kernels`]: tanh, log-softmax and recurrent layers, for both backends.
+//! - [`dense`]: the dense layers of a network as one operation, for flex.
+//! - [`trunk`]: the convolutions of an image encoder as one operation, for flex.
+//! - [`elementwise`]: activations over slices, written for vector instructions.
+//! - [`host_numbers`]: conversion between tensors and numbers in host memory.
+//! - [`among_workers`]: the threads on which the loops run.
+//! - [`kept_memory`]: memory that one pass hands to the next.
 
 pub mod among_workers;
 pub mod dense;

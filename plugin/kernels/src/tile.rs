@@ -206,7 +206,7 @@ const BLOCK: usize = 128;
 const COLOURS: usize = 9;
 
 /// Adds to `sums` the products of each window's numbers with the `channels` numbers of `y` that go with the window,
-/// summed over the windows: the gradient of [`correlate`](correlate)'s weights, in their order.
+/// summed over the windows: the gradient of [`correlate`]'s weights, in their order.
 #[macerator::with_simd]
 pub(crate) fn outer<S: Simd>(
     x: &[f32],

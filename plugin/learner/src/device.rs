@@ -12,8 +12,6 @@ use std::{
     sync::Once,
 };
 
-// The compute backends by name.
-
 /// The compute backends, by the name used on the command line and in files. The build decides which of them a program
 /// has: [`DeviceKind::BUILT`].
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -289,7 +287,7 @@ mod guard_tests {
         let said = |work: fn()| caught(work).expect_err("it panics");
         assert!(said(|| panic!("out of\n  memory")).starts_with("out of memory (at "));
         let here = said(|| panic!("{} left", 3));
-        assert!(here.starts_with("3 left (at ") && here.contains("guard.rs:"), "{here}");
+        assert!(here.starts_with("3 left (at ") && here.contains("device.rs:"), "{here}");
     }
 
     #[test]

@@ -1,4 +1,6 @@
 //! Self-describing safetensors files: tensors by name, and a JSON description in the header.
+//!
+//! - `seal`: checksums inside files, which reveal damage before the contents are used.
 
 mod seal;
 
@@ -20,8 +22,6 @@ use std::{
 };
 
 pub use crate::file::seal::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text};
-
-// Self-describing safetensors files: tensors by name, and a JSON description in the header.
 
 /// The header entry that holds the description.
 const DESCRIPTION: &str = "playbot";

@@ -13,8 +13,6 @@ use crate::{
 use serde::{Deserialize, Serialize, de::DeserializeOwned};
 use std::{fmt::Debug, path::Path, sync::Arc, time::Duration};
 
-// The interface of every learner to training.
-
 /// Improves a policy from rollouts.
 ///
 /// ```
@@ -29,7 +27,7 @@ use std::{fmt::Debug, path::Path, sync::Arc, time::Duration};
 ///     assert_eq!((learner.spec(), learner.rollout_latent(), learner.updates()), (spec, 0, 0));
 ///     assert!(learner.skills().is_none() && learner.policy().forward(&[], &[0.5, -0.5], 1).is_ok());
 /// }
-/// # Ok::<(), crate::LearnError>(())
+/// # Ok::<(), playbot_learner::LearnError>(())
 /// ```
 pub trait Learner: Debug + Send {
     /// Returns the common part of all learners.
@@ -208,7 +206,7 @@ impl LearnerBase {
     }
 
     /// Returns the mean divergence between decoder and `policy`, as
-    /// [`Learner::initial_kl`](Learner::initial_kl) does.
+    /// [`Learner::initial_kl`] does.
     pub(crate) fn initial_kl(
         &self,
         policy: &Policy,

@@ -3,8 +3,6 @@
 use crate::{FileError, LearnError, file::TensorFile};
 use serde::{Deserialize, Serialize};
 
-// Normalisation of observations: frozen, or running.
-
 /// Added to the variance.
 const EPS: f64 = 1e-8;
 

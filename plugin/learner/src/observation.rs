@@ -1,4 +1,7 @@
 //! Observations: their kinds, batches in host memory, metadata of pictures, and augmentations.
+//!
+//! - `augmentation`: image augmentations: random changes that do not matter to the task, so that networks become
+//!   insensitive to them.
 
 mod augmentation;
 

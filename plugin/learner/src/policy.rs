@@ -1,4 +1,7 @@
 //! Policies: networks that act, networks that estimate values, and the frozen snapshot of both.
+//!
+//! - `actor`: the network of a distribution over actions.
+//! - `inputs`: inputs of networks: skills joined with observations.
 
 mod actor;
 mod inputs;

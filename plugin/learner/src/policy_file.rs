@@ -12,8 +12,6 @@ use crate::{
 use serde::{Deserialize, Serialize};
 use std::{path::Path, sync::Arc};
 
-// A policy that a game ships with: one self-describing file.
-
 const FILE: FileKind = FileKind { name: "policy", version: 1 };
 
 /// Advice on recovering a policy file that is cut off.

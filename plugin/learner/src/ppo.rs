@@ -1,4 +1,13 @@
 //! Proximal policy optimisation (Schulman et al. 2017), with or without a skill decoder.
+//!
+//! - `batch`: the data of an update: a rollout with its advantages, and its minibatches in host memory.
+//! - `config`: settings of PPO.
+//! - `metrics`: metrics of a gradient step and of an update.
+//! - `objective`: the formulas of PPO: generalised advantage estimation on the host, and the losses as pure functions
+//!   of tensors.
+//! - `on_device`: an update on a graphics card: the rollout is sent once, and the numbers of all steps are read back
+//!   together.
+//! - `step`: one gradient step: minibatch → loss → gradient → Adam.
 
 mod batch;
 mod config;

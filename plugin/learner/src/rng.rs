@@ -13,7 +13,7 @@ pub use rand_chacha::ChaCha8Rng;
 /// Source of the named generators of one seed.
 ///
 /// ```
-/// use self::{Streams, unit};
+/// use playbot_learner::rng::{Streams, unit};
 /// let streams = Streams::new(7);
 /// let mut a = streams.stream("actions", 0);
 /// let mut b = streams.stream("actions", 1);

@@ -5,8 +5,6 @@ mod tests;
 
 use crate::{ActionSpace, Actions, LearnError, ObsKind, ObsSlice, Observations, Policy, PolicySpec};
 
-// The steps of a rollout, tick by tick.
-
 /// Steps of B environments over T ticks, flat and row-major: row `t * envs + b`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rollout {
@@ -209,7 +207,7 @@ impl Rollout {
 // Checks that a rollout is consistent and fits a learner.
 
 impl Rollout {
-    /// Checks that all lengths fit T and B, and that [`EndStates::cut_rows`](EndStates::cut_rows) ascend and
+    /// Checks that all lengths fit T and B, and that [`EndStates::cut_rows`] ascend and
     /// are rows of this rollout.
     ///
     /// # Errors
@@ -378,7 +376,7 @@ pub struct EndStates {
     pub cut_obs: Observations,
     /// The skill under which that observation is valued, `cut_rows * latent`.
     pub cut_z: Vec<f32>,
-    /// Remaining share of that skill, as in [`Rollout::left`](crate::Rollout::left).
+    /// Remaining share of that skill, as in [`Rollout::left`].
     pub cut_left: Vec<f32>,
     /// Observation after the last row of each environment, `B`; zeros where that row ended an episode.
     pub next_obs: Observations,
@@ -488,7 +486,7 @@ impl Rollout {
         Ok(all)
     }
 
-    /// Returns the cut episodes of all parts, in ascending order of their joined rows.
+    /// Adds the cut episodes of all parts, in ascending order of their joined rows.
     fn join_cuts(&mut self, parts: &[Self]) -> Result<(), LearnError> {
         let mut cuts = Vec::new();
         let mut offset = 0;

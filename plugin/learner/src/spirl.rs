@@ -233,7 +233,7 @@ struct Header {
 }
 
 impl SpirlLearner {
-    /// Reads a file that [`Learner::save`](crate::Learner::save) wrote. The learner continues exactly as the saved
+    /// Reads a file that [`Learner::save`] wrote. The learner continues exactly as the saved
     /// one would have.
     ///
     /// # Errors
@@ -259,7 +259,7 @@ impl SpirlLearner {
         Ok(Self { config: spirl, over_skills, below })
     }
 
-    /// Returns the file that [`Learner::save`](crate::Learner::save) writes.
+    /// Returns the file that [`Learner::save`] writes.
     fn checkpoint(&self, path: &Path) -> Result<TensorFile, FileError> {
         let over_skills = self.over_skills.checkpoint(path)?.to_bytes()?;
         let below = self.below.as_ref().map(|below| below.checkpoint(path)?.to_bytes()).transpose()?;

@@ -2,11 +2,11 @@
 //! without one is called *unmutated*; reports and files call such levels *sound levels*.
 //!
 //! - A [`DefectKind`] says how a defect is planted, into a level or into the rules of a game. Every game has
-//!   [general ones](general_defects), and those of its own [`TestTools::defects`](crate::game::TestTools::defects):
-//!   [`defect_kinds`].
+//!   [general ones](general_defects), and those of its own
+//!   [`TestTools::defects`](playbot_harness::game::TestTools::defects): [`defect_kinds`].
 //! - A [`Mutant`] is a game with one of them in its rules.
 //! - [`make_bugs`] plants a [`BugSet`], which is kept in a folder and reproducible from a seed.
-//! - [`score`] measures which testers find them.
+//! - [`score`](crate::score) measures which testers find them.
 
 mod general;
 mod make;
@@ -30,8 +30,6 @@ pub use crate::bugs::{
     mutant::{Mutant, PlantedRules},
     set::{BugGame, BugSet, PlantedBug, PlantedPart, UnmutatedLevels},
 };
-
-// The defects that can be planted into a game.
 
 /// Returns the game's own defects, and the general ones. A class of the game's own replaces a general one.
 pub fn defect_kinds(game: &dyn Game) -> Vec<DefectKind> {

@@ -136,7 +136,7 @@ mod tests {
             y_label: "testers".to_owned(),
             curves: vec![bots, others],
             y_range: Some((0.0, 1.0)),
-            marks: Vec::new(),
+            ..Chart::default()
         }
     }
 

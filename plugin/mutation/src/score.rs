@@ -1,6 +1,6 @@
 //! The score of testers: how well they find planted defects.
 //!
-//! A [`ScorePlan`] runs [`Contestant`]s on all mutants and unmutated levels of a [`BugSet`](crate::bugs::BugSet), at
+//! A [`ScorePlan`] runs [`Contestant`]s on all mutants and unmutated levels of a [`BugSet`], at
 //! equal budgets and under the detectors of a test. A [`ScoreRun`] does so on all cores, and a [`ScoreJournal`] keeps
 //! the finished jobs. A [`Score`] is the result. A [`ScoreTable`] joins several: recall and precision by class and
 //! tester, the cost of a defect, and the testers that find most together.
@@ -294,8 +294,6 @@ fn hash_of(set: &BugSet) -> String {
     let text = serde_json::to_string(&(seed, games, mutants, sound)).unwrap_or_default();
     format!("{:016x}", StateHash::of(text.bytes().map(u64::from)).0)
 }
-
-// The result of a tester on a subject.
 
 /// The result of a tester on a subject.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,4 +1,4 @@
-//! Data of a line chart.
+//! Line charts: their data, SVG paths, axes and labelled marks.
 
 use crate::text_table::text_width;
 use std::fmt::Write;
@@ -53,7 +53,7 @@ pub fn is_point(&(x, y): &(f64, f64)) -> bool {
 /// A line chart.
 ///
 /// ```
-/// use crate::{Chart, Curve};
+/// use playbot_report::{Chart, Curve};
 ///
 /// let chart = Chart {
 ///     title: "Return on held-out levels".into(),
@@ -62,6 +62,7 @@ pub fn is_point(&(x, y): &(f64, f64)) -> bool {
 ///     curves: vec![Curve::new("SCORE-PPO", vec![(0.0, 2.1), (1e6, 7.9), (2e6, 9.4)])],
 ///     y_range: None,
 ///     marks: vec![("policy starts to change".into(), 2e5)],
+///     notes: vec!["Curves begin once 100 episodes have ended.".into()],
 /// };
 /// assert!(chart.to_svg().starts_with("<svg "));
 /// ```
@@ -79,12 +80,14 @@ pub struct Chart {
     pub y_range: Option<(f64, f64)>,
     /// Vertical marks: a label and its x.
     pub marks: Vec<(String, f64)>,
+    /// Sentences below the plot.
+    pub notes: Vec<String>,
 }
 
 impl Chart {
-    /// Returns the notes about values that are missing from the picture.
+    /// Returns the chart's own notes, and those about values that are missing from the picture.
     pub(crate) fn footnotes(&self) -> Vec<String> {
-        let mut notes = Vec::new();
+        let mut notes = self.notes.clone();
         let gaps: Vec<String> = self
             .curves
             .iter()

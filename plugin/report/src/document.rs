@@ -3,7 +3,7 @@
 use crate::{
     chart::Chart,
     escape::{escape, steers, with_code_spans},
-    svg::{CHART_STYLE, draw},
+    svg::{draw, page_style},
     table::Table,
 };
 use std::{
@@ -37,7 +37,7 @@ pub struct Section {
 /// A report: one HTML file without scripts and without anything to load, for screens and for paper.
 ///
 /// ```
-/// use crate::{Report, Section};
+/// use playbot_report::{Report, Section};
 ///
 /// let report = Report {
 ///     title: "CoinRun, easy".into(),
@@ -93,8 +93,9 @@ impl Report {
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"color-scheme\" content=\"light dark\">\n\
              <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'\">\n\
-             <title>{}</title>\n<style>\n{PAGE_STYLE}{CHART_STYLE}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
+             <title>{}</title>\n<style>\n{PAGE_STYLE}{}</style>\n</head>\n<body>\n<main>\n{body}</main>\n</body>\n</html>\n",
             escape(&self.title),
+            page_style(),
         )
     }
 

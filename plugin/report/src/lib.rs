@@ -1,18 +1,22 @@
-//! Reports: results as a table on the console, curves as SVG, and both in one HTML file.
+//! Statistics, tables, charts and pages, for reports of training and of tests.
 //!
-//! - [`Chart`] draws [`Curve`]s as SVG, [`to_svg`] several charts in one file, [`sparkline`] a curve as text.
-//! - [`draw_scatters`] draws the dots of charts as a [`Drawing`](crate::drawing::Drawing).
-//! - [`ResultTable`] compares [`ResultRow`]s, on the console with [`to_text_table`]; a [`PlainTable`] holds any text.
-//! - [`StudyReport`] compares the variants of a study, as Markdown, chart and JSON.
-//! - [`CellChart`] draws which cells of a level an explorer has reached.
-//! - [`TrailChart`] draws the paths of agents on a [`FloorPlan`](crate::floor_plan::FloorPlan), as a
-//!   [`Drawing`](crate::drawing::Drawing).
-//! - [`PairedDifference`] compares two methods on the same levels and with the same seeds.
-//! - [`bootstrap`] gives intervals for few runs, [`statistics`] compares runs that differ in their seed.
-//! - [`Report`] puts them together with text into a file that needs nothing else: no scripts, no fonts,
-//!   no network. It follows the reader's light or dark setting and prints.
+//! Everything here is a function of its input: the same data give the same bytes. The modules, in reading order:
 //!
-//! Everything here is a function of its input: the same data give the same bytes.
+//! - [`number`]: numbers for people, and [`ResultTable`] with [`ResultRow`]s, rounded by their errors.
+//! - [`statistics`]: intervals by bootstrap, interquartile means, [`PairedDifference`]s, Holm's correction.
+//! - [`text_table`]: tables on a console. A [`PlainTable`] holds any text.
+//! - [`chart`]: the data of line charts. [`to_svg`] draws [`Chart`]s, [`mod@sparkline`] a curve in one line of text.
+//! - [`Report`]: text, tables and charts in one HTML file that loads nothing: no scripts, no fonts, no network. It
+//!   follows the reader's light or dark setting and prints.
+//! - [`mod@escape`]: text that is safe in HTML, in SVG and on a terminal.
+//!
+//! ```
+//! use playbot_report::{percent, sparkline, statistics::median};
+//!
+//! let solved = vec![0.25, 0.5, 1.0];
+//! println!("{}", sparkline(&solved, 3));
+//! assert_eq!(median(solved).map(percent).as_deref(), Some("50.0 %"));
+//! ```
 
 pub mod chart;
 mod document;

@@ -8,11 +8,85 @@ use crate::{
 };
 use std::fmt::Write;
 
-/// Colours and fonts of a chart, for light and dark surroundings.
-pub(crate) const CHART_STYLE: &str = include_str!("chart.css");
+/// Fonts and lines of a chart. Its colours are names, such as `var(--ink)`, that [`PALETTES`] explain.
+const RULES: &str = include_str!("chart.css");
 
-/// Number of line colours in [`CHART_STYLE`].
+/// Colours of a chart on one kind of surface.
+struct Palette {
+    /// The condition of the surface; empty for the colours without any condition.
+    media: &'static str,
+    /// Names and colours.
+    colours: [(&'static str, &'static str); 5 + COLOURS],
+}
+
+/// The colours on a light page, on a dark page and on paper. The first are those of viewers that know no conditions.
+const PALETTES: [Palette; 3] = [
+    palette("", ["#ffffff", "#1f2328", "#57606a", "#e4e7eb", "#8c959f"], LINES_ON_LIGHT),
+    palette(
+        "(prefers-color-scheme: dark)",
+        ["#15181c", "#e6e8eb", "#a3abb5", "#2a2f36", "#6b747f"],
+        ["#56b4e9", "#ff8a3d", "#2fc79a", "#e58fcb", "#f0c04a", "#9fd3ff", "#b8bec6"],
+    ),
+    palette("print", ["#ffffff", "#000000", "#333333", "#dddddd", "#777777"], LINES_ON_LIGHT),
+];
+
+/// Colours of the lines on a light page and on paper.
+const LINES_ON_LIGHT: [&str; COLOURS] = ["#0072b2", "#d55e00", "#009e73", "#b2529b", "#c98500", "#3a9bdc", "#5b5b5b"];
+
+/// Number of line colours.
 const COLOURS: usize = 7;
+
+const fn palette(media: &'static str, surface: [&'static str; 5], lines: [&'static str; COLOURS]) -> Palette {
+    let [paper, ink, soft, hair, axis] = surface;
+    let [c0, c1, c2, c3, c4, c5, c6] = lines;
+    let colours = [
+        ("--paper", paper),
+        ("--ink", ink),
+        ("--soft", soft),
+        ("--hair", hair),
+        ("--axis", axis),
+        ("--c0", c0),
+        ("--c1", c1),
+        ("--c2", c2),
+        ("--c3", c3),
+        ("--c4", c4),
+        ("--c5", c5),
+        ("--c6", c6),
+    ];
+    Palette { media, colours }
+}
+
+impl Palette {
+    /// Wraps rules in the condition of this palette.
+    fn conditional(&self, rules: &str) -> String {
+        if self.media.is_empty() { rules.to_owned() } else { format!("@media {} {{\n{rules}}}\n", self.media) }
+    }
+}
+
+/// Returns the style sheet of charts in a page, for light and dark surroundings and for paper. Colours are CSS
+/// variables, which other styles of the page may use too.
+pub(crate) fn page_style() -> String {
+    let variables = PALETTES.iter().map(|palette| {
+        let colours = palette.colours.map(|(name, colour)| format!("{name}: {colour};")).join(" ");
+        palette.conditional(&format!(".chart, .bar {{ {colours} }}\n"))
+    });
+    variables.collect::<String>() + RULES
+}
+
+/// Returns the style sheet of a chart in a file of its own. Its colours are literal, since many viewers of SVG know no
+/// CSS variables; viewers without conditions show the colours of a light page.
+fn file_style() -> String {
+    let literal = |palette: &Palette| {
+        // Rules without a colour are the same everywhere.
+        let lines = RULES.split_inclusive('\n').filter(|line| palette.media.is_empty() || line.contains("var(--"));
+        let rules = palette
+            .colours
+            .iter()
+            .fold(lines.collect::<String>(), |rules, (name, colour)| rules.replace(&format!("var({name})"), colour));
+        palette.conditional(&rules)
+    };
+    PALETTES.iter().map(literal).collect()
+}
 
 /// Width of the drawing in pixels.
 const WIDTH: f64 = 720.0;
@@ -36,8 +110,8 @@ const GAP: f64 = 20.0;
 const KEY: f64 = 26.0;
 
 impl Chart {
-    /// Returns the chart as a complete SVG file, 720 pixels wide and a margin. Text stays text, without fonts or
-    /// scripts, and colours follow the reader's light or dark setting.
+    /// Returns the chart as a complete SVG file, 720 pixels wide and a margin. Text stays text, without fonts, scripts
+    /// or CSS variables, and colours follow the reader's light or dark setting where the viewer knows it.
     pub fn to_svg(&self) -> String {
         to_svg(std::slice::from_ref(self))
     }
@@ -53,11 +127,11 @@ pub fn to_svg(charts: &[Chart]) -> String {
     }
     let titles: Vec<&str> = charts.iter().map(|chart| chart.title.as_str()).collect();
     let paper = format!("<rect class=\"paper\" x=\"-{MARGIN}\" y=\"-{MARGIN}\" width=\"100%\" height=\"100%\"/>\n");
-    let style = format!("<style>\n{CHART_STYLE}</style>\n{paper}");
+    let style = format!("<style>\n{}</style>\n{paper}", file_style());
     element(&titles.join("; "), (height - GAP).max(0.0), MARGIN, &(style + &body))
 }
 
-/// Draws the chart for a page that holds [`CHART_STYLE`].
+/// Draws the chart for a page that holds [`page_style`].
 pub(crate) fn draw(chart: &Chart) -> String {
     let (content, height) = content(chart);
     element(&chart.title, height, 0.0, &content)

@@ -1,4 +1,4 @@
-//! Tables in HTML.
+//! Tables, in HTML and as text for the console.
 
 use crate::{
     escape::{escape, one_line},

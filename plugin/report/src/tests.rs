@@ -45,6 +45,7 @@ fn everything_is_escaped() {
                     curves: vec![Curve::new(evil, vec![(0.0, 1.0), (1.0, f64::NAN)]), Curve::new(evil, vec![])],
                     y_range: None,
                     marks: vec![(evil.into(), 0.5)],
+                    notes: vec![evil.into()],
                 }],
                 tables: vec![
                     ResultTable {
@@ -70,6 +71,35 @@ fn everything_is_escaped() {
     // Nothing is loaded; the only address is the name of the SVG format.
     assert_eq!(html.matches("http://").count(), html.matches("xmlns=\"http://www.w3.org/2000/svg\"").count());
     assert!(!html.contains("https://") && !html.contains("url(") && !html.contains("src="));
+}
+
+#[test]
+fn a_file_has_literal_colours_and_a_page_has_names_that_it_explains() {
+    let curves = (0..8).map(|i| Curve::new(i.to_string(), vec![(0.0, f64::from(i)), (1.0, 1.0)])).collect();
+    let chart = Chart { notes: vec!["A note.".into()], ..chart(curves) };
+    let svg = chart.to_svg();
+    assert_sound(&svg);
+    assert!(!svg.contains("var(") && !svg.contains("--"), "a viewer without CSS variables would draw it black: {svg}");
+    assert!(svg.contains(">A note.</text>"), "{svg}");
+    let (_, style) = svg.split_once("<style>").expect("a style");
+    let (style, _) = style.split_once("</style>").expect("its end");
+    let (light, conditional) = style.split_once("@media (prefers-color-scheme: dark)").expect("colours of dark pages");
+    let (dark, print) = conditional.split_once("@media print").expect("colours of paper");
+    for (rules, line, ink) in
+        [(light, "#0072b2", "#1f2328"), (dark, "#56b4e9", "#e6e8eb"), (print, "#0072b2", "#000000")]
+    {
+        assert!(
+            rules.contains(&format!(
+                ".chart .line.c0, .chart .leader.c0, .chart .seen-through.c0 {{ stroke: {line}; }}"
+            ))
+        );
+        assert!(rules.contains(&format!("fill: {ink};")), "{rules}");
+    }
+    let page = Report { sections: vec![Section { charts: vec![chart], ..Section::default() }], ..Report::default() };
+    let page = page.to_html();
+    let names = page.split("var(").skip(1).filter_map(|rest| Some(rest.split_once(')')?.0));
+    let unknown: Vec<&str> = names.filter(|name| !page.contains(&format!("{name}: #"))).collect();
+    assert!(unknown.is_empty() && page.contains("--c6: #"), "colours without a value: {unknown:?}");
 }
 
 #[test]

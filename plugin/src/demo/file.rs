@@ -56,8 +56,6 @@ pub use crate::demo::file::{
     writer::DemoWriter,
 };
 
-// A summary of a recording in a few numbers.
-
 /// A summary of a recording in a few numbers.
 ///
 /// Means and shares are `None` without episodes, not 0.
@@ -224,7 +222,7 @@ impl MergeReport {
 /// observations and noise. Testers may differ: the new file names all of them. The input files stay unchanged.
 ///
 /// ```no_run
-/// use merge_demos;
+/// use bevy_playbot::demo::file::{DemoFileError, merge_demos};
 ///
 /// let report = merge_demos(&["ada.demo", "bob.demo"], "all.demo")?;
 /// assert!(report.episodes() >= 2, "of the game {}", report.header.game);

@@ -1,4 +1,4 @@
-//! The takeover `policy:FILE`.
+//! The takeovers `policy:FILE`, `replay:FILE` and `record:FILE`, and the former players of the agents.
 
 use crate::{
     agent::{Agent, AgentOrder, Control},

@@ -19,7 +19,7 @@ use thiserror::Error;
 ///
 /// ```
 /// use bevy::prelude::*;
-/// use crate::virtual_input::VirtualButton;
+/// use bevy_playbot::virtual_input::VirtualButton;
 ///
 /// assert_eq!("ArrowLeft".parse(), Ok(VirtualButton::Key(KeyCode::ArrowLeft)));
 /// assert_eq!(VirtualButton::from(MouseButton::Left).to_string(), "MouseLeft");

@@ -152,7 +152,7 @@ impl VirtualDevices {
 ///
 /// ```
 /// use bevy::prelude::*;
-/// use crate::virtual_input::{HeldInput, VirtualAxis};
+/// use bevy_playbot::virtual_input::{HeldInput, VirtualAxis};
 ///
 /// // Run to the right and look up.
 /// let held = HeldInput::new([KeyCode::ShiftLeft, KeyCode::KeyD]).push(VirtualAxis::MouseY, -4.0);

@@ -29,7 +29,7 @@ use std::{any::type_name, marker::PhantomData, sync::Arc};
 /// ```
 /// use bevy::prelude::*;
 /// use bevy_enhanced_input::prelude::*;
-/// use EnhancedAction;
+/// use bevy_playbot::virtual_input::enhanced_input::EnhancedAction;
 ///
 /// #[derive(InputAction)]
 /// #[action_output(Vec2)]

@@ -28,7 +28,7 @@ use leafwing_input_manager::{
 ///
 /// ```
 /// use bevy::prelude::*;
-/// use LeafwingActions;
+/// use bevy_playbot::virtual_input::leafwing::LeafwingActions;
 /// use leafwing_input_manager::prelude::*;
 ///
 /// #[derive(Actionlike, Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]

@@ -24,7 +24,7 @@ settings! {
     grayscale: bool = false;
     /// Paints two squares at the top left, each a fifth of the picture's width, whose grey shows
     /// the agent's velocity, as in the first CoinRun. The game fills
-    /// [`PaintedVelocity`](crate::vision::PaintedVelocity).
+    /// [`PaintedVelocity`].
     paint_velocity: bool = false;
 }
 
@@ -293,7 +293,7 @@ pub struct PaintedVelocity(pub Vec2);
 /// The last picture of an agent's sensor: red, green, blue and an unused byte per pixel, top row
 /// first, left to right.
 ///
-/// Filled by a sensor. The options of [`ImageSensor`](crate::vision::ImageSensor) (grey, painted velocity,
+/// Filled by a sensor. The options of [`ImageSensor`] (grey, painted velocity,
 /// stack) are applied when the observation is made from it.
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component)]

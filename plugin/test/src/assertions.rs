@@ -2,7 +2,7 @@
 //!
 //! ```
 //! use bevy::prelude::*;
-//! use playbot::prelude::*;
+//! use playbot_harness::prelude::*;
 //! use playbot_harness::foreign::{ForeignGame, Restart};
 //! use playbot_test::assertions::{LevelTest, assert_deterministic, assert_levels_solvable};
 //!
@@ -62,8 +62,6 @@ pub use crate::assertions::{
     assert_recordings::{assert_findings_gone, assert_replays},
     testers::LevelTestError,
 };
-
-// Assertions about levels, with settings.
 
 /// A test of levels: set up first, then asserted.
 ///

@@ -2,7 +2,8 @@
 //!
 //! [`Detectors`] are those of a test. Default detectors cost little and give no false alarm in an unmutated game.
 //! Opt-in detectors are named with `--detect`. All have settings, and [`list`] describes them. A game adds its own with
-//! [`TestTools::detectors`](crate::game::TestTools::detectors), see [`detector`](crate::detector).
+//! [`TestTools::detectors`](playbot_harness::game::TestTools::detectors), see
+//! [`detector`](playbot_harness::detector).
 
 mod clocks;
 mod dead_action;

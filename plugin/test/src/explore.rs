@@ -6,9 +6,10 @@
 //! deterministic, so the level and the actions restore it. A game that is not deterministic causes an error at the
 //! first tick that differs.
 //!
-//! Games with positions ([`StateTools::position`](crate::game::StateTools::position)) have a grid of cells over the
-//! level. Others have cells of their own ([`StateTools::explore_cell`](crate::game::StateTools::explore_cell)), or else
-//! cells of rounded observations.
+//! Games with positions ([`StateTools::position`](playbot_harness::game::StateTools::position)) have a grid of cells
+//! over the level. Others have cells of their own
+//! ([`StateTools::explore_cell`](playbot_harness::game::StateTools::explore_cell)), or else cells of rounded
+//! observations.
 //!
 //! ```no_run
 //! use std::ops::ControlFlow;
@@ -123,7 +124,7 @@ pub struct Exploration {
     /// Whether the level is known to have a goal, by its floor plan.
     pub has_goal: bool,
     /// The cells that no wall cuts off from the start, if cells are positions and there is a floor plan: see
-    /// [`open_cells`](crate::explore::round()).
+    /// [`open_cells`].
     pub open: Option<BTreeSet<Cell>>,
     archive: Archive,
 }
@@ -350,8 +351,6 @@ impl HasExitCode for ExploreError {
         }
     }
 }
-
-// The conditions that end an exploration.
 
 /// The condition that ends an exploration before its budget does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

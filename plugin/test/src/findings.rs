@@ -52,8 +52,6 @@ pub use crate::findings::{
     scan::scan,
 };
 
-// Files of findings.
-//
 // A file is a recording of one episode, in the format that all recordings have (`bevy_playbot::demo::file`): framed,
 // checksummed, and readable by every program that reads recordings. The head of the finding is the recording's note.
 
@@ -238,8 +236,6 @@ impl FindingHead {
         }
     }
 }
-
-// The status of a replayed finding.
 
 /// The status of a replayed finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

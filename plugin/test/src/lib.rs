@@ -1,4 +1,17 @@
-//! Verdicts on levels: detectors, findings, exploration, comparison, their reports, and assertions for `cargo test`.
+//! Tests of a game's levels: which can be solved, and what is wrong with them.
+//!
+//! Testers are bots, policies and explorers. They play every level of a range without a window, detectors watch them,
+//! and every level gets a verdict: solved, not solved by any tester, or proved unsolvable. Results are the same bytes on
+//! any number of threads and machines. Most programs use this crate through `playbot`, as `playbot::test`.
+//!
+//! The modules, in reading order:
+//!
+//! - [`assertions`]: assertions about levels, for a game's own `cargo test`. Begin here; it has an example.
+//! - [`verdict`]: verdicts on a range of levels, their results as a file, and comparison with earlier ones.
+//! - [`detectors`]: the detectors that every game has, and their settings.
+//! - [`findings`]: findings as files that replay, get shorter, and become tests.
+//! - [`explore`]: exploration of a level without training.
+//! - [`verdict_report`]: results as one HTML page, with pictures of the worst levels.
 
 pub mod assertions;
 pub mod detectors;

@@ -311,7 +311,7 @@ pub struct LevelVerdict {
     /// Open squares that all testers together visited, for levels with maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places: Option<Places>,
-    /// Maps of where agents went, for levels with maps: see [`MapScope`](MapScope).
+    /// Maps of where agents went, for levels with maps: see [`MapScope`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub maps: Option<LevelMaps>,
     /// Each tester, in the order of the plan.

@@ -1,4 +1,7 @@
 //! Data sets for the skill model, made from recordings.
+//!
+//! - `chosen`: the selection of recorded episodes to learn from.
+//! - `observe`: the replay of recordings whose files lack observations.
 
 mod chosen;
 mod observe;

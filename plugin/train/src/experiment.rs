@@ -1,4 +1,9 @@
 //! Experiments and their settings.
+//!
+//! - `checks`: checks of an experiment.
+//! - `error`: errors of experiment files and of `--set`, with their positions.
+//! - `file`: experiment files in RON.
+//! - `keys`: experiments as lists of keys with their values as text.
 
 pub(crate) mod checks;
 pub(crate) mod error;

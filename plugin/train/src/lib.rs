@@ -1,9 +1,20 @@
-//! Headless training over many levels: collection of rollouts with the current policy, and learning from them.
+//! Training of bots without a window: from recordings and reward to a policy, and to comparisons of methods.
 //!
-//! - [`Trainer`] trains an update at a time. [`train_run::Training`] is a whole run, with its folder and checkpoints.
-//! - [`learn_skills`] learns the skill model from the [`recordings`] of an experiment.
-//! - [`study_runner::StudyRunner`] brings all runs of a [`study`] to their ends, [`study_output`] writes its tables.
-//! - A [`run_observer::RunObserver`] follows any of these and stops them. What was stopped is resumed bit for bit.
+//! The numbers of a run depend on its experiment and its random seed alone. Whatever was stopped is resumed bit for bit.
+//! Most programs use this crate through `playbot`, as `playbot::train`.
+//!
+//! The modules, in reading order:
+//!
+//! - [`pipeline`]: all steps from recordings to a policy, as functions. Begin here.
+//! - [`experiment`]: experiments and their settings.
+//! - [`recordings`] and [`demo`]: recordings of an experiment, and data sets made from them.
+//! - [`learn_skills`]: the learning of a skill model.
+//! - [`trainer`]: the training loop, one update at a time ([`Trainer`]); [`collect`]: the Worlds that play for it.
+//! - [`train_run`]: a whole run ([`train_run::Training`]), with its folder ([`run_dir`], [`run_lock`]), checkpoints
+//!   ([`checkpoint`]), metrics ([`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
+//! - [`policy_export`]: the one file that a game ships with.
+//! - [`runs`]: runs on disk, found and compared over seeds.
+//! - [`study`] and [`study_runner`]: variants of an experiment, each with every seed, and their tables.
 
 pub mod checkpoint;
 pub mod collect;

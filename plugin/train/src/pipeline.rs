@@ -3,8 +3,13 @@
 //!
 //! ```no_run
 //! use playbot_harness::{eval::Player, prelude::*};
-//! use playbot_train::{config_file::parse_experiment, pipeline, run_observer::{AfterUpdate, Unobserved}, train_run::TrainingSetup};
 //! use playbot_learner::DeviceKind;
+//! use playbot_train::{
+//!     experiment::file::parse_experiment,
+//!     pipeline,
+//!     run_observer::{AfterUpdate, Unobserved},
+//!     train_run::TrainingSetup,
+//! };
 //! # fn steps(game: &dyn Game) -> Result<(), Box<dyn std::error::Error>> {
 //! let text = r#"(game: "lander", train: "moon:0..63", test: "moon:64..127", demos: "lander.demo", steps: 100000)"#;
 //! let experiment = parse_experiment(text, "lander.ron".as_ref())?;

@@ -6,7 +6,7 @@
 //! runs/<id>/metrics.jsonl      one line per update; the same bytes for the same seed
 //! runs/<id>/timing.jsonl       seconds and steps per second of each update
 //! runs/<id>/tensorboard/       both, as an event file for TensorBoard
-//! runs/<id>/checkpoints/       the latest and the best, see [`checkpoint`](super::checkpoint)
+//! runs/<id>/checkpoints/       the latest and the best, see [`checkpoint`]
 //! runs/<id>/run.lock           locked during training, see [`RunLock`]
 //! ```
 

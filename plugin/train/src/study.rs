@@ -1,4 +1,8 @@
 //! Studies: the variants of an experiment, each with every seed.
+//!
+//! - `conditions`: training and test conditions of a study's variants, as text.
+//! - `table`: studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again; and
+//!   the experiment beside them.
 
 mod conditions;
 pub(crate) mod table;
@@ -168,8 +172,11 @@ pub fn study_variants(experiment: &Experiment) -> Result<Vec<Variant>, StudyErro
 
 // Results of a study: those of its runs, and their statistics over the seeds.
 
-/// Learning curves of a run over environment steps: means over the last 100 training episodes. Empty without
-/// training.
+/// The most lines of a chart. More cannot be told apart.
+const MOST_CURVES: usize = 7;
+
+/// Learning curves of a run over environment steps: means over the last 100 training episodes, from the step on at which
+/// 100 have ended. Empty without training.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LearningCurves {
     /// Steps and success rates.
@@ -282,7 +289,17 @@ impl StudyReport {
         PairedDifference::of(&self.level_returns(variant), &self.level_returns(other))
     }
 
-    /// Returns success and return over steps: the mean of each trained variant, with its interval over the seeds.
+    /// Returns the trained variants that the charts draw, the first `MOST_CURVES` of them, and the number of the others.
+    pub fn drawn(&self) -> (Vec<&str>, usize) {
+        let mut trained = self.variants();
+        trained.retain(|variant| self.of(variant).iter().any(|run| run.training.is_some()));
+        let others = trained.len().saturating_sub(MOST_CURVES);
+        trained.truncate(MOST_CURVES);
+        (trained, others)
+    }
+
+    /// Returns success and return over steps: the mean of each variant that is [drawn](Self::drawn), with its interval
+    /// over the seeds.
     pub fn charts(&self) -> [Chart; 2] {
         [
             self.chart("success", "success rate", range_of(SUCCESS_RATE), |curves| &curves.success),
@@ -298,19 +315,25 @@ impl StudyReport {
         curve: impl Fn(&LearningCurves) -> &Vec<(u64, f64)>,
     ) -> Chart {
         let mut most_seeds = 0;
-        let curves = self.variants().into_iter().filter_map(|variant| {
+        let (variants, others) = self.drawn();
+        let curves = variants.iter().map(|&variant| {
             let runs = self.results.iter().zip(&self.curves).filter(|(result, _)| result.variant == variant);
             let seeds: Vec<_> = runs.map(|(_, curves)| curve(curves).clone()).filter(|c| !c.is_empty()).collect();
-            if seeds.is_empty() {
-                return None;
-            }
             most_seeds = most_seeds.max(seeds.len());
             let mean = mean_curve(&seeds);
             let line = Curve::new(variant, mean.iter().map(|point| (point.step as f64, point.mean)).collect());
             let band = mean.iter().map(|point| (point.low, point.high)).collect();
-            Some(if seeds.len() > 1 { line.with_band(band) } else { line })
+            if seeds.len() > 1 { line.with_band(band) } else { line }
         });
         let curves = curves.collect();
+        let mut notes = vec!["Curves begin once 100 training episodes have ended.".to_owned()];
+        if others > 0 {
+            notes.push(format!(
+                "The first {} of {} trained variants are drawn; the other {others} are in the tables.",
+                variants.len(),
+                variants.len() + others
+            ));
+        }
         let levels = match self.trained_on() {
             Some(levels) => format!(" on {levels}"),
             None => ", each variant on its own levels".to_owned(),
@@ -321,7 +344,8 @@ impl StudyReport {
             y_label: format!("{mean_of} of the last 100 training episodes, {}", over_seeds(most_seeds)),
             curves,
             y_range,
-            marks: Vec::new(),
+            notes,
+            ..Chart::default()
         }
     }
 

@@ -12,7 +12,10 @@ use crate::{
     run_lock::RunLock,
     run_observer::{CountedWork, RunEvent, RunObserver},
     runs::{RunCurves, RunsError, settings_that_differ},
-    study::{LearningCurves, StudyReport, StudyResult, StudyRun, TestResult, TrainingResult, table::markdown_table},
+    study::{
+        LearningCurves, StudyReport, StudyResult, StudyRun, TestResult, TrainingResult,
+        table::{EXPERIMENT, EXPERIMENT_HEAD, markdown_table},
+    },
     train_run::{NewRun, Training, TrainingError, TrainingSetup, run_info},
     trainer::Trainer,
 };
@@ -514,10 +517,11 @@ fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<Tr
     })
 }
 
-/// Returns the learning curves of a run, from its metrics.
+/// Returns the learning curves of a run, from its metrics. They begin once 100 episodes have ended: means of fewer jump,
+/// and are those of the shortest episodes.
 fn learning_curves(run: &Path) -> Result<LearningCurves, RunsError> {
     let curves = RunCurves::read(run)?;
-    let of = |tag| curves.curve(tag).to_vec();
+    let of = |tag| curves.settled(tag).to_vec();
     Ok(LearningCurves { success: of(SUCCESS_RATE), returns: of(EPISODIC_RETURN) })
 }
 
@@ -537,6 +541,12 @@ pub enum StudyOutputError {
     /// The experiment cannot be written as text.
     #[error("cannot write the experiment: {0}")]
     Experiment(String),
+    /// A file in the place of the experiment was not written by a study.
+    #[error(
+        "{} is not from a study, and the experiment of this one would replace it: rename it, or choose another folder with \
+         --out", .0.display()
+    )]
+    OtherExperiment(PathBuf),
     /// The results of an earlier study cannot be written as a table.
     #[error("{file}: {message}")]
     Results {
@@ -553,30 +563,50 @@ pub enum StudyOutputError {
 impl HasExitCode for StudyOutputError {
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Experiment(_) | Self::Results { .. } => 3,
+            Self::Experiment(_) | Self::OtherExperiment(_) | Self::Results { .. } => 3,
             Self::File(error) => error.exit_code(),
         }
     }
 }
 
-/// Writes `table.md`, `curves.svg` and `results.json`.
+/// Writes `table.md`, `experiment.ron`, `curves.svg` and `results.json`.
 ///
 /// # Errors
 ///
-/// A file cannot be written.
+/// A file cannot be written, or an `experiment.ron` that is not a study's is in the folder.
 pub fn write_report(folder: &Path, report: &StudyReport) -> Result<(), StudyOutputError> {
-    let table = report.to_markdown().map_err(|error| StudyOutputError::Experiment(error.to_string()))?;
     let json = report.to_json().map_err(|error| StudyOutputError::Experiment(error.to_string()))?;
-    write_atomically(&folder.join(TABLE), table.as_bytes())?;
+    write_table(folder, report)?;
     write_atomically(&folder.join("curves.svg"), to_svg(&report.charts()).as_bytes())?;
     Ok(write_atomically(&folder.join(RESULTS), json.as_bytes())?)
 }
 
-/// Writes `table.md` again from `results.json`. Learning curves are not in there, so `curves.svg` stays as it is.
+/// Writes `table.md`, and the `experiment.ron` that it links.
+fn write_table(folder: &Path, report: &StudyReport) -> Result<(), StudyOutputError> {
+    check_experiment_file(folder)?;
+    let experiment = report.to_ron(folder).map_err(|error| StudyOutputError::Experiment(error.to_string()))?;
+    write_atomically(&folder.join(EXPERIMENT), experiment.as_bytes())?;
+    Ok(write_atomically(&folder.join(TABLE), report.to_markdown().as_bytes())?)
+}
+
+/// Checks that no `experiment.ron` is in the folder, except for one that a study wrote. Another one may be the very
+/// experiment of the study, or that of a run.
 ///
 /// # Errors
 ///
-/// There are no results, or they are damaged.
+/// [`StudyOutputError::OtherExperiment`].
+pub fn check_experiment_file(folder: &Path) -> Result<(), StudyOutputError> {
+    let path = folder.join(EXPERIMENT);
+    let is_own = fs::read(&path).is_ok_and(|text| text.starts_with(EXPERIMENT_HEAD.as_bytes()));
+    if is_own || !path.exists() { Ok(()) } else { Err(StudyOutputError::OtherExperiment(path)) }
+}
+
+/// Writes `table.md` and `experiment.ron` again from `results.json`. Learning curves are not in there, so `curves.svg`
+/// stays as it is.
+///
+/// # Errors
+///
+/// There are no results, they are damaged, or an `experiment.ron` that is not a study's is in the folder.
 pub fn rewrite_table(folder: &Path) -> Result<(), StudyOutputError> {
     let path = folder.join(RESULTS);
     let refused = |message: String| StudyOutputError::Results { file: path.display().to_string(), message };
@@ -585,8 +615,7 @@ pub fn rewrite_table(folder: &Path) -> Result<(), StudyOutputError> {
         return Err(refused(message.to_owned()));
     }
     let (report, _) = read_sealed::<StudyReport>(&path)?;
-    let table = report.to_markdown().map_err(|error| refused(error.to_string()))?;
-    Ok(write_atomically(&folder.join(TABLE), table.as_bytes())?)
+    write_table(folder, &report)
 }
 
 /// Writes `cost.md`: the cost of each variant, over its seeds, and the command.
@@ -701,6 +730,38 @@ fn cpu_time() -> Option<Duration> {
 #[cfg(test)]
 mod study_output_tests {
     use super::*;
+
+    #[test]
+    fn learning_curves_begin_once_a_hundred_episodes_have_ended() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let line = |(step, episodes, value): (u64, u64, f64)| {
+            format!(
+                "{{\"step\":{step},\"charts/episodes\":{episodes},\"charts/success_rate\":{value},\
+                 \"charts/episodic_return\":{value}}}\n"
+            )
+        };
+        let write = |lines: &[(u64, u64, f64)]| {
+            let lines: String = lines.iter().map(|of| line(*of)).collect();
+            fs::write(folder.path().join("metrics.jsonl"), lines).expect("writable");
+            learning_curves(folder.path()).expect("readable")
+        };
+        let curves = write(&[(8, 40, 1.0), (16, 99, 0.1), (24, 100, 0.5), (32, 150, 0.75)]);
+        assert_eq!((&curves.success, &curves.returns), (&vec![(24, 0.5), (32, 0.75)], &vec![(24, 0.5), (32, 0.75)]));
+        assert_eq!(write(&[(8, 40, 1.0), (16, 99, 0.1)]), LearningCurves::default());
+    }
+
+    #[test]
+    fn an_experiment_that_no_study_wrote_is_not_replaced() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let file = folder.path().join(EXPERIMENT);
+        check_experiment_file(folder.path()).expect("none is there");
+        fs::write(&file, "(game: \"mine\")").expect("writable");
+        let error = check_experiment_file(folder.path()).expect_err("it would be lost");
+        assert!(matches!(&error, StudyOutputError::OtherExperiment(path) if *path == file), "{error}");
+        assert_eq!(error.exit_code(), 3);
+        fs::write(&file, format!("{EXPERIMENT_HEAD}`…`\n()")).expect("writable");
+        check_experiment_file(folder.path()).expect("a study's");
+    }
 
     #[test]
     fn what_is_gone_on_with_costs_more() {

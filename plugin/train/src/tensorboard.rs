@@ -14,8 +14,6 @@ use std::{
     path::{Path, PathBuf},
 };
 
-// The event file of a run.
-
 /// Prefix by which TensorBoard recognises event files.
 const PREFIX: &str = "events.out.tfevents.";
 

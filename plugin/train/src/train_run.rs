@@ -8,6 +8,7 @@ use crate::{
     run_dir::{OpenedRun, RunDir, RunInfo},
     run_lock::check_new,
     run_observer::{RunEvent, RunObserver},
+    trainer,
     trainer::Trainer,
 };
 use playbot_harness::{game::Game, sealed_file::file_checksum, split::seen_by_training};
@@ -153,9 +154,12 @@ impl Training {
         let NewRun { experiment, skills, .. } = *new;
         // Before the recordings are replayed, which takes longer.
         check_new(new.path, new.force)?;
-        experiment.check_memory(game).map_err(TrainError::from)?;
+        trainer::check(game, experiment)?;
         let Recorded { rollouts, seen } = read_rollouts(game, experiment, setup.recordings, setup.threads, observer)?;
-        let trainer = Trainer::with_demos(game, experiment, skills, &rollouts, setup.device, setup.threads)?;
+        let mut trainer = Trainer::with_demos(game, experiment, skills, &rollouts, setup.device, setup.threads)?;
+        if let Some(seen) = &seen {
+            trainer.note_seen(seen);
+        }
         let info = run_info(game, new, seen, setup)?;
         let run = RunDir::create(new.path, &experiment.without_study(), &info, new.force)?;
         Ok(Self { run, trainer })

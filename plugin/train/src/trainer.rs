@@ -1,4 +1,6 @@
 //! The training loop, one update at a time: the caller owns the progress bar and decides when to stop.
+//!
+//! - `learner`: the learner of an experiment's algorithm.
 
 pub mod learner;
 

@@ -1,27 +1,37 @@
-//! The reference page of settings is the one that their tables give.
+//! The reference pages of settings and verbs are those that their tables and the parser of the command line give.
 
 use std::fs;
 
+use playbot::reference::verbs_page;
 use playbot_train::experiment::keys::settings_page;
 
 use super::blocks::workspace;
 
-/// Set to write the page instead of comparing it.
+/// Set to write the pages instead of comparing them.
 const REWRITE: &str = "PLAYBOT_REWRITE";
 
 #[test]
 fn the_reference_page_of_settings_is_that_of_their_tables() {
-    let path = workspace().join("docs/reference/settings.md");
-    let page = settings_page();
+    check("docs/reference/settings.md", &settings_page());
+}
+
+#[test]
+fn the_reference_page_of_verbs_is_that_of_the_command_line() {
+    check("docs/reference/verbs.md", &verbs_page());
+}
+
+/// Compares a committed page with the one that is generated, or writes it.
+fn check(path: &str, page: &str) {
+    let file = workspace().join(path);
     if std::env::var_os(REWRITE).is_some() {
-        fs::write(&path, &page).expect("writable");
+        fs::write(&file, page).expect("writable");
     }
-    let committed = fs::read_to_string(&path).unwrap_or_default();
+    let committed = fs::read_to_string(&file).unwrap_or_default();
     let line = committed.lines().zip(page.lines()).position(|(committed, new)| committed != new);
     assert!(
         committed == page,
-        "docs/reference/settings.md is stale, from line {}: `{REWRITE}=1 cargo test --release -p playbot_tests --test \
-         documentation settings` rewrites it",
+        "{path} is stale, from line {}: `{REWRITE}=1 cargo test --release -p playbot_tests --test documentation \
+         the_reference_page` rewrites it",
         line.unwrap_or_else(|| committed.lines().count().min(page.lines().count())) + 1
     );
 }

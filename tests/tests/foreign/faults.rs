@@ -232,6 +232,6 @@ fn numbers_are_observed_by_their_paths() {
     let refused = |path: &str| see(&[path]).expect_err("no such number").to_string();
     assert!(refused("Spoon.Transform.translation.x").contains("means no entity"));
     assert!(refused("Paddle.Transform.translation.w").contains("leads nowhere"));
-    assert!(refused("Paddle.Transform.translation").contains("is no number"));
+    assert!(refused("Paddle.Transform.translation").contains("not a number"));
     assert!(refused("Paddle.Spoon.x").contains("derives `Reflect`"));
 }

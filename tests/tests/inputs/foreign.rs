@@ -100,7 +100,7 @@ fn what_does_not_go_together_is_told() {
     assert!(text.contains("`.gamepad_buttons`"), "{text}");
     for game in [keys(bare()).axes(steer()), keys(bare().axes(steer()))] {
         let text = problem(game);
-        assert!(text.contains("has `.keys` and `.axes`") && text.contains("choose one"), "{text}");
+        assert!(text.contains("has `.keys` and `.axes`") && text.contains("keep one"), "{text}");
     }
     // Playing it gives the same error.
     let (mut world, _) = build_world(&keys(bare()).axes(steer()), "default", 0, 0, 1);

@@ -1,4 +1,4 @@
-//! Which module needs which: `use` declarations, and paths that are written out.
+//! Needs between modules: `use` declarations, and paths that are written out.
 
 use std::path::PathBuf;
 

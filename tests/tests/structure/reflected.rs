@@ -8,6 +8,12 @@ use bevy::{
 };
 use bevy_playbot::headless::headless_app;
 // Linked, so that what they register is there.
+use playbot as _;
+use playbot_games as _;
+use playbot_harness as _;
+use playbot_mutation as _;
+use playbot_test as _;
+use playbot_train as _;
 
 use crate::{
     files::{files, shown},

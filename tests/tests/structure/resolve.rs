@@ -1,4 +1,4 @@
-//! Which module an imported name comes from, through re-exports.
+//! The module that an imported name comes from, through re-exports.
 
 use crate::{
     modules::{ModulePath, Modules},

@@ -11,8 +11,6 @@ use bevy::{image::ImageSampler, prelude::*};
 use bevy_playbot::vision::{Stage, TileLayer};
 use playbot_harness::prelude::*;
 
-// The view from above as a Bevy plugin.
-
 /// Draws ants and grounds with sprites.
 pub struct FlatViewPlugin;
 

@@ -13,8 +13,6 @@ use bevy::{
 use bevy_playbot::vision::VisionSystems;
 use playbot_harness::{inspect::CameraFocus, prelude::*};
 
-// The view in space as a Bevy plugin.
-
 /// Adds meshes to all entities that [`AntViewPlugin`](crate::ant::view::AntViewPlugin) draws. x, y and z are those of
 /// the physics: z is up. The camera is the window's.
 #[derive(Clone, Copy, Debug, Default)]

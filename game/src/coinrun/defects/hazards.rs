@@ -1,4 +1,4 @@
-//! Defects of hazards: harmless ones, and deaths without one.
+//! Defects of hazards, harmless ones and deaths without one, and levels with missing ground or a trap.
 
 use crate::{
     coinrun::{

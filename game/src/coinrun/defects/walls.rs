@@ -1,4 +1,4 @@
-//! Levels with rock across the path.
+//! Levels with an unreachable coin, behind rock or without any, and defects of the player's motion.
 
 use crate::{
     coinrun::{

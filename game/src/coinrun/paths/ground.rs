@@ -1,4 +1,4 @@
-//! PathGround and obstacles around a player.
+//! Tiles and crates around a player, and the buttons of paths.
 
 use crate::coinrun::{
     paths::sweep::Swept,

@@ -1,4 +1,5 @@
-//! Movement in small steps, one axis at a time.
+//! Movement of player and enemies in small steps, one axis at a time; contacts, the end of an episode, and its
+//! fingerprint.
 
 use crate::coinrun::{
     rules::{Body, CORNER, OVERLAP_MARGIN, PlayerState, PlayerStep, TIMEOUT},
@@ -71,7 +72,7 @@ pub(super) fn mirrored(centre: f32, half: f32, moves_up: bool) -> f32 {
 
 /// Moves one enemy. `crates` may be any subset that contains those within a tile of the enemy.
 ///
-/// Enemies bounce off walls and barriers. Inner ground ([`Tile::Wall`](crate::coinrun::tile::Tile::Wall)) also counts
+/// Enemies bounce off walls and barriers. Inner ground ([`Tile::Wall`]) also counts
 /// as "outside", which blocks. A turn there therefore loses a quarter of the speed: one of four parts was blocked.
 ///
 /// The original has an oddity that is kept here. It asks whether a crate holds an enemy with the state of the player.

@@ -1,6 +1,11 @@
 //! Reading of experiments, from a path or from those that come with the program, with the changes of the command line.
 
-use playbot_harness::{games::Games, inspect::ExperimentText};
+use crate::error::CliError;
+use playbot_harness::{
+    game::Game,
+    games::{Artifact, Games},
+    inspect::ExperimentText,
+};
 use playbot_train::{
     Experiment,
     experiment::{
@@ -55,6 +60,37 @@ impl ExperimentArgs {
                 let ExperimentText { origin, text } = unnamed(games, &sets);
                 parse_experiment_with(&text, Path::new(&*origin), &sets)
             }
+        }
+    }
+
+    /// Reads the experiment as [`load`](Self::load) does, and finds its game. Reports values of `--set` that its algorithm
+    /// does not read.
+    ///
+    /// # Errors
+    ///
+    /// As for [`load`](Self::load) and [`find_game`](Self::find_game).
+    pub fn open<'a>(
+        &self,
+        games: &Games<'a>,
+        options: impl IntoIterator<Item = Option<String>>,
+    ) -> Result<(Experiment, &'a dyn Game), CliError> {
+        let experiment = self.load(games, options)?;
+        tell_unread("--set ", &self.set, &[&experiment]);
+        let game = self.find_game(games, &experiment)?;
+        Ok((experiment, game))
+    }
+
+    /// Returns the game of an experiment.
+    ///
+    /// # Errors
+    ///
+    /// This program does not have it: with the file that names it, or the nearest name if the command line does.
+    pub fn find_game<'a>(&self, games: &Games<'a>, experiment: &Experiment) -> Result<&'a dyn Game, CliError> {
+        match &self.experiment {
+            Some(path) if !self.names_game_itself() => {
+                Ok(games.of_file(Artifact::Experiment, path, &experiment.game)?)
+            }
+            _ => Ok(games.get(&experiment.game)?),
         }
     }
 

@@ -5,15 +5,11 @@ use crate::{
     error::CliError,
 };
 use bevy_playbot::demo::file::{DemoFault, DemoFileError};
-use playbot_harness::{
-    game::Game,
-    games::{Artifact, Games},
-    sealed_file::file_checksum,
-};
+use playbot_harness::sealed_file::file_checksum;
 use playbot_learner::{DeviceKind, FileError, PolicyFile, SkillModel};
 use playbot_report::whole;
 use playbot_train::{
-    Algorithm, Experiment, TrainedLearner, checkpoint,
+    Algorithm, TrainedLearner, checkpoint,
     checkpoint::{Checkpoint, CheckpointChoice},
     run_dir::{MEND, RunDir},
 };
@@ -54,22 +50,6 @@ pub(crate) fn skills(path: &Path, device: DeviceKind, from: &ExperimentArgs) -> 
 
 fn is_missing(error: &FileError) -> bool {
     matches!(error, FileError::Io { source, .. } if source.kind() == ErrorKind::NotFound)
-}
-
-/// Returns the game of an experiment.
-///
-/// # Errors
-///
-/// This program does not have it: with the file that names it, or the nearest name if the command line does.
-pub(crate) fn game<'a>(
-    games: &Games<'a>,
-    from: &ExperimentArgs,
-    experiment: &Experiment,
-) -> Result<&'a dyn Game, CliError> {
-    match &from.experiment {
-        Some(path) if !from.names_game_itself() => Ok(games.of_file(Artifact::Experiment, path, &experiment.game)?),
-        _ => Ok(games.get(&experiment.game)?),
-    }
 }
 
 /// Opens a checkpoint of a run. Reports which one is the best, and why.

@@ -1,4 +1,7 @@
 //! `playbot bugs`.
+//!
+//! - `score`: `playbot bugs score`.
+//! - `testers`: testers of `playbot bugs score`, from the command line.
 
 mod score;
 pub(crate) mod testers;

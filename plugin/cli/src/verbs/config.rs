@@ -1,7 +1,7 @@
 //! `playbot config`.
 
 use crate::{
-    arguments::{experiment::ExperimentArgs, open},
+    arguments::experiment::ExperimentArgs,
     error::{CliError, Outcome, print_line},
 };
 use clap::Subcommand;
@@ -50,7 +50,7 @@ fn check_sight(experiment: &Experiment, game: &dyn Game) -> Result<(), Experimen
 
 /// Checks an experiment against its game. Recordings need not exist yet.
 fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
-    let game = open::game(games, from, experiment)?;
+    let game = from.find_game(games, experiment)?;
     let checked = experiment.check_game(game).and_then(|()| check_sight(experiment, game));
     let checked = checked.and_then(|()| experiment.check_memory(game));
     checked.map_err(|error| from.locate(games, [], error))?;

@@ -1,4 +1,6 @@
 //! `playbot demo ls|show|verify|repair|merge`.
+//!
+//! - `show`: `playbot demo show`: the header, the episodes and the ticks of a recording.
 
 mod show;
 

@@ -105,7 +105,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let experiment = read_experiment(&args, games)?;
     let game = match (&args.from.experiment, args.run.first()) {
         (None, Some(run)) => games.of_file(Artifact::Run, run, &experiment.game)?,
-        _ => open::game(games, &args.from, &experiment)?,
+        _ => args.from.find_game(games, &experiment)?,
     };
     let splits = if args.levels.is_empty() { vec![experiment.test.clone()] } else { args.levels.clone() };
     if args.levels.is_empty() {

@@ -1,4 +1,6 @@
 //! `playbot explore`.
+//!
+//! - `recorded`: recording of a path that was found.
 
 mod recorded;
 
@@ -23,8 +25,6 @@ use serde_json::json;
 use std::{ops::ControlFlow, path::PathBuf};
 
 pub use crate::verbs::explore::recorded::Talents;
-
-// Run of `playbot explore`.
 
 /// Explore a level without training: print the reachable cells and the actions that lead there.
 ///

@@ -4,7 +4,6 @@ use crate::{
     arguments::{
         Compute,
         experiment::{ExperimentArgs, Options, in_words, option, quoted},
-        open,
     },
     console::Console,
     error::{CliError, Outcome, print_line},
@@ -61,7 +60,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let experiment =
         args.from.load(games, [option("skills.epochs", &args.epochs), option("demo_steps", &args.max_steps)])?;
     let Some(checkpoint) = checkpoint(&args)? else { return finished(&args) };
-    let game = open::game(games, &args.from, &experiment)?;
+    let game = args.from.find_game(games, &experiment)?;
     let demos = match &args.demos {
         Some(demos) => demos.clone(),
         None => args.from.recordings(&experiment, games)?,

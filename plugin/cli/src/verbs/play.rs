@@ -1,4 +1,7 @@
 //! `playbot play`.
+//!
+//! - `no_window`: `playbot play` in a program without the window feature.
+//! - `window`: `playbot play` in a program that was built with a window.
 
 #[cfg(not(feature = "window"))]
 pub(crate) mod no_window;
@@ -12,8 +15,6 @@ use std::path::PathBuf;
 pub use crate::verbs::play::no_window::{no_window, run};
 #[cfg(feature = "window")]
 pub use crate::verbs::play::window::run;
-
-// Options of `playbot play`.
 
 /// Play in a window, record, and hand over to a policy and back.
 #[derive(clap::Args)]

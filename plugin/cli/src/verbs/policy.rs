@@ -162,7 +162,7 @@ fn from_run<'a>(
 
 fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Result<PolicySource<'a>, CliError> {
     let experiment = from.load(games, [])?;
-    let game = open::game(games, from, &experiment)?;
+    let game = from.find_game(games, &experiment)?;
     let model = open::skills(path, DeviceKind::default(), from)?;
     let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
     let training = match (model.demos(), &experiment.demos) {

@@ -1,4 +1,6 @@
 //! `playbot quickstart`: learn, train, test and report in one command.
+//!
+//! - `report`: the report at its end.
 
 mod report;
 
@@ -6,7 +8,7 @@ use crate::{
     arguments::{
         Threads,
         experiment::{ExperimentArgs, option},
-        open, player, revision,
+        player, revision,
     },
     console::Console,
     error::{CliError, Outcome, print_line},
@@ -114,7 +116,7 @@ struct CurvePoint {
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let start = Instant::now();
     let experiment = read_experiment(&args, games)?;
-    let game = open::game(games, &args.from, &experiment)?;
+    let game = args.from.find_game(games, &experiment)?;
     let trained = Experiment { algorithm: Algorithm::ScorePpo, ..experiment.clone() };
     trained.check_levels(game)?;
     trained.check_memory(game)?;

@@ -1,4 +1,8 @@
 //! `playbot replay`.
+//!
+//! - `no_window`: `playbot replay --window` in a program without the window feature.
+//! - `picture`: pictures of a finding: its last tick, or an animation.
+//! - `window`: window of a finding.
 
 #[cfg(not(feature = "window"))]
 mod no_window;
@@ -26,8 +30,6 @@ use std::path::{Path, PathBuf};
 use crate::verbs::replay::no_window::show;
 #[cfg(feature = "window")]
 use crate::verbs::replay::window::show;
-
-// Run of `playbot replay`.
 
 /// Findings of a folder to list in the error about the folder.
 const MOST_NAMED: usize = 3;

@@ -1,4 +1,7 @@
 //! `playbot runs ls|show|compare`.
+//!
+//! - `compare`: `playbot runs compare`.
+//! - `show`: `playbot runs show`.
 
 mod compare;
 mod show;

@@ -4,7 +4,6 @@ use crate::{
     arguments::{
         Compute,
         experiment::{ExperimentArgs, Options, in_words, quoted, sets_key, tell_unread},
-        open,
     },
     console::Console,
     error::{CliError, Outcome, print_line},
@@ -20,7 +19,9 @@ use playbot_train::{
     run_dir::is_unstarted,
     run_observer::{CountedWork, Counter, RunEvent, RunObserver},
     study::{StudyError, StudyReport, StudyRun, study_runs, study_variants},
-    study_runner::{RESULTS, StudyRunError, StudyRunner, rewrite_table, write_cost, write_report},
+    study_runner::{
+        RESULTS, StudyRunError, StudyRunner, check_experiment_file, rewrite_table, write_cost, write_report,
+    },
     train_run::{never_learns, rounded},
 };
 use serde_json::json;
@@ -50,7 +51,7 @@ pub struct Args {
     /// Random seeds, instead of the experiment's.
     #[arg(long, value_delimiter = ',')]
     seeds: Vec<u64>,
-    /// Folder for table.md, curves.svg, results.json and cost.md, which are replaced.
+    /// Folder for table.md, experiment.ron, curves.svg, results.json and cost.md, which are replaced.
     #[arg(long, value_name = "FOLDER")]
     out: PathBuf,
     /// Folder of the runs (default: `runs/` and the name of the experiment file, or else of the game).
@@ -62,7 +63,7 @@ pub struct Args {
     /// Replace existing runs.
     #[arg(long, conflicts_with = "resume")]
     force: bool,
-    /// Run nothing. Write table.md anew from the results.json in the folder.
+    /// Run nothing. Write table.md and experiment.ron anew from the results.json in the folder.
     #[arg(long, conflicts_with_all = ["game", "experiment", "set", "variant", "seeds", "runs", "resume", "force", "json"])]
     rewrite: bool,
     #[command(flatten)]
@@ -75,7 +76,7 @@ pub struct Args {
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if args.rewrite {
         rewrite_table(&args.out)?;
-        tell!("written to {}: table.md, from its results.json", args.out.display());
+        tell!("written to {}: table.md and experiment.ron, from its results.json", args.out.display());
         return Ok(Outcome::Pass);
     }
     let seeds = (!args.seeds.is_empty()).then(|| format!("seeds={:?}", args.seeds));
@@ -88,6 +89,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let folder = runs_folder(&args, &experiment);
     check_folder(&folder, &runs, &args)?;
     check_results(&runs, &args)?;
+    check_experiment_file(&args.out)?;
     for path in [&folder, &args.out] {
         output::make_folder(path)?;
     }
@@ -127,7 +129,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     } else {
         print_line(report.summary().trim_end())?;
     }
-    tell!("written to {}: table.md, curves.svg, results.json, cost.md", args.out.display());
+    tell!("written to {}: table.md, experiment.ron, curves.svg, results.json, cost.md", args.out.display());
     Ok(Outcome::Pass)
 }
 
@@ -227,7 +229,7 @@ fn keep(experiment: &mut Experiment, named: &[String]) -> Result<(), CliError> {
 
 fn check_games(runs: &[StudyRun], from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
     for StudyRun { variant, experiment } in runs {
-        let game = open::game(games, from, experiment)?;
+        let game = from.find_game(games, experiment)?;
         let of_variant = |source| StudyError::Values { variant: variant.clone(), source };
         experiment.check_game(game).map_err(of_variant)?;
         experiment.check_memory(game).map_err(of_variant)?;

@@ -1,4 +1,8 @@
 //! `playbot test`.
+//!
+//! - `regress`: replay of stored findings.
+//! - `testers`: testers on the command line.
+//! - `told`: report of results, and the files that go with them.
 
 mod regress;
 mod testers;
@@ -25,8 +29,6 @@ use playbot_test::{
 use std::path::{Path, PathBuf};
 
 pub use crate::verbs::test::told::{Results, tell_results};
-
-// Run of `playbot test`.
 
 /// Test levels: report which of them bots and policies solve, and which are unsolvable.
 ///

@@ -1,11 +1,13 @@
 //! `playbot train`.
+//!
+//! - `repeated`: options of a resumed training.
 
 mod repeated;
 
 use crate::{
     arguments::{
         Compute,
-        experiment::{ExperimentArgs, Options, in_words, sets_key, tell_unread},
+        experiment::{ExperimentArgs, Options, in_words, option, sets_key},
         open,
     },
     console::Console,
@@ -62,6 +64,18 @@ pub struct Args {
     /// Save a checkpoint every this many updates, instead of the experiment's.
     #[arg(long)]
     checkpoint_every: Option<u64>,
+}
+
+impl Args {
+    /// Returns the options that have names of their own, as `key=value`.
+    fn settings(&self) -> [Option<String>; 4] {
+        [
+            option("algorithm", &self.algorithm),
+            option("seed", &self.seed),
+            option("steps", &self.steps),
+            option("checkpoints.every", &self.checkpoint_every),
+        ]
+    }
 }
 
 /// Parses an algorithm that can be trained.
@@ -128,9 +142,7 @@ fn start(
     setup: &TrainingSetup<'_>,
     console: &mut Console<'_>,
 ) -> Result<Training, CliError> {
-    let experiment = args.from.load(games, args.settings())?;
-    tell_unread("--set ", &args.from.set, &[&experiment]);
-    let game = open::game(games, &args.from, &experiment)?;
+    let (experiment, game) = args.from.open(games, args.settings())?;
     let skills = match &args.skills {
         Some(path) if experiment.algorithm.needs_skills() => {
             Some(open::skills(path, args.compute.device(), &args.from)?)

@@ -1,4 +1,6 @@
 //! `playbot view`.
+//!
+//! - `written_picture`: report of a written picture.
 
 mod written_picture;
 
@@ -29,8 +31,6 @@ use playbot_harness::{
     sensors::GameSensors,
 };
 use std::path::{Path, PathBuf};
-
-// Run of `playbot view`.
 
 /// Write a bot's observation as a picture, or an episode as an animation.
 ///

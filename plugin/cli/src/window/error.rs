@@ -1,4 +1,4 @@
-//! Errors of opening a window and of running it.
+//! Errors of opening a window and of running it, its orderly end, and the order of its levels.
 
 use bevy::{ecs::schedule::ScheduleLabel, prelude::*, window::WindowCloseRequested};
 use bevy_playbot::{

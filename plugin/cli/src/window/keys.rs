@@ -1,4 +1,4 @@
-//! The window's own keys. The game's are in its [`KeyBindings`](bevy_playbot::key_bindings::KeyBindings).
+//! The window's own keys. The game's are in its [`KeyBindings`].
 
 use crate::window::{
     Playlist,

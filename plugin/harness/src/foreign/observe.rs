@@ -1,4 +1,5 @@
-//! The observation of a foreign game's agent.
+//! Readings of a foreign game after a tick: its agent's observation and position, reward and end, and the default
+//! state hash.
 
 use crate::foreign::runtime::{Baseline, Sensor, playing_agent, with_foreign};
 use bevy::prelude::*;

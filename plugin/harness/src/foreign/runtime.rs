@@ -233,19 +233,17 @@ fn scene_roots(world: &mut World) -> Vec<ComponentId> {
     roots.collect()
 }
 
-// The ways to restart a foreign game.
-
 /// The way in which a foreign game restarts for each episode.
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum Restart {
     /// Despawns everything that the game has spawned since the program started, resets the clock to 0, and runs
     /// `PreStartup`, `Startup` and `PostStartup` again. Resources stay unchanged, unless those systems insert them:
-    /// reset them in [`ForeignGame::level`](crate::foreign::ForeignGame::level).
+    /// reset them in [`ForeignGame::level`].
     Startup,
     /// Rebuilds the World, as if the program were started again for each episode. It is the last resort, for games
     /// whose resources, `Local`s or timers survive [`Startup`](Self::Startup). It takes far longer, loads assets again,
-    /// and works only in Worlds without a window. `Startup` already finds the level in [`LevelSeed`](crate::foreign::LevelSeed).
+    /// and works only in Worlds without a window. `Startup` already finds the level in [`LevelSeed`].
     Rebuild,
     /// The game's own restart: see [`Restart::system`] and [`Restart::state`].
     Own(OwnRestart),

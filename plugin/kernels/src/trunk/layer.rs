@@ -1,4 +1,5 @@
-//! One convolution of one image.
+//! The computation of a trunk of convolutions: one convolution of one image, all stages with their layout in memory,
+//! and the gradients of several images.
 
 use crate::{
     elementwise::{Add, Store, Write},
@@ -156,7 +157,7 @@ impl Layer {
         column_sums(grad, outputs, bias);
     }
 
-    /// Returns the gradients of the parameters, in their order, from sums over all images.
+    /// Writes the gradients of the parameters, in their order, from sums over all images.
     pub(super) fn gradients(&self, sums: &[Lanes], params: &mut [f32]) {
         let (sums, bias) = sums.split_at(self.weight_sums());
         let (weights, biases) = params.split_at_mut(params.len() - self.shape.outputs);

@@ -1,6 +1,6 @@
 //! Products of small matrices, for [`winograd`](super::winograd).
 //!
-//! As in [`tile`](super::tile), each sum is made by fused multiply-adds in a fixed order, whatever the width of
+//! As in [`tile`](crate::tile), each sum is made by fused multiply-adds in a fixed order, whatever the width of
 //! vectors.
 
 use crate::tile::{LANES, Lanes, fused, is_wide, lanes_at};

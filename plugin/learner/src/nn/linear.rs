@@ -1,4 +1,4 @@
-//! A linear layer.
+//! Linear layers, layer normalisation, and the multi-layer perceptron of both.
 
 use crate::nn::params::{Init, ParamSource, ParamVisitor, Parameters, RandomInit, path};
 use burn::tensor::{Device, Tensor, module::linear};

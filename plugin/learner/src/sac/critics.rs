@@ -1,4 +1,4 @@
-//! The critics of SAC: two, or an ensemble.
+//! The networks of SAC: critics, two or an ensemble, with the actor, the temperature, and slow copies as targets.
 
 use crate::{
     ActionSpace, FileError, LearnError,

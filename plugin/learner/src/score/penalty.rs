@@ -38,7 +38,7 @@ pub struct Penalty {
 }
 
 /// Returns the penalty by [`ScoreConfig::penalty`], from the constant `decoder`, the `policy`, and the `weight` of
-/// each row `[n]` from [`penalty_weights`](crate::score::penalty_weights).
+/// each row `[n]` from [`penalty_weights`].
 ///
 /// # Errors
 /// [`LearnError::Action`] if decoder and policy act in different kinds of spaces.

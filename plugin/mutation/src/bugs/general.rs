@@ -1,5 +1,11 @@
 //! Defects of rules that can be planted into any game, through the plugin's components of agents: episode, action,
 //! reward and observation.
+//!
+//! - `actions`: games that receive other actions than their agents decided on.
+//! - `breakage`: games that panic or log errors, and values that are not numbers.
+//! - `history`: the actions of an agent so far, for planted defects that depend on them.
+//! - `leaks`: entities that are never removed.
+//! - `rewards`: episodes that end without a reason.
 
 mod actions;
 mod breakage;
@@ -20,8 +26,6 @@ use bevy_playbot::{bot::uniform, episode::Episode};
 use playbot_harness::{defect::DefectKind, game::Game};
 use playbot_learner::{Streams, rng::unit};
 use std::hash::{BuildHasher, Hasher, RandomState};
-
-// All general defects.
 
 /// Returns the defects that can be planted into this game as into any other.
 pub fn general_defects(game: &dyn Game) -> Vec<DefectKind> {

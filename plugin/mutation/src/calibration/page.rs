@@ -90,7 +90,7 @@ impl Calibration {
             y_label: "testers".to_owned(),
             curves,
             y_range,
-            marks: Vec::new(),
+            ..Chart::default()
         })
     }
 }

@@ -1,4 +1,4 @@
-//! Spearman's rank correlation.
+//! Rank correlations, Spearman's and Kendall's, and the numbers that they compare: the tries of people on a level.
 
 use bevy_playbot::demo::file::{DemoEnd, DemoEpisode};
 use playbot_report::statistics::median;

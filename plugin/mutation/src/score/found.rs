@@ -26,7 +26,7 @@ pub struct Found {
     /// The level is proved to be unsolvable.
     pub unsolvable: bool,
     /// A tester failed. Either it solves nearly all unmutated levels of the game: see [`RELIABLE`]. Or it collected far
-    /// more or far less reward than on any of them: see [`FEWEST_SOUND`](crate::score::FEWEST_SOUND).
+    /// more or far less reward than on any of them: see [`FEWEST_SOUND`].
     pub failed: bool,
     /// The tester's episodes differ from those in the unmutated game.
     pub differs: bool,

@@ -12,7 +12,7 @@
 //! …
 //! ```
 //!
-//! The text ends with a [copy](super::second_header) of itself in comments. The magic line gives the length of the
+//! The text ends with a [copy](copy_of) of itself in comments. The magic line gives the length of the
 //! RON text in bytes and its CRC-32. It is the same in all formats, so that an older program can report that a file
 //! is too new for it.
 

@@ -20,7 +20,7 @@ use std::{
 /// the first error.
 ///
 /// ```no_run
-/// # use crate::demo::file::{DemoFileError, DemoReader};
+/// # use bevy_playbot::demo::file::{DemoFileError, DemoReader};
 /// # fn main() -> Result<(), DemoFileError> {
 /// let mut reader = DemoReader::open("demos/coinrun/easy.demo")?;
 /// let game = reader.header().game.clone();

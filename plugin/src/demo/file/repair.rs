@@ -1,4 +1,12 @@
 //! Recovery of the intact parts of a damaged recording.
+//!
+//! ```
+//! use bevy_playbot::demo::file::repair::repair;
+//!
+//! let folder = std::env::temp_dir();
+//! let missing = repair(folder.join("no-such.demo"), folder.join("repaired.demo"), None);
+//! assert!(missing.is_err(), "there is nothing to repair");
+//! ```
 
 use crate::demo::file::{
     bytes,

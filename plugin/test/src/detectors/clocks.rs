@@ -1,4 +1,5 @@
-//! Episodes that a timer loses.
+//! Detectors of wrong times: timers that lose episodes, time limits that are too short or differ, and levels and ticks
+//! that take too long.
 
 use crate::{
     detectors::{LevelDefect, LevelDetector, ShownBy, TestedLevel},

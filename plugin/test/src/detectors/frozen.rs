@@ -1,4 +1,4 @@
-//! Games that stand still.
+//! Detectors of broken Worlds: games that stand still, cameras that see nothing, and numbers that run away.
 
 use crate::detectors::Efforts;
 use bevy::{ecs::world::WorldId, prelude::*};

@@ -1,4 +1,5 @@
-//! Goals that are reached from afar.
+//! Detectors of wrong goals and ways: goals that are reached from afar or without an effect, parts of a level that
+//! cannot be reached, and shortcuts.
 
 use crate::{
     detectors::{LevelDefect, LevelDetector, ShownBy, TestedLevel},

@@ -1,4 +1,5 @@
-//! Agents that cannot move.
+//! Detectors of wrong positions: agents that cannot move, that leave their level, fall for ever, get into walls or are
+//! flung away.
 
 use crate::{detectors::Efforts, explore::CellGrid};
 use bevy::{
@@ -41,13 +42,13 @@ impl Detector for Stuck {
     }
 
     fn describe(&self) -> &'static str {
-        "the agent cannot leave its place, whatever it does"
+        "the agent cannot leave its position, whatever it does"
     }
 
     fn settings(&mut self) -> Vec<Setting<'_>> {
         vec![
-            Setting::new("ticks", &mut self.ticks, "ticks in a row at the same place").at_least(1.0),
-            Setting::new("distance", &mut self.distance, "how far the same place reaches, in tiles"),
+            Setting::new("ticks", &mut self.ticks, "ticks in a row at the same position").at_least(1.0),
+            Setting::new("distance", &mut self.distance, "how far the same position reaches, in tiles"),
         ]
     }
 

@@ -185,8 +185,6 @@ fn play(world: &mut World, agent: Entity, actions: &Actions, mut after_tick: imp
     Ok(())
 }
 
-// The summary of an exploration.
-
 /// The summary of an exploration, for people and as JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ExplorationSummary {

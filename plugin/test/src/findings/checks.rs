@@ -55,7 +55,7 @@ impl Check {
 pub struct Checks {
     checks: Vec<(&'static str, Check)>,
     /// The detectors among them with all their settings, in the form of
-    /// [`Detectors::record`](crate::detectors::Detectors::record).
+    /// [`Detectors::record`].
     pub(super) records: Vec<String>,
     /// Settings that the caller asked for, as `name.key=value`.
     pub(super) asked: Vec<String>,

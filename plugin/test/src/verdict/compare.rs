@@ -1,4 +1,6 @@
 //! Comparison with earlier results, separating changes from noise.
+//!
+//! - `common_levels`: check for common levels of two tests.
 
 mod common_levels;
 #[cfg(test)]

@@ -297,9 +297,12 @@ mod tests {
     #[test]
     fn what_the_system_refuses_has_a_next_step() {
         use io::ErrorKind::{NotFound, Other, PermissionDenied, StorageFull};
-        for (kind, next) in
-            [(StorageFull, "make room"), (PermissionDenied, "make rights"), (NotFound, "name another"), (Other, "call")]
-        {
+        for (kind, next) in [
+            (StorageFull, "make room"),
+            (PermissionDenied, "grant write access"),
+            (NotFound, "name another"),
+            (Other, "run this again"),
+        ] {
             let words = io_error("write", Path::new("a/junit.xml"))(kind.into()).to_string();
             let (what, then) = words.rsplit_once("; ").expect("two parts");
             assert!(what.starts_with("cannot write a/junit.xml: ") && then.starts_with(next), "{words}");

@@ -1,4 +1,5 @@
-//! Summary of results in a page of Markdown, short enough for a pull request.
+//! Reports of results: a page of Markdown, short enough for a pull request, JUnit XML for build servers, the files of
+//! findings, and the commands that show a level again.
 
 use crate::{
     detectors::compares_testers,

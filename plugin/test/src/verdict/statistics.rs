@@ -1,4 +1,4 @@
-//! Wilson intervals of shares.
+//! Statistics of shares: Wilson intervals, Fisher's exact test, and control of the false discovery rate.
 
 use serde::Serialize;
 

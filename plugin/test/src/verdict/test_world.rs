@@ -101,7 +101,7 @@ impl TestWorld {
         Ok(Self { world, seats, found: Vec::new() })
     }
 
-    /// Returns ticks until all tasks are played, and notes their results.
+    /// Ticks until all tasks are played, and notes their results.
     pub fn play_out(
         &mut self,
         game: &dyn Game,

@@ -1,35 +1,85 @@
-//! Studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again.
+//! Studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again; and the
+//! experiment beside them.
 
 use crate::study::{StudyReport, StudyResult, TrainingResult};
+use playbot_harness::brief::shell_word;
 use playbot_report::{
     number::{UNKNOWN, fixed, mean_and_error},
     statistics::mean_and_sd,
 };
-use std::fmt::Write;
+use std::{fmt::Write, path::Path};
+
+/// The name of the experiment beside the table.
+pub const EXPERIMENT: &str = "experiment.ron";
+
+/// The first words of the experiment beside a table. Other files of that name do not begin with them.
+pub const EXPERIMENT_HEAD: &str = "// The experiment of the table beside it, with all values: ";
 
 impl StudyReport {
-    /// Returns the page: command, tables, the plot `curves.svg`, the changes of each variant, and the experiment.
-    ///
-    /// # Errors
-    ///
-    /// The path of the demonstrations is not Unicode.
-    pub fn to_markdown(&self) -> Result<String, ron::Error> {
+    /// Returns the page: command, tables, the plot `curves.svg`, the changes of each variant, and a link to the
+    /// [experiment](Self::to_ron).
+    pub fn to_markdown(&self) -> String {
         let experiment = &self.experiment;
         let mut page = format!("# {}: {}\n\n", experiment.game, self.variants().join(", "));
         let _ = write!(page, "```sh\n{}\n```\n\n{}\n\n{}\n", self.command, self.conditions(), self.summary());
         page += &self.differences();
         page += &self.intervals();
+        page += &self.drawn_words();
         page += "![Learning curves](curves.svg)\n\n## Each seed\n\n";
         let _ = write!(page, "± is the standard error of a measurement, over its levels.\n\n{}\n", self.every_seed());
         page += "## The experiment\n\n";
         for variant in &experiment.variants {
             let changes = variant.set.iter().map(|set| format!("`{set}`")).collect::<Vec<_>>();
-            let changes = if changes.is_empty() { "as below".to_owned() } else { changes.join(", ") };
+            let changes = if changes.is_empty() { "as in the file".to_owned() } else { changes.join(", ") };
             let _ = writeln!(page, "- **{}**: {changes}", variant.name);
         }
         let blank = if experiment.variants.is_empty() { "" } else { "\n" };
-        let _ = write!(page, "{blank}```ron\n{}\n```\n", experiment.without_study().to_ron()?);
-        Ok(page)
+        let _ = writeln!(page, "{blank}All values are in [{EXPERIMENT}]({EXPERIMENT}).");
+        page
+    }
+
+    /// Says which variants the plot shows, if it does not show all that were trained.
+    fn drawn_words(&self) -> String {
+        match self.drawn() {
+            (drawn, others @ 1..) => format!(
+                "The picture shows the first {} of {} trained variants: {}. The other {others} are in the tables.\n\n",
+                drawn.len(),
+                drawn.len() + others,
+                drawn.join(", ")
+            ),
+            _ => String::new(),
+        }
+    }
+
+    /// Returns the experiment with all its values, seeds and variants, for a file in `folder`. It begins with the command
+    /// that repeats the study.
+    ///
+    /// # Errors
+    ///
+    /// The path of the demonstrations is not Unicode.
+    pub fn to_ron(&self, folder: &Path) -> Result<String, ron::Error> {
+        let experiment = &self.experiment;
+        let program = self.command.split_once(" study").map_or("playbot", |(program, _)| program);
+        let file = shell_word(&folder.join(EXPERIMENT).display().to_string()).replace(['\n', '\r'], "?");
+        let demos =
+            experiment.demos.as_deref().filter(|_| self.results.iter().any(|run| run.algorithm.learns_from_demos()));
+        let demos = demos.map_or(String::new(), |path| {
+            format!(" Its recordings, {:?}, have to be there.", path.display().to_string())
+        });
+        let seeds: Vec<String> = experiment.seeds.iter().map(u64::to_string).collect();
+        let mut variants = String::new();
+        for variant in &experiment.variants {
+            let set = variant.set.iter().map(ron::to_string).collect::<Result<Vec<_>, _>>()?;
+            let _ =
+                writeln!(variants, "        (name: {}, set: [{}]),", ron::to_string(&variant.name)?, set.join(", "));
+        }
+        // Seeds and variants are lists to read: all seeds in one line, and each variant in one.
+        let mut text = experiment.without_study().to_ron()?.replace("\r\n", "\n");
+        text = text.replacen("\n    seeds: [],", &format!("\n    seeds: [{}],", seeds.join(", ")), 1);
+        if !variants.is_empty() {
+            text = text.replacen("\n    variants: [],", &format!("\n    variants: [\n{variants}    ],"), 1);
+        }
+        Ok(format!("{EXPERIMENT_HEAD}`{program} study --experiment {file}`\n// repeats it.{demos}\n{text}\n"))
     }
 
     /// Returns the table of means over the seeds, one row for each variant.
@@ -210,7 +260,7 @@ mod tests {
 
     #[test]
     fn the_page_has_the_command_every_seed_and_what_variants_change() {
-        let page = report().to_markdown().expect("Unicode");
+        let page = report().to_markdown();
         assert!(page.contains("```sh\nplaybot study --out x\n```"), "{page}");
         let seed = page.lines().find(|line| line.contains("| full ") && line.contains("not reached"));
         assert!(seed.is_some_and(|line| line.contains("60.0 ± 4.9%") && line.contains("6.00 ± 0.25")), "{page}");
@@ -221,7 +271,82 @@ mod tests {
         let middle = page.lines().find(|line| line.starts_with("| full ") && line.contains(" 7.00 ["));
         assert!(middle.is_some(), "{page}");
         assert!(page.lines().any(|line| line.starts_with("| cloned ") && line.contains("1.00 [1.00, 1.00]")), "{page}");
-        assert!(page.contains("- **cloned**: `algorithm=bc`") && page.contains("variants: []"), "{page}");
+        assert!(page.contains("- **full**: as in the file\n- **cloned**: `algorithm=bc`\n"), "{page}");
+        assert!(page.ends_with("\nAll values are in [experiment.ron](experiment.ron).\n"), "{page}");
+        assert!(!page.contains("```ron") && !page.contains("The picture shows"), "{page}");
+    }
+
+    #[test]
+    fn the_experiment_beside_the_table_is_that_of_the_study() {
+        let mut report = report();
+        report.experiment.seeds = vec![1, 2];
+        report.experiment.variants[1].set.push(r#"train="quoted:0..3""#.to_owned());
+        let text = report.to_ron(Path::new("my studies")).expect("Unicode");
+        assert!(text.starts_with(EXPERIMENT_HEAD), "{text}");
+        let command = "`playbot study --experiment 'my studies/experiment.ron'`\n// repeats it.";
+        assert!(text.replace('\\', "/").contains(command), "{text}");
+        let lines = [
+            r"    seeds: [1, 2],",
+            r#"        (name: "full", set: []),"#,
+            r#"        (name: "cloned", set: ["algorithm=bc", "train=\"quoted:0..3\""]),"#,
+        ];
+        assert!(lines.iter().all(|line| text.lines().any(|other| other == *line)), "{text}");
+        let read = parse_experiment(&text, Path::new("experiment.ron")).expect("valid");
+        assert_eq!(read, report.experiment);
+
+        // Without variants, seeds and recordings there is nothing to add.
+        report.experiment = report.experiment.without_study();
+        report.experiment.demos = None;
+        report.experiment.algorithm = Algorithm::Ppo;
+        let text = report.to_ron(Path::new("")).expect("Unicode");
+        assert!(text.contains("--experiment experiment.ron`\n// repeats it.\n("), "{text}");
+        let read = parse_experiment(&text, Path::new("experiment.ron"));
+        assert!(read.is_ok_and(|read| read == report.experiment), "{text}");
+    }
+
+    #[test]
+    fn at_most_seven_variants_are_drawn_and_the_number_of_the_others_is_named() {
+        let mut report = report();
+        let (run, curves) = (report.results[0].clone(), report.curves[0].clone());
+        let more = |number: usize| StudyResult { variant: format!("v{number}"), ..run.clone() };
+        let last = report.results.split_off(2);
+        report.curves.truncate(2);
+        report.results.extend((2..8).map(more));
+        report.results.extend(last);
+        report.curves.extend((2..8).map(|_| curves.clone()));
+        report.curves.extend([LearningCurves::default(), LearningCurves::default()]);
+        // Seven were trained.
+        for chart in report.charts() {
+            let labels: Vec<&str> = chart.curves.iter().map(|curve| curve.label.as_str()).collect();
+            assert_eq!(labels, ["full", "v2", "v3", "v4", "v5", "v6", "v7"]);
+            assert_eq!(chart.notes.len(), 1, "{:?}", chart.notes);
+        }
+        assert!(!report.to_markdown().contains("The picture shows"));
+
+        // Nine were trained.
+        report.results.extend([more(8), more(9)]);
+        report.curves.extend([curves.clone(), curves]);
+        for chart in report.charts() {
+            assert_eq!(chart.curves.last().map(|curve| curve.label.as_str()), Some("v7"));
+            let words = "The first 7 of 9 trained variants are drawn; the other 2 are in the tables.";
+            assert_eq!(chart.notes.last().map(String::as_str), Some(words));
+        }
+        let words = "The picture shows the first 7 of 9 trained variants: full, v2, v3, v4, v5, v6, v7. The other 2 are in the \
+                     tables.\n\n![Learning curves](curves.svg)";
+        let page = report.to_markdown();
+        assert!(page.contains(words) && page.contains("| v9 "), "{page}");
+    }
+
+    #[test]
+    fn a_trained_variant_without_a_hundred_episodes_is_named_below_the_chart() {
+        let mut report = report();
+        report.curves.fill(LearningCurves::default());
+        let svg = playbot_report::to_svg(&report.charts());
+        for words in
+            ["no data", "Curves begin once 100 training episodes have ended.", "Without any value to draw: full."]
+        {
+            assert_eq!(svg.matches(words).count(), 2, "{words}: {svg}");
+        }
     }
 
     #[test]
@@ -229,7 +354,7 @@ mod tests {
         let alone = |variants: &[&str]| {
             let mut report = report();
             report.results.retain(|run| run.seed == 1 || !variants.contains(&run.variant.as_str()));
-            report.to_markdown().expect("Unicode")
+            report.to_markdown()
         };
         let page = alone(&["full", "cloned"]);
         assert!(!page.contains("95 %") && !page.contains("interquartile"), "{page}");

@@ -30,7 +30,7 @@ struct Act {
     places: Bins,
 }
 
-/// Returns all states after a step from these positions, with any action.
+/// Adds all states after a step from these positions, with any action.
 pub(super) fn step(ground: &mut ReachableGround, state: Exact, places: Bins, after: &mut Vec<(State, Bins)>) {
     let supported = supported(ground, state, places);
     // A player that presses down in the air falls as usual, and past crates, as if it missed them.

@@ -116,7 +116,7 @@ fn end(end: DemoEnd) -> &'static str {
 pub fn deciders(steps_by_decider: &BTreeMap<Decider, usize>) -> String {
     let total: usize = steps_by_decider.values().sum();
     if total == 0 {
-        return "nobody".to_owned();
+        return "no decider".to_owned();
     }
     let share = |(decider, &steps)| format!("{decider} {:.0} %", 100.0 * steps as f64 / total as f64);
     steps_by_decider.iter().map(share).collect::<Vec<_>>().join(", ")

@@ -1,4 +1,4 @@
-//! Recording of a path that was found.
+//! Recording of a path that was found, picture of the reached cells, and options for the explorers.
 
 use crate::{
     arguments::{

@@ -30,7 +30,7 @@ pub(super) fn write_report(
         y_label: y_label.to_owned(),
         curves,
         y_range: None,
-        marks: Vec::new(),
+        ..Chart::default()
     };
     let references = paper_rows(&experiment.game);
     let orientation = match references.is_empty() {

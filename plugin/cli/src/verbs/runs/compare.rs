@@ -196,6 +196,6 @@ fn chart(metric: &str, groups: &[RunGroup], curves: Vec<Curve>) -> Chart {
         y_label: y_label.to_owned(),
         curves,
         y_range: range_of(metric),
-        marks: Vec::new(),
+        ..Chart::default()
     }
 }

@@ -206,7 +206,7 @@ fn chart(run: &RunRecord, tag: &str, curve: &[(u64, f64)]) -> Chart {
         y_label: format!("{} on {}, seed {}", run.info.algorithm, run.experiment.game, run.info.seed),
         curves: vec![Curve::new("", points)],
         y_range: range_of(tag),
-        marks: Vec::new(),
+        ..Chart::default()
     }
 }
 

@@ -1,4 +1,4 @@
-//! Replay of stored findings.
+//! Replay of stored findings, and detectors on the command line.
 
 use crate::{
     arguments::counted,

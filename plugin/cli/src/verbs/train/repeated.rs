@@ -1,7 +1,7 @@
 //! Options of a resumed training.
 
 use crate::{
-    arguments::experiment::{Options, in_words, option, reaches},
+    arguments::experiment::{Options, in_words, reaches},
     error::CliError,
     verbs::train::Args,
 };
@@ -69,18 +69,6 @@ fn other_skills(path: &Path, info: &RunInfo) -> Result<Option<String>, CliError>
         let path = path.display();
         format!("`--skills {path}` is the skill model {given}, and the run has {kept}")
     }))
-}
-
-impl Args {
-    /// Returns the options that have names of their own, as `key=value`.
-    pub(super) fn settings(&self) -> [Option<String>; 4] {
-        [
-            option("algorithm", &self.algorithm),
-            option("seed", &self.seed),
-            option("steps", &self.steps),
-            option("checkpoints.every", &self.checkpoint_every),
-        ]
-    }
 }
 
 #[cfg(test)]

@@ -46,8 +46,6 @@ fn once_in_an_episode(app: &mut App, when: When, work: impl Fn() + Send + Sync +
     app.add_systems(judge, show.before(PlaybotSystems::Judge).run_if(is_tick));
 }
 
-// Values that are not numbers.
-
 /// The value that is not a number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
