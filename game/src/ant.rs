@@ -8,7 +8,7 @@
 //! used here to hold floor and walls, find those nearby, and answer rays ([`walls`]).
 //!
 //! The parts, from the bottom: [`skeleton`] has the measures, [`kinematics`] the pose, [`dynamics`] the mass matrix and
-//! the forces without contacts. [`contact`] finds contacts, [`constraint`] and [`constraint_solver`] turn joint limits
+//! the forces without contacts. [`contact`] finds contacts, [`constraint`] turns joint limits
 //! and contacts into accelerations, [`body`] integrates. [`pilot`] is the shipped walking policy, [`view`] draws ants.
 
 pub mod body;

@@ -207,6 +207,6 @@ mod level_files_tests {
         assert!(words.ends_with("restore the recorded file"), "what is no recording is not recorded again: {words}");
         let words = files.difference(0, &file("b.json", 0x2e)).expect("another file");
         assert!(words.contains("b.json (hash 000000000000002e)") && words.contains("a.json"), "{words}");
-        assert!(files.difference(1, &file("b.json", 0x2e)).expect("no level").contains("not there any more"));
+        assert!(files.difference(1, &file("b.json", 0x2e)).expect("no level").contains("is missing: restore it"));
     }
 }

@@ -2,15 +2,15 @@
 //!
 //! A [`RasterSensor`] draws the picture of Bevy's sprite renderer on a camera with nearest
 //! sampling, without multisampling and tonemapping. The background is Bevy's
-//! [`ClearColor`](bevy::prelude::ClearColor), or black without one. It draws:
+//! [`ClearColor`], or black without one. It draws:
 //!
-//! - [`Sprite`](bevy::prelude::Sprite) with image or atlas, tint, flips, rectangle, `custom_size`, [`Anchor`](bevy::sprite::Anchor) and the image
+//! - [`Sprite`] with image or atlas, tint, flips, rectangle, `custom_size`, [`Anchor`](bevy::sprite::Anchor) and the image
 //!   modes `Auto` and `Scale`, and [`TileLayer`](crate::vision::TileLayer);
-//! - with the [`Transform`](bevy::prelude::Transform) and [`Visibility`](bevy::prelude::Visibility)
-//!   of entities and their parents; the [`GlobalTransform`](bevy::prelude::GlobalTransform) is not
+//! - with the [`Transform`] and [`Visibility`]
+//!   of entities and their parents; the [`GlobalTransform`] is not
 //!   read and need not be kept;
 //! - the farthest z first. At equal z, parents come first and then the order of their
-//!   [`Children`](bevy::prelude::Children). Bevy leaves this open, so give overlapping entities
+//!   [`Children`]. Bevy leaves this open, so give overlapping entities
 //!   different z.
 //!
 //! Texels of half alpha are mixed in linear light. The centre of a pixel selects the texel that it

@@ -304,7 +304,7 @@ fn add_what_is_written(app: &mut App) {
 /// The route from an action to the game.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
 pub enum InputRoute {
-    /// For ticks that are frames. In `PreUpdate`, before [`InputSystems`](bevy::input::InputSystems), messages are
+    /// For ticks that are frames. In `PreUpdate`, before [`InputSystems`], messages are
     /// sent as a window would. Bevy's own systems, input managers and the game do the rest in the same frame.
     Messages,
     /// For fixed ticks. In `FixedPreUpdate` the state that games read is written at once. A game in `FixedUpdate`

@@ -221,7 +221,7 @@ fn stopped_steps_are_resumed_bit_for_bit() {
         pipeline::learn_skills(&Shown, &experiment, &folder.path().join(name), &setup(), observer)
     };
     let skills = learn("whole.safetensors", &mut Unobserved).expect("learned");
-    let error = learn("again.safetensors", &mut StopAfter(3)).err().expect("stopped");
+    let error = learn("again.safetensors", &mut StopAfter(3)).expect_err("stopped");
     assert!(matches!(error, PipelineError::Stopped(_)), "{error}");
     learn("again.safetensors", &mut Unobserved).expect("resumed");
     let read = |name: &str| std::fs::read(folder.path().join(name)).expect("written");

@@ -114,6 +114,7 @@ impl EpisodeWorld {
     /// # Errors
     ///
     /// The game broke its contract, or the pictures fail.
+    #[allow(clippy::should_implement_trait, reason = "`?` ends the loop at a failure")]
     pub fn next(&mut self) -> Result<Option<EpisodeStep>, CliError> {
         if self.over {
             return Ok(None);

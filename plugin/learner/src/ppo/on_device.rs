@@ -128,6 +128,7 @@ pub(super) struct Reports {
 }
 
 /// A metric of a step.
+#[allow(clippy::large_enum_variant, reason = "a dozen at a time, which are moved at once")]
 enum Metric {
     OnDevice(Tensor<1>),
     Known(f64),

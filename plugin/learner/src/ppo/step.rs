@@ -100,7 +100,7 @@ impl Losses {
 
 /// Computes loss and gradient, clips by the global norm, and does one step of Adam on tracked `nets`.
 ///
-/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added to the loss.
+/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`](fn@penalty) is added to the loss.
 ///
 /// # Errors
 /// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`]

@@ -156,7 +156,7 @@ pub fn critic_step(
 
 /// Does one step of Adam on the actor, under the present critics.
 ///
-/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`] is added to the loss. A squashed policy is compared before its tanh (see [`crate::nn::unsquashed`]).
+/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`](fn@penalty) is added to the loss. A squashed policy is compared before its tanh (see [`crate::nn::unsquashed`]).
 ///
 /// # Errors
 /// As [`critic_step`].

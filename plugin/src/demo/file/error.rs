@@ -64,9 +64,9 @@ pub enum DemoFault {
     },
     /// The file does not begin like a recording.
     #[error(
-        "not a recording: it begins with \"{found}\" instead of \"playbot-demo\"; if it was one, \
-         run `playbot demo repair FILE`, which restores its header from the copy, or with --header-from from another \
-         recording"
+        "not a recording: it begins with \"{found}\" instead of \"playbot-demo\"; \
+         run `playbot demo repair FILE` if it was one, which restores its header from the copy, or with --header-from \
+         from another recording"
     )]
     NotADemo {
         /// The first bytes of the file, with unprintable ones escaped.
