@@ -66,11 +66,11 @@ fn what_cannot_be_changed_is_told() {
         PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect_err("does not fit").to_string()
     };
     let vectors = refused(Augmentation::Translate(2), PolicySpec { obs: 7.into(), ..SPEC });
-    assert!(vectors.contains("ppo augment: Translate(2)") && vectors.contains("vectors of 7"), "{vectors}");
+    assert!(vectors.contains("`ppo.augment` Translate(2)") && vectors.contains("vectors of 7"), "{vectors}");
     assert!(refused(Augmentation::Translate(SHAPE.width), SPEC).contains("pixels"));
     let skills = SkillConfig { augment: vec![Augmentation::Cutout(0.3)], ..SkillConfig::default() };
     let error = skills.check_observation(7.into()).expect_err("vectors").to_string();
-    assert!(error.contains("skill augment"), "{error}");
+    assert!(error.contains("`skills.augment`"), "{error}");
 }
 
 #[test]

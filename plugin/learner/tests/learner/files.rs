@@ -204,7 +204,7 @@ pub fn policy_file(path: &Path, condition: bool) {
     let learner = PpoLearner::with_skill(ppo_config(), score, &model(1), 1, DeviceKind::Flex).expect("good settings");
     let file = PolicyFile { card: PolicyMetadata::default(), policy: learner.policy(), skills: learner.skills() };
     let (obs, z) = (vec![0.5; 3 * OBS], vec![0.25; 3 * learner.rollout_latent()]);
-    assert!(file.save(path, &obs, &z, 0).expect_err("no examples").to_string().contains("at least one row"));
+    assert!(file.save(path, &obs, &z, 0).expect_err("no examples").to_string().contains("at least one example row"));
     file.save(path, &obs, &z, 3).expect("written");
 }
 

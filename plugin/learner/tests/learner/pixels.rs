@@ -186,7 +186,7 @@ fn images_of_another_kind_are_refused() {
     assert!(text.contains("at least 36 rows"), "{text}");
     assert!(refused(PpoConfig { norm_obs: true, ..config() }).contains("norm_obs is for vectors"));
     let empty = CnnKind::Impala { channels: vec![4, 0], feature: 8 };
-    assert!(refused(PpoConfig { cnn: empty, ..config() }).contains("ppo cnn"));
+    assert!(refused(PpoConfig { cnn: empty, ..config() }).contains("`ppo.cnn`"));
     let spec = PolicySpec { obs: toy::OBS.into(), latent: 0, action_space: SPACE };
     let mut blind = PpoLearner::new(config(), spec, 1, DeviceKind::Flex).expect("good settings");
     let text = blind.update(&rollout).expect_err("images").to_string();
