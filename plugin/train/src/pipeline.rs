@@ -5,6 +5,7 @@
 //! use playbot_harness::{eval::Player, prelude::*};
 //! use playbot_learner::DeviceKind;
 //! use playbot_train::{
+//!     UpdateReport,
 //!     experiment::file::parse_experiment,
 //!     pipeline,
 //!     run_observer::{AfterUpdate, Unobserved},
@@ -17,7 +18,8 @@
 //! let setup = TrainingSetup::new(DeviceKind::default(), 2);
 //! let file = "skills.safetensors".as_ref();
 //! let skills = pipeline::learn_skills(game, &experiment, file, &setup, &mut Unobserved)?;
-//! let mut observer = AfterUpdate(|report: &_| println!("{} steps, return {:?}", report.step, report.episodic_return));
+//! let mut observer =
+//!     AfterUpdate(|report: &UpdateReport| println!("{} steps, return {:?}", report.step, report.episodic_return));
 //! let run = "runs/lander".as_ref();
 //! let trainer = pipeline::train(game, &experiment, Some((file, &skills)), run, &setup, &mut observer)?;
 //! let policy = pipeline::policy(game, &trainer);
