@@ -3,7 +3,8 @@
 //! The task is D4RL's, on its maps and on generated ones; the body is [`ant`](crate::ant)'s. A mode ([`AntMazeMode`])
 //! and a seed make a level ([`generate`]); each agent has a physics world of its own. Episodes end at the goal or at
 //! the time limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game with rays to the walls
-//! and the direction of the goal, [`AntMazeWithMap`] with a map, and [`AntMazeWithPositionalEncoding`] with positional encoding.
+//! and the direction of the goal, [`AntMazeWithMap`] with a map, and [`AntMazeWithPositionalEncoding`] with positional
+//! encoding.
 
 mod against_rules;
 pub mod arena;
