@@ -20,7 +20,7 @@ use bevy_playbot::state_hash::StateHash;
 use serde::{Deserialize, Serialize};
 use std::{fmt, ops::RangeInclusive};
 
-pub(crate) use crate::maze::walls::paid_otherwise;
+pub(crate) use crate::maze::walls::reward_mismatch;
 pub use crate::maze::{
     error::{MAX_CELLS, MAX_SIDE, MazeError},
     generator::generate,

@@ -11,16 +11,14 @@ use bevy::prelude::*;
 use bevy_playbot::prelude::{Observation, ObservationSpace};
 use playbot_harness::{benchmark::Benchmark, game::BenchmarkTools, prelude::*};
 
-// A game whose agents are told more than the game tells them.
-
-/// What agents are told beside what a game tells them: the same in every game that has it.
-pub trait Told: Copy + Send + Sync + 'static {
+/// Observations beside those of the game, the same in every game that has them.
+pub trait AddedObservations: Copy + Send + Sync + 'static {
     /// Names of the numbers that are added, in their order.
     fn names(self) -> Vec<String>;
 }
 
-/// How a game tells it.
-pub trait Senses<G>: Told {
+/// A game's way to fill them.
+pub trait Senses<G>: AddedObservations {
     /// Name of the game with these senses.
     const NAME: &'static str;
 
@@ -93,7 +91,7 @@ pub const REACH: i32 = 5;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WithMap;
 
-impl Told for WithMap {
+impl AddedObservations for WithMap {
     fn names(self) -> Vec<String> {
         let cells = around().map(|[east, north]| format!("cell {east:+} east {north:+} north"));
         WithRays.names().into_iter().chain(cells).collect()
@@ -122,7 +120,7 @@ pub const LENGTHS: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WithPositionalEncoding;
 
-impl Told for WithPositionalEncoding {
+impl AddedObservations for WithPositionalEncoding {
     fn names(self) -> Vec<String> {
         ["x", "y"].into_iter().flat_map(|axis| ObservationSpace::wave_names(axis, LENGTHS)).collect()
     }
@@ -139,7 +137,7 @@ pub fn push_waves(observation: &mut Observation, place: [f64; 2]) {
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WithRays;
 
-impl Told for WithRays {
+impl AddedObservations for WithRays {
     fn names(self) -> Vec<String> {
         let goal = ["goal x", "goal y"].map(str::to_owned);
         let walls = WAYS.map(|(way, _)| format!("wall {way}"));

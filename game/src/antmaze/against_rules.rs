@@ -8,7 +8,7 @@ use crate::{
         geometry::{distance, wall_boxes},
         level::AntMazeLevel,
     },
-    maze::paid_otherwise,
+    maze::reward_mismatch,
 };
 use playbot_harness::{
     detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting},
@@ -77,7 +77,7 @@ impl EpisodeWatcher for Following {
         if self.is_ready {
             body.follow(ant);
         }
-        wrong.flatten().or_else(|| paid_otherwise(moment.reward, paid_by_rules(&state, level), SLACK))
+        wrong.flatten().or_else(|| reward_mismatch(moment.reward, paid_by_rules(&state, level), SLACK))
     }
 }
 
@@ -143,8 +143,8 @@ mod tests {
         let level = generate(&mode, 3).expect("a level");
         let [x, y, ..] = level.reset.qpos;
         let right = pay(level.pay, distance([x, y], level.goal_at));
-        assert_eq!(paid_otherwise(right, paid_by_rules(&level.reset, &level), SLACK), None);
-        let told = paid_otherwise(right + 1.0, paid_by_rules(&level.reset, &level), SLACK).expect("it is too much");
+        assert_eq!(reward_mismatch(right, paid_by_rules(&level.reset, &level), SLACK), None);
+        let told = reward_mismatch(right + 1.0, paid_by_rules(&level.reset, &level), SLACK).expect("it is too much");
         assert!(told.contains("by the rules it pays"), "{told}");
     }
 }

@@ -1,7 +1,7 @@
 //! Detector of balls whose motion or reward breaks the rules.
 
 use crate::{
-    maze::paid_otherwise,
+    maze::reward_mismatch,
     maze2d::{
         arena::{MazeArena, MazeBall, PlaysIn},
         ball::{Ball, FORCE, RADIUS, Vec2d, clip_action, length, scale, sub},
@@ -67,7 +67,7 @@ impl EpisodeWatcher for Following {
         let walls = self.walls.get_or_insert_with(|| Walls::new(&level.maze, rules.wall_offset()));
         let paid = reward(ball.position, level.goal(), rules.sparse);
         moved_otherwise(&before, &ball, clip_action([x, y]).0, walls, rules)
-            .or_else(|| paid_otherwise(moment.reward, paid, SLACK_OF_REWARD))
+            .or_else(|| reward_mismatch(moment.reward, paid, SLACK_OF_REWARD))
     }
 }
 
@@ -137,11 +137,11 @@ mod tests {
 
     #[test]
     fn what_is_paid_beside_the_rules_is_found() {
-        assert_eq!(paid_otherwise(0.25, 0.25, SLACK_OF_REWARD), None);
+        assert_eq!(reward_mismatch(0.25, 0.25, SLACK_OF_REWARD), None);
         assert_eq!(
-            paid_otherwise(1.25, 0.25, SLACK_OF_REWARD).as_deref(),
+            reward_mismatch(1.25, 0.25, SLACK_OF_REWARD).as_deref(),
             Some("the tick paid 1.25; by the rules it pays 0.25")
         );
-        assert!(paid_otherwise(f32::NAN, 0.25, SLACK_OF_REWARD).is_some());
+        assert!(reward_mismatch(f32::NAN, 0.25, SLACK_OF_REWARD).is_some());
     }
 }

@@ -101,7 +101,9 @@ impl<S: Subscriber> Layer<S> for FilesOnce {
         let metadata = event.metadata();
         let is_repeated = match *metadata.level() {
             Level::ERROR => metadata.target().starts_with("bevy_asset"),
-            Level::WARN => ["playbot_train", "playbot_learner"].iter().any(|from| metadata.target().starts_with(from)),
+            Level::WARN => ["playbot_train", "playbot_harness::sealed_file", "playbot_learner"]
+                .iter()
+                .any(|from| metadata.target().starts_with(from)),
             _ => false,
         };
         if !is_repeated {

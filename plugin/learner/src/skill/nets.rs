@@ -341,7 +341,7 @@ impl StateHeads {
 }
 
 /// Returns the number of values predicted from each picture, if any.
-pub(super) fn told_numbers(config: &SkillConfig, dataset: &Dataset) -> Option<usize> {
+pub(super) fn predicted_numbers(config: &SkillConfig, dataset: &Dataset) -> Option<usize> {
     let states = dataset.states.as_ref().filter(|_| config.tells_states())?;
     Some(states.obs_dim())
 }

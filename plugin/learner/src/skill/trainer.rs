@@ -13,7 +13,7 @@ use crate::{
     rng::{ChaCha8Rng, Streams, normal, shuffle},
     skill::{
         Dataset, SkillConfig, SkillDescription, SkillForward, SkillModel, SkillNets, StateHeads, Window,
-        nets::told_numbers, skill_loss,
+        nets::predicted_numbers, skill_loss,
     },
 };
 use burn::tensor::Tensor;
@@ -72,7 +72,7 @@ impl SkillTrainer {
         device.check()?;
         let (streams, plain) = (Streams::new(seed), device.plain());
         let mut nets = SkillNets::new(&config, dataset.observation, dataset.space, &streams, &plain)?;
-        if let Some(numbers) = told_numbers(&config, &dataset) {
+        if let Some(numbers) = predicted_numbers(&config, &dataset) {
             nets.state_heads = Some(StateHeads::new(config.cnn.features(), numbers, &streams, &plain));
         }
         Self::with_nets(config, dataset, &nets, seed, device)
@@ -594,7 +594,7 @@ impl SkillTrainer {
             )));
         }
         let mut nets = SkillNets::stored(&skill, &mut file, "", &device.plain())?;
-        if let Some(numbers) = told_numbers(&skill.config, &dataset) {
+        if let Some(numbers) = predicted_numbers(&skill.config, &dataset) {
             let features = skill.config.cnn.features();
             let heads = StateHeads::build(&mut file.params(&device.plain()), "state_heads", features, numbers)?;
             nets.state_heads = Some(heads);

@@ -1,6 +1,5 @@
 //! Worlds in which testers play their episodes.
 
-use self::EpisodeObserver as WatchOfTest;
 use crate::{
     detectors::{Detectors, ErrorLogReader, GameProofs, SlowTick, TickTime},
     findings::detector_of,
@@ -462,7 +461,7 @@ type NamedWorldWatch = (&'static str, Box<dyn WorldWatcher>);
 /// The watches of a World.
 pub(super) struct EpisodeWatchers<'a> {
     game: &'a dyn Game,
-    watch: &'a WatchOfTest<'a>,
+    watch: &'a EpisodeObserver<'a>,
     seats: Vec<WatchedSeat>,
     worlds: Vec<NamedWorldWatch>,
     ear: Option<ErrorLogReader>,
@@ -482,7 +481,7 @@ impl<'a> EpisodeWatchers<'a> {
     /// Makes the watches of the test's detectors for these agents.
     pub fn new(
         game: &'a dyn Game,
-        watch: &'a WatchOfTest<'a>,
+        watch: &'a EpisodeObserver<'a>,
         agents: impl Iterator<Item = Entity>,
         is_alone: bool,
     ) -> Self {
@@ -555,7 +554,7 @@ impl<'a> EpisodeWatchers<'a> {
 
 impl WatchedSeat {
     /// Inspects the episode's last tick; `result` is the episode's result if it is over.
-    fn look(&mut self, game: &dyn Game, watch: &WatchOfTest, world: &World, result: Option<EpisodeResult>) {
+    fn look(&mut self, game: &dyn Game, watch: &EpisodeObserver, world: &World, result: Option<EpisodeResult>) {
         if watch.detectors.ticks.is_empty() {
             return;
         }
@@ -595,7 +594,7 @@ impl WatchedSeat {
 }
 
 /// Makes the watches of an episode on this level.
-fn begin(game: &dyn Game, watch: &WatchOfTest, level: u64) -> Vec<NamedWatch> {
+fn begin(game: &dyn Game, watch: &EpisodeObserver, level: u64) -> Vec<NamedWatch> {
     let ahead = LevelAhead { level, plan: game.tools().levels.floor_plan(watch.mode, level) };
     let named = |detector: &Arc<dyn Detector>| detector.watch(&ahead).map(|watch| (detector.name(), watch));
     watch.detectors.ticks.iter().filter_map(named).collect()
