@@ -2,7 +2,7 @@
 //!
 //! # Concepts
 //!
-//! - A [`SkillModel`] is learned from [`DemoEpisode`]s by a [`SkillTrainer`]. Its encoder describes several steps of
+//! - A [`SkillModel`] is learned from [`DatasetEpisode`]s by a [`SkillTrainer`]. Its encoder describes several steps of
 //!   a demonstrator by a latent skill z. Its decoder π(a | s, z) repeats them. Its [`Prior`] p(z | s) says which
 //!   skills fit a state.
 //! - A [`Policy`] is a frozen snapshot that plays: [`Policy::forward`] returns action distributions and values for a
@@ -41,6 +41,7 @@ pub mod disk;
 mod error;
 mod file;
 mod learner;
+pub mod legacy;
 pub mod nn;
 pub mod norm;
 mod observation;
@@ -74,10 +75,10 @@ pub use crate::{
     score::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig},
     seen_levels::SeenLevels,
     skill::{
-        ActionInput, Dataset, DemoEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
+        ActionInput, Dataset, DatasetEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
         SkillProgress, SkillSource, SkillTrainer, WindowRule,
     },
-    space::{Action, ActionSpace, Actions, PolicySpec, TimeLimit},
+    space::{ActionValue, ActionSpace, Actions, PolicySpec, TimeLimit},
     spirl::{SpirlConfig, SpirlLearner},
 };
 pub use playbot_kernels::among_workers::{among_awake_workers, among_workers, waited};

@@ -12,9 +12,6 @@ mod teacher;
 pub(crate) use crate::score::teacher::{Teacher, TeacherOutput, TiedTo};
 pub use crate::score::{
     config::{ConfidenceKind, KlDirection, PenaltyForm, PriorKind, ScoreConfig},
-    penalty::{
-        Penalty, confidences, decoder_kl, legacy_coinrun, legacy_d4rl, marginal_densities, own_samples, penalty,
-        penalty_weights,
-    },
+    penalty::{Penalty, confidences, decoder_kl, own_samples, penalty, penalty_weights},
     teacher::TeacherBatch,
 };

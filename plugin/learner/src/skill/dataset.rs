@@ -1,7 +1,7 @@
 //! Demonstrations for a skill model.
 
 use crate::{
-    ActionSpace, Actions, LearnError, ObsKind, Observations, SeenLevels,
+    ActionSpace, Actions, LearnError, ObsKind, Observations, SeenLevels, legacy,
     norm::ObsStats,
     rng::{Streams, below, fnv1a, shuffle},
 };
@@ -11,7 +11,7 @@ use std::sync::Arc;
 
 /// One recorded episode.
 #[derive(Clone, Debug, PartialEq)]
-pub struct DemoEpisode {
+pub struct DatasetEpisode {
     /// One observation per step.
     pub observations: Observations,
     /// The action taken at each observation, `len`.
@@ -23,7 +23,7 @@ pub struct DemoEpisode {
 pub struct Dataset {
     pub(super) observation: ObsKind,
     pub(super) space: ActionSpace,
-    pub(super) episodes: Arc<[Arc<DemoEpisode>]>,
+    pub(super) episodes: Arc<[Arc<DatasetEpisode>]>,
     /// The level of each episode.
     pub(super) levels: Arc<[usize]>,
     /// The same episodes as vectors of the game's state, if they are known.
@@ -42,7 +42,7 @@ impl Dataset {
     pub fn new(
         observation: impl Into<ObsKind>,
         space: ActionSpace,
-        episodes: Vec<DemoEpisode>,
+        episodes: Vec<DatasetEpisode>,
     ) -> Result<Self, LearnError> {
         let observation = observation.into();
         if observation.numbers() == 0 || space.dim() == 0 {
@@ -224,9 +224,6 @@ impl Dataset {
     }
 
     fn legacy_windows(&self, window: usize, streams: &Streams) -> Vec<Window> {
-        let steps = self.steps();
-        let Some(slack) = steps.checked_sub(window).filter(|_| window > 0) else { return Vec::new() };
-        let mut rng = streams.stream("skill.windows", 0);
         // The step at which each episode begins, all of them laid end to end.
         let begins: Vec<usize> = self
             .lengths()
@@ -235,8 +232,8 @@ impl Dataset {
                 Some(*sum - len)
             })
             .collect();
-        let starts = (0..steps / window).map(|_| below(&mut rng, slack as u64 + 1) as usize);
-        starts
+        legacy::window_starts(self.steps(), window, &mut streams.stream("skill.windows", 0))
+            .into_iter()
             .map(|start| {
                 // The last episode that begins there or before holds the step: empty ones come first.
                 let episode = begins.partition_point(|&begin| begin <= start) - 1;
@@ -269,7 +266,7 @@ pub(super) mod tests {
     pub(in crate::skill) fn dataset(lengths: &[usize]) -> Dataset {
         let episodes = lengths
             .iter()
-            .map(|&len| DemoEpisode {
+            .map(|&len| DatasetEpisode {
                 observations: Observations::Vector((0..len).map(|t| t as f32).collect()),
                 actions: Actions::Discrete(vec![0; len]),
             })
@@ -288,7 +285,7 @@ pub(super) mod tests {
     #[test]
     fn bad_demonstrations_are_refused() {
         let episode =
-            |observations: Observations, a: u32| DemoEpisode { observations, actions: Actions::Discrete(vec![a; 3]) };
+            |observations: Observations, a: u32| DatasetEpisode { observations, actions: Actions::Discrete(vec![a; 3]) };
         let new = |kind: ObsKind, e| Dataset::new(kind, ActionSpace::Discrete(2), vec![e]);
         let vector = ObsKind::Vector(2);
         assert!(new(vector, episode(vec![0.0; 6].into(), 1)).is_ok());

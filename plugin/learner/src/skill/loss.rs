@@ -1,13 +1,11 @@
 //! The loss of the skill model, J = NLL + β KL(q ‖ p).
 
 use crate::{
+    legacy,
     nn::Dist,
     skill::{Reduction, SkillConfig, SkillForward},
 };
 use burn::tensor::Tensor;
-
-/// Bound of the legacy clamps.
-const LEGACY_BOUND: f32 = 100.0;
 
 /// The terms of the loss, `[1]` each.
 #[derive(Clone, Debug)]
@@ -28,10 +26,7 @@ pub fn skill_loss(forward: &SkillForward, config: &SkillConfig) -> SkillLoss {
     let nll_per_step = nll_under_noise(forward, config.action_noise);
     let (nll, kl) = match config.reduction {
         Reduction::Standard => (nll_per_step.sum() / batch as f32, forward.kl_per_sequence.clone().mean()),
-        Reduction::Legacy => (
-            nll_per_step.mean().clamp(-LEGACY_BOUND, LEGACY_BOUND),
-            forward.kl_per_sequence.clone().sum().clamp(-LEGACY_BOUND, LEGACY_BOUND),
-        ),
+        Reduction::Legacy => legacy::reduced(nll_per_step, forward.kl_per_sequence.clone()),
     };
     let latent_norm = forward.decoder_latent.clone().square().sum_dim(1).sqrt().mean();
     let mut total = nll.clone() + kl.clone() * config.beta;
