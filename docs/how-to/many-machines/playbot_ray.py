@@ -35,7 +35,7 @@ except ImportError:  # Windows has no such locks; there a second process is refu
 PASSED, FINDINGS, FAILED, USAGE, STOPPED = 0, 1, 2, 3, 130
 # Seconds between two looks at the progress.
 LOOK = 2.0
-# Of what a program that failed has said, this much is told.
+# Of what a program that failed has said, this much is printed.
 LAST_WORDS = 4000
 PR_SET_PDEATHSIG = 1
 
@@ -100,7 +100,7 @@ def dies_with(parent):
 
 
 def wait_for(folder):
-    """Waits until nobody else writes into the folder: a task that Ray gave up may still be at work on another machine."""
+    """Waits until no other process writes into the folder: a task that Ray gave up may still run on another machine."""
     try:
         with open(folder / "levels.jsonl", "r+b") as journal:
             if fcntl:
@@ -135,7 +135,7 @@ def levels_done(args):
     return count
 
 
-def tell(words):
+def report(words):
     print(words, file=sys.stderr, flush=True)
 
 
@@ -148,7 +148,7 @@ def test_shards(args):
     folders = [str(shard_folder(args.out, index)) for index in range(args.shards)]
     running = {task.remote(command, folder, where): index for index, (command, folder) in enumerate(zip(commands, folders))}
     worst = PASSED
-    told = None
+    reported = None
     while running:
         ready, _ = ray.wait(list(running), timeout=LOOK)
         for reference in ready:
@@ -158,12 +158,12 @@ def test_shards(args):
             except ray.exceptions.RayError as error:
                 code, words = FAILED, f"given up after {args.retries} retries: {error}"
             if code not in (PASSED, FINDINGS):
-                tell(f"shard {index}/{args.shards} failed with exit code {code}: {shlex.join(commands[index])}\n{words}")
+                report(f"shard {index}/{args.shards} failed with exit code {code}: {shlex.join(commands[index])}\n{words}")
                 worst = max(worst, code)
         progress = f"{args.shards - len(running)} of {args.shards} shards, {levels_done(args)} levels"
-        if progress != told:
-            tell(progress)
-            told = progress
+        if progress != reported:
+            report(progress)
+            reported = progress
     return worst
 
 
@@ -171,7 +171,7 @@ def main():
     args = arguments()
     out = pathlib.Path(args.out)
     if (out / "results.json").exists() and not (out / "shards").exists():
-        tell(f"{out} has results that are not of this script: choose another --out")
+        report(f"{out} has results that are not of this script: choose another --out")
         return USAGE
     started = time.monotonic()
     if args.address:
@@ -181,9 +181,9 @@ def main():
     code = test_shards(args)
     ray.shutdown()
     if code != PASSED:
-        tell("not all shards are tested: mend what is said above, and call this again to go on")
+        report("not all shards are tested: mend what is said above, and call this again to go on")
         return code
-    tell(f"{args.shards} shards in {time.monotonic() - started:.1f} s")
+    report(f"{args.shards} shards in {time.monotonic() - started:.1f} s")
     merge = [args.program, "report", "merge", "--force", "--out", args.out]
     merge += ["--against", args.against] if args.against else []
     merge += [str(shard_folder(args.out, index)) for index in range(args.shards)]

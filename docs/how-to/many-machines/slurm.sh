@@ -20,7 +20,7 @@ set -euo pipefail
 PLAYBOT=${PLAYBOT:-playbot}
 GAME=${GAME:-coinrun}
 LEVELS=${LEVELS:-hard:0..9999}
-# Who tests, and all else that `playbot test` understands. Words are split at blanks.
+# The testers, and all else that `playbot test` understands. Words are split at blanks.
 TEST=${TEST:---bot search}
 SHARDS=${SHARDS:-16}
 OUT=${OUT:-runs/test}
@@ -34,7 +34,7 @@ if [ -n "${SLURM_ARRAY_TASK_ID:-}" ]; then
     # shellcheck disable=SC2086
     "$PLAYBOT" test "$GAME" --levels "$LEVELS" $TEST --shard "$SLURM_ARRAY_TASK_ID/$SHARDS" \
         --threads "${SLURM_CPUS_PER_TASK:-1}" --resume --out "$OUT/shards/$SLURM_ARRAY_TASK_ID" >/dev/null || code=$?
-    # Findings are no failure of a shard: the job that joins them tells of all.
+    # Findings are no failure of a shard: the job that joins them reports all.
     if [ "$code" -eq 1 ]; then exit 0; fi
     exit "$code"
 elif [ -n "${SLURM_JOB_ID:-}" ]; then

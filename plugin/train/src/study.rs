@@ -1,5 +1,7 @@
 //! Studies: the variants of an experiment, each with every seed.
 //!
+//! The folder, in reading order:
+//!
 //! - `conditions`: training and test conditions of a study's variants, as text.
 //! - `table`: studies as Markdown: means over the seeds, the numbers of every seed, and the command to run again; and
 //!   the experiment beside them.
@@ -10,8 +12,8 @@ pub(crate) mod table;
 use crate::{
     Algorithm,
     experiment::{Experiment, ExperimentError, Variant, error::ConfigError},
-    metrics_log::{SUCCESS_RATE, range_of},
     study::table::markdown_table,
+    update_report::{SUCCESS_RATE, range_of},
 };
 use playbot_harness::eval::EvalSummary;
 use playbot_learner::HasExitCode;
@@ -32,51 +34,6 @@ pub struct StudyRun {
     /// Its experiment with its seed and without variants.
     pub experiment: Experiment,
 }
-
-/// An invalid study.
-#[derive(Debug, Error)]
-pub enum StudyError {
-    /// Two variants have the same name.
-    #[error("two variants are called `{0}`: give each a name of its own")]
-    SameName(String),
-    /// A name that is not valid for a folder.
-    #[error(
-        "`{0}` cannot be the name of a variant: use letters, digits, `-`, `_` and `.`, and begin with a letter or digit"
-    )]
-    BadName(String),
-    /// The same seed occurs twice.
-    #[error("seed {0} is there twice: another run with it would be the same run")]
-    SameSeed(u64),
-    /// A variant changes a key of the study itself.
-    #[error(
-        "variant `{variant}`: `{key}` is not for a variant: all are trained with the study's `seeds` and measured in the same \
-         way on the same levels"
-    )]
-    OfTheStudy {
-        /// Its name.
-        variant: String,
-        /// The key.
-        key: String,
-    },
-    /// A variant with an invalid change.
-    #[error("variant `{variant}`: {source}")]
-    Config {
-        /// Its name.
-        variant: String,
-        /// The error.
-        source: Box<ConfigError>,
-    },
-    /// A variant whose values contradict one another.
-    #[error("variant `{variant}`: {source}")]
-    Values {
-        /// Its name.
-        variant: String,
-        /// The error.
-        source: ExperimentError,
-    },
-}
-
-impl HasExitCode for StudyError {}
 
 impl StudyRun {
     /// Returns the name of its folder.
@@ -170,13 +127,58 @@ pub fn study_variants(experiment: &Experiment) -> Result<Vec<Variant>, StudyErro
     Ok(experiment.variants.clone())
 }
 
-// Results of a study: those of its runs, and their statistics over the seeds.
+/// An invalid study.
+#[derive(Debug, Error)]
+pub enum StudyError {
+    /// Two variants have the same name.
+    #[error("two variants are called `{0}`: give each a name of its own")]
+    SameName(String),
+    /// A name that is not valid for a folder.
+    #[error(
+        "`{0}` cannot be the name of a variant: use letters, digits, `-`, `_` and `.`, and begin with a letter or digit"
+    )]
+    BadName(String),
+    /// The same seed occurs twice.
+    #[error("seed {0} is there twice: another run with it would be the same run")]
+    SameSeed(u64),
+    /// A variant changes a key of the study itself.
+    #[error(
+        "variant `{variant}`: `{key}` is not for a variant: all are trained with the study's `seeds` and measured in the same \
+         way on the same levels"
+    )]
+    OfTheStudy {
+        /// Its name.
+        variant: String,
+        /// The key.
+        key: String,
+    },
+    /// A variant with an invalid change.
+    #[error("variant `{variant}`: {source}")]
+    Config {
+        /// Its name.
+        variant: String,
+        /// The error.
+        source: Box<ConfigError>,
+    },
+    /// A variant whose values contradict one another.
+    #[error("variant `{variant}`: {source}")]
+    Values {
+        /// Its name.
+        variant: String,
+        /// The error.
+        source: ExperimentError,
+    },
+}
+
+impl HasExitCode for StudyError {}
+
+// Results of a study.
 
 /// The most lines of a chart. More cannot be told apart.
 const MOST_CURVES: usize = 7;
 
-/// Learning curves of a run over environment steps: means over the last 100 training episodes, from the step on at which
-/// 100 have ended. Empty without training.
+/// Learning curves of a run over environment steps: means over the last 100 training episodes, from the step on at
+/// which 100 have ended. Empty without training.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LearningCurves {
     /// Steps and success rates.
@@ -289,7 +291,8 @@ impl StudyReport {
         PairedDifference::of(&self.level_returns(variant), &self.level_returns(other))
     }
 
-    /// Returns the trained variants that the charts draw, the first `MOST_CURVES` of them, and the number of the others.
+    /// Returns the trained variants that the charts draw, the first `MOST_CURVES` of them, and the number of the
+    /// others.
     pub fn drawn(&self) -> (Vec<&str>, usize) {
         let mut trained = self.variants();
         trained.retain(|variant| self.of(variant).iter().any(|run| run.training.is_some()));
@@ -370,8 +373,6 @@ fn over_seeds(seeds: usize) -> &'static str {
     }
 }
 
-// Comparison of the variants of a study: paired differences, interquartile means, and probabilities of improvement.
-
 impl StudyReport {
     /// Returns the paired differences of the first variant from each other one.
     pub fn differences(&self) -> String {
@@ -433,11 +434,11 @@ impl StudyReport {
         }
         let above = format!("{} above it", variants[0]);
         format!(
-            "The interquartile mean over the seeds: that of the middle half of the runs, each with its mean held-out return over \
-             all levels. And the probability that a run of **{}** has a higher return on a level than a run of the variant, where \
-             equal returns count half. In brackets are 95 % intervals by a bootstrap over seeds and levels, which are too narrow for \
-             a handful of seeds: whether a difference is clear is what the p above says. Variants with a single seed have \
-             none.\n\n{}\n",
+            "The interquartile mean over the seeds: that of the middle half of the runs, each with its mean held-out \
+             return over all levels. The last column is the probability that a run of **{}** has a higher return on a \
+             level than a run of the variant. Equal returns count half. Brackets hold 95 % intervals by a bootstrap \
+             over seeds and levels. They are too narrow for a handful of seeds. The p above says whether a difference \
+             is clear. Variants with a single seed have neither.\n\n{}\n",
             variants[0],
             markdown_table(&["variant", "interquartile mean", &above], rows.into_iter())
         )
@@ -453,7 +454,7 @@ fn p_cell(p: Option<f64>) -> String {
 mod tests {
     use std::path::Path;
 
-    use super::*;
+    use super::{over_seeds, *};
     use crate::{Algorithm, experiment::file::parse_experiment};
 
     fn experiment(variants: &str) -> Experiment {
@@ -472,12 +473,12 @@ mod tests {
     fn every_variant_runs_with_every_seed_and_shares_skills_where_it_can() {
         let variants = r#"(name: "full"), (name: "no-kl", set: ["score.kl=false"]),
             (name: "short", set: ["skills.window=5"]), (name: "ppo", set: ["algorithm=ppo"]),
-            (name: "eyes", set: ["observation=Raster"]), (name: "grey", set: ["observation=Raster", "image.grayscale=true"]),
+            (name: "pixels", set: ["observation=Raster"]), (name: "grey", set: ["observation=Raster", "image.grayscale=true"]),
             (name: "idle", set: ["image.grayscale=true"]), (name: "few", set: ["demo_steps=9"]),
             (name: "won", set: ["demo_wins=true"])"#;
         let runs = study_runs(&experiment(variants)).expect("valid");
         let ids: Vec<String> = runs.iter().map(StudyRun::id).collect();
-        let names = ["full", "no-kl", "short", "ppo", "eyes", "grey", "idle", "few", "won"];
+        let names = ["full", "no-kl", "short", "ppo", "pixels", "grey", "idle", "few", "won"];
         let expected = names.map(|name| [3, 5].map(|seed| format!("{name}-seed{seed}")));
         assert_eq!(ids, expected.concat());
         assert!(runs.iter().all(|run| run.experiment.variants.is_empty() && run.experiment.seeds.is_empty()));
@@ -487,8 +488,8 @@ mod tests {
         assert_eq!((&skills[0], &skills[1]), (&skills[2], &skills[3]), "the same skill settings");
         assert_ne!(skills[0], skills[1], "other seeds");
         assert_ne!(skills[0], skills[4], "other windows");
-        assert!(skills[0] != skills[8] && skills[8] != skills[10], "other eyes");
-        assert_eq!(skills[0], skills[12], "nobody looks at pictures");
+        assert!(skills[0] != skills[8] && skills[8] != skills[10], "other sensors");
+        assert_eq!(skills[0], skills[12], "no variant reads pictures");
         assert_ne!(skills[0], skills[16], "other recordings");
         assert_ne!(skills[0], skills[14], "fewer demonstrations");
     }
@@ -531,11 +532,6 @@ mod tests {
         twice.seeds = vec![1, 2, 1];
         assert!(study_runs(&twice).expect_err("twice").to_string().contains("seed 1"));
     }
-}
-
-#[cfg(test)]
-mod study_tests {
-    use super::over_seeds;
 
     #[test]
     fn a_band_over_few_seeds_is_their_range() {

@@ -4,10 +4,10 @@
 mod tests;
 
 use crate::score::{
+    Score,
     contestant::ClockKind,
     error::ScoreError,
     found::ScoredJob,
-    journal::Score,
     mix::{Catch, Limits, best_mix},
     record::{ScoreBudget, SetRecord, Subject, SubjectKind},
 };
@@ -178,8 +178,6 @@ fn classes(rows: &Rows, best: &[usize], careful: &[usize], only_skills: &[bool])
     };
     classes.into_iter().map(row).collect()
 }
-
-// Tables of a score, for the console and for Markdown.
 
 impl ScoreTable {
     /// Returns the summary, in a few lines.
@@ -539,13 +537,13 @@ impl ScoreTable {
         vec![
             format!("Games and versions: {}. Sets: {}.", markdown_cell(&self.games.join(", ")), sets.join(", ")),
             format!(
-                "A sound level has no planted defect. Each tester has the same budget on each mutant and sound level: \
-                 {} for testers that play, {steps} steps and {routes} replayed paths for explorers. Seed: {seed}.",
+                "A sound level has no planted defect. Each tester has the same budget on each mutant and sound level. \
+                 Testers that play have {}, and explorers {steps} steps and {routes} replayed paths. Seed: {seed}.",
                 if episodes == 1 { "1 episode".to_owned() } else { format!("{episodes} episodes") }
             ),
             "A mutant is found if a detector reports something, the game breaks, or the level is proved to be \
              unsolvable. The failure of a tester counts if it solves at least 99 % of the sound levels of the game. A tester \
-             that solves fewer, but collects similar rewards on all of them, fails by a reward outside of all those and \
+             that solves fewer may collect similar rewards on all of them. It fails by a reward outside of all those and \
              more than four standard deviations from their mean. On a sound level the same, compared with the others, is a false \
              finding."
                 .to_owned(),
@@ -559,8 +557,8 @@ impl ScoreTable {
             "Some games bring detectors that know their rules. The column without them counts findings of the detectors \
              of all games, proofs and failures."
                 .to_owned(),
-            "Findings are minimised. Counted are actions with an effect, as a share of the path up to the tick of the \
-             finding, and of the whole episode in which it was found."
+            "Findings are minimised. The table counts actions with an effect. Their shares are of the path up to the tick of \
+             the finding, and of the whole episode in which it was found."
                 .to_owned(),
             format!("Testers with learned skills: {skilled}."),
             format!(
@@ -659,7 +657,7 @@ mod numbers_tests {
 
     #[test]
     fn numbers_have_two_or_three_digits() {
-        let told = [2160.0, 12.345, 1.234, 0.1234, 0.005_526, 0.000_02, 0.0].map(short_number);
-        assert_eq!(told, ["2,160", "12.3", "1.23", "0.12", "0.0055", "under 0.001", "0"]);
+        let reported = [2160.0, 12.345, 1.234, 0.1234, 0.005_526, 0.000_02, 0.0].map(short_number);
+        assert_eq!(reported, ["2,160", "12.3", "1.23", "0.12", "0.0055", "under 0.001", "0"]);
     }
 }

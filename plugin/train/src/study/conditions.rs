@@ -23,8 +23,8 @@ impl StudyReport {
             }
         };
         format!(
-            "{}, measured on {}, each level {}. {}. Training figures are those of the last 100 episodes, or of all where there were \
-             fewer; the steps are those until their success rate first was {}.",
+            "{}. Measured on {}, each level {}. {}. Training figures are those of the last 100 episodes, or of all \
+             where there were fewer. The steps are those until their success rate first was {}.",
             self.trainings(),
             experiment.test,
             times(experiment.eval.episodes_per_level),
@@ -47,8 +47,8 @@ impl StudyReport {
             [] => "Without training".to_owned(),
             [(words, _)] => format!("Trained on {words}"),
             _ => {
-                let each = kinds.iter().map(|(words, variants)| format!("on {words} ({})", variants.join(", ")));
-                format!("Trained {}", each.collect::<Vec<_>>().join(", "))
+                let each = kinds.iter().map(|(words, variants)| format!("Trained on {words}: {}", variants.join(", ")));
+                each.collect::<Vec<_>>().join(". ")
             }
         }
     }
@@ -159,9 +159,9 @@ mod tests {
         ]);
         assert_eq!(
             different,
-            "Trained on plain:0..7 for 32,768 environment steps (full, no-kl), on plain:0..7 for 49,152 environment steps \
-             (longer), on plain:20..29 for 32,768 environment steps (elsewhere), on plain:0..7 for 32,768 environment steps \
-             with 0.05 gradient steps per step (sac)"
+            "Trained on plain:0..7 for 32,768 environment steps: full, no-kl. Trained on plain:0..7 for 49,152 \
+             environment steps: longer. Trained on plain:20..29 for 32,768 environment steps: elsewhere. Trained on \
+             plain:0..7 for 32,768 environment steps with 0.05 gradient steps per step: sac"
         );
     }
 }
