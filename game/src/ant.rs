@@ -46,16 +46,8 @@ pub use crate::ant::{
     walls::Walls,
 };
 
-// The open floor as a game for training, evaluation and replay.
-
 /// Control steps per second.
 pub const ANT_HZ: f64 = 10.0;
-
-/// Returns the names of an action's numbers, in order.
-pub fn action_names() -> Vec<String> {
-    let joints = joint_names();
-    ACTUATED.iter().map(|&joint| joints[joint].clone()).collect()
-}
 
 /// The game `ant`: an open floor, goals in all directions.
 #[derive(Clone, Copy, Debug, Default)]
@@ -110,7 +102,7 @@ impl LevelTools for Ant {
 
 impl StateTools for Ant {
     fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        world.get::<Walker>(agent).map(Walker::place)
+        world.get::<Walker>(agent).map(Walker::position)
     }
 }
 
@@ -141,6 +133,12 @@ impl InputTools for Ant {
     fn key_bindings(&self) -> Option<KeyBindings> {
         Some(key_bindings())
     }
+}
+
+/// Returns the names of an action's numbers, in order.
+pub fn action_names() -> Vec<String> {
+    let joints = joint_names();
+    ACTUATED.iter().map(|&joint| joints[joint].clone()).collect()
 }
 
 /// The tick of the ant, in `FixedUpdate`. Add what your game adds before or after it.

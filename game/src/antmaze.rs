@@ -5,6 +5,15 @@
 //! the time limit, never because the ant has fallen over. [`AntMazeWithRays`] is the same game with rays to the walls
 //! and the direction of the goal, [`AntMazeWithMap`] with a map, and [`AntMazeWithPositionalEncoding`] with positional
 //! encoding.
+//!
+//! The folder, in reading order:
+//!
+//! - [`mode`] and [`level`]: the map with its options, and a level of it; `level_text`: level files.
+//! - [`geometry`]: conversion between cells and metres.
+//! - [`arena`]: a level as entities, and the tick; [`senses`]: more observations.
+//! - [`picture`]: what sensors and people see.
+//! - [`demonstrator`]: the bot.
+//! - `against_rules`: a detector; `defects`: the defects that can be planted.
 
 mod against_rules;
 pub mod arena;
@@ -55,8 +64,6 @@ pub use crate::antmaze::{
     mode::{AntMazeMode, GoalNoise, Goals, Pay},
     senses::{AntMazeWithMap, AntMazeWithPositionalEncoding, AntMazeWithRays},
 };
-
-// AntMaze as a game for training, evaluation and replay.
 
 /// AntMaze under its name `antmaze`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -254,8 +261,6 @@ fn shown(level: &AntMazeLevel) -> Result<ShownMaze, InspectError> {
     let maze = level.maze.clone().with_any_ends(level.start, level.goal).map_err(unfit)?;
     Ok(ShownMaze { maze, json: serde_json::json!(LevelText::of(level)) })
 }
-
-// AntMaze as a Bevy plugin.
 
 /// The tick of AntMaze, in `FixedUpdate`. Add what your game adds before or after it.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]

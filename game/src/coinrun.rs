@@ -3,6 +3,18 @@
 //! The rules and the level generator reproduce Procgen's CoinRun exactly and do not depend on an engine. [`generate`]
 //! makes a [`Level`] from a mode and a seed, [`Sim`] plays it. The functions in [`rules`] are the single steps of play,
 //! for callers that keep the state elsewhere.
+//!
+//! The folder, in reading order:
+//!
+//! - [`tile`] and [`level`]: the grid, and a level on it; [`generator`]: levels from a mode and a seed.
+//! - [`rules`]: the steps of play; [`sim`]: an episode without an engine.
+//! - [`components`] and `play`: a level as entities, and the tick; [`physics`]: colliders for sensors.
+//! - [`view`], `cells` and [`paths`]: what an agent observes.
+//! - [`planner`] and `demonstrator_bot`: plans to the coin, and the bot that follows them; `proof`: proofs about
+//!   levels.
+//! - [`picture`]: what sensors and people see.
+//! - [`text`], `level_text` and `show_level`: levels as text, as files, and on the command line.
+//! - `detectors` and `defects`: the game's own detectors, and the defects that can be planted.
 
 mod cells;
 pub mod components;
@@ -59,8 +71,6 @@ pub use crate::coinrun::{
     tile::{SIZE, Tile, TileGrid},
 };
 
-// CoinRun as a game for training, evaluation and replay.
-
 /// CoinRun under its name `coinrun`.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CoinRun {
@@ -70,11 +80,6 @@ pub struct CoinRun {
 
 /// The action "right and jump", the best constant action.
 const RIGHT_JUMP: u32 = 8;
-
-/// Returns the action with these directions, each -1, 0 or 1.
-fn directed(sideways: i8, upwards: i8) -> u32 {
-    (3 * (sideways + 1) + (upwards + 1)).unsigned_abs().into()
-}
 
 static SPACE: LazyLock<Arc<ObservationSpace>> = LazyLock::new(|| Arc::new(ObservationSpace { names: view::names() }));
 
@@ -269,7 +274,10 @@ impl BenchmarkTools for CoinRun {
     }
 }
 
-// CoinRun as a Bevy plugin.
+/// Returns the action with these directions, each -1, 0 or 1.
+fn directed(sideways: i8, upwards: i8) -> u32 {
+    (3 * (sideways + 1) + (upwards + 1)).unsigned_abs().into()
+}
 
 /// Adds the rules of CoinRun. Agents are made by [`spawn_agent`].
 #[derive(Clone, Copy, Debug)]

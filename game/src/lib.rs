@@ -10,11 +10,11 @@
 
 pub mod ant;
 pub mod antmaze;
-mod arena_grid;
 pub mod coinrun;
 mod defect_variant;
 pub mod maze;
 pub mod maze2d;
+mod pictures;
 pub mod registry;
 pub mod senses;
 #[cfg(test)]

@@ -3,6 +3,15 @@
 //! A [`Maze`] is rows of wall and free [`Cell`]s with a start and a reachable goal. The size of a cell and the
 //! direction of its axes belong to the game. [`fixed`] has the maps of the literature, [`generate`] makes mazes from a
 //! [`MazeSpec`] and a seed, and [`Planner`] finds paths to a goal from everywhere.
+//!
+//! The folder, in reading order:
+//!
+//! - `walls`: walls and free cells in rows; `text`: mazes as text.
+//! - `map` and [`fixed`]: the map of a mode, and the maps of the literature.
+//! - `spec` and `generator`: size and shape of generated mazes, and mazes from a seed.
+//! - [`planner`]: best moves to a goal, distances and proofs.
+//! - [`show_level`]: a maze on the command line.
+//! - `error`: errors of mazes; `defects`: the defects that games in mazes share.
 
 pub(crate) mod defects;
 mod error;
@@ -155,8 +164,6 @@ impl Maze {
     }
 }
 
-// Cells of a maze.
-
 /// A cell of a maze, counted from 0 at the first character of the first row. Written `(row, column)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(from = "[usize; 2]", into = "[usize; 2]")]
@@ -197,8 +204,6 @@ impl fmt::Display for Cell {
         write!(f, "({}, {})", self.row, self.col)
     }
 }
-
-// Start and goal of a generated maze: the difficulty.
 
 /// Starts that are tried for a wanted difficulty.
 const STARTS: usize = 32;

@@ -5,6 +5,15 @@
 //! [`Maze2dMode`] names the map and the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is made from it and
 //! a seed. [`Maze2dWithRays`] is the same game with rays to the walls and the direction of the goal, [`Maze2dWithMap`]
 //! with a map, and [`Maze2dWithPositionalEncoding`] with positional encoding.
+//!
+//! The folder, in reading order:
+//!
+//! - [`ball`], [`walls`] and [`sim`]: the rules; [`physics`]: rapier's contacts.
+//! - [`mode`] and [`level`]: the map with its options, and a level of it; `level_text`: level files.
+//! - [`arena`]: a level as entities, and the tick; [`senses`]: more observations.
+//! - [`picture`]: what sensors and people see.
+//! - [`demonstrator`]: the bot; `trace`: the ball under given pushes.
+//! - `against_rules`: a detector; `defects`: the defects that can be planted.
 
 mod against_rules;
 pub mod arena;
@@ -61,8 +70,6 @@ pub use crate::maze2d::{
     mode::{Contact, Maze2dMode},
     senses::{Maze2dWithMap, Maze2dWithPositionalEncoding, Maze2dWithRays},
 };
-
-// Maze2D as a game for training, evaluation and replay.
 
 /// Maze2D under its name `maze2d`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -286,8 +293,6 @@ fn shown(level: &Maze2dLevel, rules: &Maze2dMode) -> Result<ShownMaze, InspectEr
     let maze = maze.clone().with_any_ends(*start_cell, *goal_cell).map_err(unfit)?;
     Ok(ShownMaze { maze, json: serde_json::json!(LevelText::of(level, rules)) })
 }
-
-// Maze2D as a Bevy plugin.
 
 /// The tick of Maze2D, in `FixedUpdate`. Add what your game adds before or after it.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -19,8 +19,10 @@ pub trait AddedObservations: Copy + Send + Sync + 'static {
 
 /// A game's way to fill them.
 pub trait Senses<G>: AddedObservations {
-    /// Name of the game with these senses.
+    /// Name of the game with these senses, in files too.
     const NAME: &'static str;
+    /// Other names of it on the command line.
+    const ALIASES: &'static [&'static str];
 
     /// Adds systems that add them for every agent that plays and reads a vector, once the game has filled that.
     fn build(self, app: &mut App);
@@ -42,6 +44,10 @@ impl BenchmarkTools for Unmeasured {
 impl<G: Game, S: Senses<G>> Game for WithObservations<G, S> {
     fn name(&self) -> &'static str {
         S::NAME
+    }
+
+    fn aliases(&self) -> &'static [&'static str] {
+        S::ALIASES
     }
 
     fn version(&self) -> u32 {
@@ -115,20 +121,21 @@ pub fn push_map(observation: &mut Observation, is_wall: impl Fn([i32; 2]) -> boo
 /// Wavelengths, in cells of the maze, which are 1 m wide in Maze2D and 4 m in AntMaze.
 pub const LENGTHS: [f64; 4] = [8.0, 4.0, 2.0, 1.0];
 
-/// Adds sine and cosine of the position along x and y, as [positional encoding](Observation::waves) of [`LENGTHS`].
+/// Adds sine and cosine of the position along x and y, as [positional encoding](Observation::positional_encoding) of
+/// [`LENGTHS`].
 /// They carry no more information than x and y.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WithPositionalEncoding;
 
 impl AddedObservations for WithPositionalEncoding {
     fn names(self) -> Vec<String> {
-        ["x", "y"].into_iter().flat_map(|axis| ObservationSpace::wave_names(axis, LENGTHS)).collect()
+        ["x", "y"].into_iter().flat_map(|axis| ObservationSpace::positional_encoding_names(axis, LENGTHS)).collect()
     }
 }
 
-/// Adds the positional encoding to an observation, in the order of the names. `place` is in cells, along x and y.
-pub fn push_waves(observation: &mut Observation, place: [f64; 2]) {
-    observation.vector.extend(place.into_iter().flat_map(|along| Observation::waves(along, LENGTHS)));
+/// Adds the positional encoding to an observation, in the order of the names. `position` is in cells, along x and y.
+pub fn push_positional_encoding(observation: &mut Observation, position: [f64; 2]) {
+    observation.vector.extend(position.into_iter().flat_map(|along| Observation::positional_encoding(along, LENGTHS)));
 }
 
 // Direction of the goal, and distances of the walls around, as observations.
@@ -140,14 +147,14 @@ pub struct WithRays;
 impl AddedObservations for WithRays {
     fn names(self) -> Vec<String> {
         let goal = ["goal x", "goal y"].map(str::to_owned);
-        let walls = WAYS.map(|(way, _)| format!("wall {way}"));
+        let walls = DIRECTIONS.map(|(direction, _)| format!("wall {direction}"));
         goal.into_iter().chain(walls).collect()
     }
 }
 
 /// The eight directions of rays, with the components of a step of 1 m to the east and to the north: east, then on by
 /// eighths of a turn to the left. North is up in the game's own picture.
-pub const WAYS: [(&str, [f64; 2]); 8] = {
+pub const DIRECTIONS: [(&str, [f64; 2]); 8] = {
     const DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
     [
         ("east", [1.0, 0.0]),
@@ -162,23 +169,25 @@ pub const WAYS: [(&str, [f64; 2]); 8] = {
 };
 
 /// Adds the goal and the rays to an observation, in the order of the names. First comes the offset of the goal along x
-/// and y, then the distance of the nearest wall along each of [`WAYS`], all in metres. `wall` is called with each
+/// and y, then the distance of the nearest wall along each of [`DIRECTIONS`], all in metres. `wall` is called with each
 /// direction, east and north.
 pub fn push_rays(observation: &mut Observation, to_goal: [f32; 2], wall: impl Fn([f64; 2]) -> f32) {
     observation.vector.extend(to_goal);
-    observation.vector.extend(WAYS.map(|(_, way)| wall(way)));
+    observation.vector.extend(DIRECTIONS.map(|(_, direction)| wall(direction)));
 }
 
 #[cfg(test)]
-mod with_senses_tests {
+mod tests {
+    use playbot_harness::game::Game;
+
+    use super::*;
     use crate::{
         antmaze::{AntMazeWithMap, AntMazeWithPositionalEncoding, AntMazeWithRays},
         maze2d::{Maze2d, Maze2dWithMap, Maze2dWithPositionalEncoding, Maze2dWithRays},
     };
-    use playbot_harness::game::Game;
 
     #[test]
-    fn names_are_told_apart_and_go_on_from_those_of_the_game_that_tells_less() {
+    fn names_are_distinguished_and_go_on_from_those_of_the_game_without_them() {
         let games: [(&dyn Game, [&str; 3], usize); 6] = [
             (&AntMazeWithRays::default(), ["ankle 4 velocity", "goal x", "wall east"], 39),
             (&Maze2dWithRays::default(), ["vy", "goal x", "wall east"], 14),
@@ -211,11 +220,6 @@ mod with_senses_tests {
         assert!(inner.benchmarks.benchmarks().is_some_and(|all| !all.is_empty()));
         assert!(outer.benchmarks.benchmarks().is_some_and(|all| all.is_empty()));
     }
-}
-
-#[cfg(test)]
-mod mapped_tests {
-    use super::*;
 
     #[test]
     fn a_map_is_read_from_the_north_west_on() {
@@ -225,15 +229,10 @@ mod mapped_tests {
         assert_eq!((observation.vector.len(), walls.as_slice()), (121, &[0, 61][..]));
         assert_eq!((&*WithMap.names()[10], &*WithMap.names()[71]), ("cell -5 east +5 north", "cell +1 east +0 north"));
     }
-}
-
-#[cfg(test)]
-mod sighted_tests {
-    use super::*;
 
     #[test]
     fn ways_go_round_by_eighths_of_a_turn() {
-        for (index, (name, [east, north])) in WAYS.into_iter().enumerate() {
+        for (index, (name, [east, north])) in DIRECTIONS.into_iter().enumerate() {
             let angle = std::f64::consts::FRAC_PI_4 * index as f64;
             assert!((east - libm::cos(angle)).abs() < 1e-12 && (north - libm::sin(angle)).abs() < 1e-12, "{name}");
         }

@@ -54,7 +54,7 @@ pub(crate) fn first_finding(
             observation: &[],
             state_hash: 0,
             reward: world.get::<Reward>(agent)?.get(),
-            place: game.tools().state.position(world, agent),
+            position: game.tools().state.position(world, agent),
             is_success: false,
             proofs: &NoProofs,
         };

@@ -35,9 +35,12 @@ fn the_program_learns_from_pixels_and_knows_its_eyes_again() {
     done(folder, &["policy", "export", "--run", "run", "--out", "eyes.policy"]);
     let shown = done(folder, &["policy", "show", "eyes.policy"]).0;
     assert!(shown.contains("observation   16×16 colour pictures of the raster, 2 in a stack"), "{shown}");
-    let card: Value =
+    let shown: Value =
         serde_json::from_str(&done(folder, &["policy", "show", "eyes.policy", "--json"]).0).expect("JSON");
-    assert_eq!((&card["card"]["picture"]["sensor"], &card["card"]["picture"]["stack"]), (&"raster".into(), &2.into()));
+    assert_eq!(
+        (&shown["card"]["picture"]["sensor"], &shown["card"]["picture"]["stack"]),
+        (&"raster".into(), &2.into())
+    );
 
     // An experiment of vectors gives the levels here; the observation is the policy's own.
     std::fs::write(folder.join("vectors.ron"), EXPERIMENT.replace("Raster", "Vector")).expect("writable");

@@ -62,7 +62,7 @@ fn a_policy_file_plays_in_a_game() {
     for device in DeviceKind::CPU {
         let file = PolicyFile::load(&path, device).expect("sound");
         let game = CoinRun::default();
-        assert_eq!(check_policy(&game.card(), &file), Ok(()));
+        assert_eq!(check_policy(&game.metadata(), &file), Ok(()));
         let (mut world, agents) = build_world(&game, "hard", 1, 0, 1);
         install_policy(&mut world, &file, ActionDraw::Sample);
         world.entity_mut(agents[0]).insert((Control::Policy, LevelQueue::Always(0)));
@@ -134,19 +134,19 @@ fn torn_and_foreign_files_are_explained() {
 fn a_policy_of_another_game_names_the_difference() {
     let game = CoinRun::default();
     let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, provenance());
-    file.card.observations[7] = "heat".to_owned();
-    let error = check_policy(&game.card(), &file).expect_err("another observation");
+    file.metadata.observations[7] = "heat".to_owned();
+    let error = check_policy(&game.metadata(), &file).expect_err("another observation");
     assert!(matches!(&error, PolicyMisfit::Observation { at: 7, expected, .. } if expected == "heat"), "{error}");
-    file.card.observations.pop();
-    assert!(matches!(check_policy(&game.card(), &file), Err(PolicyMisfit::Card { reads: 563, named: 562 })));
+    file.metadata.observations.pop();
+    assert!(matches!(check_policy(&game.metadata(), &file), Err(PolicyMisfit::Metadata { reads: 563, named: 562 })));
     let mut file = policy_file(&game, &ObservationConfig::default(), learner(563).policy(), None, provenance());
-    file.card.actions.swap(1, 7);
-    let error = check_policy(&game.card(), &file).expect_err("other actions");
+    file.metadata.actions.swap(1, 7);
+    let error = check_policy(&game.metadata(), &file).expect_err("other actions");
     assert!(matches!(&error, PolicyMisfit::ActionName { at: 1, expected, .. } if expected == "right"), "{error}");
-    file.card.game_version = 9;
-    assert!(matches!(check_policy(&game.card(), &file), Err(PolicyMisfit::Version { made_for: 9, now: 1, .. })));
-    file.card.game = "chess".to_owned();
-    assert!(matches!(check_policy(&game.card(), &file), Err(PolicyMisfit::Game { .. })));
+    file.metadata.game_version = 9;
+    assert!(matches!(check_policy(&game.metadata(), &file), Err(PolicyMisfit::Version { made_for: 9, now: 1, .. })));
+    file.metadata.game = "chess".to_owned();
+    assert!(matches!(check_policy(&game.metadata(), &file), Err(PolicyMisfit::Game { .. })));
 }
 
 #[test]
@@ -170,9 +170,9 @@ fn the_program_exports_shows_and_measures() {
     let there = refused(&["train", "coinrun", "--run", "run"]);
     assert!(there.contains("run exists already"), "{there}");
     let (shown, _) = done(&["policy", "show", "bot.policy", "--json"]);
-    let card: Value = serde_json::from_str(&shown).expect("JSON");
-    assert_eq!(card["card"]["actions"][8], "right+jump");
-    assert_eq!(card["card"]["training"], "512 of 512 steps on hard:0..3, seed 1");
+    let described: Value = serde_json::from_str(&shown).expect("JSON");
+    assert_eq!(described["card"]["actions"][8], "right+jump");
+    assert_eq!(described["card"]["training"], "512 of 512 steps on hard:0..3, seed 1");
     let measure = |args: &[&str]| {
         let (row, _) = done(&[&["eval", "--levels", "hard:64..67", "--json", "--seed", "1"], args].concat());
         let row: Value = serde_json::from_str(&row).expect("JSON");
@@ -185,9 +185,9 @@ fn the_program_exports_shows_and_measures() {
     done(&["record", "maze2d", "--levels", "medium+fixed-start+end-at-goal:9..10", "--out", "maze.demo"]);
     done(&["learn-skills", "--experiment", "maze.ron", "--out", "sk.safetensors"]);
     done(&["train", "--algorithm", "ppo", "--experiment", "maze.ron", "--run", "maze"]);
-    let (_, told) = done(&["policy", "export", "--run", "maze", "--out", "maze.policy"]);
+    let (_, reported) = done(&["policy", "export", "--run", "maze", "--out", "maze.policy"]);
     // The command in the advice, as it would be copied.
-    let advice = told.split('`').nth(1).expect("a command");
+    let advice = reported.split('`').nth(1).expect("a command");
     assert_eq!(advice, "playbot eval --policy maze.policy --levels medium:4..5");
     let words: Vec<&str> = advice.split(' ').skip(1).chain(["--episodes-per-level", "1", "--json"]).collect();
     let (measured, _) = done(&words);
@@ -203,8 +203,8 @@ fn the_program_exports_shows_and_measures() {
     }
     let clone = ["--skills", "sk.safetensors", "--experiment", "maze.ron", "--out", "clone.policy"];
     done(&[&["policy", "export"], &clone[..]].concat());
-    let usual = refused(&["eval", "--policy", "clone.policy", "--episodes-per-level", "1", "--set", "game=coinrun"]);
-    assert!(usual.contains("for the game `maze2d`"), "{usual}");
+    let message = refused(&["eval", "--policy", "clone.policy", "--episodes-per-level", "1", "--set", "game=coinrun"]);
+    assert!(message.contains("for the game `maze2d`"), "{message}");
 
     assert_eq!(
         measure(&["--policy", "bot.policy", "--experiment", "small.ron"]),

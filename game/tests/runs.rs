@@ -71,8 +71,9 @@ fn a_run_goes_on_where_there_is_no_such_device_any_more() {
     fs::write(folder.join("a.ron"), settings).expect("writable");
     let begin = ["train", "--algorithm", "ppo", "--experiment", "a.ron", "--run", "runs/a", "--device", "ndarray"];
     ended(folder, &begin, 0);
-    let (_, told) = ended(folder, &["train", "--run", "runs/a", "--resume", "--steps", "512", "--device", "flex"], 0);
-    assert!(told.contains("begun on ndarray and goes on on flex"), "{told}");
+    let (_, reported) =
+        ended(folder, &["train", "--run", "runs/a", "--resume", "--steps", "512", "--device", "flex"], 0);
+    assert!(reported.contains("begun on ndarray and goes on on flex"), "{reported}");
     let rows = json_lines(&ended(folder, &["runs", "ls", "--json"], 0).0);
     assert!(rows.iter().any(|row| row["path"] == "runs/a" && row["steps"] == 512), "{rows:?}");
 }
@@ -125,7 +126,7 @@ fn a_run_stands_where_it_goes_on_and_is_in_training_while_somebody_has_its_lock(
     assert!(shown.contains("512 of 1,024 steps (those after it, up to 640, are not saved), not finished"), "{shown}");
 
     let lock = fs::File::open(folder.join("runs/b/run.lock")).expect("there");
-    lock.lock().expect("nobody has it");
+    lock.lock().expect("the lock is free");
     let (table, _) = ended(folder, &["runs", "ls", "runs/b"], 0);
     assert!(table.contains(" 640 ") && table.contains("training") && !table.contains("resumed"), "{table}");
     let (shown, _) = ended(folder, &["runs", "show", "runs/b"], 0);
@@ -268,14 +269,14 @@ fn what_a_run_has_lost_and_what_is_left_of_another_is_said() {
     let rows = json_lines(&ended(folder, &["runs", "ls", "--json"], 0).0);
     assert_eq!((rows.len(), &rows[3]["left_of"]), (4, &serde_json::json!("runs/b")));
 
-    let (_, told) = ended(folder, &["train", "--run", "runs/b", "--resume"], 0);
+    let (_, reported) = ended(folder, &["train", "--run", "runs/b", "--resume"], 0);
     for words in [
         "runs/b/metrics.jsonl: nothing is left of 2 updates, those of the steps 384 to 512",
         "runs/b/timing.jsonl: nothing is left of 4 updates, those of the steps 128 to 512",
         "runs/b/run.json.tmp7 is unfinished",
         "runs/b.replaced-7 holds the replaced files of runs/b, and is removed",
     ] {
-        assert!(told.contains(words), "{words}: {told}");
+        assert!(reported.contains(words), "{words}: {reported}");
     }
     assert!(!path("b/run.json.tmp7").exists() && !path("b.replaced-7").exists());
     let (listed, _) = ended(folder, &["runs", "ls"], 0);

@@ -117,7 +117,7 @@ fn a_killed_study_goes_on_to_the_same_files_and_repeats_nothing() {
     refused(&study(folder, "killed", &[]), "--resume");
     // Another process trains in one of its folders.
     let lock = fs::File::open(folder.join("killed/no-kl-seed1/run.lock")).expect("there");
-    lock.lock().expect("nobody has it");
+    lock.lock().expect("the lock is free");
     refused(&study(folder, "killed", &["--resume"]), "no-kl-seed1 is in use by another process");
     drop(lock);
     ok(study(folder, "killed", &["--resume"]));

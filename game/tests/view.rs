@@ -194,8 +194,12 @@ fn recordings_and_policies_can_be_watched() {
     assert!(film.size.1 > plain.size.1, "bars of the skill stand under the words");
     let bars = |frame: &Vec<[u8; 3]>| frame[plain.size.1 * film.size.0..].to_vec();
     let skills = film.frames.windows(2).filter(|pair| bars(&pair[0]) != bars(&pair[1])).count();
-    let horizon = 8;
-    assert_eq!(skills, (said["ticks"].as_u64().expect("a count") as usize - 1) / horizon, "a new skill every 8 ticks");
+    let skill_interval = 8;
+    assert_eq!(
+        skills,
+        (said["ticks"].as_u64().expect("a count") as usize - 1) / skill_interval,
+        "a new skill every 8 ticks"
+    );
 }
 
 #[test]

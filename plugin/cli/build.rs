@@ -7,7 +7,7 @@ const PACKED: &str = ".cargo_vcs_info.json";
 /// What changes with the revision of a clone.
 const CLONED: [&str; 2] = ["../../.git/HEAD", "../../.git/refs/heads"];
 
-#[allow(clippy::print_stdout, reason = "this is how cargo is told")]
+#[allow(clippy::print_stdout, reason = "cargo reads it")]
 fn main() {
     // A file that is missing would have this crate built again and again.
     for path in ["build.rs", PACKED].iter().chain(&CLONED).filter(|path| Path::new(path).exists()) {

@@ -61,7 +61,7 @@ fn main() -> AppExit {
 /// The file is damaged, or was made for other rules.
 pub fn add_shipped_policy(app: &mut App) -> Result<(), Box<dyn std::error::Error>> {
     let file = PolicyFile::from_bytes("lander.policy".as_ref(), SHIPPED, DeviceKind::default())?;
-    let card = GameMetadata {
+    let metadata = GameMetadata {
         name: "lander",
         version: 1,
         observations: OBSERVATION.map(String::from).into(),
@@ -69,7 +69,7 @@ pub fn add_shipped_policy(app: &mut App) -> Result<(), Box<dyn std::error::Error
         action_names: Vec::new(),
         has_picture: false,
     };
-    check_policy(&card, &file)?;
+    check_policy(&metadata, &file)?;
     install_policy(app.world_mut(), &file, ActionDraw::Sample);
     app.add_systems(Update, hand_over);
     Ok(())

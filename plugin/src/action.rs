@@ -29,7 +29,7 @@ use crate::{
 };
 use bevy::prelude::*;
 
-pub use playbot_learner::{Action as ActionValue, ActionSpace};
+pub use playbot_learner::{ActionSpace, ActionValue};
 
 /// The action of this tick. The holder of the [`Control`] writes it in
 /// [`PlaybotSystems::Decide`](crate::systems::PlaybotSystems::Decide); the game reads it in

@@ -25,7 +25,7 @@ use crate::{
     streams::AgentStreams,
 };
 use bevy::prelude::*;
-use playbot_learner::{Action as ActionValue, ActionSpace, rng::normal};
+use playbot_learner::{ActionSpace, ActionValue, rng::normal};
 use rand::RngExt;
 
 /// A scripted bot without sensors. Acts while the agent's control is [`Control::Bot`].

@@ -19,6 +19,14 @@
 //! Frames carry the number of the pass in which they were extracted through the render world. A frame with another
 //! number is reported in [`Faults`](crate::fault::Faults), with its agent and tick, and is not used.
 //!
+//! The files of the folder, in reading order:
+//!
+//! - `readback`: one pass of all sensors, from the requests to the frames.
+//! - `request`: the requests of agents for pictures.
+//! - `sensor_view`: views of agents, and their drawing with one camera.
+//! - `renderer`: Bevy's renderer, run by hand.
+//! - `tiles`: the drawing of tile layers.
+//!
 //! ```no_run
 //! use bevy::prelude::*;
 //! use bevy_playbot::{camera::{CameraSensor, CameraSensorPlugin}, prelude::*, vision::ImageOptions};
@@ -64,6 +72,55 @@ pub(crate) use crate::camera::renderer::{RenderListPlugin, creation as drawing, 
 pub use crate::camera::tiles::TileLayerPlugin;
 pub use crate::camera::{sensor_view::SensorCamera, tiles::TileBorder};
 
+/// Fills an agent's [`Frame`](crate::vision::Frame) with the picture of Bevy's renderer.
+///
+/// A sensor that follows a target sees the 2D scene on render layer 0, in front of the World's `ClearColor`: sprites,
+/// tile layers, 2D meshes. Colours come back as the bytes of the images they are from.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component)]
+#[require(ImageSensor)]
+pub struct CameraSensor {
+    /// The viewpoint.
+    pub source: CameraSource,
+}
+
+impl CameraSensor {
+    /// Returns the components of an agent that sees `width` units of the world around `target`.
+    pub fn following(target: Entity, width: f32, image: ImageOptions) -> (Self, ImageSensor) {
+        (Self { source: CameraSource::Following { target, width } }, ImageSensor(image))
+    }
+
+    /// Returns the components of an agent that sees through the game's own camera: see [`CameraSource::OfGame`].
+    pub fn of_game(image: ImageOptions) -> (Self, ImageSensor) {
+        (Self { source: CameraSource::OfGame }, ImageSensor(image))
+    }
+
+    /// Returns the components of an agent that sees through a camera of the game, 2D or 3D, scaled to the picture's
+    /// size.
+    ///
+    /// Several agents may look through one camera if their pictures have the same size. If the camera's own target
+    /// does not exist, such as the window of an app without one, it draws as for a window of the picture's size.
+    pub fn of(camera: Entity, image: ImageOptions) -> (Self, ImageSensor) {
+        (Self { source: CameraSource::Camera(camera) }, ImageSensor(image))
+    }
+}
+
+/// The viewpoint of a [`CameraSensor`].
+#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
+pub enum CameraSource {
+    /// Straight down on the 2D scene around an entity.
+    Following {
+        /// The entity in the middle of the picture. It needs a `Transform`.
+        target: Entity,
+        /// World units from the left to the right edge of the picture.
+        width: f32,
+    },
+    /// Through a camera of the game.
+    Camera(Entity),
+    /// Through the game's own camera, whichever entity it is now: of several active ones, the one that draws first.
+    OfGame,
+}
+
 /// Adds [`CameraSensor`]s to a game.
 ///
 /// In an app without a renderer, [`headless`](Self::headless) adds Bevy's. In a game with a window, add the plugin
@@ -73,11 +130,6 @@ pub use crate::camera::{sensor_view::SensorCamera, tiles::TileBorder};
 pub struct CameraSensorPlugin {
     headless: bool,
 }
-
-/// Marks an app with its own renderer, which draws windows.
-#[derive(Resource, Reflect)]
-#[reflect(Resource)]
-struct ShowsWindows;
 
 impl CameraSensorPlugin {
     /// Creates the plugin for an app without a window. It adds the parts of the renderer that the app lacks.
@@ -133,7 +185,10 @@ impl Plugin for CameraSensorPlugin {
     }
 }
 
-// Errors of camera sensors.
+/// Marks an app with its own renderer, which draws windows.
+#[derive(Resource, Reflect)]
+#[reflect(Resource)]
+struct ShowsWindows;
 
 /// The reason why an agent got no picture in a tick. Reported in [`Faults`](crate::fault::Faults) with the agent and
 /// the tick.
@@ -224,55 +279,4 @@ struct NoImage {
 
 fn called(name: &Option<Name>) -> String {
     name.as_ref().map_or_else(String::new, |name| format!(" (named `{name}`)"))
-}
-
-// The sensor that is a Bevy camera.
-
-/// The viewpoint of a [`CameraSensor`].
-#[derive(Clone, Copy, Debug, PartialEq, Reflect)]
-pub enum CameraSource {
-    /// Straight down on the 2D scene around an entity.
-    Following {
-        /// The entity in the middle of the picture. It needs a `Transform`.
-        target: Entity,
-        /// World units from the left to the right edge of the picture.
-        width: f32,
-    },
-    /// Through a camera of the game.
-    Camera(Entity),
-    /// Through the game's own camera, whichever entity it is now: of several active ones, the one that draws first.
-    OfGame,
-}
-
-/// Fills an agent's [`Frame`](crate::vision::Frame) with the picture of Bevy's renderer.
-///
-/// A sensor that follows a target sees the 2D scene on render layer 0, in front of the World's `ClearColor`: sprites,
-/// tile layers, 2D meshes. Colours come back as the bytes of the images they are from.
-#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
-#[reflect(Component)]
-#[require(ImageSensor)]
-pub struct CameraSensor {
-    /// The viewpoint.
-    pub source: CameraSource,
-}
-
-impl CameraSensor {
-    /// Returns the components of an agent that sees `width` units of the world around `target`.
-    pub fn following(target: Entity, width: f32, image: ImageOptions) -> (Self, ImageSensor) {
-        (Self { source: CameraSource::Following { target, width } }, ImageSensor(image))
-    }
-
-    /// Returns the components of an agent that sees through the game's own camera: see [`CameraSource::OfGame`].
-    pub fn of_game(image: ImageOptions) -> (Self, ImageSensor) {
-        (Self { source: CameraSource::OfGame }, ImageSensor(image))
-    }
-
-    /// Returns the components of an agent that sees through a camera of the game, 2D or 3D, scaled to the picture's
-    /// size.
-    ///
-    /// Several agents may look through one camera if their pictures have the same size. If the camera's own target
-    /// does not exist, such as the window of an app without one, it draws as for a window of the picture's size.
-    pub fn of(camera: Entity, image: ImageOptions) -> (Self, ImageSensor) {
-        (Self { source: CameraSource::Camera(camera) }, ImageSensor(image))
-    }
 }

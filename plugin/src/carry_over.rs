@@ -1,6 +1,7 @@
 //! Resources and components that are carried over into a rebuilt World. Each type states it at its definition.
 //!
-//! `#[reflect(Component, CarryComponent)]` is for components of agents, `#[reflect(Resource, CarryResource)]` for resources.
+//! `#[reflect(Component, CarryComponent)]` is for components of agents, `#[reflect(Resource, CarryResource)]` for
+//! resources.
 
 use bevy::{
     prelude::*,

@@ -1,8 +1,9 @@
-//! The parts for programs that train and test bots: Worlds that are driven tick by tick, on many threads, over many episodes.
+//! The parts for programs that train and test bots: Worlds that are driven tick by tick, on many threads, over many
+//! episodes.
 //!
-//! A game that ships a bot needs none of them. [`playbot_harness`](https://docs.rs/playbot_harness) builds its Worlds with
-//! them; a harness of your own can do the same. They are stable within a version of the plugin, and change with less
-//! notice than the rest.
+//! A game that ships a bot needs none of them. [`playbot_harness`](https://docs.rs/playbot_harness) builds its Worlds
+//! with them; a harness of your own can do the same. They are stable within a version of the plugin, and change with
+//! less notice than the rest.
 //!
 //! | to | use |
 //! |---|---|
@@ -13,7 +14,7 @@
 //! | decide for many agents at once | [`PolicyBatch`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
 //! | keep systems in one order | [`put_in_order`], [`leave_open`], [`FaultSystems`], [`run_observe_schedule`] |
 //! | check what agents see and do | [`check_actions`], [`check_observations`], [`misfit`], [`has_no_actions`], [`AgentLimit`] |
-//! | compare two pictures of a state | [`Difference`], [`CLOSE`], [`BlankEpisodes`] |
+//! | compare two pictures of a state | [`PictureDifference`], [`CLOSE`], [`BlankEpisodes`] |
 //! | record and replay | [`record_ticks`], [`flush_unfinished`], [`demo_actions`], [`recorded_action`] |
 //! | read, join and repair recordings | [`find_demos`], [`merge_demos`], [`repair()`] |
 //! | read what a policy file sees | [`policy_observation`] |
@@ -58,5 +59,5 @@ pub use crate::{
     system_errors,
     systems::{leave_open, put_in_order, run_observe_schedule},
     virtual_input::PressesForPeople,
-    vision::{BlankEpisodes, CLOSE, Difference},
+    vision::{BlankEpisodes, CLOSE, PictureDifference},
 };

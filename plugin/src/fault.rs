@@ -1,7 +1,7 @@
 //! Faults: breaches of contract by the game, reported instead of a panic.
 //!
-//! Under [`tick`](crate::headless::PlaybotAppExt::tick) the first fault of a tick is returned as an error. In an app that
-//! runs by itself each fault is logged as an error and triggers a [`FaultOccurred`] in the same frame.
+//! Under [`tick`](crate::headless::PlaybotAppExt::tick) the first fault of a tick is returned as an error. In an app
+//! that runs by itself each fault is logged as an error and triggers a [`FaultOccurred`] in the same frame.
 
 use crate::carry_over::ReflectCarryResource;
 use bevy::prelude::*;
@@ -169,7 +169,7 @@ mod tests {
         report(&mut world, false, "agent 0: something is wrong");
         assert_eq!(log.lines(), ["agent 0: something is wrong"]);
         assert_eq!(world.resource::<Heard>().0, log.lines());
-        report(&mut world, true, "agent 0: somebody else is told");
+        report(&mut world, true, "agent 0: another agent is reported");
         assert_eq!(log.lines().len(), 1, "whoever ticks the World gets this one");
     }
 }

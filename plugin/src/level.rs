@@ -115,13 +115,10 @@ impl Clone for Box<dyn LevelSource> {
     }
 }
 
-// Level files: the files that stand for the level numbers of a World.
-//
-// A level number identifies a level only until a file is added, renamed or edited. Recordings
-// therefore keep the path of the file and a hash of the level in it. A replay checks here that it
-// gets the same level.
-
 /// The file of a level: its path, and a hash of the level in it.
+///
+/// A level number identifies a level only until a file is added, renamed or edited. Recordings therefore keep the
+/// path of the file and a hash of the level in it. A replay checks that it gets the same level.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, Reflect)]
 pub struct LevelFile {
     /// Path of the file, as it was found.
@@ -181,7 +178,7 @@ impl LevelFiles {
 }
 
 #[cfg(test)]
-mod level_files_tests {
+mod tests {
     use super::*;
 
     fn file(path: &str, hash: u64) -> LevelFile {
@@ -198,7 +195,7 @@ mod level_files_tests {
     }
 
     #[test]
-    fn another_level_of_the_same_name_is_told_with_both_hashes() {
+    fn another_level_of_the_same_name_is_reported_with_both_hashes() {
         let files = LevelFiles::new(vec![file("a.json", 0x1f)]);
         assert_eq!(files.difference(0, &file("a.json", 0x1f)), None);
         assert_eq!(files.difference(0, &file("renamed.json", 0x1f)), None);

@@ -183,12 +183,12 @@ fn report(world: &mut World, words: &str) -> String {
 /// Returns a trace with lists of equal length: the tick that panicked has no outcome yet. A trace
 /// without any tick gets its first.
 fn whole(trace: Option<DemoEpisode>, agent: &Agent, episode: &Episode) -> DemoEpisode {
-    use playbot_learner::{Action as Value, ActionSpace};
+    use playbot_learner::{ActionSpace, ActionValue};
     let mut trace = trace.unwrap_or_else(|| DemoEpisode::new(episode.level, demo_actions(&agent.actions)));
     if trace.deciders.is_empty() {
         let nothing = match agent.actions {
-            ActionSpace::Discrete(_) => Value::Discrete(0),
-            ActionSpace::Continuous(n) => Value::Continuous(vec![0.0; n]),
+            ActionSpace::Discrete(_) => ActionValue::Discrete(0),
+            ActionSpace::Continuous(n) => ActionValue::Continuous(vec![0.0; n]),
         };
         push_action(&mut trace.actions, &nothing);
         trace.deciders.push(decider(Control::Idle));

@@ -134,8 +134,6 @@ fn add_outcome_systems(app: &mut App, schedule: impl ScheduleLabel) {
     );
 }
 
-// All plugins of a game that ships with agents.
-
 /// The plugins that a game with agents needs at run time:
 ///
 /// | plugin | what it brings |

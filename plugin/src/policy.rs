@@ -105,7 +105,7 @@ pub(crate) fn run_policy(
     mut faults: ResMut<Faults>,
     mut batch: ResMut<PolicyBatch>,
 ) {
-    let horizon = prior.map(|prior| prior.horizon);
+    let skill_interval = prior.map(|prior| prior.skill_interval);
     batch.start(&active.policy.observation());
     for &entity in order.entities() {
         let Ok((agent, control, episode, (observation, sensor), skill, ..)) = agents.get(entity) else { continue };
@@ -116,7 +116,7 @@ pub(crate) fn run_policy(
             faults.report(why);
             return;
         }
-        batch.push(entity, observation, skill, horizon);
+        batch.push(entity, observation, skill, skill_interval);
     }
     if batch.agents().is_empty() {
         return;

@@ -48,12 +48,18 @@ impl PolicyBatch {
         self.agents.clear();
     }
 
-    /// Adds an agent with its observation and its skill, which is drawn anew every `horizon` ticks.
-    pub(crate) fn push(&mut self, agent: Entity, observation: &Observation, skill: &ActiveSkill, horizon: Option<u32>) {
+    /// Adds an agent with its observation and its skill, which is drawn anew every `skill_interval` ticks.
+    pub(crate) fn push(
+        &mut self,
+        agent: Entity,
+        observation: &Observation,
+        skill: &ActiveSkill,
+        skill_interval: Option<u32>,
+    ) {
         self.agents.push(agent);
         observation.push_to(&mut self.rows.observations);
         self.rows.skills.extend_from_slice(&skill.z);
-        self.rows.left.extend(horizon.map(|horizon| skill.left(horizon)));
+        self.rows.left.extend(skill_interval.map(|skill_interval| skill.left(skill_interval)));
         self.rows.count += 1;
     }
 
@@ -65,8 +71,6 @@ impl PolicyBatch {
         }
     }
 }
-
-// Rows of states for which a policy decides in one pass.
 
 /// The states for which a policy decides in one pass.
 #[derive(Clone, Debug)]
@@ -106,15 +110,15 @@ impl PolicyRows {
     }
 }
 
-// Shared forward passes: one pass for the agents of several Worlds.
-//
-// A pass over a few rows takes a GPU as long as one over thousands. Worlds of a single agent spend more time on the
-// pass than on computing. So each World gets a thread and a seat. It submits its rows and waits; the last World of a
-// group computes for the whole group. There are two groups: one simulates while the other is decided for.
-//
-// The result of a row does not depend on the other rows, so the games run as they do alone.
+// Shared forward passes.
 
 /// A World's seat among those that share passes.
+///
+/// A pass over a few rows takes a GPU as long as one over thousands. Worlds of a single agent spend more time on the
+/// pass than on computing. So each World gets a thread and a seat. It submits its rows and waits; the last World of a
+/// group computes for the whole group. There are two groups: one simulates while the other is decided for.
+///
+/// The result of a row does not depend on the other rows, so the games run as they do alone.
 #[derive(Resource, Clone, Debug, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone, Debug)]
@@ -125,33 +129,6 @@ pub struct SharedBatch {
 
 /// Number of groups: seats of even number make one, those of odd number the other.
 const GROUPS: usize = 2;
-
-#[derive(Debug)]
-struct Table {
-    policy: Policy,
-    groups: [Mutex<Group>; GROUPS],
-    /// Number of further Worlds that may simulate. More would compete for the cores.
-    free: Mutex<usize>,
-    freed: Condvar,
-}
-
-#[derive(Debug, Default)]
-struct Group {
-    /// Worlds that have not left.
-    worlds: usize,
-    waiting: Vec<Waiting>,
-}
-
-/// A World that has submitted its rows.
-#[derive(Debug)]
-struct Waiting {
-    seat: usize,
-    rows: PolicyRows,
-    answer: Sender<Answer>,
-}
-
-/// A World's own rows, and the policy's output for them.
-type Answer = (PolicyRows, Result<PolicyOutput, String>);
 
 impl SharedBatch {
     /// Creates seats for as many Worlds, of which at most `threads` simulate at a time. Each World
@@ -220,6 +197,15 @@ impl Drop for Playing<'_> {
     }
 }
 
+#[derive(Debug)]
+struct Table {
+    policy: Policy,
+    groups: [Mutex<Group>; GROUPS],
+    /// Number of further Worlds that may simulate. More would compete for the cores.
+    free: Mutex<usize>,
+    freed: Condvar,
+}
+
 impl Table {
     fn begin(&self) {
         let free = lock(&self.free);
@@ -232,6 +218,24 @@ impl Table {
         self.freed.notify_one();
     }
 }
+
+#[derive(Debug, Default)]
+struct Group {
+    /// Worlds that have not left.
+    worlds: usize,
+    waiting: Vec<Waiting>,
+}
+
+/// A World that has submitted its rows.
+#[derive(Debug)]
+struct Waiting {
+    seat: usize,
+    rows: PolicyRows,
+    answer: Sender<Answer>,
+}
+
+/// A World's own rows, and the policy's output for them.
+type Answer = (PolicyRows, Result<PolicyOutput, String>);
 
 /// Locks a mutex. A World that panicked leaves the locked data as it was.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {

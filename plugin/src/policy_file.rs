@@ -10,10 +10,10 @@
 //! # let spec = PolicySpec { obs: 1.into(), latent: 0, action_space: ActionSpace::Discrete(3) };
 //! # let policy = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex)?.policy();
 //! # let observations = vec!["x".into()];
-//! # let card = PolicyMetadata { game: "walk".into(), game_version: 1, observations, ..PolicyMetadata::default() };
+//! # let metadata = PolicyMetadata { game: "walk".into(), game_version: 1, observations, ..PolicyMetadata::default() };
 //! # let folder = tempfile::tempdir()?;
 //! # let path = folder.path().join("walker.policy");
-//! # PolicyFile { card, policy, skills: None }.save(&path, &[0.5_f32], &[], 1)?;
+//! # PolicyFile { metadata, policy, skills: None }.save(&path, &[0.5_f32], &[], 1)?;
 //!
 //! let walk = GameMetadata {
 //!     name: "walk",
@@ -92,7 +92,7 @@ pub enum PolicyMisfit {
     /// The policy reads another number of values than its metadata names: it was trained with
     /// another observation.
     #[error("the policy reads {reads} observation values, but {named} are named: train it again with this observation")]
-    Card {
+    Metadata {
         /// Values that it reads.
         reads: usize,
         /// Values that are named.
@@ -167,7 +167,7 @@ fn quoted(name: &str) -> String {
 ///
 /// The file does not state it.
 pub fn policy_observation(file: &PolicyFile) -> Result<ObservationConfig, UnknownObservation> {
-    ObservationConfig::from_card(file.card.picture.as_ref(), &file.policy.observation())
+    ObservationConfig::from_metadata(file.metadata.picture.as_ref(), &file.policy.observation())
 }
 
 /// Checks that a policy was made for this game, these rules, this observation and these actions. A
@@ -178,12 +178,12 @@ pub fn policy_observation(file: &PolicyFile) -> Result<ObservationConfig, Unknow
 ///
 /// [`PolicyMisfit`] with the first difference.
 pub fn check_policy(game: &GameMetadata<'_>, file: &PolicyFile) -> Result<(), PolicyMisfit> {
-    let (card, name) = (&file.card, game.name.to_owned());
-    if card.game != name {
-        return Err(PolicyMisfit::Game { made_for: card.game.clone(), game: name });
+    let (metadata, name) = (&file.metadata, game.name.to_owned());
+    if metadata.game != name {
+        return Err(PolicyMisfit::Game { made_for: metadata.game.clone(), game: name });
     }
-    if card.game_version != game.version {
-        return Err(PolicyMisfit::Version { game: name, made_for: card.game_version, now: game.version });
+    if metadata.game_version != game.version {
+        return Err(PolicyMisfit::Version { game: name, made_for: metadata.game_version, now: game.version });
     }
     let observation_config = policy_observation(file)?;
     if !observation_config.is_image() {
@@ -194,7 +194,7 @@ pub fn check_policy(game: &GameMetadata<'_>, file: &PolicyFile) -> Result<(), Po
     if file.policy.action_space() != game.actions {
         return Err(PolicyMisfit::Actions { game: name, made_for: file.policy.action_space(), now: game.actions });
     }
-    let (theirs, ours) = (&card.actions, &game.action_names);
+    let (theirs, ours) = (&metadata.actions, &game.action_names);
     match theirs.iter().zip(ours).enumerate().find(|(_, (theirs, ours))| theirs != ours) {
         Some((at, (expected, found))) => {
             Err(PolicyMisfit::ActionName { game: name, at, expected: expected.clone(), found: found.clone() })
@@ -205,20 +205,20 @@ pub fn check_policy(game: &GameMetadata<'_>, file: &PolicyFile) -> Result<(), Po
 
 /// Compares the names of the values that the policy reads with those of the game.
 fn check_names(game: &GameMetadata<'_>, file: &PolicyFile) -> Result<(), PolicyMisfit> {
-    let (card, names) = (&file.card, &game.observations);
+    let (metadata, names) = (&file.metadata, &game.observations);
     let reads = file.policy.obs_dim();
-    if reads != card.observations.len() {
-        return Err(PolicyMisfit::Card { reads, named: card.observations.len() });
+    if reads != metadata.observations.len() {
+        return Err(PolicyMisfit::Metadata { reads, named: metadata.observations.len() });
     }
-    let longest = names.len().max(card.observations.len());
-    if let Some(at) = (0..longest).find(|&at| names.get(at) != card.observations.get(at)) {
+    let longest = names.len().max(metadata.observations.len());
+    if let Some(at) = (0..longest).find(|&at| names.get(at) != metadata.observations.get(at)) {
         let name_at = |names: &[String]| names.get(at).cloned().unwrap_or_default();
         return Err(PolicyMisfit::Observation {
             game: game.name.to_owned(),
-            made_for: card.observations.len(),
+            made_for: metadata.observations.len(),
             now: names.len(),
             at,
-            expected: name_at(&card.observations),
+            expected: name_at(&metadata.observations),
             found: name_at(names),
         });
     }

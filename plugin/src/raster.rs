@@ -4,8 +4,8 @@
 //! sampling, without multisampling and tonemapping. The background is Bevy's
 //! [`ClearColor`], or black without one. It draws:
 //!
-//! - [`Sprite`] with image or atlas, tint, flips, rectangle, `custom_size`, [`Anchor`](bevy::sprite::Anchor) and the image
-//!   modes `Auto` and `Scale`, and [`TileLayer`](crate::vision::TileLayer);
+//! - [`Sprite`] with image or atlas, tint, flips, rectangle, `custom_size`, [`Anchor`](bevy::sprite::Anchor) and the
+//!   image modes `Auto` and `Scale`, and [`TileLayer`](crate::vision::TileLayer);
 //! - with the [`Transform`] and [`Visibility`]
 //!   of entities and their parents; the [`GlobalTransform`] is not
 //!   read and need not be kept;
@@ -16,6 +16,12 @@
 //! Texels of half alpha are mixed in linear light. The centre of a pixel selects the texel that it
 //! shows. Only sums, products and quotients in a fixed order are used, so a picture has the same
 //! bytes on every machine.
+//!
+//! The files of the folder, in reading order:
+//!
+//! - `scene`: the items that are drawn on a stage, and how they are painted.
+//! - `canvas`: the pixels of a picture, colours, poses and positions.
+//! - `texture`: images as texels.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -52,38 +58,37 @@ use crate::{
 use bevy::prelude::*;
 use thiserror::Error;
 
-// The system that fills the frames of all agents.
-
-/// Converted images, and memory that is reused for every picture.
-#[derive(Default)]
-struct RasterRenderer {
-    textures: Textures,
-    viewpoints: Vec<Viewpoint>,
-    items: Vec<Item>,
-    visible: Vec<u64>,
-    columns: Vec<u32>,
-    tiles: TileBuffers,
+/// Draws the surroundings of an entity, as a [`CameraSensor`](crate::camera) would show them,
+/// without a GPU.
+#[derive(Component, Clone, Copy, Debug, Reflect)]
+#[reflect(Component)]
+#[require(ImageSensor)]
+pub struct RasterSensor {
+    /// The entity in the middle of the picture.
+    pub target: Entity,
+    /// World units from the left to the right edge of the picture.
+    pub width: f32,
 }
 
-/// An agent, and the position that its sensor looks at.
-#[derive(Debug)]
-struct Viewpoint {
-    stage: Option<Entity>,
-    row: usize,
-    agent: Entity,
-    centre: Vec2,
+impl RasterSensor {
+    /// Returns the components of an agent that sees `width` units of the world around `target`.
+    pub fn following(target: Entity, width: f32, image: ImageOptions) -> (Self, ImageSensor) {
+        (Self { target, width }, ImageSensor(image))
+    }
 }
 
-/// Agents and their frames.
-type RasterAgents<'w, 's> = Query<
-    'w,
-    's,
-    (
-        (&'static Agent, &'static Control, &'static Episode),
-        (&'static RasterSensor, &'static ImageSensor),
-        &'static mut Frame,
-    ),
->;
+/// Adds [`RasterSensor`]s to a game.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RasterPlugin;
+
+impl Plugin for RasterPlugin {
+    fn build(&self, app: &mut App) {
+        VisionPlugin::add_to(app);
+        app.init_resource::<Assets<Image>>()
+            .init_resource::<Assets<TextureAtlasLayout>>()
+            .add_systems(ObserveSchedule, fill_frames.in_set(VisionSystems::Render));
+    }
+}
 
 /// Draws the picture of each agent that is observed.
 fn fill_frames(
@@ -125,6 +130,28 @@ fn fill_frames(
             }
         }
     }
+}
+
+/// Agents and their frames.
+type RasterAgents<'w, 's> = Query<
+    'w,
+    's,
+    (
+        (&'static Agent, &'static Control, &'static Episode),
+        (&'static RasterSensor, &'static ImageSensor),
+        &'static mut Frame,
+    ),
+>;
+
+/// Converted images, and memory that is reused for every picture.
+#[derive(Default)]
+struct RasterRenderer {
+    textures: Textures,
+    viewpoints: Vec<Viewpoint>,
+    items: Vec<Item>,
+    visible: Vec<u64>,
+    columns: Vec<u32>,
+    tiles: TileBuffers,
 }
 
 impl RasterRenderer {
@@ -197,6 +224,15 @@ impl RasterRenderer {
     }
 }
 
+/// An agent, and the position that its sensor looks at.
+#[derive(Debug)]
+struct Viewpoint {
+    stage: Option<Entity>,
+    row: usize,
+    agent: Entity,
+    centre: Vec2,
+}
+
 /// Returns the stage that a sensor sees, and the position it looks at.
 fn locate(sensor: &RasterSensor, image: &ImageSensor, stages: &Stages) -> Result<(Option<Entity>, Vec2), RasterError> {
     image.0.check()?;
@@ -214,44 +250,6 @@ fn rank(z: f32) -> u32 {
     if bits >> 31 == 1 { !bits } else { bits | 1 << 31 }
 }
 
-// The plugin of `RasterSensor`s.
-
-/// Adds [`RasterSensor`]s to a game.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct RasterPlugin;
-
-impl Plugin for RasterPlugin {
-    fn build(&self, app: &mut App) {
-        VisionPlugin::add_to(app);
-        app.init_resource::<Assets<Image>>()
-            .init_resource::<Assets<TextureAtlasLayout>>()
-            .add_systems(ObserveSchedule, fill_frames.in_set(VisionSystems::Render));
-    }
-}
-
-// The sensor that draws on the CPU.
-
-/// Draws the surroundings of an entity, as a [`CameraSensor`](crate::camera) would show them,
-/// without a GPU.
-#[derive(Component, Clone, Copy, Debug, Reflect)]
-#[reflect(Component)]
-#[require(ImageSensor)]
-pub struct RasterSensor {
-    /// The entity in the middle of the picture.
-    pub target: Entity,
-    /// World units from the left to the right edge of the picture.
-    pub width: f32,
-}
-
-impl RasterSensor {
-    /// Returns the components of an agent that sees `width` units of the world around `target`.
-    pub fn following(target: Entity, width: f32, image: ImageOptions) -> (Self, ImageSensor) {
-        (Self { target, width }, ImageSensor(image))
-    }
-}
-
-// Errors of drawing.
-
 /// The reason why a picture cannot be drawn. The report names the entity.
 #[derive(Clone, Debug, PartialEq, Error)]
 enum RasterError {
@@ -265,6 +263,16 @@ enum RasterError {
     Options(#[from] crate::vision::VisionError),
     #[error("entity {0}: {1}")]
     Thing(Entity, Undrawable),
+}
+
+impl RasterError {
+    /// Returns the entity that causes the error.
+    pub fn entity(&self) -> Option<Entity> {
+        match self {
+            Self::Thing(entity, _) => Some(*entity),
+            _ => None,
+        }
+    }
 }
 
 /// The reason why an entity cannot be drawn.
@@ -294,14 +302,4 @@ enum Undrawable {
     Strip { width: u32, height: u32 },
     #[error("the tile layer asks for tile {tile}, but its tileset has {tiles}")]
     Tile { tile: u16, tiles: u32 },
-}
-
-impl RasterError {
-    /// Returns the entity that causes the error.
-    pub fn entity(&self) -> Option<Entity> {
-        match self {
-            Self::Thing(entity, _) => Some(*entity),
-            _ => None,
-        }
-    }
 }

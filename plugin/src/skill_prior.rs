@@ -7,7 +7,7 @@
 //!
 //! let mut app = headless_app();
 //! let prior = Prior::standard_normal(2, false);
-//! app.insert_resource(SkillPrior { prior, horizon: 10, draw: SkillDraw::Sample });
+//! app.insert_resource(SkillPrior { prior, skill_interval: 10, draw: SkillDraw::Sample });
 //! let agent = app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Policy)).id();
 //! let mut skill_after = |ticks| {
 //!     app.ticks(ticks).expect("no agent broke its contract");
@@ -32,7 +32,7 @@ use bevy::prelude::*;
 use playbot_learner::{ObsKind, Observations, Prior, SkillDraw, SkillSource};
 
 /// Draws a skill z from p(z | s) for each agent at the first tick of an episode and then every
-/// `horizon` fixed ticks (the paper's T). Each agent has its own count.
+/// `skill_interval` fixed ticks (the paper's T). Each agent has its own count.
 #[derive(Resource, Clone, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, CarryResource, Clone)]
@@ -40,14 +40,14 @@ pub struct SkillPrior {
     /// Distribution of skills: learned, or standard normal.
     pub prior: Prior,
     /// Ticks for which one skill is used.
-    pub horizon: u32,
+    pub skill_interval: u32,
     /// A random draw, or the mean.
     pub draw: SkillDraw,
 }
 
 impl From<&SkillSource> for SkillPrior {
     fn from(skills: &SkillSource) -> Self {
-        Self { prior: skills.prior.clone(), horizon: skills.horizon as u32, draw: skills.draw }
+        Self { prior: skills.prior.clone(), skill_interval: skills.skill_interval as u32, draw: skills.draw }
     }
 }
 
@@ -63,11 +63,11 @@ pub struct ActiveSkill {
 
 impl ActiveSkill {
     /// Returns the remaining share of the skill's ticks, this one included, if skills are used for
-    /// `horizon` ticks. A skill that has run out counts as a whole one, because the next draw
+    /// `skill_interval` ticks. A skill that has run out counts as a whole one, because the next draw
     /// replaces it.
     // Hidden: for rollouts.
-    pub fn left(&self, horizon: u32) -> f32 {
-        if self.ticks_left == 0 { 1.0 } else { self.ticks_left as f32 / horizon.max(1) as f32 }
+    pub fn left(&self, skill_interval: u32) -> f32 {
+        if self.ticks_left == 0 { 1.0 } else { self.ticks_left as f32 / skill_interval.max(1) as f32 }
     }
 }
 
@@ -124,7 +124,7 @@ pub fn draw_skills(
         let Ok((.., mut skill, _)) = agents.get_mut(entity) else { continue };
         skill.z.clear();
         skill.z.extend_from_slice(&skills[row * latent..(row + 1) * latent]);
-        skill.ticks_left = prior.horizon;
+        skill.ticks_left = prior.skill_interval;
     }
 }
 

@@ -81,8 +81,6 @@ fn describe(context: &str, param: &str, message: &str) -> String {
     }
 }
 
-// Plugins of Bevy by the resources that they add, for error messages about missing resources.
-
 /// Resources of Bevy by their short names, and the plugins that add them; `*` stands for any rest.
 /// The first match counts.
 const KNOWN: [(&str, &str); 37] = [
@@ -162,11 +160,6 @@ mod tests {
             "system `aim` cannot run: Resource does not exist; switch on Bevy's feature `debug` to see its name"
         );
     }
-}
-
-#[cfg(test)]
-mod known_plugins_tests {
-    use super::*;
 
     #[test]
     fn a_game_s_own_resource_is_not_taken_for_bevy_s() {

@@ -61,14 +61,13 @@ pub fn run_observe_schedule(world: &mut World) {
     world.run_schedule(ObserveSchedule);
 }
 
-// A fixed order for systems whose order the game leaves open.
-//
-// Bevy's order of such systems depends on the rest of the schedule. A game with ambiguous systems
-// would run differently headless and in a window, where more plugins add systems. Here such
-// systems run in the order in which they were added.
+// Fixed order for systems whose order the game leaves open.
 
 /// Gives the systems of each schedule one order: the game's constraints, and otherwise the order in
 /// which they were added. Call it before the schedules run, with single-threaded executors.
+///
+/// Bevy's order of other systems depends on the rest of the schedule. A game with ambiguous systems would run
+/// differently headless and in a window, where more plugins add systems.
 pub fn put_in_order(world: &mut World) {
     for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
         schedule.add_build_pass(InOrderOfAddition);
@@ -138,7 +137,7 @@ fn order(dependencies: &DiGraph<SystemKey>) -> Vec<SystemKey> {
 }
 
 #[cfg(test)]
-mod system_order_tests {
+mod tests {
     use bevy::ecs::schedule::SingleThreadedExecutor;
 
     use super::*;

@@ -1,7 +1,10 @@
-//! Taking over a shipped build: recording testers, letting a policy play, replaying a recording, without another program.
+//! Taking over a shipped build: recording testers, letting a policy play, replaying a recording, without another
+//! program.
 //!
 //! A game with [`PlaybotPlugins`](crate::plugin::PlaybotPlugins) reads the environment variable
 //! `PLAYBOT` when it starts:
+//!
+//! `play`, the only file of the folder, has the three takeovers, and the former players of the agents.
 //!
 //! ```text
 //! PLAYBOT=record:ada.demo ./game       record every episode of the agents that play
@@ -41,10 +44,10 @@ use playbot_learner::FileError;
 use std::{fmt, path::PathBuf, str::FromStr};
 use thiserror::Error;
 
-// The plugin that lets a person take over.
-
 /// The environment variable that holds the request.
 const VARIABLE: &str = "PLAYBOT";
+
+const WAYS: [&str; 3] = ["record", "policy", "replay"];
 
 /// Lets a person take over by the environment variable `PLAYBOT` and a key: see [the
 /// module](super).
@@ -108,15 +111,6 @@ pub struct Takeover {
     running: Running,
 }
 
-#[derive(Debug, Default)]
-enum Running {
-    #[default]
-    Nothing,
-    Recording,
-    Policy(Vec<Seat>),
-    Replay(Box<Playing>),
-}
-
 impl Takeover {
     /// Returns the request that is running, or that the key would start.
     pub fn request(&self) -> &TakeoverRequest {
@@ -138,6 +132,15 @@ impl Takeover {
     pub fn stop(&mut self) {
         self.is_wanted = false;
     }
+}
+
+#[derive(Debug, Default)]
+enum Running {
+    #[default]
+    Nothing,
+    Recording,
+    Policy(Vec<Seat>),
+    Replay(Box<Playing>),
 }
 
 fn hear_key(keys: Option<Res<ButtonInput<KeyCode>>>, mut takeover: ResMut<Takeover>) {
@@ -229,8 +232,6 @@ fn finish(world: &mut World) {
     }
 }
 
-// Requests of a takeover.
-
 /// The request of a takeover; in text `record:FILE`, `policy:FILE` or `replay:FILE`.
 #[derive(Clone, Debug, PartialEq, Eq, Reflect)]
 pub enum TakeoverRequest {
@@ -264,8 +265,6 @@ pub enum RequestError {
     },
 }
 
-const WAYS: [&str; 3] = ["record", "policy", "replay"];
-
 impl FromStr for TakeoverRequest {
     type Err = RequestError;
 
@@ -295,8 +294,6 @@ impl fmt::Display for TakeoverRequest {
         }
     }
 }
-
-// Errors of taking over.
 
 /// The reason why a takeover failed.
 #[derive(Debug, Error)]
@@ -332,8 +329,6 @@ pub enum TakeoverError {
     },
 }
 
-// The identity of the game, for recordings and policies.
-
 /// The identity of this game. Recordings carry it, and policies and recordings of another game are
 /// refused.
 ///
@@ -368,7 +363,7 @@ impl GameIdentity {
 }
 
 #[cfg(test)]
-mod request_tests {
+mod tests {
     use super::*;
 
     #[test]
@@ -379,7 +374,7 @@ mod request_tests {
     }
 
     #[test]
-    fn what_cannot_be_done_is_told_what_can() {
+    fn what_cannot_be_done_is_refused_with_what_can() {
         for (text, words) in [
             ("polic:x", "did you mean `policy`?"),
             ("x", "valid: record:FILE, policy:FILE, replay:FILE"),

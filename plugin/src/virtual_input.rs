@@ -10,11 +10,18 @@
 //!   The exception are agents with [`PressesForPeople`], for people whose own devices do not reach the game.
 //! - Everything is released at the end of an episode and at the start of the next. An episode begins with nothing
 //!   held, and replays the same alone.
-//! - A World has one keyboard and one mouse: two agents that claim the same key or motion are a fault. Every agent has a
-//!   gamepad of its own.
+//! - A World has one keyboard and one mouse: two agents that claim the same key or motion are a fault. Every agent has
+//!   a gamepad of its own.
 //! - The route is a setting: see [`InputRoute`].
 //! - With the features `leafwing-input-manager` and `bevy_enhanced_input`, actions of these input managers can also be
 //!   driven without any key. Keys drive them without these features.
+//!
+//! The files of the folder, in reading order:
+//!
+//! - `button`, `devices`: inputs that can be held down, and those that are held down now.
+//! - `act`, `claims`: the way from the actions of a tick to held inputs, and claims to keyboard and mouse.
+//! - `input_state`, `messages`: Bevy's own state of the devices, and its messages.
+//! - `leafwing`, `enhanced_input`: actions of input managers, driven without any key.
 //!
 //! ```
 //! use bevy::{input::InputPlugin, prelude::*};
@@ -111,14 +118,6 @@ pub struct VirtualInput {
     is_mixed: bool,
 }
 
-#[derive(Clone, Debug, PartialEq, Reflect)]
-enum Mapping {
-    /// The inputs that each discrete action holds.
-    Discrete(Vec<HeldInput>),
-    /// The inputs that each value of a continuous action moves.
-    Continuous(Vec<ActionAxis>),
-}
-
 impl VirtualInput {
     /// Creates a mapping with a set of keys for each discrete action; an empty set presses nothing.
     pub fn keys(sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>) -> Self {
@@ -206,7 +205,13 @@ impl VirtualInput {
     }
 }
 
-// The plugin of virtual input.
+#[derive(Clone, Debug, PartialEq, Reflect)]
+enum Mapping {
+    /// The inputs that each discrete action holds.
+    Discrete(Vec<HeldInput>),
+    /// The inputs that each value of a continuous action moves.
+    Continuous(Vec<ActionAxis>),
+}
 
 /// Lets the actions of agents with a [`VirtualInput`] play through Bevy's own input. Needs
 /// [`InputPlugin`], which is part of Bevy's `DefaultPlugins`.
@@ -299,8 +304,6 @@ fn add_what_is_written(app: &mut App) {
         .init_resource::<AccumulatedMouseScroll>();
 }
 
-// The two routes from an action to the game.
-
 /// The route from an action to the game.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
 pub enum InputRoute {
@@ -319,8 +322,6 @@ pub enum InputRoute {
     Direct,
 }
 
-// People whose own keys do not reach the game.
-
 /// Presses keys for the agent under [`Control::Human`](crate::agent::Control::Human), too, by its
 /// [`Action`](crate::action::Action). For windows that keep a person's own devices from the game and turn them into
 /// an action: the game then sees exactly the keys that a replay of these actions presses.
@@ -329,7 +330,7 @@ pub enum InputRoute {
 pub struct PressesForPeople;
 
 #[cfg(test)]
-mod component_tests {
+mod tests {
     use super::*;
     use crate::virtual_input::button::VirtualAxis;
 

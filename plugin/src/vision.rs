@@ -11,6 +11,13 @@
 //! tick and makes [`Observation::image`] from it. Idle
 //! agents and agents between two episodes are skipped.
 //!
+//! The files of the folder, in reading order:
+//!
+//! - `options`: size and form of pictures, frames, and the bytes that a policy reads.
+//! - `compose`: observations from frames.
+//! - `tile_layer`: the grid of tiles that is drawn as one.
+//! - `metadata`: the metadata of pictures in files of networks, and differences between pictures.
+//!
 //! ```
 //! use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind};
 //!
@@ -21,8 +28,8 @@
 //! assert_eq!(config.to_string(), "32×24 grey pictures of the raster, 4 in a stack");
 //! ```
 
-mod card;
 mod compose;
+mod metadata;
 mod options;
 mod tile_layer;
 
@@ -32,19 +39,52 @@ use playbot_learner::ObsKind;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
 
-pub use crate::vision::card::{CLOSE, Difference};
+pub use crate::vision::metadata::{CLOSE, PictureDifference};
 pub use crate::vision::options::BlankEpisodes;
-pub use crate::vision::{
-    card::UnknownObservation,
-    options::{Frame, ImageOptions, ImageSensor, MAX_SIDE, PaintedVelocity, VisionError},
-    tile_layer::TileLayer,
-};
 pub(crate) use crate::vision::{
     compose::{check_images, is_observed},
     tile_layer::{NO_IMAGE, lacks_image},
 };
+pub use crate::vision::{
+    metadata::UnknownObservation,
+    options::{Frame, ImageOptions, ImageSensor, MAX_SIDE, PaintedVelocity, VisionError},
+    tile_layer::TileLayer,
+};
 
-// The kind of observation of an experiment's agents, and the sensors that it needs.
+/// The observation of agents, with the form of pictures.
+///
+/// Policies and skill models that read pictures carry it in their files: images of equal shape can
+/// show different things.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ObservationConfig {
+    /// Vector or pictures.
+    pub kind: ObservationKind,
+    /// Size and form of the pictures.
+    pub image: ImageOptions,
+}
+
+impl fmt::Display for ObservationConfig {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if !self.is_image() {
+            return f.write_str("vectors");
+        }
+        let ImageOptions { width, height, stack, grayscale, paint_velocity } = self.image;
+        let colours = if grayscale { "grey" } else { "colour" };
+        write!(f, "{width}×{height} {colours} pictures of the {}", self.kind)?;
+        if stack > 1 {
+            write!(f, ", {stack} in a stack")?;
+        }
+        if paint_velocity { write!(f, ", with painted velocity") } else { Ok(()) }
+    }
+}
+
+impl ObservationConfig {
+    /// Returns whether agents see pictures.
+    pub fn is_image(&self) -> bool {
+        self.kind != ObservationKind::Vector
+    }
+}
 
 /// The kind of an observation. Its [`name`](Self::name) is used on the command line.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -87,19 +127,6 @@ impl FromStr for ObservationKind {
     }
 }
 
-/// The observation of agents, with the form of pictures.
-///
-/// Policies and skill models that read pictures carry it in their files: images of equal shape can
-/// show different things.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ObservationConfig {
-    /// Vector or pictures.
-    pub kind: ObservationKind,
-    /// Size and form of the pictures.
-    pub image: ImageOptions,
-}
-
 /// The extent of the game's picture for agents that see pictures.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picture {
@@ -117,30 +144,6 @@ impl Picture {
         self.width.max(self.least_height * image.width as f32 / image.height as f32)
     }
 }
-
-impl fmt::Display for ObservationConfig {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if !self.is_image() {
-            return f.write_str("vectors");
-        }
-        let ImageOptions { width, height, stack, grayscale, paint_velocity } = self.image;
-        let colours = if grayscale { "grey" } else { "colour" };
-        write!(f, "{width}×{height} {colours} pictures of the {}", self.kind)?;
-        if stack > 1 {
-            write!(f, ", {stack} in a stack")?;
-        }
-        if paint_velocity { write!(f, ", with painted velocity") } else { Ok(()) }
-    }
-}
-
-impl ObservationConfig {
-    /// Returns whether agents see pictures.
-    pub fn is_image(&self) -> bool {
-        self.kind != ObservationKind::Vector
-    }
-}
-
-// The plugin that all sensors of pictures share.
 
 /// Makes observations from the frames of any sensor. The sensors' plugins add it.
 #[derive(Clone, Copy, Debug, Default)]
@@ -167,8 +170,6 @@ impl Plugin for VisionPlugin {
     }
 }
 
-// System sets for agents that see pictures.
-
 /// Parts of [`ObserveSchedule`] for agents that see pictures, in this order.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum VisionSystems {
@@ -179,8 +180,6 @@ pub enum VisionSystems {
     /// The frame's tick is checked, and the observation made from it.
     Compose,
 }
-
-// Arenas that are drawn separately.
 
 /// The root of an arena whose agents see only its own contents.
 ///
@@ -196,8 +195,6 @@ pub enum VisionSystems {
 #[reflect(Component)]
 #[require(Transform, Visibility)]
 pub struct Stage;
-
-// Observations of agents as a reader expects them.
 
 /// Returns an agent's observation in the kind of `wanted`; an agent may have sensors of both kinds.
 pub(crate) fn seen_as(wanted: &ObsKind, observation: &Observation, sensor: Option<&ImageSensor>) -> ObsKind {

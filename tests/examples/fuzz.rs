@@ -7,7 +7,7 @@
 //! A file that makes its reader panic, takes it longer than five seconds, or makes it ask for much memory is kept in
 //! the folder `fuzz`, or the one that `--out` names; the exit code is 1 then. If the whole program dies of a file, that
 //! file is `current` in the folder. `--kind NAME` reads files of one kind alone.
-#![allow(clippy::print_stdout, reason = "it tells what it does")]
+#![allow(clippy::print_stdout, reason = "it prints what it does")]
 
 use std::{
     collections::BTreeMap,
@@ -74,7 +74,7 @@ impl Options {
 #[derive(Default)]
 struct Count {
     whole: u64,
-    told: u64,
+    refused: u64,
     faults: u64,
 }
 
@@ -97,7 +97,7 @@ fn run(options: &Options) -> Result<bool, String> {
             let tally = read_mutants(kind, first..first + at_once, &current, measure);
             let count = counts.entry(kind.name).or_default();
             count.whole += tally.whole;
-            count.told += tally.told;
+            count.refused += tally.refused;
             count.faults += tally.faults.len() as u64;
             tally.faults.iter().try_for_each(|fault| options.keep(fault))?;
             is_stuck |= tally.is_stuck;
@@ -108,15 +108,19 @@ fn run(options: &Options) -> Result<bool, String> {
         round += 1;
     }
     let mut all = Count::default();
-    for (name, Count { whole, told, faults }) in &counts {
+    for (name, Count { whole, refused, faults }) in &counts {
         println!(
-            "{name:<34} {:>9} mutants: {whole:>9} read, {told:>9} refused, {faults} faults",
-            whole + told + faults
+            "{name:<34} {:>9} mutants: {whole:>9} read, {refused:>9} refused, {faults} faults",
+            whole + refused + faults
         );
-        (all.whole, all.told, all.faults) = (all.whole + whole, all.told + told, all.faults + faults);
+        (all.whole, all.refused, all.faults) = (all.whole + whole, all.refused + refused, all.faults + faults);
     }
-    let Count { whole, told, faults } = all;
-    println!("{:<34} {:>9} mutants: {whole:>9} read, {told:>9} refused, {faults} faults", "all", whole + told + faults);
+    let Count { whole, refused, faults } = all;
+    println!(
+        "{:<34} {:>9} mutants: {whole:>9} read, {refused:>9} refused, {faults} faults",
+        "all",
+        whole + refused + faults
+    );
     if is_stuck {
         println!("stopped: the reader of the last file goes on for ever");
     }

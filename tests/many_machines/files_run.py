@@ -120,13 +120,13 @@ def fields(documents):
         "podReplacementPolicy Failed": lambda _, shards: shards["spec"].update(podReplacementPolicy="TerminatingOrFailed"),
         "container that is not there": lambda _, shards: shards["spec"]["template"]["spec"]["containers"][0].update(name="a"),
         "there is no volume": lambda _, shards: shards["spec"]["template"]["spec"].pop("volumes"),
-        "nobody sets $LEVELS": lambda settings, _: settings["data"].pop("LEVELS"),
+        "nothing sets $LEVELS": lambda settings, _: settings["data"].pop("LEVELS"),
         "ConfigMap.data is": lambda settings, _: settings["data"].update(SHARDS=16),
     }
     for words, plant in planted.items():
         broken = copy.deepcopy(documents)
         plant(broken[0], broken[2])
-        check(f"a mistake there is told: {words}", any(words in told for told in mistakes(broken)))
+        check(f"a mistake there is reported: {words}", any(words in reported for reported in mistakes(broken)))
 
 
 def kubernetes(folder, playbot, whole):
@@ -178,7 +178,7 @@ def kubernetes(folder, playbot, whole):
                 time.sleep(0.005)
             stopped.send_signal(signal.SIGTERM)
             code = stopped.wait()
-            check("a pod that is told to end ends with 130, its levels written", code == 130 and journal.read_bytes())
+            check("a pod that is asked to end ends with 130, its levels written", code == 130 and journal.read_bytes())
         done = run(command(test), folder, own)
         check(f"the pod of shard {index} succeeds, though it has findings", done.returncode == 0)
     wrong = run(command(test), folder, {**variables, "JOB_COMPLETION_INDEX": 0, "GAME": "none"})

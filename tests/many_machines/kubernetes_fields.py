@@ -130,7 +130,7 @@ def of_job(spec, settings, claims, at):
             wrong += [] if name in settings else [f"{at}: there is no ConfigMap {name}"]
         script = "\n".join(container.get("command", []) + container.get("args", []))
         used = re.findall(r"\$\{?([A-Z][A-Z0-9_]*)", script)
-        wrong += [f"{at}: nobody sets ${name}" for name in used if name not in known]
+        wrong += [f"{at}: nothing sets ${name}" for name in used if name not in known]
         # Kubernetes reads `$$` as `$`, and `$(NAME)` before the shell does.
         if re.search(r"\$\$|\$\([A-Za-z_]\w*\)", script):
             wrong.append(f"{at}: Kubernetes changes the script before a shell reads it")

@@ -96,10 +96,10 @@ def theirs(case):
 def ours(bench, case):
     """Milliseconds of the middle of criterion's estimate."""
     words = [bench, "--bench", "--exact", case, "--noplot", "--warm-up-time", "1", "--measurement-time", str(SECONDS)]
-    told = subprocess.run([*words, "--sample-size", "10"], capture_output=True, text=True, check=True).stdout
-    found = re.search(r"time:\s+\[\S+ \S+ (\S+) (\S+) ", told)
+    printed = subprocess.run([*words, "--sample-size", "10"], capture_output=True, text=True, check=True).stdout
+    found = re.search(r"time:\s+\[\S+ \S+ (\S+) (\S+) ", printed)
     if not found:
-        raise SystemExit(f"the benchmark has no case {case}: {told}")
+        raise SystemExit(f"the benchmark has no case {case}: {printed}")
     return float(found[1]) * {"ns": 1e-6, "µs": 1e-3, "us": 1e-3, "ms": 1.0, "s": 1e3}[found[2]]
 
 

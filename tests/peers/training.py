@@ -114,8 +114,8 @@ class Ppo:
             action = dist.sample()
             self.seen[step], self.actions[step], self.values[step] = self.obs, action, value
             self.log_probs[step] = log_prob(dist, action)
-            told = action.numpy()
-            obs, reward, terminated, truncated, _ = self.env.step(told.astype(np.int32 if told.ndim == 1 else np.float64))
+            chosen = action.numpy()
+            obs, reward, terminated, truncated, _ = self.env.step(chosen.astype(np.int32 if chosen.ndim == 1 else np.float64))
             self.rewards[step] = torch.from_numpy(reward)
             self.dones[step] = torch.from_numpy(terminated | truncated)
             self.obs = self.tensor(obs)

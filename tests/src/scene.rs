@@ -43,7 +43,7 @@ pub fn player(index: u32) -> impl Bundle {
 }
 
 /// Spawns an agent that sees `width` world units around an entity in a picture of `size` pixels.
-pub fn spawn_eye(world: &mut World, index: u32, target: Entity, width: f32, size: [u32; 2]) -> Entity {
+pub fn spawn_sensor(world: &mut World, index: u32, target: Entity, width: f32, size: [u32; 2]) -> Entity {
     let options = ImageOptions { width: size[0], height: size[1], ..default() };
     world.spawn((player(index), CameraSensor::following(target, width, options))).id()
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use playbot_learner::{ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, SkillTrainer};
+use playbot_learner::{ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, SkillTrainer};
 use playbot_train::{Algorithm, Experiment, Trainer, experiment::file::parse_experiment};
 
 use crate::Corridor;
@@ -27,7 +27,7 @@ pub fn experiment(algorithm: Algorithm) -> Experiment {
 
 /// Returns made-up recordings.
 pub fn dataset() -> Dataset {
-    let episode = |number: u16| DemoEpisode {
+    let episode = |number: u16| DatasetEpisode {
         observations: (0..2 * STEPS).map(|at| f32::from((at * 5 + number) % 7) / 7.0).collect::<Vec<f32>>().into(),
         actions: Actions::Discrete((0..STEPS).map(|at| u32::from((at + number) % 3)).collect()),
     };

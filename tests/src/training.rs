@@ -19,7 +19,7 @@ pub fn learn_skills(game: &dyn Game, experiment: &Experiment, threads: usize) ->
     let path = experiment.recordings().expect("recordings are named");
     let dataset = read_dataset(game, experiment, path, threads, &mut Unobserved).expect("readable");
     let learned = learn(experiment, dataset, DeviceKind::Flex, None, &mut Unobserved).expect("learns");
-    learned.expect("nobody stops it")
+    learned.expect("not stopped")
 }
 
 /// Returns the metadata of a run of this experiment.

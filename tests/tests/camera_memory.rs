@@ -6,7 +6,7 @@ use bevy_playbot::vision::{Stage, TileLayer};
 use playbot::prelude::*;
 use playbot_tests::{
     memory::resident_kib,
-    scene::{camera_world, drift, image, pixel, spawn_eye, spawn_large_scene},
+    scene::{camera_world, drift, image, pixel, spawn_large_scene, spawn_sensor},
 };
 
 #[test]
@@ -23,7 +23,7 @@ fn memory_does_not_grow() {
             let layer = TileLayer { tileset: tiles.clone(), columns: 64, rows: 64, cells: vec![0; 4096], outside: 0 };
             world.spawn((layer, Transform::default(), ChildOf(stage)));
             let body = world.spawn((Transform::default(), ChildOf(stage))).id();
-            let agent = spawn_eye(world, 9, body, 13.0, [64, 64]);
+            let agent = spawn_sensor(world, 9, body, 13.0, [64, 64]);
             world.ticks(4).expect("sound");
             assert_eq!(pixel(world, agent, 0, 0), [9; 3], "{i}");
             world.despawn(stage);

@@ -263,7 +263,7 @@ impl ConstraintSolver {
         hessian
     }
 
-    /// Returns the step length at which the slope of the cost along the step vanishes. Also tells whether the step is
+    /// Returns the step length at which the slope of the cost along the step vanishes. Also returns whether the step is
     /// whole with the same rows pushing throughout: then the minimum is reached.
     fn search(&self, start_slope: f64, curvature: f64, rows: &[Row]) -> (f64, bool) {
         let along = |length: f64| {
@@ -308,7 +308,7 @@ impl ConstraintSolver {
 }
 
 #[cfg(test)]
-mod constraint_solver_tests {
+mod tests {
     use super::*;
     use crate::ant::skeleton::LEGS;
 

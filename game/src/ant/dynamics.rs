@@ -237,7 +237,7 @@ impl Cholesky {
 }
 
 #[cfg(test)]
-mod arrow_matrix_tests {
+mod tests {
     use super::*;
 
     /// Returns a matrix that is positive definite because its diagonal outweighs the rest.

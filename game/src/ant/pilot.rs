@@ -6,7 +6,7 @@ use crate::ant::{
 };
 use bevy::math::Vec2;
 use playbot_assets::ANT_WALKER;
-use playbot_learner::{Action, DeviceKind, FileError, LearnError, Policy, PolicyFile};
+use playbot_learner::{ActionValue, DeviceKind, FileError, LearnError, Policy, PolicyFile};
 use std::{path::Path, sync::LazyLock};
 use thiserror::Error;
 
@@ -87,8 +87,8 @@ impl Pilot {
     pub fn act(&self, input: &PilotInput) -> Result<Vec<[f32; JOINTS]>, PilotError> {
         let output = self.0.forward(&[], &input.0[..], input.len())?;
         let row = |row| match output.greedy(row) {
-            Action::Continuous(torques) => <[f32; JOINTS]>::try_from(torques).ok(),
-            Action::Discrete(_) => None,
+            ActionValue::Continuous(torques) => <[f32; JOINTS]>::try_from(torques).ok(),
+            ActionValue::Discrete(_) => None,
         };
         let torques: Option<Vec<_>> = (0..input.len()).map(row).collect();
         torques.ok_or_else(|| PilotError(format!("its policy does not act with {JOINTS} torques")))

@@ -64,8 +64,7 @@ impl AntState {
     }
 }
 
-// Observation of the walker: its body and the direction of its goal, both as seen from the torso's heading, so a gait
-// learned in one direction works in all.
+// The observation of the walker.
 
 /// Number of values.
 pub const SENSES: usize = 28;
@@ -86,7 +85,8 @@ pub fn joint_names() -> [String; JOINTS] {
     std::array::from_fn(|joint| format!("{} {}", ["hip", "ankle"][joint % 2], joint / 2 + 1))
 }
 
-/// Returns the observation of an ant on its way to `goal`, in metres in the world.
+/// Returns the observation of an ant on its way to `goal`, in metres in the world. Body and goal are seen from the
+/// torso's heading, so a gait learned in one direction works in all.
 ///
 /// Height in metres; the world's upwards direction along the torso's axes; joint angles in radians; velocity in m/s
 /// along the heading, to its left and upwards; angular velocity along the torso's axes in rad/s; joint velocities in
@@ -109,7 +109,7 @@ pub fn senses(state: &AntState, goal: Vec2) -> [f32; SENSES] {
 }
 
 #[cfg(test)]
-mod sense_tests {
+mod tests {
     use super::*;
 
     #[test]

@@ -1,8 +1,13 @@
 //! The look of ants and of the ground they walk on, for every game with ants.
 //!
-//! A game describes its scene with [`AntPose`], [`GoalMark`] and [`OnGround`] on its agents and [`ArenaGround`] on their
-//! arenas, in [`AntViewSystems::Show`]. It is drawn from above with sprites, for sensors and windows, and with the
-//! feature `view3d` also in space with meshes, for windows.
+//! A game describes its scene with [`AntPose`], [`GoalMark`] and [`OnGround`] on its agents and [`ArenaGround`] on
+//! their arenas, in [`AntViewSystems::Show`]. It is drawn from above with sprites, for sensors and windows, and with
+//! the feature `view3d` also in space with meshes, for windows.
+//!
+//! The folder, in reading order:
+//!
+//! - `flat`: the view from above, with sprites.
+//! - `solid`: the view in space, with meshes, a sun and shadows.
 
 mod flat;
 #[cfg(feature = "view3d")]
@@ -22,8 +27,6 @@ pub use crate::ant::view::flat::VIEW;
 #[cfg(feature = "view3d")]
 pub use crate::ant::view::solid::{SolidAnt, SolidViewPlugin};
 
-// Drawing ants as a Bevy plugin.
-
 /// Draws ants. Add it after the plugins that bring images, such as Bevy's own or a sensor's.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AntViewPlugin;
@@ -36,6 +39,15 @@ impl Plugin for AntViewPlugin {
         )
         .add_plugins(FlatViewPlugin);
     }
+}
+
+/// Parts of [`VisionSystems::Sync`] for games with ants, in this order.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum AntViewSystems {
+    /// The game updates poses, goals and grounds.
+    Show,
+    /// Sprites and meshes follow them.
+    Draw,
 }
 
 // Components that are drawn.
@@ -88,21 +100,10 @@ impl ArenaGround {
     }
 }
 
-// System sets of drawing ants.
-
-/// Parts of [`VisionSystems::Sync`] for games with ants, in this order.
-#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum AntViewSystems {
-    /// The game updates poses, goals and grounds.
-    Show,
-    /// Sprites and meshes follow them.
-    Draw,
-}
-
 // The picture of the open floor.
 
-/// Adds sprites to [`AntPlugin`](crate::ant::AntPlugin). Add it after the plugins that bring images, such as Bevy's own or a
-/// sensor's.
+/// Adds sprites to [`AntPlugin`](crate::ant::AntPlugin). Add it after the plugins that bring images, such as Bevy's own
+/// or a sensor's.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AntPicturePlugin;
 

@@ -115,7 +115,7 @@ impl Default for Walker {
 
 impl Walker {
     /// Returns the position of the ant, in metres.
-    pub(super) fn place(&self) -> Vec2 {
+    pub(super) fn position(&self) -> Vec2 {
         self.body.torso().0.truncate()
     }
 }
@@ -144,7 +144,7 @@ pub(super) fn walk(
             continue;
         }
         let asked = action.continuous().unwrap_or_default();
-        let before = walker.place().distance(walker.goal);
+        let before = walker.position().distance(walker.goal);
         walker.body.step(&torques(action, &mut episode));
         let state = walker.body.state();
         if !state.is_finite() {
@@ -152,7 +152,7 @@ pub(super) fn walk(
             continue;
         }
         *hash = state.hash();
-        let distance = walker.place().distance(walker.goal);
+        let distance = walker.position().distance(walker.goal);
         let effort: f32 = asked.iter().map(|value| value.powi(2).min(MOST_EFFORT)).sum();
         reward.add(PROGRESS_REWARD * (before - distance) + UPRIGHT_REWARD - EFFORT_PRICE * effort);
         if distance <= GOAL_RADIUS {
@@ -199,7 +199,7 @@ pub(super) fn observe(mut walkers: Query<(&Episode, &Walker, &mut Observation), 
     }
 }
 
-// Steering for people: keys give a direction, and the walker walks.
+// Steering for people.
 
 /// Keys for one direction along an axis.
 type Keys = [KeyCode; 2];

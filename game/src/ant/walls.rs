@@ -115,9 +115,9 @@ mod tests {
     #[test]
     fn rays_meet_floor_and_walls() {
         let walls = Walls::new(&[block(4.0, 0.0)]);
-        let hit = |from: Vec3, way: Vec3| {
+        let hit = |from: Vec3, direction: Vec3| {
             let (collider, distance) =
-                walls.physics().cast_ray(&Ray::new(from, way), 100.0, true, QueryFilter::default())?;
+                walls.physics().cast_ray(&Ray::new(from, direction), 100.0, true, QueryFilter::default())?;
             Some((walls.physics().colliders[collider].user_data, distance))
         };
         assert_eq!(hit(Vec3::new(0.0, 0.0, 1.0), Vec3::X), Some((0, 2.0)));

@@ -11,7 +11,7 @@ use crate::{
     maze::reward_mismatch,
 };
 use playbot_harness::{
-    detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting},
+    detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead},
     prelude::*,
 };
 
@@ -51,9 +51,9 @@ impl Detector for AgainstRules {
         "the ant does not move, or is not paid, as the rules say"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         let what = "ticks between two checks of the motion";
-        vec![Setting::new("every", &mut self.every, what).at_least(1.0)]
+        vec![DetectorSetting::new("every", &mut self.every, what).at_least(1.0)]
     }
 
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -144,7 +144,8 @@ mod tests {
         let [x, y, ..] = level.reset.qpos;
         let right = pay(level.pay, distance([x, y], level.goal_at));
         assert_eq!(reward_mismatch(right, paid_by_rules(&level.reset, &level), SLACK), None);
-        let told = reward_mismatch(right + 1.0, paid_by_rules(&level.reset, &level), SLACK).expect("it is too much");
-        assert!(told.contains("by the rules it pays"), "{told}");
+        let reported =
+            reward_mismatch(right + 1.0, paid_by_rules(&level.reset, &level), SLACK).expect("it is too much");
+        assert!(reported.contains("by the rules it pays"), "{reported}");
     }
 }

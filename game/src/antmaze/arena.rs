@@ -48,7 +48,7 @@ fn build(commands: &mut Commands, agent: Entity, level: Arc<AntMazeLevel>) {
     commands.entity(agent).insert((MazeAnt(body), InMaze(level)));
 }
 
-// The game as entities: an agent with its ant, and the arena it is drawn in.
+// The game as entities.
 
 /// Mode of the generated levels.
 #[derive(Resource, Clone, Debug, PartialEq, Reflect)]
@@ -79,7 +79,7 @@ impl AntComponent for MazeAnt {
 #[reflect(Component)]
 pub struct PlaysIn(pub Entity);
 
-// Levels of a mode: from a seed, or from a file.
+// Levels of a mode, from a seed or from a file.
 
 /// The levels of a World.
 #[derive(SystemParam)]
@@ -111,7 +111,7 @@ fn generated(mode: &AntMazeMode, level: u64) -> Result<Arc<AntMazeLevel>, String
     generate(mode, level).map(Arc::new).map_err(|error| error.to_string())
 }
 
-// One tick of every arena.
+// The tick of every arena.
 
 /// Distance at which an ant has reached the goal, metres.
 pub const GOAL_RADIUS: f32 = 0.5;

@@ -168,7 +168,7 @@ fn stand(app: &mut App, variant: u32, change: ChangeMaze) {
 }
 
 #[cfg(test)]
-mod catalogue_tests {
+mod tests {
     use bevy::prelude::*;
     use bevy_playbot::test_app::{PlaybotTestExt, test_app};
     use playbot_harness::{
@@ -178,7 +178,12 @@ mod catalogue_tests {
     use playbot_learner::rng::Streams;
 
     use super::*;
-    use crate::antmaze::{AntMaze, DemonstratorBot, generate, level_text::LevelText, spawn_agent};
+    use crate::{
+        ant::WallBox,
+        antmaze::{AntMaze, DemonstratorBot, generate, level_text::LevelText, spawn_agent},
+        defect_variant::PLACES,
+        maze::Maze,
+    };
 
     /// Mode of the levels. The game's bot solves nine in ten of them in a few hundred ticks.
     const MODE: &str = "umaze+sparse";
@@ -233,20 +238,6 @@ mod catalogue_tests {
             }
         }
     }
-}
-
-#[cfg(test)]
-mod walls_tests {
-    use bevy_playbot::test_app::test_app;
-    use playbot_harness::{defect::Plant, prelude::*};
-
-    use super::*;
-    use crate::{
-        ant::WallBox,
-        antmaze::{AntMaze, spawn_agent},
-        defect_variant::PLACES,
-        maze::Maze,
-    };
 
     /// Returns the level of an agent and the walls around its ant, with this defect planted.
     fn planted(class: &str, variant: u32) -> (Maze, Vec<WallBox>) {

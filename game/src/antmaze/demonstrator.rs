@@ -21,20 +21,20 @@ use std::sync::Arc;
 pub struct DemonstratorBot {
     noise: f64,
     #[reflect(ignore)]
-    way: Option<(Arc<AntMazeLevel>, Waypoints)>,
+    waypoints: Option<(Arc<AntMazeLevel>, Waypoints)>,
 }
 
 impl DemonstratorBot {
     /// Takes the standard deviation of normal noise on its torques. The original's demonstrations have 0.2.
     pub fn new(noise: f64) -> Self {
-        Self { noise, way: None }
+        Self { noise, waypoints: None }
     }
 
     /// Returns the path through this level.
-    fn way(&mut self, level: &Arc<AntMazeLevel>) -> &mut Waypoints {
-        let known = self.way.take().filter(|(known, _)| Arc::ptr_eq(known, level));
-        let way = known.unwrap_or_else(|| (level.clone(), Waypoints::new(level)));
-        &mut self.way.insert(way).1
+    fn waypoints(&mut self, level: &Arc<AntMazeLevel>) -> &mut Waypoints {
+        let known = self.waypoints.take().filter(|(known, _)| Arc::ptr_eq(known, level));
+        let waypoints = known.unwrap_or_else(|| (level.clone(), Waypoints::new(level)));
+        &mut self.waypoints.insert(waypoints).1
     }
 }
 
@@ -54,7 +54,7 @@ pub(super) fn decide(
         }
         let state = ant.0.state();
         let at = [state.qpos[0], state.qpos[1]];
-        let next = bot.way(&level.0).next(&level.0, at, &mut streams.action);
+        let next = bot.waypoints(&level.0).next(&level.0, at, &mut streams.action);
         input.push(&state, next);
         entities.push(entity);
     }
@@ -74,8 +74,6 @@ pub(super) fn decide(
         action.0 = ActionValue::Continuous(torques.into_iter().map(noisy).collect());
     }
 }
-
-// Waypoints from cell to cell to the goal.
 
 /// Distance at which a waypoint counts as reached, metres: about the edge of its cell, as in the original. An ant that
 /// goes nearer comes nearer to walls too, and falls over more often.
@@ -102,26 +100,26 @@ impl Waypoints {
     pub fn next(&mut self, level: &AntMazeLevel, at: [f32; 2], rng: &mut ChaCha8Rng) -> [f32; 2] {
         let Some(here) = cell_at(&level.maze, at).filter(|&cell| level.maze.is_free(cell)) else {
             // Its middle is over a wall, where it cannot stay.
-            return self.next.map_or(self.goal_at, |(_, place)| place);
+            return self.next.map_or(self.goal_at, |(_, position)| position);
         };
         let from = match self.next {
-            Some((cell, place)) if distance(at, place) <= REACHED => cell,
-            Some((cell, place)) if cell == here || cell == self.planner.next_cell(here) => return place,
+            Some((cell, position)) if distance(at, position) <= REACHED => cell,
+            Some((cell, position)) if cell == here || cell == self.planner.next_cell(here) => return position,
             _ => here,
         };
         let cell = self.planner.next_cell(from);
-        let place = if cell == self.planner.goal() {
+        let position = if cell == self.planner.goal() {
             self.goal_at
         } else {
             centre_of(&level.maze, cell).map(|x| x + unit(rng) as f32)
         };
-        self.next = Some((cell, place));
-        place
+        self.next = Some((cell, position));
+        position
     }
 }
 
 #[cfg(test)]
-mod waypoints_tests {
+mod tests {
     use playbot_learner::rng::Streams;
 
     use super::*;
@@ -133,23 +131,23 @@ mod waypoints_tests {
         let mut rng = Streams::new(seed).stream("walk", 0);
         let mut waypoints = Waypoints::new(&level);
         let mut at = [level.reset.qpos[0], level.reset.qpos[1]];
-        let mut places = vec![at];
+        let mut positions = vec![at];
         while distance(at, level.goal_at) > 0.5 {
             let next = waypoints.next(&level, at, &mut rng);
             let away = distance(at, next).max(0.1);
             at = [0, 1].map(|axis| at[axis] + 0.1 * (next[axis] - at[axis]) / away);
-            places.push(at);
-            assert!(places.len() < 10_000, "{mode} {seed}: walks for ever, at {at:?} on the way to {next:?}");
+            positions.push(at);
+            assert!(positions.len() < 10_000, "{mode} {seed}: walks for ever, at {at:?} on the way to {next:?}");
         }
-        (level, places)
+        (level, positions)
     }
 
     #[test]
     fn waypoints_lead_to_the_goal_through_free_cells() {
         for mode in ["umaze", "medium", "large+goal-noise=d4rl", "xl+goals=demo+random-start", "random+corridor=2"] {
             for seed in 0..20 {
-                let (level, places) = walk(mode, seed);
-                let cells = places.iter().map(|&at| cell_at(&level.maze, at).expect("inside"));
+                let (level, positions) = walk(mode, seed);
+                let cells = positions.iter().map(|&at| cell_at(&level.maze, at).expect("inside"));
                 assert!(cells.into_iter().all(|cell| level.maze.is_free(cell)), "{mode} {seed}");
             }
         }
@@ -157,8 +155,8 @@ mod waypoints_tests {
 
     #[test]
     fn the_way_is_not_much_longer_than_the_shortest() {
-        let (level, places) = walk("large", 3);
-        let length: f32 = places.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
+        let (level, positions) = walk("large", 3);
+        let length: f32 = positions.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
         let shortest = 4.0 * (level.maze.shortest_path().len() - 1) as f32;
         assert!((0.7 * shortest..1.1 * shortest).contains(&length), "{length} m instead of {shortest}");
     }

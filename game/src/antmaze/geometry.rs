@@ -92,7 +92,7 @@ fn wall_box(maze: &Maze, (first, last): Run) -> WallBox {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::maze::fixed::antmaze;
+    use crate::maze::{MazeSpec, fixed::antmaze, generate};
 
     #[test]
     fn goals_are_where_the_original_has_them() {
@@ -117,12 +117,6 @@ mod tests {
             assert_eq!(cell_at(&maze, outside), None, "{outside:?}");
         }
     }
-}
-
-#[cfg(test)]
-mod walls_tests {
-    use super::*;
-    use crate::maze::{MazeSpec, fixed::antmaze, generate};
 
     /// Returns the number of boxes at a position.
     fn boxes_at(walls: &[WallBox], [x, y]: [f32; 2]) -> usize {

@@ -65,7 +65,7 @@ impl LevelText {
         let AntMazeLevel { maze, start, goal, goal_at, reset, pay, limit } = level;
         let drawn = maze.clone().with_any_ends(*start, *goal).unwrap_or_else(|_| maze.clone());
         let path = drawn.shortest_path();
-        let rules = AntMazeMode { pay: *pay, limit: *limit, ..usual() }.to_string();
+        let rules = AntMazeMode { pay: *pay, limit: *limit, ..default_mode() }.to_string();
         Self {
             rows: drawn.to_rows(),
             start: Some(*start),
@@ -74,7 +74,7 @@ impl LevelText {
             origin: Some(maze.start()),
             goal_at: Some(*goal_at),
             ant: Some(AntText { qpos: reset.qpos, qvel: reset.qvel }),
-            rules: rules.trim_start_matches(usual().map.name()).trim_start_matches('+').to_owned(),
+            rules: rules.trim_start_matches(default_mode().map.name()).trim_start_matches('+').to_owned(),
         }
     }
 
@@ -123,12 +123,12 @@ impl LevelText {
 }
 
 /// Returns the rules of generated mazes.
-fn usual() -> AntMazeMode {
+fn default_mode() -> AntMazeMode {
     AntMazeMode::on(Map::Random(MazeSpec::default()))
 }
 
 fn rules(text: &str) -> Result<AntMazeMode, MazeModeError> {
-    let mut mode = usual();
+    let mut mode = default_mode();
     let options: Vec<&str> = text.split('+').filter(|option| !option.is_empty()).collect();
     MazeModeError::check_once(&options, subject)?;
     for option in options {

@@ -15,8 +15,8 @@ use bevy::{
 };
 use playbot_harness::{floor_plan::FloorPlan, prelude::*};
 
-/// Adds sprites to [`AntMazePlugin`](crate::antmaze::AntMazePlugin). Add it after the plugins that bring images, such as Bevy's
-/// own or a sensor's.
+/// Adds sprites to [`AntMazePlugin`](crate::antmaze::AntMazePlugin). Add it after the plugins that bring images, such
+/// as Bevy's own or a sensor's.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct AntMazePicturePlugin;
 
@@ -59,8 +59,6 @@ fn ground(maze: &Maze) -> ArenaGround {
         boxes: wall_boxes(maze),
     }
 }
-
-// Floor plan of a level, in metres, for drawing trajectories.
 
 impl AntMazeLevel {
     /// Returns the maze from above: columns go along x, to the right, and rows along y, up.

@@ -7,7 +7,10 @@ use crate::{
         arena::{InMaze, MazeAnt},
         geometry::{CELL, cell_at},
     },
-    senses::{Senses, WithMap, WithObservations, WithPositionalEncoding, WithRays, push_map, push_rays, push_waves},
+    senses::{
+        Senses, WithMap, WithObservations, WithPositionalEncoding, WithRays, push_map, push_positional_encoding,
+        push_rays,
+    },
 };
 use bevy::{math::Vec3, prelude::*};
 use bevy_playbot::vision::VisionSystems;
@@ -23,7 +26,7 @@ const RAY_HEIGHTS: std::ops::RangeInclusive<f32> = 0.1..=1.9;
 /// AntMaze with rays, under its name `antmaze-sighted`. East is x and north is y.
 pub type AntMazeWithRays = WithObservations<AntMaze, WithRays>;
 
-/// AntMaze with rays and a map, under its name `antmaze-mapped`.
+/// AntMaze with rays and a map, under its names `antmaze-mapped` and `antmaze-with-map`.
 pub type AntMazeWithMap = WithObservations<AntMaze, WithMap>;
 
 /// AntMaze with positional encoding, under its name `antmaze-placed`.
@@ -31,6 +34,7 @@ pub type AntMazeWithPositionalEncoding = WithObservations<AntMaze, WithPositiona
 
 impl Senses<AntMaze> for WithRays {
     const NAME: &'static str = "antmaze-sighted";
+    const ALIASES: &'static [&'static str] = &["antmaze-with-rays"];
 
     fn build(self, app: &mut App) {
         app.add_systems(ObserveSchedule, sense_rays.after(arena::observe).before(VisionSystems::Sync));
@@ -39,6 +43,7 @@ impl Senses<AntMaze> for WithRays {
 
 impl Senses<AntMaze> for WithMap {
     const NAME: &'static str = "antmaze-mapped";
+    const ALIASES: &'static [&'static str] = &["antmaze-with-map"];
 
     fn build(self, app: &mut App) {
         let systems = (sense_rays, sense_map).chain();
@@ -48,9 +53,10 @@ impl Senses<AntMaze> for WithMap {
 
 impl Senses<AntMaze> for WithPositionalEncoding {
     const NAME: &'static str = "antmaze-placed";
+    const ALIASES: &'static [&'static str] = &["antmaze-with-positional-encoding"];
 
     fn build(self, app: &mut App) {
-        app.add_systems(ObserveSchedule, sense_place.after(arena::observe).before(VisionSystems::Sync));
+        app.add_systems(ObserveSchedule, sense_positional_encoding.after(arena::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -60,7 +66,7 @@ fn sense_rays(mut ants: Query<(&Episode, &MazeAnt, &InMaze, &mut Observation), W
             let at = ant.0.torso().0;
             let from = Vec3::new(at.x, at.y, at.z.clamp(*RAY_HEIGHTS.start(), *RAY_HEIGHTS.end()));
             let to_goal = Vec2::from(level.0.goal_at) - at.truncate();
-            push_rays(&mut observation, to_goal.to_array(), |way| distance(ant.0.walls(), from, way));
+            push_rays(&mut observation, to_goal.to_array(), |direction| distance(ant.0.walls(), from, direction));
         }
     }
 }
@@ -78,11 +84,11 @@ fn sense_map(mut ants: Query<(&Episode, &MazeAnt, &InMaze, &mut Observation), Wi
     }
 }
 
-fn sense_place(mut ants: Query<(&Episode, &MazeAnt, &mut Observation), With<VectorSensor>>) {
+fn sense_positional_encoding(mut ants: Query<(&Episode, &MazeAnt, &mut Observation), With<VectorSensor>>) {
     for (episode, ant, mut observation) in &mut ants {
         if episode.is_running() {
-            let place = ant.0.torso().0.truncate().as_dvec2() / f64::from(CELL);
-            push_waves(&mut observation, place.to_array());
+            let position = ant.0.torso().0.truncate().as_dvec2() / f64::from(CELL);
+            push_positional_encoding(&mut observation, position.to_array());
         }
     }
 }
@@ -110,16 +116,16 @@ mod tests {
         world.tick().expect("sound");
         let seen = &world.get::<Observation>(agents[0]).expect("an observation").vector;
         assert_eq!(seen.len(), game.observation().len());
-        let place = Vec2::new(seen[0], seen[1]);
+        let position = Vec2::new(seen[0], seen[1]);
         let near = |value: f32, wanted: f32| assert!((value - wanted).abs() < 1e-3, "{value} instead of {wanted}");
-        near(seen[29], 20.0 - place.x);
-        near(seen[30], 20.0 - place.y);
+        near(seen[29], 20.0 - position.x);
+        near(seen[30], 20.0 - position.y);
         // The room is two cells wide and high, from 2 m before the start: its walls are at -2 and 6.
-        near(seen[31], 6.0 - place.x);
-        near(seen[33], 6.0 - place.y);
-        near(seen[35], 2.0 + place.x);
-        near(seen[37], 2.0 + place.y);
-        let slant = std::f32::consts::SQRT_2 * (2.0 + place.min_element());
+        near(seen[31], 6.0 - position.x);
+        near(seen[33], 6.0 - position.y);
+        near(seen[35], 2.0 + position.x);
+        near(seen[37], 2.0 + position.y);
+        let slant = std::f32::consts::SQRT_2 * (2.0 + position.min_element());
         near(seen[36], slant);
     }
 
@@ -142,7 +148,7 @@ mod tests {
     }
 
     #[test]
-    fn waves_are_of_the_place_that_is_told_in_metres() {
+    fn the_encoding_is_of_the_observed_position_in_metres() {
         let game = AntMazeWithPositionalEncoding::default();
         for level in 0..4 {
             let (mut world, agents) = build_world(&game, "xl+random-start", 0, 0, 1);
@@ -153,12 +159,12 @@ mod tests {
             let seen = &world.get::<Observation>(agents[0]).expect("an observation").vector;
             // The shortest wavelength of x and y is a cell, the longest of x eight cells.
             let turn = |metres: f32, length: f32| (metres / length * std::f32::consts::TAU).sin_cos();
-            let told = [(seen[35], seen[36]), (seen[43], seen[44]), (seen[29], seen[30])];
+            let encoded = [(seen[35], seen[36]), (seen[43], seen[44]), (seen[29], seen[30])];
             let wanted = [turn(seen[0], 4.0), turn(seen[1], 4.0), turn(seen[0], 32.0)];
-            for ((sine, cosine), (by, beside)) in told.into_iter().zip(wanted) {
+            for ((sine, cosine), (by, beside)) in encoded.into_iter().zip(wanted) {
                 assert!(
                     (sine - by).abs() < 1e-4 && (cosine - beside).abs() < 1e-4,
-                    "level {level}: {told:?}, {wanted:?}"
+                    "level {level}: {encoded:?}, {wanted:?}"
                 );
             }
         }
@@ -173,12 +179,12 @@ mod tests {
             world.tick().expect("sound");
             let InMaze(played) = world.get::<InMaze>(agents[0]).expect("a level");
             let seen = &world.get::<Observation>(agents[0]).expect("an observation").vector[39..];
-            for (at, &told) in seen.iter().enumerate() {
+            for (at, &value) in seen.iter().enumerate() {
                 let (north, east) = (5 - (at / 11) as i32, (at % 11) as i32 - 5);
                 let [row, col] = [played.start.row as i32 + north, played.start.col as i32 + east];
                 let inside = (0..8).contains(&row) && (0..8).contains(&col);
                 let free = inside && played.maze.is_free(Cell::new(row as usize, col as usize));
-                assert_eq!(told > 0.5, !free, "level {level}, from {} to ({row}, {col})", played.start);
+                assert_eq!(value > 0.5, !free, "level {level}, from {} to ({row}, {col})", played.start);
             }
         }
     }

@@ -111,7 +111,7 @@ pub struct Coin;
 #[reflect(Component, Clone, Debug, PartialEq)]
 pub struct LastOutcome(pub Option<crate::coinrun::Outcome>);
 
-// Building a level as entities.
+// The building of a level as entities.
 
 /// Makes the level of an episode, or takes the one of a file, and puts it into the player's arena.
 pub(super) fn start_episode(
@@ -179,7 +179,7 @@ pub(super) fn arrange(order: &str, spawns: &[Spawn]) -> Option<Vec<Spawn>> {
     (arranged.len() == spawns.len()).then_some(arranged)
 }
 
-// Levels of a mode: from a seed, or from a file.
+// Levels of a mode, from a seed or from a file.
 
 /// The levels of a World.
 #[derive(SystemParam)]
@@ -217,7 +217,7 @@ fn generated(mode: crate::coinrun::Mode, level: u64) -> Result<Arc<Level>, Strin
 }
 
 #[cfg(test)]
-mod creation_order_tests {
+mod tests {
     use super::*;
 
     #[test]

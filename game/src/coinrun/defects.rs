@@ -2,6 +2,11 @@
 //!
 //! Defects of levels change the text of a level, which makes it broken by construction. Defects of rules are systems
 //! around [`CoinRunSystems`] that change the data which the rules read and write.
+//!
+//! The folder, in reading order:
+//!
+//! - `walls`: levels with an unreachable coin, and defects of the player's motion.
+//! - `hazards`: defects of hazards, and levels with missing ground or a trap.
 
 mod hazards;
 mod walls;
@@ -169,7 +174,7 @@ fn missing_ground(level: &Level, left: i32, width: i32) -> Vec<Cell> {
 }
 
 #[cfg(test)]
-mod catalogue_tests {
+mod tests {
     use std::{collections::BTreeSet, sync::Arc};
 
     use bevy::prelude::*;
@@ -304,12 +309,6 @@ mod catalogue_tests {
             }
         }
     }
-}
-
-#[cfg(test)]
-mod cells_tests {
-    use super::*;
-    use crate::coinrun::{Mode, generator::generate};
 
     #[test]
     fn what_is_changed_lies_between_start_and_coin_and_is_another_tile() {

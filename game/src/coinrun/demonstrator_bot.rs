@@ -96,7 +96,7 @@ pub(super) fn from_text(text: &str) -> Option<TieBreaks> {
 }
 
 #[cfg(test)]
-mod tie_breaks_tests {
+mod tests {
     use super::*;
 
     #[test]

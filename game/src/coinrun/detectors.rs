@@ -29,8 +29,6 @@ pub(super) fn detectors() -> Vec<Box<dyn Detector>> {
     ]
 }
 
-// Detector of coins that are touched and not taken.
-
 /// Finds a player that touches the coin in an episode that goes on.
 fn goal_ignored() -> impl Detector {
     EachTick::new("goal-ignored", "the coin is touched and the episode goes on", |moment: &DetectorTick<'_>| {
@@ -38,42 +36,6 @@ fn goal_ignored() -> impl Detector {
         is_ignored.then(|| format!("touches the coin at {}, and the episode goes on", place(moment)))
     })
 }
-
-// Contacts of a player.
-
-/// Returns the contact of the player by the rules, without the clock; `None` too without a player of CoinRun. Saws are
-/// those of the level and added ones; every hazard fills a tile, whatever its body.
-fn touched(moment: &DetectorTick<'_>) -> Option<Outcome> {
-    let world = moment.world;
-    let player = world.get::<PlayerBody>(moment.agent)?.0;
-    let arena = world.get::<PlaysIn>(moment.agent)?.0;
-    let (level, tiles) = (&world.get::<Arena>(arena)?.level, &world.get::<Tiles>(arena)?.0);
-    let (mut saws, mut enemies) = (level.saws_near(player.x).to_vec(), Vec::new());
-    for entity in world.get::<ArenaEntities>(arena)?.iter() {
-        let Some(body) = world.get::<ArenaBody>(entity) else { continue };
-        let body = Body { rx: BLOCK_HALF, ry: BLOCK_HALF, ..body.0 };
-        if world.get::<Saw>(entity).is_some() {
-            saws.push(body);
-        } else if world.get::<Enemy>(entity).is_some() {
-            enemies.push(body);
-        }
-    }
-    touch(&player, tiles, &saws, &enemies, 0)
-}
-
-/// Returns true if the episode goes on after this tick.
-fn goes_on(moment: &DetectorTick<'_>) -> bool {
-    let episode = moment.world.get::<Episode>(moment.agent);
-    episode.is_some_and(|episode| episode.is_running() && episode.end().is_none())
-}
-
-/// Describes the position of the player, for messages.
-fn place(moment: &DetectorTick<'_>) -> String {
-    let body = moment.world.get::<PlayerBody>(moment.agent).map(|body| body.0).unwrap_or_default();
-    format!("({:.1}, {:.1})", body.x, body.y)
-}
-
-// Detector of players in the ground.
 
 /// Finds a player whose middle is in ground with more ground below it. By the rules a player's corners stay out of
 /// walls, and it can be in one only across a ledge one tile thick.
@@ -86,6 +48,56 @@ fn inside_ground() -> impl Detector {
         let is_inside = tiles.get(x, y).is_wall() && tiles.get(x, y - 1).is_wall();
         is_inside.then(|| format!("inside of ground at {}", place(moment)))
     })
+}
+
+/// Finds a player that touches a hazard in an episode that goes on.
+fn harmless_hazard() -> impl Detector {
+    EachTick::new(
+        "harmless-hazard",
+        "a saw, an enemy or lava is touched and the episode goes on",
+        |moment: &DetectorTick<'_>| {
+            if !goes_on(moment) {
+                return None;
+            }
+            let what = match touched(moment)? {
+                Outcome::Saw => "a saw",
+                Outcome::Enemy => "an enemy",
+                Outcome::Lava => "lava",
+                Outcome::Coin | Outcome::LeftMap | Outcome::Timeout => return None,
+            };
+            Some(format!("touches {what} at {}, and the episode goes on", place(moment)))
+        },
+    )
+}
+
+/// A player dies away from every hazard.
+struct FarHazard;
+
+struct LookingForLethal;
+
+impl Detector for FarHazard {
+    fn name(&self) -> &'static str {
+        "far-hazard"
+    }
+
+    fn describe(&self) -> &'static str {
+        "an episode is lost without touching a hazard"
+    }
+
+    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
+        Some(Box::new(LookingForLethal))
+    }
+}
+
+impl EpisodeWatcher for LookingForLethal {
+    fn tick(&mut self, _moment: &DetectorTick<'_>) -> Option<String> {
+        None
+    }
+
+    fn end(&mut self, moment: &DetectorTick<'_>, result: &EpisodeResult) -> Option<String> {
+        let is_unfounded = result.end == EpisodeEnd::LOST && touched(moment).is_none_or(Outcome::is_success);
+        is_unfounded.then(|| format!("lost at {} without touching a hazard", place(moment)))
+    }
 }
 
 // Detector of enemies outside their lanes.
@@ -153,64 +165,46 @@ fn lanes(level: &Level) -> Vec<Lane> {
     level.spawns.iter().filter_map(lane).collect()
 }
 
-// Detectors of harmless hazards, and of deaths without one.
+// Contacts of a player.
 
-/// Finds a player that touches a hazard in an episode that goes on.
-fn harmless_hazard() -> impl Detector {
-    EachTick::new(
-        "harmless-hazard",
-        "a saw, an enemy or lava is touched and the episode goes on",
-        |moment: &DetectorTick<'_>| {
-            if !goes_on(moment) {
-                return None;
-            }
-            let what = match touched(moment)? {
-                Outcome::Saw => "a saw",
-                Outcome::Enemy => "an enemy",
-                Outcome::Lava => "lava",
-                Outcome::Coin | Outcome::LeftMap | Outcome::Timeout => return None,
-            };
-            Some(format!("touches {what} at {}, and the episode goes on", place(moment)))
-        },
-    )
+/// Returns the contact of the player by the rules, without the clock; `None` too without a player of CoinRun. Saws are
+/// those of the level and added ones; every hazard fills a tile, whatever its body.
+fn touched(moment: &DetectorTick<'_>) -> Option<Outcome> {
+    let world = moment.world;
+    let player = world.get::<PlayerBody>(moment.agent)?.0;
+    let arena = world.get::<PlaysIn>(moment.agent)?.0;
+    let (level, tiles) = (&world.get::<Arena>(arena)?.level, &world.get::<Tiles>(arena)?.0);
+    let (mut saws, mut enemies) = (level.saws_near(player.x).to_vec(), Vec::new());
+    for entity in world.get::<ArenaEntities>(arena)?.iter() {
+        let Some(body) = world.get::<ArenaBody>(entity) else { continue };
+        let body = Body { rx: BLOCK_HALF, ry: BLOCK_HALF, ..body.0 };
+        if world.get::<Saw>(entity).is_some() {
+            saws.push(body);
+        } else if world.get::<Enemy>(entity).is_some() {
+            enemies.push(body);
+        }
+    }
+    touch(&player, tiles, &saws, &enemies, 0)
 }
 
-/// A player dies away from every hazard.
-struct FarHazard;
-
-struct LookingForLethal;
-
-impl Detector for FarHazard {
-    fn name(&self) -> &'static str {
-        "far-hazard"
-    }
-
-    fn describe(&self) -> &'static str {
-        "an episode is lost without touching a hazard"
-    }
-
-    fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
-        Some(Box::new(LookingForLethal))
-    }
+/// Returns true if the episode goes on after this tick.
+fn goes_on(moment: &DetectorTick<'_>) -> bool {
+    let episode = moment.world.get::<Episode>(moment.agent);
+    episode.is_some_and(|episode| episode.is_running() && episode.end().is_none())
 }
 
-impl EpisodeWatcher for LookingForLethal {
-    fn tick(&mut self, _moment: &DetectorTick<'_>) -> Option<String> {
-        None
-    }
-
-    fn end(&mut self, moment: &DetectorTick<'_>, result: &EpisodeResult) -> Option<String> {
-        let is_unfounded = result.end == EpisodeEnd::LOST && touched(moment).is_none_or(Outcome::is_success);
-        is_unfounded.then(|| format!("lost at {} without touching a hazard", place(moment)))
-    }
+/// Describes the position of the player, for messages.
+fn place(moment: &DetectorTick<'_>) -> String {
+    let body = moment.world.get::<PlayerBody>(moment.agent).map(|body| body.0).unwrap_or_default();
+    format!("({:.1}, {:.1})", body.x, body.y)
 }
 
 #[cfg(test)]
-mod catalogue_tests {
+mod tests {
     use std::collections::BTreeSet;
 
     use super::*;
-    use crate::coinrun::detectors::testing::{Bot, findings, sound};
+    use crate::coinrun::detectors::testing::{Bot, findings, first_named, planted, sound};
 
     #[test]
     fn names_are_different_and_all_are_usual() {
@@ -228,34 +222,18 @@ mod catalogue_tests {
             }
         }
     }
-}
-
-#[cfg(test)]
-mod coin_tests {
-    use crate::coinrun::detectors::testing::{Bot, first_named, planted, sound};
 
     #[test]
     fn a_coin_that_is_not_taken_is_found_and_one_that_is_taken_is_not() {
         assert!(first_named("goal-ignored", &planted("goal-does-not-end", 0), Bot::RightJump, 0..40).is_some());
         assert_eq!(first_named("goal-ignored", &sound(), Bot::RightJump, 0..40), None);
     }
-}
-
-#[cfg(test)]
-mod inside_tests {
-    use crate::coinrun::detectors::testing::{Bot, first_named, planted, sound};
 
     #[test]
     fn who_falls_into_ground_that_does_not_hold_is_found_and_who_runs_on_it_is_not() {
         assert!(first_named("inside-ground", &planted("missing-collider", 0), Bot::RightJump, 0..60).is_some());
         assert_eq!(first_named("inside-ground", &sound(), Bot::RightJump, 0..40), None);
     }
-}
-
-#[cfg(test)]
-mod lanes_tests {
-    use super::*;
-    use crate::coinrun::detectors::testing::{Bot, first_named, planted, sound};
 
     #[test]
     fn a_lane_ends_at_walls_and_barriers() {
@@ -273,11 +251,6 @@ mod lanes_tests {
         }
         assert_eq!(first_named("stray-enemy", &sound(), Bot::RightJump, 0..40), None);
     }
-}
-
-#[cfg(test)]
-mod lethal_tests {
-    use crate::coinrun::detectors::testing::{Bot, first_named, planted, sound};
 
     #[test]
     fn hazards_that_do_not_kill_are_found_and_those_that_do_are_not() {

@@ -302,7 +302,7 @@ pub const ENEMY_SPRITES: u32 = 9;
 pub const CRATE_SPRITES: u32 = 4;
 
 #[cfg(test)]
-mod generate_tests {
+mod tests {
     use super::*;
     use crate::coinrun::{
         level::Spawn,

@@ -193,8 +193,6 @@ pub struct GoldenLevel {
     pub rows: Vec<String>,
 }
 
-// Inhabitants of a level, and their starts.
-
 /// A body that a level starts with. Cells are tile coordinates; the body's centre is the middle of
 /// its cell.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -310,11 +308,6 @@ mod tests {
         assert!(error.to_string().contains("`easy` and `hard`"));
         assert_eq!(serde_json::to_string(&Mode::Easy).ok().as_deref(), Some("\"easy\""));
     }
-}
-
-#[cfg(test)]
-mod procgen_levels_tests {
-    use super::*;
 
     #[test]
     fn stays_in_the_set_and_covers_it() {

@@ -12,6 +12,13 @@
 //!   blocked; only other steps apply the rules to each of their parts;
 //! - state that one step leaves unchanged stays unchanged in every further step;
 //! - hazards do not move the player, so they are tested once the course is known, and only near it.
+//!
+//! The folder, in reading order:
+//!
+//! - `ground`: tiles and crates around a player, and the buttons of paths.
+//! - `sweep`: a step that nothing blocks.
+//! - `slide`: a step beside straight walls and over level ground, and the choice among all ways of stepping.
+//! - `plain`: the paths without short cuts, for tests.
 
 mod ground;
 #[cfg(test)]
@@ -29,6 +36,102 @@ use crate::coinrun::{
 };
 
 pub use crate::coinrun::paths::ground::{HELD, NAMES, STEPS, VALUES};
+
+/// Bodies farther away than this (tiles, along x) cannot be met on a path: half a view, and an enemy's walk.
+const FAR: f32 = 10.0;
+
+/// A direction, and the indices in [`HELD`] of its actions with and without a jump.
+const PAIRS: [(i8, usize, usize); 3] = [(1, 0, 1), (0, 2, 3), (-1, 5, 4)];
+
+/// The bodies near a player. Made once and used again, since it holds memory.
+#[derive(Debug, Default)]
+pub struct Surroundings {
+    crates: NearCrates,
+    dangers: Dangers,
+}
+
+impl Surroundings {
+    /// Follows the path of every held action, in the order of [`HELD`], and writes for each `[dies, coin,
+    /// lands, steps, dx, dy]`: three flags, the share of [`STEPS`] that was made, and the displacement in half views.
+    ///
+    /// A path ends with death, with the coin, where a flight ends on firm ground, and at the edge of the view.
+    pub fn follow(
+        &mut self,
+        player: &Body,
+        memory: &PlayerState,
+        tiles: &TileGrid,
+        crates: &[Body],
+        saws: &[Body],
+        enemies: &[Body],
+        out: &mut [f32],
+    ) {
+        let is_near = |body: &&Body| (body.x - player.x).abs() < FAR;
+        self.crates.replace(player, crates.iter().filter(is_near));
+        self.dangers.replace(player, STEPS, saws.iter().filter(is_near), enemies.iter().filter(is_near));
+        let ground = PathGround::new(tiles, &self.crates, player);
+        let start = Course::new(Walker::new(player, memory, &ground));
+        for (ax, with_jump, without) in PAIRS {
+            let (mut course, mut fork) = (start.clone(), None);
+            course.go_on::<false>(&ground, ax, |course| fork = Some(course.clone()));
+            let values = self.values(&course, player, tiles);
+            out[VALUES * without..][..VALUES].copy_from_slice(&values);
+            let values = fork.map_or(values, |mut jump| {
+                jump.go_on::<true>(&ground, ax, |_| ());
+                self.values(&jump, player, tiles)
+            });
+            out[VALUES * with_jump..][..VALUES].copy_from_slice(&values);
+        }
+    }
+
+    fn values(&self, course: &Course, player: &Body, tiles: &TileGrid) -> [f32; VALUES] {
+        let (xs, ys) = course.places();
+        let [start_x, start_y] = course.start();
+        if xs.is_empty() {
+            // Only a player whose position is NaN makes no step.
+            return [0.0, 0.0, 0.0, 0.0, f32::NAN, f32::NAN];
+        }
+        let end = self.dangers.end(course, player, tiles);
+        let steps = end.map_or(xs.len(), |end| end.steps);
+        let flag = |is: bool| f32::from(u8::from(is));
+        [
+            flag(end.is_some_and(|end| !end.is_coin)),
+            flag(end.is_some_and(|end| end.is_coin)),
+            flag(course.lands() && steps == xs.len()),
+            steps as f32 / STEPS as f32,
+            (xs[steps - 1] - start_x) / HALF_VIEW,
+            (ys[steps - 1] - start_y) / HALF_VIEW,
+        ]
+    }
+}
+
+/// A player on a path. Its size is that of the [`PathGround`].
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Walker {
+    /// Centre, tiles from the left.
+    pub x: f32,
+    /// Centre, tiles from the bottom.
+    pub y: f32,
+    /// Horizontal velocity, tiles per step.
+    pub vx: f32,
+    /// Vertical velocity, tiles per step, upwards.
+    pub vy: f32,
+    /// A jump would work now. No other memory of the player matters to the next step.
+    pub supported: bool,
+}
+
+impl Walker {
+    /// Returns a player at the beginning of a path.
+    pub fn new(body: &Body, memory: &PlayerState, ground: &PathGround) -> Self {
+        let supported = is_supported(body, memory, ground.tiles);
+        Self { x: body.x, y: body.y, vx: body.vx, vy: body.vy, supported }
+    }
+
+    /// Returns the player's body by the rules.
+    #[inline]
+    pub fn body(&self, ground: &PathGround) -> Body {
+        Body { x: self.x, y: self.y, vx: self.vx, vy: self.vy, rx: ground.rx, ry: ground.ry }
+    }
+}
 
 // The course of a path, regardless of hazards.
 
@@ -207,106 +310,8 @@ fn touched(body: &Body, swept: &Swept) -> Corners {
     Corners { left: swept.x[0] - rx, right: swept.x[1] + rx, low: swept.y[0] - ry, high: swept.y[1] + ry }
 }
 
-// Surroundings of the paths, and their values.
-
-/// Bodies farther away than this (tiles, along x) cannot be met on a path: half a view, and an enemy's walk.
-const FAR: f32 = 10.0;
-
-/// A direction, and the indices in [`HELD`] of its actions with and without a jump.
-const PAIRS: [(i8, usize, usize); 3] = [(1, 0, 1), (0, 2, 3), (-1, 5, 4)];
-
-/// The bodies near a player. Made once and used again, since it holds memory.
-#[derive(Debug, Default)]
-pub struct Surroundings {
-    crates: NearCrates,
-    dangers: Dangers,
-}
-
-impl Surroundings {
-    /// Follows the path of every held action, in the order of [`HELD`], and writes for each `[dies, coin,
-    /// lands, steps, dx, dy]`: three flags, the share of [`STEPS`] that was made, and the displacement in half views.
-    ///
-    /// A path ends with death, with the coin, where a flight ends on firm ground, and at the edge of the view.
-    pub fn follow(
-        &mut self,
-        player: &Body,
-        memory: &PlayerState,
-        tiles: &TileGrid,
-        crates: &[Body],
-        saws: &[Body],
-        enemies: &[Body],
-        out: &mut [f32],
-    ) {
-        let is_near = |body: &&Body| (body.x - player.x).abs() < FAR;
-        self.crates.replace(player, crates.iter().filter(is_near));
-        self.dangers.replace(player, STEPS, saws.iter().filter(is_near), enemies.iter().filter(is_near));
-        let ground = PathGround::new(tiles, &self.crates, player);
-        let start = Course::new(Walker::new(player, memory, &ground));
-        for (ax, with_jump, without) in PAIRS {
-            let (mut course, mut fork) = (start.clone(), None);
-            course.go_on::<false>(&ground, ax, |course| fork = Some(course.clone()));
-            let values = self.values(&course, player, tiles);
-            out[VALUES * without..][..VALUES].copy_from_slice(&values);
-            let values = fork.map_or(values, |mut jump| {
-                jump.go_on::<true>(&ground, ax, |_| ());
-                self.values(&jump, player, tiles)
-            });
-            out[VALUES * with_jump..][..VALUES].copy_from_slice(&values);
-        }
-    }
-
-    fn values(&self, course: &Course, player: &Body, tiles: &TileGrid) -> [f32; VALUES] {
-        let (xs, ys) = course.places();
-        let [start_x, start_y] = course.start();
-        if xs.is_empty() {
-            // Only a player whose position is NaN makes no step.
-            return [0.0, 0.0, 0.0, 0.0, f32::NAN, f32::NAN];
-        }
-        let end = self.dangers.end(course, player, tiles);
-        let steps = end.map_or(xs.len(), |end| end.steps);
-        let flag = |is: bool| f32::from(u8::from(is));
-        [
-            flag(end.is_some_and(|end| !end.is_coin)),
-            flag(end.is_some_and(|end| end.is_coin)),
-            flag(course.lands() && steps == xs.len()),
-            steps as f32 / STEPS as f32,
-            (xs[steps - 1] - start_x) / HALF_VIEW,
-            (ys[steps - 1] - start_y) / HALF_VIEW,
-        ]
-    }
-}
-
-/// A player on a path. Its size is that of the [`PathGround`].
-#[derive(Clone, Copy, PartialEq, Debug)]
-struct Walker {
-    /// Centre, tiles from the left.
-    pub x: f32,
-    /// Centre, tiles from the bottom.
-    pub y: f32,
-    /// Horizontal velocity, tiles per step.
-    pub vx: f32,
-    /// Vertical velocity, tiles per step, upwards.
-    pub vy: f32,
-    /// A jump would work now. No other memory of the player matters to the next step.
-    pub supported: bool,
-}
-
-impl Walker {
-    /// Returns a player at the beginning of a path.
-    pub fn new(body: &Body, memory: &PlayerState, ground: &PathGround) -> Self {
-        let supported = is_supported(body, memory, ground.tiles);
-        Self { x: body.x, y: body.y, vx: body.vx, vy: body.vy, supported }
-    }
-
-    /// Returns the player's body by the rules.
-    #[inline]
-    pub fn body(&self, ground: &PathGround) -> Body {
-        Body { x: self.x, y: self.y, vx: self.vx, vy: self.vy, rx: ground.rx, ry: ground.ry }
-    }
-}
-
 #[cfg(test)]
-mod surroundings_tests {
+mod tests {
     use super::*;
     use crate::coinrun::{paths::ground::HELD, rules::directions};
 

@@ -3,26 +3,30 @@
 //! Each arena becomes a [`Stage`] with a backdrop, its tiles and a sprite for every
 //! inhabitant, in the arena's own coordinates: one unit is one tile. Nothing here changes the game. The picture follows
 //! from the episode alone: animations count its ticks, and enemies leave puffs behind.
+//!
+//! The folder, in reading order:
+//!
+//! - `art`: the drawings, and the positions of figures on them.
+//! - `animate`: updates of sprites: positions, poses, directions.
+//! - `puffs`: the drawing of the puffs that enemies leave behind.
 
 mod animate;
 mod art;
 mod puffs;
 
 use crate::{
-    arena_grid::ArenaGrid,
     coinrun::{
         components::{Arena, ArenaBody, ArenaEntities, Crate, Enemy, InArena, PlayerBody, PlaysIn, Saw, Tiles},
         picture::animate::Trail,
         tile::{SIZE, TileGrid},
     },
+    pictures::ArenaGrid,
 };
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::{PaintedVelocity, Stage, TileLayer, VisionSystems};
 use playbot_harness::prelude::*;
 
 pub use crate::coinrun::picture::art::{Art, Pose};
-
-// The picture of CoinRun as a Bevy plugin.
 
 /// Adds sprites and tiles to [`CoinRunPlugin`](crate::coinrun::CoinRunPlugin). Add it after the plugins that bring
 /// images, such as Bevy's own or a sensor's.
@@ -50,8 +54,6 @@ impl Plugin for CoinRunPicturePlugin {
         );
     }
 }
-
-// Size of an agent's view of a level.
 
 /// Tiles from the left to the right edge of an agent's view.
 pub const VIEW: f32 = 13.0;

@@ -2,6 +2,12 @@
 //!
 //! [`plan`] looks for a sequence of actions from any state of an episode. [`Demonstrator`] plays such plans while its
 //! actions are disturbed. [`coin_is_unreachable`] proves that a level cannot be won.
+//!
+//! The folder, in reading order:
+//!
+//! - `search`: weighted A* over the exact rules.
+//! - `demonstrator`: a player that follows plans.
+//! - `reach`: the proof that the coin cannot be reached.
 
 mod demonstrator;
 mod reach;
@@ -13,8 +19,6 @@ use crate::coinrun::{
 };
 
 pub use crate::coinrun::planner::{demonstrator::Demonstrator, reach::coin_is_unreachable};
-
-// Plans: a path to the coin, a proof that there is none, or neither.
 
 /// The result of planning.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -75,8 +79,6 @@ fn plan_or_progress(sim: &Sim, config: &PlannerConfig) -> (Found, usize) {
     let (found, expansions) = search(sim, &exact, &FINE);
     (found, all + expansions)
 }
-
-// Thoroughness of the search, and caution of plans.
 
 /// Settings of the search.
 #[derive(Clone, Copy, PartialEq, Debug)]

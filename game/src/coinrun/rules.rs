@@ -3,6 +3,10 @@
 //! One step is, in this order: [`begin_step`], [`patrol`] for every enemy, [`move_player`],
 //! [`touch`]. All arithmetic is f32 and in a fixed order, because standing and landing depend on
 //! exact equality.
+//!
+//! In the folder:
+//!
+//! - [`motion`]: movement in small steps, contacts, and the end of an episode.
 
 pub mod motion;
 
@@ -10,8 +14,6 @@ use crate::coinrun::{rules::motion::advance, tile::TileGrid};
 
 pub use crate::coinrun::rules::motion::{Outcome, hash_state, patrol, touch};
 pub(super) use crate::coinrun::rules::motion::{corners, flush, part_count};
-
-// The player: actions, support, velocity, movement.
 
 /// Most times that a crate may pass the player on to another crate within one displacement.
 pub(super) const MAX_PUSHES: u32 = 5;
@@ -138,7 +140,7 @@ pub fn move_player(
     advance(player, x_first, |body, dx, dy| displace(body, tiles, crates, step, dx, dy, on_crate, 0));
 }
 
-/// Moves the player along one axis and tells whether it was blocked. A displacement of 0 counts as
+/// Moves the player along one axis and returns whether it was blocked. A displacement of 0 counts as
 /// vertical.
 #[inline]
 fn displace(
@@ -204,8 +206,6 @@ pub(super) fn rise_to_top(player: &Body, block: &Body) -> f32 {
     (f64::from(block.y) + side - f64::from(player.y)) as f32
 }
 
-// The rectangle of every body.
-
 /// An axis-aligned rectangle with a velocity.
 #[derive(Clone, Copy, PartialEq, Debug, Default)]
 pub struct Body {
@@ -255,7 +255,7 @@ impl Body {
     }
 }
 
-// The numbers of the game. Lengths are in tiles, speeds in tiles per step.
+// The numbers of the game, with lengths in tiles and speeds in tiles per step.
 
 /// Number of actions of the environment.
 pub const ACTIONS: u8 = 15;
@@ -307,7 +307,7 @@ pub(super) const CORNER: f32 = 0.98;
 pub(super) const FOOT_MARGIN: f32 = 0.01;
 
 #[cfg(test)]
-mod player_tests {
+mod tests {
     use super::*;
     use crate::coinrun::level::Level;
 

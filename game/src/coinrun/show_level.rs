@@ -68,8 +68,6 @@ fn draw(game: &dyn Game, level: Arc<Level>) -> Result<LevelPicture, InspectError
     Ok(LevelPicture::Pixels { image, pixels: seen.image.clone() })
 }
 
-// Floor plan of a level, for drawing trajectories.
-
 impl Level {
     /// Returns the used part of the level, from the side, in tiles: ground, lava and saws, crates. Enemies walk about,
     /// so they are left out.

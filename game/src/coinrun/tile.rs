@@ -251,8 +251,6 @@ impl TileGrid {
     }
 }
 
-// Range of a player's view, in tiles.
-
 /// Tiles from the player's cell to the edge of the view.
 pub const REACH: i32 = 6;
 

@@ -13,53 +13,32 @@ use playbot_learner::rng::{ChaCha8Rng, shuffle};
 use serde::Deserialize;
 use serde_json::Value;
 
-// Defects of walls: invisible ones, and ones without effect.
+/// Makes another maze for the rules, by start, goal and variant; `None` where the defect has no suitable position.
+pub(crate) type ChangeMaze = fn(&Maze, Cell, Cell, u32) -> Option<Maze>;
 
-/// Returns the maze with one more wall, on the shortest path from one cell to another; `None` if the path has no cell
-/// between.
-fn walled_on_the_way(maze: &Maze, start: Cell, goal: Cell, variant: u32) -> Option<Maze> {
-    let path = maze.shortest_path_between(start, goal)?;
-    let last = path.len().checked_sub(2).filter(|&last| last > 0)?;
-    redrawn(maze, path[on_the_way(variant, path.len()).clamp(1, last)], '#')
+/// Returns the defects of the walls of a game; `stand` gives its rules another maze as soon as a level has been built.
+pub(crate) fn of_walls(stand: fn(&mut App, u32, ChangeMaze)) -> Vec<DefectKind> {
+    let kind = |class, about, change: ChangeMaze| {
+        DefectKind::rules(class, about, PLACES, move |app: &mut App, variant: u32| stand(app, variant, change))
+    };
+    vec![
+        kind("invisible-wall", "an empty cell blocks players", walled_on_the_way),
+        kind("missing-collider", "a wall can be gone through", wall_gone_beside_the_way),
+    ]
 }
 
-/// Returns the maze without one of its walls: one between two free cells, the first from the variant's place on along
-/// the path.
-fn wall_gone_beside_the_way(maze: &Maze, start: Cell, goal: Cell, variant: u32) -> Option<Maze> {
-    let path = maze.shortest_path_between(start, goal)?;
-    let from = on_the_way(variant, path.len()).min(path.len() - 1);
-    let cells = path[from..].iter().chain(path[..from].iter().rev());
-    let wall = cells.flat_map(|&cell| walls_beside(maze, cell)).find(|&wall| is_between(maze, wall))?;
-    redrawn(maze, wall, 'O')
-}
-
-/// Returns a quarter, a half or three quarters of the path.
-fn on_the_way(variant: u32, length: usize) -> usize {
-    length * (place(variant) + 1) / 4
-}
-
-/// Returns the walls that share a side with a free cell.
-fn walls_beside(maze: &Maze, cell: Cell) -> impl Iterator<Item = Cell> {
-    // A free cell is never at the border.
-    let Cell { row, col } = cell;
-    let beside = [Cell::new(row - 1, col), Cell::new(row + 1, col), Cell::new(row, col - 1), Cell::new(row, col + 1)];
-    beside.map(|cell| (!maze.is_free(cell)).then_some(cell)).into_iter().flatten()
-}
-
-/// Returns true if a wall parts two free cells.
-fn is_between(maze: &Maze, wall: Cell) -> bool {
-    let Cell { row, col } = wall;
-    let inside = row > 0 && col > 0 && row + 1 < maze.rows() && col + 1 < maze.columns();
-    let free = |row: usize, col: usize| maze.is_free(Cell::new(row, col));
-    inside && (free(row - 1, col) && free(row + 1, col) || free(row, col - 1) && free(row, col + 1))
-}
-
-/// Returns the maze with another letter in a cell; `None` if it is the start or the goal of the map.
-fn redrawn(maze: &Maze, cell: Cell, letter: char) -> Option<Maze> {
-    let mut rows: Vec<Vec<char>> = maze.to_rows().iter().map(|row| row.chars().collect()).collect();
-    *rows.get_mut(cell.row)?.get_mut(cell.col)? = letter;
-    let rows: Vec<String> = rows.into_iter().map(String::from_iter).collect();
-    Maze::parse_drawn(&rows, Some(maze.start()), Some(maze.goal())).ok()
+/// Lets an episode go on whose goal was reached in this tick. No game can do that; reflection can.
+pub(crate) fn take_back(episode: &mut Episode) {
+    if let Ok(reached) = episode.path_mut::<bool>("reached") {
+        *reached = false;
+    }
+    if !episode.end().is_some_and(EpisodeEnd::is_success) {
+        return;
+    }
+    if let Ok(state) = episode.reflect_path_mut("state") {
+        // If the fields of episodes change, the test below fails.
+        let _ = state.try_apply(&DynamicEnum::new("Running", ()));
+    }
 }
 
 // Defects of levels that are mazes: walls on every path to the goal.
@@ -77,7 +56,7 @@ struct Drawn {
 /// Puts walls into a maze until no path leads to its goal; `None` if it has no suitable position.
 type Close = fn(&Maze, &mut ChaCha8Rng) -> Option<Maze>;
 
-/// Returns the defects of levels of a game with such texts; `reads` tells whether a text is a level.
+/// Returns the defects of levels of a game with such texts; `reads` returns whether a text is a level.
 pub(crate) fn of_levels(reads: fn(&str) -> bool) -> Vec<DefectKind> {
     let kind = |class, about, close: Close| {
         DefectKind::level(class, about, move |text: &str, rng: &mut ChaCha8Rng| {
@@ -126,40 +105,60 @@ fn walled_way(maze: &Maze, rng: &mut ChaCha8Rng) -> Option<Maze> {
     walled.find(|maze| prove(maze, maze.start(), maze.goal()).why_unsolvable().is_some())
 }
 
-// Reversal of a reached goal.
+// Mazes with another wall, or with one less.
 
-/// Lets an episode go on whose goal was reached in this tick. No game can do that; reflection can.
-pub(crate) fn take_back(episode: &mut Episode) {
-    if let Ok(reached) = episode.path_mut::<bool>("reached") {
-        *reached = false;
-    }
-    if !episode.end().is_some_and(EpisodeEnd::is_success) {
-        return;
-    }
-    if let Ok(state) = episode.reflect_path_mut("state") {
-        // If the fields of episodes change, the test below fails.
-        let _ = state.try_apply(&DynamicEnum::new("Running", ()));
-    }
+/// Returns the maze with one more wall, on the shortest path from one cell to another; `None` if the path has no cell
+/// between.
+fn walled_on_the_way(maze: &Maze, start: Cell, goal: Cell, variant: u32) -> Option<Maze> {
+    let path = maze.shortest_path_between(start, goal)?;
+    let last = path.len().checked_sub(2).filter(|&last| last > 0)?;
+    redrawn(maze, path[on_the_way(variant, path.len()).clamp(1, last)], '#')
 }
 
-// Defects of the walls, which pictures and levels do not show.
+/// Returns the maze without one of its walls: one between two free cells, the first from the variant's place on along
+/// the path.
+fn wall_gone_beside_the_way(maze: &Maze, start: Cell, goal: Cell, variant: u32) -> Option<Maze> {
+    let path = maze.shortest_path_between(start, goal)?;
+    let from = on_the_way(variant, path.len()).min(path.len() - 1);
+    let cells = path[from..].iter().chain(path[..from].iter().rev());
+    let wall = cells.flat_map(|&cell| walls_beside(maze, cell)).find(|&wall| is_between(maze, wall))?;
+    redrawn(maze, wall, 'O')
+}
 
-/// Makes another maze for the rules, by start, goal and variant; `None` where the defect has no suitable position.
-pub(crate) type ChangeMaze = fn(&Maze, Cell, Cell, u32) -> Option<Maze>;
+/// Returns a quarter, a half or three quarters of the path.
+fn on_the_way(variant: u32, length: usize) -> usize {
+    length * (place(variant) + 1) / 4
+}
 
-/// Returns the defects of the walls of a game; `stand` gives its rules another maze as soon as a level has been built.
-pub(crate) fn of_walls(stand: fn(&mut App, u32, ChangeMaze)) -> Vec<DefectKind> {
-    let kind = |class, about, change: ChangeMaze| {
-        DefectKind::rules(class, about, PLACES, move |app: &mut App, variant: u32| stand(app, variant, change))
-    };
-    vec![
-        kind("invisible-wall", "an empty cell blocks players", walled_on_the_way),
-        kind("missing-collider", "a wall can be gone through", wall_gone_beside_the_way),
-    ]
+/// Returns the walls that share a side with a free cell.
+fn walls_beside(maze: &Maze, cell: Cell) -> impl Iterator<Item = Cell> {
+    // A free cell is never at the border.
+    let Cell { row, col } = cell;
+    let beside = [Cell::new(row - 1, col), Cell::new(row + 1, col), Cell::new(row, col - 1), Cell::new(row, col + 1)];
+    beside.map(|cell| (!maze.is_free(cell)).then_some(cell)).into_iter().flatten()
+}
+
+/// Returns true if a wall parts two free cells.
+fn is_between(maze: &Maze, wall: Cell) -> bool {
+    let Cell { row, col } = wall;
+    let inside = row > 0 && col > 0 && row + 1 < maze.rows() && col + 1 < maze.columns();
+    let free = |row: usize, col: usize| maze.is_free(Cell::new(row, col));
+    inside && (free(row - 1, col) && free(row + 1, col) || free(row, col - 1) && free(row, col + 1))
+}
+
+/// Returns the maze with another letter in a cell; `None` if it is the start or the goal of the map.
+fn redrawn(maze: &Maze, cell: Cell, letter: char) -> Option<Maze> {
+    let mut rows: Vec<Vec<char>> = maze.to_rows().iter().map(|row| row.chars().collect()).collect();
+    *rows.get_mut(cell.row)?.get_mut(cell.col)? = letter;
+    let rows: Vec<String> = rows.into_iter().map(String::from_iter).collect();
+    Maze::parse_drawn(&rows, Some(maze.start()), Some(maze.goal())).ok()
 }
 
 #[cfg(test)]
-mod cells_tests {
+mod tests {
+    use playbot_harness::defect::Plant;
+    use playbot_learner::rng::Streams;
+
     use super::*;
     use crate::maze::{MazeSpec, generate};
 
@@ -185,14 +184,6 @@ mod cells_tests {
         assert_eq!(found[0], 60);
         assert!(found[1] > 50, "{found:?}");
     }
-}
-
-#[cfg(test)]
-mod levels_tests {
-    use playbot_harness::defect::Plant;
-    use playbot_learner::rng::Streams;
-
-    use super::*;
 
     fn planted(class: &str, rows: &[&str]) -> Option<Maze> {
         let kind = of_levels(|_| true).into_iter().find(|kind| kind.class == class).expect("there is such a defect");
@@ -222,11 +213,6 @@ mod levels_tests {
         let walled = planted("walled-way", &["#######", "#SOOOG#", "#######"]).expect("there is room");
         assert!(walled.shortest_path().is_empty());
     }
-}
-
-#[cfg(test)]
-mod success_tests {
-    use super::*;
 
     #[test]
     fn an_episode_that_was_won_goes_on_and_one_that_was_lost_does_not() {

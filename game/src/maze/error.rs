@@ -114,8 +114,6 @@ pub enum MazeError {
     },
 }
 
-// Limits of the size of a maze.
-
 /// Most cells to a side.
 pub const MAX_SIDE: usize = 4096;
 

@@ -30,8 +30,6 @@ pub fn generate(spec: &MazeSpec, seed: u64) -> Result<Maze, MazeError> {
     Err(MazeError::Difficulty { least, most, longest })
 }
 
-// Rooms in a grid, and the removal of walls between them.
-
 /// A grid of square rooms.
 pub(super) struct Rooms {
     rows: usize,
@@ -133,8 +131,6 @@ impl Rooms {
         }
     }
 }
-
-// The random decisions of the generator.
 
 /// Random numbers that are the same on every machine.
 pub(super) struct Draw(Mt64);

@@ -93,8 +93,6 @@ impl Planner {
     }
 }
 
-// Distances in a maze, breadth first.
-
 /// The number of moves from every cell to one of them.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Distances {
@@ -145,8 +143,6 @@ impl Distances {
     }
 }
 
-// Proofs of a path through a maze.
-
 /// Proves whether a player can get from one cell to another.
 ///
 /// Solvable: there is a path over free cells that lie side by side. Unsolvable: there is none even over two free cells
@@ -190,7 +186,7 @@ fn is_reached_over_corners(maze: &Maze, start: Cell, goal: Cell) -> bool {
 }
 
 #[cfg(test)]
-mod proof_tests {
+mod tests {
     use super::*;
 
     fn cells(rows: &[&str], start: [usize; 2], goal: [usize; 2]) -> LevelProof {

@@ -176,8 +176,6 @@ fn draw(maze: &Maze) -> Result<Drawing, InspectError> {
     Ok(Drawing { label: "A maze with its shortest path".to_owned(), size, shapes })
 }
 
-// Floor plan of a maze, for drawing trajectories.
-
 impl Maze {
     /// Returns the maze from above. `square` gives the area of a cell and `place` the position of agents in it, both in
     /// the game's coordinates. They differ where walls are shifted against positions, as in the original Maze2D.

@@ -128,15 +128,15 @@ impl MazeSpec {
 
     /// Returns the options that differ from the default, as [`set_option`](Self::set_option) takes them: `key=value`.
     pub fn options(&self) -> Vec<String> {
-        let usual = Self::default();
+        let default = Self::default();
         let mut options = Vec::new();
-        if (self.rows, self.columns) != (usual.rows, usual.columns) {
+        if (self.rows, self.columns) != (default.rows, default.columns) {
             options.push(format!("size={}x{}", self.rows, self.columns));
         }
-        if self.loops != usual.loops {
+        if self.loops != default.loops {
             options.push(format!("loops={}", self.loops));
         }
-        if self.corridor != usual.corridor {
+        if self.corridor != default.corridor {
             options.push(format!("corridor={}", self.corridor));
         }
         if let Some(wanted) = &self.difficulty {

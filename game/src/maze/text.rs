@@ -89,8 +89,6 @@ fn mark(place: &mut Option<Cell>, cell: Cell, what: &'static str) -> Result<(), 
     }
 }
 
-// Shared parts of the level files of maze games.
-
 /// Reads the maze of a level file: rows, the first one at the top, with start and goal as letters in them, as cells, or
 /// both.
 ///

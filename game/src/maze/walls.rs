@@ -61,8 +61,6 @@ pub(super) fn check_size(rows: usize, columns: usize) -> Result<(), MazeError> {
     if fits { Ok(()) } else { Err(MazeError::TooLarge { rows, columns }) }
 }
 
-// Comparison of a tick's reward with the rules.
-
 /// Describes a reward that differs from the rules by more than `slack`; `None` if it does not.
 pub(crate) fn reward_mismatch(paid: f32, by_rules: f32, slack: f32) -> Option<String> {
     // NaN is not near to anything.

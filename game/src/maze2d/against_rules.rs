@@ -88,11 +88,11 @@ fn moved_otherwise(before: &Ball, after: &Ball, push: Vec2d, walls: &Walls, rule
     let apart = length(sub(after.position, by_rules.position)).max(length(sub(after.velocity, by_rules.velocity)));
     // NaN is not near to anything.
     let is_same = apart <= slack;
-    let told = |ball: &Ball| {
+    let reported = |ball: &Ball| {
         let Ball { position: [x, y], velocity: [vx, vy] } = ball;
         format!("at {x:.3}, {y:.3} with {vx:.3}, {vy:.3} m/s")
     };
-    (!is_same).then(|| format!("the ball is {}; by the rules it is {}", told(after), told(&by_rules)))
+    (!is_same).then(|| format!("the ball is {}; by the rules it is {}", reported(after), reported(&by_rules)))
 }
 
 #[cfg(test)]

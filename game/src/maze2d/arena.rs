@@ -53,7 +53,7 @@ pub(super) fn start_episode(
     commands.entity(event.entity).insert(ball);
 }
 
-// The game as entities: an arena with its level, and the ball of its agent.
+// The game as entities.
 
 /// Map and rules of all arenas whose levels bring no rules of their own.
 #[derive(Resource, Clone, Debug, PartialEq, Reflect)]
@@ -87,7 +87,7 @@ pub struct MazeBall(pub Ball);
 #[reflect(Component)]
 pub struct PlaysIn(pub Entity);
 
-// Levels of a mode: from a seed, or from a file.
+// Levels of a mode, from a seed or from a file.
 
 /// The levels of a World, each with its rules.
 #[derive(SystemParam)]
@@ -125,7 +125,7 @@ fn generated(rules: Maze2dMode, level: u64) -> Result<(Arc<Maze2dLevel>, Maze2dM
     Ok((Arc::new(level), rules))
 }
 
-// One tick of every arena.
+// The tick of every arena.
 
 /// Moves every ball whose agent plays, and pays for its new position.
 pub(super) fn play(

@@ -159,7 +159,7 @@ fn stand(app: &mut App, variant: u32, change: ChangeMaze) {
 }
 
 #[cfg(test)]
-mod catalogue_tests {
+mod tests {
     use bevy::prelude::*;
     use bevy_playbot::test_app::{PlaybotTestExt, test_app};
     use playbot_harness::{
@@ -169,7 +169,9 @@ mod catalogue_tests {
     use playbot_learner::rng::Streams;
 
     use super::*;
-    use crate::maze2d::{DemonstratorBot, Maze2d, Maze2dLevel, Maze2dMode, level_text::LevelText, spawn_agent};
+    use crate::maze2d::{
+        DemonstratorBot, Maze2d, Maze2dLevel, Maze2dMode, arena::PlaysIn, level_text::LevelText, spawn_agent,
+    };
 
     const MODE: &str = "random";
 
@@ -225,15 +227,6 @@ mod catalogue_tests {
             }
         }
     }
-}
-
-#[cfg(test)]
-mod walls_tests {
-    use bevy_playbot::test_app::test_app;
-    use playbot_harness::{defect::Plant, prelude::*};
-
-    use super::*;
-    use crate::maze2d::{Maze2d, arena::PlaysIn, spawn_agent};
 
     #[test]
     fn the_ball_meets_one_wall_more_or_less_than_its_level_has() {

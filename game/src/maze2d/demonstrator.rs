@@ -33,7 +33,7 @@ pub struct Demonstrator {
     target: Cell,
     planner: Planner,
     /// The waypoints, the next one first, each with its cell.
-    way: VecDeque<(Cell, Vec2d)>,
+    path: VecDeque<(Cell, Vec2d)>,
 }
 
 impl Demonstrator {
@@ -41,7 +41,7 @@ impl Demonstrator {
     pub fn new(level: Arc<Maze2dLevel>, retarget: bool, rng: &mut impl Rng) -> Self {
         let target = if retarget { any_cell(&level.maze, rng) } else { level.goal_cell };
         let planner = Planner::new(&level.maze, target);
-        Self { level, retarget, target, planner, way: VecDeque::new() }
+        Self { level, retarget, target, planner, path: VecDeque::new() }
     }
 
     /// Returns its target cell.
@@ -54,7 +54,7 @@ impl Demonstrator {
         if self.retarget && length(sub(ball.position, centre(self.target))) < NEAR {
             self.target = any_cell(&self.level.maze, rng);
             self.planner = Planner::new(&self.level.maze, self.target);
-            self.way.clear();
+            self.path.clear();
         }
         let waypoint = self.waypoint(ball, rng);
         let wanted = sub(scale(sub(waypoint, ball.position), PULL), scale(ball.velocity, BRAKE));
@@ -64,33 +64,33 @@ impl Demonstrator {
 
     /// Returns the next waypoint that has not been passed.
     fn waypoint(&mut self, ball: &Ball, rng: &mut impl Rng) -> Vec2d {
-        while self.way.len() > 1 && length(sub(ball.position, self.way[0].1)) < NEAR {
-            self.way.pop_front();
+        while self.path.len() > 1 && length(sub(ball.position, self.path[0].1)) < NEAR {
+            self.path.pop_front();
         }
         let here = self.cell_of(ball);
-        if self.way.front().is_none_or(|(next, _)| moves_between(here, *next) > 1) {
+        if self.path.front().is_none_or(|(next, _)| moves_between(here, *next) > 1) {
             self.plan(here, rng);
         }
-        self.way.front().map_or_else(|| centre(self.target), |(_, place)| *place)
+        self.path.front().map_or_else(|| centre(self.target), |(_, position)| *position)
     }
 
     /// Plans a new path from a cell. Without one, as from inside a wall, it is left empty.
     fn plan(&mut self, from: Cell, rng: &mut impl Rng) {
         let path = self.planner.path(from).unwrap_or_default();
         let offset = self.level.walls.offset();
-        self.way.clear();
+        self.path.clear();
         for cell in path {
-            let place = if cell == self.target {
+            let position = if cell == self.target {
                 centre(cell)
             } else {
                 // Between the cell's nominal position and its actual one.
                 centre(cell).map(|along| along - offset * unit(rng))
             };
-            self.way.push_back((cell, place));
+            self.path.push_back((cell, position));
         }
         // The cell it stands in is the start of the path, unless it is the target.
-        if self.way.len() > 1 {
-            self.way.pop_front();
+        if self.path.len() > 1 {
+            self.path.pop_front();
         }
     }
 
@@ -105,8 +105,6 @@ impl Demonstrator {
 fn moves_between(a: Cell, b: Cell) -> usize {
     a.row.abs_diff(b.row) + a.col.abs_diff(b.col)
 }
-
-// The waypoint demonstrator as an agent of the game.
 
 /// Plays by walking from waypoint to waypoint. See [`Demonstrator`].
 #[derive(Component, Reflect)]

@@ -72,9 +72,7 @@ pub(super) fn any_cell(maze: &Maze, rng: &mut impl Rng) -> Cell {
     maze.free_cells().nth(nth).unwrap_or(maze.start())
 }
 
-// Random numbers that are the same on every machine.
-
-/// Returns a standard normal number, by Marsaglia's polar method.
+/// Returns a standard normal number, by Marsaglia's polar method: the same on every machine.
 pub(super) fn normal(rng: &mut impl Rng) -> f64 {
     loop {
         let [u, v] = [uniform(rng, 1.0), uniform(rng, 1.0)];
@@ -91,7 +89,7 @@ pub(super) fn uniform(rng: &mut impl Rng, half: f64) -> f64 {
 }
 
 #[cfg(test)]
-mod draws_tests {
+mod tests {
     use super::*;
     use playbot_learner::rng::Streams;
 

@@ -141,7 +141,7 @@ pub(super) fn read_rules(text: &str, maze: &Maze, options: &str) -> Result<Maze2
 }
 
 #[cfg(test)]
-mod rules_text_tests {
+mod tests {
     use super::*;
     use crate::maze2d::mode::Contact;
 

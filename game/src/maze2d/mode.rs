@@ -125,7 +125,7 @@ impl Maze2dMode {
 
     /// Returns the differences from the map's defaults besides its own options, in their written order.
     pub(super) fn options(&self) -> Vec<String> {
-        let usual = Self::new(self.map.clone());
+        let default = Self::new(self.map.clone());
         let mut options = Vec::new();
         let mut add = |differs: bool, option: &str| {
             if differs {
@@ -135,7 +135,7 @@ impl Maze2dMode {
         add(self.sparse, "sparse");
         add(self.fixed_start, "fixed-start");
         add(self.random_goal, "goal=random");
-        add(self.limit != usual.limit, &format!("limit={}", self.limit));
+        add(self.limit != default.limit, &format!("limit={}", self.limit));
         add(self.end_at_goal, "end-at-goal");
         add(!self.offset, "no-offset");
         add(self.contact == Contact::Rapier, "contact=rapier");

@@ -3,17 +3,15 @@
 //! A maze of any size fills the picture. The ball is drawn larger than it is, to be visible on 64 pixels.
 
 use crate::{
-    arena_grid::ArenaGrid,
     maze::{Cell, Maze},
     maze2d::{
         arena::{MazeArena, MazeBall, PlaysIn},
         ball::{MAX_SPEED, Vec2d},
         level::{Maze2dLevel, centre},
     },
+    pictures::{ArenaGrid, decode},
 };
 use bevy::{
-    asset::RenderAssetUsages,
-    image::{CompressedImageFormats, ImageSampler, ImageType},
     math::{Rect, Vec2},
     prelude::*,
 };
@@ -21,8 +19,6 @@ use bevy_playbot::vision::{PaintedVelocity, Stage, TileLayer, VisionSystems};
 use playbot_assets::maze2d;
 use playbot_harness::{floor_plan::FloorPlan, prelude::*};
 use std::sync::LazyLock;
-
-// The picture of Maze2D as a Bevy plugin.
 
 /// Adds sprites and tiles to [`Maze2dPlugin`](crate::maze2d::Maze2dPlugin). Add it after the plugins that bring images,
 /// such as Bevy's own or a sensor's.
@@ -39,11 +35,23 @@ impl Plugin for Maze2dPicturePlugin {
     }
 }
 
-// Width of the picture.
-
 /// Width of an agent's view, in world units, and the least height: the longer side of the maze, so that all of it is
 /// visible in any shape of the picture.
 pub const VIEW: f32 = 12.0;
+
+impl Maze2dLevel {
+    /// Returns the maze with its walls as the ball meets them: x, to the right, is the row.
+    pub fn floor_plan(&self) -> FloorPlan {
+        let square = |cell| Rect::from_center_size(point(centre(cell)) - self.walls.offset() as f32, Vec2::ONE);
+        let plan = self.maze.floor_plan(square, |cell| point(centre(cell)));
+        FloorPlan { start: point(centre(self.start_cell)), goal: point(self.goal()), ..plan }
+    }
+}
+
+/// Returns a position on the plan.
+pub(super) fn point([x, y]: Vec2d) -> Vec2 {
+    Vec2::new(x as f32, y as f32)
+}
 
 // The drawings, which come with the program.
 
@@ -55,13 +63,6 @@ const FLOOR: u16 = 1;
 /// Decoded once for all Worlds: tiles, ball, goal.
 static IMAGES: LazyLock<[Image; 3]> =
     LazyLock::new(|| [decode(maze2d::TILES), decode(maze2d::BALL), decode(maze2d::GOAL)]);
-
-fn decode(png: &[u8]) -> Image {
-    let kind = ImageType::Extension("png");
-    let (formats, usages) = (CompressedImageFormats::NONE, RenderAssetUsages::default());
-    Image::from_buffer(png, kind, formats, true, ImageSampler::nearest(), usages)
-        .expect("the drawings are part of the program, and a test decodes each")
-}
 
 /// Handles of all drawings.
 #[derive(Resource, Clone, Debug, Reflect)]
@@ -188,20 +189,4 @@ fn balls(
         let [down, right] = ball.0.velocity.map(|speed| (speed / MAX_SPEED) as f32);
         velocity.0 = Vec2::new(right, -down);
     }
-}
-
-// Floor plan of a level, in the coordinates of the observation, for drawing trajectories.
-
-impl Maze2dLevel {
-    /// Returns the maze with its walls as the ball meets them: x, to the right, is the row.
-    pub fn floor_plan(&self) -> FloorPlan {
-        let square = |cell| Rect::from_center_size(point(centre(cell)) - self.walls.offset() as f32, Vec2::ONE);
-        let plan = self.maze.floor_plan(square, |cell| point(centre(cell)));
-        FloorPlan { start: point(centre(self.start_cell)), goal: point(self.goal()), ..plan }
-    }
-}
-
-/// Returns a position on the plan.
-pub(super) fn point([x, y]: Vec2d) -> Vec2 {
-    Vec2::new(x as f32, y as f32)
 }

@@ -6,7 +6,10 @@ use crate::{
         arena::{MazeArena, MazeBall, PlaysIn},
         ball::sub,
     },
-    senses::{Senses, WithMap, WithObservations, WithPositionalEncoding, WithRays, push_map, push_rays, push_waves},
+    senses::{
+        Senses, WithMap, WithObservations, WithPositionalEncoding, WithRays, push_map, push_positional_encoding,
+        push_rays,
+    },
 };
 use bevy::prelude::*;
 use bevy_playbot::vision::VisionSystems;
@@ -19,7 +22,7 @@ pub const RAY_LENGTH: f64 = 4.0;
 /// the rows, against x.
 pub type Maze2dWithRays = WithObservations<Maze2d, WithRays>;
 
-/// Maze2D with rays and a map, under its name `maze2d-mapped`.
+/// Maze2D with rays and a map, under its names `maze2d-mapped` and `maze2d-with-map`.
 pub type Maze2dWithMap = WithObservations<Maze2d, WithMap>;
 
 /// Maze2D with positional encoding, under its name `maze2d-placed`.
@@ -27,6 +30,7 @@ pub type Maze2dWithPositionalEncoding = WithObservations<Maze2d, WithPositionalE
 
 impl Senses<Maze2d> for WithRays {
     const NAME: &'static str = "maze2d-sighted";
+    const ALIASES: &'static [&'static str] = &["maze2d-with-rays"];
 
     fn build(self, app: &mut App) {
         app.add_systems(ObserveSchedule, sense_rays.after(arena::observe).before(VisionSystems::Sync));
@@ -35,6 +39,7 @@ impl Senses<Maze2d> for WithRays {
 
 impl Senses<Maze2d> for WithMap {
     const NAME: &'static str = "maze2d-mapped";
+    const ALIASES: &'static [&'static str] = &["maze2d-with-map"];
 
     fn build(self, app: &mut App) {
         let systems = (sense_rays, sense_map).chain();
@@ -44,9 +49,10 @@ impl Senses<Maze2d> for WithMap {
 
 impl Senses<Maze2d> for WithPositionalEncoding {
     const NAME: &'static str = "maze2d-placed";
+    const ALIASES: &'static [&'static str] = &["maze2d-with-positional-encoding"];
 
     fn build(self, app: &mut App) {
-        app.add_systems(ObserveSchedule, sense_place.after(arena::observe).before(VisionSystems::Sync));
+        app.add_systems(ObserveSchedule, sense_positional_encoding.after(arena::observe).before(VisionSystems::Sync));
     }
 }
 
@@ -59,9 +65,9 @@ fn sense_rays(
     for (episode, ball, plays_in, mut observation) in &mut balls {
         let Ok(arena) = arenas.get(plays_in.0) else { continue };
         if episode.is_running() {
-            let (place, level) = (ball.0.position, &arena.level);
-            let to_goal = sub(level.goal(), place).map(|along| along as f32);
-            let wall = |[east, north]: [f64; 2]| level.walls.ray(place, [-north, east], RAY_LENGTH) as f32;
+            let (position, level) = (ball.0.position, &arena.level);
+            let to_goal = sub(level.goal(), position).map(|along| along as f32);
+            let wall = |[east, north]: [f64; 2]| level.walls.ray(position, [-north, east], RAY_LENGTH) as f32;
             push_rays(&mut observation, to_goal, wall);
         }
     }
@@ -82,10 +88,10 @@ fn sense_map(
 }
 
 /// Cells are 1 m wide.
-fn sense_place(mut balls: Query<(&Episode, &MazeBall, &mut Observation), With<VectorSensor>>) {
+fn sense_positional_encoding(mut balls: Query<(&Episode, &MazeBall, &mut Observation), With<VectorSensor>>) {
     for (episode, ball, mut observation) in &mut balls {
         if episode.is_running() {
-            push_waves(&mut observation, ball.0.position);
+            push_positional_encoding(&mut observation, ball.0.position);
         }
     }
 }
@@ -100,12 +106,12 @@ mod tests {
     use crate::maze2d::Ball;
 
     /// Returns the observation of a ball at rest at this position.
-    fn seen(game: &dyn Game, mode: &str, place: [f64; 2]) -> Vec<f32> {
+    fn seen(game: &dyn Game, mode: &str, position: [f64; 2]) -> Vec<f32> {
         let (mut world, agents) = build_world(game, mode, 0, 0, 1);
         let still = Action(ActionValue::Continuous(vec![0.0; 2]));
         world.entity_mut(agents[0]).insert((Control::Human, still, LevelQueue::Always(0)));
         world.tick().expect("sound");
-        world.entity_mut(agents[0]).insert(MazeBall(Ball::at(place)));
+        world.entity_mut(agents[0]).insert(MazeBall(Ball::at(position)));
         world.tick().expect("sound");
         let seen = world.get::<Observation>(agents[0]).expect("an agent").vector.clone();
         assert_eq!(seen.len(), game.observation().len());
@@ -127,20 +133,20 @@ mod tests {
         //   3 ##OOO###
         //   4 #OO#OOO#
         //   5 #O#OO#O#
-        // East is wall (2, 3), north-east the same, north (0, 2), north-west (1, 0), west (2, 0), south-west (3, 1), south
-        // (5, 2), south-east (4, 3). The goal is in (6, 6).
-        let place = [2.1, 2.05];
+        // East is wall (2, 3), north-east the same, north (0, 2), north-west (1, 0), west (2, 0), south-west (3, 1),
+        // south (5, 2), south-east (4, 3). The goal is in (6, 6).
+        let position = [2.1, 2.05];
         let walls = |[e, ne, n, nw, w, sw, s, se]: [f32; 8]| {
             [2.1, 2.05, 0.0, 0.0, 3.9, 3.95, e, SQRT_2 * ne, n, SQRT_2 * nw, w, SQRT_2 * sw, s, SQRT_2 * se]
         };
         assert_near(
-            &seen(&Maze2dWithRays::default(), "medium+no-offset", place),
+            &seen(&Maze2dWithRays::default(), "medium+no-offset", position),
             &walls([0.45, 0.45, 1.6, 1.55, 1.55, 0.55, 2.4, 1.4]),
         );
         // With D4RL's offset they stand 0.2 nearer in the east and south, and farther in the west and north; the goal
         // stays.
         assert_near(
-            &seen(&Maze2dWithRays::default(), "medium", place),
+            &seen(&Maze2dWithRays::default(), "medium", position),
             &walls([0.25, 0.25, 1.8, 1.75, 1.75, 0.75, 2.2, 1.2]),
         );
     }
@@ -154,8 +160,8 @@ mod tests {
 
     #[test]
     fn the_map_has_the_cells_around_and_walls_outside() {
-        let rows = |mode, place| -> Vec<String> {
-            let seen = seen(&Maze2dWithMap::default(), mode, place);
+        let rows = |mode, position| -> Vec<String> {
+            let seen = seen(&Maze2dWithMap::default(), mode, position);
             let row = |row: &[f32]| row.iter().map(|&cell| if cell > 0.5 { '#' } else { 'O' }).collect();
             seen[14..].chunks(11).map(row).collect()
         };
@@ -182,7 +188,7 @@ mod tests {
     }
 
     #[test]
-    fn waves_are_of_the_place_in_cells() {
+    fn the_encoding_is_of_the_position_in_cells() {
         // A whole wavelength of a cell along x and a quarter of one along y.
         let seen = seen(&Maze2dWithPositionalEncoding::default(), "medium+no-offset", [2.0, 2.25]);
         assert_near(&seen[..4], &[2.0, 2.25, 0.0, 0.0]);

@@ -77,14 +77,14 @@ impl Walls {
     }
 
     /// Returns the cell around a position, as row and column; it may lie outside the maze.
-    pub fn cell_at(&self, place: Vec2d) -> (i32, i32) {
-        let [row, column] = place.map(|along| (along + self.offset).round() as i32);
+    pub fn cell_at(&self, position: Vec2d) -> (i32, i32) {
+        let [row, column] = position.map(|along| (along + self.offset).round() as i32);
         (row, column)
     }
 
     /// Returns true if a position lies in a free cell.
-    pub fn is_free(&self, place: Vec2d) -> bool {
-        let (row, column) = self.cell_at(place);
+    pub fn is_free(&self, position: Vec2d) -> bool {
+        let (row, column) = self.cell_at(position);
         !self.is_solid(row, column)
     }
 
@@ -95,10 +95,10 @@ impl Walls {
     }
 
     /// Returns the walls whose surface is closer than `margin` to that of a ball.
-    pub fn touches(&self, place: Vec2d, margin: f64) -> Touches {
+    pub fn touches(&self, position: Vec2d, margin: f64) -> Touches {
         let mut found = Touches { list: [Touch { normal: [0.0; 2], gap: 0.0 }; MOST], len: 0 };
-        let (row, column) = self.cell_at(place);
-        if self.is_clear(place, row, column, margin) {
+        let (row, column) = self.cell_at(position);
+        if self.is_clear(position, row, column, margin) {
             return found;
         }
         for row in row - 1..=row + 1 {
@@ -106,7 +106,7 @@ impl Walls {
                 if !self.is_solid(row, column) {
                     continue;
                 }
-                let touch = touch(self.centre(row, column), place);
+                let touch = touch(self.centre(row, column), position);
                 if touch.gap < margin {
                     found.list[found.len] = touch;
                     found.len += 1;
@@ -117,17 +117,17 @@ impl Walls {
     }
 
     /// Returns true if a position is so far within its free cell that no wall can be near: most are.
-    fn is_clear(&self, place: Vec2d, row: i32, column: i32, margin: f64) -> bool {
-        let [x, y] = sub(place, self.centre(row, column));
+    fn is_clear(&self, position: Vec2d, row: i32, column: i32, margin: f64) -> bool {
+        let [x, y] = sub(position, self.centre(row, column));
         x.abs().max(y.abs()) <= HALF - RADIUS - margin && !self.is_solid(row, column)
     }
 }
 
 /// Returns the contact of a ball and a wall.
-fn touch(centre: Vec2d, place: Vec2d) -> Touch {
-    let from = sub(place, centre);
+fn touch(centre: Vec2d, position: Vec2d) -> Touch {
+    let from = sub(position, centre);
     let nearest = add(centre, from.map(|along| along.clamp(-HALF, HALF)));
-    let out = sub(place, nearest);
+    let out = sub(position, nearest);
     let distance = length(out);
     if distance > 0.0 {
         return Touch { normal: out.map(|along| along / distance), gap: distance - RADIUS };
@@ -139,23 +139,21 @@ fn touch(centre: Vec2d, place: Vec2d) -> Touch {
     Touch { normal, gap: from[axis].abs() - HALF - RADIUS }
 }
 
-// Distance to the next wall.
-
 impl Walls {
     /// Returns the distance from a position to the nearest wall in a direction of length 1, m; at most `most`. 0 inside
     /// a wall.
     ///
     /// Walks from cell to cell through the sides that the ray leaves by. Each is computed from the position itself, so
     /// no error adds up. Every maze is closed, so the walk ends.
-    pub fn ray(&self, place: Vec2d, way: Vec2d, most: f64) -> f64 {
-        let (row, column) = self.cell_at(place);
+    pub fn ray(&self, position: Vec2d, direction: Vec2d, most: f64) -> f64 {
+        let (row, column) = self.cell_at(position);
         let mut cell = [row, column];
         let mut gone: f64 = 0.0;
         while !self.is_solid(cell[0], cell[1]) {
             let middle = self.centre(cell[0], cell[1]);
-            let until_side = [0, 1].map(|axis: usize| match way[axis] {
+            let until_side = [0, 1].map(|axis: usize| match direction[axis] {
                 0.0 => f64::INFINITY,
-                along => (middle[axis] + HALF.copysign(along) - place[axis]) / along,
+                along => (middle[axis] + HALF.copysign(along) - position[axis]) / along,
             });
             // Through a corner it takes the first axis, so it never passes between two walls that touch there.
             let axis = usize::from(until_side[1] < until_side[0]);
@@ -163,7 +161,7 @@ impl Walls {
             if gone >= most {
                 return most;
             }
-            cell[axis] += if way[axis] > 0.0 { 1 } else { -1 };
+            cell[axis] += if direction[axis] > 0.0 { 1 } else { -1 };
         }
         // Rounding can put a position on a side beyond it.
         gone.max(0.0)
@@ -281,7 +279,7 @@ fn minimum(free: Vec2d, contacts: &[Contact], pushes: impl Fn(usize) -> bool) ->
 }
 
 #[cfg(test)]
-mod ray_tests {
+mod tests {
     use bevy_rapier2d::rapier::prelude::{QueryFilter, Ray, Vector};
     use playbot_learner::rng::Streams;
 
@@ -293,7 +291,7 @@ mod ray_tests {
             level::{any_cell, centre, uniform},
             physics::MazePhysics,
         },
-        senses::WAYS,
+        senses::DIRECTIONS,
     };
 
     fn walls(rows: &[&str], offset: f64) -> Walls {
@@ -305,8 +303,8 @@ mod ray_tests {
         let walls = walls(&["#####", "#SO##", "#O#O#", "#OOG#", "#####"], 0.0);
         let diagonal = std::f64::consts::FRAC_1_SQRT_2;
         // Between (1, 3) and (2, 2), from the middles of (1, 2) and (2, 3), exactly to the corner where the four meet.
-        for (from, way) in [([1.0, 2.0], [diagonal, diagonal]), ([2.0, 3.0], [-diagonal, -diagonal])] {
-            assert!((walls.ray(from, way, 9.0) - diagonal).abs() < 1e-12, "{from:?}");
+        for (from, direction) in [([1.0, 2.0], [diagonal, diagonal]), ([2.0, 3.0], [-diagonal, -diagonal])] {
+            assert!((walls.ray(from, direction, 9.0) - diagonal).abs() < 1e-12, "{from:?}");
         }
     }
 
@@ -331,13 +329,14 @@ mod ray_tests {
             let physics = MazePhysics::following(&walls, &Ball::default());
             let filter = QueryFilter::default().exclude_rigid_body(physics.ball());
             for _ in 0..50 {
-                let place =
+                let position =
                     centre(any_cell(&maze, &mut rng)).map(|along| along - walls.offset() + uniform(&mut rng, 0.4));
-                for (name, [x, y]) in WAYS {
-                    let ray = Ray::new(Vector::new(place[0] as f32, place[1] as f32), Vector::new(x as f32, y as f32));
+                for (name, [x, y]) in DIRECTIONS {
+                    let ray =
+                        Ray::new(Vector::new(position[0] as f32, position[1] as f32), Vector::new(x as f32, y as f32));
                     let found = physics.world.cast_ray(&ray, 4.0, true, filter).map_or(4.0, |(_, distance)| distance);
-                    let ours = walls.ray(place, [x, y], 4.0);
-                    assert!((ours - f64::from(found)).abs() < 1e-4, "{name} of {place:?}: {ours}, not {found}");
+                    let ours = walls.ray(position, [x, y], 4.0);
+                    assert!((ours - f64::from(found)).abs() < 1e-4, "{name} of {position:?}: {ours}, not {found}");
                 }
             }
         }

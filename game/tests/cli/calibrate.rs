@@ -72,8 +72,8 @@ fn bots_are_held_beside_people() {
         (&["out", "people.demo", "--plot", "people.gif"], ".png or .svg"),
         (&["out"], "RECORDING"),
     ] {
-        let (_, told) = ended(folder, &[&["report", "calibrate"], args].concat(), 3);
-        assert!(told.contains(words), "{args:?}: {told}");
+        let (_, reported) = ended(folder, &[&["report", "calibrate"], args].concat(), 3);
+        assert!(reported.contains(words), "{args:?}: {reported}");
     }
 }
 

@@ -17,7 +17,7 @@ fn detectors_are_listed_with_what_they_find_and_their_settings() {
     let values: Vec<serde_json::Value> =
         json.lines().map(|line| serde_json::from_str(line).expect("a line of JSON")).collect();
     let stuck = values.iter().find(|detector| detector["name"] == "stuck").expect("it is listed");
-    assert_eq!((stuck["looks"].as_str(), stuck["settings"]["ticks"].as_f64()), (Some("usual"), Some(300.0)));
+    assert_eq!((stuck["looks"].as_str(), stuck["settings"]["ticks"].as_f64()), (Some("default"), Some(300.0)));
 }
 
 #[test]
@@ -41,7 +41,7 @@ fn slow_ticks_have_a_file_of_their_own_and_fail_nothing() {
 }
 
 #[test]
-fn what_is_no_detector_is_told_with_what_would_be_right() {
+fn what_is_no_detector_is_reported_with_what_would_be_right() {
     let temporary = tempfile::tempdir().expect("a folder");
     for (option, value, words) in [
         ("--detect", "short-cut", "did you mean `shortcut`?"),

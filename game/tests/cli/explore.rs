@@ -13,8 +13,8 @@ fn a_maze_is_covered_and_its_solution_recorded_and_drawn() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     let files = ["--out", "new/way.demo", "--png", "new/way.png", "--json"];
-    let (out, told) = done(folder, &[&MAZE[..], &files, &["--threads", "2"]].concat());
-    assert!(told.contains("recorded: new/way.demo, ") && told.contains("drawn: new/way.png"), "{told}");
+    let (out, reported) = done(folder, &[&MAZE[..], &files, &["--threads", "2"]].concat());
+    assert!(reported.contains("recorded: new/way.demo, ") && reported.contains("drawn: new/way.png"), "{reported}");
     let found = json_lines(&out).remove(0);
     assert_eq!((found["coverage"].as_f64(), found["stop"].as_str()), (Some(1.0), Some("covered")), "{found}");
     assert!(found["open_cells"].as_u64().is_some_and(|open| open >= 17), "{found}");
@@ -41,9 +41,9 @@ fn a_goal_that_is_not_found_is_a_finding() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     let args = ["explore", "coinrun", "--level", "hard:0", "--steps", "1", "--out", "none.demo"];
-    let (out, told) = ended(folder, &args, 1);
+    let (out, reported) = ended(folder, &args, 1);
     assert!(out.contains("solution  none was found") && out.contains("coinrun hard:0"), "{out}");
-    assert!(told.contains("nothing is recorded: no solution was found"), "{told}");
+    assert!(reported.contains("nothing is recorded: no solution was found"), "{reported}");
     assert!(!folder.join("none.demo").exists());
     // The outer wall.
     let cell = |cell: &str, json: &[&str], code: i32| {
@@ -52,12 +52,12 @@ fn a_goal_that_is_not_found_is_a_finding() {
     assert!(cell("0,0", &[], 1).contains("cell 0,0 was not reached"));
     assert_eq!(json_lines(&cell("0,0", &["--json"], 1))[0]["cell"]["ticks"], Value::Null);
     let reached = json_lines(&cell("1,1", &["--json"], 0))[0]["cell"]["ticks"].as_u64().expect("it is free");
-    let told = cell("1,1", &[], 0);
-    assert!(told.contains(&format!("cell 1,1 is reached in {reached} tick")), "{told}");
+    let reported = cell("1,1", &[], 0);
+    assert!(reported.contains(&format!("cell 1,1 is reached in {reached} tick")), "{reported}");
 }
 
 #[test]
-fn mistakes_are_told_before_anything_is_explored() {
+fn mistakes_are_reported_before_anything_is_explored() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     for (args, words) in [

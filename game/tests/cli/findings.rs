@@ -34,12 +34,12 @@ fn a_failure_is_a_file_that_replays_in_another_process_and_gets_shorter() {
         assert_eq!(code(&output), 1, "{}", errors(&output));
         errors(&output)
     };
-    let told = test("one", "1");
+    let reported = test("one", "1");
     test("two", "2");
     let found = findings(folder, "one");
     assert!(!found.is_empty() && found == findings(folder, "two"), "threads change no byte");
     let kept = format!(" kept in one/findings; see it: playbot replay one/findings/{}", found[0].0);
-    assert!(told.contains(&kept), "{kept} is missing in {told}");
+    assert!(reported.contains(&kept), "{kept} is missing in {reported}");
     for (name, _) in &found {
         let file = format!("one/findings/{name}");
         let (again, _) = done(folder, &["replay", &file, "--json"]);
@@ -50,16 +50,16 @@ fn a_failure_is_a_file_that_replays_in_another_process_and_gets_shorter() {
     let file = format!("one/findings/{}", lost.0);
     done(folder, &["demo", "show", &file]);
     let pictures = ["--png", "new/still.png", "--apng", "new/moving.png", "--scale", "2"];
-    let (out, told) = done(folder, &[&["replay", &file][..], &pictures].concat());
+    let (out, reported) = done(folder, &[&["replay", &file][..], &pictures].concat());
     assert!(out.contains("played by right-jump") && out.contains("it happens again at tick"), "{out}");
-    assert!(told.contains("still.png shows tick"), "{told}");
+    assert!(reported.contains("still.png shows tick"), "{reported}");
     let moving = fs::read(folder.join("new/moving.png")).expect("drawn");
     assert!(moving.starts_with(b"\x89PNG") && moving.windows(4).any(|part| part == b"acTL"), "it moves");
 
     let shorter = ["replay", &file, "--minimise", "--out", "short.finding", "--replays", "60", "--json"];
-    let told = line(&done(folder, &shorter).0);
-    let (before, now) = (told["original_ticks"].as_u64(), told["minimised"]["ticks"].as_u64());
-    assert!(now <= before && told["minimised"]["replays"].as_u64() <= Some(60), "{told}");
+    let reported = line(&done(folder, &shorter).0);
+    let (before, now) = (reported["original_ticks"].as_u64(), reported["minimised"]["ticks"].as_u64());
+    assert!(now <= before && reported["minimised"]["replays"].as_u64() <= Some(60), "{reported}");
     let short = line(&done(folder, &["replay", "short.finding", "--json"]).0);
     assert_eq!((short["ticks"].as_u64(), short["original_ticks"].as_u64()), (now, before));
     assert!(ended(folder, &shorter, 3).1.contains("--force"));
@@ -80,8 +80,8 @@ fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires
     let results = fs::read_to_string(folder.join("out/results.json")).expect("written");
     assert!(results.contains(&format!("\"file\":\"findings/{name}\"")), "{results}");
     let file = format!("out/findings/{name}");
-    let told = done(folder, &["replay", &file]).0;
-    assert!(told.contains("maze2d sealed.json: unreachable-goal: "), "{told}");
+    let reported = done(folder, &["replay", &file]).0;
+    assert!(reported.contains("maze2d sealed.json: unreachable-goal: "), "{reported}");
     assert!(
         done(folder, &["replay", &file, "--png", "a.png"]).1.contains("a.png shows the level: it was found before")
     );
@@ -144,7 +144,7 @@ fn what_is_no_finding_is_told() {
         (&["test", "coinrun", "--regress", "empty"], "--regress"),
         (&["test", "--today", "2027-01-31"], "--regress"),
     ] {
-        let (_, told) = ended(folder, args, 3);
-        assert!(told.contains(words), "{args:?}: {told}");
+        let (_, reported) = ended(folder, args, 3);
+        assert!(reported.contains(words), "{args:?}: {reported}");
     }
 }

@@ -27,8 +27,8 @@ fn nothing_is_lost_or_half_written_when_shards_cannot_be_joined() {
         ),
         (&["--out", "joined", "--against", "none"], "none has no results.json"),
     ] {
-        let told = merge(more);
-        assert!(told.contains(words), "{more:?}: {told}");
+        let reported = merge(more);
+        assert!(reported.contains(words), "{more:?}: {reported}");
     }
     assert_eq!(read(), before);
     assert!(!folder.join("joined").exists(), "nothing is left of what could not be compared");

@@ -41,11 +41,11 @@ fn recordings_of_the_experiment_that_comes_with_the_program_are_beside_it() {
     let (_, words) = ended(folder, &[&learn[..], &["--force", "--demos", "demos/coinrun"]].concat(), 3);
     assert!(words.contains("`playbot record coinrun "), "{words}");
     for game in ["coinrun", "maze2d", "antmaze"] {
-        let (_, told) = done(folder, &["config", "show", game]);
-        assert!(!told.contains("there are no recordings"), "{told}");
+        let (_, reported) = done(folder, &["config", "show", game]);
+        assert!(!reported.contains("there are no recordings"), "{reported}");
     }
-    let (_, told) = done(folder, &["config", "show", "--set", "demos=demos/coinrun"]);
-    assert!(told.contains("there are no recordings at demos/coinrun"), "{told}");
+    let (_, reported) = done(folder, &["config", "show", "--set", "demos=demos/coinrun"]);
+    assert!(reported.contains("there are no recordings at demos/coinrun"), "{reported}");
 }
 
 #[test]

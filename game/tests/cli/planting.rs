@@ -49,7 +49,7 @@ fn a_set_is_made_once_and_the_same_by_any_number_of_threads() {
 }
 
 #[test]
-fn mistakes_are_told_before_anything_is_planted() {
+fn mistakes_are_reported_before_anything_is_planted() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     for (args, words) in [

@@ -41,6 +41,7 @@ fn a_game_that_is_set_brings_its_own_experiment() {
     for part in ["train: \"umaze:0..63\"", "test: \"umaze:64..127\"", "demos: \"demos/maze2d-sighted\""] {
         assert!(plainest.contains(part), "{part}: {plainest}");
     }
+    assert_eq!(shown("game=maze2d-with-rays"), plainest, "another name of it");
     assert_eq!(shown("game=coinrun"), shown("seed=1"), "the program's first game");
 }
 
@@ -169,8 +170,8 @@ fn skills_and_quickstarts_are_as_long_as_their_switches_say() {
     let learn = |out: &str, more: &[&str]| {
         done(folder, &[&["learn-skills", "--experiment", "small.ron", "--out", out, "--json"], more].concat())
     };
-    let (one, told) = learn("a", &[]);
-    assert!(one.lines().count() == 1 && told.contains("4 episodes from few.demo"), "{one}{told}");
+    let (one, reported) = learn("a", &[]);
+    assert!(one.lines().count() == 1 && reported.contains("4 episodes from few.demo"), "{one}{reported}");
     let (three, _) = learn("b", &["--epochs", "3"]);
     let epochs: Vec<Value> = three.lines().map(|line| serde_json::from_str(line).expect("JSON")).collect();
     assert_eq!(epochs.iter().map(|epoch| epoch["epoch"].as_u64()).collect::<Vec<_>>(), [Some(1), Some(2), Some(3)]);
@@ -204,17 +205,17 @@ fn skills_say_how_they_do_on_what_is_held_out() {
     };
     let learn = |out: &str, more: &[&str]| {
         let learn = ["learn-skills", "--epochs", "3", "--json", "--out", out];
-        let (text, told) = done(folder, &[&learn[..], &apart, more].concat());
-        (nlls(&text), told)
+        let (text, reported) = done(folder, &[&learn[..], &apart, more].concat());
+        (nlls(&text), reported)
     };
-    let (all, told) = learn("a", &[]);
+    let (all, reported) = learn("a", &[]);
     let words = format!("held-out NLL {:.2} after epoch 3, the last, whose model is kept", all[2]);
-    assert!(all.len() == 3 && told.contains(&words), "{words}: {told}");
+    assert!(all.len() == 3 && reported.contains(&words), "{words}: {reported}");
 
-    let (all, told) = learn("b", &["--set", "skills.patience=3", "--set", "skills.lr=0.1"]);
+    let (all, reported) = learn("b", &["--set", "skills.patience=3", "--set", "skills.lr=0.1"]);
     let best = (0..3).min_by(|&a, &b| all[a].total_cmp(&all[b])).expect("three epochs");
     let words = format!("held-out NLL {:.2} after epoch {}, the best of 3, whose model is kept", all[best], best + 1);
-    assert!(told.contains(&words), "{words}: {told}");
+    assert!(reported.contains(&words), "{words}: {reported}");
 
     done(folder, &[&["quickstart", "--run", "quick", "--steps", "128", "--seeds", "1"][..], &apart].concat());
     assert_eq!(nlls(&String::from_utf8_lossy(&bytes(folder, "quick/skills.jsonl"))).len(), 1);
@@ -251,19 +252,20 @@ fn levels_and_traces_are_those_of_the_mode_and_the_seed() {
     assert_ne!(level(&["--level", "4"]), plain);
     assert_ne!(level(&["--level", "3", "--mode", "easy"]), plain);
     assert_eq!(level(&["--level", "3", "--mode", "hard"]), plain, "that is the default");
-    let told = |args: &[&str]| done(folder, args).1;
+    let reported = |args: &[&str]| done(folder, args).1;
     assert!(
-        told(&["level", "coinrun", "--level", "3"]).contains("no --mode is named: hard, which is trained in, level 3")
+        reported(&["level", "coinrun", "--level", "3"])
+            .contains("no --mode is named: hard, which is trained in, level 3")
     );
-    assert!(told(&["level", "maze2d", "--level", "3"]).contains("no --mode is named: medium, which is trained in"));
+    assert!(reported(&["level", "maze2d", "--level", "3"]).contains("no --mode is named: medium, which is trained in"));
     assert_eq!(level(&["--levels", "hard:3..9"]), plain);
     let (old, warning) = done(folder, &["level", "coinrun", "--seed", "3"]);
     assert_eq!(old, plain, "--seed names the level for one more version");
     assert!(warning.contains("warning: --seed 3") && warning.contains("for a level use --level 3"), "{warning}");
-    assert!(!told(&["level", "coinrun", "--level", "3"]).contains("warning"));
-    let recorded = told(&["record", "coinrun", "--steps", "20", "--out", "usual.demo"]);
+    assert!(!reported(&["level", "coinrun", "--level", "3"]).contains("warning"));
+    let recorded = reported(&["record", "coinrun", "--steps", "20", "--out", "default.demo"]);
     assert!(recorded.contains("recording hard:0..499, but for the held-out levels hard:64..1087"), "{recorded}");
-    let seen = told(&["record", "coinrun", "--levels", "hard:60..70", "--steps", "20", "--out", "seen.demo"]);
+    let seen = reported(&["record", "coinrun", "--levels", "hard:60..70", "--steps", "20", "--out", "seen.demo"]);
     assert!(seen.contains("level 64 is, or looks like, one") && seen.contains("--hold-out hard:64..1087"), "{seen}");
     let described: Value = serde_json::from_str(&level(&["--level", "3", "--json"])).expect("one line of JSON");
     assert!(described.is_object(), "{described}");
@@ -281,9 +283,9 @@ fn levels_and_traces_are_those_of_the_mode_and_the_seed() {
 }
 
 #[test]
-fn what_happens_inside_is_told_to_those_who_ask() {
+fn what_happens_inside_is_reported_on_request() {
     let temporary = tempfile::tempdir().expect("a folder");
-    let told = |more: &[&str]| {
+    let reported = |more: &[&str]| {
         let doctor = ["doctor", "maze2d", "--ticks", "2", "--level", "6", "--seed", "5", "--json"];
         let mut command = command(temporary.path(), &[&doctor[..], more].concat());
         let output = command.env_remove("RUST_LOG").output().expect("the program starts");
@@ -293,6 +295,6 @@ fn what_happens_inside_is_told_to_those_who_ask() {
         assert_eq!((&report["level"], &report["seed"]), (&json!(6), &json!(5)));
         errors(&output)
     };
-    assert!(!told(&[]).contains("DEBUG"));
-    assert!(told(&["-vv"]).contains("DEBUG"));
+    assert!(!reported(&[]).contains("DEBUG"));
+    assert!(reported(&["-vv"]).contains("DEBUG"));
 }

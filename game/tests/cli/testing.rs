@@ -84,10 +84,10 @@ fn results_say_where_bots_went_and_what_killed_them() {
             assert!(tester["places"]["visited"].as_u64().is_some_and(|own| own > 0 && own <= visited), "{row}");
         }
         let failed = row["lost"].as_u64().unwrap_or(0) + row["timed_out"].as_u64().unwrap_or(0);
-        let told = row["causes"].as_object().cloned().unwrap_or_default();
-        assert_eq!(told.values().filter_map(Value::as_u64).sum::<u64>(), failed, "{row}");
+        let reported = row["causes"].as_object().cloned().unwrap_or_default();
+        assert_eq!(reported.values().filter_map(Value::as_u64).sum::<u64>(), failed, "{row}");
         assert!(failed == 0 || maps["failure"]["way"].is_array(), "{row}");
-        causes.extend(told.into_iter().map(|(cause, _)| cause));
+        causes.extend(reported.into_iter().map(|(cause, _)| cause));
     }
     let known = ["saw", "enemy", "lava", "left the map", "time"];
     assert!(!causes.is_empty() && causes.iter().all(|cause| known.contains(&cause.as_str())), "{causes:?}");

@@ -34,7 +34,11 @@ fn nobody_listening_stops_no_work() {
     let learned = deaf(&["learn-skills", "--demos", "a.demo", "--epochs", "1", "--out", "skills"]);
     assert_eq!(code(&learned), 0);
     assert!(folder.path().join("skills").exists());
-    assert_eq!(code(&deaf(&["level", "maze2d", "--map", "nope"])), 3, "a mistake is one even if nobody is told");
+    assert_eq!(
+        code(&deaf(&["level", "maze2d", "--map", "nope"])),
+        3,
+        "a mistake is one even if standard error is closed"
+    );
 }
 
 #[test]
@@ -105,8 +109,8 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     }
     let on_purpose = ok(eval(&["--levels", "hard:64..65"]));
     assert_eq!(lines(&on_purpose).len(), 2);
-    let told = "runs/b has learned from hard:64..65, and the levels hard:64..65 have some of these: not all of them are unseen";
-    assert!(errors(&on_purpose).contains(told), "{}", errors(&on_purpose));
+    let reported = "runs/b has learned from hard:64..65, and the levels hard:64..65 have some of these: not all of them are unseen";
+    assert!(errors(&on_purpose).contains(reported), "{}", errors(&on_purpose));
     let saved = folder.path().join("runs/b/experiment.ron");
     let text = unsealed(&std::fs::read_to_string(&saved).expect("written")).replace("\"coinrun\"", "\"maze\"");
     std::fs::write(&saved, text).expect("writable");
@@ -158,8 +162,8 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
 
     let export = ["policy", "export", "--experiment", "tiny.ron", "--skills", shown, "--out", "bc.policy"];
     assert_eq!(code(&run(&export)), 0);
-    let card = run(&["policy", "show", "bc.policy"]);
-    assert!(said(&card).contains("demonstrations of hard:8..11"), "{}", said(&card));
+    let shown = run(&["policy", "show", "bc.policy"]);
+    assert!(said(&shown).contains("demonstrations of hard:8..11"), "{}", said(&shown));
     let seen_one = ["--set", "test=hard:11..12", "--force"];
     let exported = errors(&run(&[&export[..], &seen_one].concat()));
     assert!(
@@ -178,8 +182,8 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     // The metadata of a policy file has both.
     let exported = run(&["policy", "export", "--run", "runs/b", "--out", "b.policy"]);
     assert!(errors(&exported).contains("eval --policy b.policy --levels hard:64..65`"), "{}", errors(&exported));
-    let card = run(&["policy", "show", "b.policy"]);
-    assert!(said(&card).contains("has seen      hard:0..3 and hard:8..11"), "{}", said(&card));
+    let shown = run(&["policy", "show", "b.policy"]);
+    assert!(said(&shown).contains("has seen      hard:0..3 and hard:8..11"), "{}", said(&shown));
     for (test, own) in [("hard:11..12", "hard:8..11"), ("hard:3..4", "hard:0..3")] {
         let test = format!("test={test}");
         let sets = ["--set", "train=hard:30..33", "--set", &test];
@@ -192,12 +196,12 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
 
     // Recordings of it have seen them too, which is not noted: `record` warns of it.
     let recorded = run(&["record", "coinrun", "--run", "runs/b", "--levels", "hard:200..201", "--out", "pupil.demo"]);
-    let told = "the player has learned from hard:0..3 and hard:8..11: hold none of these out";
-    assert!(code(&recorded) == 0 && errors(&recorded).contains(told), "{}", errors(&recorded));
+    let reported = "the player has learned from hard:0..3 and hard:8..11: hold none of these out";
+    assert!(code(&recorded) == 0 && errors(&recorded).contains(reported), "{}", errors(&recorded));
 
     // A run whose last checkpoint is not of its end is distinguished from one that is.
-    let told = "runs/b is not trained to its end: it has ";
-    assert!(!errors(&run(&["eval", "--run", "runs/b"])).contains(told));
+    let reported = "runs/b is not trained to its end: it has ";
+    assert!(!errors(&run(&["eval", "--run", "runs/b"])).contains(reported));
     let mut checkpoints: Vec<_> = std::fs::read_dir(folder.path().join("runs/b/checkpoints"))
         .expect("checkpoints")
         .map(|entry| entry.expect("readable").path())
@@ -206,7 +210,7 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
     assert!(checkpoints.len() > 1, "{checkpoints:?}");
     std::fs::remove_dir_all(checkpoints.last().expect("one")).expect("removable");
     let (measured, words) = with("eval", &["--run", "runs/b"]);
-    assert!(measured == 0 && words.contains(told), "{words}");
+    assert!(measured == 0 && words.contains(reported), "{words}");
 
     // Settings of algorithms that are not trained are reported.
     let (trained, words) = with("train", &[&train[..], &["--force", "--set", "rlpd.critics=3"]].concat());
@@ -217,8 +221,8 @@ fn skills_remember_the_levels_that_they_were_learned_on() {
 
     // Differences from the settings of the skills are refused; the same settings may be given again.
     let (refused, words) = with("train", &[&skills[..], &["--set", "skills.latent=4", "--run", "runs/c"]].concat());
-    let told = "`--set skills.latent=4` asks for skills.latent=4, and the skill model has 2; drop the option";
-    assert!(refused == 3 && words.contains(told), "{words}");
+    let reported = "`--set skills.latent=4` asks for skills.latent=4, and the skill model has 2; drop the option";
+    assert!(refused == 3 && words.contains(reported), "{words}");
     assert_eq!(with("train", &[&skills[..], &["--set", "skills.latent=2", "--run", "runs/c"]].concat()).0, 0);
 
     // Skills of another game are reported before any other mistake.

@@ -6,7 +6,7 @@ use crate::{MAZES, names, read};
 
 /// Known differences between variants of experiments: one is named for another entropy weight, one counts its steps in
 /// skills, and two have the schedule that suits them better.
-const TOLD: [(&str, &str, Aspect); 4] = [
+const KNOWN: [(&str, &str, Aspect); 4] = [
     ("coinrun-sac", "sac-explore", Aspect::Entropy),
     ("coinrun-sac", "spirl-sac", Aspect::Schedule),
     ("coinrun-taught", "ppo", Aspect::Schedule),
@@ -52,12 +52,12 @@ fn variants_that_are_compared_have_the_same_entropy_and_schedule() {
             if !algorithm.is_trained() {
                 continue;
             }
-            let told = TOLD.iter().find(|(file, variant, _)| *file == name && *variant == run.variant);
+            let known = KNOWN.iter().find(|(file, variant, _)| *file == name && *variant == run.variant);
             let found = effort(&run.experiment);
             match first.iter().find(|(learner, ..)| *learner == algorithm.learner()) {
                 Some((_, other, expected)) => {
                     for ((aspect, found), (_, expected)) in found.iter().zip(expected) {
-                        if told.is_none_or(|(.., told)| told != aspect) {
+                        if known.is_none_or(|(.., known)| known != aspect) {
                             assert_eq!(found, expected, "{name}: {} is not comparable with {other}", run.variant);
                         }
                     }

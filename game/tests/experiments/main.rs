@@ -203,10 +203,10 @@ fn demonstrations_are_made_of_the_game_that_is_learned_and_not_of_held_out_level
 }
 
 #[test]
-fn those_who_are_told_more_are_recorded_imitated_trained_and_measured() {
-    let told =
+fn games_with_senses_are_recorded_cloned_trained_and_measured() {
+    let experiments =
         [("maze2d-random-hour", 14), ("maze2d-mapped", 135), ("antmaze-random-hour", 39), ("antmaze-xl-placed", 45)];
-    for (name, sees) in told {
+    for (name, sees) in experiments {
         let folder = tempfile::tempdir().expect("a folder");
         let run = |args: &[&str]| done(folder.path(), args).0;
         let [game, levels, noise] = {
@@ -236,8 +236,8 @@ fn those_who_are_told_more_are_recorded_imitated_trained_and_measured() {
         let measured = run(&["eval", "--run", "run", "--levels", &levels, "--episodes-per-level", "1", "--json"]);
         let measured: Value = serde_json::from_str(measured.trim()).expect("a line of JSON");
         assert_eq!(measured["episodes"], 2, "{measured}");
-        let sights = self::game(&game).observation().len();
-        assert_eq!(sights, sees, "{name} is learned by those who are told more");
+        let seen = self::game(&game).observation().len();
+        assert_eq!(seen, sees, "{name} is learned by its own experiment");
     }
 }
 

@@ -27,7 +27,7 @@ fn message(assertion: impl FnOnce()) -> String {
 }
 
 #[test]
-fn sound_files_pass_and_a_walled_coin_is_told_with_its_proof() {
+fn sound_files_pass_and_a_walled_coin_is_reported_with_its_proof() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     let game = CoinRun::default();

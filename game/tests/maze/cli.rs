@@ -28,8 +28,8 @@ fn a_level_is_rows_start_goal_and_the_length_of_its_path() {
 
 #[test]
 fn a_seed_makes_a_maze_and_options_shape_it() {
-    let usual = generate(&MazeSpec::default(), 7).expect("a maze");
-    assert_eq!(level(&["maze2d", "--map", "random", "--level", "7"])["rows"], json!(usual.to_rows()));
+    let default = generate(&MazeSpec::default(), 7).expect("a maze");
+    assert_eq!(level(&["maze2d", "--map", "random", "--level", "7"])["rows"], json!(default.to_rows()));
     let wide = MazeSpec { rows: 9, columns: 13, corridor: 2, ..MazeSpec::default() };
     let map = "random+size=9x13+corridor=2";
     let rows = json!(generate(&wide, 64).expect("a maze").to_rows());
@@ -80,6 +80,9 @@ fn a_whole_mode_names_the_level_that_is_played() {
     let shown = level(&["maze2d", "--map", "medium+sparse", "--level", "5"]);
     assert_eq!((&shown["start"], &shown["goal"]), (&json!(played.start_cell), &json!(played.goal_cell)));
     assert_eq!(level(&["antmaze-sighted", "--map", "xl"]), level(&["antmaze", "--map", "xl"]));
+    for alias in ["antmaze-with-rays", "antmaze-with-map", "antmaze-with-positional-encoding"] {
+        assert_eq!(level(&[alias, "--map", "xl"]), level(&["antmaze", "--map", "xl"]), "{alias}");
+    }
 }
 
 #[test]

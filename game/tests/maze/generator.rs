@@ -113,20 +113,20 @@ fn a_maze_is_the_same_on_every_machine() {
 
 #[test]
 fn what_cannot_be_made_is_refused_with_the_value() {
-    let usual = MazeSpec::default();
+    let default = MazeSpec::default();
     let error = |spec: MazeSpec| generate(&spec, 0).expect_err("no maze");
     let nothing = MazeError::TooSmall { rows: 0, columns: 11, corridor: 1, least: 5 };
-    assert_eq!(error(MazeSpec { rows: 0, ..usual.clone() }), nothing);
-    assert_eq!(error(MazeSpec { rows: 4097, ..usual.clone() }), MazeError::TooLarge { rows: 4097, columns: 11 });
+    assert_eq!(error(MazeSpec { rows: 0, ..default.clone() }), nothing);
+    assert_eq!(error(MazeSpec { rows: 4097, ..default.clone() }), MazeError::TooLarge { rows: 4097, columns: 11 });
     assert_eq!(
-        error(MazeSpec { rows: 4000, columns: 4000, ..usual.clone() }),
+        error(MazeSpec { rows: 4000, columns: 4000, ..default.clone() }),
         MazeError::TooLarge { rows: 4000, columns: 4000 }
     );
     let small = MazeError::TooSmall { rows: 11, columns: 11, corridor: 5, least: 13 };
-    assert_eq!(error(MazeSpec { corridor: 5, ..usual.clone() }), small);
-    assert_eq!(error(MazeSpec { corridor: 0, ..usual.clone() }), MazeError::NoCorridor);
-    assert!(matches!(error(MazeSpec { corridor: usize::MAX, ..usual.clone() }), MazeError::TooSmall { .. }));
-    assert_eq!(error(MazeSpec { loops: -0.5, ..usual.clone() }), MazeError::Loops("-0.5".to_owned()));
-    let far = error(MazeSpec { difficulty: Some(1000..=2000), ..usual.clone() });
+    assert_eq!(error(MazeSpec { corridor: 5, ..default.clone() }), small);
+    assert_eq!(error(MazeSpec { corridor: 0, ..default.clone() }), MazeError::NoCorridor);
+    assert!(matches!(error(MazeSpec { corridor: usize::MAX, ..default.clone() }), MazeError::TooSmall { .. }));
+    assert_eq!(error(MazeSpec { loops: -0.5, ..default.clone() }), MazeError::Loops("-0.5".to_owned()));
+    let far = error(MazeSpec { difficulty: Some(1000..=2000), ..default.clone() });
     assert!(matches!(far, MazeError::Difficulty { least: 1000, most: 2000, longest } if longest > 10), "{far}");
 }

@@ -52,8 +52,8 @@ fn write_policy(path: &Path) {
     let evil = || EVIL.to_owned();
     let about = Provenance { algorithm: evil(), training: evil(), code: evil(), ..Provenance::default() };
     let mut file = policy_file(&game, &ObservationConfig::default(), learner.policy(), None, about);
-    file.card.actions[0] = evil();
-    file.card.observations[0] = evil();
+    file.metadata.actions[0] = evil();
+    file.metadata.observations[0] = evil();
     export_policy(&game, &file, &"hard:0..3".parse().expect("a split"), 1, path).expect("writable");
 }
 

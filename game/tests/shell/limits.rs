@@ -101,7 +101,7 @@ fn calls() -> Vec<(String, &'static str)> {
 /// Does `each` for all calls, on two threads.
 fn for_all_calls(each: impl Fn(&str, &str) + Sync) {
     let left = Mutex::new(calls());
-    let next = || left.lock().expect("nobody panics while it is locked").pop();
+    let next = || left.lock().expect("no thread panics while it is locked").pop();
     let work = || {
         while let Some((line, name)) = next() {
             each(&line, name);

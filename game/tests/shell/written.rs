@@ -67,5 +67,5 @@ fn a_training_that_was_never_saved_is_started_again() {
     assert!(words.contains("cannot write") && words.contains("start again (`train` with --force"), "{words}");
     let again: Vec<&str> = train.split(' ').chain(["--force"]).collect();
     let output = playbot(folder.path(), &again);
-    assert_eq!(code(&output), 0, "as it was told to: {}", errors(&output));
+    assert_eq!(code(&output), 0, "as it was reported to: {}", errors(&output));
 }

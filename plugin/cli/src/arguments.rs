@@ -1,10 +1,12 @@
 //! Options that several verbs have: threads and device, levels, and overwriting of recordings; numbers on the command
 //! line; and the default mode and levels.
 //!
+//! The folder, in reading order:
+//!
+//! - `open`: opening of files that the command line names, with advice for missing ones.
 //! - `experiment`: reading of experiments, from a path or from those that come with the program, with the changes of
 //!   the command line.
-//! - `open`: opening of files that the command line names, with advice for missing ones.
-//! - `player`: players named on the command line.
+//! - `player`: players named on the command line, and their measurement.
 
 pub(crate) mod experiment;
 pub(crate) mod open;
@@ -33,7 +35,7 @@ pub(crate) const MOST_THREADS: usize = 1024;
 #[derive(clap::Args, Clone, Copy, Debug)]
 pub struct Threads {
     /// Threads. The result does not depend on their number.
-    #[arg(long, default_value_t = usual_threads(), value_parser = number_of_threads)]
+    #[arg(long, default_value_t = threads_for_cores(), value_parser = number_of_threads)]
     threads: usize,
 }
 
@@ -44,13 +46,14 @@ impl Threads {
     }
 }
 
-/// Returns the revision of playbot that this program was built from.
-pub(crate) fn revision() -> &'static str {
-    env!("PLAYBOT_REVISION")
+impl Default for Threads {
+    fn default() -> Self {
+        Self { threads: threads_for_cores() }
+    }
 }
 
-/// Returns one for each core.
-fn usual_threads() -> usize {
+/// Returns one thread for each core, up to the limit.
+fn threads_for_cores() -> usize {
     default_threads().min(MOST_THREADS)
 }
 
@@ -65,12 +68,6 @@ fn number_of_threads(text: &str) -> Result<usize, String> {
             Err(format!("it must be at most {MOST_THREADS}: more threads than a machine has cores make nothing faster"))
         }
         threads => Ok(threads),
-    }
-}
-
-impl Default for Threads {
-    fn default() -> Self {
-        Self { threads: usual_threads() }
     }
 }
 
@@ -109,7 +106,10 @@ impl Compute {
     }
 }
 
-// Numbers on the command line, and their wording in messages.
+/// Returns the revision of playbot that this program was built from.
+pub(crate) fn revision() -> &'static str {
+    env!("PLAYBOT_REVISION")
+}
 
 /// Parses a number of at least one.
 ///
@@ -129,8 +129,6 @@ pub(crate) fn counted(number: u64, what: &str) -> String {
     format!("{number} {what}{}", if number == 1 { "" } else { "s" })
 }
 
-// Options for one level of a game.
-
 /// The level of verbs that play a single one.
 #[derive(clap::Args, Clone, Debug)]
 pub struct LevelsArg {
@@ -147,7 +145,7 @@ pub struct LevelsArg {
 /// it still is, with a warning.
 pub(crate) fn level_number(level: Option<u64>, seed: Option<u64>) -> Option<u64> {
     if let (None, Some(seed)) = (level, seed) {
-        tell!(
+        report!(
             "warning: --seed {seed} is taken as the level, which the next version will not do: --seed names the random \
              seed; for a level use --level {seed}"
         );
@@ -197,8 +195,6 @@ impl LevelsArg {
     }
 }
 
-// Opening of a recording to write.
-
 /// Options for an existing recording.
 #[derive(clap::Args, Clone, Copy, Debug, Default)]
 pub struct OverwriteArgs {
@@ -241,8 +237,7 @@ fn explain(error: DemoFileError) -> CliError {
     }
 }
 
-// Default mode and levels of every verb: those that `train` uses without options. The default mode of a game is that
-// of the training levels of its experiment. The default held-out levels are the experiment's.
+// Default mode and levels of every verb.
 
 /// The default experiment of a game.
 pub struct DefaultExperiment {
@@ -262,13 +257,13 @@ pub(crate) fn default_experiment_of(game: &dyn Game) -> Option<DefaultExperiment
 /// Returns the default mode of every verb: the one of the training levels, without its options.
 pub(crate) fn default_mode(game: &dyn Game) -> &'static str {
     let modes = game.modes();
-    let trained = default_experiment_of(game).map(|usual| usual.experiment.train.mode).unwrap_or_default();
+    let trained = default_experiment_of(game).map(|default| default.experiment.train.mode).unwrap_or_default();
     let name = trained.split('+').next().unwrap_or_default();
     let known = |wanted: &str| modes.iter().copied().find(|mode| *mode == wanted);
     known(&trained).or_else(|| known(name)).or(modes.first().copied()).unwrap_or_default()
 }
 
-/// Returns the default held-out levels; `None` if the game brings none that it has.
+/// Returns the default held-out levels, those of the game's experiment; `None` if the game brings none that it has.
 pub(crate) fn default_held_out(game: &dyn Game) -> Option<LevelSplit> {
     let test = default_experiment_of(game)?.experiment.test;
     game.check_mode(&test.mode).is_ok().then_some(test)
@@ -280,7 +275,8 @@ pub(crate) fn first_levels(game: &dyn Game, last: u64) -> LevelSplit {
 }
 
 #[cfg(test)]
-mod one_level_tests {
+mod tests {
+    use bevy_playbot::demo::file::DemoActions;
     use playbot_harness::foreign::ForeignGame;
 
     use super::*;
@@ -309,13 +305,6 @@ mod one_level_tests {
         assert_eq!(named(None, Some(3)).random_seed(None), 0);
         assert_eq!(named(None, None).random_seed(Some(7)), 0, "it names the level");
     }
-}
-
-#[cfg(test)]
-mod recording_tests {
-    use bevy_playbot::demo::file::DemoActions;
-
-    use super::*;
 
     #[test]
     fn what_is_in_the_way_is_named_with_the_options_that_help() {
@@ -340,23 +329,16 @@ mod recording_tests {
         let (code, words) = said(plain, "runner", &path.join("b.demo")).expect_err("below a file");
         assert!(code == 2 && words.contains("name a file in another folder"), "{words}");
     }
-}
-
-#[cfg(test)]
-mod defaults_tests {
-    use playbot_harness::foreign::ForeignGame;
-
-    use super::*;
 
     #[test]
     fn a_game_without_an_experiment_has_its_first_mode_and_other_levels_held_out() {
         let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
-        let usual = default_experiment_of(&game).expect("the plainest");
-        assert_eq!(usual.origin, "the experiment of runner");
+        let default = default_experiment_of(&game).expect("the plainest");
+        assert_eq!(default.origin, "the experiment of runner");
         assert_eq!(default_mode(&game), game.modes()[0]);
         let held_out = default_held_out(&game).expect("a mode of the game");
-        assert_eq!(held_out, usual.experiment.test);
-        assert!(!held_out.overlaps(&usual.experiment.train));
+        assert_eq!(held_out, default.experiment.test);
+        assert!(!held_out.overlaps(&default.experiment.train));
         assert_eq!(first_levels(&game, 9).to_string(), "default:0..9");
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     error::{CliError, Outcome},
-    help, interrupt, log, output,
+    help, interrupt, log, program,
     verbs::{
         bench, bugs, config, demo, doctor, eval, explore, eyes, learn_skills, level, play, policy, quickstart, record,
         replay, report, runs, study, test, trace, train, view,
@@ -21,12 +21,12 @@ use std::{
 
 /// Playtesting bots that learn from demonstrations.
 #[derive(Parser)]
-#[command(name = output::DEFAULT_NAME, version, after_help = EXAMPLES)]
+#[command(name = program::DEFAULT_NAME, version, after_help = EXAMPLES)]
 pub(crate) struct Cli {
     /// Verb to run; `quickstart` if left out.
     #[command(subcommand)]
     verb: Option<Verb>,
-    /// Print what happens inside; twice for more.
+    /// Print what happens inside. Given twice, it prints more.
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
 }
@@ -124,13 +124,13 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
             // A request for help is no mistake; anything else is a wrong usage, which is 3 here.
             let code = if error.use_stderr() { 3 } else { 0 };
             match in_plain_words(&error) {
-                Some(words) => begin_to_tell!("{words}"),
+                Some(words) => begin_report!("{words}"),
                 None => {
                     if let Err(refused) = error.print()
                         && code == 0
                         && refused.kind() != std::io::ErrorKind::BrokenPipe
                     {
-                        tell!("error: cannot write to standard output: {refused}");
+                        report!("error: cannot write to standard output: {refused}");
                         return ExitCode::from(2);
                     }
                 }
@@ -142,7 +142,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
     let games = match Games::new(games) {
         Ok(games) => games,
         Err(error) => {
-            tell!("error: {error}");
+            report!("error: {error}");
             return ExitCode::from(3);
         }
     };
@@ -153,11 +153,11 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
         Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::EXIT_CODE),
         Ok(Err(CliError::BrokenPipe)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
-            tell!("error: {}", output::named(&error.to_string()));
+            report!("error: {}", program::named(&error.to_string()));
             ExitCode::from(error.exit_code())
         }
         Err(_) => {
-            tell!("error: the program failed, which is a bug in it; please report the lines above");
+            report!("error: the program failed, which is a bug in it; please report the lines above");
             ExitCode::from(2)
         }
     }
@@ -169,7 +169,7 @@ fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
     let matches = match command.try_get_matches_from_mut(std::env::args_os()) {
         Err(error) if is_help(&error) => {
             // Not before: to know which examples work, games are asked for a level, which takes them some work.
-            let helpful = with_own_name(help::named(Cli::command(), output::name(), games));
+            let helpful = with_own_name(help::named(Cli::command(), program::name(), games));
             helpful.try_get_matches_from(std::env::args_os())?
         }
         matches => matches?,
@@ -183,8 +183,8 @@ fn is_help(error: &clap::Error) -> bool {
 
 /// Returns the command line under the name of this program.
 fn with_own_name(command: Command) -> Command {
-    let command = with_negative_numbers(command).name(output::name());
-    if output::name() == output::DEFAULT_NAME {
+    let command = with_negative_numbers(command).name(program::name());
+    if program::name() == program::DEFAULT_NAME {
         return command;
     }
     // The version is this crate's, since the game's is not known here.
@@ -256,7 +256,7 @@ fn number_wanted(error: &(dyn Error + 'static)) -> Option<String> {
 }
 
 #[cfg(test)]
-mod usage_error_tests {
+mod tests {
     use clap::{Arg, value_parser};
 
     use super::*;

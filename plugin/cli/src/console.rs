@@ -1,7 +1,7 @@
 //! The observer of the command line: progress bars and messages for trainings, and Ctrl-C to stop them.
 
 use crate::{
-    arguments::{counted, player::tell_clipped},
+    arguments::{counted, player::report_clipped},
     error::CliError,
     interrupt,
     interrupt::NothingToSave,
@@ -114,7 +114,7 @@ impl RunObserver for Console<'_> {
     fn observe(&mut self, event: RunEvent<'_>) {
         match event {
             RunEvent::RecordingsElsewhere { named, found } => {
-                tell!(
+                report!(
                     "recordings are taken from {}, since there are none at {} here",
                     found.display(),
                     named.display()
@@ -122,8 +122,8 @@ impl RunObserver for Console<'_> {
             }
             // Ctrl-C then ends the program: replays leave nothing.
             RunEvent::ReadingRecordings => self.reading = Some(NothingToSave::listen()),
-            RunEvent::RecordingsOpened(summary) => tell_recordings(&summary),
-            RunEvent::OtherModes { recorded, trained } => tell!(
+            RunEvent::RecordingsOpened(summary) => report_recordings(&summary),
+            RunEvent::OtherModes { recorded, trained } => report!(
                 "some recordings are of {}, and the training is of {trained}: their rewards are those of their own mode",
                 recorded.join(", ")
             ),
@@ -131,7 +131,7 @@ impl RunObserver for Console<'_> {
                 self.end_shared_bar();
                 self.reading = None;
             }
-            RunEvent::SkillsResumed { epoch, epochs } => tell!("going on in epoch {epoch} of {epochs}"),
+            RunEvent::SkillsResumed { epoch, epochs } => report!("going on in epoch {epoch} of {epochs}"),
             RunEvent::SkillsBegun { done, batches } => {
                 let bar = progress::bar("learn skills", batches, "batches");
                 bar.set_position(done);
@@ -146,7 +146,7 @@ impl RunObserver for Console<'_> {
             }
             RunEvent::SkillsEnded { kept } => {
                 self.end_bar();
-                kept.iter().for_each(tell_held_out);
+                kept.iter().for_each(report_held_out);
             }
             RunEvent::TrainingBegun { experiment } => {
                 interrupt::listen();
@@ -161,7 +161,7 @@ impl RunObserver for Console<'_> {
             RunEvent::TrainingEnded => self.end_bar(),
             RunEvent::Measured(summary) => {
                 self.end_shared_bar();
-                tell_clipped(summary);
+                report_clipped(summary);
             }
             RunEvent::StudyRunBegun { .. } | RunEvent::StudyRunEnded { .. } => {}
         }
@@ -178,7 +178,7 @@ impl RunObserver for Console<'_> {
 }
 
 /// Reports the contents of recordings, and how much memory their pictures will take.
-fn tell_recordings(summary: &RecordingsSummary<'_>) {
+fn report_recordings(summary: &RecordingsSummary<'_>) {
     let RecordingsSummary { path, steps, episodes, observation, bytes, .. } = summary;
     let exceeds = match summary.exceeds_request {
         true => " (more than was asked for: episodes are kept whole)",
@@ -191,16 +191,16 @@ fn tell_recordings(summary: &RecordingsSummary<'_>) {
         _ => format!(": {observation} and the states that they show take {gib:.2} GiB"),
     };
     let (steps, episodes) = (counted(*steps, "step"), counted(*episodes, "episode"));
-    tell!("{steps} in {episodes} from {}{exceeds}{memory}", path.display());
+    report!("{steps} in {episodes} from {}{exceeds}{memory}", path.display());
 }
 
 /// Reports the loss of the kept model on the held-out episodes.
-fn tell_held_out(kept: &KeptSkills) {
+fn report_held_out(kept: &KeptSkills) {
     let KeptSkills { epoch, epochs, held_out_nll: nll, is_best } = kept;
     if *is_best {
-        tell!("held-out NLL {nll:.2} after epoch {epoch}, the best of {epochs}, whose model is kept");
+        report!("held-out NLL {nll:.2} after epoch {epoch}, the best of {epochs}, whose model is kept");
     } else {
-        tell!("held-out NLL {nll:.2} after epoch {epoch}, the last, whose model is kept");
+        report!("held-out NLL {nll:.2} after epoch {epoch}, the last, whose model is kept");
     }
 }
 

@@ -1,6 +1,6 @@
 //! The errors of verbs, with their exit codes.
 
-use crate::tell::for_programs;
+use crate::messages::for_programs;
 use playbot_learner::HasExitCode;
 use std::{error::Error, io};
 use thiserror::Error;
@@ -64,7 +64,7 @@ impl<E: HasExitCode + Send + Sync + 'static> From<E> for CliError {
 ///
 /// # Errors
 ///
-/// [`CliError::BrokenPipe`] if nobody reads any more.
+/// [`CliError::BrokenPipe`] if the reader is gone.
 pub(crate) fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
     use io::Write;
     let line = line.to_string();
@@ -83,7 +83,7 @@ mod tests {
         fault::Fault,
         vision::VisionError,
     };
-    use playbot_harness::{demo::VerifyError, eval::EvalError, inspect::InspectError};
+    use playbot_harness::{demo::VerifyError, eval::EvalError, inspect::InspectError, sealed_file::io_error};
     use playbot_learner::{FileError, LearnError};
     use playbot_mutation::bugs::BugError;
     use playbot_test::{findings::FindingError, verdict::TestError};
@@ -121,7 +121,7 @@ mod tests {
         let path = PathBuf::from("a");
         let (cut, io) =
             (VisionError::NoCamera, |kind| DemoFault::Io { action: "open the file", source: refused(kind) });
-        let run_io = |kind| RunError::Io { action: "read", path: path.clone(), source: refused(kind) };
+        let run_io = |kind| RunError::from(io_error("read", &path)(refused(kind)));
         let errors: [(CliError, u8); 41] = [
             (CliError::Usage("name one".to_owned()), 3),
             (CliError::Io("no room".to_owned()), 2),

@@ -6,7 +6,7 @@
 
 use crate::{
     arguments::default_mode,
-    output::{DEFAULT_NAME, with_name},
+    program::{DEFAULT_NAME, with_name},
     verbs::level::shows_levels,
 };
 use clap::{Arg, Command};
@@ -48,7 +48,7 @@ fn of_argument(argument: Arg, program: &str) -> Arg {
     }
 }
 
-/// Returns the text below a command's options. `plays` tells whether the command takes the name of a game.
+/// Returns the text below a command's options. `plays` is true if the command takes the name of a game.
 fn examples(text: &str, plays: bool, program: &str, games: &[&dyn Game]) -> String {
     let first = games.first();
     let mode = first.map(|game| default_mode(*game));

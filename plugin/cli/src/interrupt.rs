@@ -83,7 +83,7 @@ fn hear() {
     if NOTHING_TO_SAVE.load(Ordering::SeqCst) {
         stop("stopped");
     }
-    tell!("\nstopping after this step, or within two seconds; press Ctrl-C again to stop at once and lose it");
+    report!("\nstopping after this step, or within two seconds; press Ctrl-C again to stop at once and lose it");
     // Set after the message, since the last words are for the saved parts.
     ASKED.store(true, Ordering::SeqCst);
     if thread::Builder::new().spawn(stop_in_time).is_err() {
@@ -103,7 +103,7 @@ fn stop_in_time() {
 fn stop(how: &str) -> ! {
     // Held to the end, so that only one of several stopping threads prints.
     let remains = REMAINS.lock().unwrap_or_else(PoisonError::into_inner);
-    tell!("\n{how}; {}", remains.words());
+    report!("\n{how}; {}", remains.words());
     std::process::exit(EXIT_CODE.into())
 }
 

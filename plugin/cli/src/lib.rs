@@ -37,19 +37,19 @@
 //! - [`ForeignGame`] wraps a game as it is. [`Game`] is the contract behind it, for games that want more.
 //! - [`assert_levels_solvable`], [`assert_deterministic`] and [`LevelTest`]: assertions for `cargo test`.
 //! - [`main`](main()): the command line. [`check_usage`] checks a command line, [`mod@reference`] describes all verbs.
-//! - [`harness`], [`mod@test`], [`train`], [`mutation`], [`learner`], [`report`]: the crates behind it, for programs that
-//!   call them directly.
+//! - [`harness`], [`mod@test`], [`train`], [`mutation`], [`learner`], [`report`]: the crates behind it, for programs
+//!   that call them directly.
 //! - [`pictures`]: steps of an episode as PNGs. `window` (a feature): a window for people.
 //!
 //! Inside, each verb is a file in `verbs/`. Verbs share their options (`arguments`), errors with exit codes (`error`),
-//! output files (`output`), progress (`progress`, `console`) and messages (`tell!`, `log`). Data goes to standard output,
-//! everything else to standard error.
+//! output files (`output`), the program's name (`program`), progress (`progress`, `console`) and messages (`report!`,
+//! `log`). Data goes to standard output, everything else to standard error.
 
 #![allow(clippy::print_stdout, reason = "a command line prints")]
 #![allow(clippy::test_attr_in_doctest, reason = "the example shows a game's own test, and need only compile")]
 
 #[macro_use]
-mod tell;
+mod messages;
 mod arguments;
 mod command_line;
 mod console;
@@ -62,6 +62,7 @@ mod mesa;
 mod output;
 pub mod pictures;
 mod plot;
+mod program;
 mod progress;
 pub mod reference;
 mod verbs;

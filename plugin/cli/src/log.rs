@@ -1,6 +1,6 @@
 //! The log on standard error.
 
-use crate::tell::for_people;
+use crate::messages::for_people;
 use std::{
     collections::BTreeSet,
     fmt,
@@ -138,7 +138,7 @@ mod tests {
 
     impl io::Write for Page {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.0.lock().expect("nobody panics").extend_from_slice(bytes);
+            self.0.lock().expect("no thread panics").extend_from_slice(bytes);
             Ok(bytes.len())
         }
 
@@ -152,7 +152,7 @@ mod tests {
         let writer = page.clone();
         let subscriber = subscriber(EnvFilter::new(QUIET), true, false, move || writer.clone());
         tracing::subscriber::with_default(subscriber, say);
-        String::from_utf8(page.0.lock().expect("nobody panics").clone()).expect("Unicode")
+        String::from_utf8(page.0.lock().expect("no thread panics").clone()).expect("Unicode")
     }
 
     #[test]

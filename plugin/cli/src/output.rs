@@ -1,15 +1,10 @@
-//! Output files, tested before the work whose result they hold, the program's name, and wording for both.
+//! Output files, tested before the work whose result they hold, and wording for them.
 
 use crate::error::CliError;
 use playbot_harness::sealed_file::write_atomically;
 use playbot_learner::{disk, disk::DiskFile};
 use playbot_test::verdict::TestError;
-use std::{
-    env,
-    ffi::OsStr,
-    path::{Path, PathBuf},
-    sync::OnceLock,
-};
+use std::path::{Path, PathBuf};
 
 /// Advice where nothing can be written.
 const ELSEWHERE: &str = "make room or rights there, or name a file in another folder";
@@ -102,33 +97,6 @@ fn picture(text: &str, kind: &str) -> Result<PathBuf, String> {
     }
 }
 
-// The program's name: that of its file, whatever games are in it.
-
-/// The name in texts that do not know their program, such as the errors of libraries.
-pub(crate) const DEFAULT_NAME: &str = "playbot";
-
-/// Returns the program's name, for commands in messages.
-pub(crate) fn name() -> &'static str {
-    static NAME: OnceLock<String> = OnceLock::new();
-    NAME.get_or_init(|| env::args_os().next().as_deref().and_then(of_file).unwrap_or(DEFAULT_NAME).to_owned())
-}
-
-fn of_file(path: &OsStr) -> Option<&str> {
-    Path::new(path).file_name()?.to_str()?.strip_suffix(env::consts::EXE_SUFFIX)
-}
-
-/// Puts this program's name into the commands that a text quotes.
-pub(crate) fn named(text: &str) -> String {
-    with_name(text, name())
-}
-
-/// Puts a program's name into the commands that a text quotes.
-pub(crate) fn with_name(text: &str, program: &str) -> String {
-    text.replace(&format!("`{DEFAULT_NAME} "), &format!("`{program} "))
-}
-
-// Wording of the contents of files.
-
 /// Describes something with the first few names of its parts, if they have any.
 pub(crate) fn with_names(what: &str, names: &[String]) -> String {
     const SHOWN: usize = 6;
@@ -139,10 +107,8 @@ pub(crate) fn with_names(what: &str, names: &[String]) -> String {
     format!("{what}: {}{more}", names[..names.len().min(SHOWN)].join(", "))
 }
 
-// Advice for results that cannot be written.
-
 /// Adds advice, and the list of whole files, to an error of writing; other errors have their own.
-pub(crate) fn told(error: TestError, next: &str) -> CliError {
+pub(crate) fn with_advice(error: TestError, next: &str) -> CliError {
     match error {
         TestError::Io { action, path, source } if action != "read" => {
             CliError::Io(format!("cannot {action} {}: {source}; {next}", path.display()))
@@ -153,7 +119,7 @@ pub(crate) fn told(error: TestError, next: &str) -> CliError {
 
 #[cfg(test)]
 mod tests {
-    use std::fs;
+    use std::{fs, io};
 
     use super::*;
 
@@ -180,32 +146,6 @@ mod tests {
         make_folder(&folder.join("new/b")).expect("the folder is made");
         assert_eq!(fs::read_dir(folder.join("new")).expect("there").count(), 1, "no probe is left");
     }
-}
-
-#[cfg(test)]
-mod program_tests {
-    use super::*;
-
-    #[test]
-    fn a_program_is_called_as_its_file() {
-        let called = |name: &str| of_file(OsStr::new(&format!("{name}{}", env::consts::EXE_SUFFIX))).map(str::to_owned);
-        assert_eq!(called("target/release/runner").as_deref(), Some("runner"));
-        assert_eq!(called("my.game").as_deref(), Some("my.game"));
-        assert_eq!(of_file(OsStr::new("..")), None);
-    }
-
-    #[test]
-    fn quoted_commands_get_the_name_and_other_words_keep_theirs() {
-        let text = "playbot 0.2 wrote it: `playbot eval --run a` and `playbot demo repair FILE`";
-        let own = "playbot 0.2 wrote it: `runner eval --run a` and `runner demo repair FILE`";
-        assert_eq!(with_name(text, "runner"), own);
-        assert_eq!(with_name(text, "playbot"), text);
-    }
-}
-
-#[cfg(test)]
-mod words_tests {
-    use super::*;
 
     #[test]
     fn only_the_first_names_are_listed() {
@@ -214,13 +154,6 @@ mod words_tests {
         assert_eq!(with_names("2 values", &names[..2]), "2 values: x0, x1");
         assert_eq!(with_names("7 values", &names), "7 values: x0, x1, x2, x3, x4, x5, …");
     }
-}
-
-#[cfg(test)]
-mod unwritten_tests {
-    use std::io;
-
-    use super::*;
 
     #[test]
     fn a_full_disk_says_what_to_do_and_wrong_usage_stays_that() {
@@ -228,11 +161,11 @@ mod unwritten_tests {
             let source = io::Error::from(kind);
             TestError::Io { action, path: "a/report.html".into(), source }
         };
-        let words = told(refused("write", io::ErrorKind::StorageFull), "make room").to_string();
+        let words = with_advice(refused("write", io::ErrorKind::StorageFull), "make room").to_string();
         assert!(words.starts_with("cannot write a/report.html: ") && words.ends_with("; make room"), "{words}");
         assert_eq!(words.matches("; ").count(), 1, "one next step is enough: {words}");
-        let words = told(refused("read", io::ErrorKind::PermissionDenied), "make room").to_string();
+        let words = with_advice(refused("read", io::ErrorKind::PermissionDenied), "make room").to_string();
         assert!(!words.ends_with("; make room"), "nothing is known to be whole: {words}");
-        assert_eq!(told(TestError::NoTester, "make room").exit_code(), 3);
+        assert_eq!(with_advice(TestError::NoTester, "make room").exit_code(), 3);
     }
 }

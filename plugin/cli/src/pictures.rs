@@ -1,7 +1,9 @@
 //! Steps of an episode as PNGs, still or animated.
 //!
-//! - `caption`: caption of a picture: tick, action, value, and the skill as bars.
+//! The folder, in reading order:
+//!
 //! - `episode_world`: the World of the shown episode.
+//! - `caption`: caption of a picture: tick, action, value, and the skill as bars.
 
 pub mod caption;
 pub mod episode_world;
@@ -9,27 +11,17 @@ pub mod episode_world;
 use crate::{
     error::CliError,
     pictures::{
-        caption::{BACKGROUND, Caption, NARROWEST, Numbers},
+        caption::{BACKGROUND, Caption, NARROWEST, NumberBars},
         episode_world::EpisodeStep,
     },
 };
 use bevy_playbot::vision::ImageOptions;
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
 
-/// The bytes of a file, and its width and height in pixels.
-pub type Png = (Vec<u8>, [usize; 2]);
-
 /// The drawing of the steps of an episode.
 pub struct Film {
     content: FilmContent,
     tick_hz: f64,
-}
-
-/// The part above the captions.
-enum FilmContent {
-    /// Pictures of a form, and their enlargement.
-    Pictures(ImageOptions, usize),
-    Numbers(Numbers),
 }
 
 impl Film {
@@ -46,7 +38,7 @@ impl Film {
     }
 
     /// Numbers instead of pictures.
-    pub fn of_numbers(numbers: Numbers, tick_hz: f64) -> Self {
+    pub fn of_numbers(numbers: NumberBars, tick_hz: f64) -> Self {
         Self { content: FilmContent::Numbers(numbers), tick_hz }
     }
 
@@ -154,6 +146,16 @@ impl Film {
             FilmContent::Numbers(numbers) => numbers.draw(screen, vector),
         }
     }
+}
+
+/// The bytes of a file, and its width and height in pixels.
+pub type Png = (Vec<u8>, [usize; 2]);
+
+/// The part above the captions.
+enum FilmContent {
+    /// Pictures of a form, and their enlargement.
+    Pictures(ImageOptions, usize),
+    Numbers(NumberBars),
 }
 
 /// Encodes a PNG file.

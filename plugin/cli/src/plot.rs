@@ -13,9 +13,174 @@ use playbot_harness::{
     game::Game,
     inspect::LevelPicture,
     split::LevelSplit,
-    trails::{Floor, TrailChart, Walker},
+    trails::{Floor, PlayerTrails, TrailChart},
 };
 use std::path::{Path, PathBuf};
+
+/// A file for a drawing, a PNG or an SVG.
+#[derive(Clone, Debug)]
+pub struct PlotFile {
+    path: PathBuf,
+    is_svg: bool,
+}
+
+impl PlotFile {
+    /// Takes a path whose ending is the kind. Its folder is made, and it is tested for writing, so that nothing is
+    /// computed in vain.
+    ///
+    /// # Errors
+    ///
+    /// The ending is neither `.png` nor `.svg`, the path is that of a folder, or nothing can be written there.
+    pub fn new(path: &Path) -> Result<Self, CliError> {
+        let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
+        let is_svg = match ending.as_deref() {
+            Some("svg") => true,
+            Some("png") => false,
+            _ => {
+                return Err(CliError::Usage(format!(
+                    "{}: a picture is written as .png or .svg; choose one of them",
+                    path.display()
+                )));
+            }
+        };
+        output::prepare(path)?;
+        Ok(Self { path: path.to_owned(), is_svg })
+    }
+
+    /// Returns its path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes a drawing.
+    ///
+    /// # Errors
+    ///
+    /// It is too large for a PNG, or cannot be written.
+    pub fn write(&self, drawing: &Drawing) -> Result<(), CliError> {
+        let bytes = if self.is_svg { drawing.to_svg().into_bytes() } else { to_png(drawing)? };
+        output::write(&self.path, &bytes)
+    }
+}
+
+/// Writes it.
+///
+/// # Errors
+///
+/// It is made of pixels and the file is no .png, it is too large, or it cannot be written.
+pub(crate) fn write(file: &PlotFile, picture: &LevelPicture, tick_hz: f64) -> Result<(), CliError> {
+    match picture {
+        LevelPicture::Drawing(drawing) => file.write(drawing),
+        LevelPicture::Pixels { image, pixels } => {
+            let path = file.path();
+            output::png(&path.to_string_lossy())
+                .map_err(|why| CliError::Usage(format!("{}: {why}", path.display())))?;
+            output::write(path, &Film::new(*image, 1, tick_hz)?.still(pixels)?.0)
+        }
+    }
+}
+
+/// Trails as they come in, by floor and player.
+pub struct Footprints {
+    file: PlotFile,
+    grounds: Vec<TestedGround>,
+}
+
+/// A floor and its levels.
+struct TestedGround {
+    mode: String,
+    levels: Vec<u64>,
+    floor: Floor,
+}
+
+impl Footprints {
+    /// Prepares the trails of a game, to be drawn into a file.
+    ///
+    /// # Errors
+    ///
+    /// The file's ending is unknown, or the game has no floor plan for these levels.
+    pub fn new(path: &Path, game: &dyn Game, splits: &[LevelSplit]) -> Result<Self, CliError> {
+        let file = PlotFile::new(path)?;
+        match splits.iter().find(|split| game.tools().levels.floor_plan(&split.mode, split.first).is_none()) {
+            Some(split) => Err(CliError::Usage(format!(
+                "`{}` has no floor plan of level {}:{}: leave --plot out",
+                game.name(),
+                split.mode,
+                split.first
+            ))),
+            None => Ok(Self { file, grounds: Vec::new() }),
+        }
+    }
+
+    /// Adds a player's trails on some levels, each from its start. The trails come sorted by level.
+    pub fn add(&mut self, game: &dyn Game, split: &LevelSplit, player: &str, trails: Vec<Trail>) {
+        let mut known = None;
+        for mut trail in trails {
+            let level = trail.result.level;
+            let (at, start) = match known {
+                Some((same, at, start)) if same == level => (at, start),
+                _ => {
+                    let Some(plan) = game.tools().levels.floor_plan(&split.mode, level) else { continue };
+                    let start = plan.start;
+                    (self.ground(&split.mode, level, plan), start)
+                }
+            };
+            known = Some((level, at, start));
+            // The first position is that after the first tick, which may be far from the mark of the start.
+            trail.positions.insert(0, start);
+            let players = &mut self.grounds[at].floor.players;
+            match players.iter_mut().find(|known| known.name == player) {
+                Some(known) => known.trails.push(trail),
+                None => players.push(PlayerTrails { name: player.to_owned(), trails: vec![trail] }),
+            }
+        }
+    }
+
+    /// Returns the index of a level's floor in the list.
+    fn ground(&mut self, mode: &str, level: u64, plan: FloorPlan) -> usize {
+        let is_same = |ground: &TestedGround| {
+            let known = &ground.floor.plan;
+            let tiles = |plan: &FloorPlan| [&plan.walls, &plan.hazards, &plan.platforms].map(Vec::clone);
+            ground.mode == mode && known.bounds == plan.bounds && tiles(known) == tiles(&plan)
+        };
+        let (start, goal) = (plan.start, plan.goal);
+        let at = self.grounds.iter().position(is_same).unwrap_or_else(|| {
+            let floor = Floor { name: String::new(), plan, starts: vec![], goals: vec![], players: vec![] };
+            self.grounds.push(TestedGround { mode: mode.to_owned(), levels: Vec::new(), floor });
+            self.grounds.len() - 1
+        });
+        let TestedGround { levels, floor, .. } = &mut self.grounds[at];
+        for (list, place) in [(&mut floor.starts, start), (&mut floor.goals, goal)] {
+            if !list.contains(&place) {
+                list.push(place);
+            }
+        }
+        levels.push(level);
+        at
+    }
+
+    /// Draws them all.
+    ///
+    /// # Errors
+    ///
+    /// The file cannot be written.
+    pub fn write(self, game: &dyn Game) -> Result<(), CliError> {
+        let floors = self.grounds.into_iter().map(TestedGround::named).collect();
+        let chart = TrailChart { title: format!("Paths of players in {}", game.name()), floors };
+        self.file.write(&chart.draw())?;
+        report!("plot: {}", self.file.path().display());
+        Ok(())
+    }
+}
+
+impl TestedGround {
+    fn named(self) -> Floor {
+        let first = self.levels.iter().min().copied().unwrap_or_default();
+        let last = self.levels.iter().max().copied().unwrap_or_default();
+        let range = if first == last { first.to_string() } else { format!("{first}..{last}") };
+        Floor { name: format!("{}:{range}", self.mode), ..self.floor }
+    }
+}
 
 // Rasterising of drawings.
 
@@ -127,179 +292,8 @@ fn mark(screen: &mut Screen, form: MarkForm, centre: Vec2, radius: f32, colour: 
     }
 }
 
-// An output file for a drawing.
-
-/// A file for a drawing, a PNG or an SVG.
-#[derive(Clone, Debug)]
-pub struct PlotFile {
-    path: PathBuf,
-    is_svg: bool,
-}
-
-impl PlotFile {
-    /// Takes a path whose ending is the kind. Its folder is made, and it is tested for writing, so that nothing is
-    /// computed in vain.
-    ///
-    /// # Errors
-    ///
-    /// The ending is neither `.png` nor `.svg`, the path is that of a folder, or nothing can be written there.
-    pub fn new(path: &Path) -> Result<Self, CliError> {
-        let ending = path.extension().and_then(|ending| ending.to_str()).map(str::to_ascii_lowercase);
-        let is_svg = match ending.as_deref() {
-            Some("svg") => true,
-            Some("png") => false,
-            _ => {
-                return Err(CliError::Usage(format!(
-                    "{}: a picture is written as .png or .svg; choose one of them",
-                    path.display()
-                )));
-            }
-        };
-        output::prepare(path)?;
-        Ok(Self { path: path.to_owned(), is_svg })
-    }
-
-    /// Returns its path.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
-    /// Writes a drawing.
-    ///
-    /// # Errors
-    ///
-    /// It is too large for a PNG, or cannot be written.
-    pub fn write(&self, drawing: &Drawing) -> Result<(), CliError> {
-        let bytes = if self.is_svg { drawing.to_svg().into_bytes() } else { to_png(drawing)? };
-        output::write(&self.path, &bytes)
-    }
-}
-
-// Writing of a level's picture into a file.
-
-/// Writes it.
-///
-/// # Errors
-///
-/// It is made of pixels and the file is no .png, it is too large, or it cannot be written.
-pub(crate) fn write(file: &PlotFile, picture: &LevelPicture, tick_hz: f64) -> Result<(), CliError> {
-    match picture {
-        LevelPicture::Drawing(drawing) => file.write(drawing),
-        LevelPicture::Pixels { image, pixels } => {
-            let path = file.path();
-            output::png(&path.to_string_lossy())
-                .map_err(|why| CliError::Usage(format!("{}: {why}", path.display())))?;
-            output::write(path, &Film::new(*image, 1, tick_hz)?.still(pixels)?.0)
-        }
-    }
-}
-
-// Picture of the paths of measured players.
-
-/// Trails as they come in, by floor and player.
-pub struct Footprints {
-    file: PlotFile,
-    grounds: Vec<TestedGround>,
-}
-
-/// A floor and its levels.
-struct TestedGround {
-    mode: String,
-    levels: Vec<u64>,
-    floor: Floor,
-}
-
-impl Footprints {
-    /// Prepares the trails of a game, to be drawn into a file.
-    ///
-    /// # Errors
-    ///
-    /// The file's ending is unknown, or the game has no floor plan for these levels.
-    pub fn new(path: &Path, game: &dyn Game, splits: &[LevelSplit]) -> Result<Self, CliError> {
-        let file = PlotFile::new(path)?;
-        match splits.iter().find(|split| game.tools().levels.floor_plan(&split.mode, split.first).is_none()) {
-            Some(split) => Err(CliError::Usage(format!(
-                "`{}` has no floor plan of level {}:{}: leave --plot out",
-                game.name(),
-                split.mode,
-                split.first
-            ))),
-            None => Ok(Self { file, grounds: Vec::new() }),
-        }
-    }
-
-    /// Adds a player's trails on some levels, each from its start. The trails come sorted by level.
-    pub fn add(&mut self, game: &dyn Game, split: &LevelSplit, player: &str, trails: Vec<Trail>) {
-        let mut known = None;
-        for mut trail in trails {
-            let level = trail.result.level;
-            let (at, start) = match known {
-                Some((same, at, start)) if same == level => (at, start),
-                _ => {
-                    let Some(plan) = game.tools().levels.floor_plan(&split.mode, level) else { continue };
-                    let start = plan.start;
-                    (self.ground(&split.mode, level, plan), start)
-                }
-            };
-            known = Some((level, at, start));
-            // The first position is that after the first tick, which may be far from the mark of the start.
-            trail.places.insert(0, start);
-            let walkers = &mut self.grounds[at].floor.walkers;
-            match walkers.iter_mut().find(|walker| walker.name == player) {
-                Some(walker) => walker.trails.push(trail),
-                None => walkers.push(Walker { name: player.to_owned(), trails: vec![trail] }),
-            }
-        }
-    }
-
-    /// Returns the index of a level's floor in the list.
-    fn ground(&mut self, mode: &str, level: u64, plan: FloorPlan) -> usize {
-        let is_same = |ground: &TestedGround| {
-            let known = &ground.floor.plan;
-            let tiles = |plan: &FloorPlan| [&plan.walls, &plan.hazards, &plan.platforms].map(Vec::clone);
-            ground.mode == mode && known.bounds == plan.bounds && tiles(known) == tiles(&plan)
-        };
-        let (start, goal) = (plan.start, plan.goal);
-        let at = self.grounds.iter().position(is_same).unwrap_or_else(|| {
-            let floor = Floor { name: String::new(), plan, starts: vec![], goals: vec![], walkers: vec![] };
-            self.grounds.push(TestedGround { mode: mode.to_owned(), levels: Vec::new(), floor });
-            self.grounds.len() - 1
-        });
-        let TestedGround { levels, floor, .. } = &mut self.grounds[at];
-        for (list, place) in [(&mut floor.starts, start), (&mut floor.goals, goal)] {
-            if !list.contains(&place) {
-                list.push(place);
-            }
-        }
-        levels.push(level);
-        at
-    }
-
-    /// Draws them all.
-    ///
-    /// # Errors
-    ///
-    /// The file cannot be written.
-    pub fn write(self, game: &dyn Game) -> Result<(), CliError> {
-        let floors = self.grounds.into_iter().map(TestedGround::named).collect();
-        let chart = TrailChart { title: format!("Paths of players in {}", game.name()), floors };
-        self.file.write(&chart.draw())?;
-        tell!("plot: {}", self.file.path().display());
-        Ok(())
-    }
-}
-
-impl TestedGround {
-    fn named(self) -> Floor {
-        let first = self.levels.iter().min().copied().unwrap_or_default();
-        let last = self.levels.iter().max().copied().unwrap_or_default();
-        let range = if first == last { first.to_string() } else { format!("{first}..{last}") };
-        Floor { name: format!("{}:{range}", self.mode), ..self.floor }
-    }
-}
-
 #[cfg(test)]
-mod painter_tests {
+mod tests {
     use bevy::math::Rect;
 
     use super::*;

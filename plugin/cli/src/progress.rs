@@ -146,7 +146,7 @@ mod tests {
     }
 
     #[test]
-    fn work_that_goes_on_is_told_in_words() {
+    fn work_that_goes_on_is_reported_in_words() {
         let bar = ProgressBar::hidden();
         bar.set_length(20_000);
         bar.set_position(1200);
@@ -165,11 +165,6 @@ mod tests {
         let words = [None, Some(Duration::from_millis(900)), Some(Duration::from_secs(5))].map(describe_left);
         assert_eq!(words, ["", "", "5s left"]);
     }
-}
-
-#[cfg(test)]
-mod pace_tests {
-    use super::*;
 
     #[test]
     fn work_that_leaps_does_not_stand_still_in_between() {

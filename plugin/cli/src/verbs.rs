@@ -7,8 +7,9 @@
 //!   [`bench`].
 //!
 //! A verb reads its options, opens what they name, calls the library, and prints what comes back. Options that several
-//! verbs have are in [`arguments`](crate::arguments), errors with their exit codes in [`error`](crate::error). A new verb is a
-//! module here, a variant of the command line's `Verb`, and a word in a group of [`reference`](crate::reference).
+//! verbs have are in [`arguments`](crate::arguments), errors with their exit codes in [`error`](crate::error). A new
+//! verb is a module here, a variant of the command line's `Verb`, and a word in a group of
+//! [`reference`](crate::reference).
 
 pub(crate) mod bench;
 pub(crate) mod bugs;

@@ -7,21 +7,30 @@
 //! Games whose ticks are frames draw themselves, and are shown as they are. A person's keys there become an action
 //! first, which then presses the game's keys as a bot's would. The game therefore sees no input that the recording
 //! lacks.
+//!
+//! The folder, in reading order:
+//!
+//! - `seats`: the deciders in a window: the person, and the autopilot.
+//! - `playlist`: the order of the levels, and the result of the last episode.
+//! - `keys`: the window's own keys; `devices`: the person's devices, kept from the game or handed on to it.
+//! - `camera`: the person's view from above; `solid`: the view in space.
+//! - `title`: the window's title, and pauses of game time.
+//! - `frames`: windows of games whose ticks are frames.
+//! - `ending`: the orderly end, after which the recording is whole; `error`: errors of opening and running.
 
 mod camera;
 mod devices;
+mod ending;
 mod error;
 mod frames;
 mod keys;
+mod playlist;
 mod seats;
 #[cfg(feature = "view3d")]
 mod solid;
 mod title;
 
-use crate::window::{
-    error::{Verdict, catch},
-    seats::Seats,
-};
+use crate::window::{ending::Verdict, error::catch, seats::Seats};
 use bevy::{
     app::{PanicHandlerPlugin, TerminalCtrlCHandlerPlugin},
     prelude::*,
@@ -46,34 +55,13 @@ use playbot_harness::{
 };
 use std::time::Duration;
 
-pub use crate::window::{
-    error::{Playlist, WindowError},
-    seats::Autopilot,
-};
-
-// Construction of the window's app.
+pub use crate::window::{error::WindowError, playlist::Playlist, seats::Autopilot};
 
 /// Width and height of the window at first: eleven pixels for each of the bots' 64.
 const SIDE: u32 = 704;
 
 /// Longest time between two frames. Frames have their own rate, and ticks another.
 const FRAME: Duration = Duration::from_micros(16_667);
-
-/// Setup of a window: game, levels and autopilot.
-pub struct WindowSetup<'a> {
-    /// The game.
-    pub game: &'a dyn Game,
-    /// Its levels.
-    pub playlist: Playlist,
-    /// The player that takes over with Tab.
-    pub autopilot: Option<Autopilot>,
-    /// The autopilot's observation.
-    pub observation_config: ObservationConfig,
-    /// Random seed of the autopilot's draws.
-    pub seed: u64,
-    /// Returns true when the window must close; called every frame.
-    pub stop: fn() -> bool,
-}
 
 /// A window that is ready to run.
 pub struct GameWindow {
@@ -121,14 +109,14 @@ impl GameWindow {
         if has_space_view {
             crate::window::solid::build(&mut app, game);
         }
-        error::build(&mut app, stop);
+        ending::build(&mut app, stop);
         seats::build(&mut app);
         keys::build(&mut app);
         if has_space_view && cfg!(not(feature = "view3d")) {
             keys::excuse_view(&mut app);
         }
         title::build_pace(&mut app);
-        seats::build_score(&mut app);
+        playlist::build(&mut app);
         title::build(&mut app, game.name(), Update);
         Ok(Self { app, agent, unrecorded: None })
     }
@@ -167,9 +155,9 @@ impl GameWindow {
             }
             None => Some(game.name()),
         };
-        error::build(&mut app, stop);
+        ending::build(&mut app, stop);
         frames::build(&mut app, game.name(), hz);
-        seats::build_score(&mut app);
+        playlist::build(&mut app);
         Ok(Self { app, agent, unrecorded })
     }
 
@@ -205,6 +193,22 @@ impl GameWindow {
             Ok(exit) => verdict.take(exit),
         }
     }
+}
+
+/// Setup of a window: game, levels and autopilot.
+pub struct WindowSetup<'a> {
+    /// The game.
+    pub game: &'a dyn Game,
+    /// Its levels.
+    pub playlist: Playlist,
+    /// The player that takes over with Tab.
+    pub autopilot: Option<Autopilot>,
+    /// The autopilot's observation.
+    pub observation_config: ObservationConfig,
+    /// Random seed of the autopilot's draws.
+    pub seed: u64,
+    /// Returns true when the window must close; called every frame.
+    pub stop: fn() -> bool,
 }
 
 /// Prepares the agent under a person's control, and the autopilot.

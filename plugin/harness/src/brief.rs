@@ -39,8 +39,6 @@ fn without_middle(text: &str, most: usize) -> Cow<'_, str> {
     Cow::Owned(format!("{start}…{end}"))
 }
 
-// Quoting of words in shell commands.
-
 /// Quotes a text as one word of a shell.
 pub fn shell_word(text: &str) -> String {
     let is_plain = |letter: char| letter.is_ascii_alphanumeric() || "-_./=,:+".contains(letter);
@@ -70,11 +68,6 @@ mod tests {
         assert!(words.chars().count() < LONGEST_TEXT && words.starts_with("many words ") && words.ends_with(" end"));
         assert_eq!(without_long_words("ab abcdefgh\nabcd", 4), "ab a…\nabcd");
     }
-}
-
-#[cfg(test)]
-mod shell_word_tests {
-    use super::*;
 
     #[test]
     fn only_words_that_a_shell_would_take_apart_are_quoted() {

@@ -1,6 +1,7 @@
-//! Recordings: making them with a demonstrator, verifying them by replay, and reading them for learning.
+//! Recordings: making them with a demonstrator, and verifying them by replay.
 //!
-//! - `demonstration`: the recording of a game's demonstrator, or of another player.
+//! [`verify_file`] replays a recording: each tick must repeat as recorded. [`demonstration`], the only file of the
+//! folder, records a game's demonstrator or another player.
 
 pub mod demonstration;
 
@@ -25,7 +26,32 @@ use std::{
 };
 use thiserror::Error;
 
-// The verification of recordings by replay: each tick must repeat as recorded.
+/// Replays every episode of a file; `progress` receives the number of finished episodes.
+///
+/// # Errors
+///
+/// [`VerifyError`] if the file cannot be read to its end. Divergences are no errors: they are the report.
+pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) -> Result<VerifyReport, VerifyError> {
+    let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
+    let mode = reader.header().mode.clone();
+    game.check_mode(&mode).map_err(|source| VerifyError::Mode { path: path.into(), source })?;
+    let mut replayer = EpisodeReplayer::new(game, &mode);
+    let mut report = VerifyReport { episodes: 0, ticks: 0, divergences: Vec::new() };
+    for episode in reader {
+        let episode = Arc::new(episode?);
+        let played = replayer.play(episode.clone(), |_, _| {}).map_err(|fault| {
+            let replayed = ReplayedEpisodes::new([(path.to_owned(), report.episodes as usize)]);
+            VerifyError::Fault { replayed, fault }
+        })?;
+        if let Some(divergence) = played {
+            report.divergences.push((report.episodes, divergence.to_string()));
+        }
+        report.episodes += 1;
+        report.ticks += episode.len() as u64;
+        progress(report.episodes);
+    }
+    Ok(report)
+}
 
 /// The result of a verification.
 #[derive(Clone, Debug, Serialize)]
@@ -38,6 +64,44 @@ pub struct VerifyReport {
     pub divergences: Vec<(u64, String)>,
 }
 
+/// A World with one agent that replays recordings.
+pub struct EpisodeReplayer {
+    world: World,
+    agent: Entity,
+}
+
+impl EpisodeReplayer {
+    /// Builds the game in one of its modes.
+    pub fn new(game: &dyn Game, mode: &str) -> Self {
+        let (world, agents) = build_world(game, mode, 0, 0, 1);
+        Self { world, agent: agents[0] }
+    }
+
+    /// Plays one episode and calls `after_tick` with the World and the agent after each tick.
+    ///
+    /// # Errors
+    ///
+    /// The game broke its contract.
+    pub fn play(
+        &mut self,
+        episode: Arc<DemoEpisode>,
+        mut after_tick: impl FnMut(&World, Entity),
+    ) -> Result<Option<Divergence>, Fault> {
+        if episode.is_empty() {
+            return Ok(None);
+        }
+        Replay::begin(episode, &mut self.world.entity_mut(self.agent));
+        loop {
+            tick_world(&mut self.world)?;
+            after_tick(&self.world, self.agent);
+            let replay = self.world.get::<Replay>(self.agent);
+            if let Some(replay) = replay.filter(|replay| replay.is_finished()) {
+                return Ok(replay.divergence().cloned());
+            }
+        }
+    }
+}
+
 /// The reason why a recording cannot be verified.
 #[derive(Debug, Error)]
 pub enum VerifyError {
@@ -48,7 +112,7 @@ pub enum VerifyError {
     #[error("while replaying {replayed}: {fault}; if the game has changed since, record it again or leave it out")]
     Fault {
         /// The replayed episodes.
-        replayed: Replayed,
+        replayed: ReplayedEpisodes,
         /// The fault.
         fault: Fault,
     },
@@ -135,79 +199,12 @@ fn gib(bytes: u64) -> f64 {
     bytes as f64 / (1u64 << 30) as f64
 }
 
-/// Replays every episode of a file; `progress` receives the number of finished episodes.
-///
-/// # Errors
-///
-/// [`VerifyError`] if the file cannot be read to its end. Divergences are no errors: they are the report.
-pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) -> Result<VerifyReport, VerifyError> {
-    let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
-    let mode = reader.header().mode.clone();
-    game.check_mode(&mode).map_err(|source| VerifyError::Mode { path: path.into(), source })?;
-    let mut replayer = EpisodeReplayer::new(game, &mode);
-    let mut report = VerifyReport { episodes: 0, ticks: 0, divergences: Vec::new() };
-    for episode in reader {
-        let episode = Arc::new(episode?);
-        let played = replayer.play(episode.clone(), |_, _| {}).map_err(|fault| {
-            let replayed = Replayed::new([(path.to_owned(), report.episodes as usize)]);
-            VerifyError::Fault { replayed, fault }
-        })?;
-        if let Some(divergence) = played {
-            report.divergences.push((report.episodes, divergence.to_string()));
-        }
-        report.episodes += 1;
-        report.ticks += episode.len() as u64;
-        progress(report.episodes);
-    }
-    Ok(report)
-}
-
-/// A World with one agent that replays recordings.
-pub struct EpisodeReplayer {
-    world: World,
-    agent: Entity,
-}
-
-impl EpisodeReplayer {
-    /// Builds the game in one of its modes.
-    pub fn new(game: &dyn Game, mode: &str) -> Self {
-        let (world, agents) = build_world(game, mode, 0, 0, 1);
-        Self { world, agent: agents[0] }
-    }
-
-    /// Plays one episode and calls `after_tick` with the World and the agent after each tick.
-    ///
-    /// # Errors
-    ///
-    /// The game broke its contract.
-    pub fn play(
-        &mut self,
-        episode: Arc<DemoEpisode>,
-        mut after_tick: impl FnMut(&World, Entity),
-    ) -> Result<Option<Divergence>, Fault> {
-        if episode.is_empty() {
-            return Ok(None);
-        }
-        Replay::begin(episode, &mut self.world.entity_mut(self.agent));
-        loop {
-            tick_world(&mut self.world)?;
-            after_tick(&self.world, self.agent);
-            let replay = self.world.get::<Replay>(self.agent);
-            if let Some(replay) = replay.filter(|replay| replay.is_finished()) {
-                return Ok(replay.divergence().cloned());
-            }
-        }
-    }
-}
-
-// The recorded episodes that were replayed when an error occurred.
-
 /// Recorded episodes that were replayed at the same time. Its text names their files: one of the episodes caused the
 /// error.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Replayed(BTreeMap<PathBuf, BTreeSet<usize>>);
+pub struct ReplayedEpisodes(BTreeMap<PathBuf, BTreeSet<usize>>);
 
-impl Replayed {
+impl ReplayedEpisodes {
     /// Creates it from the episodes, each with its file and its index there, from 0.
     pub fn new(episodes: impl IntoIterator<Item = (PathBuf, usize)>) -> Self {
         let mut by_file: BTreeMap<PathBuf, BTreeSet<usize>> = BTreeMap::new();
@@ -218,7 +215,7 @@ impl Replayed {
     }
 }
 
-impl fmt::Display for Replayed {
+impl fmt::Display for ReplayedEpisodes {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let all: usize = self.0.values().map(BTreeSet::len).sum();
         f.write_str(if all > 1 { "one of " } else { "" })?;
@@ -233,13 +230,13 @@ impl fmt::Display for Replayed {
 }
 
 #[cfg(test)]
-mod replayed_tests {
+mod tests {
     use super::*;
 
     #[test]
     fn episodes_are_named_by_their_files() {
         let named = |episodes: &[(&str, usize)]| {
-            Replayed::new(episodes.iter().map(|(file, index)| (PathBuf::from(file), *index))).to_string()
+            ReplayedEpisodes::new(episodes.iter().map(|(file, index)| (PathBuf::from(file), *index))).to_string()
         };
         assert_eq!(named(&[("a.demo", 3)]), "a.demo, episode 3");
         assert_eq!(

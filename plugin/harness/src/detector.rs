@@ -22,8 +22,6 @@ use bevy_playbot::{action::ActionValue, episode::EpisodeResult, state_hash::Stat
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-// The traits of a detector.
-
 /// A search for one kind of defect in every episode of a test.
 ///
 /// Findings must depend on the episode alone, not on the clock and not on earlier episodes. Then results are the same
@@ -41,7 +39,7 @@ pub trait Detector: Send + Sync {
     }
 
     /// Returns its settings, which may be changed before the test starts.
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         Vec::new()
     }
 
@@ -53,6 +51,30 @@ pub trait Detector: Send + Sync {
     /// Starts to watch a World; `None` if it watches agents only.
     fn watch_world(&self) -> Option<Box<dyn WorldWatcher>> {
         None
+    }
+}
+
+/// A setting of a detector.
+pub struct DetectorSetting<'a> {
+    /// Its name, in small letters.
+    pub key: &'static str,
+    /// Its value.
+    pub value: &'a mut f64,
+    /// The least valid value.
+    pub least: f64,
+    /// Its meaning, with its unit.
+    pub what: &'static str,
+}
+
+impl<'a> DetectorSetting<'a> {
+    /// Creates a setting that is at least 0.
+    pub fn new(key: &'static str, value: &'a mut f64, what: &'static str) -> Self {
+        Self { key, value, least: 0.0, what }
+    }
+
+    /// Replaces the least value.
+    pub fn at_least(self, least: f64) -> Self {
+        Self { least, ..self }
     }
 }
 
@@ -91,7 +113,57 @@ pub trait WorldWatcher {
     fn tick(&mut self, moment: &WorldTick<'_>) -> Option<String>;
 }
 
-// Detectors with one question, asked after each tick.
+/// A tick of an episode that was just played, with the World after it.
+#[derive(Clone, Copy)]
+pub struct DetectorTick<'a> {
+    /// The World: to be read only. Other agents may play in it.
+    pub world: &'a World,
+    /// The agent.
+    pub agent: Entity,
+    /// Level of the episode.
+    pub level: u64,
+    /// The tick, counted from 0.
+    pub tick: u32,
+    /// The agent's action.
+    pub action: &'a ActionValue,
+    /// The observation before the action; may be empty.
+    pub observation: &'a [f32],
+    /// The game's hash of the state; 0 if it has none.
+    pub state_hash: u64,
+    /// The reward.
+    pub reward: f32,
+    /// Position of the agent on its level's plan, if the game reports it.
+    pub position: Option<Vec2>,
+    /// Whether the level's goal was reached, now or before.
+    pub is_success: bool,
+    /// The game's proofs.
+    pub proofs: &'a dyn Proofs,
+}
+
+impl DetectorTick<'_> {
+    /// Returns a hash of the known state: the game's own hash, the observation and the position.
+    pub fn fingerprint(&self) -> u64 {
+        let position = self.position.map_or([0.0; 2], |position| position.to_array());
+        let numbers = self.observation.iter().copied().chain(position).map(|number| u64::from(number.to_bits()));
+        StateHash::of([self.state_hash].into_iter().chain(numbers)).0
+    }
+
+    /// Returns the agent's height: its position on the plan, or else its transform.
+    pub fn height(&self) -> Option<f32> {
+        let transform = || self.world.get::<Transform>(self.agent).map(|transform| transform.translation.y);
+        self.position.map(|position| position.y).or_else(transform)
+    }
+}
+
+/// A tick of a World.
+#[derive(Clone, Copy)]
+pub struct WorldTick<'a> {
+    /// The World: to be read only.
+    pub world: &'a World,
+    /// Errors that were logged in this tick, except by the engine. Only for detectors that
+    /// [read the log](WorldWatcher::hears_errors).
+    pub errors: &'a [String],
+}
 
 /// A detector that asks one question after each tick of each episode: the short form of a game's own detector.
 pub struct EachTick<F> {
@@ -135,61 +207,7 @@ impl<F: Fn(&DetectorTick<'_>) -> Option<String>> EpisodeWatcher for Asking<F> {
     }
 }
 
-// The data of a tick that detectors examine.
-
-/// A tick of an episode that was just played, with the World after it.
-#[derive(Clone, Copy)]
-pub struct DetectorTick<'a> {
-    /// The World: to be read only. Other agents may play in it.
-    pub world: &'a World,
-    /// The agent.
-    pub agent: Entity,
-    /// Level of the episode.
-    pub level: u64,
-    /// The tick, counted from 0.
-    pub tick: u32,
-    /// The agent's action.
-    pub action: &'a ActionValue,
-    /// The observation before the action; may be empty.
-    pub observation: &'a [f32],
-    /// The game's hash of the state; 0 if it has none.
-    pub state_hash: u64,
-    /// The reward.
-    pub reward: f32,
-    /// Position of the agent on its level's plan, if the game reports it.
-    pub place: Option<Vec2>,
-    /// Whether the level's goal was reached, now or before.
-    pub is_success: bool,
-    /// The game's proofs.
-    pub proofs: &'a dyn Proofs,
-}
-
-/// A tick of a World.
-#[derive(Clone, Copy)]
-pub struct WorldTick<'a> {
-    /// The World: to be read only.
-    pub world: &'a World,
-    /// Errors that were logged in this tick, except by the engine. Only for detectors that
-    /// [read the log](WorldWatcher::hears_errors).
-    pub errors: &'a [String],
-}
-
-impl DetectorTick<'_> {
-    /// Returns a hash of the known state: the game's own hash, the observation and the position.
-    pub fn fingerprint(&self) -> u64 {
-        let place = self.place.map_or([0.0; 2], |place| place.to_array());
-        let numbers = self.observation.iter().copied().chain(place).map(|number| u64::from(number.to_bits()));
-        StateHash::of([self.state_hash].into_iter().chain(numbers)).0
-    }
-
-    /// Returns the agent's height: its position on the plan, or else its transform.
-    pub fn height(&self) -> Option<f32> {
-        let transform = || self.world.get::<Transform>(self.agent).map(|transform| transform.translation.y);
-        self.place.map(|place| place.y).or_else(transform)
-    }
-}
-
-// Proofs about a level and about the state of an episode.
+// Proofs about levels and about states of episodes.
 
 /// The game's proofs, on request. One may take a millisecond, so a detector must not ask in each tick.
 pub trait Proofs {
@@ -210,32 +228,6 @@ pub trait Proofs {
 pub struct NoProofs;
 
 impl Proofs for NoProofs {}
-
-/// A setting of a detector.
-pub struct Setting<'a> {
-    /// Its name, in small letters.
-    pub key: &'static str,
-    /// Its value.
-    pub value: &'a mut f64,
-    /// The least valid value.
-    pub least: f64,
-    /// Its meaning, with its unit.
-    pub what: &'static str,
-}
-
-impl<'a> Setting<'a> {
-    /// Creates a setting that is at least 0.
-    pub fn new(key: &'static str, value: &'a mut f64, what: &'static str) -> Self {
-        Self { key, value, least: 0.0, what }
-    }
-
-    /// Replaces the least value.
-    pub fn at_least(self, least: f64) -> Self {
-        Self { least, ..self }
-    }
-}
-
-// Proofs about levels, found without play.
 
 /// Proof about the goal of a level: whether it can be reached.
 ///
@@ -266,7 +258,7 @@ impl LevelProof {
 }
 
 #[cfg(test)]
-mod proof_tests {
+mod tests {
     use super::*;
 
     #[test]

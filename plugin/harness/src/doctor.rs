@@ -3,10 +3,18 @@
 //!
 //! Recording, replay, resume and training in many arenas need games that are a function of their level and their
 //! actions. [`examine`] plays copies of a game with the same random actions and compares them after every tick, by
-//! reflection: see [`Comparison`] for the pairs. No finding in some ticks of one level is no proof: more ticks and
-//! other levels show more. Components and resources that are `Reflect` and have `#[reflect(Component)]` or
+//! reflection: see [`DoctorComparison`] for the pairs. No finding in some ticks of one level is no proof: more ticks
+//! and other levels show more. Components and resources that are `Reflect` and have `#[reflect(Component)]` or
 //! `#[reflect(Resource)]` are compared field by field. The rest shows only in observations, rewards and ends of
 //! episodes.
+//!
+//! The files of the folder, in reading order:
+//!
+//! - `trial`: one comparison, tick by tick.
+//! - `game_copy`: a running copy of the game, with its entities and types.
+//! - `compare`, `field`: the comparison of two copies, down to the first field that differs.
+//! - `cause`, `observed`: causes of a difference, observations of the agents, and the uses that the game is safe for.
+//! - `text`: the report for people.
 
 mod cause;
 mod compare;
@@ -34,30 +42,6 @@ pub use crate::doctor::{
     observed::{ConstantValue, NonFiniteValue, ObservationReport, Safety, Verdict},
 };
 
-// The whole examination.
-
-/// The settings of an examination.
-#[derive(Clone, Debug)]
-pub struct DoctorOptions {
-    /// Mode of the game.
-    pub mode: String,
-    /// Ticks that each comparison plays.
-    pub ticks: u32,
-    /// The level.
-    pub level: u64,
-    /// Random seed of the World and of the actions.
-    pub seed: u64,
-    /// Components and resources whose path contains one of these are ignored, such as a high score that should last.
-    pub ignored: Vec<String>,
-}
-
-impl DoctorOptions {
-    /// Creates options for 300 ticks of a mode.
-    pub fn new(mode: impl Into<String>) -> Self {
-        Self { mode: mode.into(), ticks: 300, level: 0, seed: 0, ignored: Vec::new() }
-    }
-}
-
 /// Plays copies of a game with the same random actions, compares them after every tick, and reports the differences.
 /// `progress` receives the next comparison.
 ///
@@ -67,7 +51,7 @@ impl DoctorOptions {
 pub fn examine(
     game: &dyn Game,
     options: &DoctorOptions,
-    mut progress: impl FnMut(Comparison),
+    mut progress: impl FnMut(DoctorComparison),
 ) -> Result<DoctorReport, ModeError> {
     game.check_mode(&options.mode)?;
     let plan = Plan { mode: &options.mode, level: options.level, seed: options.seed };
@@ -75,14 +59,14 @@ pub fn examine(
     let mut comparisons: Vec<ComparisonReport> = Vec::new();
     let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
     let mut suspicions = Vec::new();
-    for comparison in Comparison::ALL {
+    for comparison in DoctorComparison::ALL {
         if let Some(why) = reason_to_skip(comparison, game, &comparisons) {
             comparisons.push(skipped(comparison, why));
             continue;
         }
         progress(comparison);
         let mut trial = Trial::new(comparison, game, &plan, options.ticks);
-        let is_first = comparison == Comparison::Repeat;
+        let is_first = comparison == DoctorComparison::Repeat;
         let mut monitor = is_first.then(|| ObservationMonitor::new(trial.copies[0].observed_names()));
         let result = trial.run(options.ticks, &mut known_types, &options.ignored, monitor.as_mut());
         if let Some(monitor) = monitor {
@@ -108,38 +92,108 @@ pub fn examine(
     })
 }
 
-/// A game that differs from itself differs in every comparison, and no comparison could name a cause.
-fn reason_to_skip(comparison: Comparison, game: &dyn Game, done: &[ComparisonReport]) -> Option<String> {
-    if comparison == Comparison::Arenas && game.tools().host.arenas_per_world() == Some(1) {
-        return Some("a World of this game holds only one arena (its `arenas_per_world` is 1)".to_owned());
-    }
-    let broken = done.iter().find(|of| of.comparison == Comparison::Repeat && of.same() == Some(false))?;
-    Some(match broken.fault.is_some() {
-        true => "the game has a fault, which must be repaired first".to_owned(),
-        false => "the game already differs from itself without this, which must be repaired first".to_owned(),
-    })
+/// The settings of an examination.
+#[derive(Clone, Debug)]
+pub struct DoctorOptions {
+    /// Mode of the game.
+    pub mode: String,
+    /// Ticks that each comparison plays.
+    pub ticks: u32,
+    /// The level.
+    pub level: u64,
+    /// Random seed of the World and of the actions.
+    pub seed: u64,
+    /// Components and resources whose path contains one of these are ignored, such as a high score that should last.
+    pub ignored: Vec<String>,
 }
 
-fn skipped(comparison: Comparison, why: String) -> ComparisonReport {
-    ComparisonReport {
-        comparison,
-        skipped: Some(why),
-        ticks: 0,
-        episodes: 0,
-        first: None,
-        others: Vec::new(),
-        effect: None,
-        unmatched: 0,
-        fault: None,
+impl DoctorOptions {
+    /// Creates options for 300 ticks of a mode.
+    pub fn new(mode: impl Into<String>) -> Self {
+        Self { mode: mode.into(), ticks: 300, level: 0, seed: 0, ignored: Vec::new() }
     }
 }
 
-// The report of an examination, for people and for programs.
+/// The result of an examination.
+#[derive(Clone, Debug, Serialize)]
+pub struct DoctorReport {
+    /// Name of the game.
+    pub game: String,
+    /// Version of its rules.
+    pub version: u32,
+    /// Its mode.
+    pub mode: String,
+    /// The level.
+    pub level: u64,
+    /// Random seed of the World and of the actions.
+    pub seed: u64,
+    /// Ticks that each comparison was to play.
+    pub ticks: u32,
+    /// The comparisons.
+    pub comparisons: Vec<ComparisonReport>,
+    /// The observations of agents.
+    pub observation: ObservationReport,
+    /// The types that could be compared.
+    pub types: TypesReport,
+    /// The uses that the game is safe for.
+    pub safety: Safety,
+    /// The findings, worst first.
+    pub findings: Vec<DoctorFinding>,
+    /// Ticks per second of one arena, if they were measured: the examination itself reads no clock.
+    pub ticks_per_second: Option<f64>,
+}
+
+impl DoctorReport {
+    /// Returns whether there is no finding.
+    pub fn is_healthy(&self) -> bool {
+        self.findings.is_empty()
+    }
+
+    /// Returns the report of a comparison.
+    pub fn of(&self, comparison: DoctorComparison) -> Option<&ComparisonReport> {
+        self.comparisons.iter().find(|report| report.comparison == comparison)
+    }
+}
+
+/// The result of one comparison.
+#[derive(Clone, Debug, Serialize)]
+pub struct ComparisonReport {
+    /// The comparison.
+    pub comparison: DoctorComparison,
+    /// Why it was skipped, if it was.
+    pub skipped: Option<String>,
+    /// Ticks compared.
+    pub ticks: u32,
+    /// Episodes that started in these ticks, in the copy on the left; the last one may be unfinished.
+    pub episodes: u32,
+    /// The first difference, the one nearest to its cause if a tick has several.
+    pub first: Option<DoctorDifference>,
+    /// A few further differences of that tick.
+    pub others: Vec<DoctorDifference>,
+    /// The first difference in observations, rewards or ends of episodes, if there is one.
+    pub effect: Option<DoctorDifference>,
+    /// Entities without a match in the other copy.
+    pub unmatched: usize,
+    /// The fault or panic of the game that ended the comparison early.
+    pub fault: Option<String>,
+}
+
+impl ComparisonReport {
+    /// Returns whether the copies played the same game to the end; `None` if they were not compared.
+    pub fn same(&self) -> Option<bool> {
+        self.skipped.is_none().then(|| self.first.is_none() && self.effect.is_none() && self.fault.is_none())
+    }
+
+    /// Returns the first difference of any kind.
+    pub fn difference(&self) -> Option<&DoctorDifference> {
+        self.first.as_ref().or(self.effect.as_ref())
+    }
+}
 
 /// The copies of the game that are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Comparison {
+pub enum DoctorComparison {
     /// Two Worlds on one thread, one after the other in every tick.
     Repeat,
     /// Two Worlds. In one of them Bevy's `Time<Real>` runs slower, as on a slow machine.
@@ -155,7 +209,7 @@ pub enum Comparison {
     Restart,
 }
 
-impl Comparison {
+impl DoctorComparison {
     /// All comparisons, in the order in which they are made.
     pub const ALL: [Self; 6] =
         [Self::Repeat, Self::Archetypes, Self::Clock, Self::Threads, Self::Arenas, Self::Restart];
@@ -185,6 +239,25 @@ impl Comparison {
     }
 }
 
+/// A difference between two copies of the game.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct DoctorDifference {
+    /// The tick of the comparison, from 0.
+    pub tick: u32,
+    /// The kind of value.
+    pub kind: DifferenceKind,
+    /// Path of the component's or resource's type; the name of other values, such as `reward`.
+    pub name: String,
+    /// The entity: its name, or how the two were matched.
+    pub entity: Option<String>,
+    /// The field, such as `.position.x`; empty if the whole differs.
+    pub field: String,
+    /// The value in the left copy, see [`DoctorComparison::sides`].
+    pub left: String,
+    /// The value in the right copy.
+    pub right: String,
+}
+
 /// The kind of value that differs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -205,102 +278,20 @@ pub enum DifferenceKind {
     StateHash,
 }
 
-/// A difference between two copies of the game.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
-pub struct Difference {
-    /// The tick of the comparison, from 0.
-    pub tick: u32,
-    /// The kind of value.
-    pub kind: DifferenceKind,
-    /// Path of the component's or resource's type; the name of other values, such as `reward`.
-    pub name: String,
-    /// The entity: its name, or how the two were matched.
-    pub entity: Option<String>,
-    /// The field, such as `.position.x`; empty if the whole differs.
-    pub field: String,
-    /// The value in the left copy, see [`Comparison::sides`].
-    pub left: String,
-    /// The value in the right copy.
-    pub right: String,
-}
-
-/// The result of one comparison.
+/// A finding.
 #[derive(Clone, Debug, Serialize)]
-pub struct ComparisonReport {
-    /// The comparison.
-    pub comparison: Comparison,
-    /// Why it was skipped, if it was.
-    pub skipped: Option<String>,
-    /// Ticks compared.
-    pub ticks: u32,
-    /// Episodes that started in these ticks, in the copy on the left; the last one may be unfinished.
-    pub episodes: u32,
-    /// The first difference, the one nearest to its cause if a tick has several.
-    pub first: Option<Difference>,
-    /// A few further differences of that tick.
-    pub others: Vec<Difference>,
-    /// The first difference in observations, rewards or ends of episodes, if there is one.
-    pub effect: Option<Difference>,
-    /// Entities without a match in the other copy.
-    pub unmatched: usize,
-    /// The fault or panic of the game that ended the comparison early.
-    pub fault: Option<String>,
+pub struct DoctorFinding {
+    /// The kind.
+    pub kind: FindingKind,
+    /// The message, in a sentence.
+    pub what: String,
+    /// The comparison that showed it.
+    pub comparison: Option<DoctorComparison>,
+    /// The first difference.
+    pub difference: Option<DoctorDifference>,
+    /// Causes that fit, likeliest first.
+    pub causes: Vec<Cause>,
 }
-
-impl ComparisonReport {
-    /// Returns whether the copies played the same game to the end; `None` if they were not compared.
-    pub fn same(&self) -> Option<bool> {
-        self.skipped.is_none().then(|| self.first.is_none() && self.effect.is_none() && self.fault.is_none())
-    }
-
-    /// Returns the first difference of any kind.
-    pub fn difference(&self) -> Option<&Difference> {
-        self.first.as_ref().or(self.effect.as_ref())
-    }
-}
-
-/// The result of an examination.
-#[derive(Clone, Debug, Serialize)]
-pub struct DoctorReport {
-    /// Name of the game.
-    pub game: String,
-    /// Version of its rules.
-    pub version: u32,
-    /// Its mode.
-    pub mode: String,
-    /// The level.
-    pub level: u64,
-    /// Random seed of the World and of the actions.
-    pub seed: u64,
-    /// Ticks that each comparison was to play.
-    pub ticks: u32,
-    /// The comparisons.
-    pub comparisons: Vec<ComparisonReport>,
-    /// The observations of agents.
-    pub observation: ObservationReport,
-    /// The types that could be compared.
-    pub types: TypesReport,
-    /// The uses that the game is safe for.
-    pub safety: Safety,
-    /// The findings, worst first.
-    pub findings: Vec<Finding>,
-    /// Ticks per second of one arena, if they were measured: the examination itself reads no clock.
-    pub ticks_per_second: Option<f64>,
-}
-
-impl DoctorReport {
-    /// Returns whether there is no finding.
-    pub fn is_healthy(&self) -> bool {
-        self.findings.is_empty()
-    }
-
-    /// Returns the report of a comparison.
-    pub fn of(&self, comparison: Comparison) -> Option<&ComparisonReport> {
-        self.comparisons.iter().find(|report| report.comparison == comparison)
-    }
-}
-
-// The findings of an examination.
 
 /// The kind of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -318,32 +309,45 @@ pub enum FindingKind {
     Blind,
 }
 
-/// A finding.
-#[derive(Clone, Debug, Serialize)]
-pub struct Finding {
-    /// The kind.
-    pub kind: FindingKind,
-    /// The message, in a sentence.
-    pub what: String,
-    /// The comparison that showed it.
-    pub comparison: Option<Comparison>,
-    /// The first difference.
-    pub difference: Option<Difference>,
-    /// Causes that fit, likeliest first.
-    pub causes: Vec<Cause>,
+/// A game that differs from itself differs in every comparison, and no comparison could name a cause.
+fn reason_to_skip(comparison: DoctorComparison, game: &dyn Game, done: &[ComparisonReport]) -> Option<String> {
+    if comparison == DoctorComparison::Arenas && game.tools().host.arenas_per_world() == Some(1) {
+        return Some("a World of this game holds only one arena (its `arenas_per_world` is 1)".to_owned());
+    }
+    let broken = done.iter().find(|of| of.comparison == DoctorComparison::Repeat && of.same() == Some(false))?;
+    Some(match broken.fault.is_some() {
+        true => "the game has a fault, which must be repaired first".to_owned(),
+        false => "the game already differs from itself without this, which must be repaired first".to_owned(),
+    })
 }
+
+fn skipped(comparison: DoctorComparison, why: String) -> ComparisonReport {
+    ComparisonReport {
+        comparison,
+        skipped: Some(why),
+        ticks: 0,
+        episodes: 0,
+        first: None,
+        others: Vec::new(),
+        effect: None,
+        unmatched: 0,
+        fault: None,
+    }
+}
+
+// Findings of an examination.
 
 /// Returns all findings, worst first.
 fn findings(
     comparisons: &[ComparisonReport],
     observation: &ObservationReport,
     suspicions: &[(CauseKind, String)],
-) -> Vec<Finding> {
+) -> Vec<DoctorFinding> {
     let mut findings = of_observation(observation);
     let is_of_observation = !findings.is_empty();
     for report in comparisons {
         if let Some(difference) = report.difference() {
-            findings.push(Finding {
+            findings.push(DoctorFinding {
                 kind: FindingKind::Differs,
                 what: sentence(report.comparison, difference),
                 comparison: Some(report.comparison),
@@ -361,11 +365,11 @@ fn findings(
     findings
 }
 
-fn plain(kind: FindingKind, what: String, comparison: Option<Comparison>) -> Finding {
-    Finding { kind, what, comparison, difference: None, causes: Vec::new() }
+fn plain(kind: FindingKind, what: String, comparison: Option<DoctorComparison>) -> DoctorFinding {
+    DoctorFinding { kind, what, comparison, difference: None, causes: Vec::new() }
 }
 
-fn of_observation(seen: &ObservationReport) -> Vec<Finding> {
+fn of_observation(seen: &ObservationReport) -> Vec<DoctorFinding> {
     let mut findings = Vec::new();
     if let Some(NonFiniteValue { tick, name, value }) = &seen.not_finite {
         let what = format!("observation `{name}` is {value} at tick {tick}: no policy can read that");
@@ -388,9 +392,9 @@ fn of_observation(seen: &ObservationReport) -> Vec<Finding> {
     findings
 }
 
-fn sentence(comparison: Comparison, difference: &Difference) -> String {
+fn sentence(comparison: DoctorComparison, difference: &DoctorDifference) -> String {
     use self::DifferenceKind::{Component, End, Entities, Observation, Resource, Reward, StateHash};
-    let Difference { kind, name, entity, field, tick, .. } = difference;
+    let DoctorDifference { kind, name, entity, field, tick, .. } = difference;
     let thing = match kind {
         Resource => format!("resource `{name}{field}`"),
         Component => format!("component `{name}{field}` of {}", entity.as_deref().unwrap_or("an entity")),
@@ -401,7 +405,7 @@ fn sentence(comparison: Comparison, difference: &Difference) -> String {
     format!("{}: {thing} differs at tick {tick}", comparison.describe())
 }
 
-// The scope of comparisons: the game's state, without the engine's housekeeping.
+// Scope of comparisons: the game's state, without the engine's housekeeping.
 
 /// Path prefixes of the plugin's own types, and of types that the engine creates for itself: on other threads, for the
 /// screen, or whenever a file happens to be loaded.
@@ -448,7 +452,7 @@ const HIERARCHY: [&str; 2] = ["bevy_ecs::hierarchy::ChildOf", "bevy_ecs::hierarc
 /// Clocks and keys go on from one episode to the next.
 const GOES_ON: [&str; 4] = ["bevy_time::", "bevy_input::", "leafwing_input_manager::", "bevy_enhanced_input::"];
 
-/// Bevy's real-time clock. Without a window it is a mock; [`Comparison::Clock`] reveals its readers.
+/// Bevy's real-time clock. Without a window it is a mock; [`DoctorComparison::Clock`] reveals its readers.
 const WALL_CLOCK: &str = "bevy_time::time::Time<bevy_time::real::Real>";
 
 /// Returns whether a type is the engine's or the plugin's, so that it says little about the cause of a difference.
@@ -463,12 +467,12 @@ fn is_compared(path: &str) -> bool {
 }
 
 /// Returns whether they are part of this comparison.
-fn is_compared_in(comparison: Comparison, path: &str) -> bool {
-    comparison != Comparison::Restart || !GOES_ON.iter().any(|prefix| path.starts_with(prefix))
+fn is_compared_in(comparison: DoctorComparison, path: &str) -> bool {
+    comparison != DoctorComparison::Restart || !GOES_ON.iter().any(|prefix| path.starts_with(prefix))
 }
 
 #[cfg(test)]
-mod scope_tests {
+mod tests {
     use super::*;
 
     #[test]
@@ -476,7 +480,7 @@ mod scope_tests {
         for path in ["breakout::Score", "bevy_transform::components::transform::Transform", HIERARCHY[0]] {
             assert!(is_compared(path), "{path}");
         }
-        for path in [WALL_CLOCK, "bevy_render::sync_world::RenderEntity", "bevy_playbot::control::Control"] {
+        for path in [WALL_CLOCK, "bevy_render::sync_world::RenderEntity", "bevy_playbot::agent::Control"] {
             assert!(!is_compared(path), "{path}");
         }
     }
@@ -484,7 +488,7 @@ mod scope_tests {
     #[test]
     fn clocks_are_no_state_that_a_restart_resets() {
         let clock = "bevy_time::time::Time<bevy_time::fixed::Fixed>";
-        assert!(is_compared(clock) && is_compared_in(Comparison::Repeat, clock));
-        assert!(!is_compared_in(Comparison::Restart, clock));
+        assert!(is_compared(clock) && is_compared_in(DoctorComparison::Repeat, clock));
+        assert!(!is_compared_in(DoctorComparison::Restart, clock));
     }
 }

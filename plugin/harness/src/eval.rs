@@ -2,11 +2,12 @@
 
 use crate::{
     arrangement::Arrangement,
+    ended_episodes::EndedEpisodes,
     game::Game,
     machine::{MemoryError, check_bytes},
     parallel::on_threads,
     split::LevelSplit,
-    worlds::{EndedEpisodes, build_observing_world},
+    worlds::build_observing_world,
 };
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -26,6 +27,9 @@ use std::collections::{BTreeMap, HashMap};
 use thiserror::Error;
 
 pub use bevy_playbot::episode::EpisodeResult;
+
+/// Name of the bot that every game has in addition to its own: [`BlindBot::Chaos`].
+pub const CHAOS: &str = "chaos";
 
 /// The player that is evaluated.
 #[derive(Clone)]
@@ -98,6 +102,15 @@ impl Player {
     }
 }
 
+/// Returns the blind bots that can play a game: [its own](crate::game::BotTools::blind_bots), and [`CHAOS`].
+pub fn blind_bots(game: &dyn Game) -> Vec<(&'static str, BlindBot)> {
+    let mut bots = game.tools().bots.blind_bots();
+    if bots.iter().all(|(name, _)| *name != CHAOS) {
+        bots.push((CHAOS, BlindBot::Chaos));
+    }
+    bots
+}
+
 /// The settings of an evaluation.
 #[derive(Clone, Debug)]
 pub struct EvalPlan {
@@ -140,7 +153,7 @@ pub struct Trail {
     pub result: EpisodeResult,
     /// Position of the agent after each tick, on the game's [`FloorPlan`](crate::floor_plan::FloorPlan). Empty if the
     /// game does not report it.
-    pub places: Vec<Vec2>,
+    pub positions: Vec<Vec2>,
 }
 
 /// Plays every level of the plan and returns all episodes, sorted by level. `progress` receives each finished episode,
@@ -230,7 +243,7 @@ fn play_out(
     progress: &(impl Fn(u64) + Sync),
 ) -> Result<Vec<Trail>, Fault> {
     let everybody = world.query_filtered::<Entity, With<Agent>>().iter(world).collect::<Vec<_>>();
-    let mut places: HashMap<Entity, Vec<Vec2>> = HashMap::new();
+    let mut positions: HashMap<Entity, Vec<Vec2>> = HashMap::new();
     let mut trails = Vec::new();
     while everybody.iter().any(|&agent| Control::of(world, agent).is_active()) {
         tick_world(world)?;
@@ -238,14 +251,14 @@ fn play_out(
         for (game, &agent) in followed.iter().flat_map(|game| everybody.iter().map(move |agent| (game, agent))) {
             let is_playing = world.get::<Episode>(agent).is_some_and(Episode::is_running);
             let is_seen = is_playing || ended.iter().any(|(entity, _)| *entity == agent);
-            if let Some(place) = is_seen.then(|| game.tools().state.position(world, agent)).flatten() {
-                places.entry(agent).or_default().push(place);
+            if let Some(position) = is_seen.then(|| game.tools().state.position(world, agent)).flatten() {
+                positions.entry(agent).or_default().push(position);
             }
         }
         if !ended.is_empty() {
             progress(ended.len() as u64);
         }
-        let trail = |(agent, result)| Trail { result, places: places.remove(&agent).unwrap_or_default() };
+        let trail = |(agent, result)| Trail { result, positions: positions.remove(&agent).unwrap_or_default() };
         trails.extend(ended.into_iter().map(trail));
     }
     Ok(trails)
@@ -345,25 +358,11 @@ fn standard_error(values: &[f64]) -> f64 {
     (squares / (n - 1.0) / n).sqrt()
 }
 
-// Bots without sensors, by name.
-
-/// Name of the bot that every game has in addition to its own: [`BlindBot::Chaos`].
-pub const CHAOS: &str = "chaos";
-
-/// Returns the blind bots that can play a game: [its own](crate::game::BotTools::blind_bots), and [`CHAOS`].
-pub fn blind_bots(game: &dyn Game) -> Vec<(&'static str, BlindBot)> {
-    let mut bots = game.tools().bots.blind_bots();
-    if bots.iter().all(|(name, _)| *name != CHAOS) {
-        bots.push((CHAOS, BlindBot::Chaos));
-    }
-    bots
-}
-
 #[cfg(test)]
-mod summary_tests {
-    use bevy_playbot::episode::EpisodeEnd;
-
+mod tests {
     use super::*;
+    use crate::foreign::ForeignGame;
+    use bevy_playbot::episode::EpisodeEnd;
 
     /// Levels 0, 1 and 2 with the returns 0, 3 and 6, each repeated `times` times.
     fn repeated(times: usize) -> Vec<(u64, f64)> {
@@ -404,12 +403,6 @@ mod summary_tests {
         assert_eq!((summary.success, summary.success_se), (0.75, 0.25));
         assert_eq!((summary.length_mean, summary.clipped), (10.0, 0.1));
     }
-}
-
-#[cfg(test)]
-mod blind_tests {
-    use super::*;
-    use crate::foreign::ForeignGame;
 
     #[test]
     fn every_game_has_chaos_behind_its_own_bots() {

@@ -5,6 +5,14 @@
 //! game's own schedules run as always. The agent's action presses keys before Bevy's own input systems run; reward and
 //! end are read in `Last`.
 //!
+//! The files of the folder, in reading order:
+//!
+//! - `runtime`: the plugin's state of a foreign game in its World, and the systems of its description.
+//! - `restart`: the start of an episode.
+//! - `input`: the path from an action into the game.
+//! - `observe`, `paths`: observation, position, reward and end after a tick, and observations by the paths of their
+//!   values.
+//!
 //! ```
 //! use bevy::prelude::*;
 //! use playbot_harness::{foreign::{ForeignGame, Restart}, prelude::*};
@@ -54,7 +62,7 @@ use crate::{
     floor_plan::FloorPlan,
     foreign::{
         input::{ForeignBot, Input},
-        observe::ForeignPlace,
+        observe::ForeignPosition,
         paths::ObservedPath,
         runtime::{Baseline, Foreign, ForeignCell, Sensor, SystemFactory},
     },
@@ -87,7 +95,8 @@ pub use crate::foreign::{
     runtime::{IntoActionValue, IntoValues, LevelSeed, Restart},
 };
 
-// The description of a foreign game, as a `Game`.
+/// Default number of frames that a level may take to load.
+const PATIENCE: u32 = 3600;
 
 /// A game without this plugin, with the actions, observations and rewards of its agent: see the
 /// [module](self).
@@ -97,248 +106,6 @@ pub use crate::foreign::{
 #[derive(Clone)]
 pub struct ForeignGame {
     description: Arc<Description>,
-}
-
-/// The settings of the builder.
-#[derive(Clone)]
-struct Description {
-    name: &'static str,
-    version: u32,
-    plugin: Arc<dyn Fn(&mut App) + Send + Sync>,
-    hz: f64,
-    levels: Option<u64>,
-    input: Input,
-    act: Option<SystemFactory<()>>,
-    /// Functions that prepare an agent when it is spawned.
-    agent: Vec<Arc<dyn Fn(&mut EntityWorldMut) + Send + Sync>>,
-    /// Names of the values that `observe` returns.
-    names: Vec<String>,
-    observe: Option<SystemFactory<Vec<f32>>>,
-    paths: Vec<String>,
-    has_camera: bool,
-    /// Position of the agent on the plan of its level.
-    place: Option<SystemFactory<Vec2>>,
-    /// The plan of a level.
-    plan: Option<Arc<dyn Fn(u64) -> FloorPlan + Send + Sync>>,
-    /// Reward systems; the flag says whether the growth of the value is paid.
-    rewards: Vec<(SystemFactory<f32>, bool)>,
-    end: Option<SystemFactory<Option<EpisodeEnd>>>,
-    /// Ticks after which an episode is truncated.
-    limit: Option<u32>,
-    restart: Restart,
-    ready: Option<SystemFactory<bool>>,
-    /// Frames that a level may take to load.
-    patience: u32,
-    level: Option<SystemFactory<()>>,
-    demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
-    hash: Option<SystemFactory<u64>>,
-    plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
-    /// Factories of the game's own detectors.
-    detectors: Vec<Arc<dyn Fn() -> Box<dyn Detector> + Send + Sync>>,
-    /// Defects that can be planted into it.
-    defects: Vec<DefectKind>,
-}
-
-impl Description {
-    fn sensor(&self) -> Sensor {
-        match &self.observe {
-            Some(system) => Sensor::System(system.make()),
-            None if self.paths.is_empty() => Sensor::Nothing,
-            None => Sensor::Paths(self.paths.iter().map(|path| ObservedPath::new(path)).collect()),
-        }
-    }
-
-    /// Returns the name of the system that observes, for messages.
-    fn sensor_name(&self) -> &'static str {
-        self.observe.as_ref().map_or("of the paths", SystemFactory::name)
-    }
-
-    fn observation(&self) -> ObservationSpace {
-        let names = if self.observe.is_some() { &self.names } else { &self.paths };
-        ObservationSpace { names: names.clone() }
-    }
-}
-
-impl ForeignGame {
-    /// Returns the number of levels, if the game declares it.
-    pub fn level_count(&self) -> Option<u64> {
-        self.description.levels
-    }
-
-    /// Returns the level that is played for this number.
-    fn level_of(&self, level: u64) -> u64 {
-        self.level_count().map_or(level, |levels| level % levels.max(1))
-    }
-}
-
-/// Returns the reason why a game without vector observations cannot be observed. `has_feature` says whether this crate
-/// is built with cameras.
-fn nothing_seen(name: &str, has_camera: bool, has_feature: bool) -> Option<String> {
-    match (has_camera, has_feature) {
-        (true, true) => None,
-        (true, false) => Some(format!(
-            "the game `{name}` is seen through its camera alone, which needs the feature `camera` of \
-             `playbot`: build with it, or add `.observe` or `.observe_paths`"
-        )),
-        (false, _) => {
-            Some(format!("nothing of the game `{name}` is seen: add `.observe`, `.observe_paths` or `.camera`"))
-        }
-    }
-}
-
-impl Game for ForeignGame {
-    fn name(&self) -> &'static str {
-        self.description.name
-    }
-
-    fn version(&self) -> u32 {
-        self.description.version
-    }
-
-    fn modes(&self) -> &'static [&'static str] {
-        &["default"]
-    }
-
-    fn tick_hz(&self) -> f64 {
-        self.description.hz
-    }
-
-    fn built_anew(&self) -> Option<Arc<dyn Game>> {
-        matches!(self.description.restart, Restart::Rebuild).then(|| Arc::new(self.clone()) as Arc<dyn Game>)
-    }
-
-    fn actions(&self) -> ActionSpace {
-        self.description.input.space()
-    }
-
-    fn observation(&self) -> ObservationSpace {
-        self.description.observation()
-    }
-
-    fn build(&self, app: &mut App, _mode: &str) {
-        app.add_plugins(ForeignPlugin(self.clone()));
-    }
-
-    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
-        let sensor = VectorSensor::new(self.description.observation().names);
-        let mut agent = world.spawn((Agent::new(index, self.actions()), sensor));
-        if let Some(input) = self.description.input.pressed() {
-            agent.insert(input);
-        }
-        self.description.agent.iter().for_each(|equip| equip(&mut agent));
-        agent.id()
-    }
-
-    fn tools(&self) -> GameTools<'_> {
-        GameTools {
-            host: self,
-            levels: self,
-            state: self,
-            pictures: self,
-            input: self,
-            bots: self,
-            tests: self,
-            ..GameTools::default()
-        }
-    }
-}
-
-impl HostTools for ForeignGame {
-    fn placement(&self) -> TickPlacement {
-        TickPlacement::Frame
-    }
-
-    fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
-        match &self.description.plugins {
-            Some(change) => change(plugins),
-            None => plugins.build(),
-        }
-    }
-
-    fn arenas_per_world(&self) -> Option<u32> {
-        Some(1)
-    }
-
-    fn unplayable(&self) -> Option<String> {
-        let Description { name, input, observe, paths, has_camera, names, .. } = &*self.description;
-        if let Some(problem) = input.problem() {
-            return Some(format!("the game `{name}` {problem}"));
-        }
-        if has_no_actions(&input.space()) {
-            return Some(format!(
-                "the game `{name}` has no actions: say what an agent can do, for instance with `.keys`"
-            ));
-        }
-        if observe.is_none() && paths.is_empty() {
-            let unseen = nothing_seen(name, *has_camera, cfg!(feature = "camera"));
-            if unseen.is_some() {
-                return unseen;
-            }
-        }
-        if observe.is_some() && names.is_empty() {
-            return Some(format!("`.observe` of the game `{name}` names no values"));
-        }
-        let is_sound = self.description.hz.is_finite() && self.description.hz > 0.0;
-        (!is_sound).then(|| format!("`.hz` of the game `{name}` is {}, not a number of frames", self.description.hz))
-    }
-}
-
-impl LevelTools for ForeignGame {
-    fn floor_plan(&self, _mode: &str, level: u64) -> Option<FloorPlan> {
-        self.description.plan.as_ref().map(|plan| plan(self.level_of(level)))
-    }
-}
-
-impl StateTools for ForeignGame {
-    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        world.get::<ForeignPlace>(agent).map(|place| place.0)
-    }
-}
-
-impl PictureTools for ForeignGame {
-    fn has_camera(&self) -> bool {
-        self.description.has_camera
-    }
-}
-
-impl InputTools for ForeignGame {
-    fn action_names(&self) -> Vec<String> {
-        self.description.input.names()
-    }
-
-    fn key_bindings(&self) -> Option<KeyBindings> {
-        self.description.input.bindings()
-    }
-}
-
-impl BotTools for ForeignGame {
-    fn demonstrator(&self) -> Option<&'static str> {
-        self.description.demonstrator.as_ref().map(|(name, _)| *name)
-    }
-
-    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
-        Renewal::carry_component::<ForeignBot>(world);
-        world.entity_mut(agent).insert(ForeignBot { noise });
-    }
-}
-
-impl TestTools for ForeignGame {
-    fn detectors(&self) -> Vec<Box<dyn Detector>> {
-        self.description.detectors.iter().map(|make| make()).collect()
-    }
-
-    fn defects(&self) -> Vec<DefectKind> {
-        self.description.defects.clone()
-    }
-}
-
-// The builder methods of a foreign game.
-
-/// Default number of frames that a level may take to load.
-const PATIENCE: u32 = 3600;
-
-fn lists<T>(sets: impl IntoIterator<Item = impl IntoIterator<Item = T>>) -> Vec<Vec<T>> {
-    sets.into_iter().map(|set| set.into_iter().collect()).collect()
 }
 
 impl ForeignGame {
@@ -358,7 +125,7 @@ impl ForeignGame {
             observe: None,
             paths: Vec::new(),
             has_camera: false,
-            place: None,
+            position: None,
             plan: None,
             rewards: Vec::new(),
             end: None,
@@ -523,12 +290,12 @@ impl ForeignGame {
     /// Declares the position of the agent, from above or from the side, in any units, for detectors of progress, for
     /// explorers and for pictures. The system may run more than once in a tick, so it must change nothing. While it is
     /// skipped, because an entity that it asks for does not exist, the position is unknown.
-    pub fn place<M: 'static>(self, system: impl IntoSystem<(), Vec2, M> + Clone + Send + Sync + 'static) -> Self {
-        self.with(|description| description.place = Some(SystemFactory::new(system, |place| place)))
+    pub fn position<M: 'static>(self, system: impl IntoSystem<(), Vec2, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.position = Some(SystemFactory::new(system, |position| position)))
     }
 
-    /// Declares the plan of a level by its number, in the units of [`place`](Self::place): for pictures of paths, and
-    /// for detectors that need walls, bounds or the goal.
+    /// Declares the plan of a level by its number, in the units of [`position`](Self::position): for pictures of paths,
+    /// and for detectors that need walls, bounds or the goal.
     pub fn plan(self, plan: impl Fn(u64) -> FloorPlan + Send + Sync + 'static) -> Self {
         self.with(|description| description.plan = Some(Arc::new(plan)))
     }
@@ -604,13 +371,250 @@ impl ForeignGame {
     }
 
     /// Changes Bevy's plugins for headless Worlds, to leave out some default ones:
-    /// `|usual| usual.build().disable::<AudioPlugin>()`.
+    /// `|plugins| plugins.build().disable::<AudioPlugin>()`.
     pub fn headless(self, plugins: impl Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync + 'static) -> Self {
         self.with(|description| description.plugins = Some(Arc::new(plugins)))
     }
 }
 
-// The plugin that adds a foreign game to an app.
+impl ForeignGame {
+    /// Returns the number of levels, if the game declares it.
+    pub fn level_count(&self) -> Option<u64> {
+        self.description.levels
+    }
+
+    /// Returns the level that is played for this number.
+    fn level_of(&self, level: u64) -> u64 {
+        self.level_count().map_or(level, |levels| level % levels.max(1))
+    }
+}
+
+impl Game for ForeignGame {
+    fn name(&self) -> &'static str {
+        self.description.name
+    }
+
+    fn version(&self) -> u32 {
+        self.description.version
+    }
+
+    fn modes(&self) -> &'static [&'static str] {
+        &["default"]
+    }
+
+    fn tick_hz(&self) -> f64 {
+        self.description.hz
+    }
+
+    fn built_anew(&self) -> Option<Arc<dyn Game>> {
+        matches!(self.description.restart, Restart::Rebuild).then(|| Arc::new(self.clone()) as Arc<dyn Game>)
+    }
+
+    fn actions(&self) -> ActionSpace {
+        self.description.input.space()
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        self.description.observation()
+    }
+
+    fn build(&self, app: &mut App, _mode: &str) {
+        app.add_plugins(ForeignPlugin(self.clone()));
+    }
+
+    fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
+        let sensor = VectorSensor::new(self.description.observation().names);
+        let mut agent = world.spawn((Agent::new(index, self.actions()), sensor));
+        if let Some(input) = self.description.input.pressed() {
+            agent.insert(input);
+        }
+        self.description.agent.iter().for_each(|equip| equip(&mut agent));
+        agent.id()
+    }
+
+    fn tools(&self) -> GameTools<'_> {
+        GameTools {
+            host: self,
+            levels: self,
+            state: self,
+            pictures: self,
+            input: self,
+            bots: self,
+            tests: self,
+            ..GameTools::default()
+        }
+    }
+}
+
+impl HostTools for ForeignGame {
+    fn placement(&self) -> TickPlacement {
+        TickPlacement::Frame
+    }
+
+    fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
+        match &self.description.plugins {
+            Some(change) => change(plugins),
+            None => plugins.build(),
+        }
+    }
+
+    fn arenas_per_world(&self) -> Option<u32> {
+        Some(1)
+    }
+
+    fn unplayable(&self) -> Option<String> {
+        let Description { name, input, observe, paths, has_camera, names, .. } = &*self.description;
+        if let Some(problem) = input.problem() {
+            return Some(format!("the game `{name}` {problem}"));
+        }
+        if has_no_actions(&input.space()) {
+            return Some(format!(
+                "the game `{name}` has no actions: say what an agent can do, for instance with `.keys`"
+            ));
+        }
+        if observe.is_none() && paths.is_empty() {
+            let unseen = nothing_seen(name, *has_camera, cfg!(feature = "camera"));
+            if unseen.is_some() {
+                return unseen;
+            }
+        }
+        if observe.is_some() && names.is_empty() {
+            return Some(format!("`.observe` of the game `{name}` names no values"));
+        }
+        let is_sound = self.description.hz.is_finite() && self.description.hz > 0.0;
+        (!is_sound).then(|| format!("`.hz` of the game `{name}` is {}, not a number of frames", self.description.hz))
+    }
+}
+
+impl LevelTools for ForeignGame {
+    fn floor_plan(&self, _mode: &str, level: u64) -> Option<FloorPlan> {
+        self.description.plan.as_ref().map(|plan| plan(self.level_of(level)))
+    }
+}
+
+impl StateTools for ForeignGame {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<ForeignPosition>(agent).map(|position| position.0)
+    }
+}
+
+impl PictureTools for ForeignGame {
+    fn has_camera(&self) -> bool {
+        self.description.has_camera
+    }
+}
+
+impl InputTools for ForeignGame {
+    fn action_names(&self) -> Vec<String> {
+        self.description.input.names()
+    }
+
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        self.description.input.bindings()
+    }
+}
+
+impl BotTools for ForeignGame {
+    fn demonstrator(&self) -> Option<&'static str> {
+        self.description.demonstrator.as_ref().map(|(name, _)| *name)
+    }
+
+    fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
+        Renewal::carry_component::<ForeignBot>(world);
+        world.entity_mut(agent).insert(ForeignBot { noise });
+    }
+}
+
+impl TestTools for ForeignGame {
+    fn detectors(&self) -> Vec<Box<dyn Detector>> {
+        self.description.detectors.iter().map(|make| make()).collect()
+    }
+
+    fn defects(&self) -> Vec<DefectKind> {
+        self.description.defects.clone()
+    }
+}
+
+/// The settings of the builder.
+#[derive(Clone)]
+struct Description {
+    name: &'static str,
+    version: u32,
+    plugin: Arc<dyn Fn(&mut App) + Send + Sync>,
+    hz: f64,
+    levels: Option<u64>,
+    input: Input,
+    act: Option<SystemFactory<()>>,
+    /// Functions that prepare an agent when it is spawned.
+    agent: Vec<Arc<dyn Fn(&mut EntityWorldMut) + Send + Sync>>,
+    /// Names of the values that `observe` returns.
+    names: Vec<String>,
+    observe: Option<SystemFactory<Vec<f32>>>,
+    paths: Vec<String>,
+    has_camera: bool,
+    /// Position of the agent on the plan of its level.
+    position: Option<SystemFactory<Vec2>>,
+    /// The plan of a level.
+    plan: Option<Arc<dyn Fn(u64) -> FloorPlan + Send + Sync>>,
+    /// Reward systems; the flag says whether the growth of the value is paid.
+    rewards: Vec<(SystemFactory<f32>, bool)>,
+    end: Option<SystemFactory<Option<EpisodeEnd>>>,
+    /// Ticks after which an episode is truncated.
+    limit: Option<u32>,
+    restart: Restart,
+    ready: Option<SystemFactory<bool>>,
+    /// Frames that a level may take to load.
+    patience: u32,
+    level: Option<SystemFactory<()>>,
+    demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
+    hash: Option<SystemFactory<u64>>,
+    plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
+    /// Factories of the game's own detectors.
+    detectors: Vec<Arc<dyn Fn() -> Box<dyn Detector> + Send + Sync>>,
+    /// Defects that can be planted into it.
+    defects: Vec<DefectKind>,
+}
+
+impl Description {
+    fn sensor(&self) -> Sensor {
+        match &self.observe {
+            Some(system) => Sensor::System(system.make()),
+            None if self.paths.is_empty() => Sensor::Nothing,
+            None => Sensor::Paths(self.paths.iter().map(|path| ObservedPath::new(path)).collect()),
+        }
+    }
+
+    /// Returns the name of the system that observes, for messages.
+    fn sensor_name(&self) -> &'static str {
+        self.observe.as_ref().map_or("of the paths", SystemFactory::name)
+    }
+
+    fn observation(&self) -> ObservationSpace {
+        let names = if self.observe.is_some() { &self.names } else { &self.paths };
+        ObservationSpace { names: names.clone() }
+    }
+}
+
+/// Returns the reason why a game without vector observations cannot be observed. `has_feature` says whether this crate
+/// is built with cameras.
+fn nothing_seen(name: &str, has_camera: bool, has_feature: bool) -> Option<String> {
+    match (has_camera, has_feature) {
+        (true, true) => None,
+        (true, false) => Some(format!(
+            "the game `{name}` is seen through its camera alone, which needs the feature `camera` of \
+             `playbot`: build with it, or add `.observe` or `.observe_paths`"
+        )),
+        (false, _) => {
+            Some(format!("nothing of the game `{name}` is seen: add `.observe`, `.observe_paths` or `.camera`"))
+        }
+    }
+}
+
+fn lists<T>(sets: impl IntoIterator<Item = impl IntoIterator<Item = T>>) -> Vec<Vec<T>> {
+    sets.into_iter().map(|set| set.into_iter().collect()).collect()
+}
+
+// Plugin that adds a foreign game to an app.
 
 /// Runs before everything that the game does when the program starts.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -647,9 +651,9 @@ impl Plugin for ForeignPlugin {
             ),
         )
         .add_systems(judge, observe::read_outcome.before(PlaybotSystems::Judge).run_if(is_tick));
-        observe::build(app);
-        if description.place.is_some() {
-            observe::build_place(app);
+        observe::add_observation(app);
+        if description.position.is_some() {
+            observe::add_position(app);
         }
     }
 
@@ -681,7 +685,7 @@ fn note_baseline(world: &mut World) {
 }
 
 #[cfg(test)]
-mod game_tests {
+mod tests {
     use super::*;
 
     /// A game with actions, and no observation yet.

@@ -1,8 +1,9 @@
 //! The contract of a game: what every game has, and the optional tools that it can bring along.
 //!
-//! [`Game`] has what a game needs in order to be built headless and played by bots. [`GameTools`] has everything beyond that,
-//! in groups that are traits of their own: level files and floor plans ([`LevelTools`]), pictures ([`PictureTools`]), bots
-//! ([`BotTools`]) and so on. A game implements the groups it has something for and names them in [`Game::tools`]:
+//! [`Game`] has what a game needs in order to be built headless and played by bots. [`GameTools`] has everything beyond
+//! that, in groups that are traits of their own: level files and floor plans ([`LevelTools`]), pictures
+//! ([`PictureTools`]), bots ([`BotTools`]) and so on. A game implements the groups it has something for and names them
+//! in [`Game::tools`]:
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -50,7 +51,7 @@ use crate::{
 };
 use bevy::{app::PluginGroupBuilder, prelude::*};
 use bevy_playbot::{
-    action::ActionSpace,
+    action::{ActionSpace, ActionValue},
     agent::has_no_actions,
     bot::BlindBot,
     demo::{file::DemoHeader, recorder::demo_actions},
@@ -64,11 +65,14 @@ use bevy_playbot::{
 };
 use std::sync::Arc;
 
+/// Words that begin the names of actions that do nothing.
+const IDLE_WORDS: [&str; 8] = ["none", "nothing", "noop", "no-op", "idle", "stay", "wait", "stand"];
+
 /// A game that can be trained on and tested without a window.
 ///
-/// The first eight methods describe the game. [`tools`](Self::tools) names what it has beyond that, and
-/// [`built_anew`](Self::built_anew) copies a game that cannot be reset. The others follow from these: a game leaves them as
-/// they are.
+/// The first eight methods describe the game. [`aliases`](Self::aliases) and [`tools`](Self::tools) name what it has
+/// beyond that, and [`built_anew`](Self::built_anew) copies a game that cannot be reset. The others follow from these:
+/// a game leaves them as they are.
 pub trait Game: Send + Sync {
     /// Name in files and on the command line.
     fn name(&self) -> &'static str;
@@ -91,23 +95,29 @@ pub trait Game: Send + Sync {
     /// Adds the game's plugins to a headless app, in a mode that [`check_mode`](Self::check_mode) accepts.
     fn build(&self, app: &mut App, mode: &str);
 
-    /// Adds one arena with one agent, which must carry [`Agent`](bevy_playbot::agent::Agent) with this number and its sensor,
-    /// under [`Control::Idle`](bevy_playbot::agent::Control::Idle).
+    /// Adds one arena with one agent, which must carry [`Agent`](bevy_playbot::agent::Agent) with this number and its
+    /// sensor, under [`Control::Idle`](bevy_playbot::agent::Control::Idle).
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity;
+
+    /// Other names that the command line and experiments accept. Files keep [`name`](Self::name).
+    fn aliases(&self) -> &'static [&'static str] {
+        &[]
+    }
 
     /// The optional part of the game; by default nothing.
     fn tools(&self) -> GameTools<'_> {
         GameTools::default()
     }
 
-    /// The game again, if its Worlds must be built anew for each episode, because it keeps state that cannot be reset. `None`
-    /// for a game that restarts in the World it has.
+    /// The game again, if its Worlds must be built anew for each episode, because it keeps state that cannot be reset.
+    /// `None` for a game that restarts in the World it has.
     fn built_anew(&self) -> Option<Arc<dyn Game>> {
         None
     }
 
     /// Checks that there is such a mode: one of [`modes`](Self::modes); or a mode with options that
-    /// [`LevelTools::check_options`] accepts; or level files, each of which [`parse_level`](Self::parse_level) can read.
+    /// [`LevelTools::check_options`] accepts; or level files, each of which [`parse_level`](Self::parse_level) can
+    /// read.
     ///
     /// # Errors
     ///
@@ -134,8 +144,8 @@ pub trait Game: Send + Sync {
         })
     }
 
-    /// A hash of the layout of a level, where different seeds can draw the same one: [`LevelTools::layout_hash`]. For a level
-    /// file it is the hash of the level in it.
+    /// A hash of the layout of a level, where different seeds can draw the same one: [`LevelTools::layout_hash`]. For a
+    /// level file it is the hash of the level in it.
     fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
         if is_level_files(mode) {
             return level_designs(self, mode).ok()?.hash(level);
@@ -170,7 +180,7 @@ pub trait Game: Send + Sync {
     }
 
     /// What policy files say of the game.
-    fn card(&self) -> GameMetadata<'_> {
+    fn metadata(&self) -> GameMetadata<'_> {
         let GameTools { input, pictures, .. } = self.tools();
         GameMetadata {
             name: self.name(),
@@ -258,13 +268,14 @@ pub trait HostTools: Send + Sync {
         TickPlacement::Fixed
     }
 
-    /// Bevy's plugins for a headless World under [`TickPlacement::Frame`]: all of these, unless the game leaves some out.
+    /// Bevy's plugins for a headless World under [`TickPlacement::Frame`]: all of these, unless the game leaves some
+    /// out.
     fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
         plugins.build()
     }
 
-    /// The most arenas that one World can hold: 1 for a game with one player or with global resources. `None` for any number.
-    /// More arenas are spread over more Worlds; one agent too many is a fault.
+    /// The most arenas that one World can hold: 1 for a game with one player or with global resources. `None` for any
+    /// number. More arenas are spread over more Worlds; one agent too many is a fault.
     fn arenas_per_world(&self) -> Option<u32> {
         None
     }
@@ -277,35 +288,36 @@ pub trait HostTools: Send + Sync {
 
 /// Levels without agents in them.
 pub trait LevelTools: Send + Sync {
-    /// Checks a mode with options behind its name. `None`, by default, for a game whose modes are [`Game::modes`] as they
-    /// are. Level files are no concern of it.
+    /// Checks a mode with options behind its name. `None`, by default, for a game whose modes are [`Game::modes`] as
+    /// they are. Level files are no concern of it.
     fn check_options(&self, _mode: &str) -> Option<Result<(), ModeError>> {
         None
     }
 
-    /// The family of a mode: in all modes of a family one seed draws the same level or a related one, so that an agent that
-    /// has trained on it in one mode has seen it in all of them. The mode itself, unless the game has options that change
-    /// rules only.
+    /// The family of a mode: in all modes of a family one seed draws the same level or a related one, so that an agent
+    /// that has trained on it in one mode has seen it in all of them. The mode itself, unless the game has options that
+    /// change rules only.
     fn family(&self, mode: &str) -> String {
         mode.to_owned()
     }
 
-    /// The largest number that a level which the game draws itself can have, in any mode; `None` if every number is one.
+    /// The largest number that a level which the game draws itself can have, in any mode; `None` if every number is
+    /// one.
     fn last_level(&self) -> Option<u64> {
         None
     }
 
-    /// A hash of the layout of a level that the game draws itself. `None` if different seeds cannot draw the same layout, or
-    /// if all levels of the mode have the same one.
+    /// A hash of the layout of a level that the game draws itself. `None` if different seeds cannot draw the same
+    /// layout, or if all levels of the mode have the same one.
     fn layout_hash(&self, _mode: &str, _level: u64) -> Option<u64> {
         None
     }
 
-    /// Reads a level in the game's own format, or says what is wrong with it and on which line. `None`, by default: the game
-    /// has no level files.
+    /// Reads a level in the game's own format, or says what is wrong with it and on which line. `None`, by default: the
+    /// game has no level files.
     ///
-    /// Worlds of level files have the result as the resource [`LevelDesigns`] before the game is built, and the game plays
-    /// its level number i instead of making one.
+    /// Worlds of level files have the result as the resource [`LevelDesigns`] before the game is built, and the game
+    /// plays its level number i instead of making one.
     fn parse(&self, _text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
         None
     }
@@ -315,9 +327,9 @@ pub trait LevelTools: Send + Sync {
         None
     }
 
-    /// What is certain about a level: whether its goal can be reached at all. Called for levels that no bot has solved, so
-    /// it may take some milliseconds. Only a search to its end is a proof; a search that gave up proves nothing. By default
-    /// nothing is proved.
+    /// What is certain about a level: whether its goal can be reached at all. Called for levels that no bot has solved,
+    /// so it may take some milliseconds. Only a search to its end is a proof; a search that gave up proves nothing. By
+    /// default nothing is proved.
     fn prove(&self, _mode: &str, _level: u64) -> LevelProof {
         LevelProof::Unknown
     }
@@ -336,21 +348,21 @@ pub trait StateTools: Send + Sync {
         None
     }
 
-    /// Why the episode of an agent has just ended without the goal, for people, such as `saw` or `lava`. Called after its last
-    /// tick, before the next episode begins.
+    /// Why the episode of an agent has just ended without the goal, for people, such as `saw` or `lava`. Called after
+    /// its last tick, before the next episode begins.
     fn end_cause(&self, _world: &World, _agent: Entity) -> Option<&'static str> {
         None
     }
 
-    /// The state of an agent in a few whole numbers, for an explorer that treats states with the same numbers as the same: see
-    /// `playbot_test::explore`. `None`, by default, for squares of the grid by [`position`](Self::position), or, if that
-    /// is not known, for the downscaled observation.
+    /// The state of an agent in a few whole numbers, for an explorer that treats states with the same numbers as the
+    /// same: see `playbot_test::explore`. `None`, by default, for squares of the grid by [`position`](Self::position),
+    /// or, if that is not known, for the downscaled observation.
     fn explore_cell(&self, _world: &World, _agent: Entity) -> Option<Vec<i32>> {
         None
     }
 
-    /// What is certain about the state of an agent that plays: whether its goal can still be reached. Called now and then
-    /// during an episode, so it takes a millisecond at most. By default nothing is proved.
+    /// What is certain about the state of an agent that plays: whether its goal can still be reached. Called now and
+    /// then during an episode, so it takes a millisecond at most. By default nothing is proved.
     fn prove_from(&self, _world: &World, _agent: Entity) -> LevelProof {
         LevelProof::Unknown
     }
@@ -368,8 +380,8 @@ pub trait TraceTools: Send + Sync {
         world.get::<Observation>(agent).map_or_else(Vec::new, |observation| observation.vector.clone())
     }
 
-    /// The game's own way of playing given actions and printing the state after each. Returns a last remark, if there is one.
-    /// `None` where [`trace_actions`](crate::trace::trace_actions) does it.
+    /// The game's own way of playing given actions and printing the state after each. Returns a last remark, if there
+    /// is one. `None` where [`trace_actions`](crate::trace::trace_actions) does it.
     fn run(&self, _request: &TraceRequest, _print: Print) -> Option<Result<Option<String>, InspectError>> {
         None
     }
@@ -382,8 +394,8 @@ pub trait PictureTools: Send + Sync {
         None
     }
 
-    /// Adds what is drawn to an app, after [`Game::build`]: sprites, tiles and transforms for everything that the game spawns,
-    /// brought up to date in [`VisionSystems::Sync`](bevy_playbot::vision::VisionSystems::Sync). Needs a
+    /// Adds what is drawn to an app, after [`Game::build`]: sprites, tiles and transforms for everything that the game
+    /// spawns, brought up to date in [`VisionSystems::Sync`](bevy_playbot::vision::VisionSystems::Sync). Needs a
     /// [`picture`](Self::picture).
     fn build_picture(&self, _app: &mut App) {}
 
@@ -397,7 +409,8 @@ pub trait PictureTools: Send + Sync {
         false
     }
 
-    /// Adds the three-dimensional view to a window's app, with a [`CameraFocus`](crate::inspect::CameraFocus) on agents.
+    /// Adds the three-dimensional view to a window's app, with a [`CameraFocus`](crate::inspect::CameraFocus) on
+    /// agents.
     fn build_space_view(&self, _app: &mut App) {}
 }
 
@@ -426,8 +439,8 @@ pub trait BotTools: Send + Sync {
         None
     }
 
-    /// Hands an agent over to the demonstrator. `noise` is the probability with which a discrete action is replaced by a
-    /// uniformly random one, or the standard deviation of the normal noise on each value of a continuous one.
+    /// Hands an agent over to the demonstrator. `noise` is the probability with which a discrete action is replaced by
+    /// a uniformly random one, or the standard deviation of the normal noise on each value of a continuous one.
     fn attach_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
 }
 
@@ -462,8 +475,8 @@ pub trait BenchmarkTools: Send + Sync {
         None
     }
 
-    /// Another game that is played for one of the [`benchmarks`](Self::benchmarks), such as the same one with physics; `None`
-    /// for the game itself.
+    /// Another game that is played for one of the [`benchmarks`](Self::benchmarks), such as the same one with physics;
+    /// `None` for the game itself.
     fn benchmarked(&self, _benchmark: &Benchmark) -> Option<&dyn Game> {
         None
     }
@@ -485,4 +498,39 @@ pub fn level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDes
 /// As for [`level_designs`].
 pub fn read_level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDesigns, LevelFileError> {
     LevelDesigns::read(game.name(), mode, &|text| game.parse_level(text))
+}
+
+/// Returns the game's idle action: the first choice with an idle name, else choice 0; zeros for continuous actions.
+pub fn idle_action(game: &dyn Game) -> ActionValue {
+    match game.actions() {
+        ActionSpace::Discrete(count) => {
+            let names = game.tools().input.action_names();
+            ActionValue::Discrete((0..count as u32).find(|&choice| is_named_idle(&names, choice)).unwrap_or(0))
+        }
+        ActionSpace::Continuous(count) => ActionValue::Continuous(vec![0.0; count]),
+    }
+}
+
+/// Returns whether a discrete choice does nothing, by its name.
+pub fn is_named_idle(names: &[String], choice: u32) -> bool {
+    let name = names.get(choice as usize).and_then(|name| name.split_whitespace().next()).unwrap_or("");
+    IDLE_WORDS.contains(&name.to_lowercase().as_str())
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::prelude::App;
+
+    use super::*;
+    use crate::foreign::ForeignGame;
+
+    #[test]
+    fn names_say_what_does_nothing() {
+        let keys = ForeignGame::new("keys", 1, |_: &mut App| {});
+        let named = keys.clone().keys_by_name([vec!["ArrowUp"], vec![], vec!["ArrowLeft"]]);
+        assert_eq!(idle_action(&named), ActionValue::Discrete(1));
+        let unnamed = keys.keys_by_name([vec!["ArrowUp"], vec!["ArrowLeft"]]);
+        assert_eq!(idle_action(&unnamed), ActionValue::Discrete(0));
+        assert!(is_named_idle(&["None (D)".to_owned()], 0) && !is_named_idle(&[], 3));
+    }
 }

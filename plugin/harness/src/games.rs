@@ -86,22 +86,23 @@ impl<'a> Games<'a> {
         if games.is_empty() {
             return Err(GamesError::None);
         }
-        let twice =
-            games.iter().enumerate().find(|(i, game)| games[..*i].iter().any(|other| other.name() == game.name()));
-        match twice {
-            Some((_, game)) => Err(GamesError::Twice(game.name())),
+        let names: Vec<&'static str> =
+            games.iter().flat_map(|game| [game.name()].into_iter().chain(game.aliases().iter().copied())).collect();
+        match names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
+            Some((_, name)) => Err(GamesError::Twice(*name)),
             None => Ok(Self(games)),
         }
     }
 
-    /// Returns the game with this name.
+    /// Returns the game with this name, or with this [alias](Game::aliases).
     ///
     /// # Errors
     ///
     /// [`UnknownName`] with the valid names.
     pub fn get(&self, name: &str) -> Result<&'a dyn Game, UnknownName> {
         let names: Vec<_> = self.iter().map(Game::name).collect();
-        self.iter().find(|game| game.name() == name).ok_or_else(|| UnknownName::new("game", name, &names))
+        let is_named = |game: &&dyn Game| game.name() == name || game.aliases().contains(&name);
+        self.iter().find(is_named).ok_or_else(|| UnknownName::new("game", name, &names))
     }
 
     /// Returns the game that a file or folder names.

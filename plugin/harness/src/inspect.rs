@@ -122,8 +122,6 @@ pub fn plain<T: std::fmt::Display + std::ops::Add<Output = T> + Default>(value: 
     format!("{}", value + T::default())
 }
 
-// Experiments that are not read from a file.
-
 /// An experiment in RON that comes with a game.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ExperimentText {
@@ -132,8 +130,6 @@ pub struct ExperimentText {
     /// Its text.
     pub text: Cow<'static, str>,
 }
-
-// The entity that a 3D view follows, for windows of games with such a view.
 
 /// Component of an agent: the entity that a 3D camera follows.
 #[derive(Component, Clone, Copy, Debug, Reflect)]

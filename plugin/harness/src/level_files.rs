@@ -3,6 +3,11 @@
 //! Their mode is the text `files:` followed by a pattern, such as `files:levels/**/*.json`. Their numbers count the
 //! files in the order of their paths. A game reads a file with [`Game::parse_level`](crate::game::Game::parse_level).
 //! Its Worlds hold all files as [`LevelDesigns`], where the game looks before it makes a level itself.
+//!
+//! The files of the folder, in reading order:
+//!
+//! - [`read`]: level files, read once for all Worlds of a verb.
+//! - `error`: errors of level files, of patterns and of the text of a level.
 
 mod error;
 pub mod read;
@@ -16,6 +21,12 @@ use bevy_playbot::{
 use std::{any::Any, path::Path, sync::Arc};
 
 pub use crate::level_files::error::{JsonStep, LevelFileError, LevelTextError, read_json, read_json_object};
+
+/// Largest number of files: a range cannot have more levels.
+const MOST: usize = 1 << 24;
+
+/// Prefix of the mode of levels from files.
+pub const LEVEL_FILES: &str = "files:";
 
 /// Levels from files, by number.
 ///
@@ -109,20 +120,11 @@ impl LevelDesigns {
     }
 }
 
-// Levels read from files.
-
 /// A level as read by its game.
 #[derive(Clone, Debug)]
 pub struct LevelDesign {
     level: Arc<dyn Any + Send + Sync>,
     hash: u64,
-}
-
-/// A level with the path of its file.
-#[derive(Clone, Debug)]
-struct DrawnLevel {
-    path: String,
-    design: LevelDesign,
 }
 
 impl LevelDesign {
@@ -145,10 +147,12 @@ impl LevelDesign {
     }
 }
 
-// Search for the files that match a pattern.
-
-/// Largest number of files: a range cannot have more levels.
-const MOST: usize = 1 << 24;
+/// A level with the path of its file.
+#[derive(Clone, Debug)]
+struct DrawnLevel {
+    path: String,
+    design: LevelDesign,
+}
 
 /// Returns the files that match a pattern, sorted by path: `*` stands for any name, `**` for any folders. Paths are
 /// relative to the current folder of the program.
@@ -198,10 +202,7 @@ fn shown(path: &Path) -> String {
     if cfg!(windows) { text.replace('\\', "/") } else { text.into_owned() }
 }
 
-// The mode of levels from files, as text.
-
-/// Prefix of the mode of levels from files.
-pub const LEVEL_FILES: &str = "files:";
+// Mode of levels from files, as text.
 
 /// Returns whether the levels of a mode are files.
 pub fn is_level_files(mode: &str) -> bool {
@@ -219,10 +220,9 @@ pub fn level_files_mode(path: &str) -> String {
 }
 
 #[cfg(test)]
-mod designs_tests {
-    use std::{fs, path::Path};
-
+mod tests {
     use super::*;
+    use std::{fs, path::Path};
 
     /// Parses a level that is a single number.
     fn number(text: &str) -> Result<LevelDesign, LevelTextError> {
@@ -286,11 +286,6 @@ mod designs_tests {
         let missing = LevelDesigns::of_file("no/such/file", &number).expect_err("missing");
         assert!(matches!(missing, LevelFileError::Unreadable { .. }));
     }
-}
-
-#[cfg(test)]
-mod design_tests {
-    use super::*;
 
     #[test]
     fn a_level_is_given_out_as_what_it_is_and_hashed_by_its_content() {
@@ -299,11 +294,6 @@ mod design_tests {
         assert_eq!(design.hash(), LevelDesign::new((), "seven").hash());
         assert_ne!(design.hash(), LevelDesign::new(7u8, "sevem").hash());
     }
-}
-
-#[cfg(test)]
-mod find_tests {
-    use super::*;
 
     #[test]
     fn files_are_found_in_the_order_of_their_paths_and_folders_are_none() {
@@ -329,11 +319,6 @@ mod find_tests {
         assert!(words.contains("is a folder") && words.contains("/a/**/*.json"), "{words}");
         assert!(matches!(find_level_files("a/***/b"), Err(LevelFileError::Pattern { .. })));
     }
-}
-
-#[cfg(test)]
-mod mode_tests {
-    use super::*;
 
     #[test]
     fn a_mode_of_files_has_a_pattern_and_others_have_none() {

@@ -11,7 +11,7 @@
 //!   plugin; [`games`], the games of a program; [`mode`], errors of modes; [`prelude`], the imports of a game.
 //! - its levels: [`split`], named ranges of levels; [`level_files`], levels from files; [`floor_plan`], their plans.
 //! - its Worlds: [`worlds`], headless Worlds with any number of agents; [`sensors`], what their agents see;
-//!   [`arrangement`], the distribution of arenas over Worlds.
+//!   [`arrangement`], the distribution of arenas over Worlds; [`ended_episodes`], the list of episodes that ended.
 //! - its players: [`eval`], evaluation of players on levels; [`demo`], recordings made and verified; [`detector`], the
 //!   contract of detectors of defects; [`defect`], the kinds of planted defects.
 //! - views: [`doctor`], the examination of a game's determinism; [`inspect`], single levels and steps; [`trace`], given
@@ -50,6 +50,7 @@ pub mod demo;
 pub mod detector;
 pub mod doctor;
 pub mod drawing;
+pub mod ended_episodes;
 pub mod eval;
 pub mod floor_plan;
 pub mod foreign;

@@ -140,9 +140,9 @@ mod tests {
         assert_eq!(share_out(&mut numbers, 2, impossible, &double), [1, 2, 3, 4, 5]);
         assert_eq!(numbers, [2, 4, 6, 8, 10]);
         let given_up = Mutex::new(Vec::new());
-        let give_up = |number: &mut i32| given_up.lock().expect("nobody panics").push(*number);
+        let give_up = |number: &mut i32| given_up.lock().expect("no thread panics").push(*number);
         let error = each_on_its_own(&mut numbers, impossible, &double, &give_up).expect_err("no thread");
         assert!(!error.to_string().is_empty());
-        assert_eq!(*given_up.lock().expect("nobody panics"), [2, 4, 6, 8, 10], "and nothing was done");
+        assert_eq!(*given_up.lock().expect("no thread panics"), [2, 4, 6, 8, 10], "and nothing was done");
     }
 }

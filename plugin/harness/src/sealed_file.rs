@@ -41,11 +41,13 @@ impl HasExitCode for SealedFileError {
     }
 }
 
-fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> SealedFileError {
+/// Makes the error of a failed action on a file.
+pub fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> SealedFileError {
     move |source| SealedFileError::Io { action, path: path.into(), source }
 }
 
-fn damaged(path: &Path, message: &impl ToString) -> SealedFileError {
+/// Makes the error of a damaged file.
+pub fn damaged(path: &Path, message: &impl ToString) -> SealedFileError {
     SealedFileError::Damaged { path: path.into(), message: message.to_string() }
 }
 

@@ -177,8 +177,6 @@ impl From<LevelSplit> for String {
     }
 }
 
-// Held-out levels, and checks that other levels do not show them.
-
 /// Largest number of levels that are drawn and compared, which bounds the time for a range from a file.
 const MOST_COMPARED: u64 = 1 << 18;
 

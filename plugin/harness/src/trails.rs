@@ -1,7 +1,9 @@
 //! Charts of where agents went: trajectories on the floor plan, and a map of visits.
 //!
-//! - `cells`: chart of the cells of a floor that were reached, by number of visits.
-//! - `visits`: number of visits of each square.
+//! The files of the folder, in reading order:
+//!
+//! - [`cells`]: chart of the cells of a floor that were reached, by number of visits, and the colours of all charts.
+//! - [`visits`](mod@visits): number of visits of each square.
 
 pub mod cells;
 pub mod visits;
@@ -26,6 +28,14 @@ pub struct TrailChart {
     pub floors: Vec<Floor>,
 }
 
+impl TrailChart {
+    /// Draws the chart: for each player its trajectories, and a map of the squares visited in all its episodes.
+    /// Trajectories are coloured lines, one per episode and at most 24.
+    pub fn draw(&self) -> Drawing {
+        draw(self)
+    }
+}
+
 /// Levels with the same walls, and the players that walked there.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Floor {
@@ -38,35 +48,29 @@ pub struct Floor {
     /// Goal positions on these levels.
     pub goals: Vec<Vec2>,
     /// The players, side by side.
-    pub walkers: Vec<Walker>,
+    pub players: Vec<PlayerTrails>,
 }
 
-/// One player on one floor.
+impl Floor {
+    /// Returns the bounds of the plan, extended to everything that was walked on.
+    fn extent(&self) -> Rect {
+        let positions = self.players.iter().flat_map(|player| &player.trails).flat_map(|trail| &trail.positions);
+        positions
+            .filter(|position| position.is_finite())
+            .fold(self.plan.bounds, |extent, &position| extent.union_point(position))
+    }
+}
+
+/// The trails of one player on one floor.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Walker {
+pub struct PlayerTrails {
     /// Name of the player.
     pub name: String,
     /// Its episodes.
     pub trails: Vec<Trail>,
 }
 
-impl Floor {
-    /// Returns the bounds of the plan, extended to everything that was walked on.
-    fn extent(&self) -> Rect {
-        let places = self.walkers.iter().flat_map(|walker| &walker.trails).flat_map(|trail| &trail.places);
-        places.filter(|place| place.is_finite()).fold(self.plan.bounds, |extent, &place| extent.union_point(place))
-    }
-}
-
-impl TrailChart {
-    /// Draws the chart: for each player its trajectories, and a map of the squares visited in all its episodes.
-    /// Trajectories are coloured lines, one per episode and at most 24.
-    pub fn draw(&self) -> Drawing {
-        draw(self)
-    }
-}
-
-// Layout of the drawings of a chart.
+// Layout of a chart.
 
 /// Largest number of floors that are drawn.
 const MOST_FLOORS: usize = 6;
@@ -159,28 +163,28 @@ impl Paper {
         let extent = floor.extent();
         let width = panel_width(extent);
         let contents = [Content::Trajectories, Content::Visits];
-        let rows: Vec<Vec<(&Walker, Content)>> = match floor.walkers.as_slice() {
+        let rows: Vec<Vec<(&PlayerTrails, Content)>> = match floor.players.as_slice() {
             [one] => vec![contents.map(|content| (one, content)).to_vec()],
-            several => contents.map(|content| several.iter().map(|walker| (walker, content)).collect()).to_vec(),
+            several => contents.map(|content| several.iter().map(|player| (player, content)).collect()).to_vec(),
         };
         for row in rows {
             let top = self.y;
-            for (column, (walker, content)) in row.into_iter().enumerate() {
+            for (column, (player, content)) in row.into_iter().enumerate() {
                 self.y = top;
-                let frame = Frame::new(extent, Vec2::new(GAP + column as f32 * (width + GAP), top + HEAD), width);
-                self.panel(floor, walker, content, &frame);
+                let frame = FloorFrame::new(extent, Vec2::new(GAP + column as f32 * (width + GAP), top + HEAD), width);
+                self.panel(floor, player, content, &frame);
             }
         }
     }
 
     /// Draws a frame with a caption above it, and moves below it.
-    fn panel(&mut self, floor: &Floor, walker: &Walker, content: Content, frame: &Frame) {
+    fn panel(&mut self, floor: &Floor, player: &PlayerTrails, content: Content, frame: &FloorFrame) {
         let area = frame.whole();
-        let reached = walker.trails.iter().filter(|trail| trail.result.success).count();
-        self.text(area.min.x - GAP, TEXT, INK, &fitted(&walker.name, area.width()));
-        self.text(area.min.x - GAP, TEXT, INK, &format!("goal reached in {reached} of {}", walker.trails.len()));
-        self.text(area.min.x - GAP, TEXT, SOFT, &content.caption(walker));
-        content.draw(floor, walker, frame, &mut self.shapes);
+        let reached = player.trails.iter().filter(|trail| trail.result.success).count();
+        self.text(area.min.x - GAP, TEXT, INK, &fitted(&player.name, area.width()));
+        self.text(area.min.x - GAP, TEXT, INK, &format!("goal reached in {reached} of {}", player.trails.len()));
+        self.text(area.min.x - GAP, TEXT, SOFT, &content.caption(player));
+        content.draw(floor, player, frame, &mut self.shapes);
         self.width = self.width.max(area.max.x);
         self.y = area.max.y + GAP;
     }
@@ -202,135 +206,15 @@ fn panel_width(extent: Rect) -> f32 {
     (330.0 * shape.sqrt()).clamp(260.0, 900.0)
 }
 
-// A drawing of a floor: trajectories, or visits.
-
-/// Largest number of trajectories in one drawing: more are indistinct.
-const MOST_LINES: usize = 24;
-
-/// Points of a line are at least this far apart, pixels.
-const STEP: f32 = 0.7;
-
-const LINE_WIDTH: f32 = 1.8;
-
-const OPACITY: f32 = 0.75;
-
-/// Content of a drawing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Content {
-    /// The paths of agents.
-    Trajectories,
-    /// Ticks per square.
-    Visits,
-}
-
-impl Content {
-    /// Returns the caption above the drawing.
-    pub fn caption(self, walker: &Walker) -> String {
-        let all = walker.trails.len();
-        let episodes = if all == 1 { "episode" } else { "episodes" };
-        match self {
-            Self::Trajectories if all > MOST_LINES => format!("trajectories: {MOST_LINES} of {all} {episodes}"),
-            Self::Trajectories => format!("trajectories: {all} {episodes}"),
-            Self::Visits => format!("visits: {all} {episodes}"),
-        }
-    }
-
-    /// Draws it.
-    pub fn draw(self, floor: &Floor, walker: &Walker, frame: &Frame, out: &mut Vec<Shape>) {
-        if self == Self::Visits {
-            visits(&walker.trails, frame, out);
-        }
-        let FloorPlan { walls, hazards, platforms, .. } = &floor.plan;
-        for (areas, fill) in [(walls, WALL), (platforms, PLATFORM), (hazards, HAZARD)] {
-            let seen = areas.iter().map(|&area| frame.area(area)).filter(|area| !area.is_empty());
-            out.extend(seen.map(|area| Shape::Block { area, fill }));
-        }
-        if self == Self::Trajectories {
-            lines(&walker.trails, frame, out);
-        }
-        border(frame, out);
-        let starts = floor.starts.iter().map(|&start| start_mark(frame.place(start), size(&floor.starts)));
-        let goals = floor.goals.iter().map(|&goal| goal_mark(frame.place(goal), size(&floor.goals)));
-        out.extend(starts.chain(goals));
-    }
-}
-
-fn visits(trails: &[Trail], frame: &Frame, out: &mut Vec<Shape>) {
-    let visits = Visits::count(frame.bounds(), trails);
-    let most = (visits.most() as f64).ln_1p();
-    out.extend(visits.visited().map(|(square, ticks)| {
-        let fill = heat((ticks as f64).ln_1p() / most);
-        Shape::Block { area: frame.area(square), fill }
-    }));
-}
-
-fn lines(trails: &[Trail], frame: &Frame, out: &mut Vec<Shape>) {
-    let chosen: Vec<_> = evenly(trails, MOST_LINES).map(|trail| points(trail, frame)).collect();
-    let coloured = || chosen.iter().zip(LINES.iter().cycle()).filter(|(points, _)| !points.is_empty());
-    out.extend(coloured().map(|(points, &colour)| Shape::Line {
-        points: points.clone(),
-        width: LINE_WIDTH,
-        colour,
-        opacity: OPACITY,
-    }));
-    // Marks at the end of each episode.
-    out.extend(coloured().filter_map(|(points, &colour)| {
-        let centre = *points.last()?;
-        Some(Shape::Mark { form: MarkForm::Disc, centre, radius: 3.0, fill: colour, outline: PAPER })
-    }));
-}
-
-/// Returns at most `most` of the trails, with the first and the last among them.
-fn evenly(trails: &[Trail], most: usize) -> impl Iterator<Item = &Trail> {
-    let shown = trails.len().min(most);
-    (0..shown).map(move |at| &trails[at * (trails.len() - 1) / (shown - 1).max(1)])
-}
-
-/// Returns the points of a trajectory on the paper, thinned to visible steps.
-fn points(trail: &Trail, frame: &Frame) -> Vec<Vec2> {
-    let mut points: Vec<Vec2> = Vec::new();
-    let mut all = trail.places.iter().map(|&place| frame.place(place)).filter(|point| point.is_finite());
-    for point in all.clone() {
-        if points.last().is_none_or(|last| last.distance(point) >= STEP) {
-            points.push(point);
-        }
-    }
-    points.extend(all.next_back());
-    points
-}
-
-fn border(frame: &Frame, out: &mut Vec<Shape>) {
-    let area = frame.whole();
-    let corners = [area.min, Vec2::new(area.max.x, area.min.y), area.max, Vec2::new(area.min.x, area.max.y), area.min];
-    out.push(Shape::Line { points: corners.to_vec(), width: 1.0, colour: INK, opacity: 1.0 });
-}
-
-/// Returns the size of marks, smaller if there are many.
-fn size(places: &[Vec2]) -> f32 {
-    if places.len() > 1 { 3.0 } else { 6.0 }
-}
-
-/// Returns the mark of a start.
-pub(crate) fn start_mark(centre: Vec2, radius: f32) -> Shape {
-    Shape::Mark { form: MarkForm::Disc, centre, radius, fill: PAPER, outline: INK }
-}
-
-/// Returns the mark of a goal.
-pub(crate) fn goal_mark(centre: Vec2, radius: f32) -> Shape {
-    Shape::Mark { form: MarkForm::Diamond, centre, radius: 1.3 * radius, fill: INK, outline: PAPER }
-}
-
-// Position of a floor on the paper.
-
 /// A floor on the paper: converts its units to pixels, with y turned around.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame {
+pub struct FloorFrame {
     bounds: Rect,
     corner: Vec2,
     scale: f32,
 }
 
-impl Frame {
+impl FloorFrame {
     /// Makes a floor with its upper left corner here, this wide.
     pub fn new(bounds: Rect, corner: Vec2, width: f32) -> Self {
         Self { bounds, corner, scale: width / bounds.width().max(f32::MIN_POSITIVE) }
@@ -358,8 +242,126 @@ impl Frame {
     }
 }
 
+// Drawing of a floor: trajectories, or visits.
+
+/// Largest number of trajectories in one drawing: more are indistinct.
+const MOST_LINES: usize = 24;
+
+/// Points of a line are at least this far apart, pixels.
+const STEP: f32 = 0.7;
+
+const LINE_WIDTH: f32 = 1.8;
+
+const OPACITY: f32 = 0.75;
+
+/// Content of a drawing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// The paths of agents.
+    Trajectories,
+    /// Ticks per square.
+    Visits,
+}
+
+impl Content {
+    /// Returns the caption above the drawing.
+    pub fn caption(self, player: &PlayerTrails) -> String {
+        let all = player.trails.len();
+        let episodes = if all == 1 { "episode" } else { "episodes" };
+        match self {
+            Self::Trajectories if all > MOST_LINES => format!("trajectories: {MOST_LINES} of {all} {episodes}"),
+            Self::Trajectories => format!("trajectories: {all} {episodes}"),
+            Self::Visits => format!("visits: {all} {episodes}"),
+        }
+    }
+
+    /// Draws it.
+    pub fn draw(self, floor: &Floor, player: &PlayerTrails, frame: &FloorFrame, out: &mut Vec<Shape>) {
+        if self == Self::Visits {
+            visits(&player.trails, frame, out);
+        }
+        let FloorPlan { walls, hazards, platforms, .. } = &floor.plan;
+        for (areas, fill) in [(walls, WALL), (platforms, PLATFORM), (hazards, HAZARD)] {
+            let seen = areas.iter().map(|&area| frame.area(area)).filter(|area| !area.is_empty());
+            out.extend(seen.map(|area| Shape::Block { area, fill }));
+        }
+        if self == Self::Trajectories {
+            lines(&player.trails, frame, out);
+        }
+        border(frame, out);
+        let starts = floor.starts.iter().map(|&start| start_mark(frame.place(start), size(&floor.starts)));
+        let goals = floor.goals.iter().map(|&goal| goal_mark(frame.place(goal), size(&floor.goals)));
+        out.extend(starts.chain(goals));
+    }
+}
+
+fn visits(trails: &[Trail], frame: &FloorFrame, out: &mut Vec<Shape>) {
+    let visits = Visits::count(frame.bounds(), trails);
+    let most = (visits.most() as f64).ln_1p();
+    out.extend(visits.visited().map(|(square, ticks)| {
+        let fill = heat((ticks as f64).ln_1p() / most);
+        Shape::Block { area: frame.area(square), fill }
+    }));
+}
+
+fn lines(trails: &[Trail], frame: &FloorFrame, out: &mut Vec<Shape>) {
+    let chosen: Vec<_> = evenly(trails, MOST_LINES).map(|trail| points(trail, frame)).collect();
+    let coloured = || chosen.iter().zip(LINES.iter().cycle()).filter(|(points, _)| !points.is_empty());
+    out.extend(coloured().map(|(points, &colour)| Shape::Line {
+        points: points.clone(),
+        width: LINE_WIDTH,
+        colour,
+        opacity: OPACITY,
+    }));
+    // Marks at the end of each episode.
+    out.extend(coloured().filter_map(|(points, &colour)| {
+        let centre = *points.last()?;
+        Some(Shape::Mark { form: MarkForm::Disc, centre, radius: 3.0, fill: colour, outline: PAPER })
+    }));
+}
+
+/// Returns at most `most` of the trails, with the first and the last among them.
+fn evenly(trails: &[Trail], most: usize) -> impl Iterator<Item = &Trail> {
+    let shown = trails.len().min(most);
+    (0..shown).map(move |at| &trails[at * (trails.len() - 1) / (shown - 1).max(1)])
+}
+
+/// Returns the points of a trajectory on the paper, thinned to visible steps.
+fn points(trail: &Trail, frame: &FloorFrame) -> Vec<Vec2> {
+    let mut points: Vec<Vec2> = Vec::new();
+    let mut all = trail.positions.iter().map(|&position| frame.place(position)).filter(|point| point.is_finite());
+    for point in all.clone() {
+        if points.last().is_none_or(|last| last.distance(point) >= STEP) {
+            points.push(point);
+        }
+    }
+    points.extend(all.next_back());
+    points
+}
+
+fn border(frame: &FloorFrame, out: &mut Vec<Shape>) {
+    let area = frame.whole();
+    let corners = [area.min, Vec2::new(area.max.x, area.min.y), area.max, Vec2::new(area.min.x, area.max.y), area.min];
+    out.push(Shape::Line { points: corners.to_vec(), width: 1.0, colour: INK, opacity: 1.0 });
+}
+
+/// Returns the size of marks, smaller if there are many.
+fn size(positions: &[Vec2]) -> f32 {
+    if positions.len() > 1 { 3.0 } else { 6.0 }
+}
+
+/// Returns the mark of a start.
+pub(crate) fn start_mark(centre: Vec2, radius: f32) -> Shape {
+    Shape::Mark { form: MarkForm::Disc, centre, radius, fill: PAPER, outline: INK }
+}
+
+/// Returns the mark of a goal.
+pub(crate) fn goal_mark(centre: Vec2, radius: f32) -> Shape {
+    Shape::Mark { form: MarkForm::Diamond, centre, radius: 1.3 * radius, fill: INK, outline: PAPER }
+}
+
 #[cfg(test)]
-mod layout_tests {
+mod tests {
     use super::*;
 
     #[test]

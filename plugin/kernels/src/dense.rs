@@ -7,6 +7,11 @@
 //!
 //! A row of the output does not depend on the rest of the batch. Every sum is made by one thread in a fixed order, so
 //! nothing depends on the number of threads.
+//!
+//! The folder, in reading order:
+//!
+//! - `packed`: weights in the orders in which products read them.
+//! - `param_grads`: gradients of weights and biases: sums over all rows.
 
 mod packed;
 mod param_grads;
@@ -42,8 +47,6 @@ pub(crate) use crate::dense::{
     packed::{Matrix, Packed},
     param_grads::{LayerSums, SumGrads, param_grads},
 };
-
-// The layers as an operation of the flex backend, with its backward pass.
 
 /// A layer: the activation of x W + b, if there is one.
 #[derive(Clone, Copy, Debug)]

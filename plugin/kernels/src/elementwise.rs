@@ -34,6 +34,16 @@ const LN_2: (f32, f32) = (0.693_359_4, -0.000_212_194_44);
 /// Adding this rounds a small number to an integer, which is then in the low bits.
 const ROUND: f32 = 12_582_912.0;
 
+/// An element-wise activation function.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub enum Activation {
+    /// max(x, 0).
+    #[default]
+    Relu,
+    /// Hyperbolic tangent.
+    Tanh,
+}
+
 /// Returns tanh(x), within 2 units in the last place; NaN stays NaN.
 #[inline(always)]
 pub(crate) fn tanh(x: f32) -> f32 {
@@ -115,8 +125,6 @@ pub(crate) fn tanh_backward(grad: &mut [f32], tanh: &[f32]) {
         .for_each(|(grad, y)| vectorized(|| grad.iter_mut().zip(y).for_each(|(g, &y)| *g *= 1.0 - y * y)));
 }
 
-// The rectifier of one number, and its gradient.
-
 /// Returns the number if it is positive, otherwise 0; NaN stays NaN.
 #[inline(always)]
 pub(crate) fn relu(x: f32) -> f32 {
@@ -169,18 +177,6 @@ pub(crate) fn log_softmax_backward(grad: &mut [f32], log_probs: &[f32], choices:
             row.iter_mut().zip(probs).for_each(|(g, p)| *g -= p * sum);
         }
     });
-}
-
-// The non-linearity between layers.
-
-/// An element-wise activation function.
-#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
-pub enum Activation {
-    /// max(x, 0).
-    #[default]
-    Relu,
-    /// Hyperbolic tangent.
-    Tanh,
 }
 
 // Destinations for the sums of a convolution.
@@ -260,7 +256,10 @@ fn put(to: &mut [f32], at: usize, count: usize, lanes: &Lanes, change: impl Fn(&
 
 #[cfg(test)]
 mod tests {
+    use playbot_learner::rng::{Streams, normal};
+
     use super::*;
+    use crate::among_workers::among_awake_workers;
 
     /// Returns every 37th finite f32, both signs.
     fn floats() -> impl Iterator<Item = f32> {
@@ -305,13 +304,6 @@ mod tests {
         tanh_in_place(&mut part);
         assert_eq!(part, whole[1..8]);
     }
-}
-
-#[cfg(test)]
-mod log_softmax_tests {
-    use super::*;
-    use crate::among_workers::among_awake_workers;
-    use playbot_learner::rng::{Streams, normal};
 
     #[test]
     fn rows_are_the_logarithms_of_their_probabilities() {

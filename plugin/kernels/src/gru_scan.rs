@@ -4,8 +4,8 @@
 //! are one product over all steps. The two directions are computed at the same time; within a direction nothing
 //! depends on the number of threads.
 //!
-//! With a = x W_i + b_i and c = h W_h + b_h for each gate (see `Gru` in `playbot_learner`): r = σ(a_r + c_r), z = σ(a_z + c_z),
-//! n = tanh(a_n + r c_n), h' = n + z (h - n).
+//! With a = x W_i + b_i and c = h W_h + b_h for each gate (see `Gru` in `playbot_learner`): r = σ(a_r + c_r), z =
+//! σ(a_z + c_z), n = tanh(a_n + r c_n), h' = n + z (h - n).
 
 use crate::{
     dense::{LayerSums, Matrix, Packed, SumGrads, param_grads, product_into},
@@ -26,7 +26,7 @@ pub struct Sizes {
     pub directions: usize,
 }
 
-/// The inputs of a layer, in host memory: see [`crate::kernels::GruInput`].
+/// The inputs of a layer, in host memory: see [`crate::host_ops::GruInput`].
 #[derive(Clone, Copy, Debug)]
 pub struct ScanInput<'a> {
     pub x: &'a [f32],

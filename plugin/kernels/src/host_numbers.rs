@@ -107,7 +107,7 @@ impl<B: KnownGradient + HostNumbers> Backward<B, 1> for Known {
 }
 
 #[cfg(test)]
-mod known_gradient_tests {
+mod tests {
     use super::*;
     use playbot_learner::DeviceKind;
     use playbot_learner::nn::{host, matrix, scalar};

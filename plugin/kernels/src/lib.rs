@@ -6,7 +6,7 @@
 //!
 //! The modules, in reading order:
 //!
-//! - [`kernels`]: tanh, log-softmax and recurrent layers, for both backends.
+//! - [`host_ops`]: tanh, log-softmax and recurrent layers, for both backends.
 //! - [`dense`]: the dense layers of a network as one operation, for flex.
 //! - [`trunk`]: the convolutions of an image encoder as one operation, for flex.
 //! - [`elementwise`]: activations over slices, written for vector instructions.
@@ -19,8 +19,8 @@ pub mod dense;
 pub mod elementwise;
 mod gru_scan;
 pub mod host_numbers;
+pub mod host_ops;
 pub mod kept_memory;
-pub mod kernels;
 mod tile;
 pub mod trunk;
 

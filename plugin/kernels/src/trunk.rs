@@ -6,6 +6,13 @@
 //! gradient of a layer's input is a convolution again (or, with strides, a sum of such rows).
 //!
 //! An image's features do not depend on the rest of the batch, and nothing depends on the number of threads.
+//!
+//! The folder, in reading order:
+//!
+//! - `grid`: the layout of one image's pixels in memory.
+//! - `layer`: one convolution of one image, and the plan of all stages.
+//! - `pool`: max-pooling.
+//! - `winograd` and `products`: 3×3 convolutions with fewer products.
 
 pub mod grid;
 mod layer;
@@ -21,7 +28,8 @@ use crate::{
     kept_memory::KeptMemory,
     tile::{LANES, Lanes},
     trunk::{
-        layer::{Group, Layer, Layout, Plan, Step, Weights},
+        grid::ConvShape,
+        layer::{Group, Layer, Layout, Plan, StageShape, Step, Weights},
         winograd::PointBuffers,
     },
 };
@@ -39,12 +47,73 @@ use burn::{
     tensor::{Device, Tensor},
 };
 use rayon::prelude::*;
-use std::sync::Arc;
+use std::{iter, sync::Arc};
 
-pub use crate::trunk::{
-    grid::window_places,
-    layer::{Conv, Stage, forward as features},
-};
+pub use crate::trunk::grid::window_places;
+
+/// Applies the stages and a last ReLU to images `[n, channels, height, width]`: features `[n, channels' * height' *
+/// width']`. Returns `None` if this is not on flex, or for unsupported stages: every convolution must keep the size
+/// of its image or have no padding.
+///
+/// Gradients reach the convolutions' parameters, never the pixels.
+pub fn features(pixels: &Tensor<4>, stages: &[TrunkStage<'_>]) -> Option<Tensor<2>> {
+    let [n, channels, height, width] = pixels.dims();
+    if n == 0 || !is_flex(&pixels.device()) {
+        return None;
+    }
+    let shapes: Vec<StageShape> = stages.iter().map(TrunkStage::shape).collect();
+    let plan = Plan::new(&shapes, [channels, height, width])?;
+    let flat = |conv: Conv<'_>| -> [Tensor<1>; 2] { [conv.weight.clone().flatten(0, 3), conv.bias.clone()] };
+    let params = stages.iter().flat_map(TrunkStage::convs).flat_map(flat).collect();
+    Some(trunk(pixels.clone(), Tensor::cat(params, 0), Arc::new(plan)))
+}
+
+/// Parameters of a convolution with a square kernel.
+#[derive(Clone, Copy, Debug)]
+pub struct Conv<'a> {
+    /// `[outputs, inputs, kernel, kernel]`.
+    pub weight: &'a Tensor<4>,
+    /// `[outputs]`.
+    pub bias: &'a Tensor<1>,
+    /// Pixels from one position of the kernel to the next.
+    pub stride: usize,
+    /// Zeros around the image.
+    pub padding: usize,
+}
+
+/// One stage of a trunk.
+#[derive(Clone, Copy, Debug)]
+pub enum TrunkStage<'a> {
+    /// A convolution, then ReLU.
+    Relu(Conv<'a>),
+    /// A convolution, then max-pooling of 3×3 at every second pixel with padding 1.
+    Pool(Conv<'a>),
+    /// x + conv1(relu(conv0(relu(x)))).
+    Residual(Conv<'a>, Conv<'a>),
+}
+
+impl<'a> TrunkStage<'a> {
+    fn convs(&self) -> impl Iterator<Item = Conv<'a>> + use<'a> {
+        let (first, second) = match *self {
+            Self::Relu(conv) | Self::Pool(conv) => (conv, None),
+            Self::Residual(conv0, conv1) => (conv0, Some(conv1)),
+        };
+        iter::once(first).chain(second)
+    }
+
+    fn shape(&self) -> StageShape {
+        match self {
+            Self::Relu(conv) => StageShape::Relu(shape(*conv)),
+            Self::Pool(conv) => StageShape::Pool(shape(*conv)),
+            Self::Residual(conv0, conv1) => StageShape::Residual([shape(*conv0), shape(*conv1)]),
+        }
+    }
+}
+
+fn shape(conv: Conv<'_>) -> ConvShape {
+    let [outputs, inputs, kernel, _] = conv.weight.dims();
+    ConvShape { inputs, outputs, kernel, stride: conv.stride, padding: conv.padding }
+}
 
 // The trunk as an operation of the flex backend, with its backward pass.
 
@@ -150,7 +219,7 @@ fn features_of_images(plan: &Plan, weights: &[Weights], images: &[f32]) -> Vec<f
     out
 }
 
-/// Does [`features`], and keeps the data for the backward pass.
+/// Does [`features_of_images`], and keeps the data for the backward pass.
 fn features_and_saved(plan: &Plan, weights: &[Weights], images: &[f32]) -> (Vec<f32>, SavedActivations) {
     let n = images.len() / image_len(plan);
     let mut out = vec![0.0; n * plan.features()];
@@ -333,9 +402,7 @@ fn backward(
     }
 }
 
-// Working memory of a thread.
-
-/// Buffers that are needed only briefly, for one image at a time.
+/// Working memory of a thread: buffers that are needed only briefly, for one image at a time.
 #[derive(Debug)]
 struct Workspace {
     /// Stages before their pooling.

@@ -89,6 +89,49 @@ impl DeviceKind {
     pub fn autodiff(self) -> Device {
         self.plain().autodiff()
     }
+
+    /// Opens the device, once in a program.
+    fn open(self) -> Result<(), String> {
+        match self {
+            Self::Flex | Self::Ndarray => Ok(()),
+            #[cfg(feature = "wgpu")]
+            Self::Wgpu => once::wgpu(),
+            #[cfg(feature = "cuda")]
+            Self::Cuda => once::cuda(),
+            #[cfg(not(all(feature = "wgpu", feature = "cuda")))]
+            _ => Err(format!("this program was built without it; build it with `--features {self}`")),
+        }
+    }
+}
+
+#[cfg(any(feature = "wgpu", feature = "cuda"))]
+mod once {
+    use super::caught;
+    use std::sync::OnceLock;
+
+    type Opened = OnceLock<Result<(), String>>;
+
+    #[cfg(feature = "wgpu")]
+    pub(super) fn wgpu() -> Result<(), String> {
+        static OPENED: Opened = OnceLock::new();
+        let open = || match burn::tensor::Device::wgpu_options().init() {
+            Ok(_) => Ok(()),
+            Err(error) => Err(error.to_string()),
+        };
+        OPENED.get_or_init(|| caught(open).unwrap_or_else(Err)).clone()
+    }
+
+    #[cfg(feature = "cuda")]
+    pub(super) fn cuda() -> Result<(), String> {
+        use burn::tensor::{Device, Tensor};
+        static OPENED: Opened = OnceLock::new();
+        // CUDA itself is loaded by the first number.
+        let open = || match Tensor::<1>::ones([1], &Device::cuda(0)).try_into_scalar::<f32>() {
+            Ok(_) => Ok(()),
+            Err(error) => Err(error.to_string()),
+        };
+        OPENED.get_or_init(|| caught(open).unwrap_or_else(Err)).clone()
+    }
 }
 
 impl fmt::Display for DeviceKind {
@@ -205,55 +248,10 @@ fn first_cause(said: &str) -> String {
     said.lines().map(str::trim).rfind(|line| !is_filler(line)).unwrap_or("no reason given").to_owned()
 }
 
-// Detection of a graphics card.
-
-impl DeviceKind {
-    /// Opens the device, once in a program.
-    fn open(self) -> Result<(), String> {
-        match self {
-            Self::Flex | Self::Ndarray => Ok(()),
-            #[cfg(feature = "wgpu")]
-            Self::Wgpu => once::wgpu(),
-            #[cfg(feature = "cuda")]
-            Self::Cuda => once::cuda(),
-            #[cfg(not(all(feature = "wgpu", feature = "cuda")))]
-            _ => Err(format!("this program was built without it; build it with `--features {self}`")),
-        }
-    }
-}
-
-#[cfg(any(feature = "wgpu", feature = "cuda"))]
-mod once {
-    use super::caught;
-    use std::sync::OnceLock;
-
-    type Opened = OnceLock<Result<(), String>>;
-
-    #[cfg(feature = "wgpu")]
-    pub(super) fn wgpu() -> Result<(), String> {
-        static OPENED: Opened = OnceLock::new();
-        let open = || match burn::tensor::Device::wgpu_options().init() {
-            Ok(_) => Ok(()),
-            Err(error) => Err(error.to_string()),
-        };
-        OPENED.get_or_init(|| caught(open).unwrap_or_else(Err)).clone()
-    }
-
-    #[cfg(feature = "cuda")]
-    pub(super) fn cuda() -> Result<(), String> {
-        use burn::tensor::{Device, Tensor};
-        static OPENED: Opened = OnceLock::new();
-        // CUDA itself is loaded by the first number.
-        let open = || match Tensor::<1>::ones([1], &Device::cuda(0)).try_into_scalar::<f32>() {
-            Ok(_) => Ok(()),
-            Err(error) => Err(error.to_string()),
-        };
-        OPENED.get_or_init(|| caught(open).unwrap_or_else(Err)).clone()
-    }
-}
-
 #[cfg(test)]
-mod kind_tests {
+mod tests {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use super::*;
 
     #[test]
@@ -274,12 +272,6 @@ mod kind_tests {
             assert!(error.contains(&format!("`{kind}`")) && error.contains("--features"), "{error}");
         }
     }
-}
-
-#[cfg(test)]
-mod guard_tests {
-    use super::*;
-    use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[test]
     fn panics_become_words() {

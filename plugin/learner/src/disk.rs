@@ -2,6 +2,10 @@
 //!
 //! The functions are those of [`std::fs`]. Their operations can be [recorded](DiskRecording), so that a test can put
 //! a disk into every state that a power cut would leave.
+//!
+//! In the folder:
+//!
+//! - `disk_file`: an open file that is written through this layer.
 
 mod disk_file;
 
@@ -19,8 +23,6 @@ use std::{
 };
 
 pub use crate::disk::disk_file::DiskFile;
-
-// Atomic writes: files that are complete or absent.
 
 /// Writes `bytes` to `path` so that a reader sees the old contents or the new, never a part. The file gets a
 /// temporary name first, is flushed to the disk, then renamed.
@@ -54,7 +56,7 @@ pub fn write_atomically_with(
     written
 }
 
-// Operations on names and folders. The errors are those of the system.
+// Operations on names and folders, with the errors of the system.
 
 /// Creates a folder and its missing parents.
 ///
@@ -133,7 +135,51 @@ pub fn remove_dir_all(path: &Path) -> io::Result<()> {
     remove_dir(path)
 }
 
-// Operations on a disk.
+// Temporary names of unfinished files, and removal of those that killed processes have left.
+
+/// Text between the name of a file and the number of the process that writes it.
+const MARK: &str = ".tmp";
+
+/// Returns the name under which this process writes a file before it is renamed, in the same folder.
+pub fn temporary_name(path: &Path) -> PathBuf {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(format!("{MARK}{}", std::process::id()));
+    path.with_file_name(name)
+}
+
+/// Returns whether this is the name of a file that some process has not finished writing.
+fn is_temporary(name: &OsStr) -> bool {
+    let name = name.to_string_lossy();
+    let Some((file, process)) = name.rsplit_once(MARK) else { return false };
+    // A number alone, without a sign.
+    !file.is_empty() && process.bytes().all(|byte| byte.is_ascii_digit()) && process.parse::<u32>().is_ok()
+}
+
+/// Removes unfinished files of killed processes from a folder, without its subfolders. Returns their names; a missing
+/// folder has none.
+///
+/// Only for a caller that alone may write there: a process that still writes could not finish.
+///
+/// # Errors
+/// The system's error.
+pub fn remove_temporaries(folder: &Path) -> io::Result<Vec<PathBuf>> {
+    let entries = match fs::read_dir(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        entries => entries?,
+    };
+    let mut left = Vec::new();
+    for entry in entries {
+        let entry = entry?;
+        if is_temporary(&entry.file_name()) && entry.file_type()?.is_file() {
+            left.push(entry.path());
+        }
+    }
+    left.sort();
+    left.iter().try_for_each(|file| remove_file(file))?;
+    Ok(left)
+}
+
+// Recording of disk operations, for tests.
 
 /// One change of a disk, after it was made. Paths are as the program named them.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -188,52 +234,6 @@ impl DiskOperation {
         }
     }
 }
-
-// Temporary names of unfinished files, and removal of the files that killed processes have left.
-
-/// Text between the name of a file and the number of the process that writes it.
-const MARK: &str = ".tmp";
-
-/// Returns the name under which this process writes a file before it is renamed, in the same folder.
-pub fn temporary_name(path: &Path) -> PathBuf {
-    let mut name = path.file_name().unwrap_or_default().to_owned();
-    name.push(format!("{MARK}{}", std::process::id()));
-    path.with_file_name(name)
-}
-
-/// Returns whether this is the name of a file that some process has not finished writing.
-fn is_temporary(name: &OsStr) -> bool {
-    let name = name.to_string_lossy();
-    let Some((file, process)) = name.rsplit_once(MARK) else { return false };
-    // A number alone, without a sign.
-    !file.is_empty() && process.bytes().all(|byte| byte.is_ascii_digit()) && process.parse::<u32>().is_ok()
-}
-
-/// Removes unfinished files of killed processes from a folder, without its subfolders. Returns their names; a missing
-/// folder has none.
-///
-/// Only for a caller that alone may write there: a process that still writes could not finish.
-///
-/// # Errors
-/// The system's error.
-pub fn remove_temporaries(folder: &Path) -> io::Result<Vec<PathBuf>> {
-    let entries = match fs::read_dir(folder) {
-        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
-        entries => entries?,
-    };
-    let mut left = Vec::new();
-    for entry in entries {
-        let entry = entry?;
-        if is_temporary(&entry.file_name()) && entry.file_type()?.is_file() {
-            left.push(entry.path());
-        }
-    }
-    left.sort();
-    left.iter().try_for_each(|file| remove_file(file))?;
-    Ok(left)
-}
-
-// Recording of disk operations, for tests.
 
 /// Number of active recordings. Without any, checking it is the only cost.
 static ACTIVE: AtomicUsize = AtomicUsize::new(0);
@@ -294,7 +294,7 @@ fn unpoisoned<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
 }
 
 #[cfg(test)]
-mod atomic_tests {
+mod tests {
     use std::fs;
 
     use super::*;
@@ -312,11 +312,6 @@ mod atomic_tests {
         assert_eq!(fs::read_to_string(&path).expect("readable"), "whole");
         assert_eq!(fs::read_dir(folder.path()).expect("readable").count(), 1);
     }
-}
-
-#[cfg(test)]
-mod temporary_tests {
-    use super::*;
 
     #[test]
     fn only_files_that_a_process_left_unfinished_are_removed() {

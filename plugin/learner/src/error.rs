@@ -292,8 +292,6 @@ impl FileError {
     }
 }
 
-// Exit codes of errors.
-
 /// An error that knows the exit code of a program that ends with it. Implemented beside each error.
 ///
 /// ```

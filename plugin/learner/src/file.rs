@@ -39,14 +39,6 @@ const NO_SUM: &[u8; 8] = b"00000000";
 /// Bytes that hold the length of the header.
 const LENGTH: usize = 8;
 
-/// A tensor in host memory.
-#[derive(Clone, Debug)]
-struct StoredTensor {
-    shape: Vec<usize>,
-    dtype: Dtype,
-    bytes: Vec<u8>,
-}
-
 /// The contents of one file, to be written or just read.
 #[derive(Clone, Debug)]
 pub(crate) struct TensorFile {
@@ -273,6 +265,14 @@ impl TensorFile {
     }
 }
 
+/// A tensor in host memory.
+#[derive(Clone, Debug)]
+struct StoredTensor {
+    shape: Vec<usize>,
+    dtype: Dtype,
+    bytes: Vec<u8>,
+}
+
 /// Returns whether the checksum of a file matches its bytes; `None` without one.
 fn is_whole(bytes: &[u8]) -> Option<bool> {
     let header = bytes.get(LENGTH..).unwrap_or_default();
@@ -460,7 +460,7 @@ impl ParamVisitor for Names {
 }
 
 #[cfg(test)]
-mod header_tests {
+mod tests {
     use super::*;
 
     #[derive(Deserialize)]

@@ -123,8 +123,6 @@ impl LearnerMetrics {
     }
 }
 
-// The common part of all learners, besides networks and optimizers.
-
 /// The common part of all learners: the policy's inputs and outputs, the skill model that it is tied to, normalisers,
 /// random numbers, and the device.
 #[derive(Debug)]

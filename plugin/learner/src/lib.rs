@@ -78,7 +78,7 @@ pub use crate::{
         ActionInput, Dataset, DatasetEpisode, Prior, Reduction, SkillConfig, SkillDraw, SkillMetrics, SkillModel,
         SkillProgress, SkillSource, SkillTrainer, WindowRule,
     },
-    space::{ActionValue, ActionSpace, Actions, PolicySpec, TimeLimit},
+    space::{ActionSpace, ActionValue, Actions, PolicySpec, TimeLimit},
     spirl::{SpirlConfig, SpirlLearner},
 };
 pub use playbot_kernels::among_workers::{among_awake_workers, among_workers, waited};

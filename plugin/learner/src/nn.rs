@@ -3,6 +3,13 @@
 //! Every network is a plain struct of tensors that implements [`Parameters`]. The names of its tensors are used in
 //! the files (`actor.l0.weight`), for the optimizer's moments and in error messages. Weights start from generators
 //! that the caller owns; burn's global generator is not used.
+//!
+//! The folder, in reading order:
+//!
+//! - `params`: named parameters, and the sources of their first values.
+//! - `linear`, `conv` and `gru`: layers; `image_net`: the network that turns images into features.
+//! - `dist`: distributions over actions; `sample`: draws from them.
+//! - `grads` and `adam`: gradients by parameter name, and the optimizer.
 
 mod adam;
 mod conv;

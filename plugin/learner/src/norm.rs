@@ -90,8 +90,6 @@ impl ObsNormalizer {
     }
 }
 
-// Scaling of rewards by the spread of the discounted return.
-
 /// The time at which the end of an episode resets its discounted return.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum RewardReset {
@@ -197,8 +195,6 @@ impl RewardNormalizer {
         Ok(())
     }
 }
-
-// Running mean and variance.
 
 /// Mean and variance of all rows so far, per dimension (Chan et al.'s parallel update).
 ///
@@ -319,7 +315,7 @@ fn take_stats(file: &mut TensorFile, name: &str, stats: &mut RunningStats) -> Re
 }
 
 #[cfg(test)]
-mod obs_tests {
+mod tests {
     use super::*;
 
     #[test]
@@ -333,11 +329,6 @@ mod obs_tests {
         assert!(got.iter().zip(want).all(|(g, w)| (g - w).abs() < 1e-4), "{got:?}, expected {want:?}");
         assert_eq!(ObsStats::of(std::iter::empty(), 2).normalize(&[3.0, -4.0]), [3.0, -4.0]);
     }
-}
-
-#[cfg(test)]
-mod reward_tests {
-    use super::*;
 
     #[test]
     fn episodes_of_others_change_the_variance_and_no_return() {

@@ -12,103 +12,6 @@ use std::{fmt, ops::Range};
 pub use crate::observation::augmentation::Augmentation;
 pub(crate) use crate::observation::augmentation::augmented;
 
-// Kinds of observations: a vector of numbers, or an image.
-
-/// Size of an image.
-#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
-#[serde(deny_unknown_fields)]
-pub struct ImageShape {
-    /// Colours, times the number of stacked frames.
-    pub channels: usize,
-    /// Rows of pixels.
-    pub height: usize,
-    /// Columns of pixels.
-    pub width: usize,
-}
-
-impl ImageShape {
-    /// Numbers in one image.
-    pub fn numbers(&self) -> usize {
-        // Sizes in files can be anything.
-        self.channels.saturating_mul(self.height).saturating_mul(self.width)
-    }
-}
-
-/// The kind of all observations of a game. In files a bare number is the width of a vector.
-#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
-#[serde(untagged)]
-pub enum ObsKind {
-    /// This many numbers.
-    Vector(usize),
-    /// Pixels of 0 to 255, in the order channel, row, column.
-    Image(ImageShape),
-}
-
-impl ObsKind {
-    /// Numbers in one observation.
-    pub fn numbers(&self) -> usize {
-        match self {
-            Self::Vector(width) => *width,
-            Self::Image(shape) => shape.numbers(),
-        }
-    }
-
-    /// Describes it for a message: `26 observation values`, or the size of an image.
-    pub fn describe(&self) -> String {
-        match self {
-            Self::Vector(values) => format!("{values} observation values"),
-            Self::Image(_) => self.to_string(),
-        }
-    }
-
-    /// Checks that `other`, the kind that `who` observes, is the same.
-    ///
-    /// # Errors
-    /// [`LearnError::Config`] names both kinds.
-    pub(crate) fn same_as(&self, other: &Self, who: &str) -> Result<(), LearnError> {
-        if self == other {
-            return Ok(());
-        }
-        Err(LearnError::Config(format!("observations must be {self}, but those of {who} are {other}")))
-    }
-
-    /// Returns the width of a vector.
-    ///
-    /// # Errors
-    /// [`LearnError::Config`], which names `reader`, if observations are images.
-    pub(crate) fn vector(&self, reader: &str) -> Result<usize, LearnError> {
-        match self {
-            Self::Vector(width) => Ok(*width),
-            Self::Image(_) => Err(LearnError::Config(format!("{reader} reads vectors, not {self}"))),
-        }
-    }
-}
-
-impl From<usize> for ObsKind {
-    fn from(width: usize) -> Self {
-        Self::Vector(width)
-    }
-}
-
-impl From<ImageShape> for ObsKind {
-    fn from(shape: ImageShape) -> Self {
-        Self::Image(shape)
-    }
-}
-
-impl fmt::Display for ObsKind {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Vector(width) => write!(f, "vectors of {width}"),
-            Self::Image(ImageShape { channels, height, width }) => {
-                write!(f, "images of {channels} channels, {height} rows and {width} columns")
-            }
-        }
-    }
-}
-
-// Batches of observations in host memory: owned, and borrowed.
-
 /// Many observations of one kind, one after the other. Their [`ObsKind`] gives the width of one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Observations {
@@ -342,8 +245,6 @@ impl<'a, const N: usize> From<&'a [f32; N]> for ObsSlice<'a> {
     }
 }
 
-// Metadata of the pictures that become observations.
-
 /// Metadata of the images that a policy or a skill model observes: images of one shape can be made in different ways.
 /// Their size is that of the policy's observation, and the network that reads them is part of the policy.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug)]
@@ -378,8 +279,103 @@ impl PictureMetadata {
     }
 }
 
+// Kinds of observations: a vector of numbers, or an image.
+
+/// Size of an image.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
+#[serde(deny_unknown_fields)]
+pub struct ImageShape {
+    /// Colours, times the number of stacked frames.
+    pub channels: usize,
+    /// Rows of pixels.
+    pub height: usize,
+    /// Columns of pixels.
+    pub width: usize,
+}
+
+impl ImageShape {
+    /// Numbers in one image.
+    pub fn numbers(&self) -> usize {
+        // Sizes in files can be anything.
+        self.channels.saturating_mul(self.height).saturating_mul(self.width)
+    }
+}
+
+/// The kind of all observations of a game. In files a bare number is the width of a vector.
+#[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]
+#[serde(untagged)]
+pub enum ObsKind {
+    /// This many numbers.
+    Vector(usize),
+    /// Pixels of 0 to 255, in the order channel, row, column.
+    Image(ImageShape),
+}
+
+impl ObsKind {
+    /// Numbers in one observation.
+    pub fn numbers(&self) -> usize {
+        match self {
+            Self::Vector(width) => *width,
+            Self::Image(shape) => shape.numbers(),
+        }
+    }
+
+    /// Describes it for a message: `26 observation values`, or the size of an image.
+    pub fn describe(&self) -> String {
+        match self {
+            Self::Vector(values) => format!("{values} observation values"),
+            Self::Image(_) => self.to_string(),
+        }
+    }
+
+    /// Checks that `other`, the kind that `who` observes, is the same.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] names both kinds.
+    pub(crate) fn same_as(&self, other: &Self, who: &str) -> Result<(), LearnError> {
+        if self == other {
+            return Ok(());
+        }
+        Err(LearnError::Config(format!("observations must be {self}, but those of {who} are {other}")))
+    }
+
+    /// Returns the width of a vector.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`], which names `reader`, if observations are images.
+    pub(crate) fn vector(&self, reader: &str) -> Result<usize, LearnError> {
+        match self {
+            Self::Vector(width) => Ok(*width),
+            Self::Image(_) => Err(LearnError::Config(format!("{reader} reads vectors, not {self}"))),
+        }
+    }
+}
+
+impl From<usize> for ObsKind {
+    fn from(width: usize) -> Self {
+        Self::Vector(width)
+    }
+}
+
+impl From<ImageShape> for ObsKind {
+    fn from(shape: ImageShape) -> Self {
+        Self::Image(shape)
+    }
+}
+
+impl fmt::Display for ObsKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Vector(width) => write!(f, "vectors of {width}"),
+            Self::Image(ImageShape { channels, height, width }) => {
+                write!(f, "images of {channels} channels, {height} rows and {width} columns")
+            }
+        }
+    }
+}
+
 #[cfg(test)]
-mod kind_tests {
+mod tests {
     use super::*;
 
     #[test]
@@ -395,11 +391,6 @@ mod kind_tests {
         let error = ObsKind::Image(image).vector("PPO").expect_err("an image");
         assert_eq!(error.to_string(), "config: PPO reads vectors, not images of 3 channels, 64 rows and 48 columns");
     }
-}
-
-#[cfg(test)]
-mod batch_tests {
-    use super::*;
 
     const IMAGE: ObsKind = ObsKind::Image(ImageShape { channels: 1, height: 1, width: 2 });
 

@@ -1,13 +1,15 @@
 //! Policies: networks that act, networks that estimate values, and the frozen snapshot of both.
 //!
-//! - `actor`: the network of a distribution over actions.
+//! The folder, in reading order:
+//!
 //! - `inputs`: inputs of networks: skills joined with observations.
+//! - `actor`: the network of a distribution over actions, and the one that estimates the return.
 
 mod actor;
 mod inputs;
 
 use crate::{
-    Action, ActionSpace, LearnError, ObsKind, ObsSlice, PolicySpec,
+    ActionSpace, ActionValue, LearnError, ObsKind, ObsSlice, PolicySpec,
     device::guarded,
     nn::{
         CnnKind, HostDist, ImageNet, argmax, categorical_log_prob, frozen, gaussian_log_prob, host, sample_categorical,
@@ -28,8 +30,6 @@ pub(crate) use crate::policy::{
     actor::{ActorShape, InputWidths, StdShape},
     inputs::{InputBuilder, StateBatch, joined_rows},
 };
-
-// A frozen policy for play.
 
 /// Number of rows that the networks read at a time. The result of a row does not depend on the others.
 pub(crate) const VECTORS_AT_A_TIME: usize = 2048;
@@ -264,21 +264,21 @@ impl PolicyOutput {
     ///
     /// # Panics
     /// If `row` is not below [`Self::len`].
-    pub fn sample<R: Rng + ?Sized>(&self, row: usize, rng: &mut R) -> (Action, f32) {
+    pub fn sample<R: Rng + ?Sized>(&self, row: usize, rng: &mut R) -> (ActionValue, f32) {
         let head = self.head(row);
         match self.space {
             ActionSpace::Discrete(_) => {
                 let index = sample_categorical(head, rng);
-                (Action::Discrete(index), categorical_log_prob(head, index))
+                (ActionValue::Discrete(index), categorical_log_prob(head, index))
             }
             ActionSpace::Continuous(_) => {
                 let action = sample_gaussian(head, self.stds(row), rng);
                 if self.squashed {
                     let log_prob = squashed_log_prob(head, self.stds(row), &action);
-                    return (Action::Continuous(squash(&action)), log_prob);
+                    return (ActionValue::Continuous(squash(&action)), log_prob);
                 }
                 let log_prob = gaussian_log_prob(head, self.stds(row), &action);
-                (Action::Continuous(action), log_prob)
+                (ActionValue::Continuous(action), log_prob)
             }
         }
     }
@@ -288,11 +288,11 @@ impl PolicyOutput {
     ///
     /// # Panics
     /// If `row` is not below [`Self::len`].
-    pub fn greedy(&self, row: usize) -> Action {
+    pub fn greedy(&self, row: usize) -> ActionValue {
         match self.space {
-            ActionSpace::Discrete(_) => Action::Discrete(argmax(self.head(row))),
-            ActionSpace::Continuous(_) if self.squashed => Action::Continuous(squash(self.head(row))),
-            ActionSpace::Continuous(_) => Action::Continuous(self.head(row).to_vec()),
+            ActionSpace::Discrete(_) => ActionValue::Discrete(argmax(self.head(row))),
+            ActionSpace::Continuous(_) if self.squashed => ActionValue::Continuous(squash(self.head(row))),
+            ActionSpace::Continuous(_) => ActionValue::Continuous(self.head(row).to_vec()),
         }
     }
 
@@ -304,18 +304,18 @@ impl PolicyOutput {
     ///
     /// # Panics
     /// If `row` is not below [`Self::len`].
-    pub fn log_prob(&self, row: usize, action: &Action) -> Result<f32, LearnError> {
+    pub fn log_prob(&self, row: usize, action: &ActionValue) -> Result<f32, LearnError> {
         match (self.space, action) {
-            (ActionSpace::Discrete(n), Action::Discrete(a)) if (*a as usize) < n => {
+            (ActionSpace::Discrete(n), ActionValue::Discrete(a)) if (*a as usize) < n => {
                 Ok(categorical_log_prob(self.head(row), *a))
             }
-            (ActionSpace::Continuous(n), Action::Continuous(a)) if a.len() == n && self.squashed => {
+            (ActionSpace::Continuous(n), ActionValue::Continuous(a)) if a.len() == n && self.squashed => {
                 if a.iter().any(|x| x.abs() > 1.0) {
                     return Ok(f32::NEG_INFINITY);
                 }
                 Ok(squashed_log_prob(self.head(row), self.stds(row), &unsquash(a)))
             }
-            (ActionSpace::Continuous(n), Action::Continuous(a)) if a.len() == n => {
+            (ActionSpace::Continuous(n), ActionValue::Continuous(a)) if a.len() == n => {
                 Ok(gaussian_log_prob(self.head(row), self.stds(row), a))
             }
             (space, action) => Err(LearnError::Action(format!("{action:?} among {space}"))),
@@ -364,7 +364,7 @@ fn unsquash(action: &[f32]) -> Vec<f32> {
 }
 
 #[cfg(test)]
-mod output_tests {
+mod tests {
     use super::*;
     use crate::rng::Streams;
 
@@ -385,11 +385,11 @@ mod output_tests {
         let width = 2.0 / n as f32;
         let density = |i: usize| {
             let action = -1.0 + (i as f32 + 0.5) * width;
-            f64::from(output.log_prob(0, &Action::Continuous(vec![action])).expect("fits")).exp()
+            f64::from(output.log_prob(0, &ActionValue::Continuous(vec![action])).expect("fits")).exp()
         };
         let total: f64 = (0..n).map(density).sum::<f64>() * f64::from(width);
         assert!((total - 1.0).abs() < 1e-3, "{total}");
-        assert_eq!(output.log_prob(0, &Action::Continuous(vec![1.5])).expect("fits"), f32::NEG_INFINITY);
+        assert_eq!(output.log_prob(0, &ActionValue::Continuous(vec![1.5])).expect("fits"), f32::NEG_INFINITY);
     }
 
     #[test]
@@ -400,12 +400,12 @@ mod output_tests {
         for _ in 0..4000 {
             let (action, log_prob) = output.sample(0, &mut rng);
             assert!((output.log_prob(0, &action).expect("fits") - log_prob).abs() < 1e-3);
-            let Action::Continuous(a) = action else { panic!("continuous") };
+            let ActionValue::Continuous(a) = action else { panic!("continuous") };
             assert!(a[0].abs() <= 1.0);
             below += usize::from(a[0] < (-0.3f32).tanh());
         }
         assert!((1850..2150).contains(&below), "half of the draws lie below the median: {below}");
-        let Action::Continuous(median) = output.greedy(0) else { panic!("continuous") };
+        let ActionValue::Continuous(median) = output.greedy(0) else { panic!("continuous") };
         assert!((median[0] - (-0.3f32).tanh()).abs() < 1e-6);
     }
 
@@ -416,7 +416,7 @@ mod output_tests {
         let mut beyond = 0;
         for _ in 0..1000 {
             let (action, log_prob) = output.sample(0, &mut rng);
-            let Action::Continuous(a) = &action else { panic!("continuous") };
+            let ActionValue::Continuous(a) = &action else { panic!("continuous") };
             beyond += usize::from(a[0] > 1.0);
             let density = (-0.5 * ((a[0] - 0.9) / 0.5).powi(2)).exp() / (0.5 * std::f32::consts::TAU.sqrt());
             assert!((log_prob - density.ln()).abs() < 1e-4, "{a:?}");
@@ -449,6 +449,6 @@ mod output_tests {
     #[test]
     fn the_edge_of_a_squashed_action_has_a_finite_density() {
         let output = output(9.0, 1.0);
-        assert!(output.log_prob(0, &Action::Continuous(vec![1.0])).expect("fits").is_finite());
+        assert!(output.log_prob(0, &ActionValue::Continuous(vec![1.0])).expect("fits").is_finite());
     }
 }

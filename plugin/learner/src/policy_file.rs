@@ -24,7 +24,7 @@ const AGAIN: &str = ": export the policy again";
 #[derive(Clone, Debug)]
 pub struct PolicyFile {
     /// Its metadata.
-    pub card: PolicyMetadata,
+    pub metadata: PolicyMetadata,
     /// The policy.
     pub policy: Policy,
     /// Its skills, if it reads any.
@@ -34,7 +34,8 @@ pub struct PolicyFile {
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Header {
-    card: PolicyMetadata,
+    #[serde(rename = "card")]
+    metadata: PolicyMetadata,
     policy: PolicyShape,
     skills: Option<SkillsShape>,
     examples: usize,
@@ -53,11 +54,11 @@ impl PolicyFile {
             let text = "a policy file needs at least one example row for the checks of its readers";
             return Err(learner(LearnError::Config(text.to_owned())));
         }
-        if let Some(picture) = &self.card.picture {
+        if let Some(picture) = &self.metadata.picture {
             picture.check(policy.observation()).map_err(learner)?;
         }
         let header = Header {
-            card: self.card.clone(),
+            metadata: self.metadata.clone(),
             policy: PolicyShape::of(policy),
             skills: self.skills.as_ref().map(SkillsShape::of).transpose().map_err(learner)?,
             examples: n,
@@ -114,17 +115,15 @@ impl PolicyFile {
         if header.examples == 0 {
             return Err(file.format("holds no examples for the checks of its readers".to_owned()));
         }
-        if let Some(picture) = &header.card.picture {
+        if let Some(picture) = &header.metadata.picture {
             picture.check(spec.obs).map_err(|e| file.learner(e))?;
         }
-        let read = Self { card: header.card, policy, skills };
+        let read = Self { metadata: header.metadata, policy, skills };
         Examples::check(&read, &mut file, header.examples)?;
         file.finish()?;
         Ok(read)
     }
 }
-
-// Metadata of a policy file, for people and for checks.
 
 /// Metadata of a policy: its purpose and origin.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Eq, Debug, Default)]
@@ -156,7 +155,7 @@ pub struct PolicyMetadata {
 
 const NORMALISED_IMAGES: &str = "normalises images, whose pixels are divided by 255 instead";
 
-const NO_HORIZON: &str = "the skill interval must be at least 1 tick, not 0";
+const NO_SKILL_INTERVAL: &str = "the skill interval must be at least 1 tick, not 0";
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -178,7 +177,8 @@ struct SkillsShape {
     /// `None` is a standard normal.
     prior: Option<ActorShape>,
     decoder: ActorShape,
-    horizon: usize,
+    #[serde(rename = "horizon")]
+    skill_interval: usize,
     draw: SkillDraw,
     /// True if decoder and prior see normalised observations.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
@@ -235,8 +235,8 @@ impl SkillsShape {
     /// # Errors
     /// [`LearnError::Config`] if their skill interval is 0, or if prior and decoder have different observations.
     fn of(skills: &SkillSource) -> Result<Self, LearnError> {
-        if skills.horizon == 0 {
-            return Err(LearnError::Config(NO_HORIZON.to_owned()));
+        if skills.skill_interval == 0 {
+            return Err(LearnError::Config(NO_SKILL_INTERVAL.to_owned()));
         }
         let (decoder, prior) = (&skills.decoder, &skills.prior.net);
         if prior.as_ref().is_some_and(|prior| prior.stats != decoder.stats) {
@@ -248,7 +248,7 @@ impl SkillsShape {
             tanh: skills.prior.tanh,
             prior: prior.as_ref().map(|net| ActorShape::of(&net.actor, 0)),
             decoder: ActorShape::of(&decoder.actor, decoder.latent()),
-            horizon: skills.horizon,
+            skill_interval: skills.skill_interval,
             draw: skills.draw,
             normalised: decoder.stats.is_some(),
         })
@@ -256,8 +256,8 @@ impl SkillsShape {
 
     /// Reads the skills of this shape out of `file` and checks that their networks fit each other and the `policy`.
     fn take(&self, file: &mut TensorFile, policy: &PolicySpec, device: DeviceKind) -> Result<SkillSource, FileError> {
-        if self.horizon == 0 {
-            return Err(file.format(NO_HORIZON.to_owned()));
+        if self.skill_interval == 0 {
+            return Err(file.format(NO_SKILL_INTERVAL.to_owned()));
         }
         check_normaliser(self.normalised, policy, file)?;
         let (latent, plain) = (self.latent, device.plain());
@@ -286,7 +286,7 @@ impl SkillsShape {
             Some(net) => Prior::learned(&net, stats.clone(), policy.obs, latent, self.tanh, plain.clone()),
         };
         let decoder = Policy::new(&decoder, None, stats, decoder_spec, plain);
-        Ok(SkillSource { prior, decoder, horizon: self.horizon, draw: self.draw })
+        Ok(SkillSource { prior, decoder, skill_interval: self.skill_interval, draw: self.draw })
     }
 }
 

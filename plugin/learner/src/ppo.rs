@@ -1,13 +1,15 @@
 //! Proximal policy optimisation (Schulman et al. 2017), with or without a skill decoder.
 //!
-//! - `batch`: the data of an update: a rollout with its advantages, and its minibatches in host memory.
+//! The folder, in reading order:
+//!
 //! - `config`: settings of PPO.
-//! - `metrics`: metrics of a gradient step and of an update.
+//! - `batch`: the data of an update: a rollout with its advantages, and its minibatches in host memory.
 //! - `objective`: the formulas of PPO: generalised advantage estimation on the host, and the losses as pure functions
 //!   of tensors.
+//! - `step`: one gradient step: minibatch → loss → gradient → Adam.
 //! - `on_device`: an update on a graphics card: the rollout is sent once, and the numbers of all steps are read back
 //!   together.
-//! - `step`: one gradient step: minibatch → loss → gradient → Adam.
+//! - `metrics`: metrics of a gradient step and of an update.
 
 mod batch;
 mod config;
@@ -44,8 +46,6 @@ pub use crate::ppo::{
     step::{Minibatch, gradient_step},
 };
 
-// The PPO learner, which is SCORE-PPO if it is given a skill model.
-
 const FILE: FileKind = FileKind { name: "ppo checkpoint", version: 1 };
 
 /// Improves a policy from rollouts.
@@ -58,12 +58,6 @@ pub struct PpoLearner {
     pub(crate) base: LearnerBase,
     pub(crate) nets: PpoNets,
     adam: Adam,
-}
-
-/// The counters in a checkpoint.
-#[derive(Serialize, Deserialize, Debug)]
-struct Counters {
-    adam_steps: u64,
 }
 
 impl PpoLearner {
@@ -192,11 +186,9 @@ impl Learner for PpoLearner {
     }
 }
 
-// One update from top to bottom: rollout → advantages → minibatches → loss → step. Its formulas are in
-// `objective.rs`.
-
 impl PpoLearner {
-    /// Trains on a rollout: epochs × minibatches gradient steps.
+    /// Trains on a rollout: epochs × minibatches gradient steps, from the rollout to advantages, minibatches, loss and
+    /// step. The formulas are in `objective`.
     ///
     /// # Errors
     /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, and
@@ -304,6 +296,12 @@ impl PpoLearner {
         let states = StateBatch { z: &rollout.z, left: &[], obs: rollout.obs.as_slice(), n: rollout.rows() };
         teacher.output(states, &rollout.actions, false, &mut rng, self.base.device)
     }
+}
+
+/// The counters in a checkpoint.
+#[derive(Serialize, Deserialize, Debug)]
+struct Counters {
+    adam_steps: u64,
 }
 
 // Actor and critic as one set of parameters.

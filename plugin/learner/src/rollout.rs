@@ -39,7 +39,8 @@ pub struct Rollout {
     pub final_values: Vec<f32>,
     /// Value of the observation after the last step of each environment (under the skill active then), `B`.
     pub next_values: Vec<f32>,
-    /// The states behind `final_values` and `next_values`, for learners that keep transitions; may be left empty for PPO.
+    /// The states behind `final_values` and `next_values`, for learners that keep transitions; may be left empty for
+    /// PPO.
     pub ends: EndStates,
 }
 
@@ -144,8 +145,8 @@ impl Rollout {
     /// Adds one tick.
     ///
     /// # Errors
-    /// [`LearnError::Action`] or [`LearnError::Config`] if actions or observations are of another kind. Lengths are checked
-    /// when the rollout is used.
+    /// [`LearnError::Action`] or [`LearnError::Config`] if actions or observations are of another kind. Lengths are
+    /// checked when the rollout is used.
     pub fn push_step(&mut self, step: RolloutStep<'_>) -> Result<(), LearnError> {
         self.actions.extend_rows(step.actions, 0, step.actions.len())?;
         self.obs.push(step.obs)?;
@@ -164,11 +165,7 @@ impl Rollout {
     pub fn done(&self) -> Vec<bool> {
         self.terminated.iter().zip(&self.truncated).map(|(a, b)| *a || *b).collect()
     }
-}
 
-// Values of the last states: where episodes were cut off and where the rollout stopped.
-
-impl Rollout {
     /// Fills [`Self::final_values`] and [`Self::next_values`] with `policy`'s values of the [`Self::ends`], all in
     /// one batch, as an alternative to one call per tick. Values that are never read become 0.
     ///
@@ -202,11 +199,7 @@ impl Rollout {
         }
         Ok(())
     }
-}
 
-// Checks that a rollout is consistent and fits a learner.
-
-impl Rollout {
     /// Checks that all lengths fit T and B, and that [`EndStates::cut_rows`] ascend and
     /// are rows of this rollout.
     ///
@@ -290,8 +283,6 @@ impl Rollout {
     }
 }
 
-// Shared memory for the observations of all Worlds, each of which fills its own part of every tick.
-
 /// The observations of some environments in a rollout of more, tick by tick.
 #[derive(Debug)]
 pub struct ObsColumns<'a> {
@@ -365,8 +356,6 @@ fn split<'a, T>(
     all
 }
 
-// The states at the ends of a rollout and of the episodes that it cuts off.
-
 /// States that are in no row of a rollout: where episodes were cut off, and where the rollout stopped.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EndStates {
@@ -413,8 +402,6 @@ impl EndStates {
         self.next_left.clear();
     }
 }
-
-// Rollouts of several Worlds as one.
 
 impl Rollout {
     /// Puts rollouts of the same length side by side: the environments of the first, then those of the second, ... A

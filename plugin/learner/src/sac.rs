@@ -2,6 +2,14 @@
 //!
 //! Discrete actions take expectations over all choices instead of draws, and act by drawing from the policy; actor and
 //! critics are networks of their own.
+//!
+//! The folder, in reading order:
+//!
+//! - `config`: settings of SAC and RLPD.
+//! - `critics`: the networks: critics with the actor, the temperature, and slow copies as targets.
+//! - `buffer`: the replay buffer; `batch`: batches of its transitions, prepared for a gradient step.
+//! - `steps`: the gradient steps of critics, actor and temperature, with their losses.
+//! - `metrics`: metrics of an update.
 
 mod batch;
 mod buffer;
@@ -44,8 +52,6 @@ pub use crate::sac::{
     },
 };
 
-// The SAC learner, which is SCORE-SAC if it is given a skill model.
-
 const FILE: FileKind = FileKind { name: "sac checkpoint", version: 1 };
 
 /// Improves a policy from transitions, new and old.
@@ -65,43 +71,6 @@ pub struct SacLearner {
     gradient_steps: u64,
     /// The fraction of a gradient step that is carried over.
     carry: f64,
-}
-
-/// One Adam for each loss.
-#[derive(Debug)]
-struct Optimizers {
-    critics: Adam,
-    actor: Adam,
-    temperature: Adam,
-}
-
-impl Optimizers {
-    fn new(config: &SacConfig) -> Self {
-        let adam = || Adam::new(AdamConfig { eps: config.adam_eps, ..AdamConfig::default() });
-        Self { critics: adam(), actor: adam(), temperature: adam() }
-    }
-
-    /// Takes the moments out of a checkpoint.
-    fn take(&mut self, file: &mut TensorFile, nets: &mut SacNets, counters: &Counters) -> Result<(), FileError> {
-        file.take_adam(&mut self.critics, "", &mut nets.critics, counters.critic_steps)?;
-        file.take_adam(&mut self.actor, "actor", &mut nets.actor, counters.actor_steps)?;
-        file.take_adam(&mut self.temperature, "", &mut nets.log_temperature, counters.temperature_steps)
-    }
-}
-
-/// The counters in a checkpoint.
-#[derive(Serialize, Deserialize, Debug)]
-struct Counters {
-    gradient_steps: u64,
-    carry: f64,
-    transitions: u64,
-    critic_steps: u64,
-    actor_steps: u64,
-    #[serde(rename = "alpha_steps")]
-    temperature_steps: u64,
-    /// Recorded transitions and their share of each batch.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    demos: Option<(u64, f64)>,
 }
 
 impl SacLearner {
@@ -321,15 +290,11 @@ impl SacLearner {
             Ok(())
         })
     }
-}
 
-// One update from top to bottom: rollout → replay buffer → batches → steps of critics, actor and temperature → targets.
-// The losses and their steps are in `loss.rs` and `steps.rs`.
-
-impl SacLearner {
     /// Adds a rollout (with its [`Rollout::ends`]; log-probabilities and values are not read) and, once there are
     /// [`SacConfig::learning_starts`](SacConfig::learning_starts) transitions, does the gradient steps that
-    /// are due.
+    /// are due: batches from the replay buffer, then steps of critics, actor and temperature, then targets. The losses
+    /// and their steps are in `steps`.
     ///
     /// # Errors
     /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, and
@@ -483,4 +448,41 @@ impl SacLearner {
         let n = self.config.batch;
         Some(matrix((0..n * dim).map(|_| normal(rng)).collect(), n, dim, &self.base.device.plain()))
     }
+}
+
+/// One Adam for each loss.
+#[derive(Debug)]
+struct Optimizers {
+    critics: Adam,
+    actor: Adam,
+    temperature: Adam,
+}
+
+impl Optimizers {
+    fn new(config: &SacConfig) -> Self {
+        let adam = || Adam::new(AdamConfig { eps: config.adam_eps, ..AdamConfig::default() });
+        Self { critics: adam(), actor: adam(), temperature: adam() }
+    }
+
+    /// Takes the moments out of a checkpoint.
+    fn take(&mut self, file: &mut TensorFile, nets: &mut SacNets, counters: &Counters) -> Result<(), FileError> {
+        file.take_adam(&mut self.critics, "", &mut nets.critics, counters.critic_steps)?;
+        file.take_adam(&mut self.actor, "actor", &mut nets.actor, counters.actor_steps)?;
+        file.take_adam(&mut self.temperature, "", &mut nets.log_temperature, counters.temperature_steps)
+    }
+}
+
+/// The counters in a checkpoint.
+#[derive(Serialize, Deserialize, Debug)]
+struct Counters {
+    gradient_steps: u64,
+    carry: f64,
+    transitions: u64,
+    critic_steps: u64,
+    actor_steps: u64,
+    #[serde(rename = "alpha_steps")]
+    temperature_steps: u64,
+    /// Recorded transitions and their share of each batch.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    demos: Option<(u64, f64)>,
 }

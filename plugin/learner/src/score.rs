@@ -4,6 +4,12 @@
 //! the decoder ([`ScoreConfig::init_from_decoder`]; not where SAC squashes actions). Its loss gains kl_coef times a
 //! penalty ([`ScoreConfig::kl`]). The penalty is mean(α KL(decoder ‖ policy)) (the SCORE paper's Eq. 3 as a loss to
 //! minimise), where α is the decoder's confidence in the row, or one of the other forms of [`PenaltyForm`].
+//!
+//! The folder, in reading order:
+//!
+//! - `config`: settings of SCORE.
+//! - `teacher`: the frozen decoder and prior of a skill model.
+//! - `penalty`: the penalty for leaving the decoder.
 
 mod config;
 pub mod penalty;

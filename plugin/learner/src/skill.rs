@@ -10,6 +10,14 @@
 //! There is one pipeline everywhere. The networks see observations raw (pixels divided by 255) or through one frozen
 //! normaliser ([`SkillConfig::norm_obs`]). The decoder sees tanh(z) (or z, by [`SkillConfig::tanh_latent`]). This
 //! holds in training, in use, and in the policies that are tied to it.
+//!
+//! The folder, in reading order:
+//!
+//! - `config`: settings of the skill model.
+//! - `dataset`: demonstrations for it, and windows cut from them.
+//! - `nets`: the three networks; `prior`: the prior in use.
+//! - `loss`: the loss J.
+//! - `trainer`: the training, its held-out demonstrations and its checkpoints.
 
 mod config;
 mod dataset;
@@ -32,25 +40,12 @@ use std::{path::Path, sync::Arc};
 pub(crate) use crate::skill::nets::Actors;
 pub use crate::skill::{
     config::{ActionInput, Reduction, SkillConfig},
-    dataset::{Dataset, DemoEpisode, Window, WindowRule},
+    dataset::{Dataset, DatasetEpisode, Window, WindowRule},
     loss::{SkillLoss, skill_loss},
     nets::{Encoder, SkillForward, SkillNets, StateHeads, StateNet},
     prior::{Prior, SkillDraw},
     trainer::{HeldOutMetrics, SkillMetrics, SkillProgress, SkillTrainer},
 };
-
-// A trained skill model and its file.
-
-/// The JSON in the file's header.
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct Header {
-    skill: SkillDescription,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    picture: Option<PictureMetadata>,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    demos: Option<SeenLevels>,
-}
 
 const FILE: FileKind = FileKind { name: "skill model", version: 1 };
 
@@ -193,7 +188,16 @@ impl SkillModel {
     }
 }
 
-// The description of a skill model's weights, and the architecture that follows from it.
+/// The JSON in the file's header.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Header {
+    skill: SkillDescription,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    picture: Option<PictureMetadata>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    demos: Option<SeenLevels>,
+}
 
 /// The settings of a skill model, and its observation and action space.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
@@ -240,8 +244,6 @@ impl SkillDescription {
     }
 }
 
-// The source of a policy's skills in play.
-
 /// The name of the frozen normaliser of decoder and prior in files of policies and learners.
 pub(crate) const SKILL_STATS: &str = "skill.obs_norm";
 
@@ -253,7 +255,7 @@ pub struct SkillSource {
     /// The skill model's decoder, without a critic; behaviour cloning if it plays instead of the policy.
     pub decoder: Policy,
     /// Ticks for which one skill is used (the paper's T).
-    pub horizon: usize,
+    pub skill_interval: usize,
     /// Draw skills at random, or use the prior's mean.
     pub draw: SkillDraw,
 }

@@ -62,7 +62,7 @@ impl fmt::Display for ActionSpace {
 
 /// One action.
 #[derive(Serialize, Deserialize, Clone, PartialEq, Debug)]
-pub enum Action {
+pub enum ActionValue {
     /// Index of the choice.
     Discrete(u32),
     /// The vector.
@@ -114,11 +114,11 @@ impl Actions {
     }
 
     /// Returns the action of row `row`, if there is one.
-    pub fn get(&self, row: usize) -> Option<Action> {
+    pub fn get(&self, row: usize) -> Option<ActionValue> {
         match self {
-            Self::Discrete(values) => values.get(row).copied().map(Action::Discrete),
+            Self::Discrete(values) => values.get(row).copied().map(ActionValue::Discrete),
             Self::Continuous { dim, values } => {
-                values.get(row * dim..(row + 1) * dim).map(|v| Action::Continuous(v.to_vec()))
+                values.get(row * dim..(row + 1) * dim).map(|v| ActionValue::Continuous(v.to_vec()))
             }
         }
     }
@@ -127,10 +127,10 @@ impl Actions {
     ///
     /// # Errors
     /// [`LearnError::Action`] if it is of another kind or width.
-    pub fn push(&mut self, action: &Action) -> Result<(), LearnError> {
+    pub fn push(&mut self, action: &ActionValue) -> Result<(), LearnError> {
         match (self, action) {
-            (Self::Discrete(values), Action::Discrete(a)) => values.push(*a),
-            (Self::Continuous { dim, values }, Action::Continuous(a)) if a.len() == *dim => {
+            (Self::Discrete(values), ActionValue::Discrete(a)) => values.push(*a),
+            (Self::Continuous { dim, values }, ActionValue::Continuous(a)) if a.len() == *dim => {
                 values.extend_from_slice(a);
             }
             (all, one) => {
@@ -198,8 +198,6 @@ impl Actions {
         }
     }
 }
-
-// The inputs and outputs of a policy, and the meaning of a time limit to a learner.
 
 /// The inputs and outputs of a policy.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug)]

@@ -4,6 +4,11 @@
 //! of the prior and acts once per skill interval. It pays for the divergence KL(π(z | s) ‖ p(z | s)) instead of
 //! earning entropy. To this policy a skill is one action, whose reward is the discounted sum of its ticks' rewards
 //! and whose next state is discounted by γᵀ. PPO or SAC learn it like any other action.
+//!
+//! The folder, in reading order:
+//!
+//! - `skill_steps`: conversion of a rollout of ticks to one of skills.
+//! - `over_skills`: the learner of π(z | s): PPO or SAC, tied to the prior.
 
 mod over_skills;
 mod skill_steps;
@@ -23,8 +28,6 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 use std::{path::Path, time::Duration};
-
-// The SPiRL learner: a policy over skills, and the decoder that plays them.
 
 /// Learns which skills to play.
 ///
@@ -56,7 +59,7 @@ impl SpirlLearner {
     ) -> Result<Self, LearnError> {
         check(&config, score, ppo.time_limit)?;
         let below = PpoLearner::below(&config, &ppo, score, model, seed, device)?;
-        let (gamma, ent_coef) = (ppo.gamma.powi(score.horizon as i32), 0.0);
+        let (gamma, ent_coef) = (ppo.gamma.powi(score.skill_interval as i32), 0.0);
         let ppo = PpoConfig { gamma, ent_coef, ..ppo };
         let teacher = Teacher::new(of_prior(&config, score, true), TiedTo::Prior, model, device)?;
         let learner = PpoLearner::fresh(ppo, teacher.policy_spec(), Some(teacher), seed, device)?;
@@ -91,7 +94,7 @@ impl SpirlLearner {
             }
             None => EntropyCoef::Fixed(config.kl_coef),
         };
-        let sac = SacConfig { gamma: sac.gamma.powi(score.horizon as i32), entropy, random_start: false, ..sac };
+        let sac = SacConfig { gamma: sac.gamma.powi(score.skill_interval as i32), entropy, random_start: false, ..sac };
         // It is tied to the prior by the cost of the divergence, without a penalty beside it.
         let teacher = Teacher::new(of_prior(&config, score, false), TiedTo::Prior, model, device)?;
         let learner = SacLearner::fresh(sac, teacher.policy_spec(), Some(teacher), seed, device)?;
@@ -218,6 +221,44 @@ impl Learner for SpirlLearner {
     }
 }
 
+settings! {
+    /// Hyperparameters of SPiRL beside those of the learner of skills, PPO or SAC, and the skill interval
+    /// ([`ScoreConfig::skill_interval`](crate::ScoreConfig::skill_interval)).
+    #[derive(Clone, PartialEq, Debug)]
+    pub struct SpirlConfig in "spirl", read by &[Reader::SPIRL_PPO, Reader::SPIRL_SAC];
+
+    /// Cost of leaving the prior, per nat of KL(π(z | s) ‖ p(z | s)); at the start if it is tuned.
+    kl_coef: f64 = 0.1, in Range::Positive(1e6);
+    /// Divergence in nats per skill that `spirl.kl_coef` is tuned for; `None` keeps it constant.
+    target_kl: Option<f64> = Some(1.0), in Range::Positive(1e6);
+    /// True if the decoder continues to learn below the skills, by SCORE-PPO with the settings of `ppo` and `score`.
+    /// It is frozen otherwise.
+    learn_decoder: bool = false;
+}
+
+impl SpirlConfig {
+    /// Checks that these settings are possible.
+    ///
+    /// # Errors
+    /// [`LearnError::Setting`] names the first impossible setting.
+    pub fn validate(&self) -> Result<(), LearnError> {
+        Ok(self.check_ranges()?)
+    }
+
+    /// Returns the weight after an update whose policy was `kl` nats from the prior. It is doubled or halved if that
+    /// is far from the target (the adaptive penalty of Schulman et al. 2017, "Proximal policy optimization
+    /// algorithms"), within bounds.
+    fn tuned(&self, kl_coef: f64, kl: f64) -> f64 {
+        const FAR: f64 = 1.5;
+        const BOUNDS: (f64, f64) = (1e-6, 1e3);
+        match self.target_kl {
+            Some(target) if kl > FAR * target => (kl_coef * 2.0).min(BOUNDS.1),
+            Some(target) if kl < target / FAR => (kl_coef / 2.0).max(BOUNDS.0),
+            _ => kl_coef,
+        }
+    }
+}
+
 // A policy over skills in one file: the checkpoints of its learners, whole, as bytes.
 
 const FILE: FileKind = FileKind { name: "spirl checkpoint", version: 2 };
@@ -278,48 +319,8 @@ impl SpirlLearner {
     }
 }
 
-// Settings of SPiRL.
-
-settings! {
-    /// Hyperparameters of SPiRL beside those of the learner of skills, PPO or SAC, and the skill interval
-    /// ([`ScoreConfig::horizon`](crate::ScoreConfig::horizon)).
-    #[derive(Clone, PartialEq, Debug)]
-    pub struct SpirlConfig in "spirl", read by &[Reader::SPIRL_PPO, Reader::SPIRL_SAC];
-
-    /// Cost of leaving the prior, per nat of KL(π(z | s) ‖ p(z | s)); at the start if it is tuned.
-    kl_coef: f64 = 0.1, in Range::Positive(1e6);
-    /// Divergence in nats per skill that `spirl.kl_coef` is tuned for; `None` keeps it constant.
-    target_kl: Option<f64> = Some(1.0), in Range::Positive(1e6);
-    /// True if the decoder continues to learn below the skills, by SCORE-PPO with the settings of `ppo` and `score`.
-    /// It is frozen otherwise.
-    learn_decoder: bool = false;
-}
-
-impl SpirlConfig {
-    /// Checks that these settings are possible.
-    ///
-    /// # Errors
-    /// [`LearnError::Setting`] names the first impossible setting.
-    pub fn validate(&self) -> Result<(), LearnError> {
-        Ok(self.check_ranges()?)
-    }
-
-    /// Returns the weight after an update whose policy was `kl` nats from the prior. It is doubled or halved if that
-    /// is far from the target (the adaptive penalty of Schulman et al. 2017, "Proximal policy optimization
-    /// algorithms"), within bounds.
-    fn tuned(&self, kl_coef: f64, kl: f64) -> f64 {
-        const FAR: f64 = 1.5;
-        const BOUNDS: (f64, f64) = (1e-6, 1e3);
-        match self.target_kl {
-            Some(target) if kl > FAR * target => (kl_coef * 2.0).min(BOUNDS.1),
-            Some(target) if kl < target / FAR => (kl_coef / 2.0).max(BOUNDS.0),
-            _ => kl_coef,
-        }
-    }
-}
-
 #[cfg(test)]
-mod config_tests {
+mod tests {
     use super::*;
 
     #[test]

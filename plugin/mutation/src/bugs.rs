@@ -7,6 +7,13 @@
 //! - A [`Mutant`] is a game with one of them in its rules.
 //! - [`make_bugs`] plants a [`BugSet`], which is kept in a folder and reproducible from a seed.
 //! - [`score`](crate::score) measures which testers find them.
+//!
+//! The folder, in reading order:
+//!
+//! - `general`: the defects of rules that fit any game.
+//! - `mutant`: games with a defect in their rules, and levels with a place for one.
+//! - `make`: the planting of defects into the games of a program.
+//! - `set`: sets of planted defects, in memory and as files.
 
 mod general;
 mod make;
@@ -15,13 +22,10 @@ mod set;
 
 use playbot_harness::{
     defect::DefectKind, eval::EvalError, game::Game, inspect::InspectError, level_files::LevelFileError,
-    mode::ModeError,
+    mode::ModeError, sealed_file::SealedFileError,
 };
 use playbot_learner::HasExitCode;
-use std::{
-    io,
-    path::{Path, PathBuf},
-};
+use std::path::PathBuf;
 use thiserror::Error;
 
 pub use crate::bugs::{
@@ -39,8 +43,6 @@ pub fn defect_kinds(game: &dyn Game) -> Vec<DefectKind> {
     kinds.extend(general);
     kinds
 }
-
-// Errors of planting defects.
 
 /// The reason why defects cannot be planted, or a set of them cannot be used.
 #[derive(Debug, Error)]
@@ -116,16 +118,9 @@ pub enum BugError {
         /// The reason.
         why: String,
     },
-    /// The system cannot read or write a file.
-    #[error("cannot {action} {}: {source}", path.display())]
-    Io {
-        /// The action that failed.
-        action: &'static str,
-        /// The file.
-        path: PathBuf,
-        /// The system's error.
-        source: io::Error,
-    },
+    /// A file of the set cannot be read or written.
+    #[error(transparent)]
+    File(#[from] SealedFileError),
     /// The game does not have the levels.
     #[error(transparent)]
     Mode(#[from] ModeError),
@@ -143,18 +138,15 @@ pub enum BugError {
 impl HasExitCode for BugError {
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Io { .. } | Self::NoLevel { .. } | Self::Eval(EvalError::Fault(_)) => 2,
+            Self::File(error) => error.exit_code(),
+            Self::NoLevel { .. } | Self::Eval(EvalError::Fault(_)) => 2,
             _ => 3,
         }
     }
 }
 
-fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> BugError {
-    move |source| BugError::Io { action, path: path.into(), source }
-}
-
 #[cfg(test)]
-mod kinds_tests {
+mod tests {
     use bevy::prelude::App;
 
     use super::*;

@@ -2,7 +2,7 @@
 //! lives, too?
 //!
 //! [`Calibration::read`] takes the results of a test and recordings of people on the same levels. For each level it has
-//! [`Numbers`] of the people and of every tester. For every tester and [`Measure`] it has an [`Agreement`]: rank
+//! [`LevelNumbers`] of the people and of every tester. For every tester and [`Measure`] it has an [`Agreement`]: rank
 //! correlations over the levels, with 95 % intervals.
 //!
 //! ```
@@ -14,13 +14,20 @@
 //! let found = spearman(&people, &bot).expect("both vary");
 //! assert!(found.value > 0.9 && found.interval.is_some_and(|[low, _]| low > 0.6));
 //! ```
+//!
+//! The folder, in reading order:
+//!
+//! - `numbers`: the numbers of a level that are compared, and the tries of people on it.
+//! - `rank`: rank correlations, Spearman's and Kendall's.
+//! - `page`: the page of a calibration, as HTML with charts and as Markdown.
 
+mod numbers;
 mod page;
 mod rank;
 
 use crate::calibration::{
+    numbers::{LevelTries, Try},
     page::LevelNames,
-    rank::{LevelTries, Try},
 };
 use bevy_playbot::demo::file::{Decider, DemoEpisode, DemoFileError, DemoHeader, DemoReader, find_demos};
 use playbot_harness::{game::Game, level_files::LevelFileError, split::LevelSplit};
@@ -32,7 +39,119 @@ use std::{
 };
 use thiserror::Error;
 
-pub use crate::calibration::rank::{CalibratedLevel, Numbers, RankCorrelation, kendall, spearman};
+pub use crate::calibration::{
+    numbers::LevelNumbers,
+    rank::{RankCorrelation, kendall, spearman},
+};
+
+/// Most levels that the error of no shared level names.
+const MOST_NAMED: usize = 4;
+
+/// The results of testers and people on the same levels.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Calibration {
+    /// Name of the game.
+    pub game: String,
+    /// Version of its rules.
+    pub game_version: u32,
+    /// The levels that were tested.
+    pub range: LevelSplit,
+    /// Names of the testers.
+    pub testers: Vec<String>,
+    /// Names of the people, or names of the recordings without one.
+    pub people: Vec<String>,
+    /// Levels that were tested and not recorded.
+    pub only_tested: u64,
+    /// Levels that were recorded and not tested.
+    pub only_recorded: u64,
+    /// Counts of recorded episodes that do not count, in words.
+    pub left_out: Vec<String>,
+    /// The agreement of each tester with people, measure by measure.
+    pub agreements: Vec<Agreement>,
+    /// The levels that both testers and people have played, in the order of the results.
+    pub levels: Vec<CalibratedLevel>,
+}
+
+impl Calibration {
+    /// Compares the results in a folder with recordings of people, or folders of them. Level files are identified by
+    /// the hash of their level, which needs the game.
+    ///
+    /// Only episodes that a person has played to their end count. A person is identified by the name in the recording
+    /// (`playbot play --name`).
+    ///
+    /// # Errors
+    ///
+    /// [`CalibrationError`]: a file is missing or damaged, recordings are of another game, version or other levels, or
+    /// there is no episode of a person.
+    pub fn read(results: &Path, recordings: &[PathBuf], game: Option<&dyn Game>) -> Result<Self, CalibrationError> {
+        let mut lines = ResultLines::open(results)?;
+        let record = lines.record().clone();
+        let names = LevelNames::of(results, &record, game)?;
+        let people = People::read(recordings, results, &record, &names)?;
+        let testers: Vec<String> = record.testers.iter().map(|tester| tester.name.clone()).collect();
+        let (mut levels, mut only_tested, mut persons) = (Vec::new(), 0, BTreeSet::new());
+        while let Some(verdict) = lines.next_level()? {
+            let Some(tries) = people.levels.get(&verdict.level) else {
+                only_tested += 1;
+                continue;
+            };
+            persons.extend(tries.people().map(str::to_owned));
+            levels.push(CalibratedLevel {
+                persons: tries.people().count() as u64,
+                people: tries.numbers(),
+                testers: testers.iter().map(|name| of_tester(&verdict, name)).collect(),
+                level: verdict.level,
+            });
+        }
+        if levels.is_empty() {
+            let (results, tested) = (results.to_owned(), record.range.to_string());
+            return Err(CalibrationError::NoSharedLevel { recorded: named(&people), results, tested });
+        }
+        let agreement = |(tester, name): (usize, &String)| {
+            Measure::ALL.map(|measure| Agreement::of(measure, name, tester, &levels))
+        };
+        let agreements = testers.iter().enumerate().flat_map(agreement).collect();
+        Ok(Self {
+            game: record.game,
+            game_version: record.game_version,
+            range: record.range,
+            only_tested,
+            only_recorded: people.levels.len().saturating_sub(levels.len()) as u64,
+            left_out: people.left_out(),
+            people: persons.into_iter().collect(),
+            agreements,
+            testers,
+            levels,
+        })
+    }
+}
+
+/// A level that both people and testers have played.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CalibratedLevel {
+    /// Its name in the results.
+    pub level: String,
+    /// Number of people who played it.
+    pub persons: u64,
+    /// Results of people. Each person counts once, for any number of tries.
+    pub people: LevelNumbers,
+    /// Results of each tester, in the order of the results.
+    pub testers: Vec<LevelNumbers>,
+}
+
+fn of_tester(verdict: &LevelVerdict, name: &str) -> LevelNumbers {
+    let found = verdict.testers.iter().find(|tester| tester.tester == *name);
+    let none = LevelNumbers { tries: 0, completion: 0.0, ticks: None, deaths: 0.0 };
+    found.map_or(none, |tester| LevelNumbers::of_score(&tester.score))
+}
+
+/// Returns the names of the first few levels that people played.
+fn named(people: &People) -> String {
+    let names: Vec<&str> = people.levels.keys().take(MOST_NAMED).map(String::as_str).collect();
+    let more = people.levels.len().saturating_sub(MOST_NAMED);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{more}", names.join(", "))
+}
 
 // The agreement of testers and people on which levels are hard.
 
@@ -65,7 +184,7 @@ impl Measure {
     }
 
     /// Returns the number; `None` if there is none, such as the time on a level that was never completed.
-    pub fn of(self, numbers: &Numbers) -> Option<f64> {
+    pub fn of(self, numbers: &LevelNumbers) -> Option<f64> {
         match self {
             Self::Completion => Some(numbers.completion),
             Self::Time => numbers.ticks,
@@ -317,111 +436,13 @@ fn why(left_out: &[String]) -> String {
     if left_out.is_empty() { String::new() } else { format!(" ({})", left_out.join(", ")) }
 }
 
-// Reading results and recordings into a calibration.
-
-/// Most levels that the error of no shared level names.
-const MOST_NAMED: usize = 4;
-
-/// The results of testers and people on the same levels.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Calibration {
-    /// Name of the game.
-    pub game: String,
-    /// Version of its rules.
-    pub game_version: u32,
-    /// The levels that were tested.
-    pub range: LevelSplit,
-    /// Names of the testers.
-    pub testers: Vec<String>,
-    /// Names of the people, or names of the recordings without one.
-    pub people: Vec<String>,
-    /// Levels that were tested and not recorded.
-    pub only_tested: u64,
-    /// Levels that were recorded and not tested.
-    pub only_recorded: u64,
-    /// Counts of recorded episodes that do not count, in words.
-    pub left_out: Vec<String>,
-    /// The agreement of each tester with people, measure by measure.
-    pub agreements: Vec<Agreement>,
-    /// The levels that both testers and people have played, in the order of the results.
-    pub levels: Vec<CalibratedLevel>,
-}
-
-impl Calibration {
-    /// Compares the results in a folder with recordings of people, or folders of them. Level files are identified by
-    /// the hash of their level, which needs the game.
-    ///
-    /// Only episodes that a person has played to their end count. A person is identified by the name in the recording
-    /// (`playbot play --name`).
-    ///
-    /// # Errors
-    ///
-    /// [`CalibrationError`]: a file is missing or damaged, recordings are of another game, version or other levels, or
-    /// there is no episode of a person.
-    pub fn read(results: &Path, recordings: &[PathBuf], game: Option<&dyn Game>) -> Result<Self, CalibrationError> {
-        let mut lines = ResultLines::open(results)?;
-        let record = lines.record().clone();
-        let names = LevelNames::of(results, &record, game)?;
-        let people = People::read(recordings, results, &record, &names)?;
-        let testers: Vec<String> = record.testers.iter().map(|tester| tester.name.clone()).collect();
-        let (mut levels, mut only_tested, mut persons) = (Vec::new(), 0, BTreeSet::new());
-        while let Some(verdict) = lines.next_level()? {
-            let Some(tries) = people.levels.get(&verdict.level) else {
-                only_tested += 1;
-                continue;
-            };
-            persons.extend(tries.people().map(str::to_owned));
-            levels.push(CalibratedLevel {
-                persons: tries.people().count() as u64,
-                people: tries.numbers(),
-                testers: testers.iter().map(|name| of_tester(&verdict, name)).collect(),
-                level: verdict.level,
-            });
-        }
-        if levels.is_empty() {
-            let (results, tested) = (results.to_owned(), record.range.to_string());
-            return Err(CalibrationError::NoSharedLevel { recorded: named(&people), results, tested });
-        }
-        let agreement = |(tester, name): (usize, &String)| {
-            Measure::ALL.map(|measure| Agreement::of(measure, name, tester, &levels))
-        };
-        let agreements = testers.iter().enumerate().flat_map(agreement).collect();
-        Ok(Self {
-            game: record.game,
-            game_version: record.game_version,
-            range: record.range,
-            only_tested,
-            only_recorded: people.levels.len().saturating_sub(levels.len()) as u64,
-            left_out: people.left_out(),
-            people: persons.into_iter().collect(),
-            agreements,
-            testers,
-            levels,
-        })
-    }
-}
-
-fn of_tester(verdict: &LevelVerdict, name: &str) -> Numbers {
-    let found = verdict.testers.iter().find(|tester| tester.tester == *name);
-    let none = Numbers { tries: 0, completion: 0.0, ticks: None, deaths: 0.0 };
-    found.map_or(none, |tester| Numbers::of_score(&tester.score))
-}
-
-/// Returns the names of the first few levels that people played.
-fn named(people: &People) -> String {
-    let names: Vec<&str> = people.levels.keys().take(MOST_NAMED).map(String::as_str).collect();
-    let more = people.levels.len().saturating_sub(MOST_NAMED);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    format!("{}{more}", names.join(", "))
-}
-
 #[cfg(test)]
-mod agreement_tests {
+mod tests {
     use super::*;
 
     /// Levels on which people and a tester complete these shares.
     fn agreement(people: &[f64], bot: &[f64]) -> Agreement {
-        let numbers = |completion| Numbers { tries: 4, completion, ticks: None, deaths: 0.0 };
+        let numbers = |completion| LevelNumbers { tries: 4, completion, ticks: None, deaths: 0.0 };
         let level = |(people, bot): (&f64, &f64)| CalibratedLevel {
             level: "a".to_owned(),
             persons: 2,

@@ -1,7 +1,7 @@
 //! Mutation testing of games: planted defects, what testers find of them, and how verdicts agree with people.
 //!
-//! A mutant is a level or a game with one planted defect, made from a random seed. A tester that finds many mutants, and
-//! nothing in unmutated levels, can be trusted with real ones. Most programs use this crate through `playbot`, as
+//! A mutant is a level or a game with one planted defect, made from a random seed. A tester that finds many mutants,
+//! and nothing in unmutated levels, can be trusted with real ones. Most programs use this crate through `playbot`, as
 //! `playbot::mutation`.
 //!
 //! The modules, in reading order:

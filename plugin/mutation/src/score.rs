@@ -4,6 +4,16 @@
 //! equal budgets and under the detectors of a test. A [`ScoreRun`] does so on all cores, and a [`ScoreJournal`] keeps
 //! the finished jobs. A [`Score`] is the result. A [`ScoreTable`] joins several: recall and precision by class and
 //! tester, the cost of a defect, and the testers that find most together.
+//!
+//! The folder, in reading order:
+//!
+//! - `record`: the record of a score: set, games, testers and settings.
+//! - `contestant`: the testers that are scored, and the clocks for their jobs.
+//! - `playing`: the jobs: testers that play, and testers that explore.
+//! - `found`: the rules that decide which defects were found.
+//! - `journal`: the journal of finished jobs, beside the file of their score.
+//! - `table` and `mix`: the table that joins several scores, and the mixes of testers that find most together.
+//! - `error`: errors of scoring testers.
 
 mod contestant;
 mod error;
@@ -22,6 +32,7 @@ use crate::{
     bugs::{BugSet, Mutant, PlantedPart, defect_kinds},
     score::{
         contestant::JobClock,
+        error::io_error,
         found::Trial,
         playing::{play, search},
     },
@@ -32,6 +43,7 @@ use bevy_playbot::{
     state_hash::StateHash,
 };
 use playbot_harness::{defect::DefectKind, game::Game, split::LevelSplit};
+use playbot_learner::{seal_json, unseal_json, write_atomically};
 use playbot_test::{
     detectors::{Detectors, own_detectors},
     findings::{Breakage, Lengths},
@@ -39,6 +51,7 @@ use playbot_test::{
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeSet,
+    fs, io,
     path::Path,
     sync::{Mutex, MutexGuard, PoisonError},
     thread,
@@ -49,166 +62,76 @@ pub use crate::score::{
     contestant::{ClockKind, Contestant, ContestantRecord, EXPLORE, EXPLORE_SKILLS, HOLD, Means, RANDOM},
     error::ScoreError,
     found::{FAR, FEWEST_SOUND, Found, RELIABLE, ScoredJob, judge},
-    journal::{Score, ScoreJournal},
+    journal::ScoreJournal,
     record::{GameRecord, SCORE_FORMAT, ScoreBudget, ScoreRecord, SetRecord, Subject, SubjectKind},
     table::{ClassRow, FEW_FALSE, ScoreTable, Share, TesterRow},
 };
 
-// The run of all testers on all subjects, on all cores.
-
-/// The callbacks of a running score.
-pub struct ScoreCallbacks<'a> {
-    /// Receives how many more jobs have finished; called from several threads.
-    pub progress: &'a (dyn Fn(u64) + Sync),
-    /// Returns true to stop; finished jobs are kept.
-    pub stop: &'a (dyn Fn() -> bool + Sync),
+/// The results of testers on a set.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Score {
+    /// The set, the testers and the settings.
+    #[serde(flatten)]
+    pub record: ScoreRecord,
+    /// The command that made it.
+    pub command: String,
+    /// The mutants and unmutated levels.
+    pub subjects: Vec<Subject>,
+    /// The results, in the order of the subjects and, for each, of the testers.
+    pub jobs: Vec<ScoredJob>,
 }
 
-/// A score in progress.
-pub struct ScoreRun<'a> {
-    plan: &'a ScorePlan<'a>,
-    cases: Vec<Case>,
-}
-
-/// The state that the threads share.
-struct Shared<'a> {
-    next: usize,
-    journal: &'a mut ScoreJournal,
-    failure: Option<ScoreError>,
-    is_stopped: bool,
-}
-
-impl<'a> ScoreRun<'a> {
-    /// Checks the plan, and reads all levels.
+impl Score {
+    /// Writes the file atomically, with a line for each subject and each job.
     ///
     /// # Errors
     ///
-    /// The plan tests nothing, or something in the set cannot be played.
-    pub fn new(plan: &'a ScorePlan<'a>) -> Result<Self, ScoreError> {
-        plan.check()?;
-        Ok(Self { plan, cases: cases(plan)? })
+    /// The system cannot write.
+    pub fn write(&self, path: &Path) -> Result<(), ScoreError> {
+        let written = self.text().and_then(|text| write_atomically(path, seal_json(&text).as_bytes()));
+        written.map_err(io_error("write", path))
     }
 
-    /// Returns the number of jobs: each tester on each subject of its game.
-    pub fn jobs(&self) -> u64 {
-        self.cases.iter().map(|case| self.plan.games[case.game].contestants.len() as u64).sum()
+    fn text(&self) -> io::Result<String> {
+        let head = serde_json::to_string(&self.record)?;
+        let head = head.strip_suffix('}').unwrap_or(&head);
+        let (subjects, jobs) = (lines(&self.subjects)?, lines(&self.jobs)?);
+        let command = serde_json::to_string(&self.command)?;
+        Ok(format!("{head},\"command\":{command},\n\"subjects\":[{subjects}],\n\"jobs\":[{jobs}]}}\n"))
     }
 
-    /// Runs all jobs that the journal does not have, and judges all of them; `None` if `stop` returned true.
-    ///
-    /// Each job runs on one thread. Its results, apart from the times, depend on the plan's budget, the tester and the
-    /// subject alone. A mutant that makes a tester panic is a finding.
+    /// Reads a file.
     ///
     /// # Errors
     ///
-    /// A tester cannot play at all, or the journal cannot be written.
-    pub fn run(&self, journal: &mut ScoreJournal, watch: &ScoreCallbacks) -> Result<Option<Score>, ScoreError> {
-        let is_open = |(case, contestant): &(&Case, &Contestant)| {
-            let key = (case.subject.id.clone(), contestant.record.name.clone());
-            !journal.finished().contains_key(&key)
-        };
-        let open: Vec<(&Case, &Contestant)> = self.all().filter(is_open).collect();
-        let threads = self.plan.threads.clamp(1, open.len().max(1));
-        let shared = Mutex::new(Shared { next: 0, journal: &mut *journal, failure: None, is_stopped: false });
-        thread::scope(|scope| {
-            for _ in 1..threads {
-                // With fewer threads than asked for, the score only takes longer.
-                let _ = Builder::new().spawn_scoped(scope, || self.work(&open, &shared, watch));
-            }
-            self.work(&open, &shared, watch);
-        });
-        let Shared { failure, is_stopped, .. } = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
-        match failure {
-            Some(error) => return Err(error),
-            None if is_stopped => return Ok(None),
-            None => {}
+    /// The file is not a score, has a form that this program does not know, or cannot be read.
+    pub fn read(path: &Path) -> Result<Self, ScoreError> {
+        let text = fs::read_to_string(path).map_err(io_error("read", path))?;
+        let no_score = |why: String| ScoreError::NoScore { path: path.into(), why };
+        let of_json = |error: serde_json::Error| no_score(format!("line {}: {error}", error.line()));
+        let text = unseal_json(&text).map_err(|error| no_score(error.to_string()))?.text;
+        let FormOnly { format } = serde_json::from_str(&text).map_err(of_json)?;
+        if format != SCORE_FORMAT {
+            return Err(no_score(format!("a score in form {format}, but this program reads form {SCORE_FORMAT}")));
         }
-        let result = |(case, contestant): (&Case, &Contestant)| {
-            journal.finished().get(&(case.subject.id.clone(), contestant.record.name.clone())).cloned()
-        };
-        let results: Vec<JobResult> = self.all().filter_map(result).collect();
-        let subjects: Vec<_> = self.cases.iter().map(|case| case.subject.clone()).collect();
-        let jobs = judge(&subjects, results);
-        Ok(Some(Score { record: self.plan.record(), command: journal.command().to_owned(), subjects, jobs }))
-    }
-
-    /// Returns all jobs in the order of the score.
-    fn all(&self) -> impl Iterator<Item = (&Case, &Contestant)> {
-        self.cases.iter().flat_map(move |case| {
-            self.plan.games[case.game].contestants.iter().map(move |contestant| (case, contestant))
-        })
-    }
-
-    /// Runs job after job on one thread.
-    fn work(&self, open: &[(&Case, &Contestant)], shared: &Mutex<Shared>, watch: &ScoreCallbacks) {
-        loop {
-            let (case, contestant) = {
-                let mut shared = lock(shared);
-                if shared.failure.is_some() || shared.is_stopped {
-                    return;
-                }
-                shared.next += 1;
-                match open.get(shared.next - 1) {
-                    Some(job) => *job,
-                    None => return,
-                }
-            };
-            let done = self.job(case, contestant, watch);
-            let mut shared = lock(shared);
-            match done {
-                Ok(Some(result)) => match shared.journal.push(result) {
-                    Ok(()) => (watch.progress)(1),
-                    Err(error) => {
-                        shared.failure.get_or_insert(error);
-                    }
-                },
-                Ok(None) => shared.is_stopped = true,
-                Err(error) => {
-                    shared.failure.get_or_insert(error);
-                }
-            }
-        }
-    }
-
-    fn job(
-        &self,
-        case: &Case,
-        contestant: &Contestant,
-        watch: &ScoreCallbacks,
-    ) -> Result<Option<JobResult>, ScoreError> {
-        if (watch.stop)() {
-            return Ok(None);
-        }
-        let tested = &self.plan.games[case.game];
-        let mutant = case.mutant(tested.game);
-        let clock = JobClock::start(self.plan.clock);
-        let trial = Trial {
-            game: &mutant,
-            mode: &case.mode,
-            level: case.level,
-            name: &case.name,
-            contestant,
-            detectors: &tested.detectors,
-            budget: self.plan.budget,
-            shortens: case.subject.class().is_some(),
-            clock,
-            stop: watch.stop,
-        };
-        let done = hear(|| match &contestant.means {
-            Means::Plays(player) => play(&trial, player),
-            Means::Explores(explorer) => search(&trial, explorer),
-        });
-        let result = done.unwrap_or_else(|message| {
-            let broken = Breakage { detector: "panic", tick: 0, message };
-            Ok(Some(JobResult::broken(broken, trial.clock.seconds())))
-        })?;
-        let (subject, tester) = (case.subject.id.clone(), contestant.record.name.clone());
-        Ok(result.map(|result| JobResult { subject, tester, ..result }))
+        serde_json::from_str(&text).map_err(of_json)
     }
 }
 
-fn lock<'a, 'b>(shared: &'a Mutex<Shared<'b>>) -> MutexGuard<'a, Shared<'b>> {
-    shared.lock().unwrap_or_else(PoisonError::into_inner)
+/// The part of the file that is read before its form is known.
+#[derive(Deserialize)]
+struct FormOnly {
+    format: u32,
+}
+
+/// Returns the JSON of some items, a line each.
+fn lines(items: &[impl Serialize]) -> serde_json::Result<String> {
+    let mut text = String::new();
+    for (index, item) in items.iter().enumerate() {
+        text.push_str(if index == 0 { "\n" } else { ",\n" });
+        text.push_str(&serde_json::to_string(item)?);
+    }
+    Ok(text)
 }
 
 // The plan of a score.
@@ -404,6 +327,163 @@ fn end_of(result: Option<&EpisodeResult>) -> String {
     format!("{how} {}", result.ticks)
 }
 
+// The run of all testers on all subjects, on all cores.
+
+/// The callbacks of a running score.
+pub struct ScoreCallbacks<'a> {
+    /// Receives how many more jobs have finished; called from several threads.
+    pub progress: &'a (dyn Fn(u64) + Sync),
+    /// Returns true to stop; finished jobs are kept.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+/// A score in progress.
+pub struct ScoreRun<'a> {
+    plan: &'a ScorePlan<'a>,
+    cases: Vec<Case>,
+}
+
+/// The state that the threads share.
+struct Shared<'a> {
+    next: usize,
+    journal: &'a mut ScoreJournal,
+    failure: Option<ScoreError>,
+    is_stopped: bool,
+}
+
+impl<'a> ScoreRun<'a> {
+    /// Checks the plan, and reads all levels.
+    ///
+    /// # Errors
+    ///
+    /// The plan tests nothing, or something in the set cannot be played.
+    pub fn new(plan: &'a ScorePlan<'a>) -> Result<Self, ScoreError> {
+        plan.check()?;
+        Ok(Self { plan, cases: cases(plan)? })
+    }
+
+    /// Returns the number of jobs: each tester on each subject of its game.
+    pub fn jobs(&self) -> u64 {
+        self.cases.iter().map(|case| self.plan.games[case.game].contestants.len() as u64).sum()
+    }
+
+    /// Runs all jobs that the journal does not have, and judges all of them; `None` if `stop` returned true.
+    ///
+    /// Each job runs on one thread. Its results, apart from the times, depend on the plan's budget, the tester and the
+    /// subject alone. A mutant that makes a tester panic is a finding.
+    ///
+    /// # Errors
+    ///
+    /// A tester cannot play at all, or the journal cannot be written.
+    pub fn run(&self, journal: &mut ScoreJournal, watch: &ScoreCallbacks) -> Result<Option<Score>, ScoreError> {
+        let is_open = |(case, contestant): &(&Case, &Contestant)| {
+            let key = (case.subject.id.clone(), contestant.record.name.clone());
+            !journal.finished().contains_key(&key)
+        };
+        let open: Vec<(&Case, &Contestant)> = self.all().filter(is_open).collect();
+        let threads = self.plan.threads.clamp(1, open.len().max(1));
+        let shared = Mutex::new(Shared { next: 0, journal: &mut *journal, failure: None, is_stopped: false });
+        thread::scope(|scope| {
+            for _ in 1..threads {
+                // With fewer threads than asked for, the score only takes longer.
+                let _ = Builder::new().spawn_scoped(scope, || self.work(&open, &shared, watch));
+            }
+            self.work(&open, &shared, watch);
+        });
+        let Shared { failure, is_stopped, .. } = shared.into_inner().unwrap_or_else(PoisonError::into_inner);
+        match failure {
+            Some(error) => return Err(error),
+            None if is_stopped => return Ok(None),
+            None => {}
+        }
+        let result = |(case, contestant): (&Case, &Contestant)| {
+            journal.finished().get(&(case.subject.id.clone(), contestant.record.name.clone())).cloned()
+        };
+        let results: Vec<JobResult> = self.all().filter_map(result).collect();
+        let subjects: Vec<_> = self.cases.iter().map(|case| case.subject.clone()).collect();
+        let jobs = judge(&subjects, results);
+        Ok(Some(Score { record: self.plan.record(), command: journal.command().to_owned(), subjects, jobs }))
+    }
+
+    /// Returns all jobs in the order of the score.
+    fn all(&self) -> impl Iterator<Item = (&Case, &Contestant)> {
+        self.cases.iter().flat_map(move |case| {
+            self.plan.games[case.game].contestants.iter().map(move |contestant| (case, contestant))
+        })
+    }
+
+    /// Runs job after job on one thread.
+    fn work(&self, open: &[(&Case, &Contestant)], shared: &Mutex<Shared>, watch: &ScoreCallbacks) {
+        loop {
+            let (case, contestant) = {
+                let mut shared = lock(shared);
+                if shared.failure.is_some() || shared.is_stopped {
+                    return;
+                }
+                shared.next += 1;
+                match open.get(shared.next - 1) {
+                    Some(job) => *job,
+                    None => return,
+                }
+            };
+            let done = self.job(case, contestant, watch);
+            let mut shared = lock(shared);
+            match done {
+                Ok(Some(result)) => match shared.journal.push(result) {
+                    Ok(()) => (watch.progress)(1),
+                    Err(error) => {
+                        shared.failure.get_or_insert(error);
+                    }
+                },
+                Ok(None) => shared.is_stopped = true,
+                Err(error) => {
+                    shared.failure.get_or_insert(error);
+                }
+            }
+        }
+    }
+
+    fn job(
+        &self,
+        case: &Case,
+        contestant: &Contestant,
+        watch: &ScoreCallbacks,
+    ) -> Result<Option<JobResult>, ScoreError> {
+        if (watch.stop)() {
+            return Ok(None);
+        }
+        let tested = &self.plan.games[case.game];
+        let mutant = case.mutant(tested.game);
+        let clock = JobClock::start(self.plan.clock);
+        let trial = Trial {
+            game: &mutant,
+            mode: &case.mode,
+            level: case.level,
+            name: &case.name,
+            contestant,
+            detectors: &tested.detectors,
+            budget: self.plan.budget,
+            shortens: case.subject.class().is_some(),
+            clock,
+            stop: watch.stop,
+        };
+        let done = hear(|| match &contestant.means {
+            Means::Plays(player) => play(&trial, player),
+            Means::Explores(explorer) => search(&trial, explorer),
+        });
+        let result = done.unwrap_or_else(|message| {
+            let broken = Breakage { detector: "panic", tick: 0, message };
+            Ok(Some(JobResult::broken(broken, trial.clock.seconds())))
+        })?;
+        let (subject, tester) = (case.subject.id.clone(), contestant.record.name.clone());
+        Ok(result.map(|result| JobResult { subject, tester, ..result }))
+    }
+}
+
+fn lock<'a, 'b>(shared: &'a Mutex<Shared<'b>>) -> MutexGuard<'a, Shared<'b>> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
 // Subjects, ready to be played.
 
 /// A subject, and its levels and rules.
@@ -495,11 +575,12 @@ fn cases_of(plan: &ScorePlan, index: usize, tested: &TestedGame) -> Result<Vec<C
 }
 
 #[cfg(test)]
-mod job_tests {
+mod tests {
     use super::*;
+    use crate::score::testing::{job, mutant, record};
 
     #[test]
-    fn ends_are_told_apart() {
+    fn ends_are_distinguished() {
         let result =
             EpisodeResult { level: 3, end: EpisodeEnd::LOST, success: false, ticks: 9, clipped: 0, total_reward: 0.0 };
         let late = EpisodeResult { end: EpisodeEnd::Truncated, ..result };
@@ -537,5 +618,38 @@ mod job_tests {
         assert_eq!(text, expected);
         assert_eq!(serde_json::from_str::<JobResult>(&text).expect("reads back"), result);
         assert!(result.is_solved() && !JobResult::default().is_solved());
+    }
+
+    #[test]
+    fn a_score_is_written_in_lines_and_reads_back() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("score.json");
+        let score = Score {
+            record: record("garden", &["random"]),
+            command: "playbot bugs score set --out \"a b.json\"".to_owned(),
+            subjects: vec![mutant("garden", "a", "panic"), mutant("garden", "b", "panic")],
+            jobs: vec![job("a", "random", true), job("b", "random", false)],
+        };
+        score.write(&path).expect("writable");
+        assert_eq!(Score::read(&path).expect("readable"), score);
+        assert_eq!(fs::read_to_string(&path).expect("readable").lines().count(), 7);
+        let empty = Score { subjects: Vec::new(), jobs: Vec::new(), ..score };
+        empty.write(&path).expect("writable");
+        assert_eq!(Score::read(&path).expect("readable"), empty);
+    }
+
+    #[test]
+    fn what_is_no_score_is_refused_with_what_is_wrong() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("score.json");
+        let said = |text: &str| {
+            fs::write(&path, text).expect("writable");
+            Score::read(&path).expect_err("no score").to_string()
+        };
+        let none = Score::read(&folder.path().join("none.json")).expect_err("no file").to_string();
+        assert!(none.contains("none.json") && none.contains("name an existing file"), "{none}");
+        assert!(said("{").contains("score.json: line 1: "));
+        assert!(said("{\"format\":1}").contains("missing field"));
+        assert!(said("{\"format\":9}").contains("a score in form 9, but this program reads form 1"));
     }
 }

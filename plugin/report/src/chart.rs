@@ -105,6 +105,57 @@ impl Chart {
     }
 }
 
+/// A vertical mark with its position in the drawing. Labels stand above the plot, in as few rows as possible.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Mark {
+    pub label: String,
+    /// Position of the line in pixels.
+    pub x: f64,
+    /// Row of the label, 0 just above the plot.
+    pub row: usize,
+    /// True if the label is left of the line, for lack of room at its right.
+    pub label_left: bool,
+}
+
+impl Mark {
+    /// Positions the marks that can be drawn, in a drawing of the given width, with a font size in pixels.
+    ///
+    /// Labels do not overlap. As far as possible, the line of a mark misses the labels of others: the line of the
+    /// leftmost mark is the longest.
+    pub fn place(marks: &[(String, f64)], width: f64, size: f64, px: impl Fn(f64) -> f64) -> Vec<Self> {
+        let mut placed: Vec<PlacedMark> = marks
+            .iter()
+            .filter(|(_, x)| is_drawable(*x))
+            .map(|(label, x)| {
+                let (x, room) = (px(*x), text_width(label, size) + 8.0);
+                let label_left = x + room > width;
+                let (start, end) = if label_left { (x - room, x) } else { (x, x + room) };
+                PlacedMark { mark: Self { label: label.clone(), x, row: 0, label_left }, start, end }
+            })
+            .collect();
+        // Labels at the right of their line from right to left, then those at the left from left to right.
+        placed.sort_by(|a, b| {
+            let (a, b) = (&a.mark, &b.mark);
+            let by_x = if a.label_left { a.x.total_cmp(&b.x) } else { b.x.total_cmp(&a.x) };
+            a.label_left.cmp(&b.label_left).then(by_x)
+        });
+        for i in 1..placed.len() {
+            let (before, rest) = placed.split_at_mut(i);
+            let PlacedMark { mark, start, end } = &mut rest[0];
+            let overlapping = before.iter().filter(|other| other.start < *end && *start < other.end);
+            mark.row = overlapping.map(|other| other.mark.row + 1).max().unwrap_or(0);
+        }
+        placed.into_iter().map(|placed| placed.mark).collect()
+    }
+}
+
+/// A mark, with the ends of its label.
+struct PlacedMark {
+    mark: Mark,
+    start: f64,
+    end: f64,
+}
+
 // SVG paths of a curve: gaps, bands, and no more points than pixels.
 
 /// A point on the drawing, in pixels, with its band.
@@ -272,61 +323,8 @@ fn round_step(step: f64) -> f64 {
     rounded * power
 }
 
-// Layout of the labels of vertical marks: above the plot, in as few rows as possible.
-
-/// A mark with its position in the drawing.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Mark {
-    pub label: String,
-    /// Position of the line in pixels.
-    pub x: f64,
-    /// Row of the label, 0 just above the plot.
-    pub row: usize,
-    /// True if the label is left of the line, for lack of room at its right.
-    pub label_left: bool,
-}
-
-/// A mark, with the ends of its label.
-struct PlacedMark {
-    mark: Mark,
-    start: f64,
-    end: f64,
-}
-
-impl Mark {
-    /// Positions the marks that can be drawn, in a drawing of the given width, with a font size in pixels.
-    ///
-    /// Labels do not overlap. As far as possible, the line of a mark misses the labels of others: the line of the
-    /// leftmost mark is the longest.
-    pub fn place(marks: &[(String, f64)], width: f64, size: f64, px: impl Fn(f64) -> f64) -> Vec<Self> {
-        let mut placed: Vec<PlacedMark> = marks
-            .iter()
-            .filter(|(_, x)| is_drawable(*x))
-            .map(|(label, x)| {
-                let (x, room) = (px(*x), text_width(label, size) + 8.0);
-                let label_left = x + room > width;
-                let (start, end) = if label_left { (x - room, x) } else { (x, x + room) };
-                PlacedMark { mark: Self { label: label.clone(), x, row: 0, label_left }, start, end }
-            })
-            .collect();
-        // Labels at the right of their line from right to left, then those at the left from left to right.
-        placed.sort_by(|a, b| {
-            let (a, b) = (&a.mark, &b.mark);
-            let by_x = if a.label_left { a.x.total_cmp(&b.x) } else { b.x.total_cmp(&a.x) };
-            a.label_left.cmp(&b.label_left).then(by_x)
-        });
-        for i in 1..placed.len() {
-            let (before, rest) = placed.split_at_mut(i);
-            let PlacedMark { mark, start, end } = &mut rest[0];
-            let overlapping = before.iter().filter(|other| other.start < *end && *start < other.end);
-            mark.row = overlapping.map(|other| other.mark.row + 1).max().unwrap_or(0);
-        }
-        placed.into_iter().map(|placed| placed.mark).collect()
-    }
-}
-
 #[cfg(test)]
-mod line_tests {
+mod tests {
     use super::*;
 
     #[test]
@@ -357,11 +355,6 @@ mod line_tests {
         assert!(parts[0].len() < 2500, "{}", parts[0].len());
         assert!(parts[0].iter().any(|d| d.y == 9.0));
     }
-}
-
-#[cfg(test)]
-mod axis_tests {
-    use super::*;
 
     #[test]
     fn round_ticks() {
@@ -403,11 +396,6 @@ mod axis_tests {
         let axis = Axis::rounded([90.0, 97.0].into_iter(), 5);
         assert!(axis.low >= 88.0, "{axis:?}");
     }
-}
-
-#[cfg(test)]
-mod mark_tests {
-    use super::*;
 
     #[test]
     fn lines_do_not_run_through_labels() {

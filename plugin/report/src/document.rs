@@ -134,8 +134,6 @@ impl Section {
     }
 }
 
-// Tables in Markdown.
-
 /// Escapes text, which then neither ends a cell of a table nor begins anything in Markdown.
 pub fn markdown_cell(text: &str) -> String {
     let mut out = String::new();
@@ -156,7 +154,7 @@ pub fn markdown_row(cells: &[String]) -> String {
 }
 
 #[cfg(test)]
-mod markdown_tests {
+mod tests {
     use super::*;
 
     #[test]

@@ -2,7 +2,8 @@
 //!
 //! Everything here is a function of its input: the same data give the same bytes. The modules, in reading order:
 //!
-//! - [`number`]: numbers for people, and [`ResultTable`] with [`ResultRow`]s, rounded by their errors.
+//! - [`number`]: numbers for people.
+//! - [`ResultTable`]: [`ResultRow`]s of methods, rounded by their errors.
 //! - [`statistics`]: intervals by bootstrap, interquartile means, [`PairedDifference`]s, Holm's correction.
 //! - [`text_table`]: tables on a console. A [`PlainTable`] holds any text.
 //! - [`chart`]: the data of line charts. [`to_svg`] draws [`Chart`]s, [`mod@sparkline`] a curve in one line of text.
@@ -22,6 +23,7 @@ pub mod chart;
 mod document;
 pub mod escape;
 pub mod number;
+mod results;
 pub mod sparkline;
 pub mod statistics;
 mod svg;
@@ -33,7 +35,8 @@ pub mod text_table;
 pub use crate::{
     chart::{Chart, Curve},
     document::{Report, ReportError, Section, markdown_cell, markdown_row},
-    number::{ResultRow, ResultTable, percent, readable, readable_with_spread, ticks, times, whole},
+    number::{percent, readable, readable_with_spread, ticks, times, whole},
+    results::{ResultRow, ResultTable},
     sparkline::sparkline,
     statistics::PairedDifference,
     svg::to_svg,

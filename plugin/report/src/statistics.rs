@@ -1,4 +1,7 @@
 //! Statistics over runs that differ only in their seed.
+//!
+//! Intervals and comparisons for few runs follow Agarwal et al. 2021, "Deep reinforcement learning at the edge of the
+//! statistical precipice". Their scores are of several seeds, each on the same levels.
 
 use playbot_learner::rng::{ChaCha8Rng, Streams, below};
 use serde::Serialize;
@@ -77,8 +80,7 @@ pub fn mean_curve(curves: &[Vec<(u64, f64)>]) -> Vec<MeanPoint> {
     steps.into_iter().filter_map(point).collect()
 }
 
-// Intervals and comparisons for few runs (Agarwal et al. 2021, "Deep reinforcement learning at the edge of the
-// statistical precipice"). Scores are of several seeds, each on the same levels.
+// Intervals and comparisons for few runs.
 
 /// Draws of a bootstrap.
 const DRAWS: u64 = 1000;
@@ -176,8 +178,6 @@ fn choices(n: usize, rng: &mut ChaCha8Rng) -> Vec<usize> {
     (0..n).map(|_| below(rng, n as u64) as usize).collect()
 }
 
-// Paired differences of two methods on the same levels with the same seeds.
-
 /// Difference between the returns of two methods.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PairedDifference {
@@ -256,6 +256,7 @@ pub fn holm(p_values: &[f64]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use playbot_learner::rng::{Streams, normal};
 
     #[test]
     fn mean_and_sample_deviation() {
@@ -307,12 +308,6 @@ mod tests {
         assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
         assert_eq!((median(vec![7.0]), median(Vec::new())), (Some(7.0), None));
     }
-}
-
-#[cfg(test)]
-mod bootstrap_tests {
-    use super::*;
-    use playbot_learner::rng::normal;
 
     #[test]
     fn the_middle_half_is_averaged() {
@@ -384,13 +379,6 @@ mod bootstrap_tests {
         assert_eq!(probability_of_improvement(&[&[1.0]], &[&[1.0, 2.0]]), None);
         assert_eq!(mean(&[]), None);
     }
-}
-
-#[cfg(test)]
-mod paired_tests {
-    use playbot_learner::rng::{Streams, normal};
-
-    use super::*;
 
     fn is_clear(difference: &PairedDifference) -> Option<bool> {
         difference.p_value().map(|p| p < 0.05)
@@ -438,13 +426,13 @@ mod paired_tests {
         // Seeds deviate by 1, levels by 2, the rest by 3: the variance of the mean is 1/4 + 4/40 + 9/160.
         let found = of_equals(4, 40, [1.0, 2.0, 3.0], 2000);
         let mean = |value: fn(&PairedDifference) -> f64| found.iter().map(value).sum::<f64>() / found.len() as f64;
-        let (variance, squares, told) = (0.25 + 0.1 + 0.05625, mean(|d| d.mean.powi(2)), mean(|d| d.se.powi(2)));
+        let (variance, squares, reported) = (0.25 + 0.1 + 0.05625, mean(|d| d.mean.powi(2)), mean(|d| d.se.powi(2)));
         assert!((squares / variance - 1.0).abs() < 0.1, "{squares}");
-        assert!((told / variance - 1.0).abs() < 0.1, "{told}");
+        assert!((reported / variance - 1.0).abs() < 0.1, "{reported}");
     }
 
     #[test]
-    fn equals_are_told_apart_in_one_of_twenty_studies_at_most() {
+    fn equals_are_distinguished_in_one_of_twenty_studies_at_most() {
         for (seeds, deviations) in
             [(2, [1.0, 0.5, 1.0]), (3, [1.0, 0.1, 0.5]), (5, [1.0, 0.1, 0.5]), (3, [0.1, 1.0, 2.0])]
         {

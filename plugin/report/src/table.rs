@@ -2,7 +2,8 @@
 
 use crate::{
     escape::{escape, one_line},
-    number::{Rank, ResultRow, ResultTable, UNKNOWN, decimals_for, fixed, mean_and_error, percent, rank_key, ranks},
+    number::{UNKNOWN, decimals_for, fixed, mean_and_error, percent},
+    results::{Rank, ResultRow, ResultTable, rank_key, ranks},
     text_table::{NO_SUCCESS, has_no_success},
 };
 use std::fmt::Write;
@@ -16,6 +17,31 @@ pub struct PlainTable {
     pub columns: Vec<String>,
     /// The cells, row by row; missing ones stay empty. Columns whose cells are numbers are right-aligned.
     pub rows: Vec<Vec<String>>,
+}
+
+impl PlainTable {
+    /// Returns the table for the console, with aligned columns; ends with a line feed.
+    pub fn to_text(&self) -> String {
+        let numbers = number_columns(self);
+        let rows: Vec<Vec<String>> = std::iter::once(&self.columns)
+            .chain(&self.rows)
+            .map(|row| (0..numbers.len()).map(|c| row.get(c).map_or(String::new(), |cell| one_line(cell))).collect())
+            .collect();
+        let width = |c: usize| rows.iter().map(|row| row[c].chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..numbers.len()).map(width).collect();
+        let line = |row: &[String]| {
+            let cells = row.iter().zip(&widths).zip(&numbers).map(|((cell, &width), number)| {
+                if *number { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
+            });
+            cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
+        };
+        let ruler: Vec<String> = widths.iter().map(|width| "-".repeat(*width)).collect();
+        let mut out = if self.caption.is_empty() { String::new() } else { one_line(&self.caption) + "\n" };
+        out += &line(&rows[0]);
+        out += &line(&ruler);
+        rows[1..].iter().for_each(|row| out += &line(row));
+        out
+    }
 }
 
 /// A table of a section.
@@ -196,37 +222,10 @@ fn ends(row: &ResultRow) -> Option<(f64, f64)> {
     (ends.0.abs() <= 1e300 && ends.1.abs() <= 1e300).then_some(ends)
 }
 
-// Tables of text for the console.
-
-impl PlainTable {
-    /// Returns the table for the console, with aligned columns; ends with a line feed.
-    pub fn to_text(&self) -> String {
-        let numbers = number_columns(self);
-        let rows: Vec<Vec<String>> = std::iter::once(&self.columns)
-            .chain(&self.rows)
-            .map(|row| (0..numbers.len()).map(|c| row.get(c).map_or(String::new(), |cell| one_line(cell))).collect())
-            .collect();
-        let width = |c: usize| rows.iter().map(|row| row[c].chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..numbers.len()).map(width).collect();
-        let line = |row: &[String]| {
-            let cells = row.iter().zip(&widths).zip(&numbers).map(|((cell, &width), number)| {
-                if *number { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
-            });
-            cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
-        };
-        let ruler: Vec<String> = widths.iter().map(|width| "-".repeat(*width)).collect();
-        let mut out = if self.caption.is_empty() { String::new() } else { one_line(&self.caption) + "\n" };
-        out += &line(&rows[0]);
-        out += &line(&ruler);
-        rows[1..].iter().for_each(|row| out += &line(row));
-        out
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::number::sample_rows;
+    use crate::results::sample_rows;
 
     #[test]
     fn results_have_bars_and_one_best_per_split() {
@@ -273,11 +272,6 @@ mod tests {
         assert!(html.contains("<tr><td class=\"number\">7</td><td></td></tr>"), "{html}");
         assert!(Table::from(PlainTable::default()).to_html().contains("nothing"));
     }
-}
-
-#[cfg(test)]
-mod plain_text_tests {
-    use super::*;
 
     #[test]
     fn words_are_left_and_numbers_right() {

@@ -1,6 +1,6 @@
 //! Tests of whole charts and reports.
 
-use crate::{number::sample_rows, *};
+use crate::{results::sample_rows, *};
 
 fn chart(curves: Vec<Curve>) -> Chart {
     Chart { title: "Return".into(), x_label: "steps".into(), y_label: "return".into(), curves, ..Chart::default() }

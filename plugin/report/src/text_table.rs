@@ -2,7 +2,8 @@
 
 use crate::{
     escape::one_line,
-    number::{Rank, ResultRow, ResultTable, UNKNOWN, decimals_for, fixed, mean_and_error, percent, rank_key, ranks},
+    number::{UNKNOWN, decimals_for, fixed, mean_and_error, percent},
+    results::{Rank, ResultRow, ResultTable, rank_key, ranks},
 };
 
 const HEADINGS: [&str; 7] = ["method", "split", "episodes", "return", "success", "length", "steps/s"];
@@ -97,7 +98,7 @@ fn cells(row: &ResultRow, decimals: usize) -> [String; 7] {
     ]
 }
 
-// Estimated width of text in a drawing: the reader's font is unknown.
+// Estimated width of text in a drawing.
 
 /// Returns the width of `text` in pixels at a font size in pixels; rather too wide than too narrow.
 pub fn text_width(text: &str, size: f64) -> f64 {
@@ -152,7 +153,7 @@ pub(crate) fn spread(wanted: &[f64], height: f64, top: f64, bottom: f64) -> Vec<
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::number::sample_rows;
+    use crate::results::sample_rows;
 
     #[test]
     fn columns_are_aligned_and_the_best_is_marked() {
@@ -198,11 +199,6 @@ mod tests {
         assert!(text.contains("\n> PPO") && text.ends_with("> reference, not measured here\n"), "{text}");
         assert_eq!(to_text_table(&[]), "no results\n");
     }
-}
-
-#[cfg(test)]
-mod text_width_tests {
-    use super::*;
 
     #[test]
     fn lines_break_at_spaces() {

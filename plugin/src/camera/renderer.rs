@@ -108,7 +108,7 @@ fn run(world: &mut World) {
     world.clear_trackers();
 }
 
-// Bevy's systems after `Update` that prepare a scene for drawing, to be run in the middle of a tick.
+// Bevy's systems that prepare a scene for drawing.
 
 /// Adds the parts of the renderer that the app lacks.
 pub(super) fn add_renderer(app: &mut App, render_creation: RenderCreation) {
@@ -136,7 +136,8 @@ fn add<P: Plugin>(app: &mut App, plugin: P) {
     }
 }
 
-/// Bevy's own systems, in schedules without systems of the game.
+/// Bevy's own systems after `Update` that prepare a scene for drawing, in schedules without systems of the game. So
+/// they run in the middle of a tick.
 ///
 /// Most of them are private to Bevy. They are taken from an app that contains nothing else.
 pub(super) struct SceneSchedule {

@@ -399,7 +399,7 @@ pub(super) fn render_target(image: Handle<Image>) -> bevy::camera::RenderTarget 
 }
 
 #[cfg(test)]
-mod atlas_tests {
+mod tests {
     use super::*;
 
     #[test]

@@ -120,14 +120,14 @@ fn bounds(transform: &GlobalTransform, aabb: &Aabb) -> Rect {
     Rect::from_center_half_size(centre.truncate(), half.truncate())
 }
 
-// Drawing of many sensors' views with the work of one camera, in the render World.
-//
-// Bevy prepares the shared camera as any other: it extracts, specialises, queues and sorts everything once. Before
-// buffers are filled, the sorted items are distributed to one phase for each view that they intersect. All views are
-// then drawn in one pass, each with its own view uniform, viewport and scissor. Items that Bevy keeps in bins
-// (opaque 2D meshes) are few and are drawn for each view.
+// Views of many sensors, drawn in the render World with the work of one camera.
 
 /// Replaces Bevy's 2D rendering of the shared camera.
+///
+/// Bevy prepares the shared camera as any other: it extracts, specialises, queues and sorts everything once. Before
+/// buffers are filled, the sorted items are distributed to one phase for each view that they intersect. All views are
+/// then drawn in one pass, each with its own view uniform, viewport and scissor. Items that Bevy keeps in bins
+/// (opaque 2D meshes) are few and are drawn for each view.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct DrawSensorViews;
 

@@ -2,6 +2,13 @@
 //!
 //! A file begins as text, so `head` shows its contents, and goes on with one frame per episode:
 //!
+//! The files of the folder, in reading order:
+//!
+//! - `header`, `episode`: the header, and one episode in memory.
+//! - `writer`, `reader`, [`mod@repair`]: writing, reading, and recovery of a damaged recording.
+//! - `preamble`, `bytes`: the text at the top of the file, and the bytes of a frame.
+//! - `error`: errors, and their messages.
+//!
 //! ```text
 //! playbot-demo header=00000214 crc32=5d3a90c1     magic line: length and checksum of the header
 //! (
@@ -154,8 +161,6 @@ impl DemoSummary {
     }
 }
 
-// Search for recordings.
-
 /// Returns the recordings at `path`: the file itself, or all `*.demo` files in a folder and its subfolders,
 /// sorted by path. Links to folders are not followed.
 ///
@@ -196,25 +201,7 @@ fn list(folder: &Path, folders: &mut Vec<PathBuf>, found: &mut Vec<PathBuf>) -> 
     Ok(())
 }
 
-// Merging of the recordings of many testers.
-
-/// The result of a merge.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MergeReport {
-    /// Header of the new file.
-    pub header: DemoHeader,
-    /// Each merged file with its number of episodes, in order.
-    pub files: Vec<(PathBuf, usize)>,
-    /// Ticks over all episodes.
-    pub steps: usize,
-}
-
-impl MergeReport {
-    /// Episodes of the new file.
-    pub fn episodes(&self) -> usize {
-        self.files.iter().map(|(_, episodes)| episodes).sum()
-    }
-}
+// Merging of recordings.
 
 /// Writes the episodes of several recordings of one game into a new file, in the order of `files`.
 ///
@@ -266,6 +253,24 @@ pub fn merge_demos(files: &[impl AsRef<Path>], out: impl AsRef<Path>) -> Result<
     Ok(report)
 }
 
+/// The result of a merge.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MergeReport {
+    /// Header of the new file.
+    pub header: DemoHeader,
+    /// Each merged file with its number of episodes, in order.
+    pub files: Vec<(PathBuf, usize)>,
+    /// Ticks over all episodes.
+    pub steps: usize,
+}
+
+impl MergeReport {
+    /// Episodes of the new file.
+    pub fn episodes(&self) -> usize {
+        self.files.iter().map(|(_, episodes)| episodes).sum()
+    }
+}
+
 /// Returns whether two paths lead to one file.
 fn is_same(one: &Path, other: &Path) -> bool {
     match (one.canonicalize(), other.canonicalize()) {
@@ -299,152 +304,4 @@ fn common_header(first: &Path, readers: &[DemoReader]) -> Result<DemoHeader, Dem
     }
     common.demonstrator = names.join(", ");
     Ok(common)
-}
-
-#[cfg(test)]
-mod summary_tests {
-    use super::*;
-    use crate::demo::file::testing::{episode, write};
-
-    #[test]
-    fn numbers_by_hand() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let lost = |seed, steps, end| crate::demo::file::episode::DemoEpisode {
-            end,
-            rewards: vec![0.0; steps],
-            ..episode(seed, steps)
-        };
-        let episodes = [
-            episode(7, 4),
-            lost(7, 6, DemoEnd::Terminated { success: false }),
-            lost(9, 10, DemoEnd::Truncated),
-            lost(9, 0, DemoEnd::Truncated),
-            lost(2, 0, DemoEnd::Aborted),
-        ];
-        let summary = DemoSummary::read(write(folder.path(), "a.demo", &episodes)).expect("sound");
-        assert_eq!((summary.episodes, summary.steps, summary.levels), (5, 20, 3));
-        assert_eq!((summary.successes, summary.failures, summary.truncated, summary.aborted), (1, 1, 2, 1));
-        assert_eq!(
-            (summary.success_share, summary.return_mean, summary.length_mean),
-            (Some(0.25), Some(2.0), Some(4.0))
-        );
-        assert_eq!((summary.level_seed_min, summary.level_seed_max), (Some(2), Some(9)));
-        let deciders: Vec<_> = summary.steps_by_decider.clone().into_iter().collect();
-        assert_eq!(deciders, [(Decider::Human, 6), (Decider::Bot, 14)]);
-        let json = serde_json::to_string(&summary).expect("serialises");
-        assert_eq!(serde_json::from_str::<DemoSummary>(&json).expect("reads back"), summary);
-        assert!(json.contains("\"success_share\":0.25"), "{json}");
-    }
-
-    #[test]
-    fn an_empty_recording_has_no_means() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let summary = DemoSummary::read(write(folder.path(), "a.demo", &[])).expect("sound");
-        assert_eq!((summary.episodes, summary.success_share, summary.level_seed_min), (0, None, None));
-    }
-}
-
-#[cfg(test)]
-mod find_tests {
-    use super::*;
-
-    #[test]
-    fn folders_are_searched_in_order() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let root = folder.path();
-        fs::create_dir_all(root.join("b/deep")).expect("created");
-        fs::create_dir_all(root.join("folder.demo")).expect("created");
-        for name in ["z.demo", "b/deep/1.demo", "a.demo", "a.demo.bak", "notes.txt"] {
-            fs::write(root.join(name), "").expect("written");
-        }
-        let found = find_demos(root).expect("found");
-        assert_eq!(found, ["a.demo", "b/deep/1.demo", "z.demo"].map(|n| root.join(n)));
-        assert_eq!(find_demos(root.join("z.demo")).expect("a file"), [root.join("z.demo")]);
-    }
-
-    #[test]
-    fn nothing_is_an_error() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        assert!(matches!(find_demos(folder.path()).expect_err("empty").fault, DemoFault::NoDemos));
-        let missing = find_demos(folder.path().join("missing")).expect_err("missing");
-        assert!(matches!(missing.fault, DemoFault::Io { .. }), "{missing}");
-    }
-}
-
-#[cfg(test)]
-mod merge_tests {
-    use super::*;
-    use crate::demo::file::testing::{episode, header, write};
-    use crate::demo::file::{episode::DemoEpisode, header::DemoActions};
-
-    fn write_as(folder: &Path, name: &str, header: DemoHeader, episodes: &[DemoEpisode]) -> PathBuf {
-        let path = folder.join(name);
-        let mut writer = DemoWriter::create(&path, header).expect("created");
-        episodes.iter().for_each(|episode| writer.push(episode).expect("written"));
-        path
-    }
-
-    #[test]
-    fn all_episodes_of_all_testers_are_in_the_merged_file() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let (a, b, c) = (episode(1, 5), episode(2, 3), episode(3, 4));
-        let one = write(folder.path(), "one.demo", &[a.clone(), b.clone()]);
-        let zoe = DemoHeader { demonstrator: "zoë".into(), note: "on the train".into(), ..header() };
-        let two = write_as(folder.path(), "two.demo", zoe, std::slice::from_ref(&c));
-        let out = folder.path().join("all.demo");
-        let report = merge_demos(&[&one, &two], &out).expect("merges");
-        assert_eq!((report.episodes(), report.steps), (3, 12));
-        assert_eq!(report.files, [(one, 2), (two, 1)]);
-        let reader = DemoReader::open(&out).expect("readable");
-        assert_eq!(reader.header().demonstrator, "tester, zoë");
-        assert_eq!(reader.header(), &report.header);
-        assert_eq!(reader.read_all().expect("whole"), [a, b, c]);
-    }
-
-    #[test]
-    fn files_that_do_not_belong_together_are_refused_by_name_and_nothing_is_written() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let one = write(folder.path(), "one.demo", &[episode(1, 5)]);
-        let out = folder.path().join("all.demo");
-        for (name, other, words) in [
-            ("game", DemoHeader { game: "maze".into(), ..header() }, "`maze`, not of `walk`"),
-            ("version", DemoHeader { game_version: 3, ..header() }, "version 3 of `walk`, but this is version 2"),
-            ("mode", DemoHeader { mode: "hard".into(), ..header() }, "mode `hard`"),
-            ("rate", DemoHeader { tick_hz: 30.0, ..header() }, "`tick_hz` is 30.0, but 60.0 in"),
-            ("actions", DemoHeader { actions: DemoActions::Discrete(5), ..header() }, "`actions` is Discrete(5)"),
-        ] {
-            let path = write_as(folder.path(), name, other, &[]);
-            let error = merge_demos(&[&one, &path], &out).expect_err(name);
-            assert_eq!(error.path, path);
-            assert!(error.to_string().contains(words), "{error}");
-            assert!(!out.exists(), "{name}");
-        }
-    }
-
-    #[test]
-    fn a_damaged_file_leaves_no_half_merge_behind() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let one = write(folder.path(), "one.demo", &[episode(1, 5)]);
-        let two = write(folder.path(), "two.demo", &[episode(2, 5)]);
-        let bytes = std::fs::read(&two).expect("readable");
-        std::fs::write(&two, &bytes[..bytes.len() - 3]).expect("writable");
-        let out = folder.path().join("all.demo");
-        let error = merge_demos(&[&one, &two], &out).expect_err("torn");
-        assert!(error.is_repairable() && error.path == two, "{error}");
-        assert!(!out.exists());
-    }
-
-    #[test]
-    fn the_same_file_twice_no_file_and_an_existing_one_are_errors() {
-        let folder = tempfile::tempdir().expect("temporary folder");
-        let one = write(folder.path(), "one.demo", &[episode(1, 5)]);
-        let out = folder.path().join("all.demo");
-        let twice = merge_demos(&[&one, &folder.path().join("./one.demo")], &out).expect_err("twice");
-        assert!(matches!(twice.fault, DemoFault::NamedTwice), "{twice}");
-        let nothing = merge_demos(&[] as &[&Path], &out).expect_err("nothing");
-        assert!(matches!(nothing.fault, DemoFault::NothingToMerge), "{nothing}");
-        let exists = merge_demos(&[&one], &one).expect_err("exists");
-        assert!(matches!(exists.fault, DemoFault::Exists), "{exists}");
-        assert_eq!(DemoReader::open(&one).and_then(DemoReader::read_all).expect("left alone").len(), 1);
-    }
 }

@@ -56,7 +56,7 @@ fn nobody_waits_for_worlds_that_have_left() {
 }
 
 #[test]
-fn rows_that_do_not_fit_are_told_to_all_of_the_group() {
+fn rows_that_do_not_fit_are_reported_to_all_of_the_group() {
     let policy = policy();
     let failed: Vec<String> = std::thread::scope(|scope| {
         let play = |(world, seat): (usize, SharedBatch)| {

@@ -99,10 +99,54 @@ impl Inverse {
     }
 }
 
-// Colours as light: tints and half-transparent pixels are mixed in linear light, as in an sRGB
-// render target.
-//
-// The curves are made of sums, products and divisions alone, so that they are the same on every machine.
+/// An affine map: three axes and the position of the origin.
+///
+/// Only sums and products in a fixed order, so the result is the same on every machine.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Pose {
+    pub x: Vec3,
+    pub y: Vec3,
+    pub z: Vec3,
+    pub at: Vec3,
+}
+
+impl Pose {
+    /// Returns the pose of a transform.
+    pub fn of(transform: &Transform) -> Self {
+        let Transform { translation: at, rotation, scale } = *transform;
+        if rotation == Quat::IDENTITY {
+            return Self { x: Vec3::X * scale.x, y: Vec3::Y * scale.y, z: Vec3::Z * scale.z, at };
+        }
+        let [i, j, k, w] = rotation.to_array();
+        let double = [i + i, j + j, k + k];
+        let squares = [i * double[0], j * double[1], k * double[2]];
+        let mixed = [j * double[2], i * double[2], i * double[1]];
+        let turned = [w * double[0], w * double[1], w * double[2]];
+        Self {
+            x: Vec3::new(1.0 - (squares[1] + squares[2]), mixed[2] + turned[2], mixed[1] - turned[1]) * scale.x,
+            y: Vec3::new(mixed[2] - turned[2], 1.0 - (squares[0] + squares[2]), mixed[0] + turned[0]) * scale.y,
+            z: Vec3::new(mixed[1] + turned[1], mixed[0] - turned[0], 1.0 - (squares[0] + squares[1])) * scale.z,
+            at,
+        }
+    }
+
+    /// Returns the pose of a child, or of an entity whose only parent is the stage.
+    pub fn child(parent: Option<&Pose>, transform: &Transform) -> Self {
+        let own = Self::of(transform);
+        parent.map_or(own, |parent| parent.then(&own))
+    }
+
+    /// Returns the pose at `inner` in the coordinates of this pose.
+    pub fn then(&self, inner: &Pose) -> Self {
+        Self { x: self.turn(inner.x), y: self.turn(inner.y), z: self.turn(inner.z), at: self.turn(inner.at) + self.at }
+    }
+
+    fn turn(&self, v: Vec3) -> Vec3 {
+        self.x * v.x + self.y * v.y + self.z * v.z
+    }
+}
+
+// Colours in linear light.
 
 /// A pixel: red, green, blue, alpha.
 pub(super) type Rgba = [u8; 4];
@@ -111,6 +155,8 @@ pub(super) type Rgba = [u8; 4];
 const BINS: usize = 4096;
 
 /// The sRGB transfer curve, both ways.
+///
+/// It is made of sums, products and divisions alone, so it is the same on every machine.
 pub(super) struct Curve {
     /// The light of each byte, 0 to 1.
     light: [f32; 256],
@@ -124,6 +170,8 @@ pub(super) struct Curve {
 pub(super) static SRGB: LazyLock<Curve> = LazyLock::new(Curve::new);
 
 /// The effect of a sprite's colour on its texels: factors in linear light, alpha last.
+///
+/// Tints and half-transparent pixels are mixed in linear light, as in an sRGB render target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Tint([f32; 4]);
 
@@ -207,57 +255,7 @@ fn fifth_root(x: f64) -> f64 {
     }
 }
 
-// Poses of entities in the coordinates of their stage.
-
-/// An affine map: three axes and the position of the origin.
-///
-/// Only sums and products in a fixed order, so the result is the same on every machine.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Pose {
-    pub x: Vec3,
-    pub y: Vec3,
-    pub z: Vec3,
-    pub at: Vec3,
-}
-
-impl Pose {
-    /// Returns the pose of a transform.
-    pub fn of(transform: &Transform) -> Self {
-        let Transform { translation: at, rotation, scale } = *transform;
-        if rotation == Quat::IDENTITY {
-            return Self { x: Vec3::X * scale.x, y: Vec3::Y * scale.y, z: Vec3::Z * scale.z, at };
-        }
-        let [i, j, k, w] = rotation.to_array();
-        let double = [i + i, j + j, k + k];
-        let squares = [i * double[0], j * double[1], k * double[2]];
-        let mixed = [j * double[2], i * double[2], i * double[1]];
-        let turned = [w * double[0], w * double[1], w * double[2]];
-        Self {
-            x: Vec3::new(1.0 - (squares[1] + squares[2]), mixed[2] + turned[2], mixed[1] - turned[1]) * scale.x,
-            y: Vec3::new(mixed[2] - turned[2], 1.0 - (squares[0] + squares[2]), mixed[0] + turned[0]) * scale.y,
-            z: Vec3::new(mixed[1] + turned[1], mixed[0] - turned[0], 1.0 - (squares[0] + squares[1])) * scale.z,
-            at,
-        }
-    }
-
-    /// Returns the pose of a child, or of an entity whose only parent is the stage.
-    pub fn child(parent: Option<&Pose>, transform: &Transform) -> Self {
-        let own = Self::of(transform);
-        parent.map_or(own, |parent| parent.then(&own))
-    }
-
-    /// Returns the pose at `inner` in the coordinates of this pose.
-    pub fn then(&self, inner: &Pose) -> Self {
-        Self { x: self.turn(inner.x), y: self.turn(inner.y), z: self.turn(inner.z), at: self.turn(inner.at) + self.at }
-    }
-
-    fn turn(&self, v: Vec3) -> Vec3 {
-        self.x * v.x + self.y * v.y + self.z * v.z
-    }
-}
-
-// The position of a sprite and the part of its image that it shows, by the rules of Bevy's sprite
-// renderer.
+// Layout of sprites, by the rules of Bevy's sprite renderer.
 
 /// A parallelogram: a corner and two sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -389,11 +387,6 @@ mod tests {
         }
         assert!(Inverse::of(&Quad { across: quad.up, ..quad }).is_none());
     }
-}
-
-#[cfg(test)]
-mod colour_tests {
-    use super::*;
 
     #[test]
     fn bytes_survive_light() {
@@ -435,11 +428,6 @@ mod colour_tests {
         assert_eq!(Tint::of(Color::linear_rgba(0.25, 0.5, 2.0, 0.75)), Tint([0.25, 0.5, 2.0, 0.75]));
         assert_eq!(SRGB.opaque(Tint([0.5, 0.0, 1.0, 0.3])), [188, 0, 255, 255]);
     }
-}
-
-#[cfg(test)]
-mod pose_tests {
-    use super::*;
 
     #[test]
     fn poses_are_what_bevy_computes() {

@@ -165,7 +165,7 @@ impl Gathering<'_, '_, '_> {
     }
 }
 
-// Painting sprites.
+// Painting of sprites.
 
 /// A sprite positioned on a picture.
 pub(super) struct SpriteOn<'a> {
@@ -313,7 +313,7 @@ impl Painter {
     }
 }
 
-// Painting grids of tiles.
+// Painting of grids of tiles.
 
 /// Smallest alpha of a texel that is drawn.
 const OPAQUE: u8 = 128;

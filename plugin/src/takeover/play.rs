@@ -30,8 +30,8 @@ use std::{
 pub(super) fn start(world: &mut World, path: &Path) -> Result<Vec<Seat>, TakeoverError> {
     let file = PolicyFile::load(path, DeviceKind::default())?;
     let agents = playing_agents(world);
-    let mut cards = agents.iter().filter_map(|&agent| card(world, agent));
-    if let Some(why) = cards.find_map(|card| check_policy(&card, &file).err()) {
+    let mut games = agents.iter().filter_map(|&agent| metadata(world, agent));
+    if let Some(why) = games.find_map(|metadata| check_policy(&metadata, &file).err()) {
         return Err(TakeoverError::Misfit { path: path.to_owned(), why: why.to_string() });
     }
     install_policy(world, &file, ActionDraw::default());
@@ -53,7 +53,7 @@ pub(super) fn stop(world: &mut World, seats: Vec<Seat>) {
 
 /// Returns the metadata that a policy must match to play this agent. Names of actions are not known
 /// here, and pictures are checked when the policy first reads one.
-fn card(world: &World, agent: Entity) -> Option<GameMetadata<'_>> {
+fn metadata(world: &World, agent: Entity) -> Option<GameMetadata<'_>> {
     let game = world.resource::<GameIdentity>();
     let names = world.get::<VectorSensor>(agent).map(|sensor| sensor.space().names.clone());
     Some(GameMetadata {
@@ -66,7 +66,7 @@ fn card(world: &World, agent: Entity) -> Option<GameMetadata<'_>> {
     })
 }
 
-// The takeover `replay:FILE`.
+// Takeover `replay:FILE`.
 
 /// A recording that plays.
 #[derive(Debug)]
@@ -131,7 +131,7 @@ impl Playing {
     }
 }
 
-// The takeover `record:FILE`.
+// Takeover `record:FILE`.
 
 /// Name of the player, unless the environment names one.
 const SOMEBODY: &str = "player";
@@ -184,7 +184,7 @@ fn tick_hz(world: &World) -> f64 {
     (1000.0 / step).round() / 1000.0
 }
 
-// Former players of agents, so that the controls can be given back.
+// Former players of agents.
 
 /// The state of an agent before a takeover.
 #[derive(Clone, Debug)]

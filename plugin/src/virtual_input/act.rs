@@ -97,21 +97,21 @@ impl InputReleaser<'_, '_> {
             }
             let after = change.read(&self.state);
             match route {
-                InputRoute::Messages => self.messages.send_and_tell(change, before, after),
-                InputRoute::Direct => self.messages.tell(change, before, after),
+                InputRoute::Messages => self.messages.send_with_processed(change, before, after),
+                InputRoute::Direct => self.messages.send_processed(change, before, after),
             }
         }
     }
 }
 
-// The route `Direct`: the state that games read is written in the fixed tick itself.
-//
-// Bevy clears `just_pressed` once a frame. A frame may run several fixed ticks, or none, and each tick must see a
-// press exactly once. So the marks of the tick before are removed before each tick. The marks of all ticks of the
-// frame are restored after the last one, for systems in `Update`. Messages are sent as well, for games that read
-// them. In the next frame, Bevy's systems process them a second time, and that effect is undone there.
+// Route `Direct`: the state that games read is written in the fixed tick itself.
 
 /// Marks and motions of this tick and of this frame.
+///
+/// Bevy clears `just_pressed` once a frame. A frame may run several fixed ticks, or none, and each tick must see a
+/// press exactly once. So the marks of the tick before are removed before each tick. The marks of all ticks of the
+/// frame are restored after the last one, for systems in `Update`. Messages are sent as well, for games that read
+/// them. In the next frame, Bevy's systems process them a second time, and that effect is undone there.
 #[derive(Resource, Clone, Debug, Default, Reflect)]
 #[reflect(Resource)]
 pub(super) struct DirectInput {
@@ -202,7 +202,7 @@ pub(super) fn write_directly(
                 }
             }
         }
-        messages.tell(change, before, change.read(&state));
+        messages.send_processed(change, before, change.read(&state));
     }
     let now = Motion { mouse: wanted.motion, wheel: wanted.wheel };
     if now != Motion::default() || past.motion != Motion::default() {

@@ -121,8 +121,6 @@ impl From<VirtualButton> for String {
     }
 }
 
-// Inputs with a continuous value.
-
 /// A motion or a stick that takes a number in each tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
 pub enum VirtualAxis {
@@ -153,8 +151,6 @@ impl From<GamepadAxis> for VirtualAxis {
     }
 }
 
-// Names of keys and buttons in text, taken from Bevy's own types.
-
 /// Returns the names of an enum's unit variants.
 pub(super) fn unit_names<T: Typed>() -> Vec<&'static str> {
     match T::type_info() {
@@ -184,7 +180,7 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_does_not_exist_is_told_the_nearest_one() {
+    fn a_name_that_does_not_exist_is_refused_with_the_nearest_one() {
         for (wrong, near) in [("arrowleft", "ArrowLeft"), ("Keyw", "KeyW"), ("MouseLeff", "MouseLeft")] {
             let error = wrong.parse::<VirtualButton>().expect_err("no such name");
             assert_eq!(error.near.as_deref(), Some(near), "{error}");
@@ -193,11 +189,6 @@ mod tests {
         let error = ron::from_str::<VirtualButton>("\"GamepadSauth\"").expect_err("no such name").to_string();
         assert!(error.contains("did you mean `GamepadSouth`?"), "{error}");
     }
-}
-
-#[cfg(test)]
-mod names_tests {
-    use super::*;
 
     #[test]
     fn every_named_key_is_found_by_its_name() {

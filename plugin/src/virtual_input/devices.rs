@@ -146,8 +146,6 @@ impl VirtualDevices {
     }
 }
 
-// The set of inputs held at one time.
-
 /// The inputs that are held down and pushed while one action lasts.
 ///
 /// ```
@@ -193,8 +191,6 @@ impl HeldInput {
         self
     }
 }
-
-// From one value of a continuous action to keys and sticks.
 
 /// Default threshold beyond which values press their key.
 const THRESHOLD: f32 = 0.5;

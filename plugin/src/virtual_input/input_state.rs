@@ -161,8 +161,6 @@ fn apply<T: Clone + Eq + Hash + Send + Sync + 'static>(input: &mut ButtonInput<T
     }
 }
 
-// Meanings of keys on a US keyboard, for messages that carry both the meaning and the position of a key.
-
 /// Returns the meaning of a key, and the text that it types.
 pub(super) fn logical_key(code: KeyCode) -> (Key, Option<String>) {
     let name = format!("{code:?}");
@@ -205,7 +203,7 @@ fn typed(name: &str) -> Option<String> {
 }
 
 #[cfg(test)]
-mod logical_key_tests {
+mod tests {
     use super::*;
 
     #[test]

@@ -54,10 +54,10 @@ impl InputMessages<'_, '_> {
 
     /// Sends the messages of a change that is already in the state, in its own tick, with the state before and after.
     ///
-    /// Messages for keys and mouse affect only the state, which [`settle`](crate::virtual_input::act::settle) restores. A
-    /// `RawGamepadEvent` is left out: Bevy's system for gamepads would read it in the next frame, when it may be
+    /// Messages for keys and mouse affect only the state, which [`settle`](crate::virtual_input::act::settle) restores.
+    /// A `RawGamepadEvent` is left out: Bevy's system for gamepads would read it in the next frame, when it may be
     /// outdated, and would press and announce everything again.
-    pub fn tell(&mut self, change: Change, before: Reading, after: Reading) {
+    pub fn send_processed(&mut self, change: Change, before: Reading, after: Reading) {
         match of_driver(change) {
             // A driver sends nothing about an unchanged value.
             Some(_) if before == after => {}
@@ -71,7 +71,7 @@ impl InputMessages<'_, '_> {
 
     /// Sends the messages of a change that is already in the state, where Bevy's own systems run later: the one for
     /// gamepads finds nothing changed.
-    pub fn send_and_tell(&mut self, change: Change, before: Reading, after: Reading) {
+    pub fn send_with_processed(&mut self, change: Change, before: Reading, after: Reading) {
         if let Some(event) = of_driver(change).filter(|_| before != after) {
             self.pads.process(&event, before, after);
         }
@@ -111,7 +111,37 @@ impl InputMessages<'_, '_> {
     }
 }
 
-// Messages about gamepads: those of a driver, and those that Bevy's own system derives from them.
+/// The gamepad of an agent. Games see it as one that is plugged in.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Component)]
+pub struct VirtualGamepad {
+    /// The agent.
+    pub agent: Entity,
+}
+
+/// Plugs in the gamepads of agents that have none yet, and unplugs those whose agents are gone.
+///
+/// Runs before Bevy's own input systems, which make them gamepads in the same frame.
+pub(super) fn connect_gamepads(
+    agents: Query<(Entity, &Agent, &VirtualInput)>,
+    pads: Query<(Entity, &VirtualGamepad)>,
+    mut messages: InputMessages,
+    mut commands: Commands,
+) {
+    for (pad, owner) in &pads {
+        if !agents.get(owner.agent).is_ok_and(|(.., input)| input.uses_gamepad()) {
+            commands.entity(pad).despawn();
+        }
+    }
+    for (entity, agent, input) in &agents {
+        if input.uses_gamepad() && !pads.iter().any(|(_, owner)| owner.agent == entity) {
+            let pad = commands.spawn(VirtualGamepad { agent: entity }).id();
+            messages.send_connection(pad, format!("gamepad of agent {}", agent.index));
+        }
+    }
+}
+
+// Messages about gamepads.
 
 /// The writers of messages about gamepads.
 #[derive(SystemParam)]
@@ -218,40 +248,8 @@ fn scaled_axis(settings: &AxisSettings, value: f32) -> f32 {
     }
 }
 
-// Gamepads of the agents that use one.
-
-/// The gamepad of an agent. Games see it as one that is plugged in.
-#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
-#[reflect(Component)]
-pub struct VirtualGamepad {
-    /// The agent.
-    pub agent: Entity,
-}
-
-/// Plugs in the gamepads of agents that have none yet, and unplugs those whose agents are gone.
-///
-/// Runs before Bevy's own input systems, which make them gamepads in the same frame.
-pub(super) fn connect_gamepads(
-    agents: Query<(Entity, &Agent, &VirtualInput)>,
-    pads: Query<(Entity, &VirtualGamepad)>,
-    mut messages: InputMessages,
-    mut commands: Commands,
-) {
-    for (pad, owner) in &pads {
-        if !agents.get(owner.agent).is_ok_and(|(.., input)| input.uses_gamepad()) {
-            commands.entity(pad).despawn();
-        }
-    }
-    for (entity, agent, input) in &agents {
-        if input.uses_gamepad() && !pads.iter().any(|(_, owner)| owner.agent == entity) {
-            let pad = commands.spawn(VirtualGamepad { agent: entity }).id();
-            messages.send_connection(pad, format!("gamepad of agent {}", agent.index));
-        }
-    }
-}
-
 #[cfg(test)]
-mod gamepad_messages_tests {
+mod tests {
     use super::*;
 
     #[test]

@@ -111,8 +111,6 @@ fn write_image(
     }
 }
 
-// Checks of the images that sensors produce.
-
 /// Reports images of the wrong length, with agent and tick.
 pub(crate) fn check_images(
     agents: Query<(&Agent, &ImageSensor, &Observation, &Control, &Episode)>,

@@ -120,6 +120,135 @@ impl ImageOptions {
 #[require(Frame, BlankEpisodes, PictureStack)]
 pub struct ImageSensor(pub ImageOptions);
 
+/// The last picture of an agent's sensor: red, green, blue and an unused byte per pixel, top row
+/// first, left to right.
+///
+/// Filled by a sensor. The options of [`ImageSensor`] (grey, painted velocity,
+/// stack) are applied when the observation is made from it.
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component)]
+pub struct Frame {
+    /// `[height, width]` pixels of `[red, green, blue, 255]`.
+    pub pixels: Vec<[u8; 4]>,
+    /// The tick ([`Tick`](crate::episode::Tick)) of the picture; `None` before the first.
+    pub tick: Option<u64>,
+}
+
+/// The velocity that [`ImageOptions::paint_velocity`](crate::vision::ImageOptions::paint_velocity) shows, each axis
+/// divided by its largest value, from -1 to 1. The game fills it before
+/// [`VisionSystems::Compose`](crate::vision::VisionSystems::Compose).
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component)]
+pub struct PaintedVelocity(pub Vec2);
+
+/// Counts the episodes of an agent in which each picture was of a single colour.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component, CarryComponent)]
+pub struct BlankEpisodes {
+    /// Finished episodes with blank pictures only.
+    pub episodes: u64,
+    /// True if this episode had a picture, and each was of one colour.
+    blank: bool,
+    /// True if a picture of this episode was not blank.
+    sees: bool,
+    /// True if a picture of any episode was not blank.
+    has_seen: bool,
+}
+
+impl BlankEpisodes {
+    /// Notes a picture of the episode. Costs nothing after the first one that is not blank.
+    pub(super) fn note(&mut self, pixels: &[[u8; 4]], starts: bool) {
+        if starts {
+            self.sees = false;
+        }
+        if !self.sees {
+            self.sees = pixels.iter().any(|pixel| pixel != &pixels[0]);
+            self.has_seen |= self.sees;
+            self.blank = !self.sees;
+        }
+    }
+}
+
+/// Reports an agent with only blank pictures in its first episodes: its sensor looks at nothing
+/// that is drawn. For an agent with earlier pictures the level may be the cause, so it gets one
+/// warning.
+pub(super) fn report_blank(
+    event: On<EpisodeEnded>,
+    mut sensors: Query<(&Agent, &mut BlankEpisodes)>,
+    mut faults: ResMut<Faults>,
+) {
+    let Ok((agent, mut sensor)) = sensors.get_mut(event.entity) else { return };
+    if !std::mem::take(&mut sensor.blank) {
+        return;
+    }
+    sensor.episodes += 1;
+    let what = format!(
+        "agent {}, level {}: each picture of an episode of {} ticks was of a single colour; point its sensor at something \
+         that is drawn",
+        agent.index, event.level, event.ticks
+    );
+    if !sensor.has_seen {
+        faults.report(what);
+    } else if sensor.episodes == 1 {
+        tracing::warn!("{what}");
+    }
+}
+
+/// The last pictures of an agent's episode, in a ring. A state that is observed twice counts once.
+#[derive(Component, Clone, Debug, Default, Reflect)]
+#[reflect(Component)]
+pub(crate) struct PictureStack {
+    ring: Vec<u8>,
+    /// Bytes of a picture.
+    size: usize,
+    newest: usize,
+    shown: Option<PictureKey>,
+}
+
+impl PictureStack {
+    /// Adds the picture of a moment, which `paint` writes, and writes all pictures, oldest first.
+    pub(super) fn push(&mut self, moment: PictureKey, count: usize, paint: impl FnOnce(&mut [u8]), out: &mut [u8]) {
+        let size = out.len() / count;
+        let goes_on = self.goes_on(moment) && (self.size, self.ring.len()) == (size, out.len());
+        if !goes_on {
+            self.size = size;
+            self.ring.resize(out.len(), 0);
+            self.newest = 0;
+        } else if self.shown != Some(moment) {
+            self.newest = (self.newest + 1) % count;
+        }
+        self.shown = Some(moment);
+        let from = self.newest * size;
+        paint(&mut self.ring[from..from + size]);
+        if !goes_on {
+            (1..count).for_each(|copy| self.ring.copy_within(..size, copy * size));
+        }
+        let oldest = (self.newest + 1) % count * size;
+        let (wrapped, first) = self.ring.split_at(oldest);
+        out[..first.len()].copy_from_slice(first);
+        out[first.len()..].copy_from_slice(wrapped);
+    }
+
+    /// Returns whether the moment belongs to the episode of the last one. The first moment always
+    /// starts anew.
+    fn goes_on(&self, moment: PictureKey) -> bool {
+        self.shown.is_some_and(|last| {
+            (last.episode, last.level) == (moment.episode, moment.level) && moment.tick > 0 && moment.tick >= last.tick
+        })
+    }
+}
+
+/// The state of the game that a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+pub(super) struct PictureKey {
+    /// Number of the episode of this agent.
+    pub episode: u64,
+    /// Its level.
+    pub level: u64,
+    /// Tick of the episode.
+    pub tick: u32,
+}
+
 // Conversion of a frame's pixels to the bytes that a policy reads.
 
 /// Weights of red, green and blue in brightness (ITU-R BT.601), in 65536ths.
@@ -168,144 +297,8 @@ pub(super) fn paint_velocity(velocity: [f32; 2], options: &ImageOptions, planes:
     }
 }
 
-// The last pictures of an episode.
-
-/// The state of the game that a picture shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Reflect)]
-pub(super) struct PictureKey {
-    /// Number of the episode of this agent.
-    pub episode: u64,
-    /// Its level.
-    pub level: u64,
-    /// Tick of the episode.
-    pub tick: u32,
-}
-
-/// The last pictures of an agent's episode, in a ring. A state that is observed twice counts once.
-#[derive(Component, Clone, Debug, Default, Reflect)]
-#[reflect(Component)]
-pub(crate) struct PictureStack {
-    ring: Vec<u8>,
-    /// Bytes of a picture.
-    size: usize,
-    newest: usize,
-    shown: Option<PictureKey>,
-}
-
-impl PictureStack {
-    /// Adds the picture of a moment, which `paint` writes, and writes all pictures, oldest first.
-    pub(super) fn push(&mut self, moment: PictureKey, count: usize, paint: impl FnOnce(&mut [u8]), out: &mut [u8]) {
-        let size = out.len() / count;
-        let goes_on = self.goes_on(moment) && (self.size, self.ring.len()) == (size, out.len());
-        if !goes_on {
-            self.size = size;
-            self.ring.resize(out.len(), 0);
-            self.newest = 0;
-        } else if self.shown != Some(moment) {
-            self.newest = (self.newest + 1) % count;
-        }
-        self.shown = Some(moment);
-        let from = self.newest * size;
-        paint(&mut self.ring[from..from + size]);
-        if !goes_on {
-            (1..count).for_each(|copy| self.ring.copy_within(..size, copy * size));
-        }
-        let oldest = (self.newest + 1) % count * size;
-        let (wrapped, first) = self.ring.split_at(oldest);
-        out[..first.len()].copy_from_slice(first);
-        out[first.len()..].copy_from_slice(wrapped);
-    }
-
-    /// Returns whether the moment belongs to the episode of the last one. The first moment always
-    /// starts anew.
-    fn goes_on(&self, moment: PictureKey) -> bool {
-        self.shown.is_some_and(|last| {
-            (last.episode, last.level) == (moment.episode, moment.level) && moment.tick > 0 && moment.tick >= last.tick
-        })
-    }
-}
-
-// Sensors whose pictures are blank.
-
-/// Counts the episodes of an agent in which each picture was of a single colour.
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
-#[reflect(Component, CarryComponent)]
-pub struct BlankEpisodes {
-    /// Finished episodes with blank pictures only.
-    pub episodes: u64,
-    /// True if this episode had a picture, and each was of one colour.
-    blank: bool,
-    /// True if a picture of this episode was not blank.
-    sees: bool,
-    /// True if a picture of any episode was not blank.
-    has_seen: bool,
-}
-
-impl BlankEpisodes {
-    /// Notes a picture of the episode. Costs nothing after the first one that is not blank.
-    pub(super) fn note(&mut self, pixels: &[[u8; 4]], starts: bool) {
-        if starts {
-            self.sees = false;
-        }
-        if !self.sees {
-            self.sees = pixels.iter().any(|pixel| pixel != &pixels[0]);
-            self.has_seen |= self.sees;
-            self.blank = !self.sees;
-        }
-    }
-}
-
-/// Reports an agent with only blank pictures in its first episodes: its sensor looks at nothing
-/// that is drawn. For an agent with earlier pictures the level may be the cause, so it gets one
-/// warning.
-pub(super) fn report_blank(
-    event: On<EpisodeEnded>,
-    mut eyes: Query<(&Agent, &mut BlankEpisodes)>,
-    mut faults: ResMut<Faults>,
-) {
-    let Ok((agent, mut eye)) = eyes.get_mut(event.entity) else { return };
-    if !std::mem::take(&mut eye.blank) {
-        return;
-    }
-    eye.episodes += 1;
-    let what = format!(
-        "agent {}, level {}: each picture of an episode of {} ticks was of a single colour; point its sensor at something \
-         that is drawn",
-        agent.index, event.level, event.ticks
-    );
-    if !eye.has_seen {
-        faults.report(what);
-    } else if eye.episodes == 1 {
-        tracing::warn!("{what}");
-    }
-}
-
-// Velocity painted into the picture.
-
-/// The velocity that [`ImageOptions::paint_velocity`](crate::vision::ImageOptions::paint_velocity) shows, each axis divided by
-/// its largest value, from -1 to 1. The game fills it before [`VisionSystems::Compose`](crate::vision::VisionSystems::Compose).
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
-#[reflect(Component)]
-pub struct PaintedVelocity(pub Vec2);
-
-// The picture of one tick.
-
-/// The last picture of an agent's sensor: red, green, blue and an unused byte per pixel, top row
-/// first, left to right.
-///
-/// Filled by a sensor. The options of [`ImageSensor`] (grey, painted velocity,
-/// stack) are applied when the observation is made from it.
-#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
-#[reflect(Component)]
-pub struct Frame {
-    /// `[height, width]` pixels of `[red, green, blue, 255]`.
-    pub pixels: Vec<[u8; 4]>,
-    /// The tick ([`Tick`](crate::episode::Tick)) of the picture; `None` before the first.
-    pub tick: Option<u64>,
-}
-
 #[cfg(test)]
-mod planes_tests {
+mod tests {
     use super::*;
 
     #[test]
@@ -349,11 +342,6 @@ mod planes_tests {
         paint_velocity([1.0, -1.0], &options, &mut planes);
         assert_eq!(planes[..9], [255, 255, 0, 0, 7, 7, 7, 7, 7]);
     }
-}
-
-#[cfg(test)]
-mod stack_tests {
-    use super::*;
 
     fn shown(stack: &mut PictureStack, episode: u64, tick: u32, picture: u8) -> [u8; 6] {
         let mut out = [0; 6];

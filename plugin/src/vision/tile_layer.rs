@@ -44,8 +44,6 @@ impl TileLayer {
     }
 }
 
-// Detection of sprites without an image.
-
 /// Advice for a sprite that [lacks an image](lacks_image).
 pub(crate) const NO_IMAGE: &str = "set `Sprite::image`, or `custom_size` for a rectangle of one colour";
 

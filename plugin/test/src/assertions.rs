@@ -41,6 +41,12 @@
 //! A failure names each broken level with its defect, and the commands that show it. Failed episodes and findings are
 //! written below `target/playbot-findings`, so that `playbot replay` shows them; `playbot` stands for the program with
 //! the game.
+//!
+//! The files of the folder, in reading order:
+//!
+//! - `testers`: the testers of an assertion, by name.
+//! - `examine`: the run of the testers over the levels, and the failure message.
+//! - `assert_recordings`: assertions about recordings and findings.
 
 mod assert_recordings;
 mod examine;
@@ -62,6 +68,9 @@ pub use crate::assertions::{
     assert_recordings::{assert_findings_gone, assert_replays},
     testers::LevelTestError,
 };
+
+/// The finding that a goal is out of reach. It says nothing about determinism.
+const UNREACHABLE: &str = "unreachable-goal";
 
 /// A test of levels: set up first, then asserted.
 ///
@@ -97,7 +106,7 @@ impl<'a> LevelTest<'a> {
             seed: 0,
             detectors: DetectorChoice::default(),
             threads: default_threads(),
-            folder: usual_folder(game.name()),
+            folder: default_folder(game.name()),
             minimise: false,
             program: "playbot".to_owned(),
         }
@@ -243,54 +252,6 @@ impl<'a> LevelTest<'a> {
     }
 }
 
-// Assertions about levels without settings. `LevelTest` has these and more.
-
-/// Asserts that each of these levels can be solved: the game's demonstrator, or else its first bot, reaches the goal.
-///
-/// # Panics
-///
-/// A level was not solved, or the levels cannot be tested: see [`LevelTest::assert_solvable`].
-#[track_caller]
-pub fn assert_levels_solvable(game: &dyn Game, levels: &str) {
-    LevelTest::new(game, levels).assert_solvable();
-}
-
-/// Asserts that a bot of the game solves each of these levels. Other testers are named with [`LevelTest`].
-///
-/// # Panics
-///
-/// A level was not solved, or the levels cannot be tested: see [`LevelTest::assert_solved`].
-#[track_caller]
-pub fn assert_levels_solved_by(game: &dyn Game, bot: &str, levels: &str) {
-    LevelTest::new(game, levels).bot(bot).assert_solved();
-}
-
-/// Asserts that levels have no findings: no default [detector](crate::detectors) reports anything while all bots of the
-/// game play, the game does not panic, and no goal is proved to be out of reach. Levels need not be solved.
-///
-/// # Panics
-///
-/// Something was found, or the levels cannot be tested: see [`LevelTest::assert_no_findings`].
-#[track_caller]
-pub fn assert_no_findings(game: &dyn Game, levels: &str) {
-    LevelTest::new(game, levels).assert_no_findings();
-}
-
-/// Asserts that each bot of the game repeats its episode bit for bit on each of these levels.
-///
-/// # Panics
-///
-/// An episode differed, or the levels cannot be tested: see [`LevelTest::assert_deterministic`].
-#[track_caller]
-pub fn assert_deterministic(game: &dyn Game, levels: &str) {
-    LevelTest::new(game, levels).assert_deterministic();
-}
-
-// The assertions about levels.
-
-/// The finding that a goal is out of reach. It says nothing about determinism.
-const UNREACHABLE: &str = "unreachable-goal";
-
 /// An assertion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Wanted {
@@ -341,10 +302,8 @@ impl Wanted {
     }
 }
 
-// The default folder of findings.
-
 /// Returns the folder for the findings of a game: `target/playbot-findings/` and the game's name.
-fn usual_folder(game: &str) -> PathBuf {
+fn default_folder(game: &str) -> PathBuf {
     let program = env::current_exe().ok();
     let target = program.as_deref().and_then(target_of).map(Path::to_owned);
     let target = target.or_else(|| env::var_os("CARGO_TARGET_DIR").map(PathBuf::from));
@@ -358,11 +317,53 @@ fn target_of(program: &Path) -> Option<&Path> {
     program.ancestors().skip(1).find(|folder| folder.join("CACHEDIR.TAG").is_file())
 }
 
-#[cfg(test)]
-mod wanted_tests {
-    use serde_json::json;
+// Assertions without settings.
 
+/// Asserts that each of these levels can be solved: the game's demonstrator, or else its first bot, reaches the goal.
+///
+/// # Panics
+///
+/// A level was not solved, or the levels cannot be tested: see [`LevelTest::assert_solvable`].
+#[track_caller]
+pub fn assert_levels_solvable(game: &dyn Game, levels: &str) {
+    LevelTest::new(game, levels).assert_solvable();
+}
+
+/// Asserts that a bot of the game solves each of these levels. Other testers are named with [`LevelTest`].
+///
+/// # Panics
+///
+/// A level was not solved, or the levels cannot be tested: see [`LevelTest::assert_solved`].
+#[track_caller]
+pub fn assert_levels_solved_by(game: &dyn Game, bot: &str, levels: &str) {
+    LevelTest::new(game, levels).bot(bot).assert_solved();
+}
+
+/// Asserts that levels have no findings: no default [detector](crate::detectors) reports anything while all bots of the
+/// game play, the game does not panic, and no goal is proved to be out of reach. Levels need not be solved.
+///
+/// # Panics
+///
+/// Something was found, or the levels cannot be tested: see [`LevelTest::assert_no_findings`].
+#[track_caller]
+pub fn assert_no_findings(game: &dyn Game, levels: &str) {
+    LevelTest::new(game, levels).assert_no_findings();
+}
+
+/// Asserts that each bot of the game repeats its episode bit for bit on each of these levels.
+///
+/// # Panics
+///
+/// An episode differed, or the levels cannot be tested: see [`LevelTest::assert_deterministic`].
+#[track_caller]
+pub fn assert_deterministic(game: &dyn Game, levels: &str) {
+    LevelTest::new(game, levels).assert_deterministic();
+}
+
+#[cfg(test)]
+mod tests {
     use super::*;
+    use serde_json::json;
 
     /// Two testers with two episodes each, and the solved ones of each.
     fn level(solved: [u64; 2], found: &[&str]) -> LevelVerdict {
@@ -405,11 +406,6 @@ mod wanted_tests {
         assert!(!Wanted::Nothing.holds(&level([2, 2], &[])), "all are asked for");
         assert_eq!(Wanted::Solvable.complaint(1, 3), "1 of 3 levels was not solved by any tester");
     }
-}
-
-#[cfg(test)]
-mod usual_folder_tests {
-    use super::*;
 
     #[test]
     fn findings_go_below_the_folder_that_cargo_builds_into() {
@@ -420,7 +416,7 @@ mod usual_folder_tests {
         assert_eq!(target_of(&program), None);
         std::fs::write(folder.path().join("target/CACHEDIR.TAG"), "").expect("writable");
         assert_eq!(target_of(&program), Some(folder.path().join("target").as_path()));
-        let usual = usual_folder("garden");
-        assert!(usual.is_absolute() && usual.ends_with("playbot-findings/garden"), "{}", usual.display());
+        let default = default_folder("garden");
+        assert!(default.is_absolute() && default.ends_with("playbot-findings/garden"), "{}", default.display());
     }
 }

@@ -1,8 +1,8 @@
 //! Exploring a level without training and without knowledge of the game: Go-Explore (Ecoffet et al. 2021, "First
 //! return, then explore") over exact replay.
 //!
-//! An archive holds the reached [`Cell`]s, each with the shortest known path to it. Each visit draws a rarely seen
-//! cell, returns to it by the same actions, and explores from there. A game need not store its state: it must be
+//! An archive holds the reached [`ExploredCell`]s, each with the shortest known path to it. Each visit draws a rarely
+//! seen cell, returns to it by the same actions, and explores from there. A game need not store its state: it must be
 //! deterministic, so the level and the actions restore it. A game that is not deterministic causes an error at the
 //! first tick that differs.
 //!
@@ -26,11 +26,18 @@
 //! # Ok(())
 //! # }
 //! ```
+//!
+//! The files of the folder, in reading order:
+//!
+//! - `round`: [`explore`], and the check of a requested cell.
+//! - `cell`: the cells, and the grid over a level.
+//! - `archive`: the archive, and one visit.
+//! - `known_paths`: the paths to cells, their replay, and the summary.
 
 mod archive;
 mod cell;
+mod known_paths;
 pub mod round;
-mod ways;
 
 use crate::explore::archive::Archive;
 use bevy::prelude::*;
@@ -56,167 +63,10 @@ use thiserror::Error;
 pub(crate) use crate::explore::cell::{cells_between, reach};
 pub use crate::explore::{
     archive::ReachedCell,
-    cell::{Cell, CellGrid, NoCell},
+    cell::{CellGrid, ExploredCell, NoCell},
+    known_paths::{ExplorationSummary, Route, follow_route, record_route},
     round::{Round, check_cell, explore, open_cells},
-    ways::{ExplorationSummary, Route, follow_route, record_route},
 };
-
-// The result of an exploration.
-
-/// The reason why an exploration ended.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Stop {
-    /// The budget is used up.
-    Spent,
-    /// A solution was found.
-    Solved,
-    /// All open cells were reached, and a solution was found if the level has a goal.
-    Covered,
-    /// The caller stopped it.
-    Asked,
-}
-
-/// Counts of the ends of episodes, without visits that just stopped.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
-pub struct EndCounts {
-    /// Terminated at the goal.
-    pub won: u64,
-    /// Terminated elsewhere.
-    pub lost: u64,
-    /// Truncated by the time limit.
-    pub out_of_time: u64,
-}
-
-impl EndCounts {
-    fn count(&mut self, end: Option<EpisodeResult>) {
-        match end.map(|end| end.end) {
-            Some(EpisodeEnd::Terminated { success: true }) => self.won += 1,
-            Some(EpisodeEnd::Terminated { success: false }) => self.lost += 1,
-            Some(EpisodeEnd::Truncated) => self.out_of_time += 1,
-            None => {}
-        }
-    }
-}
-
-/// Cells with the shortest known paths to them, and further results on a level.
-pub struct Exploration {
-    /// Mode of the game.
-    pub mode: String,
-    /// Number of the level.
-    pub level: u64,
-    /// Random seed.
-    pub seed: u64,
-    /// Name of the explorer.
-    pub explorer: &'static str,
-    /// Environment steps, with the paths back.
-    pub steps: u64,
-    /// Visits.
-    pub visits: u64,
-    /// Ends of their episodes.
-    pub ends: EndCounts,
-    /// Steps and cells after each round.
-    pub curve: Vec<(u64, u64)>,
-    /// The reason why it ended.
-    pub stop: Stop,
-    /// The squares of the cells; `None` if cells are not positions.
-    pub grid: Option<CellGrid>,
-    /// Whether the level is known to have a goal, by its floor plan.
-    pub has_goal: bool,
-    /// The cells that no wall cuts off from the start, if cells are positions and there is a floor plan: see
-    /// [`open_cells`].
-    pub open: Option<BTreeSet<Cell>>,
-    archive: Archive,
-}
-
-impl Exploration {
-    /// Returns all cells that were reached, in their order.
-    pub fn cells(&self) -> &BTreeMap<Cell, ReachedCell> {
-        self.archive.cells()
-    }
-
-    /// Returns the shortest known path to a cell, with the state hash after each tick. The last hash is that on
-    /// arrival, or that after a cell that is only passed.
-    pub fn route_to(&self, cell: &Cell) -> Option<Route> {
-        self.archive.route_to(cell)
-    }
-
-    /// Returns the shortest known path to the level's goal.
-    pub fn solution(&self) -> Option<Route> {
-        self.archive.solution().map(|way| self.archive.route(way))
-    }
-
-    /// Returns the ticks of the [`solution`](Self::solution).
-    pub fn solution_ticks(&self) -> Option<u32> {
-        self.archive.solution().map(|way| way.ticks)
-    }
-
-    /// Returns the open cells that were not reached.
-    pub fn missed(&self) -> impl Iterator<Item = &Cell> {
-        self.open.iter().flatten().filter(move |cell| !self.cells().contains_key(cell))
-    }
-
-    /// Returns how many of the open cells were reached; `None` if the open cells are unknown.
-    pub fn open_reached(&self) -> Option<usize> {
-        Some(self.open.as_ref()?.len() - self.missed().count())
-    }
-
-    /// Returns the share of the open cells that were reached; `None` if the open cells are unknown.
-    pub fn coverage(&self) -> Option<f64> {
-        let open = self.open.as_ref().map(BTreeSet::len)?;
-        Some(self.open_reached()? as f64 / open.max(1) as f64)
-    }
-}
-
-// Explorers: players that act where nothing is known yet.
-
-/// The player that explores from a cell.
-#[derive(Clone, Default)]
-#[allow(clippy::large_enum_variant, reason = "one per exploration")]
-pub enum Explorer {
-    /// Uniformly random actions, each repeated with the plan's probability: no training, and no knowledge of the game.
-    #[default]
-    Random,
-    /// A policy, with skills if it has any.
-    Policy {
-        /// The policy.
-        policy: Policy,
-        /// The source of its skills.
-        prior: Option<SkillPrior>,
-        /// How actions are drawn.
-        draw: ActionDraw,
-    },
-}
-
-impl Explorer {
-    /// Creates an explorer with skills drawn from a prior, and played by a decoder.
-    pub fn skills(prior: SkillPrior, decoder: Policy) -> Self {
-        Self::Policy { policy: decoder, prior: Some(prior), draw: ActionDraw::Sample }
-    }
-
-    /// Returns its kind in words.
-    pub fn describe(&self) -> &'static str {
-        match self {
-            Self::Random => "random actions",
-            Self::Policy { prior: Some(_), .. } => "skills",
-            Self::Policy { prior: None, .. } => "a policy",
-        }
-    }
-
-    /// Returns whether a policy decides.
-    fn is_policy(&self) -> bool {
-        matches!(self, Self::Policy { .. })
-    }
-
-    /// Installs the explorer's networks in a World, once.
-    fn install(&self, world: &mut World) {
-        if let Self::Policy { policy, prior, draw } = self {
-            ActivePolicy { policy: policy.clone(), draw: *draw }.install(world, prior.clone());
-        }
-    }
-}
-
-// The plan of an exploration.
 
 /// The plan of an exploration of a level. All fields but the threads affect the result.
 #[derive(Clone)]
@@ -306,7 +156,195 @@ impl ExplorePlan {
     }
 }
 
-// Errors of explorations.
+/// The condition that ends an exploration before its budget does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Until {
+    /// A solution.
+    Solved,
+    /// A solution, if the level has a goal, and all open cells, if they are known.
+    #[default]
+    Covered,
+    /// No condition: shorter paths are searched for until the budget is used up.
+    Spent,
+}
+
+impl Until {
+    const ALL: [Self; 3] = [Self::Solved, Self::Covered, Self::Spent];
+
+    fn name(self) -> &'static str {
+        match self {
+            Self::Solved => "solved",
+            Self::Covered => "covered",
+            Self::Spent => "spent",
+        }
+    }
+}
+
+impl fmt::Display for Until {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl FromStr for Until {
+    type Err = UnknownName;
+
+    fn from_str(name: &str) -> Result<Self, UnknownName> {
+        let known = Self::ALL.into_iter().find(|until| until.name() == name);
+        known.ok_or_else(|| UnknownName::new("end of an exploration", name, &Self::ALL.map(Self::name)))
+    }
+}
+
+/// The player that explores from a cell.
+#[derive(Clone, Default)]
+#[allow(clippy::large_enum_variant, reason = "one per exploration")]
+pub enum Explorer {
+    /// Uniformly random actions, each repeated with the plan's probability: no training, and no knowledge of the game.
+    #[default]
+    Random,
+    /// A policy, with skills if it has any.
+    Policy {
+        /// The policy.
+        policy: Policy,
+        /// The source of its skills.
+        prior: Option<SkillPrior>,
+        /// How actions are drawn.
+        draw: ActionDraw,
+    },
+}
+
+impl Explorer {
+    /// Creates an explorer with skills drawn from a prior, and played by a decoder.
+    pub fn skills(prior: SkillPrior, decoder: Policy) -> Self {
+        Self::Policy { policy: decoder, prior: Some(prior), draw: ActionDraw::Sample }
+    }
+
+    /// Returns its kind in words.
+    pub fn describe(&self) -> &'static str {
+        match self {
+            Self::Random => "random actions",
+            Self::Policy { prior: Some(_), .. } => "skills",
+            Self::Policy { prior: None, .. } => "a policy",
+        }
+    }
+
+    /// Returns whether a policy decides.
+    fn is_policy(&self) -> bool {
+        matches!(self, Self::Policy { .. })
+    }
+
+    /// Installs the explorer's networks in a World, once.
+    fn install(&self, world: &mut World) {
+        if let Self::Policy { policy, prior, draw } = self {
+            ActivePolicy { policy: policy.clone(), draw: *draw }.install(world, prior.clone());
+        }
+    }
+}
+
+/// Cells with the shortest known paths to them, and further results on a level.
+pub struct Exploration {
+    /// Mode of the game.
+    pub mode: String,
+    /// Number of the level.
+    pub level: u64,
+    /// Random seed.
+    pub seed: u64,
+    /// Name of the explorer.
+    pub explorer: &'static str,
+    /// Environment steps, with the paths back.
+    pub steps: u64,
+    /// Visits.
+    pub visits: u64,
+    /// Ends of their episodes.
+    pub ends: EndCounts,
+    /// Steps and cells after each round.
+    pub curve: Vec<(u64, u64)>,
+    /// The reason why it ended.
+    pub stop: Stop,
+    /// The squares of the cells; `None` if cells are not positions.
+    pub grid: Option<CellGrid>,
+    /// Whether the level is known to have a goal, by its floor plan.
+    pub has_goal: bool,
+    /// The cells that no wall cuts off from the start, if cells are positions and there is a floor plan: see
+    /// [`open_cells`].
+    pub open: Option<BTreeSet<ExploredCell>>,
+    archive: Archive,
+}
+
+impl Exploration {
+    /// Returns all cells that were reached, in their order.
+    pub fn cells(&self) -> &BTreeMap<ExploredCell, ReachedCell> {
+        self.archive.cells()
+    }
+
+    /// Returns the shortest known path to a cell, with the state hash after each tick. The last hash is that on
+    /// arrival, or that after a cell that is only passed.
+    pub fn route_to(&self, cell: &ExploredCell) -> Option<Route> {
+        self.archive.route_to(cell)
+    }
+
+    /// Returns the shortest known path to the level's goal.
+    pub fn solution(&self) -> Option<Route> {
+        self.archive.solution().map(|path| self.archive.route(path))
+    }
+
+    /// Returns the ticks of the [`solution`](Self::solution).
+    pub fn solution_ticks(&self) -> Option<u32> {
+        self.archive.solution().map(|path| path.ticks)
+    }
+
+    /// Returns the open cells that were not reached.
+    pub fn missed(&self) -> impl Iterator<Item = &ExploredCell> {
+        self.open.iter().flatten().filter(move |cell| !self.cells().contains_key(cell))
+    }
+
+    /// Returns how many of the open cells were reached; `None` if the open cells are unknown.
+    pub fn open_reached(&self) -> Option<usize> {
+        Some(self.open.as_ref()?.len() - self.missed().count())
+    }
+
+    /// Returns the share of the open cells that were reached; `None` if the open cells are unknown.
+    pub fn coverage(&self) -> Option<f64> {
+        let open = self.open.as_ref().map(BTreeSet::len)?;
+        Some(self.open_reached()? as f64 / open.max(1) as f64)
+    }
+}
+
+/// The reason why an exploration ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Stop {
+    /// The budget is used up.
+    Spent,
+    /// A solution was found.
+    Solved,
+    /// All open cells were reached, and a solution was found if the level has a goal.
+    Covered,
+    /// The caller stopped it.
+    Asked,
+}
+
+/// Counts of the ends of episodes, without visits that just stopped.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct EndCounts {
+    /// Terminated at the goal.
+    pub won: u64,
+    /// Terminated elsewhere.
+    pub lost: u64,
+    /// Truncated by the time limit.
+    pub out_of_time: u64,
+}
+
+impl EndCounts {
+    fn count(&mut self, end: Option<EpisodeResult>) {
+        match end.map(|end| end.end) {
+            Some(EpisodeEnd::Terminated { success: true }) => self.won += 1,
+            Some(EpisodeEnd::Terminated { success: false }) => self.lost += 1,
+            Some(EpisodeEnd::Truncated) => self.out_of_time += 1,
+            None => {}
+        }
+    }
+}
 
 /// The reason why a level cannot be explored.
 #[derive(Debug, Error)]
@@ -352,51 +390,12 @@ impl HasExitCode for ExploreError {
     }
 }
 
-/// The condition that ends an exploration before its budget does.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Until {
-    /// A solution.
-    Solved,
-    /// A solution, if the level has a goal, and all open cells, if they are known.
-    #[default]
-    Covered,
-    /// No condition: shorter paths are searched for until the budget is used up.
-    Spent,
-}
-
-impl Until {
-    const ALL: [Self; 3] = [Self::Solved, Self::Covered, Self::Spent];
-
-    fn name(self) -> &'static str {
-        match self {
-            Self::Solved => "solved",
-            Self::Covered => "covered",
-            Self::Spent => "spent",
-        }
-    }
-}
-
-impl fmt::Display for Until {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl FromStr for Until {
-    type Err = UnknownName;
-
-    fn from_str(name: &str) -> Result<Self, UnknownName> {
-        let known = Self::ALL.into_iter().find(|until| until.name() == name);
-        known.ok_or_else(|| UnknownName::new("end of an exploration", name, &Self::ALL.map(Self::name)))
-    }
-}
-
 #[cfg(test)]
-mod until_tests {
+mod tests {
     use super::*;
 
     #[test]
-    fn ends_read_back_and_others_are_told_the_nearest() {
+    fn ends_read_back_and_others_are_refused_with_the_nearest() {
         for until in Until::ALL {
             assert_eq!(until.to_string().parse(), Ok(until));
         }

@@ -8,6 +8,14 @@
 //!   failure-inducing input, 2002).
 //! - [`FindingFiles`] writes findings during a test. [`regress()`] replays all findings of a folder, with [`Pins`] for
 //!   known ones.
+//!
+//! The files of the folder, in reading order:
+//!
+//! - `play`: the replay of an episode, by its actions or by its player.
+//! - `checks`, `course`: the check of each detector, and the replay in search of a finding.
+//! - `keep`, `folder`: the writer of findings during a test, and folders of findings.
+//! - `scan`, `minimise`: the search for other findings in an episode, and the removal of actions.
+//! - `regress`: the replay of a whole folder.
 
 mod checks;
 mod course;
@@ -52,10 +60,14 @@ pub use crate::findings::{
     scan::scan,
 };
 
-// A file is a recording of one episode, in the format that all recordings have (`bevy_playbot::demo::file`): framed,
-// checksummed, and readable by every program that reads recordings. The head of the finding is the recording's note.
+/// Newest form of the head that is read and written.
+const HEAD_FORMAT: u32 = 1;
 
 /// A finding with the actions that lead to it.
+///
+/// Its file is a recording of one episode, in the format of all recordings
+/// ([`bevy_playbot::demo::file`]): framed, checksummed, and readable by every program that reads recordings. The
+/// head is the note of the recording.
 #[derive(Clone, Debug, PartialEq)]
 pub struct StoredFinding {
     /// Game, version, mode and kind of actions. The note is written from the head.
@@ -64,12 +76,6 @@ pub struct StoredFinding {
     pub head: FindingHead,
     /// The episode up to the tick of the finding; without ticks if the finding needs no play.
     pub episode: DemoEpisode,
-}
-
-/// The part of a head that is read before its form is known.
-#[derive(Deserialize)]
-struct FormOnly {
-    finding: u32,
 }
 
 impl StoredFinding {
@@ -186,11 +192,6 @@ fn head_of(path: &Path, header: &DemoHeader) -> Result<FindingHead, FindingError
     ron::from_str(note).map_err(none)
 }
 
-// The head of a finding's file.
-
-/// Newest form of the head that is read and written.
-const HEAD_FORMAT: u32 = 1;
-
 /// The description of a finding: RON text in the note of the recording. Older programs ignore fields that they do not
 /// know.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -237,6 +238,12 @@ impl FindingHead {
     }
 }
 
+/// The part of a head that is read before its form is known.
+#[derive(Deserialize)]
+struct FormOnly {
+    finding: u32,
+}
+
 /// The status of a replayed finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -262,8 +269,6 @@ impl FindingStatus {
         }
     }
 }
-
-// Errors of files of findings.
 
 /// The reason why findings cannot be read or written.
 #[derive(Debug, Error)]

@@ -8,6 +8,16 @@
 //!   `results.json`, which is the same on any number of threads, and reports for people and other programs.
 //! - [`merge()`] joins the results of shards to those of the whole range, byte for byte.
 //! - [`Comparison`] reports changes since earlier results, apart from noise.
+//!
+//! The files of the folder, in reading order:
+//!
+//! - `plan`, `run`: the plan of a test, and the test.
+//! - `test_world`, `played`, `walk`: the World in which testers play, the result of an episode, and the walk of its
+//!   agent.
+//! - `walked`, [`maps`]: the walks of a level, as maps.
+//! - `folder`, `results`, [`mod@merge`], `shard`: the folder of a test and its `results.json`, and parts of a test.
+//! - `compare`, `statistics`: the comparison with earlier results.
+//! - `reports`, `error`: reports, and errors.
 
 mod compare;
 mod error;
@@ -15,9 +25,11 @@ mod folder;
 pub mod maps;
 pub mod merge;
 mod plan;
+mod played;
 mod reports;
 mod results;
 mod run;
+mod shard;
 mod statistics;
 mod test_world;
 #[cfg(test)]
@@ -26,8 +38,8 @@ mod walk;
 mod walked;
 
 use crate::verdict::{
+    played::{Played, PlayedEnd},
     run::{inspect, seen},
-    test_world::{Played, PlayedEnd},
     walked::LevelVisits,
 };
 use bevy::math::{Rect, Vec2};
@@ -38,18 +50,194 @@ use std::collections::BTreeMap;
 
 pub use crate::verdict::{
     compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange},
-    error::{Shard, ShardError, TestError},
+    error::TestError,
     folder::{Earlier, TestFolder},
-    maps::{FailureWay, LevelMaps, LevelPars, MapScope, SkillTicks, hash_of_files, level_name},
+    maps::{FailurePath, LevelMaps, LevelPars, MapScope, SkillTicks, hash_of_files, level_name},
     merge::merge,
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
     reports::{AGAINST, JUNIT, SUMMARY, rerun_commands, write_reports},
     results::{FinishTime, MOST_WORST, Overview, RESULTS, ResultLines, TesterTotal, results_folder},
     run::{TestEnd, TestObserver, run_tests, run_tests_keeping, test_in_turn},
+    shard::{Shard, ShardError},
     statistics::{Trials, benjamini_hochberg, fisher_exact, wilson},
 };
 
-// Verdicts from episodes.
+/// Squares along the longer side of a floor plan to which [`SquareEnds`]s are rounded.
+pub const END_SQUARES: f32 = 32.0;
+
+/// All results of one level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LevelVerdict {
+    /// Its name, such as `hard:7`.
+    pub level: String,
+    /// Its index in the range, from 0.
+    pub index: u64,
+    /// Its outcome.
+    pub outcome: LevelOutcome,
+    /// Proof about the level. A level that was solved is solvable.
+    pub proof: LevelProof,
+    /// All episodes of all testers.
+    #[serde(flatten)]
+    pub score: EpisodeScore,
+    /// Positions of episodes that ended without the goal, if the game reports them.
+    pub ends: Vec<SquareEnds>,
+    /// How often each cause ended an episode without the goal, if the game reports causes.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub causes: BTreeMap<String, u64>,
+    /// Open squares that all testers together visited, for levels with maps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub places: Option<Places>,
+    /// Maps of where agents went, for levels with maps: see [`MapScope`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub maps: Option<LevelMaps>,
+    /// Each tester, in the order of the plan.
+    pub testers: Vec<TesterVerdict>,
+    /// Findings.
+    pub findings: Vec<Finding>,
+}
+
+impl LevelVerdict {
+    /// Returns whether it was solved and has no finding.
+    pub fn is_sound(&self) -> bool {
+        self.outcome == LevelOutcome::Solved && self.findings.is_empty()
+    }
+
+    /// Returns whether it was solved in every episode and has no finding.
+    pub fn is_perfect(&self) -> bool {
+        self.is_sound() && self.score.solved == self.score.episodes
+    }
+}
+
+/// Outcome of a level.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LevelOutcome {
+    /// The goal cannot be reached, which is proved.
+    ProvedUnsolvable,
+    /// No tester reached the goal, which proves nothing.
+    BotFailed,
+    /// A tester reached the goal at least once.
+    Solved,
+}
+
+impl LevelOutcome {
+    /// Returns the name in files and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ProvedUnsolvable => "proved-unsolvable",
+            Self::BotFailed => "bot-failed",
+            Self::Solved => "solved",
+        }
+    }
+}
+
+/// Results of a tester on a level.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TesterVerdict {
+    /// Name of the tester.
+    pub tester: String,
+    /// Its episodes.
+    #[serde(flatten)]
+    pub score: EpisodeScore,
+    /// True if it drew no random number in any of them: it repeats itself under any seed.
+    pub exact: bool,
+    /// Open squares that it visited in all its episodes, for levels with maps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub places: Option<Places>,
+}
+
+/// Ends of episodes.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EpisodeScore {
+    /// Episodes that reached the goal.
+    pub solved: u64,
+    /// All episodes.
+    pub episodes: u64,
+    /// 95 % Wilson interval of the share of solved episodes.
+    pub interval: [f64; 2],
+    /// Ticks of the solved episodes, if there are any.
+    pub ticks: Option<FinishTime>,
+    /// Episodes that the game ended without the goal.
+    pub lost: u64,
+    /// Episodes that ended because time was up.
+    pub timed_out: u64,
+    /// Episodes in which the game broke, each of which is a finding.
+    pub broken: u64,
+}
+
+impl EpisodeScore {
+    /// Returns the solved episodes among all.
+    pub fn trials(&self) -> Trials {
+        Trials { successes: self.solved, trials: self.episodes }
+    }
+}
+
+/// Ends of episodes without the goal in one square of the level's floor plan.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SquareEnds {
+    /// Middle of the square, in the units of the floor plan.
+    pub x: f32,
+    /// Middle of the square.
+    pub y: f32,
+    /// Episodes that were lost there.
+    pub lost: u64,
+    /// Episodes whose time was up there.
+    pub timed_out: u64,
+    /// How often each cause ended an episode there, if the game reports it.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub causes: BTreeMap<String, u64>,
+}
+
+/// A defect of a level, or of the game in it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Finding {
+    /// Its detector: `panic`, `fault`, `endless`, `unreachable-goal`, or the name of a [detector](crate::detectors).
+    pub detector: String,
+    /// The tester that played; `None` if it was found without play.
+    pub tester: Option<String>,
+    /// Episode of that tester on the level, from 0.
+    pub episode: Option<u32>,
+    /// Tick of the episode, from 0.
+    pub tick: Option<u32>,
+    /// The message.
+    pub message: String,
+    /// Its file, relative to the folder of the results: see [`findings`](crate::findings).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Settings, as `name.key=value`, for the search of its file beside those of the test: see
+    /// [`LevelDefect::settings`](crate::detectors::LevelDefect::settings). Results have none.
+    #[serde(skip)]
+    pub settings: Vec<String>,
+}
+
+/// Visited squares, among all that walls do not cut off from the start: see
+/// [`open_cells`](crate::explore::round). Under gravity, some of these may be unreachable.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Places {
+    /// Open squares that were visited, or passed between two ticks.
+    pub visited: u64,
+    /// All open squares.
+    pub open: u64,
+}
+
+impl Places {
+    /// Returns the visited share in percent; `None` without open squares.
+    pub fn percent(self) -> Option<f64> {
+        (self.open > 0).then(|| 100.0 * self.visited as f64 / self.open as f64)
+    }
+
+    /// Formats the share.
+    pub fn describe(self) -> String {
+        self.percent().map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %"))
+    }
+
+    /// Adds the squares of another level.
+    fn add(&mut self, other: Option<Self>) {
+        let other = other.unwrap_or_default();
+        self.visited = self.visited.saturating_add(other.visited);
+        self.open = self.open.saturating_add(other.open);
+    }
+}
 
 /// Returns the verdict on the level with this index in the range and this name in results. `played` has the episodes
 /// of each tester, in the order of the plan. Incomplete if `stop` returned true.
@@ -111,8 +299,8 @@ fn judge(
         findings,
     };
     let has_maps = plan.maps().wants(verdict.is_perfect());
-    let has_places = failed.iter().any(|end| end.place.is_some());
-    let Some(floor) = (has_maps || has_places).then(|| game.tools().levels.floor_plan(mode, level)).flatten() else {
+    let has_positions = failed.iter().any(|end| end.position.is_some());
+    let Some(floor) = (has_maps || has_positions).then(|| game.tools().levels.floor_plan(mode, level)).flatten() else {
         return verdict;
     };
     verdict.ends = end_places(floor.bounds, &failed);
@@ -129,7 +317,7 @@ fn judge(
     verdict
 }
 
-fn score<'a>(episodes: impl Iterator<Item = &'a Played>) -> Score {
+fn score<'a>(episodes: impl Iterator<Item = &'a Played>) -> EpisodeScore {
     let (mut count, mut solved, mut ticks, mut lost, mut timed_out, mut broken) = (0, 0, Vec::new(), 0, 0, 0);
     for episode in episodes {
         count += 1;
@@ -144,15 +332,15 @@ fn score<'a>(episodes: impl Iterator<Item = &'a Played>) -> Score {
         }
     }
     let interval = wilson(solved, count);
-    Score { solved, episodes: count, interval, ticks: FinishTime::of(ticks), lost, timed_out, broken }
+    EpisodeScore { solved, episodes: count, interval, ticks: FinishTime::of(ticks), lost, timed_out, broken }
 }
 
 /// Returns the end of an episode without the goal.
 fn failed_end(episode: &Played) -> Option<FailedEnd> {
     match &episode.end {
-        PlayedEnd::Ended { result, place, cause } if !result.success => {
+        PlayedEnd::Ended { result, position, cause } if !result.success => {
             let is_timed_out = result.end == EpisodeEnd::Truncated;
-            Some(FailedEnd { place: *place, is_timed_out, cause: *cause })
+            Some(FailedEnd { position: *position, is_timed_out, cause: *cause })
         }
         _ => None,
     }
@@ -185,163 +373,11 @@ fn broken(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
     findings
 }
 
-// Verdicts of the testers on one level.
-
-/// Outcome of a level.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum LevelOutcome {
-    /// The goal cannot be reached, which is proved.
-    ProvedUnsolvable,
-    /// No tester reached the goal, which proves nothing.
-    BotFailed,
-    /// A tester reached the goal at least once.
-    Solved,
-}
-
-impl LevelOutcome {
-    /// Returns the name in files and in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::ProvedUnsolvable => "proved-unsolvable",
-            Self::BotFailed => "bot-failed",
-            Self::Solved => "solved",
-        }
-    }
-}
-
-/// Ends of episodes.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Score {
-    /// Episodes that reached the goal.
-    pub solved: u64,
-    /// All episodes.
-    pub episodes: u64,
-    /// 95 % Wilson interval of the share of solved episodes.
-    pub interval: [f64; 2],
-    /// Ticks of the solved episodes, if there are any.
-    pub ticks: Option<FinishTime>,
-    /// Episodes that the game ended without the goal.
-    pub lost: u64,
-    /// Episodes that ended because time was up.
-    pub timed_out: u64,
-    /// Episodes in which the game broke, each of which is a finding.
-    pub broken: u64,
-}
-
-impl Score {
-    /// Returns the solved episodes among all.
-    pub fn trials(&self) -> Trials {
-        Trials { successes: self.solved, trials: self.episodes }
-    }
-}
-
-/// Ends of episodes without the goal in one square of the level's floor plan.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct SquareEnds {
-    /// Middle of the square, in the units of the floor plan.
-    pub x: f32,
-    /// Middle of the square.
-    pub y: f32,
-    /// Episodes that were lost there.
-    pub lost: u64,
-    /// Episodes whose time was up there.
-    pub timed_out: u64,
-    /// How often each cause ended an episode there, if the game reports it.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub causes: BTreeMap<String, u64>,
-}
-
-/// Results of a tester on a level.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct TesterVerdict {
-    /// Name of the tester.
-    pub tester: String,
-    /// Its episodes.
-    #[serde(flatten)]
-    pub score: Score,
-    /// True if it drew no random number in any of them: it repeats itself under any seed.
-    pub exact: bool,
-    /// Open squares that it visited in all its episodes, for levels with maps.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub places: Option<Places>,
-}
-
-/// A defect of a level, or of the game in it.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Finding {
-    /// Its detector: `panic`, `fault`, `endless`, `unreachable-goal`, or the name of a [detector](crate::detectors).
-    pub detector: String,
-    /// The tester that played; `None` if it was found without play.
-    pub tester: Option<String>,
-    /// Episode of that tester on the level, from 0.
-    pub episode: Option<u32>,
-    /// Tick of the episode, from 0.
-    pub tick: Option<u32>,
-    /// The message.
-    pub message: String,
-    /// Its file, relative to the folder of the results: see [`findings`](crate::findings).
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub file: Option<String>,
-    /// Settings, as `name.key=value`, for the search of its file beside those of the test: see
-    /// [`LevelDefect::settings`](crate::detectors::LevelDefect::settings). Results have none.
-    #[serde(skip)]
-    pub settings: Vec<String>,
-}
-
-/// All results of one level.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LevelVerdict {
-    /// Its name, such as `hard:7`.
-    pub level: String,
-    /// Its index in the range, from 0.
-    pub index: u64,
-    /// Its outcome.
-    pub outcome: LevelOutcome,
-    /// Proof about the level. A level that was solved is solvable.
-    pub proof: LevelProof,
-    /// All episodes of all testers.
-    #[serde(flatten)]
-    pub score: Score,
-    /// Positions of episodes that ended without the goal, if the game reports them.
-    pub ends: Vec<SquareEnds>,
-    /// How often each cause ended an episode without the goal, if the game reports causes.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub causes: BTreeMap<String, u64>,
-    /// Open squares that all testers together visited, for levels with maps.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub places: Option<Places>,
-    /// Maps of where agents went, for levels with maps: see [`MapScope`].
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub maps: Option<LevelMaps>,
-    /// Each tester, in the order of the plan.
-    pub testers: Vec<TesterVerdict>,
-    /// Findings.
-    pub findings: Vec<Finding>,
-}
-
-impl LevelVerdict {
-    /// Returns whether it was solved and has no finding.
-    pub fn is_sound(&self) -> bool {
-        self.outcome == LevelOutcome::Solved && self.findings.is_empty()
-    }
-
-    /// Returns whether it was solved in every episode and has no finding.
-    pub fn is_perfect(&self) -> bool {
-        self.is_sound() && self.score.solved == self.score.episodes
-    }
-}
-
-// Positions and causes of episodes that ended without the goal.
-
-/// Squares along the longer side of a floor plan to which [`SquareEnds`]s are rounded.
-pub const END_SQUARES: f32 = 32.0;
-
 /// The end of an episode without the goal.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct FailedEnd {
     /// Position, if the game reports it.
-    pub place: Option<Vec2>,
+    pub position: Option<Vec2>,
     /// True if time was up.
     pub is_timed_out: bool,
     /// Cause, if the game reports it.
@@ -357,8 +393,8 @@ fn end_places(bounds: Rect, ended: &[FailedEnd]) -> Vec<SquareEnds> {
     }
     let mut counts: BTreeMap<(i32, i32), SquareEnds> = BTreeMap::new();
     for end in ended {
-        let Some(place) = end.place.filter(|place| place.is_finite()) else { continue };
-        let square = ((place - bounds.min) / side).floor();
+        let Some(position) = end.position.filter(|position| position.is_finite()) else { continue };
+        let square = ((position - bounds.min) / side).floor();
         let (column, row) = (square.x as i32, square.y as i32);
         let counted = counts.entry((row, column)).or_insert_with(|| SquareEnds {
             x: bounds.min.x + (column as f32 + 0.5) * side,
@@ -384,40 +420,9 @@ fn add_cause(causes: &mut BTreeMap<String, u64>, cause: Option<&'static str>) {
     }
 }
 
-// Visited share of a level.
-
-/// Visited squares, among all that walls do not cut off from the start: see
-/// [`open_cells`](crate::explore::round). Under gravity, some of these may be unreachable.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Places {
-    /// Open squares that were visited, or passed between two ticks.
-    pub visited: u64,
-    /// All open squares.
-    pub open: u64,
-}
-
-impl Places {
-    /// Returns the visited share in percent; `None` without open squares.
-    pub fn percent(self) -> Option<f64> {
-        (self.open > 0).then(|| 100.0 * self.visited as f64 / self.open as f64)
-    }
-
-    /// Formats the share.
-    pub fn describe(self) -> String {
-        self.percent().map_or_else(|| "–".to_owned(), |percent| format!("{percent:.1} %"))
-    }
-
-    /// Adds the squares of another level.
-    fn add(&mut self, other: Option<Self>) {
-        let other = other.unwrap_or_default();
-        self.visited = self.visited.saturating_add(other.visited);
-        self.open = self.open.saturating_add(other.open);
-    }
-}
-
 #[cfg(test)]
-mod level_verdict_tests {
-    use super::{LevelVerdict, Places};
+mod tests {
+    use super::*;
     use crate::verdict::{maps::LevelMaps, testing::verdict};
 
     #[test]
@@ -433,17 +438,13 @@ mod level_verdict_tests {
         let text = serde_json::to_string(&new).expect("serialises");
         assert_eq!(serde_json::from_str::<LevelVerdict>(&text).expect("whole"), new);
     }
-}
-
-#[cfg(test)]
-mod ends_tests {
-    use super::*;
 
     #[test]
     fn ends_are_counted_by_square_kind_and_cause() {
         let bounds = Rect::new(-1.0, 0.0, 63.0, 10.0);
-        let at = |x: f32, y: f32, is_timed_out, cause| FailedEnd { place: Some(Vec2::new(x, y)), is_timed_out, cause };
-        let nowhere = FailedEnd { place: None, is_timed_out: false, cause: Some("saw") };
+        let at =
+            |x: f32, y: f32, is_timed_out, cause| FailedEnd { position: Some(Vec2::new(x, y)), is_timed_out, cause };
+        let nowhere = FailedEnd { position: None, is_timed_out: false, cause: Some("saw") };
         let ended = [
             at(-0.5, 3.0, false, Some("saw")),
             at(0.9, 2.5, true, None),
@@ -462,11 +463,6 @@ mod ends_tests {
         assert!(end_places(Rect::new(0.0, 0.0, 0.0, 0.0), &ended).is_empty());
         assert_eq!(causes(&ended), BTreeMap::from([("lava".to_owned(), 1), ("saw".to_owned(), 2)]));
     }
-}
-
-#[cfg(test)]
-mod places_tests {
-    use super::*;
 
     #[test]
     fn shares_are_of_all_levels_together() {

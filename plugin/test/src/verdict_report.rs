@@ -6,6 +6,12 @@
 //!
 //! The page is a function of the results, of the results compared with, and of the game, which draws the pictures.
 //! The results of a whole range and those joined from shards give the same bytes.
+//!
+//! The files of the folder, in reading order:
+//!
+//! - `level_table`: the table of levels.
+//! - `drawn`: the drawings of the levels in the table, and descriptions of walks.
+//! - `picture`, `heat`, `clip`: the plan with the ends of episodes, maps over it, and the path of a failure.
 
 mod clip;
 mod drawn;
@@ -18,14 +24,14 @@ mod testing;
 mod tests;
 
 use crate::{
-    verdict::{Comparison, LevelVerdict, Overview, Score, TestError, Trials, wilson},
+    verdict::{Comparison, EpisodeScore, LevelVerdict, Overview, TestError, Trials, wilson},
     verdict_report::{
         drawn::Plans,
         level_table::{Selection, level_table},
     },
 };
 use playbot_harness::game::Game;
-use playbot_report::{escape::escape, whole};
+use playbot_report::{PAGE_STYLE, escape::escape, whole};
 use std::{
     cmp::Reverse,
     collections::BTreeMap,
@@ -33,20 +39,33 @@ use std::{
     path::Path,
 };
 
-// Writer of the page from the results in a folder.
-
 /// Name of the file in the folder of a test.
 pub const REPORT: &str = "report.html";
 
-/// Content of a report besides the results.
-#[derive(Clone, Copy)]
-pub struct HtmlReport<'a> {
-    /// The tested game, which draws its levels; without it, the page has no pictures.
-    pub game: Option<&'a dyn Game>,
-    /// Changes since earlier results.
-    pub comparison: Option<&'a Comparison>,
-    /// Name of the program in the commands that the report shows.
-    pub program: &'a str,
+/// Additional style of this report.
+pub(crate) const STYLE: &str = include_str!("verdict_report/levels.css");
+
+/// Script that sorts and filters the table of levels.
+const SCRIPT: &str = include_str!("verdict_report/levels.js");
+
+/// Most letters of a foreign text, such as the message of a broken game.
+const MOST_LETTERS: usize = 400;
+
+/// Largest number of causes that are named.
+const MOST_CAUSES: usize = 8;
+
+/// Largest number of changes of a kind that are listed; all are in `against.json`.
+const MOST_CHANGES: usize = 100;
+
+/// Makes the report of the results in a folder, and writes it to a file.
+///
+/// # Errors
+///
+/// The folder has no results, they are damaged, or the file cannot be written.
+pub fn write_html(results: &Path, file: &Path, report: &HtmlReport) -> Result<(), TestError> {
+    let html = html(results, report)?;
+    let written = playbot_learner::write_atomically(file, html.as_bytes());
+    written.map_err(|source| TestError::Io { action: "write", path: file.to_owned(), source })
 }
 
 /// Makes the report of the results in a folder.
@@ -68,27 +87,16 @@ pub fn html(results: &Path, report: &HtmlReport) -> Result<String, TestError> {
     Ok(page.to_html())
 }
 
-/// Makes the report of the results in a folder, and writes it to a file.
-///
-/// # Errors
-///
-/// The folder has no results, they are damaged, or the file cannot be written.
-pub fn write_html(results: &Path, file: &Path, report: &HtmlReport) -> Result<(), TestError> {
-    let html = html(results, report)?;
-    let written = playbot_learner::write_atomically(file, html.as_bytes());
-    written.map_err(|source| TestError::Io { action: "write", path: file.to_owned(), source })
+/// Content of a report besides the results.
+#[derive(Clone, Copy)]
+pub struct HtmlReport<'a> {
+    /// The tested game, which draws its levels; without it, the page has no pictures.
+    pub game: Option<&'a dyn Game>,
+    /// Changes since earlier results.
+    pub comparison: Option<&'a Comparison>,
+    /// Name of the program in the commands that the report shows.
+    pub program: &'a str,
 }
-
-// The whole page.
-
-/// Style of all reports.
-use playbot_report::PAGE_STYLE;
-
-/// Additional style of this report.
-pub(crate) const STYLE: &str = include_str!("verdict_report/levels.css");
-
-/// Script that sorts and filters the table of levels.
-const SCRIPT: &str = include_str!("verdict_report/levels.js");
 
 /// Content of the page.
 pub struct Page<'a> {
@@ -132,69 +140,6 @@ impl Page<'_> {
     }
 }
 
-// Texts and numbers of the page.
-
-/// Most letters of a foreign text, such as the message of a broken game.
-const MOST_LETTERS: usize = 400;
-
-/// Largest number of causes that are named.
-const MOST_CAUSES: usize = 8;
-
-/// Escapes text for the page; a long one is cut.
-pub(crate) fn text(words: &str) -> String {
-    match words.char_indices().nth(MOST_LETTERS) {
-        Some((end, _)) => format!("{} …", escape(&words[..end])),
-        None => escape(words),
-    }
-}
-
-/// Formats a 95 % interval of a share, in percent.
-pub(crate) fn interval([low, high]: [f64; 2]) -> String {
-    format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high)
-}
-
-/// Formats the 95 % Wilson interval of a share, in percent.
-pub(crate) fn interval_of(share: Trials) -> String {
-    interval(wilson(share.successes, share.trials))
-}
-
-/// Describes the failure of a level in one line of escaped text.
-pub(crate) fn what(level: &LevelVerdict) -> String {
-    let Some(finding) = level.findings.first() else {
-        let causes = causes(level);
-        let causes = if causes.is_empty() { String::new() } else { format!(" ({causes})") };
-        return format!("{}{causes}", ends(&level.score));
-    };
-    let more = level.findings.len() - 1;
-    let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };
-    format!("{}: {}{more}", escape(&finding.detector), text(&finding.message))
-}
-
-/// Describes the ends of the episodes that were not solved.
-pub(crate) fn ends(score: &Score) -> String {
-    let counts = [("lost", score.lost), ("timed out", score.timed_out), ("broken", score.broken)];
-    let told = counts.iter().filter(|(_, count)| *count > 0).map(|(what, count)| format!("{what} {count}"));
-    let told: Vec<String> = told.collect();
-    if told.is_empty() { "solved each time".to_owned() } else { told.join(", ") }
-}
-
-/// Describes how often each cause ended an episode, as a short escaped text.
-pub(crate) fn causes(level: &LevelVerdict) -> String {
-    let told: Vec<String> =
-        most_frequent(&level.causes).map(|(cause, count)| format!("{} {count}", text(cause))).collect();
-    told.join(", ")
-}
-
-/// Returns causes with their numbers of ends, the most frequent ones first.
-pub(crate) fn most_frequent(causes: &BTreeMap<String, u64>) -> impl Iterator<Item = (&str, u64)> {
-    let mut sorted: Vec<(&str, u64)> = causes.iter().map(|(cause, count)| (cause.as_str(), *count)).collect();
-    // Equally frequent ones stay in the order of their names.
-    sorted.sort_by_key(|(_, count)| Reverse(*count));
-    sorted.into_iter().take(MOST_CAUSES)
-}
-
-// Numbers of the whole test.
-
 /// Writes the outcomes of the levels, and the totals of each tester.
 pub(crate) fn numbers(overview: &Overview) -> String {
     let levels = overview.levels;
@@ -234,11 +179,6 @@ pub(crate) fn numbers(overview: &Overview) -> String {
     out + "</tbody></table></div>\n<p class=\"key\">Intervals are 95 % Wilson intervals.</p>\n</section>\n"
 }
 
-// Section of the changes since earlier results.
-
-/// Largest number of changes of a kind that are listed; all are in `against.json`.
-const MOST_CHANGES: usize = 100;
-
 /// Writes the section of the page.
 pub(crate) fn compared(comparison: &Comparison) -> String {
     let Comparison { levels, only_now, only_before, left_out, .. } = comparison;
@@ -274,4 +214,59 @@ fn list(title: &str, changes: &[impl Display]) -> String {
         let _ = writeln!(out, "<li>and {more} more in against.json</li>");
     }
     out + "</ul>\n"
+}
+
+// Texts and numbers of the page.
+
+/// Escapes text for the page; a long one is cut.
+pub(crate) fn text(words: &str) -> String {
+    match words.char_indices().nth(MOST_LETTERS) {
+        Some((end, _)) => format!("{} …", escape(&words[..end])),
+        None => escape(words),
+    }
+}
+
+/// Formats a 95 % interval of a share, in percent.
+pub(crate) fn interval([low, high]: [f64; 2]) -> String {
+    format!("{:.1} to {:.1} %", 100.0 * low, 100.0 * high)
+}
+
+/// Formats the 95 % Wilson interval of a share, in percent.
+pub(crate) fn interval_of(share: Trials) -> String {
+    interval(wilson(share.successes, share.trials))
+}
+
+/// Describes the failure of a level in one line of escaped text.
+pub(crate) fn what(level: &LevelVerdict) -> String {
+    let Some(finding) = level.findings.first() else {
+        let causes = causes(level);
+        let causes = if causes.is_empty() { String::new() } else { format!(" ({causes})") };
+        return format!("{}{causes}", ends(&level.score));
+    };
+    let more = level.findings.len() - 1;
+    let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };
+    format!("{}: {}{more}", escape(&finding.detector), text(&finding.message))
+}
+
+/// Describes the ends of the episodes that were not solved.
+pub(crate) fn ends(score: &EpisodeScore) -> String {
+    let counts = [("lost", score.lost), ("timed out", score.timed_out), ("broken", score.broken)];
+    let reported = counts.iter().filter(|(_, count)| *count > 0).map(|(what, count)| format!("{what} {count}"));
+    let reported: Vec<String> = reported.collect();
+    if reported.is_empty() { "solved each time".to_owned() } else { reported.join(", ") }
+}
+
+/// Describes how often each cause ended an episode, as a short escaped text.
+pub(crate) fn causes(level: &LevelVerdict) -> String {
+    let reported: Vec<String> =
+        most_frequent(&level.causes).map(|(cause, count)| format!("{} {count}", text(cause))).collect();
+    reported.join(", ")
+}
+
+/// Returns causes with their numbers of ends, the most frequent ones first.
+pub(crate) fn most_frequent(causes: &BTreeMap<String, u64>) -> impl Iterator<Item = (&str, u64)> {
+    let mut sorted: Vec<(&str, u64)> = causes.iter().map(|(cause, count)| (cause.as_str(), *count)).collect();
+    // Equally frequent ones stay in the order of their names.
+    sorted.sort_by_key(|(_, count)| Reverse(*count));
+    sorted.into_iter().take(MOST_CAUSES)
 }

@@ -8,9 +8,9 @@
 //!
 //! A folder called `step-…` is whole: it is filled under another name first.
 
-use crate::error::{RunError, io_error};
+use crate::error::RunError;
 use bevy_playbot::unknown_name::UnknownName;
-use playbot_harness::sealed_file::{read_sealed, write_sealed};
+use playbot_harness::sealed_file::{SealedFileError, io_error, read_sealed, write_sealed};
 use playbot_learner::disk;
 use serde::{Deserialize, Serialize};
 use std::{
@@ -178,12 +178,12 @@ pub(crate) fn set_aside_after(run: &Path, step: u64) -> Result<(), RunError> {
 }
 
 /// Removes partial checkpoints of a process that was killed while it wrote or removed one.
-pub(crate) fn remove_halves(run: &Path) -> Result<(), RunError> {
+pub(crate) fn remove_halves(run: &Path) -> Result<(), SealedFileError> {
     [UNFINISHED, REMOVED].iter().try_for_each(|half| remove_if_there(&folder(run).join(half)))
 }
 
 /// Renames a checkpoint, if it exists, to a name that is not listed, for manual inspection.
-fn put_aside(path: &Path) -> Result<(), RunError> {
+fn put_aside(path: &Path) -> Result<(), SealedFileError> {
     if !path.exists() {
         return Ok(());
     }
@@ -220,7 +220,7 @@ fn folder(run: &Path) -> PathBuf {
     run.join("checkpoints")
 }
 
-fn remove_if_there(folder: &Path) -> Result<(), RunError> {
+fn remove_if_there(folder: &Path) -> Result<(), SealedFileError> {
     match disk::remove_dir_all(folder) {
         Err(error) if error.kind() != io::ErrorKind::NotFound => Err(io_error("remove", folder)(error)),
         _ => Ok(()),
@@ -263,7 +263,7 @@ mod tests {
         let summary = CheckpointSummary { step: 20, ..CheckpointSummary::default() };
         let failed = write(run.path(), summary, 1, |checkpoint| {
             write_atomically(&checkpoint.learner_file(), b"half")?;
-            Err(io_error("write", &checkpoint.arenas_file())(io::Error::from(io::ErrorKind::StorageFull)))
+            Err(io_error("write", &checkpoint.arenas_file())(io::Error::from(io::ErrorKind::StorageFull)).into())
         });
         assert!(failed.is_err());
         assert_eq!(steps(run.path()), [10]);

@@ -297,8 +297,6 @@ fn push_tick(
     Ok(())
 }
 
-// Data of one tick of all agents of a World, before it joins the rollout.
-
 /// Actions and results of each agent in a tick; for the shapes see [`RolloutStep`]. Observations are kept elsewhere.
 pub(crate) struct AgentsTick {
     no_obs: Observations,
@@ -341,7 +339,7 @@ impl AgentsTick {
     }
 }
 
-// Episodes that ran out of time: their last states, and the values of these.
+// Episodes that ran out of time.
 
 /// The last states of the episodes that ran out of time in one tick.
 pub(crate) struct CutEpisodes {
@@ -412,7 +410,7 @@ pub(crate) fn push_state(
 ) {
     if let (Some(skill), Some(observation)) = (world.get::<ActiveSkill>(entity), world.get::<Observation>(entity)) {
         skills.extend_from_slice(&skill.z);
-        left.extend(world.get_resource::<SkillPrior>().map(|prior| skill.left(prior.horizon)));
+        left.extend(world.get_resource::<SkillPrior>().map(|prior| skill.left(prior.skill_interval)));
         observation.push_to(observations);
     }
 }

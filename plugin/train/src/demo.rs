@@ -1,7 +1,9 @@
 //! Data sets for the skill model, made from recordings.
 //!
-//! - `chosen`: the selection of recorded episodes to learn from.
+//! The folder, in reading order:
+//!
 //! - `observe`: the replay of recordings whose files lack observations.
+//! - `chosen`: the selection of recorded episodes to learn from.
 
 mod chosen;
 mod observe;
@@ -21,9 +23,7 @@ use playbot_harness::{
     sensors::GameSensors,
     split::{HeldOut, LevelSplit},
 };
-use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode as LearnerEpisode, LearnError, ObsKind, Observations, Rollout,
-};
+use playbot_learner::{ActionSpace, Actions, Dataset, DatasetEpisode, LearnError, ObsKind, Observations, Rollout};
 use std::{
     collections::{BTreeMap, BTreeSet},
     path::Path,
@@ -191,10 +191,10 @@ impl Demonstrations {
             } else {
                 // An earlier episode is equal.
                 progress(demo.episode.len() as u64);
-                let earlier: &LearnerEpisode = &episodes[originals[i]];
+                let earlier: &DatasetEpisode = &episodes[originals[i]];
                 earlier.observations.clone()
             };
-            episodes.push(LearnerEpisode { observations, actions: learner_actions(&demo.episode) });
+            episodes.push(DatasetEpisode { observations, actions: learner_actions(&demo.episode) });
         }
         let dataset = Dataset::new(self.observation_config.obs_kind(game), game.actions(), episodes)?;
         Ok(dataset.with_levels(self.levels())?)
@@ -225,28 +225,9 @@ impl Demonstrations {
         let key = |demo: &Demonstration| (demo.level(), bits(&demo.episode.actions));
         self.episodes.iter().enumerate().map(|(i, demo)| *first.entry(key(demo)).or_insert(i)).collect()
     }
-}
 
-/// Returns the actions as numbers that can be compared.
-fn bits(actions: &EpisodeActions) -> Vec<u32> {
-    match actions {
-        EpisodeActions::Discrete(list) => list.clone(),
-        EpisodeActions::Continuous { values, .. } => values.iter().map(|value| value.to_bits()).collect(),
-    }
-}
-
-/// Returns the actions of an episode as learners take them.
-pub fn learner_actions(episode: &DemoEpisode) -> Actions {
-    match &episode.actions {
-        EpisodeActions::Discrete(list) => Actions::Discrete(list.clone()),
-        EpisodeActions::Continuous { dim, values } => Actions::Continuous { dim: *dim, values: values.clone() },
-    }
-}
-
-// Rollouts for algorithms that learn from recordings beside their own play.
-
-impl Demonstrations {
-    /// Returns the episodes with their rewards, as rollouts of one environment each. Every episode is replayed, and its
+    /// Returns the episodes with their rewards, as rollouts of one environment each, for algorithms that learn from
+    /// recordings beside their own play. Every episode is replayed, and its
     /// rewards are those of the current game. Recordings with no rewards or older ones serve as well, if the game still
     /// reaches the recorded states. The last step of an episode that the rules did not end is left out, since its
     /// outcome was not recorded.
@@ -300,6 +281,22 @@ fn rollout(
     Ok(Some(rollout))
 }
 
+/// Returns the actions as numbers that can be compared.
+fn bits(actions: &EpisodeActions) -> Vec<u32> {
+    match actions {
+        EpisodeActions::Discrete(list) => list.clone(),
+        EpisodeActions::Continuous { values, .. } => values.iter().map(|value| value.to_bits()).collect(),
+    }
+}
+
+/// Returns the actions of an episode as learners take them.
+pub fn learner_actions(episode: &DemoEpisode) -> Actions {
+    match &episode.actions {
+        EpisodeActions::Discrete(list) => Actions::Discrete(list.clone()),
+        EpisodeActions::Continuous { dim, values } => Actions::Continuous { dim: *dim, values: values.clone() },
+    }
+}
+
 #[cfg(test)]
 pub(super) mod tests {
     use super::*;
@@ -325,7 +322,7 @@ pub(super) mod tests {
     }
 
     #[test]
-    fn levels_from_files_are_told_apart_by_what_is_in_them() {
+    fn levels_from_files_are_distinguished_by_what_is_in_them() {
         // Each recording counts its files from 0.
         let levels = [(0, None), (1, None), (0, None), (0, Some(5)), (0, Some(6)), (3, Some(5))];
         let demos = all(levels.into_iter().map(|(seed, hash)| DemoEpisode {

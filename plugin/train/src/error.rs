@@ -8,12 +8,12 @@ use bevy_playbot::{
     fault::Fault,
     vision::{ObservationConfig, UnknownObservation, VisionError},
 };
-use playbot_harness::{sealed_file::SealedFileError, split::LevelSplit};
-use playbot_learner::{FileError, HasExitCode, LearnError};
-use std::{
-    io,
-    path::{Path, PathBuf},
+use playbot_harness::{
+    sealed_file::{SealedFileError, damaged},
+    split::LevelSplit,
 };
+use playbot_learner::{FileError, HasExitCode, LearnError};
+use std::{io, path::PathBuf};
 use thiserror::Error;
 
 /// Failure of training.
@@ -144,24 +144,20 @@ pub enum RunError {
         /// Environment steps of the existing checkpoints.
         steps: Vec<u64>,
     },
-    /// The operating system refused.
-    #[error("cannot {action} {}: {source}{}", path.display(), elsewhere(action))]
-    Io {
-        /// The failed action.
-        action: &'static str,
-        /// Its file.
+    /// The folder of a new run cannot be made; nothing is lost.
+    #[error(
+        "cannot create the folder {}: {source}; make room or grant write access there, or name another folder",
+        path.display()
+    )]
+    NoFolder {
+        /// The folder.
         path: PathBuf,
         /// The system's answer.
         source: io::Error,
     },
-    /// A file of the run is damaged.
-    #[error("{}: {message}", path.display())]
-    Damaged {
-        /// The file.
-        path: PathBuf,
-        /// The damage.
-        message: String,
-    },
+    /// A file of the run cannot be read or written, or is damaged.
+    #[error(transparent)]
+    File(#[from] SealedFileError),
     /// The learner's file cannot be read or written.
     #[error(transparent)]
     Learner(#[from] FileError),
@@ -176,19 +172,11 @@ pub enum RunError {
 impl HasExitCode for RunError {
     fn exit_code(&self) -> u8 {
         match self {
-            Self::Io { .. } => 2,
+            Self::NoFolder { .. } => 2,
+            Self::File(error) => error.exit_code(),
             Self::Learner(error) => error.exit_code(),
             Self::Train(error) => error.exit_code(),
             _ => 3,
-        }
-    }
-}
-
-impl From<SealedFileError> for RunError {
-    fn from(error: SealedFileError) -> Self {
-        match error {
-            SealedFileError::Io { action, path, source } => Self::Io { action, path, source },
-            SealedFileError::Damaged { path, message } => Self::Damaged { path, message },
         }
     }
 }
@@ -201,13 +189,6 @@ fn of_run(error: &ConfigError) -> String {
     format!("{error}; the file is part of a run: {MEND}")
 }
 
-/// Action of making the run's folder; a failure here loses nothing.
-pub(crate) const FOLDER: &str = "create the folder";
-
-fn elsewhere(action: &str) -> &'static str {
-    if action == FOLDER { "; make room or grant write access there, or name another folder" } else { "" }
-}
-
 fn list_steps(steps: &[u64]) -> String {
     if steps.is_empty() {
         return "no checkpoint: wait until training has saved one, restore the checkpoints from a copy, or train again with \
@@ -218,15 +199,10 @@ fn list_steps(steps: &[u64]) -> String {
     format!("no such checkpoint; the run has those of the steps {}", steps.join(", "))
 }
 
-/// Makes the error of a failed action on a file.
-pub(crate) fn io_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> RunError {
-    move |source| RunError::Io { action, path: path.into(), source }
-}
-
 /// Makes the error of a damaged file that a run needs.
 pub(crate) fn unreadable(path: PathBuf, message: &str) -> RunError {
     let known = message.strip_prefix("the file is damaged: ").unwrap_or(message);
-    RunError::Damaged { path, message: format!("the file is damaged ({known}): {MEND}") }
+    damaged(&path, &format!("the file is damaged ({known}): {MEND}")).into()
 }
 
 /// Makes the error of a run's experiment that was changed on disk.
@@ -235,9 +211,5 @@ pub(crate) fn edited(path: PathBuf, message: &str) -> RunError {
         "{message}; the file is part of a run: {MEND}. If you have edited it, write the change as --set for a new run \
          instead"
     );
-    RunError::Damaged { path, message }
-}
-
-pub(crate) fn damaged(path: &Path, error: &impl ToString) -> RunError {
-    RunError::Damaged { path: path.into(), message: error.to_string() }
+    damaged(&path, &message).into()
 }

@@ -1,9 +1,11 @@
 //! Experiments and their settings.
 //!
-//! - `checks`: checks of an experiment.
+//! The folder, in reading order:
+//!
+//! - `file`: experiment files in RON, with their bases.
+//! - `keys`: experiments as lists of keys with their values as text, by which files and `--set` override one another.
+//! - `checks`: checks of an experiment, alone and against its game.
 //! - `error`: errors of experiment files and of `--set`, with their positions.
-//! - `file`: experiment files in RON.
-//! - `keys`: experiments as lists of keys with their values as text.
 
 pub(crate) mod checks;
 pub(crate) mod error;
@@ -226,7 +228,7 @@ impl Experiment {
     }
 }
 
-// Algorithms, by name.
+// Algorithms.
 
 /// An algorithm that makes a policy. Files and the command line use its [`name`](Self::name).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -370,7 +372,7 @@ impl From<Algorithm> for String {
     }
 }
 
-// The default experiment.
+// The default experiment, and presets.
 
 /// Number of training levels, and of test levels after them, for a game without its own experiment.
 const LEVELS: u64 = 64;
@@ -399,8 +401,6 @@ fn plainest(game: &dyn Game) -> String {
     )
 }
 
-// Presets: named settings for experiments to build on, those of the paper and of its released code.
-
 /// Returns the preset with this name, which `base` in an experiment names.
 ///
 /// # Errors
@@ -412,7 +412,7 @@ pub fn find_preset(name: &str) -> Result<ExperimentFile, UnknownName> {
 }
 
 #[cfg(test)]
-mod algorithm_tests {
+mod tests {
     use super::*;
 
     #[test]

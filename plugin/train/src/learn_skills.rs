@@ -1,13 +1,13 @@
 //! The learning of a skill model: begun or resumed, saved after each epoch, stopped after any batch.
 
 use crate::{
-    error::{RunError, io_error},
+    error::RunError,
     experiment::Experiment,
     run_observer::{KeptSkills, RunEvent, RunObserver},
     runs::settings_that_differ,
 };
 use bevy_playbot::{policy::ActionDraw, skill_prior::SkillPrior};
-use playbot_harness::eval::Player;
+use playbot_harness::{eval::Player, sealed_file::io_error};
 use playbot_learner::{
     Dataset, DeviceKind, FileError, HasExitCode, LearnError, SkillModel, SkillSource, SkillTrainer, disk,
 };
@@ -120,7 +120,7 @@ pub fn learn(
         observer.observe(RunEvent::SkillEpoch { epoch: trainer.epochs_done(), metrics: &metrics });
     }
     observer.observe(RunEvent::SkillsEnded { kept: kept(&trainer, last) });
-    Ok(Some(trainer.into_model().with_picture(experiment.observation_config().card())))
+    Ok(Some(trainer.into_model().with_picture(experiment.observation_config().picture_metadata())))
 }
 
 /// Returns the loss of the kept model on the held-out episodes, if there are any. The kept model is that of the best
@@ -182,19 +182,19 @@ pub fn checkpoint_of(file: &Path) -> PathBuf {
 /// The system refuses.
 pub fn remove_checkpoint(checkpoint: &Path) -> Result<(), RunError> {
     match disk::remove_file(checkpoint) {
-        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(io_error("remove", checkpoint)(error)),
+        Err(error) if error.kind() != io::ErrorKind::NotFound => Err(io_error("remove", checkpoint)(error).into()),
         _ => Ok(()),
     }
 }
 
 /// Returns the player of behaviour cloning: the decoder under the prior, without any reinforcement learning.
-pub fn cloning(model: &SkillModel, experiment: &Experiment, draw: ActionDraw) -> Player {
-    let skills = cloning_skills(model, experiment);
+pub fn behaviour_cloning(model: &SkillModel, experiment: &Experiment, draw: ActionDraw) -> Player {
+    let skills = behaviour_cloning_skills(model, experiment);
     Player::Policy { policy: model.policy(), prior: Some(SkillPrior::from(&skills)), draw }
 }
 
 /// Returns the skills of behaviour cloning, with the experiment's skill interval and draw.
-pub fn cloning_skills(model: &SkillModel, experiment: &Experiment) -> SkillSource {
-    let (horizon, draw) = (experiment.score.horizon, experiment.score.skill_draw);
-    SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw }
+pub fn behaviour_cloning_skills(model: &SkillModel, experiment: &Experiment) -> SkillSource {
+    let (skill_interval, draw) = (experiment.score.skill_interval, experiment.score.skill_draw);
+    SkillSource { prior: model.prior(), decoder: model.policy(), skill_interval, draw }
 }

@@ -1,7 +1,7 @@
 //! Training of bots without a window: from recordings and reward to a policy, and to comparisons of methods.
 //!
-//! The numbers of a run depend on its experiment and its random seed alone. Whatever was stopped is resumed bit for bit.
-//! Most programs use this crate through `playbot`, as `playbot::train`.
+//! The numbers of a run depend on its experiment and its random seed alone. Whatever was stopped is resumed bit for
+//! bit. Most programs use this crate through `playbot`, as `playbot::train`.
 //!
 //! The modules, in reading order:
 //!
@@ -11,7 +11,7 @@
 //! - [`learn_skills`]: the learning of a skill model.
 //! - [`trainer`]: the training loop, one update at a time ([`Trainer`]); [`collect`]: the Worlds that play for it.
 //! - [`train_run`]: a whole run ([`train_run::Training`]), with its folder ([`run_dir`], [`run_lock`]), checkpoints
-//!   ([`checkpoint`]), metrics ([`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
+//!   ([`checkpoint`]), metrics ([`update_report`], [`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
 //! - [`policy_export`]: the one file that a game ships with.
 //! - [`runs`]: runs on disk, found and compared over seeds.
 //! - [`study`] and [`study_runner`]: variants of an experiment, each with every seed, and their tables.
@@ -37,13 +37,12 @@ pub mod study_runner;
 pub mod tensorboard;
 pub mod train_run;
 pub mod trainer;
+pub mod update_report;
 
 pub use crate::{
     error::TrainError,
     experiment::{Algorithm, Experiment, LearnerKind},
-    metrics_log::{Timing, UpdateReport},
-    trainer::{
-        Trainer,
-        learner::{LearnerMetrics, TrainedLearner},
-    },
+    trainer::{Trainer, learner::TrainedLearner},
+    update_report::{Timing, UpdateReport},
 };
+pub use playbot_learner::LearnerMetrics;

@@ -14,40 +14,6 @@ use playbot_harness::{
 };
 use playbot_learner::{ActionSpace, ImageShape, ObsKind, nn::CnnKind};
 
-/// Resources that the machine has left.
-struct Room {
-    /// Bytes of memory.
-    memory: u64,
-    threads: ThreadLimit,
-}
-
-/// Bytes of a learned number: the number, its gradient and the two moments of Adam.
-const LEARNED: u64 = 16;
-
-/// Sizes of the game's observations and actions.
-struct Sizes {
-    image: Option<ImageShape>,
-    /// Bytes of an observation.
-    observation: u64,
-    /// Numbers of an observation that a layer reads; 0 for images, which are read by convolutions.
-    inputs: u64,
-    /// Numbers of an action, and numbers of its distribution.
-    action: u64,
-    outputs: u64,
-}
-
-impl Sizes {
-    /// Returns the memory of the convolutions of so many networks, where there are pictures.
-    fn convolutions(&self, cnn: &CnnKind, networks: u64, key: &str) -> Option<MemoryPart> {
-        let numbers = convolution_numbers(cnn, self.image?);
-        Some(MemoryPart {
-            what: format!("convolutions of {networks} × {numbers} numbers with gradients and moments"),
-            bytes: product(&[numbers, networks, LEARNED]),
-            keys: key.to_owned(),
-        })
-    }
-}
-
 impl Experiment {
     /// Checks that the data of a training fit into the free memory: networks with their gradients and moments,
     /// minibatches, rollouts, the replay buffer of SAC, and Worlds, each of which plays on a thread of its own.
@@ -197,6 +163,40 @@ impl Experiment {
     /// Returns the numbers of a skill that the policy reads.
     fn latent(&self) -> u64 {
         if self.algorithm.needs_skills() { self.skills.latent as u64 } else { 0 }
+    }
+}
+
+/// Resources that the machine has left.
+struct Room {
+    /// Bytes of memory.
+    memory: u64,
+    threads: ThreadLimit,
+}
+
+/// Bytes of a learned number: the number, its gradient and the two moments of Adam.
+const LEARNED: u64 = 16;
+
+/// Sizes of the game's observations and actions.
+struct Sizes {
+    image: Option<ImageShape>,
+    /// Bytes of an observation.
+    observation: u64,
+    /// Numbers of an observation that a layer reads; 0 for images, which are read by convolutions.
+    inputs: u64,
+    /// Numbers of an action, and numbers of its distribution.
+    action: u64,
+    outputs: u64,
+}
+
+impl Sizes {
+    /// Returns the memory of the convolutions of so many networks, where there are pictures.
+    fn convolutions(&self, cnn: &CnnKind, networks: u64, key: &str) -> Option<MemoryPart> {
+        let numbers = convolution_numbers(cnn, self.image?);
+        Some(MemoryPart {
+            what: format!("convolutions of {networks} × {numbers} numbers with gradients and moments"),
+            bytes: product(&[numbers, networks, LEARNED]),
+            keys: key.to_owned(),
+        })
     }
 }
 

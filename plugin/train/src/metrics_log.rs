@@ -5,13 +5,11 @@
 //! - `tensorboard/`: both again, as an event file. It is derived: a resumed run writes it anew.
 
 use crate::{
-    error::{RunError, io_error},
     tensorboard::{Event, EventFolder, EventKind},
-    trainer::learner::LearnerMetrics,
+    update_report::UpdateReport,
 };
-use playbot_harness::sealed_file::{unsealed_line, write_atomically};
+use playbot_harness::sealed_file::{SealedFileError, io_error, unsealed_line, write_atomically};
 use playbot_learner::{disk::DiskFile, seal_json};
-use serde::Serialize;
 use serde_json::{Value, json};
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -23,14 +21,6 @@ use std::{
 
 /// Tag of the environment steps per second.
 pub const SPS: &str = "charts/SPS";
-
-/// Tags of the means over the last 100 episodes.
-pub const EPISODE_MEANS: [&str; 3] = [EPISODIC_RETURN, EPISODIC_LENGTH, SUCCESS_RATE];
-
-/// Returns the natural range of a metric; `None` if any value is possible.
-pub fn range_of(tag: &str) -> Option<(f64, f64)> {
-    [SUCCESS_RATE, CLIPPED_SHARE].contains(&tag).then_some((0.0, 1.0))
-}
 
 /// The files of a run that hold its metrics.
 #[derive(Clone, Debug)]
@@ -61,8 +51,8 @@ impl MetricsLog {
     ///
     /// # Errors
     ///
-    /// [`RunError::Io`].
-    pub fn append(&self, report: &UpdateReport, steps_per_update: u64) -> Result<(), RunError> {
+    /// [`SealedFileError::Io`].
+    pub fn append(&self, report: &UpdateReport, steps_per_update: u64) -> Result<(), SealedFileError> {
         self.write(report.step, &metrics_line(report), &timing_line(report, steps_per_update, wall_time()))
     }
 
@@ -70,15 +60,15 @@ impl MetricsLog {
     ///
     /// # Errors
     ///
-    /// [`RunError::Io`].
-    pub(crate) fn sync(&self) -> Result<(), RunError> {
+    /// [`SealedFileError::Io`].
+    pub(crate) fn sync(&self) -> Result<(), SealedFileError> {
         let there = [&self.metrics, &self.timing].into_iter().filter(|path| path.exists());
         there
             .into_iter()
             .try_for_each(|path| DiskFile::append(path).and_then(|file| file.sync()).map_err(io_error("write", path)))
     }
 
-    fn write(&self, step: u64, metrics: &Value, timing: &Value) -> Result<(), RunError> {
+    fn write(&self, step: u64, metrics: &Value, timing: &Value) -> Result<(), SealedFileError> {
         append_json_line(&self.metrics, metrics).map_err(io_error("write", &self.metrics))?;
         append_json_line(&self.timing, timing).map_err(io_error("write", &self.timing))?;
         let folder = EventFolder::new(self.events.clone());
@@ -89,8 +79,8 @@ impl MetricsLog {
     ///
     /// # Errors
     ///
-    /// [`RunError::Io`]; each file is then either unchanged or complete.
-    pub fn rewind(&self, step: u64, updates: u64) -> Result<(), RunError> {
+    /// [`SealedFileError::Io`]; each file is then either unchanged or complete.
+    pub fn rewind(&self, step: u64, updates: u64) -> Result<(), SealedFileError> {
         let metrics = keep_until(&self.metrics, step, updates)?;
         let timing: BTreeMap<u64, Value> = keep_until(&self.timing, step, updates)?.into_iter().collect();
         let events: Vec<Event> = metrics.iter().map(|(step, line)| event(*step, line, timing.get(step))).collect();
@@ -135,7 +125,7 @@ fn event(step: u64, metrics: &Value, timing: Option<&Value>) -> Event {
 }
 
 /// Cuts a file after `step`, and returns the rest. Warns of missing lines.
-fn keep_until(path: &Path, step: u64, updates: u64) -> Result<Vec<(u64, Value)>, RunError> {
+fn keep_until(path: &Path, step: u64, updates: u64) -> Result<Vec<(u64, Value)>, SealedFileError> {
     let mut read = JsonLines::read(path).map_err(io_error("read", path))?;
     read.lines.retain(|line| line.step <= step);
     if let Some(words) = gaps(&read, step, updates) {
@@ -275,86 +265,11 @@ pub fn append_json_line(path: &Path, line: &Value) -> io::Result<()> {
     DiskFile::append(path)?.write_all(format!("{}\n", seal_json(&line.to_string())).as_bytes())
 }
 
-// Results of one update of training.
-
-/// Tag of the success rate of the last 100 episodes.
-pub const SUCCESS_RATE: &str = "charts/success_rate";
-
-/// Tag of the mean return of the last 100 episodes.
-pub const EPISODIC_RETURN: &str = "charts/episodic_return";
-
-/// Tag of the mean length of the last 100 episodes, ticks.
-pub const EPISODIC_LENGTH: &str = "charts/episodic_length";
-
-/// Tag of the share of clipped actions in the last 100 episodes.
-pub const CLIPPED_SHARE: &str = "charts/clipped_share";
-
-/// Tag of the number of episodes that have ended.
-pub const EPISODES: &str = "charts/episodes";
-
-/// Episodes over which the current return, length and success rate are averaged.
-pub(crate) const RECENT: usize = 100;
-
-/// Results of one update. Everything except `timing` is the same in every run with the same seed.
-#[derive(Clone, Debug)]
-pub struct UpdateReport {
-    /// Updates done, this one included.
-    pub update: u64,
-    /// Environment steps done, over all arenas together.
-    pub step: u64,
-    /// Episodes that have ended. Before the 100th, the means below are over fewer episodes, of which short ones end
-    /// first.
-    pub episodes: u64,
-    /// Mean return of the last 100 episodes; `None` before the first has ended.
-    pub episodic_return: Option<f64>,
-    /// Mean length of the last 100 episodes, ticks.
-    pub episodic_length: Option<f64>,
-    /// Success rate of the last 100 episodes.
-    pub success_rate: Option<f64>,
-    /// Share of the ticks of the last 100 episodes whose action was clipped to the game's range; only for continuous
-    /// actions.
-    pub clipped_share: Option<f64>,
-    /// KL divergence from decoder to policy before the first update; only in the first report of SCORE.
-    pub initial_kl: Option<f32>,
-    /// The learner's metrics.
-    pub learner: LearnerMetrics,
-    /// Time spent.
-    pub timing: Timing,
-}
-
-impl UpdateReport {
-    /// Returns whether at least 100 episodes have ended, and at least this share of the last 100 succeeded.
-    pub fn mostly_succeeds(&self, share: f64) -> bool {
-        self.episodes >= RECENT as u64 && self.success_rate.is_some_and(|rate| rate >= share)
-    }
-
-    /// Returns all measurements by TensorBoard tag; the same numbers in every run with the same seed.
-    pub fn scalars(&self) -> Vec<(&'static str, f64)> {
-        let episodes = [
-            (EPISODES, Some(self.episodes as f64)),
-            (EPISODIC_RETURN, self.episodic_return),
-            (EPISODIC_LENGTH, self.episodic_length),
-            (SUCCESS_RATE, self.success_rate),
-            (CLIPPED_SHARE, self.clipped_share),
-            ("score/initial_kl", self.initial_kl.map(f64::from)),
-        ];
-        let known = episodes.into_iter().filter_map(|(tag, value)| Some((tag, value?)));
-        known.chain(self.learner.scalars()).collect()
-    }
-}
-
-/// Wall-clock seconds of one update.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Timing {
-    /// Simulating, observing and deciding.
-    pub collect_s: f64,
-    /// Learning.
-    pub learn_s: f64,
-}
-
 #[cfg(test)]
 mod tests {
-    use std::fs;
+    use std::{fs, path::Path};
+
+    use serde_json::json;
 
     use super::*;
     use crate::tensorboard::testing::events_after_the_header;
@@ -406,15 +321,6 @@ mod tests {
         assert_eq!(tags, ["charts/b", "losses/a"]);
         assert!(values[0] == 0.8 && values[1].is_nan());
     }
-}
-
-#[cfg(test)]
-mod log_gaps_tests {
-    use std::{fs, path::Path};
-
-    use serde_json::json;
-
-    use super::*;
 
     const UPDATES: u64 = 4;
 
@@ -499,13 +405,6 @@ mod log_gaps_tests {
         let words = missing(&JsonLines::default(), 17, 4).expect("missing");
         assert!(words.starts_with("nothing is left of 4 of 4 updates: "), "{words}");
     }
-}
-
-#[cfg(test)]
-mod json_lines_tests {
-    use serde_json::json;
-
-    use super::*;
 
     #[test]
     fn torn_lines_are_named_and_the_others_kept() {

@@ -166,8 +166,8 @@ pub fn record(game: &dyn Game, levels: &LevelSplit, noise: f64, path: &Path) -> 
 ///
 /// # Errors
 ///
-/// The experiment names no recordings, they cannot be read or do not replay, a loss is not a number, or a file cannot be
-/// written. [`PipelineError::Stopped`] if the observer stopped it.
+/// The experiment names no recordings, they cannot be read or do not replay, a loss is not a number, or a file cannot
+/// be written. [`PipelineError::Stopped`] if the observer stopped it.
 pub fn learn_skills(
     game: &dyn Game,
     experiment: &Experiment,
@@ -201,8 +201,8 @@ fn finished_skills(
 }
 
 /// Trains to the end of the experiment in the folder `run`, with its metrics and checkpoints. A run that is there
-/// already is resumed; its experiment may differ in its steps and its checkpoints only. `skills` are the skill model and
-/// its file.
+/// already is resumed; its experiment may differ in its steps and its checkpoints only. `skills` are the skill model
+/// and its file.
 ///
 /// # Errors
 ///

@@ -71,18 +71,18 @@ pub fn policy_file(
     provenance: Provenance,
 ) -> PolicyFile {
     let Provenance { algorithm, training, seen, code } = provenance;
-    let card = PolicyMetadata {
+    let metadata = PolicyMetadata {
         game: game.name().to_owned(),
         game_version: game.version(),
         observations: if observation_config.is_image() { Vec::new() } else { game.observation().names },
-        picture: observation_config.card(),
+        picture: observation_config.picture_metadata(),
         actions: game.tools().input.action_names(),
         algorithm,
         training,
         seen,
         code,
     };
-    PolicyFile { card, policy, skills }
+    PolicyFile { metadata, policy, skills }
 }
 
 /// Writes a policy file. Its examples come from a short play on `levels`.

@@ -2,14 +2,12 @@
 
 use crate::{
     checkpoint::CheckpointSummary,
-    metrics_log::{Timing, UpdateReport},
-    trainer::learner::LearnerMetrics,
+    update_report::{RECENT, Timing, UpdateReport},
 };
 use bevy_playbot::episode::EpisodeEnded;
+use playbot_learner::LearnerMetrics;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
-
-pub(crate) use crate::metrics_log::RECENT;
 
 /// A finished episode, as the moving averages keep it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]

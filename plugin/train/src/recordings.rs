@@ -87,7 +87,8 @@ pub fn read_dataset(
     Ok(dataset)
 }
 
-/// Returns the path where the recordings of an experiment are. `locate` gives it from the path that the experiment names.
+/// Returns the path where the recordings of an experiment are. `locate` gives it from the path that the experiment
+/// names.
 ///
 /// # Errors
 ///

@@ -14,17 +14,20 @@ use crate::{
     checkpoint,
     checkpoint::{Checkpoint, CheckpointChoice},
     collect::{ArenaState, restore_arenas, save_arenas},
-    error::{TrainError, damaged, edited, unreadable},
+    error::{TrainError, edited, unreadable},
     experiment::{Algorithm, Experiment, file::read_experiment},
-    metrics_log::{MetricsLog, UpdateReport},
+    metrics_log::MetricsLog,
     progress::Progress,
     run_lock::{RunLock, check_is_run, replace_run},
     trainer,
     trainer::{Trainer, learner::TrainedLearner},
+    update_report::UpdateReport,
 };
 use playbot_harness::{
     game::Game,
-    sealed_file::{SealedFileError, check_text_seal, read_sealed, remove_temporaries, write_atomically, write_sealed},
+    sealed_file::{
+        SealedFileError, check_text_seal, damaged, read_sealed, remove_temporaries, write_atomically, write_sealed,
+    },
 };
 use playbot_learner::{DeviceKind, SeenLevels, seal_text};
 use serde::{Deserialize, Serialize};
@@ -92,7 +95,7 @@ impl RunDir {
     /// # Errors
     ///
     /// [`RunError::Exists`] for a run unless `force`, which replaces it; [`RunError::NotARun`] for other content;
-    /// [`RunError::Busy`] for a folder in use. [`RunError::Io`] if it cannot be written.
+    /// [`RunError::Busy`] for a folder in use. [`RunError::File`] if it cannot be written.
     pub fn create(path: &Path, experiment: &Experiment, info: &RunInfo, force: bool) -> Result<Self, RunError> {
         Self::begin(RunLock::of_new(path, force)?, experiment, info)
     }
@@ -102,7 +105,7 @@ impl RunDir {
     ///
     /// # Errors
     ///
-    /// [`RunError::NotARun`] for a folder with other content; [`RunError::Io`] if it cannot be written.
+    /// [`RunError::NotARun`] for a folder with other content; [`RunError::File`] if it cannot be written.
     pub fn begin(lock: RunLock, experiment: &Experiment, info: &RunInfo) -> Result<Self, RunError> {
         let run = Self { path: lock.folder().to_owned(), _lock: Some(lock) };
         replace_run(&run.path, || {
@@ -161,7 +164,7 @@ impl RunDir {
     ///
     /// # Errors
     ///
-    /// [`RunError::Io`].
+    /// [`RunError::File`].
     pub fn write_experiment(&self, experiment: &Experiment) -> Result<(), RunError> {
         let text = experiment.to_ron().map_err(|error| damaged(&self.path, &error))?;
         Ok(write_atomically(&self.path.join(EXPERIMENT), seal_text(&text).as_bytes())?)
@@ -190,9 +193,9 @@ impl RunDir {
     ///
     /// # Errors
     ///
-    /// [`RunError::Io`].
+    /// [`RunError::File`].
     pub fn log(&self, report: &UpdateReport, steps_per_update: u64) -> Result<(), RunError> {
-        self.metrics_log().append(report, steps_per_update)
+        Ok(self.metrics_log().append(report, steps_per_update)?)
     }
 
     /// Saves learner and arenas as a new checkpoint; the latest and the best of the earlier ones stay.
@@ -313,7 +316,7 @@ mod tests {
 
     #[test]
     fn one_sentence_says_it_of_all() {
-        let bad = |step: u64| (step, damaged(Path::new("a"), &"torn"));
+        let bad = |step: u64| (step, damaged(Path::new("a"), &"torn").into());
         assert_eq!(passed_over(&[], 8), None);
         let words = passed_over(&[bad(16)], 8).expect("one");
         assert!(words.starts_with("the checkpoint of step 16 cannot be read (a: "), "{words}");

@@ -3,8 +3,9 @@
 //!
 //! A run is replaced in two steps: it is moved aside, and removed once the new one is written.
 
-use crate::error::{FOLDER, RunError, io_error};
+use crate::error::RunError;
 use bevy_playbot::unknown_name::nearest;
+use playbot_harness::sealed_file::{SealedFileError, io_error};
 use playbot_learner::{disk, disk::DiskFile};
 use std::{
     ffi::OsString,
@@ -34,7 +35,7 @@ impl RunLock {
     ///
     /// # Errors
     ///
-    /// [`RunError::Busy`] if another process has it; [`RunError::Io`] if the folder cannot be written.
+    /// [`RunError::Busy`] if another process has it; [`RunError::File`] if the folder cannot be written.
     pub fn take(folder: &Path) -> Result<Self, RunError> {
         let path = folder.join(LOCK_FILE);
         let file = DiskFile::open(&path, OpenOptions::new().create(true).truncate(false).write(true));
@@ -46,7 +47,7 @@ impl RunLock {
             Err(TryLockError::Error(error)) if error.kind() == io::ErrorKind::Unsupported => {
                 tracing::warn!("{} cannot be locked: make sure that nothing else trains there", folder.display());
             }
-            Err(TryLockError::Error(error)) => return Err(io_error("lock", &path)(error)),
+            Err(TryLockError::Error(error)) => return Err(io_error("lock", &path)(error).into()),
         }
         Ok(Self { folder: folder.into(), _file: file })
     }
@@ -55,10 +56,10 @@ impl RunLock {
     ///
     /// # Errors
     ///
-    /// As for [`check_new`] and [`take`](Self::take), and [`RunError::Io`] if the folder cannot be made.
+    /// As for [`check_new`] and [`take`](Self::take), and [`RunError::NoFolder`].
     pub fn of_new(path: &Path, force: bool) -> Result<Self, RunError> {
         check_new(path, force)?;
-        disk::create_dir_all(path).map_err(io_error(FOLDER, path))?;
+        disk::create_dir_all(path).map_err(|source| RunError::NoFolder { path: path.into(), source })?;
         Self::take(path)
     }
 
@@ -121,7 +122,7 @@ impl ReplacedRun {
         for name in names {
             if let Err(error) = disk::rename(&run.join(&name), &folder.join(&name)) {
                 aside.put_back();
-                return Err(io_error("replace", run)(error));
+                return Err(io_error("replace", run)(error).into());
             }
         }
         Ok(aside)
@@ -171,7 +172,7 @@ pub(crate) fn replace_run(run: &Path, write: impl FnOnce() -> Result<(), RunErro
 ///
 /// # Errors
 ///
-/// [`RunError::Busy`] while the other process lives; [`RunError::Io`] if the folder cannot be written.
+/// [`RunError::Busy`] while the other process lives; [`RunError::File`] if the folder cannot be written.
 pub fn end_replacement(run: &Path) -> Result<(), RunError> {
     let leftovers = leftovers(run);
     if leftovers.is_empty() || !run.is_dir() {
@@ -210,7 +211,7 @@ fn leftovers(run: &Path) -> Vec<PathBuf> {
     names.into_iter().map(|name| run.with_file_name(name)).filter(own).collect()
 }
 
-fn names_in(folder: &Path) -> Result<Vec<OsString>, RunError> {
+fn names_in(folder: &Path) -> Result<Vec<OsString>, SealedFileError> {
     let names = fs::read_dir(folder).and_then(|entries| entries.map(|entry| Ok(entry?.file_name())).collect());
     names.map_err(io_error("list", folder))
 }
@@ -232,7 +233,7 @@ pub fn check_replaceable(path: &Path) -> Result<(), RunError> {
 ///
 /// # Errors
 ///
-/// [`RunError::Exists`] for a run unless `force`, [`RunError::NotARun`] for other content, [`RunError::Io`] if an
+/// [`RunError::Exists`] for a run unless `force`, [`RunError::NotARun`] for other content, [`RunError::File`] if an
 /// unfinished replacement cannot be completed.
 pub fn check_new(path: &Path, force: bool) -> Result<(), RunError> {
     end_replacement(path)?;

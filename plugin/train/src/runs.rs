@@ -5,6 +5,11 @@
 //! - [`group_runs`] groups runs that differ only in their seed, and [`GroupStatistics`] measures each group.
 //!
 //! Runs are only read, so training may go on at the same time.
+//!
+//! The folder, in reading order:
+//!
+//! - `curves`: the learning curves of a run.
+//! - `group`: groups of runs that differ only in their seed, and their statistics.
 
 mod curves;
 pub mod group;
@@ -33,8 +38,6 @@ pub use crate::runs::{
         with_defaults,
     },
 };
-
-// Search for the folders of runs.
 
 /// Files and folders that only a run has. One is enough to find a run, even if the others are lost.
 const SIGNS: [&str; 3] = ["run.json", "metrics.jsonl", "checkpoints"];
@@ -102,8 +105,6 @@ fn folders_in(folder: &Path) -> io::Result<Vec<PathBuf>> {
     }
     Ok(folders)
 }
-
-// A run on disk.
 
 /// Configuration and progress of a run.
 #[derive(Clone, Debug)]
@@ -174,8 +175,6 @@ impl RunRecord {
     }
 }
 
-// Errors of reading runs.
-
 /// A run that cannot be read, or that lacks the requested metric.
 #[derive(Debug, Error)]
 pub enum RunsError {
@@ -222,8 +221,6 @@ impl HasExitCode for RunsError {
     }
 }
 
-// Leftovers of replaced runs.
-
 /// Parts of a run that a process moved aside to replace it, and did not remove, for instance because it was killed.
 /// Its text form names the remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -261,7 +258,9 @@ impl fmt::Display for Leftover {
 }
 
 #[cfg(test)]
-mod find_tests {
+mod tests {
+    use std::fs;
+
     use super::*;
 
     #[test]
@@ -300,13 +299,6 @@ mod find_tests {
         assert!(FoundRuns::at(root).expect("found").runs.is_empty());
         assert!(matches!(find_runs(root), Err(RunsError::NoRuns(_))));
     }
-}
-
-#[cfg(test)]
-mod leftover_tests {
-    use std::fs;
-
-    use super::*;
 
     #[test]
     fn what_to_do_depends_on_what_is_in_the_place_of_the_run() {

@@ -2,11 +2,10 @@
 
 use crate::{
     checkpoint::CheckpointChoice,
-    error::{TrainError, io_error},
+    error::TrainError,
     experiment::{Experiment, ExperimentError},
     learn_skills,
-    learn_skills::{LearnSkillsError, cloning},
-    metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
+    learn_skills::{LearnSkillsError, behaviour_cloning},
     recordings::{Recorded, RecordingsError, check_recordings, find_recordings, read_dataset, read_rollouts},
     run_dir::{OpenedRun, RunDir, RunError, RunInfo, check_replaceable, end_replacement, is_unstarted},
     run_lock::RunLock,
@@ -18,13 +17,14 @@ use crate::{
     },
     train_run::{NewRun, Training, TrainingError, TrainingSetup, run_info},
     trainer::Trainer,
+    update_report::{EPISODIC_RETURN, SUCCESS_RATE},
 };
 use bevy_playbot::{policy::ActionDraw, unknown_name::UnknownName, vision::ObservationConfig};
 use playbot_harness::{
     eval::{EvalError, EvalPlan, EvalSummary, Player, evaluate, summarize},
     game::Game,
     games::Games,
-    sealed_file::{SealedFileError, read_sealed, write_atomically, write_sealed},
+    sealed_file::{SealedFileError, io_error, read_sealed, write_atomically, write_sealed},
     split::{HeldOut, LevelSplit},
 };
 use playbot_learner::{Dataset, FileError, HasExitCode, SeenLevels, SkillModel, disk};
@@ -416,7 +416,7 @@ impl<'a> StudyRunner<'a> {
             RunFolder::New(lock) => self.begin(game, run, lock, skills.as_ref(), seen)?,
         };
         if let (false, Some(skills)) = (experiment.algorithm.is_trained(), &skills) {
-            let player = cloning(skills, experiment, draw);
+            let player = behaviour_cloning(skills, experiment, draw);
             return Ok(Some(TrainedRun { dir, player, training: None, curves: LearningCurves::default() }));
         }
         let trainer = if begun {
@@ -517,15 +517,15 @@ fn training_result(run: &Path, experiment: &Experiment, steps: u64) -> Result<Tr
     })
 }
 
-/// Returns the learning curves of a run, from its metrics. They begin once 100 episodes have ended: means of fewer jump,
-/// and are those of the shortest episodes.
+/// Returns the learning curves of a run, from its metrics. They begin once 100 episodes have ended: means of fewer
+/// jump, and are those of the shortest episodes.
 fn learning_curves(run: &Path) -> Result<LearningCurves, RunsError> {
     let curves = RunCurves::read(run)?;
     let of = |tag| curves.settled(tag).to_vec();
     Ok(LearningCurves { success: of(SUCCESS_RATE), returns: of(EPISODIC_RETURN) })
 }
 
-// The files of a study: its tables and curves, and the cost of its runs, which differs from machine to machine.
+// The files of a study: tables, curves, and the cost of its runs.
 
 /// The file of results.
 pub const RESULTS: &str = "results.json";
@@ -728,7 +728,7 @@ fn cpu_time() -> Option<Duration> {
 }
 
 #[cfg(test)]
-mod study_output_tests {
+mod tests {
     use super::*;
 
     #[test]

@@ -179,7 +179,7 @@ fn varint(mut value: u64, out: &mut Vec<u8>) {
     out.push(value as u8);
 }
 
-// TFRecord framing: length, checksum of the length, data, checksum of the data; numbers are little-endian.
+// TFRecord framing: length, checksum of the length, data, checksum of the data, all little-endian.
 
 /// Offset added to a rotated checksum, which makes checksums of data that contains checksums reliable.
 const MASK: u32 = 0xa282_ead8;
@@ -199,9 +199,9 @@ fn masked_crc(data: &[u8]) -> u32 {
 }
 
 #[cfg(test)]
-mod file_tests {
+mod tests {
     use super::*;
-    use crate::tensorboard::testing::events_after_the_header;
+    use crate::tensorboard::testing::{events_after_the_header, whole_records};
 
     fn scalar(step: u64) -> Event {
         Event { wall_time: 100.0, step, kind: EventKind::Scalars(vec![("a".into(), step as f64)]) }
@@ -237,11 +237,6 @@ mod file_tests {
         assert_eq!(events_after_the_header(&folder.path), framed(&[scalar(1), scalar(3)]));
         assert!(folder.path.join("notes.txt").exists() && !folder.path.join("unfinished").exists());
     }
-}
-
-#[cfg(test)]
-mod event_tests {
-    use super::*;
 
     fn hex(event: &Event) -> String {
         event.encode().iter().map(|byte| format!("{byte:02x}")).collect()
@@ -265,12 +260,6 @@ mod event_tests {
         varint(u64::MAX, &mut out);
         assert_eq!(out, [[0xff; 9].as_slice(), &[1]].concat());
     }
-}
-
-#[cfg(test)]
-mod record_tests {
-    use super::*;
-    use crate::tensorboard::testing::whole_records;
 
     #[test]
     fn checksums_are_those_of_the_standard() {

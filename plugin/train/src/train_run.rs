@@ -353,7 +353,7 @@ fn sac_never_learns(experiment: &Experiment) -> Option<String> {
     let (algorithm, sac) = (experiment.algorithm, &experiment.sac);
     // Policies over skills learn from skills, not from ticks.
     let (held, what) = match algorithm.learns_prior() {
-        true => (experiment.score.horizon as u64, "skills"),
+        true => (experiment.score.skill_interval as u64, "skills"),
         false => (1, "steps"),
     };
     let (starts, seen) = (sac.learning_starts, experiment.whole_steps() / held);
@@ -378,7 +378,7 @@ fn sac_never_learns(experiment: &Experiment) -> Option<String> {
 }
 
 #[cfg(test)]
-mod length_tests {
+mod tests {
     use std::path::Path;
 
     use crate::experiment::file::parse_experiment;

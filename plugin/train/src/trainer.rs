@@ -8,9 +8,9 @@ use crate::{
     collect::Collector,
     error::TrainError,
     experiment::Experiment,
-    metrics_log::{Timing, UpdateReport},
     progress::Progress,
     trainer::learner::TrainedLearner,
+    update_report::{Timing, UpdateReport},
 };
 use bevy::prelude::World;
 use bevy_playbot::{

@@ -30,7 +30,7 @@ mod silence {
     // A sound is over as soon as it begins.
     #[derive(Component)]
     #[component(on_add = end)]
-    #[allow(dead_code, reason = "nobody hears it")]
+    #[allow(dead_code, reason = "it is not heard")]
     pub struct AudioPlayer(pub Handle<AudioSource>);
 
     #[derive(Component)]

@@ -1,7 +1,7 @@
 //! Functions of a program's game as tests of its crate.
 
-/// Makes a test of each function of a [`GameProgram`](crate::GameProgram) that tests a verb, under its name. The one that
-/// needs a window is made with the feature `screen` of the crate that is tested.
+/// Makes a test of each function of a [`GameProgram`](crate::GameProgram) that tests a verb, under its name. The one
+/// that needs a window is made with the feature `screen` of the crate that is tested.
 #[macro_export]
 macro_rules! tests {
     ($game:ident) => {

@@ -59,8 +59,8 @@ impl GameProgram {
         let of_run = measured(&shell, &["--run", "run"]);
         assert_eq!(of_run["method"], "score-ppo");
         shell.done(&["policy", "export", "--run", "run", "--out", "bot.policy"]);
-        let card = &shell.answer(&["policy", "show", "bot.policy", "--json"])["card"];
-        assert_eq!((&card["game"], &card["algorithm"]), (&self.game.into(), &"score-ppo".into()), "{card}");
+        let metadata = &shell.answer(&["policy", "show", "bot.policy", "--json"])["card"];
+        assert_eq!((&metadata["game"], &metadata["algorithm"]), (&self.game.into(), &"score-ppo".into()), "{metadata}");
         let of_file = measured(&shell, &["--policy", "bot.policy", "--experiment", "small.ron"]);
         assert_eq!(of_file, of_run, "the file plays otherwise than the run it was made of");
     }

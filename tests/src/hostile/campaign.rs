@@ -39,7 +39,7 @@ pub struct Tally {
     /// Mutants that were read as whole files.
     pub whole: u64,
     /// Mutants that were refused, or read with a warning.
-    pub told: u64,
+    pub refused: u64,
     /// Mutants on which a reader failed.
     pub faults: Vec<HostileFault>,
     /// The last one took too long, so the ones behind it were not read.
@@ -61,8 +61,8 @@ pub fn read_mutants(kind: &FileKind, seeds: Range<u64>, folder: &Path, measure: 
                 tally.whole += 1;
                 continue;
             }
-            Ok(Ok(Reading::Told(_))) => {
-                tally.told += 1;
+            Ok(Ok(Reading::Refused(_))) => {
+                tally.refused += 1;
                 continue;
             }
             Ok(Err(ref what)) => what.clone(),

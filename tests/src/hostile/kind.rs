@@ -18,7 +18,7 @@ pub enum Reading {
     /// Read as a whole one, with these contents, part by part.
     Whole(Vec<String>),
     /// Refused, or read with a warning.
-    Told(String),
+    Refused(String),
 }
 
 /// A kind of file, with a whole one and the files beside it that reading needs.
@@ -95,7 +95,7 @@ impl FileKind {
     pub fn read(&self, folder: &Path) -> Reading {
         let (read, warnings) = heard(|| (self.read)(folder));
         match (read, warnings.into_iter().next()) {
-            (Err(words), _) | (Ok(_), Some(words)) => Reading::Told(words),
+            (Err(words), _) | (Ok(_), Some(words)) => Reading::Refused(words),
             (Ok(parts), None) => Reading::Whole(parts),
         }
     }

@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_are_told_from_words() {
+    fn numbers_are_distinguished_from_words() {
         assert!(["0", "-1", "2.5", "1e308", "0.5"].into_iter().all(is_number));
         assert!(!["NaN", "inf", "-", "a1", "\"1\"", "1.2.3", ""].into_iter().any(is_number));
     }

@@ -159,7 +159,7 @@ fn a_failure_names_each_level_with_its_proof_and_the_commands_that_show_it() {
 }
 
 #[test]
-fn a_finding_is_told_and_stays_told_until_it_is_mended() {
+fn a_finding_is_reported_until_it_is_mended() {
     let folder = tempfile::tempdir().expect("a folder");
     let test = LevelTest::new(&Lane::Burning, "plain:0..3").bot("right").findings_in(folder.path()).minimise();
     let found = message(|| test.assert_no_findings());
@@ -182,7 +182,7 @@ fn a_finding_is_told_and_stays_told_until_it_is_mended() {
 }
 
 #[test]
-fn a_game_that_does_not_play_the_same_is_told_with_the_tick() {
+fn a_game_that_does_not_play_the_same_is_reported_with_the_tick() {
     let found = message(|| assert_deterministic(&Lane::Drifting, "plain:1..2"));
     assert!(found.starts_with("2 of 2 levels did not play the same again (`lane`, plain:1..2, right + left + "));
     assert!(found.contains("\n  determinism (right, episode 0, tick 0): the episode differed"), "{found}");

@@ -6,7 +6,7 @@ use std::{
 };
 
 use bevy_playbot::demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoWriter, EpisodeActions};
-use playbot_mutation::calibration::{Agreement, Calibration, CalibrationError, Measure, Numbers, RankCorrelation};
+use playbot_mutation::calibration::{Agreement, Calibration, CalibrationError, LevelNumbers, Measure, RankCorrelation};
 
 const WON: DemoEnd = DemoEnd::Terminated { success: true };
 const LOST: DemoEnd = DemoEnd::Terminated { success: false };
@@ -91,8 +91,8 @@ fn the_rank_correlation_with_several_people_is_known() {
     assert_eq!(found.left_out, ["1 episode not played by a person", "1 episode left in the middle"]);
     let first = &found.levels[0];
     assert_eq!((first.level.as_str(), first.persons), ("bed:0", 2));
-    assert_eq!(first.people, Numbers { tries: 3, completion: 0.75, ticks: Some(200.0), deaths: 0.25 });
-    assert_eq!(first.testers, [Numbers { tries: 10, completion: 1.0, ticks: Some(10.0), deaths: 0.0 }]);
+    assert_eq!(first.people, LevelNumbers { tries: 3, completion: 0.75, ticks: Some(200.0), deaths: 0.25 });
+    assert_eq!(first.testers, [LevelNumbers { tries: 10, completion: 1.0, ticks: Some(10.0), deaths: 0.0 }]);
     // Four squares of 1: 1 - 6 * 4 / (12 * 143). Two of 66 pairs are in the other order.
     let time = agreement(&found, Measure::Time);
     let RankCorrelation { value, interval } = time.spearman.expect("both vary");

@@ -17,7 +17,7 @@ const SEED: u64 = 3;
 const AGENTS: usize = 8;
 const TICKS: usize = 400;
 /// Ticks of a skill. The fourth of an episode ends with its time, after 20 ticks.
-const HORIZON: usize = 5;
+const SKILL_INTERVAL: usize = 5;
 /// Numbers of an observation, and of a skill.
 const WIDTH: usize = 2;
 
@@ -33,7 +33,7 @@ fn skills(folder: &Path) -> SkillModel {
 }
 
 fn score() -> ScoreConfig {
-    ScoreConfig { horizon: HORIZON, ..ScoreConfig::default() }
+    ScoreConfig { skill_interval: SKILL_INTERVAL, ..ScoreConfig::default() }
 }
 
 /// Returns a rollout of a learner's policy with skills of its prior.

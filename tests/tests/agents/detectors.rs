@@ -10,7 +10,7 @@ use playbot_tests::{Corridor, faulty::Fault as Garden};
 use crate::corridor_defects::{Defect, always, assert_silent, findings, only, random, tester, verdicts};
 
 #[test]
-fn what_is_wrong_in_a_shared_world_is_told_of_the_episode_that_did_it() {
+fn what_is_wrong_in_a_shared_world_is_reported_of_the_episode_that_did_it() {
     let testers = || vec![always(2), random()];
     for (defect, detector, words) in
         [(Defect::FlyingBody, "runaway", "`Crate`"), (Defect::LoggedError, "error-log", "the door has no key")]
@@ -33,7 +33,7 @@ fn what_is_wrong_in_a_shared_world_is_told_of_the_episode_that_did_it() {
 
 #[test]
 fn a_games_own_detector_looks_with_the_others() {
-    let found = findings(&Defect::None, "plain:0..1", vec![always(1), always(2)], Detectors::usual(&Defect::None));
+    let found = findings(&Defect::None, "plain:0..1", vec![always(1), always(2)], Detectors::defaults(&Defect::None));
     let who: Vec<_> = found.iter().map(|(index, finding)| (*index, finding.detector.as_str(), finding.tick)).collect();
     assert_eq!(who, [(0, "late", Some(10)), (1, "late", Some(10))]);
     assert!(found.iter().all(|(_, finding)| finding.tester.as_deref() == Some("always 2")), "{found:?}");
@@ -135,7 +135,7 @@ fn detectors_by_the_plan_and_the_clock_are_silent_on_sound_levels() {
 }
 
 #[test]
-fn usual_detectors_are_silent_on_sound_levels() {
+fn default_detectors_are_silent_on_sound_levels() {
     let (coinrun, maze, ants) = (CoinRun::default(), Maze2d::default(), AntMaze);
     let games: [(&dyn Game, u64); 3] = [(&coinrun, 9), (&maze, 1), (&ants, 0)];
     for (game, last) in games {
@@ -144,13 +144,13 @@ fn usual_detectors_are_silent_on_sound_levels() {
         if game.name() != ants.name() {
             testers.push(tester("demonstrator", Player::Demonstrator));
         }
-        let found = findings(game, &levels, testers, Detectors::usual(game));
+        let found = findings(game, &levels, testers, Detectors::defaults(game));
         assert!(found.is_empty(), "{} {levels}: {found:?}", game.name());
     }
 }
 
 #[test]
-fn mistakes_are_told_with_what_would_be_right() {
+fn mistakes_are_reported_with_what_would_be_right() {
     let said = |with: &str, setting: &str| {
         let words = |word: &str| if word.is_empty() { Vec::new() } else { vec![word.to_owned()] };
         let choice = DetectorChoice { with: words(with), without: Vec::new(), settings: words(setting) };

@@ -23,7 +23,7 @@ fn app_with(action: u32, levels: &[u64]) -> (App, Entity) {
 }
 
 #[test]
-fn termination_and_truncation_are_told_apart() {
+fn termination_and_truncation_are_distinguished() {
     for (action, end, ticks, total) in [
         (1, EpisodeEnd::Terminated { success: true }, 3, 1.0),
         (0, EpisodeEnd::Terminated { success: false }, 3, 0.0),

@@ -15,8 +15,7 @@ use playbot_games::registry::GAMES;
 use playbot_harness::{demo::verify_file, foreign::Restart, game::StateTools, games::Games};
 use playbot_learner::{Actions, PpoConfig, Prior, SkillDraw};
 use playbot_test::explore::{
-    Cell as ExploredCell, Exploration, ExploreError, ExplorePlan, Explorer, Stop, Until, explore, follow_route,
-    record_route,
+    Exploration, ExploreError, ExplorePlan, ExploredCell, Explorer, Stop, Until, explore, follow_route, record_route,
 };
 use playbot_tests::{
     Cell, Corridor, Drift, as_corridor, corridor_plugin, foreign::stubborn::stubborn_game, spawn_walker,
@@ -133,7 +132,7 @@ fn threads_arenas_and_worlds_change_nothing() {
 #[test]
 fn policies_and_skills_explore_too() {
     let policy = untrained(&Corridor, &ObservationConfig::default(), PpoConfig::default());
-    let prior = SkillPrior { prior: Prior::standard_normal(2, false), horizon: 4, draw: SkillDraw::Sample };
+    let prior = SkillPrior { prior: Prior::standard_normal(2, false), skill_interval: 4, draw: SkillDraw::Sample };
     let alone = Explorer::Policy { policy: policy.clone(), prior: None, draw: ActionDraw::Sample };
     for explorer in [alone, Explorer::skills(prior, policy)] {
         let plan = ExplorePlan { explorer, threads: 1, ..plan("plain", 1, 4000) };
@@ -144,7 +143,7 @@ fn policies_and_skills_explore_too() {
 }
 
 #[test]
-fn a_game_that_does_not_replay_is_told_so_at_the_first_tick_that_differs() {
+fn a_game_that_does_not_replay_is_reported_at_the_first_tick_that_differs() {
     let error = refused(&Drifting, &plan("plain", 1, 5000));
     assert!(matches!(&error, ExploreError::Diverged { divergence, .. } if divergence.tick == 0), "{error}");
     let text = error.to_string();

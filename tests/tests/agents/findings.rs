@@ -119,7 +119,7 @@ fn a_death_and_what_a_detector_of_ones_own_sees_are_made_shorter_too() {
     let finding = stored(&Corridor, "near-the-end", "cell 5", &after_wandering(5, &[1, 2, 1, 0, 0]), &checks);
     assert_eq!((finding.head.tick, finding.episode.len()), (Some(12), 13), "what follows is cut off");
     is_shortened_to(&Corridor, &finding, &checks, 2);
-    let unknown = recheck(&Corridor, &finding, &Checks::default()).expect_err("nobody knows it").to_string();
+    let unknown = recheck(&Corridor, &finding, &Checks::default()).expect_err("unknown").to_string();
     assert!(unknown.contains("no check of the detector `near-the-end`"), "{unknown}");
 }
 

@@ -38,7 +38,7 @@ fn the_lander_goes_the_whole_road() {
     assert!(learned.return_mean.is_finite() && learned.length_mean > 1.0, "{learned:?}");
 
     let file = PolicyFile::load(&path, DeviceKind::default()).expect("written");
-    check_policy(&lander_example::Lander.card(), &file).expect("made for this game");
+    check_policy(&lander_example::Lander.metadata(), &file).expect("made for this game");
     let mut app = headless_app();
     set_tick_rate(&mut app, TICK_HZ);
     add_rules(&mut app);

@@ -8,7 +8,7 @@ use playbot_harness::{
     floor_plan::FloorPlan,
     game::{LevelTools, StateTools},
 };
-use playbot_test::explore::{Cell as ExploredCell, ExploreError, ExplorePlan, Stop, Until, explore, round::check_cell};
+use playbot_test::explore::{ExploreError, ExplorePlan, ExploredCell, Stop, Until, explore, round::check_cell};
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
 
 /// The corridor, whose cells are two squares apart: every other one of its 13 squares is only passed.

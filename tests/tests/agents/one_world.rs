@@ -41,5 +41,5 @@ fn sixty_four_agents_in_one_world_learn_like_one_in_each_of_sixty_four() {
         assert!((one - many).abs() < 3.0 * error + 0.01, "{what}: {one} in one World, {many} in 64, ± {error}");
     }
     let untrained = 0.6;
-    assert!(mean(&one.iter().map(|row| row[1]).collect::<Vec<_>>()).0 > untrained, "nobody learned anything");
+    assert!(mean(&one.iter().map(|row| row[1]).collect::<Vec<_>>()).0 > untrained, "the agents learned nothing");
 }

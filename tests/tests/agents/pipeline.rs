@@ -66,7 +66,7 @@ fn setup() -> TrainingSetup<'static> {
 
 /// Returns the seen levels in a policy file.
 fn seen(file: &PolicyFile) -> &[String] {
-    &file.card.seen.as_ref().expect("noted").levels
+    &file.metadata.seen.as_ref().expect("noted").levels
 }
 
 #[test]
@@ -90,8 +90,8 @@ fn the_whole_road_leads_from_a_demonstrator_to_a_policy_file() {
     assert_eq!((trainer.is_done(), steps), (true, vec![128, 256, 384, 512]), "one report for each update");
 
     let file = pipeline::policy(&Shown, &trainer);
-    assert_eq!((file.card.game.as_str(), file.card.algorithm.as_str()), ("corridor", "score-ppo"));
-    assert!(file.card.training.starts_with("512 steps on plain:0..7"), "{}", file.card.training);
+    assert_eq!((file.metadata.game.as_str(), file.metadata.algorithm.as_str()), ("corridor", "score-ppo"));
+    assert!(file.metadata.training.starts_with("512 steps on plain:0..7"), "{}", file.metadata.training);
     assert!(file.skills.is_some(), "SCORE acts with skills");
     assert_eq!(seen(&file), ["plain:0..7", "plain:16..35"], "what it has played, and what its skills were shown");
     let path = folder.path().join("corridor.policy");
@@ -122,7 +122,7 @@ fn what_chooses_skills_is_shipped_with_what_it_has_learned_of_them() {
             (folder.path().join(format!("run-{algorithm}")), skills.as_ref().map(|skills| (at.as_path(), skills)));
         let trainer = pipeline::train(&Shown, &experiment, with_file, &run, &setup(), &mut Unobserved);
         let file = pipeline::policy(&Shown, &trainer.expect("trained"));
-        assert_eq!((file.card.algorithm.as_str(), file.skills.is_some()), (algorithm.name(), skills.is_some()));
+        assert_eq!((file.metadata.algorithm.as_str(), file.skills.is_some()), (algorithm.name(), skills.is_some()));
         assert_eq!(seen(&file), ["plain:0..7", "plain:16..35"], "{algorithm}");
         let path = folder.path().join(algorithm.name());
         playbot_train::policy_export::export_policy(&Shown, &file, &experiment.train, 1, &path).expect("written");
@@ -171,7 +171,7 @@ fn each_step_says_what_it_cannot_do() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.demo");
     let record = |game: &dyn Game, split: &str| pipeline::record(game, &levels(split), 0.0, &path);
-    let error = record(&Corridor, "plain:0..1").expect_err("nobody shows the corridor");
+    let error = record(&Corridor, "plain:0..1").expect_err("the corridor has no demonstrator");
     assert!(matches!(error, PipelineError::NoDemonstrator("corridor")), "{error}");
     let error = record(&Shown, "plian:0..1").expect_err("no such mode");
     assert!(matches!(error, PipelineError::Mode(_)) && error.to_string().contains("plain"), "{error}");

@@ -90,6 +90,6 @@ fn a_level_that_was_left_takes_its_rewards_with_it() {
     let mut agent = app.world_mut().entity_mut(agent);
     agent.get_mut::<Reward>().expect("an agent").add(5.0);
     agent.get_mut::<Episode>().expect("an agent").abandon();
-    app.tick().expect("no fault: nobody ended it");
+    app.tick().expect("no fault: it was not ended");
     assert_eq!(counted(&app), [0.0, 0.0]);
 }

@@ -12,8 +12,8 @@ use playbot_train::collect::Collector;
 const SEED: u64 = 7;
 
 /// Returns normally distributed skills of two numbers.
-fn prior(horizon: u32) -> SkillPrior {
-    SkillPrior { prior: Prior::standard_normal(2, false), horizon, draw: SkillDraw::Sample }
+fn prior(skill_interval: u32) -> SkillPrior {
+    SkillPrior { prior: Prior::standard_normal(2, false), skill_interval, draw: SkillDraw::Sample }
 }
 
 /// Returns the draws of an agent's stream.

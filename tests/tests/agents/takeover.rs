@@ -110,7 +110,7 @@ fn the_same_file_is_continued_and_the_key_stops_and_starts() {
         assert!(!app.world().resource::<Takeover>().is_running());
         assert_eq!(recorded(&path).len(), round, "the key comes before the tick of its frame");
         frames(&mut app, 20);
-        assert_eq!(recorded(&path).len(), round, "nobody records");
+        assert_eq!(recorded(&path).len(), round, "no recording is on");
     }
     let (mut app, _) = build(plugin(Some(TakeoverRequest::Record(path.clone()))));
     frames(&mut app, 2);
@@ -163,16 +163,16 @@ fn a_recording_plays_and_the_seat_is_given_back() {
 }
 
 /// Writes an untrained policy.
-fn policy(folder: &Path, card: PolicyMetadata, values: usize) -> std::path::PathBuf {
+fn policy(folder: &Path, metadata: PolicyMetadata, values: usize) -> std::path::PathBuf {
     let spec = PolicySpec { obs: ObsKind::Vector(values), latent: 0, action_space: ActionSpace::Discrete(3) };
     let learner = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex).expect("good settings");
     let path = folder.join("bot.policy");
-    let file = PolicyFile { card, policy: learner.policy(), skills: None };
+    let file = PolicyFile { metadata, policy: learner.policy(), skills: None };
     file.save(&path, &vec![0.5; values], &[], 1).expect("written");
     path
 }
 
-fn card() -> PolicyMetadata {
+fn metadata() -> PolicyMetadata {
     let observations = vec!["x".into(), "time".into()];
     PolicyMetadata { game: "corridor".into(), game_version: 3, observations, ..PolicyMetadata::default() }
 }
@@ -180,7 +180,7 @@ fn card() -> PolicyMetadata {
 #[test]
 fn a_policy_plays_until_the_key_gives_the_seat_back() {
     let folder = tempfile::tempdir().expect("a folder");
-    let path = policy(folder.path(), card(), 2);
+    let path = policy(folder.path(), metadata(), 2);
     let (mut app, agent) = build(plugin(Some(TakeoverRequest::Policy(path))));
     frames(&mut app, 4);
     assert_eq!(app.world().get::<Control>(agent), Some(&Control::Policy), "{:?}", heard(&app));
@@ -195,13 +195,13 @@ fn a_policy_plays_until_the_key_gives_the_seat_back() {
 #[test]
 fn what_cannot_be_done_is_said_and_the_game_goes_on() {
     let folder = tempfile::tempdir().expect("a folder");
-    let path = policy(folder.path(), card(), 2);
+    let path = policy(folder.path(), metadata(), 2);
     let foreign = folder.path().join("foreign");
     std::fs::create_dir_all(&foreign).expect("writable");
-    let of = |card: PolicyMetadata| TakeoverRequest::Policy(policy(&foreign, card, 2));
+    let of = |metadata: PolicyMetadata| TakeoverRequest::Policy(policy(&foreign, metadata, 2));
     let missing = folder.path().join("missing");
     for (request, words) in [
-        (of(PolicyMetadata { game: "maze".into(), ..card() }), "for the game `maze`, not for `corridor`"),
+        (of(PolicyMetadata { game: "maze".into(), ..metadata() }), "for the game `maze`, not for `corridor`"),
         (TakeoverRequest::Replay(path.clone()), "not a recording"),
         (TakeoverRequest::Policy(missing.clone()), "missing"),
         (TakeoverRequest::Record(missing.join("ada.demo")), "cannot create the file"),
@@ -213,11 +213,11 @@ fn what_cannot_be_done_is_said_and_the_game_goes_on() {
         assert_eq!(app.world().get::<Control>(agent), Some(&Control::Human));
         assert!(!app.world().resource::<Takeover>().is_running());
     }
-    let names = PolicyMetadata { observations: vec!["x".into(), "heat".into()], ..card() };
+    let names = PolicyMetadata { observations: vec!["x".into(), "heat".into()], ..metadata() };
     let (mut app, _) = build(plugin(Some(of(names))));
     frames(&mut app, 6);
     assert!(heard(&app)[0].contains("number 1: `heat` there, `time` here"), "{:?}", heard(&app));
-    let (mut app, _) = build(plugin(Some(of(PolicyMetadata { observations: vec!["x".into()], ..card() }))));
+    let (mut app, _) = build(plugin(Some(of(PolicyMetadata { observations: vec!["x".into()], ..metadata() }))));
     frames(&mut app, 6);
     assert!(heard(&app)[0].contains("reads 2 observation values, but 1 are named"), "{:?}", heard(&app));
     let wrong = TakeoverPlugin { request: Some("rekord:x".parse()), ..plugin(None) };

@@ -11,7 +11,7 @@ use playbot_harness::{
     floor_plan::FloorPlan,
     game::Game,
     games::Games,
-    trails::{Floor, TrailChart, Walker, visits::Visits},
+    trails::{Floor, PlayerTrails, TrailChart, visits::Visits},
 };
 use playbot_tests::measuring::plan;
 
@@ -36,11 +36,11 @@ fn a_trail_has_the_place_after_every_tick_of_its_own_episode() {
     let mut reached = 0;
     for trail in &trails {
         let plan = game("coinrun").tools().levels.floor_plan("hard", trail.result.level).expect("a plan");
-        assert_eq!(trail.places.len() as u32, trail.result.ticks);
+        assert_eq!(trail.positions.len() as u32, trail.result.ticks);
         // A jump begins with 1.5 tiles a tick; the position in another episode would be farther away.
-        assert!(trail.places[0].distance(plan.start) < 1.7, "level {}", trail.result.level);
-        assert!(trail.places.windows(2).all(|pair| pair[0].distance(pair[1]) < 1.7), "level {}", trail.result.level);
-        let end = trail.places[trail.places.len() - 1];
+        assert!(trail.positions[0].distance(plan.start) < 1.7, "level {}", trail.result.level);
+        assert!(trail.positions.windows(2).all(|pair| pair[0].distance(pair[1]) < 1.7), "level {}", trail.result.level);
+        let end = trail.positions[trail.positions.len() - 1];
         assert_eq!(end.distance(plan.goal) < 1.7, trail.result.end.is_success(), "level {}", trail.result.level);
         reached += usize::from(trail.result.end.is_success());
     }
@@ -60,8 +60,8 @@ fn following_changes_no_result_and_threads_change_nothing() {
 
 /// Returns the cells of a ball, one after the other. D4RL's walls stand 0.2 aside.
 fn cells(trail: &Trail) -> Vec<Cell> {
-    let cell = |place: &Vec2| Cell::new((place.x + 0.2).round() as usize, (place.y + 0.2).round() as usize);
-    let mut cells: Vec<Cell> = trail.places.iter().map(cell).collect();
+    let cell = |position: &Vec2| Cell::new((position.x + 0.2).round() as usize, (position.y + 0.2).round() as usize);
+    let mut cells: Vec<Cell> = trail.positions.iter().map(cell).collect();
     cells.dedup();
     cells
 }
@@ -84,7 +84,7 @@ fn the_ants_plan_has_its_start_at_the_origin_and_the_goal_of_the_original() {
     let plan = game("antmaze").tools().levels.floor_plan("large", 0).expect("a plan");
     assert_eq!((plan.start, plan.goal), (Vec2::ZERO, Vec2::new(32.0, 24.0)));
     assert_eq!((plan.bounds.min, plan.bounds.max), (Vec2::splat(-6.0), Vec2::new(42.0, 30.0)));
-    let in_wall = |place: Vec2| plan.walls.iter().any(|wall| wall.contains(place));
+    let in_wall = |position: Vec2| plan.walls.iter().any(|wall| wall.contains(position));
     let maze = playbot_games::maze::fixed::antmaze::large();
     let centre = |cell: Cell| Vec2::new(4.0 * (cell.col as f32 - 1.0), 4.0 * (cell.row as f32 - 1.0));
     assert!(maze.wall_cells().all(|cell| in_wall(centre(cell))));
@@ -95,8 +95,8 @@ fn the_ants_plan_has_its_start_at_the_origin_and_the_goal_of_the_original() {
 fn an_ants_trail_begins_at_its_start() {
     let idle = Player::Blind(bevy_playbot::bot::BlindBot::Uniform);
     let trail = &trails("antmaze", &idle, "medium+limit=20:0..0")[0];
-    assert_eq!(trail.places.len(), 20);
-    assert!(trail.places.iter().all(|place| place.length() < 3.0), "{:?}", trail.places);
+    assert_eq!(trail.positions.len(), 20);
+    assert!(trail.positions.iter().all(|position| position.length() < 3.0), "{:?}", trail.positions);
 }
 
 #[test]
@@ -119,22 +119,22 @@ fn every_tick_is_counted_in_the_square_where_it_was() {
     let trails = trails("coinrun", &right_jump(), "hard:0..0");
     let plan = game("coinrun").tools().levels.floor_plan("hard", 0).expect("a plan");
     let visits = Visits::count(plan.bounds, &trails);
-    let inside = trails[0].places.iter().filter(|&&place| plan.bounds.contains(place));
+    let inside = trails[0].positions.iter().filter(|&&position| plan.bounds.contains(position));
     assert!(inside.clone().count() > 40 && visits.total() == inside.clone().count() as u64);
-    assert!(inside.clone().all(|&place| visits.at(place) > 0));
-    let holds = |square: Rect| trails[0].places.iter().any(|&place| square.inflate(1e-3).contains(place));
+    assert!(inside.clone().all(|&position| visits.at(position) > 0));
+    let holds = |square: Rect| trails[0].positions.iter().any(|&position| square.inflate(1e-3).contains(position));
     assert!(visits.visited().all(|(square, _)| holds(square)));
-    assert_eq!(visits.at(plan.bounds.max), 0, "nobody was in the upper corner");
+    assert_eq!(visits.at(plan.bounds.max), 0, "the upper corner was not visited");
     assert_eq!(visits.at(plan.bounds.max + 1.0), 0, "nor outside");
 }
 
-fn walkers(names: &[&str], trails: &[Trail]) -> Vec<Walker> {
-    names.iter().map(|name| Walker { name: (*name).to_owned(), trails: trails.to_vec() }).collect()
+fn players(names: &[&str], trails: &[Trail]) -> Vec<PlayerTrails> {
+    names.iter().map(|name| PlayerTrails { name: (*name).to_owned(), trails: trails.to_vec() }).collect()
 }
 
-fn floor(plan: FloorPlan, walkers: Vec<Walker>) -> Floor {
+fn floor(plan: FloorPlan, players: Vec<PlayerTrails>) -> Floor {
     let (starts, goals) = (vec![plan.start], vec![plan.goal]);
-    Floor { name: "hard:0".to_owned(), plan, starts, goals, walkers }
+    Floor { name: "hard:0".to_owned(), plan, starts, goals, players }
 }
 
 #[test]
@@ -144,7 +144,7 @@ fn the_picture_has_a_line_for_each_episode_and_everything_on_the_paper() {
     for (names, copies) in [(&["right-jump"][..], 3_usize), (&["one", "two", "<three>"], 40)] {
         let copied: Vec<Trail> = (0..copies).flat_map(|_| trails.clone()).collect();
         let chart =
-            TrailChart { title: "CoinRun".to_owned(), floors: vec![floor(plan.clone(), walkers(names, &copied))] };
+            TrailChart { title: "CoinRun".to_owned(), floors: vec![floor(plan.clone(), players(names, &copied))] };
         let drawing = chart.draw();
         let long = |shape: &&Shape| matches!(shape, Shape::Line { points, .. } if points.len() > 5);
         let lines = drawing.shapes.iter().filter(long).count();

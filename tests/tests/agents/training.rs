@@ -67,7 +67,7 @@ fn recordings_are_trained_on_with_the_rewards_that_they_earn() {
     assert!(unpaid, "only the exit pays, and it is the end");
     for episode in &given.demos {
         episode.check().expect("it fits together");
-        assert!(!episode.truncated.contains(&true), "nobody knows what came after a cut");
+        assert!(!episode.truncated.contains(&true), "the state after a cut is unknown");
     }
     let without =
         Trainer::new(&Corridor, &Experiment { algorithm: Algorithm::Rlpd, ..experiment() }, None, DeviceKind::Flex, 1);

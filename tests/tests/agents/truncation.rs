@@ -15,10 +15,10 @@ fn policy() -> Policy {
     untrained(&Corridor, &ObservationConfig::default(), config)
 }
 
-/// Returns a rollout of untrained agents, so that time is up for some. Skills are held for `horizon` ticks.
-fn rollout(policy: &Policy, horizon: u32) -> Rollout {
+/// Returns a rollout of untrained agents, so that time is up for some. Skills are held for `skill_interval` ticks.
+fn rollout(policy: &Policy, skill_interval: u32) -> Rollout {
     let split: LevelSplit = "plain:0..7".parse().expect("a split");
-    let prior = SkillPrior { prior: Prior::standard_normal(2, false), horizon, draw: SkillDraw::Sample };
+    let prior = SkillPrior { prior: Prior::standard_normal(2, false), skill_interval, draw: SkillDraw::Sample };
     let observation_config = ObservationConfig::default();
     let mut collector =
         Collector::new(&Corridor, &split, &observation_config, 3, 0, AGENTS as u32, Some(prior)).expect("can be seen");

@@ -29,8 +29,8 @@ enum Wrong {
 }
 
 /// Fills pictures of two pixels with the tick of the episode, the cell and the level.
-fn sense(mut eyes: Query<(&Cell, &Episode, &mut Frame)>, tick: Res<Tick>, wrong: Res<Wrong>) {
-    for (cell, episode, mut frame) in &mut eyes {
+fn sense(mut sensors: Query<(&Cell, &Episode, &mut Frame)>, tick: Res<Tick>, wrong: Res<Wrong>) {
+    for (cell, episode, mut frame) in &mut sensors {
         let seen = [episode.tick as u8, cell.0 as u8, episode.level as u8, 255];
         frame.pixels = match *wrong {
             Wrong::Blind => vec![seen; 2],
@@ -142,11 +142,11 @@ fn velocity_is_painted_over_the_picture() {
         .entity_mut(agent)
         .insert((PaintedVelocity(Vec2::new(1.0, -0.5)), ImageSensor(ImageOptions { width: 10, height: 1, ..options })));
     world.insert_resource(Wrong::Away);
-    let mut frame = world.get_mut::<Frame>(agent).expect("an eye");
+    let mut frame = world.get_mut::<Frame>(agent).expect("a sensor");
     frame.pixels = vec![[1, 2, 3, 255]; 10];
     frame.pixels[9] = [9; 4];
     world.resource_scope(|world, tick: Mut<Tick>| {
-        world.get_mut::<Frame>(agent).expect("an eye").tick = Some(tick.0);
+        world.get_mut::<Frame>(agent).expect("a sensor").tick = Some(tick.0);
     });
     world.insert_resource(Wrong::Nothing);
     world.entity_mut(agent).remove::<Cell>();
@@ -206,7 +206,7 @@ fn an_agent_that_sees_nothing_is_reported_once() {
     world.tick().expect("it saw something at last");
     world.insert_resource(Wrong::Blind);
     world.ticks(3).expect("it is known to see, so this is the level's fault");
-    assert_eq!(world.get::<BlankEpisodes>(agent).expect("an eye").episodes, 2);
+    assert_eq!(world.get::<BlankEpisodes>(agent).expect("a sensor").episodes, 2);
 }
 
 const RASTER: ObservationConfig = ObservationConfig {

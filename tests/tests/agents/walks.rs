@@ -13,7 +13,7 @@ use playbot_learner::{DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearne
 use playbot_test::{
     detectors::Detectors,
     verdict::{
-        FailureWay, LevelMaps, LevelVerdict, Places, SquareEnds, TestError, TestObserver, TestPlan, Tester, run_tests,
+        FailurePath, LevelMaps, LevelVerdict, Places, SquareEnds, TestError, TestObserver, TestPlan, Tester, run_tests,
     },
 };
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
@@ -111,7 +111,7 @@ fn visits_lost_time_causes_and_places_are_counted() {
     // From square 4: to the left 3, 2, 1 and 0, to the right 5 and 6.
     assert_eq!(level.testers.iter().map(|tester| tester.places).collect::<Vec<_>>(), [places(4), places(1), places(2)]);
     assert_eq!(level.places, places(7));
-    let failure = FailureWay { tester: "left".to_owned(), episode: 0, way: vec![[3, 1], [2, 1], [1, 1], [0, 1]] };
+    let failure = FailurePath { tester: "left".to_owned(), episode: 0, path: vec![[3, 1], [2, 1], [1, 1], [0, 1]] };
     let expected = LevelMaps {
         side: 1.0,
         columns: 7,
@@ -125,9 +125,9 @@ fn visits_lost_time_causes_and_places_are_counted() {
     assert_eq!(level.maps, Some(expected));
     let abyss = BTreeMap::from([("abyss".to_owned(), 1)]);
     assert_eq!(level.causes, abyss);
-    let told: Vec<(u64, u64, &BTreeMap<String, u64>)> =
+    let ended: Vec<(u64, u64, &BTreeMap<String, u64>)> =
         level.ends.iter().map(|SquareEnds { lost, timed_out, causes, .. }| (*lost, *timed_out, causes)).collect();
-    assert_eq!(told, [(1, 0, &abyss), (0, 1, &BTreeMap::new())]);
+    assert_eq!(ended, [(1, 0, &abyss), (0, 1, &BTreeMap::new())]);
 }
 
 #[test]
@@ -147,10 +147,10 @@ fn of_many_levels_only_those_that_failed_have_maps() {
 }
 
 #[test]
-fn skills_of_a_policy_are_told_where_they_were_active() {
+fn skills_of_a_policy_are_reported_where_they_were_active() {
     let spec = PolicySpec { obs: 2.into(), latent: 2, action_space: ActionSpace::Discrete(3) };
     let policy = PpoLearner::new(PpoConfig::default(), spec, 1, DeviceKind::Flex).expect("good settings").policy();
-    let prior = SkillPrior { prior: Prior::standard_normal(2, false), horizon: 3, draw: SkillDraw::Sample };
+    let prior = SkillPrior { prior: Prior::standard_normal(2, false), skill_interval: 3, draw: SkillDraw::Sample };
     let skilled = Player::Policy { policy, prior: Some(prior), draw: ActionDraw::Sample };
     let found = verdicts(&plan("plain:0..3", vec![tester("skilled", skilled)], 8, 2));
     for level in &found {

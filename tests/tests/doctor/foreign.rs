@@ -2,7 +2,10 @@
 
 use bevy::prelude::*;
 use playbot_harness::{
-    doctor::{CauseKind, Comparison, Difference, DifferenceKind, DoctorOptions, DoctorReport, Finding, examine},
+    doctor::{
+        CauseKind, DifferenceKind, DoctorComparison, DoctorDifference, DoctorFinding, DoctorOptions, DoctorReport,
+        examine,
+    },
     foreign::ForeignGame,
 };
 use playbot_tests::foreign::{
@@ -16,7 +19,7 @@ fn examined(game: &ForeignGame) -> DoctorReport {
 }
 
 /// Returns the finding of this comparison in a copy with this fault, after a check that it is the only one.
-fn found(fault: CatchFault, comparison: Comparison) -> (Finding, Difference, DoctorReport) {
+fn found(fault: CatchFault, comparison: DoctorComparison) -> (DoctorFinding, DoctorDifference, DoctorReport) {
     let report = examined(&faulty_catch(fault));
     let finding = report.findings.iter().find(|finding| finding.comparison == Some(comparison));
     let finding = finding.unwrap_or_else(|| panic!("{fault:?}:\n{report}")).clone();
@@ -25,7 +28,7 @@ fn found(fault: CatchFault, comparison: Comparison) -> (Finding, Difference, Doc
 }
 
 /// Positions of apples are reflected, whatever moves them.
-fn check_that_the_apple_is_named(difference: &Difference, report: &DoctorReport) {
+fn check_that_the_apple_is_named(difference: &DoctorDifference, report: &DoctorReport) {
     assert_eq!(difference.kind, DifferenceKind::Component, "{report}");
     assert!(difference.name.ends_with("Transform"), "{report}");
     assert_eq!(difference.entity.as_deref(), Some("[Apple]"), "{report}");
@@ -36,10 +39,10 @@ fn a_healthy_foreign_game_has_no_findings() {
     let report = examined(&catch_game());
     assert!(report.is_healthy(), "{report}");
     let arenas =
-        report.of(Comparison::Arenas).and_then(|arenas| arenas.skipped.clone()).expect("there can be only one");
+        report.of(DoctorComparison::Arenas).and_then(|arenas| arenas.skipped.clone()).expect("there can be only one");
     assert!(arenas.contains("holds only one arena"), "{arenas}");
     assert_eq!(report.safety.arenas.safe, None);
-    for comparison in Comparison::ALL.into_iter().filter(|comparison| *comparison != Comparison::Arenas) {
+    for comparison in DoctorComparison::ALL.into_iter().filter(|comparison| *comparison != DoctorComparison::Arenas) {
         let compared = report.of(comparison).expect("it was made");
         assert_eq!((compared.same(), compared.ticks), (Some(true), 120), "{report}");
     }
@@ -47,7 +50,7 @@ fn a_healthy_foreign_game_has_no_findings() {
 
 #[test]
 fn unseeded_randomness_is_found_in_the_resource_that_holds_it() {
-    let (finding, difference, report) = found(CatchFault::UnseededWind, Comparison::Repeat);
+    let (finding, difference, report) = found(CatchFault::UnseededWind, DoctorComparison::Repeat);
     assert_eq!((difference.kind, difference.tick), (DifferenceKind::Resource, 0), "{report}");
     assert!(difference.name.ends_with("::Wind") && difference.field == ".force", "{report}");
     assert_eq!(finding.causes[0].kind, CauseKind::Randomness);
@@ -56,16 +59,16 @@ fn unseeded_randomness_is_found_in_the_resource_that_holds_it() {
 
 #[test]
 fn unseeded_randomness_that_is_kept_nowhere_is_found_in_what_it_moves() {
-    let (finding, difference, report) = found(CatchFault::UnseededGust, Comparison::Repeat);
+    let (finding, difference, report) = found(CatchFault::UnseededGust, DoctorComparison::Repeat);
     check_that_the_apple_is_named(&difference, &report);
     assert_eq!((finding.causes[0].kind, report.findings.len()), (CauseKind::Randomness, 1), "{report}");
-    let effect = report.of(Comparison::Repeat).and_then(|repeat| repeat.effect.clone()).expect("it is seen");
+    let effect = report.of(DoctorComparison::Repeat).and_then(|repeat| repeat.effect.clone()).expect("it is seen");
     assert_eq!((effect.kind, effect.name.as_str()), (DifferenceKind::Observation, "apple_x"), "{report}");
 }
 
 #[test]
 fn a_resource_that_survives_a_restart_is_named() {
-    let (finding, difference, report) = found(CatchFault::EndlessSeason, Comparison::Restart);
+    let (finding, difference, report) = found(CatchFault::EndlessSeason, DoctorComparison::Restart);
     assert_eq!((difference.kind, difference.tick), (DifferenceKind::Resource, 0), "{report}");
     assert!(difference.name.ends_with("::Season") && difference.field == ".frames", "{report}");
     assert_eq!((finding.causes[0].kind, report.findings.len()), (CauseKind::SurvivesRestart, 1), "{report}");
@@ -74,7 +77,7 @@ fn a_resource_that_survives_a_restart_is_named() {
 
 #[test]
 fn a_local_that_survives_a_restart_is_found_in_what_it_moves_and_is_a_usual_cause() {
-    let (finding, difference, report) = found(CatchFault::EndlessLocal, Comparison::Restart);
+    let (finding, difference, report) = found(CatchFault::EndlessLocal, DoctorComparison::Restart);
     check_that_the_apple_is_named(&difference, &report);
     assert_eq!((finding.causes[0].kind, report.findings.len()), (CauseKind::SurvivesRestart, 1), "{report}");
     assert!(report.to_string().contains("a Local"), "{report}");
@@ -82,23 +85,23 @@ fn a_local_that_survives_a_restart_is_found_in_what_it_moves_and_is_a_usual_caus
 
 #[test]
 fn a_foreign_reader_of_the_wall_clock_is_found() {
-    let (finding, difference, report) = found(CatchFault::WallClock, Comparison::Clock);
+    let (finding, difference, report) = found(CatchFault::WallClock, DoctorComparison::Clock);
     check_that_the_apple_is_named(&difference, &report);
     assert_eq!(finding.causes[0].kind, CauseKind::WallClock);
-    assert_eq!(report.of(Comparison::Repeat).and_then(|repeat| repeat.same()), Some(true), "{report}");
+    assert_eq!(report.of(DoctorComparison::Repeat).and_then(|repeat| repeat.same()), Some(true), "{report}");
     assert_eq!(report.safety.window.safe, Some(false), "{report}");
 }
 
 #[test]
 fn an_order_of_archetypes_that_decides_is_found() {
-    let (finding, difference, report) = found(CatchFault::FirstGale, Comparison::Archetypes);
+    let (finding, difference, report) = found(CatchFault::FirstGale, DoctorComparison::Archetypes);
     check_that_the_apple_is_named(&difference, &report);
     assert_eq!((finding.causes[0].kind, report.findings.len()), (CauseKind::ArchetypeOrder, 1), "{report}");
     let [recording, window, resume] =
         [&report.safety.recording, &report.safety.window, &report.safety.resume].map(|verdict| verdict.safe);
     assert_eq!((recording, window, resume), (Some(false), Some(false), Some(true)), "{report}");
     // Another clock brings nothing that changes the order.
-    assert_eq!(report.of(Comparison::Clock).and_then(|clock| clock.same()), Some(true), "{report}");
+    assert_eq!(report.of(DoctorComparison::Clock).and_then(|clock| clock.same()), Some(true), "{report}");
 }
 
 #[test]

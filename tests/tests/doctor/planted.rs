@@ -3,8 +3,8 @@
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
 use playbot_harness::{
     doctor::{
-        CauseKind, Comparison, DifferenceKind, DoctorOptions, DoctorReport, Finding, FindingKind, NonFiniteValue,
-        examine,
+        CauseKind, DifferenceKind, DoctorComparison, DoctorFinding, DoctorOptions, DoctorReport, FindingKind,
+        NonFiniteValue, examine,
     },
     game::Game,
 };
@@ -20,7 +20,7 @@ fn examined(game: &dyn Game, ticks: u32, ignored: &[&str]) -> DoctorReport {
 }
 
 /// Returns the only finding in a copy with this fault.
-fn finding(fault: Fault) -> (Finding, DoctorReport) {
+fn finding(fault: Fault) -> (DoctorFinding, DoctorReport) {
     let report = examined(&fault, 60, &[]);
     assert_eq!(report.findings.len(), 1, "{fault:?}:\n{report}");
     (report.findings[0].clone(), report)
@@ -29,11 +29,11 @@ fn finding(fault: Fault) -> (Finding, DoctorReport) {
 /// Returns the only finding, which must be a difference of this kind of thing in this comparison.
 fn named(
     fault: Fault,
-    comparison: Comparison,
+    comparison: DoctorComparison,
     kind: DifferenceKind,
     name: &str,
     field: &str,
-) -> (Finding, DoctorReport) {
+) -> (DoctorFinding, DoctorReport) {
     let (finding, report) = finding(fault);
     let difference = finding.difference.clone().expect("a difference");
     assert_eq!((finding.kind, finding.comparison), (FindingKind::Differs, Some(comparison)), "{}", finding.what);
@@ -43,7 +43,7 @@ fn named(
     (finding, report)
 }
 
-fn likeliest(finding: &Finding) -> CauseKind {
+fn likeliest(finding: &DoctorFinding) -> CauseKind {
     finding.causes.first().expect("every difference has common causes").kind
 }
 
@@ -56,7 +56,7 @@ fn constant(report: &DoctorReport) -> Vec<&str> {
 fn a_healthy_game_has_no_findings() {
     let report = examined(&Fault::None, 60, &[]);
     assert!(report.is_healthy(), "{report}");
-    assert_eq!(report.comparisons.len(), Comparison::ALL.len());
+    assert_eq!(report.comparisons.len(), DoctorComparison::ALL.len());
     for comparison in &report.comparisons {
         assert_eq!((comparison.same(), comparison.ticks, comparison.unmatched), (Some(true), 60, 0), "{report}");
     }
@@ -79,16 +79,17 @@ fn what_reflection_sees_and_what_it_does_not_see_is_said() {
 #[test]
 fn unseeded_randomness_is_found_at_its_source() {
     let (finding, report) =
-        named(Fault::UnseededRandomness, Comparison::Repeat, DifferenceKind::Resource, "::Wind", ".force");
+        named(Fault::UnseededRandomness, DoctorComparison::Repeat, DifferenceKind::Resource, "::Wind", ".force");
     assert!(finding.causes.iter().any(|cause| cause.kind == CauseKind::Randomness));
     assert_eq!(report.safety.recording.safe, Some(false));
-    let skipped = report.of(Comparison::Restart).and_then(|restart| restart.skipped.clone());
+    let skipped = report.of(DoctorComparison::Restart).and_then(|restart| restart.skipped.clone());
     assert!(skipped.expect("it would only repeat the finding").contains("differs from itself"));
 }
 
 #[test]
 fn iteration_over_a_hash_map_is_found_and_the_map_is_named() {
-    let (finding, _) = named(Fault::HashOrder, Comparison::Repeat, DifferenceKind::Component, "::Smells", ".mixture");
+    let (finding, _) =
+        named(Fault::HashOrder, DoctorComparison::Repeat, DifferenceKind::Component, "::Smells", ".mixture");
     assert_eq!(likeliest(&finding), CauseKind::HashOrder);
     let evidence = &finding.causes[0].evidence;
     assert!(evidence.iter().any(|hint| hint.contains("Herbs.strengths")), "{evidence:?}");
@@ -96,26 +97,29 @@ fn iteration_over_a_hash_map_is_found_and_the_map_is_named() {
 
 #[test]
 fn a_reader_of_the_wall_clock_is_found_although_no_clock_runs_without_a_window() {
-    let (finding, report) = named(Fault::WallClock, Comparison::Clock, DifferenceKind::Resource, "::Sun", ".pace");
+    let (finding, report) =
+        named(Fault::WallClock, DoctorComparison::Clock, DifferenceKind::Resource, "::Sun", ".pace");
     assert_eq!(likeliest(&finding), CauseKind::WallClock);
-    assert_eq!(report.of(Comparison::Repeat).and_then(|repeat| repeat.same()), Some(true));
+    assert_eq!(report.of(DoctorComparison::Repeat).and_then(|repeat| repeat.same()), Some(true));
     assert_eq!((report.safety.window.safe, report.safety.recording.safe), (Some(false), Some(true)));
 }
 
 #[test]
 fn a_score_that_two_arenas_share_is_found() {
-    let (finding, report) = named(Fault::SharedScore, Comparison::Arenas, DifferenceKind::Resource, "::Score", ".0");
+    let (finding, report) =
+        named(Fault::SharedScore, DoctorComparison::Arenas, DifferenceKind::Resource, "::Score", ".0");
     assert_eq!(likeliest(&finding), CauseKind::SharedByArenas);
     let difference = finding.difference.expect("a difference");
     assert_eq!((difference.left.as_str(), difference.right.as_str()), ("1", "2"));
-    let effect = report.of(Comparison::Arenas).and_then(|arenas| arenas.effect.clone()).expect("it is paid out");
+    let effect = report.of(DoctorComparison::Arenas).and_then(|arenas| arenas.effect.clone()).expect("it is paid out");
     assert_eq!((effect.kind, effect.tick), (DifferenceKind::Reward, 0));
     assert_eq!((report.safety.arenas.safe, report.safety.resume.safe), (Some(false), Some(true)));
 }
 
 #[test]
 fn state_that_survives_a_restart_is_found() {
-    let (finding, report) = named(Fault::Survivor, Comparison::Restart, DifferenceKind::Resource, "::Soil", ".wet");
+    let (finding, report) =
+        named(Fault::Survivor, DoctorComparison::Restart, DifferenceKind::Resource, "::Soil", ".wet");
     assert_eq!(likeliest(&finding), CauseKind::SurvivesRestart);
     assert_eq!((report.safety.resume.safe, report.safety.threads.safe), (Some(false), Some(true)));
 }
@@ -124,21 +128,22 @@ fn state_that_survives_a_restart_is_found() {
 fn entities_that_survive_a_restart_are_counted() {
     let (finding, _) = finding(Fault::LeftOvers);
     let difference = finding.difference.expect("a difference");
-    assert_eq!((finding.comparison, difference.kind), (Some(Comparison::Restart), DifferenceKind::Entities));
+    assert_eq!((finding.comparison, difference.kind), (Some(DoctorComparison::Restart), DifferenceKind::Entities));
     assert!(difference.name.contains("Plant"), "{}", difference.name);
     assert_eq!((difference.left.as_str(), difference.right.as_str()), ("4", "8"));
 }
 
 #[test]
 fn what_is_meant_to_last_can_be_left_out() {
-    let (_, report) = named(Fault::LastingRecord, Comparison::Restart, DifferenceKind::Resource, "::Record", ".0");
+    let (_, report) =
+        named(Fault::LastingRecord, DoctorComparison::Restart, DifferenceKind::Resource, "::Record", ".0");
     assert!(report.to_string().contains("agents have noticed nothing"), "{report}");
     assert!(examined(&Fault::LastingRecord, 60, &["::Record"]).is_healthy());
 }
 
 #[test]
 fn what_reflection_cannot_see_shows_in_what_agents_get() {
-    let (finding, _) = named(Fault::Hidden, Comparison::Repeat, DifferenceKind::Reward, "reward", "");
+    let (finding, _) = named(Fault::Hidden, DoctorComparison::Repeat, DifferenceKind::Reward, "reward", "");
     assert!(finding.causes.iter().any(|cause| cause.kind == CauseKind::Randomness));
 }
 
@@ -185,7 +190,10 @@ fn the_report_names_the_cause_and_what_to_do() {
 fn the_report_says_how_much_was_compared_and_how_to_compare_more() {
     let report = examined(&Fault::None, 60, &[]);
     assert!(report.comparisons.iter().all(|comparison| comparison.episodes >= 1), "{report}");
-    assert_eq!(report.safety.window.comparisons, [Comparison::Repeat, Comparison::Clock, Comparison::Archetypes]);
+    assert_eq!(
+        report.safety.window.comparisons,
+        [DoctorComparison::Repeat, DoctorComparison::Clock, DoctorComparison::Archetypes]
+    );
     let text = report.to_string();
     for words in [
         "no difference in 60 ticks, ",

@@ -43,7 +43,8 @@ fn the_experiment_beside_each_table_can_be_read_and_makes_sense() {
     assert!(checked > 20, "only {checked} studies were found");
 }
 
-/// The index of studies has a row for each folder with a table: the calls that made it, and the CPU hours of its `cost.md`.
+/// The index of studies has a row for each folder with a table: the calls that made it, and the CPU hours of its
+/// `cost.md`.
 #[test]
 fn the_index_of_studies_has_all_of_them_with_their_costs() {
     let index = read("docs/results/README.md");

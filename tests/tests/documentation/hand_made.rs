@@ -58,7 +58,7 @@ pub fn runner() -> ForeignGame {
         .restart(Restart::Startup)
         .levels(8)
         .level(|level: Res<LevelSeed>, mut pit: ResMut<Pit>| pit.0 = PITS[level.0 as usize])
-        .place(|runner: Single<&Runner>| Vec2::new(runner.x, runner.y))
+        .position(|runner: Single<&Runner>| Vec2::new(runner.x, runner.y))
         .plan(plan)
         .demonstrator("jumper", |runner: Single<&Runner>, pit: Res<Pit>| {
             1 + u32::from((0.0..0.3).contains(&(pit.0[0] - runner.x)))

@@ -90,9 +90,9 @@ fn what_is_trained_finishes_levels_that_nobody_has_played() {
     let demos = folder.path().join("jumper.demo");
     pipeline::record(&runner(), &"default:128..167".parse().expect("levels"), 0.02, &demos).expect("recorded");
     let (game, games) = (runner(), [&runner() as &dyn Game]);
-    let usual = default_experiment(&Games::new(&games).expect("one game"));
-    let usual = parse_experiment(&usual.text, Path::new(&*usual.origin)).expect("valid");
-    let mut experiment = Experiment { demos: Some(demos), steps: 8192, arenas: 8, worlds: 2, ..usual };
+    let default = default_experiment(&Games::new(&games).expect("one game"));
+    let default = parse_experiment(&default.text, Path::new(&*default.origin)).expect("valid");
+    let mut experiment = Experiment { demos: Some(demos), steps: 8192, arenas: 8, worlds: 2, ..default };
     experiment.skills.epochs = 5;
     let (file, run) = (folder.path().join("skills.safetensors"), folder.path().join("run"));
     let setup = TrainingSetup::new(DeviceKind::Flex, 2);

@@ -146,7 +146,7 @@ fn what_headless_plugins_lack_is_named_with_its_plugin() {
     let broken = catch_game_with(|app| {
         app.add_systems(Update, count);
     });
-    let broken = broken.headless(|usual| usual.build().disable::<FrameCountPlugin>());
+    let broken = broken.headless(|plugins| plugins.build().disable::<FrameCountPlugin>());
     let text = fault(&broken, 2);
     assert!(text.contains("count` needs the resource `FrameCount`") && text.contains("`FrameCountPlugin` adds it"));
 }

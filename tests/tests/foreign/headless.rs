@@ -72,9 +72,9 @@ fn ball_game() -> ForeignGame {
         .time_limit(60)
         .restart(Restart::state(Stage::Loading))
         .ready(|stage: Res<State<Stage>>| *stage == Stage::Playing)
-        .headless(|usual| {
+        .headless(|plugins| {
             let file_path = concat!(env!("CARGO_MANIFEST_DIR"), "/../assets").to_owned();
-            usual.build().set(AssetPlugin { file_path, ..default() })
+            plugins.build().set(AssetPlugin { file_path, ..default() })
         })
 }
 

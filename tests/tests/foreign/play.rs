@@ -85,7 +85,7 @@ fn states_and_loading_screens_pass_before_the_first_tick() {
     // level is entered, one before the first tick. So the steps fall into ticks 2, 5 and 8, whatever state the episode
     // before has left.
     assert_eq!(lengths, [8, 8, 8], "no ghosts, and no loading in an episode");
-    assert_eq!(world.resource::<Tick>().0, 25, "loading frames are no ticks; the last one has nobody to play");
+    assert_eq!(world.resource::<Tick>().0, 25, "loading frames are no ticks; the last one has no agent");
     assert_eq!(*world.resource::<State<Stage>>(), Stage::Over);
     let played = world.resource::<PlayedFrames>().0;
     assert_eq!(played, 27, "eight ticks, and the frame in which the level is entered");

@@ -36,7 +36,7 @@ fn an_episode_is_the_same_whenever_it_is_played() {
     assert_eq!(rebuilt[1], rebuilt[3]);
     assert_ne!(rebuilt[0], rebuilt[1], "the hash sees the level");
     let restarted = traces(&stubborn_game(Restart::Startup), 0, &[1, 2, 1, 2]);
-    assert_eq!(restarted[0].len(), 20, "nobody pushes the ball: only the clock ends the episode");
+    assert_eq!(restarted[0].len(), 20, "no agent pushes the ball: only the clock ends the episode");
     assert_ne!(restarted[0], restarted[2], "the gusts outlive `Restart::Startup`");
 }
 
@@ -65,7 +65,7 @@ fn each_episode_has_a_world_of_its_own_with_the_same_agent() {
         // A frame that starts the clock, one that begins the level, and at most 20 ticks, or 21 for the last World.
         assert!(world.resource::<Gusts>().0 <= 4, "the gusts begin anew");
     }
-    assert_eq!((ticks, seen.len()), (61, 3), "20 ticks in each World; the last tick has nobody to play");
+    assert_eq!((ticks, seen.len()), (61, 3), "20 ticks in each World; the last tick has no agent");
     assert_eq!(world.resource::<Ends>().0, 3);
     assert_eq!(world.resource::<bevy_playbot::episode::Tick>().0, 61);
     assert_eq!(world.get::<EpisodeCount>(agents[0]).expect("an agent").finished, 3);

@@ -50,7 +50,7 @@ fn senses_change_nothing_in_the_game() {
         let (all, own) = (with_senses.observation().len(), without.observation().len());
         assert_eq!((all, with_senses.version()), (own + more, without.version()));
         for tick in 0..150 {
-            let [(seen, hashes), (told, others)] = pair.each_mut().map(|(world, agents)| {
+            let [(seen, hashes), (plain, others)] = pair.each_mut().map(|(world, agents)| {
                 world.tick().expect("sound");
                 let vectors: Vec<_> = agents
                     .iter()
@@ -61,8 +61,8 @@ fn senses_change_nothing_in_the_game() {
                 (vectors, hashes)
             });
             assert_eq!(hashes, others, "{}, tick {tick}", with_senses.name());
-            for (seen, told) in seen.iter().zip(&told) {
-                assert_eq!((seen.len(), &seen[..own]), (all, &told[..]), "{}, tick {tick}", with_senses.name());
+            for (seen, plain) in seen.iter().zip(&plain) {
+                assert_eq!((seen.len(), &seen[..own]), (all, &plain[..]), "{}, tick {tick}", with_senses.name());
             }
         }
     }

@@ -17,6 +17,6 @@ fn whole(kind: &FileKind, folder: &std::path::Path) -> Vec<String> {
     kind.put(folder, kind.bytes());
     match kind.read(folder) {
         Reading::Whole(parts) => parts,
-        Reading::Told(words) => panic!("{} is whole: {words}", kind.name),
+        Reading::Refused(words) => panic!("{} is whole: {words}", kind.name),
     }
 }

@@ -16,11 +16,11 @@ fn measure(work: &mut dyn FnMut()) -> u64 {
 #[test]
 fn no_mutant_of_any_kind_is_too_much_for_its_reader() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (mut whole, mut told, mut faults) = (0, 0, Vec::new());
+    let (mut whole, mut refused, mut faults) = (0, 0, Vec::new());
     for kind in KINDS.iter() {
         let seeds = 0..if kind.is_slow { SLOW_MUTANTS } else { MUTANTS };
         let tally = read_mutants(kind, seeds, &folder.path().join("kind"), measure);
-        (whole, told) = (whole + tally.whole, told + tally.told);
+        (whole, refused) = (whole + tally.whole, refused + tally.refused);
         faults.extend(tally.faults.iter().map(|fault| format!("{}, seed {}: {}", kind.name, fault.seed, fault.what)));
         if tally.is_stuck {
             break;
@@ -28,7 +28,7 @@ fn no_mutant_of_any_kind_is_too_much_for_its_reader() {
     }
     assert!(faults.is_empty(), "{} mutants\n{}", faults.len(), faults.join("\n"));
     // Checksums that fit let some of them in.
-    assert!(whole > 300 && told > 3000, "{whole} were read, {told} refused");
+    assert!(whole > 300 && refused > 3000, "{whole} were read, {refused} refused");
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn a_checkpoint_that_asks_for_actions_which_the_game_does_not_have_is_refused() 
     assert_ne!(changed, text);
     kind.put(folder.path(), &kind.form.reseal(changed.as_bytes()));
     match kind.read(folder.path()) {
-        Reading::Told(words) => assert!(words.contains("99 of 3 choices"), "{words}"),
+        Reading::Refused(words) => assert!(words.contains("99 of 3 choices"), "{words}"),
         Reading::Whole(parts) => panic!("{parts:?}"),
     }
 }

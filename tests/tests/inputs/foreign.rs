@@ -68,7 +68,7 @@ fn keys_can_be_said_by_name() {
 }
 
 #[test]
-fn a_key_that_does_not_exist_is_told_with_its_action_and_the_nearest_name() {
+fn a_key_that_does_not_exist_is_reported_with_its_action_and_the_nearest_name() {
     let wrong = bare().keys_by_name([vec![], vec!["Space", "ArowLeft"], vec!["Anykey"]]);
     let text = wrong.problem().expect("there is no such key");
     for part in ["the game `bare`", "in action 1", "`ArowLeft`", "did you mean `ArrowLeft`?"] {

@@ -45,7 +45,7 @@ fn a_tap_between_two_ticks_counts_once() {
     for _ in 0..4 {
         app.update();
     }
-    assert_eq!((app.world().resource::<Tick>().0, cell(&app, agent)), (1, 4), "nobody has pressed anything");
+    assert_eq!((app.world().resource::<Tick>().0, cell(&app, agent)), (1, 4), "no key was pressed");
     key(&mut app, KeyCode::ArrowRight, ButtonState::Pressed);
     app.update();
     key(&mut app, KeyCode::ArrowRight, ButtonState::Released);

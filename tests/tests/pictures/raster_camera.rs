@@ -7,14 +7,14 @@ use bevy::{
 use bevy_playbot::{
     camera::{CameraSensor, TileBorder},
     raster::{RasterPlugin, RasterSensor},
-    vision::{Difference, Frame, ImageOptions, TileLayer},
+    vision::{Frame, ImageOptions, PictureDifference, TileLayer},
 };
 use playbot::prelude::*;
 use playbot_games::{
     ant::{Ant, walk::Walker},
     coinrun::{CoinRun, picture::VIEW},
 };
-use playbot_tests::scene::{camera_world, draw, image, spawn_eye};
+use playbot_tests::scene::{camera_world, draw, image, spawn_sensor};
 
 /// Returns a World with a camera and a raster with the same view, each an agent.
 fn both_eyes(width: f32, size: [u32; 2]) -> (World, [Entity; 2]) {
@@ -22,7 +22,7 @@ fn both_eyes(width: f32, size: [u32; 2]) -> (World, [Entity; 2]) {
         app.add_plugins(RasterPlugin);
     });
     let target = world.spawn(Transform::from_xyz(0.3, -0.2, 0.0)).id();
-    let camera = spawn_eye(&mut world, 0, target, width, size);
+    let camera = spawn_sensor(&mut world, 0, target, width, size);
     let options = ImageOptions { width: size[0], height: size[1], ..default() };
     let sensor = RasterSensor::following(target, width, options);
     let raster = world.spawn((Agent::new(1, ActionSpace::Discrete(2)), Control::Human, sensor)).id();
@@ -30,9 +30,9 @@ fn both_eyes(width: f32, size: [u32; 2]) -> (World, [Entity; 2]) {
 }
 
 /// Returns the difference between the frames of two agents.
-fn difference(world: &World, one: Entity, other: Entity) -> Difference {
-    let [one, other] = [one, other].map(|agent| &world.get::<Frame>(agent).expect("an eye").pixels);
-    Difference::between(one, other).expect("they have one size")
+fn difference(world: &World, one: Entity, other: Entity) -> PictureDifference {
+    let [one, other] = [one, other].map(|agent| &world.get::<Frame>(agent).expect("a sensor").pixels);
+    PictureDifference::between(one, other).expect("they have one size")
 }
 
 /// The mean difference of many pictures.
@@ -44,7 +44,7 @@ struct Total {
 }
 
 impl Total {
-    fn add(&mut self, difference: Difference) {
+    fn add(&mut self, difference: PictureDifference) {
         self.mean += difference.mean;
         self.close += difference.close;
         self.pictures += 1.0;
@@ -200,7 +200,7 @@ fn a_grid_without_cells_is_its_outside() {
             world.tick().expect("nothing is wrong with it");
             let difference = difference(&world, camera, raster);
             assert!(difference.close > 0.98, "{columns} x {rows}, outside {outside}, scale {scale}: {difference:?}");
-            let black = world.get::<Frame>(raster).expect("an eye").pixels.iter().filter(|p| **p == [0, 0, 0, 255]);
+            let black = world.get::<Frame>(raster).expect("a sensor").pixels.iter().filter(|p| **p == [0, 0, 0, 255]);
             let expected = if outside == TileLayer::EMPTY { 64 * 48 } else { 0 };
             assert_eq!(black.count(), expected, "all of the picture, or nothing");
         }

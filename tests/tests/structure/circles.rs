@@ -19,7 +19,8 @@ pub fn folders(needs: &[Need]) -> BTreeMap<&[String], Folder<'_>> {
     found
 }
 
-/// A shortest circle for each module that is in one and not in an earlier one: needs, each from where the last one leads.
+/// A shortest circle for each module that is in one and not in an earlier one: needs, each from where the last one
+/// leads.
 pub fn circles<'a>(folder: &Folder<'a>) -> Vec<Vec<&'a Need>> {
     let names: BTreeSet<&str> = folder.keys().map(|(from, _)| *from).collect();
     let (mut found, mut seen) = (Vec::new(), BTreeSet::new());

@@ -5,8 +5,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-/// All files below a folder whose name ends so, in the order of their paths. Links and hidden folders are passed over, and
-/// so are `target` and `runs`, which git ignores too.
+/// All files below a folder whose name ends so, in the order of their paths. Links and hidden folders are passed over,
+/// and so are `target` and `runs`, which git ignores too.
 pub fn files(folder: &Path, ending: &str) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let entries = fs::read_dir(folder).unwrap_or_else(|error| panic!("{}: {error}", folder.display()));

@@ -1,9 +1,9 @@
-//! The structure of the workspace, read from its sources as text: no circles, files of a readable length, nothing hidden, an
-//! example for each concept, components and resources that are reflected.
+//! The structure of the workspace, read from its sources as text: no circles, files of a readable length, nothing
+//! hidden, an example for each concept, components and resources that are reflected.
 //!
-//! The sources are read and not compiled, so that every feature and every platform is seen at once; only what is registered
-//! is asked of Bevy. Code for tests (`#[cfg(test)]`, `tests/`, `examples/`) may import what it likes; only the length of its
-//! files is looked at.
+//! The sources are read and not compiled, so that every feature and every platform is seen at once; only what is
+//! registered is asked of Bevy. Code for tests (`#[cfg(test)]`, `tests/`, `examples/`) may import what it likes; only
+//! the length of its files is looked at.
 
 mod circles;
 mod doctests;

@@ -1,4 +1,5 @@
-//! Components, resources and events are known to Bevy's type registry: inspectors show them, and `playbot doctor` names them.
+//! Components, resources and events are known to Bevy's type registry: inspectors show them, and `playbot doctor` names
+//! them.
 
 use std::{fs, slice};
 
@@ -33,8 +34,8 @@ const CRATES: [&str; 7] = [
     "playbot_train",
 ];
 
-/// rapier's worlds, of which reflection sees nothing. Without `ReflectComponent` they are among those that `playbot doctor`
-/// says it cannot compare; with it they would count as compared.
+/// rapier's worlds, of which reflection sees nothing. Without `ReflectComponent` they are among those that
+/// `playbot doctor` says it cannot compare; with it they would count as compared.
 const CLOSED: [&str; 1] = ["playbot_games::maze2d::physics::MazePhysics"];
 
 /// What a type is to Bevy.
@@ -121,10 +122,11 @@ fn fault(kept: &Kept, package: &Package, registry: &TypeRegistry) -> Option<&'st
     (is_unmarked && known.data::<ReflectResource>().is_none()).then_some("has no `#[reflect(Resource)]`")
 }
 
-/// They can be read by it, too: `#[reflect(Resource)]` brings what `#[reflect(Component)]` does, and a resource that cannot be
-/// made from its fields has the latter.
+/// They can be read by it, too: `#[reflect(Resource)]` brings what `#[reflect(Component)]` does, and a resource that
+/// cannot be made from its fields has the latter.
 ///
-/// What does not implement `Reflect` itself is left out with `#[reflect(ignore)]`, or the whole is `#[reflect(opaque)]`.
+/// What does not implement `Reflect` itself is left out with `#[reflect(ignore)]`, or the whole is
+/// `#[reflect(opaque)]`.
 #[test]
 fn components_resources_and_events_are_reflected_and_registered() {
     let app = headless_app();

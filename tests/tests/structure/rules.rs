@@ -40,8 +40,8 @@ fn crates() -> Vec<(Package, Modules)> {
 }
 
 /// A module may name another, or be named by it, not both, whether directly or through others. `use` declarations and
-/// paths with `crate::`, `self::` and `super::` count, by the module in which the item is defined; tests do not. A folder's
-/// door is above its files: it may name them, and they may name it.
+/// paths with `crate::`, `self::` and `super::` count, by the module in which the item is defined; tests do not. A
+/// folder's door is above its files: it may name them, and they may name it.
 #[test]
 fn files_of_a_folder_need_one_another_in_no_circle() {
     let mut faults = Vec::new();
@@ -101,8 +101,8 @@ fn files_are_neither_long_nor_splinters() {
     assert!(files.len() > 300, "only {} product files are seen: does the reader still find them?", files.len());
 }
 
-/// A folder's door is the file beside it that has its name. Examples are left out: Cargo takes a file beside theirs for a
-/// program.
+/// A folder's door is the file beside it that has its name. Examples are left out: Cargo takes a file beside theirs for
+/// a program.
 #[test]
 fn modules_have_one_style() {
     let found: Vec<String> = files(&workspace(), "mod.rs")
@@ -142,8 +142,8 @@ fn modules_begin_with_a_noun() {
     fail_if_any(&faults, "Say what is in it with a noun phrase: \"Wilson intervals\".");
 }
 
-/// One short example at least, compiled as a documentation test, in every module of `bevy_playbot` that can be named from
-/// outside, or below it. What is `#[doc(hidden)]` needs none.
+/// One short example at least, compiled as a documentation test, in every module of `bevy_playbot` that can be named
+/// from outside, or below it. What is `#[doc(hidden)]` needs none.
 #[test]
 fn every_concept_has_an_example() {
     let (_, modules) = crates().into_iter().find(|(package, _)| package.name == "bevy_playbot").expect("it is there");

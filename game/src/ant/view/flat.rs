@@ -5,7 +5,7 @@ use crate::{
         body::Part,
         view::{AntPose, AntViewSystems, ArenaGround, GoalMark, OnGround},
     },
-    arena_grid::ArenaGrid,
+    pictures::ArenaGrid,
 };
 use bevy::{image::ImageSampler, prelude::*};
 use bevy_playbot::vision::{Stage, TileLayer};
@@ -25,7 +25,7 @@ impl Plugin for FlatViewPlugin {
     }
 }
 
-// The drawings: a disc, and a strip of two tiles. They are made in code, texel by texel.
+// Drawings of a disc and of two tiles, made texel by texel.
 
 /// Side of a cell's tile, texels: 16 to the metre.
 const TILE: u32 = 64;

@@ -208,7 +208,7 @@ fn block(parts: &mut LevelParts, x: i32, width: i32, height: i32) {
 }
 
 #[cfg(test)]
-mod trap_tests {
+mod tests {
     use std::sync::Arc;
 
     use playbot_learner::rng::Streams;

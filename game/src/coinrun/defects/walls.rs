@@ -50,10 +50,9 @@ fn wall_off(parts: &mut LevelParts, x: i32) {
     fill(parts, [x, 0], [2, SIZE], Tile::Wall);
 }
 
-// Positions of a rules defect along a level. Variants begin at the start, further on and late, so that testers that
-// get further find more.
+// Positions of a rules defect along a level.
 
-/// Shares of the path to the coin from which on a defect acts.
+/// Shares of the path to the coin from which on a defect acts. They differ, so testers that get further find more.
 const FROM: [f32; PLACES as usize] = [0.0, 0.35, 0.7];
 
 /// Shares of the path at which an obstacle stands.
@@ -169,8 +168,6 @@ pub(super) fn motion_defects() -> Vec<DefectKind> {
     ]
 }
 
-// Changes to players between two ticks of the rules.
-
 /// Changes each playing player that is far enough along its level, after each tick.
 pub(super) fn after_each_tick(
     app: &mut App,
@@ -194,7 +191,7 @@ pub(super) fn after_each_tick(
 }
 
 #[cfg(test)]
-mod way_tests {
+mod tests {
     use super::*;
     use crate::coinrun::{Mode, generator::generate};
 

@@ -54,7 +54,7 @@ pub(super) fn findings(rules: &Rules, level: u64, bot: Bot, ticks: u32) -> Vec<(
     };
     let ended = Arc::new(Mutex::new(None::<EpisodeResult>));
     let heard = ended.clone();
-    app.add_observer(move |event: On<EpisodeEnded>| *heard.lock().expect("nobody panics") = Some(event.result));
+    app.add_observer(move |event: On<EpisodeEnded>| *heard.lock().expect("no thread panics") = Some(event.result));
     let ahead = LevelAhead { level, plan: None };
     let all = detectors();
     let mut watches: Vec<(&'static str, Box<dyn EpisodeWatcher>)> =
@@ -63,7 +63,7 @@ pub(super) fn findings(rules: &Rules, level: u64, bot: Bot, ticks: u32) -> Vec<(
     for tick in 0..ticks {
         app.tick().expect("sound");
         let world = app.world();
-        let result = *ended.lock().expect("nobody panics");
+        let result = *ended.lock().expect("no thread panics");
         let moment = DetectorTick {
             world,
             agent,
@@ -73,7 +73,7 @@ pub(super) fn findings(rules: &Rules, level: u64, bot: Bot, ticks: u32) -> Vec<(
             observation: &[],
             state_hash: 0,
             reward: 0.0,
-            place: None,
+            position: None,
             is_success: false,
             proofs: &NoProofs,
         };

@@ -185,10 +185,9 @@ fn edges(x: &Axis, y: &Axis, ground: &PathGround, swept: &mut Swept) -> Option<(
     Some((x_edge, None))
 }
 
-// One step of a path, by the rules of the player, with short cuts where little is in the way.
-
 impl Walker {
-    /// Returns the player after one step with a direction held (-1, 0 or 1), and perhaps the jump button.
+    /// Returns the player after one step with a direction held (-1, 0 or 1), and perhaps the jump button. It follows
+    /// the rules of the player, with short cuts where little is in the way.
     #[inline(always)]
     pub fn step(self, ground: &PathGround, ax: i8, jumps: bool) -> Self {
         let ay = i8::from(jumps && self.supported);

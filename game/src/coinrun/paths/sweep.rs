@@ -53,8 +53,6 @@ impl Sweep {
     }
 }
 
-// Range of positions that a moving player passes.
-
 /// The centres that a player passes in a step, or in a path.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Swept {
@@ -104,11 +102,6 @@ mod tests {
             assert_eq!((count(threshold), count(threshold.next_down())), (parts, parts - 1));
         }
     }
-}
-
-#[cfg(test)]
-mod swept_tests {
-    use super::*;
 
     #[test]
     fn what_is_passed_on_the_way_comes_near() {

@@ -101,8 +101,8 @@ pub(super) fn moved_blocks(
 // Puffs behind enemies, which are only drawn.
 
 /// Enemies at least this many tiles to the left or to the right of the player have no puffs. They are outside of the
-/// agents' view, half of [`VIEW`](crate::coinrun::picture::VIEW) and the length of a trail, and sprites cost time anywhere. Only people
-/// with a wider view see it.
+/// agents' view, half of [`VIEW`](crate::coinrun::picture::VIEW) and the length of a trail, and sprites cost time
+/// anywhere. Only people with a wider view see it.
 const REACH: f32 = 9.0;
 
 /// In front of saws and crates, which lie within this of [`BLOCKS`], and behind enemies and player. Older puffs lie

@@ -1,11 +1,10 @@
 //! The drawings, which come with the program, and the positions of figures on them.
 
-use crate::coinrun::{Tile, picture::puffs};
-use bevy::{
-    asset::RenderAssetUsages,
-    image::{CompressedImageFormats, ImageSampler, ImageType},
-    prelude::*,
+use crate::{
+    coinrun::{Tile, picture::puffs},
+    pictures::decode,
 };
+use bevy::prelude::*;
 use playbot_assets::coinrun;
 use std::sync::LazyLock;
 
@@ -59,13 +58,6 @@ static IMAGES: LazyLock<Vec<Image>> =
     LazyLock::new(|| [coinrun::FIGURES].into_iter().chain(GROUNDS).chain(BACKDROPS).map(decode).collect());
 
 static PUFFS: LazyLock<Image> = LazyLock::new(puffs::drawing);
-
-fn decode(png: &[u8]) -> Image {
-    let kind = ImageType::Extension("png");
-    let (formats, usages) = (CompressedImageFormats::NONE, RenderAssetUsages::default());
-    Image::from_buffer(png, kind, formats, true, ImageSampler::nearest(), usages)
-        .expect("the drawings are part of the program, and a test decodes each")
-}
 
 /// The pose of a player.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

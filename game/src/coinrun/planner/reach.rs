@@ -4,6 +4,13 @@
 //! within limits. Positions along x are bins, of which a state holds any number at once. Within a step the player may
 //! go to every bin that full speed reaches. So no path is missed, and the search ends: if it has not met the coin by
 //! then, no player will.
+//!
+//! The folder, in reading order:
+//!
+//! - `bins`: sets of positions along x.
+//! - `ground`: answers about a level at one height.
+//! - `step`: one step with exact height and speed, for all positions at once.
+//! - `loose`: players that were stopped in the midst of a step.
 
 mod bins;
 mod ground;
@@ -19,8 +26,6 @@ use std::{
     cmp::Ordering,
     collections::{BinaryHeap, HashMap},
 };
-
-// The search: from state to state until there is no new one.
 
 /// The search gives up after so many steps; levels need some thousands.
 const MOST_STEPS: usize = 100_000;
@@ -145,7 +150,7 @@ struct Exact {
 }
 
 impl Exact {
-    /// Returns the key that tells it from others.
+    /// Returns the key that distinguishes it from others.
     pub fn key(&self) -> (u32, u32, bool) {
         (self.y.to_bits(), self.vy.to_bits(), self.is_held)
     }
@@ -172,7 +177,7 @@ fn put<T: PartialEq>(all: &mut Vec<(T, Bins)>, thing: T, places: Bins) {
 }
 
 #[cfg(test)]
-mod fill_tests {
+mod tests {
     use super::*;
     use std::sync::Arc;
 

@@ -9,7 +9,7 @@ use bevy_playbot::state_hash::StateHash;
 use serde::{Deserialize, Serialize};
 
 /// Moves `body` by its velocity in at least four equal parts. `displace` moves it by (dx, dy), only one of which is not
-/// 0, and tells whether something was in the way.
+/// 0, and returns whether something was in the way.
 ///
 /// Each velocity component then keeps the share of the parts in which it was not blocked. So a fall that ends in the
 /// last of five parts leaves 4/5 of the speed for the next step. Only a completely blocked step leaves 0.
@@ -68,8 +68,6 @@ pub(super) fn mirrored(centre: f32, half: f32, moves_up: bool) -> f32 {
     centre + 2.0 * excess
 }
 
-// Enemies, which walk to and fro between walls and barriers.
-
 /// Moves one enemy. `crates` may be any subset that contains those within a tile of the enemy.
 ///
 /// Enemies bounce off walls and barriers. Inner ground ([`Tile::Wall`]) also counts
@@ -101,7 +99,7 @@ pub fn patrol(
     });
 }
 
-/// Moves an enemy along one axis, turning it at walls and barriers. Tells whether it was blocked.
+/// Moves an enemy along one axis, turning it at walls and barriers. Returns whether it was blocked.
 #[inline]
 fn bounce(enemy: &mut Body, tiles: &TileGrid, dx: f32, dy: f32) -> bool {
     let (x, y) = (enemy.x + dx, enemy.y + dy);
@@ -116,8 +114,6 @@ fn bounce(enemy: &mut Body, tiles: &TileGrid, dx: f32, dy: f32) -> bool {
     }
     tiles.is_outside(&corners)
 }
-
-// Contacts of the player after all movement, and the end of an episode.
 
 /// The end of an episode.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
@@ -209,13 +205,11 @@ fn has_left(player: &Body) -> bool {
         || player.y - player.ry > size
 }
 
-// Static bodies sorted by column, so that a moving body is tested against its neighbours only.
-
 /// Columns on each side of a body's own column that are searched. Two bodies of half width 0.5
 /// touch when their centres are less than 1 apart, and a body moves less than 1 in a step.
 const REACH: i32 = 2;
 
-/// Static bodies with a list of neighbours for every column.
+/// Static bodies with a list of neighbours for every column, so that a moving body is tested against these only.
 #[derive(Clone, PartialEq, Debug, Default)]
 pub struct NearBodies {
     bodies: Vec<Body>,
@@ -245,8 +239,6 @@ impl NearBodies {
     }
 }
 
-// A fingerprint of a running episode.
-
 /// Returns the hash of the step number, then of the bit patterns of x, y, vx and vy of the player and of every enemy.
 /// Enemies come in creation order. Negative zero counts as zero.
 pub fn hash_state<'a>(player: &'a Body, enemies: impl IntoIterator<Item = &'a Body>, step: u32) -> u64 {
@@ -260,6 +252,7 @@ pub fn hash_state<'a>(player: &'a Body, enemies: impl IntoIterator<Item = &'a Bo
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coinrun::{level::Level, rules::begin_step};
 
     #[test]
     fn fast_bodies_move_in_more_parts() {
@@ -287,13 +280,6 @@ mod tests {
         assert_eq!(mirrored(3.75, 0.5, true), 3.25);
         assert_eq!(mirrored(3.25, 0.5, false), 3.75);
     }
-}
-
-#[cfg(test)]
-mod enemy_tests {
-    use super::*;
-    use crate::coinrun::level::Level;
-    use crate::coinrun::rules::begin_step;
 
     fn patrol_steps(text: &str, steps: usize) -> Vec<Body> {
         let level = Level::from_text(text).expect("a valid picture");
@@ -329,11 +315,6 @@ mod enemy_tests {
         let path = patrol_steps("#.....C\n#.>xx#.\n#######\n", 300);
         assert!(path.iter().all(|enemy| enemy.y == 1.5));
     }
-}
-
-#[cfg(test)]
-mod touch_tests {
-    use super::*;
 
     fn ends(player: Body, tiles: &TileGrid, saws: &[Body], enemies: &[Body]) -> Option<Outcome> {
         touch(&player, tiles, saws, enemies, 1)
@@ -371,11 +352,6 @@ mod touch_tests {
         tiles.set(1, 1, Tile::Lava);
         assert_eq!(ends(player, &tiles, &[], &[]), Some(Outcome::Lava));
     }
-}
-
-#[cfg(test)]
-mod near_tests {
-    use super::*;
 
     #[test]
     fn finds_neighbours_in_order() {
@@ -387,11 +363,6 @@ mod near_tests {
         assert_eq!(xs(-3.0), [2.5]);
         assert_eq!(xs(99.0), [] as [f32; 0]);
     }
-}
-
-#[cfg(test)]
-mod state_hash_tests {
-    use super::*;
 
     #[test]
     fn every_part_counts() {

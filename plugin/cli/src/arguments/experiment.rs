@@ -52,19 +52,24 @@ impl ExperimentArgs {
         games: &Games,
         options: impl IntoIterator<Item = Option<String>>,
     ) -> Result<Experiment, ConfigError> {
-        self.check_game()?;
+        self.check_game(games)?;
         let sets = self.sets(options);
-        match &self.experiment {
+        let mut experiment = match &self.experiment {
             Some(path) => read_experiment_with(path, &sets),
             None => {
                 let ExperimentText { origin, text } = unnamed(games, &sets);
                 parse_experiment_with(&text, Path::new(&*origin), &sets)
             }
+        }?;
+        // Runs and policies name a game by its own name, not by an alias.
+        if let Ok(game) = games.get(&experiment.game) {
+            game.name().clone_into(&mut experiment.game);
         }
+        Ok(experiment)
     }
 
-    /// Reads the experiment as [`load`](Self::load) does, and finds its game. Reports values of `--set` that its algorithm
-    /// does not read.
+    /// Reads the experiment as [`load`](Self::load) does, and finds its game. Reports values of `--set` that its
+    /// algorithm does not read.
     ///
     /// # Errors
     ///
@@ -75,7 +80,7 @@ impl ExperimentArgs {
         options: impl IntoIterator<Item = Option<String>>,
     ) -> Result<(Experiment, &'a dyn Game), CliError> {
         let experiment = self.load(games, options)?;
-        tell_unread("--set ", &self.set, &[&experiment]);
+        report_unread("--set ", &self.set, &[&experiment]);
         let game = self.find_game(games, &experiment)?;
         Ok((experiment, game))
     }
@@ -114,15 +119,19 @@ impl ExperimentArgs {
 
     /// Refuses a game behind the verb that differs from the one in a file or in `--set`. That would be a slip, while
     /// `--set` changes the game of a file on purpose.
-    fn check_game(&self) -> Result<(), ConfigError> {
+    fn check_game(&self, games: &Games) -> Result<(), ConfigError> {
         let Some(game) = &self.game else { return Ok(()) };
+        let is_other = |other: &str| match (games.get(game), games.get(other)) {
+            (Ok(one), Ok(other)) => one.name() != other.name(),
+            _ => game != other,
+        };
         let refused = |message| Err(ConfigError::Set { set: format!("game={game}"), message });
-        if let Some(other) = game_of(&self.set).filter(|other| other != game) {
+        if let Some(other) = game_of(&self.set).filter(|other| is_other(other)) {
             return refused(format!("`--set` names the game `{other}`: leave one of them out"));
         }
         let Some(path) = &self.experiment else { return Ok(()) };
         match read_experiment(path) {
-            Ok(own) if own.game != *game => refused(format!(
+            Ok(own) if is_other(&own.game) => refused(format!(
                 "{} is an experiment of `{}`: leave the game out, or change it with --set game={game}",
                 path.display(),
                 own.game
@@ -151,7 +160,7 @@ impl ExperimentArgs {
         let path = experiment.recordings()?;
         let found = self.find_recordings(path, games);
         if found != path {
-            tell!("recordings are taken from {}, since there are none at {} here", found.display(), path.display());
+            report!("recordings are taken from {}, since there are none at {} here", found.display(), path.display());
         }
         Ok(found)
     }
@@ -188,6 +197,19 @@ impl ExperimentArgs {
     }
 }
 
+/// Reports the `key=value`s that none of these experiments reads.
+pub(crate) fn report_unread(whose: &str, sets: &[String], experiments: &[&Experiment]) {
+    let mut names: Vec<&str> = experiments.iter().map(|experiment| experiment.algorithm.name()).collect();
+    names.sort_unstable();
+    names.dedup();
+    for set in sets {
+        let key = set.split('=').next().unwrap_or(set).trim();
+        if !experiments.iter().any(|experiment| experiment.reads(key)) {
+            report!("warning: {whose}{set} changes nothing: {} does not read `{key}`", names.join(" or "));
+        }
+    }
+}
+
 /// Returns the default experiment: that of the game that `sets` name, since levels and settings of another one would
 /// not fit it. An unknown game is refused later.
 fn unnamed(games: &Games, sets: &[String]) -> ExperimentText {
@@ -205,7 +227,8 @@ fn game_of(sets: &[String]) -> Option<&str> {
 fn is_shipped(recordings: &Path, ExperimentText { origin, text }: &ExperimentText) -> bool {
     let is_there = std::fs::read_to_string(sources().join(&**origin)).is_ok_and(|found| found == **text);
     is_there
-        && parse_experiment(text, Path::new(&**origin)).is_ok_and(|usual| usual.demos.as_deref() == Some(recordings))
+        && parse_experiment(text, Path::new(&**origin))
+            .is_ok_and(|default| default.demos.as_deref() == Some(recordings))
 }
 
 /// Returns true if a `key=value` sets exactly this key.
@@ -293,24 +316,13 @@ pub(crate) fn in_words(mut differences: Vec<String>) -> String {
     differences.join("; ")
 }
 
-// Settings without effect, since the algorithm does not read them.
-
-/// Reports the `key=value`s that none of these experiments reads.
-pub(crate) fn tell_unread(whose: &str, sets: &[String], experiments: &[&Experiment]) {
-    let mut names: Vec<&str> = experiments.iter().map(|experiment| experiment.algorithm.name()).collect();
-    names.sort_unstable();
-    names.dedup();
-    for set in sets {
-        let key = set.split('=').next().unwrap_or(set).trim();
-        if !experiments.iter().any(|experiment| experiment.reads(key)) {
-            tell!("warning: {whose}{set} changes nothing: {} does not read `{key}`", names.join(" or "));
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
     use clap::Parser;
+    use playbot_harness::foreign::ForeignGame;
+    use playbot_train::experiment::file::parse_experiment;
 
     use super::*;
 
@@ -341,7 +353,10 @@ mod tests {
         let text = r#"(game: "maze2d", train: "a:0..3", test: "a:4..7", demos: "d", steps: 10)"#;
         std::fs::write(&path, text).expect("written");
         let file = path.to_str().expect("a path");
-        let refused = |words: &[&str]| parsed(words).check_game().expect_err("two games").to_string();
+        let runner = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
+        let list: [&dyn Game; 1] = [&runner];
+        let games = Games::new(&list).expect("one game");
+        let refused = |words: &[&str]| parsed(words).check_game(&games).expect_err("two games").to_string();
         let words = refused(&["coinrun", "--set", "game=\"maze2d\""]);
         assert_eq!(words, "`game=coinrun`: `--set` names the game `maze2d`: leave one of them out");
         let words = refused(&["coinrun", "--experiment", file]);
@@ -349,18 +364,9 @@ mod tests {
         for words in
             [&["maze2d", "--experiment", file][..], &["maze2d", "--set", "game=maze2d"], &["--experiment", file]]
         {
-            parsed(words).check_game().expect("one game");
+            parsed(words).check_game(&games).expect("one game");
         }
     }
-}
-
-#[cfg(test)]
-mod differences_tests {
-    use std::path::Path;
-
-    use playbot_train::experiment::file::parse_experiment;
-
-    use super::*;
 
     #[test]
     fn each_difference_has_the_option_it_is_from_and_both_values() {

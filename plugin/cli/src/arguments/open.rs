@@ -63,7 +63,7 @@ pub(crate) fn checkpoint(run: &RunDir, algorithm: Algorithm, choice: CheckpointC
     }
     let checkpoint = run.checkpoint(choice)?;
     if choice == CheckpointChoice::Best {
-        tell!("{}", best(run.path(), &checkpoint));
+        report!("{}", best(run.path(), &checkpoint));
     }
     Ok(checkpoint)
 }

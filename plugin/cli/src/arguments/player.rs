@@ -56,7 +56,7 @@ pub struct PlayerArgs {
 }
 
 /// A player, its name and its observation.
-pub struct Chosen {
+pub struct LoadedPlayer {
     /// Its name in messages.
     pub name: String,
     /// The player.
@@ -67,7 +67,7 @@ pub struct Chosen {
     pub seen: Option<SeenLevels>,
 }
 
-impl Chosen {
+impl LoadedPlayer {
     /// Returns a bot of the game by its name.
     ///
     /// # Errors
@@ -87,11 +87,11 @@ impl Chosen {
     /// # Errors
     ///
     /// The game has none.
-    pub fn usual(game: &dyn Game) -> Result<Self, CliError> {
+    pub fn default_of(game: &dyn Game) -> Result<Self, CliError> {
         let bots = bot_names(game);
         let name = game.tools().bots.demonstrator().or(bots.first().copied());
-        let nobody = || CliError::Usage(format!("`{}` has no bot: name a --policy or a --run", game.name()));
-        Self::bot(game, name.ok_or_else(nobody)?)
+        let no_bot = || CliError::Usage(format!("`{}` has no bot: name a --policy or a --run", game.name()));
+        Self::bot(game, name.ok_or_else(no_bot)?)
     }
 
     /// Loads the policy in a file, under the name of its algorithm.
@@ -101,9 +101,9 @@ impl Chosen {
     /// It cannot be loaded, or was made for another game.
     pub fn policy_file(game: &dyn Game, path: &Path, draw: ActionDraw, device: DeviceKind) -> Result<Self, CliError> {
         let file = open::policy(path, device)?;
-        check_policy(&game.card(), &file).map_err(|misfit| does_not_fit(path, &misfit))?;
+        check_policy(&game.metadata(), &file).map_err(|misfit| does_not_fit(path, &misfit))?;
         let (player, observation_config) = (Player::of_file(&file, draw), policy_observation(&file)?);
-        Ok(Self { name: file.card.algorithm, player, observation_config, seen: file.card.seen })
+        Ok(Self { name: file.metadata.algorithm, player, observation_config, seen: file.metadata.seen })
     }
 
     /// Loads the policy of a run, under the name of its algorithm. Reports it if the training has not ended.
@@ -123,7 +123,11 @@ impl Chosen {
         let (done, wanted) = (checkpoint.summary.step, experiment.whole_steps());
         if choice == CheckpointChoice::Last && done < wanted {
             let path = run.path().display();
-            tell!("{path} is not trained to its end: it has {} of {} steps", whole(done as f64), whole(wanted as f64));
+            report!(
+                "{path} is not trained to its end: it has {} of {} steps",
+                whole(done as f64),
+                whole(wanted as f64)
+            );
         }
         let learner = open::learner(run, info.algorithm, &checkpoint, device)?;
         let prior = learner.skills().as_ref().map(SkillPrior::from);
@@ -187,24 +191,61 @@ fn way_out(what: &str, found: &str, named: &str) -> String {
     format!("name a {what} of `{named}`, or name the game `{found}`, in a program that has it")
 }
 
+/// Checks that a skill model was learned for a game, and returns its observation. Files of older versions do not name
+/// their game.
+///
+/// # Errors
+///
+/// The model's observations or actions do not fit the game. The message names the game that they fit.
+pub(crate) fn check_skills(
+    path: &Path,
+    model: &SkillModel,
+    game: &dyn Game,
+    from: &ExperimentArgs,
+    games: &Games,
+) -> Result<ObservationConfig, CliError> {
+    let observation_config = ObservationConfig::from_metadata(model.picture(), &model.observation())?;
+    let fits = |game: &dyn Game| {
+        let can_see = observation_config.check(game).is_ok();
+        can_see && (model.observation(), model.action_space()) == (observation_config.obs_kind(game), game.actions())
+    };
+    if fits(game) {
+        return Ok(observation_config);
+    }
+    let others: Vec<_> = games.iter().filter(|game| fits(*game)).map(|game| game.name()).collect();
+    let whose = if others.is_empty() { "no game here".to_owned() } else { others.join(" or ") };
+    let advice = match others.first() {
+        None => "use the program that has the game they were learned for".to_owned(),
+        Some(_) if from.names_game() => "name another one".to_owned(),
+        Some(game) => format!("name its experiment with --experiment, or its game, `{game}`, behind the verb"),
+    };
+    Err(CliError::Usage(format!(
+        "{} holds skills for {} and {}, which are those of {whose}, not of `{}`: {advice}",
+        path.display(),
+        model.observation().describe(),
+        model.action_space(),
+        game.name()
+    )))
+}
+
 impl PlayerArgs {
     /// Loads the player; `None` if none is named.
     ///
     /// # Errors
     ///
     /// It cannot be loaded, or was made for another game.
-    pub fn load(&self, game: &dyn Game) -> Result<Option<Chosen>, CliError> {
+    pub fn load(&self, game: &dyn Game) -> Result<Option<LoadedPlayer>, CliError> {
         let draw = if self.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
         if let Some(name) = &self.bot {
-            return Ok(Some(Chosen::bot(game, name)?));
+            return Ok(Some(LoadedPlayer::bot(game, name)?));
         }
         if let Some(path) = &self.policy {
-            return Ok(Some(Chosen::policy_file(game, path, draw, self.device.device)?));
+            return Ok(Some(LoadedPlayer::policy_file(game, path, draw, self.device.device)?));
         }
         let Some(path) = &self.run else { return Ok(None) };
         let opened = RunDir::open(path)?;
         check_run_of(path, &opened.experiment.game, game.name())?;
-        let chosen = Chosen::run(game, &opened, self.checkpoint, draw, self.device.device)?;
+        let chosen = LoadedPlayer::run(game, &opened, self.checkpoint, draw, self.device.device)?;
         chosen.check_fit(game)?;
         Ok(Some(chosen))
     }
@@ -304,14 +345,14 @@ fn timed<T>(
     let episodes: Vec<_> = played.iter().map(|episode| *result(episode)).collect();
     let steps: u64 = episodes.iter().map(|episode| u64::from(episode.ticks)).sum();
     let summary = summarize(name, &plan.split, &episodes);
-    tell_clipped(&summary);
+    report_clipped(&summary);
     Ok((Measured { summary, steps_per_s: steps as f64 / seconds }, played))
 }
 
 /// Reports it if actions of a measured player were clipped.
-pub(crate) fn tell_clipped(summary: &EvalSummary) {
+pub(crate) fn report_clipped(summary: &EvalSummary) {
     if summary.clipped > 0.0 {
-        tell!(
+        report!(
             "{} on {}: {:.1} % of the actions lay outside the game's range and were clipped",
             summary.method,
             summary.split,
@@ -327,45 +368,6 @@ pub(crate) fn tell_clipped(summary: &EvalSummary) {
 /// Standard output is closed.
 pub(crate) fn print_json(summary: &EvalSummary) -> Result<(), CliError> {
     print_line(json!(summary))
-}
-
-// Behaviour cloning: a skill model that plays by itself.
-
-/// Checks that a skill model was learned for a game, and returns its observation. Files of older versions do not name
-/// their game.
-///
-/// # Errors
-///
-/// The model's observations or actions do not fit the game. The message names the game that they fit.
-pub(crate) fn check_skills(
-    path: &Path,
-    model: &SkillModel,
-    game: &dyn Game,
-    from: &ExperimentArgs,
-    games: &Games,
-) -> Result<ObservationConfig, CliError> {
-    let observation_config = ObservationConfig::from_card(model.picture(), &model.observation())?;
-    let fits = |game: &dyn Game| {
-        let can_see = observation_config.check(game).is_ok();
-        can_see && (model.observation(), model.action_space()) == (observation_config.obs_kind(game), game.actions())
-    };
-    if fits(game) {
-        return Ok(observation_config);
-    }
-    let others: Vec<_> = games.iter().filter(|game| fits(*game)).map(|game| game.name()).collect();
-    let whose = if others.is_empty() { "no game here".to_owned() } else { others.join(" or ") };
-    let advice = match others.first() {
-        None => "use the program that has the game they were learned for".to_owned(),
-        Some(_) if from.names_game() => "name another one".to_owned(),
-        Some(game) => format!("name its experiment with --experiment, or its game, `{game}`, behind the verb"),
-    };
-    Err(CliError::Usage(format!(
-        "{} holds skills for {} and {}, which are those of {whose}, not of `{}`: {advice}",
-        path.display(),
-        model.observation().describe(),
-        model.action_space(),
-        game.name()
-    )))
 }
 
 // Check that measured levels were not learned from.
@@ -398,7 +400,7 @@ impl<'a> MeasuredLevels<'a> {
                      levels that no player has seen, or measure there on purpose, with --levels"
                 )));
             }
-            tell!(
+            report!(
                 "{path} has learned from {own}, and the levels {split} have some of these: not all of them are unseen"
             );
         }

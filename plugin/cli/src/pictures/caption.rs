@@ -101,14 +101,14 @@ impl Reach {
 }
 
 /// The drawing of the numbers of an observation.
-pub struct Numbers {
+pub struct NumberBars {
     names: Vec<String>,
     /// The scale of each number's bar.
     reach: Vec<f32>,
     letter: usize,
 }
 
-impl Numbers {
+impl NumberBars {
     /// Numbers of these names, drawn at a scale of pictures. Each has one scale for all observations that are drawn:
     /// its bar is full at the largest magnitude of any tick, rounded up.
     pub fn new(names: Vec<String>, scale: u32, reach: &Reach) -> Self {
@@ -280,7 +280,7 @@ pub(crate) const UP: Colour = [90, 190, 255];
 pub(crate) const DOWN: Colour = [255, 150, 80];
 
 #[cfg(test)]
-mod numbers_tests {
+mod tests {
     use super::*;
 
     #[test]
@@ -288,7 +288,7 @@ mod numbers_tests {
         let vectors = [[2.0, 0.0], [-1.0, 0.0]];
         let mut reach = Reach::default();
         vectors.iter().for_each(|vector| reach.include(vector));
-        let numbers = Numbers::new(vec!["x".to_owned(), "y".to_owned()], 4, &reach);
+        let numbers = NumberBars::new(vec!["x".to_owned(), "y".to_owned()], 4, &reach);
         let [width, height] = numbers.size();
         for (vector, colour, pixels) in [(vectors[0], UP, NUMBERS_BAR), (vectors[1], DOWN, NUMBERS_BAR / 2)] {
             let mut screen = Screen::new(width, height, [0; 3]).expect("small");
@@ -318,11 +318,6 @@ mod numbers_tests {
             assert!(width(&describe(value)) <= width("-00000.000  "), "{value}");
         }
     }
-}
-
-#[cfg(test)]
-mod font_tests {
-    use super::*;
 
     #[test]
     fn letters_are_as_wide_in_every_row_and_differ() {
@@ -341,11 +336,6 @@ mod font_tests {
         let lit = |x: usize| (0..screen.height).any(|y| screen.bytes()[3 * (y * screen.width + x)] > 0);
         assert!(lit(screen.width - 3) && !lit(screen.width - 1), "a free column after the last letter");
     }
-}
-
-#[cfg(test)]
-mod colours_tests {
-    use super::*;
 
     /// Returns the relative luminance, as WCAG 2 defines it.
     fn luminance(colour: Colour) -> f64 {

@@ -8,12 +8,12 @@ use bevy::prelude::World;
 use bevy_playbot::vision::{ObservationConfig, ObservationKind, VisionError};
 use playbot_harness::{
     arrangement::Arrangement,
-    benchmark::Benchmark,
+    benchmark::{Benchmark, StageClock},
     game::Game,
     games::Games,
     parallel::{default_threads, on_threads},
     prelude::*,
-    worlds::{StageClock, build_observing_world},
+    worlds::build_observing_world,
 };
 use playbot_learner::waited;
 use playbot_train::Trainer;
@@ -39,7 +39,7 @@ pub struct Args {
     #[arg(long, default_value_t = 64)]
     arenas: u32,
     /// Threads. Each has a World of its own.
-    #[arg(long, default_value_t = usual_threads())]
+    #[arg(long, default_value_t = threads_of_cases())]
     threads: usize,
     /// Least seconds to measure each case for.
     #[arg(long, default_value_t = 5.0)]
@@ -58,7 +58,7 @@ pub struct Args {
 }
 
 /// Returns the largest power of two that the cores and the default 64 arenas allow.
-fn usual_threads() -> usize {
+fn threads_of_cases() -> usize {
     1 << default_threads().min(64).ilog2()
 }
 
@@ -91,11 +91,11 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         return wanted.iter().try_for_each(|case| print_line(&case.name)).map(|()| Outcome::Pass);
     }
     for (number, Case { name, game, benchmark }) in wanted.iter().enumerate() {
-        tell!("{name}: case {} of {}, {} s at least", number + 1, wanted.len(), args.seconds);
+        report!("{name}: case {} of {}, {} s at least", number + 1, wanted.len(), args.seconds);
         let measure = if benchmark.train { train } else { simulate };
         let measured = match measure(*game, benchmark.mode, benchmark.observation, &args, games) {
             Err(error) if args.case.is_empty() && error.is::<VisionError>() => {
-                tell!("{name}: {error}");
+                report!("{name}: {error}");
                 continue;
             }
             measured => measured?,

@@ -1,7 +1,9 @@
-//! `playbot bugs`.
+//! `playbot bugs make|score|table`.
 //!
-//! - `score`: `playbot bugs score`.
+//! The folder, in reading order:
+//!
 //! - `testers`: testers of `playbot bugs score`, from the command line.
+//! - `score`: `playbot bugs score`.
 
 mod score;
 pub(crate) mod testers;
@@ -9,7 +11,7 @@ pub(crate) mod testers;
 use crate::{
     arguments::{Threads, default_experiment_of, default_mode},
     error::{CliError, Outcome, print_line},
-    output, progress,
+    output, program, progress,
     verbs::bugs::score::as_json,
 };
 use playbot_harness::{brief::shell_word, game::Game, games::Games, split::LevelSplit};
@@ -19,8 +21,6 @@ use playbot_mutation::{
 };
 use serde_json::json;
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
-
-// The verbs below `playbot bugs`.
 
 /// Plant defects into games and levels, and measure which testers find them.
 #[derive(clap::Args)]
@@ -82,7 +82,7 @@ pub(crate) fn run_table(args: TableArgs) -> Result<Outcome, CliError> {
     match &args.out {
         Some(path) => {
             output::write(path, format!("{}\n", text.trim_end()).as_bytes())?;
-            tell!("table: {}", path.display());
+            report!("table: {}", path.display());
         }
         None => print_line(text.trim_end())?,
     }
@@ -169,14 +169,14 @@ pub(crate) fn run_make(args: &MakeArgs, games: &Games) -> Result<Outcome, CliErr
     let made = made?;
     made.set.write(&args.out, &made.levels, args.force)?;
     for missing in &made.without_place {
-        tell!("warning: {}", missing.describe());
+        report!("warning: {}", missing.describe());
     }
     print(&made.set, &made.without_place, args.json)?;
     let folder = shell_word(&args.out.display().to_string());
-    tell!(
+    report!(
         "planted: {}; measure testers on them: {} bugs score {folder} --out score.json",
         args.out.display(),
-        output::name()
+        program::name()
     );
     Ok(Outcome::Pass)
 }
@@ -195,9 +195,9 @@ fn sources<'a>(args: &MakeArgs, games: &Games<'a>) -> Result<Vec<Source<'a>>, Cl
         chosen = games.iter().collect();
     }
     for LevelsOf { game, .. } in &args.levels {
-        games.get(game)?;
-        let is_chosen = chosen.iter().any(|other| other.name() == game);
-        if !is_chosen || args.levels.iter().filter(|other| other.game == *game).count() > 1 {
+        let named = games.get(game)?;
+        let is_chosen = chosen.iter().any(|other| other.name() == named.name());
+        if !is_chosen || args.levels.iter().filter(|other| is_of(other, named)).count() > 1 {
             return Err(CliError::Usage(format!(
                 "--levels {game}=… must be given once at most, and for a game that defects are planted into"
             )));
@@ -206,20 +206,25 @@ fn sources<'a>(args: &MakeArgs, games: &Games<'a>) -> Result<Vec<Source<'a>>, Cl
     chosen.into_iter().map(|game| source(args, game)).collect()
 }
 
+/// Returns true if these are levels of the game, by its name or an alias.
+fn is_of(levels: &LevelsOf, game: &dyn Game) -> bool {
+    levels.game == game.name() || game.aliases().contains(&levels.game.as_str())
+}
+
 fn source<'a>(args: &MakeArgs, game: &'a dyn Game) -> Result<Source<'a>, CliError> {
-    let named = args.levels.iter().find(|levels| levels.game == game.name());
-    let usual = default_experiment_of(game).map(|usual| usual.experiment);
+    let named = args.levels.iter().find(|levels| is_of(levels, game));
+    let default = default_experiment_of(game).map(|default| default.experiment);
     let is_mode = |split: &LevelSplit| game.check_mode(&split.mode).is_ok();
     let levels = match named {
         Some(named) => named.levels.clone(),
         None => {
-            let held_out = usual.as_ref().map(|usual| &usual.test).filter(|split| is_mode(split));
+            let held_out = default.as_ref().map(|default| &default.test).filter(|split| is_mode(split));
             let mode = held_out.map_or_else(|| default_mode(game).to_owned(), |split| split.mode.clone());
             LevelSplit { mode, first: FIRST, last: LAST }
         }
     };
     levels.check(game)?;
-    Ok(Source { game, levels, trained: usual.map(|usual| usual.train).filter(is_mode) })
+    Ok(Source { game, levels, trained: default.map(|default| default.train).filter(is_mode) })
 }
 
 /// Prints how many defects of each class were planted.
@@ -258,7 +263,7 @@ fn print(set: &BugSet, without_place: &[MissingMutants], json: bool) -> Result<(
 }
 
 #[cfg(test)]
-mod table_tests {
+mod tests {
     use super::*;
 
     #[test]
@@ -271,11 +276,6 @@ mod table_tests {
         assert!(error.to_string().contains("score.json: line 1: "), "{error}");
         assert_eq!(error.exit_code(), 3);
     }
-}
-
-#[cfg(test)]
-mod make_tests {
-    use super::*;
 
     #[test]
     fn levels_are_named_for_a_game() {

@@ -57,7 +57,7 @@ fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Resul
     let algorithm = experiment.algorithm;
     let demos = experiment.demos.as_deref().filter(|_| algorithm.learns_from_demos());
     if let Some(path) = demos.filter(|path| !from.find_recordings(path, games).exists()) {
-        tell!("warning: there are no recordings at {}, from which {algorithm} learns (`demos`)", path.display());
+        report!("warning: there are no recordings at {}, from which {algorithm} learns (`demos`)", path.display());
     }
     Ok(())
 }

@@ -9,9 +9,8 @@ use crate::{
     error::{CliError, Outcome, print_line},
     interrupt,
     interrupt::NothingToSave,
-    output,
     output::prepare,
-    progress,
+    program, progress,
     verbs::demo::show::show,
 };
 use bevy_playbot::demo::file::{DemoSummary, find_demos, merge_demos, repair};
@@ -61,7 +60,7 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
-    /// Replay recordings; exit code 1 if one diverges, is damaged or cannot be replayed.
+    /// Replay recordings. Exit code 1 if one diverges, is damaged or cannot be replayed.
     Verify {
         /// Files or folders.
         #[arg(default_value = "demos")]
@@ -117,7 +116,7 @@ fn ls(paths: &[PathBuf], as_json: bool) -> Result<Outcome, CliError> {
         let summary = match DemoSummary::read(&file) {
             Ok(summary) => summary,
             Err(error) => {
-                tell!("{}", output::named(&error.to_string()));
+                report!("{}", program::named(&error.to_string()));
                 outcome = Outcome::Findings;
                 continue;
             }
@@ -126,7 +125,7 @@ fn ls(paths: &[PathBuf], as_json: bool) -> Result<Outcome, CliError> {
             print_line(json!(summary))?;
         } else {
             print_line(format!(
-                "{}: {} {}, {}, {}, {}, {}, {} KiB, by {}, decided by {}",
+                "{}: {} {}, {}, {}, {}, {}, {} KiB, by {}, {}",
                 file.display(),
                 summary.header.game,
                 summary.header.mode,
@@ -136,7 +135,7 @@ fn ls(paths: &[PathBuf], as_json: bool) -> Result<Outcome, CliError> {
                 counted(summary.levels as u64, "level"),
                 summary.bytes / 1024,
                 summary.header.demonstrator,
-                deciders(&summary.steps_by_decider),
+                deciders("decided by", &summary.steps_by_decider),
             ))?;
         }
     }
@@ -202,7 +201,7 @@ fn replay(file: &Path, games: &Games) -> Result<VerifyReport, CliError> {
 
 /// Formats an error with its file.
 fn named(file: &Path, error: &CliError) -> String {
-    let (file, words) = (file.display().to_string(), output::named(&error.to_string()));
+    let (file, words) = (file.display().to_string(), program::named(&error.to_string()));
     if words.contains(&file) { words } else { format!("{file}: {words}") }
 }
 
@@ -245,8 +244,6 @@ fn mend(file: &Path, out: &Path, header_from: Option<&Path>, as_json: bool) -> R
     }
     Ok(if report.kept_episodes == 0 { Outcome::Findings } else { Outcome::Pass })
 }
-
-// `playbot demo merge`: joins recordings of many testers into one.
 
 /// Writes the episodes of all files into a new one, and reports them. A recording without a single episode is a
 /// finding.

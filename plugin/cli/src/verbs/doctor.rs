@@ -18,11 +18,11 @@ use std::time::Instant;
 
 /// Check that a game plays the same when it is given the same actions, and find the first difference.
 ///
-/// Recording, replay, resume and training in many arenas depend on it. Copies of the game play the same random actions:
-/// twice in one thread, with another wall clock, with more archetypes in the World, on two threads, two arenas in one
-/// World against each alone, and the same level again after a restart. The first difference is printed with its tick
-/// and with advice. A clean result holds for the ticks and the level that were played, so try more ticks and other
-/// levels too. Exit code 1 if something was found.
+/// Recording, replay, resume and training in many arenas depend on it. Copies of the game play the same random actions
+/// twice in one thread. They play them with another wall clock, with more archetypes in the World, and on two threads.
+/// They play two arenas in one World against each alone, and the same level again after a restart. The first difference
+/// is printed with its tick and with advice. A clean result holds for the ticks and the level that were played, so try
+/// more ticks and other levels too. Exit code 1 if something was found.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot doctor GAME
@@ -70,7 +70,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     };
     interrupt::leave("no comparison is kept: call it again, or with fewer --ticks".to_owned());
     let examining = NothingToSave::listen();
-    let mut report = examine(game, &options, |comparison| tell!("comparing: {}", comparison.describe()))?;
+    let mut report = examine(game, &options, |comparison| report!("comparing: {}", comparison.describe()))?;
     let has_fault = report.comparisons.iter().any(|report| report.fault.is_some());
     if !has_fault {
         report.ticks_per_second = Some(speed(game, &options)?);

@@ -5,7 +5,7 @@ use crate::{
         Compute, default_held_out,
         experiment::{ExperimentArgs, option},
         first_levels, open, player,
-        player::{Chosen, MeasuredLevels, check_run_of, check_skills},
+        player::{LoadedPlayer, MeasuredLevels, check_run_of, check_skills},
     },
     error::{CliError, Outcome, print_line},
     interrupt,
@@ -24,7 +24,7 @@ use playbot_harness::{
     split::LevelSplit,
 };
 use playbot_report::to_text_table;
-use playbot_train::{Experiment, checkpoint::CheckpointChoice, learn_skills::cloning, run_dir::RunDir};
+use playbot_train::{Experiment, checkpoint::CheckpointChoice, learn_skills::behaviour_cloning, run_dir::RunDir};
 use std::{
     cell::LazyCell,
     path::{Path, PathBuf},
@@ -123,7 +123,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
     let mut rows = Vec::new();
     for split in &splits {
-        for Chosen { name, player, observation_config, .. } in &players {
+        for LoadedPlayer { name, player, observation_config, .. } in &players {
             let plan = EvalPlan { observation_config: *observation_config, ..plan_of(split) };
             let measured = match &mut footprints {
                 Some(footprints) => {
@@ -190,7 +190,7 @@ fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
 fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
     let Some(path) = args.policy.first().filter(|_| !args.from.names_game()) else { return Ok(Vec::new()) };
     let file = open::policy(path, args.compute.device())?;
-    let game = games.of_file(Artifact::Policy, path, &file.card.game)?;
+    let game = games.of_file(Artifact::Policy, path, &file.metadata.game)?;
     if args.from.load(games, [])?.game == game.name() {
         return Ok(Vec::new());
     }
@@ -204,7 +204,7 @@ fn players(
     splits: &[LevelSplit],
     args: &Args,
     games: &Games,
-) -> Result<Vec<Chosen>, CliError> {
+) -> Result<Vec<LoadedPlayer>, CliError> {
     let device = args.compute.device();
     let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
     // Reads all levels, which bots do not need.
@@ -213,25 +213,25 @@ fn players(
     for path in &args.run {
         let opened = RunDir::open(path)?;
         check_run_of(path, &opened.experiment.game, &experiment.game)?;
-        let chosen = Chosen::run(game, &opened, args.checkpoint, draw, device)?;
+        let chosen = LoadedPlayer::run(game, &opened, args.checkpoint, draw, device)?;
         measured.check(path, chosen.seen.as_ref())?;
         players.push(named(chosen, path, args.run.len()));
     }
     for path in &args.skills {
         let model = open::skills(path, device, &args.from)?;
         let observation_config = check_skills(path, &model, game, &args.from, games)?;
-        let (player, seen) = (cloning(&model, experiment, draw), model.demos().cloned());
+        let (player, seen) = (behaviour_cloning(&model, experiment, draw), model.demos().cloned());
         measured.check(path, seen.as_ref())?;
-        let chosen = Chosen { name: "bc".to_owned(), player, observation_config, seen };
+        let chosen = LoadedPlayer { name: "bc".to_owned(), player, observation_config, seen };
         players.push(named(chosen, path, args.skills.len()));
     }
     for path in &args.policy {
-        let chosen = Chosen::policy_file(game, path, draw, device)?;
+        let chosen = LoadedPlayer::policy_file(game, path, draw, device)?;
         measured.check(path, chosen.seen.as_ref())?;
         players.push(named(chosen, path, args.policy.len()));
     }
     for name in &args.bot {
-        players.push(Chosen::bot(game, name)?);
+        players.push(LoadedPlayer::bot(game, name)?);
     }
     for chosen in &mut players {
         if matches!(chosen.player, Player::Policy { .. }) {
@@ -245,10 +245,10 @@ fn players(
 /// Replaces the sensor that a policy was trained with by another one of the same observation form.
 fn look_through(
     observation_config: &mut ObservationConfig,
-    eyes: Option<ObservationKind>,
+    requested: Option<ObservationKind>,
     name: &str,
 ) -> Result<(), CliError> {
-    let Some(kind) = eyes else { return Ok(()) };
+    let Some(kind) = requested else { return Ok(()) };
     let other = ObservationConfig { kind, ..*observation_config };
     if other.is_image() != observation_config.is_image() {
         let offered = if observation_config.is_image() { "vectors" } else { "pictures" };
@@ -262,6 +262,6 @@ fn look_through(
 }
 
 /// Names a player, with its path if there are several of its kind.
-fn named(chosen: Chosen, path: &Path, of: usize) -> Chosen {
-    if of > 1 { Chosen { name: format!("{} {}", chosen.name, path.display()), ..chosen } } else { chosen }
+fn named(chosen: LoadedPlayer, path: &Path, of: usize) -> LoadedPlayer {
+    if of > 1 { LoadedPlayer { name: format!("{} {}", chosen.name, path.display()), ..chosen } } else { chosen }
 }

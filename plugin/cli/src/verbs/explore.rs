@@ -1,8 +1,10 @@
 //! `playbot explore`.
 //!
+//! - `talents`: the explorers that a user can ask for.
 //! - `recorded`: recording of a path that was found.
 
 mod recorded;
+mod talents;
 
 use crate::{
     arguments::{Compute, counted, first_levels},
@@ -19,12 +21,13 @@ use playbot_harness::{
     split::{LevelSplit, SplitError},
 };
 use playbot_test::explore::{
-    Cell, Exploration, ExplorationSummary, ExplorePlan, Explorer, Route, Stop, Until, explore, round::check_cell,
+    Exploration, ExplorationSummary, ExplorePlan, ExploredCell, Explorer, Route, Stop, Until, explore,
+    round::check_cell,
 };
 use serde_json::json;
 use std::{ops::ControlFlow, path::PathBuf};
 
-pub use crate::verbs::explore::recorded::Talents;
+pub use crate::verbs::explore::talents::Talents;
 
 /// Explore a level without training: print the reachable cells and the actions that lead there.
 ///
@@ -50,8 +53,8 @@ pub struct Args {
     /// Environment steps to use, including returns to known cells. The last visits may take some more.
     #[arg(long, default_value_t = 500_000, value_parser = clap::value_parser!(u64).range(1..))]
     steps: u64,
-    /// End earlier: solved (a path to the goal is found), covered (and every open cell is reached, where their number
-    /// is known), or spent (never, to find shorter paths).
+    /// End earlier: solved (a path to the goal is found), covered (every open cell is reached, too), or spent (never).
+    /// For covered the number of open cells must be known. Use spent to find shorter paths.
     #[arg(long, default_value_t, value_name = "WHEN")]
     until: Until,
     /// Skill model: explores with skills drawn from its prior.
@@ -83,7 +86,7 @@ pub struct Args {
     out: Option<PathBuf>,
     /// Record and draw the path to this cell instead of the solution. Cells are named by their numbers, such as 3,4.
     #[arg(long, value_name = "CELL", allow_hyphen_values = true)]
-    cell: Option<Cell>,
+    cell: Option<ExploredCell>,
     /// Overwrite an existing recording.
     #[arg(long, requires = "out")]
     force: bool,
@@ -129,24 +132,24 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let to_cell = args.cell.as_ref().map(|cell| (cell, exploration.route_to(cell)));
     print(&exploration.summary(game), to_cell.as_ref(), args.json)?;
     let is_missed = matches!(to_cell, Some((_, None)));
-    let way = match to_cell {
-        Some((_, way)) => way,
+    let route = match to_cell {
+        Some((_, route)) => route,
         None => exploration.solution(),
     };
-    let way = way.filter(|route| !route.is_empty());
+    let route = route.filter(|route| !route.is_empty());
     // Last, so that the result is not lost because it cannot be written.
     if let Some(recording) = recording {
-        match &way {
+        match &route {
             Some(route) => {
                 recording.write(game, &exploration, route)?;
-                tell!("recorded: {}, {} ticks", recording.path().display(), route.len());
+                report!("recorded: {}, {} ticks", recording.path().display(), route.len());
             }
-            None => tell!("nothing is recorded: {}", why_nothing(args.cell.as_ref(), is_missed)),
+            None => report!("nothing is recorded: {}", why_nothing(args.cell.as_ref(), is_missed)),
         }
     }
     if let Some((file, floor_plan)) = floor {
-        file.write(&chart(game, floor_plan, &exploration, way.as_ref())?.draw())?;
-        tell!("drawn: {}", file.path().display());
+        file.write(&chart(game, floor_plan, &exploration, route.as_ref())?.draw())?;
+        report!("drawn: {}", file.path().display());
     }
     Ok(match (exploration.stop, exploration.solution_ticks()) {
         (Stop::Asked, _) => Outcome::Stopped,
@@ -159,10 +162,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 /// Prints the result, and for the cell of `--cell` how soon it is reached.
 fn print(
     summary: &ExplorationSummary,
-    to_cell: Option<&(&Cell, Option<Route>)>,
+    to_cell: Option<&(&ExploredCell, Option<Route>)>,
     as_json: bool,
 ) -> Result<(), CliError> {
-    let ticks = to_cell.map(|(cell, way)| (cell, way.as_ref().map(|route| route.len())));
+    let ticks = to_cell.map(|(cell, route)| (cell, route.as_ref().map(|route| route.len())));
     if as_json {
         let mut line = serde_json::to_value(summary)
             .map_err(|error| CliError::Io(format!("the summary cannot be written as JSON: {error}")))?;
@@ -185,9 +188,9 @@ fn print(
 fn level(game: &dyn Game, named: Option<&LevelSplit>) -> Result<LevelSplit, CliError> {
     match named {
         None => {
-            let usual = first_levels(game, 0);
-            tell!("no --level is named: {}", shown(&usual));
-            Ok(usual)
+            let default = first_levels(game, 0);
+            report!("no --level is named: {}", shown(&default));
+            Ok(default)
         }
         Some(split) if split.len() == 1 => Ok(split.clone()),
         Some(split) => Err(CliError::Usage(format!(
@@ -237,15 +240,13 @@ fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> 
     Ok(explored?)
 }
 
-fn why_nothing(cell: Option<&Cell>, is_missed: bool) -> String {
+fn why_nothing(cell: Option<&ExploredCell>, is_missed: bool) -> String {
     match cell {
         Some(cell) if is_missed => format!("cell {cell} was not reached"),
         Some(cell) => format!("the level starts in cell {cell}"),
         None => "no solution was found; with --cell the path to a cell is recorded".to_owned(),
     }
 }
-
-// The level argument of `playbot explore`.
 
 /// Parses a level.
 ///
@@ -271,11 +272,11 @@ pub(crate) fn one_level(text: &str) -> Result<LevelSplit, String> {
 }
 
 #[cfg(test)]
-mod one_level_tests {
+mod tests {
     use super::*;
 
     #[test]
-    fn levels_are_read_and_others_are_told_how_to_write_one() {
+    fn levels_are_read_and_others_are_refused_with_an_example() {
         assert_eq!(one_level("plain:7").map(|level| (level.first, level.len())), Ok((7, 1)));
         for (text, example) in [
             ("plain", "plain:7"),

@@ -1,16 +1,16 @@
 //! `playbot eyes`: the camera's and the raster's pictures, compared side by side.
 
 use crate::{
-    arguments::{first_levels, player::Chosen},
+    arguments::{first_levels, player::LoadedPlayer},
     error::{CliError, Outcome, print_line},
     output,
     pictures::{Screen, to_png},
-    progress,
+    program, progress,
 };
 use bevy::prelude::*;
 use bevy_playbot::{
     headless::tick_world,
-    vision::{CLOSE, Difference, Frame, ImageOptions, ObservationConfig, ObservationKind},
+    vision::{CLOSE, Frame, ImageOptions, ObservationConfig, ObservationKind, PictureDifference},
 };
 use playbot_harness::{game::Game, games::Games, prelude::*, worlds::build_observing_world};
 use serde::Serialize;
@@ -70,7 +70,7 @@ struct Compared {
     /// Tick of the episode, from 0.
     tick: u32,
     #[serde(flatten)]
-    difference: Difference,
+    difference: PictureDifference,
     #[serde(skip)]
     pictures: [Vec<[u8; 4]>; 2],
 }
@@ -138,7 +138,7 @@ fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args) -> Result<Vec<Comp
             bar.inc(1);
             spread(&mut compared, &mut level, args.frames);
         }
-        let difference = Difference::between(&by_raster.pixels, &by_camera.pixels)
+        let difference = PictureDifference::between(&by_raster.pixels, &by_camera.pixels)
             .ok_or_else(|| CliError::Io("the pictures of the two sensors differ in size".to_owned()))?;
         let pictures = [by_raster.pixels, by_camera.pixels];
         level.push(Compared { level: by_raster.level, tick: by_raster.tick, difference, pictures });
@@ -175,7 +175,7 @@ impl SensorWorld {
             ObservationConfig { kind, image: ImageOptions { width: size, height: size, ..default() } };
         let (mut world, agents) = build_observing_world(game, &levels.mode, &observation_config, 1, 0, 1)?;
         let agent = agents[0];
-        let control = Chosen::usual(game)?.player.seat(game, &mut world, agent);
+        let control = LoadedPlayer::default_of(game)?.player.seat(game, &mut world, agent);
         world.entity_mut(agent).insert((control, LevelQueue::list(levels.levels().collect::<Vec<_>>())));
         Ok(Self { world, agent })
     }
@@ -199,7 +199,7 @@ fn sum_up(game: &dyn Game, levels: &LevelSplit, compared: &[Compared]) -> Result
     let Some(worst) = worst else {
         return Err(CliError::Usage("no frame was seen on these levels".to_owned()));
     };
-    let mean = |value: fn(&Difference) -> f64| {
+    let mean = |value: fn(&PictureDifference) -> f64| {
         compared.iter().map(|frame| value(&frame.difference)).sum::<f64>() / compared.len() as f64
     };
     Ok(Summary {
@@ -248,7 +248,7 @@ fn write_report(folder: &Path, summary: &Summary, args: &Args) -> Result<(), Cli
          four:\n\n![the worst frame](worst.png)\n\n```sh\n{} eyes {} --levels {} --frames {} --out {}\n```\n",
         summary.game,
         table(summary),
-        output::name(),
+        program::name(),
         summary.game,
         summary.levels,
         args.frames,

@@ -7,8 +7,9 @@ use crate::{
     },
     console::Console,
     error::{CliError, Outcome, print_line},
-    interrupt, output,
+    interrupt,
     output::prepare,
+    program,
 };
 use playbot_harness::games::Games;
 use playbot_learner::{SkillMetrics, SkillModel};
@@ -84,10 +85,10 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let learned = learned.map_err(|error| explain(error, &options))?;
     console.result()?;
     if learned.is_none() {
-        tell!("stopped and saved; no skill model is written yet: go on with {go_on}");
+        report!("stopped and saved; no skill model is written yet: go on with {go_on}");
         return Ok(Outcome::Stopped);
     }
-    tell!("skill model written to {}", args.out.display());
+    report!("skill model written to {}", args.out.display());
     Ok(Outcome::Pass)
 }
 
@@ -142,8 +143,8 @@ fn checkpoint(args: &Args) -> Result<Option<PathBuf>, CliError> {
 /// Reports that nothing is left to resume. A file that is no skill model is not called one.
 fn finished(args: &Args) -> Result<Outcome, CliError> {
     SkillModel::load(&args.out, args.compute.device())?;
-    let (out, program) = (quoted(&args.out.display().to_string()), output::name());
-    tell!(
+    let (out, program) = (quoted(&args.out.display().to_string()), program::name());
+    report!(
         "{out} is finished: train with it, `{program} train --skills {out} --run runs/first`, or learn it anew with --force"
     );
     Ok(Outcome::Pass)

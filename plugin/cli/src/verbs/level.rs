@@ -27,16 +27,16 @@ use std::path::PathBuf;
   playbot level antmaze --mode medium+goals=random+random-start --level 7
   playbot level maze2d --map my-maze.txt --png my-maze.png
 
-A file of rows is a map as this command prints it: # is a wall, S the start, G the goal, a blank, a point or O a free cell.
-The rows end at the first empty line.")]
+A file of rows is a map as this command prints it. # is a wall, S the start, and G the goal. A blank, a point or O is a
+free cell. The rows end at the first empty line.")]
 pub struct Args {
     /// Name of the game.
     game: String,
     /// Mode of the game (default: the one that `train` trains in).
     #[arg(long)]
     mode: Option<String>,
-    /// Map, for games whose levels are maps: its name, with options where it takes any, or a file of rows. --mode also
-    /// takes the start and goal of the level.
+    /// Map, for games whose levels are maps. It is a name, with options where it takes any, or a file of rows. --mode
+    /// also takes the start and goal of the level.
     #[arg(long, value_name = "MAP", conflicts_with_all = ["mode", "levels"])]
     map: Option<String>,
     /// Level file to show, in the form that --json prints.
@@ -61,7 +61,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let level = show(game, &args, file.is_some())?;
     if let (Some(file), Some(picture)) = (file, &level.picture) {
         plot::write(&file, picture, game.tick_hz())?;
-        tell!("picture: {}", file.path().display());
+        report!("picture: {}", file.path().display());
     }
     print_line(if args.json { level.json } else { level.text })?;
     Ok(Outcome::Pass)
@@ -78,7 +78,7 @@ fn show(game: &dyn Game, args: &Args, picture: bool) -> Result<LevelView, CliErr
     let mode = named.unwrap_or_else(|| default_mode(game));
     let shown = show(&LevelRequest { mode: Some(mode), map, file, level: Some(level), picture })?;
     if named.is_none() {
-        tell!("no --mode is named: {mode}, which is trained in, level {level}");
+        report!("no --mode is named: {mode}, which is trained in, level {level}");
     }
     Ok(shown)
 }

@@ -1,7 +1,9 @@
 //! `playbot play`.
 //!
-//! - `no_window`: `playbot play` in a program without the window feature.
+//! The folder, in reading order:
+//!
 //! - `window`: `playbot play` in a program that was built with a window.
+//! - `no_window`: `playbot play` in a program without the window feature.
 
 #[cfg(not(feature = "window"))]
 pub(crate) mod no_window;

@@ -10,6 +10,7 @@ use crate::{
     error::{CliError, Outcome, print_line},
     output,
     output::prepare,
+    program,
 };
 use bevy_playbot::policy_file::{check_policy, policy_observation};
 use clap::ArgGroup;
@@ -23,7 +24,7 @@ use playbot_report::whole;
 use playbot_train::{
     Experiment,
     checkpoint::CheckpointChoice,
-    learn_skills::cloning_skills,
+    learn_skills::behaviour_cloning_skills,
     policy_export::{Provenance, export_policy, policy_file},
     run_dir::{OpenedRun, RunDir},
 };
@@ -97,9 +98,9 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
         (None, Some(skills)) => from_skills(skills, &args.from, games)?,
         (None, None) => return Err(CliError::Usage("nothing to export: name a --run or a --skills file".to_owned())),
     };
-    check_policy(&game.card(), &file)?;
+    check_policy(&game.metadata(), &file)?;
     export_policy(game, &file, &experiment.train, experiment.seed, &args.out)?;
-    tell!(
+    report!(
         "policy written to {}: measure it with {}",
         args.out.display(),
         measuring(&args.out, game, &experiment.test, &file)
@@ -110,11 +111,11 @@ fn export(args: &Export, games: &Games) -> Result<Outcome, CliError> {
 /// Returns the command that measures a policy file. It uses the held-out levels of the policy's training, if the game
 /// has them and the policy has seen none of them.
 fn measuring(path: &Path, game: &dyn Game, test: &LevelSplit, file: &PolicyFile) -> String {
-    let command = format!("{} eval --policy {}", output::name(), quoted(&path.to_string_lossy()));
+    let command = format!("{} eval --policy {}", program::name(), quoted(&path.to_string_lossy()));
     if test.check(game).is_err() {
         return format!("`{command}`");
     }
-    match HeldOut::new(game, test).shown_by(file.card.seen.as_ref()) {
+    match HeldOut::new(game, test).shown_by(file.metadata.seen.as_ref()) {
         None => format!("`{command} --levels {}`", quoted(&test.to_string())),
         Some(seen) => {
             format!(
@@ -156,7 +157,7 @@ fn from_run<'a>(
     let about = Provenance { algorithm, training, seen, code: code(&info.version, &info.revision) };
     let mut file = policy_file(game, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     // The rules of its training, which may differ from the present ones.
-    file.card.game_version = info.game_version;
+    file.metadata.game_version = info.game_version;
     Ok(PolicySource { game, experiment, file })
 }
 
@@ -166,14 +167,20 @@ fn from_skills<'a>(path: &Path, from: &ExperimentArgs, games: &'a Games) -> Resu
     let model = open::skills(path, DeviceKind::default(), from)?;
     let code = code(env!("CARGO_PKG_VERSION"), env!("PLAYBOT_REVISION"));
     let training = match (model.demos(), &experiment.demos) {
-        (Some(card), _) => format!("demonstrations of {card}"),
+        (Some(seen), _) => format!("demonstrations of {seen}"),
         (None, Some(demos)) => format!("demonstrations in {}", demos.display()),
         (None, None) => "demonstrations".to_owned(),
     };
     let about = Provenance { algorithm: "bc".to_owned(), training, seen: model.demos().cloned(), code };
     let observation_config = check_skills(path, &model, game, from, games)?;
     experiment.check_train(game)?;
-    let file = policy_file(game, &observation_config, model.policy(), Some(cloning_skills(&model, &experiment)), about);
+    let file = policy_file(
+        game,
+        &observation_config,
+        model.policy(),
+        Some(behaviour_cloning_skills(&model, &experiment)),
+        about,
+    );
     Ok(PolicySource { game, experiment, file })
 }
 
@@ -184,14 +191,14 @@ fn code(version: &str, revision: &str) -> String {
 
 fn show(path: &Path, device: DeviceKind, as_json: bool, games: &Games) -> Result<Outcome, CliError> {
     let file = open::policy(path, device)?;
-    let (card, policy) = (&file.card, &file.policy);
+    let (metadata, policy) = (&file.metadata, &file.policy);
     let skills = file.skills.as_ref();
-    let game = games.get(&card.game);
+    let game = games.get(&metadata.game);
     if as_json {
         print_line(json!({
-            "card": card, "in_this_program": game.is_ok(), "action_space": policy.action_space(),
+            "card": metadata, "in_this_program": game.is_ok(), "action_space": policy.action_space(),
             "latent": policy.latent(),
-            "horizon": skills.map(|skills| skills.horizon), "normalised": policy.normalises(),
+            "horizon": skills.map(|skills| skills.skill_interval), "normalised": policy.normalises(),
         }))?;
         return Ok(Outcome::Pass);
     }
@@ -199,25 +206,25 @@ fn show(path: &Path, device: DeviceKind, as_json: bool, games: &Games) -> Result
         Ok(_) => String::new(),
         Err(unknown) => format!("; this program does not have that game (it has {})", unknown.valid.join(", ")),
     };
-    print_line(format!("{}, version {} of its rules{where_else}", card.game, card.game_version))?;
-    print_line(format!("algorithm     {}", card.algorithm))?;
-    print_line(format!("trained on    {}", card.training))?;
-    if let Some(seen) = &card.seen {
+    print_line(format!("{}, version {} of its rules{where_else}", metadata.game, metadata.game_version))?;
+    print_line(format!("algorithm     {}", metadata.algorithm))?;
+    print_line(format!("trained on    {}", metadata.training))?;
+    if let Some(seen) = &metadata.seen {
         print_line(format!("has seen      {seen}"))?;
     }
-    print_line(format!("code          {}", card.code))?;
+    print_line(format!("code          {}", metadata.code))?;
     print_line(match policy_observation(&file)? {
         observation_config if observation_config.is_image() => format!("observation   {observation_config}"),
         _ => {
             let normalised = if policy.normalises() { ", normalised" } else { "" };
             let values = format!("{} values{normalised}", policy.obs_dim());
-            format!("observation   {}", output::with_names(&values, &card.observations))
+            format!("observation   {}", output::with_names(&values, &metadata.observations))
         }
     })?;
     let actions = policy.action_space().to_string();
-    print_line(format!("actions       {}", output::with_names(&actions, &card.actions)))?;
+    print_line(format!("actions       {}", output::with_names(&actions, &metadata.actions)))?;
     print_line(match skills {
-        Some(skills) => format!("skills        {} numbers, held for {} ticks", policy.latent(), skills.horizon),
+        Some(skills) => format!("skills        {} numbers, held for {} ticks", policy.latent(), skills.skill_interval),
         None => "skills        none".to_owned(),
     })?;
     Ok(Outcome::Pass)

@@ -12,8 +12,8 @@ use crate::{
     },
     console::Console,
     error::{CliError, Outcome, print_line},
-    interrupt, output,
-    verbs::{learn_skills, quickstart::report::write_report, train::tell_length},
+    interrupt, program,
+    verbs::{learn_skills, quickstart::report::write_report, train::report_length},
 };
 use bevy_playbot::policy::ActionDraw;
 use playbot_harness::{eval::Player, game::Game, games::Games, sealed_file::write_atomically};
@@ -24,13 +24,13 @@ use playbot_report::{
 };
 use playbot_train::{
     Algorithm, Experiment,
-    learn_skills::{cloning, learn},
-    metrics_log::SUCCESS_RATE,
+    learn_skills::{behaviour_cloning, learn},
     recordings::read_dataset,
     run_dir::{check_replaceable, is_unstarted},
     run_lock::RunLock,
     runs::RunCurves,
     train_run::{NewRun, Reached, Training, TrainingSetup, train_to_success},
+    update_report::SUCCESS_RATE,
 };
 use serde_json::json;
 use std::{
@@ -96,23 +96,6 @@ impl Default for Args {
     }
 }
 
-/// A training in the report.
-struct Trained {
-    algorithm: Algorithm,
-    player: Player,
-    curve: Vec<CurvePoint>,
-    /// Steps until its success rate first reached the experiment's threshold.
-    steps_to_threshold: Option<u64>,
-    steps_per_s: f64,
-    finished: bool,
-}
-
-struct CurvePoint {
-    step: u64,
-    episodic_return: f64,
-    success_rate: f64,
-}
-
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let start = Instant::now();
     let experiment = read_experiment(&args, games)?;
@@ -123,12 +106,12 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     check_folder(&args.run)?;
     // Not later: without recordings no folder is made.
     let demos = args.from.recordings(&experiment, games)?;
-    interrupt::leave(format!("nothing is saved yet: start again with `{} quickstart`", output::name()));
+    interrupt::leave(format!("nothing is saved yet: start again with `{} quickstart`", program::name()));
     let dataset = read_dataset(game, &experiment, &demos, args.threads.count(), &mut Console::default())?;
     let _lock = take_folder(&args.run)?;
-    tell_length(&trained);
+    report_length(&trained);
     let Some(skills) = skills(&experiment, dataset.clone(), &args)? else {
-        tell!("stopped while learning skills; nothing was saved, start again with `{} quickstart`", output::name());
+        report!("stopped while learning skills; nothing was saved, start again with `{} quickstart`", program::name());
         return Ok(Outcome::Stopped);
     };
     let draw = if experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
@@ -142,11 +125,11 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         }
     }
     let Some((seeds, first)) = first_success(game, &experiment, &trained, &dataset, &args)? else {
-        tell!("stopped; {}", interrupt::remains());
+        report!("stopped; {}", interrupt::remains());
         return Ok(Outcome::Stopped);
     };
     let mut players: Vec<_> = trained.iter().map(|one| (one.algorithm.name().to_owned(), one.player.clone())).collect();
-    players.push(("bc".to_owned(), cloning(&skills, &experiment, draw)));
+    players.push(("bc".to_owned(), behaviour_cloning(&skills, &experiment, draw)));
     players.extend(game.tools().bots.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
     let mut rows = Vec::new();
     for (name, player) in &players {
@@ -169,11 +152,28 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         print_line(to_text_table(&rows))?;
     }
     let comparison = format!("{}; {}", headline(&first, &seeds, experiment.study.threshold), compare(&trained));
-    tell!("{comparison}");
+    report!("{comparison}");
     let report = args.run.join("report.html");
     write_report(&report, &experiment, &trained, &rows, &comparison, start.elapsed().as_secs_f64())?;
-    tell!("report: {} ({:.0} s in all)", report.display(), start.elapsed().as_secs_f64());
+    report!("report: {} ({:.0} s in all)", report.display(), start.elapsed().as_secs_f64());
     Ok(Outcome::Pass)
+}
+
+/// A training in the report.
+struct Trained {
+    algorithm: Algorithm,
+    player: Player,
+    curve: Vec<CurvePoint>,
+    /// Steps until its success rate first reached the experiment's threshold.
+    steps_to_threshold: Option<u64>,
+    steps_per_s: f64,
+    finished: bool,
+}
+
+struct CurvePoint {
+    step: u64,
+    episodic_return: f64,
+    success_rate: f64,
 }
 
 fn read_experiment(args: &Args, games: &Games) -> Result<Experiment, CliError> {
@@ -218,7 +218,7 @@ fn train_one(
     let mut curve = Vec::new();
     let mut console = Console::new(format!("train {algorithm}")).on_update(|report| {
         if let Some(kl) = report.initial_kl {
-            tell!("{algorithm}: the first policy is the decoder, KL {kl}");
+            report!("{algorithm}: the first policy is the decoder, KL {kl}");
         }
         if let (Some(episodic_return), Some(success_rate)) = (report.episodic_return, report.success_rate) {
             curve.push(CurvePoint { step: report.step, episodic_return, success_rate });
@@ -227,7 +227,7 @@ fn train_one(
     let mut training = Training::begin(game, &new, &setup(args), &mut console)?;
     interrupt::go_on_with(format!(
         "this training alone, `{} train --run {} --resume`",
-        output::name(),
+        program::name(),
         folder.display()
     ));
     let start = Instant::now();
@@ -243,11 +243,11 @@ fn train_one(
 
 fn stopped(args: &Args, algorithm: Algorithm) -> Outcome {
     let run = args.run.join(algorithm.name());
-    tell!(
+    report!(
         "stopped and saved; there is no report yet: go on with this training alone, `{program} train --run {} --resume`, \
          or start again with `{program} quickstart`",
         run.display(),
-        program = output::name()
+        program = program::name()
     );
     Outcome::Stopped
 }
@@ -262,7 +262,7 @@ fn first_success(
     args: &Args,
 ) -> Result<Option<(Vec<u64>, Vec<FirstSuccess>)>, CliError> {
     interrupt::leave(format!("both trainings are saved in {}, without a report", args.run.display()));
-    interrupt::go_on_with(format!("`{} eval --run {}`", output::name(), args.run.join("score-ppo").display()));
+    interrupt::go_on_with(format!("`{} eval --run {}`", program::name(), args.run.join("score-ppo").display()));
     let of = |one: &Trained| FirstSuccess { algorithm: one.algorithm, steps: vec![one.steps_to_threshold] };
     let (mut seeds, mut first) = (vec![experiment.seed], trained.iter().map(of).collect::<Vec<_>>());
     let algorithms: Vec<_> = trained.iter().map(|one| one.algorithm).collect();
@@ -291,6 +291,43 @@ fn compare(trained: &[Trained]) -> String {
         ),
         None => format!("SCORE-PPO did not reach PPO's final training return of {target:.2}"),
     }
+}
+
+/// Checks that a folder is new or of an earlier quickstart, and not in use.
+///
+/// # Errors
+///
+/// It holds something else, or is in use.
+fn check_folder(path: &Path) -> Result<(), CliError> {
+    let is_run = path.join("run.json").exists();
+    let was_ours = RunLock::is_known(path) || path.join(Algorithm::ScorePpo.name()).join("run.json").is_file();
+    if path.exists() && !is_unstarted(path) && (is_run || !was_ours) {
+        return Err(CliError::Usage(format!(
+            "{} is not the folder of a quickstart, so it is left alone: choose another --run",
+            path.display()
+        )));
+    }
+    if RunLock::is_known(path) {
+        RunLock::take(path)?;
+    }
+    for run in [Algorithm::ScorePpo, Algorithm::Ppo].map(|algorithm| path.join(algorithm.name())) {
+        if run.exists() {
+            // Checked before skills are learned.
+            check_replaceable(&run)?;
+            RunLock::take(&run)?;
+        }
+    }
+    Ok(())
+}
+
+/// Makes the folder of the quickstart and locks it.
+///
+/// # Errors
+///
+/// The system refuses, or it is in use.
+fn take_folder(path: &Path) -> Result<RunLock, CliError> {
+    disk::create_dir_all(path).map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
+    Ok(RunLock::take(path)?)
 }
 
 // Steps to success of each method, over several seeds.
@@ -355,47 +392,8 @@ fn headline(methods: &[FirstSuccess], seeds: &[u64], threshold: f64) -> String {
     format!("{headline} (the medians of seeds {seeds}: {})", by_seed.collect::<Vec<_>>().join("; "))
 }
 
-// The folder of a quickstart.
-
-/// Checks that a folder is new or of an earlier quickstart, and not in use.
-///
-/// # Errors
-///
-/// It holds something else, or is in use.
-fn check_folder(path: &Path) -> Result<(), CliError> {
-    let is_run = path.join("run.json").exists();
-    let was_ours = RunLock::is_known(path) || path.join(Algorithm::ScorePpo.name()).join("run.json").is_file();
-    if path.exists() && !is_unstarted(path) && (is_run || !was_ours) {
-        return Err(CliError::Usage(format!(
-            "{} is not the folder of a quickstart, so it is left alone: choose another --run",
-            path.display()
-        )));
-    }
-    if RunLock::is_known(path) {
-        RunLock::take(path)?;
-    }
-    for run in [Algorithm::ScorePpo, Algorithm::Ppo].map(|algorithm| path.join(algorithm.name())) {
-        if run.exists() {
-            // Checked before skills are learned.
-            check_replaceable(&run)?;
-            RunLock::take(&run)?;
-        }
-    }
-    Ok(())
-}
-
-/// Makes the folder of the quickstart and locks it.
-///
-/// # Errors
-///
-/// The system refuses, or it is in use.
-fn take_folder(path: &Path) -> Result<RunLock, CliError> {
-    disk::create_dir_all(path).map_err(|error| CliError::Io(format!("cannot create {}: {error}", path.display())))?;
-    Ok(RunLock::take(path)?)
-}
-
 #[cfg(test)]
-mod first_success_tests {
+mod tests {
     use super::*;
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::{
     arguments::{
         OverwriteArgs, counted, default_held_out, first_levels,
-        player::{Chosen, PlayerArgs},
+        player::{LoadedPlayer, PlayerArgs},
     },
     error::{CliError, Outcome},
     interrupt, progress,
@@ -65,9 +65,9 @@ pub struct Args {
 const LAST_LEVEL: u64 = 499;
 
 /// Warns that policies learned from this recording depend on the levels of its player, which it does not note.
-fn warn_of_pupils(player: &Chosen) {
+fn warn_of_pupils(player: &LoadedPlayer) {
     if let Some(seen) = &player.seen {
-        tell!(
+        report!(
             "the player has learned from {seen}: hold none of these out from learners of its recordings, which do not note them"
         );
     }
@@ -89,8 +89,8 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let held_out: Vec<_> = args.hold_out.iter().chain(&left_out).cloned().collect();
     let chosen = choose_levels(game, &levels, &held_out)?;
     match &left_out {
-        Some(held_out) => tell!("no --levels are named: recording {levels}, but for the held-out levels {held_out}"),
-        None if args.levels.is_none() => tell!("no --levels are named: recording {levels}"),
+        Some(held_out) => report!("no --levels are named: recording {levels}, but for the held-out levels {held_out}"),
+        None if args.levels.is_none() => report!("no --levels are named: recording {levels}"),
         None => warn_of_held_out(game, &levels, &chosen),
     }
     let count = chosen.len() as u64;
@@ -109,7 +109,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
     let writer = args.overwrite.open(&args.out, header)?;
     let (mut world, agent) = match &chosen_player {
-        Some(Chosen { player, observation_config, .. }) => {
+        Some(LoadedPlayer { player, observation_config, .. }) => {
             plan.build_world_of(game, player, observation_config, writer)?
         }
         None => plan.build_world(game, writer),
@@ -118,7 +118,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let counts = format!("{}, {}", counted(episodes, "episode"), counted(steps, "step"));
     let finished = finished.inspect_err(|_| {
-        tell!("{}: the part recorded before the error is kept: {counts}", args.out.display());
+        report!("{}: the part recorded before the error is kept: {counts}", args.out.display());
     })?;
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
     let wins = match ended.successes {
@@ -126,13 +126,13 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         0 => String::new(),
         n => format!(", {:.1} % reached the goal", 100.0 * n as f64 / ended.finished as f64),
     };
-    tell!("{}: {counts}{wins}", args.out.display());
+    report!("{}: {counts}{wins}", args.out.display());
     if finished {
         return Ok(Outcome::Pass);
     }
     let level = world.get::<Episode>(agent).filter(|_| episodes <= count).map(|episode| episode.level);
     let stopped = StoppedRecording { level, steps, left_out };
-    tell!("stopped, so the recording is incomplete: {}", stopped.how_to_go_on(&args, &levels));
+    report!("stopped, so the recording is incomplete: {}", stopped.how_to_go_on(&args, &levels));
     Ok(Outcome::Stopped)
 }
 
@@ -209,7 +209,7 @@ fn warn_of_held_out(game: &dyn Game, levels: &LevelSplit, chosen: &[u64]) {
         return;
     }
     if let Some(level) = chosen.iter().find(|level| hidden.contains(&levels.mode, **level)) {
-        tell!(
+        report!(
             "warning: level {level} is, or looks like, one of the held-out levels {split}; learn-skills refuses recordings \
              of them, unless your experiment holds out others: leave them out with --hold-out {split}"
         );

@@ -1,8 +1,10 @@
 //! `playbot replay`.
 //!
-//! - `no_window`: `playbot replay --window` in a program without the window feature.
+//! The folder, in reading order:
+//!
 //! - `picture`: pictures of a finding: its last tick, or an animation.
 //! - `window`: window of a finding.
+//! - `no_window`: `playbot replay --window` in a program without the window feature.
 
 #[cfg(not(feature = "window"))]
 mod no_window;
@@ -13,7 +15,7 @@ mod window;
 use crate::{
     arguments::counted,
     error::{CliError, Outcome, print_line},
-    interrupt, output, progress,
+    interrupt, output, program, progress,
     verbs::replay::picture::Pictures,
 };
 use playbot_harness::{
@@ -99,13 +101,13 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         }
         _ => None,
     };
-    let told = ReplayReport {
+    let report = ReplayReport {
         path: &args.finding,
         finding: &stored,
         again: &again,
         shorter: shorter.as_ref().map(|(shorter, path)| (shorter, *path)),
     };
-    told.tell(args.json)?;
+    report.print(args.json)?;
     let shown = shorter.as_ref().map_or(&finding, |(Minimised { finding, .. }, _)| finding);
     pictures.write(game, shown)?;
     if args.window {
@@ -126,7 +128,7 @@ fn instead_of(folder: &Path) -> CliError {
         "{folder} is a folder with {}: name one, such as {}, or play all of them with `{} test --regress {folder}`",
         counted(found.len() as u64, "finding"),
         names.join(", "),
-        output::name()
+        program::name()
     ))
 }
 
@@ -148,8 +150,6 @@ fn play_again(game: &dyn Game, finding: &StoredFinding) -> Result<Recheck, CliEr
     Ok(again?)
 }
 
-// Report of a finding that was played again.
-
 /// A finding and the result of its replay.
 pub struct ReplayReport<'a> {
     /// Its file.
@@ -168,7 +168,7 @@ impl ReplayReport<'_> {
     /// # Errors
     ///
     /// Standard output is closed.
-    pub fn tell(&self, as_json: bool) -> Result<(), CliError> {
+    pub fn print(&self, as_json: bool) -> Result<(), CliError> {
         if as_json {
             return print_line(self.json());
         }
@@ -229,8 +229,6 @@ impl ReplayReport<'_> {
         ))
     }
 }
-
-// Shortened findings, in files of their own.
 
 /// Leaves out needless actions, with a progress bar, and writes the rest. Its level is named as in `stored`: it may
 /// have been found in another folder. Ctrl-C ends it with the best so far.

@@ -5,7 +5,8 @@ use crate::{
     error::{CliError, Outcome, print_line},
     output,
     plot::PlotFile,
-    verbs::test::{Results, tell_results},
+    program,
+    verbs::test::{Results, report_results},
 };
 use playbot_harness::games::Games;
 use playbot_mutation::calibration::{Calibration, CalibrationError};
@@ -14,8 +15,6 @@ use playbot_test::{
     verdict_report::{HtmlReport, REPORT, write_html},
 };
 use std::{fs, path::PathBuf};
-
-// The verbs below `playbot report`.
 
 /// Work with the results of tests.
 #[derive(clap::Args)]
@@ -90,9 +89,9 @@ pub(crate) fn run_merge(args: &MergeArgs, games: &Games) -> Result<Outcome, CliE
         Comparison::check(before, &record)?;
     }
     merge(&shards, &args.out).map_err(|error| {
-        output::told(error, "the shards are unchanged: make room or rights there and call this again")
+        output::with_advice(error, "the shards are unchanged: make room or rights there and call this again")
     })?;
-    tell_results(&results)
+    report_results(&results)
 }
 
 /// Checks that the joined results do not replace needed files.
@@ -145,11 +144,14 @@ pub(crate) fn run_html(args: &HtmlArgs, games: &Games) -> Result<Outcome, CliErr
     let before = args.against.as_deref().map(results_folder);
     let comparison = before.map(|before| Comparison::read(before, folder)).transpose()?;
     let game = games.get(&lines.record().game).ok();
-    let report = HtmlReport { game, comparison: comparison.as_ref(), program: output::name() };
+    let report = HtmlReport { game, comparison: comparison.as_ref(), program: program::name() };
     write_html(folder, &file, &report).map_err(|error| {
-        output::told(error, "the results are unchanged: make room or rights there, or name another file with --out")
+        output::with_advice(
+            error,
+            "the results are unchanged: make room or rights there, or name another file with --out",
+        )
     })?;
-    tell!("{}", file.display());
+    report!("{}", file.display());
     Ok(Outcome::Pass)
 }
 
@@ -215,16 +217,16 @@ pub(crate) fn run_calibrate(args: &CalibrateArgs, games: &Games) -> Result<Outco
         print_line(found.agreement_table().to_text())?;
         print_line(found.level_table(MOST_PRINTED).to_text().trim_end())?;
     }
-    found.words().iter().for_each(|words| tell!("{words}"));
+    found.words().iter().for_each(|words| report!("{words}"));
     if let Some(out) = &args.out {
         let is_page = out.extension().is_some_and(|ending| ending == "html");
         let text = if is_page { found.to_html() } else { found.to_markdown() };
         output::write(out, text.as_bytes())?;
-        tell!("{}", out.display());
+        report!("{}", out.display());
     }
     if let Some(plot) = plot {
         plot.write(&found.to_drawing())?;
-        tell!("plot: {}", plot.path().display());
+        report!("plot: {}", plot.path().display());
     }
     Ok(Outcome::Pass)
 }

@@ -1,20 +1,22 @@
 //! `playbot runs ls|show|compare`.
 //!
-//! - `compare`: `playbot runs compare`.
+//! The folder, in reading order:
+//!
 //! - `show`: `playbot runs show`.
+//! - `compare`: `playbot runs compare`.
 
 mod compare;
 mod show;
 
 use crate::{
     error::{CliError, Outcome, print_line},
-    output,
+    program,
 };
 use playbot_harness::{games::Games, sealed_file::write_atomically};
 use playbot_report::{PlainTable, percent, readable, whole};
 use playbot_train::{
-    metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
     runs::{FoundRuns, Leftover, RunRecord, RunsError},
+    update_report::{EPISODIC_RETURN, SUCCESS_RATE},
 };
 use serde_json::{Value, json};
 use std::{
@@ -57,7 +59,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 /// Writes a plot, whole or not at all, and prints its path.
 fn write_plot(path: &Path, svg: &str) -> Result<(), CliError> {
     write_atomically(path, svg.as_bytes())?;
-    tell!("plot: {}", path.display());
+    report!("plot: {}", path.display());
     Ok(())
 }
 
@@ -123,7 +125,7 @@ fn print_table(table: &PlainTable, damaged: &[RunsError]) -> Result<(), CliError
 
 /// Prints a folder that is no run, with advice.
 fn print_leftover(leftover: &Leftover, as_json: bool) -> Result<(), CliError> {
-    let words = output::named(&leftover.to_string());
+    let words = program::named(&leftover.to_string());
     if as_json {
         print_line(json!({ "path": leftover.folder, "left_of": leftover.run, "advice": words }))
     } else {

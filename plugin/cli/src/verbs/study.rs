@@ -3,11 +3,11 @@
 use crate::{
     arguments::{
         Compute,
-        experiment::{ExperimentArgs, Options, in_words, quoted, sets_key, tell_unread},
+        experiment::{ExperimentArgs, Options, in_words, quoted, report_unread, sets_key},
     },
     console::Console,
     error::{CliError, Outcome, print_line},
-    interrupt, output, progress,
+    interrupt, output, program, progress,
     verbs::learn_skills,
 };
 use bevy_playbot::unknown_name::UnknownName;
@@ -45,7 +45,7 @@ use std::{
 pub struct Args {
     #[command(flatten)]
     from: ExperimentArgs,
-    /// Run only this variant of the experiment's (default: all; repeatable).
+    /// Run only this variant of the experiment's (default: all, repeatable).
     #[arg(long, value_name = "NAME")]
     variant: Vec<String>,
     /// Random seeds, instead of the experiment's.
@@ -76,7 +76,7 @@ pub struct Args {
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if args.rewrite {
         rewrite_table(&args.out)?;
-        tell!("written to {}: table.md and experiment.ron, from its results.json", args.out.display());
+        report!("written to {}: table.md and experiment.ron, from its results.json", args.out.display());
         return Ok(Outcome::Pass);
     }
     let seeds = (!args.seeds.is_empty()).then(|| format!("seeds={:?}", args.seeds));
@@ -84,8 +84,8 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     keep(&mut experiment, &args.variant)?;
     let runs = study_runs(&experiment)?;
     check_games(&runs, &args.from, games)?;
-    tell_taken_back(&experiment, &args.from.set);
-    tell_idle_settings(&experiment, &runs, &args.from.set);
+    report_taken_back(&experiment, &args.from.set);
+    report_idle_settings(&experiment, &runs, &args.from.set);
     let folder = runs_folder(&args, &experiment);
     check_folder(&folder, &runs, &args)?;
     check_results(&runs, &args)?;
@@ -95,13 +95,13 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
     let trained = runs.iter().filter(|run| run.experiment.algorithm.is_trained());
     let lengths: BTreeSet<String> = trained.filter_map(|run| rounded(&run.experiment)).collect();
-    lengths.iter().for_each(|words| tell!("{words}"));
+    lengths.iter().for_each(|words| report!("{words}"));
     let idle: BTreeSet<String> = runs
         .iter()
         .filter_map(|run| Some((&run.variant, never_learns(&run.experiment)?)))
         .map(|(variant, words)| format!("{variant}: {words}"))
         .collect();
-    idle.iter().for_each(|words| tell!("warning: {words}"));
+    idle.iter().for_each(|words| report!("warning: {words}"));
     interrupt::listen();
     interrupt::go_on_with(format!("`{} --resume`", restart(&args)));
     let locate = |path: &Path| args.from.find_recordings(path, games);
@@ -115,7 +115,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let ended = runner.run_all(&runs, command(&args), experiment, &mut console).map_err(explained)?;
     let Some(report) = ended else {
         drop(console);
-        tell!(
+        report!(
             "stopped and saved; the study is incomplete, and its tables are not written: go on with `{} --resume`",
             restart(&args)
         );
@@ -129,7 +129,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     } else {
         print_line(report.summary().trim_end())?;
     }
-    tell!("written to {}: table.md, experiment.ron, curves.svg, results.json, cost.md", args.out.display());
+    report!("written to {}: table.md, experiment.ron, curves.svg, results.json, cost.md", args.out.display());
     Ok(Outcome::Pass)
 }
 
@@ -195,7 +195,7 @@ impl RunObserver for StudyConsole {
                 whole.set_position(self.done);
                 let test = &result.test;
                 let line = format!("{}: held-out return {:.2} ± {:.2}", run.id(), test.return_mean, test.return_se);
-                whole.suspend(|| tell!("{line}"));
+                whole.suspend(|| report!("{line}"));
             }
             RunEvent::Updated { report, .. } => {
                 whole.set_position(self.done + report.step.min(self.present));
@@ -238,32 +238,32 @@ fn check_games(runs: &[StudyRun], from: &ExperimentArgs, games: &Games) -> Resul
 }
 
 /// Reports `--set` values that variants override.
-fn tell_taken_back(experiment: &Experiment, sets: &[String]) {
+fn report_taken_back(experiment: &Experiment, sets: &[String]) {
     for (key, value) in sets.iter().filter_map(|set| set.split_once('=')) {
         let variants = experiment.variants.iter();
         let own = variants.filter(|variant| variant.set.iter().any(|set| sets_key(set, key.trim())));
         let names: Vec<&str> = own.map(|variant| variant.name.as_str()).collect();
         if !names.is_empty() {
-            tell!("warning: --set {key}={value} does not change {}: their own value comes last", names.join(", "));
+            report!("warning: --set {key}={value} does not change {}: their own value comes last", names.join(", "));
         }
     }
 }
 
 /// Reports settings without effect: of `--set` in no run, and of a variant in none of its runs.
-fn tell_idle_settings(experiment: &Experiment, runs: &[StudyRun], sets: &[String]) {
+fn report_idle_settings(experiment: &Experiment, runs: &[StudyRun], sets: &[String]) {
     let of = |is_meant: &dyn Fn(&StudyRun) -> bool| -> Vec<&Experiment> {
         runs.iter().filter(|run| is_meant(run)).map(|run| &run.experiment).collect()
     };
-    tell_unread("--set ", sets, &of(&|_| true));
+    report_unread("--set ", sets, &of(&|_| true));
     for variant in &experiment.variants {
-        tell_unread(&format!("{}: ", variant.name), &variant.set, &of(&|run| run.variant == variant.name));
+        report_unread(&format!("{}: ", variant.name), &variant.set, &of(&|run| run.variant == variant.name));
     }
 }
 
 /// Returns the folder of the runs: runs of different games lie apart.
 fn runs_folder(args: &Args, experiment: &Experiment) -> PathBuf {
-    let usual = if args.from.names_game() { &experiment.game } else { "study" };
-    let name = args.from.experiment.as_deref().and_then(Path::file_stem).unwrap_or(usual.as_ref());
+    let default = if args.from.names_game() { &experiment.game } else { "study" };
+    let name = args.from.experiment.as_deref().and_then(Path::file_stem).unwrap_or(default.as_ref());
     args.runs.clone().unwrap_or_else(|| Path::new("runs").join(name))
 }
 
@@ -304,7 +304,7 @@ fn check_results(runs: &[StudyRun], args: &Args) -> Result<(), CliError> {
 /// Returns the command that gives the same files, without options that do not change them.
 fn command(args: &Args) -> String {
     let game = args.from.game.iter().map(|game| quoted(game));
-    let mut words: Vec<String> = [format!("{} study", output::name())].into_iter().chain(game).collect();
+    let mut words: Vec<String> = [format!("{} study", program::name())].into_iter().chain(game).collect();
     let mut push = |name: &str, value: String| words.push(format!("--{name} {}", quoted(&value)));
     if let Some(path) = &args.from.experiment {
         push("experiment", path.display().to_string());

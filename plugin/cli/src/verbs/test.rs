@@ -1,19 +1,21 @@
 //! `playbot test`.
 //!
-//! - `regress`: replay of stored findings.
+//! The folder, in reading order:
+//!
 //! - `testers`: testers on the command line.
-//! - `told`: report of results, and the files that go with them.
+//! - `results`: report of results, and the files that go with them.
+//! - `regress`: replay of stored findings, and detectors on the command line.
 
 mod regress;
+mod results;
 mod testers;
-mod told;
 
 use crate::{
     arguments::{Compute, at_least_one, default_held_out, first_levels},
     error::{CliError, Outcome},
     interrupt, progress,
     verbs::test::{
-        regress::{DetectorArgs, RegressArgs, forget_slow_ticks, list_detectors, tell_slow_ticks},
+        regress::{DetectorArgs, RegressArgs, forget_slow_ticks, list_detectors, report_slow_ticks},
         testers::TesterArgs,
     },
 };
@@ -28,7 +30,7 @@ use playbot_test::{
 };
 use std::path::{Path, PathBuf};
 
-pub use crate::verbs::test::told::{Results, tell_results};
+pub use crate::verbs::test::results::{Results, report_results};
 
 /// Test levels: report which of them bots and policies solve, and which are unsolvable.
 ///
@@ -128,16 +130,16 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         (false, false) => Earlier::Keep,
     };
     let (mut folder, message) = TestFolder::open(out, &record, earlier)?;
-    message.iter().for_each(|message| tell!("warning: {message}"));
+    message.iter().for_each(|message| report!("warning: {message}"));
     interrupt::listen();
     if !args.resume {
         forget_slow_ticks(out)?;
     }
     let end = test(game, &plan, &mut folder, &args.findings.files(out, &plan.detectors))?;
-    tell_slow_ticks(&plan.detectors, out)?;
+    report_slow_ticks(&plan.detectors, out)?;
     match end {
         TestEnd::Stopped => {
-            tell!(
+            report!(
                 "stopped; {} of {} levels are finished: go on with the same command and --resume",
                 folder.finished().len(),
                 plan.places().len()
@@ -146,8 +148,8 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         }
         TestEnd::Done => {
             folder.finish()?;
-            let outcome = tell_results(&results)?;
-            args.findings.tell_missing(out);
+            let outcome = report_results(&results)?;
+            args.findings.report_missing(out);
             Ok(outcome)
         }
     }
@@ -157,9 +159,9 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
     let split = match &args.levels {
         Some(split) => split.clone(),
         None => {
-            let usual = default_held_out(game).unwrap_or_else(|| first_levels(game, 63));
-            tell!("no --levels are named: {usual}");
-            usual
+            let default = default_held_out(game).unwrap_or_else(|| first_levels(game, 63));
+            report!("no --levels are named: {default}");
+            default
         }
     };
     split.check(game)?;
@@ -193,8 +195,6 @@ fn test(game: &dyn Game, plan: &TestPlan, folder: &mut TestFolder, files: &Findi
     Ok(end?)
 }
 
-// Options for the findings of a test.
-
 /// Findings as files.
 #[derive(clap::Args, Clone, Debug)]
 pub struct FindingArgs {
@@ -219,9 +219,9 @@ impl FindingArgs {
     }
 
     /// Explains a missing failed episode, where one was requested.
-    pub fn tell_missing(&self, folder: &Path) {
+    pub fn report_missing(&self, folder: &Path) {
         if self.keep_failures && list_findings(folder).is_err() {
-            tell!(
+            report!(
                 "no failed episode is kept: it takes a level that no tester solved, and a tester that failed there and leaves \
                  nothing to chance, such as a policy with --greedy"
             );

@@ -77,7 +77,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         (None, Err(error)) => Err(error.into()),
         (None, Ok(note)) => {
             if let Some(note) = note {
-                tell!("{note}");
+                report!("{note}");
             }
             Ok(Outcome::Pass)
         }

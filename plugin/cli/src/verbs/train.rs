@@ -12,7 +12,7 @@ use crate::{
     },
     console::Console,
     error::{CliError, Outcome},
-    interrupt, output,
+    interrupt, program,
     verbs::train::repeated::resumed,
 };
 use bevy_playbot::unknown_name::UnknownName;
@@ -78,19 +78,6 @@ impl Args {
     }
 }
 
-/// Parses an algorithm that can be trained.
-fn trained(name: &str) -> Result<Algorithm, String> {
-    let names = Algorithm::TRAINED.map(Algorithm::name);
-    match name.parse::<Algorithm>() {
-        Ok(algorithm) if algorithm.is_trained() => Ok(algorithm),
-        Ok(algorithm) => {
-            let why = output::named(&TrainError::NotTrained(algorithm).to_string());
-            Err(format!("{why}; those that are: {}", names.join(", ")))
-        }
-        Err(_) => Err(UnknownName::new("algorithm", name, &names).to_string()),
-    }
-}
-
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut console = Console::new("train");
     let locate = |path: &Path| args.from.find_recordings(path, games);
@@ -99,10 +86,10 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         true => resume(&args, games, &setup)?,
         false => start(&args, games, &setup, &mut console)?,
     };
-    let (path, program) = (args.run.display(), output::name());
+    let (path, program) = (args.run.display(), program::name());
     let (steps, wanted) = (training.trainer.steps(), training.trainer.experiment().whole_steps());
     if training.trainer.is_done() {
-        tell!(
+        report!(
             "{path} is finished: it was trained for {steps} steps. Train it further with `{program} train --run {path} --resume \
              --steps N`, where N is more than {steps}, or test it with `{program} eval --run {path}`"
         );
@@ -111,14 +98,14 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     // A resumed training reported it at its beginning.
     let is_new_length = args.steps.is_some() || args.from.set.iter().any(|set| sets_key(set, "steps"));
     if !args.resume || is_new_length {
-        tell_length(training.trainer.experiment());
+        report_length(training.trainer.experiment());
     }
     interrupt::go_on_with(format!("`{program} train --run {path} --resume`"));
     if training.drive(&mut console)? {
-        tell!("done: test it with `{program} eval --run {path}`");
+        report!("done: test it with `{program} eval --run {path}`");
         return Ok(Outcome::Pass);
     }
-    tell!(
+    report!(
         "stopped and saved after {} of {wanted} steps, so the training is incomplete: go on with \
          `{program} train --run {path} --resume`",
         training.trainer.steps()
@@ -126,13 +113,26 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(Outcome::Stopped)
 }
 
+/// Parses an algorithm that can be trained.
+fn trained(name: &str) -> Result<Algorithm, String> {
+    let names = Algorithm::TRAINED.map(Algorithm::name);
+    match name.parse::<Algorithm>() {
+        Ok(algorithm) if algorithm.is_trained() => Ok(algorithm),
+        Ok(algorithm) => {
+            let why = program::named(&TrainError::NotTrained(algorithm).to_string());
+            Err(format!("{why}; those that are: {}", names.join(", ")))
+        }
+        Err(_) => Err(UnknownName::new("algorithm", name, &names).to_string()),
+    }
+}
+
 /// Reports it if a training will have more steps than requested.
-pub(crate) fn tell_length(experiment: &Experiment) {
+pub(crate) fn report_length(experiment: &Experiment) {
     if let Some(words) = rounded(experiment) {
-        tell!("{words}");
+        report!("{words}");
     }
     if let Some(words) = never_learns(experiment) {
-        tell!("warning: {words}");
+        report!("warning: {words}");
     }
 }
 
@@ -148,7 +148,7 @@ fn start(
             Some(open::skills(path, args.compute.device(), &args.from)?)
         }
         Some(path) => {
-            tell!("{} learns without skills, so {} is not used", experiment.algorithm, path.display());
+            report!("{} learns without skills, so {} is not used", experiment.algorithm, path.display());
             None
         }
         None => None,
@@ -162,7 +162,11 @@ fn start(
         other => other.into(),
     })?;
     if args.from.experiment.is_none() {
-        tell!("no --experiment is named: training on {}, held out for the test {}", experiment.train, experiment.test);
+        report!(
+            "no --experiment is named: training on {}, held out for the test {}",
+            experiment.train,
+            experiment.test
+        );
     }
     Ok(training)
 }
@@ -228,9 +232,12 @@ fn resume(args: &Args, games: &Games, setup: &TrainingSetup<'_>) -> Result<Train
         // Nothing is left to train, so the run stays as it is.
         return Ok(training);
     }
-    tell!("going on at step {steps} of {}", experiment.whole_steps());
+    report!("going on at step {steps} of {}", experiment.whole_steps());
     if setup.device != begun_on {
-        tell!("it was begun on {begun_on} and goes on on {}: the result will be similar, but not equal", setup.device);
+        report!(
+            "it was begun on {begun_on} and goes on on {}: the result will be similar, but not equal",
+            setup.device
+        );
     }
     Ok(training)
 }

@@ -7,13 +7,13 @@ mod written_picture;
 use crate::{
     arguments::{
         LevelsArg, default_mode, open,
-        player::{Chosen, PlayerArgs},
+        player::{LoadedPlayer, PlayerArgs},
     },
     error::{CliError, Outcome},
     interrupt, output,
     pictures::{
         Film,
-        caption::{Numbers, Reach},
+        caption::{NumberBars, Reach},
         episode_world::{EpisodeStep, EpisodeWorld},
     },
     progress,
@@ -32,13 +32,16 @@ use playbot_harness::{
 };
 use std::path::{Path, PathBuf};
 
+/// Most memory for the observations of an episode.
+const MOST_BYTES: usize = 1 << 30;
+
 /// Write a bot's observation as a picture, or an episode as an animation.
 ///
-/// The file is a PNG: of one observation, or with --episode an animated one of a whole episode, with tick, action,
+/// The file is a PNG of one observation. With --episode it is an animated one of a whole episode, with tick, action,
 /// value and skill under each picture. A bot that reads vectors plays on them, and the picture is drawn beside it. A
 /// game with a camera of its own is drawn through that camera. A game that cannot be drawn is shown as numbers with
-/// bars. The number behind each bar, with ±, is its scale: the largest value of the episode, or of its ticks up to the
-/// shown one, rounded up.
+/// bars. The number behind each bar, with ±, is its scale. It is the largest value of the episode, or of its ticks up
+/// to the shown one, rounded up.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot view GAME --level 5
@@ -92,9 +95,6 @@ pub struct Args {
     json: bool,
 }
 
-/// Most memory for the observations of an episode.
-const MOST_BYTES: usize = 1 << 30;
-
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     output::prepare(&args.out)?;
@@ -104,10 +104,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         .then(|| Film::new(observation_config.image, args.scale, game.tick_hz()))
         .transpose()?;
     let Some((steps, reach)) = play(&mut episode_world, &args)? else {
-        tell!("stopped before tick {}; nothing is written: call it again", args.tick);
+        report!("stopped before tick {}; nothing is written: call it again", args.tick);
         return Ok(Outcome::Stopped);
     };
-    let numbers = || Numbers::new(game.observation().names, args.scale, &reach);
+    let numbers = || NumberBars::new(game.observation().names, args.scale, &reach);
     let film = pictures.unwrap_or_else(|| Film::of_numbers(numbers(), game.tick_hz()));
     let (bytes, size) = if args.episode {
         let bar = progress::bar("draw", steps.len() as u64, "frames");
@@ -136,12 +136,12 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         end: episode_world.end(),
         divergence: episode_world.divergence(),
     };
-    written.tell(args.json)?;
+    written.print(args.json)?;
     match episode_world.divergence() {
         None if interrupt::asked() => Ok(Outcome::Stopped),
         None => Ok(Outcome::Pass),
         Some(divergence) => {
-            tell!("from there on the game differs from the recording: {divergence}");
+            report!("from there on the game differs from the recording: {divergence}");
             Ok(Outcome::Findings)
         }
     }
@@ -175,7 +175,7 @@ fn open_episode(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, C
     game.check_mode(mode)?;
     let chosen = match args.player.load(game)? {
         Some(chosen) => chosen,
-        None => Chosen::usual(game)?,
+        None => LoadedPlayer::default_of(game)?,
     };
     let observation_config = observation_config(game, args, Some(&chosen))?;
     let seed = args.levels.random_seed(args.seed);
@@ -208,7 +208,11 @@ fn can_look_through_camera(game: &dyn Game) -> bool {
 
 /// Returns the form of the pictures: the policy's, or the requested one, or else the game's. Numbers for a game without
 /// pictures.
-fn observation_config(game: &dyn Game, args: &Args, chosen: Option<&Chosen>) -> Result<ObservationConfig, CliError> {
+fn observation_config(
+    game: &dyn Game,
+    args: &Args,
+    chosen: Option<&LoadedPlayer>,
+) -> Result<ObservationConfig, CliError> {
     let own = chosen.map(|chosen| chosen.observation_config).filter(ObservationConfig::is_image);
     let is_asked_for = !args.image.is_empty();
     let kind = if game.tools().pictures.picture().is_some() || is_asked_for && !game.tools().pictures.has_camera() {

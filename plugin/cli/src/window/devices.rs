@@ -221,7 +221,11 @@ fn keep<M: Message + Clone>(mut events: ResMut<Messages<M>>, is_let_through: imp
 
 #[cfg(test)]
 mod tests {
-    use bevy::input::{ButtonState, InputPlugin, keyboard::Key};
+    use bevy::input::{
+        ButtonState, InputPlugin,
+        gamepad::{GamepadConnection, GamepadConnectionEvent},
+        keyboard::Key,
+    };
 
     use super::*;
 
@@ -276,16 +280,6 @@ mod tests {
         assert!(!world.resource::<OwnKeys>().pressed(KeyCode::KeyA));
         assert!(world.resource::<Messages<WindowFocused>>().is_empty(), "the game does not hear of it");
     }
-}
-
-#[cfg(test)]
-mod gamepads_tests {
-    use bevy::input::{
-        InputPlugin,
-        gamepad::{GamepadConnection, GamepadConnectionEvent},
-    };
-
-    use super::*;
 
     /// Input of the next frame, as from a plugin: gamepad and value.
     #[derive(Resource, Default)]

@@ -1,13 +1,6 @@
-//! Errors of opening a window and of running it, its orderly end, and the order of its levels.
+//! Errors of opening a window and of running it.
 
-use bevy::{ecs::schedule::ScheduleLabel, prelude::*, window::WindowCloseRequested};
-use bevy_playbot::{
-    demo::{file::DemoFileError, recorder::flush_unfinished},
-    fault::{Fault, FaultSystems, Faults},
-    systems::PlaybotSystems,
-    vision::VisionError,
-};
-use playbot_harness::prelude::*;
+use bevy_playbot::{demo::file::DemoFileError, fault::Fault, vision::VisionError};
 use playbot_learner::HasExitCode;
 use std::{
     panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
@@ -111,115 +104,6 @@ pub(super) fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     result.map_err(|_| std::mem::take(&mut *words.lock().unwrap_or_else(PoisonError::into_inner)))
 }
 
-// Orderly end: the recording is finished before the window closes.
-
-pub(super) fn build(app: &mut App, stop: fn() -> bool) {
-    app.insert_resource(Ending { asked: false, ended: false, stop })
-        .init_resource::<Verdict>()
-        .add_systems(Last, (hear_close, end).chain().after(PlaybotSystems::Reset).before(FaultSystems));
-}
-
-/// Listens in frames that have no `Last`, too.
-pub(super) fn listen_in(app: &mut App, schedule: impl ScheduleLabel) {
-    app.add_systems(schedule, (hear_close, end).chain());
-}
-
-/// A request to end the window.
-#[derive(Resource, Reflect)]
-#[reflect(Component, from_reflect = false)]
-pub(super) struct Ending {
-    asked: bool,
-    ended: bool,
-    #[reflect(ignore)]
-    stop: fn() -> bool,
-}
-
-impl Ending {
-    /// Asks for the end.
-    pub fn ask(&mut self) {
-        self.asked = true;
-    }
-}
-
-/// The error that ended the window, if it was not closed on purpose. Outlives the World.
-#[derive(Resource, Clone, Default, Reflect)]
-#[reflect(opaque)]
-#[reflect(Resource, Clone)]
-pub(super) struct Verdict(Arc<Mutex<Option<WindowError>>>);
-
-impl Verdict {
-    fn set(&self, error: WindowError) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
-    }
-
-    /// Returns the verdict of an app that has exited.
-    pub fn take(&self, exit: AppExit) -> Result<(), WindowError> {
-        match self.0.lock().unwrap_or_else(PoisonError::into_inner).take() {
-            Some(error) => Err(error),
-            None if exit.is_error() => Err(WindowError::Lost("the display was closed".to_owned())),
-            None => Ok(()),
-        }
-    }
-}
-
-fn hear_close(mut closes: MessageReader<WindowCloseRequested>, mut ending: ResMut<Ending>) {
-    if closes.read().count() > 0 || (ending.stop)() {
-        ending.asked = true;
-    }
-}
-
-fn end(world: &mut World) {
-    let verdict = world.resource::<Verdict>().clone();
-    let fault = world.resource_mut::<Faults>().take();
-    let mut ending = world.resource_mut::<Ending>();
-    if ending.ended || (fault.is_ok() && !ending.asked) {
-        return;
-    }
-    ending.ended = true;
-    if let Err(fault) = fault {
-        verdict.set(fault.into());
-    }
-    if let Err(error) = flush_unfinished(world) {
-        verdict.set(error.into());
-    }
-    world.write_message(AppExit::Success);
-}
-
-// Order of the levels in a window.
-
-/// The levels of a session. A won level is followed by the next, a lost one comes again, and the first follows the
-/// last.
-#[derive(Resource, Clone, Debug, Reflect)]
-#[reflect(opaque)]
-#[reflect(Resource, Clone, Debug)]
-pub struct Playlist {
-    levels: LevelSplit,
-    current: u64,
-}
-
-impl Playlist {
-    /// Takes levels, and the first one to play.
-    pub fn new(levels: LevelSplit, first: u64) -> Self {
-        let current = first.clamp(levels.first, levels.last);
-        Self { levels, current }
-    }
-
-    /// Returns the mode of the levels.
-    pub fn mode(&self) -> &str {
-        &self.levels.mode
-    }
-
-    /// Goes on to the next level.
-    pub(super) fn advance(&mut self) {
-        self.current = if self.current == self.levels.last { self.levels.first } else { self.current + 1 };
-    }
-
-    /// Returns the current level, as an agent's queue.
-    pub(super) fn queue(&self) -> LevelQueue {
-        LevelQueue::Always(self.current)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -238,21 +122,5 @@ mod tests {
             let error = WindowError::of_panic(words.to_owned()).to_string();
             assert!(error.contains(kind), "{error}");
         }
-    }
-}
-
-#[cfg(test)]
-mod playlist_tests {
-    use super::*;
-
-    #[test]
-    fn after_the_last_level_comes_the_first() {
-        let mut playlist = Playlist::new("hard:3..5".parse().expect("a split"), 4);
-        let mut levels = Vec::new();
-        for _ in 0..4 {
-            levels.push(playlist.current);
-            playlist.advance();
-        }
-        assert_eq!(levels, [4, 5, 3, 4]);
     }
 }

@@ -6,7 +6,7 @@
 use crate::window::{
     devices,
     devices::Devices,
-    error, keys,
+    ending, keys,
     seats::{OwnKeys, Seats},
     title,
     title::Pace,
@@ -58,7 +58,7 @@ pub(super) fn build(app: &mut App, game: &'static str, hz: f64) {
         .add_systems(WindowStart, keys::systems())
         .add_systems(StandStill, title::show)
         .add_systems(WindowFrame, run_frame);
-    error::listen_in(app, StandStill);
+    ending::listen_in(app, StandStill);
     title::build(app, game, WindowEnd);
     let decide = TickSchedules::of(app).decide;
     app.add_systems(decide, decide_by_hand.in_set(PlaybotSystems::Decide));
@@ -121,8 +121,6 @@ fn decide_by_hand(keys: Res<OwnKeys>, mut agents: Query<(&Control, &KeyBindings,
     }
 }
 
-// Replay of an episode before the person plays.
-
 /// Hands the agent over to a recorded episode.
 pub(super) fn build_replayed(app: &mut App, agent: Entity, episode: DemoEpisode) {
     let judge = TickSchedules::of(app).judge;
@@ -140,7 +138,7 @@ fn hand_over(mut agents: Query<(&mut Control, &Replay)>) {
 }
 
 #[cfg(test)]
-mod replayed_tests {
+mod tests {
     use bevy_playbot::demo::file::{Decider, DemoActions, EpisodeActions};
 
     use super::*;

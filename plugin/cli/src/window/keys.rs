@@ -3,7 +3,7 @@
 use crate::window::{
     Playlist,
     camera::Zoom,
-    error::Ending,
+    ending::Ending,
     seats::{OwnKeys, OwnKeysRead, Seats},
     title::{Notice, Pace},
 };

@@ -1,9 +1,6 @@
 //! The window's title: level, tick, decider and state of the game.
 
-use crate::window::{
-    Playlist,
-    seats::{LastEpisode, Seats},
-};
+use crate::window::{Playlist, playlist::LastEpisode, seats::Seats};
 use bevy::{
     app::{RunFixedMainLoop, RunFixedMainLoopSystems},
     ecs::schedule::ScheduleLabel,

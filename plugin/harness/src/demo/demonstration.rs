@@ -114,9 +114,8 @@ impl DemonstrationPlan {
     }
 }
 
-// Noise on the actions of a recorded player, so that recordings also show how to recover.
-
-/// Replaces some of an agent's actions, or adds noise to them, for any controller.
+/// Replaces some of an agent's actions, or adds noise to them, for any controller: recordings then also show how to
+/// recover.
 #[derive(Component, Clone, Debug, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug)]

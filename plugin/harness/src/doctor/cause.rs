@@ -1,6 +1,6 @@
 //! Common causes of a difference, and advice.
 
-use crate::doctor::{Comparison, Difference, DifferenceKind};
+use crate::doctor::{DifferenceKind, DoctorComparison, DoctorDifference};
 use serde::Serialize;
 
 /// A common cause.
@@ -100,20 +100,20 @@ pub struct Cause {
 /// Returns the causes that fit a difference, likeliest first. The comparison that differs matters most. Among several
 /// causes, the types in the game decide.
 pub(super) fn causes(
-    comparison: Comparison,
-    difference: Option<&Difference>,
+    comparison: DoctorComparison,
+    difference: Option<&DoctorDifference>,
     suspicions: &[(CauseKind, String)],
 ) -> Vec<Cause> {
     let kinds: &[CauseKind] = match comparison {
-        Comparison::Repeat => &[CauseKind::Randomness, CauseKind::HashOrder, CauseKind::WallClock],
-        Comparison::Clock => &[CauseKind::WallClock],
-        Comparison::Archetypes => &[CauseKind::ArchetypeOrder],
-        Comparison::Threads => &[CauseKind::ThreadState],
-        Comparison::Arenas => &[CauseKind::SharedByArenas],
-        Comparison::Restart => &[CauseKind::SurvivesRestart],
+        DoctorComparison::Repeat => &[CauseKind::Randomness, CauseKind::HashOrder, CauseKind::WallClock],
+        DoctorComparison::Clock => &[CauseKind::WallClock],
+        DoctorComparison::Archetypes => &[CauseKind::ArchetypeOrder],
+        DoctorComparison::Threads => &[CauseKind::ThreadState],
+        DoctorComparison::Arenas => &[CauseKind::SharedByArenas],
+        DoctorComparison::Restart => &[CauseKind::SurvivesRestart],
     };
     let counts_differ = difference.is_some_and(|difference| difference.kind == DifferenceKind::Entities);
-    let is_of_loading = counts_differ && matches!(comparison, Comparison::Repeat | Comparison::Threads);
+    let is_of_loading = counts_differ && matches!(comparison, DoctorComparison::Repeat | DoctorComparison::Threads);
     let all = kinds.iter().copied().chain(is_of_loading.then_some(CauseKind::Loading));
     let mut causes: Vec<_> = all
         .map(|kind| {
@@ -129,17 +129,17 @@ pub(super) fn causes(
 mod tests {
     use super::*;
 
-    fn kinds(comparison: Comparison, suspicions: &[(CauseKind, String)]) -> Vec<CauseKind> {
+    fn kinds(comparison: DoctorComparison, suspicions: &[(CauseKind, String)]) -> Vec<CauseKind> {
         causes(comparison, None, suspicions).into_iter().map(|cause| cause.kind).collect()
     }
 
     #[test]
     fn the_comparison_that_differs_tells_causes_apart() {
-        assert_eq!(kinds(Comparison::Clock, &[]), [CauseKind::WallClock]);
-        assert_eq!(kinds(Comparison::Archetypes, &[]), [CauseKind::ArchetypeOrder]);
-        assert_eq!(kinds(Comparison::Arenas, &[]), [CauseKind::SharedByArenas]);
-        assert_eq!(kinds(Comparison::Restart, &[]), [CauseKind::SurvivesRestart]);
-        assert_eq!(kinds(Comparison::Repeat, &[])[0], CauseKind::Randomness);
+        assert_eq!(kinds(DoctorComparison::Clock, &[]), [CauseKind::WallClock]);
+        assert_eq!(kinds(DoctorComparison::Archetypes, &[]), [CauseKind::ArchetypeOrder]);
+        assert_eq!(kinds(DoctorComparison::Arenas, &[]), [CauseKind::SharedByArenas]);
+        assert_eq!(kinds(DoctorComparison::Restart, &[]), [CauseKind::SurvivesRestart]);
+        assert_eq!(kinds(DoctorComparison::Repeat, &[])[0], CauseKind::Randomness);
     }
 
     #[test]
@@ -153,6 +153,6 @@ mod tests {
     #[test]
     fn what_the_game_holds_comes_first() {
         let suspicions = [(CauseKind::HashOrder, "`Bag.0` is a `HashMap`".to_owned())];
-        assert_eq!(kinds(Comparison::Repeat, &suspicions)[0], CauseKind::HashOrder);
+        assert_eq!(kinds(DoctorComparison::Repeat, &suspicions)[0], CauseKind::HashOrder);
     }
 }

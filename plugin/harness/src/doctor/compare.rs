@@ -3,7 +3,7 @@
 use crate::{
     doctor,
     doctor::{
-        Comparison, Difference, DifferenceKind,
+        DifferenceKind, DoctorComparison, DoctorDifference,
         field::{FieldComparison, FieldDifference, each_entity},
         game_copy::{GameCopy, GroupKey, Groups, KnownType, KnownTypes, types_of},
     },
@@ -23,7 +23,7 @@ use std::{
 /// The settings of a comparison.
 pub(super) struct Comparer<'a> {
     pub known_types: &'a KnownTypes,
-    pub comparison: Comparison,
+    pub comparison: DoctorComparison,
     /// Parts of type paths that are ignored.
     pub ignored: &'a [String],
     /// Types of fields that could not be compared.
@@ -33,7 +33,7 @@ pub(super) struct Comparer<'a> {
 /// The differences after a tick.
 #[derive(Default)]
 pub(super) struct Found {
-    pub differences: Vec<Difference>,
+    pub differences: Vec<DoctorDifference>,
     pub unmatched: usize,
 }
 
@@ -72,8 +72,8 @@ impl Comparer<'_> {
         }
         // After a restart, a surplus of entities is itself the cause, so it comes early. In other comparisons it is the
         // effect of another difference, and comes last.
-        let is_cause = self.comparison == Comparison::Restart;
-        let rank = |difference: &Difference| match difference.kind {
+        let is_cause = self.comparison == DoctorComparison::Restart;
+        let rank = |difference: &DoctorDifference| match difference.kind {
             DifferenceKind::Entities => (false, if is_cause { 1 } else { 3 }),
             DifferenceKind::Resource => (doctor::is_engine(&difference.name), 0),
             _ => (doctor::is_engine(&difference.name), 2),
@@ -84,7 +84,7 @@ impl Comparer<'_> {
 
     /// Returns whether entities of one kind may have another order.
     fn is_loose(&self) -> bool {
-        matches!(self.comparison, Comparison::Archetypes | Comparison::Restart | Comparison::Arenas)
+        matches!(self.comparison, DoctorComparison::Archetypes | DoctorComparison::Restart | DoctorComparison::Arenas)
     }
 
     fn is_wanted(&self, known: &KnownType) -> bool {
@@ -103,7 +103,7 @@ impl Comparer<'_> {
         found: &mut Found,
     ) {
         // Lists in resources contain both agents of a shared World, so the second one has another index than alone.
-        if self.comparison == Comparison::Arenas && left.number(0) != right.number(0) {
+        if self.comparison == DoctorComparison::Arenas && left.number(0) != right.number(0) {
             return;
         }
         let (lefts, rights) = (self.resources(left), self.resources(right));
@@ -115,7 +115,7 @@ impl Comparer<'_> {
                 (Some(&a), Some(&b)) => self.field(known, (&left.world, a), (&right.world, b), same_entity),
                 (a, b) => presence(a.is_some(), b.is_some()),
             };
-            found.differences.extend(difference.map(|field| Difference {
+            found.differences.extend(difference.map(|field| DoctorDifference {
                 tick,
                 kind: DifferenceKind::Resource,
                 name,
@@ -147,7 +147,7 @@ impl Comparer<'_> {
         let mut comparison = FieldComparison {
             same_entity,
             handles: !self.is_loose(),
-            right_may_hold_more: self.comparison == Comparison::Arenas,
+            right_may_hold_more: self.comparison == DoctorComparison::Arenas,
             incomparable: &mut self.incomparable,
         };
         comparison.first(a.as_partial_reflect(), b.as_partial_reflect())
@@ -160,13 +160,13 @@ impl Comparer<'_> {
         tick: u32,
         group: &Pairs,
         same_entity: &dyn Fn(Entity, Entity) -> bool,
-    ) -> Vec<Difference> {
+    ) -> Vec<DoctorDifference> {
         let mut differences = Vec::new();
         for (place, (&a, &b)) in group.left.iter().zip(&group.right).enumerate() {
             for (name, field) in self.components(left, a, right, b, same_entity) {
                 let entity = self.describe(group, place, a);
                 let (kind, FieldDifference { path, left, right }) = (DifferenceKind::Component, field);
-                differences.push(Difference { tick, kind, name, entity: Some(entity), field: path, left, right });
+                differences.push(DoctorDifference { tick, kind, name, entity: Some(entity), field: path, left, right });
             }
         }
         let in_another_order =
@@ -219,8 +219,6 @@ fn presence(left: bool, right: bool) -> Option<FieldDifference> {
     (left != right).then(|| FieldDifference { path: String::new(), left: word(left), right: word(right) })
 }
 
-// The pairs of corresponding entities in two copies.
-
 /// Entities of one kind, pair by pair.
 pub(super) struct Pairs {
     pub key: GroupKey,
@@ -233,7 +231,7 @@ impl Comparer<'_> {
     pub(super) fn pair_up(&self, left: &GameCopy, right: &GameCopy, tick: u32, found: &mut Found) -> Vec<Pairs> {
         let lefts = left.census.groups(&left.world, self.known_types);
         let mut rights = right.census.groups(&right.world, self.known_types);
-        if self.comparison == Comparison::Arenas {
+        if self.comparison == DoctorComparison::Arenas {
             return self.pair_with_share(left, right, lefts, &rights, found);
         }
         let mut pairs = Vec::new();
@@ -271,12 +269,12 @@ impl Comparer<'_> {
         pairs
     }
 
-    fn of_counts(&self, key: &GroupKey, left: usize, right: usize, tick: u32) -> Option<Difference> {
+    fn of_counts(&self, key: &GroupKey, left: usize, right: usize, tick: u32) -> Option<DoctorDifference> {
         let ignored = |id: &TypeId| {
             let path = self.known_types.get(*id).and_then(|known| known.path.as_deref()).unwrap_or_default();
             self.ignored.iter().any(|part| path.contains(part.as_str()))
         };
-        (!key.types.iter().any(ignored)).then(|| Difference {
+        (!key.types.iter().any(ignored)).then(|| DoctorDifference {
             tick,
             kind: DifferenceKind::Entities,
             name: self.describe_kind(key),
@@ -311,7 +309,7 @@ impl Comparer<'_> {
     }
 }
 
-// The assignment of entities to agents, in a World with several arenas.
+// Entities of each agent, in a World with several arenas.
 
 /// The number of the agent that an entity is tied to, or `None` if several are.
 pub(super) type Owners = EntityHashMap<Option<u32>>;
@@ -371,7 +369,7 @@ pub(super) fn share_of(owners: &Owners, number: u32, wanted: usize, all: &[Entit
 }
 
 #[cfg(test)]
-mod arenas_tests {
+mod tests {
     use super::*;
 
     fn entities(count: u32) -> Vec<Entity> {

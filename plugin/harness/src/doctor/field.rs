@@ -135,7 +135,7 @@ impl FieldComparison<'_> {
     }
 }
 
-// Reflected values: their text, their equality, and the entities that they name.
+// Reflected values.
 
 /// Most characters of a value in a report.
 const LONGEST: usize = 96;

@@ -29,21 +29,6 @@ use std::{
     collections::{BTreeMap, BTreeSet},
 };
 
-/// Ends of episodes in this tick.
-#[derive(Resource, Default, Reflect)]
-#[reflect(Resource)]
-struct Ends(Vec<(Entity, EpisodeEnd)>);
-
-/// An agent's observation, reward and end in a tick.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Outcome {
-    pub observation: Vec<f32>,
-    pub image: Vec<u8>,
-    pub reward: f32,
-    pub hash: u64,
-    pub end: Option<EpisodeEnd>,
-}
-
 /// A World with its agents.
 pub(super) struct GameCopy {
     pub world: World,
@@ -55,15 +40,6 @@ pub(super) struct GameCopy {
     space: ActionSpace,
     scripts: Vec<AgentStreams>,
     in_prelude: bool,
-}
-
-/// The game, mode and level that are played.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Plan<'a> {
-    pub mode: &'a str,
-    pub level: u64,
-    /// Random seed of the World and of the actions.
-    pub seed: u64,
 }
 
 impl GameCopy {
@@ -154,6 +130,30 @@ impl GameCopy {
     }
 }
 
+/// The game, mode and level that are played.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Plan<'a> {
+    pub mode: &'a str,
+    pub level: u64,
+    /// Random seed of the World and of the actions.
+    pub seed: u64,
+}
+
+/// An agent's observation, reward and end in a tick.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Outcome {
+    pub observation: Vec<f32>,
+    pub image: Vec<u8>,
+    pub reward: f32,
+    pub hash: u64,
+    pub end: Option<EpisodeEnd>,
+}
+
+/// Ends of episodes in this tick.
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource)]
+struct Ends(Vec<(Entity, EpisodeEnd)>);
+
 /// Adds the examination's own systems and components.
 fn prepare(world: &mut World) {
     Renewal::set_up(world, |world| {
@@ -170,7 +170,7 @@ pub(super) fn bare_world() -> World {
     world
 }
 
-// The game's entities, in the order in which they were spawned.
+// Entities of the game, in the order in which they were spawned.
 
 /// The key by which entities of two Worlds are matched: the name, and the game's own components. Components of the
 /// engine come and go with the loading of files.
@@ -260,7 +260,7 @@ pub(super) fn types_of(world: &World, components: &[bevy::ecs::component::Compon
     types
 }
 
-// The types of components and resources that are compared.
+// Types of components and resources that are compared.
 
 /// The types of the game, by whether they could be compared.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -403,7 +403,7 @@ fn suspicions(registration: &TypeRegistration) -> Vec<(CauseKind, String)> {
     found.collect()
 }
 
-// More archetypes in a World, to reveal games that depend on the order of archetypes.
+// Additional archetypes, to reveal games that depend on their order.
 
 /// Copies with other numbers of archetypes. One of several shows a difference that another may hide by chance.
 pub(super) const VARIANTS: u32 = 7;
@@ -443,7 +443,7 @@ fn add_archetype(world: &mut World, kinds: u32) {
     entity.despawn();
 }
 
-// A slower real-time clock, to reveal games that read it.
+// Slower real-time clock, to reveal games that read it.
 
 /// `Time<Real>` before this frame, and whether it runs slower in this World.
 #[derive(Resource, Reflect)]
@@ -491,8 +491,9 @@ fn slow(mut real: ResMut<Time<Real>>, clock: Res<WallClock>, mut frame: Local<u3
 }
 
 #[cfg(test)]
-mod census_tests {
+mod tests {
     use super::*;
+    use bevy_playbot::headless::{headless_app, into_world, tick_world};
 
     #[derive(Component)]
     struct Brick;
@@ -524,11 +525,6 @@ mod census_tests {
         census.update(&world);
         assert_eq!(order(&world, &census), [brick]);
     }
-}
-
-#[cfg(test)]
-mod archetypes_tests {
-    use super::*;
 
     #[test]
     fn each_number_makes_another_archetype() {
@@ -537,13 +533,6 @@ mod archetypes_tests {
         add_archetypes(&mut world, 7);
         assert_eq!(world.archetypes().len(), before + 7);
     }
-}
-
-#[cfg(test)]
-mod slow_clock_tests {
-    use bevy_playbot::headless::{headless_app, into_world, tick_world};
-
-    use super::*;
 
     /// A World with the normal clock and one with the slow one, after five ticks.
     fn ticked() -> [World; 2] {

@@ -1,6 +1,6 @@
 //! The observations of agents: values that are not numbers, that are sometimes missing, or that never change.
 
-use crate::doctor::{Comparison, ComparisonReport, game_copy::Outcome};
+use crate::doctor::{ComparisonReport, DoctorComparison, game_copy::Outcome};
 use serde::Serialize;
 
 /// A value that never changed while it was watched.
@@ -99,7 +99,7 @@ impl ObservationReport {
     }
 }
 
-// The uses that a game is safe for.
+// Uses that a game is safe for.
 
 /// Whether the game is safe for a use, as far as a few ticks can show.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -109,7 +109,7 @@ pub struct Verdict {
     /// The reason, or the condition.
     pub why: String,
     /// The comparisons behind it: the game is safe if they found no difference in their ticks.
-    pub comparisons: Vec<Comparison>,
+    pub comparisons: Vec<DoctorComparison>,
 }
 
 /// The uses that the game is safe for.
@@ -142,9 +142,9 @@ impl Safety {
 
 /// Judges the uses by the results of the comparisons.
 pub(super) fn assess_safety(comparisons: &[ComparisonReport], observation: &ObservationReport) -> Safety {
-    let verdict = |needed: &[Comparison]| verdict(comparisons, needed);
-    let mut resume = verdict(&[Comparison::Repeat, Comparison::Restart]);
-    let mut recording = verdict(&[Comparison::Repeat, Comparison::Archetypes, Comparison::Restart]);
+    let verdict = |needed: &[DoctorComparison]| verdict(comparisons, needed);
+    let mut resume = verdict(&[DoctorComparison::Repeat, DoctorComparison::Restart]);
+    let mut recording = verdict(&[DoctorComparison::Repeat, DoctorComparison::Archetypes, DoctorComparison::Restart]);
     for verdict in [&mut recording, &mut resume] {
         if verdict.safe == Some(true) && !observation.state_hash {
             verdict.why = "but the game writes no StateHash, so that a replay compares little".to_owned();
@@ -153,14 +153,14 @@ pub(super) fn assess_safety(comparisons: &[ComparisonReport], observation: &Obse
     Safety {
         recording,
         resume,
-        arenas: verdict(&[Comparison::Repeat, Comparison::Arenas]),
-        threads: verdict(&[Comparison::Repeat, Comparison::Threads]),
-        window: verdict(&[Comparison::Repeat, Comparison::Clock, Comparison::Archetypes]),
+        arenas: verdict(&[DoctorComparison::Repeat, DoctorComparison::Arenas]),
+        threads: verdict(&[DoctorComparison::Repeat, DoctorComparison::Threads]),
+        window: verdict(&[DoctorComparison::Repeat, DoctorComparison::Clock, DoctorComparison::Archetypes]),
     }
 }
 
 /// Returns safe if all these comparisons found nothing, unsafe if one of them did.
-fn verdict(reports: &[ComparisonReport], needed: &[Comparison]) -> Verdict {
+fn verdict(reports: &[ComparisonReport], needed: &[DoctorComparison]) -> Verdict {
     let comparisons = needed.to_vec();
     let mut of_needed = reports.iter().filter(|report| needed.contains(&report.comparison));
     if let Some(bad) = of_needed.clone().find(|report| report.same() == Some(false)) {

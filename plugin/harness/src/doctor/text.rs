@@ -1,7 +1,7 @@
 //! The report for people.
 
 use crate::doctor::{
-    Comparison, ComparisonReport, Difference, DoctorReport, Finding,
+    ComparisonReport, DoctorComparison, DoctorDifference, DoctorFinding, DoctorReport,
     game_copy::TypesReport,
     observed::{NonFiniteValue, ObservationReport, Verdict},
 };
@@ -59,7 +59,7 @@ impl DoctorReport {
         Ok(())
     }
 
-    fn write_finding(&self, f: &mut Formatter<'_>, number: usize, finding: &Finding) -> fmt::Result {
+    fn write_finding(&self, f: &mut Formatter<'_>, number: usize, finding: &DoctorFinding) -> fmt::Result {
         writeln!(f, "{number}. {}", finding.what)?;
         let report = finding.comparison.and_then(|comparison| self.of(comparison));
         if let (Some(difference), Some(report)) = (&finding.difference, report) {
@@ -110,20 +110,21 @@ fn in_words(verdict: &Verdict) -> String {
         None => format!("not compared: {why}"),
         Some(false) => format!("NO: {why}"),
         Some(true) => {
-            let compared: Vec<_> = comparisons.iter().map(|comparison: &Comparison| comparison.describe()).collect();
+            let compared: Vec<_> =
+                comparisons.iter().map(|comparison: &DoctorComparison| comparison.describe()).collect();
             let but = if why.is_empty() { String::new() } else { format!("; {why}") };
             format!("yes (compared: {}){but}", compared.join(", "))
         }
     }
 }
 
-fn in_one_line(difference: &Difference) -> String {
-    let Difference { name, entity, field, left, right, .. } = difference;
+fn in_one_line(difference: &DoctorDifference) -> String {
+    let DoctorDifference { name, entity, field, left, right, .. } = difference;
     let of = entity.as_ref().map_or_else(String::new, |entity| format!(" of {entity}"));
     format!("`{name}{field}`{of}: {left} against {right}")
 }
 
-// The report's lists of observations and of types.
+// Lists of observations and of types.
 
 /// Most lines of one list; a longer one ends with the number of further lines.
 const LISTED: usize = 8;
@@ -184,7 +185,7 @@ fn write_list(f: &mut Formatter<'_>, indent: &str, lines: impl ExactSizeIterator
 }
 
 #[cfg(test)]
-mod listing_tests {
+mod tests {
     use super::*;
     use crate::doctor::observed::ConstantValue;
 

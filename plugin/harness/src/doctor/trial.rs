@@ -2,7 +2,7 @@
 
 use crate::{
     doctor::{
-        Comparison, ComparisonReport, Difference, DifferenceKind,
+        ComparisonReport, DifferenceKind, DoctorComparison, DoctorDifference,
         compare::Comparer,
         game_copy::{GameCopy, KnownTypes, Outcome, Plan, VARIANTS, add_archetypes, add_wall_clock},
         observed::ObservationMonitor,
@@ -16,7 +16,7 @@ const OTHERS: usize = 5;
 
 /// Copies of a game that are compared.
 pub(super) struct Trial {
-    comparison: Comparison,
+    comparison: DoctorComparison,
     /// The copies. The observations of the first one are monitored.
     pub copies: Vec<GameCopy>,
     /// Indices of the copies that are compared with each other.
@@ -27,28 +27,30 @@ pub(super) struct Trial {
 
 impl Trial {
     /// Builds the copies.
-    pub fn new(comparison: Comparison, game: &dyn Game, plan: &Plan, ticks: u32) -> Self {
+    pub fn new(comparison: DoctorComparison, game: &dyn Game, plan: &Plan, ticks: u32) -> Self {
         let one = |number: u32| GameCopy::new(game, plan, number, 1);
         let (mut copies, pairs) = match comparison {
-            Comparison::Repeat | Comparison::Clock | Comparison::Restart => (vec![one(0), one(0)], vec![(0, 1)]),
-            Comparison::Archetypes => {
+            DoctorComparison::Repeat | DoctorComparison::Clock | DoctorComparison::Restart => {
+                (vec![one(0), one(0)], vec![(0, 1)])
+            }
+            DoctorComparison::Archetypes => {
                 ((0..=VARIANTS).map(|_| one(0)).collect(), (1..=VARIANTS as usize).map(|right| (0, right)).collect())
             }
-            Comparison::Threads => (vec![one(0), one(0), one(0)], vec![(0, 1), (0, 2)]),
-            Comparison::Arenas => (vec![one(0), one(1), GameCopy::new(game, plan, 0, 2)], vec![(0, 2), (1, 2)]),
+            DoctorComparison::Threads => (vec![one(0), one(0), one(0)], vec![(0, 1), (0, 2)]),
+            DoctorComparison::Arenas => (vec![one(0), one(1), GameCopy::new(game, plan, 0, 2)], vec![(0, 2), (1, 2)]),
         };
         match comparison {
             // Both get the same resource and systems, so that they differ in the clock alone.
-            Comparison::Clock => {
+            DoctorComparison::Clock => {
                 copies.iter_mut().zip([false, true]).for_each(|(copy, slow)| add_wall_clock(&mut copy.world, slow));
             }
-            Comparison::Archetypes => {
+            DoctorComparison::Archetypes => {
                 copies.iter_mut().zip(0..).for_each(|(copy, count)| add_archetypes(&mut copy.world, count));
             }
-            Comparison::Restart => copies[1].play_prelude(ticks),
+            DoctorComparison::Restart => copies[1].play_prelude(ticks),
             _ => {}
         }
-        let on_threads = if comparison == Comparison::Threads { 2 } else { 0 };
+        let on_threads = if comparison == DoctorComparison::Threads { 2 } else { 0 };
         Self { comparison, copies, pairs, on_threads }
     }
 
@@ -96,7 +98,7 @@ impl Trial {
                 report.effect = pairs.find_map(|&(left, right)| effect(&self.copies[left], &self.copies[right], tick));
             }
         }
-        if self.comparison == Comparison::Archetypes && report.effect.is_none() {
+        if self.comparison == DoctorComparison::Archetypes && report.effect.is_none() {
             report.first = None;
             report.others.clear();
         }
@@ -132,12 +134,12 @@ pub(super) struct TrialResult {
 }
 
 /// Returns the first difference in the observation, reward or end of the left copy's agent and its double on the right.
-fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<Difference> {
+fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<DoctorDifference> {
     let number = left.number(0);
     let double = (0..right.agents.len()).find(|&agent| right.number(agent) == number)?;
     let differs = |kind, name: &str, left: String, right: String| {
         let (name, entity, field) = (name.to_owned(), Some(format!("agent {number}")), String::new());
-        Difference { tick, kind, name, entity, field, left, right }
+        DoctorDifference { tick, kind, name, entity, field, left, right }
     };
     first_of_outcomes(&left.outcome(0), &right.outcome(double), &left.observed_names(), differs)
 }
@@ -147,8 +149,8 @@ fn first_of_outcomes(
     a: &Outcome,
     b: &Outcome,
     names: &[String],
-    differs: impl Fn(DifferenceKind, &str, String, String) -> Difference,
-) -> Option<Difference> {
+    differs: impl Fn(DifferenceKind, &str, String, String) -> DoctorDifference,
+) -> Option<DoctorDifference> {
     let differs = |kind, name: &str, left, right| Some(differs(kind, name, left, right));
     let same = |a: &f32, b: &f32| a.to_bits() == b.to_bits();
     if let Some(at) = a.observation.iter().zip(&b.observation).position(|(a, b)| !same(a, b)) {

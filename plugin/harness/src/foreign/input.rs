@@ -136,8 +136,6 @@ pub(super) fn act(world: &mut World) {
     });
 }
 
-// The scripted bot of a foreign game.
-
 /// Marks an agent that the game's demonstrator plays while its control is [`Control::Bot`].
 #[derive(Component, Clone, Copy, Debug, Reflect)]
 #[reflect(Component)]

@@ -13,7 +13,8 @@ use bevy_playbot::{
     vision::VisionSystems,
 };
 
-pub(super) fn build(app: &mut App) {
+/// Adds the system that reads the observation.
+pub(super) fn add_observation(app: &mut App) {
     app.add_systems(ObserveSchedule, observe.before(VisionSystems::Sync));
 }
 
@@ -46,15 +47,13 @@ pub(super) fn observe(world: &mut World) {
     }
 }
 
-// The position of a foreign game's agent.
-
 /// Position of the agent on its level's plan. Missing while it is unknown.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
-pub(super) struct ForeignPlace(pub(super) Vec2);
+pub(super) struct ForeignPosition(pub(super) Vec2);
 
 /// Adds the systems that read the position: before each tick, so that the start of an episode is known, and after it.
-pub(super) fn build_place(app: &mut App) {
+pub(super) fn add_position(app: &mut App) {
     let judge = TickSchedules::of(app).judge;
     app.add_systems(ObserveSchedule, locate.before(observe).before(VisionSystems::Sync))
         .add_systems(judge, locate.before(read_outcome).before(PlaybotSystems::Judge).run_if(is_tick));
@@ -62,17 +61,15 @@ pub(super) fn build_place(app: &mut App) {
 
 fn locate(world: &mut World) {
     let Some(agent) = playing_agent(world) else { return };
-    let place = with_foreign(world, agent, |world, foreign| match &mut foreign.place {
+    let position = with_foreign(world, agent, |world, foreign| match &mut foreign.position {
         Some(system) => system.run(world),
         None => Ok(None),
     });
-    match place.flatten() {
-        Some(place) => world.entity_mut(agent).insert(ForeignPlace(place)),
-        None => world.entity_mut(agent).remove::<ForeignPlace>(),
+    match position.flatten() {
+        Some(position) => world.entity_mut(agent).insert(ForeignPosition(position)),
+        None => world.entity_mut(agent).remove::<ForeignPosition>(),
     };
 }
-
-// Reward and end of a tick, read from the game's state.
 
 /// Reads reward and end, after the game's frame.
 pub(super) fn read_outcome(world: &mut World) {
@@ -114,8 +111,6 @@ pub(super) fn read_outcome(world: &mut World) {
     }
 }
 
-// The default state hash of a foreign game.
-
 /// Returns a hash of the transforms of all entities of the game. The ids of entities and their order in memory do not
 /// matter.
 pub(super) fn of_transforms(world: &World, baseline: &Baseline) -> u64 {
@@ -140,7 +135,7 @@ pub(super) fn with_agent(state: u64, observation: Option<&Observation>, reward: 
 }
 
 #[cfg(test)]
-mod place_tests {
+mod tests {
     use super::*;
     use crate::{
         floor_plan::FloorPlan,
@@ -163,7 +158,7 @@ mod place_tests {
         ForeignGame::new("snail", 1, game)
             .keys([vec![], vec![KeyCode::Space]])
             .observe(["x"], |at: Single<&Transform, With<Snail>>| [at.translation.x])
-            .place(|at: Single<&Transform, With<Snail>>| at.translation.truncate())
+            .position(|at: Single<&Transform, With<Snail>>| at.translation.truncate())
             .plan(|level| FloorPlan { goal: Vec2::new(level as f32, 0.0), ..FloorPlan::default() })
             .levels(3)
             .time_limit(3)
@@ -171,22 +166,22 @@ mod place_tests {
     }
 
     #[test]
-    fn places_are_known_after_each_tick_and_begin_anew_with_each_episode() {
+    fn positions_are_known_after_each_tick_and_begin_anew_with_each_episode() {
         let game = snail();
         let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
         let agent = agents[0];
         assert_eq!(game.tools().state.position(&world, agent), None, "nothing is played");
         world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, LevelQueue::list([7, 8])));
-        let mut places = Vec::new();
+        let mut positions = Vec::new();
         for _ in 0..20 {
             world.tick().expect("sound");
             if Control::of(&world, agent).is_active() {
-                places.extend(game.tools().state.position(&world, agent).map(|place| place.x));
+                positions.extend(game.tools().state.position(&world, agent).map(|position| position.x));
             }
         }
-        let episodes: Vec<&[f32]> = places.chunk_by(|one, next| one <= next).collect();
+        let episodes: Vec<&[f32]> = positions.chunk_by(|one, next| one <= next).collect();
         // Two frames pass before the first tick.
-        assert_eq!(episodes, [[4.0, 5.0, 6.0]; 2], "{places:?}");
+        assert_eq!(episodes, [[4.0, 5.0, 6.0]; 2], "{positions:?}");
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The start of an episode.
 
 use crate::foreign::{
-    observe::ForeignPlace,
+    observe::ForeignPosition,
     runtime::{Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agent, with_foreign},
 };
 use bevy::prelude::*;
@@ -21,7 +21,7 @@ pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, 
 
 fn begin(world: &mut World, agent: Entity, level: u64) {
     // The last position of the previous episode is stale.
-    world.entity_mut(agent).remove::<ForeignPlace>();
+    world.entity_mut(agent).remove::<ForeignPosition>();
     with_foreign(world, agent, |world, foreign| {
         world.insert_resource(LevelSeed(foreign.level_of(level)));
         restart(world, foreign)?;
@@ -135,8 +135,6 @@ pub(super) fn leave_loading_out(world: &mut World) {
         *clock = fresh.as_generic();
     }
 }
-
-// The loading of a level before its first tick.
 
 /// Checks whether the level is ready. Each restart gets one frame to settle: commands, states and transforms.
 pub(super) fn check(world: &mut World) {

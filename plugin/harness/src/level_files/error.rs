@@ -178,7 +178,7 @@ pub fn read_json<T: DeserializeOwned>(text: &str) -> Result<T, LevelTextError> {
     })
 }
 
-// Line numbers of the values of a JSON text.
+// Line numbers in a JSON text.
 
 /// A step from a value of a JSON text to one inside it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -310,34 +310,34 @@ impl<'a> Scanner<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use JsonStep::{Index, Key};
 
     #[test]
-    fn what_is_wrong_with_a_file_is_told_with_its_line() {
-        let told = |error| LevelFileError::Text { path: "a.json".to_owned(), error }.to_string();
+    fn what_is_wrong_with_a_file_is_reported_with_its_line() {
+        let reported = |error| LevelFileError::Text { path: "a.json".to_owned(), error }.to_string();
         let text = "{\n  \"rows\": [\n    \"##\",\n    \"#?\"\n  ]\n}";
         let row = LevelTextError::at(text, &[JsonStep::Key("rows"), JsonStep::Index(1)], "unknown letter `?`");
-        assert_eq!(told(row), "a.json, line 4: unknown letter `?`");
-        assert_eq!(told(LevelTextError::whole("no levels here")), "a.json: no levels here");
+        assert_eq!(reported(row), "a.json, line 4: unknown letter `?`");
+        assert_eq!(reported(LevelTextError::whole("no levels here")), "a.json: no levels here");
     }
 
     #[test]
     fn of_several_broken_files_a_few_are_named() {
-        let told = |count: usize| {
+        let reported = |count: usize| {
             let error = LevelTextError::whole("no levels here");
             let first = Box::new(LevelFileError::Text { path: "a.json".to_owned(), error });
             let others = (0..count).map(|number| format!("b{number}.json")).collect();
             LevelFileError::Several { first, others }.to_string()
         };
-        assert_eq!(told(2), "a.json: no levels here; and 2 more: b0.json, b1.json");
-        assert!(told(7).ends_with("; and 7 more: b0.json, b1.json, b2.json, b3.json, b4.json, …"), "{}", told(7));
+        assert_eq!(reported(2), "a.json: no levels here; and 2 more: b0.json, b1.json");
+        assert!(
+            reported(7).ends_with("; and 7 more: b0.json, b1.json, b2.json, b3.json, b4.json, …"),
+            "{}",
+            reported(7)
+        );
         let none = |count| LevelFileError::NoLevel { mode: "files:*".to_owned(), level: 7, count }.to_string();
         assert!(none(1).contains("it has 1 file, level 0;") && none(3).contains("it has 3 files, so levels 0 to 2;"));
     }
-}
-
-#[cfg(test)]
-mod text_error_tests {
-    use super::*;
 
     #[test]
     fn mistakes_of_syntax_and_unknown_keys_have_a_line() {
@@ -357,12 +357,6 @@ mod text_error_tests {
         assert_eq!(read_json_object::<Small>("\u{feff} {\"x\": 3}").expect("an object").x, 3);
         assert_eq!(read_json::<Small>("\u{feff}{\"x\": 3}").expect("a mark is no mistake").x, 3);
     }
-}
-
-#[cfg(test)]
-mod json_lines_tests {
-    use super::*;
-    use JsonStep::{Index, Key};
 
     const TEXT: &str = r#"
 {

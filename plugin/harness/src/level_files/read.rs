@@ -107,8 +107,6 @@ fn read_text(path: &str) -> Result<String, LevelFileError> {
     })
 }
 
-// Safe reading of text files of unknown origin.
-
 /// Failure to read a file as text.
 #[derive(Debug, Error)]
 pub enum TextFileError {

@@ -3,7 +3,7 @@
 use crate::{
     drawing::{Drawing, Rgb, Shape},
     floor_plan::FloorPlan,
-    trails::{Frame, goal_mark, start_mark},
+    trails::{FloorFrame, goal_mark, start_mark},
 };
 use bevy::math::{Rect, Vec2};
 use playbot_report::text_table::{text_width, wrap};
@@ -44,7 +44,7 @@ pub struct CellChart {
     /// Cells that were not reached: they are crossed.
     pub missed: Vec<Rect>,
     /// Path from the start on; may be empty.
-    pub way: Vec<Vec2>,
+    pub path: Vec<Vec2>,
 }
 
 impl CellChart {
@@ -63,7 +63,7 @@ impl CellChart {
         }
         right = right.max(self.legend(y, &mut shapes));
         y += LINE;
-        let frame = Frame::new(extent, Vec2::new(GAP, GAP + y + GAP / 2.0), LENGTH * share);
+        let frame = FloorFrame::new(extent, Vec2::new(GAP, GAP + y + GAP / 2.0), LENGTH * share);
         self.floor(&frame, &mut shapes);
         let corner = frame.whole().max;
         Drawing { label: self.title.clone(), size: Vec2::new(right.max(corner.x), corner.y) + GAP, shapes }
@@ -76,7 +76,7 @@ impl CellChart {
         let right = write_at(GAP + 20.0, y, TEXT, SOFT, "start", out);
         out.push(goal_mark(Vec2::new(right + 24.0, middle), 6.0));
         let right = write_at(right + 36.0, y, TEXT, SOFT, "goal", out);
-        if self.way.is_empty() {
+        if self.path.is_empty() {
             return right;
         }
         let ends = [right + 16.0, right + 40.0].map(|x| Vec2::new(x, middle));
@@ -89,7 +89,7 @@ impl CellChart {
         self.reached.iter().fold(self.plan.bounds, |extent, (area, _)| extent.union(*area))
     }
 
-    fn floor(&self, frame: &Frame, out: &mut Vec<Shape>) {
+    fn floor(&self, frame: &FloorFrame, out: &mut Vec<Shape>) {
         let most = self.reached.iter().map(|(_, visits)| *visits).max().unwrap_or(0);
         let most = (most as f64).ln_1p().max(f64::MIN_POSITIVE);
         for (area, visits) in &self.reached {
@@ -106,9 +106,10 @@ impl CellChart {
             let corners = [[min, max], [Vec2::new(min.x, max.y), Vec2::new(max.x, min.y)]];
             out.extend(corners.map(|points| line(points.to_vec(), 1.5, LINES[1])));
         }
-        let places: Vec<Vec2> = self.way.iter().filter(|place| place.is_finite()).map(|at| frame.place(*at)).collect();
-        if places.len() > 1 {
-            out.push(line(places, 2.0, LINES[0]));
+        let positions: Vec<Vec2> =
+            self.path.iter().filter(|position| position.is_finite()).map(|at| frame.place(*at)).collect();
+        if positions.len() > 1 {
+            out.push(line(positions, 2.0, LINES[0]));
         }
         let Rect { min, max } = frame.whole();
         let border = vec![min, Vec2::new(max.x, min.y), max, Vec2::new(min.x, max.y), min];
@@ -157,9 +158,9 @@ const HEAT: [Rgb; 5] = [[255, 237, 160], [254, 178, 76], [240, 82, 40], [177, 0,
 
 /// Returns the colour of a share, 0 to 1, of the most visits.
 pub(crate) fn heat(share: f64) -> Rgb {
-    let place = share.clamp(0.0, 1.0) * (HEAT.len() - 1) as f64;
-    let below = (place as usize).min(HEAT.len() - 2);
-    let part = place - below as f64;
+    let step = share.clamp(0.0, 1.0) * (HEAT.len() - 1) as f64;
+    let below = (step as usize).min(HEAT.len() - 2);
+    let part = step - below as f64;
     std::array::from_fn(|channel| {
         let (from, to) = (f64::from(HEAT[below][channel]), f64::from(HEAT[below + 1][channel]));
         (from + part * (to - from)).round() as u8
@@ -184,7 +185,7 @@ mod tests {
             plan,
             reached: vec![(Rect::new(0.0, 0.0, 1.0, 1.0), 100), (Rect::new(1.0, 0.0, 2.0, 1.0), 1)],
             missed: vec![Rect::new(2.0, 0.0, 3.0, 1.0)],
-            way: vec![Vec2::splat(0.5), Vec2::new(1.5, 0.5)],
+            path: vec![Vec2::splat(0.5), Vec2::new(1.5, 0.5)],
         }
     }
 
@@ -220,7 +221,7 @@ mod tests {
     fn everything_is_on_the_paper_even_beyond_the_plan() {
         let mut chart = chart();
         chart.reached.push((Rect::new(4.0, 2.0, 5.0, 3.0), 7));
-        chart.way.push(Vec2::NAN);
+        chart.path.push(Vec2::NAN);
         let drawing = chart.draw();
         for shape in &drawing.shapes {
             let points = match shape {
@@ -234,11 +235,6 @@ mod tests {
         }
         assert_eq!(chart.draw().to_svg(), drawing.to_svg());
     }
-}
-
-#[cfg(test)]
-mod colours_tests {
-    use super::*;
 
     #[test]
     fn more_visits_are_darker() {

@@ -24,26 +24,26 @@ impl Visits {
         let squares = |length: f32| ((length / side).ceil() as usize).clamp(1, SQUARES as usize);
         let (columns, rows) = (squares(bounds.width()), squares(bounds.height()));
         let mut visits = Self { bounds, side, columns, ticks: vec![0; rows * columns] };
-        for place in trails.into_iter().flat_map(|trail| &trail.places) {
-            if let Some(index) = visits.index(*place) {
+        for position in trails.into_iter().flat_map(|trail| &trail.positions) {
+            if let Some(index) = visits.index(*position) {
                 visits.ticks[index] += 1;
             }
         }
         visits
     }
 
-    fn index(&self, place: Vec2) -> Option<usize> {
+    fn index(&self, position: Vec2) -> Option<usize> {
         let rows = self.ticks.len() / self.columns;
-        self.bounds.contains(place).then(|| {
-            let at = (place - self.bounds.min) / self.side;
+        self.bounds.contains(position).then(|| {
+            let at = (position - self.bounds.min) / self.side;
             let (column, row) = ((at.x as usize).min(self.columns - 1), (at.y as usize).min(rows - 1));
             row * self.columns + column
         })
     }
 
     /// Returns the ticks in the square around a position; 0 outside of the bounds.
-    pub fn at(&self, place: Vec2) -> u64 {
-        self.index(place).map_or(0, |index| self.ticks[index])
+    pub fn at(&self, position: Vec2) -> u64 {
+        self.index(position).map_or(0, |index| self.ticks[index])
     }
 
     /// Returns the sum of the ticks in all squares.

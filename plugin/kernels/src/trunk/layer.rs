@@ -4,7 +4,6 @@
 use crate::{
     elementwise::{Add, Store, Write},
     tile::{LANES, Lanes, Window, column_sums, correlate, outer},
-    trunk,
     trunk::{
         grid::{ConvShape, Grid, window_places},
         pool::pooled,
@@ -12,8 +11,6 @@ use crate::{
         winograd::PointBuffers,
     },
 };
-use burn::tensor::Tensor;
-use std::sync::Arc;
 
 /// A convolution between two grids.
 #[derive(Clone, Debug)]
@@ -34,7 +31,8 @@ pub(super) struct Layer {
 /// The weights of a layer in the orders in which they are read.
 #[derive(Debug)]
 pub(super) struct Weights {
-    /// For each block of 16 outputs: row, column and input channel of the kernel. Or their [`points`](crate::trunk::winograd::points).
+    /// For each block of 16 outputs: row, column and input channel of the kernel. Or their
+    /// [`points`](crate::trunk::winograd::points).
     forward: Vec<Lanes>,
     bias: Vec<Lanes>,
     /// If the sizes are the same, as `forward` with inputs and outputs exchanged and the kernel rotated. Otherwise
@@ -230,72 +228,6 @@ impl Layer {
             },
         );
     }
-}
-
-// The stages of a trunk, and its forward pass on tensors.
-
-/// Parameters of a convolution with a square kernel.
-#[derive(Clone, Copy, Debug)]
-pub struct Conv<'a> {
-    /// `[outputs, inputs, kernel, kernel]`.
-    pub weight: &'a Tensor<4>,
-    /// `[outputs]`.
-    pub bias: &'a Tensor<1>,
-    /// Pixels from one position of the kernel to the next.
-    pub stride: usize,
-    /// Zeros around the image.
-    pub padding: usize,
-}
-
-/// One stage of a trunk.
-#[derive(Clone, Copy, Debug)]
-pub enum Stage<'a> {
-    /// A convolution, then ReLU.
-    Relu(Conv<'a>),
-    /// A convolution, then max-pooling of 3×3 at every second pixel with padding 1.
-    Pool(Conv<'a>),
-    /// x + conv1(relu(conv0(relu(x)))).
-    Residual(Conv<'a>, Conv<'a>),
-}
-
-/// Applies the stages and a last ReLU to images `[n, channels, height, width]`: features `[n, channels' * height' *
-/// width']`. Returns `None` if this is not on flex, or for unsupported stages: every convolution must keep the size
-/// of its image or have no padding.
-///
-/// Gradients reach the convolutions' parameters, never the pixels.
-pub fn forward(pixels: &Tensor<4>, stages: &[Stage<'_>]) -> Option<Tensor<2>> {
-    let [n, channels, height, width] = pixels.dims();
-    if n == 0 || !trunk::is_flex(&pixels.device()) {
-        return None;
-    }
-    let shapes: Vec<StageShape> = stages.iter().map(Stage::shape).collect();
-    let plan = Plan::new(&shapes, [channels, height, width])?;
-    let flat = |conv: Conv<'_>| -> [Tensor<1>; 2] { [conv.weight.clone().flatten(0, 3), conv.bias.clone()] };
-    let params = stages.iter().flat_map(Stage::convs).flat_map(flat).collect();
-    Some(trunk::trunk(pixels.clone(), Tensor::cat(params, 0), Arc::new(plan)))
-}
-
-impl<'a> Stage<'a> {
-    fn convs(&self) -> impl Iterator<Item = Conv<'a>> + use<'a> {
-        let (first, second) = match *self {
-            Self::Relu(conv) | Self::Pool(conv) => (conv, None),
-            Self::Residual(conv0, conv1) => (conv0, Some(conv1)),
-        };
-        std::iter::once(first).chain(second)
-    }
-
-    fn shape(&self) -> StageShape {
-        match self {
-            Self::Relu(conv) => StageShape::Relu(shape(*conv)),
-            Self::Pool(conv) => StageShape::Pool(shape(*conv)),
-            Self::Residual(conv0, conv1) => StageShape::Residual([shape(*conv0), shape(*conv1)]),
-        }
-    }
-}
-
-fn shape(conv: Conv<'_>) -> ConvShape {
-    let [outputs, inputs, kernel, _] = conv.weight.dims();
-    ConvShape { inputs, outputs, kernel, stride: conv.stride, padding: conv.padding }
 }
 
 // The computation for each image, and its layout in memory.

@@ -67,9 +67,9 @@ impl Net {
         let mut convs = self.convs.iter();
         let mut next = || view(convs.next().expect("one for each part"));
         let stages = self.parts.iter().map(|part| match part {
-            Part::Relu(..) | Part::Same(..) => Stage::Relu(next()),
-            Part::Pool(_) => Stage::Pool(next()),
-            Part::Residual => Stage::Residual(next(), next()),
+            Part::Relu(..) | Part::Same(..) => TrunkStage::Relu(next()),
+            Part::Pool(_) => TrunkStage::Pool(next()),
+            Part::Residual => TrunkStage::Residual(next(), next()),
         });
         features(pixels, &stages.collect::<Vec<_>>()).expect("these stages fit")
     }
@@ -150,13 +150,15 @@ fn features_and_gradients_are_those_of_separate_operations() {
     }
     // Unsupported: the output of a ReLU is needed again, and a block would change it.
     let changed = Net::new(&[Part::Same(4, 3), Part::Residual], 1);
-    let stages =
-        [Stage::Relu(view(&changed.convs[0])), Stage::Residual(view(&changed.convs[1]), view(&changed.convs[2]))];
+    let stages = [
+        TrunkStage::Relu(view(&changed.convs[0])),
+        TrunkStage::Residual(view(&changed.convs[1]), view(&changed.convs[2])),
+    ];
     assert!(features(&images([1, 1, 6, 6]), &stages).is_none());
     // Unsupported, too: a border without keeping the size. The encoders then use burn's operations.
     let odd = Net::new(&[Part::Same(2, 5), Part::Pool(2)], 1);
     let unfit = odd.convs[1].clone().with_stride(2);
-    let stages = [Stage::Relu(view(&odd.convs[0])), Stage::Relu(view(&unfit))];
+    let stages = [TrunkStage::Relu(view(&odd.convs[0])), TrunkStage::Relu(view(&unfit))];
     assert!(features(&images([1, 1, 6, 6]), &stages).is_none());
 }
 

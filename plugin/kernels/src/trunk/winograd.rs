@@ -113,7 +113,7 @@ pub(super) fn add_gradients(
     }
 }
 
-// The transforms of `winograd`, of 16 channels at a time.
+// The transforms, of 16 channels at a time.
 
 /// Numbers of a transformed tile: 4×4 points.
 pub(super) const POINTS: usize = 16;

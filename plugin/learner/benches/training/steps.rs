@@ -5,7 +5,7 @@ use std::cell::LazyCell;
 use burn::tensor::{Tensor, TensorData};
 use criterion::Criterion;
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, PpoConfig, SkillConfig, SkillTrainer, StdKind, among_awake_workers,
+    ActionSpace, Actions, Dataset, DatasetEpisode, PpoConfig, SkillConfig, SkillTrainer, StdKind, among_awake_workers,
     nn::{ActionBatch, Activation, Adam, AdamConfig, CnnKind, ImageNet, Mlp, NamedGrads, tracked},
     policy::{Actor, Critic, NetShape},
     ppo::{Minibatch, PpoBatch, PpoNets, gradient_step},
@@ -13,12 +13,13 @@ use playbot_learner::{
 
 use crate::data::{CHOICES, DEVICE, IMAGE, choices, images as image_tensor, matrix, normals, pixels, rng, tiles};
 
-/// The paper's skill model on vectors of AntMaze's size: 4 layers of a bidirectional GRU 200, windows of 10, batches of 50.
+/// The paper's skill model on vectors of AntMaze's size: 4 layers of a bidirectional GRU 200, windows of 10, batches of
+/// 50.
 pub fn skill(criterion: &mut Criterion) {
     let (obs_dim, action_dim, steps) = (29, 8, 2000);
     let config = SkillConfig { encoder_hidden: 200, gru_hidden: 200, gru_layers: 4, ..SkillConfig::default() };
     let mut rng = rng("skill");
-    let episodes = (0..20).map(|_| DemoEpisode {
+    let episodes = (0..20).map(|_| DatasetEpisode {
         observations: normals(steps * obs_dim, &mut rng).into(),
         actions: Actions::Continuous { dim: action_dim, values: normals(steps * action_dim, &mut rng) },
     });

@@ -5,7 +5,7 @@ use std::ops::ControlFlow;
 
 use criterion::Criterion;
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, Learner, PolicySpec, PpoConfig, PpoLearner, Rollout, ScoreConfig,
+    ActionSpace, Actions, Dataset, DatasetEpisode, Learner, PolicySpec, PpoConfig, PpoLearner, Rollout, ScoreConfig,
     SkillConfig, SkillModel, SkillTrainer, nn::CnnKind, rng::ChaCha8Rng,
 };
 
@@ -18,7 +18,7 @@ const SPACE: ActionSpace = ActionSpace::Discrete(CHOICES);
 
 fn trainer(episodes: usize) -> SkillTrainer {
     let (mut rng, steps) = (rng("demos"), 500);
-    let episodes = (0..episodes).map(|_| DemoEpisode {
+    let episodes = (0..episodes).map(|_| DatasetEpisode {
         observations: tiles(steps * OBS, &mut rng).into(),
         actions: Actions::Discrete(choices(steps, &mut rng)),
     });
@@ -69,7 +69,7 @@ pub fn images(criterion: &mut Criterion) {
 }
 
 fn image_skills(cnn: CnnKind) -> SkillModel {
-    let episode = DemoEpisode { observations: seen(10, &mut rng("demo")), actions: Actions::Discrete(vec![0; 10]) };
+    let episode = DatasetEpisode { observations: seen(10, &mut rng("demo")), actions: Actions::Discrete(vec![0; 10]) };
     let dataset = Dataset::new(IMAGE, SPACE, vec![episode]).expect("fits");
     let config = SkillConfig { cnn, ..SkillConfig::default() };
     SkillTrainer::new(config, dataset, 1, DEVICE).expect("fits").into_model()

@@ -157,7 +157,7 @@ mod tests {
     }
 
     #[test]
-    fn what_was_written_without_a_seal_is_told_apart() {
+    fn what_was_written_without_a_seal_is_distinguished() {
         for text in
             ["", "{", "{}", r#"{"step":8}"#, r#"{"algorithm":"ppo","seed":1}"#, r#"{"arenas":[[]],"progress":{}}"#]
         {

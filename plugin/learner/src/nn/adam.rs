@@ -95,8 +95,9 @@ impl Adam {
     /// The parameters stay tracked. Parameters without an entry in `grads` are unchanged.
     ///
     /// # Errors
-    /// [`LearnError::NotFinite`] names the first weight that stopped being finite; [`LearnError::Config`] names the first
-    /// gradient that belongs to no parameter, or comes in another order than the parameters; [`LearnError::Device`].
+    /// [`LearnError::NotFinite`] names the first weight that stopped being finite; [`LearnError::Config`] names the
+    /// first gradient that belongs to no parameter, or comes in another order than the parameters;
+    /// [`LearnError::Device`].
     pub fn step<M: Parameters>(
         &mut self,
         network: &mut M,
@@ -393,9 +394,14 @@ impl FlatMoments {
 
 #[cfg(test)]
 mod tests {
+    use playbot_kernels::elementwise::Activation;
+
     use super::*;
-    use crate::DeviceKind;
-    use crate::nn::{path, tracked, vector};
+    use crate::{
+        DeviceKind,
+        nn::{Mlp, NamedGrads, host, matrix, path, tracked, vector},
+        rng::{Streams, normal},
+    };
 
     /// Two numbers, of which the loss may depend on one.
     #[derive(Clone)]
@@ -434,15 +440,6 @@ mod tests {
         let error = adam.step(&mut pair, "other", &grads, 0.1, 1.0).expect_err("no `other.b`").to_string();
         assert!(error.contains("`b`"), "{error}");
     }
-}
-
-#[cfg(test)]
-mod flat_adam_tests {
-    use super::*;
-    use crate::DeviceKind;
-    use crate::nn::{Mlp, NamedGrads, host, matrix, tracked};
-    use crate::rng::{Streams, normal};
-    use playbot_kernels::elementwise::Activation;
 
     #[test]
     fn it_goes_where_the_other_goes_and_leaves_the_same_moments() {

@@ -77,7 +77,8 @@ impl Conv2d {
         Conv { weight: &self.weight, bias: &self.bias, stride: self.stride, padding: self.padding }
     }
 
-    /// Maps `[n, inputs, height, width]` to `[n, outputs, height', width']`, each side by [`window_places`](crate::nn::window_places).
+    /// Maps `[n, inputs, height, width]` to `[n, outputs, height', width']`, each side by
+    /// [`window_places`](crate::nn::window_places).
     pub fn forward(&self, x: Tensor<4>) -> Tensor<4> {
         let options = ConvOptions::new([self.stride; 2], [self.padding; 2], [1; 2], 1);
         conv2d(x, self.weight.clone(), Some(self.bias.clone()), options)
@@ -97,13 +98,11 @@ pub fn max_pool(x: Tensor<4>, kernel: usize, stride: usize, padding: usize) -> T
     max_pool2d(x, options)
 }
 
-// Pixels on a graphics card: sent as bytes, which saves transfer time, and converted to numbers when a network reads
-// them.
-
 /// Bytes in a word; cards without a byte type have words of 32 bits.
 const BYTES: usize = 4;
 
-/// Images of bytes, four to a word.
+/// Images of bytes, four to a word. They are sent to a graphics card as bytes, which saves transfer time, and converted
+/// to numbers when a network reads them.
 #[derive(Clone, Debug)]
 pub(crate) struct PackedPixels {
     /// `[n, words]`; the last word of an image may have unused bytes.
@@ -142,8 +141,6 @@ impl PackedPixels {
         bytes.float().reshape([n, channels, height, width]) / 255.0
     }
 }
-
-// Observations on a device.
 
 /// A batch of observations on a device, one per row.
 #[derive(Clone, Debug)]
@@ -217,11 +214,14 @@ impl ObsBatch {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::DeviceKind;
-    use crate::nn::{host, vector, window_places};
-    use crate::rng::Streams;
     use burn::tensor::TensorData;
+
+    use super::*;
+    use crate::{
+        DeviceKind,
+        nn::{host, vector, window_places},
+        rng::Streams,
+    };
 
     #[test]
     fn a_convolution_by_hand() {
@@ -247,13 +247,6 @@ mod tests {
         assert_eq!(window_places(7, 8, 4, 0), None);
         assert_eq!(window_places(8, 8, 4, 0), Some(1));
     }
-}
-
-#[cfg(test)]
-mod packed_pixels_tests {
-    use super::*;
-    use crate::DeviceKind;
-    use crate::nn::host;
 
     #[test]
     fn bytes_come_back_as_numbers_on_every_device() {
@@ -270,13 +263,6 @@ mod packed_pixels_tests {
             }
         }
     }
-}
-
-#[cfg(test)]
-mod obs_batch_tests {
-    use super::*;
-    use crate::DeviceKind;
-    use crate::nn::host;
 
     #[test]
     fn rows_of_bytes_become_numbers_from_0_to_1() {

@@ -8,8 +8,8 @@ use burn::tensor::{Device, Int, Tensor, TensorData, activation::log_softmax};
 use playbot_kernels::{
     elementwise::exp_of,
     host_numbers::is_host,
+    host_ops,
     kept_memory::{OF_A_MOVE, share},
-    kernels,
 };
 use std::ops::Range;
 
@@ -78,7 +78,7 @@ impl Dist {
     /// Creates the categorical distributions of `logits` `[n, choices]`.
     pub fn categorical(logits: Tensor<2>) -> Self {
         let on_host = is_host(&logits.device()) && !logits.dims().contains(&0);
-        Self::Categorical { log_probs: if on_host { kernels::log_softmax(logits) } else { log_softmax(logits, 1) } }
+        Self::Categorical { log_probs: if on_host { host_ops::log_softmax(logits) } else { log_softmax(logits, 1) } }
     }
 
     /// Returns the log-probability (or log-density, summed over dimensions) of one action per row, `[n]`.

@@ -2,7 +2,7 @@
 
 use crate::nn::params::{Init, ParamSource, ParamVisitor, Parameters, RandomInit, path};
 use burn::tensor::{Device, Tensor, activation::sigmoid};
-use playbot_kernels::{host_numbers::is_host, kernels, kernels::GruInput};
+use playbot_kernels::{host_numbers::is_host, host_ops, host_ops::GruInput};
 use rand::Rng;
 
 /// One recurrent layer. The directions lie side by side in the first dimension.
@@ -109,7 +109,7 @@ impl GruLayer {
         let batch = x.dims()[0] / steps.max(1);
         let device = x.device();
         let initial = initial.unwrap_or_else(|| Tensor::zeros([directions, batch, hidden], &device));
-        let scan = if is_host(&device) { kernels::gru } else { gru_steps };
+        let scan = if is_host(&device) { host_ops::gru } else { gru_steps };
         scan(GruInput {
             x,
             weight_ih: self.weight_ih.clone(),
@@ -134,7 +134,7 @@ impl GruLayer {
 }
 
 /// Applies a layer in tensor operations, for devices without a kernel and as a reference for the kernel: the same as
-/// [`playbot_kernels::kernels::gru`].
+/// [`playbot_kernels::host_ops::gru`].
 fn gru_steps(input: GruInput) -> Tensor<2> {
     let GruInput { x, weight_ih, weight_hh: weight, bias_ih, bias_hh, initial } = input;
     let [directions, batch, hidden] = initial.dims();
@@ -233,7 +233,7 @@ mod tests {
         for kind in DeviceKind::CPU {
             for (directions, hidden) in [(1, 5), (2, 5), (2, 16)] {
                 let want = run(gru_steps, directions, hidden, kind);
-                let got = run(kernels::gru, directions, hidden, kind);
+                let got = run(host_ops::gru, directions, hidden, kind);
                 for ((name, want), (_, got)) in want.iter().zip(&got) {
                     assert_eq!(want.len(), got.len());
                     assert!(want.iter().any(|x| x.abs() > 0.1), "{name} is a test");

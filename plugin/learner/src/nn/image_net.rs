@@ -14,7 +14,7 @@ use playbot_kernels::{
     among_workers::among_workers,
     elementwise::Activation,
     trunk,
-    trunk::{Stage, grid::window_places},
+    trunk::{TrunkStage, grid::window_places},
 };
 use rand::Rng;
 use serde::{Deserialize, Serialize};
@@ -271,7 +271,7 @@ impl Impala {
 
     /// Maps pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
-        let stages: Vec<Stage<'_>> = self.stages.iter().flat_map(ImpalaStage::of_trunk).collect();
+        let stages: Vec<TrunkStage<'_>> = self.stages.iter().flat_map(ImpalaStage::of_trunk).collect();
         let flat = trunk::features(&pixels, &stages).unwrap_or_else(|| {
             let x = self.stages.iter().fold(pixels, |x, stage| stage.forward(x));
             Activation::Relu.forward(x).flatten(1, 3)
@@ -295,10 +295,11 @@ impl ImpalaStage {
         Ok(Self { conv: first, blocks: [block("res0")?, block("res1")?] })
     }
 
-    fn of_trunk(&self) -> [Stage<'_>; 3] {
+    fn of_trunk(&self) -> [TrunkStage<'_>; 3] {
         let [block0, block1] = &self.blocks;
-        let [second, third] = [block0, block1].map(|block| Stage::Residual(block.conv0.view(), block.conv1.view()));
-        [Stage::Pool(self.conv.view()), second, third]
+        let [second, third] =
+            [block0, block1].map(|block| TrunkStage::Residual(block.conv0.view(), block.conv1.view()));
+        [TrunkStage::Pool(self.conv.view()), second, third]
     }
 
     /// Maps `[n, inputs, height, width]` to `[n, outputs, ⌈height/2⌉, ⌈width/2⌉]`.
@@ -395,7 +396,7 @@ impl Nature {
 
     /// Maps pixels in 0..1, `[n, channels, height, width]`, to features `[n, feature]`, none negative.
     pub fn forward(&self, pixels: Tensor<4>) -> Tensor<2> {
-        let stages: Vec<Stage<'_>> = self.convs.iter().map(|conv| Stage::Relu(conv.view())).collect();
+        let stages: Vec<TrunkStage<'_>> = self.convs.iter().map(|conv| TrunkStage::Relu(conv.view())).collect();
         let flat = trunk::features(&pixels, &stages).unwrap_or_else(|| {
             let x = self.convs.iter().fold(pixels, |x, conv| Activation::Relu.forward(conv.forward(x)));
             x.flatten(1, 3)

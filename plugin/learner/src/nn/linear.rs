@@ -93,13 +93,11 @@ impl Parameters for Linear {
     }
 }
 
-// Layer normalisation.
-
 /// Added to the variance.
 const EPS: f64 = 1e-6;
 
-/// Brings each row to mean 0 and deviation 1, then scales and shifts each column (Ba et al. 2016, "Layer normalization"):
-/// y = (x - mean) / √(var + 1e-6) · scale + shift.
+/// Brings each row to mean 0 and deviation 1, then scales and shifts each column (Ba et al. 2016, "Layer
+/// normalization"): y = (x - mean) / √(var + 1e-6) · scale + shift.
 #[derive(Clone, Debug)]
 pub struct LayerNorm {
     /// `[width]`, ones at first.
@@ -130,8 +128,6 @@ impl Parameters for LayerNorm {
         visitor.visit(&path(prefix, "shift"), &mut self.shift);
     }
 }
-
-// A multi-layer perceptron.
 
 /// Hidden layers `l0`, `l1`, ... with an activation after each, then a linear `head`.
 #[derive(Clone, Debug)]
@@ -220,7 +216,7 @@ impl Parameters for Mlp {
 }
 
 #[cfg(test)]
-mod layer_norm_tests {
+mod tests {
     use super::*;
     use crate::DeviceKind;
     use crate::nn::{host, matrix, vector};

@@ -240,7 +240,7 @@ pub(crate) fn check_loss(name: &str, value: f32, steps: u64) -> Result<(), Learn
 }
 
 #[cfg(test)]
-mod init_tests {
+mod tests {
     use super::*;
     use crate::rng::Streams;
 
@@ -264,11 +264,6 @@ mod init_tests {
             }
         }
     }
-}
-
-#[cfg(test)]
-mod tensors_tests {
-    use super::*;
 
     #[test]
     fn losses_that_ran_away_are_named() {

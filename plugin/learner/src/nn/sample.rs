@@ -226,11 +226,6 @@ mod tests {
         let got = gaussian_log_prob(&[1.0, 2.0], &[0.0, 1.0], &[1.0, 2.0]);
         assert!((got - (-1.0 - std::f32::consts::TAU.ln())).abs() < 1e-6);
     }
-}
-
-#[cfg(test)]
-mod unsquash_tests {
-    use super::*;
 
     fn of(mean: f32, std: f32) -> (f32, f32) {
         let decoder = HostDist { dim: 1, head: vec![mean], log_std: Some(vec![std.ln()]) };

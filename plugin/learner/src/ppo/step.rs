@@ -21,6 +21,25 @@ use playbot_kernels::{
 };
 use std::ops::Range;
 
+/// Computes loss and gradient, clips by the global norm, and does one step of Adam on tracked `nets`.
+///
+/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`](fn@penalty) is added to the loss.
+///
+/// # Errors
+/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`]
+/// the first loss beyond all bounds; [`LearnError::Config`] if the networks do not read such observations.
+pub fn gradient_step(
+    nets: &mut PpoNets,
+    adam: &mut Adam,
+    batch: &Minibatch,
+    config: &PpoConfig,
+    score: Option<&ScoreConfig>,
+    lr: f64,
+) -> Result<StepMetrics, LearnError> {
+    let part = std::iter::once((batch.clone(), 1.0));
+    step_in_parts(nets, adam, part, config, &UpdateSettings { lr, score, is_warming_up: false })
+}
+
 /// One minibatch on the device.
 #[derive(Clone, Debug)]
 pub struct Minibatch {
@@ -98,25 +117,6 @@ impl Losses {
     }
 }
 
-/// Computes loss and gradient, clips by the global norm, and does one step of Adam on tracked `nets`.
-///
-/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`](fn@penalty) is added to the loss.
-///
-/// # Errors
-/// [`LearnError::NotFinite`] names the first loss, gradient or weight that is not finite, [`LearnError::Exploded`]
-/// the first loss beyond all bounds; [`LearnError::Config`] if the networks do not read such observations.
-pub fn gradient_step(
-    nets: &mut PpoNets,
-    adam: &mut Adam,
-    batch: &Minibatch,
-    config: &PpoConfig,
-    score: Option<&ScoreConfig>,
-    lr: f64,
-) -> Result<StepMetrics, LearnError> {
-    let part = std::iter::once((batch.clone(), 1.0));
-    step_in_parts(nets, adam, part, config, &UpdateSettings { lr, score, is_warming_up: false })
-}
-
 /// Settings that change from update to update.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct UpdateSettings<'a> {
@@ -190,11 +190,10 @@ pub(super) fn step_in_parts(
     Ok(metrics)
 }
 
-// The loss that makes actor and critic insensitive to image augmentations (Raileanu et al. 2021, "Automatic data
-// augmentation for generalization in reinforcement learning", DrAC). It grows with the difference between their
-// outputs for a changed picture and for the original. The rollout itself is never changed.
-
-/// Returns mean(KL(π(s) ‖ π(s'))) + mean((V(s') - V(s))²) for the changed pictures s' of a minibatch, `[1]`; `None`
+/// Returns the loss that makes actor and critic insensitive to image augmentations (Raileanu et al. 2021, "Automatic
+/// data augmentation for generalization in reinforcement learning", DrAC).
+///
+/// It is mean(KL(π(s) ‖ π(s'))) + mean((V(s') - V(s))²) for the changed pictures s' of a minibatch, `[1]`; `None`
 /// without any, and while the critic warms up. The outputs for the originals, `dist` and `values`, are constants.
 ///
 /// # Errors
@@ -215,8 +214,7 @@ pub(super) fn augmentation_loss(
     Ok(Some(divergence + difference))
 }
 
-// The loss of a minibatch with its gradient in host memory, row by row: the formulas of `objective.rs` and of the
-// mean penalty. A graph of small operations would be slower than this arithmetic.
+// The loss of a minibatch with its gradient in host memory, row by row.
 
 /// Rows that a thread takes at a time.
 const ROWS: usize = 64;
@@ -224,7 +222,8 @@ const ROWS: usize = 64;
 /// Number of products that take as long as the work for each number of a distribution.
 const OF_A_NUMBER: usize = 64;
 
-/// A loss and its derivatives.
+/// A loss and its derivatives, by the formulas of `objective` and of the mean penalty. A graph of small operations
+/// would be slower than this arithmetic.
 #[derive(Debug)]
 pub(super) struct HostLoss {
     pub(super) metrics: StepMetrics,

@@ -91,8 +91,8 @@ impl ReplayBuffer {
     /// termination is stored as zeros. `weights` has one entry per row if the buffer keeps them, else none.
     ///
     /// # Errors
-    /// [`LearnError::Config`] if the observations are images, [`LearnError::Shape`] as [`Self::check_clock`] or for another number
-    /// of weights.
+    /// [`LearnError::Config`] if the observations are images, [`LearnError::Shape`] as [`Self::check_clock`] or for
+    /// another number of weights.
     pub(super) fn push(&mut self, rollout: &Rollout, weights: &[f32]) -> Result<(), LearnError> {
         let Widths { obs: obs_dim, latent, clock, weight } = self.widths;
         let (no_obs, no_z) = (vec![0.0; obs_dim], vec![0.0; latent]);
@@ -402,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_kept_goes_into_batches_and_files_and_what_is_not_needs_no_rollout_to_tell() {
+    fn what_is_kept_goes_into_batches_and_files() {
         let buffer = filled(6);
         let picked = buffer.picked(&[4, 0], None).expect("the same actions");
         assert_eq!([picked.left, picked.next_left, picked.weights], [[0.5, 1.0], [1.0, 0.25], [0.5, 2.0]]);
@@ -410,7 +410,7 @@ mod tests {
         let mut plain = new(6, PLAIN);
         plain.push(&silent, &[]).expect("nothing is missed");
         assert_eq!((plain.left.len(), plain.next_left.len(), plain.continues(0, TimeLimit::Bootstrap)), (0, 0, 1.0));
-        let error = new(6, Widths { clock: 1, ..PLAIN }).push(&silent, &[]).expect_err("it does not tell");
+        let error = new(6, Widths { clock: 1, ..PLAIN }).push(&silent, &[]).expect_err("it has no share");
         assert!(error.to_string().contains("rollout left"), "{error}");
         let error = new(6, Widths { weight: 1, ..PLAIN }).push(&silent, &[]).expect_err("no weights");
         assert!(error.to_string().contains("weights"), "{error}");

@@ -156,8 +156,6 @@ pub(super) fn check_target_critics(path: &'static str, targets: usize, critics: 
     Err(SettingError::new(path, format!("must be at most critics = {critics}, not {targets}")))
 }
 
-// Settings of RLPD.
-
 settings! {
     /// Settings that RLPD adds to SAC (Ball et al. 2023, "Efficient online reinforcement learning with offline
     /// data"): recordings in each batch, and an ensemble of normalised critics, some of which make a target.
@@ -195,7 +193,7 @@ impl RlpdConfig {
 }
 
 #[cfg(test)]
-mod rlpd_tests {
+mod tests {
     use super::*;
 
     #[test]

@@ -156,7 +156,8 @@ pub fn critic_step(
 
 /// Does one step of Adam on the actor, under the present critics.
 ///
-/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`](fn@penalty) is added to the loss. A squashed policy is compared before its tanh (see [`crate::nn::unsquashed`]).
+/// With a decoder in `batch` and settings of SCORE, kl_coef times the [`penalty`](fn@penalty) is added to the loss. A
+/// squashed policy is compared before its tanh (see [`crate::nn::unsquashed`]).
 ///
 /// # Errors
 /// As [`critic_step`].
@@ -235,6 +236,29 @@ fn descend<M: Parameters>(
     Ok(norm)
 }
 
+/// σ at which the tanh of a normal number is nearly uniform: that of the logistic distribution whose tanh is exactly
+/// uniform, π/(2√3). The density in [-0.98, 0.98] lies between 0.44 and 0.62 instead of at 0.5.
+const NEARLY_UNIFORM: f64 = 0.906_899_682_117_108_9;
+
+/// Returns the policy of play before the first gradient step. It ignores the `inputs` numbers of its observation:
+/// uniform over choices, nearly uniform over vectors in [-1, 1].
+pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Actor {
+    let dim = space.dim();
+    let zeros = || Linear {
+        weight: matrix(vec![0.0; inputs * dim], inputs, dim, device),
+        bias: vector(vec![0.0; dim], device),
+    };
+    let log_std = match space {
+        ActionSpace::Discrete(_) => LogStd::None,
+        ActionSpace::Continuous(_) => {
+            // In the middle of the range, to which the zeros lead.
+            let middle = NEARLY_UNIFORM.ln();
+            LogStd::Squashed { layer: zeros(), range: (middle - 1.0, middle + 1.0) }
+        }
+    };
+    Actor { cnn: None, net: Mlp { layers: Vec::new(), head: zeros(), activation: Activation::Relu }, log_std }
+}
+
 // The losses of SAC, as pure functions of tensors, `[n]` per row.
 //
 // Continuous and discrete actions share one form. With V = E\[Q - α ln π\], where Q is the least of the critics (or
@@ -268,37 +292,12 @@ pub fn temperature_loss(log_temperature: Tensor<1>, log_prob: Tensor<1>, target_
     (log_prob + target_entropy).mean() * log_temperature.exp().neg()
 }
 
-// The policy of play before the first gradient step: random actions.
-
-/// σ at which the tanh of a normal number is nearly uniform: that of the logistic distribution whose tanh is exactly
-/// uniform, π/(2√3). The density in [-0.98, 0.98] lies between 0.44 and 0.62 instead of at 0.5.
-const NEARLY_UNIFORM: f64 = 0.906_899_682_117_108_9;
-
-/// Returns a policy that ignores the `inputs` numbers of its observation: uniform over choices, nearly uniform over
-/// vectors in [-1, 1].
-pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Actor {
-    let dim = space.dim();
-    let zeros = || Linear {
-        weight: matrix(vec![0.0; inputs * dim], inputs, dim, device),
-        bias: vector(vec![0.0; dim], device),
-    };
-    let log_std = match space {
-        ActionSpace::Discrete(_) => LogStd::None,
-        ActionSpace::Continuous(_) => {
-            // In the middle of the range, to which the zeros lead.
-            let middle = NEARLY_UNIFORM.ln();
-            LogStd::Squashed { layer: zeros(), range: (middle - 1.0, middle + 1.0) }
-        }
-    };
-    Actor { cnn: None, net: Mlp { layers: Vec::new(), head: zeros(), activation: Activation::Relu }, log_std }
-}
-
 #[cfg(test)]
-mod explore_tests {
+mod tests {
     use super::*;
     use crate::policy::Policy;
     use crate::rng::Streams;
-    use crate::{Action, DeviceKind, PolicySpec};
+    use crate::{ActionValue, DeviceKind, PolicySpec};
 
     /// Counts how 20,000 actions fall into five bins.
     fn counts(space: ActionSpace) -> [usize; 5] {
@@ -310,8 +309,8 @@ mod explore_tests {
         let mut counts = [0; 5];
         for _ in 0..20_000 {
             let bin = match output.sample(0, &mut rng).0 {
-                Action::Discrete(choice) => choice as usize,
-                Action::Continuous(vector) => ((vector[1] + 1.0) * 2.5) as usize,
+                ActionValue::Discrete(choice) => choice as usize,
+                ActionValue::Continuous(vector) => ((vector[1] + 1.0) * 2.5) as usize,
             };
             counts[bin.min(4)] += 1;
         }

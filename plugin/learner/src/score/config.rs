@@ -107,7 +107,7 @@ settings! {
     /// Draw skills at random, or use the prior's mean.
     skill_draw: SkillDraw = SkillDraw::Sample, by Reader::WITH_SKILLS;
     /// Ticks for which one skill is used (the paper's T).
-    horizon: usize = 8, in Range::COUNT, by Reader::WITH_SKILLS;
+    skill_interval as "horizon": usize = 8, in Range::COUNT, by Reader::WITH_SKILLS;
     /// The source of skills.
     prior: PriorKind = PriorKind::Learned, by TRAINED;
     /// True if critics read the remaining ticks of a skill, on which the value of (s, z) depends. Needs
@@ -173,7 +173,7 @@ mod tests {
         let score = ScoreConfig { kl_coef: 0.4, kl_coef_end: Some(0.0), ..ScoreConfig::default() };
         let at = |update, total| score.at(update, total).kl_coef;
         assert_eq!([at(0, Some(4)), at(2, Some(4)), at(4, Some(4)), at(9, Some(4))], [0.4, 0.2, 0.0, 0.0]);
-        assert_eq!(at(3, None), 0.4, "nobody knows when the end is");
+        assert_eq!(at(3, None), 0.4, "the end is unknown");
         assert_eq!(ScoreConfig::default().at(3, Some(4)), ScoreConfig::default());
     }
 }

@@ -14,8 +14,6 @@ use rand::Rng;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-// A frozen skill model in the form that a tied learner needs.
-
 /// The network of a skill model that a policy starts as and stays close to.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub(crate) enum TiedTo {
@@ -149,8 +147,8 @@ impl Teacher {
 
     /// Does [`Self::source`] with skills from `prior`.
     pub(crate) fn source_of(&self, prior: Prior, device: DeviceKind) -> SkillSource {
-        let (horizon, draw) = (self.config.horizon, self.config.skill_draw);
-        SkillSource { prior, decoder: self.decoder_policy(device), horizon, draw }
+        let (skill_interval, draw) = (self.config.skill_interval, self.config.skill_draw);
+        SkillSource { prior, decoder: self.decoder_policy(device), skill_interval, draw }
     }
 
     /// Returns the network that the policy is tied to, as a policy.
@@ -168,6 +166,62 @@ impl Teacher {
 
     fn policy_of(&self, actor: &Actor, spec: PolicySpec, device: DeviceKind) -> Policy {
         Policy::new(actor, None, self.stats.clone(), spec, device.plain())
+    }
+
+    /// Adds the weights of decoder and prior to a file, and their normaliser.
+    pub(crate) fn put(&self, file: &mut TensorFile) -> Result<(), FileError> {
+        if let Some(stats) = &self.stats {
+            put_obs_stats(file, SKILL_STATS, stats);
+        }
+        file.put_network("decoder", &self.actors.decoder)?;
+        file.put_network("prior", &self.actors.prior)
+    }
+
+    /// Takes the teacher that [`Self::put`] has added out of `file`, the checkpoint of a policy of `spec`.
+    pub(crate) fn take(
+        (config, tied_to): (ScoreConfig, TiedTo),
+        description: SkillDescription,
+        spec: PolicySpec,
+        file: &mut TensorFile,
+        device: DeviceKind,
+    ) -> Result<Self, FileError> {
+        let actors = Actors::stored(&description, file, "", &device.plain())?;
+        let mut teacher = Self { config, tied_to, description, actors, stats: None };
+        let tied = teacher.policy_spec();
+        if tied != spec {
+            return Err(file.format(format!("the policy is {spec:?}, but its skill model makes it {tied:?}")));
+        }
+        teacher.stats = teacher.description.take_stats(file, SKILL_STATS)?;
+        Ok(teacher)
+    }
+
+    /// Returns the mean divergence between decoder and `policy` over `states`, in nats, which must be exactly 0 for a
+    /// copy that is `untrained`.
+    pub(crate) fn initial_kl(
+        &self,
+        policy: &Policy,
+        untrained: bool,
+        states: StateBatch<'_>,
+        device: DeviceKind,
+    ) -> Result<f32, LearnError> {
+        let StateBatch { z, obs, n, .. } = states;
+        if n == 0 {
+            return Err(LearnError::Config("no rows to compare decoder and policy on".to_owned()));
+        }
+        let played = policy.forward(z, obs, n)?;
+        let squashed = played.squashed;
+        let mut decoded = self.origin_policy(device).forward(z, obs, n)?.into_dist();
+        if squashed {
+            decoded = unsquashed(&decoded);
+        }
+        let rows: Vec<usize> = (0..n).collect();
+        let dist = |host: HostDist| host.rows(&rows, &device.plain());
+        let kl = decoder_kl(&dist(decoded), &dist(played.into_dist()), self.config.direction())?;
+        let kl = scalar(kl.mean())?;
+        if self.config.init_from_decoder && untrained && kl != 0.0 {
+            return Err(LearnError::InitialKl { kl });
+        }
+        Ok(kl)
     }
 }
 
@@ -231,72 +285,8 @@ impl Teacher {
     }
 }
 
-// The teacher in a learner's checkpoint.
-
-impl Teacher {
-    /// Adds the weights of decoder and prior to a file, and their normaliser.
-    pub(crate) fn put(&self, file: &mut TensorFile) -> Result<(), FileError> {
-        if let Some(stats) = &self.stats {
-            put_obs_stats(file, SKILL_STATS, stats);
-        }
-        file.put_network("decoder", &self.actors.decoder)?;
-        file.put_network("prior", &self.actors.prior)
-    }
-
-    /// Takes the teacher that [`Self::put`] has added out of `file`, the checkpoint of a policy of `spec`.
-    pub(crate) fn take(
-        (config, tied_to): (ScoreConfig, TiedTo),
-        description: SkillDescription,
-        spec: PolicySpec,
-        file: &mut TensorFile,
-        device: DeviceKind,
-    ) -> Result<Self, FileError> {
-        let actors = Actors::stored(&description, file, "", &device.plain())?;
-        let mut teacher = Self { config, tied_to, description, actors, stats: None };
-        let tied = teacher.policy_spec();
-        if tied != spec {
-            return Err(file.format(format!("the policy is {spec:?}, but its skill model makes it {tied:?}")));
-        }
-        teacher.stats = teacher.description.take_stats(file, SKILL_STATS)?;
-        Ok(teacher)
-    }
-}
-
-// The divergence of a policy from its teacher, which must be 0 if it starts as a copy.
-
-impl Teacher {
-    /// Returns the mean divergence between decoder and `policy` over `states`, in nats, which must be exactly 0 for a
-    /// copy that is `untrained`.
-    pub(crate) fn initial_kl(
-        &self,
-        policy: &Policy,
-        untrained: bool,
-        states: StateBatch<'_>,
-        device: DeviceKind,
-    ) -> Result<f32, LearnError> {
-        let StateBatch { z, obs, n, .. } = states;
-        if n == 0 {
-            return Err(LearnError::Config("no rows to compare decoder and policy on".to_owned()));
-        }
-        let played = policy.forward(z, obs, n)?;
-        let squashed = played.squashed;
-        let mut decoded = self.origin_policy(device).forward(z, obs, n)?.into_dist();
-        if squashed {
-            decoded = unsquashed(&decoded);
-        }
-        let rows: Vec<usize> = (0..n).collect();
-        let dist = |host: HostDist| host.rows(&rows, &device.plain());
-        let kl = decoder_kl(&dist(decoded), &dist(played.into_dist()), self.config.direction())?;
-        let kl = scalar(kl.mean())?;
-        if self.config.init_from_decoder && untrained && kl != 0.0 {
-            return Err(LearnError::InitialKl { kl });
-        }
-        Ok(kl)
-    }
-}
-
 #[cfg(test)]
-mod batch_tests {
+mod tests {
     use super::*;
     use crate::policy::VECTORS_AT_A_TIME;
     use crate::rng::{Streams, normal};

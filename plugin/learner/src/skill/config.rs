@@ -168,8 +168,6 @@ impl SkillConfig {
     }
 }
 
-// The encoder's representation of actions.
-
 /// The encoder's representation of a discrete action. Continuous ones are read unchanged.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum ActionInput {
@@ -227,11 +225,6 @@ mod tests {
         let error = SkillConfig { epochs: 0, ..SkillConfig::default() }.validate();
         assert!(error.expect_err("an untrained model").to_string().contains("`skills.epochs` must be at least 1"));
     }
-}
-
-#[cfg(test)]
-mod action_input_tests {
-    use super::*;
 
     #[test]
     fn each_form_by_hand() {

@@ -36,9 +36,9 @@ impl Dataset {
     /// Checks and keeps `episodes`, whose observations are all of one kind: a number is the width of a vector.
     ///
     /// # Errors
-    /// [`LearnError::Shape`] if an episode's observations do not match its actions, [`LearnError::Config`] if they are of
-    /// another kind, [`LearnError::Action`] if an action is outside `space`, [`LearnError::Input`] if an observation is
-    /// not finite.
+    /// [`LearnError::Shape`] if an episode's observations do not match its actions, [`LearnError::Config`] if they are
+    /// of another kind, [`LearnError::Action`] if an action is outside `space`, [`LearnError::Input`] if an observation
+    /// is not finite.
     pub fn new(
         observation: impl Into<ObsKind>,
         space: ActionSpace,
@@ -59,8 +59,8 @@ impl Dataset {
     }
 
     /// Assigns a level to each episode, by any number that is equal for episodes on the same level.
-    /// [`SkillConfig::held_out`](crate::skill::SkillConfig::held_out) then holds out whole levels. Without it each episode
-    /// counts as a level.
+    /// [`SkillConfig::held_out`](crate::skill::SkillConfig::held_out) then holds out whole levels. Without it each
+    /// episode counts as a level.
     ///
     /// # Errors
     /// [`LearnError::Shape`] unless there is a number for each episode.
@@ -284,8 +284,10 @@ pub(super) mod tests {
 
     #[test]
     fn bad_demonstrations_are_refused() {
-        let episode =
-            |observations: Observations, a: u32| DatasetEpisode { observations, actions: Actions::Discrete(vec![a; 3]) };
+        let episode = |observations: Observations, a: u32| DatasetEpisode {
+            observations,
+            actions: Actions::Discrete(vec![a; 3]),
+        };
         let new = |kind: ObsKind, e| Dataset::new(kind, ActionSpace::Discrete(2), vec![e]);
         let vector = ObsKind::Vector(2);
         assert!(new(vector, episode(vec![0.0; 6].into(), 1)).is_ok());

@@ -90,12 +90,12 @@ impl SkillNets {
     /// Runs a batch of B windows through all three networks.
     ///
     /// `states`, `steps * B` rows, are time-major, so that the first B rows are those of the first step;
-    /// `encoded_actions` are the actions as the encoder reads them ([`ActionInput`](crate::skill::ActionInput)), and `noise`
-    /// `[B, latent]` is standard normal: z = mean + noise · σ.
+    /// `encoded_actions` are the actions as the encoder reads them ([`ActionInput`](crate::skill::ActionInput)), and
+    /// `noise` `[B, latent]` is standard normal: z = mean + noise · σ.
     ///
     /// # Errors
-    /// [`LearnError::Action`] if `actions` do not fit the decoder; [`LearnError::Config`] if the observations are of the
-    /// other kind than the networks.
+    /// [`LearnError::Action`] if `actions` do not fit the decoder; [`LearnError::Config`] if the observations are of
+    /// the other kind than the networks.
     pub fn forward(
         &self,
         states: &ObsBatch,

@@ -294,9 +294,7 @@ impl SkillTrainer {
         let forward = self.nets.forward(&states, &rows, encoded, noise, steps)?;
         Ok((forward, actions))
     }
-}
 
-impl SkillTrainer {
     /// Returns the squared error of the predicted state of `windows` of `dataset`, `[1]`, if it is predicted.
     pub(super) fn state_error(
         &self,
@@ -468,7 +466,8 @@ pub struct SkillMetrics {
     /// Norm of the gradient before clipping.
     pub grad_norm: f32,
     /// Squared error of the predicted state, the mean over its numbers and summed over a window, with
-    /// [`state_weight`](crate::skill::SkillConfig::state_weight); it starts near the number of steps of a window plus 1.
+    /// [`state_weight`](crate::skill::SkillConfig::state_weight); it starts near the number of steps of a window plus
+    /// 1.
     pub state_error: Option<f32>,
     /// Metrics of an epoch's networks on held-out demonstrations; `None` for a single batch, and without any.
     pub held_out: Option<HeldOutMetrics>,

@@ -1,7 +1,7 @@
 //! The learner of π(z | s): PPO or SAC, tied to the prior.
 
 use crate::{
-    Action, Actions, FileError, LearnError, PpoLearner, Rollout, SacLearner,
+    ActionValue, Actions, FileError, LearnError, PpoLearner, Rollout, SacLearner,
     file::TensorFile,
     learner::Learner,
     nn::unsquashed_action,
@@ -58,7 +58,7 @@ impl OverSkills {
             Self::Ppo(learner) => learner.config().gamma,
             Self::Sac(learner) => learner.config().gamma,
         };
-        gamma.powf(1.0 / self.teacher().config.horizon as f64)
+        gamma.powf(1.0 / self.teacher().config.skill_interval as f64)
     }
 
     /// Learns π(z | s) from a rollout of ticks, and returns the metrics under names that differ from those of the
@@ -68,20 +68,21 @@ impl OverSkills {
         config: &SpirlConfig,
         rollout: &Rollout,
     ) -> Result<Vec<(&'static str, f64)>, LearnError> {
-        let (gamma, horizon) = (self.discount_of_tick(), self.teacher().config.horizon);
+        let (gamma, skill_interval) = (self.discount_of_tick(), self.teacher().config.skill_interval);
         let tanh = self.teacher().description.config.tanh_latent;
         match self {
             Self::Sac(learner) => {
                 // Its buffer keeps raw rewards: they are scaled when they are read.
                 scaled(learner.base.rewards.as_mut(), gamma, rollout)?;
-                let skills = skill_rollout(rollout, &rollout.rewards, gamma, horizon)?;
+                let skills = skill_rollout(rollout, &rollout.rewards, gamma, skill_interval)?;
                 let of_whole = learner.config().gamma;
                 let weights: Vec<f32> = skills.discounts.iter().map(|discount| (discount / of_whole) as f32).collect();
                 Ok(learner.update_of_skills(&skills.rows, &weights)?.scalars())
             }
             Self::Ppo(learner) => {
                 let rewards = scaled(learner.base.rewards.as_mut(), gamma, rollout)?;
-                let SkillRollout { rows: mut skills, discounts } = skill_rollout(rollout, &rewards, gamma, horizon)?;
+                let SkillRollout { rows: mut skills, discounts } =
+                    skill_rollout(rollout, &rewards, gamma, skill_interval)?;
                 if let (true, Actions::Continuous { values, .. }) = (tanh, &mut skills.actions) {
                     // PPO does not squash: its actions are the normal numbers whose tanh the decoder reads.
                     values.iter_mut().for_each(|z| *z = unsquashed_action(*z));
@@ -137,7 +138,7 @@ pub(super) fn of_prior(config: &SpirlConfig, score: &ScoreConfig, kl: bool) -> S
         confidence: ConfidenceKind::Off,
         penalty: PenaltyForm::Mean,
         skill_draw: SkillDraw::Sample,
-        horizon: score.horizon,
+        skill_interval: score.skill_interval,
         prior: PriorKind::Learned,
         critic_clock: false,
     }
@@ -150,7 +151,8 @@ fn score_rows(rollout: &mut Rollout, policy: &Policy) -> Result<(), LearnError> 
         return Err(LearnError::Action("skills are vectors".to_owned()));
     };
     let rows = values.chunks_exact(*dim).enumerate();
-    let log_probs: Result<_, _> = rows.map(|(row, z)| output.log_prob(row, &Action::Continuous(z.to_vec()))).collect();
+    let log_probs: Result<_, _> =
+        rows.map(|(row, z)| output.log_prob(row, &ActionValue::Continuous(z.to_vec()))).collect();
     (rollout.log_probs, rollout.values) = (log_probs?, output.values);
     rollout.bootstrap(policy)
 }
@@ -214,7 +216,8 @@ mod tests {
         };
         skills.ends.cut_rows = vec![1, 2];
         discount_cuts(&mut skills, &[0.25, 0.5, 0.25], 0.25);
-        // Each row's target is reward + 0.25 times the value behind it: 1 + 0.5 * 4 in the middle, 1 + 0.25 * 4 in the last.
+        // Each row's target is reward + 0.25 times the value behind it: 1 + 0.5 * 4 in the middle, 1 + 0.25 * 4 in the
+        // last.
         assert_eq!(skills.rewards, [1.0, 2.0, 1.0]);
     }
 }

@@ -41,9 +41,9 @@ pub(super) struct SkillRollout {
 /// its ticks, discounted by `gamma`.
 ///
 /// The skills of an environment follow one another. Behind its last one, and wherever an episode was cut off, the row
-/// counts as truncated, with the next state among the ends. Skills drawn fewer than `horizon` ticks before the end of
-/// the rollout are left out however they ended: otherwise skills that end an episode would be learned from more often
-/// than others. The state in which the first of them was drawn is the next state of its predecessor.
+/// counts as truncated, with the next state among the ends. Skills drawn fewer than `skill_interval` ticks before the
+/// end of the rollout are left out however they ended: otherwise skills that end an episode would be learned from more
+/// often than others. The state in which the first of them was drawn is the next state of its predecessor.
 /// Log-probabilities and values stay 0.
 ///
 /// # Errors
@@ -53,7 +53,7 @@ pub(super) fn skill_rollout(
     rollout: &Rollout,
     rewards: &[f32],
     gamma: f64,
-    horizon: usize,
+    skill_interval: usize,
 ) -> Result<SkillRollout, LearnError> {
     check_ends(rollout)?;
     LearnError::check("rollout left", rollout.rows(), rollout.left.len())?;
@@ -63,7 +63,7 @@ pub(super) fn skill_rollout(
     let mut skills = Rollout { envs: 1, ..Rollout::new(1, rollout.obs_kind, 0, &ActionSpace::Continuous(latent)) };
     let (mut drawn, mut discounts) = (Vec::new(), Vec::new());
     for env in 0..rollout.envs {
-        let steps = skill_steps(rollout, rewards, env, gamma, horizon);
+        let steps = skill_steps(rollout, rewards, env, gamma, skill_interval);
         for (i, step) in steps.iter().enumerate() {
             let next = steps.get(i + 1).map(|next| next.row);
             push(&mut skills, rollout, step, next)?;
@@ -84,7 +84,7 @@ pub(super) fn skill_rollout(
 }
 
 /// Returns the skills that an environment has played to their ends, among those with enough time for it.
-fn skill_steps(rollout: &Rollout, rewards: &[f32], env: usize, gamma: f64, horizon: usize) -> Vec<SkillStep> {
+fn skill_steps(rollout: &Rollout, rewards: &[f32], env: usize, gamma: f64, skill_interval: usize) -> Vec<SkillStep> {
     let (mut steps, mut open): (Vec<SkillStep>, Option<SkillStep>) = (Vec::new(), None);
     let mut close = |open: &mut Option<SkillStep>, after| {
         steps.extend(open.take().map(|step| SkillStep { after, ..step }));
@@ -93,7 +93,7 @@ fn skill_steps(rollout: &Rollout, rewards: &[f32], env: usize, gamma: f64, horiz
         // A newly drawn skill has all of its ticks left.
         if rollout.left[row] >= 1.0 {
             close(&mut open, After::Row(row));
-            if tick + horizon > rollout.steps {
+            if tick + skill_interval > rollout.steps {
                 return steps;
             }
             open = Some(SkillStep { row, reward: 0.0, discount: 1.0, after: After::Nothing });
@@ -169,8 +169,8 @@ mod tests {
         rollout
     }
 
-    fn skills_of(rollout: &Rollout, horizon: usize) -> Result<SkillRollout, LearnError> {
-        skill_rollout(rollout, &rollout.rewards, 0.5, horizon)
+    fn skills_of(rollout: &Rollout, skill_interval: usize) -> Result<SkillRollout, LearnError> {
+        skill_rollout(rollout, &rollout.rewards, 0.5, skill_interval)
     }
 
     #[test]

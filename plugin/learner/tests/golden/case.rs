@@ -238,7 +238,8 @@ impl Case {
         }
     }
 
-    /// Compares the Euclidean norm of a parameter-like tensor of ours with the number `group` + its name, if there is one.
+    /// Compares the Euclidean norm of a parameter-like tensor of ours with the number `group` + its name, if there is
+    /// one.
     pub fn check_norm(&self, group: &str, name: &str, got: &[f32]) {
         let names = self.names(group, name);
         let length = got.len() / names.len();

@@ -32,7 +32,7 @@ fn a_setting_that_is_not_the_library_s_is_named() {
     case.assert_fixed("not a setting", 3.0);
     let clip = case.number("clip");
     case.assert_fixed("clip", clip);
-    let told = std::panic::catch_unwind(|| Case::load("ppo_loss_gaussian").assert_fixed("clip", clip + 1.0));
-    let text = told.expect_err("another clip").downcast::<String>().expect("a text");
+    let reported = std::panic::catch_unwind(|| Case::load("ppo_loss_gaussian").assert_fixed("clip", clip + 1.0));
+    let text = reported.expect_err("another clip").downcast::<String>().expect("a text");
     assert!(text.starts_with("ppo_loss_gaussian: clip is "), "{text}");
 }

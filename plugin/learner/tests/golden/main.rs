@@ -1,7 +1,9 @@
-//! Golden tests: the learner against reference numbers computed in double precision, with PyTorch or from first principles.
+//! Golden tests: the learner against reference numbers computed in double precision, with PyTorch or from first
+//! principles.
 //!
-//! The cases of PyTorch lie in `tests/fixtures/numerics`, or in the folder that the environment variable `PLAYBOT_GOLDEN`
-//! names; those of variants of SAC lie in `tests/fixtures/sac_variants`, beside the script that makes them.
+//! The cases of PyTorch lie in `tests/fixtures/numerics`, or in the folder that the environment variable
+//! `PLAYBOT_GOLDEN` names; those of variants of SAC lie in `tests/fixtures/sac_variants`, beside the script that makes
+//! them.
 
 mod adam;
 mod case;

@@ -52,8 +52,8 @@ fn golden_norm_obs() {
 fn golden_norm_reward() {
     let case = Case::load("norm_reward");
     for (reset, variant) in [(RewardReset::AfterStep, "reset_after"), (RewardReset::SameStep, "reset_same_step")] {
-        let usual = RewardNormalizer::new(case.number("gamma"));
-        check_rewards(&case, RewardNormalizer { reset, stats: fresh(&case, 1), ..usual }, variant);
+        let default = RewardNormalizer::new(case.number("gamma"));
+        check_rewards(&case, RewardNormalizer { reset, stats: fresh(&case, 1), ..default }, variant);
     }
     case.finish(&[]);
 }

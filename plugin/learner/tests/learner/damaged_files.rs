@@ -17,7 +17,7 @@ fn all_kinds(folder: &Path) -> Vec<(PathBuf, Load)> {
     let path = folder.join("sac");
     sac.save(&path).expect("written");
     kinds.push((path, |path| SacLearner::load(path, DeviceKind::Flex).map(drop)));
-    let policy = PolicyFile { card: PolicyMetadata::default(), policy: sac.policy().clone(), skills: None };
+    let policy = PolicyFile { metadata: PolicyMetadata::default(), policy: sac.policy().clone(), skills: None };
     let path = folder.join("policy");
     policy.save(&path, &vec![0.5; OBS * 2][..], &[], 2).expect("written");
     kinds.push((path, |path| PolicyFile::load(path, DeviceKind::Flex).map(drop)));

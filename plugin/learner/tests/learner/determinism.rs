@@ -8,7 +8,7 @@ use crate::toy::{Driver, OBS, SPACE};
 use playbot_learner::nn::{Activation, CnnKind};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, Learner, Policy, PolicyOutput, PolicySpec,
+    ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, ImageShape, Learner, Policy, PolicyOutput, PolicySpec,
     PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillConfig, SkillTrainer,
 };
 
@@ -131,7 +131,7 @@ fn skill_training_does_not_depend_on_the_number_of_threads() {
     same_on_any_number_of_threads("skill_training_does_not_depend_on_the_number_of_threads", || {
         let (obs_dim, dim, steps) = (29, 8, 220);
         let values = numbers(steps * (obs_dim + dim));
-        let episode = DemoEpisode {
+        let episode = DatasetEpisode {
             observations: values[..steps * obs_dim].to_vec().into(),
             actions: Actions::Continuous { dim, values: values[steps * obs_dim..].to_vec() },
         };
@@ -181,7 +181,7 @@ fn skill_training_on_images_does_not_depend_on_the_number_of_threads() {
         let (shape, steps) = (ImageShape { channels: 3, height: 32, width: 32 }, 44);
         let pixels: Vec<u8> = numbers(steps * shape.numbers()).iter().map(|x| (x * 60.0 + 128.0) as u8).collect();
         let actions = Actions::Discrete((0..steps as u32).map(|t| t % 5).collect());
-        let episode = DemoEpisode { observations: pixels.into(), actions };
+        let episode = DatasetEpisode { observations: pixels.into(), actions };
         let dataset = Dataset::new(shape, ActionSpace::Discrete(5), vec![episode]).expect("a good episode");
         let cnn = CnnKind::Impala { channels: vec![16, 16], feature: 64 };
         let config = SkillConfig { window: 4, batch: 5, cnn, ..SkillConfig::default() };

@@ -2,7 +2,7 @@
 
 use crate::tick::Tick;
 use playbot_learner::rng::{ChaCha8Rng, Streams, normal, unit};
-use playbot_learner::{Action, ActionSpace, Learner, Rollout, SkillSource};
+use playbot_learner::{ActionSpace, ActionValue, Learner, Rollout, SkillSource};
 
 pub const OBS: usize = 4;
 pub const SPACE: ActionSpace = ActionSpace::Continuous(2);
@@ -98,14 +98,14 @@ impl Field {
             if held.left == 0 {
                 let noise = &mut |_| normal(rng);
                 held.z = source.prior.sample(&point.observe(), 1, source.draw, noise).expect("finite");
-                held.left = source.horizon;
+                held.left = source.skill_interval;
             }
         }
     }
 
     /// Returns the remaining share of each skill.
     fn shares_left(&self, source: &SkillSource) -> Vec<f32> {
-        let share = |held: &Held| if held.left == 0 { 1.0 } else { held.left as f32 / source.horizon as f32 };
+        let share = |held: &Held| if held.left == 0 { 1.0 } else { held.left as f32 / source.skill_interval as f32 };
         self.skills.iter().map(share).collect()
     }
 
@@ -123,7 +123,7 @@ impl Field {
             let mut tick = Tick::new(&SPACE);
             for (row, point) in self.points.iter_mut().enumerate() {
                 let (action, log_prob) = output.sample(row, &mut self.rngs[row]);
-                let Action::Continuous(velocity) = &action else { panic!("continuous") };
+                let ActionValue::Continuous(velocity) = &action else { panic!("continuous") };
                 tick.push(&action, log_prob, point.step(self.rules, velocity));
                 self.skills[row].left = self.skills[row].left.saturating_sub(1);
             }

@@ -5,8 +5,8 @@ use crate::score::model;
 use crate::skill::{config, corridor_demos};
 use crate::toy::OBS;
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, Learner, PolicyFile, PolicyMetadata, PpoLearner,
-    ScoreConfig, SkillModel, SkillTrainer,
+    ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, FileError, Learner, PolicyFile, PolicyMetadata,
+    PpoLearner, ScoreConfig, SkillModel, SkillTrainer,
 };
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde_json::{Value, json};
@@ -153,7 +153,7 @@ fn a_training_does_not_go_on_with_other_demonstrations() {
     let demos = |at: usize, by: f32| {
         let mut values: Vec<f32> = (0..40).map(|t| t as f32).collect();
         values[at] += by;
-        let episode = DemoEpisode { observations: values.into(), actions: Actions::Discrete(vec![1; 40]) };
+        let episode = DatasetEpisode { observations: values.into(), actions: Actions::Discrete(vec![1; 40]) };
         Dataset::new(1, ActionSpace::Discrete(2), vec![episode]).expect("a good episode")
     };
     let trainer = SkillTrainer::new(config(), demos(0, 0.0), 1, DeviceKind::Flex).expect("windows fit");
@@ -202,7 +202,7 @@ fn sizes_that_the_file_does_not_hold_are_refused_before_anything_is_made() {
 pub fn policy_file(path: &Path, condition: bool) {
     let score = ScoreConfig { condition, init_from_decoder: condition, ..ScoreConfig::default() };
     let learner = PpoLearner::with_skill(ppo_config(), score, &model(1), 1, DeviceKind::Flex).expect("good settings");
-    let file = PolicyFile { card: PolicyMetadata::default(), policy: learner.policy(), skills: learner.skills() };
+    let file = PolicyFile { metadata: PolicyMetadata::default(), policy: learner.policy(), skills: learner.skills() };
     let (obs, z) = (vec![0.5; 3 * OBS], vec![0.25; 3 * learner.rollout_latent()]);
     assert!(file.save(path, &obs, &z, 0).expect_err("no examples").to_string().contains("at least one example row"));
     file.save(path, &obs, &z, 3).expect("written");

@@ -3,7 +3,7 @@
 use crate::skill::corridor_demos;
 use playbot_learner::rng::{Streams, below, normal};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, LearnError, SkillConfig, SkillMetrics, SkillTrainer,
+    ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, LearnError, SkillConfig, SkillMetrics, SkillTrainer,
 };
 use std::ops::ControlFlow;
 
@@ -14,7 +14,7 @@ fn config() -> SkillConfig {
 /// Returns actions that are independent of the observations: a model can only memorise them.
 fn coins() -> Dataset {
     let mut rng = Streams::new(3).stream("coins", 0);
-    let episode = |_| DemoEpisode {
+    let episode = |_| DatasetEpisode {
         observations: (0..30 * 6).map(|_| normal(&mut rng)).collect::<Vec<f32>>().into(),
         actions: Actions::Discrete((0..30).map(|_| below(&mut rng, 3) as u32).collect()),
     };
@@ -50,12 +50,12 @@ fn whole_levels_are_kept_apart() {
     // Each level is played ten times over, with the same random actions, so one of its episodes gives away the
     // others.
     let mut rng = Streams::new(3).stream("coins", 0);
-    let mut once = || DemoEpisode {
+    let mut once = || DatasetEpisode {
         observations: (0..30 * 6).map(|_| normal(&mut rng)).collect::<Vec<f32>>().into(),
         actions: Actions::Discrete((0..30).map(|_| below(&mut rng, 3) as u32).collect()),
     };
-    let levels: Vec<DemoEpisode> = (0..8).map(|_| once()).collect();
-    let episodes: Vec<DemoEpisode> = (0..80).map(|i| levels[i % 8].clone()).collect();
+    let levels: Vec<DatasetEpisode> = (0..8).map(|_| once()).collect();
+    let episodes: Vec<DatasetEpisode> = (0..80).map(|i| levels[i % 8].clone()).collect();
     let demos = || Dataset::new(6, ActionSpace::Discrete(3), episodes.clone()).expect("consistent");
     let last = |demos: Dataset| {
         let mut trainer = trainer(SkillConfig { beta: 1.0, ..config() }, demos);
@@ -107,7 +107,7 @@ fn the_best_epoch_is_that_of_the_least_nll_whatever_the_loss_says() {
         Some(at as u64 + 1)
     };
     assert_eq!(trainer.best_epoch(), least(&nlls), "{nlls:?}");
-    assert_ne!(trainer.best_epoch(), least(&losses), "the loss would have told the same: {losses:?}");
+    assert_ne!(trainer.best_epoch(), least(&losses), "the loss would have reported the same: {losses:?}");
 }
 
 #[test]

@@ -4,7 +4,7 @@ use crate::tick::Tick;
 use playbot_learner::nn::CnnKind;
 use playbot_learner::rng::{ChaCha8Rng, Streams, below, normal};
 use playbot_learner::{
-    Action, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, Learner, ObsKind, Observations,
+    ActionSpace, ActionValue, Actions, Dataset, DatasetEpisode, DeviceKind, ImageShape, Learner, ObsKind, Observations,
     PpoConfig, Rollout, SkillConfig, SkillDraw, SkillModel, SkillTrainer,
 };
 use std::ops::ControlFlow;
@@ -12,7 +12,7 @@ use std::ops::ControlFlow;
 /// Steps until an episode is cut off.
 const LIMIT: usize = 8;
 /// Steps between two draws of a skill.
-const HORIZON: usize = 4;
+const SKILL_INTERVAL: usize = 4;
 
 /// Rows of a picture, and its columns.
 pub const SIDE: usize = 12;
@@ -74,7 +74,7 @@ pub fn demonstrations(seed: u64) -> (SkillConfig, Dataset) {
         let pixels: Vec<u8> = quarters.iter().flat_map(|&quarter| image(quarter, &mut rng)).collect();
         let mut name = |quarter| if below(&mut rng, 10) < 6 { quarter } else { below(&mut rng, 4) as u32 };
         let named = quarters.iter().map(|&quarter| name(quarter)).collect();
-        DemoEpisode { observations: pixels.into(), actions: Actions::Discrete(named) }
+        DatasetEpisode { observations: pixels.into(), actions: Actions::Discrete(named) }
     });
     (config, Dataset::new(SHAPE, SPACE, episodes.collect()).expect("consistent"))
 }
@@ -138,7 +138,7 @@ impl Driver {
         let fresh = prior.sample(obs, n, SkillDraw::Sample, &mut next).expect("finite");
         self.skills.resize(fresh.len(), 0.0);
         for (row, player) in self.players.iter().enumerate() {
-            if all || player.time.is_multiple_of(HORIZON) {
+            if all || player.time.is_multiple_of(SKILL_INTERVAL) {
                 let range = row * prior.latent()..(row + 1) * prior.latent();
                 self.skills[range.clone()].copy_from_slice(&fresh[range]);
             }
@@ -157,7 +157,7 @@ impl Driver {
             let mut tick = Tick::new(&SPACE);
             for (row, player) in self.players.iter_mut().enumerate() {
                 let (action, log_prob) = output.sample(row, &mut player.rng);
-                let hit = action == Action::Discrete(player.quarter);
+                let hit = action == ActionValue::Discrete(player.quarter);
                 player.time += 1;
                 player.draw_picture();
                 tick.push(&action, log_prob, (f32::from(u8::from(hit)), !hit, hit && player.time == LIMIT));

@@ -4,7 +4,7 @@ use crate::image_task::{SHAPE, SIDE, WINDOW, skill_config};
 use playbot_learner::nn::CnnKind;
 use playbot_learner::rng::{ChaCha8Rng, Streams, below, normal};
 use playbot_learner::{
-    ActionInput, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, ImageShape, LearnError, ObsKind, SacConfig,
+    ActionInput, ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, ImageShape, LearnError, ObsKind, SacConfig,
     SacLearner, ScoreConfig, SkillConfig, SkillDraw, SkillModel, SkillTrainer, WindowRule,
 };
 use std::ops::ControlFlow;
@@ -26,13 +26,13 @@ fn image(right: bool, rng: &mut ChaCha8Rng) -> Vec<u8> {
 
 /// Returns episodes of two kinds of demonstrators, who press a key for the half with the spot. Only the image tells
 /// the half, and only the skill tells the kind.
-fn episodes(count: u64, act: impl Fn(bool, &[bool]) -> Actions) -> Vec<DemoEpisode> {
+fn episodes(count: u64, act: impl Fn(bool, &[bool]) -> Actions) -> Vec<DatasetEpisode> {
     let streams = Streams::new(4);
     let episode = |i: u64| {
         let mut rng = streams.stream("episode", i);
         let rights: Vec<bool> = (0..3 * WINDOW).map(|_| below(&mut rng, 2) == 1).collect();
         let pixels: Vec<u8> = rights.iter().flat_map(|&right| image(right, &mut rng)).collect();
-        DemoEpisode { observations: pixels.into(), actions: act(i % 2 == 1, &rights) }
+        DatasetEpisode { observations: pixels.into(), actions: act(i % 2 == 1, &rights) }
     };
     (0..count).map(episode).collect()
 }
@@ -104,7 +104,7 @@ fn continuous_actions_of_images() {
 fn both_backends_and_both_architectures_learn_the_same() {
     let nature = CnnKind::Nature { feature: 16 };
     let shape = ImageShape { channels: 1, height: 36, width: 40 };
-    let episodes = (0..4).map(|i| DemoEpisode {
+    let episodes = (0..4).map(|i| DatasetEpisode {
         observations: (0..4 * shape.numbers()).map(|p| (p * (i + 3) % 256) as u8).collect::<Vec<_>>().into(),
         actions: Actions::Discrete(vec![i as u32 % 2; 4]),
     });
@@ -137,7 +137,7 @@ fn a_loaded_trainer_goes_on_bit_for_bit() {
     };
     assert!(bytes(&trainer, "a") == bytes(&loaded, "b"), "whole states are equal, byte for byte");
 
-    let vectors = |episode: &DemoEpisode| DemoEpisode {
+    let vectors = |episode: &DatasetEpisode| DatasetEpisode {
         observations: vec![0.0; SHAPE.numbers() * episode.actions.len()].into(),
         actions: episode.actions.clone(),
     };
@@ -188,7 +188,7 @@ fn a_row_does_not_depend_on_the_other_rows() {
     for (cnn, device) in
         [(skill_config().cnn, DeviceKind::Flex), (nature, DeviceKind::Flex), (skill_config().cnn, DeviceKind::Ndarray)]
     {
-        let episode = DemoEpisode {
+        let episode = DatasetEpisode {
             observations: pixels[..4 * shape.numbers()].to_vec().into(),
             actions: Actions::Discrete(vec![0; 4]),
         };

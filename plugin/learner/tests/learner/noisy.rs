@@ -2,8 +2,8 @@
 
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    ActionSpace, Actions, ConfidenceKind, Dataset, DemoEpisode, DeviceKind, LearnError, Learner, PpoConfig, PpoLearner,
-    Rollout, ScoreConfig, SkillConfig, SkillDraw, SkillModel, SkillTrainer, StdKind,
+    ActionSpace, Actions, ConfidenceKind, Dataset, DatasetEpisode, DeviceKind, LearnError, Learner, PpoConfig,
+    PpoLearner, Rollout, ScoreConfig, SkillConfig, SkillDraw, SkillModel, SkillTrainer, StdKind,
 };
 use std::ops::ControlFlow;
 
@@ -18,7 +18,7 @@ fn demos() -> Dataset {
         let observations: Vec<f32> = (0..30).map(|_| normal(&mut rng)).collect();
         let mut noisy = |x: &f32| [x + NOISE[0] * normal(&mut rng), -0.5 * x + NOISE[1] * normal(&mut rng)];
         let values = observations.iter().flat_map(&mut noisy).collect();
-        DemoEpisode { observations: observations.into(), actions: Actions::Continuous { dim: 2, values } }
+        DatasetEpisode { observations: observations.into(), actions: Actions::Continuous { dim: 2, values } }
     });
     Dataset::new(1, PLANE, episodes.collect()).expect("consistent")
 }

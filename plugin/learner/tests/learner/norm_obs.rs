@@ -3,7 +3,7 @@
 
 use playbot_learner::rng::{Streams, normal, unit};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, EndStates, ImageShape, LearnError, Learner, ObsKind,
+    ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, EndStates, ImageShape, LearnError, Learner, ObsKind,
     PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillConfig, SkillDraw, SkillMetrics,
     SkillModel, SkillTrainer, StdKind,
 };
@@ -41,7 +41,7 @@ pub fn demos(space: ActionSpace) -> Dataset {
                 Actions::Continuous { dim, values }
             }
         };
-        DemoEpisode { observations: observations.into(), actions }
+        DatasetEpisode { observations: observations.into(), actions }
     });
     Dataset::new(OBS, space, episodes.collect()).expect("consistent")
 }
@@ -186,7 +186,7 @@ fn what_cannot_be_normalised_is_refused() {
         assert!(error.expect_err("two normalisers").to_string().contains("same frozen normaliser"));
     }
     let image = ImageShape { channels: 1, height: 12, width: 12 };
-    let episode = DemoEpisode { observations: vec![0u8; 8 * 144].into(), actions: Actions::Discrete(vec![0; 8]) };
+    let episode = DatasetEpisode { observations: vec![0u8; 8 * 144].into(), actions: Actions::Discrete(vec![0; 8]) };
     let data = Dataset::new(ObsKind::Image(image), CHOICE, vec![episode]).expect("consistent");
     let error = SkillTrainer::new(config(true), data, 1, DeviceKind::Flex).expect_err("pixels");
     assert!(matches!(&error, LearnError::Setting(error) if error.why.contains("is for vectors")), "{error}");

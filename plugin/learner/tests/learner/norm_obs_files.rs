@@ -123,7 +123,7 @@ fn a_policy_file_needs_no_skill_file() {
     learner.update(&rollout(&learner, PLANE, 0)).expect("finite");
     let cloning = (plane.policy(), learner.skills());
     for (policy, skills) in [(learner.policy(), learner.skills()), (actor.policy(), actor.skills()), cloning] {
-        let file = PolicyFile { card: PolicyMetadata::default(), policy, skills };
+        let file = PolicyFile { metadata: PolicyMetadata::default(), policy, skills };
         let (obs, z) = (hall(4, 70), vec![0.25; 8]);
         file.save(&path, &obs, &z, 4).expect("written");
         let back = PolicyFile::load(&path, DeviceKind::Flex).expect("read");
@@ -143,7 +143,7 @@ fn a_policy_file_needs_no_skill_file() {
     }
     let skills =
         SkillSource { prior: trainer(config(false), PLANE).into_model().prior(), ..learner.skills().expect("some") };
-    let file = PolicyFile { card: PolicyMetadata::default(), policy: learner.policy(), skills: Some(skills) };
+    let file = PolicyFile { metadata: PolicyMetadata::default(), policy: learner.policy(), skills: Some(skills) };
     let error = file.save(&path, &hall(4, 70), &[0.25; 8], 4).expect_err("two ways to see").to_string();
     assert!(error.contains("prior and decoder normalise observations in different ways"), "{error}");
 }

@@ -18,8 +18,8 @@ fn picture() -> PictureMetadata {
 }
 
 fn file(learner: &PpoLearner) -> PolicyFile {
-    let card = PolicyMetadata { picture: Some(picture()), ..PolicyMetadata::default() };
-    PolicyFile { card, policy: learner.policy(), skills: learner.skills() }
+    let metadata = PolicyMetadata { picture: Some(picture()), ..PolicyMetadata::default() };
+    PolicyFile { metadata, policy: learner.policy(), skills: learner.skills() }
 }
 
 fn pixels(n: u32) -> Vec<u8> {
@@ -42,7 +42,7 @@ fn a_policy_comes_back_from_its_file_as_it_was() {
         save(&file(&learner), &path).expect("written");
         let back = PolicyFile::load(&path, DeviceKind::Flex).expect("read");
         assert_eq!((back.policy.observation(), back.policy.cnn()), (SHAPE.into(), Some(config().cnn)));
-        assert_eq!(back.card.picture, Some(picture()));
+        assert_eq!(back.metadata.picture, Some(picture()));
         let (pixels, z) = (pixels(8), vec![-0.5; 8 * back.policy.latent()]);
         let played = |file: &PolicyFile| file.policy.forward(&z, &pixels, 8).expect("finite");
         assert_eq!(played(&back), played(&file(&learner)));
@@ -55,20 +55,21 @@ fn a_policy_comes_back_from_its_file_as_it_was() {
         assert_eq!((&shape[..], *dtype), (&[3, 144][..], Dtype::U8));
     }
     // Behaviour cloning.
-    let skills = SkillSource { prior: model.prior(), decoder: model.policy(), horizon: 4, draw: SkillDraw::Sample };
-    let cloned = PolicyFile { card: PolicyMetadata::default(), policy: model.policy(), skills: Some(skills) };
+    let skills =
+        SkillSource { prior: model.prior(), decoder: model.policy(), skill_interval: 4, draw: SkillDraw::Sample };
+    let cloned = PolicyFile { metadata: PolicyMetadata::default(), policy: model.policy(), skills: Some(skills) };
     save(&cloned, &path).expect("written");
     load_policy(&path).expect("whole");
 }
 
 #[test]
-fn a_card_that_tells_of_other_pictures_is_refused() {
+fn metadata_of_other_pictures_is_refused() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("policy");
     let learner = ppo(config(), 1);
-    for card in [PictureMetadata { grayscale: false, ..picture() }, PictureMetadata { stack: 2, ..picture() }] {
+    for metadata in [PictureMetadata { grayscale: false, ..picture() }, PictureMetadata { stack: 2, ..picture() }] {
         let mut wrong = file(&learner);
-        wrong.card.picture = Some(card);
+        wrong.metadata.picture = Some(metadata);
         let error = save(&wrong, &path).expect_err("other channels").to_string();
         assert!(error.contains("but the policy observes images of 1 channels"), "{error}");
     }

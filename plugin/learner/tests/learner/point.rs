@@ -4,7 +4,7 @@ use crate::field::{Field, HURRY, OBS, Point, SPACE};
 use crate::tick::Tick;
 use playbot_learner::rng::Streams;
 use playbot_learner::{
-    Action, DeviceKind, EntropyCoef, Learner, ObsKind, PolicySpec, PpoConfig, PpoLearner, Rollout, SacConfig,
+    ActionValue, DeviceKind, EntropyCoef, Learner, ObsKind, PolicySpec, PpoConfig, PpoLearner, Rollout, SacConfig,
     SacLearner, TimeLimit,
 };
 
@@ -20,7 +20,7 @@ pub fn recordings(episodes: u64) -> Vec<Rollout> {
             let [x, y, to_x, to_y] = obs;
             let velocity = [to_x - x, to_y - y].map(|way| (5.0 * way).clamp(-1.0, 1.0));
             let mut tick = Tick::new(&SPACE);
-            tick.push(&Action::Continuous(velocity.to_vec()), 0.0, point.step(&HURRY, &velocity));
+            tick.push(&ActionValue::Continuous(velocity.to_vec()), 0.0, point.step(&HURRY, &velocity));
             tick.add_to(&mut rollout, (&obs).into(), &[], &[0.0]);
             if tick.is_done(0) {
                 rollout.next_values = vec![0.0];

@@ -5,7 +5,7 @@ use crate::score::model;
 use crate::toy::{Driver, OBS};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    Action, ActionSpace, Actions, ConfidenceKind, Dataset, DemoEpisode, DeviceKind, EndStates, EntropyCoef,
+    ActionSpace, ActionValue, Actions, ConfidenceKind, Dataset, DatasetEpisode, DeviceKind, EndStates, EntropyCoef,
     KlDirection, LearnError, Learner, ObsKind, Observations, Rollout, SacConfig, SacLearner, ScoreConfig, SkillModel,
     SkillTrainer,
 };
@@ -67,7 +67,7 @@ fn continuous_model() -> SkillModel {
         let mut rng = streams.stream("demo", i);
         let observations: Vec<f32> = (0..20).map(|_| normal(&mut rng)).collect();
         let values = observations.iter().flat_map(|x| [0.5 * x, -x]).collect();
-        DemoEpisode { observations: observations.into(), actions: Actions::Continuous { dim: 2, values } }
+        DatasetEpisode { observations: observations.into(), actions: Actions::Continuous { dim: 2, values } }
     });
     let data = Dataset::new(1, ActionSpace::Continuous(2), episodes.collect()).expect("consistent");
     let mut trainer = SkillTrainer::new(crate::skill::config(), data, 3, DeviceKind::Flex).expect("windows fit");
@@ -116,7 +116,7 @@ fn distance(model: &SkillModel, score: ScoreConfig) -> (f32, f32) {
     let decoded = model.policy().forward(&probe.z, &probe.obs, 64).expect("finite");
     let mut sum = 0.0;
     for row in 0..64 {
-        let (Action::Continuous(a), Action::Continuous(b)) = (played.greedy(row), decoded.greedy(row)) else {
+        let (ActionValue::Continuous(a), ActionValue::Continuous(b)) = (played.greedy(row), decoded.greedy(row)) else {
             panic!("continuous")
         };
         sum += a.iter().zip(&b).map(|(x, y)| (x - y.clamp(-1.0, 1.0)).abs()).sum::<f32>() / 128.0;

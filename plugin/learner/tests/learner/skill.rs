@@ -3,8 +3,8 @@
 use crate::toy::{Corridor, OBS, SPACE};
 use playbot_learner::rng::{Streams, normal, unit};
 use playbot_learner::{
-    Action, ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, FileError, SkillConfig, SkillDraw, SkillMetrics,
-    SkillModel, SkillTrainer,
+    ActionSpace, ActionValue, Actions, Dataset, DatasetEpisode, DeviceKind, FileError, SkillConfig, SkillDraw,
+    SkillMetrics, SkillModel, SkillTrainer,
 };
 use std::ops::ControlFlow;
 
@@ -39,7 +39,7 @@ pub fn demos_until(place: usize, episodes: u64) -> Dataset {
             actions.push(action);
             let (_, end, cut) = corridor.step(action);
             if end || cut || corridor.place() >= place {
-                return DemoEpisode { observations: observations.into(), actions: Actions::Discrete(actions) };
+                return DatasetEpisode { observations: observations.into(), actions: Actions::Discrete(actions) };
             }
         }
     });
@@ -79,7 +79,7 @@ fn walks(model: &SkillModel) -> f64 {
             let z = prior.sample(&obs, 1, SkillDraw::Mean, &mut |_| panic!("no draw")).expect("finite");
             let output = policy.forward(&z, &obs, 1).expect("finite");
             assert_eq!(output.values, [0.0]);
-            let Action::Discrete(action) = output.greedy(0) else { panic!("discrete") };
+            let ActionValue::Discrete(action) = output.greedy(0) else { panic!("discrete") };
             right += usize::from(action == corridor.best());
             steps += 1;
             let (_, end, cut) = corridor.step(action);
@@ -95,7 +95,7 @@ fn walks(model: &SkillModel) -> f64 {
 #[test]
 fn skills_keep_players_apart() {
     let episodes = (0..60)
-        .map(|i| DemoEpisode { observations: vec![1.0; 20].into(), actions: Actions::Discrete(vec![i % 2; 20]) });
+        .map(|i| DatasetEpisode { observations: vec![1.0; 20].into(), actions: Actions::Discrete(vec![i % 2; 20]) });
     let data = Dataset::new(1, ActionSpace::Discrete(2), episodes.collect()).expect("consistent");
     let mut trainer = SkillTrainer::new(config(), data, 3, DeviceKind::Flex).expect("windows fit");
     let history = train(&mut trainer, 25);
@@ -108,7 +108,7 @@ fn skills_keep_players_apart() {
     let z = model.prior().sample(&obs, n, SkillDraw::Sample, &mut |_| normal(&mut rng)).expect("finite");
     assert!(z.iter().all(|x| x.abs() <= 1.0), "skills are squashed");
     let output = model.policy().forward(&z, &obs, n).expect("finite");
-    let ones = (0..n).filter(|&row| output.greedy(row) == Action::Discrete(1)).count();
+    let ones = (0..n).filter(|&row| output.greedy(row) == ActionValue::Discrete(1)).count();
     assert!((n / 5..4 * n / 5).contains(&ones), "{ones} of {n} skills press 1");
 }
 
@@ -119,7 +119,7 @@ pub fn continuous_demos() -> Dataset {
         let mut rng = streams.stream("demo", i);
         let observations: Vec<f32> = (0..20).map(|_| normal(&mut rng)).collect();
         let values = observations.iter().flat_map(|x| [0.5 * x, -x]).collect();
-        DemoEpisode { observations: observations.into(), actions: Actions::Continuous { dim: 2, values } }
+        DatasetEpisode { observations: observations.into(), actions: Actions::Continuous { dim: 2, values } }
     });
     Dataset::new(1, ActionSpace::Continuous(2), episodes.collect()).expect("consistent")
 }

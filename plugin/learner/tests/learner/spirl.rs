@@ -10,12 +10,12 @@ use playbot_learner::{
 use std::sync::LazyLock;
 
 /// Ticks for which one skill is used.
-const HORIZON: usize = 4;
+const SKILL_INTERVAL: usize = 4;
 
 static MODEL: LazyLock<SkillModel> = LazyLock::new(skills_of_directions);
 
 fn score() -> ScoreConfig {
-    ScoreConfig { horizon: HORIZON, ..ScoreConfig::default() }
+    ScoreConfig { skill_interval: SKILL_INTERVAL, ..ScoreConfig::default() }
 }
 
 fn ppo_config() -> PpoConfig {
@@ -164,7 +164,7 @@ fn what_cannot_work_is_refused() {
     assert!(refused(score(), legacy).contains("time_limit"));
 
     let mut learner = ppo(SpirlConfig::default());
-    let short: Rollout = Field::new(&WALK, 2, 1).rollout(&learner, HORIZON - 1);
+    let short: Rollout = Field::new(&WALK, 2, 1).rollout(&learner, SKILL_INTERVAL - 1);
     let error = learner.learn(&short).expect_err("no whole skill");
     assert!(matches!(&error, LearnError::Config(text) if text.contains("twice as long")), "{error}");
 }

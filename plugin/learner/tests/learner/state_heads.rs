@@ -3,7 +3,7 @@
 use crate::image_task::{SHAPE, SIDE, WINDOW, skill_config};
 use playbot_learner::rng::{Streams, below};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DemoEpisode, DeviceKind, LearnError, SkillConfig, SkillMetrics, SkillModel,
+    ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, LearnError, SkillConfig, SkillMetrics, SkillModel,
     SkillTrainer,
 };
 use std::ops::ControlFlow;
@@ -30,7 +30,7 @@ fn demos(count: u64) -> (Dataset, Dataset) {
             state.extend([row as f32, column as f32]);
             actions.push(u32::from(column >= SIDE / 2));
         }
-        let episode = |observations| DemoEpisode { observations, actions: Actions::Discrete(actions.clone()) };
+        let episode = |observations| DatasetEpisode { observations, actions: Actions::Discrete(actions.clone()) };
         pictures.push(episode(pixels.into()));
         vectors.push(episode(state.into()));
     }
@@ -38,7 +38,7 @@ fn demos(count: u64) -> (Dataset, Dataset) {
     (dataset(SHAPE.into(), pictures), dataset(2.into(), vectors))
 }
 
-fn told(count: u64) -> Dataset {
+fn demos_with_states(count: u64) -> Dataset {
     let (pictures, states) = demos(count);
     pictures.with_states(states).expect("the same episodes")
 }
@@ -53,26 +53,26 @@ fn train(trainer: &mut SkillTrainer, epochs: usize) -> SkillMetrics {
 }
 
 #[test]
-fn trunks_learn_to_tell_the_state_of_pictures_they_were_not_shown() {
+fn trunks_learn_the_state_of_pictures_they_were_not_shown() {
     let error = |weight: f64| {
-        let metrics = train(&mut trainer(config(weight), told(120)), 12);
+        let metrics = train(&mut trainer(config(weight), demos_with_states(120)), 12);
         assert!(metrics.nll < 1.6, "the actions are learned as well: {}", metrics.nll);
-        let apart = metrics.held_out.and_then(|apart| apart.state_error).expect("it is measured");
-        (metrics.state_error.expect("it is told"), apart)
+        let held_out = metrics.held_out.and_then(|held_out| held_out.state_error).expect("it is measured");
+        (metrics.state_error.expect("it is measured"), held_out)
     };
     // Predicting the mean costs one per step, and one for the prior.
-    let (told, told_apart) = error(1.0);
-    assert!(told < 1.5 && told_apart < 1.5, "{told}, {told_apart}");
+    let (trained, held_out) = error(1.0);
+    assert!(trained < 1.5 && held_out < 1.5, "{trained}, {held_out}");
     // With next to no weight only the layers over the trunks learn, and the row is not needed to press a key.
     let (_, hardly) = error(1e-9);
-    assert!(hardly > 1.4 * told_apart, "the trunks themselves learn: {told_apart} against {hardly}");
+    assert!(hardly > 1.4 * held_out, "the trunks themselves learn: {held_out} against {hardly}");
 }
 
 #[test]
-fn what_tells_the_state_is_not_part_of_the_model() {
+fn heads_for_the_state_are_not_part_of_the_model() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("skills.safetensors");
-    let mut trainer = trainer(SkillConfig { patience: Some(9), ..config(1.0) }, told(12));
+    let mut trainer = trainer(SkillConfig { patience: Some(9), ..config(1.0) }, demos_with_states(12));
     train(&mut trainer, 1);
     trainer.into_model().save(&path).expect("written");
     let bytes = std::fs::read(&path).expect("readable");
@@ -85,11 +85,11 @@ fn what_tells_the_state_is_not_part_of_the_model() {
 fn a_stopped_training_goes_on_to_the_same_bytes() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("skills.checkpoint");
-    let mut whole = trainer(SkillConfig { patience: Some(9), ..config(1.0) }, told(12));
+    let mut whole = trainer(SkillConfig { patience: Some(9), ..config(1.0) }, demos_with_states(12));
     train(&mut whole, 1);
     whole.train_batch().expect("finite");
     whole.save(&path).expect("written");
-    let mut loaded = SkillTrainer::load(&path, told(12), DeviceKind::Flex).expect("read");
+    let mut loaded = SkillTrainer::load(&path, demos_with_states(12), DeviceKind::Flex).expect("read");
     assert_eq!(train(&mut loaded, 2), train(&mut whole, 2));
     let bytes = |trainer: &SkillTrainer| {
         trainer.save(&path).expect("written");
@@ -101,7 +101,7 @@ fn a_stopped_training_goes_on_to_the_same_bytes() {
 }
 
 #[test]
-fn what_cannot_be_told_is_refused() {
+fn impossible_settings_are_refused() {
     let error = |config: SkillConfig, dataset: Dataset| {
         SkillTrainer::new(config, dataset, 1, DeviceKind::Flex).expect_err("cannot work").to_string()
     };

@@ -4,8 +4,9 @@ use crate::corridor;
 use crate::score::model;
 use crate::toy::{Driver, OBS};
 use playbot_learner::{
-    Action, ConfidenceKind, DeviceKind, KlDirection, LearnError, Learner, PenaltyForm, Policy, PpoConfig, PpoLearner,
-    PriorKind, Rollout, SacConfig, SacLearner, SacMetrics, ScoreConfig, SkillDraw, SkillModel, UpdateMetrics,
+    ActionValue, ConfidenceKind, DeviceKind, KlDirection, LearnError, Learner, PenaltyForm, Policy, PpoConfig,
+    PpoLearner, PriorKind, Rollout, SacConfig, SacLearner, SacMetrics, ScoreConfig, SkillDraw, SkillModel,
+    UpdateMetrics,
 };
 
 const CHOICES: u32 = 3;
@@ -30,7 +31,7 @@ pub fn rollout(model: &SkillModel) -> Rollout {
 /// Probabilities of all choices in each row.
 fn probabilities(policy: &Policy, rollout: &Rollout) -> Vec<Vec<f64>> {
     let output = policy.forward(&rollout.z, &rollout.obs, rollout.rows()).expect("finite");
-    let of = |row, choice| f64::from(output.log_prob(row, &Action::Discrete(choice)).expect("a choice")).exp();
+    let of = |row, choice| f64::from(output.log_prob(row, &ActionValue::Discrete(choice)).expect("a choice")).exp();
     (0..rollout.rows()).map(|row| (0..CHOICES).map(|choice| of(row, choice)).collect()).collect()
 }
 
@@ -92,11 +93,11 @@ fn skills_come_from_the_prior_that_is_chosen() {
 #[test]
 fn skills_are_held_and_drawn_as_they_say() {
     let model = model(1);
-    for (horizon, skill_draw) in [(3, SkillDraw::Mean), (11, SkillDraw::Sample)] {
-        let score = ScoreConfig { horizon, skill_draw, ..ScoreConfig::default() };
+    for (skill_interval, skill_draw) in [(3, SkillDraw::Mean), (11, SkillDraw::Sample)] {
+        let score = ScoreConfig { skill_interval, skill_draw, ..ScoreConfig::default() };
         for source in [ppo(score.clone(), &model).skills(), sac(score, &model).skills()] {
             let source = source.expect("a skill model");
-            assert_eq!((source.horizon, source.draw), (horizon, skill_draw));
+            assert_eq!((source.skill_interval, source.draw), (skill_interval, skill_draw));
         }
     }
 }
@@ -147,7 +148,7 @@ fn the_confidence_is_that_of_its_kind() {
     let rollout = rollout(&model);
     let decoder = probabilities(&model.policy(), &rollout);
     let chosen = |row: usize| match rollout.actions.get(row) {
-        Some(Action::Discrete(choice)) => decoder[row][choice as usize],
+        Some(ActionValue::Discrete(choice)) => decoder[row][choice as usize],
         other => panic!("a choice, not {other:?}"),
     };
     let largest = |row: usize| decoder[row].iter().copied().fold(0.0, f64::max);

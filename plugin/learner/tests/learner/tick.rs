@@ -1,6 +1,6 @@
 //! A tick of several environments, gathered row by row as a driver plays it.
 
-use playbot_learner::{Action, ActionSpace, Actions, ObsSlice, Rollout, RolloutStep};
+use playbot_learner::{ActionSpace, ActionValue, Actions, ObsSlice, Rollout, RolloutStep};
 
 /// The results of every row so far.
 pub struct Tick {
@@ -18,7 +18,7 @@ impl Tick {
     }
 
     /// Adds the next row; the last three are reward, terminated and truncated.
-    pub fn push(&mut self, action: &Action, log_prob: f32, (reward, end, cut): (f32, bool, bool)) {
+    pub fn push(&mut self, action: &ActionValue, log_prob: f32, (reward, end, cut): (f32, bool, bool)) {
         self.actions.push(action).expect("an action of the space");
         self.log_probs.push(log_prob);
         self.rewards.push(reward);

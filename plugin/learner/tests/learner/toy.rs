@@ -1,14 +1,14 @@
 //! A corridor, and a driver that plays it.
 
 use playbot_learner::rng::{ChaCha8Rng, Streams, normal};
-use playbot_learner::{Action, ActionSpace, Actions, Learner, PolicyOutput, Rollout, RolloutStep, SkillDraw};
+use playbot_learner::{ActionSpace, ActionValue, Actions, Learner, PolicyOutput, Rollout, RolloutStep, SkillDraw};
 
 /// Steps until an episode is cut off.
 const LIMIT: usize = 40;
 /// Position of the goal; 0 is the start.
 const GOAL: usize = 6;
 /// Steps between two draws of a skill.
-const HORIZON: usize = 4;
+const SKILL_INTERVAL: usize = 4;
 
 pub const OBS: usize = GOAL + 2;
 pub const SPACE: ActionSpace = ActionSpace::Discrete(3);
@@ -86,7 +86,7 @@ impl Driver {
         let width = prior.latent();
         self.skills.resize(fresh.len(), 0.0);
         for (row, corridor) in self.corridors.iter().enumerate() {
-            if all || corridor.time % HORIZON == 0 {
+            if all || corridor.time % SKILL_INTERVAL == 0 {
                 let range = row * width..(row + 1) * width;
                 self.skills[range.clone()].copy_from_slice(&fresh[range]);
             }
@@ -149,8 +149,8 @@ impl Driver {
     fn act(&mut self, output: &PolicyOutput) -> (Vec<u32>, Vec<f32>) {
         let rows = self.rngs.iter_mut().enumerate().map(|(row, rng)| output.sample(row, rng));
         rows.map(|(action, log_prob)| match action {
-            Action::Discrete(action) => (action, log_prob),
-            Action::Continuous(_) => panic!("the corridor is discrete"),
+            ActionValue::Discrete(action) => (action, log_prob),
+            ActionValue::Continuous(_) => panic!("the corridor is discrete"),
         })
         .unzip()
     }

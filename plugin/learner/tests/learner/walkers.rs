@@ -2,7 +2,7 @@
 
 use crate::field::{OBS, Point, SPACE, WALK};
 use playbot_learner::rng::{Streams, normal, unit};
-use playbot_learner::{Actions, Dataset, DemoEpisode, DeviceKind, SkillConfig, SkillModel, SkillTrainer};
+use playbot_learner::{Actions, Dataset, DatasetEpisode, DeviceKind, SkillConfig, SkillModel, SkillTrainer};
 use std::f64::consts::TAU;
 use std::ops::ControlFlow;
 
@@ -25,7 +25,7 @@ pub fn skills_of_directions() -> SkillModel {
             walker.step(&WALK, &action);
             actions.extend(action);
         }
-        DemoEpisode { observations: obs.into(), actions: Actions::Continuous { dim: 2, values: actions } }
+        DatasetEpisode { observations: obs.into(), actions: Actions::Continuous { dim: 2, values: actions } }
     });
     let dataset = Dataset::new(OBS, SPACE, episodes.collect()).expect("consistent");
     let config = SkillConfig {

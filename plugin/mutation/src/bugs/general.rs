@@ -1,11 +1,13 @@
 //! Defects of rules that can be planted into any game, through the plugin's components of agents: episode, action,
 //! reward and observation.
 //!
-//! - `actions`: games that receive other actions than their agents decided on.
+//! The folder, in reading order:
+//!
+//! - `history`: the actions of an agent so far, on which defects depend.
+//! - `actions`: games that receive other actions than their agents decided on, and games that stand still.
+//! - `rewards`: episodes that end without a reason, and rewards that can be collected without end.
+//! - `leaks`: entities that are never removed, and state that leaks into the next episode.
 //! - `breakage`: games that panic or log errors, and values that are not numbers.
-//! - `history`: the actions of an agent so far, for planted defects that depend on them.
-//! - `leaks`: entities that are never removed.
-//! - `rewards`: episodes that end without a reason.
 
 mod actions;
 mod breakage;
@@ -48,8 +50,6 @@ pub fn general_defects(game: &dyn Game) -> Vec<DefectKind> {
     }
     kinds
 }
-
-// The moments at which a planted defect shows.
 
 /// The moment of an episode from which a defect shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -94,8 +94,6 @@ fn one_of<T: Copy>(of: &[T], variant: u32) -> T {
     of[variant as usize % of.len()]
 }
 
-// Randomness without a seed.
-
 /// The start of the defect, and the share of actions that are random then.
 const VARIANTS: [(When, f64); 4] =
     [(When::Tick(0), 0.1), (When::Tick(25), 0.3), (When::Held(7), 0.5), (When::Tick(60), 0.05)];
@@ -116,12 +114,14 @@ fn unseeded_randomness() -> DefectKind {
 }
 
 #[cfg(test)]
-mod list_tests {
+mod tests {
     use std::collections::BTreeSet;
 
-    use super::*;
-    use crate::bugs::general::testing::Track;
+    use bevy_playbot::action::ActionValue;
     use playbot_harness::defect::Plant;
+
+    use super::*;
+    use crate::bugs::general::testing::{Track, play, play_sound};
 
     #[test]
     fn each_general_defect_has_a_class_of_its_own_and_three_variants_or_more() {
@@ -133,13 +133,6 @@ mod list_tests {
             assert!(matches!(kind.plant, Plant::Rules { variants: 3.., .. }), "{kind:?}");
         }
     }
-}
-
-#[cfg(test)]
-mod when_tests {
-    use bevy_playbot::action::ActionValue;
-
-    use super::*;
 
     #[test]
     fn a_moment_comes_by_the_tick_by_what_was_held_or_by_the_episode() {
@@ -162,12 +155,6 @@ mod when_tests {
         assert!(later.is_now(&history, &at(5)) && !later.is_now(&history, &at(4)));
         assert!(!When::Held(3).is_now(&history, &at(0)), "an episode begins with nothing held");
     }
-}
-
-#[cfg(test)]
-mod chance_tests {
-    use super::*;
-    use crate::bugs::general::testing::{play, play_sound};
 
     #[test]
     fn the_same_actions_lead_elsewhere_each_time() {

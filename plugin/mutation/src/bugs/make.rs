@@ -31,6 +31,36 @@ const BASES_PER_MUTANT: u64 = 4;
 
 const FEWEST_BASES: u64 = 24;
 
+/// Plants every kind of defect into every game. The same seed gives the same set, for any number of threads. Each
+/// mutant depends on the seed, its game, class and number alone.
+///
+/// A defect of a game's own rules is planted on a level where it changes some bot's episode: that of the demonstrator,
+/// of a bot that holds an action, of chaos or of random actions. `progress` receives how many more unmutated levels
+/// were found, and how many of those mutants have their level.
+///
+/// # Errors
+///
+/// A game has too few levels that its demonstrator solves, panics in one, or cannot print them.
+pub fn make_bugs(sources: &[Source], plan: &MakePlan, progress: &(dyn Fn(u64) + Sync)) -> Result<Made, BugError> {
+    let set = BugSet { seed: plan.seed, games: Vec::new(), mutants: Vec::new(), sound: Vec::new() };
+    let mut made = Made { set, levels: Vec::new(), without_place: Vec::new() };
+    for (n, source) in sources.iter().enumerate() {
+        let (game, mode) = (source.game, source.levels.mode.as_str());
+        game.check_mode(mode)?;
+        let share = plan.share(n, sources.len());
+        let wanted = share + plan.bases();
+        let levels = sound_levels(source, start(source, plan, wanted), wanted, plan.threads, progress)?;
+        let (beside, bases) = levels.split_at(usize::try_from(share).unwrap_or(usize::MAX).min(levels.len()));
+        made.set.games.push(BugGame { name: game.name().to_owned(), version: game.version() });
+        made.set.sound.extend(ranges(game.name(), mode, beside));
+        let noticed = bases_with_effect(game, (mode, bases), &game.tools().tests.defects(), plan, progress);
+        for kind in defect_kinds(game) {
+            plant(&mut made, game, (mode, bases), &kind, &noticed, plan)?;
+        }
+    }
+    Ok(made)
+}
+
 /// A game that defects are planted into.
 #[derive(Clone)]
 pub struct Source<'a> {
@@ -117,36 +147,6 @@ impl MakePlan {
     }
 }
 
-/// Plants every kind of defect into every game. The same seed gives the same set, for any number of threads. Each
-/// mutant depends on the seed, its game, class and number alone.
-///
-/// A defect of a game's own rules is planted on a level where it changes some bot's episode: that of the demonstrator,
-/// of a bot that holds an action, of chaos or of random actions. `progress` receives how many more unmutated levels
-/// were found, and how many of those mutants have their level.
-///
-/// # Errors
-///
-/// A game has too few levels that its demonstrator solves, panics in one, or cannot print them.
-pub fn make_bugs(sources: &[Source], plan: &MakePlan, progress: &(dyn Fn(u64) + Sync)) -> Result<Made, BugError> {
-    let set = BugSet { seed: plan.seed, games: Vec::new(), mutants: Vec::new(), sound: Vec::new() };
-    let mut made = Made { set, levels: Vec::new(), without_place: Vec::new() };
-    for (n, source) in sources.iter().enumerate() {
-        let (game, mode) = (source.game, source.levels.mode.as_str());
-        game.check_mode(mode)?;
-        let share = plan.share(n, sources.len());
-        let wanted = share + plan.bases();
-        let levels = sound_levels(source, start(source, plan, wanted), wanted, plan.threads, progress)?;
-        let (beside, bases) = levels.split_at(usize::try_from(share).unwrap_or(usize::MAX).min(levels.len()));
-        made.set.games.push(BugGame { name: game.name().to_owned(), version: game.version() });
-        made.set.sound.extend(ranges(game.name(), mode, beside));
-        let noticed = bases_with_effect(game, (mode, bases), &game.tools().tests.defects(), plan, progress);
-        for kind in defect_kinds(game) {
-            plant(&mut made, game, (mode, bases), &kind, &noticed, plan)?;
-        }
-    }
-    Ok(made)
-}
-
 /// Returns the number of the first level to try.
 fn start(source: &Source, plan: &MakePlan, wanted: u64) -> u64 {
     let LevelSplit { first, last, .. } = source.levels;
@@ -211,7 +211,7 @@ fn plant(
     Ok(())
 }
 
-// Levels on which a defect of rules has an effect: a broken wall that no bot walks into is no defect of that level.
+// Levels on which a defect of rules has an effect.
 
 /// Unmutated levels that are tried for each mutant.
 pub(super) const MOST_TRIED: usize = 20;
@@ -223,8 +223,9 @@ const SEEDS: u64 = 3;
 /// tried.
 pub(super) type Bases = BTreeMap<(&'static str, u32), Option<u64>>;
 
-/// Finds an unmutated level on which a bot notices each mutant of the rules among these kinds. The levels are tried in
-/// a random order of the mutant's own. `progress` is called for each mutant.
+/// Finds an unmutated level on which a bot notices each mutant of the rules among these kinds: a broken wall that no
+/// bot walks into is no defect of that level. The levels are tried in a random order of the mutant's own. `progress` is
+/// called for each mutant.
 pub(super) fn bases_with_effect(
     game: &dyn Game,
     (mode, bases): (&str, &[u64]),

@@ -167,11 +167,11 @@ pub(super) fn plant_level(
 /// Returns the text of a level, as `playbot level GAME --json` prints it. Games whose levels are maps take modes by
 /// another name, and some maps have no numbers.
 fn level_json(game: &dyn Game, mode: &str, level: u64) -> Result<String, InspectError> {
-    let usual = LevelRequest { mode: Some(mode), level: Some(level), ..LevelRequest::default() };
+    let default = LevelRequest { mode: Some(mode), level: Some(level), ..LevelRequest::default() };
     let requests = [
-        usual,
-        LevelRequest { mode: None, map: Some(mode), ..usual },
-        LevelRequest { mode: None, map: Some(mode), level: None, ..usual },
+        default,
+        LevelRequest { mode: None, map: Some(mode), ..default },
+        LevelRequest { mode: None, map: Some(mode), level: None, ..default },
     ];
     let mut first = None;
     for request in requests {

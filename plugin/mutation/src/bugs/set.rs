@@ -8,15 +8,16 @@
 #[cfg(test)]
 mod tests;
 
-use crate::bugs::{BugError, defect_kinds, io_error};
+use crate::bugs::{BugError, defect_kinds};
 use bevy_playbot::level::LevelFile;
 use playbot_harness::{
     defect::Plant,
     game::Game,
     level_files::{LevelDesigns, level_files_mode},
+    sealed_file::{io_error, write_atomically},
     split::LevelSplit,
 };
-use playbot_learner::{disk, write_atomically, write_atomically_with};
+use playbot_learner::{disk, write_atomically_with};
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeSet,
@@ -127,7 +128,7 @@ impl BugSet {
         let text = fs::read_to_string(&path).map_err(|error| match error.kind() {
             io::ErrorKind::NotFound => BugError::Missing(folder.to_owned()),
             io::ErrorKind::InvalidData => damaged(&path, 1, "it is not UTF-8 text"),
-            _ => io_error("read", &path)(error),
+            _ => io_error("read", &path)(error).into(),
         })?;
         let set: SetText = serde_json::from_str(&text).map_err(|error| damaged(&path, error.line(), error))?;
         if set.format != FORMAT {
@@ -187,15 +188,15 @@ impl BugSet {
         disk::create_dir_all(&level_folder).map_err(io_error("create", &level_folder))?;
         for (id, text) in levels {
             let file = folder.join(level_path(id));
-            write_atomically(&file, format!("{}\n", text.trim_end()).as_bytes()).map_err(io_error("write", &file))?;
+            write_atomically(&file, format!("{}\n", text.trim_end()).as_bytes())?;
         }
         let Self { seed, games, mutants, sound } = self.clone();
         let text = SetText { format: FORMAT, seed, games, mutants, sound };
-        write_atomically_with(&path, |file| {
+        let written = write_atomically_with(&path, |file| {
             serde_json::to_writer_pretty(&mut *file, &text)?;
             writeln!(file)
-        })
-        .map_err(io_error("write", &path))
+        });
+        Ok(written.map_err(io_error("write", &path))?)
     }
 
     /// Checks that the mutants of a game can be planted. The game must have the version of the set and these kinds of

@@ -2,8 +2,7 @@
 
 use crate::{
     calibration::{
-        Agreement, Calibration, CalibrationError, FEW_LEVELS, Measure,
-        rank::{Numbers, RankCorrelation},
+        Agreement, Calibration, CalibrationError, FEW_LEVELS, Measure, numbers::LevelNumbers, rank::RankCorrelation,
     },
     scatter::draw_scatters,
 };
@@ -110,6 +109,48 @@ fn markdown(table: &PlainTable) -> String {
     [markdown_row(&table.columns), ruler].into_iter().chain(rows).collect::<Vec<_>>().join("\n")
 }
 
+/// The levels of results, as recordings know them.
+pub(super) enum LevelNames {
+    /// Generated from seeds: by mode and number.
+    Seeds,
+    /// Files: the names of all files with a level of this hash.
+    Files(BTreeMap<u64, Vec<String>>),
+}
+
+impl LevelNames {
+    /// Reads the levels of the results in this folder.
+    pub fn of(results: &Path, record: &TestRecord, game: Option<&dyn Game>) -> Result<Self, CalibrationError> {
+        if !is_level_files(&record.range.mode) {
+            return Ok(Self::Seeds);
+        }
+        let no_game = || CalibrationError::NoGame { results: results.into(), game: record.game.clone() };
+        let game = game.ok_or_else(no_game)?;
+        let designs = read_level_designs(game, &record.range.mode)?;
+        if hash_of_files(game, &record.range) != record.files {
+            let range = record.range.to_string();
+            return Err(CalibrationError::ChangedFiles { results: results.into(), range });
+        }
+        let mut names: BTreeMap<u64, Vec<String>> = BTreeMap::new();
+        for level in record.range.levels() {
+            if let (Some(hash), Some(path)) = (designs.hash(level), designs.path(level)) {
+                names.entry(hash).or_default().push(path.to_owned());
+            }
+        }
+        Ok(Self::Files(names))
+    }
+
+    /// Returns the names that results give to the level of an episode. Files with the same level have several names.
+    pub fn of_episode(&self, header: &DemoHeader, episode: &DemoEpisode) -> Vec<String> {
+        match (&episode.level_file, self) {
+            (None, _) => vec![format!("{}:{}", header.mode, episode.level_seed)],
+            (Some(file), Self::Files(names)) => {
+                names.get(&file.hash).cloned().unwrap_or_else(|| vec![file.to_string()])
+            }
+            (Some(file), Self::Seeds) => vec![file.to_string()],
+        }
+    }
+}
+
 // The tables of a calibration.
 
 /// The sign for a missing number.
@@ -163,7 +204,7 @@ fn heading(measure: Measure) -> &'static str {
     }
 }
 
-fn cell(measure: Measure, numbers: &Numbers) -> String {
+fn cell(measure: Measure, numbers: &LevelNumbers) -> String {
     match (measure, measure.of(numbers)) {
         (_, None) => NONE.to_owned(),
         (Measure::Completion, Some(share)) => percent(share),
@@ -230,7 +271,7 @@ impl Calibration {
         "A rank correlation is 1 if a tester orders the levels from easy to hard as people do, 0 if its order says nothing of \
          theirs, −1 if it is the reverse. Spearman's has a 95 % interval by Fisher's z with the variance of Bonett and Wright \
          (2000), Kendall's tau-b by Fisher's z with that of Fieller, Hartley and Pearson (1957). Time is the median of the \
-         completed tries, in ticks; deaths are tries that the game ended without the aim."
+         completed tries, in ticks; deaths are tries that the game ended before the goal."
     }
 }
 
@@ -239,50 +280,6 @@ fn counted(count: u64, what: &str) -> String {
         (1, _) => format!("1 {what}"),
         (_, "try") => format!("{count} tries"),
         _ => format!("{count} {what}s"),
-    }
-}
-
-// The level names of recorded episodes, as results use them.
-
-/// The levels of results, as recordings know them.
-pub(super) enum LevelNames {
-    /// Generated from seeds: by mode and number.
-    Seeds,
-    /// Files: the names of all files with a level of this hash.
-    Files(BTreeMap<u64, Vec<String>>),
-}
-
-impl LevelNames {
-    /// Reads the levels of the results in this folder.
-    pub fn of(results: &Path, record: &TestRecord, game: Option<&dyn Game>) -> Result<Self, CalibrationError> {
-        if !is_level_files(&record.range.mode) {
-            return Ok(Self::Seeds);
-        }
-        let no_game = || CalibrationError::NoGame { results: results.into(), game: record.game.clone() };
-        let game = game.ok_or_else(no_game)?;
-        let designs = read_level_designs(game, &record.range.mode)?;
-        if hash_of_files(game, &record.range) != record.files {
-            let range = record.range.to_string();
-            return Err(CalibrationError::ChangedFiles { results: results.into(), range });
-        }
-        let mut names: BTreeMap<u64, Vec<String>> = BTreeMap::new();
-        for level in record.range.levels() {
-            if let (Some(hash), Some(path)) = (designs.hash(level), designs.path(level)) {
-                names.entry(hash).or_default().push(path.to_owned());
-            }
-        }
-        Ok(Self::Files(names))
-    }
-
-    /// Returns the names that results give to the level of an episode. Files with the same level have several names.
-    pub fn of_episode(&self, header: &DemoHeader, episode: &DemoEpisode) -> Vec<String> {
-        match (&episode.level_file, self) {
-            (None, _) => vec![format!("{}:{}", header.mode, episode.level_seed)],
-            (Some(file), Self::Files(names)) => {
-                names.get(&file.hash).cloned().unwrap_or_else(|| vec![file.to_string()])
-            }
-            (Some(file), Self::Seeds) => vec![file.to_string()],
-        }
     }
 }
 
@@ -298,11 +295,6 @@ mod tests {
         assert_eq!((line.points, line.is_scatter), (vec![(1.0, 1.0), (90.0, 90.0)], false));
         assert_eq!(diagonal(&[Curve::scatter("one", vec![(2.0, 2.0)])]), None);
     }
-}
-
-#[cfg(test)]
-mod tables_tests {
-    use super::*;
 
     #[test]
     fn correlations_have_two_decimals() {

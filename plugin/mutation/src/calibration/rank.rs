@@ -1,10 +1,6 @@
-//! Rank correlations, Spearman's and Kendall's, and the numbers that they compare: the tries of people on a level.
+//! Rank correlations, Spearman's and Kendall's.
 
-use bevy_playbot::demo::file::{DemoEnd, DemoEpisode};
-use playbot_report::statistics::median;
-use playbot_test::verdict::Score;
 use serde::Serialize;
-use std::collections::BTreeMap;
 
 /// Number of standard deviations around the mean of a normal distribution that hold 95 % of it.
 const Z_95: f64 = 1.959_963_984_540_054;
@@ -135,120 +131,6 @@ fn sort(values: &mut [f64]) -> u64 {
     swaps
 }
 
-// The numbers of a level: tries, completion, time and deaths.
-
-/// The results of a tester, or of people, on a level.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Numbers {
-    /// Episodes.
-    pub tries: u64,
-    /// Share of the tries that reached the goal.
-    pub completion: f64,
-    /// Median ticks of the tries that reached it, if there are any.
-    pub ticks: Option<f64>,
-    /// Deaths in a try: the share of tries that the game ended before the goal.
-    pub deaths: f64,
-}
-
-/// A level that both people and testers have played.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct CalibratedLevel {
-    /// Its name in the results.
-    pub level: String,
-    /// Number of people who played it.
-    pub persons: u64,
-    /// Results of people. Each person counts once, for any number of tries.
-    pub people: Numbers,
-    /// Results of each tester, in the order of the results.
-    pub testers: Vec<Numbers>,
-}
-
-impl Numbers {
-    /// Returns the numbers of a tester.
-    pub(super) fn of_score(score: &Score) -> Self {
-        let share = |count: u64| if score.episodes == 0 { 0.0 } else { count as f64 / score.episodes as f64 };
-        Self {
-            tries: score.episodes,
-            completion: share(score.solved),
-            ticks: score.ticks.map(|ticks| ticks.median),
-            deaths: share(score.lost),
-        }
-    }
-
-    /// Returns the numbers of several people: means, and the median of their times.
-    pub(super) fn of_people(people: &[Self]) -> Self {
-        let mean = |value: fn(&Self) -> f64| people.iter().map(value).sum::<f64>() / people.len().max(1) as f64;
-        Self {
-            tries: people.iter().map(|person| person.tries).sum(),
-            completion: mean(|person| person.completion),
-            ticks: median(people.iter().filter_map(|person| person.ticks).collect()),
-            deaths: mean(|person| person.deaths),
-        }
-    }
-}
-
-// The tries of people on a level.
-
-/// A try with a known end.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Try {
-    end: TryEnd,
-    ticks: u64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum TryEnd {
-    Completed,
-    Died,
-    TimedOut,
-}
-
-impl Try {
-    /// Returns the try; `None` for an episode that was left before its end, since its outcome is unknown.
-    pub fn of(episode: &DemoEpisode) -> Option<Self> {
-        let end = match episode.end {
-            DemoEnd::Terminated { success: true } => TryEnd::Completed,
-            DemoEnd::Terminated { success: false } => TryEnd::Died,
-            DemoEnd::Truncated => TryEnd::TimedOut,
-            DemoEnd::Aborted => return None,
-        };
-        Some(Self { end, ticks: episode.len() as u64 })
-    }
-}
-
-/// Tries on one level, by person.
-#[derive(Clone, Debug, Default)]
-pub(super) struct LevelTries(BTreeMap<String, Vec<Try>>);
-
-impl LevelTries {
-    /// Adds a try.
-    pub fn add(&mut self, person: &str, one: Try) {
-        self.0.entry(person.to_owned()).or_default().push(one);
-    }
-
-    /// Returns the names of the people.
-    pub fn people(&self) -> impl Iterator<Item = &str> {
-        self.0.keys().map(String::as_str)
-    }
-
-    /// Returns the numbers of these people.
-    pub fn numbers(&self) -> Numbers {
-        let people: Vec<Numbers> = self.0.values().map(|tries| of_person(tries)).collect();
-        Numbers::of_people(&people)
-    }
-}
-
-fn of_person(tries: &[Try]) -> Numbers {
-    let share = |end: TryEnd| tries.iter().filter(|one| one.end == end).count() as f64 / tries.len().max(1) as f64;
-    let completed = tries.iter().filter(|one| one.end == TryEnd::Completed);
-    Numbers {
-        tries: tries.len() as u64,
-        completion: share(TryEnd::Completed),
-        ticks: median(completed.map(|one| one.ticks as f64).collect()),
-        deaths: share(TryEnd::Died),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -285,11 +167,6 @@ mod tests {
         assert_eq!(spearman(&[], &[]), None);
         assert_eq!(spearman(&[1.0], &[1.0]), None);
     }
-}
-
-#[cfg(test)]
-mod tau_tests {
-    use super::*;
 
     /// Tau-b as it is defined, pair by pair.
     fn by_pairs(one: &[f64], other: &[f64]) -> f64 {
@@ -331,18 +208,5 @@ mod tau_tests {
         assert_eq!(four.interval, None);
         assert_eq!(kendall(&[1.0, 2.0], &[3.0, 3.0]), None);
         assert_eq!(kendall(&[], &[]), None);
-    }
-}
-
-#[cfg(test)]
-mod numbers_tests {
-    use super::*;
-
-    #[test]
-    fn each_person_counts_once() {
-        let person = |tries, completion, ticks, deaths| Numbers { tries, completion, ticks, deaths };
-        let all = [person(9, 1.0, Some(30.0), 0.0), person(1, 0.0, None, 1.0), person(2, 0.5, Some(50.0), 0.5)];
-        assert_eq!(Numbers::of_people(&all), person(12, 0.5, Some(40.0), 0.5));
-        assert_eq!(Numbers::of_people(&all[1..2]), all[1]);
     }
 }

@@ -71,7 +71,7 @@ impl ContestantRecord {
 impl Contestant {
     /// Returns the game's bots and the explorer without skills: [`RANDOM`], [`HOLD`], [`CHAOS`], [`EXPLORE`] and, under
     /// its own name, the demonstrator, if there is one.
-    pub fn usual(game: &dyn Game) -> Vec<Self> {
+    pub fn defaults(game: &dyn Game) -> Vec<Self> {
         let bots = blind_bots(game);
         let is_constant = |bot: &BlindBot| matches!(bot, BlindBot::Constant(_));
         let constant = bots.into_iter().map(|(_, bot)| bot).find(is_constant);
@@ -170,12 +170,13 @@ fn thread_cpu_seconds() -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
     use playbot_corridor::Corridor;
+
+    use super::*;
 
     #[test]
     fn a_game_without_a_bot_that_holds_an_action_holds_its_last() {
-        let all = Contestant::usual(&Corridor::default());
+        let all = Contestant::defaults(&Corridor::default());
         let names: Vec<&str> = all.iter().map(|contestant| contestant.record.name.as_str()).collect();
         assert_eq!(names, [RANDOM, HOLD, CHAOS, EXPLORE, "guide"]);
         let hold = BlindBot::Constant(ActionValue::Discrete(2));
@@ -183,11 +184,6 @@ mod tests {
         assert!(matches!(all[3].means, Means::Explores(Explorer::Random)));
         assert!(all.iter().all(|contestant| !contestant.record.skilled));
     }
-}
-
-#[cfg(test)]
-mod clock_tests {
-    use super::*;
 
     #[test]
     fn work_takes_time_by_either_clock() {

@@ -245,15 +245,10 @@ fn is_far(number: f64, others: &[f64]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::score::JobFinding;
-
-    fn subject(id: &str, kind: SubjectKind) -> Subject {
-        Subject { id: id.to_owned(), game: "garden".to_owned(), kind }
-    }
-
-    fn mutant(id: &str) -> Subject {
-        subject(id, SubjectKind::Mutant { class: "panic".to_owned(), original: "garden bed:0".to_owned() })
-    }
+    use crate::score::{
+        JobFinding,
+        testing::{mutant, sound},
+    };
 
     fn result(subject: &str, tester: &str, solved: u64, episodes: u64) -> JobResult {
         JobResult {
@@ -267,12 +262,12 @@ mod tests {
     }
 
     fn sound_levels(count: u64) -> Vec<Subject> {
-        (0..count).map(|level| subject(&format!("garden bed:{level}"), SubjectKind::Sound)).collect()
+        (0..count).map(|level| sound("garden", level)).collect()
     }
 
     #[test]
     fn only_who_solves_nearly_all_sound_levels_finds_by_failing() {
-        let subjects = [sound_levels(100), vec![mutant("m")]].concat();
+        let subjects = [sound_levels(100), vec![mutant("garden", "m", "panic")]].concat();
         let mut results = Vec::new();
         for (level, subject) in (0_u64..).zip(&subjects[..100]) {
             results.push(result(&subject.id, "good", u64::from(level != 7), 1));
@@ -292,7 +287,8 @@ mod tests {
 
     #[test]
     fn who_never_wins_finds_by_its_reward() {
-        let subjects = [sound_levels(9), vec![mutant("poor"), mutant("usual")]].concat();
+        let subjects =
+            [sound_levels(9), vec![mutant("garden", "poor", "panic"), mutant("garden", "usual", "panic")]].concat();
         let collected = |subject: &str, reward: f64| JobResult {
             reward: Some(reward),
             seconds: 8.0,
@@ -309,7 +305,7 @@ mod tests {
 
     #[test]
     fn what_was_found_first_counts() {
-        let subjects = [sound_levels(1), vec![mutant("m")]].concat();
+        let subjects = [sound_levels(1), vec![mutant("garden", "m", "panic")]].concat();
         let finding = JobFinding { detector: "stuck".to_owned(), tick: None, message: String::new() };
         let found = JobResult { findings: vec![finding], found_after: Some(0.5), ..result("m", "good", 0, 1) };
         let scored = judge(&subjects, vec![result("garden bed:0", "good", 1, 1), found]);
@@ -321,7 +317,7 @@ mod tests {
 
     #[test]
     fn beside_a_sound_build_what_is_exact_shows_any_difference_and_chance_only_large_ones() {
-        let subjects = [sound_levels(1), vec![mutant("a"), mutant("b")]].concat();
+        let subjects = [sound_levels(1), vec![mutant("garden", "a", "panic"), mutant("garden", "b", "panic")]].concat();
         let exact = |subject: &str, end: &str| JobResult {
             exact: true,
             ends: vec![end.to_owned()],
@@ -339,12 +335,6 @@ mod tests {
         let differs: Vec<bool> = scored.iter().map(|job| job.found.differs).collect();
         assert_eq!(differs, [false, false, true, false, false, true]);
     }
-}
-
-#[cfg(test)]
-mod usual_reward_tests {
-    use super::*;
-    use crate::score::testing::{mutant, sound};
 
     fn played(subject: &Subject, reward: f64) -> JobResult {
         let (subject, tester) = (subject.id.clone(), "glutton".to_owned());

@@ -117,7 +117,7 @@ mod tests {
     fn of_equals_the_one_with_fewer_false_findings_is_taken_and_then_the_first() {
         let all = [catch("x-", "x-"), catch("x-", "--"), catch("x-", "--")];
         assert_eq!((best_mix(&all, None), greedy(&all, None)), (vec![1], vec![1]));
-        assert!(best_mix(&[catch("--", "-")], None).is_empty(), "nobody is needed to find nothing");
+        assert!(best_mix(&[catch("--", "-")], None).is_empty(), "no tester is needed to find nothing");
         assert!(best_mix(&[], None).is_empty());
     }
 

@@ -5,12 +5,12 @@ use bevy_playbot::{action::ActionValue, bot::BlindBot, state_hash::StateHash};
 use playbot_harness::{
     detector::LevelProof,
     eval::{EvalError, Player},
+    game::idle_action,
     split::LevelSplit,
-    worlds::idle_action,
 };
 use playbot_test::{
     detectors::{Detectors, ErrorLogReader, TestedBy, TestedLevel},
-    explore::{Cell, Exploration, ExploreError, ExplorePlan, Explorer, ReachedCell, Route, Stop, explore},
+    explore::{Exploration, ExploreError, ExplorePlan, ExploredCell, Explorer, ReachedCell, Route, Stop, explore},
     findings::{Breakage, Checks, FindingHead, Lengths, actions_of, minimise::lengths, scan},
     verdict::{Finding, LevelVerdict, TestError, TestObserver, TestPlan, Tester, TesterRecord, test_in_turn},
 };
@@ -229,7 +229,7 @@ fn hear_errors(trial: &Trial, ear: &ErrorLogReader, sightings: &mut Sightings) {
 /// Returns the path to the goal and the longest paths, at most `most`. Paths on which the episode ended and those on
 /// which it goes on alternate.
 fn routes(found: &Exploration, most: usize) -> Vec<Route> {
-    let mut cells: Vec<(&Cell, &ReachedCell)> = found.cells().iter().collect();
+    let mut cells: Vec<(&ExploredCell, &ReachedCell)> = found.cells().iter().collect();
     cells.sort_by(|(one, near), (other, far)| far.ticks().cmp(&near.ticks()).then_with(|| one.cmp(other)));
     let (ended, open): (Vec<_>, Vec<_>) = cells.into_iter().partition(|(_, reached)| reached.is_over);
     let longest = ended.len().max(open.len());
@@ -284,10 +284,10 @@ fn inspect(trial: &Trial, solution: Option<&Route>, sightings: &mut Sightings) {
         seed: trial.budget.seed,
         episodes: ended.map(|end| (0, end)).into_iter().collect(),
         // The last positions are not examined.
-        places: std::collections::BTreeMap::new(),
+        positions: std::collections::BTreeMap::new(),
     };
     let (game, mode, level) = (trial.game, trial.mode, trial.level);
-    let tested = TestedLevel { game, mode, level, place: 0, par: None, testers: vec![tester], stop: trial.stop };
+    let tested = TestedLevel { game, mode, level, index: 0, par: None, testers: vec![tester], stop: trial.stop };
     for detector in &trial.detectors.levels {
         for defect in detector.inspect(&tested) {
             let detector = detector.name().to_owned();

@@ -114,8 +114,6 @@ impl ScoreRecord {
     }
 }
 
-// The subjects of a score: mutants and unmutated levels.
-
 /// A level of a game, unmutated or with a planted defect.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Subject {
@@ -179,11 +177,6 @@ mod tests {
         let budget = ScoreBudget { steps: 7, ..one.budget };
         assert_eq!(one.differences_of_way(&ScoreRecord { budget, ..one.clone() }), ["steps 50000 and 7"]);
     }
-}
-
-#[cfg(test)]
-mod subject_tests {
-    use super::*;
 
     #[test]
     fn files_say_what_it_is() {

@@ -34,7 +34,7 @@ fn plan<'a>(set: &'a BugSet, folder: &'a Path, game: &'a Corridor, threads: usiz
     let without = ["tick-time", "unreachable-region"].map(str::to_owned).to_vec();
     let choice = DetectorChoice { with: vec!["all".to_owned()], without, ..DetectorChoice::default() };
     let detectors = Detectors::choose(game, &choice).expect("there are such");
-    let contestants = Contestant::usual(game);
+    let contestants = Contestant::defaults(game);
     ScorePlan {
         set,
         folder,
@@ -68,7 +68,7 @@ fn defects_are_found_by_whoever_can_see_them_and_sound_levels_are_left_alone() {
     let (set, game) = (made(folder.path()), Corridor::default());
     let plan = plan(&set, folder.path(), &game, 2);
     let (score, _) = scored(&plan, &folder.path().join("score.json"), Earlier::Keep, u64::MAX);
-    let score = score.expect("nobody stopped it");
+    let score = score.expect("not stopped");
     // Seven subjects, with the original that is not among the unmutated levels, and five testers.
     assert_eq!((score.subjects.len(), score.jobs.len()), (7, 35));
     let job = |subject: &str, tester: &str| {
@@ -123,7 +123,7 @@ fn what_only_breaks_after_other_episodes_is_found_by_whoever_plays_several() {
     let (score, _) = scored(&plan, &folder.path().join("score.json"), Earlier::Keep, u64::MAX);
     // `hold` holds the last action and stays for the whole time.
     let is_hold = |job: &&ScoredJob| job.result.tester == "hold" && job.result.subject == "corridor-panic-01";
-    let score = score.expect("nobody stopped it");
+    let score = score.expect("not stopped");
     let JobResult { findings, ends, .. } = &score.jobs.iter().find(is_hold).expect("it was done").result;
     assert_eq!(findings[0].detector, "panic");
     assert!(findings[0].message.contains("other episodes in the same World may have left state"), "{findings:?}");

@@ -182,27 +182,27 @@ pub(super) fn payload(frame: &[u8]) -> Option<&[u8]> {
     intact.then_some(&body[FRAME_HEAD..])
 }
 
-// The bytes of one episode inside its frame.
-//
-// | Field | Coding |
-// |---|---|
-// | steps | `u32` |
-// | state hashes | `steps` × `u32` |
-// | level seed | `u64` |
-// | end | `u8`: 0 terminated without, 1 with success, 2 truncated, 3 aborted |
-// | kind of actions | `u8`: 1, 2 or 4 bytes for a discrete action; 0 for continuous ones, then `u32` dimensions |
-// | actions | discrete: list; continuous: `steps` × dimensions × `f32` |
-// | rewards | list of `f32` |
-// | deciders | list of `u8`: 0 human, 1 bot, 2 policy, 3 replay, 4 idle |
-// | observation width | `u32` |
-// | observations | `steps` × width × `f32` |
-// | level file | from format 2 on: `u32` bytes of its path, 0 for none; the path in UTF-8; the level's hash, `u64` |
-//
-// All numbers are little-endian. A list is one byte and then either the plain values (byte 0) or runs
-// of a count (seven bits a byte, lowest first) and a value (byte 1), whichever is shorter.
-// The hashes come first: they bound the number of steps by the size of the frame.
+// Payload of a frame: one episode.
 
 /// Appends the episode to `out`, after [`DemoEpisode::check`] against the header.
+///
+/// | Field | Coding |
+/// |---|---|
+/// | steps | `u32` |
+/// | state hashes | `steps` × `u32` |
+/// | level seed | `u64` |
+/// | end | `u8`: 0 terminated without, 1 with success, 2 truncated, 3 aborted |
+/// | kind of actions | `u8`: 1, 2 or 4 bytes for a discrete action; 0 for continuous ones, then `u32` dimensions |
+/// | actions | discrete: list; continuous: `steps` × dimensions × `f32` |
+/// | rewards | list of `f32` |
+/// | deciders | list of `u8`: 0 human, 1 bot, 2 policy, 3 replay, 4 idle |
+/// | observation width | `u32` |
+/// | observations | `steps` × width × `f32` |
+/// | level file | from format 2 on: `u32` bytes of its path, 0 for none; the path in UTF-8; the level's hash, `u64` |
+///
+/// All numbers are little-endian. A list is one byte and then either the plain values (byte 0) or runs
+/// of a count (seven bits a byte, lowest first) and a value (byte 1), whichever is shorter.
+/// The hashes come first: they bound the number of steps by the size of the frame.
 pub(super) fn encode_payload(
     episode: &DemoEpisode,
     header: &DemoHeader,
@@ -347,6 +347,7 @@ fn decider(code: u8) -> Result<Decider, EpisodeFault> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::demo::file::testing::{episode, header};
 
     #[test]
     fn lists_take_the_shorter_coding_and_read_back() {
@@ -378,12 +379,6 @@ mod tests {
         assert!(Cursor(&[0x80; 40][..]).varint("actions").is_err());
         assert!(Cursor(&[]).plain::<u64>(usize::MAX, "hashes").is_err());
     }
-}
-
-#[cfg(test)]
-mod payload_tests {
-    use super::*;
-    use crate::demo::file::testing::{episode, header};
 
     fn coded(episode: &DemoEpisode, header: &DemoHeader) -> Result<Vec<u8>, EpisodeFault> {
         let mut bytes = Vec::new();

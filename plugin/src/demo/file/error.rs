@@ -294,8 +294,6 @@ impl DemoFault {
     }
 }
 
-// Faults of a single episode of a recording, and their messages.
-
 /// The fault of an episode.
 ///
 /// `step` counts the ticks of the episode from 0.

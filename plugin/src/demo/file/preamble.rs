@@ -33,6 +33,9 @@ const LINE_LENGTH: usize = "playbot-demo header=00000000 crc32=00000000\n".len()
 /// Longest header that is read, in bytes, to guard the memory against a damaged length.
 const MAX_HEADER: usize = 1 << 20;
 
+/// Start of a comment line.
+const COMMENT: &str = "// ";
+
 /// The only field that is read before the format is known.
 #[derive(Deserialize)]
 struct FormatOnly {
@@ -126,15 +129,12 @@ fn parse_text(text: &[u8], intact: bool) -> Result<DemoHeader, DemoFault> {
     ron::de::from_bytes(text).map_err(syntax)
 }
 
-// The second copy of a header, so that damage to one copy loses no episode.
-//
-// The copy follows the header as comments of RON: the magic line and the text once more. The magic line at the top
-// of the file gives length and checksum of both together, so older programs skip the copy.
-
-/// Start of a comment line.
-const COMMENT: &str = "// ";
+// Second copy of the header, so that damage to one copy loses no episode.
 
 /// Returns the copy of the text at the top of a file.
+///
+/// The copy follows the header as comments of RON: the magic line and the text once more. The magic line at the top
+/// of the file gives length and checksum of both together, so older programs skip the copy.
 pub(super) fn copy_of(top: &str) -> String {
     top.lines().flat_map(|line| [COMMENT, line, "\n"]).collect()
 }
@@ -171,7 +171,13 @@ fn first(top: &[u8]) -> Option<DemoHeader> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::demo::file::header::DemoActions;
+    use crate::demo::file::{
+        DemoReader,
+        header::DemoActions,
+        repair,
+        testing::{self, episode, write},
+    };
+    use std::fs;
 
     fn header() -> DemoHeader {
         DemoHeader {
@@ -226,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn other_files_and_cut_files_are_told_apart() {
+    fn other_files_and_cut_files_are_distinguished() {
         assert!(
             matches!(decode(b"PK\x03\x04".as_slice()), Err(DemoFault::NotADemo { found }) if found == "PK\\x03\\x04")
         );
@@ -235,13 +241,6 @@ mod tests {
         let huge = b"playbot-demo header=99999999 crc32=00000000\n";
         assert!(matches!(decode(huge.as_slice()), Err(DemoFault::HeaderLine { .. })));
     }
-}
-
-#[cfg(test)]
-mod second_header_tests {
-    use crate::demo::file::testing::{episode, header, write};
-    use crate::demo::file::{DemoReader, repair};
-    use std::fs;
 
     #[test]
     fn one_flipped_bit_in_a_header_loses_no_episode() {
@@ -279,6 +278,6 @@ mod second_header_tests {
         assert_eq!(repair(&path, &out, Some(&other)).expect("it fits").kept_episodes, 1);
         let read = DemoReader::open(&out).and_then(DemoReader::read_all).expect("sound");
         assert_eq!(read, [episode(1, 3)]);
-        assert_eq!(DemoReader::open(&out).expect("opens").header(), &header());
+        assert_eq!(DemoReader::open(&out).expect("opens").header(), &testing::header());
     }
 }

@@ -1,4 +1,4 @@
-//! Tests of whole files: round trips, cuts at every byte, flips of every bit, hostile lengths.
+//! Tests of whole files: round trips, cuts, flips of bits, hostile lengths, summaries, search and merging.
 
 use crate::demo::file::{
     testing::{episode, header, write},
@@ -292,4 +292,131 @@ proptest! {
         let _ = crate::demo::file::preamble::decode(bytes.as_slice());
         let _ = crate::demo::file::preamble::decode([DEMO_MAGIC.as_bytes(), &bytes].concat().as_slice());
     }
+}
+
+#[test]
+fn numbers_by_hand() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let lost = |seed, steps, end| crate::demo::file::episode::DemoEpisode {
+        end,
+        rewards: vec![0.0; steps],
+        ..episode(seed, steps)
+    };
+    let episodes = [
+        episode(7, 4),
+        lost(7, 6, DemoEnd::Terminated { success: false }),
+        lost(9, 10, DemoEnd::Truncated),
+        lost(9, 0, DemoEnd::Truncated),
+        lost(2, 0, DemoEnd::Aborted),
+    ];
+    let summary = DemoSummary::read(write(folder.path(), "a.demo", &episodes)).expect("sound");
+    assert_eq!((summary.episodes, summary.steps, summary.levels), (5, 20, 3));
+    assert_eq!((summary.successes, summary.failures, summary.truncated, summary.aborted), (1, 1, 2, 1));
+    assert_eq!((summary.success_share, summary.return_mean, summary.length_mean), (Some(0.25), Some(2.0), Some(4.0)));
+    assert_eq!((summary.level_seed_min, summary.level_seed_max), (Some(2), Some(9)));
+    let deciders: Vec<_> = summary.steps_by_decider.clone().into_iter().collect();
+    assert_eq!(deciders, [(Decider::Human, 6), (Decider::Bot, 14)]);
+    let json = serde_json::to_string(&summary).expect("serialises");
+    assert_eq!(serde_json::from_str::<DemoSummary>(&json).expect("reads back"), summary);
+    assert!(json.contains("\"success_share\":0.25"), "{json}");
+}
+
+#[test]
+fn an_empty_recording_has_no_means() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let summary = DemoSummary::read(write(folder.path(), "a.demo", &[])).expect("sound");
+    assert_eq!((summary.episodes, summary.success_share, summary.level_seed_min), (0, None, None));
+}
+
+#[test]
+fn folders_are_searched_in_order() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let root = folder.path();
+    fs::create_dir_all(root.join("b/deep")).expect("created");
+    fs::create_dir_all(root.join("folder.demo")).expect("created");
+    for name in ["z.demo", "b/deep/1.demo", "a.demo", "a.demo.bak", "notes.txt"] {
+        fs::write(root.join(name), "").expect("written");
+    }
+    let found = find_demos(root).expect("found");
+    assert_eq!(found, ["a.demo", "b/deep/1.demo", "z.demo"].map(|n| root.join(n)));
+    assert_eq!(find_demos(root.join("z.demo")).expect("a file"), [root.join("z.demo")]);
+}
+
+#[test]
+fn nothing_is_an_error() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    assert!(matches!(find_demos(folder.path()).expect_err("empty").fault, DemoFault::NoDemos));
+    let missing = find_demos(folder.path().join("missing")).expect_err("missing");
+    assert!(matches!(missing.fault, DemoFault::Io { .. }), "{missing}");
+}
+
+fn write_as(folder: &Path, name: &str, header: DemoHeader, episodes: &[DemoEpisode]) -> PathBuf {
+    let path = folder.join(name);
+    let mut writer = DemoWriter::create(&path, header).expect("created");
+    episodes.iter().for_each(|episode| writer.push(episode).expect("written"));
+    path
+}
+
+#[test]
+fn all_episodes_of_all_testers_are_in_the_merged_file() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (a, b, c) = (episode(1, 5), episode(2, 3), episode(3, 4));
+    let one = write(folder.path(), "one.demo", &[a.clone(), b.clone()]);
+    let zoe = DemoHeader { demonstrator: "zoë".into(), note: "on the train".into(), ..header() };
+    let two = write_as(folder.path(), "two.demo", zoe, std::slice::from_ref(&c));
+    let out = folder.path().join("all.demo");
+    let report = merge_demos(&[&one, &two], &out).expect("merges");
+    assert_eq!((report.episodes(), report.steps), (3, 12));
+    assert_eq!(report.files, [(one, 2), (two, 1)]);
+    let reader = DemoReader::open(&out).expect("readable");
+    assert_eq!(reader.header().demonstrator, "tester, zoë");
+    assert_eq!(reader.header(), &report.header);
+    assert_eq!(reader.read_all().expect("whole"), [a, b, c]);
+}
+
+#[test]
+fn files_that_do_not_belong_together_are_refused_by_name_and_nothing_is_written() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let one = write(folder.path(), "one.demo", &[episode(1, 5)]);
+    let out = folder.path().join("all.demo");
+    for (name, other, words) in [
+        ("game", DemoHeader { game: "maze".into(), ..header() }, "`maze`, not of `walk`"),
+        ("version", DemoHeader { game_version: 3, ..header() }, "version 3 of `walk`, but this is version 2"),
+        ("mode", DemoHeader { mode: "hard".into(), ..header() }, "mode `hard`"),
+        ("rate", DemoHeader { tick_hz: 30.0, ..header() }, "`tick_hz` is 30.0, but 60.0 in"),
+        ("actions", DemoHeader { actions: DemoActions::Discrete(5), ..header() }, "`actions` is Discrete(5)"),
+    ] {
+        let path = write_as(folder.path(), name, other, &[]);
+        let error = merge_demos(&[&one, &path], &out).expect_err(name);
+        assert_eq!(error.path, path);
+        assert!(error.to_string().contains(words), "{error}");
+        assert!(!out.exists(), "{name}");
+    }
+}
+
+#[test]
+fn a_damaged_file_leaves_no_half_merge_behind() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let one = write(folder.path(), "one.demo", &[episode(1, 5)]);
+    let two = write(folder.path(), "two.demo", &[episode(2, 5)]);
+    let bytes = std::fs::read(&two).expect("readable");
+    std::fs::write(&two, &bytes[..bytes.len() - 3]).expect("writable");
+    let out = folder.path().join("all.demo");
+    let error = merge_demos(&[&one, &two], &out).expect_err("torn");
+    assert!(error.is_repairable() && error.path == two, "{error}");
+    assert!(!out.exists());
+}
+
+#[test]
+fn the_same_file_twice_no_file_and_an_existing_one_are_errors() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let one = write(folder.path(), "one.demo", &[episode(1, 5)]);
+    let out = folder.path().join("all.demo");
+    let twice = merge_demos(&[&one, &folder.path().join("./one.demo")], &out).expect_err("twice");
+    assert!(matches!(twice.fault, DemoFault::NamedTwice), "{twice}");
+    let nothing = merge_demos(&[] as &[&Path], &out).expect_err("nothing");
+    assert!(matches!(nothing.fault, DemoFault::NothingToMerge), "{nothing}");
+    let exists = merge_demos(&[&one], &one).expect_err("exists");
+    assert!(matches!(exists.fault, DemoFault::Exists), "{exists}");
+    assert_eq!(DemoReader::open(&one).and_then(DemoReader::read_all).expect("left alone").len(), 1);
 }

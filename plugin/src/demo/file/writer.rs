@@ -206,8 +206,6 @@ impl DemoWriter {
     }
 }
 
-// The file operations of the writer: writing, synchronising, truncating, locking.
-
 /// The file operations of the writer; tests substitute a disk that fills up.
 pub(super) trait Store: Write + Send + Sync {
     fn sync(&mut self) -> io::Result<()>;
@@ -235,6 +233,48 @@ pub(super) fn lock(file: &File) -> Result<(), DemoFault> {
         Err(TryLockError::WouldBlock) => Err(DemoFault::Locked),
         // File systems without locks are used without them.
         Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
+    }
+}
+
+#[cfg(test)]
+pub(super) mod store_tests {
+    use std::sync::{Arc, Mutex};
+
+    use super::*;
+
+    /// A disk with limited room.
+    #[derive(Clone)]
+    pub(in crate::demo::file) struct SmallDisk {
+        pub bytes: Arc<Mutex<Vec<u8>>>,
+        pub room: usize,
+        pub can_cut: bool,
+    }
+
+    impl Write for SmallDisk {
+        fn write(&mut self, data: &[u8]) -> io::Result<usize> {
+            let mut bytes = self.bytes.lock().expect("one thread");
+            let fits = data.len().min(self.room - bytes.len());
+            bytes.extend_from_slice(&data[..fits]);
+            if fits == 0 { Err(io::ErrorKind::StorageFull.into()) } else { Ok(fits) }
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Store for SmallDisk {
+        fn sync(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+
+        fn cut(&mut self, length: u64) -> io::Result<()> {
+            if !self.can_cut {
+                return Err(io::ErrorKind::PermissionDenied.into());
+            }
+            self.bytes.lock().expect("one thread").truncate(length as usize);
+            Ok(())
+        }
     }
 }
 
@@ -315,47 +355,5 @@ mod tests {
         };
         let error = writer.push(&episode(1, 5)).expect_err("full");
         assert!(error.to_string().contains("No space left on device"), "{error}");
-    }
-}
-
-#[cfg(test)]
-pub(super) mod store_tests {
-    use std::sync::{Arc, Mutex};
-
-    use super::*;
-
-    /// A disk with limited room.
-    #[derive(Clone)]
-    pub(in crate::demo::file) struct SmallDisk {
-        pub bytes: Arc<Mutex<Vec<u8>>>,
-        pub room: usize,
-        pub can_cut: bool,
-    }
-
-    impl Write for SmallDisk {
-        fn write(&mut self, data: &[u8]) -> io::Result<usize> {
-            let mut bytes = self.bytes.lock().expect("one thread");
-            let fits = data.len().min(self.room - bytes.len());
-            bytes.extend_from_slice(&data[..fits]);
-            if fits == 0 { Err(io::ErrorKind::StorageFull.into()) } else { Ok(fits) }
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
-
-    impl Store for SmallDisk {
-        fn sync(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-
-        fn cut(&mut self, length: u64) -> io::Result<()> {
-            if !self.can_cut {
-                return Err(io::ErrorKind::PermissionDenied.into());
-            }
-            self.bytes.lock().expect("one thread").truncate(length as usize);
-            Ok(())
-        }
     }
 }

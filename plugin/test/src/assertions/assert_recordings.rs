@@ -95,8 +95,8 @@ fn check_recording(game: &dyn Game, path: &Path) -> Result<(), String> {
     }
     let (wrong, all) = (report.divergences.len(), report.episodes);
     let mut lines = vec![format!("{}: {wrong} of {all} episodes do not play the same game again:", path.display())];
-    let told = report.divergences.iter().take(MOST_EPISODES);
-    lines.extend(told.map(|(episode, what)| format!("  episode {episode}: {what}")));
+    let reported = report.divergences.iter().take(MOST_EPISODES);
+    lines.extend(reported.map(|(episode, what)| format!("  episode {episode}: {what}")));
     let more = wrong.saturating_sub(MOST_EPISODES);
     lines.extend((more > 0).then(|| format!("  and {more} more")));
     lines.push(format!("    {PROGRAM} demo verify {}", shell_word(&path.display().to_string())));

@@ -113,15 +113,13 @@ impl LevelTest<'_> {
         if wanted == Wanted::Deterministic {
             choice.with.push("determinism".to_owned());
             choice.without.push("all".to_owned());
-            let usual = ["determinism.every=1", "determinism.ticks=100000"].map(str::to_owned);
+            let default = ["determinism.every=1", "determinism.ticks=100000"].map(str::to_owned);
             // Explicit settings come last, and win.
-            choice.settings = usual.into_iter().chain(choice.settings).collect();
+            choice.settings = default.into_iter().chain(choice.settings).collect();
         }
         choice
     }
 }
-
-// Files that show why a level is broken.
 
 /// Most episodes of a tester that are replayed to find a failed one.
 const MOST_TRIES: u32 = 16;
@@ -188,8 +186,6 @@ impl<'a> Evidence<'a> {
         Some(Played { tester: &record.name, player, observation_config, seed })
     }
 }
-
-// Failure messages of broken levels.
 
 /// Most broken levels that are listed in full.
 pub(super) const MOST_SHOWN: usize = 10;
@@ -293,8 +289,6 @@ fn of_finding(finding: &Finding) -> String {
     format!("{}{place}: {}", finding.detector, finding.message)
 }
 
-// The commands that reproduce a broken level.
-
 /// Commands of a program.
 pub(super) struct Commands<'a> {
     /// The command that starts the program.
@@ -332,7 +326,7 @@ pub(super) fn replay(program: &str, file: &Path) -> String {
 }
 
 #[cfg(test)]
-mod commands_tests {
+mod tests {
     use super::*;
 
     #[test]

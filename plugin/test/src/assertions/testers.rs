@@ -77,7 +77,7 @@ fn of_player(name: &str, player: Player) -> Tester {
 
 fn policy(game: &dyn Game, path: &Path, draw: ActionDraw) -> Result<Tester, LevelTestError> {
     let file = PolicyFile::load(path, DeviceKind::default())?;
-    check_policy(&game.card(), &file)
+    check_policy(&game.metadata(), &file)
         .map_err(|misfit| LevelTestError::Misfit { path: path.into(), misfit: Box::new(misfit) })?;
     let observation_config = policy_observation(&file)?;
     observation_config.check(game)?;
@@ -88,8 +88,6 @@ fn policy(game: &dyn Game, path: &Path, draw: ActionDraw) -> Result<Tester, Leve
         observation_config,
     })
 }
-
-// Errors of a test of levels.
 
 /// The reason why levels cannot be tested.
 #[derive(Debug, Error)]

@@ -7,7 +7,7 @@ use crate::{
 };
 use bevy::math::Vec2;
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
-use playbot_harness::detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting};
+use playbot_harness::detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead};
 use playbot_learner::{disk, disk::DiskFile};
 use serde::Serialize;
 use std::{
@@ -43,13 +43,14 @@ impl LevelDetector for ClockEnd {
     }
 
     fn describe(&self) -> &'static str {
-        "episodes are lost in the same tick at different places, and none lasts longer"
+        "episodes are lost in the same tick at different positions, and none lasts longer"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("episodes", &mut self.episodes, "episodes that end so, at different places").at_least(2.0),
-            Setting::new("distance", &mut self.distance, "how far apart different places are, in tiles"),
+            DetectorSetting::new("episodes", &mut self.episodes, "episodes that end so, at different positions")
+                .at_least(2.0),
+            DetectorSetting::new("distance", &mut self.distance, "how far apart different positions are, in tiles"),
         ]
     }
 
@@ -66,17 +67,17 @@ impl LevelDetector for ClockEnd {
         }
         let plan = level.game.tools().levels.floor_plan(level.mode, level.level);
         let apart = self.distance as f32 * CellGrid::new(plan.as_ref(), None).size;
-        let mut places: Vec<Vec2> = Vec::new();
+        let mut positions: Vec<Vec2> = Vec::new();
         let ended =
             level.testers.iter().flat_map(|tester| tester.episodes.iter().map(move |episode| (tester, episode)));
         for (tester, (number, _)) in ended.filter(|(_, (_, result))| is_last(result)) {
-            if let Some(&place) = tester.places.get(number)
-                && places.iter().all(|other| other.distance(place) > apart)
+            if let Some(&position) = tester.positions.get(number)
+                && positions.iter().all(|other| other.distance(position) > apart)
             {
-                places.push(place);
+                positions.push(position);
             }
         }
-        if places.len() < self.episodes as usize {
+        if positions.len() < self.episodes as usize {
             return Vec::new();
         }
         let first = last().next();
@@ -86,8 +87,8 @@ impl LevelDetector for ClockEnd {
             tick: longest.checked_sub(1),
             settings: Vec::new(),
             message: format!(
-                "{} episodes are lost after {longest} ticks at different places, and none lasts longer",
-                places.len()
+                "{} episodes are lost after {longest} ticks at different positions, and none lasts longer",
+                positions.len()
             ),
         });
         defect.into_iter().collect()
@@ -101,8 +102,6 @@ impl LevelDetector for ClockEnd {
         is_lost(result) && tick.is_none_or(|tick| result.ticks == tick.saturating_add(1))
     }
 }
-
-// Time limits that are too short.
 
 /// A finding for time limits before which the agent could not have reached the goal, even straight through all walls,
 /// at its fastest pace. An agent that goes nowhere shows no pace.
@@ -146,10 +145,15 @@ impl Detector for ShortTime {
         false
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("factor", &mut self.factor, "times the fastest pace that the agent has shown").at_least(1.0),
-            Setting::new("tiles", &mut self.tiles, "tiles that the agent must have gone to have shown its pace"),
+            DetectorSetting::new("factor", &mut self.factor, "times the fastest pace that the agent has shown")
+                .at_least(1.0),
+            DetectorSetting::new(
+                "tiles",
+                &mut self.tiles,
+                "tiles that the agent must have gone to have shown its pace",
+            ),
         ]
     }
 
@@ -171,14 +175,14 @@ impl Detector for ShortTime {
 
 impl EpisodeWatcher for Going {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
-        let place = moment.place.filter(|place| place.is_finite())?;
+        let position = moment.position.filter(|position| position.is_finite())?;
         if let Some(first) = self.first {
-            self.fastest = self.fastest.max((place - self.last).abs());
-            self.farthest = self.farthest.max((place - first).abs());
+            self.fastest = self.fastest.max((position - self.last).abs());
+            self.farthest = self.farthest.max((position - first).abs());
         } else {
-            self.first = Some(place);
+            self.first = Some(position);
         }
-        self.last = place;
+        self.last = position;
         None
     }
 
@@ -199,8 +203,6 @@ impl EpisodeWatcher for Going {
         })
     }
 }
-
-// Levels that take longer than they should.
 
 /// A finding for levels that testers solve, but never within their par, by the designer or by demonstrations. Levels
 /// without a par are skipped.
@@ -224,10 +226,10 @@ impl LevelDetector for TooLong {
         "the level is solved, and never within its par"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("factor", &mut self.factor, "times the par that it may take"),
-            Setting::new("par", &mut self.par, "ticks that a level should take; 0 for those of --par"),
+            DetectorSetting::new("factor", &mut self.factor, "times the par that it may take"),
+            DetectorSetting::new("par", &mut self.par, "ticks that a level should take; 0 for those of --par"),
         ]
     }
 
@@ -251,8 +253,6 @@ impl LevelDetector for TooLong {
         defect.into_iter().collect()
     }
 }
-
-// Time limits that differ.
 
 /// A finding for time limits that are shorter than another episode of the level. It is opt-in, because some games give
 /// more time for progress, or truncate for other reasons.
@@ -298,8 +298,6 @@ impl LevelDetector for UnevenTime {
     }
 }
 
-// Ticks that take too long.
-
 /// Name of the file with slow ticks in the folder of a test.
 pub const TIMING: &str = "timing.jsonl";
 
@@ -340,9 +338,9 @@ impl TickTime {
     /// The defect that it finds.
     pub const ABOUT: &str = "a tick takes too long by the clock; written to timing.jsonl, not to the results";
 
-    pub(super) fn settings(&mut self) -> Vec<Setting<'_>> {
+    pub(super) fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         let what = "the longest tick of an arena; 0 for the length of a tick in game time";
-        vec![Setting::new("milliseconds", &mut self.milliseconds, what)]
+        vec![DetectorSetting::new("milliseconds", &mut self.milliseconds, what)]
     }
 
     /// Returns whether a tick with this many agents took too long, in a game with `tick_hz` ticks per second.
@@ -394,7 +392,9 @@ pub fn forget_timing(folder: &Path) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detectors::testing::{LOST, TIMED_OUT, WON, inspected};
+    use crate::detectors::testing::{LOST, Step, TIMED_OUT, WON, inspected, room, timed_out_proving};
+    use bevy::math::Rect;
+    use playbot_harness::detector::NoProofs;
 
     #[test]
     fn who_is_lost_in_one_tick_wherever_they_are_is_found() {
@@ -418,15 +418,6 @@ mod tests {
             assert!(inspected(&ClockEnd::default(), &sound, None).is_empty(), "{sound:?}");
         }
     }
-}
-
-#[cfg(test)]
-mod short_time_tests {
-    use bevy::math::Rect;
-
-    use super::*;
-    use crate::detectors::testing::{Step, room, timed_out_proving};
-    use playbot_harness::detector::NoProofs;
 
     /// The room with its goal 100 tiles away.
     fn long() -> LevelAhead {
@@ -440,31 +431,25 @@ mod short_time_tests {
         (0..ticks).map(|tick| Step::at(tick, 1.0 + pace * tick as f32, 1.5)).collect()
     }
 
-    fn told(steps: &[Step]) -> Option<String> {
+    fn reported(steps: &[Step]) -> Option<String> {
         timed_out_proving(&ShortTime::default(), &long(), steps, &NoProofs).map(|(_, message)| message)
     }
 
     #[test]
     fn a_limit_that_nobody_can_keep_is_found() {
         // 40 ticks at twice the pace of half a tile are 40 tiles of 98.
-        let message = told(&run(40, 0.5)).expect("too short");
+        let message = reported(&run(40, 0.5)).expect("too short");
         assert!(message.contains("after 40 ticks") && message.contains("from 1.0, 1.5"), "{message}");
     }
 
     #[test]
     fn a_limit_that_somebody_might_keep_and_an_agent_that_goes_nowhere_are_sound() {
-        assert_eq!(told(&run(100, 0.5)), None, "100 tiles are enough");
-        assert_eq!(told(&run(40, 0.0)), None);
-        assert_eq!(told(&run(40, 0.05)), None, "two tiles show no pace");
+        assert_eq!(reported(&run(100, 0.5)), None, "100 tiles are enough");
+        assert_eq!(reported(&run(40, 0.0)), None);
+        assert_eq!(reported(&run(40, 0.05)), None, "two tiles show no pace");
         let jumps: Vec<Step> = (0..40).map(|tick| Step::at(tick, 1.0, 1.5 + (tick % 8) as f32)).collect();
-        assert_eq!(told(&jumps), None, "up and down is no way along x");
+        assert_eq!(reported(&jumps), None, "up and down is no way along x");
     }
-}
-
-#[cfg(test)]
-mod too_long_tests {
-    use super::*;
-    use crate::detectors::testing::{LOST, WON, inspected};
 
     #[test]
     fn a_level_that_nobody_solves_within_its_par_is_found() {
@@ -483,12 +468,6 @@ mod too_long_tests {
         assert!(inspected(&TooLong::default(), &episodes, None).is_empty());
         assert!(inspected(&TooLong::default(), &[(LOST, 90, [1.0; 2])], Some(1.0)).is_empty());
     }
-}
-
-#[cfg(test)]
-mod uneven_time_tests {
-    use super::*;
-    use crate::detectors::testing::{LOST, TIMED_OUT, WON, inspected};
 
     const HERE: [f32; 2] = [1.0, 1.0];
 
@@ -506,18 +485,13 @@ mod uneven_time_tests {
         assert!(inspected(&UnevenTime, &same, None).is_empty());
         assert!(inspected(&UnevenTime, &[], None).is_empty());
     }
-}
-
-#[cfg(test)]
-mod tick_time_tests {
-    use super::*;
 
     #[test]
     fn long_ticks_are_slow_and_short_ones_are_not() {
-        let usual = TickTime::default();
+        let default = TickTime::default();
         let ms = Duration::from_millis;
-        assert!(usual.is_slow(ms(21), 1, 50.0) && !usual.is_slow(ms(19), 1, 50.0), "a tick is 20 ms");
-        assert!(!usual.is_slow(ms(39), 2, 50.0), "two arenas may take twice as long");
+        assert!(default.is_slow(ms(21), 1, 50.0) && !default.is_slow(ms(19), 1, 50.0), "a tick is 20 ms");
+        assert!(!default.is_slow(ms(39), 2, 50.0), "two arenas may take twice as long");
         let strict = TickTime { milliseconds: 5.0, ..TickTime::default() };
         assert!(strict.is_slow(ms(6), 1, 50.0) && !strict.is_slow(ms(4), 1, 50.0));
     }

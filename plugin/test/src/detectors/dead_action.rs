@@ -12,9 +12,8 @@ use bevy_playbot::{
     fault::Fault,
 };
 use playbot_harness::{
-    detector::Setting,
-    game::Game,
-    worlds::{idle_action, is_named_idle},
+    detector::DetectorSetting,
+    game::{Game, idle_action, is_named_idle},
 };
 
 /// A finding for actions that do the same as doing nothing, at every moment of an episode at which they are tried.
@@ -46,11 +45,12 @@ impl LevelDetector for DeadAction {
         "an action that does what doing nothing does, wherever it is tried"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
-            Setting::new("moments", &mut self.moments, "moments of the episode in which it is tried").at_least(1.0),
-            Setting::new("ticks", &mut self.ticks, "ticks for which it is held").at_least(1.0),
+            DetectorSetting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
+            DetectorSetting::new("moments", &mut self.moments, "moments of the episode in which it is tried")
+                .at_least(1.0),
+            DetectorSetting::new("ticks", &mut self.ticks, "ticks for which it is held").at_least(1.0),
         ]
     }
 
@@ -123,8 +123,8 @@ impl DeadAction {
 /// Returns whether the agent is on different tiles in at least half of these moments, more than one.
 fn gets_around(script: &Script<'_>, course: &Course, moments: &[usize]) -> bool {
     let grid = CellGrid::new(script.game.tools().levels.floor_plan(script.mode, script.level).as_ref(), None);
-    let place = |moment: &usize| course.places.get(*moment - 1).copied().flatten();
-    let mut cells: Vec<_> = moments.iter().filter_map(place).filter_map(|place| grid.cell_at(place)).collect();
+    let position = |moment: &usize| course.positions.get(*moment - 1).copied().flatten();
+    let mut cells: Vec<_> = moments.iter().filter_map(position).filter_map(|position| grid.cell_at(position)).collect();
     cells.sort();
     cells.dedup();
     cells.len() > 1 && cells.len() >= moments.len().div_ceil(2)
@@ -217,18 +217,18 @@ mod tests {
 
     #[test]
     fn an_episode_without_success_tells_if_its_agent_gets_around() {
-        let place = |at: Single<&Transform, With<Runner>>| at.translation.truncate();
+        let position = |at: Single<&Transform, With<Runner>>| at.translation.truncate();
         let rests = Player::Blind(BlindBot::Constant(ActionValue::Discrete(0)));
-        let told = |game: ForeignGame, player: &Player| dead(&game, player, 5.0);
-        assert_eq!(told(game(false, 1e9).place(place), &Player::Demonstrator), ["`Space`"]);
-        assert!(told(game(true, 1e9).place(place), &Player::Demonstrator).is_empty());
-        assert!(told(game(false, 1e9).place(place), &rests).is_empty(), "it may be stuck");
-        assert!(told(game(false, 1e9), &Player::Demonstrator).is_empty(), "nobody knows where it is");
+        let reported = |game: ForeignGame, player: &Player| dead(&game, player, 5.0);
+        assert_eq!(reported(game(false, 1e9).position(position), &Player::Demonstrator), ["`Space`"]);
+        assert!(reported(game(true, 1e9).position(position), &Player::Demonstrator).is_empty());
+        assert!(reported(game(false, 1e9).position(position), &rests).is_empty(), "it may be stuck");
+        assert!(reported(game(false, 1e9), &Player::Demonstrator).is_empty(), "its position is unknown");
     }
 
     #[test]
     fn who_solves_a_level_tells_or_else_who_is_paid_best() {
-        let told = |episodes: &[(u32, bool, f64)]| {
+        let reported = |episodes: &[(u32, bool, f64)]| {
             let tested = |&(number, success, total_reward): &(u32, bool, f64)| {
                 let end = EpisodeEnd::Terminated { success };
                 let result = EpisodeResult { level: 0, end, success, ticks: 1, clipped: 0, total_reward };
@@ -238,18 +238,18 @@ mod tests {
                     observation_config: ObservationConfig::default(),
                     seed: 0,
                     episodes: vec![(number, result)],
-                    places: BTreeMap::new(),
+                    positions: BTreeMap::new(),
                 }
             };
             let (game, testers) = (game(true, 1.0), episodes.iter().map(tested).collect());
             let mode = "default";
-            let level = TestedLevel { game: &game, mode, level: 0, place: 0, par: None, testers, stop: &|| false };
+            let level = TestedLevel { game: &game, mode, level: 0, index: 0, par: None, testers, stop: &|| false };
             teller(&level).map(|tester| tester.episodes[0].1.total_reward)
         };
-        assert_eq!(told(&[(0, false, 9.0), (0, true, 1.0), (0, true, 2.0)]), Some(1.0));
-        assert_eq!(told(&[(0, false, 1.0), (0, false, 9.0), (1, false, 12.0)]), Some(9.0));
-        assert_eq!(told(&[(0, false, 9.0), (1, true, 2.0)]), None, "the first episodes of others say nothing");
-        assert_eq!(told(&[]), None);
+        assert_eq!(reported(&[(0, false, 9.0), (0, true, 1.0), (0, true, 2.0)]), Some(1.0));
+        assert_eq!(reported(&[(0, false, 1.0), (0, false, 9.0), (1, false, 12.0)]), Some(9.0));
+        assert_eq!(reported(&[(0, false, 9.0), (1, true, 2.0)]), None, "the first episodes of others say nothing");
+        assert_eq!(reported(&[]), None);
     }
 
     #[test]

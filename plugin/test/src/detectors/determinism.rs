@@ -11,7 +11,7 @@ use bevy_playbot::{
     state_hash::StateHash,
     vision::{ObservationConfig, VisionError},
 };
-use playbot_harness::{detector::Setting, eval::Player, game::Game};
+use playbot_harness::{detector::DetectorSetting, eval::Player, game::Game};
 
 /// A finding for testers whose episode differs between two Worlds, or within one World that plays it again and again.
 /// It is opt-in, because it plays a tester's first episode on some of the levels several more times.
@@ -130,11 +130,11 @@ impl LevelDetector for Determinism {
         "the same tester with the same seed does not have the same episode again"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
-            Setting::new("ticks", &mut self.ticks, "ticks of an episode that are compared").at_least(1.0),
-            Setting::new("episodes", &mut self.episodes, "episodes of a World that are compared").at_least(1.0),
+            DetectorSetting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
+            DetectorSetting::new("ticks", &mut self.ticks, "ticks of an episode that are compared").at_least(1.0),
+            DetectorSetting::new("episodes", &mut self.episodes, "episodes of a World that are compared").at_least(1.0),
         ]
     }
 
@@ -170,7 +170,7 @@ pub struct Course {
     /// The agent's action in each tick.
     pub actions: Vec<ActionValue>,
     /// The agent's position in each tick, if the game reports it.
-    pub places: Vec<Option<Vec2>>,
+    pub positions: Vec<Option<Vec2>>,
     /// Whether it reached the goal.
     pub is_solved: bool,
 }
@@ -200,7 +200,7 @@ impl<'a> Script<'a> {
             let is_active = probe.tick()?;
             if ticks(&probe) > course.actions.len() {
                 course.actions.extend(probe.world.get::<Action>(probe.agent).map(|action| action.0.clone()));
-                course.places.push(self.game.tools().state.position(&probe.world, probe.agent));
+                course.positions.push(self.game.tools().state.position(&probe.world, probe.agent));
             }
             if !is_active || probe.is_over() {
                 break;

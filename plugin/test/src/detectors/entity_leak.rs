@@ -13,7 +13,7 @@ use bevy_playbot::{
     streams::EpisodeSeeds,
     vision::{ObservationConfig, VisionError},
 };
-use playbot_harness::{detector::Setting, eval::Player, game::Game, worlds::build_observing_world};
+use playbot_harness::{detector::DetectorSetting, eval::Player, game::Game, worlds::build_observing_world};
 
 /// A finding for levels on which each episode leaves entities behind. Some levels are played a few times, each time up
 /// to the same tick, and the entities in the World are counted.
@@ -92,11 +92,11 @@ impl LevelDetector for EntityLeak {
         true
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
-            Setting::new("ticks", &mut self.ticks, "ticks of an episode").at_least(1.0),
-            Setting::new("episodes", &mut self.episodes, "episodes on a level").at_least(4.0),
+            DetectorSetting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
+            DetectorSetting::new("ticks", &mut self.ticks, "ticks of an episode").at_least(1.0),
+            DetectorSetting::new("episodes", &mut self.episodes, "episodes on a level").at_least(4.0),
         ]
     }
 
@@ -126,8 +126,6 @@ fn grows(counts: &[u32]) -> Option<String> {
         format!("there are more entities after each episode of the level: {}", counts.join(", "))
     })
 }
-
-// Worlds for detectors that play.
 
 /// A World with one agent that plays one level again and again, each time from the same seed.
 pub struct Probe<'a> {

@@ -42,7 +42,7 @@ impl WorldWatcher for ErrorLog {
     }
 }
 
-// The reader of a game's log of errors.
+// Reader of a game's log of errors.
 
 /// Crates whose errors are not the game's: the engine, its dependencies, and the plugin. Crates of the same name
 /// followed by an underscore belong to these as well, except for `bevy`, which many games have in their names.
@@ -233,24 +233,18 @@ impl Subscriber for Listener {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use bevy::prelude::World;
 
-    use super::*;
-
     #[test]
-    fn the_first_error_is_told_and_silence_is_sound() {
+    fn the_first_error_is_reported_and_silence_is_sound() {
         let world = World::new();
         let errors = ["no such door".to_owned(), "no such key".to_owned()];
         let mut watch = ErrorLog.watch_world().expect("it looks at Worlds");
-        let told = watch.tick(&WorldTick { world: &world, errors: &errors });
-        assert_eq!(told.as_deref(), Some("the game logged an error: no such door"));
+        let reported = watch.tick(&WorldTick { world: &world, errors: &errors });
+        assert_eq!(reported.as_deref(), Some("the game logged an error: no such door"));
         assert_eq!(watch.tick(&WorldTick { world: &world, errors: &[] }), None);
     }
-}
-
-#[cfg(test)]
-mod ear_tests {
-    use super::*;
 
     #[test]
     fn errors_of_the_game_are_heard_and_others_are_not() {
@@ -274,7 +268,7 @@ mod ear_tests {
     }
 
     #[test]
-    fn the_engine_is_told_from_games_with_names_like_it() {
+    fn the_engine_is_distinguished_from_games_with_names_like_it() {
         for engine in ["bevy_ecs::world", "bevy", "playbot_harness::eval", "wgpu_core"] {
             assert!(is_of_engine(engine), "{engine}");
         }

@@ -3,7 +3,9 @@
 use crate::detectors::Efforts;
 use bevy::{ecs::world::WorldId, prelude::*};
 use bevy_playbot::{agent::AgentOrder, vision::BlankEpisodes};
-use playbot_harness::detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting, WorldTick, WorldWatcher};
+use playbot_harness::detector::{
+    Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher,
+};
 
 /// A finding for games in which nothing changes for any action: not the state and not the observations.
 pub struct FrozenWorld {
@@ -32,8 +34,8 @@ impl Detector for FrozenWorld {
         "nothing changes any more, whatever the agent does"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
-        vec![Setting::new("ticks", &mut self.ticks, "ticks in a row without any change").at_least(1.0)]
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
+        vec![DetectorSetting::new("ticks", &mut self.ticks, "ticks in a row without any change").at_least(1.0)]
     }
 
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -55,8 +57,6 @@ impl EpisodeWatcher for Still {
             .then(|| format!("nothing has changed for {} ticks, whatever the agent did", self.same))
     }
 }
-
-// Cameras that see nothing.
 
 /// A finding for episodes in which every picture was of one colour. Only testers with pictures have any. An agent that
 /// never gets an observation is a fault of the game, which is a finding of its own.
@@ -91,8 +91,6 @@ impl WorldWatcher for Counted {
     }
 }
 
-// Numbers that are not finite, or far too large.
-
 /// A finding for a transform, an agent's position or an observation that is not a number, and for positions too far
 /// from the origin.
 pub struct Runaway {
@@ -125,8 +123,8 @@ impl Detector for Runaway {
         "a transform, a position or an observation is not a number, or a position is too far from the origin"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
-        vec![Setting::new("distance", &mut self.distance, "distance from the origin that is too far")]
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
+        vec![DetectorSetting::new("distance", &mut self.distance, "distance from the origin that is too far")]
     }
 
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -143,9 +141,9 @@ impl EpisodeWatcher for Numbers {
         if let Some(index) = moment.observation.iter().position(|number| !number.is_finite()) {
             return Some(format!("value {index} of the observation is {}", moment.observation[index]));
         }
-        let place = moment.place?;
-        (!place.is_finite() || place.abs().max_element() > self.most)
-            .then(|| format!("the agent is at {}, {}", place.x, place.y))
+        let position = moment.position?;
+        (!position.is_finite() || position.abs().max_element() > self.most)
+            .then(|| format!("the agent is at {}, {}", position.x, position.y))
     }
 }
 
@@ -177,7 +175,9 @@ impl WorldWatcher for Transforms {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detectors::testing::{Step, found, room};
+    use crate::detectors::testing::{Step, found, found_in, room};
+    use bevy::prelude::Entity;
+    use bevy_playbot::{headless::headless_app, prelude::*};
 
     #[test]
     fn a_world_that_stands_still_is_found() {
@@ -194,14 +194,6 @@ mod tests {
         let steps: Vec<Step> = (0..600).map(clock).collect();
         assert_eq!(found(&FrozenWorld::default(), &room(), &steps), None);
     }
-}
-
-#[cfg(test)]
-mod blank_picture_tests {
-    use bevy::prelude::Entity;
-    use bevy_playbot::{headless::headless_app, prelude::*};
-
-    use super::*;
 
     #[test]
     fn an_episode_without_a_picture_of_anything_is_found_once() {
@@ -209,22 +201,16 @@ mod blank_picture_tests {
         let agent: Entity = app.world_mut().spawn(Agent::new(0, ActionSpace::Discrete(2))).id();
         app.tick().expect("one agent");
         let mut watch = BlankPicture.watch_world().expect("it looks at Worlds");
-        let mut told = |app: &bevy::app::App| watch.tick(&WorldTick { world: app.world(), errors: &[] });
-        assert_eq!(told(&app), None, "who has no eyes is not blind");
+        let mut reported = |app: &bevy::app::App| watch.tick(&WorldTick { world: app.world(), errors: &[] });
+        assert_eq!(reported(&app), None, "an agent without a sensor is not blind");
         app.world_mut().entity_mut(agent).insert(BlankEpisodes::default());
-        assert_eq!(told(&app), None);
+        assert_eq!(reported(&app), None);
         if let Some(mut blank) = app.world_mut().get_mut::<BlankEpisodes>(agent) {
             blank.episodes = 1;
         }
-        assert!(told(&app).is_some_and(|message| message.contains("single colour")));
-        assert_eq!(told(&app), None);
+        assert!(reported(&app).is_some_and(|message| message.contains("single colour")));
+        assert_eq!(reported(&app), None);
     }
-}
-
-#[cfg(test)]
-mod runaway_tests {
-    use super::*;
-    use crate::detectors::testing::{Step, found, found_in, room};
 
     #[test]
     fn transforms_that_are_no_numbers_or_too_far_are_found() {

@@ -8,7 +8,7 @@ use crate::{
 use bevy::math::Vec2;
 use bevy_playbot::{episode::EpisodeResult, vision::ObservationConfig};
 use playbot_harness::{
-    detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting},
+    detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead},
     eval::{EvalPlan, Player, evaluate},
     game::Game,
     split::LevelSplit,
@@ -31,8 +31,8 @@ impl Default for FarGoal {
 }
 
 impl FarGoal {
-    /// Creates the detector for [a game's own detectors](playbot_harness::game::TestTools::detectors): no agent farther from the
-    /// goal than this, in tiles, can reach it.
+    /// Creates the detector for [a game's own detectors](playbot_harness::game::TestTools::detectors): no agent farther
+    /// from the goal than this, in tiles, can reach it.
     pub fn beyond(distance: f64) -> Self {
         Self { distance, is_default: true }
     }
@@ -57,8 +57,8 @@ impl Detector for FarGoal {
         self.is_default
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
-        vec![Setting::new("distance", &mut self.distance, "how far the goal may reach, in tiles")]
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
+        vec![DetectorSetting::new("distance", &mut self.distance, "how far the goal may reach, in tiles")]
     }
 
     fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -72,12 +72,10 @@ impl EpisodeWatcher for Away {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let is_first = moment.is_success && !self.was_success;
         self.was_success |= moment.is_success;
-        let away = moment.place.filter(|_| is_first)?.distance(self.goal);
+        let away = moment.position.filter(|_| is_first)?.distance(self.goal);
         (away > self.distance).then(|| format!("the agent succeeds {away:.1} from the goal"))
     }
 }
-
-// Goals without an effect.
 
 /// A finding for agents that are at the goal of their level's plan without success.
 ///
@@ -96,8 +94,8 @@ impl Default for GoalIgnored {
 }
 
 impl GoalIgnored {
-    /// Creates the detector for [a game's own detectors](playbot_harness::game::TestTools::detectors): an agent within this
-    /// distance of the goal after a tick, in tiles, has reached it in this tick.
+    /// Creates the detector for [a game's own detectors](playbot_harness::game::TestTools::detectors): an agent within
+    /// this distance of the goal after a tick, in tiles, has reached it in this tick.
     pub fn within(distance: f64) -> Self {
         Self { distance, ticks: 1.0, is_default: true }
     }
@@ -123,10 +121,10 @@ impl Detector for GoalIgnored {
         self.is_default
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("distance", &mut self.distance, "how far the goal reaches, in tiles"),
-            Setting::new("ticks", &mut self.ticks, "ticks in a row at the goal").at_least(1.0),
+            DetectorSetting::new("distance", &mut self.distance, "how far the goal reaches, in tiles"),
+            DetectorSetting::new("ticks", &mut self.ticks, "ticks in a row at the goal").at_least(1.0),
         ]
     }
 
@@ -139,14 +137,12 @@ impl Detector for GoalIgnored {
 
 impl EpisodeWatcher for Near {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
-        let away = moment.place?.distance(self.goal);
+        let away = moment.position?.distance(self.goal);
         self.stayed = if away <= self.distance && !moment.is_success { self.stayed + 1 } else { 0 };
         (self.stayed >= self.ticks)
             .then(|| format!("the agent is {away:.2} from the goal for {} ticks, and has not reached it", self.stayed))
     }
 }
-
-// Parts of a level that cannot be reached.
 
 /// A finding for tiles that an explorer does not reach, though no wall cuts them off from the start. It is opt-in,
 /// because it is no proof and takes some seconds for each level.
@@ -195,11 +191,11 @@ impl LevelDetector for UnreachableRegion {
         "an explorer does not get to tiles that no wall cuts off"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("steps", &mut self.steps, "steps of the explorer on a level").at_least(1.0),
-            Setting::new("share", &mut self.share, "share of the tiles that it may miss"),
-            Setting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
+            DetectorSetting::new("steps", &mut self.steps, "steps of the explorer on a level").at_least(1.0),
+            DetectorSetting::new("share", &mut self.share, "share of the tiles that it may miss"),
+            DetectorSetting::new("every", &mut self.every, "look at every n-th level of the range").at_least(1.0),
         ]
     }
 
@@ -219,8 +215,6 @@ impl LevelDetector for UnreachableRegion {
         self.missed(game, mode, level, &|| false).is_some()
     }
 }
-
-// Levels that are solved too fast.
 
 /// A finding for testers that solve a level in far fewer ticks than expected: its par, by the designer or by
 /// demonstrations, or else the ticks of the game's demonstrator.
@@ -270,10 +264,10 @@ impl LevelDetector for Shortcut {
         "the level is solved far faster than by the demonstrator, or than its par"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("factor", &mut self.factor, "share of the par that is too fast"),
-            Setting::new(
+            DetectorSetting::new("factor", &mut self.factor, "share of the par that is too fast"),
+            DetectorSetting::new(
                 "par",
                 &mut self.par,
                 "ticks that a level should take; 0 for those of --par, or of the demonstrator",
@@ -318,7 +312,7 @@ fn is_too_fast(result: &EpisodeResult, par: f64, factor: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detectors::testing::{Step, found, room};
+    use crate::detectors::testing::{LOST, Step, WON, found, inspected, room};
 
     /// From the goal at 8.5, 8.5 to the left, with success in one tick.
     fn leave(success: usize) -> Vec<Step> {
@@ -342,12 +336,6 @@ mod tests {
         assert_eq!(found(&FarGoal::default(), &LevelAhead::default(), &leave(8)), None, "no plan");
         assert!(!FarGoal::default().is_default() && FarGoal::beyond(1.0).is_default());
     }
-}
-
-#[cfg(test)]
-mod goal_ignored_tests {
-    use super::*;
-    use crate::detectors::testing::{Step, found, room};
 
     /// Towards the goal at 8.5, 8.5, where the agent stays.
     fn arrive(is_success: bool) -> Vec<Step> {
@@ -375,12 +363,6 @@ mod goal_ignored_tests {
         assert_eq!(found(&GoalIgnored::default(), &LevelAhead::default(), &arrive(false)), None, "no plan");
         assert!(!GoalIgnored::default().is_default() && GoalIgnored::within(0.3).is_default());
     }
-}
-
-#[cfg(test)]
-mod shortcut_tests {
-    use super::*;
-    use crate::detectors::testing::{LOST, WON, inspected};
 
     #[test]
     fn a_level_that_is_solved_far_faster_than_its_par_has_a_shortcut() {
@@ -388,7 +370,7 @@ mod shortcut_tests {
         let found = inspected(&Shortcut::default(), &episodes, Some(100.0));
         assert_eq!((found.len(), found[0].episode, found[0].tick), (1, Some(1), Some(39)));
         assert!(inspected(&Shortcut::default(), &episodes, Some(80.0)).is_empty(), "half the par is no shortcut");
-        assert!(inspected(&Shortcut::default(), &episodes, None).is_empty(), "nobody demonstrates it");
+        assert!(inspected(&Shortcut::default(), &episodes, None).is_empty(), "it is not demonstrated");
     }
 
     #[test]

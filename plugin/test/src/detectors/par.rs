@@ -174,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn pars_are_read_and_told_apart_by_their_hash() {
+    fn pars_are_read_and_distinguished_by_their_hash() {
         let pars = read(r#"{"hard:7": 120, "levels/cave.json": 300.5}"#).expect("pars");
         assert_eq!(
             (pars.of("hard:7"), pars.of("levels/cave.json"), pars.of("hard:8")),
@@ -185,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_par_is_told_with_its_place() {
+    fn what_is_no_par_is_reported_with_its_place() {
         for (text, words) in [
             ("{\n\"hard:7\": soon}", "line 2"),
             ("[1, 2]", "\"hard:7\": 120"),

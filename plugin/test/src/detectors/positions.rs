@@ -7,7 +7,7 @@ use bevy::{
     prelude::Transform,
 };
 use playbot_harness::{
-    detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting},
+    detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead},
     floor_plan::FloorPlan,
 };
 
@@ -45,10 +45,10 @@ impl Detector for Stuck {
         "the agent cannot leave its position, whatever it does"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("ticks", &mut self.ticks, "ticks in a row at the same position").at_least(1.0),
-            Setting::new("distance", &mut self.distance, "how far the same position reaches, in tiles"),
+            DetectorSetting::new("ticks", &mut self.ticks, "ticks in a row at the same position").at_least(1.0),
+            DetectorSetting::new("distance", &mut self.distance, "how far the same position reaches, in tiles"),
         ]
     }
 
@@ -62,23 +62,24 @@ impl Detector for Stuck {
 
 impl EpisodeWatcher for Staying {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
-        let place = moment.place.filter(|place| place.is_finite())?;
+        let position = moment.position.filter(|position| position.is_finite())?;
         self.efforts.note(moment.action);
-        let is_at_goal = self.goal.is_some_and(|(goal, near)| place.distance(goal) <= near);
-        let has_moved = self.anchor.is_none_or(|anchor| place.distance(anchor) > self.distance);
+        let is_at_goal = self.goal.is_some_and(|(goal, near)| position.distance(goal) <= near);
+        let has_moved = self.anchor.is_none_or(|anchor| position.distance(anchor) > self.distance);
         if has_moved || is_at_goal || moment.is_success {
-            (self.anchor, self.stayed) = (Some(place), 0);
+            (self.anchor, self.stayed) = (Some(position), 0);
             self.efforts.restart();
             return None;
         }
         self.stayed += 1;
         (self.stayed >= self.ticks && self.efforts.are_many(self.stayed)).then(|| {
-            format!("the agent has not left {:.1}, {:.1} for {} ticks, whatever it did", place.x, place.y, self.stayed)
+            format!(
+                "the agent has not left {:.1}, {:.1} for {} ticks, whatever it did",
+                position.x, position.y, self.stayed
+            )
         })
     }
 }
-
-// Agents outside their level.
 
 /// A finding for agents outside the plan of their level. Levels without walls have no outside, and are skipped.
 pub struct OutOfBounds {
@@ -103,8 +104,8 @@ impl Detector for OutOfBounds {
         "the agent is outside its level"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
-        vec![Setting::new("margin", &mut self.margin, "tiles around the level that still belong to it")]
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
+        vec![DetectorSetting::new("margin", &mut self.margin, "tiles around the level that still belong to it")]
     }
 
     fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -116,12 +117,10 @@ impl Detector for OutOfBounds {
 
 impl EpisodeWatcher for Inside {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
-        let place = moment.place.filter(|place| place.is_finite() && !self.0.contains(*place))?;
-        Some(format!("the agent is at {:.1}, {:.1}, outside the level", place.x, place.y))
+        let position = moment.position.filter(|position| position.is_finite() && !self.0.contains(*position))?;
+        Some(format!("the agent is at {:.1}, {:.1}, outside the level", position.x, position.y))
     }
 }
-
-// Agents that fall for ever.
 
 /// A finding for agents that fall with nothing left below them.
 pub struct FellThrough {
@@ -153,10 +152,14 @@ impl Detector for FellThrough {
         "the agent falls and nothing is below it any more"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("ticks", &mut self.ticks, "ticks in a row in which it falls").at_least(1.0),
-            Setting::new("depth", &mut self.depth, "how far below its start, in the game's units, without a plan"),
+            DetectorSetting::new("ticks", &mut self.ticks, "ticks in a row in which it falls").at_least(1.0),
+            DetectorSetting::new(
+                "depth",
+                &mut self.depth,
+                "how far below its start, in the game's units, without a plan",
+            ),
         ]
     }
 
@@ -179,8 +182,6 @@ impl EpisodeWatcher for Falling {
     }
 }
 
-// Agents inside walls.
-
 /// A finding for agents deep inside a wall of their level's plan, on all sides.
 ///
 /// Bodies are round or have corners, sink in a little, and may hang over a ledge that is thinner than they are. A game
@@ -197,8 +198,8 @@ impl Default for ThroughWall {
 }
 
 impl ThroughWall {
-    /// Creates the detector for [a game's own detectors](playbot_harness::game::TestTools::detectors): agents are never this deep
-    /// inside a wall, in tiles.
+    /// Creates the detector for [a game's own detectors](playbot_harness::game::TestTools::detectors): agents are never
+    /// this deep inside a wall, in tiles.
     pub fn deeper_than(depth: f64) -> Self {
         Self { depth }
     }
@@ -218,8 +219,12 @@ impl Detector for ThroughWall {
         "the agent is deep inside a wall"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
-        vec![Setting::new("depth", &mut self.depth, "wall on all sides of the agent that is too much, in tiles")]
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
+        vec![DetectorSetting::new(
+            "depth",
+            &mut self.depth,
+            "wall on all sides of the agent that is too much, in tiles",
+        )]
     }
 
     fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -230,13 +235,11 @@ impl Detector for ThroughWall {
 
 impl EpisodeWatcher for InsideWall {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
-        let place = moment.place?;
-        let is_deep = self.solid.surround(place, self.depth);
-        is_deep.then(|| format!("the agent is at {:.1}, {:.1}, deep inside a wall", place.x, place.y))
+        let position = moment.position?;
+        let is_deep = self.solid.surround(position, self.depth);
+        is_deep.then(|| format!("the agent is at {:.1}, {:.1}, deep inside a wall", position.x, position.y))
     }
 }
-
-// Agents that are flung away.
 
 /// A finding for agents that move farther in one tick than physics allows. It is opt-in, because portals do that on
 /// purpose.
@@ -269,10 +272,18 @@ impl Detector for PhysicsExplosion {
         false
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("share", &mut self.share, "share of the level's longer side that is too far for one tick"),
-            Setting::new("distance", &mut self.distance, "the same in the game's units, for levels without a plan"),
+            DetectorSetting::new(
+                "share",
+                &mut self.share,
+                "share of the level's longer side that is too far for one tick",
+            ),
+            DetectorSetting::new(
+                "distance",
+                &mut self.distance,
+                "the same in the game's units, for levels without a plan",
+            ),
         ]
     }
 
@@ -286,13 +297,11 @@ impl Detector for PhysicsExplosion {
 impl EpisodeWatcher for Leaping {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let transform = || moment.world.get::<Transform>(moment.agent).map(|transform| transform.translation);
-        let place = moment.place.map(|place| place.extend(0.0)).or_else(transform)?;
-        let way = self.last.replace(place).map(|last| last.distance(place))?;
+        let position = moment.position.map(|position| position.extend(0.0)).or_else(transform)?;
+        let way = self.last.replace(position).map(|last| last.distance(position))?;
         (way > self.most).then(|| format!("the agent moved {way:.1} units in one tick"))
     }
 }
-
-// The inside of walls.
 
 /// Most tiles of a plan that are examined.
 const MOST_TILES: f32 = 4e6;
@@ -333,8 +342,8 @@ impl SolidTiles {
     }
 
     /// Returns whether all is wall up to this distance from a position along both axes, in tiles.
-    pub fn surround(&self, place: Vec2, distance: f32) -> bool {
-        let at = (place - self.grid.origin) / self.grid.size;
+    pub fn surround(&self, position: Vec2, distance: f32) -> bool {
+        let at = (position - self.grid.origin) / self.grid.size;
         let (low, high) = ((at - distance + ROUNDING).floor(), (at + distance - ROUNDING).floor());
         let is_inside = low.min_element() >= 0.0 && high.x < self.columns as f32 && high.y < self.rows as f32;
         is_inside
@@ -347,13 +356,14 @@ impl SolidTiles {
 mod tests {
     use super::*;
     use crate::detectors::testing::{Step, found, room};
+    use bevy::math::Rect;
 
     fn steps(step: impl Fn(usize) -> Step) -> Vec<Step> {
         (0..500).map(step).collect()
     }
 
     #[test]
-    fn who_cannot_leave_its_place_is_found() {
+    fn who_cannot_leave_its_position_is_found() {
         // The world around it goes on.
         let walled = steps(|tick| Step { seen: tick as f32, ..Step::at(tick, 2.0, 2.0) });
         let (tick, message) = found(&Stuck::default(), &room(), &walled).expect("it is stuck");
@@ -367,17 +377,11 @@ mod tests {
         let holds = steps(|_| Step::at(0, 2.0, 2.0));
         let rests = steps(|tick| Step::at(tick, 8.0, 8.0));
         let done = steps(|tick| Step { is_success: true, ..Step::at(tick, 2.0, 2.0) });
-        let nowhere = steps(|tick| Step { place: None, ..Step::at(tick, 2.0, 2.0) });
+        let nowhere = steps(|tick| Step { position: None, ..Step::at(tick, 2.0, 2.0) });
         for sound in [wanders, holds, rests, done, nowhere] {
             assert_eq!(found(&Stuck::default(), &room(), &sound), None);
         }
     }
-}
-
-#[cfg(test)]
-mod out_of_bounds_tests {
-    use super::*;
-    use crate::detectors::testing::{Step, found, room};
 
     fn walk(to: f32) -> Vec<Step> {
         (0..=40).map(|tick| Step::at(tick, 5.0 + (to - 5.0) * tick as f32 / 40.0, 5.0)).collect()
@@ -399,12 +403,6 @@ mod out_of_bounds_tests {
         assert_eq!(found(&OutOfBounds::default(), &open, &walk(90.0)), None);
         assert_eq!(found(&OutOfBounds::default(), &LevelAhead::default(), &walk(90.0)), None);
     }
-}
-
-#[cfg(test)]
-mod fell_through_tests {
-    use super::*;
-    use crate::detectors::testing::{Step, found, room};
 
     fn fall(speed: f32, until: f32) -> Vec<Step> {
         (0..200).map(|tick| Step::at(tick, 5.0, (5.0 - speed * tick as f32).max(until))).collect()
@@ -426,14 +424,6 @@ mod fell_through_tests {
         assert_eq!(found(&FellThrough::default(), &room(), &fall(0.5, -3.0)), None, "it has landed");
         assert_eq!(found(&FellThrough::default(), &LevelAhead::default(), &fall(0.5, -1e9)), None);
     }
-}
-
-#[cfg(test)]
-mod through_wall_tests {
-    use bevy::math::Rect;
-
-    use super::*;
-    use crate::detectors::testing::{Step, found, room};
 
     /// Upwards at x = 5, into the wall above, which is three tiles thick.
     fn climb() -> (LevelAhead, Vec<Step>) {
@@ -462,12 +452,6 @@ mod through_wall_tests {
         assert_eq!(found(&ThroughWall::deeper_than(0.3), &room(), &open), None);
         assert_eq!(found(&ThroughWall::default(), &LevelAhead::default(), &across), None, "no plan");
     }
-}
-
-#[cfg(test)]
-mod explosion_tests {
-    use super::*;
-    use crate::detectors::testing::{Step, found, room};
 
     #[test]
     fn who_is_flung_away_is_found_and_who_runs_is_not() {
@@ -477,20 +461,13 @@ mod explosion_tests {
         let runs: Vec<Step> = [1.0, 4.0, 8.0, 9.0].iter().map(|x| Step::at(0, *x, 5.0)).collect();
         assert_eq!(found(&detector, &room(), &runs), None);
     }
-}
-
-#[cfg(test)]
-mod solid_tiles_tests {
-    use bevy::math::Rect;
-
-    use super::*;
 
     fn plan(walls: Vec<Rect>) -> FloorPlan {
         FloorPlan { bounds: Rect::new(-1.0, -1.0, 9.0, 5.0), walls, ..FloorPlan::default() }
     }
 
     #[test]
-    fn how_deep_a_place_is_counts_to_all_sides_and_over_walls_that_touch() {
+    fn how_deep_a_position_is_counts_to_all_sides_and_over_walls_that_touch() {
         // Two rows of tiles of side 2, one above the other.
         let walls = vec![Rect::new(-1.0, -1.0, 7.0, 1.0), Rect::new(-1.0, 1.0, 7.0, 3.0)];
         let solid = SolidTiles::of(&plan(walls)).expect("walls");

@@ -5,7 +5,7 @@ use crate::{
     explore::CellGrid,
 };
 use bevy_playbot::episode::EpisodeEnd;
-use playbot_harness::detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting};
+use playbot_harness::detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead};
 use std::collections::BTreeMap;
 
 /// A finding for episodes with more reward at the time limit than any solved one.
@@ -28,8 +28,8 @@ impl LevelDetector for RewardFarm {
         "an episode that was not solved brings more reward than the solved ones"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
-        vec![Setting::new("factor", &mut self.factor, "times the reward of the best solved episode")]
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
+        vec![DetectorSetting::new("factor", &mut self.factor, "times the reward of the best solved episode")]
     }
 
     fn compares_testers(&self) -> bool {
@@ -55,8 +55,6 @@ impl LevelDetector for RewardFarm {
         defect.into_iter().collect()
     }
 }
-
-// Rewards that can be collected without end.
 
 /// A finding for agents that earn again and again for coming back to the same spot or staying there. A reward for
 /// getting nearer to something pays nothing on the path back. It is opt-in, because a game that pays for each tick does
@@ -104,10 +102,10 @@ impl Detector for RewardLoop {
         false
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new("times", &mut self.times, "payments for one spot that are too many").at_least(2.0),
-            Setting::new("spot", &mut self.spot, "side of a spot, in tiles").at_least(0.001),
+            DetectorSetting::new("times", &mut self.times, "payments for one spot that are too many").at_least(2.0),
+            DetectorSetting::new("spot", &mut self.spot, "side of a spot, in tiles").at_least(0.001),
         ]
     }
 
@@ -124,8 +122,8 @@ impl EpisodeWatcher for Earning {
             return None;
         }
         self.sum += moment.reward;
-        let place = moment.place?;
-        let cell = self.grid.cell_at(place)?;
+        let position = moment.position?;
+        let cell = self.grid.cell_at(position)?;
         let &[column, row] = cell.0.as_slice() else { return None };
         let is_first = !self.spots.contains_key(&(column, row));
         let visits = self.spots.entry((column, row)).or_default();
@@ -134,14 +132,14 @@ impl EpisodeWatcher for Earning {
         (visits.paid >= self.times).then(|| {
             format!(
                 "the agent was paid {} times for coming back to {:.1}, {:.1} or staying there, {earned} the last time",
-                visits.paid, place.x, place.y
+                visits.paid, position.x, position.y
             )
         })
     }
 }
 
 #[cfg(test)]
-mod reward_loop_tests {
+mod tests {
     use super::*;
     use crate::detectors::testing::{Step, found, room};
 

@@ -77,7 +77,7 @@ pub enum DetectorError {
 
 impl Detectors {
     /// Selects the default detectors: those that cost little and give no false alarm in an unmutated game.
-    pub fn usual(game: &dyn Game) -> Self {
+    pub fn defaults(game: &dyn Game) -> Self {
         Self::of(all(game).into_iter().filter(Known::is_default).collect())
     }
 
@@ -169,7 +169,7 @@ impl DetectorChoice {
 }
 
 /// Returns the options of a command line that change results, in an order that does not depend on that of the choice.
-fn options(known: &mut [Known], choice: &DetectorChoice, usual: &mut [Known]) -> Vec<String> {
+fn options(known: &mut [Known], choice: &DetectorChoice, defaults: &mut [Known]) -> Vec<String> {
     let is_all = |list: &[String]| list.iter().any(|name| name == ALL);
     let (adds_all, leaves_all) = (is_all(&choice.with), is_all(&choice.without));
     let mut words = Vec::new();
@@ -185,10 +185,11 @@ fn options(known: &mut [Known], choice: &DetectorChoice, usual: &mut [Known]) ->
         |is: bool| known.iter().filter(counts).filter(move |it| choice.takes(it) == is && is_implied(it) != is);
     list("--detect", adds_all && !leaves_all, chosen(true).map(Known::name).collect());
     list("--no-detect", leaves_all, chosen(false).map(Known::name).collect());
-    for (known, usual) in known.iter_mut().zip(usual).filter(|(known, _)| counts(&&**known) && choice.takes(known)) {
+    for (known, default) in known.iter_mut().zip(defaults).filter(|(known, _)| counts(&&**known) && choice.takes(known))
+    {
         let name = known.name();
-        for (setting, usual) in known.settings().into_iter().zip(usual.settings()) {
-            if *setting.value != *usual.value {
+        for (setting, default) in known.settings().into_iter().zip(default.settings()) {
+            if *setting.value != *default.value {
                 words.extend(["--detector".to_owned(), format!("{name}.{}={}", setting.key, setting.value)]);
             }
         }
@@ -248,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_setting_is_told_with_its_detector_and_what_there_is() {
+    fn an_unknown_setting_is_reported_with_its_detector_and_what_there_is() {
         let settings = vec!["stuck.tick=3".to_owned()];
         let words = said(&DetectorChoice { settings, ..DetectorChoice::default() });
         assert!(

@@ -1,13 +1,13 @@
 //! Agents that can no longer win.
 
-use crate::explore::{Cell, CellGrid};
+use crate::explore::{CellGrid, ExploredCell};
 use bevy::math::Vec2;
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
-use playbot_harness::detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, Setting};
+use playbot_harness::detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead};
 use std::collections::BTreeMap;
 
-/// A finding for episodes that go on after the game [proves](playbot_harness::game::StateTools::prove_from) that their agent can
-/// no longer reach the goal.
+/// A finding for episodes that go on after the game [proves](playbot_harness::game::StateTools::prove_from) that their
+/// agent can no longer reach the goal.
 ///
 /// An agent that falls to its death cannot win either, so the episode must go on for a while. For a level that is
 /// unsolvable from its start, that is reported instead.
@@ -33,7 +33,7 @@ struct Asking {
     /// The next tick with a question; `None` if there is no further one.
     next: Option<u32>,
     /// Ticks of the questions, by tile and whether the agent rested there.
-    asked: BTreeMap<(Cell, bool), u32>,
+    asked: BTreeMap<(ExploredCell, bool), u32>,
     last: Option<Vec2>,
     /// The tick since which the goal is out of reach, and why.
     locked: Option<(u32, String)>,
@@ -48,15 +48,15 @@ impl Detector for SoftLock {
         "the agent provably can no longer reach its goal, and the episode goes on"
     }
 
-    fn settings(&mut self) -> Vec<Setting<'_>> {
+    fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![
-            Setting::new(
+            DetectorSetting::new(
                 "every",
                 &mut self.every,
                 "ticks between two questions to the game; more, later in an episode",
             )
             .at_least(1.0),
-            Setting::new("ticks", &mut self.ticks, "ticks that the episode goes on without hope"),
+            DetectorSetting::new("ticks", &mut self.ticks, "ticks that the episode goes on without hope"),
         ]
     }
 
@@ -78,12 +78,12 @@ impl Detector for SoftLock {
 impl Asking {
     /// Returns whether this position was never asked about, or so long ago that the answer may have changed.
     fn is_unknown(&mut self, moment: &DetectorTick<'_>, rests: bool) -> bool {
-        let Some(cell) = moment.place.and_then(|place| self.grid.cell_at(place)) else { return true };
-        let place = (cell, rests);
+        let Some(cell) = moment.position.and_then(|position| self.grid.cell_at(position)) else { return true };
+        let asked = (cell, rests);
         let stale = self.every.saturating_mul(STALE);
-        let is_known = self.asked.get(&place).is_some_and(|asked| moment.tick.saturating_sub(*asked) < stale);
+        let is_known = self.asked.get(&asked).is_some_and(|last| moment.tick.saturating_sub(*last) < stale);
         if !is_known {
-            self.asked.insert(place, moment.tick);
+            self.asked.insert(asked, moment.tick);
         }
         !is_known
     }
@@ -101,7 +101,7 @@ impl Asking {
     }
 
     /// Returns the message once the episode has gone on for this many ticks.
-    fn told(&self, moment: &DetectorTick<'_>, ticks: u32) -> Option<String> {
+    fn reported(&self, moment: &DetectorTick<'_>, ticks: u32) -> Option<String> {
         let (since, why) = self.locked.as_ref()?;
         (moment.tick >= since.saturating_add(ticks)).then(|| format!("since tick {since} at the latest {why}"))
     }
@@ -109,13 +109,13 @@ impl Asking {
 
 impl EpisodeWatcher for Asking {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
-        let rests = moment.place.is_some() && moment.place == self.last;
-        self.last = moment.place;
+        let rests = moment.position.is_some() && moment.position == self.last;
+        self.last = moment.position;
         if moment.is_success {
             (self.next, self.locked) = (None, None);
         }
         if self.locked.is_some() {
-            return self.told(moment, self.ticks);
+            return self.reported(moment, self.ticks);
         }
         if self.next.is_some_and(|next| moment.tick >= next) && self.is_unknown(moment, rests) {
             self.ask(moment);
@@ -126,7 +126,7 @@ impl EpisodeWatcher for Asking {
     /// The time limit came while the goal was out of reach. Half the ticks are enough then, since nothing kills there.
     fn end(&mut self, moment: &DetectorTick<'_>, result: &EpisodeResult) -> Option<String> {
         let is_late = result.end == EpisodeEnd::Truncated && !result.success;
-        is_late.then(|| self.told(moment, self.ticks / 2)).flatten()
+        is_late.then(|| self.reported(moment, self.ticks / 2)).flatten()
     }
 }
 
@@ -193,7 +193,7 @@ mod tests {
     }
 
     #[test]
-    fn a_place_is_asked_about_once_in_a_while() {
+    fn a_position_is_asked_about_once_in_a_while() {
         let rests: Vec<Step> = (0..201).map(|tick| Step::at(tick, 2.0, 2.0)).collect();
         let hopeful = Trap { from: 1000, ..Trap::default() };
         assert_eq!(found_proving(&quick(), &room(), &rests, &hopeful), None);

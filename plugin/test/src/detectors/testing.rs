@@ -17,7 +17,7 @@ use playbot_harness::{
 /// The data of a tick.
 #[derive(Clone, Debug)]
 pub struct Step {
-    pub place: Option<Vec2>,
+    pub position: Option<Vec2>,
     pub action: u32,
     pub seen: f32,
     pub reward: f32,
@@ -28,7 +28,7 @@ impl Step {
     /// An agent at this position; the number of the tick is its action.
     pub fn at(tick: usize, x: f32, y: f32) -> Self {
         let action = tick as u32 % 3;
-        Self { place: Some(Vec2::new(x, y)), action, seen: 0.5, reward: 0.0, is_success: false }
+        Self { position: Some(Vec2::new(x, y)), action, seen: 0.5, reward: 0.0, is_success: false }
     }
 }
 
@@ -90,7 +90,7 @@ fn play(
             observation: &observation,
             state_hash: 0,
             reward: step.reward,
-            place: step.place,
+            position: step.position,
             is_success: step.is_success,
             proofs,
         };
@@ -145,8 +145,8 @@ pub(crate) fn inspected(
         observation_config: ObservationConfig::default(),
         seed: 0,
         episodes: (0..).zip(episodes.iter().map(result)).collect(),
-        places: (0..).zip(episodes.iter().map(|(_, _, place)| Vec2::from_array(*place))).collect(),
+        positions: (0..).zip(episodes.iter().map(|(_, _, position)| Vec2::from_array(*position))).collect(),
     };
     let (mode, testers) = ("plain", vec![tester]);
-    detector.inspect(&TestedLevel { game: &game, mode, level: 0, place: 0, par, testers, stop: &|| false })
+    detector.inspect(&TestedLevel { game: &game, mode, level: 0, index: 0, par, testers, stop: &|| false })
 }

@@ -1,8 +1,8 @@
 //! The archive of reached cells, with the paths to them.
 
 use crate::explore::{
-    cell::{Cell, Spotted},
-    ways::{Route, Way, Ways},
+    cell::{ExploredCell, Spotted},
+    known_paths::{KnownPath, KnownPaths, Route},
 };
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -25,7 +25,7 @@ use std::{collections::BTreeMap, iter};
 /// A cell that was reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReachedCell {
-    way: Way,
+    path: KnownPath,
     /// Whether the episode was over on arrival, on every path there, so that no path goes on from it.
     pub is_over: bool,
     /// Whether every path there only passes it between two ticks. The path then ends with the tick after the cell.
@@ -38,7 +38,7 @@ impl ReachedCell {
     /// Returns the ticks of the shortest known path to it. A path on which the episode goes on comes before a shorter
     /// one on which it ends. One that ends in the cell comes before a shorter one that passes it.
     pub fn ticks(&self) -> u32 {
-        self.way.ticks
+        self.path.ticks
     }
 
     fn sight(&self) -> Sight {
@@ -50,54 +50,54 @@ impl ReachedCell {
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Destination {
     /// The cell; `None` for the start of the level, which needs no path.
-    pub cell: Option<Cell>,
-    pub way: Way,
+    pub cell: Option<ExploredCell>,
+    pub path: KnownPath,
     /// Whether the path only passes the cell, with the agent behind it at the end.
     pub is_passed: bool,
 }
 
 impl Destination {
     /// The start of the level.
-    pub const START: Self = Self { cell: None, way: Way::START, is_passed: false };
+    pub const START: Self = Self { cell: None, path: KnownPath::START, is_passed: false };
 }
 
 /// All cells, with their paths.
 pub(super) struct Archive {
     start: ReachedCell,
-    cells: BTreeMap<Cell, ReachedCell>,
-    ways: Ways,
-    solution: Option<Way>,
+    cells: BTreeMap<ExploredCell, ReachedCell>,
+    paths: KnownPaths,
+    solution: Option<KnownPath>,
 }
 
 impl Archive {
     /// Creates an archive with the start of a level alone.
     pub fn new(space: ActionSpace) -> Self {
-        let start = ReachedCell { way: Way::START, is_over: false, is_passed: false, visits: 0 };
-        Self { start, cells: BTreeMap::new(), ways: Ways::new(space), solution: None }
+        let start = ReachedCell { path: KnownPath::START, is_over: false, is_passed: false, visits: 0 };
+        Self { start, cells: BTreeMap::new(), paths: KnownPaths::new(space), solution: None }
     }
 
     /// Returns all cells, in their order.
-    pub fn cells(&self) -> &BTreeMap<Cell, ReachedCell> {
+    pub fn cells(&self) -> &BTreeMap<ExploredCell, ReachedCell> {
         &self.cells
     }
 
     /// Returns the shortest path on which the level's goal was reached.
-    pub fn solution(&self) -> Option<Way> {
+    pub fn solution(&self) -> Option<KnownPath> {
         self.solution
     }
 
     /// Returns a whole path.
-    pub fn route(&self, way: Way) -> Route {
-        self.ways.route(way)
+    pub fn route(&self, path: KnownPath) -> Route {
+        self.paths.route(path)
     }
 
     /// Returns the path to a cell.
-    pub fn route_to(&self, cell: &Cell) -> Option<Route> {
-        self.cells.get(cell).map(|reached| self.route(reached.way))
+    pub fn route_to(&self, cell: &ExploredCell) -> Option<Route> {
+        self.cells.get(cell).map(|reached| self.route(reached.path))
     }
 
     /// Returns whether a cell is new, or reached sooner than before.
-    pub fn is_news(&self, cell: &Cell, sight: &Sight) -> bool {
+    pub fn is_news(&self, cell: &ExploredCell, sight: &Sight) -> bool {
         self.cells.get(cell).is_none_or(|known| sight.is_better_than(&known.sight()))
     }
 
@@ -115,7 +115,7 @@ impl Archive {
         let mut draw = || {
             let at = unit(rng) * sum;
             let (cell, reached) = open[ends.partition_point(|end| *end <= at).min(open.len() - 1)];
-            Destination { cell: cell.cloned(), way: reached.way, is_passed: reached.is_passed }
+            Destination { cell: cell.cloned(), path: reached.path, is_passed: reached.is_passed }
         };
         (0..count).map(|_| draw()).collect()
     }
@@ -129,11 +129,11 @@ impl Archive {
         let solved = solved.filter(|ticks| self.solution.is_none_or(|known| *ticks < known.ticks));
         let news = seen.iter().filter(|(cell, sight)| self.is_news(cell, sight)).map(|(_, sight)| sight.ticks);
         let farthest = news.chain(solved).max();
-        let way = farthest.map(|ticks| self.ways.extend(destination.way, &piece, ticks));
+        let path = farthest.map(|ticks| self.paths.extend(destination.path, &piece, ticks));
         for (cell, sight) in seen {
             let is_news = self.is_news(&cell, &sight);
             let found = ReachedCell {
-                way: way.map_or(destination.way, |way| way.cut(sight.ticks)),
+                path: path.map_or(destination.path, |path| path.cut(sight.ticks)),
                 is_over: sight.is_over,
                 is_passed: sight.is_passed,
                 visits: 0,
@@ -144,13 +144,13 @@ impl Archive {
             }
             reached.visits += 1;
         }
-        if let (Some(ticks), Some(way)) = (solved, way) {
-            self.solution = Some(way.cut(ticks));
+        if let (Some(ticks), Some(path)) = (solved, path) {
+            self.solution = Some(path.cut(ticks));
         }
     }
 }
 
-// The task of one visit.
+// Visits of agents.
 
 /// A path back to a cell, and the ticks to explore there.
 pub(super) struct Job {
@@ -165,8 +165,6 @@ pub(super) struct Job {
     /// Most ticks to explore.
     pub most: u32,
 }
-
-// The visit of an agent: its path back to a cell, and the exploration from there.
 
 /// The moment at which a cell was seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -193,7 +191,7 @@ pub(super) struct Visited {
     /// The actions after the path to the destination.
     pub piece: Route,
     /// The cells that were seen from the destination on, each by its best path.
-    pub seen: BTreeMap<Cell, Sight>,
+    pub seen: BTreeMap<ExploredCell, Sight>,
     /// Ticks after which the level's goal was reached.
     pub solved: Option<u32>,
     /// Ticks played, with the path back.
@@ -222,7 +220,7 @@ pub(super) struct Visit {
     /// Ticks left, unless something new is found.
     left: u32,
     /// Position of the agent after the last tick, from the destination on.
-    place: Option<Vec2>,
+    position: Option<Vec2>,
     rng: ChaCha8Rng,
     /// The last random action that was played.
     last: Option<ActionValue>,
@@ -241,23 +239,23 @@ impl Visit {
         // The streams of replays, for games that draw from the streams of their agents.
         agent.insert((Control::Bot, LevelQueue::Always(level), AgentStreams::new(0, 0)));
         let destination = job.destination.clone();
-        let sight = Sight { ticks: destination.way.ticks, is_over: false, is_passed: destination.is_passed };
+        let sight = Sight { ticks: destination.path.ticks, is_over: false, is_passed: destination.is_passed };
         let here = destination.cell.clone().map(|cell| (cell, sight));
         let piece = Route::empty(&draws.space);
         let seen = here.into_iter().collect();
         let visited = Visited { destination, piece, seen, solved: None, steps: 0, end: None };
         let rng = draws.streams.stream("explore", job.number);
         let (ticks, left) = (0, job.patience);
-        Self { level, job, visited, ticks, left, place: None, rng, last: None, next: None, was_solved: false }
+        Self { level, job, visited, ticks, left, position: None, rng, last: None, next: None, was_solved: false }
     }
 
     /// Sets the agent's next action, or lets the policy decide.
     pub fn act(&mut self, draws: &Draws, agent: &mut EntityWorldMut) {
-        let way = self.job.route.len();
+        let path = self.job.route.len();
         if let Some(action) = self.job.route.actions.get(self.ticks as usize) {
             agent.insert(Action(action));
         } else if draws.is_policy {
-            if self.ticks as usize == way && agent.get::<Control>() != Some(&Control::Policy) {
+            if self.ticks as usize == path && agent.get::<Control>() != Some(&Control::Policy) {
                 let stream = |name| draws.streams.stream(name, self.job.number);
                 let [level, action, skill] = ["explore/level", "explore/action", "explore/skill"].map(stream);
                 agent.insert((Control::Policy, AgentStreams::restored(level, action, skill), ActiveSkill::default()));
@@ -320,8 +318,8 @@ impl Visit {
                 self.visited.solved = Some(ticks);
             }
         }
-        if ticks >= self.visited.destination.way.ticks
-            && let Some(spotted) = spot(ticks, self.place.take())
+        if ticks >= self.visited.destination.path.ticks
+            && let Some(spotted) = spot(ticks, self.position.take())
         {
             self.look(spotted, end.is_some(), archive)?;
         }
@@ -347,13 +345,13 @@ impl Visit {
 
     /// Adds the cell of the agent, and those that it has passed.
     fn look(&mut self, spotted: Spotted, is_last: bool, archive: &Archive) -> Result<(), Divergence> {
-        let Spotted { ticks, cell, place, passed } = spotted;
-        let Destination { cell: wanted, way, is_passed } = &self.visited.destination;
-        if ticks < way.ticks {
+        let Spotted { ticks, cell, position, passed } = spotted;
+        let Destination { cell: wanted, path, is_passed } = &self.visited.destination;
+        if ticks < path.ticks {
             return Ok(());
         }
         // After passing a cell the agent is in another one. The state hash has confirmed the path.
-        let is_there = ticks == way.ticks && !is_passed;
+        let is_there = ticks == path.ticks && !is_passed;
         if let Some(wanted) = wanted.as_ref().filter(|wanted| is_there && **wanted != cell) {
             let what = format!("the agent is in cell {cell}, and the same actions led to cell {wanted} before");
             return Err(self.divergence(ticks.saturating_sub(1), what));
@@ -364,12 +362,12 @@ impl Visit {
             self.see(cell, Sight { ticks, is_over, is_passed: true }, archive);
         }
         self.see(cell, Sight { ticks, is_over, is_passed: false }, archive);
-        self.place = place;
+        self.position = position;
         Ok(())
     }
 
     /// Adds a cell, unless the visit has a better path to it.
-    fn see(&mut self, cell: Cell, sight: Sight, archive: &Archive) {
+    fn see(&mut self, cell: ExploredCell, sight: Sight, archive: &Archive) {
         if self.visited.seen.get(&cell).is_some_and(|known| !sight.is_better_than(known)) {
             return;
         }
@@ -395,23 +393,23 @@ mod tests {
 
     use super::*;
 
-    fn cell(number: i32) -> Cell {
-        Cell(vec![number])
+    fn cell(number: i32) -> ExploredCell {
+        ExploredCell(vec![number])
     }
 
     /// A visit from a cell of the archive, with the actions after it, and the cells by the tick in which they were
     /// seen.
     fn visit(archive: &Archive, from: Option<i32>, actions: &[u32], seen: &[(i32, u32, bool)]) -> Visited {
         let from = from.map(cell);
-        let way = from.as_ref().map_or(Way::START, |from| archive.cells[from].way);
+        let path = from.as_ref().map_or(KnownPath::START, |from| archive.cells[from].path);
         let seen =
             seen.iter().map(|&(number, ticks, is_over)| (cell(number), Sight { ticks, is_over, is_passed: false }));
         Visited {
-            destination: Destination { cell: from, way, is_passed: false },
+            destination: Destination { cell: from, path, is_passed: false },
             piece: Route { actions: Actions::Discrete(actions.to_vec()), hashes: actions.to_vec() },
             seen: seen.collect(),
             solved: None,
-            steps: u64::from(way.ticks) + actions.len() as u64,
+            steps: u64::from(path.ticks) + actions.len() as u64,
             end: None,
         }
     }
@@ -476,10 +474,10 @@ mod tests {
             ..visit(archive, None, actions, &[(1, 1, false)])
         };
         archive.merge(solved(&archive, &[4, 4, 4, 4], 3));
-        assert_eq!(archive.solution().map(|way| archive.route(way).hashes), Some(vec![4, 4, 4]));
+        assert_eq!(archive.solution().map(|path| archive.route(path).hashes), Some(vec![4, 4, 4]));
         archive.merge(solved(&archive, &[5, 5, 5, 5], 4));
         archive.merge(solved(&archive, &[6, 6], 2));
-        assert_eq!(archive.solution().map(|way| archive.route(way).hashes), Some(vec![6, 6]));
+        assert_eq!(archive.solution().map(|path| archive.route(path).hashes), Some(vec![6, 6]));
     }
 
     #[test]
@@ -489,7 +487,7 @@ mod tests {
             archive.merge(visit(&archive, None, &[1], &[(1, 1, false)]));
         }
         let chosen = archive.choose(20_000, &mut Streams::new(1).stream("test", 0));
-        let share = |cell: Option<Cell>| {
+        let share = |cell: Option<ExploredCell>| {
             chosen.iter().filter(|destination| destination.cell == cell).count() as f64 / chosen.len() as f64
         };
         // Weights: the start and cell 1 have 99 visits, 1/10 each; cell 2 has one, 1/√2.

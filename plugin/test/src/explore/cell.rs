@@ -12,21 +12,21 @@ use thiserror::Error;
 
 /// A group of states that count as the same: a square of a grid, the game's own cell, or similar observations.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-pub struct Cell(pub Vec<i32>);
+pub struct ExploredCell(pub Vec<i32>);
 
 /// The text is not a cell.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 #[error("`{0}` is not a cell: write its numbers as they are printed, separated by commas, such as 3,4")]
 pub struct NoCell(pub String);
 
-impl fmt::Display for Cell {
+impl fmt::Display for ExploredCell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let words: Vec<_> = self.0.iter().map(ToString::to_string).collect();
         f.write_str(&words.join(","))
     }
 }
 
-impl FromStr for Cell {
+impl FromStr for ExploredCell {
     type Err = NoCell;
 
     fn from_str(text: &str) -> Result<Self, NoCell> {
@@ -34,8 +34,6 @@ impl FromStr for Cell {
         numbers.map(Self).map_err(|_| NoCell(text.to_owned()))
     }
 }
-
-// Grids of square cells over a level.
 
 /// Squares along the longer side of a plan without walls that would give their size.
 const SQUARES: f32 = 16.0;
@@ -56,22 +54,22 @@ impl CellGrid {
     /// Creates the grid of a level: its cells are the tiles of the floor plan, unless `size` is given. Without a plan
     /// they have side 1 and start at the origin.
     pub fn new(plan: Option<&FloorPlan>, size: Option<f32>) -> Self {
-        let usual = plan.map_or(1.0, |plan| {
+        let default = plan.map_or(1.0, |plan| {
             let even = || plan.bounds.size().max_element() / SQUARES;
             let side = tile_size(plan).unwrap_or_else(even);
             if side.is_finite() && side > 0.0 { side } else { 1.0 }
         });
-        Self { origin: plan.map_or(Vec2::ZERO, |plan| plan.bounds.min), size: size.unwrap_or(usual) }
+        Self { origin: plan.map_or(Vec2::ZERO, |plan| plan.bounds.min), size: size.unwrap_or(default) }
     }
 
     /// Returns the cell at a position; `None` for a position that is not finite.
-    pub fn cell_at(&self, place: Vec2) -> Option<Cell> {
-        let at = ((place - self.origin) / self.size).floor();
-        place.is_finite().then(|| Cell(vec![at.x as i32, at.y as i32]))
+    pub fn cell_at(&self, position: Vec2) -> Option<ExploredCell> {
+        let at = ((position - self.origin) / self.size).floor();
+        position.is_finite().then(|| ExploredCell(vec![at.x as i32, at.y as i32]))
     }
 
     /// Returns the area of a cell; `None` for a cell of another kind.
-    pub fn area(&self, cell: &Cell) -> Option<Rect> {
+    pub fn area(&self, cell: &ExploredCell) -> Option<Rect> {
         let &[column, row] = cell.0.as_slice() else { return None };
         let corner = self.origin + Vec2::new(column as f32, row as f32) * self.size;
         Some(Rect::from_corners(corner, corner + self.size))
@@ -86,7 +84,7 @@ pub(super) fn tile_size(plan: &FloorPlan) -> Option<f32> {
     Some(if rounded > 0.0 { rounded } else { side })
 }
 
-// The cell of an agent after each tick.
+// Cells of agents.
 
 /// Default step to which observed values are rounded.
 const LOOKOUT_FINENESS: f32 = 0.125;
@@ -97,7 +95,7 @@ enum CellKind {
     /// The game's own cells.
     Own,
     /// Positions on a grid.
-    Places,
+    Positions,
     /// Rounded observations.
     Values,
 }
@@ -107,7 +105,7 @@ enum CellKind {
 pub(super) struct Lookout<'a> {
     grid: CellGrid,
     /// The cells that can be passed.
-    open: Option<&'a BTreeSet<Cell>>,
+    open: Option<&'a BTreeSet<ExploredCell>>,
     /// The farthest that an agent moves in a tick.
     reach: f32,
     fineness: f32,
@@ -117,23 +115,23 @@ pub(super) struct Lookout<'a> {
 /// A cell, and the tick of the episode in which the agent was there.
 pub(super) struct Spotted {
     pub ticks: u32,
-    pub cell: Cell,
+    pub cell: ExploredCell,
     /// Position of the agent, if cells are positions.
-    pub place: Option<Vec2>,
+    pub position: Option<Vec2>,
     /// The open cells that it passed since the position of the tick before.
-    pub passed: Vec<Cell>,
+    pub passed: Vec<ExploredCell>,
 }
 
 impl<'a> Lookout<'a> {
     /// Creates it for cells of this grid, unless the game has its own cells, or reports no positions. Of the cells that
     /// are passed between two ticks only open ones count, if they are known. `tile` is the side of a tile.
-    pub fn new(grid: CellGrid, cell_size: Option<f32>, open: Option<&'a BTreeSet<Cell>>, tile: f32) -> Self {
+    pub fn new(grid: CellGrid, cell_size: Option<f32>, open: Option<&'a BTreeSet<ExploredCell>>, tile: f32) -> Self {
         Self { grid, open, reach: reach(tile), fineness: cell_size.unwrap_or(LOOKOUT_FINENESS), kind: None }
     }
 
     /// Returns whether cells are squares of the grid; false before the first agent was seen.
-    pub fn has_places(&self) -> bool {
-        self.kind == Some(CellKind::Places)
+    pub fn has_positions(&self) -> bool {
+        self.kind == Some(CellKind::Positions)
     }
 
     /// Returns the cell of an agent after this many ticks, with its position a tick before, if that is known. An
@@ -146,27 +144,27 @@ impl<'a> Lookout<'a> {
         ticks: u32,
         before: Option<Vec2>,
     ) -> Option<Spotted> {
-        let alone = |ticks, cell| Spotted { ticks, cell, place: None, passed: Vec::new() };
+        let alone = |ticks, cell| Spotted { ticks, cell, position: None, passed: Vec::new() };
         match *self.kind.get_or_insert_with(|| kind_of(game, world, agent)) {
-            CellKind::Own => game.tools().state.explore_cell(world, agent).map(|cell| alone(ticks, Cell(cell))),
-            CellKind::Places => {
-                let place = game.tools().state.position(world, agent)?;
-                let cell = self.grid.cell_at(place)?;
-                let passed = before.map_or_else(Vec::new, |before| self.passed(before, place));
-                Some(Spotted { ticks, cell, place: Some(place), passed })
+            CellKind::Own => game.tools().state.explore_cell(world, agent).map(|cell| alone(ticks, ExploredCell(cell))),
+            CellKind::Positions => {
+                let position = game.tools().state.position(world, agent)?;
+                let cell = self.grid.cell_at(position)?;
+                let passed = before.map_or_else(Vec::new, |before| self.passed(before, position));
+                Some(Spotted { ticks, cell, position: Some(position), passed })
             }
             CellKind::Values => {
                 let values = &world.get::<Observation>(agent)?.vector;
                 let cell = values.iter().map(|value| (value / self.fineness).floor() as i32).collect();
-                Some(alone(ticks.checked_sub(1)?, Cell(cell)))
+                Some(alone(ticks.checked_sub(1)?, ExploredCell(cell)))
             }
         }
     }
 
     /// Returns the open cells between two positions.
-    fn passed(&self, from: Vec2, to: Vec2) -> Vec<Cell> {
+    fn passed(&self, from: Vec2, to: Vec2) -> Vec<ExploredCell> {
         let Some(open) = self.open else { return Vec::new() };
-        let between = cells_between(self.grid, from, to, self.reach).map(|cell| Cell(cell.to_vec()));
+        let between = cells_between(self.grid, from, to, self.reach).map(|cell| ExploredCell(cell.to_vec()));
         between.filter(|cell| open.contains(cell)).collect()
     }
 }
@@ -175,13 +173,13 @@ fn kind_of(game: &dyn Game, world: &World, agent: Entity) -> CellKind {
     if game.tools().state.explore_cell(world, agent).is_some() {
         CellKind::Own
     } else if game.tools().state.position(world, agent).is_some() {
-        CellKind::Places
+        CellKind::Positions
     } else {
         CellKind::Values
     }
 }
 
-// The cells that an agent passes between two ticks.
+// Cells that an agent passes between two ticks.
 
 /// Most tiles that an agent moves in a tick. An agent that is farther away was teleported, and has passed nothing.
 const FARTHEST: f32 = 4.0;
@@ -195,7 +193,7 @@ pub(crate) fn reach(tile: f32) -> f32 {
 /// list is empty if the positions are farther apart than `reach`. A line through a corner goes diagonally from cell to
 /// cell, and touches no third one.
 pub(crate) fn cells_between(grid: CellGrid, from: Vec2, to: Vec2, reach: f32) -> CellsBetween {
-    let [from, to] = [from, to].map(|place| ((place - grid.origin) / grid.size).to_array());
+    let [from, to] = [from, to].map(|position| ((position - grid.origin) / grid.size).to_array());
     let at = from.map(|value| value.floor() as i32);
     let is_near = Vec2::from_array(from).distance(Vec2::from_array(to)) * grid.size <= reach;
     // NaN is not near either.
@@ -254,19 +252,14 @@ mod tests {
 
     #[test]
     fn cells_read_back_as_they_are_printed() {
-        let cell = Cell(vec![3, -4]);
+        let cell = ExploredCell(vec![3, -4]);
         assert_eq!(cell.to_string(), "3,-4");
         assert_eq!("3,-4".parse(), Ok(cell));
         for bad in ["", "3,", "a,1", "1.5,2"] {
-            let error = bad.parse::<Cell>().expect_err(bad).to_string();
+            let error = bad.parse::<ExploredCell>().expect_err(bad).to_string();
             assert!(error.contains(&format!("`{bad}` is not a cell")) && error.contains("3,4"), "{error}");
         }
     }
-}
-
-#[cfg(test)]
-mod grid_tests {
-    use super::*;
 
     fn plan() -> FloorPlan {
         let square = |row: usize, column: usize| {
@@ -279,9 +272,9 @@ mod grid_tests {
     fn cells_are_the_tiles_of_the_plan() {
         let grid = CellGrid::new(Some(&plan()), None);
         assert_eq!(grid.size, 4.0);
-        assert_eq!(grid.cell_at(Vec2::new(8.0, 4.0)), Some(Cell(vec![2, 1])));
-        assert_eq!(grid.cell_at(Vec2::splat(-3.0)), Some(Cell(vec![-1, -1])));
-        let area = grid.area(&Cell(vec![2, 1])).expect("a square");
+        assert_eq!(grid.cell_at(Vec2::new(8.0, 4.0)), Some(ExploredCell(vec![2, 1])));
+        assert_eq!(grid.cell_at(Vec2::splat(-3.0)), Some(ExploredCell(vec![-1, -1])));
+        let area = grid.area(&ExploredCell(vec![2, 1])).expect("a square");
         assert!(area.center().distance(Vec2::new(7.8, 3.8)) < 1e-4, "{area:?}");
     }
 
@@ -291,21 +284,16 @@ mod grid_tests {
         let bare = CellGrid::new(None, None);
         assert_eq!((bare.origin, bare.size), (Vec2::ZERO, 1.0));
         assert_eq!(bare.cell_at(Vec2::new(f32::NAN, 0.0)), None);
-        assert_eq!(bare.area(&Cell(vec![1, 2, 3])), None);
+        assert_eq!(bare.area(&ExploredCell(vec![1, 2, 3])), None);
         let empty = FloorPlan { bounds: Rect::new(0.0, 0.0, 32.0, 8.0), ..FloorPlan::default() };
         assert_eq!(CellGrid::new(Some(&empty), None).size, 2.0);
     }
-}
-
-#[cfg(test)]
-mod passed_tests {
-    use super::*;
 
     const GRID: CellGrid = CellGrid { origin: Vec2::new(-1.0, 0.0), size: 0.5 };
 
     fn between(from: [f32; 2], to: [f32; 2]) -> Vec<[i32; 2]> {
         // In cells, from the corner of the grid.
-        let [from, to] = [from, to].map(|place| GRID.origin + Vec2::from_array(place) * GRID.size);
+        let [from, to] = [from, to].map(|position| GRID.origin + Vec2::from_array(position) * GRID.size);
         cells_between(GRID, from, to, reach(0.5)).collect()
     }
 

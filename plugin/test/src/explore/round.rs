@@ -3,8 +3,8 @@
 use crate::explore::{
     EndCounts, Exploration, ExploreError, ExplorePlan, Stop, Until,
     archive::{Archive, Destination, Draws, Job, Visit, Visited},
-    cell::{Cell, CellGrid, Lookout, tile_size},
-    ways::Route,
+    cell::{CellGrid, ExploredCell, Lookout, tile_size},
+    known_paths::Route,
 };
 use bevy::{
     math::{Rect, Vec2},
@@ -12,11 +12,8 @@ use bevy::{
 };
 use bevy_playbot::{agent::Control, headless::tick_world, panics::PanicReports, vision::VisionError};
 use playbot_harness::{
-    arrangement::Arrangement,
-    floor_plan::FloorPlan,
-    game::Game,
-    parallel::on_threads,
-    worlds::{EndedEpisodes, build_observing_world},
+    arrangement::Arrangement, ended_episodes::EndedEpisodes, floor_plan::FloorPlan, game::Game, parallel::on_threads,
+    worlds::build_observing_world,
 };
 use playbot_learner::{Streams, rng::ChaCha8Rng};
 use std::{
@@ -85,12 +82,12 @@ pub fn explore(
         if after_round(round).is_break() {
             break Stop::Asked;
         }
-        let open = open.as_ref().filter(|_| has_places(&crews));
+        let open = open.as_ref().filter(|_| has_positions(&crews));
         if let Some(stop) = stop_of(plan.until, &archive, open, floor_plan.is_some()) {
             break stop;
         }
     };
-    let grid = has_places(&crews).then_some(grid);
+    let grid = has_positions(&crews).then_some(grid);
     // They borrow the open cells, which are part of the result.
     drop(crews);
     Ok(Exploration {
@@ -111,8 +108,8 @@ pub fn explore(
 }
 
 /// Returns whether cells are squares of the grid, which is equal for all Worlds.
-fn has_places(crews: &[Crew<'_>]) -> bool {
-    crews.iter().any(|crew| crew.world.has_places())
+fn has_positions(crews: &[Crew<'_>]) -> bool {
+    crews.iter().any(|crew| crew.world.has_positions())
 }
 
 /// Builds the Worlds of agents. Games that are rebuilt for each episode have one agent in each, since others would have
@@ -137,7 +134,7 @@ fn choose_jobs(plan: &ExplorePlan, archive: &Archive, chance: &mut ChaCha8Rng, s
     let mut left = plan.steps.saturating_sub(steps);
     let mut jobs: Vec<Job> = Vec::new();
     for destination in archive.choose(plan.batch as usize, chance) {
-        let beyond = left.saturating_sub(u64::from(destination.way.ticks));
+        let beyond = left.saturating_sub(u64::from(destination.path.ticks));
         let patience = plan.explore_ticks.min(u32::try_from(beyond).unwrap_or(u32::MAX));
         if patience == 0 {
             continue;
@@ -145,7 +142,7 @@ fn choose_jobs(plan: &ExplorePlan, archive: &Archive, chance: &mut ChaCha8Rng, s
         left = beyond - u64::from(patience);
         jobs.push(Job {
             number: visits + jobs.len() as u64,
-            route: archive.route(destination.way),
+            route: archive.route(destination.path),
             destination,
             patience,
             most: patience.saturating_mul(LONGEST),
@@ -179,7 +176,7 @@ fn play_round(
 }
 
 /// Returns the reason to stop, if there is one.
-fn stop_of(until: Until, archive: &Archive, open: Option<&BTreeSet<Cell>>, has_goal: bool) -> Option<Stop> {
+fn stop_of(until: Until, archive: &Archive, open: Option<&BTreeSet<ExploredCell>>, has_goal: bool) -> Option<Stop> {
     let is_solved = archive.solution().is_some();
     let is_covered = || open.is_some_and(|open| open.iter().all(|cell| archive.cells().contains_key(cell)));
     match until {
@@ -188,8 +185,6 @@ fn stop_of(until: Until, archive: &Archive, open: Option<&BTreeSet<Cell>>, has_g
         Until::Spent => None,
     }
 }
-
-// Worlds in which agents make visits.
 
 /// Some arenas of an exploration.
 pub(super) struct ExploreWorld<'a> {
@@ -231,8 +226,8 @@ impl<'a> ExploreWorld<'a> {
     }
 
     /// Returns whether cells are squares of the grid.
-    pub fn has_places(&self) -> bool {
-        self.lookout.has_places()
+    pub fn has_positions(&self) -> bool {
+        self.lookout.has_positions()
     }
 
     /// Makes visits, several of them at a time. `progress` receives the ticks of each.
@@ -287,8 +282,6 @@ impl<'a> ExploreWorld<'a> {
     }
 }
 
-// The check that a level can have a requested cell.
-
 /// Cells beyond each side of a level that are accepted: agents can be there, for instance above it.
 const MARGIN: i64 = 8;
 
@@ -301,7 +294,7 @@ const SLACK: f32 = 1e-3;
 /// # Errors
 ///
 /// [`ExploreError::Plan`] with the valid values, or the plan does not fit the game, or the game breaks its contract.
-pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &Cell) -> Result<(), ExploreError> {
+pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &ExploredCell) -> Result<(), ExploreError> {
     plan.check(game)?;
     let floor_plan = game.tools().levels.floor_plan(&plan.mode, plan.level);
     let grid = CellGrid::new(floor_plan.as_ref(), plan.cell_size);
@@ -319,12 +312,12 @@ pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &Cell) -> Result<()
         )));
     }
     match floor_plan {
-        Some(floor_plan) if world.has_places() => check_bounds(&grid, floor_plan.bounds, cell),
+        Some(floor_plan) if world.has_positions() => check_bounds(&grid, floor_plan.bounds, cell),
         _ => Ok(()),
     }
 }
 
-fn check_bounds(grid: &CellGrid, bounds: Rect, cell: &Cell) -> Result<(), ExploreError> {
+fn check_bounds(grid: &CellGrid, bounds: Rect, cell: &ExploredCell) -> Result<(), ExploreError> {
     let last = (bounds.size() / grid.size - SLACK).ceil().to_array().map(|count| (count as i64 - 1).max(0));
     let is_near = |(number, last): (&i32, i64)| (-MARGIN..=last + MARGIN).contains(&i64::from(*number));
     if cell.0.iter().zip(last).all(is_near) {
@@ -337,8 +330,6 @@ fn check_bounds(grid: &CellGrid, bounds: Rect, cell: &Cell) -> Result<(), Explor
     )))
 }
 
-// The reachable cells of a level, by its floor plan.
-
 /// Most squares that are examined.
 const MOST: f32 = (1 << 20) as f32;
 
@@ -347,7 +338,7 @@ const MOST: f32 = (1 << 20) as f32;
 ///
 /// In a maze these are exactly the reachable cells. With gravity or enemies they are a bound: no other cell is
 /// reachable, and some of these may be out of reach.
-pub fn open_cells(plan: &FloorPlan, grid: &CellGrid) -> Option<BTreeSet<Cell>> {
+pub fn open_cells(plan: &FloorPlan, grid: &CellGrid) -> Option<BTreeSet<ExploredCell>> {
     let squares = Squares::new(plan, grid)?;
     let start = squares.index_at(plan.start).filter(|index| !squares.is_wall[*index])?;
     let mut reached = vec![false; squares.is_wall.len()];
@@ -406,8 +397,8 @@ impl Squares {
         Some(squares)
     }
 
-    fn index_at(&self, place: Vec2) -> Option<usize> {
-        let at = (place - self.origin) / self.side;
+    fn index_at(&self, position: Vec2) -> Option<usize> {
+        let at = (position - self.origin) / self.side;
         let (column, row) = (at.x as usize, at.y as usize);
         let is_inside = at.min_element() >= 0.0 && column < self.columns && row < self.rows;
         is_inside.then(|| row * self.columns + column)
@@ -419,15 +410,15 @@ impl Squares {
 }
 
 #[cfg(test)]
-mod check_cell_tests {
-    use bevy::math::Vec2;
-
+mod tests {
     use super::*;
+    use bevy::math::{Rect, Vec2};
 
     #[test]
     fn cells_far_outside_are_refused_with_those_that_there_are() {
         let grid = CellGrid { origin: Vec2::ZERO, size: 0.5 };
-        let check = |numbers: [i32; 2]| check_bounds(&grid, Rect::new(0.0, 0.0, 5.0, 2.0), &Cell(numbers.to_vec()));
+        let check =
+            |numbers: [i32; 2]| check_bounds(&grid, Rect::new(0.0, 0.0, 5.0, 2.0), &ExploredCell(numbers.to_vec()));
         for near in [[0, 0], [9, 3], [9, 5], [-1, 0]] {
             assert!(check(near).is_ok(), "{near:?}");
         }
@@ -436,13 +427,6 @@ mod check_cell_tests {
             assert!(error.contains("outside of the level: its cells go from 0,0 to 9,3"), "{error}");
         }
     }
-}
-
-#[cfg(test)]
-mod open_cells_tests {
-    use bevy::math::Rect;
-
-    use super::*;
 
     /// A room of five cells, and a closed one.
     const ROWS: [&str; 5] = ["#######", "#..#..#", "#.##..#", "#..####", "#######"];
@@ -454,7 +438,7 @@ mod open_cells_tests {
         FloorPlan::of_tiles([5, 7], is_wall, square, [Vec2::ONE, Vec2::new(2.0, 3.0)])
     }
 
-    fn open(size: Option<f32>) -> BTreeSet<Cell> {
+    fn open(size: Option<f32>) -> BTreeSet<ExploredCell> {
         let plan = plan();
         open_cells(&plan, &CellGrid::new(Some(&plan), size)).expect("a small plan")
     }
@@ -462,7 +446,7 @@ mod open_cells_tests {
     #[test]
     fn cells_behind_walls_are_not_open() {
         let expected = [[1, 1], [1, 2], [1, 3], [2, 1], [2, 3]];
-        assert_eq!(open(None), expected.map(|cell| Cell(cell.to_vec())).into_iter().collect());
+        assert_eq!(open(None), expected.map(|cell| ExploredCell(cell.to_vec())).into_iter().collect());
     }
 
     #[test]

@@ -48,8 +48,6 @@ impl Check {
     }
 }
 
-// The checks of all detectors, by name.
-
 /// Checks by the names of their detectors.
 #[derive(Clone)]
 pub struct Checks {
@@ -155,7 +153,7 @@ impl Checks {
     /// Returns the checks of general findings, and of all detectors of this game with their default settings.
     pub fn of_game(game: &dyn Game) -> Self {
         let choice = DetectorChoice { with: vec!["all".to_owned()], ..DetectorChoice::default() };
-        let all = Detectors::choose(game, &choice).unwrap_or_else(|_| Detectors::usual(game));
+        let all = Detectors::choose(game, &choice).unwrap_or_else(|_| Detectors::defaults(game));
         Self::default().with_detectors(&all)
     }
 
@@ -216,7 +214,7 @@ impl Looking {
             observation: world.get::<Observation>(agent).map_or(&[][..], |seen| seen.vector.as_slice()),
             state_hash: world.get::<StateHash>(agent).map_or(0, |hash| hash.0),
             reward: world.get::<Reward>(agent).map_or(0.0, Reward::get),
-            place: game.tools().state.position(world, agent),
+            position: game.tools().state.position(world, agent),
             is_success: end.map_or_else(|| episode.is_success(), |end| end.success),
             proofs: &proofs,
         };
@@ -229,11 +227,10 @@ impl Looking {
 }
 
 #[cfg(test)]
-mod checks_tests {
-    use bevy_playbot::episode::EpisodeResult;
-
+mod tests {
     use super::*;
     use crate::findings::{Breakage, testing::head};
+    use bevy_playbot::episode::EpisodeResult;
 
     fn ended(end: EpisodeEnd) -> Replayed {
         let success = end.is_success();
@@ -264,30 +261,24 @@ mod checks_tests {
         assert!(matches!(checks.of("lost"), Some(Check::Level(_))), "it takes the place of the old one");
         assert_eq!(checks.names().count(), Checks::default().names().count() + 1);
     }
-}
 
-#[cfg(test)]
-mod failure_tests {
-    use super::*;
-    use crate::findings::Breakage;
-
-    fn ended(end: EpisodeEnd) -> EpisodeResult {
+    fn result_of(end: EpisodeEnd) -> EpisodeResult {
         EpisodeResult { level: 3, end, success: end.is_success(), ticks: 47, clipped: 0, total_reward: 0.0 }
     }
 
     #[test]
     fn each_failure_has_its_name_and_the_ticks_of_this_episode() {
-        let (name, words) = failure_of(&ended(EpisodeEnd::Terminated { success: false })).expect("it failed");
+        let (name, words) = failure_of(&result_of(EpisodeEnd::Terminated { success: false })).expect("it failed");
         assert_eq!((name, words.as_str()), (LOST, "the game ended the episode after 47 ticks"));
-        assert!(!words.contains(name), "told behind its name, it is not told twice");
-        let (name, words) = failure_of(&ended(EpisodeEnd::Truncated)).expect("it failed");
+        assert!(!words.contains(name), "its name is not repeated in its message");
+        let (name, words) = failure_of(&result_of(EpisodeEnd::Truncated)).expect("it failed");
         assert_eq!((name, words.as_str()), (NOT_SOLVED, "time was up after 47 ticks"));
-        assert_eq!(failure_of(&ended(EpisodeEnd::Terminated { success: true })), None);
+        assert_eq!(failure_of(&result_of(EpisodeEnd::Terminated { success: true })), None);
     }
 
     #[test]
     fn only_what_was_looked_for_has_words() {
-        let end = Some(ended(EpisodeEnd::Truncated));
+        let end = Some(result_of(EpisodeEnd::Truncated));
         let replayed = Replayed { end, ..Replayed::default() };
         assert_eq!(message_of(NOT_SOLVED, &replayed).as_deref(), Some("time was up after 47 ticks"));
         assert_eq!(message_of(LOST, &replayed), None);

@@ -55,8 +55,6 @@ pub fn keeps_course(game: &dyn Game, (mode, level): (&str, u64), seed: u64, bot:
     }
 }
 
-// Findings on level files that are replayed from another folder than that of the test.
-
 impl StoredFinding {
     /// Returns the finding of this file with the right path of its level file. Level files are named relative to the
     /// folder of the test. A level file that is not in the current folder is searched for in each folder above the
@@ -98,7 +96,7 @@ impl StoredFinding {
     }
 }
 
-// The replay of actions in search of a finding.
+// Replay of actions in search of a finding.
 
 /// The result of a replay.
 pub(super) struct Look {
@@ -161,10 +159,12 @@ fn in_episode(setting: Setting, actions: &[ActionValue], tick: impl Fn(&Replayed
 
 #[cfg(test)]
 mod tests {
-    use bevy_playbot::{action::ActionValue, bot::BlindBot};
-
     use super::*;
-    use playbot_corridor::{Corridor, Rule};
+    use crate::findings::{Checks, FindingHead, keep::recheck};
+    use bevy_playbot::{action::ActionValue, bot::BlindBot, demo::file::DemoEpisode, level::LevelFile};
+    use playbot_corridor::{Corridor, Rule, to_the_goal};
+    use playbot_harness::level_files::LevelDesign;
+    use std::fs;
 
     #[test]
     fn the_same_game_keeps_its_course_and_a_broken_one_does_not() {
@@ -182,18 +182,6 @@ mod tests {
         let broken = course_of(&burning, level, 0, &Player::Demonstrator);
         assert!(broken.broken.is_some() && keeps_course(&burning, level, 0, &Player::Demonstrator, &broken));
     }
-}
-
-#[cfg(test)]
-mod seen_from_tests {
-    use std::fs;
-
-    use bevy_playbot::{demo::file::DemoEpisode, level::LevelFile};
-
-    use super::*;
-    use crate::findings::{Checks, FindingHead, keep::recheck};
-    use playbot_corridor::{Corridor, to_the_goal};
-    use playbot_harness::level_files::LevelDesign;
 
     /// A path without a file, relative to the folder of this test.
     const LEVEL: &str = "lv-of-another-folder/a.json";

@@ -87,8 +87,6 @@ fn files_in(folder: &Path) -> io::Result<Vec<(String, PathBuf)>> {
     Ok(found)
 }
 
-// Names of files of findings.
-
 /// Ending of the files.
 pub(super) const ENDING: &str = "finding";
 
@@ -213,9 +211,9 @@ impl fmt::Display for Date {
 
 #[cfg(test)]
 mod tests {
-    use playbot_learner::HasExitCode as _;
-
     use super::*;
+    use crate::findings::{FindingHead, StoredFinding, testing::stored};
+    use playbot_learner::HasExitCode as _;
 
     #[test]
     fn findings_are_listed_gathered_and_removed() {
@@ -241,11 +239,6 @@ mod tests {
         }
         assert!(list_findings(&one).expect_err("none").to_string().contains("nothing to play again"));
     }
-}
-
-#[cfg(test)]
-mod file_name_tests {
-    use crate::findings::{FindingHead, StoredFinding, testing::stored};
 
     fn name(head: FindingHead) -> String {
         StoredFinding { head, ..stored() }.file_name()
@@ -266,11 +259,6 @@ mod file_name_tests {
         let long = name(FindingHead { level: "levels/deep/ö/".repeat(40), ..head });
         assert!(long.len() < 110 && long.starts_with("levels-deep--"), "{long}");
     }
-}
-
-#[cfg(test)]
-mod date_tests {
-    use super::*;
 
     #[test]
     fn days_are_counted_as_the_calendar_has_them() {

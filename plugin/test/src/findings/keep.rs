@@ -159,7 +159,7 @@ fn alone(game: &dyn Game, level: SeenLevel) -> (String, u64) {
     (level.mode.to_owned(), level.level)
 }
 
-// The recheck of a finding.
+// Rechecks of findings.
 
 /// The tick and state in which a finding was seen again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]

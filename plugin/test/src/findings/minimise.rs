@@ -7,8 +7,14 @@ use crate::findings::{
     play::{Setting, Unplayable, efforts, play_player},
 };
 use bevy_playbot::{action::ActionValue, vision::ObservationConfig};
-use playbot_harness::{eval::Player, game::Game, worlds::idle_action};
+use playbot_harness::{
+    eval::Player,
+    game::{Game, idle_action},
+};
 use std::cell::Cell;
+
+/// Most parts into which the actions are cut before ddmin: 31 replays.
+const LARGE_PARTS: usize = 16;
 
 /// The budget of a minimisation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,9 +90,6 @@ pub fn minimise(
     Ok(Minimised { finding: shorter, efforts, replays: trial.replays.get(), is_minimal: !has_enough() })
 }
 
-/// Most parts into which the actions are cut before ddmin: 31 replays.
-const LARGE_PARTS: usize = 16;
-
 /// Tries actions, and counts.
 struct Trial<'a> {
     setting: Setting<'a>,
@@ -160,13 +163,13 @@ impl Trial<'_> {
     }
 }
 
-// ddmin: the search for a part of a list with the same effect as the whole list (Zeller and Hildebrandt, Simplifying
-// and isolating failure-inducing input, IEEE Transactions on Software Engineering 28 (2), 2002).
-
 /// Leaves out parts of a list until no more can be left out, or the budget of `try_it` is used up.
 ///
 /// `try_it` receives a shorter list. It returns `Some` if the effect remains, with the number of items that were
 /// needed, counted from the first; else `None`. The order of its calls is reproducible.
+///
+/// This is ddmin (Zeller and Hildebrandt, Simplifying and isolating failure-inducing input, IEEE Transactions on
+/// Software Engineering 28 (2), 2002).
 pub(super) fn ddmin<T: Clone>(
     mut items: Vec<T>,
     has_enough: &dyn Fn() -> bool,
@@ -219,7 +222,7 @@ fn reduced<T: Clone>(
     None
 }
 
-// The lengths of findings, before and after minimisation.
+// Lengths of findings, before and after minimisation.
 
 /// Lengths of a finding, in actions with an effect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -269,6 +272,7 @@ mod tests {
     use super::*;
     use crate::findings::checks::LOST;
     use playbot_corridor::Corridor;
+    use std::cell::Cell;
 
     /// A finding of this detector on a level of the corridor, where action 0 is idling, and goes to the end that loses.
     fn stored(detector: &str, actions: &[u32]) -> StoredFinding {
@@ -313,13 +317,6 @@ mod tests {
         assert!(is_minimal && replays < 80, "{replays}");
         assert_eq!(finding.episode.len(), 30);
     }
-}
-
-#[cfg(test)]
-mod ddmin_tests {
-    use std::cell::Cell;
-
-    use super::*;
 
     const NEVER: &dyn Fn() -> bool = &|| false;
 

@@ -17,13 +17,23 @@ use bevy_playbot::{
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{
+    ended_episodes::EndedEpisodes,
     eval::Player,
-    game::{Game, read_level_designs},
+    game::{Game, idle_action, read_level_designs},
     level_files::{LevelFileError, is_level_files},
-    worlds::{EndedEpisodes, build_observing_world, idle_action},
+    worlds::build_observing_world,
 };
 use playbot_learner::HasExitCode;
 use thiserror::Error;
+
+/// Ticks after which an episode counts as endless, as in tests of levels.
+const MOST_TICKS: u32 = 1_000_000;
+
+/// Beginning of the message of a game's panic, after its position.
+const PANICKED: &str = "the game panicked: ";
+
+/// Beginning of the message of an agent whose pictures were all blank.
+const BLANK: &str = "each picture of an episode of ";
 
 /// The result of a replayed episode.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -127,77 +137,6 @@ pub(super) fn play_player(
         }
     }
 }
-
-// The check that a finding can be replayed at all.
-
-/// The reason why a finding cannot be replayed, in words.
-#[derive(Clone, Debug, Error, PartialEq, Eq)]
-#[error("{0}")]
-pub struct Unplayable(pub String);
-
-impl HasExitCode for Unplayable {}
-
-impl StoredFinding {
-    /// Checks that the game is the one that was tested, and that the level is still there.
-    ///
-    /// # Errors
-    ///
-    /// [`Unplayable`]: another game or version, other actions, a mode that the game no longer has, a level file that is
-    /// gone or was changed.
-    pub fn check_playable(&self, game: &dyn Game) -> Result<(), Unplayable> {
-        let StoredFinding { header, episode, .. } = self;
-        if header.game != game.name() {
-            return Err(Unplayable(format!("it was found in the game `{}`, not in `{}`", header.game, game.name())));
-        }
-        if header.game_version != game.version() {
-            return Err(Unplayable(format!(
-                "it was found in version {} of `{}`, but this is version {}: test the level again",
-                header.game_version,
-                header.game,
-                game.version()
-            )));
-        }
-        let actions = demo_actions(&game.actions());
-        if header.actions != actions {
-            return Err(Unplayable(format!(
-                "its actions are {}, but those of `{}` are {actions}",
-                header.actions, header.game
-            )));
-        }
-        if !is_level_files(&header.mode) {
-            return game.check_mode(&header.mode).map_err(|error| {
-                Unplayable(format!("the level no longer exists: {error}; test the levels again, or remove the finding"))
-            });
-        }
-        let designs = read_level_designs(game, &header.mode).map_err(|error| gone(&error))?;
-        match &episode.level_file {
-            Some(file) => {
-                let difference = designs.files().difference(episode.level_seed, file);
-                difference.map_or(Ok(()), |what| Err(Unplayable(format!("{what}, or remove the finding"))))
-            }
-            None => Err(Unplayable("it names no level file, though its levels are files".to_owned())),
-        }
-    }
-}
-
-/// Returns the error of a level file that cannot be read, without the general advice about patterns.
-fn gone(error: &LevelFileError) -> Unplayable {
-    Unplayable(match error {
-        // The file may exist relative to the folder of the test.
-        LevelFileError::NoFiles { pattern, folder } => format!(
-            "there is no level file {pattern}, neither seen from {folder} nor from a folder above the finding: do this from \
-             the folder where the test was run, or bring the recorded file back"
-        ),
-        error => {
-            format!("the level cannot be read any more: {error}; bring the recorded file back, or remove the finding")
-        }
-    })
-}
-
-// One agent that plays one episode, in a World of its own.
-
-/// Ticks after which an episode counts as endless, as in tests of levels.
-const MOST_TICKS: u32 = 1_000_000;
 
 /// The episode to play.
 #[derive(Clone, Copy)]
@@ -327,6 +266,92 @@ impl<'a> Solo<'a> {
     }
 }
 
+/// An episode after one of its ticks.
+#[derive(Clone, Copy)]
+pub struct CheckTick<'a> {
+    /// The game.
+    pub game: &'a dyn Game,
+    /// Its mode.
+    pub mode: &'a str,
+    /// Its World, with one agent.
+    pub world: &'a World,
+    /// The agent.
+    pub agent: Entity,
+    /// The tick that has just been played, from 0.
+    pub tick: u32,
+    /// The result of the episode, if it ended in this tick.
+    pub end: Option<EpisodeResult>,
+    /// Errors that were logged since the tick before, except by the engine.
+    pub errors: &'a [String],
+}
+
+/// A function that receives every tick of an episode in order, and returns the tick of the finding, once it was seen.
+pub type Watcher = Box<dyn FnMut(&CheckTick) -> Option<u32>>;
+
+/// The reason why a finding cannot be replayed, in words.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+#[error("{0}")]
+pub struct Unplayable(pub String);
+
+impl HasExitCode for Unplayable {}
+
+impl StoredFinding {
+    /// Checks that the game is the one that was tested, and that the level is still there.
+    ///
+    /// # Errors
+    ///
+    /// [`Unplayable`]: another game or version, other actions, a mode that the game no longer has, a level file that is
+    /// gone or was changed.
+    pub fn check_playable(&self, game: &dyn Game) -> Result<(), Unplayable> {
+        let StoredFinding { header, episode, .. } = self;
+        if header.game != game.name() {
+            return Err(Unplayable(format!("it was found in the game `{}`, not in `{}`", header.game, game.name())));
+        }
+        if header.game_version != game.version() {
+            return Err(Unplayable(format!(
+                "it was found in version {} of `{}`, but this is version {}: test the level again",
+                header.game_version,
+                header.game,
+                game.version()
+            )));
+        }
+        let actions = demo_actions(&game.actions());
+        if header.actions != actions {
+            return Err(Unplayable(format!(
+                "its actions are {}, but those of `{}` are {actions}",
+                header.actions, header.game
+            )));
+        }
+        if !is_level_files(&header.mode) {
+            return game.check_mode(&header.mode).map_err(|error| {
+                Unplayable(format!("the level no longer exists: {error}; test the levels again, or remove the finding"))
+            });
+        }
+        let designs = read_level_designs(game, &header.mode).map_err(|error| gone(&error))?;
+        match &episode.level_file {
+            Some(file) => {
+                let difference = designs.files().difference(episode.level_seed, file);
+                difference.map_or(Ok(()), |what| Err(Unplayable(format!("{what}, or remove the finding"))))
+            }
+            None => Err(Unplayable("it names no level file, though its levels are files".to_owned())),
+        }
+    }
+}
+
+/// Returns the error of a level file that cannot be read, without the general advice about patterns.
+fn gone(error: &LevelFileError) -> Unplayable {
+    Unplayable(match error {
+        // The file may exist relative to the folder of the test.
+        LevelFileError::NoFiles { pattern, folder } => format!(
+            "there is no level file {pattern}, neither seen from {folder} nor from a folder above the finding: do this from \
+             the folder where the test was run, or bring the recorded file back"
+        ),
+        error => {
+            format!("the level cannot be read any more: {error}; bring the recorded file back, or remove the finding")
+        }
+    })
+}
+
 // Conversions between lists of actions and those of recordings.
 
 /// Returns the number of actions with an effect.
@@ -359,37 +384,7 @@ pub(super) fn recorded(actions: &[ActionValue], space: &ActionSpace) -> EpisodeA
     }
 }
 
-// The data of a tick that checks examine.
-
-/// An episode after one of its ticks.
-#[derive(Clone, Copy)]
-pub struct CheckTick<'a> {
-    /// The game.
-    pub game: &'a dyn Game,
-    /// Its mode.
-    pub mode: &'a str,
-    /// Its World, with one agent.
-    pub world: &'a World,
-    /// The agent.
-    pub agent: Entity,
-    /// The tick that has just been played, from 0.
-    pub tick: u32,
-    /// The result of the episode, if it ended in this tick.
-    pub end: Option<EpisodeResult>,
-    /// Errors that were logged since the tick before, except by the engine.
-    pub errors: &'a [String],
-}
-
-/// A function that receives every tick of an episode in order, and returns the tick of the finding, once it was seen.
-pub type Watcher = Box<dyn FnMut(&CheckTick) -> Option<u32>>;
-
 // Panics and faults of a game during an episode.
-
-/// Beginning of the message of a game's panic, after its position.
-const PANICKED: &str = "the game panicked: ";
-
-/// Beginning of the message of an agent whose pictures were all blank.
-const BLANK: &str = "each picture of an episode of ";
 
 /// A failure of the game: it panicked, broke its contract, or the episode never ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -449,14 +444,14 @@ pub(super) fn say_the_same(one: &str, other: &str) -> bool {
 }
 
 #[cfg(test)]
-mod playable_tests {
-    use bevy::prelude::KeyCode;
-
+mod tests {
+    use super::*;
     use crate::findings::testing::stored;
+    use bevy::prelude::KeyCode;
     use playbot_harness::foreign::ForeignGame;
 
     #[test]
-    fn a_level_file_that_is_gone_is_told_without_patterns() {
+    fn a_level_file_that_is_gone_is_reported_without_patterns() {
         let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {}).keys([vec![], vec![KeyCode::Space]]);
         let mut finding = stored();
         finding.header.mode = "files:none/gone.json".to_owned();
@@ -476,11 +471,6 @@ mod playable_tests {
         assert!(said("garden", 2).starts_with("it was found in version 1 of `garden`, but this is version 2"));
         assert!(said("garden", 1).starts_with("its actions are discrete (2 actions), but"));
     }
-}
-
-#[cfg(test)]
-mod actions_tests {
-    use super::*;
 
     #[test]
     fn actions_go_into_recordings_and_come_back() {
@@ -493,14 +483,9 @@ mod actions_tests {
         assert!(listed(&recorded(&[], &space)).is_empty());
         assert_eq!(efforts(&actions, &actions[1]), 1);
     }
-}
-
-#[cfg(test)]
-mod breakage_tests {
-    use super::*;
 
     #[test]
-    fn a_panic_is_told_from_a_fault_and_both_without_their_place() {
+    fn a_panic_is_distinguished_from_a_fault_and_both_without_their_place() {
         let of = |words: &str| Breakage::of_fault(&Fault(words.to_owned()), 7);
         let panic = of("agent 0, level 3, tick 7: the game panicked: it burns (src/fire.rs:3:9)");
         assert_eq!((panic.detector, panic.message.as_str()), ("panic", "it burns (src/fire.rs:3:9)"));

@@ -172,7 +172,7 @@ fn elsewhere(seen: Sighting, finding: &StoredFinding) -> String {
     }
 }
 
-// Pins: known findings that are accepted for a while.
+// Pins of known findings.
 
 /// Name of the file with pins, beside the findings.
 pub const PINS: &str = "pins.ron";
@@ -248,7 +248,7 @@ fn name(pin: &Pin) -> &str {
 }
 
 #[cfg(test)]
-mod pins_tests {
+mod tests {
     use playbot_learner::HasExitCode as _;
 
     use super::*;
@@ -278,7 +278,7 @@ mod pins_tests {
     }
 
     #[test]
-    fn what_is_no_pin_is_told_with_its_line() {
+    fn what_is_no_pin_is_reported_with_its_line() {
         for (text, parts) in [
             ("[\n(finding: \"a\", reason: \"b\", until: \"soon\")]", ["line 2", "`soon` is not a date"]),
             ("[(finding: \"a\", until: \"2027-01-31\")]", ["line 1", "reason"]),

@@ -66,8 +66,6 @@ pub fn scan(
     Scan { seen, end: replayed.end }
 }
 
-// The settings of detectors with which findings were made.
-
 impl Checks {
     /// Replaces the settings of detectors.
     pub(super) fn with_records(mut self, records: &[String], asked: &[String]) -> Self {
@@ -80,11 +78,11 @@ impl Checks {
     /// Returns the settings of a detector that differ from the default, as `name.key=value`.
     pub(super) fn settings_of(&self, game: &dyn Game, detector: &str) -> Vec<String> {
         let Some(record) = self.records.iter().find(|record| name_of(record) == detector) else { return Vec::new() };
-        let usual = list(game).into_iter().find(|known| known.name == detector);
-        let usual: Vec<String> = usual.map_or_else(Vec::new, |known| {
+        let default = list(game).into_iter().find(|known| known.name == detector);
+        let default: Vec<String> = default.map_or_else(Vec::new, |known| {
             known.settings.iter().map(|(key, value, _)| format!("{key}={value}")).collect()
         });
-        let values = record.split(' ').skip(1).filter(|value| !usual.iter().any(|known| known == value));
+        let values = record.split(' ').skip(1).filter(|value| !default.iter().any(|known| known == value));
         values.map(|value| format!("{detector}.{value}")).collect()
     }
 
@@ -119,7 +117,11 @@ fn name_of(record: &str) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::detectors::DetectorChoice;
+    use crate::{
+        detectors::DetectorChoice,
+        findings::{FindingStatus, StoredFinding, keep::recheck},
+    };
+    use bevy_playbot::action::ActionValue;
     use playbot_corridor::{Corridor, Rule, to_the_goal};
 
     fn scanned(game: &Corridor, actions: &[ActionValue]) -> Scan {
@@ -138,15 +140,6 @@ mod tests {
         let loud = scanned(&Corridor { rule: Rule::Logs }, &to_the_goal());
         assert_eq!(loud.seen.iter().map(|seen| seen.detector).collect::<Vec<_>>(), ["error-log"]);
     }
-}
-
-#[cfg(test)]
-mod settings_tests {
-    use bevy_playbot::action::ActionValue;
-
-    use super::*;
-    use crate::findings::{FindingStatus, StoredFinding, keep::recheck};
-    use playbot_corridor::{Corridor, Rule};
 
     fn set(settings: &[&str]) -> Checks {
         let settings = settings.iter().map(|text| (*text).to_owned()).collect();
@@ -162,7 +155,7 @@ mod settings_tests {
         for checks in [set(&["stuck.ticks=20"]), Checks::of_game(&game), Checks::default()] {
             assert!(checks.settings_of(&game, "frozen-world").is_empty());
         }
-        let reset = set(&["stuck.ticks=20"]).with_detectors(&Detectors::usual(&game));
+        let reset = set(&["stuck.ticks=20"]).with_detectors(&Detectors::defaults(&game));
         assert!(reset.settings_of(&game, "stuck").is_empty());
     }
 
@@ -173,20 +166,21 @@ mod settings_tests {
         let actions: Vec<ActionValue> = [1, 2].repeat(10).into_iter().map(ActionValue::Discrete).collect();
         let strict = set(&["frozen-world.ticks=8"]);
         let head = FindingHead::new("plain:3", "frozen-world", "nothing has changed");
-        let usual = Checks::of_game(&game);
+        let default = Checks::of_game(&game);
         let found = |head: &FindingHead, checks: &Checks| {
             StoredFinding::of_actions(&game, "plain", 3, head.clone(), &actions, checks)
         };
-        assert_eq!(found(&head, &usual), None, "the usual setting is larger than the episode");
+        assert_eq!(found(&head, &default), None, "the default setting is larger than the episode");
         let head = FindingHead { settings: strict.settings_of(&game, "frozen-world"), ..head };
         assert_eq!(head.settings, ["frozen-world.ticks=8"]);
         let stored = found(&head, &strict).expect("nothing changes");
         let status = |checks: &Checks| recheck(&game, &stored, checks).expect("playable").status(&stored);
-        assert_eq!(status(&usual), FindingStatus::StillThere);
+        assert_eq!(status(&default), FindingStatus::StillThere);
         assert_eq!(status(&set(&["frozen-world.ticks=100"])), FindingStatus::Gone, "somebody says otherwise");
-        let as_usual = usual.records.iter().find_map(|record| record.strip_prefix("frozen-world ")).expect("it looks");
-        let as_usual = format!("frozen-world.{as_usual}");
-        assert_eq!(status(&set(&[&as_usual])), FindingStatus::Gone, "also by saying what is usual");
+        let as_default =
+            default.records.iter().find_map(|record| record.strip_prefix("frozen-world ")).expect("it looks");
+        let as_default = format!("frozen-world.{as_default}");
+        assert_eq!(status(&set(&[&as_default])), FindingStatus::Gone, "also by saying the default");
         let unknown = FindingHead { settings: vec!["frozen-world.colour=4".to_owned()], ..head };
         assert!(found(&unknown, &strict).is_some(), "a setting that is no more is left aside");
     }

@@ -59,7 +59,7 @@ fn a_file_that_is_cut_anywhere_is_refused() {
 }
 
 #[test]
-fn files_of_others_are_told_what_they_are() {
+fn files_of_others_are_reported_as_what_they_are() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("a.finding");
     let missing = StoredFinding::read(&path).expect_err("not there");

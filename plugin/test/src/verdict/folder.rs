@@ -142,7 +142,7 @@ fn check_same(folder: &Path, file: &Path, record: &TestRecord) -> Result<(), Tes
     if differences.is_empty() { Ok(()) } else { Err(TestError::OtherPlan { folder: folder.into(), differences }) }
 }
 
-// The journal `levels.jsonl`: finished levels as they come in, each with a checksum.
+// Journal of finished levels.
 
 /// A file with a line of JSON for each finished level, in the order of finishing. It is locked while open.
 pub(super) struct Journal {
@@ -268,10 +268,10 @@ fn whole_lines(file: &mut DiskFile) -> io::Result<(BTreeMap<u64, (u64, usize)>, 
 
 #[cfg(test)]
 mod tests {
-    use playbot_learner::HasExitCode as _;
-
     use super::*;
     use crate::verdict::{MapScope, TesterRecord, results::ResultLines, testing::verdict};
+    use playbot_learner::HasExitCode as _;
+    use std::fs;
 
     fn record() -> TestRecord {
         TestRecord {
@@ -325,14 +325,6 @@ mod tests {
         let (folder, _) = open(&other, Earlier::Replace).expect("it may go");
         assert!(folder.finished().is_empty() && !path.join(RESULTS).exists());
     }
-}
-
-#[cfg(test)]
-mod journal_tests {
-    use std::fs;
-
-    use super::*;
-    use crate::verdict::testing::verdict;
 
     fn lines(journal: &mut Journal) -> Vec<String> {
         let mut lines = Vec::new();

@@ -11,6 +11,12 @@ use playbot_harness::{
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeSet, fmt};
 
+/// Largest number of names that are reported.
+const MOST_NAMES: usize = 5;
+
+/// Largest number of levels of a range that all have maps: as many as the page shows.
+const MOST_LEVELS: u64 = 2_000;
+
 /// Ticks by squares of a level, of all episodes of all testers.
 ///
 /// A square is a tile of the level, or several of them in levels of more than 64. Squares are counted row by row from
@@ -40,7 +46,7 @@ pub struct LevelMaps {
     pub skill_at: Vec<[u64; 2]>,
     /// The path of an episode that failed, or that has a finding.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub failure: Option<FailureWay>,
+    pub failure: Option<FailurePath>,
 }
 
 /// Ticks of a skill.
@@ -55,19 +61,59 @@ pub struct SkillTicks {
 
 /// The path of one episode.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct FailureWay {
+pub struct FailurePath {
     /// The tester.
     pub tester: String,
     /// Episode of that tester on the level, from 0.
     pub episode: u32,
     /// Squares in order, with the ticks spent in each; of a long path the last 200.
-    pub way: Vec<[u64; 2]>,
+    #[serde(rename = "way")]
+    pub path: Vec<[u64; 2]>,
 }
 
-// Pars of the levels of a test.
+/// The levels whose results have maps of where agents went. The size of the whole range decides, so its shards agree.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum MapScope {
+    /// No level, as in results that are older than maps.
+    #[default]
+    None,
+    /// Levels that were not solved each time, or that have a finding.
+    Failed,
+    /// All levels.
+    All,
+}
 
-/// Largest number of names that are reported.
-const MOST_NAMES: usize = 5;
+impl MapScope {
+    /// Returns the scope for a range of so many levels.
+    pub fn of(levels: u64) -> Self {
+        if levels <= MOST_LEVELS { Self::All } else { Self::Failed }
+    }
+
+    /// Returns the name in files and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Failed => "failed",
+            Self::All => "all",
+        }
+    }
+
+    /// Returns whether a level has maps.
+    pub(super) fn wants(self, is_perfect: bool) -> bool {
+        match self {
+            Self::None => false,
+            Self::Failed => !is_perfect,
+            Self::All => true,
+        }
+    }
+
+    /// Returns whether no level has maps; files leave the key out then, as older versions do.
+    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde requires this signature")]
+    pub(super) fn is_none(&self) -> bool {
+        *self == Self::None
+    }
+}
 
 /// Number of these levels with a par, and the pars without a level.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -95,12 +141,12 @@ impl LevelPars {
         };
         let is_one = |name: &str| known.contains(name) || by_number(name).is_some_and(|own| own == name);
         let (own, others): (Vec<&str>, Vec<&str>) = pars.levels().partition(|name: &&str| is_one(name));
-        let told = |(index, name): (usize, &str)| {
+        let reported = |(index, name): (usize, &str)| {
             let near = || by_number(name).or_else(|| nearest(name, &paths).map(str::to_owned));
             let near = (index < MOST_NAMES).then(near).flatten();
             near.map_or_else(|| name.to_owned(), |near| format!("{name} (did you mean {near}?)"))
         };
-        let others = others.into_iter().enumerate().map(told).collect();
+        let others = others.into_iter().enumerate().map(reported).collect();
         Self { with: own.len() as u64, levels: split.len(), others }
     }
 }
@@ -150,58 +196,10 @@ pub(super) fn drawn(game: &dyn Game, split: &LevelSplit) -> Option<LevelDesigns>
     is_drawn.then(|| level_designs(game, &split.mode).ok()).flatten()
 }
 
-// Scope of the maps in results.
-
-/// Largest number of levels of a range that all have maps: as many as the page shows.
-const MOST_LEVELS: u64 = 2_000;
-
-/// The levels whose results have maps of where agents went. The size of the whole range decides, so its shards agree.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum MapScope {
-    /// No level, as in results that are older than maps.
-    #[default]
-    None,
-    /// Levels that were not solved each time, or that have a finding.
-    Failed,
-    /// All levels.
-    All,
-}
-
-impl MapScope {
-    /// Returns the scope for a range of so many levels.
-    pub fn of(levels: u64) -> Self {
-        if levels <= MOST_LEVELS { Self::All } else { Self::Failed }
-    }
-
-    /// Returns the name in files and in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::None => "none",
-            Self::Failed => "failed",
-            Self::All => "all",
-        }
-    }
-
-    /// Returns whether a level has maps.
-    pub(super) fn wants(self, is_perfect: bool) -> bool {
-        match self {
-            Self::None => false,
-            Self::Failed => !is_perfect,
-            Self::All => true,
-        }
-    }
-
-    /// Returns whether no level has maps; files leave the key out then, as older versions do.
-    #[allow(clippy::trivially_copy_pass_by_ref, reason = "serde requires this signature")]
-    pub(super) fn is_none(&self) -> bool {
-        *self == Self::None
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use playbot_harness::foreign::ForeignGame;
 
     #[test]
     fn maps_read_back_as_they_are_written() {
@@ -218,18 +216,12 @@ mod tests {
         let text = serde_json::to_string(&maps).expect("serialises");
         let expected = r#"{"x":-0.5,"y":0.1,"side":1.0,"columns":64,"rows":13,"visits":[[3,70],[4,1]],"lost":[[3,9]]}"#;
         assert_eq!(text, expected);
-        let failure = Some(FailureWay { tester: "random".to_owned(), episode: 1, way: vec![[3, 70], [4, 1]] });
+        let failure = Some(FailurePath { tester: "random".to_owned(), episode: 1, path: vec![[3, 70], [4, 1]] });
         let skills = vec![SkillTicks { skill: "z1+".to_owned(), ticks: 71 }];
         let full = LevelMaps { skills, skill_at: vec![[3, 0], [4, 0]], failure, ..maps };
         let text = serde_json::to_string(&full).expect("serialises");
         assert_eq!(serde_json::from_str::<LevelMaps>(&text).expect("whole"), full);
     }
-}
-
-#[cfg(test)]
-mod level_pars_tests {
-    use super::*;
-    use playbot_harness::foreign::ForeignGame;
 
     fn found(text: &str) -> LevelPars {
         let folder = tempfile::tempdir().expect("a folder");
@@ -241,7 +233,7 @@ mod level_pars_tests {
     }
 
     #[test]
-    fn pars_of_other_levels_are_told_with_what_may_be_meant() {
+    fn pars_of_other_levels_are_reported_with_what_may_be_meant() {
         let all = found(r#"{"hard:1": 9, "hard:3": 9}"#);
         assert_eq!(all.to_string(), "pars for 2 of 5 levels");
         let some = found(r#"{"hard:1": 9, "hard:3": 9, "hard:99": 9, "hrad:3": 9, "hard:04": 9}"#);
@@ -258,12 +250,6 @@ mod level_pars_tests {
         assert_eq!((none.with, none.others.len()), (0, 6));
         assert!(none.to_string().ends_with("no level of this test: a, b, c, d, e and 1 more"), "{none}");
     }
-}
-
-#[cfg(test)]
-mod level_name_tests {
-    use super::*;
-    use playbot_harness::foreign::ForeignGame;
 
     #[test]
     fn a_name_is_a_range_of_one_level() {
@@ -282,11 +268,6 @@ mod level_name_tests {
         assert_eq!(level_argument(&split, "levels/a.json"), "files:levels/a.json");
         assert_eq!(level_argument(&split, "my levels/a.json"), "'files:my levels/a.json'");
     }
-}
-
-#[cfg(test)]
-mod map_scope_tests {
-    use super::*;
 
     #[test]
     fn of_many_levels_only_those_that_failed_have_maps() {

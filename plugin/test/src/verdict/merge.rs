@@ -3,9 +3,10 @@
 use crate::{
     findings::gather_findings,
     verdict::{
-        error::{Shard, TestError, io_error},
+        error::{TestError, io_error},
         plan::TestRecord,
         results::{RESULTS, ResultLines, ResultWriter},
+        shard::Shard,
     },
 };
 use playbot_learner::{disk, write_atomically_with};

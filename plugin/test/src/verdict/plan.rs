@@ -3,18 +3,25 @@
 use crate::{
     detectors::Detectors,
     verdict::{
-        error::{Shard, TestError},
+        error::TestError,
         maps::{MapScope, hash_of_files},
+        played::{Played, Task},
+        shard::Shard,
     },
 };
 use bevy_playbot::{state_hash::StateHash, vision::ObservationConfig};
 use playbot_harness::{
+    arrangement::Arrangement,
     eval::{EvalError, Player},
     game::Game,
+    machine::{MemoryError, check_bytes},
     split::LevelSplit,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+
+/// Bytes of a listed level, and of its entry in the journal.
+const LEVEL: usize = size_of::<u64>() + size_of::<(u64, (u64, usize))>();
 
 /// Plan of a test.
 #[derive(Clone)]
@@ -92,6 +99,33 @@ impl TestPlan {
         }
     }
 
+    /// Checks that the list of levels and the episodes on one of them fit into the free memory.
+    ///
+    /// # Errors
+    ///
+    /// [`MemoryError`].
+    pub fn check_memory(&self) -> Result<(), MemoryError> {
+        let worlds = Arrangement { worlds: 1, arenas: 1 };
+        self.kept().into_iter().try_for_each(|(what, bytes, options)| check_bytes(what, bytes, options, worlds))
+    }
+
+    fn kept(&self) -> [Kept; 2] {
+        let levels = self.shard.map_or(self.split.len(), |shard| shard.places(self.split.len()).count() as u64);
+        let (testers, episodes) = (self.testers.len() as u64, u64::from(self.episodes.max(1)));
+        let of_levels = levels.saturating_mul(LEVEL as u64);
+        // A level is judged when all testers have played all of their episodes on it.
+        let one_tester = episodes.saturating_mul(size_of::<Task>() as u64);
+        let all_testers = episodes.saturating_mul(testers).saturating_mul(size_of::<Played>() as u64);
+        [
+            (format!("the places of the results of {levels} levels"), of_levels, "`--levels`"),
+            (
+                format!("the results of testers × episodes = {testers} × {episodes} on a level"),
+                one_tester.saturating_add(all_testers),
+                "`--episodes`",
+            ),
+        ]
+    }
+
     /// Returns its description for files.
     pub fn record(&self, game: &dyn Game) -> TestRecord {
         TestRecord {
@@ -131,6 +165,9 @@ impl TestPlan {
     }
 }
 
+/// Data in memory: description, bytes, and the option to lower.
+type Kept = (String, u64, &'static str);
+
 impl TestRecord {
     /// Describes the differences between two tests, without their shards.
     pub fn differences(&self, other: &Self) -> Vec<String> {
@@ -169,7 +206,7 @@ impl TestRecord {
     }
 }
 
-// Testers: players with names and observations.
+// Testers.
 
 /// A player with a name and its observations.
 #[derive(Clone)]
@@ -240,42 +277,16 @@ impl TesterRecord {
     }
 }
 
-// Names for skills that are points of a continuous space.
-//
-// A skill is named after the nearest of several fixed directions: the positive and the negative half of each axis of
-// z. That is the number of z that is furthest from 0, and its sign. So a name is independent of levels and draws,
-// and is the same in every test of a policy.
-
-/// Largest number of axes with a name: further ones are left out.
-const MOST_NUMBERS: usize = 16;
-
-/// Returns the number of names for skills of this length; 0 without a skill.
-pub(super) fn skill_count(z: &[f32]) -> usize {
-    2 * z.len().min(MOST_NUMBERS)
-}
-
-/// Returns the number of a skill's name, below [`skill_count`]; of equally large numbers the first counts.
-pub(super) fn skill_number(z: &[f32]) -> Option<usize> {
-    let mut nearest: Option<(usize, f32)> = None;
-    for (number, value) in z.iter().take(MOST_NUMBERS).enumerate() {
-        if nearest.is_none_or(|(_, longest)| value.abs() > longest.abs()) {
-            nearest = Some((number, *value));
-        }
-    }
-    nearest.map(|(number, value)| 2 * number + usize::from(value < 0.0))
-}
-
-/// Returns the name: `z3+` for a skill whose third number is furthest from 0, and is positive.
-pub(super) fn skill_name(number: usize) -> String {
-    format!("z{}{}", number / 2 + 1, if number.is_multiple_of(2) { '+' } else { '-' })
-}
-
 #[cfg(test)]
 mod tests {
-    use bevy_playbot::{bot::BlindBot, vision::ObservationConfig};
-
     use super::*;
+    use crate::{
+        detectors::Detectors,
+        verdict::{TestError, Tester, TesterRecord},
+    };
+    use bevy_playbot::{bot::BlindBot, vision::ObservationConfig};
     use playbot_harness::eval::Player;
+    use playbot_learner::HasExitCode as _;
 
     fn plan(testers: &[&str], shard: Option<&str>) -> TestPlan {
         let tester = |name: &&str| Tester {
@@ -345,22 +356,17 @@ mod tests {
         let mapped = TestRecord { maps: MapScope::All, ..record.clone() };
         assert_eq!(record.differences(&mapped), ["levels with maps none and all"]);
     }
-}
-
-#[cfg(test)]
-mod tester_tests {
-    use super::*;
 
     #[test]
-    fn a_file_is_told_where_it_is_not_the_name() {
-        let told = |name: Option<&str>, path: &str| {
+    fn a_file_is_reported_where_it_is_not_the_name() {
+        let record = |name: Option<&str>, path: &str| {
             let record = TesterRecord::policy(name.map(str::to_owned), Path::new(path), "0f".to_owned());
             (record.name, record.file)
         };
         let wanted = |name: &str, file: Option<&str>| (name.to_owned(), file.map(str::to_owned));
-        assert_eq!(told(None, "a.policy"), wanted("a.policy", None));
-        assert_eq!(told(None, "new/a.policy"), wanted("a.policy", Some("new/a.policy")));
-        assert_eq!(told(Some("ppo"), "a.policy"), wanted("ppo", Some("a.policy")));
+        assert_eq!(record(None, "a.policy"), wanted("a.policy", None));
+        assert_eq!(record(None, "new/a.policy"), wanted("a.policy", Some("new/a.policy")));
+        assert_eq!(record(Some("ppo"), "a.policy"), wanted("ppo", Some("a.policy")));
     }
 
     #[test]
@@ -376,22 +382,41 @@ mod tester_tests {
         assert_eq!(text, r#"{"name":"ppo","checksum":"0f","file":"runs/new.policy"}"#);
         assert_eq!(serde_json::to_string(&here).expect("JSON"), r#"{"name":"ppo","checksum":"0f"}"#);
     }
-}
 
-#[cfg(test)]
-mod skill_name_tests {
-    use super::*;
+    fn sized_plan(levels: &str, testers: usize, episodes: u32) -> TestPlan {
+        let tester = |number: usize| Tester {
+            record: TesterRecord::bot(number.to_string()),
+            player: Player::Blind(BlindBot::Uniform),
+            observation_config: ObservationConfig::default(),
+        };
+        TestPlan {
+            split: levels.parse().expect("a split"),
+            testers: (0..testers).map(tester).collect(),
+            episodes,
+            seed: 0,
+            detectors: Detectors::default(),
+            shard: None,
+            threads: 1,
+        }
+    }
 
     #[test]
-    fn a_skill_is_called_by_its_number_furthest_from_zero() {
-        let name = |z: &[f32]| skill_number(z).map(skill_name);
-        assert_eq!(name(&[0.1, -0.2, 1.5]).as_deref(), Some("z3+"));
-        assert_eq!(name(&[0.1, -2.0, 1.5]).as_deref(), Some("z2-"));
-        assert_eq!(name(&[1.0, -1.0]).as_deref(), Some("z1+"));
-        assert_eq!(name(&[]), None);
-        let mut long = [0.5; 40];
-        long[30] = 9.0;
-        assert_eq!((name(&long).as_deref(), skill_count(&long)), (Some("z1+"), 32));
-        assert_eq!((skill_count(&[0.0; 3]), skill_count(&[])), (6, 0));
+    fn what_no_machine_has_room_for_is_refused_by_the_name_of_its_option() {
+        assert!(sized_plan("hard:0..9", 64, 100).check().is_ok());
+        let error = sized_plan("hard:0..9", 64, u32::MAX).check().expect_err("terabytes");
+        let words = error.to_string();
+        assert!(error.is_usage() && matches!(error, TestError::Eval(_)), "{words}");
+        assert!(words.starts_with("the results of testers × episodes = 64 × 4294967295 on a level need "), "{words}");
+        assert!(words.ends_with(": lower `--episodes`"), "{words}");
+    }
+
+    #[test]
+    fn levels_are_counted_without_those_of_other_shards() {
+        let whole = sized_plan("hard:0..16777215", 1, 1);
+        let [(what, bytes, option), _] = whole.kept();
+        assert_eq!((what.as_str(), option), ("the places of the results of 16777216 levels", "`--levels`"));
+        assert_eq!(bytes, (LEVEL as u64) << 24);
+        let part = TestPlan { shard: Some("1/4".parse().expect("a shard")), ..whole };
+        assert_eq!(part.kept()[0].1, (LEVEL as u64) << 22);
     }
 }

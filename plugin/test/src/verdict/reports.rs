@@ -19,8 +19,77 @@ use playbot_report::markdown_cell;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use std::{fmt::Display, path::Path};
 
+/// Name of the file with JUnit XML.
+pub const JUNIT: &str = "junit.xml";
+
+/// Name of the file with a short summary, in Markdown.
+pub const SUMMARY: &str = "summary.md";
+
+/// Name of the file with the comparison, in JSON.
+pub const AGAINST: &str = "against.json";
+
 /// Most changes of a kind that are listed.
 const MOST_CHANGES: usize = 20;
+
+/// Writes `junit.xml`, `summary.md` and, with a comparison, `against.json` beside the results in a folder.
+///
+/// `program` is the name of the program in the commands that they show. [`verdict_report`](crate::verdict_report)
+/// makes `report.html`, whose pictures need the game.
+///
+/// # Errors
+///
+/// The folder has no results, they are damaged, or the files cannot be written.
+pub fn write_reports(folder: &Path, comparison: Option<&Comparison>, program: &str) -> Result<Overview, TestError> {
+    let overview = Overview::read(folder)?;
+    write(&folder.join(JUNIT), &junit(folder, program)?)?;
+    write(&folder.join(SUMMARY), &summary(&overview, comparison, program))?;
+    if let Some(comparison) = comparison {
+        let path = folder.join(AGAINST);
+        let text = serde_json::to_string(comparison).map_err(|error| io_error("write", &path)(error.into()))?;
+        write(&path, &format!("{text}\n"))?;
+    }
+    Ok(overview)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), TestError> {
+    playbot_learner::write_atomically(path, text.as_bytes()).map_err(io_error("write", path))
+}
+
+/// Writes the findings of a level to files, and notes the files' names in it.
+pub(super) fn keep_findings(
+    game: &dyn Game,
+    plan: &TestPlan,
+    files: &FindingFiles,
+    verdict: &mut LevelVerdict,
+) -> Result<(), TestError> {
+    let LevelVerdict { level: name, index, outcome, testers, findings, .. } = verdict;
+    let level = SeenLevel { mode: &plan.split.mode, level: plan.split.first + *index, name };
+    let played = |tester: &str, episode: u32| {
+        let tester = plan.testers.iter().find(|known| known.record.name == tester)?;
+        Some(played_by(tester, plan.episode_seed(&tester.record, level.name, episode)))
+    };
+    for finding in findings {
+        let who = finding.tester.as_deref().zip(finding.episode);
+        let played = who.and_then(|(tester, episode)| played(tester, episode));
+        let Finding { detector, message, settings, .. } = finding;
+        let seen = SeenFinding { detector, message, settings, played };
+        finding.file = files.keep(game, level, &seen)?;
+    }
+    if files.keep_failures && *outcome == LevelOutcome::BotFailed {
+        let failed = testers.iter().find(|tester| tester.exact && tester.score.lost + tester.score.timed_out > 0);
+        if let Some(played) = failed.and_then(|tester| played(&tester.tester, 0)) {
+            files.keep_failure(game, level, played)?;
+        }
+    }
+    Ok(())
+}
+
+fn played_by(tester: &Tester, seed: u64) -> Played<'_> {
+    let Tester { record, player, observation_config } = tester;
+    Played { tester: &record.name, player, observation_config, seed }
+}
+
+// Summary in Markdown.
 
 /// Writes the page.
 pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, program: &str) -> String {
@@ -105,78 +174,7 @@ fn texts(changes: &[impl Display]) -> Vec<String> {
     changes.iter().map(ToString::to_string).collect()
 }
 
-// Reports of results for people and other programs.
-
-/// Name of the file with JUnit XML.
-pub const JUNIT: &str = "junit.xml";
-
-/// Name of the file with a short summary, in Markdown.
-pub const SUMMARY: &str = "summary.md";
-
-/// Name of the file with the comparison, in JSON.
-pub const AGAINST: &str = "against.json";
-
-/// Writes `junit.xml`, `summary.md` and, with a comparison, `against.json` beside the results in a folder.
-///
-/// `program` is the name of the program in the commands that they show. [`verdict_report`](crate::verdict_report)
-/// makes `report.html`, whose pictures need the game.
-///
-/// # Errors
-///
-/// The folder has no results, they are damaged, or the files cannot be written.
-pub fn write_reports(folder: &Path, comparison: Option<&Comparison>, program: &str) -> Result<Overview, TestError> {
-    let overview = Overview::read(folder)?;
-    write(&folder.join(JUNIT), &junit(folder, program)?)?;
-    write(&folder.join(SUMMARY), &summary(&overview, comparison, program))?;
-    if let Some(comparison) = comparison {
-        let path = folder.join(AGAINST);
-        let text = serde_json::to_string(comparison).map_err(|error| io_error("write", &path)(error.into()))?;
-        write(&path, &format!("{text}\n"))?;
-    }
-    Ok(overview)
-}
-
-fn write(path: &Path, text: &str) -> Result<(), TestError> {
-    playbot_learner::write_atomically(path, text.as_bytes()).map_err(io_error("write", path))
-}
-
-// Files of the findings of a level.
-
-/// Writes the findings of a level to files, and notes the files' names in it.
-pub(super) fn keep_findings(
-    game: &dyn Game,
-    plan: &TestPlan,
-    files: &FindingFiles,
-    verdict: &mut LevelVerdict,
-) -> Result<(), TestError> {
-    let LevelVerdict { level: name, index, outcome, testers, findings, .. } = verdict;
-    let level = SeenLevel { mode: &plan.split.mode, level: plan.split.first + *index, name };
-    let played = |tester: &str, episode: u32| {
-        let tester = plan.testers.iter().find(|known| known.record.name == tester)?;
-        Some(played_by(tester, plan.episode_seed(&tester.record, level.name, episode)))
-    };
-    for finding in findings {
-        let who = finding.tester.as_deref().zip(finding.episode);
-        let played = who.and_then(|(tester, episode)| played(tester, episode));
-        let Finding { detector, message, settings, .. } = finding;
-        let seen = SeenFinding { detector, message, settings, played };
-        finding.file = files.keep(game, level, &seen)?;
-    }
-    if files.keep_failures && *outcome == LevelOutcome::BotFailed {
-        let failed = testers.iter().find(|tester| tester.exact && tester.score.lost + tester.score.timed_out > 0);
-        if let Some(played) = failed.and_then(|tester| played(&tester.tester, 0)) {
-            files.keep_failure(game, level, played)?;
-        }
-    }
-    Ok(())
-}
-
-fn played_by(tester: &Tester, seed: u64) -> Played<'_> {
-    let Tester { record, player, observation_config } = tester;
-    Played { tester: &record.name, player, observation_config, seed }
-}
-
-// Results as JUnit XML for build servers: a test case for each level.
+// JUnit XML, with a test case for each level.
 
 /// Converts the results in a folder. A level that was not solved, or that has a finding, has failed.
 pub(super) fn junit(folder: &Path, program: &str) -> Result<String, TestError> {
@@ -326,13 +324,13 @@ fn seen(tester: &TesterRecord) -> String {
 mod tests {
     use super::*;
     use crate::verdict::{
-        LevelVerdict, MapScope, Places, TestRecord, TesterRecord,
+        Finding, LevelVerdict, MapScope, Places, TestRecord, TestedRun, TesterRecord,
         folder::{Earlier, TestFolder},
-        testing::verdict,
+        testing::{tester, verdict},
     };
 
     #[test]
-    fn the_share_of_visited_places_is_told_where_it_is_known() {
+    fn the_share_of_visited_places_is_reported_where_it_is_known() {
         let record = TestRecord {
             game: "garden".to_owned(),
             game_version: 1,
@@ -361,15 +359,6 @@ mod tests {
         let mapped = said(&level);
         assert!(mapped.contains("75.0 % of the open squares") && mapped.contains(" | 25.0 % |"), "{mapped}");
     }
-}
-
-#[cfg(test)]
-mod rerun_tests {
-    use super::*;
-    use crate::verdict::{
-        Finding, MapScope, TestedRun, TesterRecord,
-        testing::{tester, verdict},
-    };
 
     #[test]
     fn runs_are_named_by_their_folders_with_the_checkpoint_that_they_share() {

@@ -32,58 +32,8 @@ const LEVELS: &str = ",\"levels\":[";
 /// Text after the last level in files of older versions.
 const END: &str = "]}";
 
-/// Returns the text after the last level, with the checksum of all bytes of the lines before.
-fn end(hasher: &Hasher) -> String {
-    format!("],\"crc32\":\"{:08x}\"}}", hasher.clone().finalize())
-}
-
-/// Returns the folder of results, given the folder or the file in it.
-pub fn results_folder(named: &Path) -> &Path {
-    let is_file = named.file_name().is_some_and(|name| name == RESULTS) && named.is_file();
-    match named.parent() {
-        Some(folder) if is_file && folder.as_os_str().is_empty() => Path::new("."),
-        Some(folder) if is_file => folder,
-        _ => named,
-    }
-}
-
-/// Writer of results, a level at a time.
-pub(super) struct ResultWriter<W> {
-    out: W,
-    is_first: bool,
-    hasher: Hasher,
-}
-
-impl<W: Write> ResultWriter<W> {
-    /// Begins with the description of the test.
-    pub fn begin(out: W, record: &TestRecord) -> io::Result<Self> {
-        let head = serde_json::to_string(record)?;
-        let mut results = Self { out, is_first: true, hasher: Hasher::new() };
-        // The record is an object that is not empty, and goes on.
-        results.write(&format!("{}{LEVELS}\n", head.strip_suffix('}').unwrap_or(&head)))?;
-        Ok(results)
-    }
-
-    /// Adds a level, as a line of JSON without line feed.
-    pub fn push(&mut self, line: &str) -> io::Result<()> {
-        let separator = if self.is_first { "" } else { ",\n" };
-        self.is_first = false;
-        self.write(&format!("{separator}{line}"))
-    }
-
-    /// Ends the file.
-    pub fn end(mut self) -> io::Result<()> {
-        let line_feed = if self.is_first { "" } else { "\n" };
-        self.write(line_feed)?;
-        let end = end(&self.hasher);
-        writeln!(self.out, "{end}")
-    }
-
-    fn write(&mut self, text: &str) -> io::Result<()> {
-        self.hasher.update(text.as_bytes());
-        self.out.write_all(text.as_bytes())
-    }
-}
+/// Largest number of worst levels that are reported.
+pub const MOST_WORST: usize = 20;
 
 /// The levels of a `results.json`, in their order, as lines of JSON.
 pub struct ResultLines {
@@ -215,15 +165,65 @@ impl ResultLines {
     }
 }
 
+/// Writer of results, a level at a time.
+pub(super) struct ResultWriter<W> {
+    out: W,
+    is_first: bool,
+    hasher: Hasher,
+}
+
+impl<W: Write> ResultWriter<W> {
+    /// Begins with the description of the test.
+    pub fn begin(out: W, record: &TestRecord) -> io::Result<Self> {
+        let head = serde_json::to_string(record)?;
+        let mut results = Self { out, is_first: true, hasher: Hasher::new() };
+        // The record is an object that is not empty, and goes on.
+        results.write(&format!("{}{LEVELS}\n", head.strip_suffix('}').unwrap_or(&head)))?;
+        Ok(results)
+    }
+
+    /// Adds a level, as a line of JSON without line feed.
+    pub fn push(&mut self, line: &str) -> io::Result<()> {
+        let separator = if self.is_first { "" } else { ",\n" };
+        self.is_first = false;
+        self.write(&format!("{separator}{line}"))
+    }
+
+    /// Ends the file.
+    pub fn end(mut self) -> io::Result<()> {
+        let line_feed = if self.is_first { "" } else { "\n" };
+        self.write(line_feed)?;
+        let end = end(&self.hasher);
+        writeln!(self.out, "{end}")
+    }
+
+    fn write(&mut self, text: &str) -> io::Result<()> {
+        self.hasher.update(text.as_bytes());
+        self.out.write_all(text.as_bytes())
+    }
+}
+
+/// Returns the folder of results, given the folder or the file in it.
+pub fn results_folder(named: &Path) -> &Path {
+    let is_file = named.file_name().is_some_and(|name| name == RESULTS) && named.is_file();
+    match named.parent() {
+        Some(folder) if is_file && folder.as_os_str().is_empty() => Path::new("."),
+        Some(folder) if is_file => folder,
+        _ => named,
+    }
+}
+
+/// Returns the text after the last level, with the checksum of all bytes of the lines before.
+fn end(hasher: &Hasher) -> String {
+    format!("],\"crc32\":\"{:08x}\"}}", hasher.clone().finalize())
+}
+
 fn hash_line(hasher: &mut Hasher, line: &str) {
     hasher.update(line.as_bytes());
     hasher.update(b"\n");
 }
 
-// Totals of results, and the worst levels.
-
-/// Largest number of worst levels that are reported.
-pub const MOST_WORST: usize = 20;
+// Totals of a test.
 
 /// Totals of a tester over all levels.
 #[derive(Clone, Debug, PartialEq)]
@@ -330,8 +330,6 @@ fn is_worse(level: &LevelVerdict, later: &LevelVerdict) -> bool {
     rank(level).cmp(&rank(later)).then(shares).is_le()
 }
 
-// Times of solved episodes.
-
 /// Ticks of solved episodes.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FinishTime {
@@ -356,80 +354,5 @@ impl FinishTime {
             low + (place - below as f64) * (high - low)
         };
         Some(Self { lower_quartile: at(0.25), median: at(0.5), upper_quartile: at(0.75) })
-    }
-}
-
-#[cfg(test)]
-mod overview_tests {
-    use super::*;
-    use crate::verdict::{Finding, MapScope, TesterRecord, testing::verdict};
-    use playbot_harness::detector::LevelProof;
-
-    #[test]
-    fn the_worst_come_first_and_perfect_ones_not_at_all() {
-        let record = TestRecord {
-            game: "garden".to_owned(),
-            game_version: 1,
-            range: "hard:0..99".parse().expect("a split"),
-            files: None,
-            seed: 0,
-            testers: vec![TesterRecord::bot("random")],
-            episodes: 4,
-            detectors: Vec::new(),
-            options: Vec::new(),
-            maps: MapScope::default(),
-            shard: None,
-        };
-        let mut overview = Overview::empty(record);
-        for (index, solved) in [4, 3, 0, 1, 0].into_iter().enumerate() {
-            let mut level =
-                LevelVerdict { places: Some(Places { visited: 3, open: 4 }), ..verdict(index as u64, solved, 4) };
-            level.testers[0].places = Some(Places { visited: 1, open: 4 });
-            overview.add(level);
-        }
-        let why = "walled in".to_owned();
-        let finding = Finding {
-            detector: "unreachable-goal".to_owned(),
-            tester: None,
-            episode: None,
-            tick: None,
-            message: why.clone(),
-            file: None,
-            settings: Vec::new(),
-        };
-        let proved = LevelVerdict {
-            outcome: LevelOutcome::ProvedUnsolvable,
-            proof: LevelProof::Unsolvable { why },
-            findings: vec![finding],
-            ..verdict(5, 0, 4)
-        };
-        overview.add(proved);
-        let worst: Vec<u64> = overview.worst.iter().map(|level| level.index).collect();
-        assert_eq!(worst, [5, 2, 4, 3, 1]);
-        assert_eq!((overview.solved, overview.bot_failed, overview.proved_unsolvable), (3, 2, 1));
-        assert_eq!(overview.testers[0].levels, Trials { successes: 3, trials: 6 });
-        assert_eq!(overview.testers[0].episodes, Trials { successes: 8, trials: 24 });
-        assert_eq!(overview.places, Places { visited: 15, open: 20 }, "the sixth level has no maps");
-        assert_eq!(overview.testers[0].places.percent(), Some(25.0));
-        assert!(!overview.is_sound());
-        for index in 6..60 {
-            overview.add(verdict(index, 0, 4));
-        }
-        assert_eq!((overview.worst.len(), overview.worst[0].index), (20, 5));
-    }
-}
-
-#[cfg(test)]
-mod finish_time_tests {
-    use super::*;
-
-    #[test]
-    fn quartiles_lie_between_the_values() {
-        let of = |ticks: &[u32]| FinishTime::of(ticks.to_vec());
-        let time = |lower_quartile, median, upper_quartile| FinishTime { lower_quartile, median, upper_quartile };
-        assert_eq!(of(&[4, 1, 3, 2]), Some(time(1.75, 2.5, 3.25)));
-        assert_eq!(of(&[30, 10, 20, 50, 40]), Some(time(20.0, 30.0, 40.0)));
-        assert_eq!(of(&[7]), Some(time(7.0, 7.0, 7.0)));
-        assert_eq!(of(&[]), None);
     }
 }

@@ -9,8 +9,9 @@ use crate::{
         judge,
         maps::level_name,
         plan::TestPlan,
+        played::{Played, PlayedEnd, Task},
         reports::keep_findings,
-        test_world::{EpisodeObserver, Played, PlayedEnd, Task, play_tasks},
+        test_world::{EpisodeObserver, play_tasks},
     },
 };
 use bevy::math::Vec2;
@@ -250,7 +251,7 @@ fn judge_portion(
     places.iter().enumerate().take_while(|_| !stop()).map(verdict).collect()
 }
 
-// A test of one level on this thread, with all episodes in sequence in the same World.
+// Tests of one level on this thread.
 
 /// Results of a level.
 pub struct TestedInTurn {
@@ -300,7 +301,7 @@ fn ended(episode: &Played) -> Option<EpisodeResult> {
     }
 }
 
-// Defects reported by detectors, as findings of a level.
+// Findings from the defects that detectors report.
 
 /// Returns the defects seen while testers played. A repeated defect in several episodes of a tester is reported once,
 /// for the first.
@@ -346,10 +347,10 @@ pub(super) fn inspect(
         observation_config: tester.observation_config,
         seed: plan.episode_seed(&tester.record, name, 0),
         episodes: (0..).zip(episodes.iter()).filter_map(ended_by_defect).collect(),
-        places: (0..).zip(episodes.iter()).filter_map(ended_at).collect(),
+        positions: (0..).zip(episodes.iter()).filter_map(ended_at).collect(),
     });
     let (mode, par) = (plan.split.mode.as_str(), plan.detectors.par(name));
-    let tested = TestedLevel { game, mode, level, place: index, par, testers: testers.collect(), stop };
+    let tested = TestedLevel { game, mode, level, index, par, testers: testers.collect(), stop };
     let mut findings = Vec::new();
     for detector in plan.detectors.levels.iter().take_while(|_| !stop()) {
         findings.extend(detector.inspect(&tested).into_iter().map(|defect| Finding {
@@ -374,7 +375,7 @@ fn ended_by_defect((number, episode): (u32, &Played)) -> Option<(u32, EpisodeRes
 
 fn ended_at((number, episode): (u32, &Played)) -> Option<(u32, Vec2)> {
     match &episode.end {
-        PlayedEnd::Ended { place, .. } => place.map(|place| (number, place)),
+        PlayedEnd::Ended { position, .. } => position.map(|position| (number, position)),
         PlayedEnd::Broken { .. } => None,
     }
 }

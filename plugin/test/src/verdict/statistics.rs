@@ -22,8 +22,6 @@ pub fn wilson(successes: u64, trials: u64) -> [f64; 2] {
     [low, high]
 }
 
-// Fisher's exact test for two shares of successes.
-
 /// Successes among trials.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Trials {
@@ -92,8 +90,6 @@ impl Tail {
     }
 }
 
-// Control of the false discovery rate over many tests.
-
 /// Returns which of these probabilities are significant, with an expected share of false alarms of at most `rate`
 /// among all alarms.
 ///
@@ -128,11 +124,6 @@ mod tests {
         }
         assert_eq!(wilson(0, 0), [0.0, 1.0]);
     }
-}
-
-#[cfg(test)]
-mod fisher_tests {
-    use super::*;
 
     /// Checked against R's `fisher.test`.
     #[test]
@@ -174,11 +165,6 @@ mod fisher_tests {
         assert!(p(half, MOST_TRIALS, half, MOST_TRIALS) > 0.999, "as likely as can be");
         assert!(p(0, MOST_TRIALS, MOST_TRIALS, MOST_TRIALS) < 1e-300);
     }
-}
-
-#[cfg(test)]
-mod false_discovery_tests {
-    use super::*;
 
     /// The example of Benjamini and Hochberg (1995), section 4.
     #[test]

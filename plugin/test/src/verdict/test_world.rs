@@ -4,7 +4,8 @@ use crate::{
     detectors::{Detectors, ErrorLogReader, GameProofs, SlowTick, TickTime},
     findings::detector_of,
     verdict::{
-        plan::{TestPlan, Tester},
+        plan::Tester,
+        played::{EpisodeFinding, Played, PlayedEnd, Task},
         walk::{Walk, WalkCounter},
     },
 };
@@ -24,12 +25,12 @@ use bevy_playbot::{
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{
-    arrangement::{Arrangement, at_most},
+    arrangement::at_most,
     detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher},
+    ended_episodes::EndedEpisodes,
     eval::Player,
     game::Game,
-    machine::{MemoryError, check_bytes},
-    worlds::{EndedEpisodes, build_observing_world},
+    worlds::build_observing_world,
 };
 use std::{sync::Arc, time::Instant};
 
@@ -39,21 +40,89 @@ const MOST_TICKS: u32 = 1_000_000;
 /// Text before the message of a game's panic, after its position.
 const PANICKED: &str = "the game panicked: ";
 
-/// An agent and its tasks, in order.
-struct Seat {
-    agent: Entity,
-    /// Indices of its tasks, with the seeds of their episodes.
-    tasks: Vec<(usize, u64)>,
-    done: usize,
-    /// Walk of the agent.
-    walk: WalkCounter,
+/// Plays episodes and returns their results in order; `None` if `stop` returned true.
+///
+/// Many are played in one World. If it breaks, its current episodes are played again, each alone in a World of its
+/// own. An episode that breaks its World again is the broken one; all others are played as if nothing had happened.
+///
+/// If no episode does, the break depends on state that other episodes left in the World. It is then a finding of the
+/// episode in which it occurred.
+///
+/// # Errors
+///
+/// The game does not support the tester's observations.
+pub(super) fn play_tasks(
+    game: &dyn Game,
+    mode: &str,
+    tester: &Tester,
+    tasks: &[Task],
+    watch: &EpisodeObserver,
+) -> Result<Option<Vec<Played>>, VisionError> {
+    let mut played: Vec<Option<Played>> = vec![None; tasks.len()];
+    let mut waiting: Vec<usize> = (0..tasks.len()).collect();
+    while !waiting.is_empty() {
+        let mut test_world = TestWorld::build(game, mode, tester, tasks, &waiting, watch.arenas)?;
+        match test_world.play_out(game, &mut played, watch) {
+            Ok(()) => {}
+            Err(Interruption::Stopped) => return Ok(None),
+            Err(Interruption::Broken { detector, message }) => {
+                let mut is_seen = false;
+                for suspect in test_world.suspects() {
+                    let Some(alone) = play_alone(game, mode, tester, tasks[suspect], watch)? else { return Ok(None) };
+                    is_seen |= alone.shows(detector);
+                    played[suspect] = Some(alone);
+                }
+                if let Some((suspect, finding)) = test_world.left_behind(detector, &message).filter(|_| !is_seen)
+                    && let Some(played) = &mut played[suspect]
+                {
+                    played.found.push(finding);
+                }
+            }
+        }
+        waiting.retain(|&task| played[task].is_none());
+    }
+    Ok(Some(played.into_iter().flatten().collect()))
 }
 
-impl Seat {
-    /// Returns the present or next task, and the seed of its episode.
-    fn current(&self) -> Option<(usize, u64)> {
-        self.tasks.get(self.done).copied()
-    }
+/// Plays one episode in a World of its own.
+fn play_alone(
+    game: &dyn Game,
+    mode: &str,
+    tester: &Tester,
+    task: Task,
+    watch: &EpisodeObserver,
+) -> Result<Option<Played>, VisionError> {
+    let mut test_world = TestWorld::build(game, mode, tester, &[task], &[0], 1)?;
+    let mut played = [None];
+    let end = match test_world.play_out(game, &mut played, watch) {
+        Ok(()) => return Ok(played[0].take()),
+        Err(Interruption::Stopped) => return Ok(None),
+        Err(Interruption::Broken { detector, message }) => {
+            (watch.progress)(1);
+            let (tick, message) = test_world.without_moment(&message);
+            PlayedEnd::Broken { detector, tick, message }
+        }
+    };
+    let found = std::mem::take(&mut test_world.found);
+    let walk = test_world.take_walk(0);
+    Ok(Some(Played { end, exact: test_world.is_untouched(0, task.seed), found, walk }))
+}
+
+/// Observers of an episode during play.
+pub(super) struct EpisodeObserver<'a> {
+    /// Called with the number of newly finished episodes.
+    pub progress: &'a (dyn Fn(u64) + Sync),
+    /// Returns whether to stop.
+    pub stop: &'a (dyn Fn() -> bool + Sync),
+    /// The detectors at work.
+    pub detectors: &'a Detectors,
+    /// Mode of the levels.
+    pub mode: &'a str,
+    /// Name of the tester.
+    pub tester: &'a str,
+    /// Largest number of arenas of a World. It does not change the results of a game that keeps no state between
+    /// episodes.
+    pub arenas: usize,
 }
 
 /// A World and the agents in it.
@@ -160,11 +229,11 @@ impl TestWorld {
             let Some(seat) = self.seats.iter().position(|seat| seat.agent == agent) else { continue };
             let walk = self.take_walk(seat);
             let Some((task, seed)) = self.seats[seat].current() else { continue };
-            let place = game.tools().state.position(&self.world, agent);
+            let position = game.tools().state.position(&self.world, agent);
             let cause = if result.success { None } else { game.tools().state.end_cause(&self.world, agent) };
             let exact = self.is_untouched(seat, seed);
             let found = watched.take_found(seat);
-            let end = PlayedEnd::Ended { result, place, cause };
+            let end = PlayedEnd::Ended { result, position, cause };
             played[task] = Some(Played { end, exact, found, walk });
             self.seats[seat].done += 1;
             (watch.progress)(1);
@@ -196,13 +265,13 @@ impl TestWorld {
     /// Returns the message about a broken World that no episode breaks alone. It is a finding of the suspect whose
     /// agent the game names, or else of the first one.
     pub fn left_behind(&self, detector: &'static str, message: &str) -> Option<(usize, EpisodeFinding)> {
-        let told = |seat: &Seat| {
+        let reported = |seat: &Seat| {
             let (agent, episode) = (self.world.get::<Agent>(seat.agent)?, self.world.get::<Episode>(seat.agent)?);
-            told_tick(message, agent.index, episode.level)
+            reported_tick(message, agent.index, episode.level)
         };
-        let (seat, task) = self.suspected().into_iter().min_by_key(|(seat, _)| told(seat).is_none())?;
+        let (seat, task) = self.suspected().into_iter().min_by_key(|(seat, _)| reported(seat).is_none())?;
         let played = || self.world.get::<Episode>(seat.agent).map_or(0, |episode| episode.tick.saturating_sub(1));
-        let (tick, words) = told(seat).unwrap_or_else(|| (played(), message));
+        let (tick, words) = reported(seat).unwrap_or_else(|| (played(), message));
         let words = words.strip_prefix(PANICKED).unwrap_or(words);
         // A World with a single episode breaks by that episode.
         let is_shared = self.seats.iter().map(|seat| seat.tasks.len()).sum::<usize>() > 1;
@@ -226,198 +295,12 @@ impl TestWorld {
         let agent = self.seats.first().map(|seat| seat.agent);
         let parts = agent.and_then(|agent| Some((self.world.get::<Agent>(agent)?, self.world.get::<Episode>(agent)?)));
         let Some((agent, episode)) = parts else { return (None, message.to_owned()) };
-        let told = told_tick(message, agent.index, episode.level);
+        let reported = reported_tick(message, agent.index, episode.level);
         let is_begun = episode.is_running() || episode.is_loading();
-        let (tick, rest) = told.map_or((is_begun.then_some(episode.tick), message), |(tick, rest)| (Some(tick), rest));
+        let (tick, rest) =
+            reported.map_or((is_begun.then_some(episode.tick), message), |(tick, rest)| (Some(tick), rest));
         (tick, rest.strip_prefix(PANICKED).unwrap_or(rest).to_owned())
     }
-}
-
-/// Parses the tick at the start of a message such as `agent 0, level 3, tick 7: words`, and returns it with the
-/// words.
-fn told_tick(message: &str, agent: u32, level: u64) -> Option<(u32, &str)> {
-    let rest = message.strip_prefix(&format!("agent {agent}, level {level}, tick "))?;
-    let (tick, words) = rest.split_once(": ")?;
-    Some((tick.parse().ok()?, words))
-}
-
-/// Returns whether an agent has an episode that is not over.
-fn is_playing(world: &World, agent: Entity) -> bool {
-    let is_begun = |episode: &Episode| episode.is_running() || episode.is_loading();
-    Control::of(world, agent).is_active() && world.get::<Episode>(agent).is_some_and(is_begun)
-}
-
-// Least memory of a test, checked before it begins.
-
-/// Bytes of a listed level, and of its entry in the journal.
-const LEVEL: usize = size_of::<u64>() + size_of::<(u64, (u64, usize))>();
-
-/// Data in memory: description, bytes, and the option to lower.
-type Kept = (String, u64, &'static str);
-
-impl TestPlan {
-    /// Checks that the list of levels and the episodes on one of them fit into the free memory.
-    ///
-    /// # Errors
-    ///
-    /// [`MemoryError`].
-    pub(super) fn check_memory(&self) -> Result<(), MemoryError> {
-        let worlds = Arrangement { worlds: 1, arenas: 1 };
-        self.kept().into_iter().try_for_each(|(what, bytes, options)| check_bytes(what, bytes, options, worlds))
-    }
-
-    fn kept(&self) -> [Kept; 2] {
-        let levels = self.shard.map_or(self.split.len(), |shard| shard.places(self.split.len()).count() as u64);
-        let (testers, episodes) = (self.testers.len() as u64, u64::from(self.episodes.max(1)));
-        let of_levels = levels.saturating_mul(LEVEL as u64);
-        // A level is judged when all testers have played all of their episodes on it.
-        let one_tester = episodes.saturating_mul(size_of::<Task>() as u64);
-        let all_testers = episodes.saturating_mul(testers).saturating_mul(size_of::<Played>() as u64);
-        [
-            (format!("the places of the results of {levels} levels"), of_levels, "`--levels`"),
-            (
-                format!("the results of testers × episodes = {testers} × {episodes} on a level"),
-                one_tester.saturating_add(all_testers),
-                "`--episodes`",
-            ),
-        ]
-    }
-}
-
-// Play of a few episodes to their end, whatever the game does in them.
-
-/// Plays episodes and returns their results in order; `None` if `stop` returned true.
-///
-/// Many are played in one World. If it breaks, its current episodes are played again, each alone in a World of its
-/// own. An episode that breaks its World again is the broken one; all others are played as if nothing had happened.
-///
-/// If no episode does, the break depends on state that other episodes left in the World. It is then a finding of the
-/// episode in which it occurred.
-///
-/// # Errors
-///
-/// The game does not support the tester's observations.
-pub(super) fn play_tasks(
-    game: &dyn Game,
-    mode: &str,
-    tester: &Tester,
-    tasks: &[Task],
-    watch: &EpisodeObserver,
-) -> Result<Option<Vec<Played>>, VisionError> {
-    let mut played: Vec<Option<Played>> = vec![None; tasks.len()];
-    let mut waiting: Vec<usize> = (0..tasks.len()).collect();
-    while !waiting.is_empty() {
-        let mut test_world = TestWorld::build(game, mode, tester, tasks, &waiting, watch.arenas)?;
-        match test_world.play_out(game, &mut played, watch) {
-            Ok(()) => {}
-            Err(Interruption::Stopped) => return Ok(None),
-            Err(Interruption::Broken { detector, message }) => {
-                let mut is_seen = false;
-                for suspect in test_world.suspects() {
-                    let Some(alone) = play_alone(game, mode, tester, tasks[suspect], watch)? else { return Ok(None) };
-                    is_seen |= alone.shows(detector);
-                    played[suspect] = Some(alone);
-                }
-                if let Some((suspect, finding)) = test_world.left_behind(detector, &message).filter(|_| !is_seen)
-                    && let Some(played) = &mut played[suspect]
-                {
-                    played.found.push(finding);
-                }
-            }
-        }
-        waiting.retain(|&task| played[task].is_none());
-    }
-    Ok(Some(played.into_iter().flatten().collect()))
-}
-
-/// Plays one episode in a World of its own.
-fn play_alone(
-    game: &dyn Game,
-    mode: &str,
-    tester: &Tester,
-    task: Task,
-    watch: &EpisodeObserver,
-) -> Result<Option<Played>, VisionError> {
-    let mut test_world = TestWorld::build(game, mode, tester, &[task], &[0], 1)?;
-    let mut played = [None];
-    let end = match test_world.play_out(game, &mut played, watch) {
-        Ok(()) => return Ok(played[0].take()),
-        Err(Interruption::Stopped) => return Ok(None),
-        Err(Interruption::Broken { detector, message }) => {
-            (watch.progress)(1);
-            let (tick, message) = test_world.without_moment(&message);
-            PlayedEnd::Broken { detector, tick, message }
-        }
-    };
-    let found = std::mem::take(&mut test_world.found);
-    let walk = test_world.take_walk(0);
-    Ok(Some(Played { end, exact: test_world.is_untouched(0, task.seed), found, walk }))
-}
-
-// Episodes to play, and their results.
-
-/// An episode to play.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Task {
-    /// The level.
-    pub level: u64,
-    /// Seed of the player's streams.
-    pub seed: u64,
-}
-
-/// Result of an episode.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct Played {
-    /// Its end.
-    pub end: PlayedEnd,
-    /// True if the player drew no random number.
-    pub exact: bool,
-    /// The detectors' findings in it.
-    pub found: Vec<EpisodeFinding>,
-    /// Walk of its agent, if the game reports positions.
-    pub walk: Option<Walk>,
-}
-
-impl Played {
-    /// Returns whether this detector has a finding in it, or the game broke this way.
-    pub fn shows(&self, detector: &str) -> bool {
-        let is_broken = matches!(&self.end, PlayedEnd::Broken { detector: how, .. } if *how == detector);
-        is_broken || self.found.iter().any(|finding| finding.detector == detector)
-    }
-}
-
-/// A detector's finding in an episode.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct EpisodeFinding {
-    /// The detector.
-    pub detector: &'static str,
-    /// Tick of the episode.
-    pub tick: u32,
-    /// The message.
-    pub message: String,
-}
-
-/// The end of an episode.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum PlayedEnd {
-    /// An end by the game.
-    Ended {
-        /// The result.
-        result: EpisodeResult,
-        /// Last position of the agent, if the game reports it.
-        place: Option<Vec2>,
-        /// Cause of an end without the goal, if the game reports it.
-        cause: Option<&'static str>,
-    },
-    /// The game broke.
-    Broken {
-        /// `panic`, `fault` or `endless`.
-        detector: &'static str,
-        /// Tick of the episode, if it had begun.
-        tick: Option<u32>,
-        /// The game's message.
-        message: String,
-    },
 }
 
 /// Interruption of the episodes of a World.
@@ -433,24 +316,38 @@ pub(super) enum Interruption {
     },
 }
 
-/// Observers of an episode during play.
-pub(super) struct EpisodeObserver<'a> {
-    /// Called with the number of newly finished episodes.
-    pub progress: &'a (dyn Fn(u64) + Sync),
-    /// Returns whether to stop.
-    pub stop: &'a (dyn Fn() -> bool + Sync),
-    /// The detectors at work.
-    pub detectors: &'a Detectors,
-    /// Mode of the levels.
-    pub mode: &'a str,
-    /// Name of the tester.
-    pub tester: &'a str,
-    /// Largest number of arenas of a World. It does not change the results of a game that keeps no state between
-    /// episodes.
-    pub arenas: usize,
+/// An agent and its tasks, in order.
+struct Seat {
+    agent: Entity,
+    /// Indices of its tasks, with the seeds of their episodes.
+    tasks: Vec<(usize, u64)>,
+    done: usize,
+    /// Walk of the agent.
+    walk: WalkCounter,
 }
 
-// Detectors at work in a World in which testers play.
+impl Seat {
+    /// Returns the present or next task, and the seed of its episode.
+    fn current(&self) -> Option<(usize, u64)> {
+        self.tasks.get(self.done).copied()
+    }
+}
+
+/// Parses the tick at the start of a message such as `agent 0, level 3, tick 7: words`, and returns it with the
+/// words.
+fn reported_tick(message: &str, agent: u32, level: u64) -> Option<(u32, &str)> {
+    let rest = message.strip_prefix(&format!("agent {agent}, level {level}, tick "))?;
+    let (tick, words) = rest.split_once(": ")?;
+    Some((tick.parse().ok()?, words))
+}
+
+/// Returns whether an agent has an episode that is not over.
+fn is_playing(world: &World, agent: Entity) -> bool {
+    let is_begun = |episode: &Episode| episode.is_running() || episode.is_loading();
+    Control::of(world, agent).is_active() && world.get::<Episode>(agent).is_some_and(is_begun)
+}
+
+// Detectors at work in a World.
 
 /// A detector's watch of an agent, under the detector's name.
 type NamedWatch = (&'static str, Box<dyn EpisodeWatcher>);
@@ -576,7 +473,7 @@ impl WatchedSeat {
             observation: observation.map_or(&[][..], |observation| observation.vector.as_slice()),
             state_hash: world.get::<StateHash>(self.agent).map_or(0, |hash| hash.0),
             reward: reward.get(),
-            place: if watches.is_empty() { None } else { game.tools().state.position(world, self.agent) },
+            position: if watches.is_empty() { None } else { game.tools().state.position(world, self.agent) },
             is_success: result.map_or_else(|| episode.is_success(), |result| result.success),
             proofs: &proofs,
         };
@@ -606,56 +503,8 @@ mod tests {
 
     #[test]
     fn the_moment_is_taken_from_the_words() {
-        assert_eq!(told_tick("agent 0, level 3, tick 7: it burns: hot", 0, 3), Some((7, "it burns: hot")));
-        assert_eq!(told_tick("agent 0, level 3, after tick 7: late", 0, 3), None);
-        assert_eq!(told_tick("the policy cannot decide", 0, 3), None);
-    }
-}
-
-#[cfg(test)]
-mod plan_memory_tests {
-    use bevy_playbot::{bot::BlindBot, vision::ObservationConfig};
-    use playbot_learner::HasExitCode as _;
-
-    use super::*;
-    use crate::detectors::Detectors;
-    use crate::verdict::{TestError, Tester, TesterRecord};
-    use playbot_harness::eval::Player;
-
-    fn plan(levels: &str, testers: usize, episodes: u32) -> TestPlan {
-        let tester = |number: usize| Tester {
-            record: TesterRecord::bot(number.to_string()),
-            player: Player::Blind(BlindBot::Uniform),
-            observation_config: ObservationConfig::default(),
-        };
-        TestPlan {
-            split: levels.parse().expect("a split"),
-            testers: (0..testers).map(tester).collect(),
-            episodes,
-            seed: 0,
-            detectors: Detectors::default(),
-            shard: None,
-            threads: 1,
-        }
-    }
-
-    #[test]
-    fn what_no_machine_has_room_for_is_refused_by_the_name_of_its_option() {
-        assert!(plan("hard:0..9", 64, 100).check().is_ok());
-        let error = plan("hard:0..9", 64, u32::MAX).check().expect_err("terabytes");
-        let words = error.to_string();
-        assert!(error.is_usage() && matches!(error, TestError::Eval(_)), "{words}");
-        assert!(words.starts_with("the results of testers × episodes = 64 × 4294967295 on a level need "), "{words}");
-        assert!(words.ends_with(": lower `--episodes`"), "{words}");
-    }
-
-    #[test]
-    fn levels_are_counted_without_those_of_other_shards() {
-        let whole = plan("hard:0..16777215", 1, 1);
-        let [(what, bytes, option), _] = whole.kept();
-        assert_eq!((what.as_str(), option), ("the places of the results of 16777216 levels", "`--levels`"));
-        assert_eq!(bytes, (LEVEL as u64) << 24);
-        let part = TestPlan { shard: Some("1/4".parse().expect("a shard")), ..whole };
-        assert_eq!(part.kept()[0].1, (LEVEL as u64) << 22);
+        assert_eq!(reported_tick("agent 0, level 3, tick 7: it burns: hot", 0, 3), Some((7, "it burns: hot")));
+        assert_eq!(reported_tick("agent 0, level 3, after tick 7: late", 0, 3), None);
+        assert_eq!(reported_tick("the policy cannot decide", 0, 3), None);
     }
 }

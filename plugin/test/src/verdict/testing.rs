@@ -1,13 +1,15 @@
 //! Verdicts for unit tests.
 
-use crate::verdict::{LevelOutcome, LevelVerdict, Score, TesterVerdict, results::FinishTime, statistics::wilson};
+use crate::verdict::{
+    EpisodeScore, LevelOutcome, LevelVerdict, TesterVerdict, results::FinishTime, statistics::wilson,
+};
 use playbot_harness::detector::LevelProof;
 use std::collections::BTreeMap;
 
 /// Makes a score with so many solved episodes.
-pub(super) fn score(solved: u64, episodes: u64) -> Score {
+pub(super) fn score(solved: u64, episodes: u64) -> EpisodeScore {
     let ticks = FinishTime::of(vec![40; solved as usize]);
-    Score {
+    EpisodeScore {
         solved,
         episodes,
         interval: wilson(solved, episodes),

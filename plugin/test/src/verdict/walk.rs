@@ -1,9 +1,6 @@
 //! Positions of an agent in an episode, counted tick by tick.
 
-use crate::{
-    explore::{Cell, CellGrid, cells_between, reach, round::open_cells},
-    verdict::plan::{skill_count, skill_number},
-};
+use crate::explore::{CellGrid, ExploredCell, cells_between, reach, round::open_cells};
 use bevy::{math::Vec2, prelude::*};
 use bevy_playbot::{episode::Episode, skill_prior::ActiveSkill};
 use playbot_harness::{floor_plan::FloorPlan, game::Game};
@@ -14,6 +11,9 @@ const PATIENCE: f64 = 2.0;
 
 /// Largest number of squares of a path that are kept: the last ones.
 const MOST_STEPS: usize = 200;
+
+/// Largest number of axes with a name: further ones are left out.
+const MOST_NUMBERS: usize = 16;
 
 /// Squares of an agent's walk.
 #[derive(Clone, Debug, PartialEq)]
@@ -96,18 +96,18 @@ impl WalkCounter {
         }
         let Some((_, Some(squares))) = self.level else { return };
         let before = self.last.take().filter(|_| episode.tick > 1);
-        let Some(place) = game.tools().state.position(world, self.agent) else { return };
-        let Some(square) = squares.at(place) else { return };
+        let Some(position) = game.tools().state.position(world, self.agent) else { return };
+        let Some(square) = squares.at(position) else { return };
         let skill = world.get::<ActiveSkill>(self.agent);
         let z = skill.map_or(&[][..], |skill| skill.z.as_slice());
-        if let Some(before) = before.filter(|before| squares.between(*before, place).next().is_some()) {
+        if let Some(before) = before.filter(|before| squares.between(*before, position).next().is_some()) {
             if self.open.is_none() {
                 self.open = Some(self.plan.take().and_then(|plan| squares.open(&plan)).unwrap_or_default());
             }
-            self.pass(squares, before, place, z);
+            self.pass(squares, before, position, z);
         }
         self.count(squares.count(), square, z);
-        self.last = Some(place);
+        self.last = Some(position);
     }
 
     /// Counts the open squares that were passed between two positions, as one tick each if they are new in the
@@ -190,8 +190,6 @@ fn grow(counters: &mut Vec<u32>, wanted: usize) {
     }
 }
 
-// The squares of a level in which events are counted.
-
 /// Most squares along the longer side of a level.
 const MOST: f32 = 64.0;
 
@@ -231,8 +229,8 @@ impl LevelSquares {
     }
 
     /// Returns the square around a position, counted row by row from below; `None` outside the level.
-    pub fn at(&self, place: Vec2) -> Option<usize> {
-        let at = (place - self.grid.origin) / self.grid.size;
+    pub fn at(&self, position: Vec2) -> Option<usize> {
+        let at = (position - self.grid.origin) / self.grid.size;
         // Positions that are not numbers count as outside.
         let is_inside = at.x >= 0.0 && at.y >= 0.0 && at.x < self.columns as f32 && at.y < self.rows as f32;
         is_inside.then(|| at.y as usize * self.columns + at.x as usize)
@@ -250,7 +248,7 @@ impl LevelSquares {
         Some(cells.iter().filter_map(|cell| self.of_cell(cell)).collect())
     }
 
-    fn of_cell(&self, cell: &Cell) -> Option<usize> {
+    fn of_cell(&self, cell: &ExploredCell) -> Option<usize> {
         let &[column, row] = cell.0.as_slice() else { return None };
         self.index([column, row])
     }
@@ -261,11 +259,37 @@ impl LevelSquares {
     }
 }
 
+// Names of skills that are points of a continuous space.
+
+/// Returns the number of names for skills of this length; 0 without a skill.
+fn skill_count(z: &[f32]) -> usize {
+    2 * z.len().min(MOST_NUMBERS)
+}
+
+/// Returns the number of a skill's name, below [`skill_count`].
+///
+/// A skill is named after the nearest of several fixed directions: the positive and the negative half of each axis of
+/// z. That is the number of z that is furthest from 0, and its sign; of equally large numbers the first counts. So a
+/// name is independent of levels and draws, and is the same in every test of a policy.
+fn skill_number(z: &[f32]) -> Option<usize> {
+    let mut nearest: Option<(usize, f32)> = None;
+    for (number, value) in z.iter().take(MOST_NUMBERS).enumerate() {
+        if nearest.is_none_or(|(_, longest)| value.abs() > longest.abs()) {
+            nearest = Some((number, *value));
+        }
+    }
+    nearest.map(|(number, value)| 2 * number + usize::from(value < 0.0))
+}
+
+/// Returns the name: `z3+` for a skill whose third number is furthest from 0, and is positive.
+pub(super) fn skill_name(number: usize) -> String {
+    format!("z{}{}", number / 2 + 1, if number.is_multiple_of(2) { '+' } else { '-' })
+}
+
 #[cfg(test)]
 mod tests {
-    use bevy::math::Rect;
-
     use super::*;
+    use bevy::math::Rect;
     use playbot_harness::floor_plan::FloorPlan;
 
     /// Makes a counter for ten squares in a row whose patience is four ticks.
@@ -318,9 +342,9 @@ mod tests {
         let (_, squares) = counter.level.expect("a level");
         let squares = squares.expect("it has an extent");
         counter.open = Some(BTreeSet::from([0, 1, 2, 4, 5]));
-        let place = |square: usize| Vec2::new(square as f32 + 0.5, 0.5);
+        let position = |square: usize| Vec2::new(square as f32 + 0.5, 0.5);
         for (from, to) in [(0, 0), (0, 4), (4, 0), (0, 5)] {
-            counter.pass(squares, place(from), place(to), &[0.1, -2.0]);
+            counter.pass(squares, position(from), position(to), &[0.1, -2.0]);
             counter.count(16, to, &[0.1, -2.0]);
         }
         let walk = counter.take().expect("it went somewhere");
@@ -340,13 +364,6 @@ mod tests {
         assert_eq!(walk.trail.last(), Some(&[499 % 16, 2]));
         assert_eq!(walk.counts.iter().map(|count| count.ticks).sum::<u32>(), 1_000);
     }
-}
-
-#[cfg(test)]
-mod squares_tests {
-    use bevy::math::Rect;
-
-    use super::*;
 
     fn plan(width: f32, height: f32, tile: f32) -> FloorPlan {
         FloorPlan {
@@ -380,5 +397,18 @@ mod squares_tests {
         assert_eq!((squares.columns, squares.rows, squares.grid.size), (64, 3, 10.0));
         assert_eq!(LevelSquares::of(&plan(0.0, 3.0, 1.0)), None);
         assert_eq!(LevelSquares::of(&plan(f32::NAN, 3.0, 1.0)), None);
+    }
+
+    #[test]
+    fn a_skill_is_called_by_its_number_furthest_from_zero() {
+        let name = |z: &[f32]| skill_number(z).map(skill_name);
+        assert_eq!(name(&[0.1, -0.2, 1.5]).as_deref(), Some("z3+"));
+        assert_eq!(name(&[0.1, -2.0, 1.5]).as_deref(), Some("z2-"));
+        assert_eq!(name(&[1.0, -1.0]).as_deref(), Some("z1+"));
+        assert_eq!(name(&[]), None);
+        let mut long = [0.5; 40];
+        long[30] = 9.0;
+        assert_eq!((name(&long).as_deref(), skill_count(&long)), (Some("z1+"), 32));
+        assert_eq!((skill_count(&[0.0; 3]), skill_count(&[])), (6, 0));
     }
 }

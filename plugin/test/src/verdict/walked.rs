@@ -2,10 +2,9 @@
 
 use crate::verdict::{
     Finding, Places,
-    maps::{FailureWay, LevelMaps, SkillTicks},
-    plan::skill_name,
-    test_world::{Played, PlayedEnd},
-    walk::{LevelSquares, Walk},
+    maps::{FailurePath, LevelMaps, SkillTicks},
+    played::{Played, PlayedEnd},
+    walk::{LevelSquares, Walk, skill_name},
 };
 use playbot_harness::floor_plan::FloorPlan;
 use std::{
@@ -78,10 +77,10 @@ fn maps(squares: &LevelSquares, sums: &BTreeMap<usize, Sum>) -> LevelMaps {
     let mut order: Vec<(usize, u64)> = totals.into_iter().collect();
     // Of equally frequent ones the first stays first.
     order.sort_by_key(|(_, ticks)| Reverse(*ticks));
-    let place = |skill: usize| order.iter().position(|(known, _)| *known == skill);
+    let rank = |skill: usize| order.iter().position(|(known, _)| *known == skill);
     let most =
         |sum: &Sum| sum.skills.iter().max_by_key(|(skill, ticks)| (**ticks, Reverse(**skill))).map(|(skill, _)| *skill);
-    let skill_at = sums.iter().filter_map(|(square, sum)| Some([*square as u64, place(most(sum)?)? as u64]));
+    let skill_at = sums.iter().filter_map(|(square, sum)| Some([*square as u64, rank(most(sum)?)? as u64]));
     LevelMaps {
         x: squares.grid.origin.x,
         y: squares.grid.origin.y,
@@ -97,21 +96,21 @@ fn maps(squares: &LevelSquares, sums: &BTreeMap<usize, Sum>) -> LevelMaps {
 }
 
 /// Returns the path to the first finding from play, or else the path of the first episode that failed.
-fn failure(names: &[&str], played: &[&[Played]], findings: &[Finding]) -> Option<FailureWay> {
-    let way = |tester: usize, episode: usize| {
+fn failure(names: &[&str], played: &[&[Played]], findings: &[Finding]) -> Option<FailurePath> {
+    let path = |tester: usize, episode: usize| {
         let Walk { trail, .. } = played.get(tester)?.get(episode)?.walk.as_ref()?;
         let tester = (*names.get(tester)?).to_owned();
-        Some(FailureWay { tester, episode: u32::try_from(episode).ok()?, way: trail.clone() })
+        Some(FailurePath { tester, episode: u32::try_from(episode).ok()?, path: trail.clone() })
     };
     let found = findings.iter().find_map(|finding| {
         let tester = names.iter().position(|name| Some(*name) == finding.tester.as_deref())?;
-        way(tester, finding.episode? as usize)
+        path(tester, finding.episode? as usize)
     });
     found.or_else(|| {
         let all = played.iter().enumerate().flat_map(|(tester, episodes)| {
             episodes.iter().enumerate().map(move |(number, episode)| (tester, number, episode))
         });
-        all.filter(|(.., episode)| has_failed(episode)).find_map(|(tester, number, _)| way(tester, number))
+        all.filter(|(.., episode)| has_failed(episode)).find_map(|(tester, number, _)| path(tester, number))
     })
 }
 
@@ -153,7 +152,7 @@ mod tests {
             skills: skills.to_vec(),
         };
         let walk = Some(Walk { squares, counts: counts.iter().map(count).collect(), trail });
-        Played { end: PlayedEnd::Ended { result, place: None, cause: None }, exact: true, found: Vec::new(), walk }
+        Played { end: PlayedEnd::Ended { result, position: None, cause: None }, exact: true, found: Vec::new(), walk }
     }
 
     #[test]
@@ -173,7 +172,7 @@ mod tests {
         assert_eq!(maps.skill_at, [[0, 0], [1, 0], [2, 1]]);
         let failure = maps.failure.expect("one has failed");
         assert_eq!((failure.tester.as_str(), failure.episode), ("b", 0));
-        assert_eq!(failure.way, [[1, 1], [2, 1], [4, 1]]);
+        assert_eq!(failure.path, [[1, 1], [2, 1], [4, 1]]);
     }
 
     #[test]
@@ -189,7 +188,7 @@ mod tests {
             settings: Vec::new(),
         };
         let found = LevelVisits::of(&plan(), &["a"], &[&episodes], &[finding]).and_then(|walked| walked.maps.failure);
-        assert_eq!(found.map(|failure| (failure.episode, failure.way)), Some((1, vec![[3, 1]])));
+        assert_eq!(found.map(|failure| (failure.episode, failure.path)), Some((1, vec![[3, 1]])));
         let solved = LevelVisits::of(&plan(), &["a"], &[&episodes[1..]], &[]).expect("walks are known");
         assert_eq!(solved.maps.failure, None);
         let unknown = [Played { walk: None, ..episodes[0].clone() }];

@@ -1,6 +1,6 @@
 //! Clips: the path of a failure as an animated PNG of the plan with a dot and its trail.
 
-use crate::verdict::{FailureWay, LevelMaps};
+use crate::verdict::{FailurePath, LevelMaps};
 use bevy::math::{Rect, Vec2};
 use playbot_harness::{drawing::Rgb, floor_plan::FloorPlan};
 use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, Filter};
@@ -28,19 +28,19 @@ const PACE: [f64; 2] = [30.0, 800.0];
 /// Returns the clip of a level's failure, which plays once; `None` without a failure or anything to draw. Of a path
 /// that is too long for a clip, the end is shown.
 pub(crate) fn clip(plan: &FloorPlan, maps: &LevelMaps, tick_hz: f64) -> Option<Vec<u8>> {
-    let FailureWay { way, .. } = maps.failure.as_ref()?;
+    let FailurePath { path, .. } = maps.failure.as_ref()?;
     let all = maps.columns.checked_mul(maps.rows)?;
     let is_drawn = maps.columns.max(maps.rows) <= MOST_SQUARES && all > 0 && maps.side > 0.0 && tick_hz > 0.0;
-    if !is_drawn || way.iter().any(|[square, _]| *square >= all) {
+    if !is_drawn || path.iter().any(|[square, _]| *square >= all) {
         return None;
     }
-    let mut way = way.as_slice();
-    while !way.is_empty() {
-        let bytes = Clip::new(plan, maps, tick_hz).encode(way).ok()?;
+    let mut path = path.as_slice();
+    while !path.is_empty() {
+        let bytes = Clip::new(plan, maps, tick_hz).encode(path).ok()?;
         if bytes.len() <= MOST_BYTES {
             return Some(bytes);
         }
-        way = &way[way.len() / 2 + 1..];
+        path = &path[path.len() / 2 + 1..];
     }
     None
 }
@@ -81,7 +81,7 @@ impl Clip {
         [column, row, column + 1, row + 1].map(|edge| (edge * self.scale) as usize)
     }
 
-    fn encode(&mut self, way: &[[u64; 2]]) -> Result<Vec<u8>, EncodingError> {
+    fn encode(&mut self, path: &[[u64; 2]]) -> Result<Vec<u8>, EncodingError> {
         let mut bytes = Vec::new();
         let mut encoder = Encoder::new(&mut bytes, self.canvas.width as u32, self.canvas.height as u32);
         encoder.set_color(ColorType::Indexed);
@@ -91,12 +91,12 @@ impl Clip {
         encoder.set_trns(vec![0]);
         encoder.set_compression(Compression::Balanced);
         encoder.set_filter(Filter::NoFilter);
-        encoder.set_animated(way.len() as u32, 1)?;
+        encoder.set_animated(path.len() as u32, 1)?;
         let mut writer = encoder.write_header()?;
-        let total = way.iter().map(|[_, ticks]| *ticks as f64).sum::<f64>() * self.tick;
+        let total = path.iter().map(|[_, ticks]| *ticks as f64).sum::<f64>() * self.tick;
         let speed = (total / LONGEST).max(1.0);
         let mut before: Option<[usize; 4]> = None;
-        for [square, ticks] in way {
+        for [square, ticks] in path {
             let now = self.pixels(*square);
             let mut changed = [0, 0, self.canvas.width, self.canvas.height];
             if let Some(before) = before {
@@ -117,6 +117,21 @@ impl Clip {
         writer.finish()?;
         Ok(bytes)
     }
+}
+
+const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+
+/// Encodes bytes in Base64 with padding (RFC 4648).
+pub(crate) fn base64(bytes: &[u8]) -> String {
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let bits = three.iter().fold(0_usize, |bits, byte| (bits << 8) | usize::from(*byte)) << (8 * (3 - three.len()));
+        for place in 0..4 {
+            let letter = LETTERS[(bits >> (18 - 6 * place)) & 63];
+            text.push(if place <= three.len() { char::from(letter) } else { '=' });
+        }
+    }
+    text
 }
 
 // Canvas of pixels in a few colours.
@@ -178,39 +193,21 @@ impl Canvas {
     }
 }
 
-// Base64, for data URLs.
-
-const LETTERS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-
-/// Encodes bytes in Base64 with padding (RFC 4648).
-pub(crate) fn base64(bytes: &[u8]) -> String {
-    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
-    for three in bytes.chunks(3) {
-        let bits = three.iter().fold(0_usize, |bits, byte| (bits << 8) | usize::from(*byte)) << (8 * (3 - three.len()));
-        for place in 0..4 {
-            let letter = LETTERS[(bits >> (18 - 6 * place)) & 63];
-            text.push(if place <= three.len() { char::from(letter) } else { '=' });
-        }
-    }
-    text
-}
-
 #[cfg(test)]
 mod tests {
-    use std::io::Cursor;
-
     use super::*;
     use crate::verdict_report::testing::garden;
+    use std::io::Cursor;
 
-    fn maps(way: Vec<[u64; 2]>) -> LevelMaps {
-        let failure = Some(FailureWay { tester: "random".to_owned(), episode: 0, way });
+    fn maps(path: Vec<[u64; 2]>) -> LevelMaps {
+        let failure = Some(FailurePath { tester: "random".to_owned(), episode: 0, path });
         LevelMaps { side: 1.0, columns: 64, rows: 16, failure, ..LevelMaps::default() }
     }
 
     #[test]
     fn a_dot_goes_the_way_and_every_frame_can_be_read() {
-        let way: Vec<[u64; 2]> = (65..85).map(|square| [square, 3]).collect();
-        let bytes = clip(&garden(), &maps(way), 15.0).expect("a way");
+        let path: Vec<[u64; 2]> = (65..85).map(|square| [square, 3]).collect();
+        let bytes = clip(&garden(), &maps(path), 15.0).expect("a path");
         assert!(bytes.len() < 4_000, "{} bytes", bytes.len());
         let mut reader = png::Decoder::new(Cursor::new(&bytes)).read_info().expect("a picture");
         assert_eq!((reader.info().width, reader.info().height), (192, 48));
@@ -232,8 +229,8 @@ mod tests {
 
     #[test]
     fn long_ways_stay_small() {
-        let way: Vec<[u64; 2]> = (0..200).map(|step| [(step * 37) % 1024, 500]).collect();
-        let bytes = clip(&garden(), &maps(way), 15.0).expect("a way");
+        let path: Vec<[u64; 2]> = (0..200).map(|step| [(step * 37) % 1024, 500]).collect();
+        let bytes = clip(&garden(), &maps(path), 15.0).expect("a path");
         assert!(bytes.len() <= MOST_BYTES, "{} bytes", bytes.len());
     }
 
@@ -245,11 +242,6 @@ mod tests {
         let huge = LevelMaps { columns: u64::MAX, ..maps(vec![[0, 1]]) };
         assert_eq!(clip(&garden(), &huge, 15.0), None);
     }
-}
-
-#[cfg(test)]
-mod canvas_tests {
-    use super::*;
 
     #[test]
     fn areas_are_clipped_and_rows_are_padded() {
@@ -263,11 +255,6 @@ mod canvas_tests {
         assert_eq!(canvas.packed([0, 0, 3, 2]), [0x00, 0x60, 0x11, 0x00]);
         assert_eq!(canvas.packed([2, 0, 3, 1]), [0x60]);
     }
-}
-
-#[cfg(test)]
-mod base64_tests {
-    use super::*;
 
     #[test]
     fn texts_are_those_of_the_standard() {

@@ -67,8 +67,6 @@ impl<'a> Drawer<'a> {
     }
 }
 
-// Floor plans of tested levels.
-
 /// Floor plans of a test, if its levels can still be drawn as they were.
 pub enum Plans<'a> {
     /// The game can draw them.
@@ -135,7 +133,7 @@ fn difference(game: &dyn Game, record: &TestRecord) -> Option<String> {
     (!is_same).then(|| "the level files are not those that were tested".to_owned())
 }
 
-// Walks of agents and causes of ends, described.
+// Descriptions of walks and of causes of ends.
 
 /// Largest number of positions that are named for a cause.
 const MOST_PLACES: usize = 3;
@@ -147,9 +145,9 @@ const MOST_TESTERS: usize = 8;
 pub(crate) fn walks(level: &LevelVerdict) -> String {
     let mut out = String::new();
     if !level.causes.is_empty() {
-        let told: Vec<String> =
+        let reported: Vec<String> =
             most_frequent(&level.causes).map(|(cause, count)| cause_line(level, cause, count)).collect();
-        let _ = writeln!(out, "<p>Ended by {}.</p>", told.join("; "));
+        let _ = writeln!(out, "<p>Ended by {}.</p>", reported.join("; "));
     }
     if let Some(places) = level.places {
         let each = level.testers.iter().filter_map(|tester| Some((&tester.tester, tester.places?)));
@@ -200,7 +198,7 @@ fn swatch(rank: usize) -> String {
 mod tests {
     use super::*;
     use crate::{
-        verdict::{FailureWay, LevelMaps},
+        verdict::{FailurePath, LevelMaps, Places, SquareEnds},
         verdict_report::testing::{Garden, level, record},
     };
 
@@ -209,7 +207,7 @@ mod tests {
         let tested = record("hard:0..299", None);
         let plans = Plans::of(Some(&Garden), &tested);
         let mut drawer = Drawer::new(&plans);
-        let failure = Some(FailureWay { tester: "random".to_owned(), episode: 0, way: vec![[65, 3], [66, 1]] });
+        let failure = Some(FailurePath { tester: "random".to_owned(), episode: 0, path: vec![[65, 3], [66, 1]] });
         let maps = LevelMaps { side: 1.0, columns: 64, rows: 16, failure, ..LevelMaps::default() };
         let mut clips = 0;
         for index in 0..300 {
@@ -222,12 +220,6 @@ mod tests {
         }
         assert_eq!((drawer.pictures, drawer.maps, clips), (200, 100, MOST_CLIPS));
     }
-}
-
-#[cfg(test)]
-mod plans_tests {
-    use super::*;
-    use crate::verdict_report::testing::{Garden, level, record};
 
     #[test]
     fn only_levels_that_are_as_they_were_are_drawn() {
@@ -253,15 +245,6 @@ mod plans_tests {
         let without = Plans::of(None, &tested);
         assert_eq!(without.problem(), Some("this program does not have the game `garden`"));
     }
-}
-
-#[cfg(test)]
-mod walks_tests {
-    use super::*;
-    use crate::{
-        verdict::{LevelMaps, Places, SquareEnds},
-        verdict_report::testing::level,
-    };
 
     #[test]
     fn causes_places_lost_time_and_skills_are_told() {
@@ -287,7 +270,7 @@ mod walks_tests {
             ..level(0, 0, 8, 0)
         };
         level.testers[0].places = Some(Places { visited: 1, open: 4 });
-        let told = walks(&level);
+        let reported = walks(&level);
         for words in [
             "<p>Ended by saw 5 (at 21.00, 3.000 and 11.00, 3.000); time 2; &lt;saw&gt; 1 (at 13.00, 3.000).</p>",
             "<p>Visited 75.0 % of the open squares (random 25.0 %).</p>",
@@ -295,7 +278,7 @@ mod walks_tests {
             "z1+ 12.5 %, ",
             "others.</p>",
         ] {
-            assert!(told.contains(words), "{words} in {told}");
+            assert!(reported.contains(words), "{words} in {reported}");
         }
         assert_eq!(crate::verdict_report::causes(&level), "saw 5, time 2, &lt;saw&gt; 1");
         assert_eq!(walks(&crate::verdict_report::testing::level(0, 1, 1, 3)), "", "older results say nothing");

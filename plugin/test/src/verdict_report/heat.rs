@@ -139,7 +139,7 @@ fn dominant(maps: &LevelMaps, step: u64, others: usize) -> BTreeMap<(u64, u64), 
     sums.into_iter().filter_map(|(place, ranks)| Some((place, most(ranks)?.0))).collect()
 }
 
-// Shapes of a floor on a grid of whole numbers, and short SVG paths around them.
+// Shapes of a floor on a grid of whole numbers, and SVG paths around them.
 
 /// Units of the grid along the longer side of a floor.
 const LENGTH: f32 = 640.0;
@@ -285,11 +285,6 @@ mod tests {
         assert!(visits.len() <= MOST_BYTES && visits.contains("visit\" opacity"), "{} bytes", visits.len());
         assert_eq!(layers(&grid(), &LevelMaps::default()), "");
     }
-}
-
-#[cfg(test)]
-mod shapes_tests {
-    use super::*;
 
     #[test]
     fn blocks_lie_on_whole_numbers_with_the_lowest_below() {

@@ -29,6 +29,18 @@ const HEAD: &str = "\
 <th scope=\"col\">visited</th><th scope=\"col\">found by</th></tr></thead>
 ";
 
+/// Sort key of an unknown share: before all others.
+const UNKNOWN: f64 = -1.0;
+
+/// Sort key of a missing finish time: after all others.
+const NEVER: f64 = 1e12;
+
+/// Largest number of findings and testers of a level that are listed, which keeps the page fast.
+const MOST_LISTED: usize = 10;
+
+/// Largest number of levels in the table: a longer page would open slowly. All levels are in `results.json`.
+const MOST_LEVELS: usize = 2_000;
+
 /// Writes the section of the page.
 pub(crate) fn level_table(record: &TestRecord, selection: &Selection, plans: &Plans, program: &str) -> String {
     let mut rows = String::new();
@@ -59,13 +71,48 @@ pub(crate) fn level_table(record: &TestRecord, selection: &Selection, plans: &Pl
     out + FILTER + HEAD + &rows + "</table></div>\n</section>\n"
 }
 
-// Rows of a level in the table.
+/// Levels of a test, the worst ones first.
+pub struct Selection {
+    /// The levels of the table.
+    pub levels: Vec<LevelVerdict>,
+    /// Number of the other levels, which are not worse.
+    pub left_out: u64,
+}
 
-/// Sort key of an unknown share: before all others.
-const UNKNOWN: f64 = -1.0;
+impl Selection {
+    /// Reads the results in a folder. Memory does not grow with their number.
+    pub fn read(folder: &Path) -> Result<Self, TestError> {
+        let mut lines = ResultLines::open(folder)?;
+        let (mut levels, mut all) = (Vec::new(), 0_u64);
+        while let Some(level) = lines.next_level()? {
+            all += 1;
+            levels.push(level);
+            if levels.len() >= 2 * MOST_LEVELS {
+                keep_worst(&mut levels);
+            }
+        }
+        keep_worst(&mut levels);
+        let left_out = all - levels.len() as u64;
+        Ok(Self { levels, left_out })
+    }
+}
 
-/// Sort key of a missing finish time: after all others.
-const NEVER: f64 = 1e12;
+fn keep_worst(levels: &mut Vec<LevelVerdict>) {
+    levels.sort_by(worst_first);
+    levels.truncate(MOST_LEVELS);
+}
+
+/// Orders by more findings, then fewer solved episodes, then slower ones, then the order in the range.
+fn worst_first(one: &LevelVerdict, other: &LevelVerdict) -> Ordering {
+    let share = |a: &LevelVerdict, b: &LevelVerdict| u128::from(a.score.solved) * u128::from(b.score.episodes);
+    let ticks = |level: &LevelVerdict| level.score.ticks.map_or(0.0, |ticks| ticks.median);
+    let findings = other.findings.len().cmp(&one.findings.len());
+    findings
+        .then_with(|| one.outcome.cmp(&other.outcome))
+        .then_with(|| share(one, other).cmp(&share(other, one)))
+        .then_with(|| ticks(other).total_cmp(&ticks(one)))
+        .then_with(|| one.index.cmp(&other.index))
+}
 
 /// Writes the rows of a level: its numbers, and below them its details, if it has findings or a picture. `data-v` is
 /// the sort key of a column, `data-k` the filter key of a level.
@@ -113,10 +160,7 @@ fn detectors(level: &LevelVerdict) -> String {
     if names.is_empty() { "–".to_owned() } else { escape(&names.join(", ")) }
 }
 
-// Details of one level: findings, picture, testers, and commands to see it again.
-
-/// Largest number of findings and testers of a level that are listed, which keeps the page fast.
-const MOST_LISTED: usize = 10;
+// Details of one level.
 
 /// Writes the details of a level, with its picture if it has one.
 pub(crate) fn details(record: &TestRecord, level: &LevelVerdict, program: &str, drawn: Option<&Drawn>) -> String {
@@ -188,56 +232,8 @@ fn testers(testers: &[TesterVerdict]) -> String {
     out + "</tbody></table></div>\n"
 }
 
-// Selection of the levels that the page shows.
-
-/// Largest number of levels in the table: a longer page would open slowly. All levels are in `results.json`.
-const MOST_LEVELS: usize = 2_000;
-
-/// Levels of a test, the worst ones first.
-pub struct Selection {
-    /// The levels of the table.
-    pub levels: Vec<LevelVerdict>,
-    /// Number of the other levels, which are not worse.
-    pub left_out: u64,
-}
-
-impl Selection {
-    /// Reads the results in a folder. Memory does not grow with their number.
-    pub fn read(folder: &Path) -> Result<Self, TestError> {
-        let mut lines = ResultLines::open(folder)?;
-        let (mut levels, mut all) = (Vec::new(), 0_u64);
-        while let Some(level) = lines.next_level()? {
-            all += 1;
-            levels.push(level);
-            if levels.len() >= 2 * MOST_LEVELS {
-                keep_worst(&mut levels);
-            }
-        }
-        keep_worst(&mut levels);
-        let left_out = all - levels.len() as u64;
-        Ok(Self { levels, left_out })
-    }
-}
-
-fn keep_worst(levels: &mut Vec<LevelVerdict>) {
-    levels.sort_by(worst_first);
-    levels.truncate(MOST_LEVELS);
-}
-
-/// Orders by more findings, then fewer solved episodes, then slower ones, then the order in the range.
-fn worst_first(one: &LevelVerdict, other: &LevelVerdict) -> Ordering {
-    let share = |a: &LevelVerdict, b: &LevelVerdict| u128::from(a.score.solved) * u128::from(b.score.episodes);
-    let ticks = |level: &LevelVerdict| level.score.ticks.map_or(0.0, |ticks| ticks.median);
-    let findings = other.findings.len().cmp(&one.findings.len());
-    findings
-        .then_with(|| one.outcome.cmp(&other.outcome))
-        .then_with(|| share(one, other).cmp(&share(other, one)))
-        .then_with(|| ticks(other).total_cmp(&ticks(one)))
-        .then_with(|| one.index.cmp(&other.index))
-}
-
 #[cfg(test)]
-mod selection_tests {
+mod tests {
     use super::*;
     use crate::verdict_report::testing::{finding, level, record, tested};
 

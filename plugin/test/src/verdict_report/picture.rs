@@ -107,7 +107,7 @@ fn is_finite(area: &Rect) -> bool {
     area.min.is_finite() && area.max.is_finite()
 }
 
-// Legend of the pictures, and the control that switches their layers.
+// Legend of the pictures.
 
 /// Legend of the marks of all pictures.
 const MARKS: &str = "\

@@ -1,8 +1,8 @@
 //! Levels, results and a game for unit tests.
 
 use crate::verdict::{
-    Earlier, Finding, FinishTime, LevelOutcome, LevelVerdict, MapScope, Score, TestFolder, TestRecord, TesterRecord,
-    TesterVerdict, wilson,
+    Earlier, EpisodeScore, Finding, FinishTime, LevelOutcome, LevelVerdict, MapScope, TestFolder, TestRecord,
+    TesterRecord, TesterVerdict, wilson,
 };
 use bevy::prelude::*;
 use bevy_playbot::{action::ActionSpace, observation::ObservationSpace};
@@ -88,7 +88,7 @@ pub(crate) fn record(range: &str, shard: Option<&str>) -> TestRecord {
 
 /// Makes a level of `hard:0..` with so many solved episodes of so many ticks; the others are lost.
 pub(crate) fn level(index: u64, solved: u64, episodes: u64, ticks: u32) -> LevelVerdict {
-    let score = Score {
+    let score = EpisodeScore {
         solved,
         episodes,
         interval: wilson(solved, episodes),

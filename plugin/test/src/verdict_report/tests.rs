@@ -2,7 +2,7 @@
 
 use crate::{
     verdict::{
-        Comparison, FailureWay, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard, SkillTicks,
+        Comparison, FailurePath, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard, SkillTicks,
         SquareEnds, TestError, TestRecord, TesterVerdict, merge,
     },
     verdict_report::{
@@ -25,7 +25,7 @@ fn page(levels: &[LevelVerdict], report: &HtmlReport) -> String {
 /// Makes maps of a level with agents everywhere, and a failure path all over it.
 fn full_maps() -> LevelMaps {
     let often = |square: u64| [square, 1 + square * square * 7919 % 997];
-    let way = (0..200).map(|step| [step * 389 % 1024, 40]).collect();
+    let path = (0..200).map(|step| [step * 389 % 1024, 40]).collect();
     LevelMaps {
         side: 1.0,
         columns: 64,
@@ -34,7 +34,7 @@ fn full_maps() -> LevelMaps {
         lost: (0..1024).map(|square| often(square + 3)).map(|[square, ticks]| [square - 3, ticks]).collect(),
         skills: (1..9).map(|number| SkillTicks { skill: format!("z{number}+"), ticks: 7 }).collect(),
         skill_at: (0..1024).map(|square| [square, often(square)[1] % 8]).collect(),
-        failure: Some(FailureWay { tester: "random".to_owned(), episode: 3, way }),
+        failure: Some(FailurePath { tester: "random".to_owned(), episode: 3, path }),
         ..LevelMaps::default()
     }
 }

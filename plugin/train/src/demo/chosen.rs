@@ -42,11 +42,7 @@ impl Demonstrations {
         self.episodes.retain(|_| keep.next().unwrap_or(false));
         self
     }
-}
 
-// The levels of demonstrations, as learners store them.
-
-impl Demonstrations {
     /// Returns the levels that the demonstrations show.
     pub fn seen_levels(&self, game: &dyn Game) -> SeenLevels {
         let (mut levels, mut files) = (BTreeMap::<&str, BTreeSet<u64>>::new(), BTreeSet::new());

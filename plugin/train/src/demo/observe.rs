@@ -16,7 +16,7 @@ use bevy_playbot::{
 };
 use playbot_harness::{
     arrangement::at_most,
-    demo::{Replayed, VerifyError},
+    demo::{ReplayedEpisodes, VerifyError},
     game::Game,
     parallel::on_threads,
     sensors::GameSensors,
@@ -66,7 +66,7 @@ impl Demonstrations {
         match error {
             ReplayError::Vision(error) => error.into(),
             ReplayError::Fault { ids, fault } => {
-                VerifyError::Fault { replayed: Replayed::new(ids.into_iter().map(place)), fault }
+                VerifyError::Fault { replayed: ReplayedEpisodes::new(ids.into_iter().map(place)), fault }
             }
         }
     }
@@ -85,7 +85,7 @@ impl Demonstrations {
     }
 }
 
-// Observations and rewards of recordings, from replays of many at a time.
+// Replays of many recordings at a time.
 
 /// Recordings that one World replays at the same time. They share the cost of a tick and of a camera.
 const SIDE_BY_SIDE: usize = 16;

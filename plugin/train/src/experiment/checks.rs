@@ -157,8 +157,6 @@ fn nearest_divisor(n: u64, wanted: u64) -> u64 {
     small.flat_map(|d| [d, n / d]).min_by_key(distance).unwrap_or(1)
 }
 
-// Checks that an experiment fits its game: levels, actions and observations.
-
 impl Experiment {
     /// Checks the settings that depend on the game's levels, actions and observations, before hours are spent on
     /// skills.
@@ -292,8 +290,6 @@ fn check_mode(key: &'static str, levels: &LevelSplit, game: &dyn Game) -> Result
     })
 }
 
-// Checks of an experiment whose policy chooses skills.
-
 impl Experiment {
     /// Checks that skills are whole and drawn, as a policy over skills needs them.
     pub(crate) fn check_skill_draws(&self) -> Result<(), ExperimentError> {
@@ -313,7 +309,7 @@ impl Experiment {
         if limit != TimeLimit::Bootstrap {
             return refuse(limit_key, "Legacy", "a policy over skills needs Bootstrap: its rollouts are cut anyway");
         }
-        let least = self.score.horizon.saturating_mul(2);
+        let least = self.score.skill_interval.saturating_mul(2);
         if steps < least {
             let why =
                 format!("a policy over skills learns from whole skills: use at least 2 × `score.horizon` = {least}");
@@ -428,8 +424,7 @@ mod tests {
     use std::path::Path;
 
     use super::*;
-    use crate::Algorithm;
-    use crate::experiment::file::parse_experiment;
+    use crate::{Algorithm, experiment::file::parse_experiment};
 
     fn check(changes: &str) -> Result<(), String> {
         let text = format!(r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: 1000, {changes})"#);
@@ -504,7 +499,7 @@ mod tests {
     #[test]
     fn nobody_plays_nowhere() {
         // Not with the learning rate that cannot fall over no updates.
-        let text = check(r#"algorithm: "ppo", arenas: 0, ppo: (anneal_lr: true)"#).expect_err("nobody");
+        let text = check(r#"algorithm: "ppo", arenas: 0, ppo: (anneal_lr: true)"#).expect_err("refused");
         assert_eq!(text, "`arenas` is 0: must be at least 1");
         let text = check(r#"algorithm: "ppo", worlds: 0"#).expect_err("nowhere");
         assert!(text.starts_with("`worlds` is 0"), "{text}");
@@ -570,14 +565,6 @@ mod tests {
         assert_eq!(long, "`sac.updates_per_step` must lie in 0..10000, but is 1e300");
         assert_eq!(check(&ppo("ppo: (max_grad_norm: 1e9, ent_coef: 0, epochs: 100)")), Ok(()));
     }
-}
-
-#[cfg(test)]
-mod experiment_fit_tests {
-    use std::path::Path;
-
-    use super::*;
-    use crate::experiment::file::parse_experiment;
 
     #[test]
     fn actions_are_checked_before_skills_are_learned() {
@@ -598,15 +585,8 @@ mod experiment_fit_tests {
         let untied = r#"algorithm: "sac", score: (penalty: LegacyCoinrun)"#;
         assert_eq!(check(untied, ActionSpace::Continuous(8)), Ok(()));
     }
-}
 
-#[cfg(test)]
-mod prior_checks_tests {
-    use std::path::Path;
-
-    use crate::experiment::file::parse_experiment;
-
-    fn check(changes: &str) -> Result<(), String> {
+    fn check_with_demos(changes: &str) -> Result<(), String> {
         let text = format!(r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: 1000, demos: "d", {changes})"#);
         parse_experiment(&text, Path::new("x.ron")).expect("valid").check().map_err(|error| error.to_string())
     }
@@ -623,10 +603,13 @@ mod prior_checks_tests {
             (r#"algorithm: "rlpd", rlpd: (demo_share: 1.0)"#, "`rlpd.demo_share` must lie between"),
             (r#"algorithm: "rlpd", observation: Raster"#, "`observation` is Raster: rlpd learns from vectors only"),
         ] {
-            let text = check(changes).expect_err(changes);
+            let text = check_with_demos(changes).expect_err(changes);
             assert!(text.contains(words), "{changes}: {text}");
         }
-        assert_eq!(check(r#"algorithm: "spirl-sac", sac: (num_steps: 16), ppo: (time_limit: Legacy)"#), Ok(()));
-        assert_eq!(check(r#"algorithm: "score-ppo", score: (skill_draw: Mean)"#), Ok(()));
+        assert_eq!(
+            check_with_demos(r#"algorithm: "spirl-sac", sac: (num_steps: 16), ppo: (time_limit: Legacy)"#),
+            Ok(())
+        );
+        assert_eq!(check_with_demos(r#"algorithm: "score-ppo", score: (skill_draw: Mean)"#), Ok(()));
     }
 }

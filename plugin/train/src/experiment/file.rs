@@ -31,15 +31,6 @@ const MAX_BASES: usize = 64;
 /// Largest size of a file in bytes. The longest experiments have a few thousand.
 const MAX_BYTES: u64 = 1 << 20;
 
-/// The files that are being read for one experiment.
-#[derive(Default)]
-struct Reading {
-    /// Files that have the current one as a base, the outermost first.
-    users: Vec<PathBuf>,
-    /// Files and presets read so far, beside the experiment itself.
-    bases: usize,
-}
-
 /// Reads and checks an experiment.
 ///
 /// # Errors
@@ -129,6 +120,15 @@ pub fn read_experiment_text(path: &Path) -> Result<String, ConfigError> {
     read_text_file(path, MAX_BYTES).map_err(|error| ConfigError::Read { path: path.into(), source: error.into() })
 }
 
+/// The files that are being read for one experiment.
+#[derive(Default)]
+struct Reading {
+    /// Files that have the current one as a base, the outermost first.
+    users: Vec<PathBuf>,
+    /// Files and presets read so far, beside the experiment itself.
+    bases: usize,
+}
+
 /// Collects the keys of a file over those of its bases. Each file is checked alone: a wrong value is reported even if a
 /// later one overrides it.
 fn gather(text: &str, path: &Path, reading: &mut Reading) -> Result<Keys, ConfigError> {
@@ -187,8 +187,6 @@ fn gather_base(name: &str, reading: &mut Reading, origin: &Origin) -> Result<Key
         .map_err(|error| origin.error((1, 1), format!("{error}; or a file, by its path ending in .ron")))?;
     gather(preset.text, &path, reading)
 }
-
-// Changes of single settings by `--set key=value`.
 
 impl Experiment {
     /// Returns this experiment with each `key=value` put into it, in order. A key in a section has its path, such as

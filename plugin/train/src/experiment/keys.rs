@@ -295,7 +295,7 @@ impl Keys {
     }
 }
 
-// Keys of an experiment, from the tables of its settings, and messages about unknown keys and wrong values.
+// Keys of an experiment, and messages about unknown keys and wrong values.
 
 /// Settings that are no sections, by their path.
 static ALL_SETTINGS: LazyLock<BTreeMap<&'static str, &'static Setting>> = LazyLock::new(|| {
@@ -488,7 +488,7 @@ fn word(text: &str) -> &str {
     &text[..end]
 }
 
-// Reference page of all settings, written from their tables.
+// The reference page of all settings.
 
 /// Returns the reference page of all settings as Markdown: key, type, default, range, readers and documentation of
 /// each.
@@ -591,6 +591,7 @@ fn summary(doc: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Algorithm;
 
     #[test]
     fn values_of_every_kind_come_out_as_written() {
@@ -634,12 +635,6 @@ mod tests {
         assert_eq!(at(fields[0].1), (2, 6));
         assert_eq!(at(fields[1].0), (3, 3));
     }
-}
-
-#[cfg(test)]
-mod known_settings_tests {
-    use super::*;
-    use crate::Algorithm;
 
     #[test]
     fn rows_lie_in_their_sections_and_name_algorithms_and_switches_that_exist() {
@@ -658,11 +653,6 @@ mod known_settings_tests {
         }
         assert_eq!(renamed("sac.alpha_lr"), Some("sac.temperature_lr"));
     }
-}
-
-#[cfg(test)]
-mod settings_page_tests {
-    use super::*;
 
     #[test]
     fn rows_say_type_default_range_and_readers() {

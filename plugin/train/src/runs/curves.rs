@@ -2,9 +2,9 @@
 
 use crate::{
     checkpoint,
-    metrics_log::{EPISODE_MEANS, EPISODES, JsonLines, MetricsLog, SPS, scalars},
-    progress::RECENT,
+    metrics_log::{JsonLines, MetricsLog, SPS, scalars},
     runs::RunsError,
+    update_report::{EPISODE_MEANS, EPISODES, RECENT},
 };
 use bevy_playbot::unknown_name::UnknownName;
 use std::{collections::BTreeMap, path::Path};

@@ -272,14 +272,15 @@ fn flatten(value: &Value, path: String, found: &mut BTreeMap<String, String>) {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
+    use std::{fs, path::Path};
+
     use playbot_learner::DeviceKind;
 
     use super::*;
-    use crate::runs::{curves::RunCurves, group::settings_tests::experiment};
-    use crate::{Algorithm, run_dir::RunInfo};
+    use crate::{Algorithm, experiment::file::parse_experiment, run_dir::RunInfo, runs::curves::RunCurves};
 
-    pub fn run(algorithm: Algorithm, seed: u64, changes: &str) -> RunRecord {
+    fn run(algorithm: Algorithm, seed: u64, changes: &str) -> RunRecord {
         let experiment = experiment(&format!("seed: {seed}, {changes}"));
         let (version, revision) = ("1".into(), "r".into());
         let info = RunInfo {
@@ -365,15 +366,6 @@ pub(super) mod tests {
         assert!(warnings.contains("same seed") && warnings.contains("not finished"), "{warnings}");
         assert!(warnings.contains("revisions"), "{warnings}");
     }
-}
-
-#[cfg(test)]
-mod group_statistics_tests {
-    use std::fs;
-
-    use super::*;
-    use crate::Algorithm;
-    use crate::runs::{curves::RunCurves, group::tests::run};
 
     fn with_curve(seed: u64, values: &[f64]) -> RunRecord {
         let folder = tempfile::tempdir().expect("a folder");
@@ -435,16 +427,8 @@ mod group_statistics_tests {
         let runs = [runs[0].clone(), run(Algorithm::Ppo, 2, "")];
         assert!(matches!(mean_and_spread(&group_runs(&runs), "charts/a"), Err(RunsError::NoMetrics(_))));
     }
-}
 
-#[cfg(test)]
-pub(super) mod settings_tests {
-    use std::path::Path;
-
-    use super::*;
-    use crate::experiment::file::parse_experiment;
-
-    pub fn experiment(changes: &str) -> Experiment {
+    fn experiment(changes: &str) -> Experiment {
         let text = format!(
             r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", demos: "d", steps: 100, {changes})"#
         );

@@ -51,8 +51,8 @@ impl StudyReport {
         }
     }
 
-    /// Returns the experiment with all its values, seeds and variants, for a file in `folder`. It begins with the command
-    /// that repeats the study.
+    /// Returns the experiment with all its values, seeds and variants, for a file in `folder`. It begins with the
+    /// command that repeats the study.
     ///
     /// # Errors
     ///

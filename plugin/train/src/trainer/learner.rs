@@ -14,8 +14,6 @@ use std::{
     path::Path,
 };
 
-pub use playbot_learner::LearnerMetrics;
-
 /// Learner of any algorithm.
 #[derive(Debug)]
 pub struct TrainedLearner(Box<dyn Learner>);
@@ -123,7 +121,7 @@ fn fitting<'a>(
 ) -> Result<&'a SkillModel, TrainError> {
     let skills = skills.ok_or(TrainError::NoSkills(experiment.algorithm))?;
     let (model, observation_config) =
-        (ObservationConfig::from_card(skills.picture(), &skills.observation())?, experiment.observation_config());
+        (ObservationConfig::from_metadata(skills.picture(), &skills.observation())?, experiment.observation_config());
     if model.is_image() != observation_config.is_image()
         || (observation_config.is_image() && model != observation_config)
     {

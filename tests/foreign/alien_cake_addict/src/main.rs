@@ -20,7 +20,7 @@ fn main() -> ExitCode {
         .observe(["i", "j", "cake_i", "cake_j", "cake"], |g: Res<Game>| {
             [g.player.i, g.player.j, g.bonus.i, g.bonus.j, g.bonus.entity.iter().len()].map(|n| n as f32 / 10.0)
         })
-        .place(|game: Res<Game>| Vec2::new(game.player.i as f32, game.player.j as f32))
+        .position(|game: Res<Game>| Vec2::new(game.player.i as f32, game.player.j as f32))
         .reward_delta(|game: Res<Game>| game.cake_eaten as f32)
         .end(|state: Res<State<GameState>>| (*state == GameState::GameOver).then_some(EpisodeEnd::LOST))
         .time_limit(1200)

@@ -11,14 +11,16 @@ use crate::defects;
 /// Adds the detector and the possible defects to the game.
 pub fn add_to(game: ForeignGame) -> ForeignGame {
     defects::add_to(game).detector(|| {
-        EachTick::new("cake-rules", "a cake is eaten by nobody who walked onto it, or not by who did", |moment| {
-            broken_rule(moment)
-        })
+        EachTick::new(
+            "cake-rules",
+            "a cake is eaten by a player that did not walk onto it, or not by one that did",
+            |moment| broken_rule(moment),
+        )
     })
 }
 
 fn broken_rule(moment: &DetectorTick<'_>) -> Option<String> {
-    let at = moment.place?.as_uvec2();
+    let at = moment.position?.as_uvec2();
     // The observation before the tick, in tens: see the adapter.
     let &[i, j, cake_i, cake_j, cakes] = moment.observation else { return None };
     let field = |i: f32, j: f32| UVec2::new((10.0 * i).round() as u32, (10.0 * j).round() as u32);
@@ -26,7 +28,7 @@ fn broken_rule(moment: &DetectorTick<'_>) -> Option<String> {
     let is_cake_here = cakes > 0.0 && field(cake_i, cake_j) == at;
     match (has_walked && is_cake_here, moment.reward > 0.0) {
         (true, false) => Some(format!("a player walks onto the cake at {at}, and it does not count")),
-        (false, true) => Some(format!("a cake counts at {at}, and nobody has walked onto one")),
+        (false, true) => Some(format!("a cake counts at {at}, and no player has walked onto one")),
         _ => None,
     }
 }
@@ -54,7 +56,7 @@ mod tests {
             observation: &seen,
             state_hash: 0,
             reward,
-            place: Some(Vec2::from_array(now)),
+            position: Some(Vec2::from_array(now)),
             is_success: false,
             proofs: &NoProofs,
         })

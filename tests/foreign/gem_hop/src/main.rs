@@ -17,7 +17,7 @@ fn main() -> ExitCode {
     playbot::main(&[&defects::add_to(ForeignGame::new("gem_hop", 1, game::game))
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
         .observe("x y vx vy coyote".split(' ').map(String::from).chain((0..24).map(|i| format!("ahead {i}"))), see)
-        .place(|at: Single<&Transform, With<Hero>>| at.translation.truncate())
+        .position(|at: Single<&Transform, With<Hero>>| at.translation.truncate())
         .reward_delta(|run: Res<Run>, at: Single<&Transform, With<Hero>>| run.gems as f32 + at.translation.x / 10.0)
         .end(|on: Res<State<Screen>>| matches!(**on, Won | Lost).then(|| Terminated { success: **on == Won }))
         .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>, mut next: ResMut<NextState<Screen>>| {

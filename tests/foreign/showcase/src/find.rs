@@ -39,7 +39,7 @@ fn metadata(options: &[&str]) -> Result<Value, String> {
         command.stdin(Stdio::null()).output().map_err(|error| format!("cannot run cargo metadata: {error}"))?;
     if !output.status.success() {
         let why = String::from_utf8_lossy(&output.stderr).trim().replace('\n', "; ");
-        return Err(format!("cargo metadata cannot tell where it is ({why}); `cargo fetch` may help"));
+        return Err(format!("cargo metadata does not find it ({why}); `cargo fetch` may help"));
     }
     serde_json::from_slice(&output.stdout)
         .map_err(|error| format!("cargo metadata answers something else than JSON: {error}"))

@@ -53,12 +53,12 @@ fn save_policy(path: &Path) {
     let trainer = small::trainer(Algorithm::ScorePpo);
     let policy = trainer.policy();
     let z = vec![0.25; 2 * policy.latent()];
-    let card = PolicyMetadata {
+    let metadata = PolicyMetadata {
         game: Corridor.name().to_owned(),
         game_version: Corridor.version(),
         ..PolicyMetadata::default()
     };
-    let file = PolicyFile { card, policy, skills: trainer.skill_source() };
+    let file = PolicyFile { metadata, policy, skills: trainer.skill_source() };
     file.save(path, &[0.5; 4][..], &z, 2).expect("written");
 }
 
@@ -89,12 +89,12 @@ fn learner(folder: &Path, algorithm: Algorithm) -> Read {
 fn policy(folder: &Path) -> Read {
     let file = PolicyFile::load(&folder.join(FILE), DEVICE).map_err(words)?;
     let output = file.policy.forward(&vec![0.1; file.policy.latent()], &vec![0.3; file.policy.obs_dim()], 1);
-    Ok(vec![format!("{:?}", file.card), format!("{output:?}")])
+    Ok(vec![format!("{:?}", file.metadata), format!("{output:?}")])
 }
 
 fn handle_policy(folder: &Path) {
     if let Ok(file) = PolicyFile::load(&folder.join(FILE), DEVICE) {
         // Its fit is not tested here.
-        let _ = check_policy(&Corridor.card(), &file);
+        let _ = check_policy(&Corridor.metadata(), &file);
     }
 }

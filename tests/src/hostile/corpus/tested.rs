@@ -7,8 +7,8 @@ use playbot_games::coinrun::CoinRun;
 use playbot_harness::detector::LevelProof;
 use playbot_test::{
     verdict::{
-        Comparison, Earlier, FailureWay, Finding, FinishTime, LevelMaps, LevelOutcome, LevelVerdict, MapScope,
-        Overview, Places, RESULTS, ResultLines, Score, Shard, SkillTicks, SquareEnds, TestFolder, TestRecord,
+        Comparison, Earlier, EpisodeScore, FailurePath, Finding, FinishTime, LevelMaps, LevelOutcome, LevelVerdict,
+        MapScope, Overview, Places, RESULTS, ResultLines, Shard, SkillTicks, SquareEnds, TestFolder, TestRecord,
         TesterRecord, TesterVerdict, merge, wilson, write_reports,
     },
     verdict_report::{HtmlReport, html},
@@ -73,8 +73,8 @@ fn record(shard: Option<Shard>) -> TestRecord {
     }
 }
 
-fn score(solved: u64, episodes: u64) -> Score {
-    Score {
+fn score(solved: u64, episodes: u64) -> EpisodeScore {
+    EpisodeScore {
         solved,
         episodes,
         interval: wilson(solved, episodes),
@@ -124,7 +124,7 @@ fn maps() -> LevelMaps {
         lost: vec![[3, 9]],
         skills: vec![SkillTicks { skill: "z1+".to_owned(), ticks: 71 }],
         skill_at: vec![[3, 0], [4, 0]],
-        failure: Some(FailureWay { tester: "random".to_owned(), episode: 1, way: vec![[3, 70], [4, 1]] }),
+        failure: Some(FailurePath { tester: "random".to_owned(), episode: 1, path: vec![[3, 70], [4, 1]] }),
         ..LevelMaps::default()
     }
 }
@@ -141,8 +141,8 @@ fn read_results(folder: &Path) -> Read {
 /// Resumes the test, of which every level may be finished, and returns its results.
 fn go_on(folder: &Path) -> Read {
     let folder = folder.join(TEST);
-    let (mut opened, told) = TestFolder::open(&folder, &record(None), Earlier::Resume).map_err(words)?;
-    if let Some(words) = told {
+    let (mut opened, reported) = TestFolder::open(&folder, &record(None), Earlier::Resume).map_err(words)?;
+    if let Some(words) = reported {
         return Err(words);
     }
     opened.finish().map_err(words)?;

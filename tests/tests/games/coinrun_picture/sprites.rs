@@ -84,7 +84,7 @@ fn a_player_stands_walks_jumps_and_turns() {
         assert!((size.y - 1.7415 * 1.1574).abs() < 1e-4, "taller than the body");
         let anchor = world.get::<Anchor>(agent).expect("drawn").0;
         let feet = at.translation.y - (anchor.y + 0.5) * size.y;
-        assert_eq!(at.translation.y, body.y, "the eye is on the middle of the body");
+        assert_eq!(at.translation.y, body.y, "the view is on the middle of the body");
         assert!((feet - (body.y - body.ry)).abs() < 1e-5, "the feet are on the ground");
     };
     feet(world);

@@ -10,7 +10,7 @@ use bevy_playbot::{
     vision::{BlankEpisodes, ImageOptions, TileLayer},
 };
 use playbot::prelude::*;
-use playbot_tests::scene::{camera_world, image, pixel, player, spawn_eye};
+use playbot_tests::scene::{camera_world, image, pixel, player, spawn_sensor};
 
 #[track_caller]
 fn fault(world: &mut World) -> String {
@@ -22,18 +22,18 @@ fn sizes_that_cannot_be_are_refused() {
     let mut world = camera_world(|_| {});
     let target = world.spawn(Transform::default()).id();
     for (size, word) in [([0, 64], "width is 0"), ([64, 0], "height is 0"), ([64, 100_000], "height is 100000")] {
-        let agent = spawn_eye(&mut world, 3, target, 4.0, size);
+        let agent = spawn_sensor(&mut world, 3, target, 4.0, size);
         let fault = fault(&mut world);
         assert!(fault.starts_with("agent 3, level 0, tick ") && fault.contains(word), "{fault}");
         world.despawn(agent);
     }
     for width in [0.0, -1.0, f32::NAN, f32::INFINITY] {
-        let agent = spawn_eye(&mut world, 3, target, width, [8, 8]);
+        let agent = spawn_sensor(&mut world, 3, target, width, [8, 8]);
         let fault = fault(&mut world);
         assert!(fault.contains("world units wide"), "{fault}");
         world.despawn(agent);
     }
-    spawn_eye(&mut world, 3, target, 4.0, [64, 64]);
+    spawn_sensor(&mut world, 3, target, 4.0, [64, 64]);
     world.tick().expect("sound");
 }
 
@@ -43,7 +43,7 @@ fn more_than_the_adapter_can_hold_is_refused() {
     let target = world.spawn(Transform::default()).id();
     // A picture may have 1,024 pixels a side; adapters hold 8,192 or 16,384, or 32,768.
     for i in 0..1100 {
-        spawn_eye(&mut world, i, target, 4.0, [1024, 1024]);
+        spawn_sensor(&mut world, i, target, 4.0, [1024, 1024]);
     }
     let fault = fault(&mut world);
     assert!(fault.contains("pictures together are over the graphics adapter's limit"), "{fault}");
@@ -53,8 +53,8 @@ fn more_than_the_adapter_can_hold_is_refused() {
 fn a_target_that_is_gone_is_named() {
     let mut world = camera_world(|_| {});
     let (gone, there) = (world.spawn(Transform::default()).id(), world.spawn(Transform::default()).id());
-    spawn_eye(&mut world, 6, gone, 4.0, [8, 8]);
-    let other = spawn_eye(&mut world, 7, there, 4.0, [8, 8]);
+    spawn_sensor(&mut world, 6, gone, 4.0, [8, 8]);
+    let other = spawn_sensor(&mut world, 7, there, 4.0, [8, 8]);
     world.tick().expect("sound");
     world.despawn(gone);
     let fault = fault(&mut world);
@@ -70,7 +70,7 @@ fn a_camera_on_a_target_without_pixels_is_named_and_seeing_goes_on_once_it_is_go
     let red = world.resource_mut::<Assets<Image>>().add(image(1, &[[255, 0, 0, 255]]));
     let here =
         world.spawn((Sprite { image: red, custom_size: Some(Vec2::ONE), ..default() }, Transform::default())).id();
-    let eye = spawn_eye(&mut world, 0, here, 4.0, [8, 8]);
+    let sensor = spawn_sensor(&mut world, 0, here, 4.0, [8, 8]);
     world.tick().expect("sound");
     let screen = |world: &mut World, [width, height]: [u32; 2]| {
         let screen = Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None);
@@ -87,9 +87,9 @@ fn a_camera_on_a_target_without_pixels_is_named_and_seeing_goes_on_once_it_is_go
             let options = ImageOptions { width: 8, height: 8, ..default() };
             let through = world.spawn((player(1), CameraSensor::of(camera, options))).id();
             for _ in 0..2 {
-                let told = fault(&mut world);
+                let reported = fault(&mut world);
                 let words = format!("the camera {camera} draws on a target of {}x{} pixels", size[0], size[1]);
-                assert!(told.contains(&words) && told.starts_with("agent "), "{told}");
+                assert!(reported.contains(&words) && reported.starts_with("agent "), "{reported}");
             }
             world.despawn(camera);
             world.despawn(through);
@@ -97,29 +97,29 @@ fn a_camera_on_a_target_without_pixels_is_named_and_seeing_goes_on_once_it_is_go
                 world.resource_mut::<Assets<Image>>().remove(&handle);
             }
             world.tick().expect("sound again");
-            assert_eq!([pixel(&world, eye, 4, 4), pixel(&world, eye, 0, 0)], [[255, 0, 0], [0, 0, 0]]);
+            assert_eq!([pixel(&world, sensor, 4, 4), pixel(&world, sensor, 0, 0)], [[255, 0, 0], [0, 0, 0]]);
         }
     }
     // An image without a camera makes the renderer stop as well.
     let handle = screen(&mut world, [0, 0]);
     let target = RenderTarget::Image(ImageRenderTarget { handle, scale_factor: 1.0 });
     let camera = world.spawn((Camera2d, target, Msaa::Off)).id();
-    let told = fault(&mut world);
-    assert!(told.starts_with("agent 0, ") && told.contains(&format!("the camera {camera}")), "{told}");
+    let reported = fault(&mut world);
+    assert!(reported.starts_with("agent 0, ") && reported.contains(&format!("the camera {camera}")), "{reported}");
 }
 
 #[test]
 fn things_without_an_image_are_named() {
     let mut world = camera_world(|_| {});
     let target = world.spawn(Transform::default()).id();
-    spawn_eye(&mut world, 0, target, 4.0, [8, 8]);
+    spawn_sensor(&mut world, 0, target, 4.0, [8, 8]);
     world.tick().expect("sound");
     let lost = world.resource::<AssetServer>().load("no/such/file.png");
     let sprite = world.spawn((Name::new("ghost"), Sprite::from_image(lost), Transform::default())).id();
-    let told = fault(&mut world);
+    let reported = fault(&mut world);
     assert!(
-        told.contains("`ghost`") && told.contains(&sprite.to_string()) && told.contains("no/such/file.png"),
-        "{told}"
+        reported.contains("`ghost`") && reported.contains(&sprite.to_string()) && reported.contains("no/such/file.png"),
+        "{reported}"
     );
     assert!(fault(&mut world).contains("`ghost`"), "as long as it is so");
     world.despawn(sprite);
@@ -129,11 +129,11 @@ fn things_without_an_image_are_named() {
     let layer = world.spawn((layer, Transform::default())).id();
     world.tick().expect("sound");
     world.resource_mut::<Assets<Image>>().remove(&soon_gone);
-    let told = fault(&mut world);
-    assert!(told.contains(&format!("tile layer {layer} has no image")), "{told}");
+    let reported = fault(&mut world);
+    assert!(reported.contains(&format!("tile layer {layer} has no image")), "{reported}");
     world.entity_mut(layer).insert(TileLayer { tileset: default(), columns: 2, rows: 2, cells: vec![0], outside: 0 });
-    let told = fault(&mut world);
-    assert!(told.contains("has 1 cells; with 2 columns and 2 rows"), "{told}");
+    let reported = fault(&mut world);
+    assert!(reported.contains("has 1 cells; with 2 columns and 2 rows"), "{reported}");
     // As many as there should be.
     world.entity_mut(layer).insert(TileLayer { tileset: default(), columns: 0, rows: 2, cells: vec![], outside: 0 });
     world.tick().expect("a grid without cells");
@@ -144,23 +144,23 @@ fn things_without_an_image_are_named() {
 fn a_sprite_without_an_image_is_named_and_a_rectangle_of_one_colour_is_drawn() {
     let mut world = camera_world(|_| {});
     let target = world.spawn(Transform::default()).id();
-    let eye = spawn_eye(&mut world, 0, target, 4.0, [8, 8]);
+    let sensor = spawn_sensor(&mut world, 0, target, 4.0, [8, 8]);
     let blank = (Name::new("ghost"), Sprite::default(), Transform::default(), Visibility::Hidden);
     let blank = world.spawn(blank).id();
     world.tick().expect("what is hidden needs no image");
     for _ in 0..2 {
         world.entity_mut(blank).insert(Visibility::Visible);
-        let told = fault(&mut world);
+        let reported = fault(&mut world);
         for part in ["sprite", &blank.to_string(), "`ghost`", "has no image", "custom_size"] {
-            assert!(told.contains(part), "`{part}` is missing in: {told}");
+            assert!(reported.contains(part), "`{part}` is missing in: {reported}");
         }
     }
     world.entity_mut(blank).insert(Sprite::from_color(Color::srgb_u8(200, 40, 90), Vec2::splat(2.0)));
     world.tick().expect("a rectangle");
-    assert_eq!([pixel(&world, eye, 4, 4), pixel(&world, eye, 0, 0)], [[200, 40, 90], [0, 0, 0]]);
+    assert_eq!([pixel(&world, sensor, 4, 4), pixel(&world, sensor, 0, 0)], [[200, 40, 90], [0, 0, 0]]);
     world.entity_mut(blank).insert(Sprite::from_color(Color::WHITE, Vec2::splat(2.0)));
     world.tick().expect("white as well");
-    assert_eq!(pixel(&world, eye, 4, 4), [255; 3]);
+    assert_eq!(pixel(&world, sensor, 4, 4), [255; 3]);
 }
 
 fn five_ticks(mut agents: Query<&mut Episode>) {
@@ -182,16 +182,19 @@ fn a_camera_that_sees_nothing_is_counted() {
     let far = world.spawn(Transform::from_xyz(1000.0, 0.0, 0.0)).id();
     let play = (Control::Bot, BlindBot::Uniform);
     let [seeing, blind] = [(0, here), (1, far)].map(|(i, target)| {
-        let agent = spawn_eye(&mut world, i, target, 4.0, [8, 8]);
+        let agent = spawn_sensor(&mut world, i, target, 4.0, [8, 8]);
         world.entity_mut(agent).insert(play.clone());
         agent
     });
-    let mut told = Vec::new();
+    let mut reported = Vec::new();
     for _ in 0..15 {
-        told.extend(world.tick().err().map(|fault| fault.to_string()));
+        reported.extend(world.tick().err().map(|fault| fault.to_string()));
     }
-    assert!(told.iter().all(|told| told.starts_with("agent 1,") && told.contains("a single colour")), "{told:?}");
-    assert_eq!(told.len(), 3, "once for each episode: {told:?}");
+    assert!(
+        reported.iter().all(|reported| reported.starts_with("agent 1,") && reported.contains("a single colour")),
+        "{reported:?}"
+    );
+    assert_eq!(reported.len(), 3, "once for each episode: {reported:?}");
     let count = |world: &World, agent| world.get::<BlankEpisodes>(agent).expect("it has a sensor").episodes;
     assert_eq!((count(&world, seeing), count(&world, blind)), (0, 3));
     // It comes into view in the middle of an episode: that one is not blank.

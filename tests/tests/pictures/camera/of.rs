@@ -6,7 +6,7 @@ use bevy::{
 };
 use bevy_playbot::{camera::CameraSensor, vision::ImageOptions};
 use playbot::prelude::*;
-use playbot_tests::scene::{camera_world, image, pixel, player, spawn_eye};
+use playbot_tests::scene::{camera_world, image, pixel, player, spawn_sensor};
 
 fn agent(world: &mut World, index: u32, camera: Entity, size: [u32; 2]) -> Entity {
     let options = ImageOptions { width: size[0], height: size[1], ..default() };
@@ -34,7 +34,7 @@ fn a_camera_without_a_window_is_seen_through() {
     let (first, second) = (agent(&mut world, 0, wide, [50, 37]), agent(&mut world, 1, wide, [50, 37]));
     let third = agent(&mut world, 2, near, [8, 8]);
     let target = world.spawn(Transform::from_xyz(-2.0, 0.0, 0.0)).id();
-    let fourth = spawn_eye(&mut world, 3, target, 2.0, [5, 5]);
+    let fourth = spawn_sensor(&mut world, 3, target, 2.0, [5, 5]);
     for _ in 0..3 {
         world.tick().expect("sound");
         for agent in [first, second] {

@@ -3,7 +3,7 @@
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::vision::TileLayer;
 use playbot::prelude::*;
-use playbot_tests::scene::{camera_world, image, pixel, spawn_eye};
+use playbot_tests::scene::{camera_world, image, pixel, spawn_sensor};
 
 const RED: [u8; 4] = [200, 10, 30, 255];
 const GREEN: [u8; 4] = [20, 180, 40, 255];
@@ -24,7 +24,7 @@ fn see(sprites: impl FnOnce(&mut World)) -> Vec<[u8; 3]> {
     let mut world = camera_world(|_| {});
     sprites(&mut world);
     let target = world.spawn(Transform::default()).id();
-    let agent = spawn_eye(&mut world, 0, target, 4.0, [4, 4]);
+    let agent = spawn_sensor(&mut world, 0, target, 4.0, [4, 4]);
     world.tick().expect("sound");
     (0..16).map(|i| pixel(&world, agent, i % 4, i / 4)).collect()
 }
@@ -47,7 +47,7 @@ fn every_byte_of_an_image_comes_back() {
     let handle = add(&mut world, 16, &picture);
     world.spawn((Sprite { image: handle, custom_size: Some(Vec2::splat(16.0)), ..default() }, Transform::default()));
     let target = world.spawn(Transform::default()).id();
-    let agent = spawn_eye(&mut world, 0, target, 18.0, [18, 18]);
+    let agent = spawn_sensor(&mut world, 0, target, 18.0, [18, 18]);
     world.tick().expect("sound");
     for (x, y) in (0..18).flat_map(|x| (0..18).map(move |y| (x, y))) {
         let inside = (1..17).contains(&x) && (1..17).contains(&y);
@@ -134,7 +134,7 @@ fn tiles_lie_among_the_sprites() {
     let behind = Sprite { image: behind, custom_size: Some(Vec2::splat(100.0)), ..default() };
     world.spawn((behind, Transform::default()));
     let target = world.spawn(Transform::default()).id();
-    let agent = spawn_eye(&mut world, 0, target, 6.0, [12, 12]);
+    let agent = spawn_sensor(&mut world, 0, target, 6.0, [12, 12]);
     world.tick().expect("sound");
     // Bottom left cell: tile 0. Its neighbour on the right: tile 1. Above: nothing, and tile 0.
     let at = |world: &World, x, y| pixel(world, agent, x, y);
@@ -165,7 +165,7 @@ fn meshes_of_the_game_are_seen() {
         world.spawn((Mesh2d(mesh.clone()), MeshMaterial2d(material), Transform::from_xyz(x, 0.0, 0.0)));
     }
     let target = world.spawn(Transform::default()).id();
-    let agents: Vec<Entity> = (0..3).map(|i| spawn_eye(&mut world, i, target, 4.0, [4, 4])).collect();
+    let agents: Vec<Entity> = (0..3).map(|i| spawn_sensor(&mut world, i, target, 4.0, [4, 4])).collect();
     world.tick().expect("sound");
     for agent in agents {
         assert_eq!([pixel(&world, agent, 0, 0), pixel(&world, agent, 1, 1)], [[0; 3], [250, 90, 20]]);
@@ -187,7 +187,7 @@ fn pictures_of_all_sizes_at_once() {
             let odd = Vec2::new((size[0] % 2) as f32, (size[1] % 2) as f32) / 2.0;
             let place = Vec2::new((i % 5) as f32 - 2.0, (i % 7) as f32 - 3.0) + odd;
             let target = world.spawn(Transform::from_translation(place.extend(0.0))).id();
-            (spawn_eye(&mut world, i, target, size[0] as f32, size), size, place)
+            (spawn_sensor(&mut world, i, target, size[0] as f32, size), size, place)
         })
         .collect();
     for _ in 0..3 {

@@ -7,7 +7,7 @@ use bevy_playbot::{
     vision::{Frame, ImageOptions, Stage, TileLayer, VisionSystems},
 };
 use playbot::prelude::*;
-use playbot_tests::scene::{camera_world, draw, image, pixel, player, spawn_eye};
+use playbot_tests::scene::{camera_world, draw, image, pixel, player, spawn_sensor};
 
 /// The walking entity, and its position at the observation.
 #[derive(Resource)]
@@ -52,7 +52,7 @@ fn expected(world: &World) -> [u8; 3] {
 #[test]
 fn every_frame_is_of_its_tick() {
     let (mut world, walker) = walking_world();
-    let agents: Vec<Entity> = (0..3).map(|i| spawn_eye(&mut world, i, walker, 3.0, [3, 3])).collect();
+    let agents: Vec<Entity> = (0..3).map(|i| spawn_sensor(&mut world, i, walker, 3.0, [3, 3])).collect();
     let mut before = [0; 3];
     for _ in 0..3000 {
         world.tick().expect("sound");
@@ -69,7 +69,7 @@ fn every_frame_is_of_its_tick() {
 #[test]
 fn a_late_readback_is_reported_and_not_handed_out() {
     let (mut world, walker) = walking_world();
-    let agent = spawn_eye(&mut world, 4, walker, 3.0, [3, 3]);
+    let agent = spawn_sensor(&mut world, 4, walker, 3.0, [3, 3]);
     world.ticks(5).expect("sound");
     let good = world.get::<Frame>(agent).expect("a frame").clone();
     world.resource_mut::<ReadbackDelay>().0 = 2;
@@ -93,7 +93,7 @@ fn a_late_readback_is_reported_and_not_handed_out() {
 fn what_is_new_in_a_tick_is_seen_in_it() {
     let mut world = camera_world(|_| {});
     let target = world.spawn(Transform::default()).id();
-    let agent = spawn_eye(&mut world, 0, target, 4.0, [4, 4]);
+    let agent = spawn_sensor(&mut world, 0, target, 4.0, [4, 4]);
     let mut state = 3;
     for i in 0..60 {
         // New image, new sprite or tiles, each time; the old ones go.
@@ -143,7 +143,7 @@ fn each_of_many_sees_its_own_arena() {
     world.tick().expect("sound");
     let stage = world.get::<ChildOf>(agents[1]).expect("in an arena").parent();
     let late = world.spawn((Transform::from_xyz(1.0, 0.0, 0.0), ChildOf(stage))).id();
-    let late = spawn_eye(&mut world, 99, late, 5.0, [10, 10]);
+    let late = spawn_sensor(&mut world, 99, late, 5.0, [10, 10]);
     world.tick().expect("sound");
     let [red, green, blue, _] = colour(1);
     assert_eq!(pixel(&world, late, 9, 9), [red, green, blue]);

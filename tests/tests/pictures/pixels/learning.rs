@@ -52,12 +52,12 @@ fn what_is_learned_from_pictures_survives_its_files() {
         policy_file(&PaintedCorridor, &experiment.observation_config(), learner.policy(), learner.skills(), about);
     export_policy(&PaintedCorridor, &file, &experiment.train, 1, &path).expect("writable");
     let read = PolicyFile::load(&path, DeviceKind::Flex).expect("as written");
-    check_policy(&PaintedCorridor.card(), &read).expect("fits");
+    check_policy(&PaintedCorridor.metadata(), &read).expect("fits");
     assert_eq!(policy_observation(&read), Ok(experiment.observation_config()));
     let prior = read.skills.as_ref().map(SkillPrior::from);
     assert_eq!(measure(&read.policy, prior, 2), results, "the file plays another game");
 
-    let error = check_policy(&Corridor.card(), &read).expect_err("cannot be drawn");
+    let error = check_policy(&Corridor.metadata(), &read).expect_err("cannot be drawn");
     assert!(matches!(error, PolicyMisfit::NoPicture { .. }), "{error}");
 }
 

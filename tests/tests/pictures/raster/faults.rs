@@ -8,7 +8,7 @@ use bevy_playbot::{
 use playbot::prelude::*;
 use playbot_tests::scene::image;
 
-use super::eye::{GREEN, RED, add, fault, four, looking};
+use super::viewer::{GREEN, RED, add, fault, four, looking};
 
 /// Returns an image without a single texel.
 fn empty(world: &mut World, [width, height]: [u32; 2]) -> Handle<Image> {
@@ -94,12 +94,12 @@ fn sensors_that_cannot_look_are_named_with_agent_and_tick() {
         ("gone", |sensor, _| sensor.target = Entity::PLACEHOLDER),
     ];
     for (what, spoil) in cases {
-        let (mut world, eye) = looking([4, 4]);
+        let (mut world, sensor) = looking([4, 4]);
         world.tick().expect("sound so far");
         let mut options = ImageOptions { width: 4, height: 4, ..default() };
-        let mut sensor = *world.get::<RasterSensor>(eye).expect("an eye");
-        spoil(&mut sensor, &mut options);
-        world.entity_mut(eye).insert((sensor, bevy_playbot::vision::ImageSensor(options)));
+        let mut spoiled = *world.get::<RasterSensor>(sensor).expect("a sensor");
+        spoil(&mut spoiled, &mut options);
+        world.entity_mut(sensor).insert((spoiled, bevy_playbot::vision::ImageSensor(options)));
         let fault = fault(&mut world);
         for part in [what, "agent 0, level 0, tick 1"] {
             assert!(fault.contains(part), "`{part}` is missing in: {fault}");

@@ -7,7 +7,7 @@ use bevy_playbot::{
 };
 use playbot::prelude::*;
 
-use super::eye::{BLUE, GREEN, RED, WHITE, four, frame, looking, raster_world, spawn_eye};
+use super::viewer::{BLUE, GREEN, RED, WHITE, four, frame, looking, raster_world, spawn_sensor};
 
 /// Spawns a stage with a sprite, an agent and, on a stage of its own inside, an entity that no other agent sees.
 fn spawn_stage(world: &mut World, index: u32, place: Transform, sprite: &Sprite) -> Entity {
@@ -40,19 +40,19 @@ fn a_picture_does_not_depend_on_where_its_stage_stands() {
         assert!(first.contains(&colour), "{colour:?} is covered by what is on another stage, or on none");
     }
     for agent in &agents[1..] {
-        assert_eq!(world.get::<Frame>(*agent).expect("an eye").pixels, first);
+        assert_eq!(world.get::<Frame>(*agent).expect("a sensor").pixels, first);
     }
     // An agent on no stage sees entities on no stage.
     let target = world.spawn(Transform::default()).id();
-    let outside = spawn_eye(&mut world, target, 10.0, [4, 4]);
+    let outside = spawn_sensor(&mut world, target, 10.0, [4, 4]);
     assert_eq!(frame(&mut world, outside), [WHITE; 16]);
 }
 
 #[test]
 fn idle_agents_are_not_looked_after() {
-    let (mut world, eye) = looking([1, 1]);
-    world.entity_mut(eye).insert(Control::Idle);
+    let (mut world, sensor) = looking([1, 1]);
+    world.entity_mut(sensor).insert(Control::Idle);
     world.spawn(Sprite::default());
     world.tick().expect("nobody looks at what cannot be drawn");
-    assert_eq!(*world.get::<Frame>(eye).expect("an eye"), Frame::default());
+    assert_eq!(*world.get::<Frame>(sensor).expect("a sensor"), Frame::default());
 }

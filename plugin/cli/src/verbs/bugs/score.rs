@@ -3,7 +3,7 @@
 use crate::{
     arguments::{Compute, experiment::quoted},
     error::{CliError, Outcome, print_line},
-    interrupt, output, progress,
+    interrupt, output, program, progress,
     verbs::bugs::testers::ContestantArgs,
 };
 use playbot_harness::{game::Game, games::Games};
@@ -26,12 +26,12 @@ const LEFT_OUT: [&str; 2] = ["tick-time", "unreachable-region"];
 
 /// Measure which testers find planted defects: in how many mutants, with how many false findings, and how soon.
 ///
-/// Every tester plays every mutant of this program's games and every unmutated level of the set, with equal budgets and
-/// under all detectors but tick-time and unreachable-region. A mutant is found if a detector finds something, if the
-/// game breaks, if the level is proved unsolvable, or if a tester fails that solves at least 99 % of the unmutated
-/// levels. A tester that solves fewer fails where its reward lies far outside of its rewards on the unmutated levels.
-/// On an unmutated level the same signs are a false finding. Results are also compared with those of the same tester on
-/// the unmutated level that the mutant was made from.
+/// Every tester plays every mutant of this program's games and every unmutated level of the set. Budgets are equal, and
+/// all detectors look but tick-time and unreachable-region. A mutant is found if a detector finds something, if the
+/// game breaks, or if the level is proved unsolvable. It is also found if a tester fails that solves at least 99 % of
+/// the unmutated levels. A tester that solves fewer fails where its reward lies far outside of its rewards on the
+/// unmutated levels. On an unmutated level the same signs are a false finding. Results are also compared with those of
+/// the same tester on the unmutated level that the mutant was made from.
 ///
 /// All results but the times are the same on any number of threads.
 #[derive(clap::Args)]
@@ -108,8 +108,8 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     output::make_folder_of(&args.out)?;
     if args.resume && args.out.exists() && !ScoreJournal::is_begun(&args.out) {
         let score = done_before(&args.out, &plan)?;
-        tell!("{} is done already", args.out.display());
-        return tell_score(&args.out, score, args.json);
+        report!("{} is done already", args.out.display());
+        return report_score(&args.out, score, args.json);
     }
     let earlier = match (args.resume, args.force) {
         (true, _) => Earlier::Resume,
@@ -119,7 +119,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let opened = ScoreJournal::open(&args.out, &command(), &plan.record(), earlier);
     let (mut journal, cut) = opened?;
     if cut > 0 {
-        tell!("warning: the last {cut} bytes of the finished part are damaged, and are done again");
+        report!("warning: the last {cut} bytes of the finished part are damaged, and are done again");
     }
     let total = score_run.jobs();
     let finished = journal.finished().len() as u64;
@@ -131,12 +131,12 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     bar.finish_and_clear();
     let Some(score) = scored? else {
         let finished = journal.finished().len();
-        tell!("stopped; {finished} of {total} jobs are finished: go on with the same command and --resume");
+        report!("stopped; {finished} of {total} jobs are finished: go on with the same command and --resume");
         return Ok(Outcome::Stopped);
     };
     score.write(&args.out)?;
     journal.close()?;
-    tell_score(&args.out, score, args.json)
+    report_score(&args.out, score, args.json)
 }
 
 /// Returns the games of the set that this program has, each with its testers.
@@ -157,7 +157,7 @@ fn tested<'a>(args: &Args, set: &BugSet, games: &Games<'a>) -> Result<Vec<Tested
         let is_left_out = |name: &&str| !chosen.iter().any(|game| game.name() == *name);
         let left_out: Vec<&str> = set.games.iter().map(|game| game.name.as_str()).filter(is_left_out).collect();
         if !left_out.is_empty() {
-            tell!("left out, since this program does not have them: {}", left_out.join(", "));
+            report!("left out, since this program does not have them: {}", left_out.join(", "));
         }
     }
     let contestants = args.testers.load(&chosen, games, args.compute.device())?;
@@ -169,7 +169,7 @@ fn tested<'a>(args: &Args, set: &BugSet, games: &Games<'a>) -> Result<Vec<Tested
     let mut tested = Vec::new();
     for (game, contestants) in chosen.into_iter().zip(contestants) {
         if contestants.is_empty() {
-            tell!("left out, since it has none of the testers: {}", game.name());
+            report!("left out, since it has none of the testers: {}", game.name());
             continue;
         }
         let detectors = Detectors::choose(game, &choice).map_err(|error| CliError::Usage(error.to_string()))?;
@@ -187,7 +187,7 @@ fn none_of_the_games(set: &BugSet, games: &Games) -> CliError {
          `{} bugs make`",
         of_set.join(", "),
         known.join(", "),
-        output::name()
+        program::name()
     ))
 }
 
@@ -202,7 +202,7 @@ fn done_before(path: &Path, plan: &ScorePlan) -> Result<Score, CliError> {
     }
 }
 
-fn tell_score(path: &Path, score: Score, json: bool) -> Result<Outcome, CliError> {
+fn report_score(path: &Path, score: Score, json: bool) -> Result<Outcome, CliError> {
     let table = ScoreTable::join(&[(path.to_owned(), score)])?;
     if json {
         print_line(as_json(&table)?)?;
@@ -213,7 +213,7 @@ fn tell_score(path: &Path, score: Score, json: bool) -> Result<Outcome, CliError
         print_line("")?;
         table.headlines().into_iter().try_for_each(print_line)?;
     }
-    tell!("score: {}", path.display());
+    report!("score: {}", path.display());
     Ok(Outcome::Pass)
 }
 
@@ -229,7 +229,7 @@ pub(crate) fn as_json(table: &ScoreTable) -> Result<String, CliError> {
 /// Returns the command line as it reads for a first call.
 fn command() -> String {
     let words = std::env::args().skip(1).filter(|word| !["--resume", "--force", "--json"].contains(&word.as_str()));
-    [output::name().to_owned()].into_iter().chain(words.map(|word| quoted(&word))).collect::<Vec<_>>().join(" ")
+    [program::name().to_owned()].into_iter().chain(words.map(|word| quoted(&word))).collect::<Vec<_>>().join(" ")
 }
 
 #[cfg(test)]
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn what_the_caller_can_mend_is_told_from_what_failed() {
+    fn what_the_caller_can_mend_is_distinguished_from_what_failed() {
         assert_eq!(CliError::from(ScoreError::Nothing).exit_code(), 3);
         let source = std::io::Error::from(std::io::ErrorKind::StorageFull);
         let failed = ScoreError::Io { action: "write", path: "a".into(), source };

@@ -1,7 +1,7 @@
 //! Testers of `playbot bugs score`, from the command line.
 
 use crate::{
-    arguments::{open, player::Chosen},
+    arguments::{open, player::LoadedPlayer},
     error::CliError,
     verbs::explore::Talents,
 };
@@ -26,10 +26,11 @@ const DEMONSTRATOR: &str = "demonstrator";
 /// Bots, explorers and policies.
 #[derive(clap::Args, Clone, Debug)]
 pub struct ContestantArgs {
-    /// Testers, separated by commas (default: all). random, hold (the action that a bot of the game holds, or else its
-    /// last one), chaos (random actions, each held for up to 30 ticks), explore, explore-skills (with a skill model, or
-    /// else with the first policy that has skills), and demonstrator (the game's own bot, also by its own name).
-    /// Policies given with --policy test in any case.
+    /// Testers, separated by commas (default: all). They are random, hold, chaos, explore, explore-skills and
+    /// demonstrator. The tester hold repeats the action that a bot of the game holds, or else the game's last action.
+    /// The tester chaos holds random actions for up to 30 ticks each. The tester explore-skills uses a skill model, or
+    /// else the first policy that has skills. The demonstrator is the game's own bot, also by its own name. Policies
+    /// given with --policy test in any case.
     #[arg(long = "tester", value_name = "NAME", value_delimiter = ',')]
     testers: Vec<String>,
     /// Policy file and its name in the score (repeatable). A name is used once for each game.
@@ -56,10 +57,10 @@ impl ContestantArgs {
         games: &Games,
         device: DeviceKind,
     ) -> Result<Vec<Vec<Contestant>>, CliError> {
-        let mut all: Vec<Vec<Contestant>> = chosen.iter().map(|game| Contestant::usual(*game)).collect();
+        let mut all: Vec<Vec<Contestant>> = chosen.iter().map(|game| Contestant::defaults(*game)).collect();
         for Named { name, path } in &self.policy {
-            let card = open::policy(path, device)?.card;
-            let game = games.of_file(Artifact::Policy, path, &card.game)?;
+            let metadata = open::policy(path, device)?.metadata;
+            let game = games.of_file(Artifact::Policy, path, &metadata.game)?;
             // A game that is not tested needs no policy.
             if let Some(place) = chosen.iter().position(|chosen| chosen.name() == game.name()) {
                 all[place].push(self.policy(name, path, game, device)?);
@@ -79,7 +80,7 @@ impl ContestantArgs {
 
     fn policy(&self, name: &str, path: &Path, game: &dyn Game, device: DeviceKind) -> Result<Contestant, CliError> {
         let draw = if self.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
-        let chosen = Chosen::policy_file(game, path, draw, device)?;
+        let chosen = LoadedPlayer::policy_file(game, path, draw, device)?;
         chosen.check_fit(game)?;
         let skilled = matches!(&chosen.player, Player::Policy { prior: Some(_), .. });
         let checksum = Some(file_checksum(path)?);
@@ -170,8 +171,6 @@ fn with_policy(testers: &[Contestant]) -> Option<Contestant> {
     })
 }
 
-// Files with a name in front on the command line, `NAME=FILE`.
-
 /// A file with a name in front of it: `NAME=FILE`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Named {
@@ -213,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn testers_are_chosen_by_name_and_others_are_told_the_nearest() {
+    fn testers_are_chosen_by_name_and_others_are_refused_with_the_nearest() {
         let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {}).keys([vec![], vec![KeyCode::Space]]);
         let all: [&dyn Game; 1] = [&game];
         let games = Games::new(&all).expect("one game");
@@ -230,11 +229,6 @@ mod tests {
         let words = load(&["explore-skills"]).map(drop).expect_err("no skills").to_string();
         assert!(words.contains("--skills FILE"), "{words}");
     }
-}
-
-#[cfg(test)]
-mod named_tests {
-    use super::*;
 
     #[test]
     fn a_name_stands_in_front_of_a_file() {

@@ -88,12 +88,12 @@ fn show_episode(index: usize, episode: &DemoEpisode, as_json: bool) -> Result<()
         }));
     }
     print_line(format!(
-        "episode {index:>4}  level {:>6}  {:>4} steps  return {:>6.2}  {:<11}  by {}{}",
+        "episode {index:>4}  level {:>6}  {:>4} steps  return {:>6.2}  {:<11}  {}{}",
         episode.level_seed,
         episode.len(),
         episode.episode_return(),
         end(episode.end),
-        deciders(&episode.steps_by_decider()),
+        deciders("by", &episode.steps_by_decider()),
         episode.level_file.as_ref().map_or_else(String::new, |file| format!("  on {}", file.path)),
     ))
 }
@@ -112,14 +112,14 @@ fn end(end: DemoEnd) -> &'static str {
     }
 }
 
-/// Describes the share of the ticks of each decider.
-pub fn deciders(steps_by_decider: &BTreeMap<Decider, usize>) -> String {
+/// Describes the share of the ticks of each decider, after these words.
+pub fn deciders(words: &str, steps_by_decider: &BTreeMap<Decider, usize>) -> String {
     let total: usize = steps_by_decider.values().sum();
     if total == 0 {
-        return "no decider".to_owned();
+        return "no ticks".to_owned();
     }
     let share = |(decider, &steps)| format!("{decider} {:.0} %", 100.0 * steps as f64 / total as f64);
-    steps_by_decider.iter().map(share).collect::<Vec<_>>().join(", ")
+    format!("{words} {}", steps_by_decider.iter().map(share).collect::<Vec<_>>().join(", "))
 }
 
 fn show_ticks(episode: &DemoEpisode, as_json: bool) -> Result<(), CliError> {

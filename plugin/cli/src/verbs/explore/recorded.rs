@@ -1,20 +1,13 @@
-//! Recording of a path that was found, picture of the reached cells, and options for the explorers.
+//! Recording of a path that was found, and picture of the reached cells.
 
 use crate::{
-    arguments::{
-        default_experiment_of,
-        experiment::ExperimentArgs,
-        player::{Chosen, check_skills},
-    },
     error::CliError,
     output::{beside, prepare},
 };
-use bevy_playbot::{demo::file::DemoWriter, policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
-use playbot_harness::{
-    demo::verify_file, eval::Player, floor_plan::FloorPlan, game::Game, games::Games, trails::cells::CellChart,
-};
-use playbot_learner::{DeviceKind, ScoreConfig, SkillDraw, SkillModel, SkillSource, disk};
-use playbot_test::explore::{Cell, Exploration, Explorer, Route, follow_route, record_route};
+use bevy_playbot::demo::file::DemoWriter;
+use playbot_harness::{demo::verify_file, floor_plan::FloorPlan, game::Game, trails::cells::CellChart};
+use playbot_learner::disk;
+use playbot_test::explore::{Exploration, ExploredCell, Route, follow_route, record_route};
 use std::path::{Path, PathBuf};
 
 /// A file for a recording, tested before the work whose result it holds.
@@ -82,8 +75,6 @@ impl RecordingFile {
     }
 }
 
-// Picture of the cells that an explorer reached.
-
 /// Draws the cells of an exploration on the level's floor plan, with a path through them.
 ///
 /// # Errors
@@ -93,15 +84,15 @@ pub(crate) fn chart(
     game: &dyn Game,
     plan: FloorPlan,
     exploration: &Exploration,
-    way: Option<&Route>,
+    route: Option<&Route>,
 ) -> Result<CellChart, CliError> {
     let Exploration { mode, level, grid, .. } = exploration;
-    let mut places = Vec::new();
-    if let Some(route) = way {
-        places.push(plan.start);
-        places.extend(follow_route(game, mode, *level, &route.actions)?);
+    let mut positions = Vec::new();
+    if let Some(route) = route {
+        positions.push(plan.start);
+        positions.extend(follow_route(game, mode, *level, &route.actions)?);
     }
-    let area = |cell: &Cell| grid.as_ref()?.area(cell);
+    let area = |cell: &ExploredCell| grid.as_ref()?.area(cell);
     let cells = exploration.cells().iter();
     let reached = cells.filter_map(|(cell, reached)| Some((area(cell)?, reached.visits))).collect();
     let summary = exploration.summary(game).to_string();
@@ -115,52 +106,6 @@ pub(crate) fn chart(
         plan,
         reached,
         missed: exploration.missed().filter_map(area).collect(),
-        way: places,
+        path: positions,
     })
-}
-
-// Explorers of `playbot explore`, from the command line.
-
-/// An explorer and its observation.
-pub struct Talents {
-    pub explorer: Explorer,
-    pub observation_config: ObservationConfig,
-}
-
-impl Talents {
-    /// Returns an explorer with random actions.
-    pub fn none() -> Self {
-        Self { explorer: Explorer::Random, observation_config: ObservationConfig::default() }
-    }
-
-    /// Skills of a model, drawn from its prior, with the skill interval of the game's experiment.
-    ///
-    /// # Errors
-    ///
-    /// The model cannot be read, or was learned for another game.
-    pub fn skills(path: &Path, game: &dyn Game, games: &Games, device: DeviceKind) -> Result<Self, CliError> {
-        let model = SkillModel::load(path, device)?;
-        // The game is named, so that errors do not ask for an experiment.
-        let named = ExperimentArgs::of_game(game.name());
-        let observation_config = check_skills(path, &model, game, &named, games)?;
-        let horizon =
-            default_experiment_of(game).map_or_else(ScoreConfig::default, |usual| usual.experiment.score).horizon;
-        let source = SkillSource { prior: model.prior(), decoder: model.policy(), horizon, draw: SkillDraw::Sample };
-        Ok(Self { explorer: Explorer::skills(SkillPrior::from(&source), source.decoder), observation_config })
-    }
-
-    /// Returns the policy of a file, whose actions are drawn.
-    ///
-    /// # Errors
-    ///
-    /// It cannot be loaded, or was made for another game.
-    pub fn policy(path: &Path, game: &dyn Game, device: DeviceKind) -> Result<Self, CliError> {
-        let chosen = Chosen::policy_file(game, path, ActionDraw::Sample, device)?;
-        chosen.check_fit(game)?;
-        let explorer = match chosen.player {
-            Player::Policy { policy, prior, draw } => Explorer::Policy { policy, prior, draw },
-            Player::Blind(_) | Player::Demonstrator => Explorer::Random,
-        };
-        Ok(Self { explorer, observation_config: chosen.observation_config })
-    }
 }

@@ -1,9 +1,9 @@
 //! `playbot play` in a program that was built with a window.
 
 use crate::{
-    arguments::{counted, default_mode, level_number, player::Chosen},
+    arguments::{counted, default_mode, level_number, player::LoadedPlayer},
     error::{CliError, Outcome},
-    interrupt, output,
+    interrupt, program,
     verbs::{demo::deciders, play::Args},
     window::{Autopilot, GameWindow, Playlist, WindowSetup},
 };
@@ -62,7 +62,9 @@ fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
 /// Returns the autopilot and its observation.
 fn autopilot(game: &dyn Game, args: &Args) -> Result<(Option<Autopilot>, ObservationConfig), CliError> {
     Ok(match args.autopilot.load(game)? {
-        Some(Chosen { name, player, observation_config, .. }) => (Some(Autopilot { name, player }), observation_config),
+        Some(LoadedPlayer { name, player, observation_config, .. }) => {
+            (Some(Autopilot { name, player }), observation_config)
+        }
         None => (None, ObservationConfig::default()),
     })
 }
@@ -75,14 +77,14 @@ fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
 fn announce(game: &dyn Game, args: &Args) {
     if let Some(keys) = game.tools().input.key_bindings() {
         let zoom = if game.tools().host.placement() == TickPlacement::Fixed { ", - and = zoom" } else { "" };
-        tell!("{}; R again, N next level, P pause{zoom}, Escape ends", keys.help());
+        report!("{}; R again, N next level, P pause{zoom}, Escape ends", keys.help());
     } else {
-        tell!("the game's own keys and mouse; R again, N next level, P pause, Escape ends");
+        report!("the game's own keys and mouse; R again, N next level, P pause, Escape ends");
     }
     if args.autopilot.is_named() {
-        tell!("Tab hands over and takes over again");
+        report!("Tab hands over and takes over again");
     } else {
-        tell!("there is no autopilot to hand over to: name a --policy, a --run or a --bot");
+        report!("there is no autopilot to hand over to: name a --policy, a --run or a --bot");
     }
 }
 
@@ -90,14 +92,14 @@ fn announce(game: &dyn Game, args: &Args) {
 fn conclude(path: &Path) -> Result<Outcome, CliError> {
     let summary = DemoSummary::read(path)?;
     let file = path.display();
-    tell!(
-        "{file}: {}, {}, decided by {}",
+    report!(
+        "{file}: {}, {}, {}",
         counted(summary.episodes as u64, "episode"),
         counted(summary.steps as u64, "step"),
-        deciders(&summary.steps_by_decider)
+        deciders("decided by", &summary.steps_by_decider)
     );
-    let program = output::name();
-    tell!("  {program} demo verify {file}   proves that it replays");
-    tell!("  {program} learn-skills --set demos={file} --out skills.safetensors   learns from it");
+    let program = program::name();
+    report!("  {program} demo verify {file}   proves that it replays");
+    report!("  {program} learn-skills --set demos={file} --out skills.safetensors   learns from it");
     Ok(Outcome::Pass)
 }

@@ -5,7 +5,7 @@ use crate::{
     output,
     pictures::{
         Film,
-        caption::{Numbers, Reach},
+        caption::{NumberBars, Reach},
         episode_world::{EpisodeStep, EpisodeWorld},
     },
     plot,
@@ -62,18 +62,18 @@ impl Pictures<'_> {
         let film = if seen_as.is_image() {
             Film::new(seen_as.image, self.scale, game.tick_hz())?
         } else {
-            Film::of_numbers(Numbers::new(game.observation().names, self.scale, &reach), game.tick_hz())
+            Film::of_numbers(NumberBars::new(game.observation().names, self.scale, &reach), game.tick_hz())
         };
         if let Some(path) = self.still {
             output::write(path, &film.captioned(last)?.0)?;
-            tell!("{} shows tick {}", path.display(), last.tick);
+            report!("{} shows tick {}", path.display(), last.tick);
         }
         if let Some(path) = self.animated {
             let bar = progress::bar("draw", steps.len() as u64, "frames");
             let drawn = film.animated(&steps, || bar.inc(1));
             bar.finish_and_clear();
             output::write(path, &drawn?.0)?;
-            tell!("{} shows ticks {} to {}", path.display(), steps[0].tick, last.tick);
+            report!("{} shows ticks {} to {}", path.display(), steps[0].tick, last.tick);
         }
         Ok(())
     }
@@ -82,12 +82,12 @@ impl Pictures<'_> {
     fn write_level(&self, game: &dyn Game, finding: &StoredFinding) -> Result<(), CliError> {
         let why = "it was found before the first tick was over";
         let Some(level) = picture_of(game, &finding.header.mode, finding.episode.level_seed) else {
-            tell!("nothing is drawn: {why}");
+            report!("nothing is drawn: {why}");
             return Ok(());
         };
         for path in self.still.into_iter().chain(self.animated) {
             plot::write(&PlotFile::new(path)?, &level, game.tick_hz())?;
-            tell!("{} shows the level: {why}", path.display());
+            report!("{} shows the level: {why}", path.display());
         }
         Ok(())
     }

@@ -28,7 +28,7 @@ pub(crate) fn show(game: &dyn Game, finding: &StoredFinding) -> Result<(), CliEr
     .map_err(or_a_picture)?;
     window.replay(finding.episode.clone());
     interrupt::listen();
-    tell!("the finding is played first, then you play on; P pause, R again, Escape ends");
+    report!("the finding is played first, then you play on; P pause, R again, Escape ends");
     Ok(window.run()?)
 }
 

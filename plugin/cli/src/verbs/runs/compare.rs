@@ -7,8 +7,8 @@ use crate::{
 };
 use playbot_report::{Chart, Curve, PlainTable, readable, readable_with_spread, statistics::mean_and_sd, whole};
 use playbot_train::{
-    metrics_log::{EPISODE_MEANS, SUCCESS_RATE, range_of},
     runs::{GroupStatistics, RunGroup, RunRecord, find_runs, group_runs, mean_and_spread},
+    update_report::{EPISODE_MEANS, SUCCESS_RATE, range_of},
 };
 use serde_json::json;
 use std::{
@@ -47,23 +47,23 @@ pub(crate) fn run(args: &Args) -> Result<Outcome, CliError> {
     if runs.iter().any(|run| run.curves.last_step() > 0) {
         // Behaviour cloning trains nothing, and a run that has just begun has nothing to show.
         for run in runs.extract_if(.., |run| run.curves.last_step() == 0) {
-            tell!("warning: {} is left out: it has no metrics", run.path.display());
+            report!("warning: {} is left out: it has no metrics", run.path.display());
         }
     }
     let metric = args.metric.as_deref().unwrap_or(SUCCESS_RATE);
     let has_metric = |run: &RunRecord| !run.curves.curve(metric).is_empty();
     if runs.iter().all(|run| run.curves.last_step() > 0) && (args.metric.is_none() || runs.iter().any(has_metric)) {
         for run in runs.extract_if(.., |run| !has_metric(run)) {
-            tell!("warning: {} is left out: it has no {metric}{}", run.path.display(), why_not(metric));
+            report!("warning: {} is left out: it has no {metric}{}", run.path.display(), why_not(metric));
         }
         if runs.is_empty() {
-            tell!("nothing to compare yet: train for longer, or name another --metric");
+            report!("nothing to compare yet: train for longer, or name another --metric");
             return Ok(Outcome::Pass);
         }
     }
     let groups = group_runs(&runs);
     let curves = mean_and_spread(&groups, metric)?;
-    groups.iter().flat_map(RunGroup::warnings).for_each(|warning| tell!("warning: {warning}"));
+    groups.iter().flat_map(RunGroup::warnings).for_each(|warning| report!("warning: {warning}"));
     let threshold = args.threshold.or_else(|| if metric == SUCCESS_RATE { common_threshold(&runs) } else { None });
     let rows: Vec<_> = groups.iter().map(|group| GroupStatistics::new(group, metric, threshold)).collect();
     if args.json {
@@ -103,11 +103,11 @@ fn read(paths: &[PathBuf]) -> Result<Vec<RunRecord>, CliError> {
             seen.push(same);
             match RunRecord::read(&path) {
                 Ok(run) => {
-                    run.curves.warnings().iter().for_each(|warning| tell!("warning: {warning}"));
+                    run.curves.warnings().iter().for_each(|warning| report!("warning: {warning}"));
                     runs.push(run);
                 }
                 Err(error) if path != *folder => {
-                    tell!("warning: {} is left out: {error}", path.display());
+                    report!("warning: {} is left out: {error}", path.display());
                     damaged.get_or_insert(error);
                 }
                 Err(error) => return Err(error.into()),
@@ -127,7 +127,7 @@ fn common_threshold(runs: &[RunRecord]) -> Option<f64> {
     if runs.iter().all(|run| threshold(run) == first) {
         return Some(first);
     }
-    tell!("warning: the runs differ in study.threshold, so no steps are counted: choose one with --threshold");
+    report!("warning: the runs differ in study.threshold, so no steps are counted: choose one with --threshold");
     None
 }
 

@@ -11,8 +11,8 @@ use playbot_report::{Chart, Curve, PlainTable, readable, sparkline, to_svg, whol
 use playbot_train::{
     Experiment,
     checkpoint::{Checkpoint, CheckpointSummary},
-    metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
     runs::{RunCurves, RunRecord, changed_settings, with_defaults},
+    update_report::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -29,7 +29,7 @@ const SPARKS: usize = 60;
 pub struct Args {
     /// Folder of the run.
     run: PathBuf,
-    /// Metric to draw (default: return and success rate; repeatable).
+    /// Metric to draw (default: return and success rate, repeatable).
     #[arg(long)]
     metric: Vec<String>,
     /// Draw the curves into this SVG file.
@@ -42,7 +42,7 @@ pub struct Args {
 
 pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let run = RunRecord::read(&args.run)?;
-    run.curves.warnings().iter().for_each(|warning| tell!("warning: {warning}"));
+    run.curves.warnings().iter().for_each(|warning| report!("warning: {warning}"));
     let curves = curves(&run, &args.metric)?;
     if args.plot.is_some() && curves.is_empty() {
         return Err(CliError::Usage(format!(
@@ -71,8 +71,8 @@ fn curves<'a>(run: &'a RunRecord, wanted: &'a [String]) -> Result<Vec<TaggedCurv
     if !wanted.is_empty() {
         return wanted.iter().map(|tag| Ok((tag.as_str(), run.curve(tag)?))).collect();
     }
-    let usual = [EPISODIC_RETURN, SUCCESS_RATE];
-    Ok(usual.into_iter().map(|tag| (tag, run.curves.curve(tag))).filter(|(_, curve)| !curve.is_empty()).collect())
+    let default = [EPISODIC_RETURN, SUCCESS_RATE];
+    Ok(default.into_iter().map(|tag| (tag, run.curves.curve(tag))).filter(|(_, curve)| !curve.is_empty()).collect())
 }
 
 fn print_head(run: &RunRecord, games: &Games) -> Result<(), CliError> {
@@ -130,9 +130,9 @@ fn rating(summary: &CheckpointSummary, curves: &RunCurves) -> String {
 /// all keys, whichever is nearest. A run does not note its base.
 fn describe_settings(experiment: &Experiment, games: &Games) -> String {
     let own = games.get(&experiment.game).ok().and_then(default_experiment_of);
-    let usual = default_experiment_of(games.first()).into_iter().chain(own);
+    let default = default_experiment_of(games.first()).into_iter().chain(own);
     let defaults = ("the defaults".to_owned(), with_defaults(experiment));
-    let bases = usual.map(|usual| (usual.origin, usual.experiment)).chain([defaults]);
+    let bases = default.map(|default| (default.origin, default.experiment)).chain([defaults]);
     let nearest = bases
         .map(|(origin, base)| (origin, changed_settings(experiment, &base)))
         .min_by_key(|(_, changed)| changed.len());
@@ -235,9 +235,9 @@ mod tests {
         let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
         let games = [&game as &dyn Game];
         let games = Games::new(&games).expect("one game");
-        let usual = ExperimentArgs::default().load(&games, []).expect("that of the game");
-        assert_eq!(describe_settings(&usual, &games), "settings: those of the experiment of runner");
-        let changed = usual.with_set(&["ppo.gamma=0.5", "seed=7"]).expect("valid");
+        let default = ExperimentArgs::default().load(&games, []).expect("that of the game");
+        assert_eq!(describe_settings(&default, &games), "settings: those of the experiment of runner");
+        let changed = default.with_set(&["ppo.gamma=0.5", "seed=7"]).expect("valid");
         let words = "settings: those of the experiment of runner, but for ppo.gamma=0.5, seed=7";
         assert_eq!(describe_settings(&changed, &games), words);
         // Of a game that the program does not have.

@@ -75,9 +75,9 @@ fn play(
     } else {
         print_line(table(folder, &regression).to_text().trim_end())?;
     }
-    tell_all(&regression);
+    report_all(&regression);
     if regression.left > 0 {
-        tell!(
+        report!(
             "stopped; {} of {total} were not played: the same command plays all of them",
             counted(regression.left, "finding")
         );
@@ -102,11 +102,11 @@ fn table(folder: &Path, regression: &Regression) -> PlainTable {
     }
 }
 
-fn tell_all(regression: &Regression) {
+fn report_all(regression: &Regression) {
     let count = |status| regression.rows.iter().filter(|row| row.status == status).count();
     let pinned = regression.rows.iter().filter(|row| row.pin.as_ref().is_some_and(|pin| !pin.expired)).count();
     let pinned = if pinned > 0 { format!("; {pinned} pinned") } else { String::new() };
-    tell!(
+    report!(
         "{}: {} still there, {} there in another way, {} gone, {} unplayable{pinned}",
         counted(regression.rows.len() as u64, "finding"),
         count(FindingStatus::StillThere),
@@ -117,7 +117,7 @@ fn tell_all(regression: &Regression) {
     for row in &regression.rows {
         match &row.pin {
             Some(pin) if pin.expired => {
-                tell!(
+                report!(
                     "the pin of {} has expired on {} ({}): mend it, or pin it anew",
                     row.finding,
                     pin.until,
@@ -125,13 +125,13 @@ fn tell_all(regression: &Regression) {
                 );
             }
             Some(_) if row.status == FindingStatus::Gone => {
-                tell!("the pin of {} is no longer needed, since it is gone", row.finding);
+                report!("the pin of {} is no longer needed, since it is gone", row.finding);
             }
             _ => {}
         }
     }
     for name in &regression.unknown_pins {
-        tell!("there is no finding {name}, though it is pinned: take the pin out, or correct its name");
+        report!("there is no finding {name}, though it is pinned: take the pin out, or correct its name");
     }
 }
 
@@ -186,7 +186,7 @@ impl DetectorArgs {
                 level_name(game, split, split.first)
             )));
         }
-        tell!("{found}");
+        report!("{found}");
         Ok(detectors.with_pars(pars))
     }
 
@@ -232,7 +232,7 @@ pub(crate) fn list_detectors(game: &dyn Game, json: bool) -> Result<Outcome, Cli
         }
     }
     for detector in list(game) {
-        let looks = if detector.is_default { "usual" } else { "chosen" };
+        let looks = if detector.is_default { "default" } else { "opt-in" };
         if json {
             print_line(as_json(&detector, looks))?;
             continue;
@@ -251,10 +251,10 @@ pub(crate) fn forget_slow_ticks(folder: &Path) -> Result<(), CliError> {
 }
 
 /// Writes the slow ticks of a test to their file, and reports their number.
-pub(crate) fn tell_slow_ticks(detectors: &Detectors, folder: &Path) -> Result<(), CliError> {
+pub(crate) fn report_slow_ticks(detectors: &Detectors, folder: &Path) -> Result<(), CliError> {
     let Some(clock) = detectors.clock() else { return Ok(()) };
     let count = clock.write(folder).map_err(|error| no_timing(folder, "write", &error))?;
-    tell!("{} in {}", counted(count as u64, "slow tick"), folder.join(TIMING).display());
+    report!("{} in {}", counted(count as u64, "slow tick"), folder.join(TIMING).display());
     Ok(())
 }
 

@@ -3,7 +3,7 @@
 use crate::{
     arguments::{
         open,
-        player::{Chosen, check_run_of},
+        player::{LoadedPlayer, check_run_of},
     },
     error::CliError,
     verbs::bugs::testers::Named,
@@ -53,12 +53,12 @@ impl TesterArgs {
         let draw = if self.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
         let mut testers = Vec::new();
         for name in &self.bot {
-            testers.push(of_bot(Chosen::bot(game, name)?));
+            testers.push(of_bot(LoadedPlayer::bot(game, name)?));
         }
         for given in &self.policy {
             let named = Named::given(given);
             let path = named.as_ref().map_or(given.as_path(), |named| named.path.as_path());
-            let chosen = Chosen::policy_file(game, path, draw, device)?;
+            let chosen = LoadedPlayer::policy_file(game, path, draw, device)?;
             chosen.check_fit(game)?;
             let name = named.as_ref().map(|named| named.name.clone());
             let record = TesterRecord::policy(name, path, file_checksum(path)?);
@@ -71,27 +71,27 @@ impl TesterArgs {
             let checksum = Some(file_checksum(&checkpoint.learner_file())?);
             // Another checkpoint may be the last one by now, while the run is trained.
             let step = checkpoint.summary.step;
-            let chosen = Chosen::run(game, &opened, CheckpointChoice::Step(step), draw, device)?;
+            let chosen = LoadedPlayer::run(game, &opened, CheckpointChoice::Step(step), draw, device)?;
             chosen.check_fit(game)?;
             let name = path.file_name().map_or(chosen.name.clone(), |name| name.to_string_lossy().into_owned());
             let tested = Some(TestedRun { folder: path.display().to_string(), step });
             testers.push(self.of_policy(chosen, TesterRecord { checksum, run: tested, ..TesterRecord::bot(name) }));
         }
         if testers.is_empty() {
-            testers.push(of_bot(Chosen::usual(game)?));
+            testers.push(of_bot(LoadedPlayer::default_of(game)?));
         }
         check_names(testers.iter().map(|tester| &tester.record))?;
         Ok(testers)
     }
 
-    fn of_policy(&self, chosen: Chosen, record: TesterRecord) -> Tester {
+    fn of_policy(&self, chosen: LoadedPlayer, record: TesterRecord) -> Tester {
         let record = TesterRecord { greedy: self.greedy, ..record };
         Tester { record, player: chosen.player, observation_config: chosen.observation_config }
     }
 }
 
-fn of_bot(chosen: Chosen) -> Tester {
-    let Chosen { name, player, observation_config, .. } = chosen;
+fn of_bot(chosen: LoadedPlayer) -> Tester {
+    let LoadedPlayer { name, player, observation_config, .. } = chosen;
     Tester { record: TesterRecord::bot(name), player, observation_config }
 }
 
@@ -119,7 +119,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn two_testers_of_one_name_are_told_what_to_write() {
+    fn two_testers_of_one_name_are_refused_with_advice() {
         let policy = |name: &str| TesterRecord { checksum: Some("0f".to_owned()), ..TesterRecord::bot(name) };
         let bot = TesterRecord::bot;
         let said = |testers: &[TesterRecord]| check_names(testers.iter()).map_err(|error| error.to_string());

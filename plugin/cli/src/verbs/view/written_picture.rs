@@ -50,9 +50,9 @@ impl WrittenPicture<'_> {
     /// # Errors
     ///
     /// Standard output is closed.
-    pub fn tell(&self, as_json: bool) -> Result<(), CliError> {
+    pub fn print(&self, as_json: bool) -> Result<(), CliError> {
         if !as_json {
-            tell!("{}", self.sentence());
+            report!("{}", self.sentence());
             return Ok(());
         }
         let [width, height] = self.size;

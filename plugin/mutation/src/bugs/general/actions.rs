@@ -14,7 +14,10 @@ use bevy_playbot::{
     placement::{TickPlacement, TickSchedules, is_tick},
     systems::PlaybotSystems,
 };
-use playbot_harness::{defect::DefectKind, game::Game, worlds::is_named_idle};
+use playbot_harness::{
+    defect::DefectKind,
+    game::{Game, is_named_idle},
+};
 
 /// An agent after its decision.
 pub(super) struct Doing<'a> {
@@ -59,8 +62,6 @@ fn give_back(mut agents: Query<(&mut Action, &mut History)>) {
     }
 }
 
-// An action that does nothing.
-
 /// The start of the defect, and the index of the dead action among those that matter.
 const VARIANTS: [(When, usize); 5] =
     [(When::Tick(0), 0), (When::Tick(25), 0), (When::Held(7), 0), (When::Tick(0), 1), (When::Tick(0), 2)];
@@ -75,8 +76,6 @@ pub(super) fn dead_action(moves: &Moves) -> DefectKind {
         });
     })
 }
-
-// The actions of a game's agents, ranked by how much they matter.
 
 /// The actions of an agent.
 #[derive(Clone, Debug)]
@@ -241,7 +240,10 @@ impl Plugin for FreezePlugin {
 }
 
 #[cfg(test)]
-mod dead_action_tests {
+mod tests {
+    use bevy::prelude::App;
+    use playbot_harness::foreign::ForeignGame;
+
     use super::*;
     use crate::bugs::general::testing::{Track, play, play_sound};
 
@@ -257,15 +259,6 @@ mod dead_action_tests {
         }
         assert_eq!(play(&kind, 3, 40, |_| 1).episodes, [(true, 30)], "another action is dead");
     }
-}
-
-#[cfg(test)]
-mod moves_tests {
-    use bevy::prelude::App;
-
-    use super::*;
-    use crate::bugs::general::testing::Track;
-    use playbot_harness::foreign::ForeignGame;
 
     #[test]
     fn the_choice_that_does_nothing_is_known_by_its_name_and_held_ones_come_first() {
@@ -286,12 +279,6 @@ mod moves_tests {
         assert_eq!(moves.without(3, &action), Some(ActionValue::Continuous(vec![1.0, 0.0])));
         assert_eq!(moves.idle(), ActionValue::Continuous(vec![0.0; 2]));
     }
-}
-
-#[cfg(test)]
-mod frozen_tests {
-    use super::*;
-    use crate::bugs::general::testing::{play, play_sound};
 
     #[test]
     fn nothing_moves_from_its_moment_on() {

@@ -95,9 +95,10 @@ pub(super) fn nan() -> DefectKind {
 
 #[cfg(test)]
 mod tests {
+    use playbot_test::detectors::ErrorLogReader;
+
     use super::*;
     use crate::bugs::general::testing::play;
-    use playbot_test::detectors::ErrorLogReader;
 
     #[test]
     fn a_panic_is_a_fault_at_its_moment() {
@@ -118,12 +119,6 @@ mod tests {
         // Two episodes, in a game with fixed ticks and in one whose ticks are frames.
         assert_eq!(ear.take(), ["no entity of that name"; 4]);
     }
-}
-
-#[cfg(test)]
-mod not_a_number_tests {
-    use super::*;
-    use crate::bugs::general::testing::play;
 
     #[test]
     fn what_is_no_number_is_a_fault_of_its_tick() {

@@ -107,7 +107,7 @@ pub(super) fn state_leak(moves: &Moves) -> DefectKind {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bugs::general::testing::play;
+    use crate::bugs::general::testing::{Track, play};
 
     /// The entities that the second and the third episode leave behind.
     fn left(variant: u32) -> u32 {
@@ -122,12 +122,6 @@ mod tests {
         assert_eq!(left(2), 2, "an episode begins with something else");
         assert_eq!(left(3), 1, "from the third episode on");
     }
-}
-
-#[cfg(test)]
-mod state_leak_tests {
-    use super::*;
-    use crate::bugs::general::testing::{Track, play};
 
     #[test]
     fn the_first_episodes_are_sound_and_later_ones_are_not() {
@@ -136,6 +130,6 @@ mod state_leak_tests {
         assert_eq!((stuck.episodes.as_slice(), stuck.place), (&[(true, 30)][..], 0));
         assert_eq!(play(&kind, 1, 70, |_| 1).episodes, [(true, 30), (true, 33)]);
         assert_eq!(play(&kind, 2, 100, |_| 1).episodes, [(true, 30), (true, 30), (true, 36)]);
-        assert_eq!(play(&kind, 3, 120, |_| 1).episodes.len(), 4, "nobody needs the way back");
+        assert_eq!(play(&kind, 3, 120, |_| 1).episodes.len(), 4, "the path back is not needed");
     }
 }

@@ -95,7 +95,7 @@ fn pays(farm: Farm, moves: &Moves, episode: &Episode, history: &History) -> bool
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::bugs::general::testing::{play, play_sound};
+    use crate::bugs::general::testing::{Track, play, play_sound};
 
     #[test]
     fn episodes_are_lost_at_their_moment() {
@@ -105,7 +105,7 @@ mod tests {
         let lost = play(&kind, 0, 26, slowly);
         assert_eq!((lost.ends, lost.episodes), (vec![EpisodeEnd::LOST], vec![(false, 26)]));
         assert_eq!(play(&kind, 1, 7, |_| 1).episodes, [(false, 7)], "after seven ticks of the same");
-        assert_eq!(play(&kind, 1, 59, slowly).episodes, [], "nobody held anything");
+        assert_eq!(play(&kind, 1, 59, slowly).episodes, [], "no key was held");
         assert_eq!(play(&kind, 2, 41, |_| 1).episodes, [(true, 30), (false, 11)], "the second episode");
         assert_eq!(play(&kind, 3, 61, |tick| tick % 4 / 3).episodes, [(false, 61)]);
     }
@@ -116,12 +116,6 @@ mod tests {
         assert_eq!((out.ends, out.episodes), (vec![EpisodeEnd::Truncated], vec![(false, 26)]));
         assert_eq!(play(&short_time_out(), 3, 60, |_| 1).episodes, [(true, 30), (true, 30)], "whoever is quick");
     }
-}
-
-#[cfg(test)]
-mod reward_farm_tests {
-    use super::*;
-    use crate::bugs::general::testing::{Track, play, play_sound};
 
     #[test]
     fn what_leads_nowhere_pays() {

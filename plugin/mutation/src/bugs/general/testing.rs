@@ -5,10 +5,11 @@ use bevy::prelude::*;
 use bevy_playbot::{headless::tick_world, panics::PanicReports};
 use playbot_harness::{
     defect::DefectKind,
+    ended_episodes::EndedEpisodes,
     foreign::ForeignGame,
     game::{BotTools, InputTools},
     prelude::*,
-    worlds::{EndedEpisodes, build_world},
+    worlds::build_world,
 };
 
 /// Steps to the goal.

@@ -77,8 +77,8 @@ fn damaged_files_are_refused_with_their_line() {
         ("\"name\": \"track\"", "\"name\": \"truck\"", "is missing in `games`"),
         ("plain:3..9", "plain:9..3", "first level 9 is after last level 3"),
     ] {
-        let told = error(old, new);
-        assert!(told.contains(words) && told.contains("make the set again"), "{told}");
+        let reported = error(old, new);
+        assert!(reported.contains(words) && reported.contains("make the set again"), "{reported}");
     }
     fs::remove_file(&path).expect("there");
     assert!(matches!(BugSet::read(folder.path()), Err(BugError::Missing(_))));

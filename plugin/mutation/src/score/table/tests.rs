@@ -60,7 +60,7 @@ fn numbers_are_those_that_are_worked_out_by_hand() {
 }
 
 #[test]
-fn what_only_a_games_own_detectors_find_is_told_apart() {
+fn what_only_a_games_own_detectors_find_is_distinguished() {
     let (path, mut score) = garden();
     let finding = |detector: &str| JobFinding { detector: detector.to_owned(), tick: None, message: String::new() };
     let found = |job: &mut ScoredJob, detectors: &[&str]| {

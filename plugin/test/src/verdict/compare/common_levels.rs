@@ -61,7 +61,7 @@ mod tests {
         assert!(may(("hard:0..9", Some("0/2")), ("hard:0..9", None)));
         assert!(!may(("hard:0..9", Some("0/2")), ("hard:0..9", Some("1/2"))));
         assert!(may(("hard:0..9", Some("0/2")), ("hard:1..9", Some("1/2"))), "1 + 1 is in both");
-        assert!(may(("files:a/*.json:0..3", None), ("files:a/b.json:0..0", None)), "nobody knows yet");
+        assert!(may(("files:a/*.json:0..3", None), ("files:a/b.json:0..0", None)), "it is not known yet");
         assert!(!may(("files:a/*.json:0..3", None), ("hard:0..3", None)));
         let words = no_common_level(&record("hard:0..9", Some("0/2")), &record("easy:3..4", None));
         assert_eq!(words, "no level is in shard 0/2 of hard:0..9 and in easy:3..4");

@@ -1,4 +1,5 @@
-use crate::verdict::{MapScope, TesterRecord, results::*};
+use crate::verdict::{Finding, MapScope, TesterRecord, results::*, testing::verdict};
+use playbot_harness::detector::LevelProof;
 use std::fs;
 
 fn record() -> TestRecord {
@@ -116,4 +117,67 @@ fn nothing_may_follow_the_last_level_or_the_end() {
     let (levels, _) = text.rsplit_once("],").expect("an end");
     fs::write(&path, format!("{levels}]}}\n")).expect("writable");
     assert_eq!(*ResultLines::open_whole(folder.path()).expect("an older file").record(), record());
+}
+
+#[test]
+fn the_worst_come_first_and_perfect_ones_not_at_all() {
+    let record = TestRecord {
+        game: "garden".to_owned(),
+        game_version: 1,
+        range: "hard:0..99".parse().expect("a split"),
+        files: None,
+        seed: 0,
+        testers: vec![TesterRecord::bot("random")],
+        episodes: 4,
+        detectors: Vec::new(),
+        options: Vec::new(),
+        maps: MapScope::default(),
+        shard: None,
+    };
+    let mut overview = Overview::empty(record);
+    for (index, solved) in [4, 3, 0, 1, 0].into_iter().enumerate() {
+        let mut level =
+            LevelVerdict { places: Some(Places { visited: 3, open: 4 }), ..verdict(index as u64, solved, 4) };
+        level.testers[0].places = Some(Places { visited: 1, open: 4 });
+        overview.add(level);
+    }
+    let why = "walled in".to_owned();
+    let finding = Finding {
+        detector: "unreachable-goal".to_owned(),
+        tester: None,
+        episode: None,
+        tick: None,
+        message: why.clone(),
+        file: None,
+        settings: Vec::new(),
+    };
+    let proved = LevelVerdict {
+        outcome: LevelOutcome::ProvedUnsolvable,
+        proof: LevelProof::Unsolvable { why },
+        findings: vec![finding],
+        ..verdict(5, 0, 4)
+    };
+    overview.add(proved);
+    let worst: Vec<u64> = overview.worst.iter().map(|level| level.index).collect();
+    assert_eq!(worst, [5, 2, 4, 3, 1]);
+    assert_eq!((overview.solved, overview.bot_failed, overview.proved_unsolvable), (3, 2, 1));
+    assert_eq!(overview.testers[0].levels, Trials { successes: 3, trials: 6 });
+    assert_eq!(overview.testers[0].episodes, Trials { successes: 8, trials: 24 });
+    assert_eq!(overview.places, Places { visited: 15, open: 20 }, "the sixth level has no maps");
+    assert_eq!(overview.testers[0].places.percent(), Some(25.0));
+    assert!(!overview.is_sound());
+    for index in 6..60 {
+        overview.add(verdict(index, 0, 4));
+    }
+    assert_eq!((overview.worst.len(), overview.worst[0].index), (20, 5));
+}
+
+#[test]
+fn quartiles_lie_between_the_values() {
+    let of = |ticks: &[u32]| FinishTime::of(ticks.to_vec());
+    let time = |lower_quartile, median, upper_quartile| FinishTime { lower_quartile, median, upper_quartile };
+    assert_eq!(of(&[4, 1, 3, 2]), Some(time(1.75, 2.5, 3.25)));
+    assert_eq!(of(&[30, 10, 20, 50, 40]), Some(time(20.0, 30.0, 40.0)));
+    assert_eq!(of(&[7]), Some(time(7.0, 7.0, 7.0)));
+    assert_eq!(of(&[]), None);
 }

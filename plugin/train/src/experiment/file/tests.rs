@@ -158,7 +158,7 @@ fn every_preset_makes_an_experiment_with_settings_of_the_paper() {
     assert_eq!((sac.batch, sac.buffer, sac.tau, sac.gamma), (256, 1_000_000, 0.005, 0.99));
     let sac = with("base: [\"coinrun-sac\"], algorithm: \"sac\", game:").sac;
     assert_eq!((sac.batch, sac.buffer, sac.actor_lr, sac.gamma), (64, 10_000, 3e-4, 0.99));
-    assert_eq!((d4rl.score.horizon, d4rl.skills.latent_reg), (1, 0.1));
+    assert_eq!((d4rl.score.skill_interval, d4rl.skills.latent_reg), (1, 0.1));
     let base = "base: [\"coinrun-ppo\", \"skill-paper\", \"skill-released\", \"score-released-coinrun\"], game:";
     let released = with(base);
     assert_eq!((released.ppo.reward_gamma, released.ppo.minibatches, released.skills.window), (Some(0.99), 8, 5));

@@ -21,10 +21,11 @@ impl HasExitCode for UnknownObservation {}
 
 impl ObservationConfig {
     /// Returns the metadata for a file; `None` for vectors, whose names are kept.
-    pub fn card(&self) -> Option<PictureMetadata> {
+    pub fn picture_metadata(&self) -> Option<PictureMetadata> {
         let ImageOptions { stack, grayscale, paint_velocity, .. } = self.image;
-        let card = PictureMetadata { sensor: self.kind.to_string(), stack: stack as usize, grayscale, paint_velocity };
-        self.is_image().then_some(card)
+        let metadata =
+            PictureMetadata { sensor: self.kind.to_string(), stack: stack as usize, grayscale, paint_velocity };
+        self.is_image().then_some(metadata)
     }
 
     /// Returns the observation of a file whose networks read `observation`.
@@ -33,22 +34,25 @@ impl ObservationConfig {
     ///
     /// [`UnknownObservation`] if the metadata is missing, not understood, or of pictures of another
     /// shape.
-    pub fn from_card(card: Option<&PictureMetadata>, observation: &ObsKind) -> Result<Self, UnknownObservation> {
+    pub fn from_metadata(
+        metadata: Option<&PictureMetadata>,
+        observation: &ObsKind,
+    ) -> Result<Self, UnknownObservation> {
         let unknown = |why: String| Err(UnknownObservation { why });
-        let (card, shape) = match (card, observation) {
+        let (metadata, shape) = match (metadata, observation) {
             (None, ObsKind::Vector(_)) => return Ok(Self::default()),
-            (Some(card), ObsKind::Image(shape)) => (card, shape),
+            (Some(metadata), ObsKind::Image(shape)) => (metadata, shape),
             (None, _) => return unknown(format!("it reads {observation}, but has no metadata of them")),
             (Some(_), _) => return unknown(format!("it reads {observation}, but has metadata of pictures")),
         };
         let kind: ObservationKind =
-            card.sensor.parse().map_err(|error: UnknownName| UnknownObservation { why: error.to_string() })?;
+            metadata.sensor.parse().map_err(|error: UnknownName| UnknownObservation { why: error.to_string() })?;
         let image = ImageOptions {
             width: shape.width as u32,
             height: shape.height as u32,
-            stack: card.stack as u32,
-            grayscale: card.grayscale,
-            paint_velocity: card.paint_velocity,
+            stack: metadata.stack as u32,
+            grayscale: metadata.grayscale,
+            paint_velocity: metadata.paint_velocity,
         };
         let observation_config = Self { kind, image };
         if !observation_config.is_image() || image.check().is_err() || image.obs_kind() != *observation {
@@ -58,21 +62,19 @@ impl ObservationConfig {
     }
 }
 
-// The difference between two pictures of the same state.
-
 /// A difference, out of 255, that a person does not see and a policy should not mind.
 pub const CLOSE: u8 = 8;
 
 /// The difference between two pictures of the same size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Difference {
+pub struct PictureDifference {
     /// Mean absolute difference over pixels and the three colours, of 255.
     pub mean: f64,
     /// Share of pixels whose three colours are all within [`CLOSE`] of each other.
     pub close: f64,
 }
 
-impl Difference {
+impl PictureDifference {
     /// Compares pixel by pixel, ignoring the fourth byte. Returns `None` if the sizes differ or are
     /// 0.
     pub fn between(a: &[[u8; 4]], b: &[[u8; 4]]) -> Option<Self> {
@@ -95,41 +97,41 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cards_are_read_as_written_and_only_beside_what_they_describe() {
+    fn metadata_is_read_as_written_and_only_beside_what_they_describe() {
         let image = ImageOptions { stack: 4, grayscale: true, width: 48, ..ImageOptions::default() };
         let observation_config = ObservationConfig { kind: ObservationKind::Camera, image };
-        let card = observation_config.card();
-        assert_eq!(ObservationConfig::from_card(card.as_ref(), &image.obs_kind()), Ok(observation_config));
+        let metadata = observation_config.picture_metadata();
+        assert_eq!(ObservationConfig::from_metadata(metadata.as_ref(), &image.obs_kind()), Ok(observation_config));
         assert_eq!(
-            ObservationConfig::from_card(ObservationConfig::default().card().as_ref(), &ObsKind::Vector(3)),
+            ObservationConfig::from_metadata(
+                ObservationConfig::default().picture_metadata().as_ref(),
+                &ObsKind::Vector(3)
+            ),
             Ok(ObservationConfig::default())
         );
-        let other = |sensor: &str| card.clone().map(|card| PictureMetadata { sensor: sensor.to_owned(), ..card });
-        for (card, observation, words) in [
+        let other =
+            |sensor: &str| metadata.clone().map(|metadata| PictureMetadata { sensor: sensor.to_owned(), ..metadata });
+        for (metadata, observation, words) in [
             (None, image.obs_kind(), "has no metadata"),
-            (card.clone(), ObsKind::Vector(3), "vectors of 3"),
-            (card.clone(), ImageOptions::default().obs_kind(), "64×64 grey pictures of the camera, 4 in a stack"),
+            (metadata.clone(), ObsKind::Vector(3), "vectors of 3"),
+            (metadata.clone(), ImageOptions::default().obs_kind(), "64×64 grey pictures of the camera, 4 in a stack"),
             (other("sonar"), image.obs_kind(), "sonar"),
             (other("vector"), image.obs_kind(), "describes vectors"),
         ] {
-            let error =
-                ObservationConfig::from_card(card.as_ref(), &observation).expect_err("does not fit").to_string();
+            let error = ObservationConfig::from_metadata(metadata.as_ref(), &observation)
+                .expect_err("does not fit")
+                .to_string();
             assert!(error.contains(words), "{error}");
         }
     }
-}
-
-#[cfg(test)]
-mod difference_tests {
-    use super::*;
 
     #[test]
     fn counts_colours_and_pixels() {
         let a = [[10, 20, 30, 255], [0, 0, 0, 255]];
         let b = [[18, 20, 30, 0], [0, 9, 3, 0]];
-        let difference = Difference::between(&a, &b).expect("one size");
-        assert_eq!(difference, Difference { mean: 20.0 / 6.0, close: 0.5 });
-        assert_eq!(Difference::between(&a, &b[..1]), None);
-        assert_eq!(Difference::between(&[], &[]), None);
+        let difference = PictureDifference::between(&a, &b).expect("one size");
+        assert_eq!(difference, PictureDifference { mean: 20.0 / 6.0, close: 0.5 });
+        assert_eq!(PictureDifference::between(&a, &b[..1]), None);
+        assert_eq!(PictureDifference::between(&[], &[]), None);
     }
 }

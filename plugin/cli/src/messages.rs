@@ -48,21 +48,21 @@ pub(crate) fn for_people(text: &str) -> String {
 
 /// Prints a line on standard error. A closed standard error, or one on a full disk, loses the words: work does not end
 /// for that, as it would with `eprintln!`.
-macro_rules! tell {
-    () => { tell!("") };
+macro_rules! report {
+    () => { report!("") };
     ($($words:tt)*) => {{
         use std::io::Write as _;
         let words = format!($($words)*);
-        let _ = writeln!(std::io::stderr().lock(), "{}", $crate::tell::for_people(&words));
+        let _ = writeln!(std::io::stderr().lock(), "{}", $crate::messages::for_people(&words));
     }};
 }
 
-/// Prints the beginning of a line, see [`tell`].
-macro_rules! begin_to_tell {
+/// Prints the beginning of a line, see [`report`].
+macro_rules! begin_report {
     ($($words:tt)*) => {{
         use std::io::Write as _;
         let words = format!($($words)*);
-        let _ = write!(std::io::stderr().lock(), "{}", $crate::tell::for_people(&words));
+        let _ = write!(std::io::stderr().lock(), "{}", $crate::messages::for_people(&words));
     }};
 }
 
@@ -96,7 +96,9 @@ mod tests {
 
     #[test]
     fn no_word_fills_the_screen() {
-        let told = for_people(&format!("warning: there is no {}: name another", "k".repeat(10_000_000)));
-        assert!(told.len() < 4096 && told.starts_with("warning: there is no kkk") && told.ends_with("k: name another"));
+        let words = for_people(&format!("warning: there is no {}: name another", "k".repeat(10_000_000)));
+        assert!(
+            words.len() < 4096 && words.starts_with("warning: there is no kkk") && words.ends_with("k: name another")
+        );
     }
 }

@@ -1,6 +1,18 @@
-//! Positions of the arenas of one World.
+//! Shared parts of the games' pictures: drawings that come with the program, and positions for the arenas of one World.
 
-use bevy::prelude::*;
+use bevy::{
+    asset::RenderAssetUsages,
+    image::{CompressedImageFormats, ImageSampler, ImageType},
+    prelude::*,
+};
+
+/// Returns a drawing that comes with the program, from the bytes of its PNG.
+pub(crate) fn decode(png: &[u8]) -> Image {
+    let kind = ImageType::Extension("png");
+    let (formats, usages) = (CompressedImageFormats::NONE, RenderAssetUsages::default());
+    Image::from_buffer(png, kind, formats, true, ImageSampler::nearest(), usages)
+        .expect("the drawings are part of the program, and a test decodes each")
+}
 
 /// Arenas in a row.
 const COLUMNS: u32 = 8;

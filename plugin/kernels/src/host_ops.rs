@@ -1,4 +1,4 @@
-//! Custom operations for the backends whose numbers are in host memory.
+//! Operations on tensors for the backends whose numbers are in host memory: tanh, log-softmax and recurrent layers.
 //!
 //! Each has its backward pass beside it and enters the gradient graph as one node. Devices without a kernel (see
 //! [`is_host`]) use plain tensor operations instead.

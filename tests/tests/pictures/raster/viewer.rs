@@ -30,7 +30,7 @@ pub fn raster_world() -> World {
     into_world(app)
 }
 
-pub fn spawn_eye(world: &mut World, target: Entity, width: f32, size: [u32; 2]) -> Entity {
+pub fn spawn_sensor(world: &mut World, target: Entity, width: f32, size: [u32; 2]) -> Entity {
     let options = ImageOptions { width: size[0], height: size[1], ..default() };
     let sensor = RasterSensor::following(target, width, options);
     let index = world.query::<&Agent>().iter(world).len() as u32;
@@ -41,8 +41,8 @@ pub fn spawn_eye(world: &mut World, target: Entity, width: f32, size: [u32; 2]) 
 pub fn looking(size: [u32; 2]) -> (World, Entity) {
     let mut world = raster_world();
     let target = world.spawn(Transform::default()).id();
-    let eye = spawn_eye(&mut world, target, size[0] as f32, size);
-    (world, eye)
+    let sensor = spawn_sensor(&mut world, target, size[0] as f32, size);
+    (world, sensor)
 }
 
 pub fn add(world: &mut World, width: u32, texels: &[[u8; 4]]) -> Handle<Image> {
@@ -55,9 +55,9 @@ pub fn four(world: &mut World) -> Sprite {
 }
 
 /// Returns the picture as text: a letter for each pixel, `.` for black and `?` for other colours.
-pub fn text(world: &mut World, eye: Entity) -> String {
+pub fn text(world: &mut World, sensor: Entity) -> String {
     world.tick().expect("sound");
-    let options = world.get::<bevy_playbot::vision::ImageSensor>(eye).expect("a sensor").0;
+    let options = world.get::<bevy_playbot::vision::ImageSensor>(sensor).expect("a sensor").0;
     let letter = |pixel: [u8; 3]| match pixel {
         [255, 0, 0] => 'R',
         [0, 255, 0] => 'G',
@@ -66,13 +66,13 @@ pub fn text(world: &mut World, eye: Entity) -> String {
         [0, 0, 0] => '.',
         _ => '?',
     };
-    let row = |y| (0..options.width).map(|x| letter(pixel(world, eye, x, y))).collect::<String>();
+    let row = |y| (0..options.width).map(|x| letter(pixel(world, sensor, x, y))).collect::<String>();
     (0..options.height).map(row).collect::<Vec<_>>().join("/")
 }
 
-pub fn frame(world: &mut World, eye: Entity) -> Vec<[u8; 4]> {
+pub fn frame(world: &mut World, sensor: Entity) -> Vec<[u8; 4]> {
     world.tick().expect("sound");
-    world.get::<Frame>(eye).expect("an eye").pixels.clone()
+    world.get::<Frame>(sensor).expect("a sensor").pixels.clone()
 }
 
 pub fn fault(world: &mut World) -> String {

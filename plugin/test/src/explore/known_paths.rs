@@ -55,13 +55,13 @@ impl Route {
 
 /// A path: the first ticks up to the end of a segment, or up to a tick within it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Way {
+pub(super) struct KnownPath {
     segment: usize,
     /// Its length, from the start of the level.
     pub ticks: u32,
 }
 
-impl Way {
+impl KnownPath {
     /// The path to the start of the level.
     pub const START: Self = Self { segment: 0, ticks: 0 };
 
@@ -73,38 +73,38 @@ impl Way {
 
 /// The actions after a path that was known before.
 struct Segment {
-    parent: Way,
+    parent: KnownPath,
     piece: Route,
 }
 
 /// All paths of an exploration. Segments stay when a shorter path is found, since other paths may go through them.
-pub(super) struct Ways {
+pub(super) struct KnownPaths {
     space: ActionSpace,
     segments: Vec<Segment>,
 }
 
-impl Ways {
+impl KnownPaths {
     /// Creates it with the path to the start alone.
     pub fn new(space: ActionSpace) -> Self {
-        let start = Segment { parent: Way::START, piece: Route::empty(&space) };
+        let start = Segment { parent: KnownPath::START, piece: Route::empty(&space) };
         Self { space, segments: vec![start] }
     }
 
     /// Adds a path of this many ticks, which extends a known one by the beginning of a piece.
-    pub fn extend(&mut self, parent: Way, piece: &Route, ticks: u32) -> Way {
+    pub fn extend(&mut self, parent: KnownPath, piece: &Route, ticks: u32) -> KnownPath {
         if ticks <= parent.ticks {
             return parent.cut(ticks);
         }
         let mut kept = Route::empty(&self.space);
         kept.extend(piece, (ticks - parent.ticks) as usize);
         self.segments.push(Segment { parent, piece: kept });
-        Way { segment: self.segments.len() - 1, ticks }
+        KnownPath { segment: self.segments.len() - 1, ticks }
     }
 
     /// Returns a whole path.
-    pub fn route(&self, way: Way) -> Route {
+    pub fn route(&self, path: KnownPath) -> Route {
         let mut pieces = Vec::new();
-        let mut rest = way;
+        let mut rest = path;
         while rest.ticks > 0 {
             let Segment { parent, piece } = &self.segments[rest.segment];
             if rest.ticks > parent.ticks {
@@ -119,8 +119,6 @@ impl Ways {
         route
     }
 }
-
-// The replay of a path, alone: for recordings and for pictures.
 
 /// Plays actions on a level under the recorder. An episode that goes on after them is recorded as aborted. A replay of
 /// the recording, for instance with [`verify_file`](playbot_harness::demo::verify_file), checks that the path is the
@@ -152,9 +150,9 @@ pub fn record_route(
 /// The game broke its contract.
 pub fn follow_route(game: &dyn Game, mode: &str, level: u64, actions: &Actions) -> Result<Vec<Vec2>, Fault> {
     let (mut world, agent) = world_of(game, mode, level);
-    let mut places = Vec::new();
-    play(&mut world, agent, actions, |world| places.extend(game.tools().state.position(world, agent)))?;
-    Ok(places)
+    let mut positions = Vec::new();
+    play(&mut world, agent, actions, |world| positions.extend(game.tools().state.position(world, agent)))?;
+    Ok(positions)
 }
 
 /// Builds a World with an agent that plays the level once.
@@ -286,32 +284,27 @@ mod tests {
 
     #[test]
     fn ways_go_on_behind_others_and_are_whole_again() {
-        let mut ways = Ways::new(ActionSpace::Discrete(10));
-        let first = ways.extend(Way::START, &piece(&[1, 2, 3, 4]), 3);
-        assert_eq!(ways.route(first), piece(&[1, 2, 3]));
-        let second = ways.extend(first.cut(2), &piece(&[7, 8, 9]), 4);
-        assert_eq!(ways.route(second), piece(&[1, 2, 7, 8]), "what is not needed is not kept");
-        let third = ways.extend(second, &piece(&[5]), 5);
-        assert_eq!(ways.route(third), piece(&[1, 2, 7, 8, 5]));
-        assert_eq!(ways.route(third.cut(1)), piece(&[1]));
-        assert_eq!(ways.route(first), piece(&[1, 2, 3]), "others change nothing");
-        assert!(ways.route(Way::START).is_empty());
+        let mut paths = KnownPaths::new(ActionSpace::Discrete(10));
+        let first = paths.extend(KnownPath::START, &piece(&[1, 2, 3, 4]), 3);
+        assert_eq!(paths.route(first), piece(&[1, 2, 3]));
+        let second = paths.extend(first.cut(2), &piece(&[7, 8, 9]), 4);
+        assert_eq!(paths.route(second), piece(&[1, 2, 7, 8]), "what is not needed is not kept");
+        let third = paths.extend(second, &piece(&[5]), 5);
+        assert_eq!(paths.route(third), piece(&[1, 2, 7, 8, 5]));
+        assert_eq!(paths.route(third.cut(1)), piece(&[1]));
+        assert_eq!(paths.route(first), piece(&[1, 2, 3]), "others change nothing");
+        assert!(paths.route(KnownPath::START).is_empty());
     }
 
     #[test]
     fn a_way_that_is_no_longer_than_its_beginning_needs_no_segment() {
-        let mut ways = Ways::new(ActionSpace::Continuous(2));
+        let mut paths = KnownPaths::new(ActionSpace::Continuous(2));
         let actions = Actions::Continuous { dim: 2, values: vec![0.5, -0.5, 1.0, 0.0] };
-        let first = ways.extend(Way::START, &Route { actions, hashes: vec![1, 2] }, 2);
-        assert_eq!(ways.extend(first, &Route::empty(&ActionSpace::Continuous(2)), 1), first.cut(1));
-        assert_eq!(ways.segments.len(), 2);
-        assert_eq!(ways.route(first.cut(1)).hashes, [1]);
+        let first = paths.extend(KnownPath::START, &Route { actions, hashes: vec![1, 2] }, 2);
+        assert_eq!(paths.extend(first, &Route::empty(&ActionSpace::Continuous(2)), 1), first.cut(1));
+        assert_eq!(paths.segments.len(), 2);
+        assert_eq!(paths.route(first.cut(1)).hashes, [1]);
     }
-}
-
-#[cfg(test)]
-mod summary_tests {
-    use super::*;
 
     fn summary() -> ExplorationSummary {
         ExplorationSummary {

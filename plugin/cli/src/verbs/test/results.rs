@@ -3,7 +3,7 @@
 use crate::{
     arguments::counted,
     error::{CliError, Outcome, print_line},
-    output,
+    output, program,
 };
 use playbot_harness::{brief::shell_word, game::Game};
 use playbot_report::{PlainTable, ticks, whole};
@@ -55,16 +55,16 @@ impl Results<'_> {
 
 /// Compares results if requested, writes the files that go with them, and prints them. The outcome is that of the
 /// comparison if there is one, else that of the results.
-pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
+pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     let comparison = results.against.map(|before| Comparison::read(before, results.folder)).transpose()?;
     let folder = results.folder.display();
     let next = format!(
         "the results in {folder} are whole: make room or rights there, and make their page with `{} report html {folder}`",
-        output::name()
+        program::name()
     );
-    let not_written = |error| output::told(error, &next);
-    let overview = write_reports(results.folder, comparison.as_ref(), output::name()).map_err(not_written)?;
-    let report = HtmlReport { game: results.game, comparison: comparison.as_ref(), program: output::name() };
+    let not_written = |error| output::with_advice(error, &next);
+    let overview = write_reports(results.folder, comparison.as_ref(), program::name()).map_err(not_written)?;
+    let report = HtmlReport { game: results.game, comparison: comparison.as_ref(), program: program::name() };
     write_html(results.folder, &results.folder.join(REPORT), &report).map_err(not_written)?;
     if results.json {
         let mut lines = ResultLines::open(results.folder)?;
@@ -77,13 +77,13 @@ pub fn tell_results(results: &Results) -> Result<Outcome, CliError> {
             print_line(format!("\n{}", worst(&overview).to_text().trim_end()))?;
         }
     }
-    tell!("{}", counts(&overview));
-    replays(results.folder, &overview).iter().for_each(|line| tell!("{line}"));
+    report!("{}", counts(&overview));
+    replays(results.folder, &overview).iter().for_each(|line| report!("{line}"));
     if let Some(comparison) = &comparison {
-        tell_comparison(comparison);
+        report_comparison(comparison);
     }
     let names = [RESULTS, REPORT, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
-    tell!("{folder}: {}", names.collect::<Vec<_>>().join(", "));
+    report!("{folder}: {}", names.collect::<Vec<_>>().join(", "));
     let is_sound = comparison.as_ref().map_or(overview.is_sound(), |comparison| !comparison.has_alarms());
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
 }
@@ -108,7 +108,7 @@ fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
 
 /// Returns the command that shows a finding.
 fn seen_with(file: &Path) -> String {
-    format!("see it: {} replay {}", output::name(), shell_word(&file.display().to_string()))
+    format!("see it: {} replay {}", program::name(), shell_word(&file.display().to_string()))
 }
 
 fn counts(overview: &Overview) -> String {
@@ -165,8 +165,8 @@ fn worst(overview: &Overview) -> PlainTable {
     }
 }
 
-fn tell_comparison(comparison: &Comparison) {
-    comparison.left_out.iter().for_each(|why| tell!("left out of the comparison: {why}"));
+fn report_comparison(comparison: &Comparison) {
+    comparison.left_out.iter().for_each(|why| report!("left out of the comparison: {why}"));
     let lists = [
         ("unsolvable", texts(&comparison.unsolvable)),
         ("harder", texts(&comparison.harder)),
@@ -175,10 +175,10 @@ fn tell_comparison(comparison: &Comparison) {
         ("gone finding", texts(&comparison.gone_findings)),
     ];
     for (what, changes) in &lists {
-        changes.iter().for_each(|change| tell!("{what}: {change}"));
+        changes.iter().for_each(|change| report!("{what}: {change}"));
     }
     if lists.iter().all(|(_, changes)| changes.is_empty()) {
-        tell!("nothing has changed by more than chance in {}", counted(comparison.levels, "level"));
+        report!("nothing has changed by more than chance in {}", counted(comparison.levels, "level"));
     }
 }
 

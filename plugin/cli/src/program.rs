@@ -1,0 +1,47 @@
+//! The program's name: that of its file, whatever games are in it.
+
+use std::{env, ffi::OsStr, path::Path, sync::OnceLock};
+
+/// The name in texts that do not know their program, such as the errors of libraries.
+pub(crate) const DEFAULT_NAME: &str = "playbot";
+
+/// Returns the program's name, for commands in messages.
+pub(crate) fn name() -> &'static str {
+    static NAME: OnceLock<String> = OnceLock::new();
+    NAME.get_or_init(|| env::args_os().next().as_deref().and_then(of_file).unwrap_or(DEFAULT_NAME).to_owned())
+}
+
+fn of_file(path: &OsStr) -> Option<&str> {
+    Path::new(path).file_name()?.to_str()?.strip_suffix(env::consts::EXE_SUFFIX)
+}
+
+/// Puts this program's name into the commands that a text quotes.
+pub(crate) fn named(text: &str) -> String {
+    with_name(text, name())
+}
+
+/// Puts a program's name into the commands that a text quotes.
+pub(crate) fn with_name(text: &str, program: &str) -> String {
+    text.replace(&format!("`{DEFAULT_NAME} "), &format!("`{program} "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_is_called_as_its_file() {
+        let called = |name: &str| of_file(OsStr::new(&format!("{name}{}", env::consts::EXE_SUFFIX))).map(str::to_owned);
+        assert_eq!(called("target/release/runner").as_deref(), Some("runner"));
+        assert_eq!(called("my.game").as_deref(), Some("my.game"));
+        assert_eq!(of_file(OsStr::new("..")), None);
+    }
+
+    #[test]
+    fn quoted_commands_get_the_name_and_other_words_keep_theirs() {
+        let text = "playbot 0.2 wrote it: `playbot eval --run a` and `playbot demo repair FILE`";
+        let own = "playbot 0.2 wrote it: `runner eval --run a` and `runner demo repair FILE`";
+        assert_eq!(with_name(text, "runner"), own);
+        assert_eq!(with_name(text, "playbot"), text);
+    }
+}
