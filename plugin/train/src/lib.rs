@@ -11,7 +11,7 @@
 //! - [`learn_skills`]: the learning of a skill model.
 //! - [`trainer`]: the training loop, one update at a time ([`Trainer`]); [`collect`]: the Worlds that play for it.
 //! - [`train_run`]: a whole run ([`train_run::Training`]), with its folder ([`run_dir`], [`run_lock`]), checkpoints
-//!   ([`checkpoint`]), metrics ([`update_report`], [`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
+//!   ([`checkpoint`]), metrics ([`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
 //! - [`policy_export`]: the one file that a game ships with.
 //! - [`runs`]: runs on disk, found and compared over seeds.
 //! - [`study`] and [`study_runner`]: variants of an experiment, each with every seed, and their tables.
@@ -26,7 +26,6 @@ mod memory;
 pub mod metrics_log;
 pub mod pipeline;
 pub mod policy_export;
-pub(crate) mod progress;
 pub mod recordings;
 pub mod run_dir;
 pub mod run_lock;
@@ -37,12 +36,10 @@ pub mod study_runner;
 pub mod tensorboard;
 pub mod train_run;
 pub mod trainer;
-pub mod update_report;
 
 pub use crate::{
     error::TrainError,
     experiment::{Algorithm, Experiment, LearnerKind},
-    trainer::{Trainer, learner::TrainedLearner},
-    update_report::{Timing, UpdateReport},
+    trainer::{Timing, Trainer, UpdateReport, learner::TrainedLearner},
 };
 pub use playbot_learner::LearnerMetrics;

@@ -6,7 +6,7 @@
 
 use crate::{
     tensorboard::{Event, EventFolder, EventKind},
-    update_report::UpdateReport,
+    trainer::UpdateReport,
 };
 use playbot_harness::sealed_file::{SealedFileError, io_error, unsealed_line, write_atomically};
 use playbot_learner::{disk::DiskFile, seal_json};

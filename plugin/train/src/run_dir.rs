@@ -17,11 +17,9 @@ use crate::{
     error::{TrainError, edited, unreadable},
     experiment::{Algorithm, Experiment, file::read_experiment},
     metrics_log::MetricsLog,
-    progress::Progress,
     run_lock::{RunLock, check_is_run, replace_run},
     trainer,
-    trainer::{Trainer, learner::TrainedLearner},
-    update_report::UpdateReport,
+    trainer::{Progress, Trainer, UpdateReport, learner::TrainedLearner},
 };
 use playbot_harness::{
     game::Game,

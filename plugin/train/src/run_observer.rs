@@ -3,7 +3,7 @@
 use crate::{
     experiment::Experiment,
     study::{StudyResult, StudyRun},
-    update_report::UpdateReport,
+    trainer::UpdateReport,
 };
 use bevy_playbot::vision::ObservationConfig;
 use playbot_harness::eval::EvalSummary;

@@ -13,7 +13,7 @@ use crate::{
     Algorithm,
     experiment::{Experiment, ExperimentError, Variant, error::ConfigError},
     study::table::markdown_table,
-    update_report::{SUCCESS_RATE, range_of},
+    trainer::{SUCCESS_RATE, range_of},
 };
 use playbot_harness::eval::EvalSummary;
 use playbot_learner::HasExitCode;

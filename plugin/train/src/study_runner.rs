@@ -16,8 +16,7 @@ use crate::{
         table::{EXPERIMENT, EXPERIMENT_HEAD, markdown_table},
     },
     train_run::{NewRun, Training, TrainingError, TrainingSetup, run_info},
-    trainer::Trainer,
-    update_report::{EPISODIC_RETURN, SUCCESS_RATE},
+    trainer::{EPISODIC_RETURN, SUCCESS_RATE, Trainer},
 };
 use bevy_playbot::{policy::ActionDraw, unknown_name::UnknownName, vision::ObservationConfig};
 use playbot_harness::{

@@ -1,16 +1,13 @@
-//! The training loop, one update at a time: the caller owns the progress bar and decides when to stop.
+//! The training loop, one update at a time, with its progress and the report of each update. The caller owns the
+//! progress bar and decides when to stop.
 //!
 //! - `learner`: the learner of an experiment's algorithm.
 
 pub mod learner;
 
 use crate::{
-    collect::Collector,
-    error::TrainError,
-    experiment::Experiment,
-    progress::Progress,
+    checkpoint::CheckpointSummary, collect::Collector, error::TrainError, experiment::Experiment,
     trainer::learner::TrainedLearner,
-    update_report::{Timing, UpdateReport},
 };
 use bevy::prelude::World;
 use bevy_playbot::{
@@ -24,16 +21,39 @@ use playbot_harness::{
     split::seen_by_training,
 };
 use playbot_learner::{
-    ActionSpace, DeviceKind, LearnError, ObsColumns, ObsKind, Observations, Policy, Rollout, SeenLevels, SkillModel,
-    SkillSource,
+    ActionSpace, DeviceKind, LearnError, LearnerMetrics, ObsColumns, ObsKind, Observations, Policy, Rollout,
+    SeenLevels, SkillModel, SkillSource,
 };
+use serde::{Deserialize, Serialize};
 use std::{
+    collections::VecDeque,
     path::Path,
     time::{Duration, Instant},
 };
 
 /// Rows on which the first policy is compared with the decoder.
 const INITIAL_KL_ROWS: usize = 1024;
+
+/// Tag of the success rate of the last 100 episodes.
+pub const SUCCESS_RATE: &str = "charts/success_rate";
+
+/// Tag of the mean return of the last 100 episodes.
+pub const EPISODIC_RETURN: &str = "charts/episodic_return";
+
+/// Tag of the mean length of the last 100 episodes, ticks.
+pub const EPISODIC_LENGTH: &str = "charts/episodic_length";
+
+/// Tag of the share of clipped actions in the last 100 episodes.
+pub const CLIPPED_SHARE: &str = "charts/clipped_share";
+
+/// Tag of the number of episodes that have ended.
+pub const EPISODES: &str = "charts/episodes";
+
+/// Tags of the means over the last 100 episodes.
+pub const EPISODE_MEANS: [&str; 3] = [EPISODIC_RETURN, EPISODIC_LENGTH, SUCCESS_RATE];
+
+/// Episodes over which the current return, length and success rate are averaged.
+pub(crate) const RECENT: usize = 100;
 
 /// Training of one algorithm on one experiment.
 pub struct Trainer {
@@ -283,4 +303,145 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
     experiment.check_game(game)?;
     experiment.observation_config().check(game)?;
     Ok(experiment.check_memory(game)?)
+}
+
+/// Results of one update. Everything except `timing` is the same in every run with the same seed.
+#[derive(Clone, Debug)]
+pub struct UpdateReport {
+    /// Updates done, this one included.
+    pub update: u64,
+    /// Environment steps done, over all arenas together.
+    pub step: u64,
+    /// Episodes that have ended. Before the 100th, the means below are over fewer episodes, of which short ones end
+    /// first.
+    pub episodes: u64,
+    /// Mean return of the last 100 episodes; `None` before the first has ended.
+    pub episodic_return: Option<f64>,
+    /// Mean length of the last 100 episodes, ticks.
+    pub episodic_length: Option<f64>,
+    /// Success rate of the last 100 episodes.
+    pub success_rate: Option<f64>,
+    /// Share of the ticks of the last 100 episodes whose action was clipped to the game's range; only for continuous
+    /// actions.
+    pub clipped_share: Option<f64>,
+    /// KL divergence from decoder to policy before the first update; only in the first report of SCORE.
+    pub initial_kl: Option<f32>,
+    /// The learner's metrics.
+    pub learner: LearnerMetrics,
+    /// Time spent.
+    pub timing: Timing,
+}
+
+impl UpdateReport {
+    /// Returns whether at least 100 episodes have ended, and at least this share of the last 100 succeeded.
+    pub fn mostly_succeeds(&self, share: f64) -> bool {
+        self.episodes >= RECENT as u64 && self.success_rate.is_some_and(|rate| rate >= share)
+    }
+
+    /// Returns all measurements by TensorBoard tag; the same numbers in every run with the same seed.
+    pub fn scalars(&self) -> Vec<(&'static str, f64)> {
+        let episodes = [
+            (EPISODES, Some(self.episodes as f64)),
+            (EPISODIC_RETURN, self.episodic_return),
+            (EPISODIC_LENGTH, self.episodic_length),
+            (SUCCESS_RATE, self.success_rate),
+            (CLIPPED_SHARE, self.clipped_share),
+            ("score/initial_kl", self.initial_kl.map(f64::from)),
+        ];
+        let known = episodes.into_iter().filter_map(|(tag, value)| Some((tag, value?)));
+        known.chain(self.learner.scalars()).collect()
+    }
+}
+
+/// Wall-clock seconds of one update.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Timing {
+    /// Simulating, observing and deciding.
+    pub collect_s: f64,
+    /// Learning.
+    pub learn_s: f64,
+}
+
+/// Returns the natural range of a metric; `None` if any value is possible.
+pub fn range_of(tag: &str) -> Option<(f64, f64)> {
+    [SUCCESS_RATE, CLIPPED_SHARE].contains(&tag).then_some((0.0, 1.0))
+}
+
+/// A finished episode, as the moving averages keep it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RecentEpisode {
+    total_reward: f64,
+    ticks: u32,
+    success: bool,
+    /// Ticks whose action was clipped; missing in older checkpoints.
+    #[serde(default)]
+    clipped: u32,
+}
+
+/// Progress of training.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Progress {
+    pub(crate) updates: u64,
+    pub(crate) steps: u64,
+    pub(crate) episodes: u64,
+    pub(crate) recent: VecDeque<RecentEpisode>,
+}
+
+impl Progress {
+    pub(crate) fn note(&mut self, finished: &[EpisodeEnded]) {
+        self.episodes += finished.len() as u64;
+        self.recent.extend(finished.iter().map(|episode| RecentEpisode {
+            total_reward: episode.total_reward,
+            ticks: episode.ticks,
+            success: episode.success,
+            clipped: episode.clipped,
+        }));
+        let surplus = self.recent.len().saturating_sub(RECENT);
+        self.recent.drain(..surplus);
+    }
+
+    /// Returns the mean over the last episodes; `None` before the first has ended.
+    fn mean(&self, value: fn(&RecentEpisode) -> f64) -> Option<f64> {
+        let n = self.recent.len();
+        (n > 0).then(|| self.recent.iter().map(value).sum::<f64>() / n as f64)
+    }
+
+    fn episodic_return(&self) -> Option<f64> {
+        self.mean(|episode| episode.total_reward)
+    }
+
+    fn success_rate(&self) -> Option<f64> {
+        self.mean(|episode| f64::from(u8::from(episode.success)))
+    }
+
+    /// Returns the share of the clipped ticks among those of the last episodes.
+    fn clipped_share(&self) -> Option<f64> {
+        let ticks = self.mean(|episode| f64::from(episode.ticks)).filter(|ticks| *ticks > 0.0)?;
+        Some(self.mean(|episode| f64::from(episode.clipped))? / ticks)
+    }
+
+    /// Returns the training results, with means once enough episodes have ended.
+    pub(crate) fn summary(&self) -> CheckpointSummary {
+        let settled = |mean: Option<f64>| mean.filter(|_| self.recent.len() == RECENT);
+        CheckpointSummary {
+            step: self.steps,
+            episodic_return: settled(self.episodic_return()),
+            success_rate: settled(self.success_rate()),
+        }
+    }
+
+    pub(crate) fn report(&self, learner: LearnerMetrics, initial_kl: Option<f32>, timing: Timing) -> UpdateReport {
+        UpdateReport {
+            update: self.updates,
+            step: self.steps,
+            episodes: self.episodes,
+            episodic_return: self.episodic_return(),
+            episodic_length: self.mean(|episode| f64::from(episode.ticks)),
+            success_rate: self.success_rate(),
+            clipped_share: self.clipped_share(),
+            initial_kl,
+            learner,
+            timing,
+        }
+    }
 }

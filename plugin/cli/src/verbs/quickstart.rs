@@ -30,7 +30,7 @@ use playbot_train::{
     run_lock::RunLock,
     runs::RunCurves,
     train_run::{NewRun, Reached, Training, TrainingSetup, train_to_success},
-    update_report::SUCCESS_RATE,
+    trainer::SUCCESS_RATE,
 };
 use serde_json::json;
 use std::{

@@ -16,7 +16,7 @@ use playbot_harness::{games::Games, sealed_file::write_atomically};
 use playbot_report::{PlainTable, percent, readable, whole};
 use playbot_train::{
     runs::{FoundRuns, Leftover, RunRecord, RunsError},
-    update_report::{EPISODIC_RETURN, SUCCESS_RATE},
+    trainer::{EPISODIC_RETURN, SUCCESS_RATE},
 };
 use serde_json::{Value, json};
 use std::{

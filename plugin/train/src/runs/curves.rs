@@ -4,7 +4,7 @@ use crate::{
     checkpoint,
     metrics_log::{JsonLines, MetricsLog, SPS, scalars},
     runs::RunsError,
-    update_report::{EPISODE_MEANS, EPISODES, RECENT},
+    trainer::{EPISODE_MEANS, EPISODES, RECENT},
 };
 use bevy_playbot::unknown_name::UnknownName;
 use std::{collections::BTreeMap, path::Path};

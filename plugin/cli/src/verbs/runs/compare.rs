@@ -8,7 +8,7 @@ use crate::{
 use playbot_report::{Chart, Curve, PlainTable, readable, readable_with_spread, statistics::mean_and_sd, whole};
 use playbot_train::{
     runs::{GroupStatistics, RunGroup, RunRecord, find_runs, group_runs, mean_and_spread},
-    update_report::{EPISODE_MEANS, SUCCESS_RATE, range_of},
+    trainer::{EPISODE_MEANS, SUCCESS_RATE, range_of},
 };
 use serde_json::json;
 use std::{

@@ -12,7 +12,7 @@ use playbot_train::{
     Experiment,
     checkpoint::{Checkpoint, CheckpointSummary},
     runs::{RunCurves, RunRecord, changed_settings, with_defaults},
-    update_report::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
+    trainer::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;
