@@ -58,8 +58,7 @@ use crate::{
 use bevy::prelude::*;
 use thiserror::Error;
 
-/// Draws the surroundings of an entity, as a [`CameraSensor`](crate::camera) would show them,
-/// without a GPU.
+/// Draws the surroundings of an entity, as a `CameraSensor` would show them, without a GPU.
 #[derive(Component, Clone, Copy, Debug, Reflect)]
 #[reflect(Component)]
 #[require(ImageSensor)]
