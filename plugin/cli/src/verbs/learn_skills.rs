@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 #[command(mut_arg("threads", |threads| threads.help("Threads that replay recordings. The result does not depend on their number")))]
 #[command(after_help = "Examples:
   playbot learn-skills GAME --out skills.safetensors
-  playbot learn-skills --set observation=Raster --max-steps 30000 --out eyes.safetensors
+  playbot learn-skills --set observation=Raster --max-steps 30000 --out pixels.safetensors
   playbot learn-skills --experiment my.ron --demos recordings/ --epochs 30 --out skills.safetensors
   playbot learn-skills --out skills.safetensors --resume")]
 pub struct Args {
