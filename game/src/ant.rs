@@ -2,7 +2,7 @@
 //!
 //! [`AntBody`] moves exactly as D4RL's ant does in MuJoCo: free flight to the last printed digit, and contacts too, as
 //! `tests/ant_golden.rs` shows. Its dynamics are written here, over joint coordinates, for lack of an engine that has
-//! them: a hinge of this ant carries a rotor of 1 kg·m² while a limb has 0.01 kg·m². rapier's impulse joints with a
+//! them. A hinge of this ant carries a rotor of 1 kg·m² while a limb has 0.01 kg·m². rapier's impulse joints with a
 //! motor in the rotor's place reach 40 % of the right joint speed at 4 solver iterations and 75 % at 16. Its multibody
 //! joints, which support rotors, let the ant rest at 0.49 m instead of 0.37 m and take ten times as long. rapier is
 //! used here to hold floor and walls, find those nearby, and answer rays ([`walls`]).

@@ -1,4 +1,4 @@
-//! Variants of a defect: places along the path first, so that testers that get further find more, and then strengths.
+//! Variants of a defect: first its positions along the path, then its strengths. So testers that get further find more.
 
 /// Places: at the start, further on and late.
 pub(crate) const PLACES: u32 = 3;

@@ -235,7 +235,7 @@ fn choose_ends(walls: &Walls, wanted: Option<&RangeInclusive<usize>>, draw: &mut
     Err(longest)
 }
 
-/// Returns two cells far apart and the moves between them: walks to the farthest cell, turns around, and goes on as
+/// Returns two cells far apart and the moves between them. Walks to the farthest cell, turns around, and goes on as
 /// long as that makes the path longer. Without loops no two cells are farther apart; with loops no cell is farther from
 /// either.
 fn far_apart(walls: &Walls, from: Cell) -> (Cell, Cell, usize) {

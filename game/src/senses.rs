@@ -104,7 +104,7 @@ impl AddedObservations for WithMap {
     }
 }
 
-/// Returns the offsets of the map's cells to the east and to the north of the agent's own: rows from north to south,
+/// Returns the offsets of the map's cells to the east and to the north of the agent's own. Rows go from north to south,
 /// each from west to east, as on a map.
 fn around() -> impl Iterator<Item = [i32; 2]> {
     (-REACH..=REACH).rev().flat_map(|north| (-REACH..=REACH).map(move |east| [east, north]))
@@ -152,8 +152,8 @@ impl AddedObservations for WithRays {
     }
 }
 
-/// The eight directions of rays, with the components of a step of 1 m to the east and to the north: east, then on by
-/// eighths of a turn to the left. North is up in the game's own picture.
+/// The eight directions of rays, with the components of a step of 1 m to the east and to the north. The first is east,
+/// then on by eighths of a turn to the left. North is up in the game's own picture.
 pub const DIRECTIONS: [(&str, [f64; 2]); 8] = {
     const DIAGONAL: f64 = std::f64::consts::FRAC_1_SQRT_2;
     [

@@ -271,8 +271,8 @@ fn what_a_run_has_lost_and_what_is_left_of_another_is_said() {
 
     let (_, reported) = ended(folder, &["train", "--run", "runs/b", "--resume"], 0);
     for words in [
-        "runs/b/metrics.jsonl: nothing is left of 2 updates, those of the steps 384 to 512",
-        "runs/b/timing.jsonl: nothing is left of 4 updates, those of the steps 128 to 512",
+        "runs/b/metrics.jsonl: metrics are missing for 2 updates, those of the steps 384 to 512",
+        "runs/b/timing.jsonl: metrics are missing for 4 updates, those of the steps 128 to 512",
         "runs/b/run.json.tmp7 is unfinished",
         "runs/b.replaced-7 holds the replaced files of runs/b, and is removed",
     ] {

@@ -1,10 +1,10 @@
-//! Notes playbot's revision, so that a run can say what made it.
+//! Build script that notes playbot's revision, so that a run can say what made it.
 
 use std::{fs, path::Path, process::Command};
 
-/// Where `cargo package` writes the revision that it packs.
+/// The file into which `cargo package` writes the revision that it packs.
 const PACKED: &str = ".cargo_vcs_info.json";
-/// What changes with the revision of a clone.
+/// Files that change with the revision of a clone.
 const CLONED: [&str; 2] = ["../../.git/HEAD", "../../.git/refs/heads"];
 
 #[allow(clippy::print_stdout, reason = "cargo reads it")]

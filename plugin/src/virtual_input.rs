@@ -314,17 +314,16 @@ pub enum InputRoute {
     /// sees `just_pressed` in the same tick, and exactly once, however many ticks a frame runs. Systems in `Update`
     /// see everything that happened in the frame.
     ///
-    /// Messages are sent in the same tick. Only `RawGamepadEvent` is left out, except for the connection of a
-    /// gamepad: Bevy's own system would read it in the next frame and play everything a second time. A driver's
-    /// values are in `RawGamepadButtonChangedEvent` and `RawGamepadAxisChangedEvent`; most games read `GamepadEvent`
-    /// and its parts.
+    /// Messages are sent in the same tick. Only `RawGamepadEvent` is left out, except for the connection of a gamepad.
+    /// Bevy's own system would read it in the next frame and play everything a second time. A driver's values are in
+    /// `RawGamepadButtonChangedEvent` and `RawGamepadAxisChangedEvent`; most games read `GamepadEvent` and its parts.
     #[default]
     Direct,
 }
 
 /// Presses keys for the agent under [`Control::Human`](crate::agent::Control::Human), too, by its
-/// [`Action`](crate::action::Action). For windows that keep a person's own devices from the game and turn them into
-/// an action: the game then sees exactly the keys that a replay of these actions presses.
+/// [`Action`](crate::action::Action). For windows that keep a person's own devices from the game and turn them into an
+/// action. The game then sees exactly the keys that a replay of these actions presses.
 #[derive(Component, Clone, Copy, Debug, Default, Reflect)]
 #[reflect(Component)]
 pub struct PressesForPeople;

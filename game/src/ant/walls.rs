@@ -1,7 +1,7 @@
 //! Floor and walls as rapier colliders.
 //!
 //! rapier finds the walls near the ant, and answers the rays and shape casts of a game's own sensors. It does not move
-//! the ant: its impulse joints do not keep up with hinges whose rotors are a hundred times heavier than the limbs, see
+//! the ant. Its impulse joints do not keep up with hinges whose rotors are a hundred times heavier than the limbs, see
 //! [the module](super).
 
 use crate::ant::contact::WallBox;

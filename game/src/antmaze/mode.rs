@@ -64,8 +64,8 @@ const OPTIONS: [&str; 7] =
     ["sparse", "dense=exp", "goals=demo", "goals=random", "goal-noise=d4rl", "random-start", "limit=1000"];
 
 impl AntMazeMode {
-    /// Returns the default mode on a map, for comparisons: dense reward, fixed start and goal, and time for 1000 ticks,
-    /// on the smallest map for 700.
+    /// Returns the default mode on a map, for comparisons. It has a dense reward, a fixed start and goal, and time for
+    /// 1000 ticks, on the smallest map for 700.
     pub fn on(map: Map) -> Self {
         let (pay, goals, goal_noise) = (Pay::default(), Goals::default(), GoalNoise::default());
         Self { limit: default_limit(&map), map, pay, goals, goal_noise, random_start: false }

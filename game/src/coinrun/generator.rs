@@ -1,8 +1,7 @@
-//! Builds a level from its mode and seed, draw for draw as Procgen's CoinRun does.
+//! Generator of levels from mode and seed, draw for draw as Procgen's CoinRun does.
 //!
-//! Every random decision takes one output of an mt19937 generator seeded with the level seed, so
-//! the order of the draws is part of the result: a draw that is skipped or added changes the rest
-//! of the level.
+//! Every random decision takes one output of an mt19937 generator seeded with the level seed, so the order of the draws
+//! is part of the result. A draw that is skipped or added changes the rest of the level.
 
 use crate::coinrun::{
     level::{Level, LevelParts, Mode, Spawn},
@@ -274,7 +273,7 @@ impl Draw {
         (f64::from(self.0.next_u32()) / (f64::from(u32::MAX) + 1.0)) as f32
     }
 
-    /// Returns the draws of the first 1024 steps, one output each: bit `k` is set when step `k` (from 0) resolves a tie
+    /// Returns the draws of the first 1024 steps, one output each. Bit `k` is set when step `k` (from 0) resolves a tie
     /// between the axes in favour of x.
     fn tie_breaks(&mut self) -> [u64; 16] {
         let mut bits = [0; 16];

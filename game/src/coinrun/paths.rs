@@ -4,8 +4,8 @@
 //! own motion through the view: tiles, crates and saws as they stand, enemies at their present speed. A path ends at
 //! the edge of the view.
 //!
-//! Six paths of up to 20 steps are followed at every tick, so they take short cuts, each of which gives the numbers of
-//! the rules to the bit:
+//! Six paths of up to 20 steps are followed at every tick, so they take short cuts. Each gives the numbers of the rules
+//! to the bit:
 //!
 //! - with and without the jump button, a path is one path until a jump would work;
 //! - a step through free space only adds, and so does one beside a straight wall or on level ground until it is

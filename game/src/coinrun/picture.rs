@@ -1,8 +1,8 @@
 //! The look of CoinRun: Procgen's picture, with drawings of our own.
 //!
-//! Each arena becomes a [`Stage`] with a backdrop, its tiles and a sprite for every
-//! inhabitant, in the arena's own coordinates: one unit is one tile. Nothing here changes the game. The picture follows
-//! from the episode alone: animations count its ticks, and enemies leave puffs behind.
+//! Each arena becomes a [`Stage`] with a backdrop, its tiles and a sprite for every inhabitant, in the arena's own
+//! coordinates. One unit is one tile. Nothing here changes the game. The picture follows from the episode alone:
+//! animations count its ticks, and enemies leave puffs behind.
 //!
 //! The folder, in reading order:
 //!

@@ -10,10 +10,10 @@
 //! | 8 | `vx`, `vy`, `cell_x`, `cell_y`, `supported`, `rising`, `on_crate`, `faces_left` | the player |
 //! | 36 | `hold_a_dies`, `_coin`, `_lands`, `_steps`, `_dx`, `_dy` | six curved rays: see [`paths`] |
 //!
-//! The cells are centred on the player and so lie across the tiles of the level: a picture with one pixel per tile,
-//! with soft edges. Rows (r) go up from 0 at the bottom to 12, columns (c) from 0 at the left to 12; the player is in
-//! the middle of cell (6, 6). Velocities are divided by their largest value. `cell_x` and `cell_y` are the player's
-//! position in its tile, from -0.5 to 0.5, and `a` is the number of the held action.
+//! The cells are centred on the player and so lie across the tiles of the level. They are a picture with one pixel per
+//! tile, with soft edges. Rows (r) go up from 0 at the bottom to 12, columns (c) from 0 at the left to 12. The player
+//! is in the middle of cell (6, 6). Velocities are divided by their largest value. `cell_x` and `cell_y` are the
+//! player's position in its tile, from -0.5 to 0.5, and `a` is the number of the held action.
 
 use crate::coinrun::{
     cells::Cells,

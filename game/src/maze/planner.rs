@@ -37,11 +37,11 @@ impl GridMove {
     }
 }
 
-/// The best moves to a goal as D4RL's demonstrator plans them: Q-values of five deterministic moves, with reward 1 for
-/// any move in the goal cell and discount 0.99.
+/// The best moves to a goal as D4RL's demonstrator plans them. They follow from Q-values of five deterministic moves,
+/// with reward 1 for any move in the goal cell and discount 0.99.
 ///
 /// The original sweeps 50 times over all cells, so its goal is unknown farther than 50 moves away. The limit of its
-/// sweeps needs none: the value of a cell that is d moves away is 0.99^d / (1 - 0.99), and the move of the highest
+/// sweeps needs none. The value of a cell that is d moves away is 0.99^d / (1 - 0.99), and the move of the highest
 /// Q-value is the one to the least d. So the cells are visited once, nearest first, and mazes of any size are planned
 /// in the time it takes to read them.
 #[derive(Clone, Debug)]

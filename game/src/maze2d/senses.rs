@@ -56,8 +56,8 @@ impl Senses<Maze2d> for WithPositionalEncoding {
     }
 }
 
-/// Adds goal and rays to observations. The walls are squares on a grid, and arenas have no rapier context in training:
-/// rays walk the grid, which is exact and takes no more than a few steps.
+/// Adds goal and rays to observations. The walls are squares on a grid, and arenas have no rapier context in training.
+/// So rays walk the grid, which is exact and takes no more than a few steps.
 fn sense_rays(
     mut balls: Query<(&Episode, &MazeBall, &PlaysIn, &mut Observation), With<VectorSensor>>,
     arenas: Query<&MazeArena>,

@@ -245,7 +245,7 @@ fn impedance(depth: f64) -> f64 {
 
 /// Returns the acceleration with the least cost.
 ///
-/// The cost is convex and, for each choice of contacts that push, quadratic: the choice that is consistent with its own
+/// The cost is convex and, for each choice of contacts that push, quadratic. The choice that is consistent with its own
 /// minimum is the right one.
 fn least_cost(free: Vec2d, contacts: &[Contact]) -> Vec2d {
     let mut best = free;

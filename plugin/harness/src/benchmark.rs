@@ -13,7 +13,7 @@ pub struct Benchmark {
     pub mode: &'static str,
     /// The agents' observation.
     pub observation: ObservationKind,
-    /// Whether a learner trains as well.
+    /// True if a learner trains as well.
     pub train: bool,
 }
 

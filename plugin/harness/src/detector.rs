@@ -102,7 +102,7 @@ pub trait EpisodeWatcher {
 /// A detector's view of a World after each of its ticks.
 ///
 /// If it finds something while several agents play there, their episodes are replayed, each alone in a World of its
-/// own, to see whose finding it is.
+/// own. That shows whose finding it is.
 pub trait WorldWatcher {
     /// Returns whether it reads the errors of the log.
     fn hears_errors(&self) -> bool {
@@ -134,7 +134,7 @@ pub struct DetectorTick<'a> {
     pub reward: f32,
     /// Position of the agent on its level's plan, if the game reports it.
     pub position: Option<Vec2>,
-    /// Whether the level's goal was reached, now or before.
+    /// True if the level's goal was reached, now or before.
     pub is_success: bool,
     /// The game's proofs.
     pub proofs: &'a dyn Proofs,

@@ -160,7 +160,7 @@ impl DoctorReport {
 pub struct ComparisonReport {
     /// The comparison.
     pub comparison: DoctorComparison,
-    /// Why it was skipped, if it was.
+    /// The reason that it was skipped, if it was.
     pub skipped: Option<String>,
     /// Ticks compared.
     pub ticks: u32,
@@ -272,7 +272,7 @@ pub enum DifferenceKind {
     Observation,
     /// The agent's reward.
     Reward,
-    /// Whether and how the agent's episode ends.
+    /// The end of the agent's episode, if it ends.
     End,
     /// The game's own hash of its state.
     StateHash,
@@ -407,8 +407,8 @@ fn sentence(comparison: DoctorComparison, difference: &DoctorDifference) -> Stri
 
 // Scope of comparisons: the game's state, without the engine's housekeeping.
 
-/// Path prefixes of the plugin's own types, and of types that the engine creates for itself: on other threads, for the
-/// screen, or whenever a file happens to be loaded.
+/// Path prefixes of the plugin's own types, and of types that the engine creates for itself. It does so on other
+/// threads, for the screen, or whenever a file happens to be loaded.
 const HOUSEKEEPING: [&str; 34] = [
     "accesskit",
     "bevy_a11y::",

@@ -41,7 +41,7 @@ pub enum Player {
         policy: Policy,
         /// The source of its skills.
         prior: Option<SkillPrior>,
-        /// How actions are drawn.
+        /// The drawing of actions.
         draw: ActionDraw,
     },
     /// A bot without sensors.
@@ -322,7 +322,7 @@ pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) ->
     }
 }
 
-/// Returns the standard error of the mean of values that come in clusters, the levels: s / √L, with s the sample
+/// Returns the standard error of the mean of values that come in clusters, the levels. It is s / √L, with s the sample
 /// standard deviation of the L level means.
 ///
 /// Episodes of one level are alike, and those of a player without randomness are equal. Repeats of a level say nothing

@@ -1,9 +1,9 @@
 //! The contract of a game: what every game has, and the optional tools that it can bring along.
 //!
 //! [`Game`] has what a game needs in order to be built headless and played by bots. [`GameTools`] has everything beyond
-//! that, in groups that are traits of their own: level files and floor plans ([`LevelTools`]), pictures
-//! ([`PictureTools`]), bots ([`BotTools`]) and so on. A game implements the groups it has something for and names them
-//! in [`Game::tools`]:
+//! that, in groups that are traits of their own. Examples are level files and floor plans ([`LevelTools`]), pictures
+//! ([`PictureTools`]) and bots ([`BotTools`]). A game implements the groups it has something for and names them in
+//! [`Game::tools`]:
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -74,22 +74,23 @@ const IDLE_WORDS: [&str; 8] = ["none", "nothing", "noop", "no-op", "idle", "stay
 /// beyond that, and [`built_anew`](Self::built_anew) copies a game that cannot be reset. The others follow from these:
 /// a game leaves them as they are.
 pub trait Game: Send + Sync {
-    /// Name in files and on the command line.
+    /// Returns the name in files and on the command line.
     fn name(&self) -> &'static str;
 
-    /// Version of the rules; raise it whenever an old recording would no longer replay.
+    /// Returns the version of the rules; raise it whenever an old recording would no longer replay.
     fn version(&self) -> u32;
 
-    /// Modes, such as difficulties. At least one. Where modes take options, these are the names in front of them.
+    /// Returns the modes, such as difficulties: at least one. Where modes take options, these are the names in front of
+    /// them.
     fn modes(&self) -> &'static [&'static str];
 
-    /// Ticks per second of game time.
+    /// Returns the ticks per second of game time.
     fn tick_hz(&self) -> f64;
 
-    /// Actions of every agent.
+    /// Returns the actions of every agent.
     fn actions(&self) -> ActionSpace;
 
-    /// Observation of every agent.
+    /// Returns the observation of every agent.
     fn observation(&self) -> ObservationSpace;
 
     /// Adds the game's plugins to a headless app, in a mode that [`check_mode`](Self::check_mode) accepts.
@@ -99,25 +100,25 @@ pub trait Game: Send + Sync {
     /// sensor, under [`Control::Idle`](bevy_playbot::agent::Control::Idle).
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity;
 
-    /// Other names that the command line and experiments accept. Files keep [`name`](Self::name).
+    /// Returns other names that the command line and experiments accept. Files keep [`name`](Self::name).
     fn aliases(&self) -> &'static [&'static str] {
         &[]
     }
 
-    /// The optional part of the game; by default nothing.
+    /// Returns the optional part of the game; by default nothing.
     fn tools(&self) -> GameTools<'_> {
         GameTools::default()
     }
 
-    /// The game again, if its Worlds must be built anew for each episode, because it keeps state that cannot be reset.
-    /// `None` for a game that restarts in the World it has.
+    /// Returns the game again, if its Worlds must be built anew for each episode, because it keeps state that cannot be
+    /// reset. Returns `None` for a game that restarts in the World it has.
     fn built_anew(&self) -> Option<Arc<dyn Game>> {
         None
     }
 
-    /// Checks that there is such a mode: one of [`modes`](Self::modes); or a mode with options that
-    /// [`LevelTools::check_options`] accepts; or level files, each of which [`parse_level`](Self::parse_level) can
-    /// read.
+    /// Checks that there is such a mode. It is one of [`modes`](Self::modes), or a mode with options that
+    /// [`LevelTools::check_options`] accepts. Or it names level files, each of which [`parse_level`](Self::parse_level)
+    /// can read.
     ///
     /// # Errors
     ///
@@ -144,8 +145,8 @@ pub trait Game: Send + Sync {
         })
     }
 
-    /// A hash of the layout of a level, where different seeds can draw the same one: [`LevelTools::layout_hash`]. For a
-    /// level file it is the hash of the level in it.
+    /// Returns a hash of the layout of a level, where different seeds can draw the same one:
+    /// [`LevelTools::layout_hash`]. For a level file it is the hash of the level in it.
     fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
         if is_level_files(mode) {
             return level_designs(self, mode).ok()?.hash(level);
@@ -165,7 +166,8 @@ pub trait Game: Send + Sync {
             .unwrap_or_else(|| Err(InspectError::Usage(format!("`{}` has no levels to show", self.name()))))
     }
 
-    /// Why the game cannot be played at all, if so: [`HostTools::unplayable`], or that it has no actions.
+    /// Returns the reason that the game cannot be played at all, if there is one: [`HostTools::unplayable`], or that it
+    /// has no actions.
     fn problem(&self) -> Option<String> {
         self.tools().host.unplayable().or_else(|| {
             has_no_actions(&self.actions())
@@ -173,13 +175,13 @@ pub trait Game: Send + Sync {
         })
     }
 
-    /// The head of a recording of the game in this mode.
+    /// Builds the head of a recording of the game in this mode.
     fn demo_header(&self, mode: &str) -> DemoHeader {
         let header = DemoHeader::new(self.name(), self.version(), mode, self.tick_hz(), demo_actions(&self.actions()));
         if is_level_files(mode) { header.with_level_files() } else { header }
     }
 
-    /// What policy files say of the game.
+    /// Builds the metadata of the game for policy files.
     fn metadata(&self) -> GameMetadata<'_> {
         let GameTools { input, pictures, .. } = self.tools();
         GameMetadata {
@@ -198,7 +200,7 @@ pub trait Game: Send + Sync {
 /// It holds references only: [`Game::tools`] is cheap enough to be called in every tick.
 #[derive(Clone, Copy)]
 pub struct GameTools<'a> {
-    /// How Worlds are set up.
+    /// Set-up of Worlds.
     pub host: &'a dyn HostTools,
     /// Levels without agents: modes with options, files, floor plans, proofs.
     pub levels: &'a dyn LevelTools,
@@ -260,27 +262,29 @@ impl Default for GameTools<'_> {
     }
 }
 
-/// How the Worlds of a game are set up.
+/// Set-up of the Worlds of a game.
 pub trait HostTools: Send + Sync {
-    /// Where ticks run. Under [`TickPlacement::Frame`] the game is built into a World with [`HeadlessPlugins`], as
-    /// [`headless_plugins`](Self::headless_plugins) returns them; otherwise into one with time and nothing more.
+    /// Returns the place in the schedule where ticks run. Under [`TickPlacement::Frame`] the game is built into a World
+    /// with [`HeadlessPlugins`], as [`headless_plugins`](Self::headless_plugins) returns them; otherwise into one with
+    /// time and nothing more.
     fn placement(&self) -> TickPlacement {
         TickPlacement::Fixed
     }
 
-    /// Bevy's plugins for a headless World under [`TickPlacement::Frame`]: all of these, unless the game leaves some
-    /// out.
+    /// Returns Bevy's plugins for a headless World under [`TickPlacement::Frame`]: all of these, unless the game leaves
+    /// some out.
     fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
         plugins.build()
     }
 
-    /// The most arenas that one World can hold: 1 for a game with one player or with global resources. `None` for any
-    /// number. More arenas are spread over more Worlds; one agent too many is a fault.
+    /// Returns the most arenas that one World can hold: 1 for a game with one player or with global resources. Returns
+    /// `None` for any number. More arenas are spread over more Worlds; one agent too many is a fault.
     fn arenas_per_world(&self) -> Option<u32> {
         None
     }
 
-    /// Why the game cannot be played at all, if so. That it has no actions is checked for every game.
+    /// Returns the reason that the game cannot be played at all, if there is one. That it has no actions is checked for
+    /// every game.
     fn unplayable(&self) -> Option<String> {
         None
     }
@@ -288,81 +292,81 @@ pub trait HostTools: Send + Sync {
 
 /// Levels without agents in them.
 pub trait LevelTools: Send + Sync {
-    /// Checks a mode with options behind its name. `None`, by default, for a game whose modes are [`Game::modes`] as
-    /// they are. Level files are no concern of it.
+    /// Checks a mode with options behind its name. Returns `None`, by default, for a game whose modes are
+    /// [`Game::modes`] as they are. Level files are no concern of it.
     fn check_options(&self, _mode: &str) -> Option<Result<(), ModeError>> {
         None
     }
 
-    /// The family of a mode: in all modes of a family one seed draws the same level or a related one, so that an agent
-    /// that has trained on it in one mode has seen it in all of them. The mode itself, unless the game has options that
-    /// change rules only.
+    /// Returns the family of a mode: the mode itself, unless the game has options that change rules only. In all modes
+    /// of a family one seed draws the same level or a related one. So an agent that has trained on the level in one
+    /// mode has seen it in all of them.
     fn family(&self, mode: &str) -> String {
         mode.to_owned()
     }
 
-    /// The largest number that a level which the game draws itself can have, in any mode; `None` if every number is
-    /// one.
+    /// Returns the largest number of a level that the game draws itself, in any mode; `None` if every number is valid.
     fn last_level(&self) -> Option<u64> {
         None
     }
 
-    /// A hash of the layout of a level that the game draws itself. `None` if different seeds cannot draw the same
-    /// layout, or if all levels of the mode have the same one.
+    /// Returns a hash of the layout of a level that the game draws itself. Returns `None` if different seeds cannot
+    /// draw the same layout, or if all levels of the mode have the same one.
     fn layout_hash(&self, _mode: &str, _level: u64) -> Option<u64> {
         None
     }
 
-    /// Reads a level in the game's own format, or says what is wrong with it and on which line. `None`, by default: the
-    /// game has no level files.
+    /// Reads a level in the game's own format, or says what is wrong with it and on which line. Returns `None`, by
+    /// default: the game has no level files.
     ///
-    /// Worlds of level files have the result as the resource [`LevelDesigns`] before the game is built, and the game
-    /// plays its level number i instead of making one.
+    /// Worlds of level files have the result as the resource [`LevelDesigns`] before the game is built. The game plays
+    /// its level number i instead of making one.
     fn parse(&self, _text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
         None
     }
 
-    /// A level from above, for pictures of agents' paths; `None` if there is no such picture.
+    /// Returns a level from above, for pictures of agents' paths; `None` if there is no such picture.
     fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
         None
     }
 
-    /// What is certain about a level: whether its goal can be reached at all. Called for levels that no bot has solved,
-    /// so it may take some milliseconds. Only a search to its end is a proof; a search that gave up proves nothing. By
-    /// default nothing is proved.
+    /// Returns what is certain about a level: whether its goal can be reached at all. Called for levels that no bot has
+    /// solved, so it may take some milliseconds. Only a search to its end is a proof; a search that gave up proves
+    /// nothing. By default nothing is proved.
     fn prove(&self, _mode: &str, _level: u64) -> LevelProof {
         LevelProof::Unknown
     }
 
-    /// A level for people and programs, or why there is none. `None`, by default: the game cannot show levels.
+    /// Returns a level for people and programs, or the reason that there is none. Returns `None`, by default: the game
+    /// cannot show levels.
     fn show(&self, _request: &LevelRequest) -> Option<Result<LevelView, InspectError>> {
         None
     }
 }
 
-/// What can be read from the state of an agent that plays.
+/// Readings of the state of an agent that plays.
 pub trait StateTools: Send + Sync {
-    /// The position of an agent on the [floor plan](LevelTools::floor_plan); `None` if there is no plan, or no level is
-    /// played.
+    /// Returns the position of an agent on the [floor plan](LevelTools::floor_plan); `None` if there is no plan, or no
+    /// level is played.
     fn position(&self, _world: &World, _agent: Entity) -> Option<Vec2> {
         None
     }
 
-    /// Why the episode of an agent has just ended without the goal, for people, such as `saw` or `lava`. Called after
-    /// its last tick, before the next episode begins.
+    /// Returns the reason that the episode of an agent has just ended without the goal, for people, such as `saw` or
+    /// `lava`. Called after its last tick, before the next episode begins.
     fn end_cause(&self, _world: &World, _agent: Entity) -> Option<&'static str> {
         None
     }
 
-    /// The state of an agent in a few whole numbers, for an explorer that treats states with the same numbers as the
-    /// same: see `playbot_test::explore`. `None`, by default, for squares of the grid by [`position`](Self::position),
-    /// or, if that is not known, for the downscaled observation.
+    /// Returns the state of an agent in a few whole numbers, for an explorer that treats states with the same numbers
+    /// as the same: see `playbot_test::explore`. Returns `None`, by default, for squares of the grid by
+    /// [`position`](Self::position), or, if that is not known, for the downscaled observation.
     fn explore_cell(&self, _world: &World, _agent: Entity) -> Option<Vec<i32>> {
         None
     }
 
-    /// What is certain about the state of an agent that plays: whether its goal can still be reached. Called now and
-    /// then during an episode, so it takes a millisecond at most. By default nothing is proved.
+    /// Returns what is certain about the state of an agent that plays: whether its goal can still be reached. Called
+    /// now and then during an episode, so it takes a millisecond at most. By default nothing is proved.
     fn prove_from(&self, _world: &World, _agent: Entity) -> LevelProof {
         LevelProof::Unknown
     }
@@ -370,18 +374,19 @@ pub trait StateTools: Send + Sync {
 
 /// Steps of an agent as lines of numbers: see [`trace_actions`](crate::trace::trace_actions).
 pub trait TraceTools: Send + Sync {
-    /// Names of the numbers that a trace prints after each step. `None`, by default, for the names of the observation.
+    /// Returns the names of the numbers that a trace prints after each step. Returns `None`, by default, for the names
+    /// of the observation.
     fn columns(&self) -> Option<Vec<String>> {
         None
     }
 
-    /// These numbers for an agent; by default its observation.
+    /// Returns these numbers for an agent; by default its observation.
     fn row(&self, world: &World, agent: Entity) -> Vec<f32> {
         world.get::<Observation>(agent).map_or_else(Vec::new, |observation| observation.vector.clone())
     }
 
-    /// The game's own way of playing given actions and printing the state after each. Returns a last remark, if there
-    /// is one. `None` where [`trace_actions`](crate::trace::trace_actions) does it.
+    /// Plays given actions in the game's own way, and prints the state after each. Returns a last remark, if there is
+    /// one. Returns `None` where [`trace_actions`](crate::trace::trace_actions) does it.
     fn run(&self, _request: &TraceRequest, _print: Print) -> Option<Result<Option<String>, InspectError>> {
         None
     }
@@ -389,7 +394,7 @@ pub trait TraceTools: Send + Sync {
 
 /// Pictures of a game, for agents that see them and for windows.
 pub trait PictureTools: Send + Sync {
-    /// How the game is drawn for agents that see pictures; `None` if it cannot be drawn.
+    /// Returns the drawing of the game for agents that see pictures; `None` if it cannot be drawn.
     fn picture(&self) -> Option<Picture> {
         None
     }
@@ -399,12 +404,12 @@ pub trait PictureTools: Send + Sync {
     /// [`picture`](Self::picture).
     fn build_picture(&self, _app: &mut App) {}
 
-    /// Whether agents can see the game through a camera of its own, without a [`picture`](Self::picture).
+    /// Returns true if agents can see the game through a camera of its own, without a [`picture`](Self::picture).
     fn has_camera(&self) -> bool {
         false
     }
 
-    /// Whether windows can show the game in three dimensions, too.
+    /// Returns true if windows can show the game in three dimensions, too.
     fn has_space_view(&self) -> bool {
         false
     }
@@ -416,12 +421,12 @@ pub trait PictureTools: Send + Sync {
 
 /// Actions for people.
 pub trait InputTools: Send + Sync {
-    /// Names of the discrete choices, or of the dimensions of continuous actions; may be empty.
+    /// Returns the names of the discrete choices, or of the dimensions of continuous actions; may be empty.
     fn action_names(&self) -> Vec<String> {
         Vec::new()
     }
 
-    /// The keys with which a person plays; `None` if the game cannot be played by hand.
+    /// Returns the keys with which a person plays; `None` if the game cannot be played by hand.
     fn key_bindings(&self) -> Option<KeyBindings> {
         None
     }
@@ -429,31 +434,32 @@ pub trait InputTools: Send + Sync {
 
 /// Bots that come with a game.
 pub trait BotTools: Send + Sync {
-    /// Bots that every learner is compared with, by name.
+    /// Returns the bots that every learner is compared with, by name.
     fn blind_bots(&self) -> Vec<(&'static str, BlindBot)> {
         vec![("random", BlindBot::Uniform)]
     }
 
-    /// Name of the bot that demonstrates the game, if there is one.
+    /// Returns the name of the bot that demonstrates the game, if there is one.
     fn demonstrator(&self) -> Option<&'static str> {
         None
     }
 
-    /// Hands an agent over to the demonstrator. `noise` is the probability with which a discrete action is replaced by
-    /// a uniformly random one, or the standard deviation of the normal noise on each value of a continuous one.
+    /// Hands an agent over to the demonstrator. For discrete actions, `noise` is the probability with which an action
+    /// is replaced by a uniformly random one. For continuous ones, it is the standard deviation of the normal noise on
+    /// each value.
     fn attach_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
 }
 
 /// Detectors and planted defects of a game.
 pub trait TestTools: Send + Sync {
-    /// The game's own detectors, which look for defects in tests beside those that all games have
+    /// Returns the game's own detectors, which look for defects in tests beside those that all games have
     /// (`playbot_test::detectors`). A detector with the name of another one takes its place.
     fn detectors(&self) -> Vec<Box<dyn Detector>> {
         Vec::new()
     }
 
-    /// Defects that can be planted into this game, beside those of all games (`playbot_mutation::bugs`). A defect with
-    /// the class of another one takes its place.
+    /// Returns the defects that can be planted into this game, beside those of all games (`playbot_mutation::bugs`). A
+    /// defect with the class of another one takes its place.
     fn defects(&self) -> Vec<DefectKind> {
         Vec::new()
     }
@@ -461,7 +467,7 @@ pub trait TestTools: Send + Sync {
 
 /// The experiment of a game.
 pub trait TrainTools: Send + Sync {
-    /// The experiment that is the default of the game; `None` for the plainest one, see
+    /// Returns the experiment that is the default of the game; `None` for the plainest one, see
     /// `playbot_train::experiment::default_experiment`.
     fn experiment(&self) -> Option<ExperimentText> {
         None
@@ -470,19 +476,20 @@ pub trait TrainTools: Send + Sync {
 
 /// Measurements of a game's speed.
 pub trait BenchmarkTools: Send + Sync {
-    /// What is measured. `None`, by default, for random actions and PPO, on state vectors, in the game's first mode.
+    /// Returns the measurements. Returns `None`, by default, for random actions and PPO, on state vectors, in the
+    /// game's first mode.
     fn benchmarks(&self) -> Option<Vec<Benchmark>> {
         None
     }
 
-    /// Another game that is played for one of the [`benchmarks`](Self::benchmarks), such as the same one with physics;
-    /// `None` for the game itself.
+    /// Returns another game that is played for one of the [`benchmarks`](Self::benchmarks), such as the same one with
+    /// physics; `None` for the game itself.
     fn benchmarked(&self, _benchmark: &Benchmark) -> Option<&dyn Game> {
         None
     }
 }
 
-/// The level files of a mode, as they were when they were read last: [`LevelDesigns::of`] this game.
+/// Returns the level files of a mode, as they were when they were read last: [`LevelDesigns::of`] this game.
 ///
 /// # Errors
 ///
@@ -491,7 +498,7 @@ pub fn level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDes
     LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text))
 }
 
-/// The level files of a mode, as they are on disk now: [`LevelDesigns::read`] for this game.
+/// Returns the level files of a mode, as they are on disk now: [`LevelDesigns::read`] for this game.
 ///
 /// # Errors
 ///

@@ -273,8 +273,8 @@ struct GateGrads {
     recurrent: SumGrads,
 }
 
-/// Does one step for all rows of the batch: from the gradient of the state after it to those of a, c and the state
-/// before it, except for the part that goes through c.
+/// Does one step for all rows of the batch. It goes from the gradient of the state after it to those of a, c and the
+/// state before it, except for the part that goes through c.
 #[inline(always)]
 fn step_backward(
     grads: &mut GateGrads,

@@ -42,8 +42,8 @@ pub trait Learner: Debug + Send {
     /// [`LearnError`] if it does not fit, or names the number that diverged.
     fn learn(&mut self, rollout: &Rollout) -> Result<LearnerMetrics, LearnError>;
 
-    /// Returns the mean divergence between decoder and policy over `n` rows, in nats: exactly 0 for a policy that is
-    /// still a copy of the decoder. `None` without a skill model.
+    /// Returns the mean divergence between decoder and policy over `n` rows, in nats. It is exactly 0 for a policy that
+    /// is still a copy of the decoder. `None` without a skill model.
     ///
     /// # Errors
     /// [`LearnError::InitialKl`] if the policy should be a copy ([`ScoreConfig::init_from_decoder`], and it was not

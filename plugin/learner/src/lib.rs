@@ -18,7 +18,7 @@
 //!
 //! Observations are vectors or images ([`ObsKind`]); SAC alone reads only vectors. Rows are flat `f32` slices in host
 //! memory (bytes for pixels), row-major ([`ObsSlice`]). All randomness comes from generators that the caller owns or
-//! from the named [`rng::Streams`] of one seed: the same seed gives the same numbers, whatever the number of threads.
+//! from the named [`rng::Streams`] of one seed. The same seed gives the same numbers, whatever the number of threads.
 //!
 //! # Example
 //!

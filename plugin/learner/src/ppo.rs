@@ -244,9 +244,9 @@ impl PpoLearner {
         Ok(UpdateMetrics::mean(&sum, steps, has, explained_variance, lr))
     }
 
-    /// Restarts Adam when the policy begins to learn. While the critic warms up the policy's gradients are zero: the
-    /// moments stay 0 while their bias correction wears off, so its first steps would be several times too long.
-    /// Before that there is no weight decay, either.
+    /// Restarts Adam when the policy begins to learn. While the critic warms up the policy's gradients are zero. The
+    /// moments stay 0 while their bias correction wears off, so its first steps would be several times too long. Before
+    /// that there is no weight decay, either.
     fn prepare_adam(&mut self, is_warming_up: bool) {
         let PpoConfig { critic_warmup, weight_decay, .. } = self.config;
         let config = AdamConfig { weight_decay: if is_warming_up { 0.0 } else { weight_decay }, ..self.adam.config };

@@ -12,7 +12,7 @@ pub enum ActionSpace {
     /// A vector of `n` real numbers. Games take those in [-1, 1] and clip the others.
     ///
     /// Gaussian policies (PPO's, and the skill model's decoder) draw numbers beyond. To a learner clipping is part of
-    /// the game: it keeps an action as it was drawn, with the density of that draw, and measures the decoder's
+    /// the game. It keeps an action as it was drawn, with the density of that draw, and measures the decoder's
     /// confidence there too. Squashed policies (SAC's) stay within.
     Continuous(usize),
 }

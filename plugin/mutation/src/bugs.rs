@@ -101,9 +101,9 @@ pub enum BugError {
         game: String,
         /// The levels.
         levels: String,
-        /// How many of them are unmutated levels.
+        /// Number of unmutated levels among them.
         count: u64,
-        /// How many are needed.
+        /// Number of unmutated levels that are needed.
         wanted: u64,
     },
     /// A kind of defect makes an invalid level.

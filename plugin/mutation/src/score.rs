@@ -229,7 +229,7 @@ pub struct JobResult {
     pub solved: u64,
     /// All episodes; 1 for an explorer.
     pub episodes: u64,
-    /// Whether the tester used no random number.
+    /// True if the tester used no random number.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub exact: bool,
     /// The end of each episode and its tick: `won 83`, `lost 12`, `time up 1000` or `broken`.
@@ -240,7 +240,7 @@ pub struct JobResult {
     /// Findings of the detectors, and panics of the game.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<JobFinding>,
-    /// Why the level is unsolvable, if that was proved.
+    /// The reason that the level is unsolvable, if that was proved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unsolvable: Option<String>,
     /// Actions with an effect in the whole episode of the first finding that can be replayed.

@@ -1,4 +1,4 @@
-//! From the actions of this tick to the inputs that are held down.
+//! Conversion of the actions of this tick into the inputs that are held down.
 
 use crate::{
     action::Action,

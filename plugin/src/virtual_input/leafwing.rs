@@ -1,7 +1,7 @@
 //! Actions of `leafwing-input-manager`, driven without any key.
 //!
 //! A [`VirtualInput`](super::VirtualInput) drives them through their keys, without this module. Use it where actions
-//! have no keys, or where fixed ticks need an action in the tick that decides it: an `ActionState` reads its keys
+//! have no keys, or where fixed ticks need an action in the tick that decides it. An `ActionState` reads its keys
 //! before the first fixed tick of a frame.
 
 use crate::{

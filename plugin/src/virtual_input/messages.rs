@@ -55,7 +55,7 @@ impl InputMessages<'_, '_> {
     /// Sends the messages of a change that is already in the state, in its own tick, with the state before and after.
     ///
     /// Messages for keys and mouse affect only the state, which [`settle`](crate::virtual_input::act::settle) restores.
-    /// A `RawGamepadEvent` is left out: Bevy's system for gamepads would read it in the next frame, when it may be
+    /// A `RawGamepadEvent` is left out. Bevy's system for gamepads would read it in the next frame, when it may be
     /// outdated, and would press and announce everything again.
     pub fn send_processed(&mut self, change: Change, before: Reading, after: Reading) {
         match of_driver(change) {

@@ -195,7 +195,7 @@ impl<'a> LevelTest<'a> {
     ///
     /// # Panics
     ///
-    /// A level was not solved: the message names each, with the results of its testers, the proof if it is unsolvable,
+    /// A level was not solved. The message names each, with the results of its testers, the proof if it is unsolvable,
     /// and the commands that show it. Or the levels cannot be tested.
     #[track_caller]
     pub fn assert_solvable(&self) {
@@ -340,7 +340,7 @@ pub fn assert_levels_solved_by(game: &dyn Game, bot: &str, levels: &str) {
 }
 
 /// Asserts that levels have no findings: no default [detector](crate::detectors) reports anything while all bots of the
-/// game play, the game does not panic, and no goal is proved to be out of reach. Levels need not be solved.
+/// game play. The game does not panic, and no goal is proved to be out of reach. Levels need not be solved.
 ///
 /// # Panics
 ///

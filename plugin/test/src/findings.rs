@@ -210,7 +210,7 @@ pub struct FindingHead {
     pub tick: Option<u32>,
     /// The message.
     pub message: String,
-    /// Hash of the game's state after that tick, or after the last one before it if the game broke in it; `None` if
+    /// Hash of the game's state after that tick, or after the last one before it if the game broke in it. `None` if
     /// there is no hash.
     pub state_hash: Option<u32>,
     /// Ticks of the episode before minimisation.

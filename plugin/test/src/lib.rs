@@ -1,7 +1,7 @@
 //! Tests of a game's levels: which can be solved, and what is wrong with them.
 //!
-//! Testers are bots, policies and explorers. They play every level of a range without a window, detectors watch them,
-//! and every level gets a verdict: solved, not solved by any tester, or proved unsolvable. Results are the same bytes
+//! Testers are bots, policies and explorers. They play every level of a range without a window, and detectors watch
+//! them. Every level gets a verdict: solved, not solved by any tester, or proved unsolvable. Results are the same bytes
 //! on any number of threads and machines. Most programs use this crate through `playbot`, as `playbot::test`.
 //!
 //! The modules, in reading order:

@@ -32,7 +32,7 @@ pub enum LearnSkillsError {
     Unusable {
         /// The error of its file.
         source: FileError,
-        /// What to do.
+        /// Advice for the user.
         advice: &'static str,
     },
     /// The checkpoint or the model is of other settings.

@@ -15,8 +15,9 @@ use playbot_harness::{
 use playbot_learner::{ActionSpace, ImageShape, ObsKind, nn::CnnKind};
 
 impl Experiment {
-    /// Checks that the data of a training fit into the free memory: networks with their gradients and moments,
-    /// minibatches, rollouts, the replay buffer of SAC, and Worlds, each of which plays on a thread of its own.
+    /// Checks that the data of a training fit into the free memory. These are networks with their gradients and
+    /// moments, minibatches, rollouts, the replay buffer of SAC, and Worlds, each of which plays on a thread of its
+    /// own.
     ///
     /// # Errors
     ///

@@ -180,7 +180,7 @@ fn missing(read: &JsonLines, step: u64, updates: u64) -> Option<String> {
             format!("{missing} of {updates} updates")
         }
     };
-    Some(format!("nothing is left of {words}: curves have a gap there, and learning is not affected"))
+    Some(format!("metrics are missing for {words}: curves have a gap there, and learning is not affected"))
 }
 
 /// Describes updates by their steps; `None` without updates.
@@ -354,9 +354,9 @@ mod tests {
             }
             let words = words.unwrap_or_else(|| panic!("{length} bytes: nothing is said"));
             let gap = match kept {
-                3 => "nothing is left of the update of step 32: ".to_owned(),
+                3 => "metrics are missing for the update of step 32: ".to_owned(),
                 kept => format!(
-                    "nothing is left of {} updates, those of the steps {} to 32: ",
+                    "metrics are missing for {} updates, those of the steps {} to 32: ",
                     UPDATES - kept,
                     8 * (kept + 1)
                 ),
@@ -367,7 +367,7 @@ mod tests {
         }
         fs::remove_file(&path).expect("removed");
         let words = said(&path).expect("it is gone");
-        assert!(words.starts_with("nothing is left of 4 updates, those of the steps 8 to 32: curves"), "{words}");
+        assert!(words.starts_with("metrics are missing for 4 updates, those of the steps 8 to 32: curves"), "{words}");
     }
 
     #[test]
@@ -378,11 +378,11 @@ mod tests {
         let lines: Vec<&str> = text.lines().collect();
         fs::write(&path, format!("{}\n{}\n", lines[1], lines[3])).expect("writable");
         let words = said(&path).expect("two are missing");
-        assert!(words.starts_with("nothing is left of 2 updates, those of the steps 8, 24: "), "{words}");
+        assert!(words.starts_with("metrics are missing for 2 updates, those of the steps 8, 24: "), "{words}");
         fs::write(&path, format!("{}\n{}\nx\n{}\n", lines[0], lines[1], lines[3])).expect("writable");
         let words = said(&path).expect("one is damaged");
         assert!(
-            words.starts_with("line 3 is damaged and left out; nothing is left of the update of step 24"),
+            words.starts_with("line 3 is damaged and left out; metrics are missing for the update of step 24"),
             "{words}"
         );
     }
@@ -403,7 +403,7 @@ mod tests {
         let words = of_updates(even, 10).expect("missing");
         assert_eq!(words, "20 updates, those of the steps 20, 40, 60, 80, 100, 120, 140, 160 and others");
         let words = missing(&JsonLines::default(), 17, 4).expect("missing");
-        assert!(words.starts_with("nothing is left of 4 of 4 updates: "), "{words}");
+        assert!(words.starts_with("metrics are missing for 4 of 4 updates: "), "{words}");
     }
 
     #[test]

@@ -66,8 +66,8 @@ pub struct Recorded {
 ///
 /// # Errors
 ///
-/// The experiment does not go with the game's actions or observations, a recording cannot be read, belongs to another
-/// game, shows a held-out level or does not replay, or the pictures would need more memory than is free.
+/// The experiment does not go with the game's actions or observations. Or a recording cannot be read, belongs to
+/// another game, shows a held-out level or does not replay. Or the pictures would need more memory than is free.
 pub fn read_dataset(
     game: &dyn Game,
     experiment: &Experiment,

@@ -94,7 +94,7 @@ fn try_often(file: &File) -> Result<(), TryLockError> {
 const MARK: &str = ".replaced-";
 
 /// File in which a study notes the time of a run, even of one that was stopped while its skills were learned.
-const COST: &str = "cost.json";
+pub(crate) const COST: &str = "cost.json";
 
 /// The files of a replaced run.
 struct ReplacedRun {

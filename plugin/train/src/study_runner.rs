@@ -8,7 +8,7 @@ use crate::{
     learn_skills::{LearnSkillsError, behaviour_cloning},
     recordings::{Recorded, RecordingsError, check_recordings, find_recordings, read_dataset, read_rollouts},
     run_dir::{OpenedRun, RunDir, RunError, RunInfo, check_replaceable, end_replacement, is_unstarted},
-    run_lock::RunLock,
+    run_lock::{COST, RunLock},
     run_observer::{CountedWork, RunEvent, RunObserver},
     runs::{RunCurves, RunsError, settings_that_differ},
     study::{
@@ -530,9 +530,6 @@ fn learning_curves(run: &Path) -> Result<LearningCurves, RunsError> {
 pub const RESULTS: &str = "results.json";
 
 const TABLE: &str = "table.md";
-
-/// The file of the cost in the folder of a run.
-const COST: &str = "cost.json";
 
 /// Failure to write the files of a study.
 #[derive(Debug, Error)]

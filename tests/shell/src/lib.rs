@@ -1,4 +1,4 @@
-//! For tests: programs started from a shell and on a display of their own. The crate does not depend on Bevy or the
+//! Programs for tests, started from a shell and on a display of their own. The crate does not depend on Bevy or the
 //! plugin. It sees only a user's view: words, numbers, exit codes, files and windows.
 
 mod at_work;

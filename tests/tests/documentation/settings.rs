@@ -1,4 +1,5 @@
-//! The reference pages of settings and verbs are those that their tables and the parser of the command line give.
+//! Tests that the reference pages of settings and verbs are those that their tables and the parser of the command line
+//! give.
 
 use std::fs;
 

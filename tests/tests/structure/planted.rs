@@ -1,4 +1,4 @@
-//! The rules find what is planted for them.
+//! Tests that the rules find what is planted for them.
 
 use std::{fs, path::Path};
 

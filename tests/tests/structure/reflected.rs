@@ -1,5 +1,5 @@
-//! Components, resources and events are known to Bevy's type registry: inspectors show them, and `playbot doctor` names
-//! them.
+//! Test that components, resources and events are known to Bevy's type registry: inspectors show them, and `playbot
+//! doctor` names them.
 
 use std::{fs, slice};
 

@@ -1,4 +1,4 @@
-//! All that products write to a disk goes through one module.
+//! Test that all writes of products to a disk go through one module.
 
 use std::fs;
 

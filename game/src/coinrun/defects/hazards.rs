@@ -117,7 +117,7 @@ pub(super) fn pit_defects() -> Vec<DefectKind> {
     ]
 }
 
-/// Returns the width of a pit that no jump crosses. A jump is back at its height after 16 ticks; from there it falls by
+/// Returns the width of a pit that no jump crosses. A jump is back at its height after 16 ticks. From there it falls by
 /// 1.5 tiles in each, and by no more than the highest ground. A tick moves half a tile. Half a player hangs over on
 /// either side, and the rest is spare.
 fn too_wide(parts: &LevelParts) -> i32 {

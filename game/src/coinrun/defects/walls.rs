@@ -71,7 +71,7 @@ pub(super) fn column(level: &Level, variant: u32) -> i32 {
 
 // Levels with an unreachable coin, without any rock.
 
-/// Rows above the highest ground at which nothing can be touched any more: a jump lifts by less than seven, and the
+/// Rows above the highest ground at which nothing can be touched any more. A jump lifts by less than seven, and the
 /// head reaches two higher at the most.
 const SKY: i32 = 10;
 

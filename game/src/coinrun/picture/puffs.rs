@@ -1,7 +1,7 @@
 //! The drawing of the puffs that enemies leave behind: translucent white discs, side by side, made in code.
 //!
 //! An enemy leaves a puff in every tick. Each rises, grows and fades, and is gone after [`PUFFS`] ticks. Those of ticks
-//! in which it walked at one speed are drawn as one: many overlapping sprites would take the raster many times as long,
+//! in which it walked at one speed are drawn as one. Many overlapping sprites would take the raster many times as long,
 //! for the same picture.
 
 use bevy::{image::ImageSampler, prelude::*};

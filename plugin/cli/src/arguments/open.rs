@@ -78,8 +78,8 @@ pub(crate) fn untrained(run: &Path, algorithm: Algorithm) -> CliError {
     ))
 }
 
-/// Returns the skill model of a run, if it lies in the same folder as the run, as in a study; else an example of a
-/// name.
+/// Returns the skill model of a run, if it lies in the same folder as the run, as in a study. Else returns an example
+/// of a name.
 fn skills_beside(run: &Path) -> PathBuf {
     let wanted = RunDir::open(run).ok().and_then(|opened| opened.info.skills);
     let study = run.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));

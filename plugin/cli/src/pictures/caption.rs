@@ -162,7 +162,7 @@ fn describe_scale(reach: f32) -> String {
     if (1e-3..1e5).contains(&reach) { format!("±{reach}") } else { format!("±{reach:e}") }
 }
 
-/// Returns the next of 1, 2, 5, 10, 20, 50 and so on, larger and smaller ones too, at or above a magnitude: such scales
+/// Returns the next of 1, 2, 5, 10, 20, 50 and so on, larger and smaller ones too, at or above a magnitude. Such scales
 /// stay as they are from one picture to the next where magnitudes differ a little. 1 for 0.
 fn round_up(largest: f32) -> f32 {
     if largest == 0.0 {

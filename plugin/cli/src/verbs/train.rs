@@ -188,7 +188,7 @@ fn check_asked(args: &Args, experiment: &Experiment, model: &SkillModel) -> Resu
     )))
 }
 
-/// Explains an error before a training: with the position of the faulty key, and where skills are missing, with the
+/// Explains an error before a training, with the position of the faulty key. Where skills are missing, it names the
 /// commands that make and use them.
 fn explain(error: TrainError, args: &Args, experiment: &Experiment, games: &Games) -> CliError {
     let algorithm = match error {
@@ -225,7 +225,7 @@ fn resume(args: &Args, games: &Games, setup: &TrainingSetup<'_>) -> Result<Train
     if training.trainer.is_done() {
         if steps < whole {
             return Err(CliError::Usage(format!(
-                "{} has {steps} steps already, and no fewer can be asked for: leave --steps out to go on to {whole}",
+                "{} has {steps} steps already, so --steps cannot be less: leave --steps out to go on to {whole}",
                 args.run.display()
             )));
         }

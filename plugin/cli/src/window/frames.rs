@@ -1,6 +1,6 @@
 //! Windows of games whose ticks are frames: each frame of the window is one, or it shows the state as it is.
 //!
-//! While the game stands still, none of its systems may run: a frame without a tick would still move it, and a
+//! While the game stands still, none of its systems may run. A frame without a tick would still move it, and a
 //! recording would lack that.
 
 use crate::window::{

@@ -50,7 +50,7 @@ pub struct DemonstrationPlan {
     pub seed: u64,
     /// Steps after which the recording stops. Until then the levels are repeated. `None` plays each level once.
     pub steps: Option<u64>,
-    /// Whether the recording keeps the observation vectors. Without them a replay restores them.
+    /// True if the recording keeps the observation vectors. Without them a replay restores them.
     pub keep_observations: bool,
 }
 

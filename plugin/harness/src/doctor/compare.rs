@@ -41,8 +41,8 @@ pub(super) struct Found {
 type Places = EntityHashMap<(usize, usize)>;
 
 impl Comparer<'_> {
-    /// Returns all differences, nearest to their cause first: types of the game before those of the engine, and
-    /// resources before components, whose values often come from them.
+    /// Returns all differences, nearest to their cause first. These are types of the game before those of the engine,
+    /// and resources before components, whose values often come from them.
     pub fn compare(&mut self, left: &GameCopy, right: &GameCopy, tick: u32) -> Found {
         let mut found = Found::default();
         let pairs = self.pair_up(left, right, tick, &mut found);

@@ -32,11 +32,11 @@ impl FieldDifference {
 
 /// The settings of a comparison of values.
 pub(super) struct FieldComparison<'a> {
-    /// Returns whether an entity of the left World corresponds to one of the right World.
+    /// Returns true if an entity of the left World corresponds to one of the right World.
     pub same_entity: &'a dyn Fn(Entity, Entity) -> bool,
-    /// Whether handles of assets are compared. A second episode creates new ones.
+    /// True if handles of assets are compared. A second episode creates new ones.
     pub handles: bool,
-    /// Whether a list or map on the right may have more entries, as for agents that are not on the left.
+    /// True if a list or map on the right may have more entries, as for agents that are not on the left.
     pub right_may_hold_more: bool,
     /// Collects types whose values cannot be compared.
     pub incomparable: &'a mut BTreeSet<String>,

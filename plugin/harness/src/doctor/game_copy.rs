@@ -282,7 +282,7 @@ pub(super) struct KnownType {
     pub path: Option<String>,
     /// Its reader, if it is reflected.
     pub reflect: Option<ReflectComponent>,
-    /// Whether it belongs to the engine or to the plugin.
+    /// True if it belongs to the engine or to the plugin.
     pub engine: bool,
     /// Possible causes of a difference in it, and why.
     pub suspicions: Vec<(CauseKind, String)>,

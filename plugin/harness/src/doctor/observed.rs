@@ -36,7 +36,7 @@ pub struct ObservationReport {
     pub not_finite: Option<NonFiniteValue>,
     /// The first tick, from 0, with another number of values, and that number.
     pub length: Option<(u32, usize)>,
-    /// Whether the game writes a state hash.
+    /// True if the game writes a state hash.
     pub state_hash: bool,
 }
 
@@ -101,7 +101,7 @@ impl ObservationReport {
 
 // Uses that a game is safe for.
 
-/// Whether the game is safe for a use, as far as a few ticks can show.
+/// The safety of the game for a use, as far as a few ticks can show.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Verdict {
     /// `None` if it was not compared.

@@ -112,7 +112,7 @@ fn set_clock_back(world: &mut World) {
     }
 }
 
-/// Sets the clock of the first tick after loading, for any number of frames: the game entered the level in the frame
+/// Sets the clock of the first tick after loading, for any number of frames. The game entered the level in the frame
 /// before, and that counts as the first with a length. The clock keeps its speed.
 pub(super) fn leave_loading_out(world: &mut World) {
     let Some(clock) = world.get_resource::<Time<Virtual>>() else { return };

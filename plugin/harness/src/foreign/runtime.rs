@@ -41,7 +41,7 @@ pub(super) enum Sensor {
 /// A part of the reward.
 pub(super) struct RewardPart {
     pub(super) system: OwnedSystem<f32>,
-    /// Whether the growth of the value since the last tick is paid.
+    /// True if the growth of the value since the last tick is paid.
     pub(super) is_delta: bool,
     pub(super) last: Option<f32>,
 }
@@ -81,7 +81,7 @@ pub(super) struct Foreign {
     pub(super) startup: Vec<InternedScheduleLabel>,
     /// Frames since the last restart.
     pub(super) frames: u32,
-    /// Whether an episode has started in this World, if each has its own World.
+    /// True if an episode has started in this World, if each has its own World.
     pub(super) has_begun: bool,
 }
 

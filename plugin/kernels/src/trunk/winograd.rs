@@ -1,10 +1,10 @@
 //! 3×3 convolutions with 2.25 times fewer products: Winograd's F(2×2, 3×3) (Lavin and Gray 2016, "Fast algorithms for
 //! convolutional neural networks").
 //!
-//! The 4×4 input pixels d of 2×2 output pixels, and the 3×3 weights g, become 4×4 points each. The output is Aᵀ[Σ (G
-//! g Gᵀ) ⊙ (Bᵀ d B)]A, where the sum over the input channels makes a product of matrices for each point. The gradient
-//! of the input is such a convolution again; that of the weights is Gᵀ[Σ (Bᵀ d B) ⊙ (A y Aᵀ)]G for the gradient y of
-//! the output.
+//! The 4×4 input pixels d of 2×2 output pixels, and the 3×3 weights g, become 4×4 points each. The output is Aᵀ[Σ (G g
+//! Gᵀ) ⊙ (Bᵀ d B)]A, where the sum over the input channels makes a product of matrices for each point. The gradient of
+//! the input is such a convolution again. That of the weights is Gᵀ[Σ (Bᵀ d B) ⊙ (A y Aᵀ)]G for the gradient y of the
+//! output.
 
 use crate::{
     elementwise::Store,

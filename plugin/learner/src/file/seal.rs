@@ -1,6 +1,6 @@
 //! Checksums inside files, which reveal damage before the contents are used.
 //!
-//! A seal stands at a fixed position near the start of a text: a prefix, the CRC-32 (the one of zip, ISO-HDLC) as
+//! A seal stands at a fixed position near the start of a text. It is a prefix, the CRC-32 (the one of zip, ISO-HDLC) as
 //! eight hexadecimal digits, and a suffix. A text that almost has a seal has a damaged one. A text without any was
 //! written by an older version.
 

@@ -72,8 +72,8 @@ impl Gru {
     /// Runs over a sequence `[steps * B, inputs]`, time-major (row `t * B + b`), from `initial` states (one
     /// `[directions, B, hidden]` per layer) or zeros.
     ///
-    /// Returns the outputs of the last layer, `[steps * B, directions * hidden]` (forward features first), and the
-    /// last state of each layer, `[directions, B, hidden]`; the backward direction ends at the first time step.
+    /// Returns the outputs of the last layer, `[steps * B, directions * hidden]` (forward features first), and the last
+    /// state of each layer, `[directions, B, hidden]`. The backward direction ends at the first time step.
     pub fn forward(
         &self,
         sequence: Tensor<2>,

@@ -190,8 +190,8 @@ impl ImageNet {
 /// Returns the ReLU of `fc` over the channels, rows and columns of images, in this order.
 pub(super) fn last_layer(fc: &Linear, flat: Tensor<2>) -> Tensor<2> {
     let [n, _] = flat.dims();
-    // Matrix libraries sum a single row in another order than the rows of a matrix; an image's features must not
-    // depend on the others in the batch.
+    // Matrix libraries sum a single row in another order than the rows of a matrix. An image's features must not depend
+    // on the others in the batch.
     let flat = if n == 1 { flat.repeat_dim(0, 2) } else { flat };
     fc.activated(flat, Activation::Relu).narrow(0, 0, n)
 }

@@ -18,7 +18,7 @@ pub struct Advantages {
 /// Computes generalised advantage estimates (Schulman et al. 2016, "High-dimensional continuous control using
 /// generalized advantage estimation"):
 ///
-/// δ = r + γ v' - V(s), A = δ + γ λ (1 - done) A'. v' is 0 after a termination; after a truncation it is the value of
+/// δ = r + γ v' - V(s), A = δ + γ λ (1 - done) A'. v' is 0 after a termination. After a truncation it is the value of
 /// the episode's last observation (or 0 by [`TimeLimit::Legacy`]); else it is the next row's value. A step that is both
 /// counts as a termination.
 ///

@@ -262,9 +262,9 @@ pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Ac
 // The losses of SAC, as pure functions of tensors, `[n]` per row.
 //
 // Continuous and discrete actions share one form. With V = E\[Q - α ln π\], where Q is the least of the critics (or
-// another reduction) and α the temperature, the actor maximises mean(V), and critics learn y = r + γ V'. For
-// continuous actions the expectation is one draw; for discrete ones it is the sum over all choices (Christodoulou
-// 2019, "Soft actor-critic for discrete action settings").
+// another reduction) and α the temperature, the actor maximises mean(V), and critics learn y = r + γ V'. For continuous
+// actions the expectation is one draw. For discrete ones it is the sum over all choices (Christodoulou 2019, "Soft
+// actor-critic for discrete action settings").
 
 /// Returns V of one draw per row: Q - α ln π(a).
 pub fn soft_value(log_prob: Tensor<1>, q: Tensor<1>, temperature: f64) -> Tensor<1> {

@@ -165,8 +165,8 @@ impl Dataset {
 /// The rule by which windows are cut.
 #[derive(Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum WindowRule {
-    /// Each episode is cut into consecutive windows from a random first step, anew and in a new order in every epoch,
-    /// so that an epoch shows nearly every step once. No window crosses the end of an episode.
+    /// Each episode is cut into consecutive windows from a random first step, anew and in a new order in every epoch.
+    /// So an epoch shows nearly every step once. No window crosses the end of an episode.
     #[default]
     WithinEpisodes,
     /// The released code's: as many windows as fit side by side, but from starts drawn once, uniformly with

@@ -37,8 +37,8 @@ pub fn skill_loss(forward: &SkillForward, config: &SkillConfig) -> SkillLoss {
 }
 
 /// Returns the negative log-likelihood of each recorded action if a share ε of discrete actions was replaced by
-/// uniformly random ones: −ln((1 − ε) π(a) + ε / K) for K actions. The decoder then learns the intended action, not
-/// the noise. Continuous actions are not corrected.
+/// uniformly random ones. It is −ln((1 − ε) π(a) + ε / K) for K actions. The decoder then learns the intended action,
+/// not the noise. Continuous actions are not corrected.
 fn nll_under_noise(forward: &SkillForward, noise: f64) -> Tensor<1> {
     let nll = forward.nll_per_step.clone();
     match &forward.decoded {

@@ -179,7 +179,7 @@ pub enum StateNet {
     Image(ImageNet),
 }
 
-/// The features of each step's observation, joined with the action, read in both directions by recurrent layers; from
+/// The features of each step's observation, joined with the action, read in both directions by recurrent layers. From
 /// the two last outputs, linear heads for the mean and ln σ of z.
 #[derive(Clone, Debug)]
 pub struct Encoder {

@@ -117,7 +117,7 @@ fn scaled(normalizer: Option<&mut RewardNormalizer>, gamma: f64, rollout: &Rollo
     }
 }
 
-/// Corrects a discount that is the same for every skill: the value behind a skill that was cut off after k ticks is
+/// Corrects a discount that is the same for every skill. The value behind a skill that was cut off after k ticks is
 /// discounted by γᵏ, not by `gamma`, that of a whole one.
 fn discount_cuts(skills: &mut Rollout, discounts: &[f64], gamma: f64) {
     for &row in &skills.ends.cut_rows {

@@ -42,7 +42,7 @@ pub(super) struct SkillRollout {
 ///
 /// The skills of an environment follow one another. Behind its last one, and wherever an episode was cut off, the row
 /// counts as truncated, with the next state among the ends. Skills drawn fewer than `skill_interval` ticks before the
-/// end of the rollout are left out however they ended: otherwise skills that end an episode would be learned from more
+/// end of the rollout are left out however they ended. Otherwise skills that end an episode would be learned from more
 /// often than others. The state in which the first of them was drawn is the next state of its predecessor.
 /// Log-probabilities and values stay 0.
 ///

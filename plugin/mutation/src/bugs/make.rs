@@ -34,9 +34,9 @@ const FEWEST_BASES: u64 = 24;
 /// Plants every kind of defect into every game. The same seed gives the same set, for any number of threads. Each
 /// mutant depends on the seed, its game, class and number alone.
 ///
-/// A defect of a game's own rules is planted on a level where it changes some bot's episode: that of the demonstrator,
-/// of a bot that holds an action, of chaos or of random actions. `progress` receives how many more unmutated levels
-/// were found, and how many of those mutants have their level.
+/// A defect of a game's own rules is planted on a level where it changes some bot's episode. That is the episode of the
+/// demonstrator, of a bot that holds an action, of chaos or of random actions. `progress` receives how many more
+/// unmutated levels were found, and how many of those mutants have their level.
 ///
 /// # Errors
 ///
@@ -103,9 +103,9 @@ pub struct MissingMutants {
     pub game: String,
     /// The class of the defect.
     pub class: String,
-    /// How many were planted.
+    /// Number of planted ones.
     pub planted: u32,
-    /// How many were asked for.
+    /// Number of requested ones.
     pub wanted: u32,
     /// Variants, of a defect of rules, that change nothing on any level that was tried.
     pub without_effect: BTreeSet<u32>,
@@ -223,7 +223,7 @@ const SEEDS: u64 = 3;
 /// tried.
 pub(super) type Bases = BTreeMap<(&'static str, u32), Option<u64>>;
 
-/// Finds an unmutated level on which a bot notices each mutant of the rules among these kinds: a broken wall that no
+/// Finds an unmutated level on which a bot notices each mutant of the rules among these kinds. A broken wall that no
 /// bot walks into is no defect of that level. The levels are tried in a random order of the mutant's own. `progress` is
 /// called for each mutant.
 pub(super) fn bases_with_effect(

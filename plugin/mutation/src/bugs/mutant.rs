@@ -14,9 +14,9 @@ use std::{collections::BTreeSet, ops::Deref, sync::Arc};
 /// A defect of rules, in one of its variants.
 #[derive(Clone)]
 pub struct PlantedRules {
-    /// What plants it.
+    /// The function that plants it.
     pub plant: Arc<ChangeRules>,
-    /// Which variant.
+    /// Number of the variant.
     pub variant: u32,
 }
 

@@ -54,10 +54,10 @@ pub struct ContestantRecord {
     /// Checksum of the tester's file, if there is one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub checksum: Option<String>,
-    /// Whether a policy takes its most probable action instead of drawing one.
+    /// True if a policy takes its most probable action instead of drawing one.
     #[serde(default)]
     pub greedy: bool,
-    /// Whether it acts with learned skills.
+    /// True if it acts with learned skills.
     pub skilled: bool,
 }
 

@@ -166,7 +166,7 @@ pub(super) struct Trial<'a> {
     pub detectors: &'a Detectors,
     /// The budget.
     pub budget: ScoreBudget,
-    /// Whether findings are minimised.
+    /// True if findings are minimised.
     pub shortens: bool,
     /// Runs from the start of the job.
     pub clock: JobClock,

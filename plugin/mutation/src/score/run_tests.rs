@@ -1,3 +1,5 @@
+//! Tests of the scoring of testers.
+
 use crate::{
     bugs::BugSet,
     score::{ClockKind, Found, ScoreBudget, ScoredJob, TestedGame, *},

@@ -423,7 +423,7 @@ pub struct TesterRow {
     pub testers: Vec<String>,
     /// The games that they test.
     pub games: Vec<String>,
-    /// Whether all of them act with learned skills.
+    /// True if all of them act with learned skills.
     pub skilled: bool,
     /// Share of the mutants that they test and find; for several testers, of all mutants.
     pub recall: Share,

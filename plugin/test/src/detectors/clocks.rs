@@ -304,7 +304,7 @@ pub const TIMING: &str = "timing.jsonl";
 /// Most slow ticks that are kept.
 const MOST: usize = 10_000;
 
-/// A finding for ticks that take too long. Times differ from machine to machine and from run to run, so slow ticks are
+/// A finding for ticks that take too long. Times differ from machine to machine and from run to run. So slow ticks are
 /// no part of the results and have a file of their own.
 pub struct TickTime {
     pub(super) milliseconds: f64,

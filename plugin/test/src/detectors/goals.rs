@@ -1,5 +1,5 @@
-//! Detectors of wrong goals and ways: goals that are reached from afar or without an effect, parts of a level that
-//! cannot be reached, and shortcuts.
+//! Detectors of wrong goals and wrong paths. They find goals that are reached from afar or without an effect, parts of
+//! a level that cannot be reached, and shortcuts.
 
 use crate::{
     detectors::{LevelDefect, LevelDetector, ShownBy, TestedLevel},
@@ -216,8 +216,8 @@ impl LevelDetector for UnreachableRegion {
     }
 }
 
-/// A finding for testers that solve a level in far fewer ticks than expected: its par, by the designer or by
-/// demonstrations, or else the ticks of the game's demonstrator.
+/// A finding for testers that solve a level in far fewer ticks than expected. Its par, by the designer or by
+/// demonstrations, is expected, or else the ticks of the game's demonstrator.
 pub struct Shortcut {
     factor: f64,
     par: f64,

@@ -288,7 +288,7 @@ const MARGIN: i64 = 8;
 /// Part of a cell by which a level may be longer than its cells, through rounding.
 const SLACK: f32 = 1e-3;
 
-/// Plays one tick of the level, and checks a cell: it must have as many numbers as the level's cells, and must not lie
+/// Plays one tick of the level, and checks a cell. It must have as many numbers as the level's cells, and must not lie
 /// far outside.
 ///
 /// # Errors

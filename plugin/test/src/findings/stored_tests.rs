@@ -1,3 +1,5 @@
+//! Tests of stored findings.
+
 use crate::findings::{testing::stored, *};
 use bevy_playbot::demo::file::DemoFault;
 use playbot_learner::HasExitCode as _;

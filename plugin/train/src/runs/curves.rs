@@ -37,7 +37,7 @@ impl RunCurves {
             let last = lines.lines.last().map_or(0, |line| line.step);
             if last < saved && lines.damaged.is_empty() && file.exists() {
                 // A file cut off between two lines looks whole.
-                let words = format!("{}: nothing is left of the steps {last} to {saved}", file.display());
+                let words = format!("{}: metrics are missing for the steps {last} to {saved}", file.display());
                 read.warnings.push(words);
             }
             let damaged = |number| format!("{}: line {number} is damaged and left out", file.display());

@@ -1,5 +1,5 @@
-//! For build scripts: takes a game out of the examples of the `bevy` package, which cargo has already downloaded. It
-//! writes a copy into `OUT_DIR` that has a function over an app where the example has its `main`.
+//! Extraction, for build scripts, of a game from the examples of the `bevy` package, which cargo has already
+//! downloaded. It writes a copy into `OUT_DIR` that has a function over an app where the example has its `main`.
 //!
 //! The examples themselves stay as they are, and no part of them is kept in this repository.
 

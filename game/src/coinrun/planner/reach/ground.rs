@@ -35,7 +35,7 @@ static CORNER_COLUMNS: LazyLock<Columns> = LazyLock::new(|| columns(corners(&PLA
 
 static BODY_COLUMNS: LazyLock<Columns> = LazyLock::new(|| columns(PLAYER.rx + OVERLAP_MARGIN));
 
-/// A question about a level. Corners are the same corners in both rows of a question: a player free in one row and
+/// A question about a level. Corners are the same corners in both rows of a question. A player free in one row and
 /// stopped by the other does not slide down beside a wall as if on steps.
 #[derive(Clone, Copy, PartialEq, Eq, Hash)]
 enum Question {

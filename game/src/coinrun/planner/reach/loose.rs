@@ -26,8 +26,8 @@ const SLOWED: i32 = (GRAVITY * TENTHS) as i32;
 /// A standing player is in the middle of a tenth.
 const OFFSET: f32 = PLAYER_HALF_HEIGHT - 0.55;
 
-/// Bins that a player with a corner in a wall may move before all are free again: a tile, an eighth of one for a part
-/// of a step, and some more.
+/// Bins that a player with a corner in a wall may move before all are free again. These are a tile, an eighth of one
+/// for a part of a step, and some more.
 const WALL_REACH: usize = 12;
 
 /// Largest depth below a crate's top of a player that overlaps it, tenths of a tile.
@@ -52,7 +52,7 @@ impl Loose {
 
 /// Follows a player with a corner in a wall: one that starts there, or has stood across a ledge and moved up or down.
 /// Until all corners are free again, such a player stays in the same columns, or one beside, and at two heights between
-/// two rows; it may have any speed then.
+/// two rows. It may have any speed then.
 pub(super) fn out_of_wall(ground: &mut ReachableGround, y: f32, places: Bins, after: &mut Vec<(State, Bins)>) {
     let row = y.floor();
     let heights = [row + 1.0 - PLAYER_HALF_HEIGHT, row + PLAYER_HALF_HEIGHT];

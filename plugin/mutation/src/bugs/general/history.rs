@@ -24,7 +24,7 @@ pub(super) struct History {
     done: VecDeque<ActionValue>,
     held: u32,
     longest: u32,
-    /// Whether a defect that shows once has already shown in this episode.
+    /// True if a defect that shows once has already shown in this episode.
     pub(super) has_shown: bool,
     /// The agent's own action, if the game receives another one in this tick.
     pub(super) meant: Option<ActionValue>,

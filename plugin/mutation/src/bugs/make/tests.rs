@@ -1,3 +1,5 @@
+//! Tests of the planting of defects.
+
 use crate::bugs::make::*;
 use bevy::prelude::*;
 use playbot_harness::{

@@ -1,3 +1,5 @@
+//! Tests of sets of planted defects.
+
 use crate::bugs::{general::testing::Track, set::*};
 
 fn set() -> BugSet {

@@ -1,3 +1,5 @@
+//! Tests of the table that joins several scores.
+
 use crate::score::{
     Found, JobFinding, JobResult, ScoredJob,
     table::*,

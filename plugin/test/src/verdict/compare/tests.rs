@@ -1,3 +1,5 @@
+//! Tests of the comparison of results.
+
 use crate::verdict::{
     Finding, LevelOutcome, MapScope, TesterRecord,
     compare::*,

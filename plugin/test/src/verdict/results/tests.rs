@@ -1,3 +1,5 @@
+//! Tests of results as files.
+
 use crate::verdict::{Finding, MapScope, TesterRecord, results::*, testing::verdict};
 use playbot_harness::detector::LevelProof;
 use std::fs;

@@ -1,3 +1,5 @@
+//! Tests of experiment files.
+
 use crate::experiment::{PRESETS, file::*};
 
 const GOOD: &str = r#"(
