@@ -1,5 +1,4 @@
-//! A game of one's own, and the whole road with it as functions, without the command line: record, learn skills, train,
-//! measure, ship.
+//! A game of one's own, and all steps from recordings to a shipped policy as functions, without the command line.
 //!
 //! `cargo run --release -p playbot --example lander -- plugin/examples/lander.policy` writes the policy with which
 //! `bevy_playbot`'s example `lander_window` ships; without a path it is thrown away.
@@ -13,14 +12,14 @@ use std::path::{Path, PathBuf};
 
 use bevy::prelude::*;
 use playbot::prelude::*;
-use playbot_harness::{
+use playbot::harness::{
     demo::verify_file,
     eval::{EvalSummary, Player},
     game::BotTools,
     parallel::default_threads,
 };
-use playbot_learner::DeviceKind;
-use playbot_train::{
+use playbot::learner::DeviceKind;
+use playbot::train::{
     Experiment, UpdateReport,
     experiment::file::parse_experiment,
     pipeline,
@@ -96,7 +95,7 @@ fn pilot(mut agents: Query<(&Control, &Capsule, &mut Action), Without<BlindBot>>
 /// # Errors
 ///
 /// One of the steps failed.
-pub fn road(experiment: &str, demos: &str, policy: &Path) -> Result<[EvalSummary; 2], Box<dyn std::error::Error>> {
+pub fn all_steps(experiment: &str, demos: &str, policy: &Path) -> Result<[EvalSummary; 2], Box<dyn std::error::Error>> {
     let (device, threads) = (DeviceKind::default(), default_threads());
     let folder = tempfile::tempdir()?;
     let recording = folder.path().join("pilot.demo");
@@ -129,7 +128,7 @@ pub fn road(experiment: &str, demos: &str, policy: &Path) -> Result<[EvalSummary
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let folder = tempfile::tempdir()?;
     let policy = std::env::args_os().nth(1).map_or_else(|| folder.path().join("lander.policy"), PathBuf::from);
-    for summary in road(EXPERIMENT, "moon:128..200", &policy)? {
+    for summary in all_steps(EXPERIMENT, "moon:128..200", &policy)? {
         println!("{}: {:.0} % landed softly on {}", summary.method, 100.0 * summary.success, summary.split);
     }
     Ok(())

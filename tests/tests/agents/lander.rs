@@ -30,10 +30,10 @@ const TINY: &str = r#"(
 )"#;
 
 #[test]
-fn the_lander_goes_the_whole_road() {
+fn the_lander_takes_all_steps() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("lander.policy");
-    let [learned, random] = lander_example::road(TINY, "moon:128..133", &path).expect("every step works");
+    let [learned, random] = lander_example::all_steps(TINY, "moon:128..133", &path).expect("every step works");
     assert_eq!((learned.episodes, random.episodes), (8, 8));
     assert!(learned.return_mean.is_finite() && learned.length_mean > 1.0, "{learned:?}");
 
