@@ -93,9 +93,9 @@ pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
     }
 }
 
-/// Returns the planned action of a demonstrator with noise. The noise is the probability of
-/// replacing a discrete action by a uniformly random one, or the standard deviation of the normal
-/// noise on each continuous value. Zero noise draws no random number and keeps the action.
+/// Returns the planned action of a demonstrator with noise. For discrete actions, the noise is the probability of
+/// replacing one by a uniformly random one. For continuous ones, it is the standard deviation of the normal noise on
+/// each value. Zero noise draws no random number and keeps the action.
 pub fn with_noise(planned: ActionValue, space: &ActionSpace, noise: f64, rng: &mut impl rand::Rng) -> ActionValue {
     match planned {
         ActionValue::Discrete(_) if noise > 0.0 && rng.random_bool(noise.min(1.0)) => uniform(space, rng),

@@ -98,8 +98,8 @@ impl CameraSensor {
     /// Returns the components of an agent that sees through a camera of the game, 2D or 3D, scaled to the picture's
     /// size.
     ///
-    /// Several agents may look through one camera if their pictures have the same size. If the camera's own target does
-    /// not exist, such as the window of an app without one, it draws as for a window of the picture's size.
+    /// Several agents may look through one camera if their pictures have the same size. The camera's own target may not
+    /// exist, such as the window of an app without one. Then it draws as for a window of the picture's size.
     pub fn of(camera: Entity, image: ImageOptions) -> (Self, ImageSensor) {
         (Self { source: CameraSource::Camera(camera) }, ImageSensor(image))
     }

@@ -221,9 +221,9 @@ impl PlaybotAppExt for World {
 /// Input, assets, states, text, meshes and materials are there, and a window of 1280 by 720 that
 /// only the game sees. There is no event loop, and the renderer has no surface to draw on.
 ///
-/// With Bevy's feature `bevy_winit`, it needs the feature `window` of this crate; with
-/// `bevy_render`, the feature `camera`: a plugin can be left out only by its type. Leave out others
-/// with [`disable`](bevy::app::PluginGroupBuilder::disable), as with any group.
+/// With Bevy's feature `bevy_winit`, it needs the feature `window` of this crate; with `bevy_render`, the feature
+/// `camera`. A plugin can be left out only by its type. Leave out others with
+/// [`disable`](bevy::app::PluginGroupBuilder::disable), as with any group.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HeadlessPlugins {
     /// True if pictures are drawn for agents that see through a camera.

@@ -24,8 +24,8 @@ use std::{
     sync::Once,
 };
 
-/// Turns panics of the game into a [`Fault`] that [`tick_world`](crate::headless::tick_world) returns, with the running
-/// episodes of all agents kept in a file that replays to the panic.
+/// Turns panics of the game into a [`Fault`] that [`tick_world`](crate::headless::tick_world) returns. The running
+/// episodes of all agents are kept in a file that replays to the panic.
 #[derive(Resource, Clone, Debug, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, CarryResource, Clone, Debug)]

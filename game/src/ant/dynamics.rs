@@ -1,8 +1,8 @@
 //! Mass matrix and forces without contacts: the composite rigid body algorithm and a recursive Newton-Euler pass over a
 //! torso with four legs of two limbs.
 //!
-//! Unknowns are the accelerations of the coordinates: the torso's angular acceleration and the acceleration of its
-//! centre, both along the torso's axes, and those of the hinges.
+//! Unknowns are the accelerations of the coordinates. These are the torso's angular acceleration and the acceleration
+//! of its centre, both along the torso's axes, and those of the hinges.
 
 use crate::ant::{
     kinematics::{Inertia, Leg, Pose, Solids, Spatial},

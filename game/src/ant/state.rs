@@ -31,8 +31,8 @@ impl AntState {
         Self { qpos, qvel: [0.0; VELOCITIES] }
     }
 
-    /// Returns the start of an episode: every position of the nominal pose shifted by up to 0.1 either way, velocities
-    /// drawn from a normal distribution with standard deviation 0.1.
+    /// Returns the start of an episode. Every position of the nominal pose is shifted by up to 0.1 either way.
+    /// Velocities are drawn from a normal distribution with standard deviation 0.1.
     pub fn reset(rng: &mut impl Rng) -> Self {
         let mut state = Self::nominal();
         for position in &mut state.qpos {
@@ -88,9 +88,9 @@ pub fn joint_names() -> [String; JOINTS] {
 /// Returns the observation of an ant on its way to `goal`, in metres in the world. Body and goal are seen from the
 /// torso's heading, so a gait learned in one direction works in all.
 ///
-/// Height in metres; the world's upwards direction along the torso's axes; joint angles in radians; velocity in m/s
-/// along the heading, to its left and upwards; angular velocity along the torso's axes in rad/s; joint velocities in
-/// rad/s; the direction of the goal, of length 1, along the heading and to its left.
+/// Height in metres; the world's upwards direction along the torso's axes; joint angles in radians. Then velocity in
+/// m/s along the heading, to its left and upwards; angular velocity along the torso's axes in rad/s; joint velocities
+/// in rad/s. Then the direction of the goal, of length 1, along the heading and to its left.
 pub fn senses(state: &AntState, goal: Vec2) -> [f32; SENSES] {
     let (q, v) = (&state.qpos, &state.qvel);
     let rotation = Quat::from_xyzw(q[4], q[5], q[6], q[3]);

@@ -8,8 +8,8 @@ use crate::ant::contact::WallBox;
 use bevy::math::{DVec3, Vec3};
 use bevy_rapier3d::rapier::prelude::*;
 
-/// Largest distance of a part of the ant from the torso's centre in one control step, in metres: legs of 1.13 m and the
-/// path of a jump.
+/// Largest distance of a part of the ant from the torso's centre in one control step, in metres. It covers legs of 1.13
+/// m and the path of a jump.
 const REACH: f32 = 2.5;
 
 /// The floor and the walls of an arena.

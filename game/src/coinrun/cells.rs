@@ -88,8 +88,8 @@ fn window(bits: u64, outside: u64, left: i32) -> u32 {
     wide as u32 & ((1 << (SIDE + 1)) - 1)
 }
 
-/// Sums the coverage of a row of cells by the tiles of two rows, from left to right and from the low row to the high
-/// one.
+/// Sums the coverage of a row of cells by the tiles of two rows. The order is from left to right and from the low row
+/// to the high one.
 fn fill_row(rows: [(u32, f32); 2], across: &Shares, cells: &mut [f32]) {
     let mut sums = [0.0_f32; WIDE];
     for (bits, height) in rows {

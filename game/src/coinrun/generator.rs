@@ -1,6 +1,6 @@
 //! Generator of levels from mode and seed, draw for draw as Procgen's CoinRun does.
 //!
-//! Every random decision takes one output of an mt19937 generator seeded with the level seed, so the order of the draws
+//! Every random decision takes one output of an mt19937 generator seeded with the level seed. So the order of the draws
 //! is part of the result. A draw that is skipped or added changes the rest of the level.
 
 use crate::coinrun::{

@@ -108,8 +108,8 @@ impl Default for PlannerConfig {
 impl PlannerConfig {
     /// Returns settings for an actor whose actions are disturbed.
     ///
-    /// With a fifth of its actions replaced by random ones, a [`Demonstrator`] with these settings
-    /// reaches the coin in about 94 % of the easy levels 0 to 499. On the hard ones it is about 91 %.
+    /// With a fifth of its actions replaced by random ones, a [`Demonstrator`] with these settings reaches the coin in
+    /// about 94 % of the easy levels 0 to 499. On the hard ones it is about 91 %.
     pub fn cautious() -> Self {
         Self { greed: 1.5, margin: 0.5, caution: 1.0, ..Self::default() }
     }

@@ -47,8 +47,8 @@ pub struct PlayerStep {
 }
 
 impl PlayerStep {
-    /// Returns true if the top of `block` holds a player with the present vertical velocity `vy`: only one that falls,
-    /// does not press down and was not below the top when the step began.
+    /// Returns true if the top of `block` holds a player with the present vertical velocity `vy`. It holds only one
+    /// that falls, does not press down and was not below the top when the step began.
     #[inline]
     fn is_held_by(&self, block: &Body, vy: f32) -> bool {
         vy < 0.0 && self.ay >= 0 && self.y >= block.y + block.ry + self.ry

@@ -36,8 +36,8 @@ pub enum PictureError {
 }
 
 impl Level {
-    /// Returns a picture of the used part of the level: all columns up to the rock behind the coin, and the rows up to
-    /// a little above the highest thing.
+    /// Returns a picture of the used part of the level. It has all columns up to the rock behind the coin, and the rows
+    /// up to a little above the highest thing.
     pub fn to_text(&self) -> String {
         let [width, height] = self.used_size();
         let mut rows: Vec<Vec<char>> =

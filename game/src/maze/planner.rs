@@ -41,9 +41,9 @@ impl GridMove {
 /// with reward 1 for any move in the goal cell and discount 0.99.
 ///
 /// The original sweeps 50 times over all cells, so its goal is unknown farther than 50 moves away. The limit of its
-/// sweeps needs none. The value of a cell that is d moves away is 0.99^d / (1 - 0.99), and the move of the highest
-/// Q-value is the one to the least d. So the cells are visited once, nearest first, and mazes of any size are planned
-/// in the time it takes to read them.
+/// sweeps needs no counterpart here. The value of a cell that is d moves away is 0.99^d / (1 - 0.99). So the move of
+/// the highest Q-value is the one to the least d. Therefore the cells are visited once, nearest first. Mazes of any
+/// size are planned in the time it takes to read them.
 #[derive(Clone, Debug)]
 pub struct Planner {
     maze: Maze,

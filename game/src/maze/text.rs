@@ -18,8 +18,8 @@ impl Maze {
         Self::new(walls, start.ok_or(MazeError::NoStart)?, goal.ok_or(MazeError::NoGoal)?)
     }
 
-    /// Reads a maze of a level file: like [`parse`](Self::parse), but start and goal may also be given as cells, and
-    /// there need not be a path between them.
+    /// Reads a maze of a level file: like [`parse`](Self::parse), but start and goal may also be given as cells. There
+    /// need not be a path between them.
     ///
     /// # Errors
     ///
@@ -89,8 +89,7 @@ fn mark(place: &mut Option<Cell>, cell: Cell, what: &'static str) -> Result<(), 
     }
 }
 
-/// Reads the maze of a level file: rows, the first one at the top, with start and goal as letters in them, as cells, or
-/// both.
+/// Reads the maze of a level file: rows, the first one at the top. Start and goal are letters in them, cells, or both.
 ///
 /// # Errors
 ///

@@ -11,7 +11,6 @@ pub mod lander_rules;
 use std::path::{Path, PathBuf};
 
 use bevy::prelude::*;
-use playbot::prelude::*;
 use playbot::harness::{
     demo::verify_file,
     eval::{EvalSummary, Player},
@@ -19,6 +18,7 @@ use playbot::harness::{
     parallel::default_threads,
 };
 use playbot::learner::DeviceKind;
+use playbot::prelude::*;
 use playbot::train::{
     Experiment, UpdateReport,
     experiment::file::parse_experiment,
@@ -30,7 +30,7 @@ use playbot::train::{
 
 use lander_rules::{Capsule, OBSERVATION, TICK_HZ, add_rules, capsule};
 
-/// What is learned, on which levels, how, and how long.
+/// The experiment: the game that is learned, its levels, the method, and the duration.
 pub const EXPERIMENT: &str = r#"(
     game: "lander", train: "moon:0..63", test: "moon:64..127", steps: 400000, arenas: 16, worlds: 2,
     skills: (window: 5, latent: 4, epochs: 20, hidden: [32, 32], encoder_hidden: 32, gru_hidden: 32),
@@ -89,8 +89,8 @@ fn pilot(mut agents: Query<(&Control, &Capsule, &mut Action), Without<BlindBot>>
     }
 }
 
-/// Records the pilot on these levels, learns from that as the experiment says, writes the policy, and returns how the
-/// policy and a bot that does not look do on levels that it has not seen.
+/// Records the pilot on these levels, learns from that as the experiment says, and writes the policy. Returns the
+/// results of the policy and of a bot that does not look, on levels that the policy has not seen.
 ///
 /// # Errors
 ///

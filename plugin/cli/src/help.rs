@@ -91,7 +91,7 @@ fn works(example: &str, plays: bool, games: &[&dyn Game]) -> bool {
 }
 
 /// Returns an example with the names in it. Its explanation, if any, stands in the common column, at least three blanks
-/// behind it, so that it does not look like a part of the command.
+/// behind it. So it does not look like a part of the command.
 fn own_example(example: &str, program: &str, names: &[(&str, &str)]) -> String {
     let own = |text: &str| names.iter().fold(text.to_owned(), |text, (word, name)| text.replace(word, name));
     let (command, explanation) = example.split_once("   ").unwrap_or((example, ""));

@@ -158,10 +158,10 @@ impl ForeignGame {
         self.with(|description| description.input.set_keys(sets))
     }
 
-    /// Declares discrete actions as [`keys`](Self::keys) does, by the names of keys, such as those in a settings file:
-    /// `ArrowLeft`, `KeyW`, `Space`, and those that [`VirtualButton`](bevy_playbot::virtual_input::VirtualButton) has
-    /// for buttons of mouse and gamepad. With a name that does not exist the game has a
-    /// [`problem`](crate::game::Game::problem), and cannot be played.
+    /// Declares discrete actions as [`keys`](Self::keys) does, by the names of keys, such as those in a settings file.
+    /// Names are `ArrowLeft`, `KeyW`, `Space`, and those that
+    /// [`VirtualButton`](bevy_playbot::virtual_input::VirtualButton) has for buttons of mouse and gamepad. With a name
+    /// that does not exist the game has a [`problem`](crate::game::Game::problem), and cannot be played.
     ///
     /// ```
     /// use bevy::prelude::*;
@@ -216,7 +216,7 @@ impl ForeignGame {
     /// Gives the agent components, whenever it is spawned: in each World, and in each that [`Restart::Rebuild`] builds.
     /// Several calls add up.
     ///
-    /// This is how an agent drives actions of an input manager that no key is bound to: with the feature
+    /// This is how an agent drives actions of an input manager that no key is bound to. It does so with the feature
     /// `leafwing-input-manager` of this crate by `LeafwingActions`, with `bevy_enhanced_input` by an `EnhancedAction`.
     /// The game's function adds their plugins, for `InputRoute::Messages`. [`actions`](Self::actions) with a system
     /// that does nothing declares how many actions the agent has.
@@ -294,8 +294,8 @@ impl ForeignGame {
         self.with(|description| description.position = Some(SystemFactory::new(system, |position| position)))
     }
 
-    /// Declares the plan of a level by its number, in the units of [`position`](Self::position): for pictures of paths,
-    /// and for detectors that need walls, bounds or the goal.
+    /// Declares the plan of a level by its number, in the units of [`position`](Self::position). It is for pictures of
+    /// paths, and for detectors that need walls, bounds or the goal.
     pub fn plan(self, plan: impl Fn(u64) -> FloorPlan + Send + Sync + 'static) -> Self {
         self.with(|description| description.plan = Some(Arc::new(plan)))
     }

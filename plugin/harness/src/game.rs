@@ -358,8 +358,8 @@ pub trait StateTools: Send + Sync {
         None
     }
 
-    /// Returns the state of an agent in a few whole numbers, for an explorer that treats states with the same numbers
-    /// as the same: see `playbot_test::explore`. Returns `None`, by default, for squares of the grid by
+    /// Returns the state of an agent in a few whole numbers. An explorer treats states with the same numbers as the
+    /// same: see `playbot_test::explore`. Returns `None`, by default, for squares of the grid by
     /// [`position`](Self::position), or, if that is not known, for the downscaled observation.
     fn explore_cell(&self, _world: &World, _agent: Entity) -> Option<Vec<i32>> {
         None

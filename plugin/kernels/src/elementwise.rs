@@ -1,5 +1,5 @@
-//! Functions of single numbers and rows, in a form that compilers turn into vector instructions: tanh, the logistic
-//! function, exp, the rectifier, log-probabilities, and destinations for the sums of convolutions.
+//! Functions of single numbers and rows, in a form that compilers turn into vector instructions. They are tanh, the
+//! logistic function, exp, the rectifier, log-probabilities, and destinations for the sums of convolutions.
 //!
 //! Only sums, products, quotients and bit operations are used, in a fixed order for each element. A number has the
 //! same result at any index of a slice, on any number of threads, and with any vector instructions. The coefficients

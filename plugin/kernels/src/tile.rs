@@ -1,7 +1,7 @@
 //! Sums of products for a few pixels and 16 channels at once, so that the sums stay in registers. Most of the time
 //! goes here.
 //!
-//! Each sum is made by fused multiply-adds in a fixed order: it does not depend on the rest of the tile, on the width
+//! Each sum is made by fused multiply-adds in a fixed order. It does not depend on the rest of the tile, on the width
 //! of vectors, or on threads. A machine without such instructions rounds twice, and its last bits differ.
 
 use macerator::{Scalar, Simd, VFma};
@@ -206,7 +206,7 @@ const BLOCK: usize = 128;
 const COLOURS: usize = 9;
 
 /// Adds to `sums` the products of each window's numbers with the `channels` numbers of `y` that go with the window,
-/// summed over the windows: the gradient of [`correlate`]'s weights, in their order.
+/// summed over the windows. That is the gradient of [`correlate`]'s weights, in their order.
 #[macerator::with_simd]
 pub(crate) fn outer<S: Simd>(
     x: &[f32],

@@ -191,8 +191,8 @@ impl LearnerBase {
         self.teacher.as_ref().map_or(self.spec.latent, Teacher::rollout_latent)
     }
 
-    /// Returns the present normalisation of the networks' observations: the frozen normaliser of the skill model if
-    /// that has one, else the learner's own running one, else `None`.
+    /// Returns the present normalisation of the networks' observations. It is the frozen normaliser of the skill model
+    /// if that has one, else the learner's own running one, else `None`.
     pub(crate) fn obs_stats(&self) -> Option<Arc<ObsStats>> {
         let frozen = self.teacher.as_ref().and_then(|teacher| teacher.stats.clone());
         frozen.or_else(|| self.observations.as_ref().map(|normalizer| Arc::new(normalizer.snapshot())))

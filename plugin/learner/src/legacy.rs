@@ -60,8 +60,8 @@ pub fn reduced(nll_per_step: Tensor<1>, kl_per_sequence: Tensor<1>) -> (Tensor<1
     (nll_per_step.mean().clamp(-BOUND, BOUND), kl_per_sequence.sum().clamp(-BOUND, BOUND))
 }
 
-/// Returns the first steps of the windows by [`WindowRule::Legacy`], in `steps` steps of all episodes laid end to end:
-/// as many as fit side by side, each drawn uniformly, whatever was drawn before. Empty if none fits.
+/// Returns the first steps of the windows by [`WindowRule::Legacy`], in `steps` steps of all episodes laid end to end.
+/// There are as many as fit side by side, each drawn uniformly, whatever was drawn before. Empty if none fits.
 ///
 /// [`WindowRule::Legacy`]: crate::WindowRule::Legacy
 pub fn window_starts<R: Rng + ?Sized>(steps: usize, window: usize, rng: &mut R) -> Vec<usize> {

@@ -7,10 +7,10 @@
 //!   skills fit a state.
 //! - A [`Policy`] is a frozen snapshot that plays: [`Policy::forward`] returns action distributions and values for a
 //!   batch of observations. The decoder under the prior is such a policy ([`SkillModel::policy`]): behaviour cloning.
-//! - A [`PpoLearner`] improves a policy from [`Rollout`]s by PPO. With a skill model it is SCORE-PPO: the policy
-//!   reads the skill z, starts as a copy of the decoder, and is penalised for leaving it where the decoder is
-//!   confident ([`ScoreConfig`]).
-//! - A [`SacLearner`] does so by SAC, from the same rollouts and with the same ties to a skill model, but keeps
+//! - A [`PpoLearner`] improves a policy from [`Rollout`]s by PPO. With a skill model it is SCORE-PPO. The policy reads
+//!   the skill z, starts as a copy of the decoder, and is penalised for leaving it where the decoder is confident
+//!   ([`ScoreConfig`]).
+//! - A [`SacLearner`] does so by SAC, from the same rollouts and with the same ties to a skill model. It keeps
 //!   transitions and learns from them repeatedly.
 //! - A [`SpirlLearner`] learns, by either algorithm, which skills the decoder plays, instead of drawing them from the
 //!   prior.

@@ -292,9 +292,9 @@ impl SacLearner {
     }
 
     /// Adds a rollout (with its [`Rollout::ends`]; log-probabilities and values are not read) and, once there are
-    /// [`SacConfig::learning_starts`](SacConfig::learning_starts) transitions, does the gradient steps that
-    /// are due: batches from the replay buffer, then steps of critics, actor and temperature, then targets. The losses
-    /// and their steps are in `steps`.
+    /// [`SacConfig::learning_starts`](SacConfig::learning_starts) transitions, does the gradient steps that are due.
+    /// These take batches from the replay buffer, then steps of critics, actor and temperature, then targets. The
+    /// losses and their steps are in `steps`.
     ///
     /// # Errors
     /// [`LearnError::Shape`], [`LearnError::Action`] or [`LearnError::Config`] if the rollout does not fit, and

@@ -283,10 +283,10 @@ pub fn text(value: &impl Serialize) -> String {
 /// field: type = default, within "words for a range that code beside the struct checks";
 /// ```
 ///
-/// Required are documentation, field and type, and the default in a table of a section. (The second form is for the
-/// struct of all sections, whose rows name the attributes of serde themselves, and `keys of Type` for a section.) A
-/// value that is `off` by the named function is not written. Ranges are [`Range`]s, readers
-/// slices of [`Reader`]s; without `by` a row has those of its table.
+/// Required are documentation, field and type, and the default in a table of a section. The second form is for the
+/// struct of all sections. Its rows name the attributes of serde themselves, and `keys of Type` for a section. A value
+/// that is `off` by the named function is not written. Ranges are [`Range`]s, and readers are slices of [`Reader`]s.
+/// Without `by` a row has the readers of its table.
 #[macro_export]
 macro_rules! settings {
     (@key $field:ident) => { stringify!($field) };

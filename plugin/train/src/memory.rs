@@ -16,8 +16,7 @@ use playbot_learner::{ActionSpace, ImageShape, ObsKind, nn::CnnKind};
 
 impl Experiment {
     /// Checks that the data of a training fit into the free memory. These are networks with their gradients and
-    /// moments, minibatches, rollouts, the replay buffer of SAC, and Worlds, each of which plays on a thread of its
-    /// own.
+    /// moments, minibatches, rollouts, the replay buffer of SAC, and Worlds. Each World plays on a thread of its own.
     ///
     /// # Errors
     ///

@@ -1,5 +1,5 @@
 //! Folders of runs: the lock of the one process that trains there, the replacement of a run, and the error of a folder
-//! without a run.
+//! without one.
 //!
 //! A run is replaced in two steps: it is moved aside, and removed once the new one is written.
 

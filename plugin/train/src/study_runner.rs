@@ -251,8 +251,8 @@ impl<'a> StudyRunner<'a> {
         Ok(Some((result, curves)))
     }
 
-    /// Checks the folders of all existing runs, so that nothing is begun if one of them is in use, or is no run and
-    /// would have to be replaced.
+    /// Checks the folders of all existing runs. So nothing is begun if one of them is in use, or is no run and would
+    /// have to be replaced.
     ///
     /// # Errors
     ///

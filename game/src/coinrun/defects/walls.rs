@@ -108,8 +108,8 @@ fn hazard_wall(parts: &mut LevelParts, rng: &mut ChaCha8Rng) -> Option<()> {
 
 // Defects of the player's motion.
 
-/// Addition to the vertical speed of a player in the air, in each tick, tiles per tick: half of the gravity less, and
-/// three quarters more.
+/// Addition to the vertical speed of a player in the air, in each tick, tiles per tick. It is half of the gravity less,
+/// and three quarters more.
 const LIFT: [f32; 2] = [0.1, -0.15];
 
 /// Factor on the speed with which a jump begins: too low for the steps of levels, and too high.

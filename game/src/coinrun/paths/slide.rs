@@ -84,8 +84,8 @@ impl Axis {
     }
 }
 
-/// Computes the step of a player in free space that meets at most one straight edge along each axis; `None` if it may
-/// be any other step.
+/// Computes the step of a player in free space that meets at most one straight edge along each axis. Returns `None` if
+/// it may be any other step.
 ///
 /// Let the wall beside be solid over all passed rows, and the ground over all passed columns. Then each axis is blocked
 /// or not regardless of the other one. No crate may be near.

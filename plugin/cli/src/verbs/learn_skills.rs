@@ -104,7 +104,7 @@ pub(crate) fn explain(error: LearnSkillsError, options: &Options<'_>) -> CliErro
     }
 }
 
-/// Notes the saved state before this process has learned anything, for a stop while recordings are replayed: the
+/// Notes the saved state before this process has learned anything, for a stop while recordings are replayed. It is the
 /// checkpoint to resume from, if there is one.
 fn note_unlearned(checkpoint: Option<&Path>, go_on: &str) {
     let (left, command) = match checkpoint {

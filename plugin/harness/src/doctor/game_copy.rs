@@ -459,8 +459,8 @@ struct WallClock {
 /// Without a window a frame lasts exactly a tick, so reading the real-time clock changes nothing there. In a window it
 /// changes everything.
 ///
-/// A World with the normal clock gets the same resource and systems, so that two Worlds differ only in the clock, and
-/// have the same number of archetypes.
+/// A World with the normal clock gets the same resource and systems. So two Worlds differ only in the clock, and have
+/// the same number of archetypes.
 pub(super) fn add_wall_clock(world: &mut World, is_slow: bool) {
     Renewal::set_up(world, move |world| add_one(world, is_slow));
 }

@@ -16,7 +16,7 @@ pub enum LevelFileError {
         pattern: String,
         /// Position of the wrong character in the pattern, from 1.
         at: usize,
-        /// What is wrong with it.
+        /// Description of the fault.
         why: String,
     },
     /// No file matches the pattern.
@@ -99,7 +99,7 @@ pub enum LevelFileError {
     Text {
         /// The file.
         path: String,
-        /// What is wrong with it.
+        /// Description of the fault.
         error: LevelTextError,
     },
 }

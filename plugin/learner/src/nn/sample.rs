@@ -167,7 +167,7 @@ const EDGE: f64 = 0.999;
 /// Maps a Gaussian over actions in [-1, 1] back through tanh, to be compared with a squashed policy before its tanh.
 ///
 /// The inverse image is not normal, so this is an approximation. The inverse of tanh is monotone and maps quantiles to
-/// quantiles. The median m goes to atanh(m), and σ to half the distance of the images of m ± σ, with m and m ± σ
+/// quantiles. The median m goes to atanh(m). σ goes to half the distance of the images of m ± σ, with m and m ± σ
 /// clamped to ±0.999. For small σ this is the tangent's σ / (1 - m²). Near the edges, where that explodes, it stays a
 /// width that a policy can have. Categorical distributions are unchanged.
 pub fn unsquashed(decoder: &HostDist) -> HostDist {

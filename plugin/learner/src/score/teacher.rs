@@ -266,7 +266,7 @@ impl TeacherOutput {
 
 impl Teacher {
     /// Returns the distributions of the network that the policy is tied to, and its confidence, in `states` where
-    /// `actions` were taken; `None` if there is no penalty. `squashed`: the policy is a squashed Gaussian.
+    /// `actions` were taken. Returns `None` if there is no penalty. `squashed`: the policy is a squashed Gaussian.
     pub(crate) fn output<R: Rng + ?Sized>(
         &self,
         states: StateBatch<'_>,

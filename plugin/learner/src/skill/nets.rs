@@ -89,7 +89,7 @@ impl SkillNets {
 
     /// Runs a batch of B windows through all three networks.
     ///
-    /// `states`, `steps * B` rows, are time-major, so that the first B rows are those of the first step;
+    /// `states`, `steps * B` rows, are time-major, so that the first B rows are those of the first step.
     /// `encoded_actions` are the actions as the encoder reads them ([`ActionInput`](crate::skill::ActionInput)), and
     /// `noise` `[B, latent]` is standard normal: z = mean + noise · σ.
     ///

@@ -349,8 +349,9 @@ pub(super) struct Best {
 }
 
 impl Dataset {
-    /// Returns the episodes to learn from and the held-out ones: all episodes of a share of the levels, which is
-    /// drawn from `streams`, at least one. Whole levels are held out because episodes of the same level are alike.
+    /// Returns the episodes to learn from and the held-out ones. The held-out ones are all episodes of a share of the
+    /// levels, which is drawn from `streams`, at least one. Whole levels are held out because episodes of the same
+    /// level are alike.
     ///
     /// # Errors
     /// [`LearnError::Config`] if no episode would be left to learn from.
@@ -466,7 +467,7 @@ pub struct SkillMetrics {
     /// Norm of the gradient before clipping.
     pub grad_norm: f32,
     /// Squared error of the predicted state, the mean over its numbers and summed over a window, with
-    /// [`state_weight`](crate::skill::SkillConfig::state_weight); it starts near the number of steps of a window plus
+    /// [`state_weight`](crate::skill::SkillConfig::state_weight). It starts near the number of steps of a window plus
     /// 1.
     pub state_error: Option<f32>,
     /// Metrics of an epoch's networks on held-out demonstrations; `None` for a single batch, and without any.

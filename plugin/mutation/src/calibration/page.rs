@@ -69,7 +69,7 @@ impl Calibration {
     }
 
     /// Returns a scatter plot of the levels, people on the x axis and a tester on the y axis, with the line on which
-    /// both are equal; `None` if no level has both numbers.
+    /// both are equal. Returns `None` if no level has both numbers.
     pub fn scatter(&self, measure: Measure) -> Option<Chart> {
         let curve =
             |(tester, name): (usize, &String)| Curve::scatter(name.as_str(), measure.pairs(&self.levels, tester));

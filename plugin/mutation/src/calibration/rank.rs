@@ -37,7 +37,7 @@ fn rounded(value: f64) -> f64 {
 /// share their mean rank.
 ///
 /// The interval is by Fisher's z with the variance of Bonett and Wright (Sample size requirements for estimating
-/// Pearson, Kendall and Spearman correlations, 2000), (1 + r² / 2) / (n - 3), and needs four values.
+/// Pearson, Kendall and Spearman correlations, 2000), (1 + r² / 2) / (n - 3). It needs four values.
 pub fn spearman(one: &[f64], other: &[f64]) -> Option<RankCorrelation> {
     let value = pearson(&ranks(one), &ranks(other))?;
     let count = one.len().min(other.len()) as f64;
@@ -79,7 +79,7 @@ fn pearson(one: &[f64], other: &[f64]) -> Option<f64> {
 /// order, and corrects for equal values.
 ///
 /// The interval is by Fisher's z with the variance of Fieller, Hartley and Pearson (Tests for rank correlation
-/// coefficients, 1957), 0.437 / (n - 4), and needs five values.
+/// coefficients, 1957), 0.437 / (n - 4). It needs five values.
 pub fn kendall(one: &[f64], other: &[f64]) -> Option<RankCorrelation> {
     let mut pairs: Vec<(f64, f64)> = one.iter().copied().zip(other.iter().copied()).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));

@@ -200,9 +200,9 @@ pub(super) fn payload(frame: &[u8]) -> Option<&[u8]> {
 /// | observations | `steps` × width × `f32` |
 /// | level file | from format 2 on: `u32` bytes of its path, 0 for none; the path in UTF-8; the level's hash, `u64` |
 ///
-/// All numbers are little-endian. A list is one byte and then either the plain values (byte 0) or runs
-/// of a count (seven bits a byte, lowest first) and a value (byte 1), whichever is shorter.
-/// The hashes come first: they bound the number of steps by the size of the frame.
+/// All numbers are little-endian. A list is one byte and then the shorter of two forms: the plain values (byte 0), or
+/// runs (byte 1). A run is a count (seven bits a byte, lowest first) and a value. The hashes come first: they bound the
+/// number of steps by the size of the frame.
 pub(super) fn encode_payload(
     episode: &DemoEpisode,
     header: &DemoHeader,

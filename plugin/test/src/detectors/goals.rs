@@ -216,8 +216,8 @@ impl LevelDetector for UnreachableRegion {
     }
 }
 
-/// A finding for testers that solve a level in far fewer ticks than expected. Its par, by the designer or by
-/// demonstrations, is expected, or else the ticks of the game's demonstrator.
+/// A finding for testers that solve a level in far fewer ticks than expected. The expected number is the par of the
+/// level, by the designer or by demonstrations, or else the ticks of the game's demonstrator.
 pub struct Shortcut {
     factor: f64,
     par: f64,

@@ -333,8 +333,8 @@ fn check_bounds(grid: &CellGrid, bounds: Rect, cell: &ExploredCell) -> Result<()
 /// Most squares that are examined.
 const MOST: f32 = (1 << 20) as f32;
 
-/// Returns the cells of a grid that no wall cuts off from the start of a level; `None` if the plan is too large for
-/// such squares, or its start lies in a wall.
+/// Returns the cells of a grid that no wall cuts off from the start of a level. Returns `None` if the plan is too large
+/// for such squares, or its start lies in a wall.
 ///
 /// In a maze these are exactly the reachable cells. With gravity or enemies they are a bound: no other cell is
 /// reachable, and some of these may be out of reach.

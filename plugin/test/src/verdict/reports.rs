@@ -1,5 +1,5 @@
-//! Reports of results: a page of Markdown, short enough for a pull request, JUnit XML for build servers, the files of
-//! findings, and the commands that show a level again.
+//! Reports of results. They are a page of Markdown, short enough for a pull request, JUnit XML for build servers, the
+//! files of findings, and the commands that show a level again.
 
 use crate::{
     detectors::compares_testers,

@@ -151,8 +151,8 @@ fn table(metric: &str, threshold: Option<f64>, groups: &[GroupStatistics]) -> Pl
     PlainTable { caption: metric.to_owned(), columns, rows: groups.iter().map(row).collect() }
 }
 
-/// Describes mean and range of the steps to the threshold, the number of runs that did not reach it, and of those with
-/// too few episodes.
+/// Describes mean and range of the steps to the threshold. Adds the number of runs that did not reach it, and of those
+/// with too few episodes.
 fn reached(steps: &[Option<u64>], early: usize) -> String {
     let known: Vec<f64> = steps.iter().flatten().map(|step| *step as f64).collect();
     let (all, never) = (steps.len(), steps.len() - known.len() - early);

@@ -125,7 +125,7 @@ fn framed_track() -> ForeignGame {
 /// The result of playing a track.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Played {
-    /// Whether each ended episode was won, and its ticks.
+    /// Results of the ended episodes: true if won, and the ticks.
     pub(super) episodes: Vec<(bool, u32)>,
     pub(super) ends: Vec<EpisodeEnd>,
     /// The agent's last position.
