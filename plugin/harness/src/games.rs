@@ -89,7 +89,7 @@ impl<'a> Games<'a> {
         let names: Vec<&'static str> =
             games.iter().flat_map(|game| [game.name()].into_iter().chain(game.aliases().iter().copied())).collect();
         match names.iter().enumerate().find(|(i, name)| names[..*i].contains(name)) {
-            Some((_, name)) => Err(GamesError::Twice(*name)),
+            Some((_, name)) => Err(GamesError::Twice(name)),
             None => Ok(Self(games)),
         }
     }

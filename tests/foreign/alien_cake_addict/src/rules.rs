@@ -14,7 +14,7 @@ pub fn add_to(game: ForeignGame) -> ForeignGame {
         EachTick::new(
             "cake-rules",
             "a cake is eaten by a player that did not walk onto it, or not by one that did",
-            |moment| broken_rule(moment),
+            broken_rule,
         )
     })
 }
