@@ -179,6 +179,21 @@ pub struct ComparisonReport {
 }
 
 impl ComparisonReport {
+    /// Makes the report of a comparison that has not begun.
+    pub(crate) fn new(comparison: DoctorComparison) -> Self {
+        Self {
+            comparison,
+            skipped: None,
+            ticks: 0,
+            episodes: 0,
+            first: None,
+            others: Vec::new(),
+            effect: None,
+            unmatched: 0,
+            fault: None,
+        }
+    }
+
     /// Returns whether the copies played the same game to the end; `None` if they were not compared.
     pub fn same(&self) -> Option<bool> {
         self.skipped.is_none().then(|| self.first.is_none() && self.effect.is_none() && self.fault.is_none())
@@ -322,17 +337,7 @@ fn reason_to_skip(comparison: DoctorComparison, game: &dyn Game, done: &[Compari
 }
 
 fn skipped(comparison: DoctorComparison, why: String) -> ComparisonReport {
-    ComparisonReport {
-        comparison,
-        skipped: Some(why),
-        ticks: 0,
-        episodes: 0,
-        first: None,
-        others: Vec::new(),
-        effect: None,
-        unmatched: 0,
-        fault: None,
-    }
+    ComparisonReport { skipped: Some(why), ..ComparisonReport::new(comparison) }
 }
 
 // Findings of an examination.

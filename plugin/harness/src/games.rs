@@ -76,6 +76,11 @@ pub struct ForeignArtifact {
 
 impl HasExitCode for ForeignArtifact {}
 
+/// Returns whether this is the game's name, or an [alias](Game::aliases) of it.
+pub fn is_named(game: &dyn Game, name: &str) -> bool {
+    game.name() == name || game.aliases().contains(&name)
+}
+
 impl<'a> Games<'a> {
     /// Checks and keeps the games.
     ///
@@ -101,8 +106,7 @@ impl<'a> Games<'a> {
     /// [`UnknownName`] with the valid names.
     pub fn get(&self, name: &str) -> Result<&'a dyn Game, UnknownName> {
         let names: Vec<_> = self.iter().map(Game::name).collect();
-        let is_named = |game: &&dyn Game| game.name() == name || game.aliases().contains(&name);
-        self.iter().find(is_named).ok_or_else(|| UnknownName::new("game", name, &names))
+        self.iter().find(|game| is_named(*game, name)).ok_or_else(|| UnknownName::new("game", name, &names))
     }
 
     /// Returns the game that a file or folder names.

@@ -7,8 +7,8 @@ use crate::{
     modules::{ModulePath, Modules},
 };
 
-/// Public modules that show nobody how they are used: neither in their own documentation, nor in that of an item, nor
-/// in a module below them.
+/// Public modules without an example: it may stand in their own documentation, in that of an item, or in a module below
+/// them.
 pub fn without_example(modules: &Modules) -> Vec<String> {
     let is_shown = |path: &ModulePath| {
         let below = modules.0.iter().filter(|(of, _)| of.starts_with(path));

@@ -14,7 +14,12 @@ use crate::{
     output, program, progress,
     verbs::bugs::score::as_json,
 };
-use playbot_harness::{brief::shell_word, game::Game, games::Games, split::LevelSplit};
+use playbot_harness::{
+    brief::shell_word,
+    game::Game,
+    games::{Games, is_named},
+    split::LevelSplit,
+};
 use playbot_mutation::{
     bugs::{BugError, BugSet, MakePlan, MissingMutants, PlantedPart, Source, make_bugs},
     score::{Score, ScoreTable},
@@ -197,7 +202,7 @@ fn sources<'a>(args: &MakeArgs, games: &Games<'a>) -> Result<Vec<Source<'a>>, Cl
     for LevelsOf { game, .. } in &args.levels {
         let named = games.get(game)?;
         let is_chosen = chosen.iter().any(|other| other.name() == named.name());
-        if !is_chosen || args.levels.iter().filter(|other| is_of(other, named)).count() > 1 {
+        if !is_chosen || args.levels.iter().filter(|other| is_named(named, &other.game)).count() > 1 {
             return Err(CliError::Usage(format!(
                 "--levels {game}=… must be given once at most, and for a game that defects are planted into"
             )));
@@ -206,13 +211,8 @@ fn sources<'a>(args: &MakeArgs, games: &Games<'a>) -> Result<Vec<Source<'a>>, Cl
     chosen.into_iter().map(|game| source(args, game)).collect()
 }
 
-/// Returns true if these are levels of the game, by its name or an alias.
-fn is_of(levels: &LevelsOf, game: &dyn Game) -> bool {
-    levels.game == game.name() || game.aliases().contains(&levels.game.as_str())
-}
-
 fn source<'a>(args: &MakeArgs, game: &'a dyn Game) -> Result<Source<'a>, CliError> {
-    let named = args.levels.iter().find(|levels| is_of(levels, game));
+    let named = args.levels.iter().find(|levels| is_named(game, &levels.game));
     let default = default_experiment_of(game).map(|default| default.experiment);
     let is_mode = |split: &LevelSplit| game.check_mode(&split.mode).is_ok();
     let levels = match named {

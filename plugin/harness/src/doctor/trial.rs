@@ -62,17 +62,7 @@ impl Trial {
         ignored: &[String],
         mut monitor: Option<&mut ObservationMonitor>,
     ) -> TrialResult {
-        let mut report = ComparisonReport {
-            comparison: self.comparison,
-            skipped: None,
-            ticks: 0,
-            episodes: 0,
-            first: None,
-            others: Vec::new(),
-            effect: None,
-            unmatched: 0,
-            fault: None,
-        };
+        let mut report = ComparisonReport::new(self.comparison);
         let mut incomparable = Default::default();
         let mut is_over = true;
         for tick in 0..ticks {
