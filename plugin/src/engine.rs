@@ -11,7 +11,7 @@
 //! | begin an episode in a World as new | [`Renewal`], [`NextEpisode`], [`EpisodeSeeds`], [`LevelFiles`] |
 //! | find the tick of a game, whatever its frames | [`TickSchedules`], [`is_tick`], [`set_tick_rate`] |
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
-//! | decide for many agents at once | [`PolicyBatch`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
+//! | decide for many agents at once | [`PolicyBatch`], [`PolicyRows`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
 //! | keep systems in one order | [`put_in_order`], [`leave_open`], [`FaultSystems`], [`run_observe_schedule`] |
 //! | check what agents see and do | [`check_actions`], [`check_observations`], [`misfit`], [`has_no_actions`], [`AgentLimit`] |
 //! | compare two pictures of a state | [`PictureDifference`], [`CLOSE`], [`BlankEpisodes`] |
@@ -49,15 +49,25 @@ pub use crate::{
     key_bindings::TappedKeys,
     level::LevelFiles,
     observation::check_observations,
-    panics,
     placement::{TickSchedules, is_tick},
-    policy_batch::{Playing, PolicyBatch, SharedBatch},
     policy_file::policy_observation,
-    renewal::{NextEpisode, Renewal},
     skill_prior::draw_skills,
     streams::EpisodeSeeds,
-    system_errors,
     systems::{leave_open, put_in_order, run_observe_schedule},
     virtual_input::PressesForPeople,
     vision::{BlankEpisodes, CLOSE, PictureDifference},
 };
+pub use crate::{
+    policy_batch::{Playing, PolicyBatch, PolicyRows, SharedBatch},
+    renewal::{NextEpisode, Renewal},
+};
+
+/// Panics of a game: turned into faults, with a file that replays to the panic.
+pub mod panics {
+    pub use crate::panics::{EpisodeTrace, PanicReports, hear, note_actions};
+}
+
+/// Errors of systems in a headless World: reported as text instead of a panic.
+pub mod system_errors {
+    pub use crate::system_errors::{explain, take};
+}

@@ -2,7 +2,7 @@
 //!
 //! ```
 //! use bevy::{prelude::*, time::TimePlugin};
-//! use bevy_playbot::{headless::set_tick_rate, placement::TickSchedules, prelude::*};
+//! use bevy_playbot::{engine::{TickSchedules, set_tick_rate}, prelude::*};
 //!
 //! #[derive(Resource, Default)]
 //! struct Judged(u32);

@@ -2,7 +2,7 @@
 //!
 //! ```
 //! use bevy::prelude::*;
-//! use bevy_playbot::{prelude::*, renewal::Renewal};
+//! use bevy_playbot::{engine::Renewal, prelude::*};
 //!
 //! /// A game with a counter that it cannot reset. An episode ends after three ticks.
 //! fn count(mut ticks: Local<u32>, mut episodes: Query<&mut Episode>) {

@@ -3,7 +3,7 @@
 use bevy::{asset::RenderAssetUsages, image::ImageSampler, prelude::*, render::render_resource as wgpu};
 use bevy_playbot::{
     camera::{CameraSensor, CameraSensorPlugin},
-    headless::into_world,
+    engine::into_world,
     vision::{Frame, ImageOptions, ImageSensor, Stage, TileLayer},
 };
 use playbot::prelude::*;

@@ -9,7 +9,7 @@ use std::{
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    headless::into_world,
+    engine::into_world,
     raster::{RasterPlugin, RasterSensor},
     vision::{ImageOptions, PaintedVelocity, Stage, TileLayer},
 };

@@ -43,10 +43,10 @@ use bevy_playbot::{
         file::{DemoEpisode, DemoWriter},
         recorder::Recorder,
     },
+    engine::PressesForPeople,
     headless::{set_fixed_step, set_frame_rate},
     key_bindings::KeyboardPlugin,
     placement::TickPlacement,
-    virtual_input::PressesForPeople,
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{

@@ -1,7 +1,7 @@
 //! The benchmarks of a game's speed, and the clock that they read.
 
 use bevy::prelude::*;
-use bevy_playbot::{placement::TickSchedules, systems::PlaybotSystems, vision::ObservationKind};
+use bevy_playbot::{engine::TickSchedules, systems::PlaybotSystems, vision::ObservationKind};
 use std::time::Instant;
 
 /// One measurement of speed.

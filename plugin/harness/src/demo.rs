@@ -12,8 +12,8 @@ use bevy_playbot::{
         file::{DemoEpisode, DemoFileError, DemoReader},
         replay::{Divergence, Replay},
     },
+    engine::tick_world,
     fault::Fault,
-    headless::tick_world,
     vision::{ObservationConfig, VisionError},
 };
 use playbot_learner::HasExitCode;

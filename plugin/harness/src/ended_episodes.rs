@@ -2,8 +2,8 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{
+    engine::Renewal,
     episode::{EpisodeEnded, EpisodeResult},
-    renewal::Renewal,
 };
 
 /// Agents with their ended episodes since the last call, in order. The list outlives Worlds that are rebuilt.

@@ -13,9 +13,9 @@ use bevy::prelude::*;
 use bevy_playbot::{
     agent::{Agent, Control},
     bot::BlindBot,
+    engine::tick_world,
     episode::Episode,
     fault::Fault,
-    headless::tick_world,
     level::LevelQueue,
     policy::{ActionDraw, ActivePolicy},
     skill_prior::SkillPrior,

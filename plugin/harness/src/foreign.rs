@@ -74,17 +74,18 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::{
-    action::{ActionSpace, ActionValue, check_actions},
-    agent::{Agent, has_no_actions},
+    action::{ActionSpace, ActionValue},
+    agent::Agent,
+    engine::{
+        Renewal, TickSchedules, check_actions, has_no_actions, is_tick,
+        panics::{self, note_actions},
+    },
     episode::EpisodeEnd,
     fault::Faults,
     headless::HeadlessPlugins,
     key_bindings::KeyBindings,
     observation::{ObservationSpace, VectorSensor},
-    panics,
-    panics::note_actions,
-    placement::{TickPlacement, TickSchedules, is_tick},
-    renewal::Renewal,
+    placement::TickPlacement,
     systems::PlaybotSystems,
     virtual_input::{ActionAxis, InputRoute, VirtualInput, VirtualInputPlugin},
 };

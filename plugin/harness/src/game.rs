@@ -52,9 +52,9 @@ use crate::{
 use bevy::{app::PluginGroupBuilder, prelude::*};
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
-    agent::has_no_actions,
     bot::BlindBot,
-    demo::{file::DemoHeader, recorder::demo_actions},
+    demo::file::DemoHeader,
+    engine::{demo_actions, has_no_actions},
     headless::HeadlessPlugins,
     key_bindings::KeyBindings,
     observation::{Observation, ObservationSpace},

@@ -14,10 +14,7 @@ pub mod read;
 
 use crate::level_files::read::DrawnLevels;
 use bevy::prelude::*;
-use bevy_playbot::{
-    level::{LevelFile, LevelFiles},
-    state_hash::StateHash,
-};
+use bevy_playbot::{engine::LevelFiles, level::LevelFile, state_hash::StateHash};
 use std::{any::Any, path::Path, sync::Arc};
 
 pub use crate::level_files::error::{JsonStep, LevelFileError, LevelTextError, read_json, read_json_object};

@@ -5,7 +5,7 @@ use crate::{
     inspect::{InspectError, Print, TraceRequest, plain, read_text},
     worlds::build_world,
 };
-use bevy_playbot::{action::misfit, prelude::*};
+use bevy_playbot::{engine::misfit, prelude::*};
 use std::path::Path;
 
 /// Plays given discrete actions and prints the columns of [`TraceTools::row`](crate::game::TraceTools::row), the

@@ -8,12 +8,14 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_playbot::{
-    agent::AgentLimit,
+    engine::{
+        AgentLimit, Renewal, headless_frame_app, into_world,
+        panics::{EpisodeTrace, PanicReports},
+        set_tick_rate,
+    },
     fault::{Fault, Faults},
-    headless::{headless_app, headless_frame_app, into_world, set_tick_rate},
-    panics::{EpisodeTrace, PanicReports},
+    headless::headless_app,
     placement::TickPlacement,
-    renewal::Renewal,
     streams::PlaybotSeed,
     vision::{ObservationConfig, VisionError},
 };

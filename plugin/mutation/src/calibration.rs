@@ -29,7 +29,10 @@ use crate::calibration::{
     numbers::{LevelTries, Try},
     page::LevelNames,
 };
-use bevy_playbot::demo::file::{Decider, DemoEpisode, DemoFileError, DemoHeader, DemoReader, find_demos};
+use bevy_playbot::{
+    demo::file::{Decider, DemoEpisode, DemoFileError, DemoHeader, DemoReader},
+    engine::find_demos,
+};
 use playbot_harness::{game::Game, level_files::LevelFileError, split::LevelSplit};
 use playbot_test::verdict::{LevelVerdict, ResultLines, TestError, TestRecord};
 use serde::Serialize;

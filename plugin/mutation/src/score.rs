@@ -38,8 +38,8 @@ use crate::{
     },
 };
 use bevy_playbot::{
+    engine::panics::hear,
     episode::{EpisodeEnd, EpisodeResult},
-    panics::hear,
     state_hash::StateHash,
 };
 use playbot_harness::{defect::DefectKind, game::Game, split::LevelSplit};

@@ -11,9 +11,10 @@ mod observe;
 use crate::{Experiment, demo::observe::ObservedEpisode};
 use bevy_playbot::{
     demo::{
-        file::{DemoEnd, DemoEpisode, DemoReader, EpisodeActions, find_demos},
+        file::{DemoEnd, DemoEpisode, DemoReader, EpisodeActions},
         replay::Replay,
     },
+    engine::find_demos,
     vision::ObservationConfig,
 };
 use playbot_harness::{

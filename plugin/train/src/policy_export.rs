@@ -2,8 +2,8 @@
 
 use crate::collect::Collector;
 use bevy_playbot::{
+    engine::policy_observation,
     fault::Fault,
-    policy_file::policy_observation,
     skill_prior::SkillPrior,
     vision::{ObservationConfig, UnknownObservation, VisionError},
 };

@@ -11,7 +11,10 @@ use crate::{
 };
 use bevy::prelude::World;
 use bevy_playbot::{
-    episode::EpisodeEnded, fault::Fault, panics::PanicReports, policy_batch::SharedBatch, skill_prior::SkillPrior,
+    engine::{SharedBatch, panics::PanicReports},
+    episode::EpisodeEnded,
+    fault::Fault,
+    skill_prior::SkillPrior,
 };
 use playbot_harness::{
     arrangement::Arrangement,

@@ -8,7 +8,7 @@ use std::{
     time::Duration,
 };
 
-use bevy_playbot::panics::hear;
+use bevy_playbot::engine::panics::hear;
 
 use super::kind::{FileKind, Reading};
 

@@ -12,7 +12,7 @@ mod lander_window;
 
 use bevy::prelude::{App, ButtonInput, KeyCode};
 use bevy_playbot::{
-    headless::set_tick_rate,
+    engine::set_tick_rate,
     policy_file::{PolicyFile, check_policy, install_policy},
     prelude::*,
 };

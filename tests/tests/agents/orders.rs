@@ -3,8 +3,8 @@
 
 use bevy::prelude::*;
 use bevy_playbot::{
-    headless::{HeadlessPlugins, set_tick_rate},
-    systems::leave_open,
+    engine::{leave_open, set_tick_rate},
+    headless::HeadlessPlugins,
     test_app::PlaybotTestExt,
     virtual_input::{
         InputRoute, VirtualInput, VirtualInputPlugin,

@@ -6,9 +6,9 @@ use bevy::prelude::*;
 use bevy_playbot::{
     demo::{
         file::{Decider, DemoActions, DemoEnd, DemoHeader, DemoReader, DemoWriter, EpisodeActions, repair},
-        recorder::flush_unfinished,
         replay::{Divergence, ReplayDiverged},
     },
+    engine::flush_unfinished,
     vision::ObservationConfig,
 };
 use playbot::prelude::*;

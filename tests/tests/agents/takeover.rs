@@ -11,7 +11,8 @@ use bevy::{
     time::{TimePlugin, TimeUpdateStrategy},
 };
 use bevy_playbot::{
-    demo::file::{Decider, DemoEnd, DemoReader, merge_demos},
+    demo::file::{Decider, DemoEnd, DemoReader},
+    engine::merge_demos,
     episode::Tick,
     fault::FaultOccurred,
     headless::set_fixed_step,

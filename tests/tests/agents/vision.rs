@@ -5,11 +5,11 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::{
+    engine::{BlankEpisodes, into_world},
     episode::Tick,
-    headless::into_world,
     vision::{
-        BlankEpisodes, Frame, ImageOptions, ImageSensor, ObservationConfig, ObservationKind, PaintedVelocity,
-        VisionPlugin, VisionSystems,
+        Frame, ImageOptions, ImageSensor, ObservationConfig, ObservationKind, PaintedVelocity, VisionPlugin,
+        VisionSystems,
     },
 };
 use playbot::prelude::*;

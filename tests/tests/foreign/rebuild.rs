@@ -8,7 +8,7 @@ use bevy_playbot::{
         file::{DemoEpisode, DemoReader},
         replay::Divergence,
     },
-    renewal::Renewal,
+    engine::Renewal,
 };
 use playbot::prelude::*;
 use playbot_harness::{

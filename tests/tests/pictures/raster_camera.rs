@@ -6,8 +6,9 @@ use bevy::{
 };
 use bevy_playbot::{
     camera::{CameraSensor, TileBorder},
+    engine::PictureDifference,
     raster::{RasterPlugin, RasterSensor},
-    vision::{Frame, ImageOptions, PictureDifference, TileLayer},
+    vision::{Frame, ImageOptions, TileLayer},
 };
 use playbot::prelude::*;
 use playbot_games::{

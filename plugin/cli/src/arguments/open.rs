@@ -184,7 +184,7 @@ fn shown(path: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
-    use bevy_playbot::demo::file::{DemoReader, find_demos};
+    use bevy_playbot::{demo::file::DemoReader, engine::find_demos};
     use playbot_train::checkpoint::CheckpointSummary;
 
     use super::*;

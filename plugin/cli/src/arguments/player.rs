@@ -6,8 +6,9 @@ use crate::{
     progress,
 };
 use bevy_playbot::{
+    engine::policy_observation,
     policy::ActionDraw,
-    policy_file::{PolicyMisfit, check_policy, policy_observation},
+    policy_file::{PolicyMisfit, check_policy},
     skill_prior::SkillPrior,
     unknown_name::UnknownName,
     vision::ObservationConfig,

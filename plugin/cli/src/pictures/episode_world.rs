@@ -4,9 +4,8 @@ use crate::error::CliError;
 use bevy::prelude::*;
 use bevy_playbot::{
     demo::{file::DemoEpisode, replay::Divergence},
-    panics::PanicReports,
+    engine::{Renewal, panics::PanicReports},
     policy::Decision,
-    renewal::Renewal,
     vision::ObservationConfig,
 };
 use playbot_harness::{eval::Player, game::Game, prelude::*, worlds::build_observing_world};

@@ -13,7 +13,10 @@ use crate::{
     program, progress,
     verbs::demo::show::show,
 };
-use bevy_playbot::demo::file::{DemoSummary, find_demos, merge_demos, repair};
+use bevy_playbot::{
+    demo::file::{DemoSummary, repair},
+    engine::{find_demos, merge_demos},
+};
 use playbot_harness::{
     demo::{VerifyReport, verify_file},
     games::{Artifact, Games},

@@ -9,8 +9,8 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_playbot::{
-    headless::tick_world,
-    vision::{CLOSE, Frame, ImageOptions, ObservationConfig, ObservationKind, PictureDifference},
+    engine::{CLOSE, PictureDifference, tick_world},
+    vision::{Frame, ImageOptions, ObservationConfig, ObservationKind},
 };
 use playbot_harness::{game::Game, games::Games, prelude::*, worlds::build_observing_world};
 use serde::Serialize;

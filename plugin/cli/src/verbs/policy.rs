@@ -12,7 +12,7 @@ use crate::{
     output::prepare,
     program,
 };
-use bevy_playbot::policy_file::{check_policy, policy_observation};
+use bevy_playbot::{engine::policy_observation, policy_file::check_policy};
 use clap::ArgGroup;
 use playbot_harness::{
     game::Game,

@@ -8,7 +8,7 @@ use crate::{
     error::{CliError, Outcome},
     interrupt, progress,
 };
-use bevy_playbot::demo::recorder::{Recorder, flush_unfinished};
+use bevy_playbot::{demo::recorder::Recorder, engine::flush_unfinished};
 use playbot_harness::{demo::demonstration::DemonstrationPlan, game::Game, games::Games, prelude::*, split::HeldOut};
 use std::path::PathBuf;
 

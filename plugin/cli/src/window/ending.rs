@@ -3,8 +3,8 @@
 use crate::window::WindowError;
 use bevy::{ecs::schedule::ScheduleLabel, prelude::*, window::WindowCloseRequested};
 use bevy_playbot::{
-    demo::recorder::flush_unfinished,
-    fault::{FaultSystems, Faults},
+    engine::{FaultSystems, flush_unfinished},
+    fault::Faults,
     systems::PlaybotSystems,
 };
 use std::sync::{Arc, Mutex, PoisonError};

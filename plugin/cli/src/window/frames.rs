@@ -17,8 +17,13 @@ use bevy::{
     time::TimeReceiver,
 };
 use bevy_playbot::{
-    action::Action, agent::Control, demo::file::DemoEpisode, episode::Episode, fault::Faults,
-    headless::run_on_one_thread, key_bindings::KeyBindings, placement::TickSchedules, system_errors,
+    action::Action,
+    agent::Control,
+    demo::file::DemoEpisode,
+    engine::{TickSchedules, run_on_one_thread, system_errors},
+    episode::Episode,
+    fault::Faults,
+    key_bindings::KeyBindings,
 };
 use playbot_harness::prelude::*;
 use std::sync::Arc;

@@ -14,7 +14,7 @@ use bevy::{
     },
     prelude::*,
 };
-use bevy_playbot::{demo::recorder::flush_unfinished, fault::Faults};
+use bevy_playbot::{engine::flush_unfinished, fault::Faults};
 use playbot_harness::prelude::*;
 
 pub(super) fn build(app: &mut App) {

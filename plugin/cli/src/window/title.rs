@@ -9,7 +9,7 @@ use bevy::{
     window::PrimaryWindow,
     winit::WINIT_WINDOWS,
 };
-use bevy_playbot::{episode::Tick, key_bindings::TappedKeys, vision::VisionSystems};
+use bevy_playbot::{engine::TappedKeys, episode::Tick, vision::VisionSystems};
 use playbot_harness::prelude::*;
 use std::time::Duration;
 

@@ -31,7 +31,7 @@ use bevy::prelude::*;
 use bevy_playbot::{
     bot::with_noise,
     demo::file::{DemoHeader, DemoWriter},
-    placement::{TickSchedules, is_tick},
+    engine::{TickSchedules, is_tick},
     prelude::*,
     vision::{ObservationConfig, VisionError},
 };

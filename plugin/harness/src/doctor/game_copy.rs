@@ -14,11 +14,11 @@ use bevy_playbot::{
     action::{Action, ActionSpace},
     agent::{Agent, Control},
     bot::uniform,
+    engine::{Renewal, into_world, tick_world},
     episode::{Episode, EpisodeEnd, EpisodeEnded},
-    headless::{headless_app, into_world, tick_world},
+    headless::headless_app,
     level::LevelQueue,
     observation::{Observation, VectorSensor},
-    renewal::Renewal,
     reward::Reward,
     state_hash::StateHash,
     streams::AgentStreams,
@@ -493,7 +493,10 @@ fn slow(mut real: ResMut<Time<Real>>, clock: Res<WallClock>, mut frame: Local<u3
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bevy_playbot::headless::{headless_app, into_world, tick_world};
+    use bevy_playbot::{
+        engine::{into_world, tick_world},
+        headless::headless_app,
+    };
 
     #[derive(Component)]
     struct Brick;

@@ -4,9 +4,9 @@
 use crate::foreign::runtime::{Baseline, Sensor, playing_agent, with_foreign};
 use bevy::prelude::*;
 use bevy_playbot::{
+    engine::{TickSchedules, is_tick},
     episode::{Episode, EpisodeEnd},
     observation::{Observation, VectorSensor},
-    placement::{TickSchedules, is_tick},
     reward::Reward,
     state_hash::StateHash,
     systems::{ObserveSchedule, PlaybotSystems},

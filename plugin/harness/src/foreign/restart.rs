@@ -6,8 +6,8 @@ use crate::foreign::{
 };
 use bevy::prelude::*;
 use bevy_playbot::{
+    engine::{NextEpisode, Renewal},
     episode::{Episode, StartEpisode},
-    renewal::{NextEpisode, Renewal},
 };
 
 /// Restarts the game as soon as the schedule allows it.

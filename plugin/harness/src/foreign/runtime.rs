@@ -17,9 +17,9 @@ use bevy::{
 use bevy_playbot::{
     action::ActionValue,
     agent::{Agent, Control},
+    engine::system_errors,
     episode::{Episode, EpisodeEnd},
     fault::Faults,
-    system_errors,
 };
 use std::{
     any::{TypeId, type_name},

@@ -7,7 +7,7 @@ use crate::{
         list_findings, regress,
     },
 };
-use bevy_playbot::demo::file::{DemoFault, find_demos};
+use bevy_playbot::{demo::file::DemoFault, engine::find_demos};
 use playbot_harness::{brief::shell_word, demo::verify_file, game::Game, games::Games, parallel::default_threads};
 use std::path::{Path, PathBuf};
 

@@ -6,8 +6,9 @@ use crate::{
     verdict::{TestError, Tester, TesterRecord},
 };
 use bevy_playbot::{
+    engine::policy_observation,
     policy::ActionDraw,
-    policy_file::{PolicyMisfit, check_policy, policy_observation},
+    policy_file::{PolicyMisfit, check_policy},
     unknown_name::UnknownName,
     vision::{ObservationConfig, UnknownObservation, VisionError},
 };

@@ -5,12 +5,10 @@ use bevy::prelude::*;
 use bevy_playbot::{
     agent::Control,
     bot::BlindBot,
+    engine::{EpisodeSeeds, panics::PanicReports, tick_world},
     episode::{Episode, EpisodeCount},
     fault::Fault,
-    headless::tick_world,
     level::LevelQueue,
-    panics::PanicReports,
-    streams::EpisodeSeeds,
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{detector::DetectorSetting, eval::Player, game::Game, worlds::build_observing_world};

@@ -2,7 +2,7 @@
 
 use crate::detectors::Efforts;
 use bevy::{ecs::world::WorldId, prelude::*};
-use bevy_playbot::{agent::AgentOrder, vision::BlankEpisodes};
+use bevy_playbot::{agent::AgentOrder, engine::BlankEpisodes};
 use playbot_harness::detector::{
     Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher,
 };

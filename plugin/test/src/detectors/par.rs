@@ -1,7 +1,8 @@
 //! Pars: the ticks that levels should take.
 
 use bevy_playbot::{
-    demo::file::{DemoFileError, DemoReader, find_demos},
+    demo::file::{DemoFileError, DemoReader},
+    engine::find_demos,
     state_hash::StateHash,
 };
 use playbot_harness::game::Game;

@@ -7,11 +7,11 @@ use bevy_playbot::{
     agent::Control,
     demo::{
         file::DemoWriter,
-        recorder::{Recorder, Recording, flush_unfinished},
+        recorder::{Recorder, Recording},
     },
+    engine::{flush_unfinished, tick_world},
     episode::{Episode, EpisodeCount},
     fault::Fault,
-    headless::tick_world,
     level::LevelQueue,
     streams::AgentStreams,
 };

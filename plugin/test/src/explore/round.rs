@@ -10,7 +10,11 @@ use bevy::{
     math::{Rect, Vec2},
     prelude::*,
 };
-use bevy_playbot::{agent::Control, headless::tick_world, panics::PanicReports, vision::VisionError};
+use bevy_playbot::{
+    agent::Control,
+    engine::{panics::PanicReports, tick_world},
+    vision::VisionError,
+};
 use playbot_harness::{
     arrangement::Arrangement, ended_episodes::EndedEpisodes, floor_plan::FloorPlan, game::Game, parallel::on_threads,
     worlds::build_observing_world,

@@ -3,17 +3,15 @@
 use crate::{detectors::ErrorLogReader, findings::StoredFinding};
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::{Action, ActionSpace, ActionValue, misfit},
+    action::{Action, ActionSpace, ActionValue},
     agent::Control,
-    demo::{file::EpisodeActions, recorder::demo_actions, replay::recorded_action},
+    demo::file::EpisodeActions,
+    engine::{EpisodeSeeds, LevelFiles, demo_actions, misfit, panics::PanicReports, recorded_action, tick_world},
     episode::{Episode, EpisodeResult},
     fault::Fault,
-    headless::tick_world,
-    level::{LevelFile, LevelFiles, LevelQueue},
-    panics::PanicReports,
+    level::{LevelFile, LevelQueue},
     reward::Reward,
     state_hash::StateHash,
-    streams::EpisodeSeeds,
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{

@@ -13,15 +13,14 @@ use bevy::prelude::*;
 use bevy_playbot::{
     action::Action,
     agent::{Agent, Control},
+    engine::{EpisodeSeeds, panics::PanicReports, tick_world},
     episode::{Episode, EpisodeResult},
     fault::Fault,
-    headless::tick_world,
     level::LevelQueue,
     observation::Observation,
-    panics::PanicReports,
     reward::Reward,
     state_hash::StateHash,
-    streams::{AgentStreams, EpisodeSeeds},
+    streams::AgentStreams,
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{

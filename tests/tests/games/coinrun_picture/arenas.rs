@@ -2,7 +2,7 @@
 
 use bevy::{prelude::*, sprite::Anchor};
 use bevy_playbot::{
-    headless::into_world,
+    engine::into_world,
     test_app::PlaybotTestExt,
     vision::{Stage, TileLayer},
 };

@@ -5,8 +5,9 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::{
+    engine::PressesForPeople,
     prelude::*,
-    virtual_input::{InputRoute, PressesForPeople, VirtualDevices, VirtualInput, VirtualInputPlugin},
+    virtual_input::{InputRoute, VirtualDevices, VirtualInput, VirtualInputPlugin},
 };
 
 use super::scripted::{InFrames, STEP, Script, actions, app_with, frames, frames_of, left, ticks};

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use bevy::{input::InputPlugin, prelude::*, time::TimeUpdateStrategy};
 use bevy_playbot::{
-    headless::set_tick_rate,
+    engine::set_tick_rate,
     prelude::*,
     test_app::test_app,
     virtual_input::{InputRoute, VirtualInput, VirtualInputPlugin},

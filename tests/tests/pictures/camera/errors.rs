@@ -7,7 +7,8 @@ use bevy::{
 };
 use bevy_playbot::{
     camera::CameraSensor,
-    vision::{BlankEpisodes, ImageOptions, TileLayer},
+    engine::BlankEpisodes,
+    vision::{ImageOptions, TileLayer},
 };
 use playbot::prelude::*;
 use playbot_tests::scene::{camera_world, image, pixel, player, spawn_sensor};

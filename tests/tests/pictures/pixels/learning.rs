@@ -1,6 +1,9 @@
 //! Tests of runs, their files and their results.
 
-use bevy_playbot::policy_file::{PolicyMisfit, check_policy, policy_observation};
+use bevy_playbot::{
+    engine::policy_observation,
+    policy_file::{PolicyMisfit, check_policy},
+};
 use playbot::prelude::*;
 use playbot_harness::eval::{EpisodeResult, EvalPlan, Player, evaluate};
 use playbot_learner::{DeviceKind, Policy, PolicyFile, SkillModel};

@@ -5,7 +5,7 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::{
-    headless::into_world,
+    engine::into_world,
     raster::{RasterPlugin, RasterSensor},
     vision::{Frame, ImageOptions},
 };

@@ -10,8 +10,9 @@ use bevy_playbot::{
     action::{Action, ActionSpace, ActionValue},
     agent::{Agent, Control},
     bot::BlindBot,
+    engine::{TickSchedules, is_tick},
     episode::Episode,
-    placement::{TickPlacement, TickSchedules, is_tick},
+    placement::TickPlacement,
     systems::PlaybotSystems,
 };
 use playbot_harness::{

@@ -8,11 +8,11 @@ use crate::bugs::general::{
 use bevy::prelude::*;
 use bevy_playbot::{
     agent::Control,
+    engine::{TickSchedules, check_observations, is_tick, run_observe_schedule},
     episode::Episode,
-    observation::{Observation, check_observations},
-    placement::{TickSchedules, is_tick},
+    observation::Observation,
     reward::Reward,
-    systems::{PlaybotSystems, run_observe_schedule},
+    systems::PlaybotSystems,
 };
 use playbot_harness::defect::DefectKind;
 

@@ -4,9 +4,8 @@ use bevy::prelude::*;
 use bevy_playbot::{
     action::{Action, ActionValue},
     agent::{Agent, Control},
+    engine::{Renewal, TickSchedules, is_tick},
     episode::{Episode, StartEpisode},
-    placement::{TickSchedules, is_tick},
-    renewal::Renewal,
     systems::PlaybotSystems,
 };
 use std::collections::VecDeque;

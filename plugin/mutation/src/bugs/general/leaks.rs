@@ -9,8 +9,8 @@ use crate::bugs::general::{
 use bevy::prelude::*;
 use bevy_playbot::{
     agent::Control,
+    engine::{TickSchedules, is_tick},
     episode::Episode,
-    placement::{TickSchedules, is_tick},
     systems::PlaybotSystems,
 };
 use playbot_harness::defect::DefectKind;

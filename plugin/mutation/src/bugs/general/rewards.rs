@@ -9,8 +9,8 @@ use crate::bugs::general::{
 use bevy::prelude::*;
 use bevy_playbot::{
     agent::Control,
+    engine::{TickSchedules, is_tick},
     episode::{Episode, EpisodeEnd},
-    placement::{TickSchedules, is_tick},
     reward::Reward,
     systems::PlaybotSystems,
 };

@@ -2,7 +2,7 @@
 
 use crate::bugs::Mutant;
 use bevy::prelude::*;
-use bevy_playbot::{headless::tick_world, panics::PanicReports};
+use bevy_playbot::engine::{panics::PanicReports, tick_world};
 use playbot_harness::{
     defect::DefectKind,
     ended_episodes::EndedEpisodes,
