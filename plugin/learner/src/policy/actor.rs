@@ -11,7 +11,10 @@ use crate::{
     rng::Streams,
 };
 use burn::tensor::{Device, Tensor};
-use playbot_kernels::elementwise::Activation;
+use playbot_kernels::{
+    dense::{Dense, dense},
+    elementwise::Activation,
+};
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -253,8 +256,12 @@ pub(crate) const CLOCK: &str = "clock";
 
 /// Returns the one output of a layer, `[n]`.
 fn number(layer: &Linear, features: Tensor<2>) -> Tensor<1> {
+    let of_layer = Dense { weight: &layer.weight, bias: &layer.bias, activation: None };
+    if let Some(numbers) = dense(&features, &[of_layer]) {
+        return numbers.squeeze_dim(1);
+    }
     let [width, _] = layer.weight.dims();
-    // A product with a single column is summed in an order that depends on the number of rows; this is not.
+    // Backends sum a product with a single column in an order that depends on the number of rows. They do not here.
     let weight = layer.weight.clone().reshape([1, width]);
     (features * weight).sum_dim(1).squeeze_dim(1) + layer.bias.clone()
 }
