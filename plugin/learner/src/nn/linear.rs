@@ -51,16 +51,27 @@ impl Linear {
 
     /// Applies layers, one after the other, with the activation of each.
     pub(super) fn chain(x: Tensor<2>, layers: &[(&Self, Option<Activation>)]) -> Tensor<2> {
-        let of_layers = layers.iter().map(|(layer, activation)| {
-            let Self { weight, bias } = layer;
-            Dense { weight, bias, activation: *activation }
-        });
+        let of_layers = layers.iter().map(|(layer, activation)| layer.dense(*activation));
         dense(&x, &of_layers.collect::<Vec<_>>()).unwrap_or_else(|| {
             layers.iter().fold(x, |x, (layer, activation)| match activation {
                 Some(activation) => activation.forward(layer.plain(x)),
                 None => layer.plain(x),
             })
         })
+    }
+
+    /// Returns the one output of a layer with one, `[n]`, in which no row depends on the others.
+    pub(crate) fn number(&self, x: Tensor<2>) -> Tensor<1> {
+        let fused = dense(&x, &[self.dense(None)]).map(|y| y.squeeze_dim(1));
+        fused.unwrap_or_else(|| {
+            // Backends sum a product with a single column in an order that depends on the number of rows.
+            let weight = self.weight.clone().reshape([1, -1]);
+            (x * weight).sum_dim(1).squeeze_dim(1) + self.bias.clone()
+        })
+    }
+
+    fn dense(&self, activation: Option<Activation>) -> Dense<'_> {
+        Dense { weight: &self.weight, bias: &self.bias, activation }
     }
 
     /// Applies the layer by the backend's own operations.

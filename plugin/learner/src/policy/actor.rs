@@ -11,10 +11,7 @@ use crate::{
     rng::Streams,
 };
 use burn::tensor::{Device, Tensor};
-use playbot_kernels::{
-    dense::{Dense, dense},
-    elementwise::Activation,
-};
+use playbot_kernels::elementwise::Activation;
 use rand::Rng;
 use serde::{Deserialize, Serialize};
 
@@ -242,10 +239,10 @@ impl Critic {
     /// remaining share of each skill's ticks; without it all skills count as newly drawn.
     pub fn forward(&self, x: Tensor<2>, left: Option<Tensor<1>>) -> Tensor<1> {
         let features = self.net.features(x);
-        let values = number(&self.net.head, features.clone());
+        let values = self.net.head.number(features.clone());
         match (&self.clock, left) {
-            (Some(clock), Some(left)) => values + number(clock, features) * left,
-            (Some(clock), None) => values + number(clock, features),
+            (Some(clock), Some(left)) => values + clock.number(features) * left,
+            (Some(clock), None) => values + clock.number(features),
             (None, _) => values,
         }
     }
@@ -253,18 +250,6 @@ impl Critic {
 
 /// Name of the second head, behind the name of its critic.
 pub(crate) const CLOCK: &str = "clock";
-
-/// Returns the one output of a layer, `[n]`.
-fn number(layer: &Linear, features: Tensor<2>) -> Tensor<1> {
-    let of_layer = Dense { weight: &layer.weight, bias: &layer.bias, activation: None };
-    if let Some(numbers) = dense(&features, &[of_layer]) {
-        return numbers.squeeze_dim(1);
-    }
-    let [width, _] = layer.weight.dims();
-    // Backends sum a product with a single column in an order that depends on the number of rows. They do not here.
-    let weight = layer.weight.clone().reshape([1, width]);
-    (features * weight).sum_dim(1).squeeze_dim(1) + layer.bias.clone()
-}
 
 impl Parameters for Critic {
     fn visit<V: ParamVisitor>(&mut self, prefix: &str, visitor: &mut V) {
