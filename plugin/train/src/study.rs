@@ -437,8 +437,7 @@ impl StudyReport {
             "The interquartile mean over the seeds: that of the middle half of the runs, each with its mean held-out \
              return over all levels. The last column is the probability that a run of **{}** has a higher return on a \
              level than a run of the variant. Equal returns count half. Brackets hold 95 % intervals by a bootstrap \
-             over seeds and levels. They are too narrow for a handful of seeds. The p above says whether a difference \
-             is clear. Variants with a single seed have neither.\n\n{}\n",
+             over seeds and levels. They are too narrow for a handful of seeds. Variants with a single seed have neither.\n\n{}\n",
             variants[0],
             markdown_table(&["variant", "interquartile mean", &above], rows.into_iter())
         )
