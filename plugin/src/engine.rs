@@ -35,6 +35,7 @@
 //! assert_eq!(world.resource::<Ticks>().0, 1);
 //! ```
 
+// Documented in their own modules, which are public.
 #[doc(no_inline)]
 pub use crate::{
     action::{check_actions, misfit},
@@ -57,6 +58,7 @@ pub use crate::{
     virtual_input::PressesForPeople,
     vision::{BlankEpisodes, CLOSE, PictureDifference},
 };
+// Documented here: games do not need their modules, which are private.
 pub use crate::{
     policy_batch::{Playing, PolicyBatch, PolicyRows, SharedBatch},
     renewal::{NextEpisode, Renewal},
