@@ -22,10 +22,8 @@ use crate::coinrun::{
     rules::corners,
     sim::Sim,
 };
-use std::{
-    cmp::Ordering,
-    collections::{BinaryHeap, HashMap},
-};
+use bevy::platform::collections::HashMap;
+use std::{cmp::Ordering, collections::BinaryHeap};
 
 /// The search gives up after so many steps; levels need some thousands.
 const MOST_STEPS: usize = 100_000;

@@ -1,10 +1,8 @@
 //! Weighted A* over the exact rules.
 
 use crate::coinrun::{planner::PlannerConfig, rules::WALK_SPEED, sim::Sim};
-use std::{
-    cmp::Ordering,
-    collections::{BinaryHeap, HashSet},
-};
+use bevy::platform::collections::HashSet;
+use std::{cmp::Ordering, collections::BinaryHeap};
 
 /// Resolution of actions and states in a search.
 pub(super) struct SearchResolution {
@@ -122,7 +120,7 @@ impl<'a> Search<'a> {
             resolution,
             nodes: Vec::new(),
             open: BinaryHeap::new(),
-            seen: HashSet::new(),
+            seen: HashSet::default(),
             nearest: (0, f32::INFINITY),
         };
         let start = Step { parent: 0, action: 0, ticks: 0 };

@@ -6,7 +6,8 @@ use crate::coinrun::{
     rules::{Body, FOOT_MARGIN, OVERLAP_MARGIN, corners},
     tile::{Corners, Tile},
 };
-use std::{collections::HashMap, sync::LazyLock};
+use bevy::platform::collections::HashMap;
+use std::sync::LazyLock;
 
 /// Shift of a bin's ends when its columns are computed: more than rounding does.
 const SLACK: f32 = 1e-4;
@@ -64,7 +65,7 @@ impl<'a> ReachableGround<'a> {
         let has_enemies = blocks(Spawn::enemy).next().is_some();
         Self {
             level,
-            answers: HashMap::new(),
+            answers: HashMap::default(),
             enemies_lend: has_enemies && !crates.is_empty(),
             crates,
             saws: blocks(Spawn::saw).map(|saw| (saw, beside(&saw, &PLAYER, false))).collect(),
