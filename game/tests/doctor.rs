@@ -46,11 +46,21 @@ fn a_seed_alone_is_the_level_too_for_one_more_version() {
 }
 
 #[test]
+fn a_type_to_ignore_that_is_none_is_told() {
+    let (text, _) = doctor(&["coinrun", "--ticks", "2", "--json"], 0);
+    let report: Value = serde_json::from_str(text.trim_end()).expect("one line of JSON");
+    let known = report["types"]["compared"][0].as_str().expect("a type");
+    let (_, words) = doctor(&["coinrun", "--ticks", "2", "--ignore", known, "--ignore", "HighScor"], 0);
+    assert_eq!(words.matches("warning: ").count(), 1, "{words}");
+    assert!(words.contains("--ignore HighScor leaves nothing out"), "{words}");
+}
+
+#[test]
 fn wrong_names_and_numbers_are_usage_errors() {
     for (args, words) in [
         (&["coinrunn"][..], "did you mean `coinrun`?"),
         (&["coinrun", "--mode", "hrad"], "did you mean `hard`?"),
-        (&["coinrun", "--ticks", "0"], "it must be at least 1"),
+        (&["coinrun", "--ticks", "0"], "it must be a whole number from 1 to 4294967295"),
         (&["coinrun", "--level", "4294967296"], "does not exist: choose one up to 4294967295"),
     ] {
         let (_, errors) = doctor(args, 3);

@@ -60,7 +60,7 @@ pub fn unfit(error: MazeError) -> InspectError {
 pub fn show(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Result<LevelView, InspectError> {
     let ShownMaze { maze, json } = shown(game, request, source)?;
     let way = match moves(&maze) {
-        Some(moves) => format!(". shortest path: {moves} moves"),
+        Some(moves) => format!(". shortest path: {moves} move{}", if moves == 1 { "" } else { "s" }),
         None => "there is no path from the start to the goal".to_owned(),
     };
     // The empty line ends the rows, so that the output can be read as a file.

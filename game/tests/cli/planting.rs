@@ -52,6 +52,11 @@ fn a_set_is_made_once_and_the_same_by_any_number_of_threads() {
 fn mistakes_are_reported_before_anything_is_planted() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
+    fs::create_dir(folder.join("set")).expect("writable");
+    fs::write(folder.join("set/results.json"), "").expect("writable");
+    let output = playbot(folder, &["bugs", "make", "coinrun", "--out", "set"]);
+    assert!(code(&output) == 3 && errors(&output).contains("set has the results of a test"), "{}", errors(&output));
+    fs::remove_file(folder.join("set/results.json")).expect("writable");
     for (args, words) in [
         (&["coinrn"][..], "did you mean `coinrun`?"),
         (&["coinrun", "coinrun"], "is named twice"),

@@ -239,6 +239,8 @@ fn speed_is_measured_of_the_case_and_for_the_time_that_bench_is_told() {
     }
     let (listed, _) = done(temporary.path(), &["bench", "--case", "sim/maze2d", "--list"]);
     assert_eq!(listed.lines().collect::<Vec<_>>(), names, "--list");
+    let (listed, _) = done(temporary.path(), &["bench", "--case", "sim/maze2d", "--list", "--json"]);
+    assert_eq!(listed.lines().next(), Some(&*json!({ "case": names[0] }).to_string()));
     let (_, took) = bench(&["--seconds", "0.5"]);
     assert!(took >= 0.5 * cases.len() as f64, "--seconds: {took} for {names:?}");
 }
@@ -255,9 +257,9 @@ fn levels_and_traces_are_those_of_the_mode_and_the_seed() {
     let reported = |args: &[&str]| done(folder, args).1;
     assert!(
         reported(&["level", "coinrun", "--level", "3"])
-            .contains("no --mode is named: hard, which is trained in, level 3")
+            .contains("no --mode is named: level 3 of hard, the mode that `train` trains in")
     );
-    assert!(reported(&["level", "maze2d", "--level", "3"]).contains("no --mode is named: medium, which is trained in"));
+    assert!(reported(&["level", "maze2d", "--level", "3"]).contains("no --mode is named: level 3 of medium"));
     assert_eq!(level(&["--levels", "hard:3..9"]), plain);
     let (old, warning) = done(folder, &["level", "coinrun", "--seed", "3"]);
     assert_eq!(old, plain, "--seed names the level for one more version");

@@ -251,8 +251,12 @@ fn the_page_has_pictures_of_the_levels_and_is_made_again_to_the_byte() {
     // For another version of the game there are numbers, and no pictures.
     let results = unsealed(&read(folder, "out/results.json")).replace("\"game_version\":1", "\"game_version\":0");
     fs::write(folder.join("out/results.json"), results).expect("writable");
-    done(folder, &["report", "html", "out"]);
-    let page = read(folder, "out/report.html");
+    let (_, words) = ended(folder, &["report", "html", "out"], 3);
+    assert!(words.contains("is kept, since a new page would have no pictures: version 0 of"), "{words}");
+    assert!(read(folder, "out/report.html") == page);
+    let (_, words) = done(folder, &["report", "html", "out", "--out", "bare.html"]);
+    assert!(words.contains("warning: the page has no pictures: version 0 of"), "{words}");
+    let page = read(folder, "bare.html");
     assert!(page.contains("version 0 of `coinrun` was tested") && !page.contains("<figure>"), "{page}");
 }
 

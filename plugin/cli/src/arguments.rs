@@ -124,9 +124,16 @@ pub(crate) fn at_least_one(text: &str) -> Result<usize, String> {
     }
 }
 
-/// Formats `1 step`, `2 steps`.
-pub(crate) fn counted(number: u64, what: &str) -> String {
-    format!("{number} {what}{}", if number == 1 { "" } else { "s" })
+/// Parses a name in a list with commas.
+///
+/// # Errors
+///
+/// It is empty.
+pub(crate) fn name_in_list(name: &str) -> Result<String, String> {
+    match name.trim() {
+        "" => Err("a name is missing beside a comma".to_owned()),
+        name => Ok(name.to_owned()),
+    }
 }
 
 /// The level of verbs that play a single one.

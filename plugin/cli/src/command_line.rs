@@ -8,7 +8,10 @@ use crate::{
         replay, report, runs, study, test, trace, train, view,
     },
 };
-use clap::{Command, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind};
+use clap::{
+    Command, CommandFactory, FromArgMatches, Parser, Subcommand,
+    error::{ContextKind, ContextValue, ErrorKind},
+};
 use playbot_harness::{game::Game, games::Games, level_files::LevelFileError, split::SplitError};
 use playbot_learner::UnknownDevice;
 use std::{
@@ -233,8 +236,21 @@ pub(crate) fn with_negative_numbers(command: Command) -> Command {
 /// Returns the whole text of an error about a number in plain words; `None` for other errors.
 pub(crate) fn in_plain_words(error: &clap::Error) -> Option<String> {
     let source = error.source()?;
-    let plain = number_wanted(source)?;
+    let mut plain = number_wanted(source)?;
+    if let Some((mode, level)) = mode_and_level(error) {
+        plain += &format!("; write --mode {mode} --level {level}");
+    }
     Some(error.render().to_string().replacen(&format!(": {source}"), &format!(": {plain}"), 1))
+}
+
+/// Returns mode and level where both were given as the number of a level, as in `--level hard:7`.
+fn mode_and_level(error: &clap::Error) -> Option<(&str, &str)> {
+    let text = |kind| match error.get(kind) {
+        Some(ContextValue::String(text)) => Some(text.as_str()),
+        _ => None,
+    };
+    text(ContextKind::InvalidArg).filter(|option| option.starts_with("--level "))?;
+    text(ContextKind::InvalidValue)?.split_once(':')
 }
 
 /// Describes the wanted number.
@@ -264,6 +280,7 @@ mod tests {
     fn said(option: &str, value: &str) -> String {
         let inner = Command::new("inner")
             .arg(Arg::new("seed").long("seed").value_parser(value_parser!(u64)))
+            .arg(Arg::new("level").long("level").value_parser(value_parser!(u64)))
             .arg(Arg::new("noise").long("noise").value_parser(value_parser!(f64)))
             .arg(Arg::new("scale").long("scale").value_parser(value_parser!(u32).range(1..=32)));
         let command = with_negative_numbers(Command::new("outer").subcommand(inner));
@@ -279,6 +296,8 @@ mod tests {
             ("--seed", "x", "error: invalid value 'x' for '--seed <seed>': it must be a whole number, 0 or more"),
             ("--seed", "-1", "it must be a whole number, 0 or more"),
             ("--seed", "18446744073709551616", "the number is too large"),
+            ("--level", "hard:7", "0 or more; write --mode hard --level 7"),
+            ("--seed", "hard:7", "it must be a whole number, 0 or more\n"),
             ("--noise", "abc", "it must be a number, such as 0.5"),
             ("--scale", "0", "it must be a whole number from 1 to 32"),
         ] {

@@ -1,15 +1,9 @@
 //! The observer of the command line: progress bars and messages for trainings, and Ctrl-C to stop them.
 
-use crate::{
-    arguments::{counted, player::report_clipped},
-    error::CliError,
-    interrupt,
-    interrupt::NothingToSave,
-    progress,
-};
+use crate::{arguments::player::report_clipped, error::CliError, interrupt, interrupt::NothingToSave, progress};
 use indicatif::ProgressBar;
 use playbot_learner::SkillMetrics;
-use playbot_report::whole;
+use playbot_report::{counted, whole};
 use playbot_train::{
     UpdateReport,
     run_observer::{CountedWork, Counter, KeptSkills, RecordingsSummary, RunEvent, RunObserver},

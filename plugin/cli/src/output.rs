@@ -88,12 +88,25 @@ pub(crate) fn svg(text: &str) -> Result<PathBuf, String> {
     picture(text, "svg")
 }
 
+/// Parses the path of a page.
+///
+/// # Errors
+///
+/// Its name ends otherwise.
+pub(crate) fn html(text: &str) -> Result<PathBuf, String> {
+    of_kind(text, "page", "html")
+}
+
 fn picture(text: &str, kind: &str) -> Result<PathBuf, String> {
+    of_kind(text, "picture", kind)
+}
+
+fn of_kind(text: &str, what: &str, kind: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(kind)) {
         Ok(path)
     } else {
-        Err(format!("this picture is written as .{kind}: choose a name that ends so"))
+        Err(format!("this {what} is written as .{kind}: choose a name that ends so"))
     }
 }
 

@@ -26,8 +26,11 @@ playbot test --help
 Data goes to standard output, as JSON with `--json`. Everything else goes to standard error. [Exit codes](exit-codes.md)
 are the same for all verbs.
 
-`--level` names a level and `--seed` the random seed in every verb. In `level`, `trace`, `view`, `play` and `doctor`, `--seed`
-alone named the level before: for one version it still does, with a warning.
+In every verb that has them, `--level` names a level and `--seed` the random seed. In `level`, `trace`, `view`, `play` and
+`doctor`, `--seed` alone named the level before: for one version it still does, with a warning.
+
+A picture or a page replaces an earlier one of its name. What took work is kept: recordings, findings, models, policies, runs
+and results are overwritten only with `--force`.
 
 If no mode is named, a verb takes the mode of the game's training levels: that of the game's own experiment, or else the
 game's first mode. Only `trace` takes the game's last mode.

@@ -8,7 +8,7 @@ use crate::{
 use bevy_playbot::level::LevelFile;
 use playbot_learner::{HasExitCode, SeenLevels};
 use serde::{Deserialize, Serialize};
-use std::{collections::BTreeSet, fmt, str::FromStr};
+use std::{collections::BTreeSet, fmt, num::IntErrorKind, str::FromStr};
 use thiserror::Error;
 
 /// Largest number of levels in a split: more would not fit in memory as a list.
@@ -110,6 +110,9 @@ pub enum SplitError {
          as in files:{}", .0, files_like(.0)
     )]
     NotARange(String),
+    /// A number of the range is too large.
+    #[error("`{0}` is not a level: numbers go up to 18,446,744,073,709,551,615")]
+    TooLarge(String),
     /// The range goes backwards.
     #[error("`{text}`: first level {first} is after last level {last}; write {mode}:{last}..{first}")]
     Reversed {
@@ -138,6 +141,15 @@ fn range(text: &str) -> Option<(u64, u64)> {
     Some((first.parse().ok()?, last.parse().ok()?))
 }
 
+/// Returns the first number of a range that is larger than every level.
+fn too_large(text: &str) -> Option<&str> {
+    let (_, levels) = text.rsplit_once(':')?;
+    let (first, last) = levels.split_once("..").unwrap_or((levels, levels));
+    let is_large =
+        |number: &&str| matches!(number.parse::<u64>(), Err(error) if *error.kind() == IntErrorKind::PosOverflow);
+    [first, last].into_iter().find(is_large)
+}
+
 impl FromStr for LevelSplit {
     type Err = SplitError;
 
@@ -152,7 +164,10 @@ impl FromStr for LevelSplit {
             let count = find_level_files(pattern)?.len() as u64;
             return Ok(Self { mode: text.to_owned(), first: 0, last: count - 1 });
         }
-        let (mode, first, last) = parse().ok_or_else(|| SplitError::NotARange(text.to_owned()))?;
+        let (mode, first, last) = parse().ok_or_else(|| match too_large(text) {
+            Some(number) => SplitError::TooLarge(number.to_owned()),
+            None => SplitError::NotARange(text.to_owned()),
+        })?;
         if first > last {
             return Err(SplitError::Reversed { text: text.to_owned(), mode, first, last });
         }
@@ -297,6 +312,10 @@ mod tests {
         let words = |text: &str| text.parse::<LevelSplit>().expect_err("no split").to_string();
         assert_eq!(words("easy:9..3"), "`easy:9..3`: first level 9 is after last level 3; write easy:3..9");
         assert!(words("easy:0..16777216").contains("at most 16,777,216"));
+        assert_eq!(
+            words("easy:0..18446744073709551616"),
+            "`18446744073709551616` is not a level: numbers go up to 18,446,744,073,709,551,615"
+        );
         assert_eq!("easy:0..16777215".parse::<LevelSplit>().expect("just as many").len(), MAX_LEVELS);
     }
 

@@ -50,8 +50,11 @@ pub enum BugError {
     /// The folder already has a set.
     #[error("{} has planted defects already: choose another --out, or replace them with --force", .0.display())]
     Exists(PathBuf),
+    /// The folder is that of a test.
+    #[error("{} has the results of a test: choose another --out", .0.display())]
+    IsTest(PathBuf),
     /// The folder has no set.
-    #[error("{} has no mutants.json: make one with `playbot bugs make --out {}`", .0.display(), .0.display())]
+    #[error("{} has no mutants.json: name a folder that `playbot bugs make --out FOLDER` has made", .0.display())]
     Missing(PathBuf),
     /// A file has an invalid line.
     #[error("{}, line {line}: {what}; make the set again with `playbot bugs make`", path.display())]

@@ -34,6 +34,7 @@ use bevy_playbot::{
     engine::find_demos,
 };
 use playbot_harness::{game::Game, level_files::LevelFileError, split::LevelSplit};
+use playbot_report::counted;
 use playbot_test::verdict::{LevelVerdict, ResultLines, TestError, TestRecord};
 use serde::Serialize;
 use std::{
@@ -315,9 +316,7 @@ impl People {
 
     /// Returns the counts of episodes that do not count, in words.
     pub fn left_out(&self) -> Vec<String> {
-        let words = |count: u64, what: &str| {
-            (count > 0).then(|| format!("{count} episode{} {what}", if count == 1 { "" } else { "s" }))
-        };
+        let words = |count: u64, what: &str| (count > 0).then(|| format!("{} {what}", counted(count, "episode")));
         let (others, unfinished) = (self.by_others, self.unfinished);
         [words(others, "not played by a person"), words(unfinished, "left in the middle")]
             .into_iter()

@@ -35,7 +35,7 @@ pub mod text_table;
 pub use crate::{
     chart::{Chart, Curve},
     document::{Report, ReportError, Section, markdown_cell, markdown_row},
-    number::{percent, readable, readable_with_spread, ticks, times, whole},
+    number::{counted, percent, readable, readable_with_spread, ticks, times, whole},
     results::{ResultRow, ResultTable},
     sparkline::sparkline,
     statistics::PairedDifference,

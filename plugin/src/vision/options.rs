@@ -55,8 +55,8 @@ pub enum VisionError {
     NoAdapter,
     /// The program was built without cameras.
     #[error(
-        "this program was built without cameras: switch on the feature `camera` of `playbot` \
-         (`--features camera` in the program `playbot`), or use another `observation`"
+        "this program was built without cameras: leave the camera out, or switch on the feature `camera` of `playbot` (for the \
+         program `playbot`, `--features camera` behind `cargo build` or `cargo install`)"
     )]
     NoCamera,
 }

@@ -59,6 +59,7 @@ use crate::{
 };
 use bevy_playbot::policy::ActionDraw;
 use playbot_harness::{eval::Player, game::Game, parallel::default_threads};
+use playbot_report::counted;
 use std::{
     env,
     path::{Path, PathBuf},
@@ -286,7 +287,7 @@ impl Wanted {
     /// Returns the headline for this number of broken levels.
     pub fn complaint(self, broken: usize, levels: u64) -> String {
         let was = if broken == 1 { "was" } else { "were" };
-        let of = format!("{broken} of {levels} level{}", if levels == 1 { "" } else { "s" });
+        let of = format!("{broken} of {}", counted(levels, "level"));
         match self {
             Self::Solvable => format!("{of} {was} not solved by any tester"),
             Self::Solved => format!("{of} {was} not solved by every tester in every episode"),

@@ -24,7 +24,7 @@ mod testing;
 mod tests;
 
 use crate::{
-    verdict::{Comparison, EpisodeScore, LevelVerdict, Overview, TestError, Trials, wilson},
+    verdict::{Comparison, EpisodeScore, LevelVerdict, Overview, TestError, TestRecord, Trials, wilson},
     verdict_report::{
         drawn::Plans,
         level_table::{Selection, level_table},
@@ -85,6 +85,11 @@ pub fn html(results: &Path, report: &HtmlReport) -> Result<String, TestError> {
         program: report.program,
     };
     Ok(page.to_html())
+}
+
+/// Returns why a report of this test has no pictures of its levels; `None` if the game can still draw them.
+pub fn without_pictures(game: Option<&dyn Game>, record: &TestRecord) -> Option<String> {
+    Plans::of(game, record).problem().map(str::to_owned)
 }
 
 /// Content of a report besides the results.

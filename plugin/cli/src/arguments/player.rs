@@ -47,7 +47,7 @@ pub struct PlayerArgs {
     #[arg(long, value_name = "NAME", group = "player")]
     bot: Option<String>,
     /// Checkpoint of the run: last, best (highest return in training), or its number of environment steps.
-    #[arg(long, default_value = "last", requires = "run")]
+    #[arg(long, default_value = "last", requires = "run", conflicts_with_all = ["policy", "bot"])]
     checkpoint: CheckpointChoice,
     /// The policy takes its most probable action instead of drawing one.
     #[arg(long)]
@@ -229,6 +229,19 @@ pub(crate) fn check_skills(
     )))
 }
 
+/// Returns how policies choose their actions, by the value of --greedy.
+///
+/// # Errors
+///
+/// --greedy without a policy: bots choose their actions themselves.
+pub(crate) fn action_draw(is_greedy: bool, has_policy: bool) -> Result<ActionDraw, CliError> {
+    match (is_greedy, has_policy) {
+        (true, true) => Ok(ActionDraw::Greedy),
+        (false, _) => Ok(ActionDraw::Sample),
+        (true, false) => Err(CliError::Usage("--greedy is for policies, and none is named: leave it out".to_owned())),
+    }
+}
+
 impl PlayerArgs {
     /// Loads the player; `None` if none is named.
     ///
@@ -236,7 +249,7 @@ impl PlayerArgs {
     ///
     /// It cannot be loaded, or was made for another game.
     pub fn load(&self, game: &dyn Game) -> Result<Option<LoadedPlayer>, CliError> {
-        let draw = if self.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+        let draw = action_draw(self.greedy, self.policy.is_some() || self.run.is_some())?;
         if let Some(name) = &self.bot {
             return Ok(Some(LoadedPlayer::bot(game, name)?));
         }

@@ -88,7 +88,8 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         return Err(CliError::Usage(format!("no case has `{}` in its name; cases: {}", args.case, names.join(", "))));
     }
     if args.list {
-        return wanted.iter().try_for_each(|case| print_line(&case.name)).map(|()| Outcome::Pass);
+        let line = |case: &&&Case| if args.json { json!({ "case": case.name }).to_string() } else { case.name.clone() };
+        return wanted.iter().try_for_each(|case| print_line(line(&case))).map(|()| Outcome::Pass);
     }
     for (number, Case { name, game, benchmark }) in wanted.iter().enumerate() {
         report!("{name}: case {} of {}, {} s at least", number + 1, wanted.len(), args.seconds);

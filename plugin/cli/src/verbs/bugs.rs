@@ -24,6 +24,7 @@ use playbot_mutation::{
     bugs::{BugError, BugSet, MakePlan, MissingMutants, PlantedPart, Source, make_bugs},
     score::{Score, ScoreTable},
 };
+use playbot_test::verdict::RESULTS;
 use serde_json::json;
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
 
@@ -164,6 +165,9 @@ impl FromStr for LevelsOf {
 pub(crate) fn run_make(args: &MakeArgs, games: &Games) -> Result<Outcome, CliError> {
     if !args.force && BugSet::is_in(&args.out) {
         return Err(BugError::Exists(args.out.clone()).into());
+    }
+    if args.out.join(RESULTS).exists() {
+        return Err(BugError::IsTest(args.out.clone()).into());
     }
     let sources = sources(args, games)?;
     output::make_folder(&args.out)?;

@@ -5,7 +5,7 @@
 mod show;
 
 use crate::{
-    arguments::{counted, open},
+    arguments::open,
     error::{CliError, Outcome, print_line},
     interrupt,
     interrupt::NothingToSave,
@@ -21,6 +21,7 @@ use playbot_harness::{
     demo::{VerifyReport, verify_file},
     games::{Artifact, Games},
 };
+use playbot_report::counted;
 use serde_json::json;
 use std::path::{Path, PathBuf};
 

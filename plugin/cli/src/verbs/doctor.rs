@@ -1,7 +1,7 @@
 //! `playbot doctor`.
 
 use crate::{
-    arguments::{at_least_one, default_mode, level_number},
+    arguments::{default_mode, level_number},
     error::{CliError, Outcome, print_line},
     interrupt,
     interrupt::NothingToSave,
@@ -36,8 +36,8 @@ pub struct Args {
     #[arg(long)]
     mode: Option<String>,
     /// Ticks of each comparison. More of them find rare and late differences.
-    #[arg(long, default_value = "300", value_parser = at_least_one)]
-    ticks: usize,
+    #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
+    ticks: u32,
     /// Number of the level to play (default: 0).
     #[arg(long, value_name = "N")]
     level: Option<u64>,
@@ -62,7 +62,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let level = level_number(args.level, args.seed).unwrap_or(0);
     check_level(game, &mode, level)?;
     let options = DoctorOptions {
-        ticks: u32::try_from(args.ticks).map_err(|_| CliError::Usage("--ticks has too many digits".to_owned()))?,
+        ticks: args.ticks,
         level,
         seed: args.seed.unwrap_or(0),
         ignored: args.ignore,
@@ -76,6 +76,11 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         report.ticks_per_second = Some(speed(game, &options)?);
     }
     drop(examining);
+    for part in options.ignored.iter().filter(|part| !report.types.compared.iter().any(|path| path.contains(*part))) {
+        report!(
+            "warning: --ignore {part} leaves nothing out: no component or resource that is compared has it in its path"
+        );
+    }
     if args.json {
         let line = serde_json::to_string(&report)
             .map_err(|error| CliError::Io(format!("the report cannot be written as JSON: {error}")))?;

@@ -4,18 +4,15 @@ use crate::{
     arguments::{
         Compute, default_held_out,
         experiment::{ExperimentArgs, option},
-        first_levels, open, player,
-        player::{LoadedPlayer, MeasuredLevels, check_run_of, check_skills},
+        first_levels, name_in_list, open, player,
+        player::{LoadedPlayer, MeasuredLevels, action_draw, check_run_of, check_skills},
     },
     error::{CliError, Outcome, print_line},
     interrupt,
     interrupt::NothingToSave,
     plot::Footprints,
 };
-use bevy_playbot::{
-    policy::ActionDraw,
-    vision::{ObservationConfig, ObservationKind},
-};
+use bevy_playbot::vision::{ObservationConfig, ObservationKind};
 use playbot_harness::{
     eval::{EvalPlan, Player},
     game::Game,
@@ -59,7 +56,7 @@ pub struct Args {
     #[arg(long)]
     policy: Vec<PathBuf>,
     /// Bot of the game, such as random. An unknown name lists all. Repeatable, or separated by commas.
-    #[arg(long, value_delimiter = ',')]
+    #[arg(long, value_delimiter = ',', value_parser = name_in_list)]
     bot: Vec<String>,
     /// Sensor for policies that read pictures: camera or raster (default: the one that the policy was trained with).
     #[arg(long)]
@@ -206,7 +203,8 @@ fn players(
     games: &Games,
 ) -> Result<Vec<LoadedPlayer>, CliError> {
     let device = args.compute.device();
-    let draw = if args.greedy || experiment.eval.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+    let has_policy = !(args.run.is_empty() && args.skills.is_empty() && args.policy.is_empty());
+    let draw = action_draw(args.greedy || has_policy && experiment.eval.greedy, has_policy)?;
     // Reads all levels, which bots do not need.
     let measured = LazyCell::new(|| MeasuredLevels::new(game, splits, !args.levels.is_empty()));
     let mut players = Vec::new();

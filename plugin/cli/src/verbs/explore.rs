@@ -7,7 +7,7 @@ mod recorded;
 mod talents;
 
 use crate::{
-    arguments::{Compute, counted, first_levels},
+    arguments::{Compute, first_levels},
     error::{CliError, Outcome, print_line},
     interrupt, output,
     plot::PlotFile,
@@ -20,6 +20,7 @@ use playbot_harness::{
     games::Games,
     split::{LevelSplit, SplitError},
 };
+use playbot_report::counted;
 use playbot_test::explore::{
     Exploration, ExplorationSummary, ExplorePlan, ExploredCell, Explorer, Route, Stop, Until, explore,
     round::check_cell,

@@ -78,7 +78,7 @@ fn show(game: &dyn Game, args: &Args, picture: bool) -> Result<LevelView, CliErr
     let mode = named.unwrap_or_else(|| default_mode(game));
     let shown = show(&LevelRequest { mode: Some(mode), map, file, level: Some(level), picture })?;
     if named.is_none() {
-        report!("no --mode is named: {mode}, which is trained in, level {level}");
+        report!("no --mode is named: level {level} of {mode}, the mode that `train` trains in");
     }
     Ok(shown)
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     arguments::{
-        OverwriteArgs, counted, default_held_out, first_levels,
+        OverwriteArgs, default_held_out, first_levels,
         player::{LoadedPlayer, PlayerArgs},
     },
     error::{CliError, Outcome},
@@ -10,6 +10,7 @@ use crate::{
 };
 use bevy_playbot::{demo::recorder::Recorder, engine::flush_unfinished};
 use playbot_harness::{demo::demonstration::DemonstrationPlan, game::Game, games::Games, prelude::*, split::HeldOut};
+use playbot_report::counted;
 use std::path::PathBuf;
 
 /// Record the game's demonstrator, or another player.

@@ -13,7 +13,6 @@ mod picture;
 mod window;
 
 use crate::{
-    arguments::counted,
     error::{CliError, Outcome, print_line},
     interrupt, output, program, progress,
     verbs::replay::picture::Pictures,
@@ -22,6 +21,7 @@ use playbot_harness::{
     game::Game,
     games::{Artifact, Games},
 };
+use playbot_report::counted;
 use playbot_test::findings::{
     Budget, Checks, FindingStatus, Minimised, Recheck, StoredFinding, keep::recheck, list_findings, minimise,
 };
@@ -221,7 +221,7 @@ impl ReplayReport<'_> {
         let end =
             if shorter.is_minimal { "" } else { "; the budget was used up before nothing more could be left out" };
         Some(format!(
-            "{}: {} of {original} ({percent:.0} %), {} of {before} that do something, after {}{end}",
+            "{}: {} of {original} that the tester played ({percent:.0} %), {} of {before} that do something, after {}{end}",
             path.display(),
             counted(now as u64, "tick"),
             counted(after.into(), "action"),

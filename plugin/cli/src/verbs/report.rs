@@ -12,7 +12,7 @@ use playbot_harness::games::Games;
 use playbot_mutation::calibration::{Calibration, CalibrationError};
 use playbot_test::{
     verdict::{Comparison, RESULTS, ResultLines, TestRecord, merge, results_folder},
-    verdict_report::{HtmlReport, REPORT, write_html},
+    verdict_report::{HtmlReport, REPORT, without_pictures, write_html},
 };
 use std::{fs, path::PathBuf};
 
@@ -131,8 +131,8 @@ pub struct HtmlArgs {
     /// Folder of earlier results of the same version of the game, to report changes.
     #[arg(long, value_name = "DIR")]
     against: Option<PathBuf>,
-    /// File to write (default: report.html in the folder of the results).
-    #[arg(long, value_name = "FILE")]
+    /// File to write, an .html (default: report.html in the folder of the results). An existing page is replaced.
+    #[arg(long, value_name = "FILE", value_parser = output::html)]
     out: Option<PathBuf>,
 }
 
@@ -144,6 +144,15 @@ pub(crate) fn run_html(args: &HtmlArgs, games: &Games) -> Result<Outcome, CliErr
     let before = args.against.as_deref().map(results_folder);
     let comparison = before.map(|before| Comparison::read(before, folder)).transpose()?;
     let game = games.get(&lines.record().game).ok();
+    if let Some(why) = without_pictures(game, lines.record()) {
+        if args.out.is_none() && file.exists() {
+            return Err(CliError::Usage(format!(
+                "{} is kept, since a new page would have no pictures: {why}; write the new page beside it, with --out FILE",
+                file.display()
+            )));
+        }
+        report!("warning: the page has no pictures: {why}");
+    }
     let report = HtmlReport { game, comparison: comparison.as_ref(), program: program::name() };
     write_html(folder, &file, &report).map_err(|error| {
         output::with_advice(

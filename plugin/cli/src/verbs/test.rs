@@ -11,7 +11,7 @@ mod results;
 mod testers;
 
 use crate::{
-    arguments::{Compute, at_least_one, default_held_out, first_levels},
+    arguments::{Compute, default_held_out, first_levels},
     error::{CliError, Outcome},
     interrupt, progress,
     verbs::test::{
@@ -22,7 +22,7 @@ use crate::{
 use playbot_harness::{game::Game, games::Games, split::LevelSplit};
 use playbot_test::{
     detectors::Detectors,
-    findings::{Budget, Checks, FindingFiles, list_findings},
+    findings::{Budget, Checks, FINDINGS, FindingFiles, list_findings},
     verdict::{
         Comparison, Earlier, LevelVerdict, Shard, TestEnd, TestFolder, TestObserver, TestPlan, results_folder,
         run_tests_keeping,
@@ -64,8 +64,8 @@ pub struct Args {
     #[command(flatten)]
     testers: TesterArgs,
     /// Episodes of each tester on each level.
-    #[arg(long, visible_alias = "episodes-per-level", default_value = "1", value_parser = at_least_one)]
-    episodes: usize,
+    #[arg(long, visible_alias = "episodes-per-level", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
+    episodes: u32,
     /// Random seed of the testers' draws.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -165,13 +165,11 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
         }
     };
     split.check(game)?;
-    let episodes = u32::try_from(args.episodes)
-        .map_err(|_| CliError::Usage("--episodes has too many digits: choose fewer".to_owned()))?;
     let detectors = args.detectors.choose(game, &split)?;
     let plan = TestPlan {
         split,
         testers: args.testers.load(game, args.compute.device())?,
-        episodes,
+        episodes: args.episodes,
         seed: args.seed,
         detectors,
         shard: args.shard,
@@ -220,7 +218,7 @@ impl FindingArgs {
 
     /// Explains a missing failed episode, where one was requested.
     pub fn report_missing(&self, folder: &Path) {
-        if self.keep_failures && list_findings(folder).is_err() {
+        if self.keep_failures && list_findings(&folder.join(FINDINGS)).is_err() {
             report!(
                 "no failed episode is kept: it takes a level that no tester solved, and a tester that failed there and leaves \
                  nothing to chance, such as a policy with --greedy"

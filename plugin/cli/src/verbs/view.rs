@@ -75,7 +75,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["player", "level"])]
     demo: Option<PathBuf>,
     /// Episode of the recording, counted from 0.
-    #[arg(long, default_value_t = 0, requires = "demo")]
+    #[arg(long, default_value_t = 0, requires = "demo", conflicts_with_all = ["player", "mode", "level", "seed"])]
     episode_number: usize,
     /// File to write, a .png.
     #[arg(long, default_value = "view.png", value_parser = output::png)]

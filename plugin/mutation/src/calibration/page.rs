@@ -13,7 +13,7 @@ use playbot_harness::{
     level_files::is_level_files,
 };
 use playbot_report::{
-    Chart, Curve, PlainTable, Report, Section, markdown_cell, markdown_row, percent, readable, whole,
+    Chart, Curve, PlainTable, Report, Section, counted, markdown_cell, markdown_row, percent, readable, whole,
 };
 use playbot_test::verdict::{TestRecord, hash_of_files};
 use std::{collections::BTreeMap, path::Path};
@@ -272,14 +272,6 @@ impl Calibration {
          theirs, −1 if it is the reverse. Spearman's has a 95 % interval by Fisher's z with the variance of Bonett and Wright \
          (2000), Kendall's tau-b by Fisher's z with that of Fieller, Hartley and Pearson (1957). Time is the median of the \
          completed tries, in ticks; deaths are tries that the game ended before the goal."
-    }
-}
-
-fn counted(count: u64, what: &str) -> String {
-    match (count, what) {
-        (1, _) => format!("1 {what}"),
-        (_, "try") => format!("{count} tries"),
-        _ => format!("{count} {what}s"),
     }
 }
 

@@ -11,7 +11,7 @@ use crate::score::{
     mix::{Catch, Limits, best_mix},
     record::{ScoreBudget, SetRecord, Subject, SubjectKind},
 };
-use playbot_report::{PlainTable, markdown_cell, markdown_row, statistics::median, whole};
+use playbot_report::{PlainTable, counted, markdown_cell, markdown_row, statistics::median, whole};
 use playbot_test::verdict::wilson;
 use serde::Serialize;
 use std::{
@@ -195,7 +195,12 @@ impl ScoreTable {
             )
         };
         let mut lines = vec![
-            format!("{} mutants in {} classes, {} sound levels", self.mutants, self.classes.len(), self.sound),
+            format!(
+                "{} in {}, {}",
+                counted(self.mutants, "mutant"),
+                counted(self.classes.len() as u64, "class"),
+                counted(self.sound, "sound level")
+            ),
             format!("Best mix: {}", mix(&self.best)),
         ];
         if self.careful.testers != self.best.testers {

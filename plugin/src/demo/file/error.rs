@@ -203,7 +203,7 @@ pub enum DemoFault {
         expected: u32,
     },
     /// The recording belongs to another mode of the game.
-    #[error("recorded in mode `{found}` of `{game}`, not in mode `{expected}`")]
+    #[error("recorded in mode `{found}` of `{game}`, not in mode `{expected}`: name recordings of one mode")]
     ForeignMode {
         /// The game.
         game: String,

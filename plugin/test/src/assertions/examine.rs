@@ -13,6 +13,7 @@ use crate::{
     },
 };
 use playbot_harness::{brief::shell_word, game::Game, level_files::is_level_files, split::LevelSplit};
+use playbot_report::counted;
 use std::{
     collections::BTreeSet,
     path::{Path, PathBuf},
@@ -236,8 +237,7 @@ impl Failure<'_> {
     fn headline(&self) -> String {
         let record = &self.commands.record;
         let testers: Vec<&str> = self.plan.testers.iter().map(|tester| tester.record.name.as_str()).collect();
-        let episodes = self.plan.episodes.max(1);
-        let episodes = format!("{episodes} episode{} each", if episodes == 1 { "" } else { "s" });
+        let episodes = format!("{} each", counted(self.plan.episodes.max(1).into(), "episode"));
         let complaint = self.wanted.complaint(self.broken.len(), self.plan.split.len());
         let (game, range, seed) = (&record.game, &record.range, record.seed);
         format!("{complaint} (`{game}`, {range}, {}, {episodes}, seed {seed}):", testers.join(" + "))
@@ -251,7 +251,7 @@ impl Failure<'_> {
             lines.extend(finding.file.iter().map(|file| self.replay(file)));
         }
         let more = level.findings.len().saturating_sub(MOST_FINDINGS);
-        lines.extend((more > 0).then(|| format!("  and {more} more finding{}", if more == 1 { "" } else { "s" })));
+        lines.extend((more > 0).then(|| format!("  and {}", counted(more as u64, "more finding"))));
         if let Some(file) = episode {
             lines.extend(["  an episode that failed:".to_owned(), self.replay(file)]);
         }

@@ -66,7 +66,7 @@ pub enum DetectorError {
         least: String,
     },
     /// A setting of a detector that is not selected.
-    #[error("`{text}` sets a detector that is not selected: add `--detect {name}`")]
+    #[error("`{text}` sets a detector that is not selected: add `--detect {name}`, or leave the setting out")]
     Idle {
         /// The text.
         text: String,

@@ -17,6 +17,7 @@ use bevy_playbot::{
 };
 use playbot_harness::{game::Game, worlds::build_world};
 use playbot_learner::{ActionSpace, Actions};
+use playbot_report::counted;
 use serde::Serialize;
 use std::{collections::BTreeSet, fmt};
 
@@ -250,20 +251,27 @@ impl Exploration {
 impl fmt::Display for ExplorationSummary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { game, mode, level, explorer, steps, visits, cells, ends, .. } = self;
-        writeln!(f, "{game} {mode}:{level}, explored by {explorer} in {steps} steps and {visits} visits")?;
+        writeln!(
+            f,
+            "{game} {mode}:{level}, explored by {explorer} in {} and {}",
+            counted(*steps, "step"),
+            counted(*visits, "visit")
+        )?;
         match (self.open_cells, self.open_cells_reached, self.coverage) {
             (Some(open), Some(reached), Some(coverage)) => {
                 write!(f, "cells     {reached} of {open} open cells ({:.1} %)", 100.0 * coverage)?;
                 match self.other_cells {
-                    Some(others) if others > 0 => writeln!(f, ", {others} more")?,
+                    Some(others) if others > 0 => writeln!(f, ", and {others} beside them")?,
                     _ => writeln!(f)?,
                 }
             }
             _ => writeln!(f, "cells     {cells}")?,
         }
         match (self.solution_ticks, self.has_goal) {
-            (Some(ticks), _) if ends.won == 0 => writeln!(f, "solution  {ticks} ticks; episodes go on after it")?,
-            (Some(ticks), _) => writeln!(f, "solution  {ticks} ticks")?,
+            (Some(ticks), _) if ends.won == 0 => {
+                writeln!(f, "solution  {}; episodes go on after it", counted(ticks.into(), "tick"))?
+            }
+            (Some(ticks), _) => writeln!(f, "solution  {}", counted(ticks.into(), "tick"))?,
             (None, true) => writeln!(f, "solution  none was found")?,
             (None, false) => writeln!(f, "solution  none was found, and no goal is known")?,
         }
@@ -333,7 +341,7 @@ mod tests {
         let text = summary().to_string();
         for words in [
             "walk easy:7",
-            "cells     24 of 40 open cells (60.0 %), 6 more\n",
+            "cells     24 of 40 open cells (60.0 %), and 6 beside them\n",
             "none was found\n",
             "0 won, 2 lost, 1 out of time",
         ] {

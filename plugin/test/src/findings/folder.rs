@@ -38,6 +38,11 @@ pub fn list_findings(folder: &Path) -> Result<Vec<(String, PathBuf)>, FindingErr
     Ok(found)
 }
 
+/// Returns true if files of findings are in the folder itself, as in the `findings` of a test.
+pub fn has_findings(folder: &Path) -> bool {
+    files_in(folder).is_ok_and(|found| !found.is_empty())
+}
+
 /// Removes the findings of an earlier test from its folder.
 ///
 /// # Errors

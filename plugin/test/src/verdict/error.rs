@@ -42,6 +42,9 @@ pub enum TestError {
     /// A file is at the path of the folder.
     #[error("{} is a file, and results need a folder: name another --out", .0.display())]
     NotAFolder(PathBuf),
+    /// The folder is that of another test's findings, which would count as those of this one.
+    #[error("{} has the findings of another test: name another --out", .0.display())]
+    HasFindings(PathBuf),
     /// Another process tests into the folder.
     #[error("{} is in use by another test: wait for it or stop it, or choose another --out", .0.display())]
     Busy(PathBuf),

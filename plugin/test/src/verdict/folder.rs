@@ -7,7 +7,7 @@
 //! ```
 
 use crate::{
-    findings::{FINDINGS, clear_findings},
+    findings::{FINDINGS, clear_findings, has_findings},
     verdict::{
         LevelVerdict,
         error::{JOURNAL, TestError, io_error, json_fault},
@@ -58,6 +58,9 @@ impl TestFolder {
     pub fn open(path: &Path, record: &TestRecord, earlier: Earlier) -> Result<(Self, Option<String>), TestError> {
         if path.is_file() {
             return Err(TestError::NotAFolder(path.into()));
+        }
+        if has_findings(path) {
+            return Err(TestError::HasFindings(path.into()));
         }
         disk::create_dir_all(path).map_err(io_error("create", path))?;
         let (record_file, results) = (path.join(RECORD), path.join(RESULTS));
@@ -304,6 +307,11 @@ mod tests {
         let file = path.join(RECORD);
         let error = TestFolder::open(&file, &record(), Earlier::Replace).map(drop).expect_err("a file");
         assert!(error.is_usage() && error.to_string().contains("test.json is a file"), "{error}");
+        let findings = path.join(FINDINGS);
+        fs::create_dir_all(&findings).expect("writable");
+        fs::write(findings.join("a.finding"), "").expect("writable");
+        let error = TestFolder::open(&findings, &record(), Earlier::Replace).map(drop).expect_err("another test's");
+        assert!(error.is_usage() && error.to_string().contains("has the findings of another test"), "{error}");
 
         let journal = path.join(JOURNAL);
         let torn = [fs::read(&journal).expect("written"), b"{\"ind".to_vec()].concat();

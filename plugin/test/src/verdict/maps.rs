@@ -8,6 +8,7 @@ use playbot_harness::{
     level_files::{LevelDesigns, is_level_files, level_files_mode},
     split::LevelSplit,
 };
+use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use std::{collections::BTreeSet, fmt};
 
@@ -154,7 +155,7 @@ impl LevelPars {
 impl fmt::Display for LevelPars {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { with, levels, others } = self;
-        write!(f, "pars for {with} of {levels} level{}", if *levels == 1 { "" } else { "s" })?;
+        write!(f, "pars for {with} of {}", counted(*levels, "level"))?;
         if others.is_empty() {
             return Ok(());
         }

@@ -15,7 +15,7 @@ use crate::{
     },
 };
 use playbot_harness::{brief::shell_word, game::Game};
-use playbot_report::markdown_cell;
+use playbot_report::{counted, markdown_cell};
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 use std::{fmt::Display, path::Path};
 
@@ -97,15 +97,13 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
     let mut lines = vec![format!("# {} {}", record.game, markdown_cell(&record.range.to_string())), String::new()];
     let solved = Trials { successes: overview.solved, trials: overview.levels };
     lines.push(format!(
-        "**{} level{}**: {} solved{}, {} unsolved with nothing proved, {} proved unsolvable; {} finding{}.",
-        overview.levels,
-        if overview.levels == 1 { "" } else { "s" },
+        "**{}**: {} solved{}, {} unsolved with nothing proved, {} proved unsolvable; {}.",
+        counted(overview.levels, "level"),
         overview.solved,
         interval(solved),
         overview.bot_failed,
         overview.proved_unsolvable,
-        overview.findings,
-        if overview.findings == 1 { "" } else { "s" }
+        counted(overview.findings, "finding")
     ));
     if overview.places.percent().is_some() {
         lines.push(format!("{} of the open squares were visited.", overview.places.describe()));

@@ -442,6 +442,9 @@ pub(crate) fn syntax_message(error: &ron::Error) -> String {
         | Fault::ExpectedStructLikeEnd => "a comma or a closing bracket is missing",
         Fault::ExpectedMapColon => "a colon is missing between a key and its value",
         Fault::TrailingCharacters => "the text goes on behind its end: a bracket or a comma is wrong",
+        Fault::ExpectedAttribute => {
+            "there is no experiment behind this #: an experiment is in round brackets, as `playbot config show` prints one"
+        }
         Fault::UnclosedBlockComment => "a comment has no end: a */ is missing",
         other => return other.to_string(),
     };

@@ -1,11 +1,14 @@
 //! Testers of `playbot bugs score`, from the command line.
 
 use crate::{
-    arguments::{open, player::LoadedPlayer},
+    arguments::{
+        name_in_list, open,
+        player::{LoadedPlayer, action_draw},
+    },
     error::CliError,
     verbs::explore::Talents,
 };
-use bevy_playbot::{policy::ActionDraw, unknown_name::UnknownName};
+use bevy_playbot::unknown_name::UnknownName;
 use playbot_harness::{
     eval::Player,
     game::Game,
@@ -31,7 +34,7 @@ pub struct ContestantArgs {
     /// The tester chaos holds random actions for up to 30 ticks each. The tester explore-skills uses a skill model, or
     /// else the first policy that has skills. The demonstrator is the game's own bot, also by its own name. Policies
     /// given with --policy test in any case.
-    #[arg(long = "tester", value_name = "NAME", value_delimiter = ',')]
+    #[arg(long = "tester", value_name = "NAME", value_delimiter = ',', value_parser = name_in_list)]
     testers: Vec<String>,
     /// Policy file and its name in the score (repeatable). A name is used once for each game.
     #[arg(long, value_name = "NAME=FILE")]
@@ -57,6 +60,7 @@ impl ContestantArgs {
         games: &Games,
         device: DeviceKind,
     ) -> Result<Vec<Vec<Contestant>>, CliError> {
+        action_draw(self.greedy, !self.policy.is_empty())?;
         let mut all: Vec<Vec<Contestant>> = chosen.iter().map(|game| Contestant::defaults(*game)).collect();
         for Named { name, path } in &self.policy {
             let metadata = open::policy(path, device)?.metadata;
@@ -79,7 +83,7 @@ impl ContestantArgs {
     }
 
     fn policy(&self, name: &str, path: &Path, game: &dyn Game, device: DeviceKind) -> Result<Contestant, CliError> {
-        let draw = if self.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+        let draw = action_draw(self.greedy, true)?;
         let chosen = LoadedPlayer::policy_file(game, path, draw, device)?;
         chosen.check_fit(game)?;
         let skilled = matches!(&chosen.player, Player::Policy { prior: Some(_), .. });

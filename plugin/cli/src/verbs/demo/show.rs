@@ -1,7 +1,7 @@
 //! `playbot demo show`: the header, the episodes and the ticks of a recording.
 
 use crate::{
-    arguments::{counted, open},
+    arguments::open,
     error::{CliError, Outcome, print_line},
     output,
 };
@@ -9,6 +9,7 @@ use bevy_playbot::{
     demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoReader, EpisodeActions},
     level::LevelFile,
 };
+use playbot_report::counted;
 use serde_json::{Value, json};
 use std::{collections::BTreeMap, path::Path};
 

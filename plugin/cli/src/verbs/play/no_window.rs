@@ -15,8 +15,8 @@ pub fn run(_: Args, _: &Games) -> Result<Outcome, CliError> {
 pub fn no_window() -> CliError {
     CliError::Usage(
         "this program was built without a window: it needs the feature `window` of `playbot` (in your own Cargo.toml, \
-         `features = [\"window\"]` of that dependency; for `playbot`, `cargo build --release --features window`), and no \
-         system packages"
+         `features = [\"window\"]` of that dependency; for the program `playbot`, `--features window` behind `cargo build` or \
+         `cargo install`), and no system packages"
             .to_owned(),
     )
 }

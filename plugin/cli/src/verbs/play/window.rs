@@ -1,7 +1,7 @@
 //! `playbot play` in a program that was built with a window.
 
 use crate::{
-    arguments::{counted, default_mode, level_number, player::LoadedPlayer},
+    arguments::{default_mode, level_number, player::LoadedPlayer},
     error::{CliError, Outcome},
     interrupt, program,
     verbs::{demo::deciders, play::Args},
@@ -13,6 +13,7 @@ use bevy_playbot::{
     vision::ObservationConfig,
 };
 use playbot_harness::{game::Game, games::Games, level_files::is_level_files, split::LevelSplit};
+use playbot_report::counted;
 use std::path::Path;
 
 /// The last level where the game does not limit them: levels have 32 bits.

@@ -1,12 +1,11 @@
 //! Replay of stored findings, and detectors on the command line.
 
 use crate::{
-    arguments::counted,
     error::{CliError, Outcome, print_line},
     interrupt, progress,
 };
 use playbot_harness::{game::Game, games::Games, split::LevelSplit};
-use playbot_report::PlainTable;
+use playbot_report::{PlainTable, counted};
 use playbot_test::{
     detectors::{ALWAYS, DetectorChoice, DetectorError, DetectorInfo, Detectors, Pars, TIMING, forget_timing, list},
     findings::{Checks, Date, FindingStatus, Regress, RegressRow, Regression, list_findings, regress_until},
@@ -25,13 +24,14 @@ pub struct RegressArgs {
         long,
         value_name = "DIR",
         conflicts_with_all = [
-            "game", "levels", "bot", "policy", "run", "out", "against", "shard", "resume", "force", "minimise",
-            "keep_failures", "detect", "no_detect", "par",
+            "game", "levels", "bot", "policy", "run", "checkpoint", "greedy", "episodes", "seed", "out", "against", "shard",
+            "resume", "force", "minimise", "keep_failures", "detect", "no_detect", "par",
         ]
     )]
     regress: Option<PathBuf>,
     /// Date of pins, instead of today.
-    #[arg(long, value_name = "YYYY-MM-DD", requires = "regress")]
+    // That it needs --regress is not said of a test, which that option conflicts with.
+    #[arg(long, value_name = "YYYY-MM-DD", requires = "regress", conflicts_with = "game")]
     today: Option<Date>,
 }
 

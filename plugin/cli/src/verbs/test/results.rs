@@ -1,12 +1,11 @@
 //! Report of results, and the files that go with them.
 
 use crate::{
-    arguments::counted,
     error::{CliError, Outcome, print_line},
     output, program,
 };
 use playbot_harness::{brief::shell_word, game::Game};
-use playbot_report::{PlainTable, ticks, whole};
+use playbot_report::{PlainTable, counted, ticks, whole};
 use playbot_test::{
     findings::{FINDINGS, list_findings},
     verdict::{
@@ -93,7 +92,7 @@ fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
     let findings = overview.worst.iter().flat_map(|level| &level.findings);
     let files: Vec<_> = findings.filter_map(|finding| finding.file.as_ref()).map(|file| folder.join(file)).collect();
     let mut lines: Vec<_> = files.iter().take(MOST_REPLAYS).map(|file| seen_with(file)).collect();
-    let kept: Vec<_> = list_findings(folder).unwrap_or_default();
+    let kept: Vec<_> = list_findings(&folder.join(FINDINGS)).unwrap_or_default();
     let more = kept.len().saturating_sub(lines.len());
     match kept.first() {
         Some((_, first)) if lines.is_empty() => {

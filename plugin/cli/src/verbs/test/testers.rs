@@ -2,13 +2,12 @@
 
 use crate::{
     arguments::{
-        open,
-        player::{LoadedPlayer, check_run_of},
+        name_in_list, open,
+        player::{LoadedPlayer, action_draw, check_run_of},
     },
     error::CliError,
     verbs::bugs::testers::Named,
 };
-use bevy_playbot::policy::ActionDraw;
 use playbot_harness::{game::Game, sealed_file::file_checksum};
 use playbot_learner::DeviceKind;
 use playbot_test::verdict::{TestedRun, Tester, TesterRecord};
@@ -20,7 +19,7 @@ use std::path::PathBuf;
 pub struct TesterArgs {
     /// Bots of the game, such as random, separated by commas. An unknown name lists all. Default: the game's
     /// demonstrator, or else its first bot.
-    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = trimmed)]
+    #[arg(long, value_name = "NAME", value_delimiter = ',', value_parser = name_in_list)]
     bot: Vec<String>,
     /// Policy file, as written by `playbot policy export` (repeatable). Results have the name of the file, or a name in
     /// front of it, as in ppo=runs/bot.policy. With such a name, --against recognises a file that was moved.
@@ -37,11 +36,6 @@ pub struct TesterArgs {
     greedy: bool,
 }
 
-/// Returns a name without the blanks around it.
-fn trimmed(name: &str) -> Result<String, std::convert::Infallible> {
-    Ok(name.trim().to_owned())
-}
-
 impl TesterArgs {
     /// Loads the testers. Policies and runs have the names of their files and folders, unless a policy is given another
     /// name.
@@ -50,7 +44,7 @@ impl TesterArgs {
     ///
     /// One of them does not exist, or was made for another game, or two have one name.
     pub fn load(&self, game: &dyn Game, device: DeviceKind) -> Result<Vec<Tester>, CliError> {
-        let draw = if self.greedy { ActionDraw::Greedy } else { ActionDraw::Sample };
+        let draw = action_draw(self.greedy, !(self.policy.is_empty() && self.run.is_empty()))?;
         let mut testers = Vec::new();
         for name in &self.bot {
             testers.push(of_bot(LoadedPlayer::bot(game, name)?));

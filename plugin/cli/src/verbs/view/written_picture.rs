@@ -1,14 +1,12 @@
 //! Report of a written picture.
 
-use crate::{
-    arguments::counted,
-    error::{CliError, print_line},
-};
+use crate::error::{CliError, print_line};
 use bevy_playbot::{
     demo::replay::Divergence,
     episode::{EpisodeEnd, EpisodeEnded},
 };
 use playbot_harness::game::Game;
+use playbot_report::counted;
 use serde_json::json;
 use std::path::Path;
 
