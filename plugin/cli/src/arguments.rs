@@ -24,9 +24,8 @@ use playbot_learner::DeviceKind;
 use playbot_train::{
     Experiment,
     experiment::{experiment_of, file::parse_experiment},
-    train_run::TrainingSetup,
 };
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// More threads than any machine has cores.
 pub(crate) const MOST_THREADS: usize = 1024;
@@ -97,12 +96,6 @@ impl Compute {
     /// Returns the device that computes networks.
     pub fn device(&self) -> DeviceKind {
         self.device.device
-    }
-
-    /// Returns the setup of trainings, whose recordings are where `recordings` finds them.
-    pub fn setup<'a>(&self, recordings: &'a dyn Fn(&Path) -> PathBuf) -> TrainingSetup<'a> {
-        let (device, threads) = (self.device(), self.threads());
-        TrainingSetup { device, threads, revision: revision(), recordings }
     }
 }
 

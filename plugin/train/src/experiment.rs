@@ -2,15 +2,17 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `file`: experiment files in RON, with their bases.
-//! - `keys`: experiments as lists of keys with their values as text, by which files and `--set` override one another.
-//! - `checks`: checks of an experiment, alone and against its game.
+//! - `file`: experiment files in RON with their bases, and `--set`, which override one another key by key.
+//! - `keys`: the setting of each key, and messages about wrong ones.
+//! - `checks`: checks of an experiment, alone, against its game and against the machine's memory.
 //! - `error`: errors of experiment files and of `--set`, with their positions.
+//! - `page`: the reference page of all settings.
 
 pub(crate) mod checks;
 pub(crate) mod error;
 pub mod file;
-pub mod keys;
+pub(crate) mod keys;
+pub mod page;
 
 use bevy_playbot::{
     unknown_name::UnknownName,

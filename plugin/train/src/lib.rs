@@ -10,7 +10,7 @@
 //! - [`recordings`] and [`demo`]: recordings of an experiment, and data sets made from them.
 //! - [`learn_skills`]: the learning of a skill model.
 //! - [`trainer`]: the training loop, one update at a time ([`Trainer`]); [`collect`]: the Worlds that play for it.
-//! - [`train_run`]: a whole run ([`train_run::Training`]), with its folder ([`run_dir`], [`run_lock`]), checkpoints
+//! - [`train_run`]: a whole run ([`train_run::Training`]), with its folder ([`run_dir`]), checkpoints
 //!   ([`checkpoint`]), metrics ([`metrics_log`], [`tensorboard`]) and observer ([`run_observer`]).
 //! - [`policy_export`]: the one file that a game ships with.
 //! - [`runs`]: runs on disk, found and compared over seeds.
@@ -22,13 +22,11 @@ pub mod demo;
 mod error;
 pub mod experiment;
 pub mod learn_skills;
-mod memory;
 pub mod metrics_log;
 pub mod pipeline;
 pub mod policy_export;
 pub mod recordings;
 pub mod run_dir;
-pub mod run_lock;
 pub mod run_observer;
 pub mod runs;
 pub mod study;
@@ -40,6 +38,7 @@ pub mod trainer;
 pub use crate::{
     error::TrainError,
     experiment::{Algorithm, Experiment, LearnerKind},
-    trainer::{Timing, Trainer, UpdateReport, learner::TrainedLearner},
+    metrics_log::{Timing, UpdateReport},
+    trainer::{TrainedLearner, Trainer},
 };
 pub use playbot_learner::LearnerMetrics;

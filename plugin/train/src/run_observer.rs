@@ -2,8 +2,8 @@
 
 use crate::{
     experiment::Experiment,
+    metrics_log::UpdateReport,
     study::{StudyResult, StudyRun},
-    trainer::UpdateReport,
 };
 use bevy_playbot::vision::ObservationConfig;
 use playbot_harness::eval::EvalSummary;

@@ -17,8 +17,7 @@ pub mod group;
 use crate::{
     Experiment, checkpoint,
     checkpoint::Checkpoint,
-    run_dir::{OpenedRun, RunDir, RunError, RunInfo},
-    run_lock::{RunLock, run_of_leftover},
+    run_dir::{OpenedRun, RunDir, RunError, RunInfo, RunLock, run_of_leftover},
     runs::curves::check_metric,
 };
 use bevy_playbot::unknown_name::UnknownName;

@@ -12,8 +12,8 @@ pub(crate) mod table;
 use crate::{
     Algorithm,
     experiment::{Experiment, ExperimentError, Variant, error::ConfigError},
+    metrics_log::{SUCCESS_RATE, range_of},
     study::table::markdown_table,
-    trainer::{SUCCESS_RATE, range_of},
 };
 use playbot_harness::eval::EvalSummary;
 use playbot_learner::HasExitCode;

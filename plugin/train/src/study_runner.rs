@@ -6,9 +6,9 @@ use crate::{
     experiment::{Experiment, ExperimentError},
     learn_skills,
     learn_skills::{LearnSkillsError, behaviour_cloning},
+    metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
     recordings::{Recorded, RecordingsError, check_recordings, find_recordings, read_dataset, read_rollouts},
-    run_dir::{OpenedRun, RunDir, RunError, RunInfo, check_replaceable, end_replacement, is_unstarted},
-    run_lock::{COST, RunLock},
+    run_dir::{COST, OpenedRun, RunDir, RunError, RunInfo, RunLock, check_replaceable, end_replacement, is_unstarted},
     run_observer::{CountedWork, RunEvent, RunObserver},
     runs::{RunCurves, RunsError, settings_that_differ},
     study::{
@@ -16,7 +16,7 @@ use crate::{
         table::{EXPERIMENT, EXPERIMENT_HEAD, markdown_table},
     },
     train_run::{NewRun, Training, TrainingError, TrainingSetup, run_info},
-    trainer::{EPISODIC_RETURN, SUCCESS_RATE, Trainer},
+    trainer::Trainer,
 };
 use bevy_playbot::{policy::ActionDraw, unknown_name::UnknownName, vision::ObservationConfig};
 use playbot_harness::{

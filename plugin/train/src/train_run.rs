@@ -5,8 +5,7 @@ use crate::{
     error::{RunError, TrainError},
     experiment::{Experiment, LearnerKind},
     recordings::{Recorded, RecordingsError, read_rollouts},
-    run_dir::{OpenedRun, RunDir, RunInfo},
-    run_lock::check_new,
+    run_dir::{OpenedRun, RunDir, RunInfo, check_new},
     run_observer::{RunEvent, RunObserver},
     trainer,
     trainer::Trainer,
@@ -152,10 +151,14 @@ impl Training {
         observer: &mut dyn RunObserver,
     ) -> Result<Self, TrainingError> {
         let NewRun { experiment, skills, .. } = *new;
-        // Before the recordings are replayed, which takes longer.
         check_new(new.path, new.force)?;
-        trainer::check(game, experiment)?;
-        let Recorded { rollouts, seen } = read_rollouts(game, experiment, setup.recordings, setup.threads, observer)?;
+        let Recorded { rollouts, seen } = if experiment.algorithm.trains_on_demos() {
+            // Before the recordings are replayed, which takes longer than the trainer's own check.
+            trainer::check(game, experiment)?;
+            read_rollouts(game, experiment, setup.recordings, setup.threads, observer)?
+        } else {
+            Recorded::default()
+        };
         let mut trainer = Trainer::with_demos(game, experiment, skills, &rollouts, setup.device, setup.threads)?;
         if let Some(seen) = &seen {
             trainer.note_seen(seen);

@@ -1,13 +1,12 @@
-//! The training loop, one update at a time, with its progress and the report of each update. The caller owns the
+//! The training loop, one update at a time, with its progress, and the learner of each algorithm. The caller owns the
 //! progress bar and decides when to stop.
-//!
-//! - `learner`: the learner of an experiment's algorithm.
-
-pub mod learner;
 
 use crate::{
-    checkpoint::CheckpointSummary, collect::Collector, error::TrainError, experiment::Experiment,
-    trainer::learner::TrainedLearner,
+    checkpoint::CheckpointSummary,
+    collect::Collector,
+    error::TrainError,
+    experiment::{Algorithm, Experiment, LearnerKind},
+    metrics_log::{RECENT, Timing, UpdateReport},
 };
 use bevy::prelude::World;
 use bevy_playbot::{
@@ -15,48 +14,29 @@ use bevy_playbot::{
     episode::EpisodeEnded,
     fault::Fault,
     skill_prior::SkillPrior,
+    vision::ObservationConfig,
 };
 use playbot_harness::{
     arrangement::Arrangement,
     game::Game,
     parallel::{on_own_threads, on_threads},
     sensors::GameSensors,
-    split::seen_by_training,
+    split::{HeldOut, seen_by_training},
 };
 use playbot_learner::{
-    ActionSpace, DeviceKind, LearnError, LearnerMetrics, ObsColumns, ObsKind, Observations, Policy, Rollout,
-    SeenLevels, SkillModel, SkillSource,
+    ActionSpace, DeviceKind, FileError, LearnError, Learner, LearnerMetrics, ObsColumns, ObsKind, Observations, Policy,
+    PolicySpec, PpoLearner, Rollout, SacLearner, SeenLevels, SkillModel, SkillSource, SpirlLearner,
 };
 use serde::{Deserialize, Serialize};
 use std::{
     collections::VecDeque,
+    ops::{Deref, DerefMut},
     path::Path,
     time::{Duration, Instant},
 };
 
 /// Rows on which the first policy is compared with the decoder.
 const INITIAL_KL_ROWS: usize = 1024;
-
-/// Tag of the success rate of the last 100 episodes.
-pub const SUCCESS_RATE: &str = "charts/success_rate";
-
-/// Tag of the mean return of the last 100 episodes.
-pub const EPISODIC_RETURN: &str = "charts/episodic_return";
-
-/// Tag of the mean length of the last 100 episodes, ticks.
-pub const EPISODIC_LENGTH: &str = "charts/episodic_length";
-
-/// Tag of the share of clipped actions in the last 100 episodes.
-pub const CLIPPED_SHARE: &str = "charts/clipped_share";
-
-/// Tag of the number of episodes that have ended.
-pub const EPISODES: &str = "charts/episodes";
-
-/// Tags of the means over the last 100 episodes.
-pub const EPISODE_MEANS: [&str; 3] = [EPISODIC_RETURN, EPISODIC_LENGTH, SUCCESS_RATE];
-
-/// Episodes over which the current return, length and success rate are averaged.
-pub(crate) const RECENT: usize = 100;
 
 /// Training of one algorithm on one experiment.
 pub struct Trainer {
@@ -308,68 +288,6 @@ pub(crate) fn check(game: &dyn Game, experiment: &Experiment) -> Result<(), Trai
     Ok(experiment.check_memory(game)?)
 }
 
-/// Results of one update. Everything except `timing` is the same in every run with the same seed.
-#[derive(Clone, Debug)]
-pub struct UpdateReport {
-    /// Updates done, this one included.
-    pub update: u64,
-    /// Environment steps done, over all arenas together.
-    pub step: u64,
-    /// Episodes that have ended. Before the 100th, the means below are over fewer episodes, of which short ones end
-    /// first.
-    pub episodes: u64,
-    /// Mean return of the last 100 episodes; `None` before the first has ended.
-    pub episodic_return: Option<f64>,
-    /// Mean length of the last 100 episodes, ticks.
-    pub episodic_length: Option<f64>,
-    /// Success rate of the last 100 episodes.
-    pub success_rate: Option<f64>,
-    /// Share of the ticks of the last 100 episodes whose action was clipped to the game's range; only for continuous
-    /// actions.
-    pub clipped_share: Option<f64>,
-    /// KL divergence from decoder to policy before the first update; only in the first report of SCORE.
-    pub initial_kl: Option<f32>,
-    /// The learner's metrics.
-    pub learner: LearnerMetrics,
-    /// Time spent.
-    pub timing: Timing,
-}
-
-impl UpdateReport {
-    /// Returns whether at least 100 episodes have ended, and at least this share of the last 100 succeeded.
-    pub fn mostly_succeeds(&self, share: f64) -> bool {
-        self.episodes >= RECENT as u64 && self.success_rate.is_some_and(|rate| rate >= share)
-    }
-
-    /// Returns all measurements by TensorBoard tag; the same numbers in every run with the same seed.
-    pub fn scalars(&self) -> Vec<(&'static str, f64)> {
-        let episodes = [
-            (EPISODES, Some(self.episodes as f64)),
-            (EPISODIC_RETURN, self.episodic_return),
-            (EPISODIC_LENGTH, self.episodic_length),
-            (SUCCESS_RATE, self.success_rate),
-            (CLIPPED_SHARE, self.clipped_share),
-            ("score/initial_kl", self.initial_kl.map(f64::from)),
-        ];
-        let known = episodes.into_iter().filter_map(|(tag, value)| Some((tag, value?)));
-        known.chain(self.learner.scalars()).collect()
-    }
-}
-
-/// Wall-clock seconds of one update.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub struct Timing {
-    /// Simulating, observing and deciding.
-    pub collect_s: f64,
-    /// Learning.
-    pub learn_s: f64,
-}
-
-/// Returns the natural range of a metric; `None` if any value is possible.
-pub fn range_of(tag: &str) -> Option<(f64, f64)> {
-    [SUCCESS_RATE, CLIPPED_SHARE].contains(&tag).then_some((0.0, 1.0))
-}
-
 /// A finished episode, as the moving averages keep it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RecentEpisode {
@@ -446,5 +364,136 @@ impl Progress {
             learner,
             timing,
         }
+    }
+}
+
+// The learner of an algorithm.
+
+/// Learner of any algorithm.
+#[derive(Debug)]
+pub struct TrainedLearner(Box<dyn Learner>);
+
+impl Deref for TrainedLearner {
+    type Target = dyn Learner;
+
+    fn deref(&self) -> &Self::Target {
+        &*self.0
+    }
+}
+
+impl DerefMut for TrainedLearner {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut *self.0
+    }
+}
+
+impl TrainedLearner {
+    /// Makes a learner with fresh weights, tied to `skills` if the experiment's algorithm needs them. `demos` are the
+    /// rollouts for algorithms that train on recordings too.
+    ///
+    /// # Errors
+    ///
+    /// [`TrainError`] if settings, game and skill model do not fit one another.
+    pub fn new(
+        game: &dyn Game,
+        experiment: &Experiment,
+        skills: Option<&SkillModel>,
+        demos: &[Rollout],
+        device: DeviceKind,
+    ) -> Result<Self, TrainError> {
+        let algorithm = experiment.algorithm;
+        let (seed, score) = (experiment.seed, experiment.score.clone());
+        let spec =
+            PolicySpec { obs: experiment.observation_config().obs_kind(game), latent: 0, action_space: game.actions() };
+        let (ppo, sac, spirl) = (experiment.ppo_config(), experiment.sac.clone(), experiment.spirl.clone());
+        let skills = skills.filter(|_| algorithm.needs_skills());
+        match algorithm.learner() {
+            LearnerKind::Ppo => {}
+            LearnerKind::Sac => warn_of_large_buffer(experiment, spec, skills.map_or(0, SkillModel::latent)),
+        }
+        if algorithm.trains_on_demos() && demos.is_empty() {
+            return Err(TrainError::NoDemos(algorithm));
+        }
+        let model = || fitting(game, experiment, skills);
+        Ok(match algorithm {
+            Algorithm::BehaviourCloning => return Err(TrainError::NotTrained(algorithm)),
+            Algorithm::Ppo => Self::of(PpoLearner::new(ppo, spec, seed, device)?),
+            Algorithm::Sac => Self::of(SacLearner::new(sac, spec, seed, device)?),
+            Algorithm::Rlpd => Self::of(SacLearner::with_demos(sac, &experiment.rlpd, demos, spec, seed, device)?),
+            Algorithm::ScorePpo => Self::of(PpoLearner::with_skill(ppo, score, model()?, seed, device)?),
+            Algorithm::ScoreSac => Self::of(SacLearner::with_skill(sac, score, model()?, seed, device)?),
+            Algorithm::SpirlPpo => Self::of(SpirlLearner::ppo(spirl, ppo, &score, model()?, seed, device)?),
+            Algorithm::SpirlSac => Self::of(SpirlLearner::sac(spirl, sac, &ppo, &score, model()?, seed, device)?),
+        })
+    }
+
+    fn of(learner: impl Learner + 'static) -> Self {
+        Self(Box::new(learner))
+    }
+
+    /// Takes over the settings that may change while training is stopped: the length, over which a learning rate
+    /// falls.
+    pub(crate) fn set_length(&mut self, experiment: &Experiment) {
+        self.set_total_updates(experiment.ppo_config().total_updates);
+    }
+
+    /// Loads a learner of this algorithm.
+    ///
+    /// # Errors
+    ///
+    /// [`FileError`] with the error of the file.
+    pub fn load(algorithm: Algorithm, path: &Path, device: DeviceKind) -> Result<Self, FileError> {
+        if algorithm.learns_prior() {
+            return Ok(Self::of(SpirlLearner::load(path, device)?));
+        }
+        Ok(match algorithm.learner() {
+            LearnerKind::Ppo => Self::of(PpoLearner::load(path, device)?),
+            LearnerKind::Sac => Self::of(SacLearner::load(path, device)?),
+        })
+    }
+}
+
+/// Warns of a large replay buffer.
+fn warn_of_large_buffer(experiment: &Experiment, spec: PolicySpec, latent: usize) {
+    const GIB: f64 = (1u64 << 30) as f64;
+    let transitions = (experiment.sac.buffer as u64).min(experiment.steps);
+    let numbers = 2 * (spec.obs.numbers() + latent) + spec.action_space.dim() + 2;
+    let size = transitions as f64 * (4 * numbers) as f64 / GIB;
+    if size > 1.0 {
+        tracing::warn!(
+            "the replay buffer will grow to {size:.1} GiB of memory, and each checkpoint with it on the disk: \
+             `sac.buffer` can be smaller than {}, and `checkpoints.every` larger",
+            experiment.sac.buffer
+        );
+    }
+}
+
+/// Returns the skill model, if it exists and was learned for this game.
+fn fitting<'a>(
+    game: &dyn Game,
+    experiment: &Experiment,
+    skills: Option<&'a SkillModel>,
+) -> Result<&'a SkillModel, TrainError> {
+    let skills = skills.ok_or(TrainError::NoSkills(experiment.algorithm))?;
+    let (model, observation_config) =
+        (ObservationConfig::from_metadata(skills.picture(), &skills.observation())?, experiment.observation_config());
+    if model.is_image() != observation_config.is_image()
+        || (observation_config.is_image() && model != observation_config)
+    {
+        return Err(TrainError::SkillObservation { model, experiment: observation_config });
+    }
+    let (observation, action_space) = (observation_config.obs_kind(game), game.actions());
+    if (skills.observation(), skills.action_space()) != (observation, action_space) {
+        return Err(TrainError::ForeignSkills {
+            game: game.name().to_owned(),
+            model_obs: skills.observation(),
+            model_actions: skills.action_space(),
+            game_obs: observation,
+            game_actions: action_space,
+        });
+    }
+    match HeldOut::new(game, &experiment.test).shown_by(skills.demos()) {
+        Some(seen) => Err(TrainError::SeenSkills { seen, test: experiment.test.clone() }),
+        None => Ok(skills),
     }
 }

@@ -16,8 +16,7 @@ use playbot_tests::{
 use playbot_train::{
     Algorithm, Experiment, Trainer,
     checkpoint::CheckpointChoice,
-    run_dir::{RunDir, end_replacement, is_unstarted},
-    run_lock::RunLock,
+    run_dir::{RunDir, RunLock, end_replacement, is_unstarted},
     study::{StudyResult, TestResult, TrainingResult},
 };
 

@@ -4,7 +4,7 @@
 use std::fs;
 
 use playbot::reference::verbs_page;
-use playbot_train::experiment::keys::settings_page;
+use playbot_train::experiment::page::settings_page;
 
 use super::blocks::workspace;
 

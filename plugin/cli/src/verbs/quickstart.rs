@@ -25,12 +25,11 @@ use playbot_report::{
 use playbot_train::{
     Algorithm, Experiment,
     learn_skills::{behaviour_cloning, learn},
+    metrics_log::SUCCESS_RATE,
     recordings::read_dataset,
-    run_dir::{check_replaceable, is_unstarted},
-    run_lock::RunLock,
+    run_dir::{RunLock, check_replaceable, is_unstarted},
     runs::RunCurves,
     train_run::{NewRun, Reached, Training, TrainingSetup, train_to_success},
-    trainer::SUCCESS_RATE,
 };
 use serde_json::json;
 use std::{

@@ -15,8 +15,8 @@ use crate::{
 use playbot_harness::{games::Games, sealed_file::write_atomically};
 use playbot_report::{PlainTable, percent, readable, whole};
 use playbot_train::{
+    metrics_log::{EPISODIC_RETURN, SUCCESS_RATE},
     runs::{FoundRuns, Leftover, RunRecord, RunsError},
-    trainer::{EPISODIC_RETURN, SUCCESS_RATE},
 };
 use serde_json::{Value, json};
 use std::{

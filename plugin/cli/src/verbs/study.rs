@@ -4,6 +4,7 @@ use crate::{
     arguments::{
         Compute,
         experiment::{ExperimentArgs, Options, in_words, quoted, report_unread, sets_key},
+        revision,
     },
     console::Console,
     error::{CliError, Outcome, print_line},
@@ -22,7 +23,7 @@ use playbot_train::{
     study_runner::{
         RESULTS, StudyRunError, StudyRunner, check_experiment_file, rewrite_table, write_cost, write_report,
     },
-    train_run::{never_learns, rounded},
+    train_run::{TrainingSetup, never_learns, rounded},
 };
 use serde_json::json;
 use std::{
@@ -105,7 +106,8 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     interrupt::listen();
     interrupt::go_on_with(format!("`{} --resume`", restart(&args)));
     let locate = |path: &Path| args.from.find_recordings(path, games);
-    let setup = args.compute.setup(&locate);
+    let (device, threads) = (args.compute.device(), args.compute.threads());
+    let setup = TrainingSetup { device, threads, revision: revision(), recordings: &locate };
     let mut console = StudyConsole::new(&runs);
     let mut runner = StudyRunner::new(games, &folder, args.force, setup);
     let explained = |error| explain(error, &args.from);

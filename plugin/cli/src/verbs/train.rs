@@ -8,7 +8,7 @@ use crate::{
     arguments::{
         Compute,
         experiment::{ExperimentArgs, Options, in_words, option, sets_key},
-        open,
+        open, revision,
     },
     console::Console,
     error::{CliError, Outcome},
@@ -81,7 +81,8 @@ impl Args {
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut console = Console::new("train");
     let locate = |path: &Path| args.from.find_recordings(path, games);
-    let setup = args.compute.setup(&locate);
+    let (device, threads) = (args.compute.device(), args.compute.threads());
+    let setup = TrainingSetup { device, threads, revision: revision(), recordings: &locate };
     let mut training = match args.resume {
         true => resume(&args, games, &setup)?,
         false => start(&args, games, &setup, &mut console)?,

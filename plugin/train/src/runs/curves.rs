@@ -2,9 +2,8 @@
 
 use crate::{
     checkpoint,
-    metrics_log::{JsonLines, MetricsLog, SPS, scalars},
+    metrics_log::{EPISODE_MEANS, EPISODES, JsonLines, MetricsLog, RECENT, SPS, scalars},
     runs::RunsError,
-    trainer::{EPISODE_MEANS, EPISODES, RECENT},
 };
 use bevy_playbot::unknown_name::UnknownName;
 use std::{collections::BTreeMap, path::Path};

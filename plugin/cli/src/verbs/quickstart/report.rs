@@ -7,7 +7,7 @@ use crate::{
 use playbot_report::{Chart, Curve, Report, ResultRow, ResultTable, Section, Table, times};
 use playbot_train::{
     Experiment,
-    trainer::{SUCCESS_RATE, range_of},
+    metrics_log::{SUCCESS_RATE, range_of},
 };
 use std::path::Path;
 

@@ -7,8 +7,8 @@ use crate::{
 };
 use playbot_report::{Chart, Curve, PlainTable, readable, readable_with_spread, statistics::mean_and_sd, whole};
 use playbot_train::{
+    metrics_log::{EPISODE_MEANS, SUCCESS_RATE, range_of},
     runs::{GroupStatistics, RunGroup, RunRecord, find_runs, group_runs, mean_and_spread},
-    trainer::{EPISODE_MEANS, SUCCESS_RATE, range_of},
 };
 use serde_json::json;
 use std::{

@@ -11,8 +11,8 @@ use playbot_report::{Chart, Curve, PlainTable, readable, sparkline, to_svg, whol
 use playbot_train::{
     Experiment,
     checkpoint::{Checkpoint, CheckpointSummary},
+    metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
     runs::{RunCurves, RunRecord, changed_settings, with_defaults},
-    trainer::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
 };
 use serde_json::{Value, json};
 use std::path::PathBuf;

@@ -227,3 +227,46 @@ fn a_key_or_value_of_ten_megabytes_is_named_with_its_place_in_less_than_a_kiloby
         assert!(text.starts_with(place) && text.contains(words), "{text}");
     }
 }
+
+#[test]
+fn values_of_every_kind_come_out_as_written() {
+    let text = r##"// a comment, with ( and "
+    Experiment( /* and /* another ) */ one */ a: 1, b : -0.5e-3 , c: "x, ) \" y", d: r#"raw " )"#,
+        e: [1, (2, 3)], f: /* before */ Some(Relu), g: ')', h: { "k": (z: 1) }, i: (x: 1, y: (w: 2)), // last )
+        j: Named(x: "//"), k: '"',
+    )"##;
+    let expected = [
+        ("a", "1"),
+        ("b", "-0.5e-3"),
+        ("c", r#""x, ) \" y""#),
+        ("d", r##"r#"raw " )"#"##),
+        ("e", "[1, (2, 3)]"),
+        ("f", "Some(Relu)"),
+        ("g", "')'"),
+        ("h", r#"{ "k": (z: 1) }"#),
+        ("i", "(x: 1, y: (w: 2))"),
+        ("j", r#"Named(x: "//")"#),
+        ("k", "'\"'"),
+    ];
+    assert_eq!(fields(text), Some(expected.to_vec()));
+    assert_eq!(fields("()"), Some(Vec::new()));
+    assert_eq!(fields("( )"), Some(Vec::new()));
+    let extended = "#![enable(implicit_some)]\n#![enable(unwrap_newtypes)] // on\n(a: 1)";
+    assert_eq!(fields(extended), Some(vec![("a", "1")]));
+}
+
+#[test]
+fn a_text_without_keys_is_no_struct() {
+    for text in ["3", "[1]", "[]", "(1, 2)", "\"a: 1\"", "Relu", "Some(3)", "{\"a\": 1}", ""] {
+        assert_eq!(fields(text), None, "{text}");
+    }
+}
+
+#[test]
+fn positions_count_from_one_in_characters() {
+    let text = "(\n  ä: 1,\n  b: 2)";
+    let fields = fields(text).expect("a struct");
+    let at = |part: &str| position(text, offset(text, part));
+    assert_eq!(at(fields[0].1), (2, 6));
+    assert_eq!(at(fields[1].0), (3, 3));
+}

@@ -1,6 +1,6 @@
 //! Tests of the memory check: small experiments pass, large ones are refused before allocation.
 
-use crate::{experiment::file::parse_experiment, memory::*};
+use crate::experiment::{checks::*, file::parse_experiment};
 use bevy::prelude::*;
 use bevy_playbot::{action::ActionSpace, observation::ObservationSpace};
 use playbot_harness::game::{GameTools, HostTools};
