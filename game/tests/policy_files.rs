@@ -127,7 +127,7 @@ fn torn_and_foreign_files_are_explained() {
     let file = folder.path().join("checkpoint");
     learner(563).save(&file).expect("writable");
     let error = PolicyFile::load(&file, DeviceKind::Flex).expect_err("a checkpoint").to_string();
-    assert!(error.contains("expected `policy`"), "{error}");
+    assert!(error.contains("one of the kind `policy` is needed"), "{error}");
 }
 
 #[test]

@@ -175,7 +175,7 @@ fn what_cannot_be_tested_is_an_error_and_never_a_pass() {
         (&["--levels", "hard:0..2", "--bot", "search,search"], "two testers are called `search`"),
         (&["--levels", "hard:0..2", "--policy", "none.policy"], "none.policy"),
         (&["--levels", "hard:0..2", "--against", "none"], "none has no results.json"),
-        (&["--levels", "hard:0..2", "--episodes", "0"], "at least 1"),
+        (&["--levels", "hard:0..2", "--episodes", "0"], "from 1 to "),
     ] {
         let found = said(rest);
         assert!(found.contains(words), "{rest:?}: {found}");

@@ -355,7 +355,7 @@ impl TensorFile {
         let FileKind { name, version } = kind;
         if found.kind != name {
             let kind: String = found.kind.chars().take(QUOTED).collect();
-            return Err(self.format(format!("it is of the kind `{kind}`, and one of the kind `{name}` is needed here")));
+            return Err(self.format(format!("is of the kind `{kind}`, and one of the kind `{name}` is needed here")));
         }
         match found.version.cmp(&version) {
             Ordering::Equal => Ok(()),

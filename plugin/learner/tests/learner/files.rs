@@ -118,7 +118,7 @@ fn a_file_of_a_newer_version_or_another_kind_says_so() {
         assert!(error.contains("older version of playbot"), "{error}");
         let foreign = |c: &mut Contents| c.description = c.description.replacen(r#""kind":""#, r#""kind":"other "#, 1);
         let error = after(&path, load, foreign).to_string();
-        assert!(error.contains("kind `other ") && error.contains("expected `"), "{error}");
+        assert!(error.contains("kind `other ") && error.contains("` is needed here"), "{error}");
     }
 }
 
