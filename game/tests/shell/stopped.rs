@@ -46,6 +46,30 @@ fn a_stopped_recording_says_how_the_rest_is_added() {
     assert_eq!(listed("steps"), Some(recorded + 100), "the steps that were there are not counted again");
 }
 
+/// `nohup` has SIGHUP ignored, and a shell without job control SIGINT of what it starts in the background.
+#[cfg(target_os = "linux")]
+#[test]
+fn signals_that_the_caller_has_switched_off_stop_nothing() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let (folder, file) = (temporary.path(), temporary.path().join("a.demo"));
+    let steps = ENDLESS.to_string();
+    let work =
+        command(folder, &["record", "coinrun", "--levels", "easy:0..4000", "--steps", &steps, "--out", "a.demo"]);
+    let mut shell = Command::new("sh");
+    shell.args(["-c", "trap '' HUP INT; exec \"$0\" \"$@\""]).arg(work.get_program()).args(work.get_args());
+    shell.current_dir(folder).stdout(Stdio::null()).stderr(Stdio::piped());
+    let child = at_work(&mut shell, || fs::metadata(&file).is_ok_and(|file| file.len() > 3_000));
+    for signal in ["-HUP", "-INT", "-INT", "-TERM"] {
+        let sent = Command::new("kill").args([signal, &child.id().to_string()]).status().expect("a shell's kill");
+        assert!(sent.success(), "it has ended before {signal}");
+    }
+    let output = child.wait_with_output().expect("a child");
+    let words = errors(&output);
+    assert_eq!(code(&output), 130, "{words}");
+    // A second signal that is heard stops at once.
+    assert!(words.contains("stopping after this step") && !words.contains("stopped at once"), "{words}");
+}
+
 #[test]
 fn stopped_learning_is_not_done() {
     let temporary = tempfile::tempdir().expect("a folder");

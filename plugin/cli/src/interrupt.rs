@@ -2,6 +2,13 @@
 //! reaches no safe point in time is stopped where it is. All saved files are whole, and the work can be resumed from
 //! the last of them.
 
+#[cfg(unix)]
+use signal_hook::{
+    consts::{SIGHUP, SIGINT, SIGTERM},
+    iterator::Signals,
+};
+#[cfg(unix)]
+use std::{fs, io};
 use std::{
     sync::{
         Mutex, OnceLock, PoisonError,
@@ -47,13 +54,35 @@ impl Remains {
     }
 }
 
-/// Listens for Ctrl-C and for SIGTERM from now on.
+/// Listens for Ctrl-C from now on; on Unix also for SIGTERM and SIGHUP. A signal that the program was started to ignore,
+/// as by `nohup`, stays ignored.
 pub(crate) fn listen() {
     INSTALLED.get_or_init(|| {
-        if let Err(error) = ctrlc::set_handler(hear) {
+        if let Err(error) = install() {
             tracing::warn!("Ctrl-C will stop at once, without saving: {error}");
         }
     });
+}
+
+#[cfg(unix)]
+fn install() -> io::Result<()> {
+    let ignored = ignored_signals(&fs::read_to_string("/proc/self/status").unwrap_or_default());
+    let heard = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    let mut signals = Signals::new(heard)?;
+    thread::Builder::new().spawn(move || signals.forever().for_each(|_| hear())).map(drop)
+}
+
+#[cfg(not(unix))]
+fn install() -> Result<(), ctrlc::Error> {
+    ctrlc::set_handler(hear)
+}
+
+/// Returns the ignored signals of a process, a bit for each from signal 1 on, by Linux' description of the process.
+/// Without one, as on macOS, no signal counts as ignored.
+#[cfg(unix)]
+fn ignored_signals(status: &str) -> u64 {
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0)
 }
 
 /// Work that has nothing to save: while this lives, the first Ctrl-C ends the program where it is. Earlier saved parts,
@@ -130,6 +159,15 @@ pub(crate) fn go_on_with(command: String) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[cfg(unix)]
+    #[test]
+    fn what_was_to_be_ignored_is_read_from_the_process() {
+        let status =
+            "Name:\tplaybot\nSigBlk:\t0000000000000000\nSigIgn:\t0000000000001003\nSigCgt:\t0000000000000440\n";
+        assert_eq!(ignored_signals(status), 0b1_0000_0000_0011);
+        assert_eq!(ignored_signals(""), 0);
+    }
 
     #[test]
     fn the_last_words_say_what_is_left_and_how_to_go_on() {
