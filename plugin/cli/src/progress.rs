@@ -1,7 +1,9 @@
 //! Progress on standard error, for all work that can take longer than two seconds: bars on a terminal, a plain line now
 //! and then elsewhere.
 
-use indicatif::{HumanDuration, MultiProgress, ProgressBar, ProgressState, ProgressStyle, WeakProgressBar};
+use indicatif::{
+    HumanDuration, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar,
+};
 use std::{
     collections::VecDeque,
     fmt::Write as _,
@@ -12,7 +14,10 @@ use std::{
 };
 
 /// All bars, so that the bar of a part stands below that of the whole.
-static BARS: LazyLock<MultiProgress> = LazyLock::new(MultiProgress::new);
+static BARS: LazyLock<MultiProgress> = LazyLock::new(|| {
+    let target = if draws_bars() { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+    MultiProgress::with_draw_target(target)
+});
 
 /// Time between two plain lines.
 const PAUSE: Duration = Duration::from_secs(10);
@@ -25,7 +30,8 @@ static REPORTER: Once = Once::new();
 /// Makes a bar with a title, a count, the time left and room for a message. A bar whose length grows with its position
 /// shows no time left.
 pub(crate) fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
-    let template = format!("{title:<22} [{{bar:32}}] {{human_pos}}/{{human_len}} {unit} {{left}}  {{msg}}");
+    // A message that is wider than the rest of the terminal is cut off: a line that wraps would leave parts behind.
+    let template = format!("{title:<22} [{{bar:20}}] {{human_pos}}/{{human_len}} {unit} {{left}}  {{wide_msg}}");
     let style = ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar());
     let pace = Arc::new(Mutex::new(Pace::default()));
     let left = move |state: &ProgressState, out: &mut dyn std::fmt::Write| {
@@ -36,7 +42,7 @@ pub(crate) fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
     };
     let bar = BARS.add(ProgressBar::new(length)).with_style(style.with_key("left", left).progress_chars("=> "));
     bar.enable_steady_tick(Duration::from_millis(250));
-    if !stderr().is_terminal() {
+    if !draws_bars() {
         text_progress().push(TextProgress {
             title: title.to_owned(),
             unit: unit.to_owned(),
@@ -47,6 +53,16 @@ pub(crate) fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
         REPORTER.call_once(|| drop(thread::Builder::new().spawn(report)));
     }
     bar
+}
+
+/// Returns whether standard error is a terminal that can move its cursor, as bars need.
+fn draws_bars() -> bool {
+    stderr().is_terminal() && moves_cursor(std::env::var("TERM").ok().as_deref())
+}
+
+/// Returns whether a terminal of this name can move its cursor. Windows names none.
+fn moves_cursor(term: Option<&str>) -> bool {
+    cfg!(windows) || term.is_some_and(|name| !name.is_empty() && name != "dumb")
 }
 
 /// Describes the time that is left, if known and at least a second.
@@ -143,6 +159,12 @@ mod tests {
     fn words(bar: &ProgressBar) -> Option<String> {
         let (title, unit) = ("record".to_owned(), "steps".to_owned());
         TextProgress { title, unit, bar: bar.downgrade(), pace: Pace::default() }.line()
+    }
+
+    #[test]
+    fn a_terminal_that_cannot_move_its_cursor_has_lines() {
+        assert!(moves_cursor(Some("xterm-256color")));
+        assert!([None, Some(""), Some("dumb")].iter().all(|term| moves_cursor(*term) == cfg!(windows)));
     }
 
     #[test]
