@@ -230,6 +230,9 @@ pub fn merge_demos(files: &[impl AsRef<Path>], out: impl AsRef<Path>) -> Result<
         if files[..index].iter().any(|before| is_same(before.as_ref(), path)) {
             return Err(DemoFileError::new(path, DemoFault::NamedTwice));
         }
+        if let Some(before) = files[..index].iter().find(|before| has_same_bytes(before.as_ref(), path)) {
+            return Err(DemoFileError::new(path, DemoFault::CopyOf(before.as_ref().into())));
+        }
         readers.push(DemoReader::open(path)?);
     }
     let header = common_header(first.as_ref(), &readers)?;
@@ -277,6 +280,15 @@ fn is_same(one: &Path, other: &Path) -> bool {
         (Ok(one), Ok(other)) => one == other,
         _ => one == other,
     }
+}
+
+/// Returns whether two files are equal. Only files of one length are read.
+fn has_same_bytes(one: &Path, other: &Path) -> bool {
+    let length = |path: &Path| fs::metadata(path).ok().map(|data| data.len());
+    // What cannot be read is an error when it is opened.
+    length(one).is_some()
+        && length(one) == length(other)
+        && fs::read(one).is_ok_and(|bytes| fs::read(other).is_ok_and(|other| other == bytes))
 }
 
 /// Returns the common header of all these recordings.

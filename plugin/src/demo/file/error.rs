@@ -237,6 +237,9 @@ pub enum DemoFault {
     /// The file appears twice among those to merge.
     #[error("named twice: its episodes would be in the merged file twice")]
     NamedTwice,
+    /// The file is a copy of another one of those to merge.
+    #[error("it is a copy of {}, whose episodes would be in the merged file twice: leave one of them out", .0.display())]
+    CopyOf(PathBuf),
     /// No recording was named.
     #[error("there is nothing to merge: name the recordings to merge")]
     NothingToMerge,

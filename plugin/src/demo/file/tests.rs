@@ -414,6 +414,11 @@ fn the_same_file_twice_no_file_and_an_existing_one_are_errors() {
     let out = folder.path().join("all.demo");
     let twice = merge_demos(&[&one, &folder.path().join("./one.demo")], &out).expect_err("twice");
     assert!(matches!(twice.fault, DemoFault::NamedTwice), "{twice}");
+    let copy = folder.path().join("copy.demo");
+    fs::copy(&one, &copy).expect("writable");
+    let copied = merge_demos(&[&one, &copy], &out).expect_err("a copy");
+    assert!(matches!(&copied.fault, DemoFault::CopyOf(of) if *of == one) && copied.path == copy, "{copied}");
+    assert!(!out.exists());
     let nothing = merge_demos(&[] as &[&Path], &out).expect_err("nothing");
     assert!(matches!(nothing.fault, DemoFault::NothingToMerge), "{nothing}");
     let exists = merge_demos(&[&one], &one).expect_err("exists");
