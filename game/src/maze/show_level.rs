@@ -7,10 +7,13 @@ use playbot_harness::{
     floor_plan::FloorPlan,
     game::Game,
     inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
-    level_files::{LevelDesigns, is_level_files},
+    level_files::{
+        LevelDesigns, is_level_files,
+        read::{TextFileError, read_text_file},
+    },
 };
 use serde_json::{Value, json};
-use std::{fs::File, io, io::Read, path::Path};
+use std::{io, path::Path};
 
 /// Most bytes that a file of rows may have: two line ends for each cell of the largest maze.
 const MAX_BYTES: u64 = 3 * MAX_CELLS as u64;
@@ -116,21 +119,20 @@ fn no_file(error: &io::Error) -> String {
 /// Reads the maze in a file of rows; `unknown` explains that the text names no map.
 fn from_file(path: &Path, request: &LevelRequest, unknown: &str) -> Result<Maze, InspectError> {
     let shown = path.display();
-    let file = File::open(path).map_err(|error| InspectError::Usage(format!("{unknown}; {}", no_file(&error))))?;
+    let text = read_text_file(path, MAX_BYTES).map_err(|error| {
+        InspectError::Usage(match error {
+            TextFileError::Unreadable(error) => format!("{unknown}; {}", no_file(&error)),
+            TextFileError::TooLarge { .. } => {
+                format!("{shown}: more than {MAX_CELLS} cells are no maze that fits into memory")
+            }
+            error => format!("cannot read {shown}: {error}"),
+        })
+    })?;
     if request.level.is_some() {
         return Err(no_levels(&shown.to_string()));
     }
-    let mut text = String::new();
-    let read = file.take(MAX_BYTES + 1).read_to_string(&mut text);
-    read.map_err(|error| InspectError::Usage(format!("cannot read {shown}: {error}")))?;
-    if text.len() as u64 > MAX_BYTES {
-        return Err(InspectError::Usage(format!(
-            "{shown}: more than {MAX_CELLS} cells are no maze that fits into memory"
-        )));
-    }
-    // Some editors put a byte order mark in front.
-    let lines = text.trim_start_matches('\u{feff}').lines().map(str::trim_end);
-    let rows: Vec<&str> = lines.skip_while(|row| row.is_empty()).take_while(|row| !row.is_empty()).collect();
+    let rows: Vec<&str> =
+        text.lines().map(str::trim_end).skip_while(|row| row.is_empty()).take_while(|row| !row.is_empty()).collect();
     Maze::parse(&rows).map_err(|error| InspectError::Usage(format!("{shown}: {error}")))
 }
 

@@ -1,6 +1,6 @@
 //! Views of single levels and single steps.
 
-use crate::{drawing::Drawing, mode::ModeError};
+use crate::{drawing::Drawing, level_files::read::read_text_file, mode::ModeError};
 use bevy::prelude::*;
 use bevy_playbot::{
     fault::Fault,
@@ -104,14 +104,16 @@ pub struct TraceRequest<'a> {
 /// Callback that takes one line of output.
 pub type Print<'a> = &'a mut dyn FnMut(String) -> Result<(), InspectError>;
 
+/// Largest size of a file that is shown, bytes.
+const MOST_BYTES: u64 = 32 << 20;
+
 /// Reads a text file.
 ///
 /// # Errors
 ///
 /// The file cannot be read.
 pub fn read_text(path: &Path) -> Result<String, InspectError> {
-    let read = std::fs::read_to_string(path);
-    read.map_err(|error| {
+    read_text_file(path, MOST_BYTES).map_err(|error| {
         InspectError::Usage(format!("cannot read {}: {error}; name an existing file that you may read", path.display()))
     })
 }

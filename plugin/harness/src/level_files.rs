@@ -151,13 +151,17 @@ struct DrawnLevel {
     design: LevelDesign,
 }
 
-/// Returns the files that match a pattern, sorted by path: `*` stands for any name, `**` for any folders. Paths are
-/// relative to the current folder of the program.
+/// Returns the files that match a pattern, sorted by path: `*` stands for any name, `**` for any folders, `[ab]` for a
+/// letter. A file with the pattern as its name is taken alone. Paths are relative to the current folder of the program.
 ///
 /// # Errors
 ///
 /// The pattern is invalid, or no file matches.
 pub fn find_level_files(pattern: &str) -> Result<Vec<String>, LevelFileError> {
+    let literal = Path::new(pattern);
+    if pattern.contains(['*', '?', '[']) && literal.is_file() {
+        return Ok(vec![shown(literal)]);
+    }
     let found = glob::glob(pattern).map_err(|error| LevelFileError::Pattern {
         pattern: pattern.to_owned(),
         at: error.pos + 1,
@@ -315,6 +319,18 @@ mod tests {
         let words = error("a").to_string();
         assert!(words.contains("is a folder") && words.contains("/a/**/*.json"), "{words}");
         assert!(matches!(find_level_files("a/***/b"), Err(LevelFileError::Pattern { .. })));
+    }
+
+    #[test]
+    fn a_file_whose_name_is_the_pattern_is_taken_alone() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for file in ["a[1].json", "a1.json"] {
+            std::fs::write(folder.path().join(file), "{}").expect("writable");
+        }
+        let found = |name: &str| find_level_files(&shown(&folder.path().join(name)));
+        let paths = |names: &[&str]| Ok(names.iter().map(|name| shown(&folder.path().join(name))).collect::<Vec<_>>());
+        assert_eq!(found("a[1].json"), paths(&["a[1].json"]));
+        assert_eq!(found("a[12].json"), paths(&["a1.json"]));
     }
 
     #[test]

@@ -165,12 +165,33 @@ pub fn read_text_file(path: &Path, most: u64) -> Result<String, TextFileError> {
     if read.len() as u64 > most {
         return Err(TextFileError::TooLarge { bytes: read.len() as u64, most });
     }
-    String::from_utf8(read).map_err(|error| {
-        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+    decode(read)
+}
+
+/// Returns the text of bytes in UTF-8, or in UTF-16 with a mark. Marks, which some editors put in front, are left out.
+fn decode(bytes: Vec<u8>) -> Result<String, TextFileError> {
+    let no_text = |bytes: &[u8], at: usize| {
+        let before = &bytes[..at];
         let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
         let byte = 1 + before.iter().rev().take_while(|&&byte| byte != b'\n').count();
         TextFileError::NoText { line, byte }
-    })
+    };
+    let utf16 = |number: fn([u8; 2]) -> u16| {
+        let (pairs, rest) = bytes[2..].as_chunks::<2>();
+        let text = String::from_utf16(&pairs.iter().copied().map(number).collect::<Vec<_>>());
+        text.ok().filter(|_| rest.is_empty()).ok_or_else(|| no_text(&bytes, 0))
+    };
+    match bytes.as_slice() {
+        [0xff, 0xfe, ..] => return utf16(u16::from_le_bytes),
+        [0xfe, 0xff, ..] => return utf16(u16::from_be_bytes),
+        _ => {}
+    }
+    // UTF-16 without a mark would pass for UTF-8.
+    if let Some(zero) = bytes.iter().position(|&byte| byte == 0) {
+        return Err(no_text(&bytes, zero));
+    }
+    let text = String::from_utf8(bytes).map_err(|error| no_text(error.as_bytes(), error.utf8_error().valid_up_to()))?;
+    Ok(text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned))
 }
 
 #[cfg(all(test, unix))]
@@ -200,6 +221,28 @@ mod tests {
 #[cfg(test)]
 mod text_file_tests {
     use super::*;
+
+    #[test]
+    fn marks_are_left_out_and_utf_16_is_read_or_named() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("text");
+        let read = |bytes: &[u8]| {
+            fs::write(&path, bytes).expect("writable");
+            read_text_file(&path, 64).map_err(|error| error.to_string())
+        };
+        let text = Ok("ä\r\n(".to_owned());
+        assert_eq!(read("ä\r\n(".as_bytes()), text);
+        assert_eq!(read("\u{feff}ä\r\n(".as_bytes()), text);
+        for of in [u16::to_le_bytes, u16::to_be_bytes] {
+            let bytes = |text: &str| text.encode_utf16().flat_map(of).collect::<Vec<u8>>();
+            assert_eq!(read(&bytes("\u{feff}ä\r\n(")), text);
+            let torn = read(&bytes("\u{feff}ä\r\n(")[..7]).expect_err("half a letter");
+            assert!(torn.starts_with("line 1: byte 1 of the line is not UTF-8"), "{torn}");
+            let bare = read(&bytes("(a: 1)")).expect_err("no mark");
+            assert!(bare.contains("of the line is not UTF-8: save it as UTF-8"), "{bare}");
+        }
+        assert_eq!(read(b""), Ok(String::new()));
+    }
 
     #[test]
     fn a_text_is_read_up_to_its_limit_and_not_beyond() {

@@ -5,10 +5,10 @@ use bevy_playbot::{
     engine::find_demos,
     state_hash::StateHash,
 };
-use playbot_harness::game::Game;
+use playbot_harness::{game::Game, level_files::read::read_text_file};
 use std::{
     collections::BTreeMap,
-    fs, io,
+    io,
     path::{Path, PathBuf},
     sync::Arc,
 };
@@ -121,8 +121,12 @@ impl Pars {
     }
 }
 
+/// Largest size of a file of pars, bytes.
+const MOST_BYTES: u64 = 32 << 20;
+
 fn of_text(path: &Path) -> Result<BTreeMap<String, f64>, ParError> {
-    let text = fs::read_to_string(path).map_err(|source| ParError::Io { path: path.into(), source })?;
+    let read = read_text_file(path, MOST_BYTES);
+    let text = read.map_err(|error| ParError::Io { path: path.into(), source: error.into() })?;
     let pars: BTreeMap<String, f64> = serde_json::from_str(&text).map_err(|error| ParError::Text {
         path: path.into(),
         line: error.line(),
@@ -162,6 +166,7 @@ mod tests {
 
     use super::*;
     use playbot_harness::foreign::ForeignGame;
+    use std::fs;
 
     fn garden() -> ForeignGame {
         ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {})

@@ -7,10 +7,10 @@ use crate::findings::{
     io_error,
     keep::{Sighting, recheck},
 };
-use playbot_harness::{game::Game, games::Games, parallel::on_threads};
+use playbot_harness::{game::Game, games::Games, level_files::read::read_text_file, parallel::on_threads};
 use serde::{Deserialize, Serialize};
 use std::{
-    fs, io,
+    io,
     path::{Path, PathBuf},
 };
 
@@ -200,6 +200,9 @@ pub struct PinState {
     pub expired: bool,
 }
 
+/// Largest size of a file of pins, bytes.
+const MOST_PIN_BYTES: u64 = 1 << 20;
+
 /// The pins of a folder.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Pins(Vec<Pin>);
@@ -212,7 +215,7 @@ impl Pins {
     /// [`FindingError::Pins`] with line and column, or the file cannot be read.
     pub fn read(folder: &Path) -> Result<Self, FindingError> {
         let path = folder.join(PINS);
-        let text = match fs::read_to_string(&path) {
+        let text = match read_text_file(&path, MOST_PIN_BYTES).map_err(io::Error::from) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
             text => text.map_err(io_error("read", &path))?,
         };
@@ -252,6 +255,7 @@ mod tests {
     use playbot_learner::HasExitCode as _;
 
     use super::*;
+    use std::fs;
 
     fn read(text: &str) -> Result<Pins, FindingError> {
         let folder = tempfile::tempdir().expect("a folder");
