@@ -66,7 +66,7 @@ pub use crate::coinrun::{
     level::{GoldenLevel, Level, LevelParts, LevelSet, Mode, ProcgenLevels, Spawn},
     planner::{Demonstrator, Plan, PlannerConfig, plan},
     play::CoinRunSystems,
-    rules::{Body, Outcome, PlayerState, PlayerStep},
+    rules::{Body, CoinRunEnd, PlayerState, PlayerStep},
     sim::{Sim, StepResult},
     tile::{SIZE, Tile, TileGrid},
 };

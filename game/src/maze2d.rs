@@ -1,7 +1,7 @@
 //! Maze2D: push a ball through a maze to the goal. D4RL's `pointmaze`, and generated mazes.
 //!
-//! [`ball`], [`walls`] and [`sim`] are the rules, without an engine. With [`Contact::Soft`] they reproduce the
-//! original (MuJoCo 3.1.6) to within rounding; with [`Contact::Rapier`] rapier2d solves the contacts ([`physics`]). A
+//! [`ball`], [`walls`] and [`sim`] are the rules, without an engine. With [`ContactModel::Soft`] they reproduce the
+//! original (MuJoCo 3.1.6) to within rounding; with [`ContactModel::Rapier`] rapier2d solves the contacts ([`physics`]). A
 //! [`Maze2dMode`] names the map and the rules in which the paper and D4RL differ; a [`Maze2dLevel`] is made from it and
 //! a seed. [`Maze2dWithRays`] is the same game with rays to the walls and the direction of the goal, [`Maze2dWithMap`]
 //! with a map, and [`Maze2dWithPositionalEncoding`] with positional encoding.
@@ -67,7 +67,7 @@ pub use crate::maze2d::{
     ball::Ball,
     demonstrator::{Demonstrator, DemonstratorBot},
     level::Maze2dLevel,
-    mode::{Contact, Maze2dMode},
+    mode::{ContactModel, Maze2dMode},
     senses::{Maze2dWithMap, Maze2dWithPositionalEncoding, Maze2dWithRays},
 };
 

@@ -5,7 +5,7 @@ mod golden;
 
 use std::sync::Arc;
 
-use playbot_games::coinrun::{Level, Mode, Outcome, Sim, generator::generate};
+use playbot_games::coinrun::{CoinRunEnd, Level, Mode, Sim, generator::generate};
 use rand_mt::Mt;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
@@ -59,15 +59,15 @@ impl Trace {
     }
 }
 
-fn outcome_name(end: Option<Outcome>) -> &'static str {
+fn outcome_name(end: Option<CoinRunEnd>) -> &'static str {
     match end {
         None => "running",
-        Some(Outcome::Coin) => "coin",
-        Some(Outcome::Saw) => "saw",
-        Some(Outcome::Enemy) => "enemy",
-        Some(Outcome::Lava) => "lava",
-        Some(Outcome::LeftMap) => "left_map",
-        Some(Outcome::Timeout) => "timeout",
+        Some(CoinRunEnd::Coin) => "coin",
+        Some(CoinRunEnd::Saw) => "saw",
+        Some(CoinRunEnd::Enemy) => "enemy",
+        Some(CoinRunEnd::Lava) => "lava",
+        Some(CoinRunEnd::LeftMap) => "left_map",
+        Some(CoinRunEnd::Timeout) => "timeout",
     }
 }
 
@@ -232,8 +232,8 @@ impl Means {
                 wins += paid / 10.0;
                 sums[0] += paid;
                 sums[1] += f64::from(sim.steps());
-                sums[2] += f64::from(u8::from(sim.end().is_some_and(Outcome::is_success)));
-                sums[3] += f64::from(u8::from(sim.end() == Some(Outcome::Timeout)));
+                sums[2] += f64::from(u8::from(sim.end().is_some_and(CoinRunEnd::is_success)));
+                sums[3] += f64::from(u8::from(sim.end() == Some(CoinRunEnd::Timeout)));
             }
             let share = wins / f64::from(passes);
             variance += 100.0 * share * (1.0 - share) / f64::from(passes);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use playbot_games::coinrun::{
-    Demonstrator, Mode, Outcome, Plan, PlannerConfig, Sim, generator::generate, planner::plan,
+    CoinRunEnd, Demonstrator, Mode, Plan, PlannerConfig, Sim, generator::generate, planner::plan,
 };
 use rand_mt::Mt;
 
@@ -20,7 +20,7 @@ fn wins(sim: &Sim, config: &PlannerConfig) -> bool {
         assert_eq!(copy.end(), None, "the plan goes on after the end");
         copy.step(action);
     }
-    copy.end() == Some(Outcome::Coin)
+    copy.end() == Some(CoinRunEnd::Coin)
 }
 
 #[test]
@@ -69,7 +69,7 @@ fn wins_with_noise(mut sim: Sim, draws: &mut Mt) -> bool {
         }
         sim.step(action);
     }
-    sim.end() == Some(Outcome::Coin)
+    sim.end() == Some(CoinRunEnd::Coin)
 }
 
 #[test]

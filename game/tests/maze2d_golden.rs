@@ -4,7 +4,7 @@
 mod golden;
 
 use playbot_games::maze2d::{
-    Ball, Contact, Maze2dLevel, Maze2dMode,
+    Ball, ContactModel, Maze2dLevel, Maze2dMode,
     ball::{RADIUS, clip_action},
     sim::BallSim,
     walls::HALF,
@@ -61,7 +61,7 @@ impl Run {
     }
 
     /// Returns a ball in the recorded state after `step` steps.
-    fn sim(&self, contact: Contact, step: usize) -> BallSim {
+    fn sim(&self, contact: ContactModel, step: usize) -> BallSim {
         let mode = Maze2dMode { contact, ..self.map.parse().expect("a map") };
         let [x, y, vx, vy] = self.states[step];
         let level = Maze2dLevel::new(&mode, 0).expect("a fixed map");
@@ -70,7 +70,7 @@ impl Run {
 
     /// Returns the largest difference to the recording, of positions and of velocities, over `steps` steps from the
     /// state after `from`.
-    fn deviation(&self, contact: Contact, from: usize, steps: usize) -> (f64, f64) {
+    fn deviation(&self, contact: ContactModel, from: usize, steps: usize) -> (f64, f64) {
         let mut sim = self.sim(contact, from);
         let mut worst = (0.0_f64, 0.0_f64);
         for step in from..from + steps {
@@ -119,7 +119,7 @@ fn all_runs() -> Vec<Run> {
     long_runs().into_iter().map(|(run, _)| run).chain(impacts()).collect()
 }
 
-const BOTH: [Contact; 2] = [Contact::Soft, Contact::Rapier];
+const BOTH: [ContactModel; 2] = [ContactModel::Soft, ContactModel::Rapier];
 
 #[test]
 fn free_flight_is_the_original_s_under_both_contacts() {
@@ -129,7 +129,7 @@ fn free_flight_is_the_original_s_under_both_contacts() {
             for step in (0..run.len()).filter(|&step| run.contacts[step] == b'0') {
                 let (place, speed) = run.deviation(contact, step, 1);
                 // A hard contact begins when the surfaces meet within the step, a soft one 2 mm before.
-                if contact == Contact::Rapier && run.contacts.get(step + 1).is_some_and(|&after| after != b'0') {
+                if contact == ContactModel::Rapier && run.contacts.get(step + 1).is_some_and(|&after| after != b'0') {
                     continue;
                 }
                 assert!(place <= 1e-5 && speed <= 1e-4, "{contact:?}, step {step}: {place} m, {speed} m/s");
@@ -139,7 +139,7 @@ fn free_flight_is_the_original_s_under_both_contacts() {
         assert!(steps > 0, "{contact:?}: no step of free flight");
         for (run, free) in long_runs() {
             // Under rapier the step before the first recorded contact may already be stopped by the wall.
-            let steps = free.saturating_sub(usize::from(contact == Contact::Rapier));
+            let steps = free.saturating_sub(usize::from(contact == ContactModel::Rapier));
             let (place, _) = run.deviation(contact, 0, steps);
             assert!(place <= 1e-4, "{contact:?}: {place} m before the first contact");
         }
@@ -150,14 +150,14 @@ fn free_flight_is_the_original_s_under_both_contacts() {
 fn soft_contact_is_the_original_s() {
     for run in all_runs() {
         for step in 0..run.len() {
-            let (place, speed) = run.deviation(Contact::Soft, step, 1);
+            let (place, speed) = run.deviation(ContactModel::Soft, step, 1);
             assert!(place <= 1e-5 && speed <= 1e-3, "step {step}: {place} m, {speed} m/s");
         }
         for from in 0..run.len().saturating_sub(20) {
-            let (place, _) = run.deviation(Contact::Soft, from, 20);
+            let (place, _) = run.deviation(ContactModel::Soft, from, 20);
             assert!(place <= 1e-4, "from step {from}: {place} m");
         }
-        let (place, _) = run.deviation(Contact::Soft, 0, run.len());
+        let (place, _) = run.deviation(ContactModel::Soft, 0, run.len());
         assert!(place <= 0.02, "open loop: {place} m");
     }
 }
@@ -168,7 +168,7 @@ fn rapier_s_contact_stays_near_the_original() {
     for run in all_runs() {
         for from in (0..run.len()).step_by(10) {
             let steps = (run.len() - from).min(10);
-            errors.push(run.deviation(Contact::Rapier, from, steps).0);
+            errors.push(run.deviation(ContactModel::Rapier, from, steps).0);
         }
     }
     errors.sort_by(f64::total_cmp);
@@ -216,7 +216,7 @@ fn rest(mode: &Maze2dMode, cell: f64, push: f64) -> f64 {
 
 #[test]
 fn a_full_push_rests_where_the_original_rests() {
-    for (contact, tolerance) in [(Contact::Soft, 1e-5), (Contact::Rapier, 0.01)] {
+    for (contact, tolerance) in [(ContactModel::Soft, 1e-5), (ContactModel::Rapier, 0.01)] {
         // Around cell (1, 1) of this map the walls are those of the cells 0 and 3 along both axes.
         for (axis, push, cell) in [(0, -1.0, 0.0), (0, 1.0, 3.0), (1, -1.0, 0.0), (1, 1.0, 3.0)] {
             let mode = Maze2dMode { contact, .."medium".parse().expect("a mode") };

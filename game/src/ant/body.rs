@@ -2,7 +2,7 @@
 
 use crate::ant::{
     constraint,
-    constraint::{ConstraintSolver, Mobility, Row},
+    constraint::{ConstraintRow, ConstraintSolver, Mobility},
     contact,
     contact::{Contact, WallBox},
     dynamics::{Coordinates, GRAVITY, bias, mass_matrix},
@@ -97,7 +97,7 @@ pub struct AntBody {
     #[reflect(ignore)]
     contacts: Vec<Contact>,
     #[reflect(ignore)]
-    rows: Vec<Row>,
+    rows: Vec<ConstraintRow>,
     #[reflect(ignore)]
     solver: ConstraintSolver,
 }

@@ -29,7 +29,7 @@ const FRICTION: f64 = 1.0;
 
 /// A one-sided constraint.
 #[derive(Clone, Copy, Debug)]
-pub struct Row {
+pub struct ConstraintRow {
     /// Its part over the torso's coordinates.
     pub base: [f64; BASE],
     /// The leg whose hinges take part.
@@ -42,7 +42,7 @@ pub struct Row {
     pub weight: f64,
 }
 
-impl Row {
+impl ConstraintRow {
     /// Its scalar product with coordinates.
     pub fn dot(&self, x: &Coordinates) -> f64 {
         let base: f64 = self.base.iter().zip(&x.base).map(|(a, b)| a * b).sum();
@@ -121,7 +121,7 @@ fn jacobian(pose: &Pose, limb: Limb, leg: usize, point: DVec3, direction: DVec3)
 }
 
 /// Adds a row for each joint that is beyond its limit.
-pub fn limits(joints: &[[f64; 2]; LEGS], velocity: &Coordinates, mobility: &Mobility, rows: &mut Vec<Row>) {
+pub fn limits(joints: &[[f64; 2]; LEGS], velocity: &Coordinates, mobility: &Mobility, rows: &mut Vec<ConstraintRow>) {
     let (stiffness, damping) = spring(LIMIT_IMPEDANCE[1]);
     for (leg, angles) in joints.iter().enumerate() {
         for (k, &angle) in angles.iter().enumerate() {
@@ -136,7 +136,7 @@ pub fn limits(joints: &[[f64; 2]; LEGS], velocity: &Coordinates, mobility: &Mobi
             let impedance = limit_impedance(-gap);
             let mut hinges = [0.0; 2];
             hinges[k] = inwards;
-            rows.push(Row {
+            rows.push(ConstraintRow {
                 base: [0.0; BASE],
                 leg,
                 hinges,
@@ -155,7 +155,13 @@ fn limit_impedance(beyond: f64) -> f64 {
 }
 
 /// Adds the four edges of a contact's friction pyramid.
-pub fn contact(touch: &Contact, pose: &Pose, velocity: &Coordinates, mobility: &Mobility, rows: &mut Vec<Row>) {
+pub fn contact(
+    touch: &Contact,
+    pose: &Pose,
+    velocity: &Coordinates,
+    mobility: &Mobility,
+    rows: &mut Vec<ConstraintRow>,
+) {
     let (stiffness, damping) = spring(CONTACT_IMPEDANCE);
     let into_torso = pose.rotation.transpose();
     let point = into_torso * (touch.point - pose.position);
@@ -168,7 +174,7 @@ pub fn contact(touch: &Contact, pose: &Pose, velocity: &Coordinates, mobility: &
         let tangent = row(tangent);
         for sign in [FRICTION, -FRICTION] {
             let edge = normal.plus(sign, &tangent);
-            rows.push(Row {
+            rows.push(ConstraintRow {
                 base: edge.base,
                 leg: touch.leg,
                 hinges: edge.legs[touch.leg],
@@ -204,7 +210,13 @@ pub struct ConstraintSolver {
 
 impl ConstraintSolver {
     /// Minimises the cost, starting from `guess`.
-    pub fn solve(&mut self, mass: &ArrowMatrix, free: &Coordinates, rows: &[Row], guess: &Coordinates) -> Coordinates {
+    pub fn solve(
+        &mut self,
+        mass: &ArrowMatrix,
+        free: &Coordinates,
+        rows: &[ConstraintRow],
+        guess: &Coordinates,
+    ) -> Coordinates {
         let mut at = *guess;
         self.residuals.clear();
         self.residuals.extend(rows.iter().map(|row| row.dot(&at) - row.reference));
@@ -228,7 +240,7 @@ impl ConstraintSolver {
         at
     }
 
-    fn gradient(&self, pull: &Coordinates, rows: &[Row]) -> Coordinates {
+    fn gradient(&self, pull: &Coordinates, rows: &[ConstraintRow]) -> Coordinates {
         let mut gradient = *pull;
         for (row, &residual) in rows.iter().zip(&self.residuals) {
             if residual < 0.0 {
@@ -243,7 +255,7 @@ impl ConstraintSolver {
         gradient
     }
 
-    fn hessian(&self, mass: &ArrowMatrix, rows: &[Row]) -> ArrowMatrix {
+    fn hessian(&self, mass: &ArrowMatrix, rows: &[ConstraintRow]) -> ArrowMatrix {
         let mut hessian = *mass;
         for (row, _) in rows.iter().zip(&self.residuals).filter(|(_, residual)| **residual < 0.0) {
             let [p, q] = row.hinges.map(|hinge| hinge * row.weight);
@@ -265,7 +277,7 @@ impl ConstraintSolver {
 
     /// Returns the step length at which the slope of the cost along the step vanishes. Also returns whether the step is
     /// whole with the same rows pushing throughout: then the minimum is reached.
-    fn search(&self, start_slope: f64, curvature: f64, rows: &[Row]) -> (f64, bool) {
+    fn search(&self, start_slope: f64, curvature: f64, rows: &[ConstraintRow]) -> (f64, bool) {
         let along = |length: f64| {
             let (mut slope, mut bend, mut same) = (start_slope + length * curvature, curvature, true);
             for ((row, &residual), &change) in rows.iter().zip(&self.residuals).zip(&self.slopes) {
@@ -320,10 +332,10 @@ mod tests {
         mass
     }
 
-    fn push(dimension: usize, sign: f64, reference: f64, weight: f64) -> Row {
+    fn push(dimension: usize, sign: f64, reference: f64, weight: f64) -> ConstraintRow {
         let mut base = [0.0; BASE];
         base[dimension] = sign;
-        Row { base, leg: 0, hinges: [0.0; 2], reference, weight }
+        ConstraintRow { base, leg: 0, hinges: [0.0; 2], reference, weight }
     }
 
     #[test]

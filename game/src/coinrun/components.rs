@@ -109,7 +109,7 @@ pub struct Coin;
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug, PartialEq)]
-pub struct LastOutcome(pub Option<crate::coinrun::Outcome>);
+pub struct LastOutcome(pub Option<crate::coinrun::CoinRunEnd>);
 
 // The building of a level as entities.
 

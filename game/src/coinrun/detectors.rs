@@ -6,7 +6,7 @@
 mod testing;
 
 use crate::coinrun::{
-    Outcome,
+    CoinRunEnd,
     components::{Arena, ArenaBody, ArenaEntities, Enemy, PlayerBody, PlaysIn, Saw, Tiles},
     level::{Level, Spawn},
     rules::{BLOCK_HALF, Body, motion::touch},
@@ -32,7 +32,7 @@ pub(super) fn detectors() -> Vec<Box<dyn Detector>> {
 /// Finds a player that touches the coin in an episode that goes on.
 fn goal_ignored() -> impl Detector {
     EachTick::new("goal-ignored", "the coin is touched and the episode goes on", |moment: &DetectorTick<'_>| {
-        let is_ignored = goes_on(moment) && touched(moment) == Some(Outcome::Coin);
+        let is_ignored = goes_on(moment) && touched(moment) == Some(CoinRunEnd::Coin);
         is_ignored.then(|| format!("touches the coin at {}, and the episode goes on", place(moment)))
     })
 }
@@ -60,10 +60,10 @@ fn harmless_hazard() -> impl Detector {
                 return None;
             }
             let what = match touched(moment)? {
-                Outcome::Saw => "a saw",
-                Outcome::Enemy => "an enemy",
-                Outcome::Lava => "lava",
-                Outcome::Coin | Outcome::LeftMap | Outcome::Timeout => return None,
+                CoinRunEnd::Saw => "a saw",
+                CoinRunEnd::Enemy => "an enemy",
+                CoinRunEnd::Lava => "lava",
+                CoinRunEnd::Coin | CoinRunEnd::LeftMap | CoinRunEnd::Timeout => return None,
             };
             Some(format!("touches {what} at {}, and the episode goes on", place(moment)))
         },
@@ -95,7 +95,7 @@ impl EpisodeWatcher for LookingForLethal {
     }
 
     fn end(&mut self, moment: &DetectorTick<'_>, result: &EpisodeResult) -> Option<String> {
-        let is_unfounded = result.end == EpisodeEnd::LOST && touched(moment).is_none_or(Outcome::is_success);
+        let is_unfounded = result.end == EpisodeEnd::LOST && touched(moment).is_none_or(CoinRunEnd::is_success);
         is_unfounded.then(|| format!("lost at {} without touching a hazard", place(moment)))
     }
 }
@@ -169,7 +169,7 @@ fn lanes(level: &Level) -> Vec<Lane> {
 
 /// Returns the contact of the player by the rules, without the clock; `None` too without a player of CoinRun. Saws are
 /// those of the level and added ones; every hazard fills a tile, whatever its body.
-fn touched(moment: &DetectorTick<'_>) -> Option<Outcome> {
+fn touched(moment: &DetectorTick<'_>) -> Option<CoinRunEnd> {
     let world = moment.world;
     let player = world.get::<PlayerBody>(moment.agent)?.0;
     let arena = world.get::<PlaysIn>(moment.agent)?.0;

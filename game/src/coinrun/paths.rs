@@ -31,7 +31,7 @@ use crate::coinrun::{
         ground::{NearCrates, PathGround},
         sweep::Swept,
     },
-    rules::{Body, OVERLAP_MARGIN, Outcome, PlayerState, is_supported, motion::touch},
+    rules::{Body, CoinRunEnd, OVERLAP_MARGIN, PlayerState, is_supported, motion::touch},
     tile::{Corners, REACH, TileGrid},
 };
 
@@ -297,7 +297,7 @@ impl Dangers {
         let at_tiles = (0..until).find_map(|step| {
             let there = Body { x: xs[step], y: ys[step], ..*player };
             let end = touch(&there, tiles, [], [], 0)?;
-            Some(End { steps: step + 1, is_coin: end == Outcome::Coin })
+            Some(End { steps: step + 1, is_coin: end == CoinRunEnd::Coin })
         });
         // Other contacts in the same step change nothing: the coin wins, and all others kill.
         at_tiles.or(death)

@@ -1,7 +1,7 @@
 //! One tick of every arena, by the rules.
 
 use crate::coinrun::{
-    Outcome,
+    CoinRunEnd,
     components::{
         Arena, ArenaBody, ArenaEntities, Crate, Enemy, LastOutcome, PlayerBody, PlayerMemory, PlaysIn, Saw, Tiles,
     },
@@ -98,9 +98,9 @@ pub(super) fn play(
     }
 }
 
-fn finish(outcome: Option<Outcome>, episode: &mut Episode, reward: &mut Reward) {
+fn finish(outcome: Option<CoinRunEnd>, episode: &mut Episode, reward: &mut Reward) {
     match outcome {
-        Some(Outcome::Timeout) => episode.truncate(),
+        Some(CoinRunEnd::Timeout) => episode.truncate(),
         Some(outcome) => {
             if outcome.is_success() {
                 reward.add(COIN_REWARD);

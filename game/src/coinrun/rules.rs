@@ -12,7 +12,7 @@ pub mod motion;
 
 use crate::coinrun::{rules::motion::advance, tile::TileGrid};
 
-pub use crate::coinrun::rules::motion::{Outcome, hash_state, patrol, touch};
+pub use crate::coinrun::rules::motion::{CoinRunEnd, hash_state, patrol, touch};
 pub(super) use crate::coinrun::rules::motion::{corners, flush, part_count};
 
 /// Most times that a crate may pass the player on to another crate within one displacement.

@@ -3,7 +3,7 @@
 use crate::coinrun::{
     level::Level,
     rules::{
-        ACTIONS, Body, COIN_REWARD, Outcome, PlayerState, begin_step, hash_state, motion::touch, move_player, patrol,
+        ACTIONS, Body, COIN_REWARD, CoinRunEnd, PlayerState, begin_step, hash_state, motion::touch, move_player, patrol,
     },
 };
 use std::sync::Arc;
@@ -14,7 +14,7 @@ pub struct StepResult {
     /// 10 in the step that reaches the coin, otherwise 0.
     pub reward: f32,
     /// The end of the episode, once it has ended.
-    pub end: Option<Outcome>,
+    pub end: Option<CoinRunEnd>,
 }
 
 /// The state of one episode.
@@ -25,7 +25,7 @@ pub struct Sim {
     state: PlayerState,
     enemies: Vec<Body>,
     steps: u32,
-    end: Option<Outcome>,
+    end: Option<CoinRunEnd>,
 }
 
 impl Sim {
@@ -53,7 +53,7 @@ impl Sim {
         self.advance(action, x_wins_tie);
         let saws = self.level.saws_near(self.player.x);
         self.end = touch(&self.player, &self.level.tiles, saws, &self.enemies, self.steps);
-        let won = self.end == Some(Outcome::Coin);
+        let won = self.end == Some(CoinRunEnd::Coin);
         StepResult { reward: if won { COIN_REWARD } else { 0.0 }, end: self.end }
     }
 
@@ -115,7 +115,7 @@ impl Sim {
     }
 
     /// Returns the end of the episode, once it has ended.
-    pub fn end(&self) -> Option<Outcome> {
+    pub fn end(&self) -> Option<CoinRunEnd> {
         self.end
     }
 
@@ -137,10 +137,10 @@ mod tests {
         while sim.end().is_none() {
             sim.step(8);
         }
-        assert_eq!((sim.end(), sim.steps()), (Some(Outcome::Coin), 63));
+        assert_eq!((sim.end(), sim.steps()), (Some(CoinRunEnd::Coin), 63));
         let hash = sim.state_hash();
         let after = sim.step(8);
-        assert_eq!((after.reward, after.end), (0.0, Some(Outcome::Coin)));
+        assert_eq!((after.reward, after.end), (0.0, Some(CoinRunEnd::Coin)));
         assert_eq!(sim.state_hash(), hash);
     }
 
@@ -165,6 +165,6 @@ mod tests {
         for _ in 0..999 {
             assert_eq!(sim.step(4).end, None);
         }
-        assert_eq!(sim.step(4).end, Some(Outcome::Timeout));
+        assert_eq!(sim.step(4).end, Some(CoinRunEnd::Timeout));
     }
 }

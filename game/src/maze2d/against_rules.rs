@@ -5,7 +5,7 @@ use crate::{
     maze2d::{
         arena::{MazeArena, MazeBall, PlaysIn},
         ball::{Ball, FORCE, RADIUS, Vec2d, clip_action, length, scale, sub},
-        mode::{Contact, Maze2dMode},
+        mode::{ContactModel, Maze2dMode},
         sim::{reward, step_soft},
         walls::Walls,
     },
@@ -18,7 +18,7 @@ use playbot_harness::{
 /// Computes each tick once more from the position of the ball before it, the action and the map of the level, and
 /// compares the results.
 ///
-/// The walls are those of the map, whatever the arena has. Under [`Contact::Rapier`] balls near walls are left out: a
+/// The walls are those of the map, whatever the arena has. Under [`ContactModel::Rapier`] balls near walls are left out: a
 /// solver's result there depends on its memory.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AgainstRules;
@@ -74,16 +74,16 @@ impl EpisodeWatcher for Following {
 fn moved_otherwise(before: &Ball, after: &Ball, push: Vec2d, walls: &Walls, rules: &Maze2dMode) -> Option<String> {
     let mut by_rules = *before;
     let slack = match rules.contact {
-        Contact::Soft => {
+        ContactModel::Soft => {
             step_soft(&mut by_rules, push, walls);
             SLACK
         }
-        Contact::Rapier if walls.touches(before.position, CLEAR).as_slice().is_empty() => {
+        ContactModel::Rapier if walls.touches(before.position, CLEAR).as_slice().is_empty() => {
             by_rules.limit_speed();
             by_rules.fly(scale(push, FORCE));
             SLACK_OF_SOLVER
         }
-        Contact::Rapier => return None,
+        ContactModel::Rapier => return None,
     };
     let apart = length(sub(after.position, by_rules.position)).max(length(sub(after.velocity, by_rules.velocity)));
     // NaN is not near to anything.

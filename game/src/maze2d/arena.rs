@@ -6,7 +6,7 @@ use crate::{
         ball::{Ball, clip_action},
         level::Maze2dLevel,
         level_text::DrawnLevel,
-        mode::{Contact, Maze2dMode},
+        mode::{ContactModel, Maze2dMode},
         physics::MazePhysics,
         sim::{hash_state, is_at_goal, reward, step_rapier, step_soft},
     },
@@ -40,7 +40,7 @@ pub(super) fn start_episode(
         Err(error) => return faults.report(format!("agent {}, level {}: {error}", agent.index, event.level)),
     };
     let mut arena = commands.entity(plays_in.0);
-    if rules.contact == Contact::Rapier {
+    if rules.contact == ContactModel::Rapier {
         arena.insert(MazePhysics::solving(&level.walls, &level.start));
     } else if with_physics.0 {
         arena.insert(MazePhysics::following(&level.walls, &level.start));
@@ -145,7 +145,7 @@ pub(super) fn play(
         }
         let (ball, level, mode) = (&mut ball.0, &arena.level, &arena.rules);
         match (physics, mode.contact) {
-            (Some(mut physics), Contact::Rapier) => step_rapier(ball, push, &mut physics),
+            (Some(mut physics), ContactModel::Rapier) => step_rapier(ball, push, &mut physics),
             (physics, _) => {
                 step_soft(ball, push, &level.walls);
                 if let Some(mut physics) = physics {

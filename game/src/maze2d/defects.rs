@@ -9,7 +9,7 @@ use crate::{
         ball::{Ball, FORCE, MASS, STEP, Vec2d, clip_action, length, sub},
         level::Maze2dLevel,
         level_text,
-        mode::Contact,
+        mode::ContactModel,
         physics::MazePhysics,
         walls::Walls,
     },
@@ -148,7 +148,7 @@ fn stand(app: &mut App, variant: u32, change: ChangeMaze) {
             let Some(maze) = change(maze, *start_cell, *goal_cell, variant) else { continue };
             let walls = Walls::new(&maze, arena.rules.wall_offset());
             if let Some(mut physics) = physics {
-                let solves = arena.rules.contact == Contact::Rapier;
+                let solves = arena.rules.contact == ContactModel::Rapier;
                 let stand = if solves { MazePhysics::solving } else { MazePhysics::following };
                 *physics = stand(&walls, start);
             }

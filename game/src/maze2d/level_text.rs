@@ -143,7 +143,7 @@ pub(super) fn read_rules(text: &str, maze: &Maze, options: &str) -> Result<Maze2
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::maze2d::mode::Contact;
+    use crate::maze2d::mode::ContactModel;
 
     fn maze() -> Maze {
         Maze::parse(&["####", "#SG#", "####"]).expect("a maze")
@@ -155,7 +155,7 @@ mod tests {
         assert_eq!((plain.limit, plain.sparse, plain.fixed_start), (300, false, false));
         let mode =
             Maze2dMode::of_drawn(&maze(), "sparse+limit=40+contact=rapier+no-offset+end-at-goal").expect("rules");
-        assert_eq!((mode.limit, mode.sparse, mode.contact, mode.offset), (40, true, Contact::Rapier, false));
+        assert_eq!((mode.limit, mode.sparse, mode.contact, mode.offset), (40, true, ContactModel::Rapier, false));
         assert_eq!(mode.rules_of_drawn(&maze()), "sparse+limit=40+end-at-goal+no-offset+contact=rapier");
         let medium: Maze2dMode = "medium+goal=random+fixed-start".parse().expect("a mode");
         assert_eq!(medium.rules_of_drawn(&maze()), "limit=600");

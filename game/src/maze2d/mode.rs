@@ -8,7 +8,7 @@ use std::{fmt, str::FromStr};
 
 /// The contact model of walls and ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Contact {
+pub enum ContactModel {
     /// MuJoCo's soft contact in closed form: the game of the literature.
     #[default]
     Soft,
@@ -35,7 +35,7 @@ pub struct Maze2dMode {
     /// The walls stand 0.2 aside, as D4RL's do.
     pub offset: bool,
     /// The contact model.
-    pub contact: Contact,
+    pub contact: ContactModel,
     /// The demonstrator walks to one random cell after the other, as in D4RL's data. The game itself stays the same.
     pub retarget: bool,
 }
@@ -70,7 +70,7 @@ impl Maze2dMode {
             limit,
             end_at_goal: false,
             offset: true,
-            contact: Contact::Soft,
+            contact: ContactModel::Soft,
             retarget: false,
         }
     }
@@ -100,8 +100,8 @@ impl Maze2dMode {
             ("end-at-goal", "") => self.end_at_goal = true,
             ("no-end-at-goal", "") => self.end_at_goal = false,
             ("no-offset", "") => self.offset = false,
-            ("contact", "soft") => self.contact = Contact::Soft,
-            ("contact", "rapier") => self.contact = Contact::Rapier,
+            ("contact", "soft") => self.contact = ContactModel::Soft,
+            ("contact", "rapier") => self.contact = ContactModel::Rapier,
             ("retarget", "") => self.retarget = true,
             ("limit", _) => {
                 let steps = value.parse().ok().filter(|&steps| steps > 0);
@@ -138,7 +138,7 @@ impl Maze2dMode {
         add(self.limit != default.limit, &format!("limit={}", self.limit));
         add(self.end_at_goal, "end-at-goal");
         add(!self.offset, "no-offset");
-        add(self.contact == Contact::Rapier, "contact=rapier");
+        add(self.contact == ContactModel::Rapier, "contact=rapier");
         add(self.retarget, "retarget");
         options
     }

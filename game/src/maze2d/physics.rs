@@ -1,8 +1,8 @@
 //! A rapier2d context of an arena's own: the walls as colliders, the ball as a body.
 //!
 //! The owner of the context steps it, so arenas are independent and can be stepped on any thread. Under
-//! [`Contact::Rapier`](super::mode::Contact) it computes the contacts of the ball. Under
-//! [`Contact::Soft`](super::mode::Contact) it only follows the ball, for sensors and rays of a game's own.
+//! [`ContactModel::Rapier`](super::mode::ContactModel) it computes the contacts of the ball. Under
+//! [`ContactModel::Soft`](super::mode::ContactModel) it only follows the ball, for sensors and rays of a game's own.
 
 use crate::maze2d::{
     ball::{Ball, MASS, RADIUS, STEP, Vec2d},

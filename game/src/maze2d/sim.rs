@@ -3,7 +3,7 @@
 use crate::maze2d::{
     ball::{Ball, FORCE, Vec2d, length, scale, sub},
     level::Maze2dLevel,
-    mode::{Contact, Maze2dMode},
+    mode::{ContactModel, Maze2dMode},
     physics::MazePhysics,
     walls::{Walls, contact_force},
 };
@@ -49,7 +49,7 @@ impl BallSim {
     /// Returns the ball of a level.
     pub fn new(mode: &Maze2dMode, level: &Maze2dLevel) -> Self {
         let mut sim = Self { ball: level.start, walls: level.walls.clone(), physics: None };
-        if mode.contact == Contact::Rapier {
+        if mode.contact == ContactModel::Rapier {
             sim.physics = Some(MazePhysics::solving(&sim.walls, &sim.ball));
         }
         sim

@@ -5,10 +5,10 @@
 #[cfg(unix)]
 use signal_hook::{
     consts::{SIGHUP, SIGINT, SIGTERM},
-    iterator::Signals,
+    flag,
 };
 #[cfg(unix)]
-use std::{fs, io};
+use std::{fs, io, sync::Arc};
 use std::{
     sync::{
         Mutex, OnceLock, PoisonError,
@@ -24,6 +24,10 @@ pub(crate) const EXIT_CODE: u8 = 130;
 /// Time in which work must reach a safe point to stop. The user waits for two seconds at most, some of which the end
 /// needs.
 const PATIENCE: Duration = Duration::from_millis(1400);
+
+/// Time between two looks for a signal.
+#[cfg(unix)]
+const GLANCE: Duration = Duration::from_millis(20);
 
 /// Ctrl-C was pressed; a second one stops at once.
 static HEARD: AtomicBool = AtomicBool::new(false);
@@ -67,9 +71,20 @@ pub(crate) fn listen() {
 #[cfg(unix)]
 fn install() -> io::Result<()> {
     let ignored = ignored_signals(&fs::read_to_string("/proc/self/status").unwrap_or_default());
-    let heard = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
-    let mut signals = Signals::new(heard)?;
-    thread::Builder::new().spawn(move || signals.forever().for_each(|_| hear())).map(drop)
+    let mut heard = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
+    let sent = Arc::new(AtomicBool::new(false));
+    let seen = Arc::clone(&sent);
+    // A handler may do next to nothing, so a thread looks whether it was called. It comes first: a signal that is
+    // caught is no longer deadly, and must be seen.
+    thread::Builder::new().spawn(move || {
+        loop {
+            thread::park_timeout(GLANCE);
+            if seen.swap(false, Ordering::SeqCst) {
+                hear();
+            }
+        }
+    })?;
+    heard.try_for_each(|signal| flag::register(signal, Arc::clone(&sent)).map(drop))
 }
 
 #[cfg(not(unix))]

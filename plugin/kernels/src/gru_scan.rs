@@ -36,7 +36,7 @@ pub struct ScanInput<'a> {
 
 /// The data that a forward pass keeps for the backward pass.
 #[derive(Debug)]
-pub struct Scan {
+pub struct ScanRecord {
     pub sizes: Sizes,
     directions: Vec<Direction>,
 }
@@ -95,7 +95,7 @@ pub fn forward(
     (bias_ih, bias_hh): (&[f32], &[f32]),
     initial: &[f32],
     sizes: Sizes,
-) -> (Vec<f32>, Scan) {
+) -> (Vec<f32>, ScanRecord) {
     let runs = (0..sizes.directions).into_par_iter().map(|d| {
         let part = |all| of_direction(all, d, sizes.directions);
         let packed = |numbers, rows| Packed::new(Matrix { numbers, rows, columns: sizes.gates(), is_turned: false });
@@ -106,7 +106,7 @@ pub fn forward(
         scan(&sums, &weights, part(bias_hh), part(initial), d == 1, sizes)
     });
     let runs: Vec<Direction> = runs.collect();
-    (joined(&runs, sizes), Scan { sizes, directions: runs })
+    (joined(&runs, sizes), ScanRecord { sizes, directions: runs })
 }
 
 /// Scans one direction, for its sums x W_ih + b_ih.
@@ -194,7 +194,7 @@ pub struct Wanted {
 }
 
 /// Returns the gradients for `output`, the gradient of the outputs.
-pub fn backward(output: &[f32], input: ScanInput<'_>, scan: &Scan, wanted: Wanted) -> ScanGrads {
+pub fn backward(output: &[f32], input: ScanInput<'_>, scan: &ScanRecord, wanted: Wanted) -> ScanGrads {
     let sizes = scan.sizes;
     let parts = scan.directions.par_iter().enumerate().map(|(d, run)| {
         let part = |all| of_direction(all, d, sizes.directions);

@@ -9,7 +9,7 @@ use crate::{
     elementwise,
     elementwise::{Activation, log_softmax_backward, log_softmax_in_place},
     gru_scan,
-    gru_scan::{Scan, ScanGrads, ScanInput, Sizes, Wanted},
+    gru_scan::{ScanGrads, ScanInput, ScanRecord, Sizes, Wanted},
     host_numbers::{HostNumbers, data, is_host, tensor},
 };
 use burn::{
@@ -171,7 +171,7 @@ fn scanned<B: HostNumbers>(
     [weight_ih, weight_hh]: [&FloatTensor<B>; 2],
     [bias_ih, bias_hh]: [&FloatTensor<B>; 2],
     initial: &FloatTensor<B>,
-) -> (FloatTensor<B>, Scan) {
+) -> (FloatTensor<B>, ScanRecord) {
     let [directions, batch, hidden] = initial.shape().dims();
     let [rows, inputs] = x.shape().dims();
     let sizes = Sizes { steps: rows / batch.max(1), batch, inputs, hidden, directions };
@@ -216,7 +216,7 @@ struct GruScan;
 
 impl<B: Kernels + HostNumbers> Backward<B, 6> for GruScan {
     /// The intermediate results of the forward pass, x, W_ih and W_hh.
-    type State = (Arc<Scan>, FloatTensor<B>, FloatTensor<B>, FloatTensor<B>);
+    type State = (Arc<ScanRecord>, FloatTensor<B>, FloatTensor<B>, FloatTensor<B>);
 
     fn backward(self, ops: Ops<Self::State, 6>, grads: &mut Gradients, _: &mut Checkpointer) {
         let output = grads.consume::<B>(&ops.node);

@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use bevy_rapier2d::prelude::*;
 use playbot::prelude::*;
 use playbot_games::coinrun::{
-    Body, CoinRun, Mode, Outcome, Sim,
+    Body, CoinRun, CoinRunEnd, Mode, Sim,
     components::{ArenaBody, Crate, InArena, LastOutcome, PlayerBody, PlaysIn, Saw},
     generator::generate,
 };
@@ -64,7 +64,7 @@ fn a_game_may_add_a_saw_and_a_crate() {
     assert!((player.y - (3.0 + player.ry)).abs() < 1e-4, "stands on the added crate, not at {}", player.y);
     world.spawn((Saw, ArenaBody(Body::block([1, 3])), InArena(arena)));
     world.tick().expect("sound");
-    assert_eq!(world.get::<LastOutcome>(agent).expect("a player").0, Some(Outcome::Saw));
+    assert_eq!(world.get::<LastOutcome>(agent).expect("a player").0, Some(CoinRunEnd::Saw));
     assert_eq!(CoinRun::default().tools().state.end_cause(&world, agent), Some("saw"));
 }
 

@@ -5,7 +5,7 @@ use crate::coinrun::{
     Level, Mode, Sim, Tile, TileGrid,
     generator::generate,
     paths::{HELD, STEPS, Surroundings, VALUES},
-    rules::{ACTIONS, Body, Outcome, PlayerState, begin_step, is_supported, motion::touch, move_player},
+    rules::{ACTIONS, Body, CoinRunEnd, PlayerState, begin_step, is_supported, motion::touch, move_player},
     tile::REACH,
 };
 use rand::{RngExt, SeedableRng};
@@ -46,8 +46,8 @@ impl Scene {
         }
         let flag = |is: bool| f32::from(u8::from(is));
         [
-            flag(end.is_some_and(|end| end != Outcome::Coin)),
-            flag(end == Some(Outcome::Coin)),
+            flag(end.is_some_and(|end| end != CoinRunEnd::Coin)),
+            flag(end == Some(CoinRunEnd::Coin)),
             flag(lands),
             steps as f32 / STEPS as f32,
             (player.x - start.x) / half_view,

@@ -5,7 +5,7 @@ use crate::coinrun::{
     picture::{
         BLOCKS, PLAYER_HEIGHT, Scenery,
         art::{Art, Pose},
-        puffs::{PUFFS, Row},
+        puffs::{PUFFS, PuffRow},
     },
     play::NOTHING,
     rules::{Body, JUMP_SPEED, PlayerState, WALK_SPEED, directions},
@@ -149,10 +149,10 @@ impl Trail {
     }
 
     /// Returns the longest row at one speed whose newest puff is `first` ticks old, of `count` puffs in all.
-    fn row(&self, tick: u32, first: usize, count: usize) -> Row {
+    fn row(&self, tick: u32, first: usize, count: usize) -> PuffRow {
         let step = |age| self.place(tick, age) - self.place(tick, age + 1);
         let alike = (first..count - 1).take_while(|&age| (step(age) - step(first)).length_squared() < ALIKE * ALIKE);
-        Row { first, count: 1 + alike.count() }
+        PuffRow { first, count: 1 + alike.count() }
     }
 }
 

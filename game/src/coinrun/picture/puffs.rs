@@ -38,7 +38,7 @@ const CELL: (u32, u32) = (32, 10);
 
 /// Puffs of ticks in a row: the newest is `first` ticks old, and there are `count` of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Row {
+pub struct PuffRow {
     /// Age of the newest.
     pub first: usize,
     /// Number of puffs, at least 1; all are younger than [`PUFFS`] ticks.
@@ -50,7 +50,7 @@ fn half_size(age: usize) -> Vec2 {
     (0..age).fold(NEW, |half, _| half * GROWTH)
 }
 
-impl Row {
+impl PuffRow {
     fn last(self) -> usize {
         self.first + self.count - 1
     }
@@ -98,7 +98,7 @@ impl Row {
 pub(crate) fn drawing() -> Image {
     let (width, height) = (PUFFS as u32 * CELL.0, PUFFS as u32 * CELL.1);
     let texel = |x: u32, y: u32| {
-        let row = Row { first: (y / CELL.1) as usize, count: (x / CELL.0) as usize + 1 };
+        let row = PuffRow { first: (y / CELL.1) as usize, count: (x / CELL.0) as usize + 1 };
         let place = Vec2::new((x % CELL.0) as f32 + 0.5, (y % CELL.1) as f32 + 0.5) / TEXELS;
         let alpha = if row.last() < PUFFS { row.alpha(Vec2::new(place.x, TOP - place.y)) } else { 0.0 };
         [255, 255, 255, (alpha * 255.0 + 0.5) as u8]
@@ -125,12 +125,12 @@ mod tests {
         let image = drawing();
         let mut faded = 127.5;
         for first in 0..PUFFS {
-            let single = Row { first, count: 1 }.rect();
+            let single = PuffRow { first, count: 1 }.rect();
             assert!((f32::from(alpha(&image, single.center())) - faded).abs() <= 1.0, "age {first}");
             assert_eq!(alpha(&image, single.min), 0, "round");
             faded *= 0.8;
         }
-        let all = Row { first: 0, count: PUFFS }.rect();
+        let all = PuffRow { first: 0, count: PUFFS }.rect();
         let at = |x: f32| alpha(&image, Vec2::new(x, all.min.y + TOP * TEXELS));
         // Middle of the newest: 0.3 + 8 of its own 0.6 wide, under it those of the two ticks before.
         let expected = 255.0 * (1.0 - 0.5 * 0.6 * 0.68);
@@ -142,7 +142,7 @@ mod tests {
     fn every_row_lies_in_its_place() {
         for first in 0..PUFFS {
             for count in 1..=PUFFS - first {
-                let Vec2 { x, y } = Row { first, count }.rect().size();
+                let Vec2 { x, y } = PuffRow { first, count }.rect().size();
                 assert!(x <= CELL.0 as f32 && y <= CELL.1 as f32, "{first}, {count}: {x} x {y}");
             }
         }
@@ -150,7 +150,7 @@ mod tests {
 
     #[test]
     fn a_row_reaches_from_its_oldest_to_its_newest_puff() {
-        let row = Row { first: 1, count: 3 };
+        let row = PuffRow { first: 1, count: 3 };
         let (newest, old) = (0.3 * 1.05, 0.3 * 1.05 * 1.05 * 1.05);
         let right = row.lay_out(Vec2::new(5.0, 2.0), Vec2::new(4.7, 2.0));
         assert!((right.1.x + right.0.x / 2.0 - (5.0 + newest)).abs() < 1e-5);

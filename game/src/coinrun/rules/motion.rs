@@ -118,7 +118,7 @@ fn bounce(enemy: &mut Body, tiles: &TileGrid, dx: f32, dy: f32) -> bool {
 /// The end of an episode.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Outcome {
+pub enum CoinRunEnd {
     /// The player reached the coin. Also when something deadly was touched in the same step.
     Coin,
     /// The player touched a saw.
@@ -133,21 +133,21 @@ pub enum Outcome {
     Timeout,
 }
 
-impl Outcome {
+impl CoinRunEnd {
     /// Returns true if the coin was reached, which pays the reward.
     pub const fn is_success(self) -> bool {
-        matches!(self, Outcome::Coin)
+        matches!(self, CoinRunEnd::Coin)
     }
 
     /// Returns the cause of a failure in words; `None` if the coin was reached.
     pub const fn cause(self) -> Option<&'static str> {
         match self {
-            Outcome::Coin => None,
-            Outcome::Saw => Some("saw"),
-            Outcome::Enemy => Some("enemy"),
-            Outcome::Lava => Some("lava"),
-            Outcome::LeftMap => Some("left the map"),
-            Outcome::Timeout => Some("time"),
+            CoinRunEnd::Coin => None,
+            CoinRunEnd::Saw => Some("saw"),
+            CoinRunEnd::Enemy => Some("enemy"),
+            CoinRunEnd::Lava => Some("lava"),
+            CoinRunEnd::LeftMap => Some("left the map"),
+            CoinRunEnd::Timeout => Some("time"),
         }
     }
 }
@@ -161,21 +161,21 @@ pub fn touch<'a>(
     saws: impl IntoIterator<Item = &'a Body>,
     enemies: impl IntoIterator<Item = &'a Body>,
     step: u32,
-) -> Option<Outcome> {
+) -> Option<CoinRunEnd> {
     let (coin, lava) = touched_tiles(player, tiles);
     let hits = |body: &'a Body| body.overlaps(player, 0.0);
     if coin {
-        Some(Outcome::Coin)
+        Some(CoinRunEnd::Coin)
     } else if saws.into_iter().any(hits) {
-        Some(Outcome::Saw)
+        Some(CoinRunEnd::Saw)
     } else if enemies.into_iter().any(hits) {
-        Some(Outcome::Enemy)
+        Some(CoinRunEnd::Enemy)
     } else if lava {
-        Some(Outcome::Lava)
+        Some(CoinRunEnd::Lava)
     } else if has_left(player) {
-        Some(Outcome::LeftMap)
+        Some(CoinRunEnd::LeftMap)
     } else {
-        (step >= TIMEOUT).then_some(Outcome::Timeout)
+        (step >= TIMEOUT).then_some(CoinRunEnd::Timeout)
     }
 }
 
@@ -316,7 +316,7 @@ mod tests {
         assert!(path.iter().all(|enemy| enemy.y == 1.5));
     }
 
-    fn ends(player: Body, tiles: &TileGrid, saws: &[Body], enemies: &[Body]) -> Option<Outcome> {
+    fn ends(player: Body, tiles: &TileGrid, saws: &[Body], enemies: &[Body]) -> Option<CoinRunEnd> {
         touch(&player, tiles, saws, enemies, 1)
     }
 
@@ -326,8 +326,8 @@ mod tests {
         tiles.set(1, 1, Tile::Coin);
         tiles.set(1, 2, Tile::LavaTop);
         let saw = [Body::block([1, 1])];
-        assert_eq!(ends(Body::player(), &tiles, &saw, &saw), Some(Outcome::Coin));
-        assert_eq!(touch(&Body::player(), &tiles, &saw, [], TIMEOUT), Some(Outcome::Coin));
+        assert_eq!(ends(Body::player(), &tiles, &saw, &saw), Some(CoinRunEnd::Coin));
+        assert_eq!(touch(&Body::player(), &tiles, &saw, [], TIMEOUT), Some(CoinRunEnd::Coin));
     }
 
     #[test]
@@ -337,20 +337,20 @@ mod tests {
         let beside = [Body::block([2, 1])];
         assert_eq!(ends(player, &tiles, &beside, &[]), None);
         let closer = Body { x: player.x + 0.001, ..player };
-        assert_eq!(ends(closer, &tiles, &beside, &[]), Some(Outcome::Saw));
-        assert_eq!(ends(closer, &tiles, &[], &beside), Some(Outcome::Enemy));
+        assert_eq!(ends(closer, &tiles, &beside, &[]), Some(CoinRunEnd::Saw));
+        assert_eq!(ends(closer, &tiles, &[], &beside), Some(CoinRunEnd::Enemy));
     }
 
     #[test]
     fn lava_the_border_and_the_clock_end_episodes() {
         let mut tiles = TileGrid::default();
         let player = Body::player();
-        assert_eq!(touch(&player, &tiles, [], [], TIMEOUT), Some(Outcome::Timeout));
+        assert_eq!(touch(&player, &tiles, [], [], TIMEOUT), Some(CoinRunEnd::Timeout));
         assert_eq!(touch(&player, &tiles, [], [], TIMEOUT - 1), None);
         let gone = Body { x: 65.0, ..player };
-        assert_eq!(ends(gone, &tiles, &[], &[]), Some(Outcome::LeftMap));
+        assert_eq!(ends(gone, &tiles, &[], &[]), Some(CoinRunEnd::LeftMap));
         tiles.set(1, 1, Tile::Lava);
-        assert_eq!(ends(player, &tiles, &[], &[]), Some(Outcome::Lava));
+        assert_eq!(ends(player, &tiles, &[], &[]), Some(CoinRunEnd::Lava));
     }
 
     #[test]

@@ -66,12 +66,16 @@ impl Clip {
             let (min, max) = ((area.min - origin) * unit, (area.max - origin) * unit);
             Rect::from_corners(Vec2::new(min.x, height - max.y), Vec2::new(max.x, height - min.y))
         };
-        let kinds = [(&plan.walls, Colour::Wall), (&plan.platforms, Colour::Platform), (&plan.hazards, Colour::Hazard)];
+        let kinds = [
+            (&plan.walls, ClipColour::Wall),
+            (&plan.platforms, ClipColour::Platform),
+            (&plan.hazards, ClipColour::Hazard),
+        ];
         for (areas, colour) in kinds {
             areas.iter().for_each(|area| canvas.area(on_canvas(area), colour));
         }
         let half = Vec2::splat(maps.side / 2.0);
-        canvas.area(on_canvas(&Rect::from_corners(plan.goal - half, plan.goal + half)), Colour::Goal);
+        canvas.area(on_canvas(&Rect::from_corners(plan.goal - half, plan.goal + half)), ClipColour::Goal);
         Self { canvas, columns, rows, scale, tick: 1000.0 / tick_hz }
     }
 
@@ -100,10 +104,10 @@ impl Clip {
             let now = self.pixels(*square);
             let mut changed = [0, 0, self.canvas.width, self.canvas.height];
             if let Some(before) = before {
-                self.canvas.block(before, Colour::Trail);
+                self.canvas.block(before, ClipColour::Trail);
                 changed = [before[0].min(now[0]), before[1].min(now[1]), before[2].max(now[2]), before[3].max(now[3])];
             }
-            self.canvas.block(now, Colour::Agent);
+            self.canvas.block(now, ClipColour::Agent);
             let [left, top, right, bottom] = changed.map(|edge| edge as u32);
             let pause = (*ticks as f64 * self.tick / speed).clamp(PACE[0], PACE[1]);
             writer.set_frame_delay(pause.round() as u16, 1000)?;
@@ -142,7 +146,7 @@ pub(crate) const PALETTE: [Rgb; 7] =
 
 /// A colour of the palette.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Colour {
+pub enum ClipColour {
     Paper,
     Wall,
     Platform,
@@ -162,11 +166,11 @@ pub struct Canvas {
 impl Canvas {
     /// Makes empty paper.
     pub fn new(width: usize, height: usize) -> Self {
-        Self { width, height, pixels: vec![Colour::Paper as u8; width * height] }
+        Self { width, height, pixels: vec![ClipColour::Paper as u8; width * height] }
     }
 
     /// Fills the pixels whose middle lies in an area, and at least one.
-    pub fn area(&mut self, area: Rect, colour: Colour) {
+    pub fn area(&mut self, area: Rect, colour: ClipColour) {
         if !(area.min.is_finite() && area.max.is_finite()) {
             return;
         }
@@ -180,7 +184,7 @@ impl Canvas {
     }
 
     /// Fills the pixels between left, top, right and bottom, which lie on the canvas.
-    pub fn block(&mut self, [left, top, right, bottom]: [usize; 4], colour: Colour) {
+    pub fn block(&mut self, [left, top, right, bottom]: [usize; 4], colour: ClipColour) {
         for row in top..bottom {
             self.pixels[row * self.width + left..row * self.width + right].fill(colour as u8);
         }
@@ -221,7 +225,7 @@ mod tests {
             assert_eq!((frame.width, frame.height), size, "frame {number}");
         }
         // Of the last frame, two pixels to a byte: the trail on the left, the agent on the right.
-        let (trail, agent) = (Colour::Trail as u8, Colour::Agent as u8);
+        let (trail, agent) = (ClipColour::Trail as u8, ClipColour::Agent as u8);
         assert_eq!(buffer[..3], [(trail << 4) | trail, (trail << 4) | agent, (agent << 4) | agent]);
         let again: Vec<[u64; 2]> = (65..85).map(|square| [square, 3]).collect();
         assert_eq!(clip(&garden(), &maps(again), 15.0).as_deref(), Some(bytes.as_slice()), "the same bytes");
@@ -246,12 +250,12 @@ mod tests {
     #[test]
     fn areas_are_clipped_and_rows_are_padded() {
         let mut canvas = Canvas::new(3, 2);
-        canvas.area(Rect::new(-5.0, 1.0, 2.0, 9.0), Colour::Wall);
-        canvas.area(Rect::new(2.2, 0.1, 2.3, 0.2), Colour::Goal);
+        canvas.area(Rect::new(-5.0, 1.0, 2.0, 9.0), ClipColour::Wall);
+        canvas.area(Rect::new(2.2, 0.1, 2.3, 0.2), ClipColour::Goal);
         for outside in [Rect::new(3.0, 0.0, 4.0, 1.0), Rect::new(-4.0, 0.0, -1.0, 2.0)] {
-            canvas.area(outside, Colour::Hazard);
+            canvas.area(outside, ClipColour::Hazard);
         }
-        canvas.area(Rect { min: bevy::math::Vec2::NAN, max: bevy::math::Vec2::ONE }, Colour::Hazard);
+        canvas.area(Rect { min: bevy::math::Vec2::NAN, max: bevy::math::Vec2::ONE }, ClipColour::Hazard);
         assert_eq!(canvas.packed([0, 0, 3, 2]), [0x00, 0x60, 0x11, 0x00]);
         assert_eq!(canvas.packed([2, 0, 3, 1]), [0x60]);
     }
