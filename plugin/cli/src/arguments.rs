@@ -109,7 +109,7 @@ pub(crate) fn revision() -> &'static str {
 /// # Errors
 ///
 /// It is 0 or no number.
-pub(crate) fn at_least_one(text: &str) -> Result<usize, String> {
+fn at_least_one(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(0) => Err("it must be at least 1".to_owned()),
         Ok(number) => Ok(number),

@@ -76,7 +76,7 @@ pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
 ///
 /// Its name ends otherwise.
 pub(crate) fn png(text: &str) -> Result<PathBuf, String> {
-    picture(text, "png")
+    of_kind(text, "picture", "png")
 }
 
 /// Parses the path of an SVG.
@@ -85,7 +85,7 @@ pub(crate) fn png(text: &str) -> Result<PathBuf, String> {
 ///
 /// Its name ends otherwise.
 pub(crate) fn svg(text: &str) -> Result<PathBuf, String> {
-    picture(text, "svg")
+    of_kind(text, "picture", "svg")
 }
 
 /// Parses the path of a page.
@@ -95,10 +95,6 @@ pub(crate) fn svg(text: &str) -> Result<PathBuf, String> {
 /// Its name ends otherwise.
 pub(crate) fn html(text: &str) -> Result<PathBuf, String> {
     of_kind(text, "page", "html")
-}
-
-fn picture(text: &str, kind: &str) -> Result<PathBuf, String> {
-    of_kind(text, "picture", kind)
 }
 
 fn of_kind(text: &str, what: &str, kind: &str) -> Result<PathBuf, String> {

@@ -42,7 +42,7 @@ pub(crate) fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
     };
     let bar = BARS.add(ProgressBar::new(length)).with_style(style.with_key("left", left).progress_chars("=> "));
     bar.enable_steady_tick(Duration::from_millis(250));
-    if !draws_bars() {
+    if BARS.is_hidden() {
         text_progress().push(TextProgress {
             title: title.to_owned(),
             unit: unit.to_owned(),

@@ -190,8 +190,12 @@ fn decode(bytes: Vec<u8>) -> Result<String, TextFileError> {
     if let Some(zero) = bytes.iter().position(|&byte| byte == 0) {
         return Err(no_text(&bytes, zero));
     }
-    let text = String::from_utf8(bytes).map_err(|error| no_text(error.as_bytes(), error.utf8_error().valid_up_to()))?;
-    Ok(text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned))
+    let mut text =
+        String::from_utf8(bytes).map_err(|error| no_text(error.as_bytes(), error.utf8_error().valid_up_to()))?;
+    if text.starts_with('\u{feff}') {
+        text.remove(0);
+    }
+    Ok(text)
 }
 
 #[cfg(all(test, unix))]

@@ -16,8 +16,8 @@ mod tests;
 use crate::experiment::{
     Experiment, ExperimentError,
     error::Origin,
-    find_preset, keys as known,
-    keys::{find, is_section, missing_key, no_value, renamed, syntax_message, type_message, unknown_key},
+    find_preset,
+    keys::{all, find, is_section, missing_key, no_value, renamed, syntax_message, type_message, unknown_key},
 };
 use playbot_harness::level_files::read::read_text_file;
 use playbot_learner::settings::Reader;
@@ -220,7 +220,7 @@ impl Experiment {
     pub fn reads(&self, key: &str) -> bool {
         let key = renamed(key).unwrap_or(key);
         let is_asked = |path: &str| path.strip_prefix(key).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'));
-        let mut asked = known::all().filter(|setting| is_asked(setting.path)).peekable();
+        let mut asked = all().filter(|setting| is_asked(setting.path)).peekable();
         asked.peek().is_none() || asked.any(|setting| self.is_among(setting.readers))
     }
 
@@ -295,7 +295,7 @@ const MOST_KEYS: usize = 200;
 static ALL: LazyLock<Keys> = LazyLock::new(|| {
     let origin = Origin::start_of(Path::new("example"));
     let value = |text| Value { text, origin: origin.clone() };
-    Keys(known::all().map(|setting| (setting.path.to_owned(), value(setting.sample()))).collect())
+    Keys(all().map(|setting| (setting.path.to_owned(), value(setting.sample()))).collect())
 });
 
 /// Returns a reader for which a value may stand for `Some(value)`.
@@ -584,7 +584,7 @@ mod config_set_tests {
     fn every_setting_of_the_tables_can_be_set_and_has_the_default_of_its_row() {
         let text = r#"(game: "coinrun", train: "hard:0..63", test: "hard:64..127", steps: 1000)"#;
         let least = parse_experiment(text, Path::new("x.ron")).expect("valid");
-        for setting in known::all() {
+        for setting in all() {
             let with = |value: String| least.with_set(&[format!("{}={value}", setting.path)]).expect(setting.path);
             with(setting.sample());
             if let Some(default) = setting.default {

@@ -8,7 +8,7 @@ use crate::{
     error::CliError,
     verbs::explore::Talents,
 };
-use bevy_playbot::unknown_name::UnknownName;
+use bevy_playbot::{policy::ActionDraw, unknown_name::UnknownName};
 use playbot_harness::{
     eval::Player,
     game::Game,
@@ -60,14 +60,14 @@ impl ContestantArgs {
         games: &Games,
         device: DeviceKind,
     ) -> Result<Vec<Vec<Contestant>>, CliError> {
-        action_draw(self.greedy, !self.policy.is_empty())?;
+        let draw = action_draw(self.greedy, !self.policy.is_empty())?;
         let mut all: Vec<Vec<Contestant>> = chosen.iter().map(|game| Contestant::defaults(*game)).collect();
         for Named { name, path } in &self.policy {
             let metadata = open::policy(path, device)?.metadata;
             let game = games.of_file(Artifact::Policy, path, &metadata.game)?;
             // A game that is not tested needs no policy.
             if let Some(place) = chosen.iter().position(|chosen| chosen.name() == game.name()) {
-                all[place].push(self.policy(name, path, game, device)?);
+                all[place].push(self.policy(name, path, game, draw, device)?);
             }
         }
         for text in &self.skills {
@@ -82,8 +82,14 @@ impl ContestantArgs {
         Ok(all)
     }
 
-    fn policy(&self, name: &str, path: &Path, game: &dyn Game, device: DeviceKind) -> Result<Contestant, CliError> {
-        let draw = action_draw(self.greedy, true)?;
+    fn policy(
+        &self,
+        name: &str,
+        path: &Path,
+        game: &dyn Game,
+        draw: ActionDraw,
+        device: DeviceKind,
+    ) -> Result<Contestant, CliError> {
         let chosen = LoadedPlayer::policy_file(game, path, draw, device)?;
         chosen.check_fit(game)?;
         let skilled = matches!(&chosen.player, Player::Policy { prior: Some(_), .. });
