@@ -7,7 +7,7 @@ use std::time::Duration;
 use bevy::prelude::World;
 use criterion::{Criterion, Throughput};
 use playbot::prelude::*;
-use playbot_games::registry::GAMES;
+use playbot_games::GAMES;
 use playbot_harness::{arrangement::Arrangement, worlds::build_world};
 
 const ARENAS: u32 = 16;

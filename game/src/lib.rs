@@ -6,7 +6,7 @@
 //! - [`maze2d`]: the ball in a maze, step for step D4RL's.
 //! - [`antmaze`]: a quadruped walks through a maze to a goal it does not see.
 //! - [`senses`]: the mazes with more observations: rays and goal, a map, or positional encoding.
-//! - [`registry`]: all of them, for the program `playbot`.
+//! - [`GAMES`]: all of them, for the program `playbot`.
 
 pub mod ant;
 pub mod antmaze;
@@ -15,7 +15,29 @@ mod defect_variant;
 pub mod maze;
 pub mod maze2d;
 mod pictures;
-pub mod registry;
 pub mod senses;
 #[cfg(test)]
 mod watched;
+
+use crate::{
+    ant::Ant,
+    antmaze::AntMaze,
+    coinrun::CoinRun,
+    maze2d::Maze2d,
+    senses::{WithMap, WithObservations, WithPositionalEncoding, WithRays},
+};
+use playbot_harness::game::Game;
+
+/// All games, CoinRun first.
+pub const GAMES: [&dyn Game; 10] = [
+    &CoinRun { physics: false },
+    &Maze2d { physics: false },
+    &WithObservations(Maze2d { physics: false }, WithRays),
+    &WithObservations(Maze2d { physics: false }, WithMap),
+    &WithObservations(Maze2d { physics: false }, WithPositionalEncoding),
+    &Ant,
+    &AntMaze,
+    &WithObservations(AntMaze, WithRays),
+    &WithObservations(AntMaze, WithMap),
+    &WithObservations(AntMaze, WithPositionalEncoding),
+];

@@ -17,7 +17,7 @@ fn main() {
     println!("cargo::rustc-env=PLAYBOT_REVISION={}", revision.as_deref().unwrap_or("unknown"));
 }
 
-/// The revision of a package from a registry. Asking git there would find the repository of whoever uses it, if any.
+/// The revision of a package from a registry. Asking git there would find the repository of the user, if any.
 fn packed() -> Option<String> {
     let text = fs::read_to_string(PACKED).ok()?;
     let (_, rest) = text.split_once("\"sha1\"")?;

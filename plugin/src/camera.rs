@@ -57,7 +57,6 @@ use crate::{
         request::BorrowedTargets,
         sensor_view::{SensorViews, Stamp},
     },
-    no_screen::NoScreen,
     systems::ObserveSchedule,
     vision::{ImageOptions, ImageSensor, VisionError, VisionPlugin, VisionSystems},
 };
@@ -279,4 +278,18 @@ struct NoImage {
 
 fn called(name: &Option<Name>) -> String {
     name.as_ref().map_or_else(String::new, |name| format!(" (named `{name}`)"))
+}
+
+/// Marks an app without a screen: only the pictures of agents need to be drawn.
+#[derive(Resource, Clone, Copy, Debug, Reflect)]
+#[reflect(Resource)]
+struct NoScreen;
+
+/// Marks an app with [`NoScreen`].
+pub(crate) struct NoScreenPlugin;
+
+impl Plugin for NoScreenPlugin {
+    fn build(&self, app: &mut App) {
+        app.insert_resource(NoScreen);
+    }
 }

@@ -38,7 +38,6 @@ use crate::{
     agent::Control,
     episode::{Episode, Tick},
     fault::{Fault, Faults},
-    no_screen::NoScreenPlugin,
     panics,
     placement::{FrameGate, TickPlacement},
     plugin::PlaybotPlugin,
@@ -250,7 +249,7 @@ impl PluginGroup for HeadlessPlugins {
                     ..default()
                 },
             );
-        without_screen(plugins, self.draws).add(NoScreenPlugin)
+        without_screen(plugins, self.draws)
     }
 }
 
@@ -259,7 +258,9 @@ fn without_screen(plugins: PluginGroupBuilder, draws: bool) -> PluginGroupBuilde
     use bevy::render::{RenderPlugin, pipelined_rendering::PipelinedRenderingPlugin};
     let render_creation = if draws { crate::camera::drawing() } else { crate::camera::not_drawing() };
     let renderer = RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() };
-    let plugins = without_event_loop(plugins.set(renderer)).add(crate::camera::RenderListPlugin);
+    let plugins = without_event_loop(plugins.set(renderer))
+        .add(crate::camera::RenderListPlugin)
+        .add(crate::camera::NoScreenPlugin);
     if plugins.contains::<PipelinedRenderingPlugin>() { plugins.disable::<PipelinedRenderingPlugin>() } else { plugins }
 }
 

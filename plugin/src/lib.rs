@@ -100,7 +100,6 @@ pub mod fault;
 pub mod headless;
 pub mod key_bindings;
 pub mod level;
-mod no_screen;
 pub mod observation;
 mod panics;
 pub mod placement;

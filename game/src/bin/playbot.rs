@@ -1,5 +1,5 @@
 //! The program `playbot`.
 
 fn main() -> std::process::ExitCode {
-    playbot::main(&playbot_games::registry::GAMES)
+    playbot::main(&playbot_games::GAMES)
 }

@@ -6,7 +6,7 @@ mod program;
 
 use std::path::{Path, PathBuf};
 
-use playbot_games::registry::GAMES;
+use playbot_games::GAMES;
 use playbot_harness::{
     game::Game,
     games::Games,

@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use playbot_games::registry::GAMES;
+use playbot_games::GAMES;
 use playbot_harness::games::Games;
 use playbot_train::experiment::file::{locate, parse_experiment_with, read_experiment};
 

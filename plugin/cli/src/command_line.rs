@@ -1,8 +1,11 @@
-//! The command line's verbs and their dispatch.
+//! The command line's verbs and their dispatch. Help texts are in `help`.
+
+mod help;
 
 use crate::{
     error::{CliError, Outcome},
-    help, interrupt, log, program,
+    output::{log, program},
+    progress::interrupt,
     verbs::{
         bench, bugs, config, demo, doctor, eval, explore, eyes, learn_skills, level, play, policy, quickstart, record,
         replay, report, runs, study, test, trace, train, view,
@@ -120,7 +123,7 @@ fn is_about_missing_files(error: &clap::Error) -> bool {
 /// Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration, 130 stopped by Ctrl-C.
 pub fn main(games: &[&dyn Game]) -> ExitCode {
     #[cfg(all(target_os = "linux", feature = "camera"))]
-    crate::mesa::silence_warnings();
+    log::silence_mesa();
     let cli = match read(games) {
         Ok(cli) => cli,
         Err(error) => {
@@ -304,7 +307,7 @@ mod tests {
             let text = said(option, value);
             assert!(text.contains(words) && text.ends_with('\n'), "{text}");
         }
-        assert_eq!(said("--noise", "-1"), "taken", "whoever reads it says what is wrong with it");
+        assert_eq!(said("--noise", "-1"), "taken", "its reader reports what is wrong with it");
         assert!(said("--nose", "1").starts_with("in other words: "));
     }
 }

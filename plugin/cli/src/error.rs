@@ -1,8 +1,7 @@
 //! The errors of verbs, with their exit codes.
 
-use crate::messages::for_programs;
 use playbot_learner::HasExitCode;
-use std::{error::Error, io};
+use std::error::Error;
 use thiserror::Error;
 
 /// The end of a command that worked.
@@ -60,23 +59,9 @@ impl<E: HasExitCode + Send + Sync + 'static> From<E> for CliError {
     }
 }
 
-/// Prints one line of data.
-///
-/// # Errors
-///
-/// [`CliError::BrokenPipe`] if the reader is gone.
-pub(crate) fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
-    use io::Write;
-    let line = line.to_string();
-    writeln!(io::stdout().lock(), "{}", for_programs(&line)).map_err(|error| match error.kind() {
-        io::ErrorKind::BrokenPipe => CliError::BrokenPipe,
-        _ => CliError::Io(format!("cannot write to standard output: {error}")),
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use std::path::PathBuf;
+    use std::{io, path::PathBuf};
 
     use bevy_playbot::{
         demo::file::{DemoFault, DemoFileError},

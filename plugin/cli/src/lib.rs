@@ -41,28 +41,19 @@
 //!   that call them directly.
 //! - [`pictures`]: steps of an episode as PNGs. `window` (a feature): a window for people.
 //!
-//! Inside, each verb is a file in `verbs/`. Verbs share their options (`arguments`), errors with exit codes (`error`),
-//! output files (`output`), the program's name (`program`), progress (`progress`, `console`) and messages (`report!`,
-//! `log`). Data goes to standard output, everything else to standard error.
+//! Inside, each verb is a file in `verbs/`. Verbs share their options (`arguments`), what they print and write (`output`),
+//! progress and Ctrl-C (`progress`), and errors with exit codes (`error`). Data goes to standard output, everything else
+//! to standard error.
 
 #![allow(clippy::print_stdout, reason = "a command line prints")]
 #![allow(clippy::test_attr_in_doctest, reason = "the example shows a game's own test, and need only compile")]
 
 #[macro_use]
-mod messages;
+mod output;
 mod arguments;
 mod command_line;
-mod console;
 mod error;
-mod help;
-mod interrupt;
-mod log;
-#[cfg(all(target_os = "linux", feature = "camera"))]
-mod mesa;
-mod output;
 pub mod pictures;
-mod plot;
-mod program;
 mod progress;
 pub mod reference;
 mod verbs;

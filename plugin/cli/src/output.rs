@@ -1,13 +1,40 @@
-//! Output files, tested before the work whose result they hold, and wording for them.
+//! What verbs print and write: lines of data, and files, tested before the work whose result they hold.
+//!
+//! The folder, in reading order:
+//!
+//! - `messages`: messages on standard error (`report!`), and text that cannot steer a terminal.
+//! - `program`: the program's name in messages.
+//! - `log`: the log of libraries and of games.
 
-use crate::error::CliError;
+#[macro_use]
+pub(crate) mod messages;
+pub(crate) mod log;
+pub(crate) mod program;
+
+use crate::{error::CliError, output::messages::for_programs};
 use playbot_harness::sealed_file::write_atomically;
 use playbot_learner::{disk, disk::DiskFile};
 use playbot_test::verdict::TestError;
-use std::path::{Path, PathBuf};
+use std::{
+    io::{self, Write},
+    path::{Path, PathBuf},
+};
 
 /// Advice where nothing can be written.
 const ELSEWHERE: &str = "make room or rights there, or name a file in another folder";
+
+/// Prints one line of data.
+///
+/// # Errors
+///
+/// [`CliError::BrokenPipe`] if the reader is gone.
+pub(crate) fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
+    let line = line.to_string();
+    writeln!(io::stdout().lock(), "{}", for_programs(&line)).map_err(|error| match error.kind() {
+        io::ErrorKind::BrokenPipe => CliError::BrokenPipe,
+        _ => CliError::Io(format!("cannot write to standard output: {error}")),
+    })
+}
 
 /// Makes the folder of a file, and tests whether the file can be written.
 ///

@@ -1,12 +1,14 @@
-//! Steps of an episode as PNGs, still or animated.
+//! Pictures: steps of an episode, still or animated, and drawings.
 //!
 //! The folder, in reading order:
 //!
 //! - `episode_world`: the World of the shown episode.
 //! - `caption`: caption of a picture: tick, action, value, and the skill as bars.
+//! - `plot`: drawings (charts, maps of levels) as PNGs or SVGs.
 
 pub mod caption;
 pub mod episode_world;
+pub(crate) mod plot;
 
 use crate::{
     error::CliError,

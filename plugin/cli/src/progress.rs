@@ -1,5 +1,13 @@
 //! Progress on standard error, for all work that can take longer than two seconds: bars on a terminal, a plain line now
 //! and then elsewhere.
+//!
+//! The folder, in reading order:
+//!
+//! - `interrupt`: Ctrl-C, and what it leaves.
+//! - `console`: progress of trainings.
+
+pub(crate) mod console;
+pub(crate) mod interrupt;
 
 use indicatif::{
     HumanDuration, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar,

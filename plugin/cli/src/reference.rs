@@ -1,6 +1,6 @@
 //! The reference page of all verbs, written from the parser of the command line.
 
-use crate::{command_line::Cli, program::DEFAULT_NAME};
+use crate::{command_line::Cli, output::program::DEFAULT_NAME};
 use clap::{Arg, Command, CommandFactory};
 use std::fmt::Write;
 

@@ -10,7 +10,7 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `seats`: the deciders in a window: the person, and the autopilot.
+//! - `deciders`: the deciders in a window: the person, and the autopilot.
 //! - `playlist`: the order of the levels, and the result of the last episode.
 //! - `keys`: the window's own keys; `devices`: the person's devices, kept from the game or handed on to it.
 //! - `camera`: the person's view from above; `solid`: the view in space.
@@ -19,18 +19,18 @@
 //! - `ending`: the orderly end, after which the recording is whole; `error`: errors of opening and running.
 
 mod camera;
+mod deciders;
 mod devices;
 mod ending;
 mod error;
 mod frames;
 mod keys;
 mod playlist;
-mod seats;
 #[cfg(feature = "view3d")]
 mod solid;
 mod title;
 
-use crate::window::{ending::Verdict, error::catch, seats::Seats};
+use crate::window::{deciders::Deciders, ending::Verdict, error::catch};
 use bevy::{
     app::{PanicHandlerPlugin, TerminalCtrlCHandlerPlugin},
     prelude::*,
@@ -55,7 +55,7 @@ use playbot_harness::{
 };
 use std::time::Duration;
 
-pub use crate::window::{error::WindowError, playlist::Playlist, seats::Autopilot};
+pub use crate::window::{deciders::Autopilot, error::WindowError, playlist::Playlist};
 
 /// Width and height of the window at first: eleven pixels for each of the bots' 64.
 const SIDE: u32 = 704;
@@ -110,7 +110,7 @@ impl GameWindow {
             crate::window::solid::build(&mut app, game);
         }
         ending::build(&mut app, stop);
-        seats::build(&mut app);
+        deciders::build(&mut app);
         keys::build(&mut app);
         if has_space_view && cfg!(not(feature = "view3d")) {
             keys::excuse_view(&mut app);
@@ -220,9 +220,9 @@ fn seat(
     playlist: Playlist,
 ) -> Entity {
     let agent = spawn_agents(game, app.world_mut(), observation_config, 0, 1)[0];
-    let seats = Seats::new(game, app.world_mut(), agent, autopilot);
+    let deciders = Deciders::new(game, app.world_mut(), agent, autopilot);
     app.world_mut().entity_mut(agent).insert((Control::Human, playlist.queue()));
-    app.insert_resource(seats).insert_resource(playlist);
+    app.insert_resource(deciders).insert_resource(playlist);
     agent
 }
 

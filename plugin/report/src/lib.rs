@@ -6,7 +6,7 @@
 //! - [`ResultTable`]: [`ResultRow`]s of methods, rounded by their errors.
 //! - [`statistics`]: intervals by bootstrap, interquartile means, [`PairedDifference`]s, Holm's correction.
 //! - [`text_table`]: tables on a console. A [`PlainTable`] holds any text.
-//! - [`chart`]: the data of line charts. [`to_svg`] draws [`Chart`]s, [`mod@sparkline`] a curve in one line of text.
+//! - [`chart`]: the data of line charts. [`to_svg`] draws [`Chart`]s, [`sparkline`] a curve in one line of text.
 //! - [`Report`]: text, tables and charts in one HTML file that loads nothing: no scripts, no fonts, no network. It
 //!   follows the reader's light or dark setting and prints.
 //! - [`mod@escape`]: text that is safe in HTML, in SVG and on a terminal.
@@ -24,7 +24,6 @@ mod document;
 pub mod escape;
 pub mod number;
 mod results;
-pub mod sparkline;
 pub mod statistics;
 mod svg;
 mod table;
@@ -33,11 +32,10 @@ mod tests;
 pub mod text_table;
 
 pub use crate::{
-    chart::{Chart, Curve},
+    chart::{Chart, Curve, sparkline},
     document::{Report, ReportError, Section, markdown_cell, markdown_row},
     number::{counted, percent, readable, readable_with_spread, ticks, times, whole},
     results::{ResultRow, ResultTable},
-    sparkline::sparkline,
     statistics::PairedDifference,
     svg::to_svg,
     table::{PlainTable, Table},

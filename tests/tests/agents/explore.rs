@@ -11,7 +11,7 @@ use bevy_playbot::{
     vision::ObservationConfig,
 };
 use playbot::prelude::*;
-use playbot_games::registry::GAMES;
+use playbot_games::GAMES;
 use playbot_harness::{demo::verify_file, foreign::Restart, game::StateTools, games::Games};
 use playbot_learner::{Actions, PpoConfig, Prior, SkillDraw};
 use playbot_test::explore::{
@@ -203,7 +203,7 @@ fn a_small_maze_is_reached_as_a_whole() {
 }
 
 #[test]
-fn whoever_listens_can_stop_after_a_round() {
+fn an_observer_can_stop_it_after_a_round() {
     let mut rounds = Vec::new();
     let heard = AtomicU64::new(0);
     let progress = |ticks| {

@@ -14,7 +14,7 @@ use bevy_playbot::{
     vision::{ObservationConfig, ObservationKind},
 };
 use playbot::prelude::*;
-use playbot_games::registry::GAMES;
+use playbot_games::GAMES;
 use playbot_harness::worlds::{build_observing_world, build_world};
 use playbot_tests::{
     corridor_plugin,

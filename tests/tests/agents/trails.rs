@@ -2,8 +2,8 @@
 
 use bevy::math::{Rect, Vec2};
 use playbot_games::{
+    GAMES,
     maze::{Cell, Planner},
-    registry::GAMES,
 };
 use playbot_harness::{
     drawing::Shape,

@@ -2,8 +2,10 @@
 
 use crate::{
     arguments::{Device, experiment::ExperimentArgs, open},
-    error::{CliError, print_line},
+    error::CliError,
+    output::print_line,
     progress,
+    progress::console::report_clipped,
 };
 use bevy_playbot::{
     engine::policy_observation,
@@ -361,18 +363,6 @@ fn timed<T>(
     let summary = summarize(name, &plan.split, &episodes);
     report_clipped(&summary);
     Ok((Measured { summary, steps_per_s: steps as f64 / seconds }, played))
-}
-
-/// Reports it if actions of a measured player were clipped.
-pub(crate) fn report_clipped(summary: &EvalSummary) {
-    if summary.clipped > 0.0 {
-        report!(
-            "{} on {}: {:.1} % of the actions lay outside the game's range and were clipped",
-            summary.method,
-            summary.split,
-            100.0 * summary.clipped
-        );
-    }
 }
 
 /// Prints a row as one line of JSON.

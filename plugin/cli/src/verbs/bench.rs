@@ -2,7 +2,8 @@
 
 use crate::{
     arguments::{Device, MOST_THREADS, experiment::ExperimentArgs},
-    error::{CliError, Outcome, print_line},
+    error::{CliError, Outcome},
+    output::print_line,
 };
 use bevy::prelude::World;
 use bevy_playbot::vision::{ObservationConfig, ObservationKind, VisionError};

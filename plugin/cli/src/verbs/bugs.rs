@@ -10,8 +10,10 @@ pub(crate) mod testers;
 
 use crate::{
     arguments::{Threads, default_experiment_of, default_mode},
-    error::{CliError, Outcome, print_line},
-    output, program, progress,
+    error::{CliError, Outcome},
+    output,
+    output::{print_line, program},
+    progress,
     verbs::bugs::score::as_json,
 };
 use playbot_harness::{

@@ -2,7 +2,8 @@
 
 use crate::{
     arguments::experiment::ExperimentArgs,
-    error::{CliError, Outcome, print_line},
+    error::{CliError, Outcome},
+    output::print_line,
 };
 use clap::Subcommand;
 use playbot_harness::{game::Game, games::Games, sensors::GameSensors};

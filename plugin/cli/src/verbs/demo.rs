@@ -6,11 +6,10 @@ mod show;
 
 use crate::{
     arguments::open,
-    error::{CliError, Outcome, print_line},
-    interrupt,
-    interrupt::NothingToSave,
-    output::prepare,
-    program, progress,
+    error::{CliError, Outcome},
+    output::{prepare, print_line, program},
+    progress,
+    progress::{interrupt, interrupt::NothingToSave},
     verbs::demo::show::show,
 };
 use bevy_playbot::{

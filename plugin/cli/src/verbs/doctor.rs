@@ -2,9 +2,9 @@
 
 use crate::{
     arguments::{default_mode, level_number},
-    error::{CliError, Outcome, print_line},
-    interrupt,
-    interrupt::NothingToSave,
+    error::{CliError, Outcome},
+    output::print_line,
+    progress::{interrupt, interrupt::NothingToSave},
 };
 use playbot_harness::{
     doctor::{DoctorOptions, examine},

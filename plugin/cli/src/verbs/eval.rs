@@ -7,10 +7,10 @@ use crate::{
         first_levels, name_in_list, open, player,
         player::{LoadedPlayer, MeasuredLevels, action_draw, check_run_of, check_skills},
     },
-    error::{CliError, Outcome, print_line},
-    interrupt,
-    interrupt::NothingToSave,
-    plot::Footprints,
+    error::{CliError, Outcome},
+    output::print_line,
+    pictures::plot::Footprints,
+    progress::{interrupt, interrupt::NothingToSave},
 };
 use bevy_playbot::vision::{ObservationConfig, ObservationKind};
 use playbot_harness::{

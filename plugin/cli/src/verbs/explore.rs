@@ -1,17 +1,19 @@
 //! `playbot explore`.
 //!
-//! - `talents`: the explorers that a user can ask for.
+//! - `explorer`: the explorers that a user can ask for.
 //! - `recorded`: recording of a path that was found.
 
+mod explorer;
 mod recorded;
-mod talents;
 
 use crate::{
     arguments::{Compute, first_levels},
-    error::{CliError, Outcome, print_line},
-    interrupt, output,
-    plot::PlotFile,
+    error::{CliError, Outcome},
+    output,
+    output::print_line,
+    pictures::plot::PlotFile,
     progress,
+    progress::interrupt,
     verbs::explore::recorded::{RecordingFile, chart},
 };
 use bevy_playbot::vision::ObservationConfig;
@@ -28,7 +30,7 @@ use playbot_test::explore::{
 use serde_json::json;
 use std::{ops::ControlFlow, path::PathBuf};
 
-pub use crate::verbs::explore::talents::Talents;
+pub use crate::verbs::explore::explorer::ExplorerSetup;
 
 /// Explore a level without training: print the reachable cells and the actions that lead there.
 ///
@@ -104,10 +106,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let split = level(game, args.level.as_ref())?;
     split.check(game)?;
     let device = args.compute.device();
-    let Talents { explorer, observation_config } = match (&args.skills, &args.policy) {
-        (Some(path), _) => Talents::skills(path, game, games, device)?,
-        (None, Some(path)) => Talents::policy(path, game, device)?,
-        (None, None) => Talents::none(),
+    let ExplorerSetup { explorer, observation_config } = match (&args.skills, &args.policy) {
+        (Some(path), _) => ExplorerSetup::skills(path, game, games, device)?,
+        (None, Some(path)) => ExplorerSetup::policy(path, game, device)?,
+        (None, None) => ExplorerSetup::none(),
     };
     let plan = plan(&args, &split, explorer, observation_config);
     plan.check(game)?;

@@ -2,10 +2,11 @@
 
 use crate::{
     arguments::{first_levels, player::LoadedPlayer},
-    error::{CliError, Outcome, print_line},
+    error::{CliError, Outcome},
     output,
+    output::{print_line, program},
     pictures::{Screen, to_png},
-    program, progress,
+    progress,
 };
 use bevy::prelude::*;
 use bevy_playbot::{

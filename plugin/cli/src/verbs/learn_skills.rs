@@ -5,11 +5,9 @@ use crate::{
         Compute,
         experiment::{ExperimentArgs, Options, in_words, option, quoted},
     },
-    console::Console,
-    error::{CliError, Outcome, print_line},
-    interrupt,
-    output::prepare,
-    program,
+    error::{CliError, Outcome},
+    output::{prepare, print_line, program},
+    progress::{console::Console, interrupt},
 };
 use playbot_harness::games::Games;
 use playbot_learner::{SkillMetrics, SkillModel};

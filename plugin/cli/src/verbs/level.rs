@@ -2,9 +2,9 @@
 
 use crate::{
     arguments::{LevelsArg, default_mode},
-    error::{CliError, Outcome, print_line},
-    plot,
-    plot::PlotFile,
+    error::{CliError, Outcome},
+    output::print_line,
+    pictures::{plot, plot::PlotFile},
 };
 use playbot_harness::{
     game::Game,

@@ -1,20 +1,17 @@
 //! `playbot play`.
 //!
-//! The folder, in reading order:
-//!
-//! - `window`: `playbot play` in a program that was built with a window.
-//! - `no_window`: `playbot play` in a program without the window feature.
+//! The folder: `window`, the verb in a program that was built with a window.
 
-#[cfg(not(feature = "window"))]
-pub(crate) mod no_window;
 #[cfg(feature = "window")]
 mod window;
 
 use crate::arguments::{OverwriteArgs, player::PlayerArgs};
+#[cfg(not(feature = "window"))]
+use crate::error::{CliError, Outcome};
+#[cfg(not(feature = "window"))]
+use playbot_harness::games::Games;
 use std::path::PathBuf;
 
-#[cfg(not(feature = "window"))]
-pub use crate::verbs::play::no_window::{no_window, run};
 #[cfg(feature = "window")]
 pub use crate::verbs::play::window::run;
 
@@ -65,4 +62,21 @@ pub struct Args {
     /// The autopilot, which takes over with Tab.
     #[command(flatten)]
     autopilot: PlayerArgs,
+}
+
+/// Returns the error of a program without a window, with the command that builds one.
+#[cfg(not(feature = "window"))]
+pub fn run(_: Args, _: &Games) -> Result<Outcome, CliError> {
+    Err(no_window())
+}
+
+/// Returns the error of a program without a window, with the command that builds one.
+#[cfg(not(feature = "window"))]
+pub fn no_window() -> CliError {
+    CliError::Usage(
+        "this program was built without a window: it needs the feature `window` of `playbot` (in your own Cargo.toml, \
+         `features = [\"window\"]` of that dependency; for the program `playbot`, `--features window` behind `cargo build` or \
+         `cargo install`), and no system packages"
+            .to_owned(),
+    )
 }

@@ -7,10 +7,9 @@ use crate::{
         open,
         player::{check_run_of, check_skills, seen_by_run},
     },
-    error::{CliError, Outcome, print_line},
+    error::{CliError, Outcome},
     output,
-    output::prepare,
-    program,
+    output::{prepare, print_line, program},
 };
 use bevy_playbot::{engine::policy_observation, policy_file::check_policy};
 use clap::ArgGroup;

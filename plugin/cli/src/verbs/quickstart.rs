@@ -10,9 +10,9 @@ use crate::{
         experiment::{ExperimentArgs, option},
         player, revision,
     },
-    console::Console,
-    error::{CliError, Outcome, print_line},
-    interrupt, program,
+    error::{CliError, Outcome},
+    output::{print_line, program},
+    progress::{console::Console, interrupt},
     verbs::{learn_skills, quickstart::report::write_report, train::report_length},
 };
 use bevy_playbot::policy::ActionDraw;

@@ -6,7 +6,8 @@ use crate::{
         player::{LoadedPlayer, PlayerArgs},
     },
     error::{CliError, Outcome},
-    interrupt, progress,
+    progress,
+    progress::interrupt,
 };
 use bevy_playbot::{demo::recorder::Recorder, engine::flush_unfinished};
 use playbot_harness::{demo::demonstration::DemonstrationPlan, game::Game, games::Games, prelude::*, split::HeldOut};

@@ -4,17 +4,17 @@
 //!
 //! - `picture`: pictures of a finding: its last tick, or an animation.
 //! - `window`: window of a finding.
-//! - `no_window`: `playbot replay --window` in a program without the window feature.
 
-#[cfg(not(feature = "window"))]
-mod no_window;
 mod picture;
 #[cfg(feature = "window")]
 mod window;
 
 use crate::{
-    error::{CliError, Outcome, print_line},
-    interrupt, output, program, progress,
+    error::{CliError, Outcome},
+    output,
+    output::{print_line, program},
+    progress,
+    progress::interrupt,
     verbs::replay::picture::Pictures,
 };
 use playbot_harness::{
@@ -29,7 +29,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 #[cfg(not(feature = "window"))]
-use crate::verbs::replay::no_window::show;
+use crate::verbs::play::no_window;
 #[cfg(feature = "window")]
 use crate::verbs::replay::window::show;
 
@@ -253,4 +253,10 @@ pub(crate) fn write_shorter(
     output::make_folder_of(out)?;
     shorter.finding.clone().with_level_of(stored).write(out)?;
     Ok(shorter)
+}
+
+/// Returns the error of a program without a window, with the command that builds one, and options that need none.
+#[cfg(not(feature = "window"))]
+fn show(_: &dyn Game, _: &StoredFinding) -> Result<(), CliError> {
+    Err(CliError::Usage(format!("{}; --png FILE and --apng FILE draw the finding without one", no_window())))
 }

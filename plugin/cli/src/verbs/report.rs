@@ -2,10 +2,10 @@
 
 use crate::{
     arguments::open,
-    error::{CliError, Outcome, print_line},
+    error::{CliError, Outcome},
     output,
-    plot::PlotFile,
-    program,
+    output::{print_line, program},
+    pictures::plot::PlotFile,
     verbs::test::{Results, report_results},
 };
 use playbot_harness::games::Games;

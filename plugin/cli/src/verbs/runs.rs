@@ -9,8 +9,8 @@ mod compare;
 mod show;
 
 use crate::{
-    error::{CliError, Outcome, print_line},
-    program,
+    error::{CliError, Outcome},
+    output::{print_line, program},
 };
 use playbot_harness::{games::Games, sealed_file::write_atomically};
 use playbot_report::{PlainTable, percent, readable, whole};

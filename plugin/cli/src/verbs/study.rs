@@ -6,9 +6,11 @@ use crate::{
         experiment::{ExperimentArgs, Options, in_words, quoted, report_unread, sets_key},
         revision,
     },
-    console::Console,
-    error::{CliError, Outcome, print_line},
-    interrupt, output, program, progress,
+    error::{CliError, Outcome},
+    output,
+    output::{print_line, program},
+    progress,
+    progress::{console::Console, interrupt},
     verbs::learn_skills,
 };
 use bevy_playbot::unknown_name::UnknownName;

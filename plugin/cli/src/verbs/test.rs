@@ -13,7 +13,8 @@ mod testers;
 use crate::{
     arguments::{Compute, default_held_out, first_levels},
     error::{CliError, Outcome},
-    interrupt, progress,
+    progress,
+    progress::interrupt,
     verbs::test::{
         regress::{DetectorArgs, RegressArgs, forget_slow_ticks, list_detectors, report_slow_ticks},
         testers::TesterArgs,

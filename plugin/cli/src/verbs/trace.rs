@@ -2,7 +2,8 @@
 
 use crate::{
     arguments::LevelsArg,
-    error::{CliError, Outcome, print_line},
+    error::{CliError, Outcome},
+    output::print_line,
 };
 use clap::ArgGroup;
 use playbot_harness::{

@@ -10,9 +10,9 @@ use crate::{
         experiment::{ExperimentArgs, Options, in_words, option, sets_key},
         open, revision,
     },
-    console::Console,
     error::{CliError, Outcome},
-    interrupt, program,
+    output::program,
+    progress::{console::Console, interrupt},
     verbs::train::repeated::resumed,
 };
 use bevy_playbot::unknown_name::UnknownName;

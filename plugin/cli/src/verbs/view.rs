@@ -10,13 +10,14 @@ use crate::{
         player::{LoadedPlayer, PlayerArgs},
     },
     error::{CliError, Outcome},
-    interrupt, output,
+    output,
     pictures::{
         Film,
         caption::{NumberBars, Reach},
         episode_world::{EpisodeStep, EpisodeWorld},
     },
     progress,
+    progress::interrupt,
     verbs::view::written_picture::WrittenPicture,
 };
 use bevy_playbot::{

@@ -1,6 +1,6 @@
 //! The person's camera: the bots' square view, enlarged, with the player in the middle.
 
-use crate::window::seats::Seats;
+use crate::window::deciders::Deciders;
 use bevy::{
     camera::{ScalingMode, Viewport},
     prelude::*,
@@ -70,9 +70,12 @@ fn spawn_camera(zoom: Res<Zoom>, mut commands: Commands) {
     commands.spawn((WindowCamera, Camera2d, Projection::Orthographic(projection), Msaa::Off));
 }
 
-fn follow(seats: Res<Seats>, mut camera: ParamSet<(TransformHelper, Single<&mut Transform, With<WindowCamera>>)>) {
+fn follow(
+    deciders: Res<Deciders>,
+    mut camera: ParamSet<(TransformHelper, Single<&mut Transform, With<WindowCamera>>)>,
+) {
     // Until the first level is drawn the agent may have no position.
-    let Ok(at) = camera.p0().compute_global_transform(seats.agent) else { return };
+    let Ok(at) = camera.p0().compute_global_transform(deciders.agent) else { return };
     let at = at.translation();
     let mut camera = camera.p1();
     camera.translation.x = at.x;

@@ -3,7 +3,7 @@
 //! Between two frames the window system writes its messages into empty lists, while those of the game are stashed. This
 //! keeps the person's input apart from virtual input, message by message.
 
-use crate::window::seats::OwnKeys;
+use crate::window::deciders::OwnKeys;
 use bevy::{
     input::{
         InputSystems,

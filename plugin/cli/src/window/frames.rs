@@ -4,11 +4,10 @@
 //! recording would lack that.
 
 use crate::window::{
+    deciders::{Deciders, OwnKeys},
     devices,
     devices::Devices,
-    ending, keys,
-    seats::{OwnKeys, Seats},
-    title,
+    ending, keys, title,
     title::Pace,
 };
 use bevy::{
@@ -110,7 +109,7 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
 
 /// Opens the devices to the game where a person plays without bindings, and keeps them otherwise.
 fn choose_devices(world: &mut World) {
-    let agent = world.resource::<Seats>().agent;
+    let agent = world.resource::<Deciders>().agent;
     let is_person = world.get::<Control>(agent) == Some(&Control::Human);
     let is_open = is_person && world.get::<KeyBindings>(agent).is_none();
     devices::set(world, if is_open { Devices::Open } else { Devices::Kept });

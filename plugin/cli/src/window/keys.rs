@@ -3,8 +3,8 @@
 use crate::window::{
     Playlist,
     camera::Zoom,
+    deciders::{Deciders, OwnKeys, OwnKeysRead},
     ending::Ending,
-    seats::{OwnKeys, OwnKeysRead, Seats},
     title::{Notice, Pace},
 };
 use bevy::{
@@ -39,15 +39,15 @@ pub(super) fn excuse_view(app: &mut App) {
 /// Hands over to the autopilot and back with Tab.
 fn hand_over(
     keys: Res<OwnKeys>,
-    seats: Res<Seats>,
+    deciders: Res<Deciders>,
     mut agents: Query<(&mut Control, &mut ActiveSkill)>,
     mut notice: ResMut<Notice>,
 ) {
-    let Ok((mut control, mut skill)) = agents.get_mut(seats.agent) else { return };
+    let Ok((mut control, mut skill)) = agents.get_mut(deciders.agent) else { return };
     if !keys.just_pressed(KeyCode::Tab) || !control.is_active() {
         return;
     }
-    match seats.other(*control) {
+    match deciders.other(*control) {
         Some(other) => {
             *control = other;
             // A skill that was drawn for another state does not fit this one.
@@ -75,7 +75,7 @@ fn leave_level(world: &mut World) {
     if let Err(error) = flush_unfinished(world) {
         world.resource_mut::<Faults>().report(error.to_string());
     }
-    let (agent, queue) = (world.resource::<Seats>().agent, world.resource::<Playlist>().queue());
+    let (agent, queue) = (world.resource::<Deciders>().agent, world.resource::<Playlist>().queue());
     let mut agent = world.entity_mut(agent);
     agent.insert(queue);
     if let Some(mut episode) = agent.get_mut::<Episode>() {

@@ -1,6 +1,6 @@
 //! The order of the levels in a window, and the result of the last episode.
 
-use crate::window::seats::Seats;
+use crate::window::deciders::Deciders;
 use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
 use playbot_harness::prelude::*;
@@ -66,14 +66,14 @@ fn note_end(
     event: On<EpisodeEnded>,
     mut last: ResMut<LastEpisode>,
     mut playlist: ResMut<Playlist>,
-    seats: Res<Seats>,
+    deciders: Res<Deciders>,
     mut queues: Query<&mut LevelQueue>,
 ) {
     last.0 = Some(event.result);
     if event.success {
         playlist.advance();
     }
-    if let Ok(mut queue) = queues.get_mut(seats.agent) {
+    if let Ok(mut queue) = queues.get_mut(deciders.agent) {
         *queue = playlist.queue();
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::window::{
     camera::Zoom,
-    seats::{OwnKeys, OwnKeysRead, Seats},
+    deciders::{Deciders, OwnKeys, OwnKeysRead},
 };
 use bevy::{
     camera::RenderTarget, core_pipeline::tonemapping::Tonemapping, prelude::*, transform::helper::TransformHelper,
@@ -58,12 +58,12 @@ fn choose(solid: Res<Solid>, mut cameras: Query<(&mut Camera, &RenderTarget, Has
 
 fn follow(
     clock: Res<Time<Real>>,
-    seats: Res<Seats>,
+    deciders: Res<Deciders>,
     zoom: Res<Zoom>,
     focuses: Query<&CameraFocus>,
     mut set: ParamSet<(TransformHelper, Single<(&mut SolidCamera, &mut Transform)>)>,
 ) {
-    let Ok(focus) = focuses.get(seats.agent) else { return };
+    let Ok(focus) = focuses.get(deciders.agent) else { return };
     let Ok(at) = set.p0().compute_global_transform(focus.0) else { return };
     let (mut camera, mut transform) = set.p1().into_inner();
     let at = at.translation();

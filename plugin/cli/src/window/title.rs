@@ -1,6 +1,6 @@
 //! The window's title: level, tick, decider and state of the game.
 
-use crate::window::{Playlist, playlist::LastEpisode, seats::Seats};
+use crate::window::{Playlist, deciders::Deciders, playlist::LastEpisode};
 use bevy::{
     app::{RunFixedMainLoop, RunFixedMainLoopSystems},
     ecs::schedule::ScheduleLabel,
@@ -62,15 +62,15 @@ fn write_title(
     playlist: Res<Playlist>,
     (pace, last, notice): (Res<Pace>, Res<LastEpisode>, Res<Notice>),
     recorder: Option<Res<Recorder>>,
-    seats: Res<Seats>,
+    deciders: Res<Deciders>,
     agents: Query<(&Control, &Episode)>,
     mut window: Single<&mut Window, With<PrimaryWindow>>,
 ) {
-    let Ok((control, episode)) = agents.get(seats.agent) else { return };
+    let Ok((control, episode)) = agents.get(deciders.agent) else { return };
     let mut parts = vec![
         format!("{} {} {}", game.0, playlist.mode(), episode.level),
         format!("tick {}", episode.tick),
-        seats.who(*control),
+        deciders.decider_name(*control),
         format!("return {}", to_cents(episode.total_reward)),
     ];
     parts.extend(last.words());

@@ -1,19 +1,16 @@
 //! Comparison with earlier results, separating changes from noise.
-//!
-//! - `common_levels`: check for common levels of two tests.
 
-mod common_levels;
 #[cfg(test)]
 mod tests;
 
 use crate::verdict::{
-    LevelVerdict, TesterVerdict,
-    compare::common_levels::{may_have_common_levels, no_common_level},
+    LevelVerdict, Shard, TesterVerdict,
     error::TestError,
     plan::TestRecord,
     results::ResultLines,
     statistics::{Trials, benjamini_hochberg, fisher_exact},
 };
+use playbot_harness::level_files::is_level_files;
 use serde::Serialize;
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -293,6 +290,32 @@ fn comparable(before: &Path, record: &TestRecord) -> Result<Comparable, TestErro
         (false, _) => differences,
     };
     Err(TestError::Incomparable { folder: before.into(), differences })
+}
+
+/// Returns whether they may have common levels, judged by their ranges: the files of other patterns are known from
+/// results only.
+fn may_have_common_levels(before: &TestRecord, now: &TestRecord) -> bool {
+    if is_level_files(&before.range.mode) && is_level_files(&now.range.mode) {
+        return true;
+    }
+    let shard = now.shard.unwrap_or(Shard { index: 0, count: 1 });
+    let mut levels = shard.places(now.range.len()).map(|place| now.range.first + place);
+    before.range.mode == now.range.mode && levels.any(|level| has(before, level))
+}
+
+/// Returns whether a level of the mode is tested.
+fn has(record: &TestRecord, level: u64) -> bool {
+    let is_mine = |shard: Shard| (level - record.range.first) % shard.count == shard.index;
+    (record.range.first..=record.range.last).contains(&level) && record.shard.is_none_or(is_mine)
+}
+
+/// Describes the lack of a common level.
+fn no_common_level(before: &TestRecord, now: &TestRecord) -> String {
+    let levels = |record: &TestRecord| match record.shard {
+        Some(shard) => format!("shard {shard} of {}", record.range),
+        None => record.range.to_string(),
+    };
+    format!("no level is in {} and in {}", levels(before), levels(now))
 }
 
 /// Returns the names of the detectors that differ between both.

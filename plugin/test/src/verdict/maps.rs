@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn of_many_names_a_few_are_told() {
+    fn of_many_names_a_few_are_reported() {
         let none = found(r#"{"a": 1, "b": 1, "c": 1, "d": 1, "e": 1, "f": 1}"#);
         assert_eq!((none.with, none.others.len()), (0, 6));
         assert!(none.to_string().ends_with("no level of this test: a, b, c, d, e and 1 more"), "{none}");

@@ -158,7 +158,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_that_nobody_has_played_take_no_time() {
+    fn numbers_without_an_episode_take_no_time() {
         let p = |a, n, b, m| fisher_exact(Trials { successes: a, trials: n }, Trials { successes: b, trials: m });
         assert_eq!((p(u64::MAX, u64::MAX, 0, 4), p(5, 4, 0, 4), p(0, u64::MAX, 7, 9)), (1.0, 1.0, 1.0));
         let half = MOST_TRIALS / 2;

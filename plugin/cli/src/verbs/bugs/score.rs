@@ -2,8 +2,11 @@
 
 use crate::{
     arguments::{Compute, experiment::quoted},
-    error::{CliError, Outcome, print_line},
-    interrupt, output, program, progress,
+    error::{CliError, Outcome},
+    output,
+    output::{print_line, program},
+    progress,
+    progress::interrupt,
     verbs::bugs::testers::ContestantArgs,
 };
 use playbot_harness::{game::Game, games::Games};

@@ -6,7 +6,7 @@ use crate::{
         player::{LoadedPlayer, action_draw},
     },
     error::CliError,
-    verbs::explore::Talents,
+    verbs::explore::ExplorerSetup,
 };
 use bevy_playbot::{policy::ActionDraw, unknown_name::UnknownName};
 use playbot_harness::{
@@ -116,14 +116,14 @@ impl ContestantArgs {
             if named.is_some_and(|(name, _)| name != game.name()) {
                 continue;
             }
-            match Talents::skills(path, *game, games, device) {
-                Ok(talents) => {
+            match ExplorerSetup::skills(path, *game, games, device) {
+                Ok(setup) => {
                     let record = ContestantRecord {
                         checksum: Some(file_checksum(path)?),
                         skilled: true,
                         ..ContestantRecord::bot(EXPLORE_SKILLS)
                     };
-                    let (means, observation_config) = (Means::Explores(talents.explorer), talents.observation_config);
+                    let (means, observation_config) = (Means::Explores(setup.explorer), setup.observation_config);
                     testers.push(Contestant { record, means, observation_config });
                     has_game = true;
                 }

@@ -2,8 +2,9 @@
 
 use crate::{
     arguments::open,
-    error::{CliError, Outcome, print_line},
+    error::{CliError, Outcome},
     output,
+    output::print_line,
 };
 use bevy_playbot::{
     demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoReader, EpisodeActions},

@@ -3,7 +3,8 @@
 use crate::{
     arguments::{default_mode, level_number, player::LoadedPlayer},
     error::{CliError, Outcome},
-    interrupt, program,
+    output::program,
+    progress::interrupt,
     verbs::{demo::deciders, play::Args},
     window::{Autopilot, GameWindow, Playlist, WindowSetup},
 };

@@ -7,9 +7,9 @@ use crate::{
         Film,
         caption::{NumberBars, Reach},
         episode_world::{EpisodeStep, EpisodeWorld},
+        plot,
+        plot::PlotFile,
     },
-    plot,
-    plot::PlotFile,
     progress,
 };
 use bevy_playbot::{

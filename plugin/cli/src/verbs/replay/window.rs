@@ -2,7 +2,7 @@
 
 use crate::{
     error::CliError,
-    interrupt,
+    progress::interrupt,
     window::{GameWindow, Playlist, WindowError, WindowSetup},
 };
 use bevy_playbot::vision::ObservationConfig;

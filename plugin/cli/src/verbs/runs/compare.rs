@@ -1,8 +1,9 @@
 //! `playbot runs compare`.
 
 use crate::{
-    error::{CliError, Outcome, print_line},
+    error::{CliError, Outcome},
     output,
+    output::print_line,
     verbs::runs::write_plot,
 };
 use playbot_report::{Chart, Curve, PlainTable, readable, readable_with_spread, statistics::mean_and_sd, whole};

@@ -2,8 +2,9 @@
 
 use crate::{
     arguments::default_experiment_of,
-    error::{CliError, Outcome, print_line},
+    error::{CliError, Outcome},
     output,
+    output::print_line,
     verbs::runs::{UNKNOWN, age_s, duration, to_json, write_plot},
 };
 use playbot_harness::games::Games;

@@ -1,8 +1,10 @@
 //! Replay of stored findings, and detectors on the command line.
 
 use crate::{
-    error::{CliError, Outcome, print_line},
-    interrupt, progress,
+    error::{CliError, Outcome},
+    output::print_line,
+    progress,
+    progress::interrupt,
 };
 use playbot_harness::{game::Game, games::Games, split::LevelSplit};
 use playbot_report::{PlainTable, counted};

@@ -1,8 +1,9 @@
 //! Report of results, and the files that go with them.
 
 use crate::{
-    error::{CliError, Outcome, print_line},
-    output, program,
+    error::{CliError, Outcome},
+    output,
+    output::{print_line, program},
 };
 use playbot_harness::{brief::shell_word, game::Game};
 use playbot_report::{PlainTable, counted, ticks, whole};

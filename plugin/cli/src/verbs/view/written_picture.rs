@@ -1,6 +1,6 @@
 //! Report of a written picture.
 
-use crate::error::{CliError, print_line};
+use crate::{error::CliError, output::print_line};
 use bevy_playbot::{
     demo::replay::Divergence,
     episode::{EpisodeEnd, EpisodeEnded},

@@ -81,7 +81,7 @@ fn chance_gives_no_alarm_and_what_is_more_does() {
 }
 
 #[test]
-fn a_new_proof_and_a_new_finding_are_always_told() {
+fn a_new_proof_and_a_new_finding_are_always_reported() {
     let why = "walled in".to_owned();
     let finding = |tester: Option<&str>| Finding {
         detector: "panic".to_owned(),
@@ -177,4 +177,28 @@ fn earlier_results_with_a_flipped_bit_are_refused_before_anybody_plays() {
         let is_of_file = matches!(error, TestError::Damaged { .. } | TestError::Io { .. });
         assert!(is_of_file && error.to_string().contains(RESULTS), "bit {at}: {error}");
     }
+}
+
+fn sharded((range, shard): (&str, Option<&str>)) -> TestRecord {
+    TestRecord {
+        range: range.parse().expect("a split"),
+        shard: shard.map(|shard| shard.parse().expect("a shard")),
+        ..record(&["random"])
+    }
+}
+
+#[test]
+fn ranges_and_shards_without_a_common_level_are_reported() {
+    let may =
+        |one: (&str, Option<&str>), other: (&str, Option<&str>)| may_have_common_levels(&sharded(one), &sharded(other));
+    assert!(may(("hard:0..9", None), ("hard:9..20", None)));
+    assert!(!may(("hard:0..9", None), ("hard:10..20", None)));
+    assert!(!may(("hard:0..9", None), ("easy:0..9", None)));
+    assert!(may(("hard:0..9", Some("0/2")), ("hard:0..9", None)));
+    assert!(!may(("hard:0..9", Some("0/2")), ("hard:0..9", Some("1/2"))));
+    assert!(may(("hard:0..9", Some("0/2")), ("hard:1..9", Some("1/2"))), "1 + 1 is in both");
+    assert!(may(("files:a/*.json:0..3", None), ("files:a/b.json:0..0", None)), "it is not known yet");
+    assert!(!may(("files:a/*.json:0..3", None), ("hard:0..3", None)));
+    let words = no_common_level(&sharded(("hard:0..9", Some("0/2"))), &sharded(("easy:3..4", None)));
+    assert_eq!(words, "no level is in shard 0/2 of hard:0..9 and in easy:3..4");
 }

@@ -53,7 +53,7 @@ macro_rules! report {
     ($($words:tt)*) => {{
         use std::io::Write as _;
         let words = format!($($words)*);
-        let _ = writeln!(std::io::stderr().lock(), "{}", $crate::messages::for_people(&words));
+        let _ = writeln!(std::io::stderr().lock(), "{}", $crate::output::messages::for_people(&words));
     }};
 }
 
@@ -62,7 +62,7 @@ macro_rules! begin_report {
     ($($words:tt)*) => {{
         use std::io::Write as _;
         let words = format!($($words)*);
-        let _ = write!(std::io::stderr().lock(), "{}", $crate::messages::for_people(&words));
+        let _ = write!(std::io::stderr().lock(), "{}", $crate::output::messages::for_people(&words));
     }};
 }
 

@@ -6,7 +6,7 @@
 
 use crate::{
     arguments::default_mode,
-    program::{DEFAULT_NAME, with_name},
+    output::program::{DEFAULT_NAME, with_name},
     verbs::level::shows_levels,
 };
 use clap::{Arg, Command};

@@ -1,7 +1,12 @@
 //! The observer of the command line: progress bars and messages for trainings, and Ctrl-C to stop them.
 
-use crate::{arguments::player::report_clipped, error::CliError, interrupt, interrupt::NothingToSave, progress};
+use crate::{
+    error::CliError,
+    progress,
+    progress::{interrupt, interrupt::NothingToSave},
+};
 use indicatif::ProgressBar;
+use playbot_harness::eval::EvalSummary;
 use playbot_learner::SkillMetrics;
 use playbot_report::{counted, whole};
 use playbot_train::{
@@ -202,4 +207,16 @@ fn speed_and_return(report: &UpdateReport, steps_per_update: u64) -> String {
     let sps = steps_per_update as f64 / (report.timing.collect_s + report.timing.learn_s);
     let current = report.episodic_return.map_or("-".to_owned(), |value| format!("{value:.2}"));
     format!("{sps:.0} steps/s, return {current}")
+}
+
+/// Reports it if actions of a measured player were clipped.
+pub(crate) fn report_clipped(summary: &EvalSummary) {
+    if summary.clipped > 0.0 {
+        report!(
+            "{} on {}: {:.1} % of the actions lay outside the game's range and were clipped",
+            summary.method,
+            summary.split,
+            100.0 * summary.clipped
+        );
+    }
 }

@@ -14,13 +14,13 @@ pub struct Autopilot {
 /// The agent of the window and its deciders.
 #[derive(Resource, Clone, Debug, Reflect)]
 #[reflect(Resource)]
-pub(super) struct Seats {
+pub(super) struct Deciders {
     /// The agent.
     pub agent: Entity,
     autopilot: Option<(String, Control)>,
 }
 
-impl Seats {
+impl Deciders {
     /// Prepares the agent for the autopilot; no decider is set yet.
     pub fn new(game: &dyn Game, world: &mut World, agent: Entity, autopilot: Option<Autopilot>) -> Self {
         let autopilot = autopilot.map(|Autopilot { name, player }| {
@@ -37,7 +37,7 @@ impl Seats {
     }
 
     /// Names the decider.
-    pub fn who(&self, control: Control) -> String {
+    pub fn decider_name(&self, control: Control) -> String {
         match (&self.autopilot, control) {
             (_, Control::Human) => "you play".to_owned(),
             (Some((name, autopilot)), control) if *autopilot == control => format!("{name} plays"),

@@ -15,12 +15,12 @@ use playbot_test::explore::Explorer;
 use std::path::Path;
 
 /// An explorer and its observation.
-pub struct Talents {
+pub struct ExplorerSetup {
     pub explorer: Explorer,
     pub observation_config: ObservationConfig,
 }
 
-impl Talents {
+impl ExplorerSetup {
     /// Returns an explorer with random actions.
     pub fn none() -> Self {
         Self { explorer: Explorer::Random, observation_config: ObservationConfig::default() }

@@ -1,6 +1,6 @@
-//! The log on standard error.
+//! The log on standard error, and libraries that write there by themselves.
 
-use crate::messages::for_people;
+use crate::output::messages::for_people;
 use std::{
     collections::BTreeSet,
     fmt,
@@ -125,6 +125,25 @@ impl Visit for Message {
             self.0 = format!("{value:?}");
         }
     }
+}
+
+/// Restarts the program, as the same process, with Mesa's choice among devices switched off, if there is no folder of a
+/// desktop session. The choice asks a Wayland desktop first, whose library then complains on standard error, several
+/// times. wgpu chooses by itself, so nothing is lost.
+///
+/// The layer reads the environment of the process, which a program cannot change in itself without unsafe code.
+#[cfg(all(target_os = "linux", feature = "camera"))]
+pub(crate) fn silence_mesa() {
+    use std::{env, os::unix::process::CommandExt, path::Path, process::Command};
+    const SWITCH: &str = "NODEVICE_SELECT";
+    let has_session = env::var_os("XDG_RUNTIME_DIR").is_some_and(|folder| Path::new(&folder).is_absolute());
+    if has_session || env::var_os(SWITCH).is_some() {
+        return;
+    }
+    let mut args = env::args_os();
+    let (Some(name), Ok(program)) = (args.next(), env::current_exe()) else { return };
+    // It returns only if it fails; the program goes on, with Mesa's warnings.
+    let _ = Command::new(program).arg0(name).args(args).env(SWITCH, "1").exec();
 }
 
 #[cfg(test)]
