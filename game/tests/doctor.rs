@@ -46,7 +46,7 @@ fn a_seed_alone_is_the_level_too_for_one_more_version() {
 }
 
 #[test]
-fn a_type_to_ignore_that_is_none_is_told() {
+fn an_unknown_type_to_ignore_is_reported() {
     let (text, _) = doctor(&["coinrun", "--ticks", "2", "--json"], 0);
     let report: Value = serde_json::from_str(text.trim_end()).expect("one line of JSON");
     let known = report["types"]["compared"][0].as_str().expect("a type");

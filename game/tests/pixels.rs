@@ -18,7 +18,7 @@ const EXPERIMENT: &str = r#"(
 )"#;
 
 #[test]
-fn the_program_learns_from_pixels_and_knows_its_eyes_again() {
+fn the_program_learns_from_pixels_and_knows_its_sensor_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     std::fs::write(folder.join("small.ron"), EXPERIMENT).expect("writable");
@@ -96,7 +96,7 @@ fn the_experiments_of_the_repository_are_sound() {
 
 #[cfg(feature = "screen")]
 #[test]
-fn the_two_eyes_are_compared_and_the_worst_frame_is_drawn() {
+fn the_two_sensors_are_compared_and_the_worst_frame_is_drawn() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     let eyes = ["eyes", "coinrun", "--levels", "hard:0..3", "--frames", "4", "--size", "48"];

@@ -152,7 +152,7 @@ mod tests {
     struct Heard(Vec<String>);
 
     #[test]
-    fn a_fault_that_nobody_takes_is_logged_as_an_error_beside_its_event() {
+    fn a_fault_that_is_not_taken_is_logged_as_an_error_beside_its_event() {
         let mut world = World::new();
         world.init_resource::<Faults>();
         world.init_resource::<Heard>();
@@ -170,6 +170,6 @@ mod tests {
         assert_eq!(log.lines(), ["agent 0: something is wrong"]);
         assert_eq!(world.resource::<Heard>().0, log.lines());
         report(&mut world, true, "agent 0: another agent is reported");
-        assert_eq!(log.lines().len(), 1, "whoever ticks the World gets this one");
+        assert_eq!(log.lines().len(), 1, "the caller that ticks the World gets this one");
     }
 }

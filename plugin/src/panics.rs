@@ -111,10 +111,10 @@ thread_local! {
 fn hear_panics() {
     static HOOK: Once = Once::new();
     HOOK.call_once(|| {
-        let usual = take_hook();
+        let default_hook = take_hook();
         set_hook(Box::new(move |panic| {
             if !GUARDED.get() {
-                return usual(panic);
+                return default_hook(panic);
             }
             let words = panic.payload_as_str().unwrap_or("no reason given");
             let place = panic.location().map_or_else(String::new, |place| format!(" ({place})"));

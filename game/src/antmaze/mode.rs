@@ -183,7 +183,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_usual_is_left_out() {
+    fn defaults_are_left_out() {
         let written = |text: &str| text.parse::<AntMazeMode>().expect("a mode").to_string();
         assert_eq!(written("umaze+limit=700+goals=fixed+goal-noise=none"), "umaze");
         assert_eq!(written("medium+limit=700"), "medium+limit=700");

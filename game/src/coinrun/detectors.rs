@@ -207,7 +207,7 @@ mod tests {
     use crate::coinrun::detectors::testing::{Bot, findings, first_named, planted, sound};
 
     #[test]
-    fn names_are_different_and_all_are_usual() {
+    fn names_are_different_and_all_are_defaults() {
         let names: BTreeSet<_> = detectors().iter().map(|detector| detector.name()).collect();
         assert_eq!(names.len(), 5);
         assert!(detectors().iter().all(|detector| detector.is_default()));
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn who_falls_into_ground_that_does_not_hold_is_found_and_who_runs_on_it_is_not() {
+    fn a_fall_into_ground_that_does_not_hold_is_found_and_a_run_on_ground_is_not() {
         assert!(first_named("inside-ground", &planted("missing-collider", 0), Bot::RightJump, 0..60).is_some());
         assert_eq!(first_named("inside-ground", &sound(), Bot::RightJump, 0..40), None);
     }

@@ -128,7 +128,7 @@ fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires
 }
 
 #[test]
-fn what_is_no_finding_is_told() {
+fn a_file_that_is_no_finding_is_reported() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     done(folder, &["record", "coinrun", "--levels", "easy:0..0", "--out", "a.demo"]);

@@ -222,7 +222,7 @@ fn skills_say_how_they_do_on_what_is_held_out() {
 }
 
 #[test]
-fn speed_is_measured_of_the_case_and_for_the_time_that_bench_is_told() {
+fn bench_measures_the_requested_case_for_the_requested_time() {
     let temporary = tempfile::tempdir().expect("a folder");
     let bench = |more: &[&str]| {
         let args = ["bench", "--case", "sim/maze2d", "--arenas", "4", "--threads", "2", "--json"];

@@ -23,7 +23,7 @@ fn prepared() -> tempfile::TempDir {
 }
 
 #[test]
-fn nobody_listening_stops_no_work() {
+fn work_goes_on_without_a_reader() {
     let folder = tempfile::tempdir().expect("a folder");
     let deaf = |args: &[&str]| {
         let full = std::fs::File::create("/dev/full").expect("a disk that is always full");

@@ -85,7 +85,7 @@ proptest! {
 }
 
 #[test]
-fn the_seeds_for_the_test_give_mazes_that_nobody_trained_on() {
+fn the_seeds_for_the_test_give_mazes_outside_the_training() {
     let mazes = |seeds: std::ops::RangeInclusive<u64>| -> BTreeSet<Vec<String>> {
         seeds.map(|seed| generate(&MazeSpec::default(), seed).expect("a maze").to_rows()).collect()
     };

@@ -92,7 +92,7 @@ fn recordings_of_another_game_are_named_and_nothing_is_lost() {
 }
 
 #[test]
-fn recordings_of_another_task_are_told() {
+fn recordings_of_another_task_are_reported() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
     fs::write(folder.join("tiny.ron"), TINY).expect("writable");

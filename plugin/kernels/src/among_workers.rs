@@ -106,7 +106,7 @@ mod tests {
     use rayon::prelude::*;
 
     /// Waits for the updates of other tests in this process.
-    fn nobody_is_awake_in_the_end() -> bool {
+    fn all_sleep_in_the_end() -> bool {
         (0..2000).any(|_| {
             std::thread::park_timeout(Duration::from_millis(5));
             !are_awake()
@@ -125,7 +125,7 @@ mod tests {
         if rayon::current_num_threads() > 1 {
             assert!(waited() > before, "the others waited meanwhile");
         }
-        assert!(nobody_is_awake_in_the_end());
+        assert!(all_sleep_in_the_end());
     }
 
     #[test]
@@ -145,6 +145,6 @@ mod tests {
     #[test]
     fn a_panic_ends_it() {
         let result = std::panic::catch_unwind(|| among_awake_workers(|| panic!("stop")));
-        assert!(result.is_err() && nobody_is_awake_in_the_end());
+        assert!(result.is_err() && all_sleep_in_the_end());
     }
 }

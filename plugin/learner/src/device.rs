@@ -310,11 +310,11 @@ mod tests {
         });
         let heard = HEARD.load(Ordering::Relaxed);
         assert!(catch_unwind(|| panic!("outside")).is_err());
-        assert!(HEARD.load(Ordering::Relaxed) > heard, "whoever listened still does");
+        assert!(HEARD.load(Ordering::Relaxed) > heard, "earlier hooks still run");
     }
 
     #[test]
-    fn what_it_came_from_is_told() {
+    fn the_source_of_an_error_is_reported() {
         let said = "An error happened\nCaused by:\n  An IO error happened\n  skipped `Kernel`: it failed\nCaused by:\n  \
                     can't allocate buffer of size: 268435456\nNo backtrace available\nAsked at:\nNo backtrace available";
         assert_eq!(first_cause(said), "can't allocate buffer of size: 268435456");

@@ -526,7 +526,7 @@ mod columns_tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_told() {
+    fn a_misfit_is_reported() {
         let kind = ObsKind::Vector(2);
         let mut all = Observations::empty(&kind);
         let mut parts = all.columns(&kind, 2, &[1]);

@@ -290,7 +290,7 @@ impl People {
         }
         if people.levels.is_empty() {
             let files: Vec<String> = recordings.iter().map(|path| path.display().to_string()).collect();
-            return Err(CalibrationError::Nobody { files: files.join(", "), left_out: people.left_out() });
+            return Err(CalibrationError::NoPerson { files: files.join(", "), left_out: people.left_out() });
         }
         Ok(people)
     }
@@ -413,7 +413,7 @@ pub enum CalibrationError {
         "no episode of {files} was played by a person to its end{}: record people with `playbot play GAME --record people.demo`",
         why(left_out)
     )]
-    Nobody {
+    NoPerson {
         /// The recordings.
         files: String,
         /// Counts of the episodes that do not count, each in words.

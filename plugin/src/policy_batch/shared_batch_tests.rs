@@ -50,7 +50,7 @@ fn everybody_gets_what_it_would_get_alone() {
 }
 
 #[test]
-fn nobody_waits_for_worlds_that_have_left() {
+fn worlds_that_have_left_are_not_waited_for() {
     let played = play(7, 3, |world| 3 * world);
     assert_eq!(played.iter().map(Vec::len).collect::<Vec<_>>(), [0, 3, 6, 9, 12, 15, 18]);
 }

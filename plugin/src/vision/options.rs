@@ -371,7 +371,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_begins_to_look_in_the_middle_starts_anew() {
+    fn looking_from_the_middle_on_starts_anew() {
         let stack = &mut PictureStack::default();
         assert_eq!(shown(stack, 0, 5, 1), [1; 6]);
         assert_eq!(shown(stack, 2, 9, 2), [2; 6]);

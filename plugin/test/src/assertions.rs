@@ -388,10 +388,7 @@ mod tests {
             tester
         });
         level["testers"] = testers.collect();
-        let finding = |detector: &&str| {
-            let nobody = json!(null);
-            json!({ "detector": detector, "tester": nobody, "episode": nobody, "tick": nobody, "message": "" })
-        };
+        let finding = |detector: &&str| json!({ "detector": detector, "tester": null, "episode": null, "tick": null, "message": "" });
         level["findings"] = found.iter().map(finding).collect();
         serde_json::from_value(level).expect("a verdict")
     }

@@ -404,7 +404,7 @@ mod tests {
     }
 
     #[test]
-    fn who_begins_to_learn_too_late_is_told() {
+    fn a_training_that_begins_too_late_is_reported() {
         let said = |algorithm: &str, steps: u64| {
             let text = format!(
                 r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: {steps}, algorithm: "{algorithm}", demos: "d",
@@ -422,7 +422,7 @@ mod tests {
     }
 
     #[test]
-    fn a_warm_up_that_never_ends_is_told() {
+    fn a_warm_up_that_never_ends_is_reported() {
         let said = |algorithm: &str, steps: u64| {
             let text = format!(
                 r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: {steps}, algorithm: "{algorithm}", demos: "d",

@@ -153,7 +153,7 @@ mod tests {
     }
 
     #[test]
-    fn a_program_that_does_not_end_is_killed_and_what_it_said_is_told() {
+    fn a_program_that_does_not_end_is_killed_and_its_output_is_reported() {
         let mut endless = shell("echo begun; echo in earnest >&2; sleep 1000; echo over");
         let error = output_within(Duration::from_secs(3), &mut endless).expect_err("it does not end");
         let words = error.to_string();

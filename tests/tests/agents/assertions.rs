@@ -215,7 +215,7 @@ fn what_cannot_be_tested_is_a_failure_in_words() {
 }
 
 #[test]
-fn recordings_play_again_or_the_first_tick_that_differs_is_told() {
+fn recordings_play_again_or_the_first_tick_that_differs_is_reported() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("walk.demo");
     record_random(&Corridor, "plain", 3, &path, 0..4);

@@ -101,7 +101,7 @@ fn rewards_for_doing_nothing_are_found() {
 }
 
 #[test]
-fn a_wing_that_nobody_gets_to_is_found() {
+fn a_wing_out_of_reach_is_found() {
     let explore = |game: Defect| {
         // Cells on which an episode ends may not count as reached.
         let settings = ["unreachable-region.steps=3000", "unreachable-region.share=0.4"];

@@ -50,7 +50,7 @@ fn reach(mut episodes: Query<&mut Episode>) {
 }
 
 #[test]
-fn an_aim_that_was_reached_before_time_was_up_is_a_success_and_no_termination() {
+fn a_goal_reached_before_time_was_up_is_a_success_and_no_termination() {
     for (reaches, success, clipped) in [(true, true, 15), (false, false, 0)] {
         let (mut app, agent) = app_with(2, &[1, 1]);
         app.add_systems(FixedPostUpdate, reach.before(PlaybotSystems::Judge).run_if(move || reaches));

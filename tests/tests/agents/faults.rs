@@ -39,7 +39,7 @@ fn an_app_that_runs_by_itself_hears_every_fault_in_its_frame() {
 }
 
 #[test]
-fn whoever_ticks_the_world_gets_the_fault_and_nobody_else_does() {
+fn only_the_caller_that_ticks_the_world_gets_the_fault() {
     let mut app = test_app();
     corridor_plugin(&mut app);
     listen(&mut app);

@@ -220,7 +220,7 @@ fn stored_findings_are_there_or_gone_or_pinned_for_a_while() {
 }
 
 #[test]
-fn whoever_stops_keeps_what_is_known_by_then() {
+fn a_stop_keeps_what_is_known_by_then() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     test(&Corridor, vec![tester("left", 0)], folder, 1);

@@ -255,7 +255,7 @@ fn the_environment_says_what_is_done() {
 }
 
 #[test]
-fn nobody_takes_over_where_somebody_ticks_the_world() {
+fn no_takeover_where_a_caller_ticks_the_world() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("ada.demo");
     let (mut app, _) = build(plugin(Some(TakeoverRequest::Record(path.clone()))));

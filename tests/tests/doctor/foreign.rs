@@ -76,7 +76,7 @@ fn a_resource_that_survives_a_restart_is_named() {
 }
 
 #[test]
-fn a_local_that_survives_a_restart_is_found_in_what_it_moves_and_is_a_usual_cause() {
+fn a_local_that_survives_a_restart_is_found_in_what_it_moves_and_is_a_listed_cause() {
     let (finding, difference, report) = found(CatchFault::EndlessLocal, DoctorComparison::Restart);
     check_that_the_apple_is_named(&difference, &report);
     assert_eq!((finding.causes[0].kind, report.findings.len()), (CauseKind::SurvivesRestart, 1), "{report}");
@@ -105,7 +105,7 @@ fn an_order_of_archetypes_that_decides_is_found() {
 }
 
 #[test]
-fn what_nobody_can_see_is_listed_with_what_to_do_about_it() {
+fn invisible_state_is_listed_with_what_to_do_about_it() {
     let report = examined(&faulty_catch(CatchFault::HiddenMood));
     assert!(report.is_healthy(), "{report}");
     assert!(report.types.not_reflected.iter().any(|path| path.ends_with("::Mood")), "{:?}", report.types);

@@ -85,7 +85,7 @@ fn the_jumper_finishes_levels_that_a_bot_which_only_runs_does_not() {
 
 /// Its steps 3 and 4 by functions, from fewer recordings, in fewer steps.
 #[test]
-fn what_is_trained_finishes_levels_that_nobody_has_played() {
+fn the_trained_bot_finishes_unplayed_levels() {
     let folder = tempfile::tempdir().expect("a folder");
     let demos = folder.path().join("jumper.demo");
     pipeline::record(&runner(), &"default:128..167".parse().expect("levels"), 0.02, &demos).expect("recorded");

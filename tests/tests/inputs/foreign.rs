@@ -89,7 +89,7 @@ fn buttons_join_an_input_that_was_said_as_a_whole() {
 }
 
 #[test]
-fn what_does_not_go_together_is_told() {
+fn settings_that_exclude_each_other_are_reported() {
     let steer = || [ActionAxis::keys([KeyCode::KeyA], [KeyCode::KeyD])];
     let problem = |game: ForeignGame| game.problem().expect("they do not go together");
     for game in [bare().axes(steer()).mouse_buttons([vec![MouseButton::Left]]), mouse(bare()).axes(steer())] {

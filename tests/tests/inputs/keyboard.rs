@@ -83,7 +83,7 @@ fn the_frame_rate_changes_nothing() {
 }
 
 #[test]
-fn keys_move_nobody_but_people() {
+fn keys_move_only_people() {
     let (mut app, agent) = corridor(1);
     app.world_mut().entity_mut(agent).insert((Control::Bot, BlindBot::Constant(ActionValue::Discrete(STAY))));
     key(&mut app, KeyCode::ArrowRight, ButtonState::Pressed);

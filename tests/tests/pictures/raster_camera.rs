@@ -18,7 +18,7 @@ use playbot_games::{
 use playbot_tests::scene::{camera_world, draw, image, spawn_sensor};
 
 /// Returns a World with a camera and a raster with the same view, each an agent.
-fn both_eyes(width: f32, size: [u32; 2]) -> (World, [Entity; 2]) {
+fn both_sensors(width: f32, size: [u32; 2]) -> (World, [Entity; 2]) {
     let mut world = camera_world(|app| {
         app.add_plugins(RasterPlugin);
     });
@@ -122,7 +122,7 @@ fn noise(dice: &mut Dice, alpha: impl Fn(&mut Dice) -> u8) -> Image {
 
 #[test]
 fn sprites_of_all_kinds_look_the_same() {
-    let (mut world, [camera, raster]) = both_eyes(13.0, [64, 48]);
+    let (mut world, [camera, raster]) = both_sensors(13.0, [64, 48]);
     let dice = &mut Dice(1);
     let pictures = [noise(dice, |_| 255), noise(dice, |dice| 255 * draw(&mut dice.0, 2) as u8), {
         noise(dice, |dice| draw(&mut dice.0, 256) as u8)
@@ -155,7 +155,7 @@ fn sprites_of_all_kinds_look_the_same() {
 
 #[test]
 fn tiles_look_the_same() {
-    let (mut world, [camera, raster]) = both_eyes(13.0, [64, 64]);
+    let (mut world, [camera, raster]) = both_sensors(13.0, [64, 64]);
     // The raster draws the outside as far as its view reaches.
     world.insert_resource(TileBorder(40.0));
     let dice = &mut Dice(2);
@@ -187,7 +187,7 @@ fn tiles_look_the_same() {
 
 #[test]
 fn a_grid_without_cells_is_its_outside() {
-    let (mut world, [camera, raster]) = both_eyes(13.0, [64, 48]);
+    let (mut world, [camera, raster]) = both_sensors(13.0, [64, 48]);
     let dice = &mut Dice(3);
     let texels: Vec<[u8; 4]> = (0..32).map(|_| [(); 4].map(|()| draw(&mut dice.0, 256) as u8 | 128)).collect();
     let tileset = world.resource_mut::<Assets<Image>>().add(image(4, &texels));

@@ -223,7 +223,7 @@ mod tests {
     };
 
     #[test]
-    fn who_is_in_the_trap_stays_there_and_who_is_not_gets_past() {
+    fn a_player_in_the_trap_stays_there_and_others_get_past() {
         let mut past = 0;
         for seed in 0..30 {
             let mut parts = generate(Mode::Hard, seed).parts().clone();

@@ -121,13 +121,13 @@ fn coordinate(draw: &mut ChaCha8Rng, range: [f32; 2], half: f32) -> f32 {
     }
 }
 
-fn speed(draw: &mut ChaCha8Rng, usual: f32) -> f32 {
+fn speed(draw: &mut ChaCha8Rng, typical: f32) -> f32 {
     match draw.random_range(0..6) {
         0 => 0.0,
         1 => -0.0,
-        2 => draw.random_range(-3.0..3.0) * usual,
-        3 => usual * if draw.random_bool(0.5) { 1.0 } else { -1.0 },
-        _ => draw.random_range(-1.0..1.0) * usual,
+        2 => draw.random_range(-3.0..3.0) * typical,
+        3 => typical * if draw.random_bool(0.5) { 1.0 } else { -1.0 },
+        _ => draw.random_range(-1.0..1.0) * typical,
     }
 }
 
@@ -136,9 +136,9 @@ fn bodies(draw: &mut ChaCha8Rng, player: &Body) -> Vec<Body> {
     let count = draw.random_range(0..6);
     let one = |_| {
         let (x, y) = (player.x + draw.random_range(-11.0..11.0), player.y + draw.random_range(-5.0..5.0));
-        let usual = Body::enemy([x.floor() as i32, y.floor() as i32], draw.random_range(-1..=1));
-        let odd = Body { x, y, vx: draw.random_range(-0.4..0.4), rx: draw.random_range(0.2..1.5), ..usual };
-        if draw.random_bool(0.7) { usual } else { odd }
+        let typical = Body::enemy([x.floor() as i32, y.floor() as i32], draw.random_range(-1..=1));
+        let odd = Body { x, y, vx: draw.random_range(-0.4..0.4), rx: draw.random_range(0.2..1.5), ..typical };
+        if draw.random_bool(0.7) { typical } else { odd }
     };
     (0..count).map(one).collect()
 }

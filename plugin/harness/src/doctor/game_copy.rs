@@ -550,23 +550,23 @@ mod tests {
     #[test]
     fn only_the_wall_clock_is_slower() {
         let worlds = ticked();
-        let [usual, slower] = worlds.each_ref().map(|world| world.resource::<Time<Real>>().elapsed());
-        assert!(slower > usual, "{slower:?} against {usual:?}");
-        let [usual, same] = worlds.each_ref().map(|world| world.resource::<Time<Virtual>>().elapsed());
-        assert_eq!(usual, same);
+        let [normal, slower] = worlds.each_ref().map(|world| world.resource::<Time<Real>>().elapsed());
+        assert!(slower > normal, "{slower:?} against {normal:?}");
+        let [normal, same] = worlds.each_ref().map(|world| world.resource::<Time<Virtual>>().elapsed());
+        assert_eq!(normal, same);
     }
 
     #[test]
-    fn the_usual_clock_is_as_it_is_without_this() {
+    fn the_default_clock_is_as_it_is_without_this() {
         let mut bare = into_world(headless_app());
         (0..5).for_each(|_| tick_world(&mut bare).expect("there is no agent"));
-        let [usual, _] = ticked();
-        assert_eq!(usual.resource::<Time<Real>>().elapsed(), bare.resource::<Time<Real>>().elapsed());
+        let [normal, _] = ticked();
+        assert_eq!(normal.resource::<Time<Real>>().elapsed(), bare.resource::<Time<Real>>().elapsed());
     }
 
     #[test]
     fn both_worlds_have_the_same_archetypes() {
-        let [usual, slower] = ticked().map(|world| world.archetypes().len());
-        assert_eq!(usual, slower);
+        let [normal, slower] = ticked().map(|world| world.archetypes().len());
+        assert_eq!(normal, slower);
     }
 }

@@ -233,7 +233,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_fit_is_told() {
+    fn a_misfit_is_reported() {
         let error = |augmentation: Augmentation, kind: ObsKind| {
             augmentation.check("ppo.augment", &kind).expect_err("does not fit").to_string()
         };

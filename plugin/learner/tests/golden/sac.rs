@@ -210,7 +210,7 @@ fn golden_sac_update_continuous() {
 }
 
 #[test]
-fn the_usual_target_entropy_is_minus_the_number_of_dimensions() {
+fn the_default_target_entropy_is_minus_the_number_of_dimensions() {
     let entropy = EntropyCoef::Auto { initial: 1.0, target_scale: None };
     let settings = SacConfig { entropy, ..SacConfig::default() };
     assert_eq!(settings.target_entropy(ActionSpace::Continuous(3)), Some(-3.0));

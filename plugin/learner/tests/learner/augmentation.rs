@@ -60,7 +60,7 @@ fn the_policy_with_skills_learns_it_too_and_goes_on_from_a_checkpoint() {
 }
 
 #[test]
-fn what_cannot_be_changed_is_told() {
+fn images_that_cannot_be_changed_are_reported() {
     let refused = |augment: Augmentation, spec| {
         let config = PpoConfig { augment: vec![augment], ..config() };
         PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect_err("does not fit").to_string()

@@ -52,7 +52,7 @@ fn train(trainer: &mut SkillTrainer, epochs: usize) -> Vec<f32> {
 }
 
 #[test]
-fn the_model_sees_where_the_spot_is_and_who_plays() {
+fn the_model_sees_where_the_spot_is_and_which_demonstrator_plays() {
     for action_input in [ActionInput::OneHot, ActionInput::ScaledIndex] {
         let config = SkillConfig { action_input, ..skill_config() };
         let mut trainer = SkillTrainer::new(config, demos(96), 1, DeviceKind::Flex).expect("windows fit");

@@ -92,13 +92,13 @@ enum Failure {
 /// Returns for each result how the tester failed, if it does not fail in this way on unmutated levels.
 fn failures(subjects: &BTreeMap<&str, &Subject>, results: &[JobResult]) -> Vec<Option<Failure>> {
     let reliable = reliable(subjects, results);
-    let usual = TypicalRewards::new(subjects, results);
+    let typical = TypicalRewards::new(subjects, results);
     let failure = |result: &JobResult| {
         let game = subjects.get(result.subject.as_str()).map_or("", |subject| subject.game.as_str());
         if reliable.contains(&(game.to_owned(), result.tester.clone())) {
             (!result.is_solved()).then_some(Failure::Unsolved)
         } else {
-            usual.is_unusual(game, result).then_some(Failure::Reward)
+            typical.is_unusual(game, result).then_some(Failure::Reward)
         }
     };
     results.iter().map(failure).collect()
@@ -266,7 +266,7 @@ mod tests {
     }
 
     #[test]
-    fn only_who_solves_nearly_all_sound_levels_finds_by_failing() {
+    fn only_a_tester_that_solves_nearly_all_sound_levels_finds_by_failing() {
         let subjects = [sound_levels(100), vec![mutant("garden", "m", "panic")]].concat();
         let mut results = Vec::new();
         for (level, subject) in (0_u64..).zip(&subjects[..100]) {
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn who_never_wins_finds_by_its_reward() {
         let subjects =
-            [sound_levels(9), vec![mutant("garden", "poor", "panic"), mutant("garden", "usual", "panic")]].concat();
+            [sound_levels(9), vec![mutant("garden", "poor", "panic"), mutant("garden", "typical", "panic")]].concat();
         let collected = |subject: &str, reward: f64| JobResult {
             reward: Some(reward),
             seconds: 8.0,
@@ -296,7 +296,7 @@ mod tests {
         };
         let mut results: Vec<JobResult> =
             (0_u32..).zip(&subjects[..9]).map(|(level, it)| collected(&it.id, f64::from(20 + level % 3))).collect();
-        results.extend([collected("poor", 3.0), collected("usual", 19.0)]);
+        results.extend([collected("poor", 3.0), collected("typical", 19.0)]);
         let scored = judge(&subjects, results);
         let found: Vec<bool> = scored.iter().map(|job| job.found.failed).collect();
         assert_eq!(found, [[false; 9].as_slice(), &[true, false]].concat());
@@ -348,10 +348,10 @@ mod tests {
         let results: Vec<JobResult> =
             levels.iter().zip(sound_rewards).map(|(level, reward)| played(level, *reward)).collect();
         let subjects = levels.iter().map(|level| (level.id.as_str(), level)).collect();
-        let usual = TypicalRewards::new(&subjects, &results);
+        let typical = TypicalRewards::new(&subjects, &results);
         let broken = mutant("garden", "m", "panic");
-        let of_mutant = rewards.iter().map(|reward| usual.is_unusual("garden", &played(&broken, *reward))).collect();
-        let of_sound = (0..results.len()).filter(|place| usual.is_unusual("garden", &results[*place])).collect();
+        let of_mutant = rewards.iter().map(|reward| typical.is_unusual("garden", &played(&broken, *reward))).collect();
+        let of_sound = (0..results.len()).filter(|place| typical.is_unusual("garden", &results[*place])).collect();
         (of_mutant, of_sound)
     }
 
@@ -384,10 +384,10 @@ mod tests {
         let results: Vec<JobResult> =
             (0_u32..).zip(&levels).map(|(place, level)| played(level, f64::from(20 + place % 5))).collect();
         let subjects = levels.iter().map(|level| (level.id.as_str(), level)).collect();
-        let usual = TypicalRewards::new(&subjects, &results);
+        let typical = TypicalRewards::new(&subjects, &results);
         let far = played(&mutant("garden", "m", "panic"), 99.0);
-        assert!(usual.is_unusual("garden", &far) && !usual.is_unusual("forest", &far));
-        assert!(!usual.is_unusual("garden", &JobResult { reward: None, ..far.clone() }));
-        assert!(!usual.is_unusual("garden", &JobResult { tester: "random".to_owned(), ..far }));
+        assert!(typical.is_unusual("garden", &far) && !typical.is_unusual("forest", &far));
+        assert!(!typical.is_unusual("garden", &JobResult { reward: None, ..far.clone() }));
+        assert!(!typical.is_unusual("garden", &JobResult { tester: "random".to_owned(), ..far }));
     }
 }

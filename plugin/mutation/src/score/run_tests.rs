@@ -65,7 +65,7 @@ fn scored(plan: &ScorePlan, file: &Path, earlier: Earlier, most: u64) -> (Option
 }
 
 #[test]
-fn defects_are_found_by_whoever_can_see_them_and_sound_levels_are_left_alone() {
+fn defects_are_found_by_the_detectors_for_them_and_sound_levels_are_left_alone() {
     let folder = tempfile::tempdir().expect("a folder");
     let (set, game) = (made(folder.path()), Corridor::default());
     let plan = plan(&set, folder.path(), &game, 2);
@@ -117,7 +117,7 @@ const LATER: &str = r#"{"format":1,"seed":7,"games":[{"name":"corridor","version
 "sound":[{"game":"corridor","range":"plain:0..0"}]}"#;
 
 #[test]
-fn what_only_breaks_after_other_episodes_is_found_by_whoever_plays_several() {
+fn a_break_after_other_episodes_is_found_by_testers_that_play_several() {
     let (folder, game) = (tempfile::tempdir().expect("a folder"), Corridor::default());
     fs::write(folder.path().join("mutants.json"), LATER).expect("writable");
     let set = BugSet::read(folder.path()).expect("a set");

@@ -436,7 +436,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limit_that_nobody_can_keep_is_found() {
+    fn a_limit_that_cannot_be_kept_is_found() {
         // 40 ticks at twice the pace of half a tile are 40 tiles of 98.
         let message = reported(&run(40, 0.5)).expect("too short");
         assert!(message.contains("after 40 ticks") && message.contains("from 1.0, 1.5"), "{message}");
@@ -452,7 +452,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_that_nobody_solves_within_its_par_is_found() {
+    fn a_level_not_solved_within_its_par_is_found() {
         let episodes = [(WON, 90, [1.0; 2]), (WON, 70, [1.0; 2]), (LOST, 5, [1.0; 2])];
         let found = inspected(&TooLong::default(), &episodes, Some(60.0));
         assert_eq!((found.len(), found[0].episode, found[0].tick), (1, Some(1), Some(69)));
@@ -462,7 +462,7 @@ mod tests {
     }
 
     #[test]
-    fn a_level_within_its_par_without_one_or_that_nobody_solves_is_silent() {
+    fn a_level_within_its_par_without_one_or_unsolved_is_silent() {
         let episodes = [(WON, 90, [1.0; 2]), (WON, 70, [1.0; 2])];
         assert!(inspected(&TooLong::default(), &episodes, Some(70.0)).is_empty());
         assert!(inspected(&TooLong::default(), &episodes, None).is_empty());

@@ -227,7 +227,7 @@ mod tests {
     }
 
     #[test]
-    fn who_solves_a_level_tells_or_else_who_is_paid_best() {
+    fn the_tester_that_solves_the_level_counts_or_else_the_one_with_the_best_return() {
         let reported = |episodes: &[(u32, bool, f64)]| {
             let tested = |&(number, success, total_reward): &(u32, bool, f64)| {
                 let end = EpisodeEnd::Terminated { success };

@@ -256,12 +256,12 @@ mod tests {
             7
         });
         assert_eq!((value, ear.take()), (7, vec!["door 3 has no key".to_owned()]));
-        tracing::error!(target: "my_game", "nobody listens");
+        tracing::error!(target: "my_game", "after the end");
         assert!(ear.take().is_empty());
     }
 
     #[test]
-    fn whoever_listened_before_still_hears_them() {
+    fn earlier_subscribers_still_receive_them() {
         let outer = ErrorLogReader::new();
         outer.listen(|| ErrorLogReader::new().listen(|| tracing::error!(target: "my_game", "twice")));
         assert_eq!(outer.take(), ["twice"]);

@@ -454,7 +454,7 @@ mod tests {
     }
 
     #[test]
-    fn who_is_flung_away_is_found_and_who_runs_is_not() {
+    fn a_flung_agent_is_found_and_a_running_one_is_not() {
         let detector = PhysicsExplosion::default();
         let flung: Vec<Step> = [1.0, 2.0, 4.0, 9.5].iter().map(|x| Step::at(0, *x, 5.0)).collect();
         assert_eq!(found(&detector, &room(), &flung).map(|(tick, _)| tick), Some(3), "5.5 of 10 tiles");

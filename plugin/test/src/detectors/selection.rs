@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_usual_can_be_said_again() {
+    fn settings_other_than_the_defaults_can_be_typed_again() {
         let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {});
         let list = |text: &str| text.split_whitespace().map(str::to_owned).collect();
         let chosen = |with: &str, without: &str, settings: &str| {

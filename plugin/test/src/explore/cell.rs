@@ -314,7 +314,7 @@ mod tests {
     }
 
     #[test]
-    fn whoever_is_put_elsewhere_passes_nothing() {
+    fn an_agent_that_is_put_elsewhere_passes_nothing() {
         assert_eq!(between([0.5, 0.5], [4.5, 0.5]).len(), 3, "just as far as one can go");
         for far in [[4.75, 0.5], [90.0, 0.5], [f32::NAN, 0.5], [f32::INFINITY, 0.5]] {
             assert!(between([0.5, 0.5], far).is_empty(), "{far:?}");

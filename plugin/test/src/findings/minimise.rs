@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn what_needs_nobody_is_found_to_do_so_in_one_replay_more() {
+    fn a_finding_that_needs_no_action_takes_one_replay_more() {
         let actions = [[1, 0].repeat(4), vec![0; 3]].concat();
         let found = shorter(&stored(LOST, &actions));
         assert_eq!((found.efforts, found.replays), ([4, 0], 2));

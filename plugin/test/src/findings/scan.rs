@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn only_settings_that_are_not_the_usual_ones_are_kept() {
+    fn only_settings_other_than_the_defaults_are_kept() {
         let game = Corridor::default();
         assert_eq!(set(&["stuck.ticks=20"]).settings_of(&game, "stuck"), ["stuck.ticks=20"]);
         for checks in [set(&["stuck.ticks=20"]), Checks::of_game(&game), Checks::default()] {

@@ -40,7 +40,7 @@ fn a_finding_without_ticks_reads_back() {
 }
 
 #[test]
-fn it_is_a_recording_for_whoever_reads_recordings() {
+fn a_finding_is_also_a_recording() {
     let (_folder, path) = written(&stored());
     let episodes = DemoReader::open(&path).and_then(DemoReader::read_all).expect("a recording");
     assert_eq!(episodes, [stored().episode]);

@@ -247,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn causes_places_lost_time_and_skills_are_told() {
+    fn causes_places_lost_time_and_skills_are_reported() {
         let ended = |x: f32, cause: &str, count| SquareEnds {
             x,
             y: 3.0,

@@ -670,7 +670,7 @@ mod tests {
     }
 
     #[test]
-    fn only_those_who_learn_skills_need_demonstrations() {
+    fn only_methods_that_learn_skills_need_demonstrations() {
         for algorithm in Algorithm::ALL {
             let without = check(&format!(r#"algorithm: "{algorithm}""#));
             assert_eq!(without, check(&format!(r#"algorithm: "{algorithm}", demos: None"#)));
@@ -696,7 +696,7 @@ mod tests {
     }
 
     #[test]
-    fn a_penalty_that_nobody_pays_has_no_end() {
+    fn a_penalty_that_is_never_paid_has_no_end() {
         for algorithm in ["spirl-ppo", "spirl-sac"] {
             let spirl = |learn| {
                 format!(
@@ -735,7 +735,7 @@ mod tests {
     }
 
     #[test]
-    fn nobody_plays_nowhere() {
+    fn no_arenas_and_no_worlds_are_refused() {
         // Not with the learning rate that cannot fall over no updates.
         let text = check(r#"algorithm: "ppo", arenas: 0, ppo: (anneal_lr: true)"#).expect_err("refused");
         assert_eq!(text, "`arenas` is 0: must be at least 1");

@@ -63,7 +63,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cake_counts_for_whoever_walks_onto_it_and_for_nobody_else() {
+    fn a_cake_counts_only_for_the_player_that_walks_onto_it() {
         let (here, there) = ([7.0, 10.0], [8.0, 10.0]);
         let is_broken = |before, now, cake, reward| said(before, now, cake, reward).is_some();
         assert!(!is_broken(here, there, Some(there), 1.0) && !is_broken(here, there, Some(here), 0.0));

@@ -98,5 +98,5 @@ fn cameras_that_cannot_be_looked_through_are_named() {
     let fault = world.tick().expect_err("the camera is gone").to_string();
     assert!(fault.contains("agent 0") && fault.contains(&format!("the camera {camera}")), "{fault}");
     world.despawn(first);
-    world.tick().expect("nobody looks");
+    world.tick().expect("no sensor looks");
 }

@@ -10,7 +10,7 @@ use playbot_train::{Experiment, TrainError, Trainer, collect::Collector};
 use super::corridor::{experiment, record, skills};
 
 #[test]
-fn what_an_agent_sees_does_not_depend_on_who_is_beside_it() {
+fn an_observation_does_not_depend_on_the_agents_beside_it() {
     let (observation_config, levels) = (experiment().observation_config(), experiment().train);
     let policy = untrained(&PaintedCorridor, &observation_config, experiment().ppo);
     let play = |first, count| {
@@ -40,7 +40,7 @@ fn what_an_agent_sees_does_not_depend_on_who_is_beside_it() {
 }
 
 #[test]
-fn eyes_that_do_not_fit_are_refused_with_a_way_out() {
+fn sensors_that_do_not_fit_are_refused_with_advice() {
     let folder = tempfile::tempdir().expect("a folder");
     record(folder.path());
     let skills = skills(folder.path());
@@ -68,7 +68,7 @@ fn eyes_that_do_not_fit_are_refused_with_a_way_out() {
 }
 
 #[test]
-fn a_policy_says_which_eyes_it_needs() {
+fn a_policy_says_which_sensor_it_needs() {
     let observation_config = experiment().observation_config();
     let untrained =
         |observation_config: &ObservationConfig| untrained(&PaintedCorridor, observation_config, experiment().ppo);

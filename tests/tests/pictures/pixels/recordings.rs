@@ -5,7 +5,7 @@ use playbot_tests::PaintedCorridor;
 use super::corridor::{demonstrations, experiment, record};
 
 #[test]
-fn recordings_show_the_same_pictures_whoever_replays_them() {
+fn recordings_show_the_same_pictures_in_every_replay() {
     let folder = tempfile::tempdir().expect("a folder");
     record(folder.path());
     let observation_config = experiment().observation_config();

@@ -53,6 +53,6 @@ fn idle_agents_are_not_looked_after() {
     let (mut world, sensor) = looking([1, 1]);
     world.entity_mut(sensor).insert(Control::Idle);
     world.spawn(Sprite::default());
-    world.tick().expect("nobody looks at what cannot be drawn");
+    world.tick().expect("no sensor looks at what cannot be drawn");
     assert_eq!(*world.get::<Frame>(sensor).expect("a sensor"), Frame::default());
 }

@@ -114,7 +114,11 @@ mod tests {
     fn time_is_up_too_early() {
         let out = play(&short_time_out(), 0, 26, |_| 1);
         assert_eq!((out.ends, out.episodes), (vec![EpisodeEnd::Truncated], vec![(false, 26)]));
-        assert_eq!(play(&short_time_out(), 3, 60, |_| 1).episodes, [(true, 30), (true, 30)], "whoever is quick");
+        assert_eq!(
+            play(&short_time_out(), 3, 60, |_| 1).episodes,
+            [(true, 30), (true, 30)],
+            "quick actions do not help"
+        );
     }
 
     #[test]

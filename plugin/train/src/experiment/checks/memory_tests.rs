@@ -52,7 +52,7 @@ impl HostTools for Ten {
 
 /// Makes a machine with this memory, and enough threads.
 fn machine(memory: u64) -> Room {
-    Room { memory, threads: ThreadLimit { most: u64::MAX, whose: "nobody" } }
+    Room { memory, threads: ThreadLimit { most: u64::MAX, whose: "no limit" } }
 }
 
 fn check(algorithm: &str, changes: &str, free: u64) -> Result<(), String> {
