@@ -1,4 +1,4 @@
-//! What verbs print and write: lines of data, and files, tested before the work whose result they hold.
+//! Output of verbs: lines of data, and files, tested before the work whose result they hold.
 //!
 //! The folder, in reading order:
 //!
