@@ -43,6 +43,9 @@ fn the_demonstrator_solves_levels_that_a_blind_bot_does_not() {
         assert_eq!((row["outcome"].as_str(), row["solved"].as_u64()), (Some("solved"), Some(1)), "{row}");
         assert!(row["ticks"]["median"].as_f64().is_some_and(|ticks| ticks > 10.0), "{row}");
         assert_eq!(row["testers"][0]["exact"], true, "{row}");
+        // One episode, and CoinRun has 15 ticks per second.
+        let time = row["ticks"]["median"].as_f64().map(|ticks| ticks / 15.0);
+        assert_eq!(row["seconds"].as_f64(), time, "{row}");
     }
     let output = test(folder, "blind", &[&levels[..], &["--bot", "right-jump,random", "--json"]].concat());
     assert_eq!(code(&output), 1, "{}", errors(&output));
@@ -99,6 +102,20 @@ fn results_say_where_bots_went_and_what_killed_them() {
     done(folder, &["report", "html", "out"]);
     let page = read(folder, "out/report.html");
     assert!(page.contains("<figure><svg") && !page.contains("<form id=\"maps\""));
+}
+
+#[test]
+fn build_servers_are_given_causes_positions_and_the_time_of_the_game() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let output = test(folder, "out", &["--levels", "hard:0..9", "--bot", "right-jump"]);
+    assert_eq!(code(&output), 1, "{}", errors(&output));
+    let junit = read(folder, "out/junit.xml");
+    let failed: Vec<&str> = junit.lines().filter(|line| line.contains("type=\"bot-failed\"")).collect();
+    assert!(!failed.is_empty() && failed.iter().all(|line| line.contains(" 1 (near ")), "{junit}");
+    assert!(junit.contains("classname=\"coinrun.hard:0-9.right-jump\"") && junit.contains("hostname=\"localhost\""));
+    let cases = junit.lines().filter(|line| line.contains("<testcase ")).collect::<Vec<_>>();
+    assert!(cases.len() == 10 && cases.iter().all(|line| line.contains(" time=\"")), "{cases:?}");
 }
 
 /// Returns a line of results as it was before there were maps.

@@ -32,7 +32,7 @@ pub(crate) struct Cli {
     /// Verb to run; `quickstart` if left out.
     #[command(subcommand)]
     verb: Option<Verb>,
-    /// Print what happens inside. Given twice, it prints more.
+    /// Print what happens inside, and equal messages of a game each time. Given twice, it prints more.
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
 }
@@ -144,7 +144,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
             return ExitCode::from(code);
         }
     };
-    log::init(cli.verbose, !matches!(cli.verb, Some(Verb::Bugs(_))));
+    let repeats = log::init(cli.verbose, !matches!(cli.verb, Some(Verb::Bugs(_))));
     let games = match Games::new(games) {
         Ok(games) => games,
         Err(error) => {
@@ -153,7 +153,10 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
         }
     };
     let verb = cli.verb.unwrap_or_else(|| Verb::Quickstart(quickstart::Args::default()));
-    match std::panic::catch_unwind(AssertUnwindSafe(|| run(verb, &games))) {
+    let ended = std::panic::catch_unwind(AssertUnwindSafe(|| run(verb, &games)));
+    // Before an error, which is the last line.
+    repeats.report();
+    match ended {
         Ok(Ok(Outcome::Pass)) => ExitCode::SUCCESS,
         Ok(Ok(Outcome::Findings)) => ExitCode::from(1),
         Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::EXIT_CODE),

@@ -79,6 +79,9 @@ pub struct LevelVerdict {
     /// All episodes of all testers.
     #[serde(flatten)]
     pub score: EpisodeScore,
+    /// Game time of all episodes of all testers: ticks by ticks per second. Older results lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seconds: Option<f64>,
     /// Positions of episodes that ended without the goal, if the game reports them.
     pub ends: Vec<SquareEnds>,
     /// How often each cause ended an episode without the goal, if the game reports causes.
@@ -291,6 +294,7 @@ fn judge(
         outcome,
         proof,
         score,
+        seconds: seconds(all(), game.tick_hz()),
         ends: Vec::new(),
         causes: causes(&failed),
         places: None,
@@ -333,6 +337,16 @@ fn score<'a>(episodes: impl Iterator<Item = &'a Played>) -> EpisodeScore {
     }
     let interval = wilson(solved, count);
     EpisodeScore { solved, episodes: count, interval, ticks: FinishTime::of(ticks), lost, timed_out, broken }
+}
+
+/// Returns the game time of episodes in seconds; `None` if the game has no ticks per second.
+fn seconds<'a>(episodes: impl Iterator<Item = &'a Played>, tick_hz: f64) -> Option<f64> {
+    let ticks = |episode: &Played| match &episode.end {
+        PlayedEnd::Ended { result, .. } => result.ticks,
+        PlayedEnd::Broken { tick, .. } => tick.unwrap_or(0),
+    };
+    let seconds = episodes.map(|episode| u64::from(ticks(episode))).sum::<u64>() as f64 / tick_hz;
+    seconds.is_finite().then_some(seconds)
 }
 
 /// Returns the end of an episode without the goal.
@@ -424,17 +438,19 @@ fn add_cause(causes: &mut BTreeMap<String, u64>, cause: Option<&'static str>) {
 mod tests {
     use super::*;
     use crate::verdict::{maps::LevelMaps, testing::verdict};
+    use bevy_playbot::episode::EpisodeResult;
 
     #[test]
     fn older_results_are_read_and_newer_ones_read_back() {
         let old = serde_json::to_string(&verdict(3, 1, 2)).expect("serialises");
-        for name in ["maps", "places", "causes"] {
+        for name in ["maps", "places", "causes", "seconds"] {
             assert!(!old.contains(name), "{old}");
         }
         assert_eq!(serde_json::from_str::<LevelVerdict>(&old).expect("whole"), verdict(3, 1, 2));
         let places = Some(Places { visited: 3, open: 9 });
         let maps = Some(LevelMaps { x: -0.1, side: 0.3, visits: vec![[4, 70]], ..LevelMaps::default() });
-        let new = LevelVerdict { places, maps, causes: [("saw".to_owned(), 1)].into(), ..verdict(3, 1, 2) };
+        let causes = [("saw".to_owned(), 1)].into();
+        let new = LevelVerdict { places, maps, causes, seconds: Some(0.1 + 0.2), ..verdict(3, 1, 2) };
         let text = serde_json::to_string(&new).expect("serialises");
         assert_eq!(serde_json::from_str::<LevelVerdict>(&text).expect("whole"), new);
     }
@@ -462,6 +478,20 @@ mod tests {
         assert_eq!(end_places(bounds, &ended), [place(6.0, 1.0, 1, 0, "lava"), place(0.0, 3.0, 1, 1, "saw")]);
         assert!(end_places(Rect::new(0.0, 0.0, 0.0, 0.0), &ended).is_empty());
         assert_eq!(causes(&ended), BTreeMap::from([("lava".to_owned(), 1), ("saw".to_owned(), 2)]));
+    }
+
+    #[test]
+    fn the_time_of_a_level_is_that_of_all_its_ticks() {
+        let end = EpisodeEnd::WON;
+        let result = EpisodeResult { level: 0, end, success: true, ticks: 40, clipped: 0, total_reward: 0.0 };
+        let ends = [
+            PlayedEnd::Ended { result, position: None, cause: None },
+            PlayedEnd::Broken { detector: "panic", tick: Some(5), message: String::new() },
+            PlayedEnd::Broken { detector: "panic", tick: None, message: String::new() },
+        ];
+        let played = ends.map(|end| Played { end, exact: true, found: Vec::new(), walk: None });
+        assert_eq!(seconds(played.iter(), 15.0), Some(3.0));
+        assert_eq!(seconds(played.iter(), 0.0), None, "it has no ticks per second");
     }
 
     #[test]

@@ -1,11 +1,14 @@
 //! The log on standard error, and libraries that write there by themselves.
 
 use crate::output::messages::for_people;
+use playbot_report::counted;
 use std::{
-    collections::BTreeSet,
+    cmp::Reverse,
+    collections::BTreeMap,
     fmt,
+    fmt::Write as _,
     io::IsTerminal,
-    sync::{Mutex, PoisonError},
+    sync::{Arc, Mutex, PoisonError},
 };
 use tracing::{
     Event, Level, Subscriber,
@@ -31,8 +34,16 @@ const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_res
 /// Messages of broken games are left out.
 const WITHOUT_GAMES: &str = "off,bevy_playbot=warn,playbot=warn,playbot_games=off";
 
+/// Most messages that are kept for comparison: a game that logs its positions makes any number. Further ones are written
+/// each time.
+const MOST_KEPT: usize = 1_000;
+
+/// Most messages that are listed at the end of a verb.
+const MOST_LISTED: usize = 10;
+
 /// Logs at the levels of `RUST_LOG`, or else warnings, and more with each `-v`. With `-v` each line names its source.
-pub(crate) fn init(verbose: u8, hears_games: bool) {
+/// Without both, a message of a game is written once, and the result has how often it came again.
+pub(crate) fn init(verbose: u8, hears_games: bool) -> Repeats {
     let quiet = if hears_games { QUIET } else { WITHOUT_GAMES };
     let level = [quiet, "info", "debug"][usize::from(verbose.min(2))];
     let asked = EnvFilter::try_from_default_env().ok();
@@ -40,10 +51,18 @@ pub(crate) fn init(verbose: u8, hears_games: bool) {
     let filter = asked.unwrap_or_else(|| EnvFilter::new(level));
     // Colours are for people.
     let colours = std::io::stderr().is_terminal() && std::env::var_os("NO_COLOR").is_none_or(|value| value.is_empty());
-    subscriber(filter, is_plain, colours, std::io::stderr).init();
+    let repeats = Repeats { counts_games: is_plain, ..Repeats::default() };
+    subscriber(filter, is_plain, colours, repeats.clone(), std::io::stderr).init();
+    repeats
 }
 
-fn subscriber<W>(filter: EnvFilter, is_plain: bool, colours: bool, writer: W) -> impl Subscriber + Send + Sync
+fn subscriber<W>(
+    filter: EnvFilter,
+    is_plain: bool,
+    colours: bool,
+    repeats: Repeats,
+    writer: W,
+) -> impl Subscriber + Send + Sync
 where
     W: for<'a> MakeWriter<'a> + Send + Sync + 'static,
 {
@@ -51,7 +70,7 @@ where
     let lines = Lines { is_plain, full: tracing_subscriber::fmt::format().without_time() };
     let format = tracing_subscriber::fmt().with_env_filter(filter).log_internal_errors(false).with_ansi(colours);
     let format = format.fmt_fields(HarmlessFields(DefaultFields::new()));
-    format.event_format(lines).with_writer(writer).finish().with(FilesOnce::default())
+    format.event_format(lines).with_writer(writer).finish().with(repeats)
 }
 
 /// The format of a line of the log.
@@ -89,41 +108,91 @@ impl<'writer> FormatFields<'writer> for HarmlessFields {
     }
 }
 
-/// Lets each error about an asset and each warning of a training through once. Every World loads the files of its game
-/// and reports the same missing ones, and a damaged checkpoint is found again at each look.
-#[derive(Default)]
-struct FilesOnce {
-    said: Mutex<BTreeSet<String>>,
+/// Lets equal messages through once.
+///
+/// Errors about assets and warnings of a training are repeated by nature: every World loads the files of its game and
+/// reports the same missing ones, and a damaged checkpoint is found again at each look. Warnings and errors of a game
+/// come in every episode and would drown the progress. The log does not know levels and ticks: findings have them.
+#[derive(Clone, Default)]
+pub(crate) struct Repeats {
+    /// True if messages of games are let through once too.
+    counts_games: bool,
+    /// Messages that were let through, and how often each of a game came again.
+    kept: Arc<Mutex<BTreeMap<String, u64>>>,
 }
 
-impl<S: Subscriber> Layer<S> for FilesOnce {
-    fn event_enabled(&self, event: &Event<'_>, _: Context<'_, S>) -> bool {
-        let metadata = event.metadata();
-        let is_repeated = match *metadata.level() {
-            Level::ERROR => metadata.target().starts_with("bevy_asset"),
-            Level::WARN => ["playbot_train", "playbot_harness::sealed_file", "playbot_learner"]
-                .iter()
-                .any(|from| metadata.target().starts_with(from)),
-            _ => false,
-        };
-        if !is_repeated {
-            return true;
+impl Repeats {
+    /// Prints which messages of a game came again, and how often.
+    pub fn report(&self) {
+        self.lines().iter().for_each(|line| report!("{line}"));
+    }
+
+    /// Returns the lines of the report, the most frequent message first.
+    fn lines(&self) -> Vec<String> {
+        let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut again: Vec<(&str, u64)> = kept.iter().map(|(text, count)| (text.as_str(), *count)).collect();
+        again.retain(|(_, count)| *count > 0);
+        if again.is_empty() {
+            return Vec::new();
         }
-        let mut message = Message::default();
-        event.record(&mut message);
-        self.said.lock().unwrap_or_else(PoisonError::into_inner).insert(message.0)
+        again.sort_by_key(|(_, count)| Reverse(*count));
+        let title = "messages of the game that came again (-v shows them each time):".to_owned();
+        // A message may have a stack trace below it.
+        let line = |(text, count): &(&str, u64)| {
+            format!("  {} more: {}", counted(*count, "time"), text.lines().next().unwrap_or_default())
+        };
+        let more = again.len().saturating_sub(MOST_LISTED);
+        let more = (more > 0).then(|| format!("  and {}", counted(more as u64, "other message")));
+        [title].into_iter().chain(again.iter().take(MOST_LISTED).map(line)).chain(more).collect()
     }
 }
 
-/// The text of an event.
-#[derive(Default)]
+impl<S: Subscriber> Layer<S> for Repeats {
+    fn event_enabled(&self, event: &Event<'_>, _: Context<'_, S>) -> bool {
+        let (level, target) = (*event.metadata().level(), event.metadata().target());
+        let is_of_files = match level {
+            Level::ERROR => target.starts_with("bevy_asset"),
+            Level::WARN => ["playbot_train", "playbot_harness::sealed_file", "playbot_learner"]
+                .iter()
+                .any(|from| target.starts_with(from)),
+            _ => false,
+        };
+        // Levels are ordered by how much they show.
+        let is_of_game = self.counts_games && level <= Level::WARN && !is_of_program(target);
+        if !(is_of_files || is_of_game) {
+            return true;
+        }
+        let mut message = Message(format!("{level} {target}:"));
+        event.record(&mut message);
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(again) = kept.get_mut(&message.0) {
+            *again += u64::from(!is_of_files);
+            return false;
+        }
+        if kept.len() < MOST_KEPT {
+            kept.insert(message.0, 0);
+        }
+        true
+    }
+}
+
+/// Returns whether a message is of the program around the games. The plugin's messages are about the game that it is
+/// in.
+fn is_of_program(target: &str) -> bool {
+    let krate = target.split("::").next().unwrap_or_default();
+    krate == "playbot" || (krate.starts_with("playbot_") && krate != "playbot_games")
+}
+
+/// The text and the values of an event, after its level and source.
 struct Message(String);
 
 impl Visit for Message {
     fn record_debug(&mut self, field: &Field, value: &dyn fmt::Debug) {
-        if field.name() == "message" {
-            self.0 = format!("{value:?}");
-        }
+        // A String takes all that is written.
+        let _ = match field.name() {
+            "message" => write!(self.0, " {value:?}"),
+            name => write!(self.0, " {name}={value:?}"),
+        };
     }
 }
 
@@ -167,11 +236,18 @@ mod tests {
     }
 
     fn logged(say: impl FnOnce()) -> String {
+        heard(true, say).0
+    }
+
+    /// Returns what is written, and the report at the end; `is_plain` without `-v`.
+    fn heard(is_plain: bool, say: impl FnOnce()) -> (String, Vec<String>) {
         let page = Page::default();
         let writer = page.clone();
-        let subscriber = subscriber(EnvFilter::new(QUIET), true, false, move || writer.clone());
+        let repeats = Repeats { counts_games: is_plain, ..Repeats::default() };
+        let subscriber = subscriber(EnvFilter::new(QUIET), is_plain, false, repeats.clone(), move || writer.clone());
         tracing::subscriber::with_default(subscriber, say);
-        String::from_utf8(page.0.lock().expect("no thread panics").clone()).expect("Unicode")
+        let text = String::from_utf8(page.0.lock().expect("no thread panics").clone()).expect("Unicode");
+        (text, repeats.lines())
     }
 
     #[test]
@@ -216,15 +292,77 @@ mod tests {
         }
     }
 
+    /// Title of the report of repeated messages.
+    const TITLE: &str = "messages of the game that came again (-v shows them each time):";
+
     #[test]
-    fn everything_else_is_said_as_often_as_it_happens() {
-        let text = logged(|| {
+    fn a_message_of_a_game_is_written_once_and_counted_at_the_end() {
+        let (text, lines) = heard(true, || {
+            for _episode in 0..58 {
+                tracing::error!(target: "my_game::doors", "door {} has no key", 3);
+            }
+            tracing::warn!(target: "my_game", "it is late\n  at night");
+            tracing::warn!(target: "my_game", "it is late\n  at night");
+            tracing::warn!(target: "playbot_games", "once only");
+        });
+        assert_eq!(text.matches("door 3 has no key").count(), 1, "{text}");
+        assert_eq!(text.matches("it is late").count(), 1, "{text}");
+        let counts =
+            ["  57 times more: ERROR my_game::doors: door 3 has no key", "  1 time more: WARN my_game: it is late"];
+        assert_eq!(lines, [TITLE, counts[0], counts[1]]);
+    }
+
+    #[test]
+    fn messages_with_other_values_are_other_messages() {
+        let (text, lines) = heard(true, || {
+            for door in [3, 4] {
+                tracing::error!(target: "my_game", "door {door} has no key");
+                tracing::error!(target: "my_game", door, "no key");
+            }
+            tracing::error!(target: "other_game", "door 3 has no key");
+            tracing::warn!(target: "my_game", "door 3 has no key");
+        });
+        assert_eq!(text.lines().count(), 6, "{text}");
+        assert!(lines.is_empty(), "{lines:?}");
+    }
+
+    #[test]
+    fn with_v_a_message_of_a_game_is_written_each_time() {
+        let (text, lines) = heard(false, || {
+            (0..3).for_each(|_| tracing::error!(target: "my_game", "door 3 has no key"));
+        });
+        assert_eq!(text.matches("door 3 has no key").count(), 3, "{text}");
+        assert!(lines.is_empty(), "{lines:?}");
+    }
+
+    #[test]
+    fn a_message_of_the_program_is_written_each_time() {
+        let (text, lines) = heard(true, || {
             for _ in 0..2 {
-                tracing::error!("the game has a fault");
-                tracing::warn!(target: "bevy_asset::server", "a loader is there twice");
+                tracing::warn!(target: "playbot_test::verdict::folder", "out cannot be locked");
+                tracing::warn!(target: "playbot::progress", "Ctrl-C will stop at once");
             }
         });
-        assert_eq!(text.matches("the game has a fault").count(), 2, "{text}");
-        assert_eq!(text.matches("a loader is there twice").count(), 2, "{text}");
+        assert_eq!(text.lines().count(), 4, "{text}");
+        assert!(lines.is_empty(), "{lines:?}");
+    }
+
+    #[test]
+    fn of_many_messages_the_most_frequent_are_listed_and_no_more_than_a_thousand_kept() {
+        let (text, lines) = heard(true, || {
+            for round in 0..3 {
+                for door in 0..1_001 {
+                    if round < 2 || door == 7 {
+                        tracing::warn!(target: "my_game", "door {door}");
+                    }
+                }
+            }
+        });
+        assert_eq!(text.lines().count(), 1_002, "the last door is not kept, so it is written twice");
+        assert_eq!((lines.len(), lines[0].as_str()), (12, TITLE));
+        assert_eq!(
+            (lines[1].as_str(), lines[11].as_str()),
+            ("  2 times more: WARN my_game: door 7", "  and 990 other messages")
+        );
     }
 }

@@ -1,23 +1,27 @@
 //! Reports of results. They are a page of Markdown, short enough for a pull request, JUnit XML for build servers, the
 //! files of findings, and the commands that show a level again.
+//!
+//! The file `junit` of the folder writes the XML.
+
+mod junit;
 
 use crate::{
     detectors::compares_testers,
     findings::{FindingFiles, Played, SeenFinding, SeenLevel},
     verdict::{
-        Finding, LevelOutcome, LevelVerdict,
+        Finding, LevelOutcome, LevelVerdict, SquareEnds,
         compare::Comparison,
         error::{TestError, io_error},
         maps::level_argument,
         plan::{TestPlan, TestRecord, Tester, TesterRecord},
-        results::{Overview, ResultLines},
+        reports::junit::junit,
+        results::Overview,
         statistics::{Trials, wilson},
     },
 };
 use playbot_harness::{brief::shell_word, game::Game};
 use playbot_report::{counted, markdown_cell};
-use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
-use std::{fmt::Display, path::Path};
+use std::{cmp::Reverse, fmt::Display, path::Path};
 
 /// Name of the file with JUnit XML.
 pub const JUNIT: &str = "junit.xml";
@@ -172,69 +176,53 @@ fn texts(changes: &[impl Display]) -> Vec<String> {
     changes.iter().map(ToString::to_string).collect()
 }
 
-// JUnit XML, with a test case for each level.
+// Failures in words.
 
-/// Converts the results in a folder. A level that was not solved, or that has a finding, has failed.
-pub(super) fn junit(folder: &Path, program: &str) -> Result<String, TestError> {
-    let mut lines = ResultLines::open(folder)?;
-    let record = lines.record().clone();
-    let name = format!("{} {}", record.game, record.range);
-    let mut suite = TestSuite::new(name.as_str());
-    while let Some(level) = lines.next_level()? {
-        suite.add_test_case(test_case(&record, &level, program));
-    }
-    let mut report = Report::new(name.as_str());
-    report.add_test_suite(suite);
-    report.to_string().map_err(|error| TestError::Junit(error.to_string()))
-}
-
-fn test_case(record: &TestRecord, level: &LevelVerdict, program: &str) -> TestCase {
-    let status = if level.is_sound() {
-        TestCaseStatus::success()
-    } else {
-        let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-        status.set_type(kind(level)).set_message(message(level));
-        status.set_description(description(record, level, program));
-        status
-    };
-    let mut case = TestCase::new(level.level.as_str(), status);
-    case.set_classname(record.game.as_str());
-    case
-}
-
-/// Returns the kind of a failure, in a word.
-fn kind(level: &LevelVerdict) -> &str {
-    match level.outcome {
-        LevelOutcome::Solved => level.findings.first().map_or("finding", |finding| finding.detector.as_str()),
-        outcome => outcome.name(),
-    }
-}
+/// Most causes or squares that are named in one line.
+const MOST_CAUSES: usize = 3;
 
 /// Describes the failure of a level in one line.
 pub(super) fn message(level: &LevelVerdict) -> String {
     let solved = format!("solved {} of {} episodes", level.score.solved, level.score.episodes);
-    let finding = level.findings.first().map(|finding| format!("{}: {}", finding.detector, finding.message));
+    let finding = level.findings.first().map(|finding| format!("; {}: {}", finding.detector, finding.message));
     let more = level.findings.len().saturating_sub(1);
     let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };
-    format!("{solved}{}{more}", finding.map_or_else(String::new, |finding| format!("; {finding}")))
+    format!("{solved}{}{}{more}", lost(level), finding.unwrap_or_default())
 }
 
-fn description(record: &TestRecord, level: &LevelVerdict, program: &str) -> String {
-    let mut lines = vec![format!("{}: {}", level.level, level.outcome.name())];
-    for tester in &level.testers {
-        let score = &tester.score;
-        lines.push(format!(
-            "{}: solved {} of {}, lost {}, timed out {}, broken {}",
-            tester.tester, score.solved, score.episodes, score.lost, score.timed_out, score.broken
-        ));
+/// Describes how, why and where episodes ended without the goal; empty without such episodes.
+fn lost(level: &LevelVerdict) -> String {
+    let kinds = [("lost", level.score.lost), ("timed out", level.score.timed_out)];
+    let kinds = kinds.into_iter().filter(|(_, count)| *count > 0).map(|(kind, count)| format!("{kind} {count}"));
+    let kinds = kinds.collect::<Vec<_>>().join(", ");
+    if kinds.is_empty() {
+        return String::new();
     }
-    for finding in &level.findings {
-        let tester = finding.tester.as_ref().map_or_else(String::new, |tester| format!(" ({tester})"));
-        let tick = finding.tick.map_or_else(String::new, |tick| format!(", tick {tick}"));
-        lines.push(format!("{}{tester}{tick}: {}", finding.detector, finding.message));
+    let mut reasons = reasons(level);
+    // A stable sort: equally frequent ones keep the order of the results.
+    reasons.sort_by_key(|(count, _)| Reverse(*count));
+    let more = reasons.len().saturating_sub(MOST_CAUSES);
+    let more = (more > 0).then(|| format!("{more} more"));
+    let words: Vec<String> = reasons.into_iter().take(MOST_CAUSES).map(|(_, words)| words).chain(more).collect();
+    if words.is_empty() { format!("; {kinds}") } else { format!("; {kinds}: {}", words.join(", ")) }
+}
+
+/// Returns how often each cause ended an episode, and the square where it did most often. Without causes, returns the
+/// squares.
+fn reasons(level: &LevelVerdict) -> Vec<(u64, String)> {
+    let near = |end: &SquareEnds| format!("near {:.1}, {:.1}", end.x, end.y);
+    if level.causes.is_empty() {
+        let count = |end: &SquareEnds| end.lost.saturating_add(end.timed_out);
+        return level.ends.iter().map(|end| (count(end), format!("{} ({})", count(end), near(end)))).collect();
     }
-    lines.extend(rerun_commands(program, record, level));
-    lines.join("\n")
+    let reason = |(cause, count): (&String, &u64)| {
+        let ends = level.ends.iter().filter(|end| end.causes.contains_key(cause));
+        // Of equal squares `max_by_key` takes the last one, which is the first of the results.
+        let most = ends.rev().max_by_key(|end| end.causes.get(cause).copied());
+        let place = most.map_or_else(String::new, |end| format!(" ({})", near(end)));
+        (*count, format!("{cause} {count}{place}"))
+    };
+    level.causes.iter().map(reason).collect()
 }
 
 // Commands that show a level of results again.
@@ -356,6 +344,37 @@ mod tests {
         level.testers[0].places = Some(Places { visited: 1, open: 4 });
         let mapped = said(&level);
         assert!(mapped.contains("75.0 % of the open squares") && mapped.contains(" | 25.0 % |"), "{mapped}");
+    }
+
+    #[test]
+    fn a_failure_has_its_causes_and_where_each_is_most_frequent() {
+        let counts =
+            |causes: &[(&str, u64)]| causes.iter().map(|(cause, count)| ((*cause).to_owned(), *count)).collect();
+        let end = |x, y, [lost, timed_out]: [u64; 2], causes: &[(&str, u64)]| {
+            let causes = counts(causes);
+            SquareEnds { x, y, lost, timed_out, causes }
+        };
+        let mut level = LevelVerdict {
+            ends: vec![
+                end(12.5, 3.0, [1, 0], &[("saw", 1)]),
+                end(4.0, 1.0, [1, 1], &[("lava", 1), ("time", 1)]),
+                end(20.0, 2.5, [1, 0], &[("saw", 1)]),
+            ],
+            causes: counts(&[("lava", 1), ("saw", 2), ("time", 1)]),
+            ..verdict(0, 0, 4)
+        };
+        (level.score.lost, level.score.timed_out) = (3, 1);
+        let start = "solved 0 of 4 episodes; lost 3, timed out 1";
+        let causes = "saw 2 (near 12.5, 3.0), lava 1 (near 4.0, 1.0), time 1 (near 4.0, 1.0)";
+        assert_eq!(message(&level), format!("{start}: {causes}"));
+        level.causes.insert("toad".to_owned(), 1);
+        assert_eq!(message(&level), format!("{start}: {causes}, 1 more"));
+        level.causes.clear();
+        let squares = "2 (near 4.0, 1.0), 1 (near 12.5, 3.0), 1 (near 20.0, 2.5)";
+        assert_eq!(message(&level), format!("{start}: {squares}"), "the game reports no causes");
+        level.ends.clear();
+        assert_eq!(message(&level), start, "nor positions");
+        assert_eq!(message(&verdict(0, 4, 4)), "solved 4 of 4 episodes");
     }
 
     #[test]

@@ -28,6 +28,7 @@ pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
         outcome: if solved > 0 { LevelOutcome::Solved } else { LevelOutcome::BotFailed },
         proof: if solved > 0 { LevelProof::Solvable } else { LevelProof::Unknown },
         score: score(solved, episodes),
+        seconds: None,
         ends: Vec::new(),
         causes: BTreeMap::new(),
         places: None,

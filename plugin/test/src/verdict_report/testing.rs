@@ -103,6 +103,7 @@ pub(crate) fn level(index: u64, solved: u64, episodes: u64, ticks: u32) -> Level
         outcome: if solved > 0 { LevelOutcome::Solved } else { LevelOutcome::BotFailed },
         proof: if solved > 0 { LevelProof::Solvable } else { LevelProof::Unknown },
         score: score.clone(),
+        seconds: None,
         ends: Vec::new(),
         causes: BTreeMap::new(),
         places: None,

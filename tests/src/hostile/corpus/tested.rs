@@ -106,6 +106,7 @@ fn verdict(index: u64) -> LevelVerdict {
         outcome: if solved > 0 { LevelOutcome::Solved } else { LevelOutcome::BotFailed },
         proof: if solved > 0 { LevelProof::Solvable } else { LevelProof::Unknown },
         score: score(2 * solved, 8),
+        seconds: Some(8.0),
         ends: vec![SquareEnds { x: 3.5, y: 2.5, lost: 2, timed_out: 1, causes: causes.clone() }],
         causes,
         places,

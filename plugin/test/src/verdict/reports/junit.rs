@@ -1,0 +1,343 @@
+//! JUnit XML, with a test case for each level.
+//!
+//! The elements and attributes are those that the xUnit plugin of Jenkins accepts (its `junit-10.xsd`), which refuses a
+//! whole file for one attribute more. Equal results give equal bytes, so times are those of the game.
+
+use crate::verdict::{
+    LevelOutcome, LevelVerdict,
+    error::TestError,
+    plan::{TestRecord, TesterRecord},
+    reports::{message, rerun_commands},
+    results::ResultLines,
+};
+use playbot_harness::level_files::is_level_files;
+use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
+use std::{path::Path, time::Duration};
+
+/// The host in every file: results are independent of the machine.
+const HOST: &str = "localhost";
+
+/// The attribute that [`quick_junit`] writes on `testsuites`, and the schema of Jenkins lacks.
+const REFUSED: &str = " skipped=\"0\"";
+
+/// Converts the results in a folder. A level that was not solved, or that has a finding, has failed.
+pub(super) fn junit(folder: &Path, program: &str) -> Result<String, TestError> {
+    let mut lines = ResultLines::open(folder)?;
+    let record = lines.record().clone();
+    let class = class(&record);
+    let name = format!("{} {}", record.game, record.range);
+    let has_files = is_level_files(&record.range.mode);
+    let mut suites: Vec<TestSuite> = Vec::new();
+    while let Some(level) = lines.next_level()? {
+        let case = test_case(&record, &level, program, &class);
+        match suites.last_mut() {
+            Some(suite) if !has_files => add(suite, case),
+            _ => {
+                let mut suite = suite(&record, has_files.then_some(level.level.as_str()));
+                add(&mut suite, case);
+                suites.push(suite);
+            }
+        }
+    }
+    if suites.is_empty() {
+        suites.push(suite(&record, None));
+    }
+    let mut report = Report::new(name.as_str());
+    report.time = suites.iter().filter_map(|suite| suite.time).reduce(Duration::saturating_add);
+    report.add_test_suites(suites);
+    let text = report.to_string().map_err(|error| TestError::Junit(error.to_string()))?;
+    // The first occurrence is the one on `testsuites`: quotation marks in names before it are escaped.
+    Ok(text.replacen(REFUSED, "", 1))
+}
+
+/// Makes the suite of all levels, or that of a level file. Readers that show failures at files read the suite's file,
+/// because a case may not have one.
+fn suite(record: &TestRecord, file: Option<&str>) -> TestSuite {
+    let levels = file.map_or_else(|| record.range.to_string(), str::to_owned);
+    let mut suite = TestSuite::new(format!("{} {levels}", record.game));
+    suite.extra.insert("hostname".into(), HOST.into());
+    if let Some(file) = file {
+        suite.extra.insert("file".into(), file.into());
+    }
+    suite
+}
+
+/// Adds a case and its time to a suite.
+fn add(suite: &mut TestSuite, case: TestCase) {
+    suite.time = [suite.time, case.time].into_iter().flatten().reduce(Duration::saturating_add);
+    suite.add_test_case(case);
+}
+
+fn test_case(record: &TestRecord, level: &LevelVerdict, program: &str, class: &str) -> TestCase {
+    let status = if level.is_sound() {
+        TestCaseStatus::success()
+    } else {
+        let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
+        status.set_type(kind(level)).set_message(message(level));
+        status.set_description(description(record, level, program));
+        status
+    };
+    let mut case = TestCase::new(level.level.as_str(), status);
+    case.set_classname(class);
+    // Results of older versions have no time, and a file may hold any number.
+    case.time = level.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    case
+}
+
+/// Returns the class of all cases: game, levels and testers. Build servers take cases of the same class and name for one,
+/// so two tests of a game in one pipeline need different classes.
+fn class(record: &TestRecord) -> String {
+    let range = &record.range;
+    // A further file leaves the cases of the others as they were.
+    let levels = if is_level_files(&range.mode) { range.mode.clone() } else { range.to_string() };
+    let testers = record.testers.iter().map(tester).collect::<Vec<_>>().join("+");
+    let seed = if record.seed == 0 { String::new() } else { format!(" seed {}", record.seed) };
+    [&record.game, &levels, &format!("{testers}{seed}")].map(|part| without_dots(part)).join(".")
+}
+
+/// Replaces full stops, at which readers split a class into packages.
+fn without_dots(part: &str) -> String {
+    part.replace("..", "-").replace('.', "_")
+}
+
+/// Returns a tester as a part of the class: its name, and the file or checkpoint of a policy.
+fn tester(record: &TesterRecord) -> String {
+    let of_run = || record.run.as_ref().map(|run| format!("({} step {})", run.folder, run.step));
+    let of_file = || record.file.as_ref().map(|file| format!("({file})"));
+    let greedy = if record.greedy { " greedy" } else { "" };
+    format!("{}{}{greedy}", record.name, of_run().or_else(of_file).unwrap_or_default())
+}
+
+/// Returns the kind of a failure, in a word.
+fn kind(level: &LevelVerdict) -> &str {
+    match level.outcome {
+        LevelOutcome::Solved => level.findings.first().map_or("finding", |finding| finding.detector.as_str()),
+        outcome => outcome.name(),
+    }
+}
+
+/// Describes a failure in several lines. Begins with its message, because some readers show the text alone.
+fn description(record: &TestRecord, level: &LevelVerdict, program: &str) -> String {
+    let mut lines = vec![format!("{}: {}", level.level, level.outcome.name()), message(level)];
+    for tester in &level.testers {
+        let score = &tester.score;
+        lines.push(format!(
+            "{}: solved {} of {}, lost {}, timed out {}, broken {}",
+            tester.tester, score.solved, score.episodes, score.lost, score.timed_out, score.broken
+        ));
+    }
+    for finding in &level.findings {
+        let tester = finding.tester.as_ref().map_or_else(String::new, |tester| format!(" ({tester})"));
+        let tick = finding.tick.map_or_else(String::new, |tick| format!(", tick {tick}"));
+        lines.push(format!("{}{tester}{tick}: {}", finding.detector, finding.message));
+    }
+    lines.extend(rerun_commands(program, record, level));
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::verdict::{
+        Finding, MapScope, TestedRun,
+        folder::{Earlier, TestFolder},
+        testing::verdict,
+    };
+    use playbot_harness::split::LevelSplit;
+    use quick_xml::{Reader, XmlVersion, events::Event};
+    use std::collections::{BTreeMap, BTreeSet};
+
+    /// Elements of junit-10.xsd that are written: parent, name, required attributes, and others that are allowed.
+    const SCHEMA: [(&str, &str, &[&str], &[&str]); 4] = [
+        ("", "testsuites", &[], &["name", "time", "tests", "failures", "errors"]),
+        (
+            "testsuites",
+            "testsuite",
+            &["name", "tests", "failures", "errors"],
+            &["group", "time", "skipped", "timestamp", "hostname", "id", "package", "file", "log", "url", "version"],
+        ),
+        ("testsuite", "testcase", &["name"], &["time", "classname", "group"]),
+        ("testcase", "failure", &[], &["type", "message"]),
+    ];
+
+    /// An element of the XML.
+    struct Element {
+        parent: String,
+        name: String,
+        attributes: BTreeMap<String, String>,
+    }
+
+    fn elements(text: &str) -> Vec<Element> {
+        let mut reader = Reader::from_str(text);
+        let (mut open, mut found) = (Vec::<String>::new(), Vec::new());
+        let words = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).expect("Unicode");
+        loop {
+            let event = reader.read_event().expect("well-formed XML");
+            match &event {
+                Event::Start(tag) | Event::Empty(tag) => {
+                    let mut attributes = BTreeMap::new();
+                    for attribute in tag.attributes() {
+                        let attribute = attribute.expect("an attribute");
+                        let value = attribute.normalized_value(XmlVersion::Explicit1_0).expect("a value");
+                        attributes.insert(words(attribute.key.as_ref()), value.into_owned());
+                    }
+                    let (parent, name) = (open.last().cloned().unwrap_or_default(), words(tag.name().as_ref()));
+                    if matches!(event, Event::Start(_)) {
+                        open.push(name.clone());
+                    }
+                    found.push(Element { parent, name, attributes });
+                }
+                Event::End(_) => {
+                    open.pop();
+                }
+                Event::Eof => {
+                    assert!(open.is_empty(), "{open:?} are not closed in {text}");
+                    return found;
+                }
+                _ => {}
+            }
+        }
+    }
+
+    /// Returns the values of an attribute of all elements of this name; `None` where it is missing.
+    fn values(text: &str, name: &str, attribute: &str) -> Vec<Option<String>> {
+        let own = elements(text).into_iter().filter(|element| element.name == name);
+        own.map(|element| element.attributes.get(attribute).cloned()).collect()
+    }
+
+    fn record(mode: &str) -> TestRecord {
+        TestRecord {
+            game: "garden".to_owned(),
+            game_version: 1,
+            range: LevelSplit { mode: mode.to_owned(), first: 0, last: 9 },
+            files: None,
+            seed: 0,
+            testers: vec![TesterRecord::bot("random")],
+            episodes: 2,
+            detectors: Vec::new(),
+            options: Vec::new(),
+            maps: MapScope::default(),
+            shard: None,
+        }
+    }
+
+    fn written(record: &TestRecord, levels: &[LevelVerdict]) -> String {
+        let parent = tempfile::tempdir().expect("a folder");
+        let (mut folder, _) = TestFolder::open(parent.path(), record, Earlier::Keep).expect("new");
+        levels.iter().for_each(|level| folder.keep(level).expect("writable"));
+        folder.finish().expect("writable");
+        junit(parent.path(), "playbot").expect("results")
+    }
+
+    #[test]
+    fn jenkins_accepts_every_element_and_attribute() {
+        let finding = Finding {
+            detector: "panic".to_owned(),
+            tester: Some("random".to_owned()),
+            episode: Some(0),
+            tick: Some(3),
+            message: "a < b && \"c\" skipped=\"0\" \u{1b}[31m".to_owned(),
+            file: Some("findings/a.finding".to_owned()),
+            settings: Vec::new(),
+        };
+        let timed = |index, solved| LevelVerdict { seconds: Some(1_234.5), ..verdict(index, solved, 2) };
+        let broken = LevelVerdict { findings: vec![finding], ..timed(2, 1) };
+        let levels = [timed(0, 2), timed(1, 0), broken, verdict(3, 2, 2)];
+        let texts = [
+            written(&record("hard"), &levels),
+            written(&record("files:levels/*.json"), &levels),
+            written(&record("skipped=\"0\""), &[]),
+        ];
+        for text in &texts {
+            for Element { parent, name, attributes } in elements(text) {
+                let known = SCHEMA.iter().find(|(above, own, ..)| *above == parent && *own == name);
+                let (_, _, required, others) = known.unwrap_or_else(|| panic!("{name} in {parent}: {text}"));
+                assert!(required.iter().all(|key| attributes.contains_key(*key)), "{name}: {text}");
+                let is_known = |key: &String| required.contains(&key.as_str()) || others.contains(&key.as_str());
+                assert!(attributes.keys().all(is_known), "{name} has {attributes:?}: {text}");
+                // The schema's pattern of a time: digits and at most three more after the point.
+                let is_time = |time: &String| {
+                    let (whole, part) = time.split_once('.').unwrap_or((time.as_str(), ""));
+                    part.len() <= 3 && [whole, part].iter().all(|half| half.bytes().all(|byte| byte.is_ascii_digit()))
+                };
+                assert!(attributes.get("time").is_none_or(is_time), "{name}: {text}");
+            }
+        }
+        assert_eq!(values(&texts[0], "testsuites", "failures"), [Some("2".to_owned())]);
+        assert_eq!(values(&texts[1], "testsuite", "tests"), vec![Some("1".to_owned()); 4]);
+        assert_eq!(values(&texts[2], "testsuite", "tests"), [Some("0".to_owned())]);
+    }
+
+    #[test]
+    fn times_are_those_of_the_game_and_older_results_have_none() {
+        let level = |index, seconds| LevelVerdict { seconds, ..verdict(index, 2, 2) };
+        let text = written(&record("hard"), &[level(0, Some(1.25)), level(1, Some(2.0)), level(2, None)]);
+        let time = |text: &str| Some(text.to_owned());
+        assert_eq!(values(&text, "testcase", "time"), [time("1.250"), time("2.000"), None]);
+        assert_eq!(values(&text, "testsuite", "time"), [time("3.250")]);
+        assert_eq!(values(&text, "testsuites", "time"), [time("3.250")]);
+        let older = written(&record("hard"), &[level(0, None), level(1, Some(-1.0))]);
+        assert!(!older.contains(" time="), "{older}");
+    }
+
+    #[test]
+    fn a_level_file_is_the_file_of_its_suite() {
+        let level = |index, path: &str| LevelVerdict { level: path.to_owned(), ..verdict(index, 0, 2) };
+        let levels = [level(0, "levels/a.json"), level(1, "levels/b & c.json")];
+        let text = written(&record("files:levels/*.json"), &levels);
+        let paths = ["levels/a.json", "levels/b & c.json"];
+        assert_eq!(values(&text, "testsuite", "file"), paths.map(|path| Some(path.to_owned())));
+        assert_eq!(values(&text, "testcase", "name"), paths.map(|path| Some(path.to_owned())));
+        assert_eq!(values(&text, "testsuite", "name"), paths.map(|path| Some(format!("garden {path}"))));
+        assert_eq!(values(&written(&record("hard"), &levels), "testsuite", "file"), [None]);
+    }
+
+    #[test]
+    fn a_reader_of_the_text_alone_sees_the_message() {
+        let text = written(&record("hard"), &[verdict(0, 0, 2)]);
+        let message = Some("solved 0 of 2 episodes; lost 2".to_owned());
+        assert_eq!(values(&text, "failure", "message"), [message]);
+        assert!(text.contains(">hard:0: bot-failed\nsolved 0 of 2 episodes; lost 2\nrandom: solved 0 of 2"), "{text}");
+    }
+
+    #[test]
+    fn tests_of_one_game_have_cases_of_different_classes() {
+        let plain = record("hard");
+        assert_eq!(class(&plain), "garden.hard:0-9.random");
+        let by = |testers: &[TesterRecord]| TestRecord { testers: testers.to_vec(), ..plain.clone() };
+        let policy = TesterRecord { checksum: Some("0f".to_owned()), ..TesterRecord::bot("a.policy") };
+        let file = |path: &str| TesterRecord { file: Some(path.to_owned()), ..policy.clone() };
+        let run = |folder: &str, step| {
+            let run = Some(TestedRun { folder: folder.to_owned(), step });
+            TesterRecord { run, ..policy.clone() }
+        };
+        let tests = [
+            plain.clone(),
+            record("easy"),
+            TestRecord { range: LevelSplit { mode: "hard".to_owned(), first: 0, last: 8 }, ..plain.clone() },
+            TestRecord { seed: 1, ..plain.clone() },
+            by(&[TesterRecord::bot("search")]),
+            by(&[TesterRecord::bot("random"), TesterRecord::bot("search")]),
+            by(std::slice::from_ref(&policy)),
+            by(&[TesterRecord { greedy: true, ..policy.clone() }]),
+            by(&[file("old/a.policy")]),
+            by(&[file("new/a.policy")]),
+            by(&[run("runs/a", 4096)]),
+            by(&[run("runs/a", 8192)]),
+            by(&[run("runs/b", 4096)]),
+            record("files:levels/*.json"),
+        ];
+        let classes: BTreeSet<String> = tests.iter().map(class).collect();
+        assert_eq!(classes.len(), tests.len(), "{classes:?}");
+        assert!(classes.iter().all(|class| class.matches('.').count() == 2), "game, levels and testers: {classes:?}");
+    }
+
+    #[test]
+    fn a_further_level_file_and_a_shard_leave_the_class_as_it_is() {
+        let files = record("files:levels/*.json");
+        let more = LevelSplit { mode: files.range.mode.clone(), first: 0, last: 10 };
+        assert_eq!(class(&files), class(&TestRecord { range: more, ..files.clone() }));
+        let shard = Some("0/2".parse().expect("a shard"));
+        assert_eq!(class(&record("hard")), class(&TestRecord { shard, ..record("hard") }));
+    }
+}
