@@ -155,6 +155,10 @@ impl LevelTools for CoinRun {
         Some(u32::MAX.into())
     }
 
+    fn layout_hash(&self, mode: &str, level: u64) -> Option<u64> {
+        Some(level_of(self, mode, level).ok()?.layout_hash())
+    }
+
     fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
         Some(level_text::parse(text))
     }

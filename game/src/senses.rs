@@ -213,7 +213,7 @@ mod tests {
         let (inner, outer) = (game.tools(), with_rays.tools());
         let mode = "random+size=7x7";
         assert!(game.check_mode(mode).is_ok() && with_rays.check_mode(mode).is_ok());
-        assert_eq!(game.fingerprint(mode, 3), with_rays.fingerprint(mode, 3));
+        assert_eq!(game.layout(mode, 3), with_rays.layout(mode, 3));
         assert_eq!(inner.bots.demonstrator(), outer.bots.demonstrator());
         assert_eq!(inner.levels.floor_plan(mode, 3), outer.levels.floor_plan(mode, 3));
         assert!(inner.training.experiment().is_some() && outer.training.experiment().is_none());

@@ -148,7 +148,8 @@ fn rules(text: &str) -> Result<AntMazeMode, MazeModeError> {
 pub(super) fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
     let level = read_json_object::<LevelText>(text)?.into_level(text)?;
     let content = serde_json::json!(LevelText::of(&level)).to_string();
-    Ok(LevelDesign::new(level, &content))
+    let layout = level.maze.fingerprint();
+    Ok(LevelDesign::new(level, &content).with_layout(layout))
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::coinrun::{
     rules::{Body, motion::NearBodies},
     tile::TileGrid,
 };
-use bevy_playbot::level::LevelSource;
+use bevy_playbot::{level::LevelSource, state_hash::StateHash};
 use rand_mt::Mt;
 use serde::{Deserialize, Serialize};
 use std::{fmt, str::FromStr};
@@ -129,6 +129,22 @@ impl Level {
     pub fn x_wins_tie(&self, step: u32) -> bool {
         let step = step as usize % 1024;
         self.tie_breaks[step / 64] >> (step % 64) & 1 == 1
+    }
+
+    /// Returns a hash of all that play meets: the tiles, the coin and the bodies, without pictures and tie-breaks.
+    pub fn layout_hash(&self) -> u64 {
+        let cell = |[x, y]: [i32; 2]| [x as u32 as u64, y as u32 as u64];
+        let body = |spawn: &Spawn| match *spawn {
+            Spawn::Saw(at) => (0, at),
+            Spawn::Crate { cell, .. } => (1, cell),
+            Spawn::Enemy { cell, dir, .. } => (3 + i64::from(dir), cell),
+        };
+        // Bodies of one kind have an order that play can depend on, and the order among kinds is none of a level's.
+        let mut bodies: Vec<_> = self.spawns.iter().map(body).collect();
+        bodies.sort_by_key(|(kind, _)| (*kind).min(2));
+        let bodies = bodies.into_iter().flat_map(|(kind, at)| [kind as u64].into_iter().chain(cell(at)));
+        let tiles = self.tiles.rows().into_iter().flat_map(String::into_bytes).map(u64::from);
+        StateHash::of(cell(self.coin).into_iter().chain(bodies).chain(tiles)).0
     }
 
     /// Returns the level in the form of the reference data's JSON objects.
@@ -299,6 +315,38 @@ impl LevelSource for ProcgenLevels {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::coinrun::generator::generate;
+    use std::collections::BTreeSet;
+
+    #[test]
+    fn layouts_repeat_as_often_as_counted_from_their_text() {
+        // Counted from the JSON of the levels by two other programs.
+        let layouts = |mode, last| (0..=last).map(|seed| generate(mode, seed).layout_hash()).collect::<BTreeSet<_>>();
+        let easy = layouts(Mode::Easy, 499);
+        assert_eq!((easy.len(), layouts(Mode::Easy, 3999).len()), (422, 2840));
+        assert_eq!([1087, 1999].map(|last| layouts(Mode::Hard, last).len()), [869, 1496]);
+        let trained = layouts(Mode::Hard, 63);
+        let seen = |others: &[&BTreeSet<u64>]| {
+            let hashes = (64..=1087).map(|seed| generate(Mode::Hard, seed).layout_hash());
+            hashes.filter(|hash| others.iter().any(|other| other.contains(hash))).count()
+        };
+        assert_eq!((seen(&[&trained]), seen(&[&easy]), seen(&[&trained, &easy])), (46, 222, 224));
+        assert_eq!(generate(Mode::Hard, 81).layout_hash(), generate(Mode::Hard, 142).layout_hash());
+    }
+
+    #[test]
+    fn pictures_and_tie_breaks_are_no_part_of_a_layout() {
+        let level = generate(Mode::Hard, 7);
+        let other = Level::new(LevelParts {
+            background: level.background ^ 1,
+            agent_theme: (level.agent_theme + 1) % 5,
+            tie_breaks: [!0; 16],
+            ..level.parts().clone()
+        });
+        assert_eq!(level.layout_hash(), other.layout_hash());
+        let moved = Level::new(LevelParts { coin: [level.coin[0] + 1, level.coin[1]], ..level.parts().clone() });
+        assert_ne!(level.layout_hash(), moved.layout_hash());
+    }
 
     #[test]
     fn modes_read_back_and_errors_list_them() {

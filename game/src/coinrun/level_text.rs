@@ -100,7 +100,8 @@ pub(super) fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
     let level = read_json_object::<LevelText>(text)?.into_level(text)?;
     // The origin of a level is no part of its content.
     let content = LevelText { mode: Mode::Hard, seed: 0, ..level.to_level_text() };
-    Ok(LevelDesign::new(level, &serde_json::json!(content).to_string()))
+    let layout = level.layout_hash();
+    Ok(LevelDesign::new(level, &serde_json::json!(content).to_string()).with_layout(layout))
 }
 
 impl LevelText {

@@ -80,11 +80,10 @@ impl Map {
         matches!(self, Self::Random(_)).then(|| self.name().to_owned())
     }
 
-    /// Returns a hash of a generated maze's walls. Returns `None` for a fixed map, for an impossible spec, and for
-    /// mazes of so many rooms that no two are alike.
+    /// Returns a hash of a generated maze's walls. Returns `None` for a fixed map and for an impossible spec.
     pub fn fingerprint(&self, seed: u64) -> Option<u64> {
         match self {
-            Self::Random(spec) if spec.may_repeat() => Some(generate(spec, seed).ok()?.fingerprint()),
+            Self::Random(spec) => Some(generate(spec, seed).ok()?.fingerprint()),
             _ => None,
         }
     }

@@ -12,9 +12,6 @@ pub const TRAIN_SEEDS: RangeInclusive<u64> = 0..=63;
 /// Default seeds of the held-out mazes of the test.
 pub const HELD_OUT_SEEDS: RangeInclusive<u64> = 64..=127;
 
-/// Random walls between rooms, from which on two seeds do not draw the same ones.
-const UNLIKELY: f64 = 36.0;
-
 /// Size and shape of generated mazes.
 ///
 /// Corridors join rooms of `corridor` x `corridor` cells that stand in a grid, one wall apart. Cells that a row of
@@ -65,13 +62,6 @@ impl MazeSpec {
             }
             _ => Ok(()),
         }
-    }
-
-    /// Returns true if two seeds are likely to draw the same walls: where there are few rooms, or few walls between
-    /// them.
-    pub(super) fn may_repeat(&self) -> bool {
-        let rooms = [self.rows, self.columns].map(|cells| cells.saturating_sub(1) / (self.corridor + 1));
-        rooms.iter().product::<usize>() as f64 * (1.0 - self.loops) <= UNLIKELY
     }
 }
 

@@ -94,7 +94,8 @@ impl LevelText {
 pub(super) fn parse(text: &str) -> Result<LevelDesign, LevelTextError> {
     let drawn = read_json_object::<LevelText>(text)?.into_drawn(text)?;
     let content = serde_json::json!(LevelText::of(&drawn.level, &drawn.rules)).to_string();
-    Ok(LevelDesign::new(drawn, &content))
+    let layout = drawn.level.maze.fingerprint();
+    Ok(LevelDesign::new(drawn, &content).with_layout(layout))
 }
 
 // The rules of a level file, as text: options of a mode without its map.

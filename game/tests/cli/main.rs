@@ -5,6 +5,7 @@ mod detectors;
 mod eval;
 mod explore;
 mod findings;
+mod levels;
 mod merging;
 mod named_policies;
 mod paths;

@@ -111,6 +111,30 @@ fn a_small_run_from_demonstrations_to_evaluation() {
     assert_eq!(lines(&on_purpose).len(), 2);
     let reported = "runs/b has learned from hard:64..65, and the levels hard:64..65 have some of these: not all of them are unseen";
     assert!(errors(&on_purpose).contains(reported), "{}", errors(&on_purpose));
+
+    // Levels 81 and 142 differ in their pictures only.
+    let mut twins = vec!["train", "--experiment", "tiny.ron", "--algorithm", "ppo", "--run", "runs/c"];
+    twins.extend(["--set", "train=hard:81..81", "--set", "test=hard:142..145", "--steps", "128"]);
+    ok(run(&twins));
+    let measured = |more: &[&str]| ok(run(&[&["eval", "--run", "runs/c", "--bot", "random", "--json"], more].concat()));
+    let known = "runs/c knows 1 of the 4 levels hard:142..145: by number or layout they are among hard:81..81";
+    for (more, left_out, words) in [
+        (&[][..], Some(1), "1 level of hard:142..145 is left out"),
+        (&["--levels", "hard:142..145"][..], None, "--new-layouts leaves it out"),
+        (&["--levels", "hard:142..145", "--new-layouts"][..], Some(1), "1 level of hard:142..145 is left out"),
+    ] {
+        let output = measured(more);
+        assert!(errors(&output).contains(known) && errors(&output).contains(words), "{}", errors(&output));
+        for row in lines(&output) {
+            assert_eq!((row["left_out"].as_u64(), row["levels"].as_u64()), (left_out, Some(4 - left_out.unwrap_or(0))));
+        }
+    }
+    let all_known = run(&["eval", "--run", "runs/c", "--levels", "hard:142..142", "--new-layouts"]);
+    assert_eq!(code(&all_known), 3);
+    assert!(errors(&all_known).contains("every one of the levels hard:142..142"), "{}", errors(&all_known));
+    let tested = run(&["test", "coinrun", "--run", "runs/c", "--levels", "hard:142..145", "--out", "runs/tested"]);
+    assert!(errors(&tested).contains(known), "{}", errors(&tested));
+
     let saved = folder.path().join("runs/b/experiment.ron");
     let text = unsealed(&std::fs::read_to_string(&saved).expect("written")).replace("\"coinrun\"", "\"maze\"");
     std::fs::write(&saved, text).expect("writable");

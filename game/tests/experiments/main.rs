@@ -7,11 +7,7 @@ mod program;
 use std::path::{Path, PathBuf};
 
 use playbot_games::GAMES;
-use playbot_harness::{
-    game::Game,
-    games::Games,
-    split::{HeldOut, LevelSplit},
-};
+use playbot_harness::{game::Game, games::Games, held_out::HeldOut, split::LevelSplit};
 use playbot_train::{
     Experiment,
     experiment::file::{parse_experiment, read_experiment},
@@ -67,14 +63,17 @@ fn what_is_held_out_is_not_trained_on_by_another_name() {
             assert!(error.contains(train) && error.contains("random:50..99"), "{error}");
         }
         assert_eq!(check(game, "random+sparse:0..49", "random:50..99"), Ok(()));
-        // So few rooms that seeds draw the same walls again and again.
-        let error = check(game, "random+size=5x5:0..49", "random+size=5x5:50..99").expect_err("the same walls");
-        assert!(error.contains("looks like"), "{error}");
+        // So few rooms that seeds draw the same walls again and again. Results leave these out.
+        assert_eq!(check(game, "random+size=5x5:0..49", "random+size=5x5:50..99"), Ok(()));
         assert!(check(game, "random+lops=0.3:0..9", "random:50..99").is_err_and(|error| error.contains("loops")));
     }
     let error = check("maze2d", "medium+limit=600:0..9", "medium:9..9").expect_err("the limit that it has anyway");
     assert!(error.contains("level 9"), "{error}");
     assert_eq!(check("maze2d", "medium+fixed-start:0..9", "medium:9..9"), Ok(()), "another start");
+    // Levels 81 and 142 differ in their pictures only.
+    let error = check("coinrun", "hard:81..81", "hard:142..142").expect_err("one layout");
+    assert!(error.contains("hard:142..142 has the layout of one of the training levels hard:81..81"), "{error}");
+    assert_eq!(check("coinrun", "hard:81..81", "hard:142..143"), Ok(()), "143 is new");
 }
 
 /// Mazes of the paper's tables and figures, with the compared methods.

@@ -3,8 +3,10 @@
 use playbot::prelude::*;
 use playbot_games::{coinrun::CoinRun, maze2d::Maze2d};
 use playbot_harness::{
+    game::level_designs,
+    held_out::{HeldOut, seen_by_training},
+    inspect::LevelRequest,
     level_files::level_files_mode,
-    split::{HeldOut, seen_by_training},
 };
 use playbot_learner::SeenLevels;
 
@@ -47,7 +49,7 @@ fn a_copy_of_a_held_out_level_is_found_under_any_name() {
 }
 
 fn test_hash(game: &CoinRun, test: &LevelSplit) -> u64 {
-    game.fingerprint(&test.mode, 0).expect("a file")
+    level_designs(game, &test.mode).expect("files").hash(0).expect("a file")
 }
 
 #[test]
@@ -73,12 +75,49 @@ fn what_a_file_says_that_it_has_seen_is_not_believed_beyond_reason() {
     let mazes = |first, last| LevelSplit { mode: "random+size=5x5".to_owned(), first, last };
     let test = mazes(0, 63);
     let hidden = HeldOut::new(&game, &test);
-    let shown = |ranges: &[LevelSplit]| {
+    let seen = |ranges: &[LevelSplit]| {
         let levels = ranges.iter().map(LevelSplit::to_string).collect();
-        hidden.shown_by(Some(&SeenLevels { game: "maze2d".to_owned(), levels, ..SeenLevels::default() }))
+        SeenLevels { game: "maze2d".to_owned(), levels, ..SeenLevels::default() }
     };
     let (few, millions) = (mazes(1000, 1999), mazes(1 << 20, (1 << 24) - 1));
-    assert_eq!(shown(std::slice::from_ref(&few)), Some(few.to_string()));
-    assert_eq!(shown(&[millions.clone(), few]), None, "that would take long");
-    assert_eq!(shown(&[millions, mazes(63, 64)]).as_deref(), Some("random+size=5x5:63..64, among others"));
+    assert_eq!(hidden.shown_by(Some(&seen(std::slice::from_ref(&few)))), None, "the numbers differ");
+    let alike = hidden.seen_in(&seen(std::slice::from_ref(&few)));
+    assert!(alike.len() > 32 && alike.iter().all(|level| test.contains(&test.mode, *level)), "{alike:?}");
+    assert!(alike.iter().all(|level| hidden.resembles(&test.mode, *level)));
+    assert!(hidden.seen_in(&seen(std::slice::from_ref(&millions))).is_empty(), "that would take long");
+    assert_eq!(hidden.seen_in(&seen(&[millions.clone(), few])), alike, "later ranges are compared");
+    let numbers = seen(&[millions, mazes(63, 64)]);
+    assert_eq!(hidden.shown_by(Some(&numbers)).as_deref(), Some("random+size=5x5:63..64, among others"));
+}
+
+#[test]
+fn levels_of_a_seen_layout_are_found_under_another_number_and_as_a_file() {
+    let game = CoinRun::default();
+    let hard = |first, last| LevelSplit { mode: "hard".to_owned(), first, last };
+    // Counted from the JSON of the levels by another program.
+    let test = hard(64, 1087);
+    let hidden = HeldOut::new(&game, &test);
+    let seen = |ranges: &[&str]| {
+        let levels = ranges.iter().map(|&range| range.to_owned()).collect();
+        hidden.seen_in(&SeenLevels { game: "coinrun".to_owned(), levels, ..SeenLevels::default() }).len()
+    };
+    assert_eq!([seen(&["hard:0..63"]), seen(&["easy:0..499"]), seen(&["easy:0..499", "hard:0..63"])], [46, 222, 224]);
+    assert!(!hidden.contains("hard", 0) && hidden.contains("hard", 64));
+
+    // Levels 81 and 142 differ in their pictures only.
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("81.json");
+    let request = LevelRequest { mode: Some("hard"), level: Some(81), map: None, file: None, picture: false };
+    std::fs::write(&path, game.show_level(&request).expect("a level").json).expect("writable");
+    let files: LevelSplit = level_files_mode(&path.to_string_lossy()).parse().expect("a file");
+    files.check(&game).expect("a level");
+    let drawn = seen_by_training(&game, &files);
+    let test = hard(80, 142);
+    let hidden = HeldOut::new(&game, &test);
+    let known = hidden.seen_in(&drawn);
+    assert!(known.contains(&81) && known.contains(&142) && !known.contains(&80), "{known:?}");
+    assert_eq!((hidden.shown_by(Some(&drawn)), hidden.first_of(&files)), (None, None));
+    let twin = hard(142, 142);
+    let twin = HeldOut::new(&game, &twin);
+    assert!(twin.are_all_in(&files) && twin.are_all_in(&hard(81, 81)) && !twin.are_all_in(&hard(82, 82)));
 }

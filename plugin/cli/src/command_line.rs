@@ -7,8 +7,8 @@ use crate::{
     output::{log, program},
     progress::interrupt,
     verbs::{
-        bench, bugs, config, demo, doctor, eval, explore, eyes, learn_skills, level, play, policy, quickstart, record,
-        replay, report, runs, study, test, trace, train, view,
+        bench, bugs, config, demo, doctor, eval, explore, eyes, learn_skills, level, levels, play, policy, quickstart,
+        record, replay, report, runs, study, test, trace, train, view,
     },
 };
 use clap::{
@@ -82,6 +82,7 @@ enum Verb {
     Policy(policy::Args),
     Runs(runs::Args),
     Level(level::Args),
+    Levels(levels::Args),
     Trace(trace::Args),
     View(view::Args),
     Bench(bench::Args),
@@ -220,6 +221,7 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::Policy(args) => policy::run(args, games),
         Verb::Runs(args) => runs::run(args, games),
         Verb::Level(args) => level::run(args, games),
+        Verb::Levels(args) => levels::run(&args, games),
         Verb::Trace(args) => trace::run(args, games),
         Verb::View(args) => view::run(args, games),
         Verb::Bench(args) => bench::run(args, games),

@@ -6,7 +6,7 @@ use std::fmt::Write;
 
 /// The groups of verbs on the page, in the order of the page.
 const GROUPS: [(&str, &[&str]); 4] = [
-    ("Test levels", &["test", "doctor", "replay", "explore", "report", "bugs"]),
+    ("Test levels", &["test", "doctor", "replay", "explore", "levels", "report", "bugs"]),
     ("See levels and episodes", &["level", "trace", "view", "eyes", "play"]),
     ("Record", &["record", "demo"]),
     ("Learn", &["quickstart", "learn-skills", "train", "study", "eval", "config", "runs", "policy", "bench"]),

@@ -1,6 +1,6 @@
 //! The verbs of the command line: a module each, with its options (`Args`) and its `run`.
 //!
-//! - Test levels: [`mod@test`], [`doctor`], [`replay`], [`explore`], [`report`], [`bugs`].
+//! - Test levels: [`mod@test`], [`doctor`], [`replay`], [`explore`], [`levels`], [`report`], [`bugs`].
 //! - See levels and episodes: [`level`], [`trace`], [`view`], [`eyes`], [`play`].
 //! - Record: [`record`], [`demo`].
 //! - Learn: [`quickstart`], [`learn_skills`], [`train`], [`study`], [`eval`], [`config`], [`runs`], [`policy`],
@@ -21,6 +21,7 @@ pub(crate) mod explore;
 pub(crate) mod eyes;
 pub(crate) mod learn_skills;
 pub(crate) mod level;
+pub(crate) mod levels;
 pub(crate) mod play;
 pub(crate) mod policy;
 pub(crate) mod quickstart;

@@ -136,7 +136,7 @@ pub enum VerifyError {
     },
     /// A recording shows a held-out level.
     #[error(
-        "{}: level {level} is, or looks like, one of the held-out levels {split}, which must not be learned from: take \
+        "{}: level {level} is one of the held-out levels {split}, which must not be learned from: take \
          recordings of other levels (`playbot record --hold-out {split}` leaves these out), or hold out others with `test`",
         path.display()
     )]

@@ -23,7 +23,7 @@ use bevy_playbot::{
 };
 use playbot_learner::{HasExitCode, Policy, PolicyFile};
 use serde::Serialize;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use thiserror::Error;
 
 pub use bevy_playbot::episode::EpisodeResult;
@@ -116,6 +116,8 @@ pub fn blind_bots(game: &dyn Game) -> Vec<(&'static str, BlindBot)> {
 pub struct EvalPlan {
     /// Levels.
     pub split: LevelSplit,
+    /// Levels among them that are not played: see [`HeldOut::seen_in`](crate::held_out::HeldOut::seen_in).
+    pub left_out: BTreeSet<u64>,
     /// The observation of a learned policy. Bots have vectors, which are cheaper.
     pub observation_config: ObservationConfig,
     /// Episodes on each level.
@@ -131,6 +133,21 @@ pub struct EvalPlan {
 }
 
 impl EvalPlan {
+    /// Returns the levels to play, in order.
+    pub fn levels(&self) -> impl Iterator<Item = u64> + '_ {
+        self.split.levels().filter(|level| !self.left_out.contains(level))
+    }
+
+    /// Returns the number of episodes to play.
+    pub fn episodes(&self) -> u64 {
+        let levels = self.split.len() - self.left_out.iter().filter(|&&level| self.has(level)).count() as u64;
+        levels.saturating_mul(self.episodes_per_level.into())
+    }
+
+    fn has(&self, level: u64) -> bool {
+        self.split.contains(&self.split.mode, level)
+    }
+
     /// Checks that the Worlds and the results of all episodes fit into free memory.
     ///
     /// # Errors
@@ -225,7 +242,7 @@ fn build_eval_world(
     let (mut world, agents) =
         build_observing_world(game, &plan.split.mode, &observation_config, plan.seed, first, per_world)?;
     EndedEpisodes::note_in(&mut world);
-    let all: Vec<u64> = (0..plan.episodes_per_level).flat_map(|_| plan.split.levels()).collect();
+    let all: Vec<u64> = (0..plan.episodes_per_level).flat_map(|_| plan.levels()).collect();
     for (offset, &agent) in agents.iter().enumerate() {
         let levels: Vec<u64> = all.iter().skip(first as usize + offset).step_by(total).copied().collect();
         world.entity_mut(agent).insert(LevelQueue::list(levels));
@@ -277,6 +294,9 @@ pub struct EvalSummary {
     pub split: String,
     /// Levels that were played.
     pub levels: u64,
+    /// Levels of the range that were left out, since the compared players know them.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub left_out: u64,
     /// Episodes.
     pub episodes: u64,
     /// Mean return.
@@ -297,7 +317,11 @@ pub struct EvalSummary {
     pub level_returns: Vec<f64>,
 }
 
-/// Summarises the episodes of one player on one split.
+fn is_zero(count: &u64) -> bool {
+    *count == 0
+}
+
+/// Summarises the episodes of one player on one split, all of whose other levels were left out.
 pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) -> EvalSummary {
     let by_level = |value: fn(&EpisodeResult) -> f64| -> Vec<(u64, f64)> {
         results.iter().map(|result| (result.level, value(result))).collect()
@@ -311,6 +335,7 @@ pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) ->
         method: method.to_owned(),
         split: split.to_string(),
         levels: level_returns.len() as u64,
+        left_out: split.len().saturating_sub(level_returns.len() as u64),
         episodes: results.len() as u64,
         return_mean: mean(&returns),
         return_se: error_over_levels(&returns),
@@ -398,7 +423,8 @@ mod tests {
             |level, success, total_reward| EpisodeResult { level, end, success, ticks: 10, clipped: 1, total_reward };
         let results = [result(0, true, 2.0), result(0, true, 2.0), result(1, false, 0.0), result(1, true, 0.0)];
         let summary = summarize("bot", &split, &results);
-        assert_eq!((summary.levels, summary.episodes), (2, 4));
+        assert_eq!((summary.levels, summary.episodes, summary.left_out), (2, 4, 0));
+        assert_eq!(summarize("bot", &split, &results[2..]).left_out, 1);
         assert_eq!((summary.return_mean, summary.return_se), (1.0, 1.0));
         assert_eq!((summary.success, summary.success_se), (0.75, 0.25));
         assert_eq!((summary.length_mean, summary.clipped), (10.0, 0.1));

@@ -145,11 +145,12 @@ pub trait Game: Send + Sync {
         })
     }
 
-    /// Returns a hash of the layout of a level, where different seeds can draw the same one:
-    /// [`LevelTools::layout_hash`]. For a level file it is the hash of the level in it.
-    fn fingerprint(&self, mode: &str, level: u64) -> Option<u64> {
+    /// Returns a hash of the layout of a level, by which equal levels under different numbers are found:
+    /// [`LevelTools::layout_hash`]. For a level file it is that of the level in it, or the hash of its content if the
+    /// game does not compute any.
+    fn layout(&self, mode: &str, level: u64) -> Option<u64> {
         if is_level_files(mode) {
-            return level_designs(self, mode).ok()?.hash(level);
+            return level_designs(self, mode).ok()?.layout(level);
         }
         self.tools().levels.layout_hash(mode, level)
     }
@@ -310,8 +311,9 @@ pub trait LevelTools: Send + Sync {
         None
     }
 
-    /// Returns a hash of the layout of a level that the game draws itself. Returns `None` if different seeds cannot
-    /// draw the same layout, or if all levels of the mode have the same one.
+    /// Returns a hash of the layout of a level that the game draws itself: of all that play meets, without pictures and
+    /// without random numbers that only break ties. Returns `None`, by default, if the game does not compare its levels,
+    /// or if all levels of the mode have the same layout. [`LevelDesign::with_layout`] is the same for level files.
     fn layout_hash(&self, _mode: &str, _level: u64) -> Option<u64> {
         None
     }

@@ -110,6 +110,11 @@ impl LevelDesigns {
         self.drawn(level).map(|drawn| drawn.design.hash())
     }
 
+    /// Returns the hash of a level's layout.
+    pub fn layout(&self, level: u64) -> Option<u64> {
+        self.drawn(level).map(|drawn| drawn.design.layout())
+    }
+
     /// Returns the description of the levels that recordings keep.
     pub fn files(&self) -> LevelFiles {
         let file = |drawn: &DrawnLevel| LevelFile { path: drawn.path.clone(), hash: drawn.design.hash() };
@@ -122,6 +127,7 @@ impl LevelDesigns {
 pub struct LevelDesign {
     level: Arc<dyn Any + Send + Sync>,
     hash: u64,
+    layout: Option<u64>,
 }
 
 impl LevelDesign {
@@ -130,7 +136,18 @@ impl LevelDesign {
     /// `content` is all of the level that affects play, in one canonical form. So the level has the same hash under
     /// any layout of its file.
     pub fn new<T: Any + Send + Sync>(level: T, content: &str) -> Self {
-        Self { level: Arc::new(level), hash: StateHash::of(content.bytes().map(u64::from)).0 }
+        Self { level: Arc::new(level), hash: StateHash::of(content.bytes().map(u64::from)).0, layout: None }
+    }
+
+    /// Adds the hash of the level's [layout](crate::game::LevelTools::layout_hash), by which it is found among the levels
+    /// that the game draws itself.
+    pub fn with_layout(self, layout: u64) -> Self {
+        Self { layout: Some(layout), ..self }
+    }
+
+    /// Returns the hash of the layout; without one, the hash of the content.
+    pub fn layout(&self) -> u64 {
+        self.layout.unwrap_or(self.hash)
     }
 
     /// Returns a hash of the content.

@@ -18,6 +18,9 @@ pub struct SeenLevels {
     /// Hashes of the level files among them.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub level_files: Vec<u64>,
+    /// Hashes of the layouts of these files.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub layouts: Vec<u64>,
 }
 
 impl SeenLevels {
@@ -27,6 +30,8 @@ impl SeenLevels {
         self.levels.extend(levels.cloned().collect::<Vec<_>>());
         let files = other.level_files.iter().filter(|hash| !self.level_files.contains(hash));
         self.level_files.extend(files.copied().collect::<Vec<_>>());
+        let layouts = other.layouts.iter().filter(|hash| !self.layouts.contains(hash));
+        self.layouts.extend(layouts.copied().collect::<Vec<_>>());
     }
 }
 
@@ -57,7 +62,8 @@ mod tests {
     fn they_are_said_in_few_words() {
         let seen = |levels: usize, files: u64| {
             let levels = (0..levels).map(|i| format!("hard:{i}..{i}")).collect();
-            SeenLevels { game: "a".to_owned(), levels, level_files: (0..files).collect() }.to_string()
+            SeenLevels { game: "a".to_owned(), levels, level_files: (0..files).collect(), layouts: Vec::new() }
+                .to_string()
         };
         assert_eq!(seen(1, 0), "hard:0..0");
         assert_eq!(seen(2, 1), "hard:0..0, hard:1..1 and 1 level file");

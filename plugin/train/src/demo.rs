@@ -18,11 +18,7 @@ use bevy_playbot::{
     vision::ObservationConfig,
 };
 use playbot_harness::{
-    demo::VerifyError,
-    game::Game,
-    machine::free_memory,
-    sensors::GameSensors,
-    split::{HeldOut, LevelSplit},
+    demo::VerifyError, game::Game, held_out::HeldOut, machine::free_memory, sensors::GameSensors, split::LevelSplit,
 };
 use playbot_learner::{ActionSpace, Actions, Dataset, DatasetEpisode, LearnError, ObsKind, Observations, Rollout};
 use std::{

@@ -26,7 +26,7 @@ use playbot_learner::{
     settings::{Range, is_off},
 };
 use serde::{Deserialize, Serialize, Serializer};
-use std::{fmt, path::PathBuf, str::FromStr};
+use std::{collections::BTreeSet, fmt, path::PathBuf, str::FromStr};
 
 pub use crate::experiment::checks::ExperimentError;
 pub use bevy_playbot::vision::ObservationKind;
@@ -172,6 +172,7 @@ impl Experiment {
     pub fn eval_plan(&self, split: &LevelSplit, threads: usize) -> EvalPlan {
         EvalPlan {
             split: split.clone(),
+            left_out: BTreeSet::new(),
             observation_config: self.observation_config(),
             episodes_per_level: self.eval.episodes_per_level,
             seed: self.seed,

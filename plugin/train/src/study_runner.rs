@@ -23,8 +23,9 @@ use playbot_harness::{
     eval::{EvalError, EvalPlan, EvalSummary, Player, evaluate, summarize},
     game::Game,
     games::Games,
+    held_out::HeldOut,
     sealed_file::{SealedFileError, io_error, read_sealed, write_atomically, write_sealed},
-    split::{HeldOut, LevelSplit},
+    split::LevelSplit,
 };
 use playbot_learner::{Dataset, FileError, HasExitCode, SeenLevels, SkillModel, disk};
 use playbot_report::{statistics::steps_to_reach, to_svg};
@@ -498,7 +499,7 @@ fn measure(
     plan: &EvalPlan,
     observer: &mut dyn RunObserver,
 ) -> Result<EvalSummary, EvalError> {
-    let episodes = plan.split.len() * u64::from(plan.episodes_per_level);
+    let episodes = plan.episodes();
     let counter = observer.counter(CountedWork::Measure { name, episodes });
     let summary = summarize(name, &plan.split, &evaluate(game, player, plan, counter)?);
     observer.observe(RunEvent::Measured(&summary));

@@ -10,7 +10,7 @@ use crate::{
     trainer,
     trainer::Trainer,
 };
-use playbot_harness::{game::Game, sealed_file::file_checksum, split::seen_by_training};
+use playbot_harness::{game::Game, held_out::seen_by_training, sealed_file::file_checksum};
 use playbot_learner::{DeviceKind, HasExitCode, SeenLevels, SkillModel};
 use playbot_report::whole;
 use std::path::{Path, PathBuf};

@@ -19,9 +19,9 @@ use bevy_playbot::{
 use playbot_harness::{
     arrangement::Arrangement,
     game::Game,
+    held_out::{HeldOut, seen_by_training},
     parallel::{on_own_threads, on_threads},
     sensors::GameSensors,
-    split::{HeldOut, seen_by_training},
 };
 use playbot_learner::{
     ActionSpace, DeviceKind, FileError, LearnError, Learner, LearnerMetrics, ObsColumns, ObsKind, Observations, Policy,

@@ -22,8 +22,9 @@ use playbot_harness::{
     },
     game::Game,
     games::Games,
+    held_out::{HeldOut, seen_by_training},
     sensors::GameSensors,
-    split::{HeldOut, LevelSplit, seen_by_training},
+    split::LevelSplit,
 };
 use playbot_learner::{DeviceKind, SeenLevels, SkillModel};
 use playbot_report::{ResultRow, whole};
@@ -33,7 +34,10 @@ use playbot_train::{
     run_dir::{OpenedRun, RunDir, RunInfo},
 };
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 /// Options for a policy, a run or a bot.
 #[derive(clap::Args, Clone, Debug)]
@@ -310,7 +314,10 @@ impl Measured {
         let summary = self.summary;
         ResultRow {
             method: summary.method,
-            split: summary.split,
+            split: match summary.left_out {
+                0 => summary.split,
+                left_out => format!("{} without {left_out}", summary.split),
+            },
             episodes: summary.episodes as usize,
             return_mean: summary.return_mean,
             return_se: summary.return_se,
@@ -352,7 +359,7 @@ fn timed<T>(
     play: impl FnOnce(&(dyn Fn(u64) + Sync)) -> Result<Vec<T>, EvalError>,
     result: impl Fn(&T) -> &EpisodeResult,
 ) -> Result<(Measured, Vec<T>), CliError> {
-    let total = plan.split.len() * u64::from(plan.episodes_per_level);
+    let total = plan.episodes();
     let bar = progress::bar(&format!("test {name}"), total, "episodes");
     let start = std::time::Instant::now();
     let played = play(&|n| bar.inc(n))?;
@@ -376,9 +383,9 @@ pub(crate) fn print_json(summary: &EvalSummary) -> Result<(), CliError> {
 
 // Check that measured levels were not learned from.
 
-/// The levels that players are measured on.
+/// The levels that players are measured on, and those of them that the players know.
 pub struct MeasuredLevels<'a> {
-    splits: Vec<HeldOut<'a>>,
+    splits: Vec<(HeldOut<'a>, BTreeSet<u64>)>,
     /// The levels were named; else they are the held-out ones of the experiment.
     are_named: bool,
 }
@@ -386,29 +393,49 @@ pub struct MeasuredLevels<'a> {
 impl<'a> MeasuredLevels<'a> {
     /// Takes ranges of levels that the game [has](LevelSplit::check).
     pub fn new(game: &'a dyn Game, splits: &'a [LevelSplit], are_named: bool) -> Self {
-        Self { splits: splits.iter().map(|split| HeldOut::new(game, split)).collect(), are_named }
+        let splits = splits.iter().map(|split| (HeldOut::new(game, split), BTreeSet::new())).collect();
+        Self { splits, are_named }
     }
 
-    /// Checks that the policy in `path` has not learned from these levels. Levels that were named are only reported.
+    /// Checks that the policy in `path` has not learned from these levels. Levels that were named are only reported, and
+    /// so are levels of a layout that it has seen under another number.
     ///
     /// # Errors
     ///
     /// It has seen held-out levels.
-    pub fn check(&self, path: &Path, seen: Option<&SeenLevels>) -> Result<(), CliError> {
-        for levels in &self.splits {
-            let Some(own) = levels.shown_by(seen) else { continue };
-            let (path, split) = (path.display(), levels.split());
-            if !self.are_named {
-                return Err(CliError::Usage(format!(
-                    "{path} has learned from {own}, and the held-out levels {split} have some of these: choose \
-                     levels that no player has seen, or measure there on purpose, with --levels"
-                )));
+    pub fn check(&mut self, path: &Path, seen: Option<&SeenLevels>) -> Result<(), CliError> {
+        let path = path.display();
+        for (levels, known) in &mut self.splits {
+            let split = levels.split();
+            if let Some(own) = levels.shown_by(seen) {
+                if !self.are_named {
+                    return Err(CliError::Usage(format!(
+                        "{path} has learned from {own}, and the held-out levels {split} have some of these: choose \
+                         levels that no player has seen, or measure there on purpose, with --levels"
+                    )));
+                }
+                report!(
+                    "{path} has learned from {own}, and the levels {split} have some of these: not all of them are unseen"
+                );
             }
-            report!(
-                "{path} has learned from {own}, and the levels {split} have some of these: not all of them are unseen"
-            );
+            let Some(seen) = seen else { continue };
+            let own = levels.seen_in(seen);
+            if !own.is_empty() {
+                report!(
+                    "{path} knows {} of the {} levels {split}: by number or layout they are among {seen}, from which it has \
+                     learned",
+                    whole(own.len() as f64),
+                    whole(split.len() as f64)
+                );
+            }
+            known.extend(own);
         }
         Ok(())
+    }
+
+    /// Returns the levels of each range that some player knows.
+    pub fn known(self) -> Vec<BTreeSet<u64>> {
+        self.splits.into_iter().map(|(_, known)| known).collect()
     }
 }
 

@@ -20,10 +20,10 @@ use playbot_harness::{
     mode::ModeError,
     split::LevelSplit,
 };
-use playbot_report::to_text_table;
+use playbot_report::{counted, to_text_table};
 use playbot_train::{Experiment, checkpoint::CheckpointChoice, learn_skills::behaviour_cloning, run_dir::RunDir};
 use std::{
-    cell::LazyCell,
+    collections::BTreeSet,
     path::{Path, PathBuf},
 };
 
@@ -66,6 +66,10 @@ pub struct Args {
     /// experiment.
     #[arg(long)]
     levels: Vec<LevelSplit>,
+    /// Leave out levels of a layout that some player has learned from, under any number. Held-out levels are always
+    /// measured so.
+    #[arg(long)]
+    new_layouts: bool,
     /// Episodes on each level, instead of the experiment's.
     #[arg(long, visible_alias = "episodes")]
     episodes_per_level: Option<u32>,
@@ -113,15 +117,17 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     // Checked before anything is measured.
     let plan_of = |split| experiment.eval_plan(split, args.compute.threads());
     splits.iter().try_for_each(|split| plan_of(split).check_memory())?;
-    let players = players(game, &experiment, &splits, &args, games)?;
+    let (players, known) = players(game, &experiment, &splits, &args, games)?;
+    let left_out = left_out(&splits, known, &args)?;
     let kept = if args.json { KEPT_LINES } else { KEPT_NOTHING };
     interrupt::leave(kept.to_owned());
     let measuring = NothingToSave::listen();
     let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
     let mut rows = Vec::new();
-    for split in &splits {
+    for (split, left_out) in splits.iter().zip(&left_out) {
         for LoadedPlayer { name, player, observation_config, .. } in &players {
-            let plan = EvalPlan { observation_config: *observation_config, ..plan_of(split) };
+            let observation_config = *observation_config;
+            let plan = EvalPlan { observation_config, left_out: left_out.clone(), ..plan_of(split) };
             let measured = match &mut footprints {
                 Some(footprints) => {
                     let (measured, trails) = player::follow(game, name, player, &plan)?;
@@ -145,6 +151,26 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         footprints.write(game)?;
     }
     Ok(Outcome::Pass)
+}
+
+/// Returns the levels of each range that are not measured: of held-out levels, and with --new-layouts of any, those that
+/// some player knows. All players are measured on the same levels.
+fn left_out(splits: &[LevelSplit], known: Vec<BTreeSet<u64>>, args: &Args) -> Result<Vec<BTreeSet<u64>>, CliError> {
+    for (split, known) in splits.iter().zip(&known).filter(|(_, known)| !known.is_empty()) {
+        let (is, it) = if known.len() == 1 { ("is", "it") } else { ("are", "them") };
+        let levels = format!("{} of {split} {is}", counted(known.len() as u64, "level"));
+        if !args.levels.is_empty() && !args.new_layouts {
+            report!("{levels} measured with the others: --new-layouts leaves {it} out");
+        } else if known.len() as u64 == split.len() {
+            return Err(CliError::Usage(format!(
+                "the players know every one of the levels {split}: name others with --levels"
+            )));
+        } else {
+            report!("{levels} left out");
+        }
+    }
+    let keeps_all = !args.levels.is_empty() && !args.new_layouts;
+    Ok(if keeps_all { vec![BTreeSet::new(); splits.len()] } else { known })
 }
 
 /// Returns the error of levels of a mode that the game does not have. It names the games that have it.
@@ -195,18 +221,18 @@ fn of_policy(args: &Args, games: &Games) -> Result<Vec<String>, CliError> {
     Ok(vec![format!("game={}", game.name()), format!("test={levels}")])
 }
 
+/// Returns the players, and the levels of each range that some player knows.
 fn players(
     game: &dyn Game,
     experiment: &Experiment,
     splits: &[LevelSplit],
     args: &Args,
     games: &Games,
-) -> Result<Vec<LoadedPlayer>, CliError> {
+) -> Result<(Vec<LoadedPlayer>, Vec<BTreeSet<u64>>), CliError> {
     let device = args.compute.device();
     let has_policy = !(args.run.is_empty() && args.skills.is_empty() && args.policy.is_empty());
     let draw = action_draw(args.greedy || has_policy && experiment.eval.greedy, has_policy)?;
-    // Reads all levels, which bots do not need.
-    let measured = LazyCell::new(|| MeasuredLevels::new(game, splits, !args.levels.is_empty()));
+    let mut measured = MeasuredLevels::new(game, splits, !args.levels.is_empty());
     let mut players = Vec::new();
     for path in &args.run {
         let opened = RunDir::open(path)?;
@@ -237,7 +263,7 @@ fn players(
         }
         chosen.check_fit(game)?;
     }
-    Ok(players)
+    Ok((players, measured.known()))
 }
 
 /// Replaces the sensor that a policy was trained with by another one of the same observation form.

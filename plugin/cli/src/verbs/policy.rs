@@ -16,7 +16,8 @@ use clap::ArgGroup;
 use playbot_harness::{
     game::Game,
     games::{Artifact, Games},
-    split::{HeldOut, LevelSplit},
+    held_out::HeldOut,
+    split::LevelSplit,
 };
 use playbot_learner::{DeviceKind, PolicyFile};
 use playbot_report::whole;

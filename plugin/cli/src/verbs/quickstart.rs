@@ -16,9 +16,16 @@ use crate::{
     verbs::{learn_skills, quickstart::report::write_report, train::report_length},
 };
 use bevy_playbot::policy::ActionDraw;
-use playbot_harness::{eval::Player, game::Game, games::Games, sealed_file::write_atomically};
-use playbot_learner::{Dataset, DeviceKind, SkillModel, disk};
+use playbot_harness::{
+    eval::{EvalPlan, Player},
+    game::Game,
+    games::Games,
+    held_out::{HeldOut, seen_by_training},
+    sealed_file::write_atomically,
+};
+use playbot_learner::{Dataset, DeviceKind, SeenLevels, SkillModel, disk};
 use playbot_report::{
+    counted,
     statistics::{median, steps_to_reach},
     to_text_table, whole,
 };
@@ -33,6 +40,7 @@ use playbot_train::{
 };
 use serde_json::json;
 use std::{
+    collections::BTreeSet,
     path::{Path, PathBuf},
     time::Instant,
 };
@@ -130,9 +138,11 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mut players: Vec<_> = trained.iter().map(|one| (one.algorithm.name().to_owned(), one.player.clone())).collect();
     players.push(("bc".to_owned(), behaviour_cloning(&skills, &experiment, draw)));
     players.extend(game.tools().bots.blind_bots().into_iter().map(|(name, bot)| (name.to_owned(), Player::Blind(bot))));
+    let left_out = known_levels(game, &experiment, &skills);
     let mut rows = Vec::new();
     for (name, player) in &players {
-        let plan = experiment.eval_plan(&experiment.test, args.threads.count());
+        let all = experiment.eval_plan(&experiment.test, args.threads.count());
+        let plan = EvalPlan { left_out: left_out.clone(), ..all };
         let measured = player::measure(game, name, player, &plan)?;
         if args.json {
             let mut line = json!(measured.summary);
@@ -156,6 +166,23 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     write_report(&report, &experiment, &trained, &rows, &comparison, start.elapsed().as_secs_f64())?;
     report!("report: {} ({:.0} s in all)", report.display(), start.elapsed().as_secs_f64());
     Ok(Outcome::Pass)
+}
+
+/// Returns the held-out levels of a layout that the trainings or the recordings show, and reports how many they are.
+fn known_levels(game: &dyn Game, experiment: &Experiment, skills: &SkillModel) -> BTreeSet<u64> {
+    let mut seen = seen_by_training(game, &experiment.train);
+    seen.extend(skills.demos().unwrap_or(&SeenLevels::default()));
+    let known = HeldOut::new(game, &experiment.test).seen_in(&seen);
+    // Without a new level the known ones are better than none.
+    if known.is_empty() || known.len() as u64 == experiment.test.len() {
+        return BTreeSet::new();
+    }
+    report!(
+        "left out of {}: {} of a layout that was recorded or trained on under another number",
+        experiment.test,
+        counted(known.len() as u64, "level")
+    );
+    known
 }
 
 /// A training in the report.

@@ -10,7 +10,9 @@ use crate::{
     progress::interrupt,
 };
 use bevy_playbot::{demo::recorder::Recorder, engine::flush_unfinished};
-use playbot_harness::{demo::demonstration::DemonstrationPlan, game::Game, games::Games, prelude::*, split::HeldOut};
+use playbot_harness::{
+    demo::demonstration::DemonstrationPlan, game::Game, games::Games, held_out::HeldOut, prelude::*,
+};
 use playbot_report::counted;
 use std::path::PathBuf;
 
@@ -21,7 +23,7 @@ use std::path::PathBuf;
 /// that recordings also show recoveries.
 ///
 /// Recordings may show training levels and any others, but no held-out level, on which bots are tested. `learn-skills`
-/// refuses those, and any level that looks like one. Held-out levels are the experiment's `test`, and --hold-out leaves
+/// refuses those. Held-out levels are the experiment's `test`, and --hold-out leaves
 /// them out.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
@@ -38,7 +40,7 @@ pub struct Args {
     /// but for the held-out ones of the game's own experiment.
     #[arg(long)]
     levels: Option<LevelSplit>,
-    /// Leave out these levels, and any that look like one of them (repeatable).
+    /// Leave out these levels, and any of the same layout as one of them (repeatable).
     #[arg(long, value_name = "LEVELS")]
     hold_out: Vec<LevelSplit>,
     /// File to write.
@@ -195,8 +197,10 @@ fn check_noise(game: &dyn Game, noise: f64) -> Result<(), CliError> {
 fn choose_levels(game: &dyn Game, levels: &LevelSplit, held_out: &[LevelSplit]) -> Result<Vec<u64>, CliError> {
     held_out.iter().try_for_each(|split| split.check(game))?;
     let hidden: Vec<_> = held_out.iter().map(|split| HeldOut::new(game, split)).collect();
+    let is_held_out =
+        |hidden: &HeldOut, level| hidden.contains(&levels.mode, level) || hidden.resembles(&levels.mode, level);
     let chosen: Vec<u64> =
-        levels.levels().filter(|&level| !hidden.iter().any(|hidden| hidden.contains(&levels.mode, level))).collect();
+        levels.levels().filter(|&level| !hidden.iter().any(|hidden| is_held_out(hidden, level))).collect();
     if chosen.is_empty() {
         return Err(CliError::Usage(format!("every one of the levels {levels} is held out: record others")));
     }
@@ -212,8 +216,8 @@ fn warn_of_held_out(game: &dyn Game, levels: &LevelSplit, chosen: &[u64]) {
     }
     if let Some(level) = chosen.iter().find(|level| hidden.contains(&levels.mode, **level)) {
         report!(
-            "warning: level {level} is, or looks like, one of the held-out levels {split}; learn-skills refuses recordings \
-             of them, unless your experiment holds out others: leave them out with --hold-out {split}"
+            "warning: level {level} is one of the held-out levels {split}; learn-skills refuses recordings of them, unless \
+             your experiment holds out others: leave them out with --hold-out {split}"
         );
     }
 }

@@ -11,7 +11,7 @@ mod results;
 mod testers;
 
 use crate::{
-    arguments::{Compute, default_held_out, first_levels},
+    arguments::{Compute, default_held_out, experiment::quoted, first_levels},
     error::{CliError, Outcome},
     progress,
     progress::interrupt,
@@ -20,7 +20,8 @@ use crate::{
         testers::TesterArgs,
     },
 };
-use playbot_harness::{game::Game, games::Games, split::LevelSplit};
+use playbot_harness::{game::Game, games::Games, level_audit::EqualLevels, split::LevelSplit};
+use playbot_report::counted;
 use playbot_test::{
     detectors::Detectors,
     findings::{Budget, Checks, FINDINGS, FindingFiles, list_findings},
@@ -166,10 +167,12 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
         }
     };
     split.check(game)?;
+    report_equal_levels(game, &split);
     let detectors = args.detectors.choose(game, &split)?;
+    let testers = args.testers.load(game, &split, args.compute.device())?;
     let plan = TestPlan {
         split,
-        testers: args.testers.load(game, args.compute.device())?,
+        testers,
         episodes: args.episodes,
         seed: args.seed,
         detectors,
@@ -178,6 +181,24 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
     };
     plan.check()?;
     Ok(plan)
+}
+
+/// Largest number of levels whose layouts are compared before a test, so that it begins at once.
+const MOST_COMPARED: u64 = 10_000;
+
+/// Reports it if some levels are equal: they would be tested again and again.
+fn report_equal_levels(game: &dyn Game, split: &LevelSplit) {
+    if split.len() > MOST_COMPARED {
+        return;
+    }
+    let Some(equal) = EqualLevels::of(game, split).filter(|equal| !equal.groups.is_empty()) else { return };
+    report!(
+        "{} have {}: `playbot levels {} --levels {}` lists the equal ones",
+        counted(split.len(), "level"),
+        counted(equal.layouts, "layout"),
+        game.name(),
+        quoted(&split.to_string())
+    );
 }
 
 /// Tests the unfinished levels, with a progress bar.

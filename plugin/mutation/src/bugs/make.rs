@@ -13,8 +13,9 @@ use playbot_harness::{
     defect::{DefectKind, Plant},
     eval::{EpisodeResult, EvalPlan, Player, blind_bots, evaluate},
     game::Game,
+    held_out::HeldOut,
     parallel::on_threads,
-    split::{HeldOut, LevelSplit},
+    split::LevelSplit,
 };
 use playbot_learner::{
     Streams,
@@ -399,6 +400,7 @@ fn play(source: &Source, chunk: &LevelSplit, threads: usize) -> Result<Vec<Episo
     let arenas = ARENAS.min(u32::try_from(chunk.len()).unwrap_or(ARENAS));
     let plan = EvalPlan {
         split: chunk.clone(),
+        left_out: BTreeSet::new(),
         observation_config: ObservationConfig::default(),
         episodes_per_level: 1,
         seed: 0,

@@ -13,7 +13,7 @@ use playbot_harness::{
     game::Game,
     split::LevelSplit,
 };
-use std::ops::ControlFlow;
+use std::{collections::BTreeSet, ops::ControlFlow};
 
 /// A finding for agents that succeed far from the goal of their level's plan.
 ///
@@ -242,6 +242,7 @@ impl Shortcut {
         let split = LevelSplit { mode: level.mode.to_owned(), first: level.level, last: level.level };
         let plan = EvalPlan {
             split,
+            left_out: BTreeSet::new(),
             observation_config: ObservationConfig::default(),
             episodes_per_level: 1,
             seed: 0,

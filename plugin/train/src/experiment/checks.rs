@@ -10,10 +10,11 @@ use crate::{
 use playbot_harness::{
     arrangement::Arrangement,
     game::Game,
+    held_out::HeldOut,
     machine::{MemoryError, MemoryPart, ThreadLimit, check_parts, free_memory, product},
     mode::ModeError,
     sensors::GameSensors,
-    split::{HeldOut, LevelSplit},
+    split::LevelSplit,
 };
 use playbot_learner::{
     ActionSpace, Augmentation, HasExitCode, ImageShape, LearnError, ObsKind, PriorKind, SettingError, SkillDraw,
@@ -184,8 +185,9 @@ impl Experiment {
         self.check_observation(game)
     }
 
-    /// Checks that the game has the modes, and that no held-out level is trained on, under any name
-    /// ([`LevelTools::family`](playbot_harness::game::LevelTools::family), [`Game::fingerprint`]).
+    /// Checks that the game has the modes, that no held-out level is trained on
+    /// ([`LevelTools::family`](playbot_harness::game::LevelTools::family)), and that not all of them have the layout of a
+    /// training level.
     ///
     /// # Errors
     ///
@@ -193,11 +195,11 @@ impl Experiment {
     pub fn check_levels(&self, game: &dyn Game) -> Result<(), ExperimentError> {
         self.check_train(game)?;
         self.check_test(game)?;
-        match HeldOut::new(game, &self.test).first_of(&self.train) {
-            Some(level) => {
-                let (train, test) = (Box::new(self.train.clone()), Box::new(self.test.clone()));
-                Err(ExperimentError::Leak { train, level, test })
-            }
+        let held_out = HeldOut::new(game, &self.test);
+        let (train, test) = (Box::new(self.train.clone()), Box::new(self.test.clone()));
+        match held_out.first_of(&self.train) {
+            Some(level) => Err(ExperimentError::Leak { train, level, test }),
+            None if held_out.are_all_in(&self.train) => Err(ExperimentError::SameLayouts { train, test }),
             None => Ok(()),
         }
     }
@@ -571,14 +573,20 @@ pub enum ExperimentError {
         test: LevelSplit,
     },
     /// A training level is equal to a held-out level in content.
-    #[error(
-        "level {level} of the training levels {train} is, or looks like, one of the held-out levels {test}: choose others"
-    )]
+    #[error("level {level} of the training levels {train} is one of the held-out levels {test}: choose others")]
     Leak {
         /// Training levels.
         train: Box<LevelSplit>,
         /// The first such level.
         level: u64,
+        /// Held-out levels.
+        test: Box<LevelSplit>,
+    },
+    /// No held-out level has a layout of its own.
+    #[error("each of the held-out levels {test} has the layout of one of the training levels {train}: choose others")]
+    SameLayouts {
+        /// Training levels.
+        train: Box<LevelSplit>,
         /// Held-out levels.
         test: Box<LevelSplit>,
     },
@@ -626,7 +634,7 @@ impl ExperimentError {
     /// Returns the keys or sections to look at, the first one first.
     pub fn keys(&self) -> Vec<&str> {
         match self {
-            Self::Overlap { .. } | Self::Leak { .. } => vec!["train", "test"],
+            Self::Overlap { .. } | Self::Leak { .. } | Self::SameLayouts { .. } => vec!["train", "test"],
             Self::Mode { key, .. } | Self::Value { key, .. } => vec![key],
             // Keys are named between backticks.
             Self::Memory(MemoryError { keys, .. }) => keys.split('`').skip(1).step_by(2).collect(),

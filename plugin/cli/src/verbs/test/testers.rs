@@ -3,12 +3,12 @@
 use crate::{
     arguments::{
         name_in_list, open,
-        player::{LoadedPlayer, action_draw, check_run_of},
+        player::{LoadedPlayer, MeasuredLevels, action_draw, check_run_of},
     },
     error::CliError,
     verbs::bugs::testers::Named,
 };
-use playbot_harness::{game::Game, sealed_file::file_checksum};
+use playbot_harness::{game::Game, sealed_file::file_checksum, split::LevelSplit};
 use playbot_learner::DeviceKind;
 use playbot_test::verdict::{TestedRun, Tester, TesterRecord};
 use playbot_train::{checkpoint::CheckpointChoice, run_dir::RunDir};
@@ -38,12 +38,14 @@ pub struct TesterArgs {
 
 impl TesterArgs {
     /// Loads the testers. Policies and runs have the names of their files and folders, unless a policy is given another
-    /// name.
+    /// name. Levels that they have learned from are reported.
     ///
     /// # Errors
     ///
     /// One of them does not exist, or was made for another game, or two have one name.
-    pub fn load(&self, game: &dyn Game, device: DeviceKind) -> Result<Vec<Tester>, CliError> {
+    pub fn load(&self, game: &dyn Game, split: &LevelSplit, device: DeviceKind) -> Result<Vec<Tester>, CliError> {
+        let levels = std::slice::from_ref(split);
+        let mut measured = MeasuredLevels::new(game, levels, true);
         let draw = action_draw(self.greedy, !(self.policy.is_empty() && self.run.is_empty()))?;
         let mut testers = Vec::new();
         for name in &self.bot {
@@ -54,6 +56,7 @@ impl TesterArgs {
             let path = named.as_ref().map_or(given.as_path(), |named| named.path.as_path());
             let chosen = LoadedPlayer::policy_file(game, path, draw, device)?;
             chosen.check_fit(game)?;
+            measured.check(path, chosen.seen.as_ref())?;
             let name = named.as_ref().map(|named| named.name.clone());
             let record = TesterRecord::policy(name, path, file_checksum(path)?);
             testers.push(self.of_policy(chosen, record));
@@ -67,6 +70,7 @@ impl TesterArgs {
             let step = checkpoint.summary.step;
             let chosen = LoadedPlayer::run(game, &opened, CheckpointChoice::Step(step), draw, device)?;
             chosen.check_fit(game)?;
+            measured.check(path, chosen.seen.as_ref())?;
             let name = path.file_name().map_or(chosen.name.clone(), |name| name.to_string_lossy().into_owned());
             let tested = Some(TestedRun { folder: path.display().to_string(), step });
             testers.push(self.of_policy(chosen, TesterRecord { checksum, run: tested, ..TesterRecord::bot(name) }));

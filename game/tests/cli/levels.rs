@@ -1,0 +1,66 @@
+//! Tests of audits of levels.
+
+use std::{fs, path::Path};
+
+use serde_json::{Value, json};
+
+use crate::program::{done, ended};
+
+fn audit(folder: &Path, args: &[&str], wanted: i32) -> Value {
+    let (data, _) = ended(folder, &[&["levels"], args, &["--json"]].concat(), wanted);
+    serde_json::from_str(&data).expect("one line of JSON")
+}
+
+#[test]
+fn equal_levels_are_counted_and_named_within_a_set_and_among_another() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    // Counted from the JSON of the levels by another program.
+    let all = audit(folder, &["coinrun", "--levels", "hard:0..1087", "--layouts-only"], 1);
+    assert_eq!((&all["count"], &all["layouts"]), (&json!(1088), &json!(869)));
+    let groups = all["equal"].as_array().expect("groups");
+    assert_eq!(groups[0].as_array().map(Vec::len), Some(12));
+    assert!(groups.iter().any(|group| group.as_array().is_some_and(|all| all.contains(&json!(142)))));
+    assert_eq!(all["solved_at_start"], Value::Null);
+    let among = ["--among", "hard:0..63", "--among", "easy:0..499"];
+    let held_out =
+        audit(folder, &[&["coinrun", "--levels", "hard:64..1087", "--layouts-only"], &among[..]].concat(), 1);
+    let counts = [0, 1].map(|at: usize| held_out["among"][at]["levels"].as_array().map(Vec::len));
+    assert_eq!(counts, [Some(46), Some(222)]);
+    let (text, _) = ended(folder, &["levels", "coinrun", "--levels", "hard:0..1087", "--layouts-only"], 1);
+    assert!(text.contains("layouts: 869; ") && text.contains("(--json has all)"), "{text}");
+}
+
+#[test]
+fn levels_that_one_held_action_solves_are_those_of_the_bot_that_holds_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let found = audit(folder, &["coinrun", "--levels", "hard:0..63"], 1);
+    let held = found["solved_by_one_action"].as_array().expect("actions");
+    let held = held.iter().find(|one| one["action"] == "right+jump").expect("the bot's action");
+    // The return of right-jump on these levels is 6.40625 in the original, and a coin is worth 10.
+    assert_eq!(held["levels"].as_array().map(Vec::len), Some(41));
+    assert_eq!(found["solved_at_start"], json!([]));
+    // Start and goal of this one are in the same cell, so that no action is needed.
+    let (mazes, _) = ended(folder, &["levels", "maze2d", "--levels", "medium:0..49"], 1);
+    assert!(mazes.contains("solved at the start: ") && !mazes.contains("solved at the start: 0"), "{mazes}");
+    assert!(mazes.contains("equal levels: unknown"), "{mazes}");
+}
+
+#[test]
+fn copies_of_a_file_and_of_a_numbered_level_are_found() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let (level, _) = done(folder, &["level", "coinrun", "--level", "81", "--json"]);
+    for name in ["a.json", "b.json"] {
+        fs::write(folder.join(name), &level).expect("writable");
+    }
+    let args = ["coinrun", "--levels", "files:*.json", "--layouts-only", "--among", "hard:140..145"];
+    let found = audit(folder, &args, 1);
+    assert_eq!((&found["layouts"], &found["equal"]), (&json!(1), &json!([[0, 1]])));
+    assert_eq!(found["among"][0]["levels"], json!([0, 1]), "level 142 has the same layout");
+    let clean = audit(folder, &["coinrun", "--levels", "files:a.json", "--layouts-only"], 0);
+    assert_eq!(clean["equal"], json!([]));
+    let (_, words) = done(folder, &["test", "coinrun", "--levels", "files:*.json", "--bot", "search", "--out", "t"]);
+    assert!(words.contains("2 levels have 1 layout"), "{words}");
+}

@@ -1,0 +1,136 @@
+//! Audits of sets of levels: equal levels under different numbers, and levels that one held action solves.
+
+use crate::{
+    eval::{EpisodeResult, EvalError, EvalPlan, Player, evaluate},
+    game::Game,
+    held_out::{HeldOut, by_layout},
+    split::LevelSplit,
+};
+use bevy_playbot::{bot::BlindBot, vision::ObservationConfig};
+use playbot_learner::{ActionSpace, ActionValue};
+use std::collections::{BTreeMap, BTreeSet};
+
+/// Arenas and Worlds in which actions are tried. The result does not depend on them.
+const ARENAS: u32 = 64;
+
+const WORLDS: u32 = 8;
+
+/// Levels of one layout under different numbers.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct EqualLevels {
+    /// The number of layouts.
+    pub layouts: u64,
+    /// Levels that share their layout, in ascending order: the largest groups first, then by their first level.
+    pub groups: Vec<Vec<u64>>,
+}
+
+impl EqualLevels {
+    /// Compares levels of a game; `None` if the game does not compare its [layouts](Game::layout).
+    pub fn of(game: &dyn Game, split: &LevelSplit) -> Option<Self> {
+        let layouts = by_layout(game, split);
+        if layouts.is_empty() {
+            return None;
+        }
+        let count = layouts.len() as u64;
+        let mut groups: Vec<_> = layouts.into_values().filter(|levels| levels.len() > 1).collect();
+        groups.sort_by_key(|levels| (usize::MAX - levels.len(), levels[0]));
+        Some(Self { layouts: count, groups })
+    }
+
+    /// Returns the number of levels that share their layout with another.
+    pub fn shared(&self) -> u64 {
+        self.groups.iter().map(|levels| levels.len() as u64).sum()
+    }
+}
+
+/// Returns the levels of a split that are among others: by number, as a file, or by their layout.
+pub fn levels_in(game: &dyn Game, split: &LevelSplit, others: &LevelSplit) -> BTreeSet<u64> {
+    let others = HeldOut::new(game, others);
+    let is_in = |level: &u64| others.contains(&split.mode, *level) || others.resembles(&split.mode, *level);
+    split.levels().filter(is_in).collect()
+}
+
+/// Levels that need no player.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PlainLevels {
+    /// Levels that are solved at their start: in the first tick, by every action.
+    pub at_start: BTreeSet<u64>,
+    /// Other levels that are solved by holding one action all the time, by its name.
+    pub by_one_action: Vec<(String, BTreeSet<u64>)>,
+}
+
+impl PlainLevels {
+    /// Plays each level once with each action, held for the whole episode. Continuous actions are rest, and each axis at
+    /// both its ends. `progress` receives finished episodes, from several threads.
+    ///
+    /// # Errors
+    ///
+    /// The game broke its contract.
+    pub fn of(
+        game: &dyn Game,
+        split: &LevelSplit,
+        threads: usize,
+        progress: impl Fn(u64) + Sync,
+    ) -> Result<Self, EvalError> {
+        let arenas = ARENAS.min(u32::try_from(split.len()).unwrap_or(ARENAS));
+        let plan = EvalPlan {
+            split: split.clone(),
+            left_out: BTreeSet::new(),
+            observation_config: ObservationConfig::default(),
+            episodes_per_level: 1,
+            seed: 0,
+            arenas,
+            worlds: WORLDS.min(arenas),
+            threads,
+        };
+        let mut solved = Vec::new();
+        let mut first_ticks = BTreeMap::<u64, u64>::new();
+        let actions = held_actions(game);
+        for (name, action) in &actions {
+            let player = Player::Blind(BlindBot::Constant(action.clone()));
+            let results = evaluate(game, &player, &plan, &progress)?;
+            let wins = || results.iter().filter(|result| result.success);
+            for result in wins().filter(|result: &&EpisodeResult| result.ticks <= 1) {
+                *first_ticks.entry(result.level).or_default() += 1;
+            }
+            solved.push((name.clone(), wins().map(|result| result.level).collect::<BTreeSet<u64>>()));
+        }
+        let is_at_start = |(level, count): (u64, u64)| (count == actions.len() as u64).then_some(level);
+        let at_start: BTreeSet<u64> = first_ticks.into_iter().filter_map(is_at_start).collect();
+        let others = |levels: BTreeSet<u64>| levels.difference(&at_start).copied().collect::<BTreeSet<_>>();
+        let by_one_action = solved.into_iter().map(|(name, levels)| (name, others(levels)));
+        let by_one_action = by_one_action.filter(|(_, levels)| !levels.is_empty()).collect();
+        Ok(Self { at_start, by_one_action })
+    }
+
+    /// Returns the levels that some held action solves.
+    pub fn by_any_action(&self) -> BTreeSet<u64> {
+        self.by_one_action.iter().flat_map(|(_, levels)| levels.iter().copied()).collect()
+    }
+}
+
+/// Returns the number of episodes that [`PlainLevels::of`] plays.
+pub fn plain_episodes(game: &dyn Game, split: &LevelSplit) -> u64 {
+    split.len().saturating_mul(held_actions(game).len() as u64)
+}
+
+/// Returns the actions that are held, with their names.
+fn held_actions(game: &dyn Game) -> Vec<(String, ActionValue)> {
+    let names = game.tools().input.action_names();
+    let name = |index: usize| names.get(index).cloned().unwrap_or_else(|| format!("action {index}"));
+    match game.actions() {
+        ActionSpace::Discrete(count) => {
+            (0..count).map(|action| (name(action), ActionValue::Discrete(action as u32))).collect()
+        }
+        ActionSpace::Continuous(axes) => {
+            let rest = vec![0.0; axes];
+            let pushed = |axis: usize, value: f32| {
+                let mut values = rest.clone();
+                values[axis] = value;
+                (format!("{} at {value}", name(axis)), ActionValue::Continuous(values))
+            };
+            let ends = (0..axes).flat_map(|axis| [pushed(axis, -1.0), pushed(axis, 1.0)]);
+            std::iter::once(("rest".to_owned(), ActionValue::Continuous(rest.clone()))).chain(ends).collect()
+        }
+    }
+}
