@@ -63,6 +63,28 @@ fn runs_are_listed_shown_and_compared() {
 }
 
 #[test]
+fn a_prolonged_run_goes_on_from_its_last_learning_rate() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let settings = r#"(game: "coinrun", train: "easy:0..3", test: "easy:4..5", demos: "none", steps: 256, arenas: 8,
+        worlds: 2, ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8], lr: 0.001, anneal_lr: true))"#;
+    fs::write(folder.join("a.ron"), settings).expect("writable");
+    ended(folder, &["train", "--algorithm", "ppo", "--experiment", "a.ron", "--run", "runs/a"], 0);
+    let (_, reported) = ended(folder, &["train", "--run", "runs/a", "--resume", "--steps", "512"], 0);
+    let words =
+        "the length is new: until step 512 the learning rate falls from 5.00e-4 to 0, beginning with the last value";
+    assert!(reported.contains(words), "{reported}");
+    let text = fs::read_to_string(folder.join("runs/a/metrics.jsonl")).expect("written");
+    let rates = json_lines(&text).iter().filter_map(|line| line["charts/learning_rate"].as_f64()).collect::<Vec<_>>();
+    // Of updates 1 and 2 of two, then of two that begin with the second rate.
+    let expected = [0.001, 0.0005, 0.0005, 0.000_25];
+    assert!(
+        rates.len() == 4 && rates.iter().zip(expected).all(|(rate, wanted)| (rate - wanted).abs() < 1e-9),
+        "{rates:?}"
+    );
+}
+
+#[test]
 fn a_run_goes_on_where_there_is_no_such_device_any_more() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

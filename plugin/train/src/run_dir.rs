@@ -237,13 +237,13 @@ impl RunDir {
     ) -> Result<Trainer, RunError> {
         trainer::check(game, experiment)?;
         let (mut learner, state) = self.last_readable(experiment.algorithm, device)?;
-        learner.set_length(experiment);
+        let continued_schedule = learner.set_length(experiment);
         let mut trainer = Trainer::with_learner(game, experiment, learner, threads)?;
         trainer.report_panics_to(&self.path);
         for (collector, saved) in trainer.collectors.iter_mut().zip(&state.arenas) {
             restore_arenas(collector, saved).map_err(TrainError::from)?;
         }
-        trainer.progress = state.progress;
+        (trainer.progress, trainer.continued_schedule) = (state.progress, continued_schedule);
         trainer.seen = read_sealed::<RunInfo>(&self.path.join("run.json"))?.0.seen;
         checkpoint::set_aside_after(&self.path, trainer.progress.steps)?;
         self.metrics_log().rewind(trainer.progress.steps, trainer.progress.updates)?;

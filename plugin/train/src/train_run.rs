@@ -11,7 +11,7 @@ use crate::{
     trainer::Trainer,
 };
 use playbot_harness::{game::Game, sealed_file::file_checksum, split::seen_by_training};
-use playbot_learner::{DeviceKind, HasExitCode, SeenLevels, SkillModel};
+use playbot_learner::{ContinuedSchedule, DeviceKind, HasExitCode, SeenLevels, SkillModel};
 use playbot_report::whole;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -333,6 +333,17 @@ pub fn rounded(experiment: &Experiment) -> Option<String> {
     })
 }
 
+/// Returns a message about the values from which a prolonged training goes on; `None` if it has none that change.
+pub fn goes_on_from(experiment: &Experiment, continued: &ContinuedSchedule) -> Option<String> {
+    let lr = continued.lr.map(|lr| format!("the learning rate falls from {lr:.2e} to 0"));
+    let kl_coef = continued.kl_coef.map(|(from, to)| format!("the penalty's weight goes from {from:.2e} to {to}"));
+    let values: Vec<String> = lr.into_iter().chain(kl_coef).collect();
+    (!values.is_empty()).then(|| {
+        let last = whole(experiment.whole_steps() as f64);
+        format!("the length is new: until step {last} {}, beginning with the last value", values.join(", and "))
+    })
+}
+
 /// Returns a message about a training that ends before its policy learns; `None` for others.
 pub fn never_learns(experiment: &Experiment) -> Option<String> {
     let algorithm = experiment.algorithm;
@@ -401,6 +412,23 @@ mod tests {
         assert_eq!(said(1).as_deref(), Some("1 step is rounded up to 1 update of 4,096: training for 4,096"));
         assert_eq!(said(4097).as_deref(), Some("4,097 steps are rounded up to 2 updates of 4,096: training for 8,192"));
         assert_eq!(said(8192), None);
+    }
+
+    #[test]
+    fn the_values_of_a_prolonged_training_are_reported() {
+        let text = r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: 8000, algorithm: "ppo", arenas: 32,
+            ppo: (num_steps: 128))"#;
+        let experiment = parse_experiment(text, Path::new("x.ron")).expect("valid");
+        let said = |lr, kl_coef| goes_on_from(&experiment, &ContinuedSchedule { lr, kl_coef });
+        assert_eq!(
+            said(Some(0.000_05), None).as_deref(),
+            Some(
+                "the length is new: until step 8,192 the learning rate falls from 5.00e-5 to 0, beginning with the last value"
+            )
+        );
+        let both = said(Some(0.000_05), Some((0.25, 0.0))).expect("both change");
+        assert!(both.contains("to 0, and the penalty's weight goes from 2.50e-1 to 0, beginning"), "{both}");
+        assert_eq!(said(None, None), None);
     }
 
     #[test]

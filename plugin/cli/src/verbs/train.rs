@@ -21,7 +21,7 @@ use playbot_learner::SkillModel;
 use playbot_train::{
     Algorithm, Experiment, LearnerKind, TrainError,
     run_dir::{OpenedRun, RunDir},
-    train_run::{NewRun, Training, TrainingError, TrainingSetup, never_learns, rounded},
+    train_run::{NewRun, Training, TrainingError, TrainingSetup, goes_on_from, never_learns, rounded},
 };
 use std::path::{Path, PathBuf};
 
@@ -234,6 +234,10 @@ fn resume(args: &Args, games: &Games, setup: &TrainingSetup<'_>) -> Result<Train
         return Ok(training);
     }
     report!("going on at step {steps} of {}", experiment.whole_steps());
+    let continued = training.trainer.continued_schedule();
+    if let Some(words) = continued.and_then(|continued| goes_on_from(&experiment, continued)) {
+        report!("{words}");
+    }
     if setup.device != begun_on {
         report!(
             "it was begun on {begun_on} and goes on on {}: the result will be similar, but not equal",

@@ -42,3 +42,29 @@ fn a_loaded_learner_goes_on_bit_for_bit() {
         assert_eq!(read(&first), read(&second), "whole states are equal, byte for byte");
     }
 }
+
+#[test]
+fn a_prolonged_learner_begins_with_its_last_rate_also_after_it_was_loaded() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("checkpoint.safetensors");
+    let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
+    let config = PpoConfig { anneal_lr: true, total_updates: Some(2), lr: 0.004, ..config() };
+    let mut learner = PpoLearner::new(config, spec, 5, DeviceKind::Flex).expect("good settings");
+    let mut driver = Driver::new(4, 1);
+    let mut rate = |learner: &mut PpoLearner| {
+        let rollout = driver.rollout(&*learner, 16);
+        learner.update(&rollout).expect("finite").lr
+    };
+    assert_eq!([rate(&mut learner), rate(&mut learner)], [0.004, 0.002]);
+    assert_eq!(learner.set_total_updates(Some(2)), None, "the length is the same");
+    learner.save(&path).expect("written");
+    let holds = || String::from_utf8_lossy(&std::fs::read(&path).expect("readable")).contains("taken_up");
+    assert!(!holds(), "files of other runs are as before");
+    let continued = learner.set_total_updates(Some(4)).expect("the rate falls");
+    assert_eq!((continued.lr, continued.kl_coef), (Some(0.002), None));
+    assert_eq!(rate(&mut learner), 0.002, "it does not jump to that of half a run");
+    learner.save(&path).expect("written");
+    assert!(holds());
+    let mut loaded = PpoLearner::load(&path, DeviceKind::Flex).expect("read");
+    assert_eq!(rate(&mut loaded), 0.001);
+}
