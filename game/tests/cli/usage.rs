@@ -41,7 +41,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["policy", "export", "--out", "a.policy"], "<--run <RUN>|--skills <SKILLS>>"),
         (&["train", "--run", "r", "--skills", "no.safetensors"], "`playbot learn-skills --out no.safetensors`"),
         (&["train", "--run", "r", "--steps", "0"], "`steps=0`: must be at least 1\n"),
-        (&["config", "show", "--experiment", "no.ron"], "`playbot config show > no.ron`"),
+        (&["config", "show", "--experiment", "no.ron"], "`playbot config show --out no.ron`"),
         (&["record", "coinrun", "--noise", "1.5", "--out", "o"], "a probability lies between 0 and 1"),
         (&["eval", "--set", "game=maze2d", "--bot", "random", "--levels", "random+size=3x3:0..1"], "size=3x3"),
         (&["fly"], "unrecognized subcommand"),
