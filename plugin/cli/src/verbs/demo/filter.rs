@@ -29,10 +29,10 @@ pub(super) struct FilterArgs {
     #[arg(long)]
     out: PathBuf,
     /// Keep episodes with at least this return.
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     min_return: Option<f64>,
     /// Keep episodes with at most this return.
-    #[arg(long, allow_negative_numbers = true)]
+    #[arg(long)]
     max_return: Option<f64>,
     /// Keep episodes that ended at the goal.
     #[arg(long)]
