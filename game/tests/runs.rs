@@ -63,6 +63,41 @@ fn runs_are_listed_shown_and_compared() {
 }
 
 #[test]
+fn a_new_run_begins_with_the_weights_of_another_and_notes_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    three_runs(folder);
+    let begin = ["train", "--experiment", "b.ron", "--init-from", "runs/a/1", "--run", "runs/c"];
+    let train = |more: &[&str], wanted| ended(folder, &[&begin[..], more].concat(), wanted).1;
+    for (more, words) in [
+        (&["--algorithm", "sac"][..], "it was trained by ppo, and the new one is by sac: add --algorithm ppo"),
+        (
+            &["--algorithm", "ppo", "--set", "ppo.hidden=[4]"],
+            "it has other hidden layers or convolutions than the new run",
+        ),
+        (
+            &["--algorithm", "ppo", "--set", "train=easy:4..5", "--set", "test=easy:0..1"],
+            "it has learned from easy:0..3, and the new run holds out easy:0..1 (`test`)",
+        ),
+    ] {
+        let refused = train(more, 3);
+        assert!(
+            refused.contains("no run can begin with the weights of runs/a/1: ") && refused.contains(words),
+            "{refused}"
+        );
+        assert!(!folder.join("runs/c").exists(), "{more:?}");
+    }
+    let reported = train(&["--algorithm", "ppo"], 0);
+    assert!(reported.contains("beginning with the weights of runs/a/1"), "{reported}");
+    let row = &json_lines(&ended(folder, &["runs", "ls", "runs/c", "--json"], 0).0)[0];
+    assert_eq!(row["begun_from"], serde_json::json!({ "run": "runs/a/1", "step": 512 }));
+    let (shown, _) = ended(folder, &["runs", "show", "runs/c"], 0);
+    assert!(shown.contains("begun with the weights of runs/a/1 at step 512"), "{shown}");
+    let (_, refused) = ended(folder, &["train", "--run", "runs/c", "--resume", "--set", "ppo.lr=0.5"], 3);
+    assert!(refused.contains("--init-from runs/c to begin with the weights of this one"), "{refused}");
+}
+
+#[test]
 fn a_prolonged_run_goes_on_from_its_last_learning_rate() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

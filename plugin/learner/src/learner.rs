@@ -64,6 +64,17 @@ pub trait Learner: Debug + Send {
         None
     }
 
+    /// Takes over weights and normalisers from the checkpoint of another run, before the first update. Counters and the
+    /// optimiser stay those of a new learner.
+    ///
+    /// # Errors
+    /// [`FileError`] if the file cannot be read, its networks are not those of this learner, or the algorithm cannot
+    /// start from another run.
+    fn start_from(&mut self, path: &Path) -> Result<(), FileError> {
+        let source = LearnError::Config("only ppo and score-ppo can start from the weights of another run".to_owned());
+        Err(FileError::Learner { path: path.to_owned(), source })
+    }
+
     /// Returns the inputs and outputs of the policy. With a skill model rollouts need skills even if `latent` is 0
     /// ([`Self::rollout_latent`]).
     fn spec(&self) -> PolicySpec {

@@ -66,9 +66,21 @@ pub struct RunInfo {
     /// The levels that it sees, with those of its recordings and its skills; missing in older runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seen: Option<SeenLevels>,
+    /// The run whose weights it began with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub begun_from: Option<BegunFrom>,
     /// Device that it was started on; the default one if the run does not name it.
     #[serde(default)]
     pub device: DeviceKind,
+}
+
+/// The run whose weights another run began with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BegunFrom {
+    /// Its folder, as it was named then.
+    pub run: PathBuf,
+    /// Environment steps of the checkpoint.
+    pub step: u64,
 }
 
 /// Saved state of training besides the learner.
