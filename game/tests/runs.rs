@@ -63,6 +63,63 @@ fn runs_are_listed_shown_and_compared() {
 }
 
 #[test]
+fn a_new_run_begins_with_the_weights_of_another_and_notes_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    three_runs(folder);
+    let begin = ["train", "--experiment", "b.ron", "--init-from", "runs/a/1", "--run", "runs/c"];
+    let train = |more: &[&str], wanted| ended(folder, &[&begin[..], more].concat(), wanted).1;
+    for (more, words) in [
+        (&["--algorithm", "sac"][..], "it was trained by ppo, and the new one is by sac: add --algorithm ppo"),
+        (
+            &["--algorithm", "ppo", "--set", "ppo.hidden=[4]"],
+            "it has other hidden layers or convolutions than the new run",
+        ),
+        (
+            &["--algorithm", "ppo", "--set", "train=easy:4..5", "--set", "test=easy:0..1"],
+            "it has learned from easy:0..3, and the new run holds out easy:0..1 (`test`)",
+        ),
+    ] {
+        let refused = train(more, 3);
+        assert!(
+            refused.contains("no run can begin with the weights of runs/a/1: ") && refused.contains(words),
+            "{refused}"
+        );
+        assert!(!folder.join("runs/c").exists(), "{more:?}");
+    }
+    let reported = train(&["--algorithm", "ppo"], 0);
+    assert!(reported.contains("beginning with the weights of runs/a/1"), "{reported}");
+    let row = &json_lines(&ended(folder, &["runs", "ls", "runs/c", "--json"], 0).0)[0];
+    assert_eq!(row["begun_from"], serde_json::json!({ "run": "runs/a/1", "step": 512 }));
+    let (shown, _) = ended(folder, &["runs", "show", "runs/c"], 0);
+    assert!(shown.contains("begun with the weights of runs/a/1 at step 512"), "{shown}");
+    let (_, refused) = ended(folder, &["train", "--run", "runs/c", "--resume", "--set", "ppo.lr=0.5"], 3);
+    assert!(refused.contains("--init-from runs/c to begin with the weights of this one"), "{refused}");
+}
+
+#[test]
+fn a_prolonged_run_goes_on_from_its_last_learning_rate() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let settings = r#"(game: "coinrun", train: "easy:0..3", test: "easy:4..5", demos: "none", steps: 256, arenas: 8,
+        worlds: 2, ppo: (num_steps: 16, minibatches: 2, hidden: [8, 8], lr: 0.001, anneal_lr: true))"#;
+    fs::write(folder.join("a.ron"), settings).expect("writable");
+    ended(folder, &["train", "--algorithm", "ppo", "--experiment", "a.ron", "--run", "runs/a"], 0);
+    let (_, reported) = ended(folder, &["train", "--run", "runs/a", "--resume", "--steps", "512"], 0);
+    let words =
+        "the length is new: until step 512 the learning rate falls from 5.00e-4 to 0, beginning with the last value";
+    assert!(reported.contains(words), "{reported}");
+    let text = fs::read_to_string(folder.join("runs/a/metrics.jsonl")).expect("written");
+    let rates = json_lines(&text).iter().filter_map(|line| line["charts/learning_rate"].as_f64()).collect::<Vec<_>>();
+    // Of updates 1 and 2 of two, then of two that begin with the second rate.
+    let expected = [0.001, 0.0005, 0.0005, 0.000_25];
+    assert!(
+        rates.len() == 4 && rates.iter().zip(expected).all(|(rate, wanted)| (rate - wanted).abs() < 1e-9),
+        "{rates:?}"
+    );
+}
+
+#[test]
 fn a_run_goes_on_where_there_is_no_such_device_any_more() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

@@ -16,7 +16,7 @@
 //! | check what agents see and do | [`check_actions`], [`check_observations`], [`misfit`], [`has_no_actions`], [`AgentLimit`] |
 //! | compare two pictures of a state | [`PictureDifference`], [`CLOSE`], [`BlankEpisodes`] |
 //! | record and replay | [`record_ticks`], [`flush_unfinished`], [`demo_actions`], [`recorded_action`] |
-//! | read, join and repair recordings | [`find_demos`], [`merge_demos`], [`repair()`] |
+//! | read, join, select and repair recordings | [`find_demos`], [`merge_demos`], [`select_demos`], [`relabel_demo`], [`repair()`] |
 //! | read what a policy file sees | [`policy_observation`] |
 //! | let a person play in a window | [`PressesForPeople`], [`TappedKeys`] |
 //!
@@ -41,7 +41,7 @@ pub use crate::{
     action::{check_actions, misfit},
     agent::{AgentLimit, has_no_actions},
     demo::{
-        file::{find_demos, merge_demos, repair::repair},
+        file::{find_demos, merge_demos, relabel_demo, repair::repair, select_demos},
         recorder::{demo_actions, flush_unfinished, record_ticks},
         replay::recorded_action,
     },

@@ -32,6 +32,7 @@ pub fn run_info(experiment: &Experiment) -> RunInfo {
         game_version: 1,
         skills: None,
         seen: None,
+        begun_from: None,
         device: DeviceKind::Flex,
     }
 }

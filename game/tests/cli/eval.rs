@@ -28,6 +28,25 @@ fn blind_bots_score_what_they_score_in_the_original() {
 }
 
 #[test]
+fn a_measure_below_its_bound_is_a_finding_that_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let eval = |more: &[&str]| {
+        let levels = ["--levels", "hard:64..127", "--episodes-per-level", "1", "--json"];
+        playbot(folder.path(), &[&["eval", "--bot", "right-jump"], &levels[..], more].concat())
+    };
+    let passed = eval(&["--at-least", "return=5.46875", "--at-least", "success=0"]);
+    assert_eq!(code(&passed), 0, "{}", errors(&passed));
+    let failed = eval(&["--at-least", "return=6", "--at-least", "success=0"]);
+    assert_eq!((code(&failed), lines(&failed).len()), (1, 1), "the row is printed all the same");
+    let words = "right-jump on hard:64..127: return is 5.46875, below the required 6";
+    assert!(errors(&failed).contains(words), "{}", errors(&failed));
+    assert!(!errors(&failed).contains("success is"), "{}", errors(&failed));
+    let wrong = eval(&["--at-least", "wins=3"]);
+    assert_eq!(code(&wrong), 3);
+    assert!(errors(&wrong).contains("write success=0.9 or return=8.5"), "{}", errors(&wrong));
+}
+
+#[test]
 fn a_measurement_outlives_its_plot() {
     let folder = tempfile::tempdir().expect("a folder");
     let eval = |plot: &str| {

@@ -2,7 +2,7 @@
 
 #[cfg(feature = "window")]
 use crate::program::command;
-use crate::program::{code, errors, lines, playbot};
+use crate::program::{code, errors, lines, playbot, said};
 
 #[test]
 fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
@@ -41,7 +41,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["policy", "export", "--out", "a.policy"], "<--run <RUN>|--skills <SKILLS>>"),
         (&["train", "--run", "r", "--skills", "no.safetensors"], "`playbot learn-skills --out no.safetensors`"),
         (&["train", "--run", "r", "--steps", "0"], "`steps=0`: must be at least 1\n"),
-        (&["config", "show", "--experiment", "no.ron"], "`playbot config show > no.ron`"),
+        (&["config", "show", "--experiment", "no.ron"], "`playbot config show --out no.ron`"),
         (&["record", "coinrun", "--noise", "1.5", "--out", "o"], "a probability lies between 0 and 1"),
         (&["eval", "--set", "game=maze2d", "--bot", "random", "--levels", "random+size=3x3:0..1"], "size=3x3"),
         (&["fly"], "unrecognized subcommand"),
@@ -159,6 +159,20 @@ fn a_window_that_cannot_open_is_refused_before_anything_is_recorded() {
         // The second where the machine does not even have the library.
         refuse(Some(":9999"), &[], &["no X server answers at DISPLAY=:9999", "install libx11-6"]);
     }
+}
+
+#[test]
+fn a_shell_gets_the_verbs_that_it_completes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let printed = playbot(folder.path(), &["completions", "bash"]);
+    assert_eq!(code(&printed), 0, "{}", errors(&printed));
+    let script = said(&printed);
+    assert!(script.contains("complete -F") && script.contains("learn-skills"), "{script}");
+    let written = playbot(folder.path(), &["completions", "bash", "--out", "new/playbot"]);
+    assert_eq!((code(&written), said(&written)), (0, String::new()), "{}", errors(&written));
+    assert_eq!(std::fs::read_to_string(folder.path().join("new/playbot")).expect("written"), script);
+    let unknown = playbot(folder.path(), &["completions", "bsh"]);
+    assert!(code(&unknown) == 3 && errors(&unknown).contains("bash"), "{}", errors(&unknown));
 }
 
 #[test]

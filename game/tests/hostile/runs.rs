@@ -38,6 +38,7 @@ fn trained(path: &Path) {
         game_version: 1,
         skills: None,
         seen: None,
+        begun_from: None,
         device: DeviceKind::Flex,
     };
     let run = RunDir::create(path, &experiment, &info, false).expect("writable");

@@ -110,6 +110,7 @@ fn text_of_strangers_steers_no_terminal_and_is_no_markup() {
         "demo verify foreign.demo",
         "demo verify foreign.demo --json",
         "demo merge evil.demo few.demo --out all.demo",
+        "demo filter evil.demo few.demo --out kept.demo",
         "view coinrun --demo foreign.demo",
         "runs ls",
         "runs ls --json",

@@ -155,3 +155,67 @@ fn recordings_are_shown_in_plain_words() {
     let none = show(&["--episode", "7"]);
     assert!(errors(&none).contains("has no episode 7; it has 1 episode, counted from 0"), "{}", errors(&none));
 }
+
+#[test]
+fn chosen_episodes_make_a_recording_that_replays() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    record(folder, "cut.demo", &["--levels", "easy:0..9", "--steps", "200"]);
+    let filter = |more: &[&str]| playbot(folder, &[&["demo", "filter", "cut.demo"], more].concat());
+    let won = filter(&["--success", "--without-idle-start", "--out", "new/won.demo", "--json"]);
+    assert_eq!(code(&won), 0, "{}", errors(&won));
+    let report = lines(&won).remove(0);
+    let count = |key: &str| report["files"][0][key].as_u64().expect("a number");
+    assert_eq!(count("kept") + 1, count("episodes"), "the last episode was cut off: {report}");
+    let verified = playbot(folder, &["demo", "verify", "new/won.demo"]);
+    assert_eq!(code(&verified), 0, "{}", said(&verified));
+    let first = filter(&["--level", "easy:0", "--min-return", "10", "--out", "first.demo"]);
+    assert_eq!(code(&first), 0, "{}", errors(&first));
+    assert!(said(&first).contains("cut.demo: kept 1 of "), "{}", said(&first));
+    assert!(said(&first).contains("first.demo: coinrun easy, 1 episode with "), "{}", said(&first));
+}
+
+#[test]
+fn a_filter_that_keeps_nothing_writes_nothing() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    record(folder, "a.demo", &["--levels", "easy:0..1"]);
+    let filter = |more: &[&str]| playbot(folder, &[&["demo", "filter", "a.demo", "--out", "out.demo"], more].concat());
+    let nothing = filter(&["--max-return", "-1"]);
+    assert_eq!(code(&nothing), 1, "{}", errors(&nothing));
+    let words = "a.demo: kept 0 of 2 episodes\nno episode meets all conditions, so nothing was written\n";
+    assert_eq!(said(&nothing), words);
+    for (more, words) in [
+        (&["--min-return", "5", "--max-return", "3"][..], "--min-return 5 is above --max-return 3"),
+        (&["--levels", "hard:0..9"], "a.demo: recorded in mode `easy`, so no episode is on the levels hard:0..9"),
+        (&["--player", "eve"], "no recording is by `eve`; the players are search"),
+    ] {
+        let output = filter(more);
+        assert_eq!(code(&output), 3, "{more:?}: {}", errors(&output));
+        assert!(errors(&output).contains(words), "{more:?}: {}", errors(&output));
+    }
+    assert!(!folder.join("out.demo").exists());
+}
+
+#[test]
+fn a_label_names_another_player_and_changes_no_episode() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    record(folder, "a.demo", &["--levels", "easy:0..0"]);
+    record(folder, "b.demo", &["--levels", "easy:1..1"]);
+    let label = |name: &str| playbot(folder, &["demo", "label", "a.demo", "--player", name, "--out", "ada.demo"]);
+    let empty = label(" ");
+    assert!(code(&empty) == 3 && errors(&empty).contains("--player is empty"), "{}", errors(&empty));
+    let labelled = label("ada");
+    assert_eq!(code(&labelled), 0, "{}", errors(&labelled));
+    assert!(said(&labelled).starts_with("ada.demo: coinrun easy, 1 episode with "), "{}", said(&labelled));
+    assert!(said(&labelled).ends_with(", by ada\n"), "{}", said(&labelled));
+    let episodes = |file: &str| said(&playbot(folder, &["demo", "show", file, "--json"]));
+    assert_eq!(episodes("ada.demo"), episodes("a.demo"));
+    assert_eq!(code(&playbot(folder, &["demo", "verify", "ada.demo"])), 0);
+    let hers = ["demo", "filter", "ada.demo", "b.demo", "--player", "ada", "--out", "hers.demo"];
+    let kept = said(&playbot(folder, &hers));
+    assert!(kept.contains("b.demo: by another player, left out\n") && kept.contains("1 episode with "), "{kept}");
+    let taken = label("ada");
+    assert!(code(&taken) == 3 && errors(&taken).contains("name another --out"), "{}", errors(&taken));
+}

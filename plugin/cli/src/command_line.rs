@@ -7,8 +7,8 @@ use crate::{
     output::{log, program},
     progress::interrupt,
     verbs::{
-        bench, bugs, config, demo, doctor, eval, explore, eyes, learn_skills, level, levels, play, policy, quickstart,
-        record, replay, report, runs, study, test, trace, train, view,
+        bench, bugs, completions, config, demo, doctor, eval, explore, eyes, learn_skills, level, levels, play, policy,
+        quickstart, record, replay, report, runs, study, test, trace, train, view,
     },
 };
 use clap::{
@@ -20,6 +20,7 @@ use playbot_learner::UnknownDevice;
 use std::{
     error::Error,
     ffi::OsString,
+    io::IsTerminal,
     num::{IntErrorKind, ParseFloatError, ParseIntError},
     panic::AssertUnwindSafe,
     process::ExitCode,
@@ -36,6 +37,9 @@ pub(crate) struct Cli {
     #[arg(short, long, action = clap::ArgAction::Count, global = true)]
     verbose: u8,
 }
+
+/// The most columns of help on a terminal: longer lines are hard to read.
+const WIDEST: usize = 100;
 
 const EXAMPLES: &str = "\
 Examples:
@@ -87,6 +91,7 @@ enum Verb {
     View(view::Args),
     Bench(bench::Args),
     Bugs(bugs::Args),
+    Completions(completions::Args),
 }
 
 /// Checks that a command line can be parsed, for tests of documentation. `args` begin with the name of the program.
@@ -193,12 +198,18 @@ fn is_help(error: &clap::Error) -> bool {
 
 /// Returns the command line under the name of this program.
 fn with_own_name(command: Command) -> Command {
-    let command = with_negative_numbers(command).name(program::name());
+    let command = with_width(with_negative_numbers(command).name(program::name()), std::io::stdout().is_terminal());
     if program::name() == program::DEFAULT_NAME {
         return command;
     }
     // The version is this crate's, since the game's is not known here.
     command.version(concat!("(playbot ", env!("CARGO_PKG_VERSION"), ")"))
+}
+
+/// Breaks lines of help between words, at the width of the terminal. Help in a file or a pipe is not broken, so it is the
+/// same on every terminal.
+fn with_width(command: Command, is_on_terminal: bool) -> Command {
+    if is_on_terminal { command.max_term_width(WIDEST) } else { command.term_width(0) }
 }
 
 fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
@@ -226,6 +237,7 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
         Verb::View(args) => view::run(args, games),
         Verb::Bench(args) => bench::run(args, games),
         Verb::Bugs(args) => bugs::run(args, games),
+        Verb::Completions(args) => completions::run(&args, with_own_name(Cli::command())),
     }
 }
 
@@ -296,6 +308,17 @@ mod tests {
             Ok(_) => "taken".to_owned(),
             Err(error) => in_plain_words(&error).unwrap_or_else(|| format!("in other words: {error}")),
         }
+    }
+
+    #[test]
+    fn help_breaks_between_words_on_terminals_alone() {
+        let about = ["every word of this long text stays whole"; 4].join(", and ");
+        let help = |command: Command| command.about(about.clone()).render_help().to_string();
+        let narrow = help(Command::new("outer").term_width(40));
+        let first: Vec<_> = narrow.lines().take_while(|line| !line.is_empty()).collect();
+        assert!(first.len() > 4 && first.iter().all(|line| line.len() <= 40), "{narrow}");
+        assert_eq!(first.join(" ").split_whitespace().collect::<Vec<_>>().join(" "), about);
+        assert!(help(with_width(Command::new("outer"), false)).starts_with(&format!("{about}\n")));
     }
 
     #[test]

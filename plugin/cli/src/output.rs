@@ -90,6 +90,24 @@ pub(crate) fn write(path: &Path, bytes: &[u8]) -> Result<(), CliError> {
     Ok(write_atomically(path, bytes)?)
 }
 
+/// Prints data, or writes it to a new file if one is named.
+///
+/// # Errors
+///
+/// There is such a file already, or it cannot be written.
+pub(crate) fn print_or_write(data: &str, out: Option<&Path>) -> Result<(), CliError> {
+    let Some(path) = out else { return print_line(data) };
+    if path.exists() {
+        return Err(CliError::Usage(format!(
+            "{} exists already; nothing was written: name another --out, or remove that file first",
+            path.display()
+        )));
+    }
+    write(path, format!("{data}\n").as_bytes())?;
+    report!("written: {}", path.display());
+    Ok(())
+}
+
 /// Returns the file in the same folder whose name goes on with `ending`.
 pub(crate) fn beside(path: &Path, ending: &str) -> PathBuf {
     let mut name = path.file_name().unwrap_or_default().to_owned();
@@ -181,6 +199,16 @@ mod tests {
         prepare(&folder.join("new/a")).expect("the folder is made");
         make_folder(&folder.join("new/b")).expect("the folder is made");
         assert_eq!(fs::read_dir(folder.join("new")).expect("there").count(), 1, "no probe is left");
+    }
+
+    #[test]
+    fn data_goes_to_a_new_file_and_over_no_other() {
+        let temporary = tempfile::tempdir().expect("a folder");
+        let path = temporary.path().join("new/level.json");
+        print_or_write("{}", Some(&path)).expect("writable");
+        let error = print_or_write("[]", Some(&path)).expect_err("taken");
+        assert!(error.exit_code() == 3 && error.to_string().contains("name another --out"), "{error}");
+        assert_eq!(fs::read_to_string(&path).expect("written"), "{}\n");
     }
 
     #[test]

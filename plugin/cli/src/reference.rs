@@ -5,11 +5,12 @@ use clap::{Arg, Command, CommandFactory};
 use std::fmt::Write;
 
 /// The groups of verbs on the page, in the order of the page.
-const GROUPS: [(&str, &[&str]); 4] = [
+const GROUPS: [(&str, &[&str]); 5] = [
     ("Test levels", &["test", "doctor", "replay", "explore", "levels", "report", "bugs"]),
     ("See levels and episodes", &["level", "trace", "view", "eyes", "play"]),
     ("Record", &["record", "demo"]),
     ("Learn", &["quickstart", "learn-skills", "train", "study", "eval", "config", "runs", "policy", "bench"]),
+    ("Use the shell", &["completions"]),
 ];
 
 const INTRODUCTION: &str = "\

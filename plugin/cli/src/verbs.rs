@@ -5,6 +5,7 @@
 //! - Record: [`record`], [`demo`].
 //! - Learn: [`quickstart`], [`learn_skills`], [`train`], [`study`], [`eval`], [`config`], [`runs`], [`policy`],
 //!   [`bench`].
+//! - Use the shell: [`completions`].
 //!
 //! A verb reads its options, opens what they name, calls the library, and prints what comes back. Options that several
 //! verbs have are in [`arguments`](crate::arguments), errors with their exit codes in [`error`](crate::error). A new
@@ -13,6 +14,7 @@
 
 pub(crate) mod bench;
 pub(crate) mod bugs;
+pub(crate) mod completions;
 pub(crate) mod config;
 pub(crate) mod demo;
 pub(crate) mod doctor;

@@ -1,9 +1,10 @@
 //! Recordings: making them with a demonstrator, and verifying them by replay.
 //!
-//! [`verify_file`] replays a recording: each tick must repeat as recorded. [`demonstration`], the only file of the
-//! folder, records a game's demonstrator or another player.
+//! [`verify_file`] replays a recording: each tick must repeat as recorded. In the folder, [`demonstration`] records a
+//! game's demonstrator or another player, and [`mod@filter`] selects episodes by outcome, level and player.
 
 pub mod demonstration;
+pub mod filter;
 
 use crate::{game::Game, mode::ModeError, split::LevelSplit, worlds::build_world};
 use bevy::prelude::*;

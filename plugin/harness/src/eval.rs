@@ -23,7 +23,10 @@ use bevy_playbot::{
 };
 use playbot_learner::{HasExitCode, Policy, PolicyFile};
 use serde::Serialize;
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use std::{
+    collections::{BTreeMap, BTreeSet, HashMap},
+    str::FromStr,
+};
 use thiserror::Error;
 
 pub use bevy_playbot::episode::EpisodeResult;
@@ -347,6 +350,72 @@ pub fn summarize(method: &str, split: &LevelSplit, results: &[EpisodeResult]) ->
     }
 }
 
+/// A measure of an [`EvalSummary`] that can have a lower bound.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EvalMeasure {
+    /// Share of episodes that reached the level's goal, 0 to 1.
+    Success,
+    /// Mean return.
+    Return,
+}
+
+/// A lower bound of a measure. Written `success=0.9` or `return=8.5`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AtLeast {
+    /// The measure.
+    pub measure: EvalMeasure,
+    /// The smallest value that passes.
+    pub least: f64,
+}
+
+impl AtLeast {
+    /// Describes how far a measurement is below the bound, with its player and levels; `None` if it is not below.
+    pub fn shortfall(&self, summary: &EvalSummary) -> Option<String> {
+        let (name, value) = match self.measure {
+            EvalMeasure::Success => ("success", summary.success),
+            EvalMeasure::Return => ("return", summary.return_mean),
+        };
+        // A measure that is no number passes no bound.
+        let passes = value >= self.least;
+        (!passes).then(|| {
+            format!("{} on {}: {name} is {value}, below the required {}", summary.method, summary.split, self.least)
+        })
+    }
+}
+
+/// Text that is not a valid lower bound.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum AtLeastError {
+    /// The text has another form.
+    #[error("`{0}` is not a lower bound: write success=0.9 or return=8.5")]
+    NotABound(String),
+    /// The share is larger than 1 or negative.
+    #[error("`{0}`: success is a share from 0 to 1; write success=0.9 for 90 %")]
+    NotAShare(String),
+}
+
+impl FromStr for AtLeast {
+    type Err = AtLeastError;
+
+    fn from_str(text: &str) -> Result<Self, AtLeastError> {
+        let parse = || {
+            let (name, least) = text.split_once('=')?;
+            let measure = match name.trim() {
+                "success" => EvalMeasure::Success,
+                "return" => EvalMeasure::Return,
+                _ => return None,
+            };
+            let least = least.trim().parse::<f64>().ok().filter(|least| least.is_finite())?;
+            Some(Self { measure, least })
+        };
+        let bound = parse().ok_or_else(|| AtLeastError::NotABound(text.to_owned()))?;
+        if bound.measure == EvalMeasure::Success && !(0.0..=1.0).contains(&bound.least) {
+            return Err(AtLeastError::NotAShare(text.to_owned()));
+        }
+        Ok(bound)
+    }
+}
+
 /// Returns the standard error of the mean of values that come in clusters, the levels. It is s / √L, with s the sample
 /// standard deviation of the L level means.
 ///
@@ -428,6 +497,40 @@ mod tests {
         assert_eq!((summary.return_mean, summary.return_se), (1.0, 1.0));
         assert_eq!((summary.success, summary.success_se), (0.75, 0.25));
         assert_eq!((summary.length_mean, summary.clipped), (10.0, 0.1));
+    }
+
+    #[test]
+    fn a_bound_names_the_measure_the_player_and_the_levels_below_it() {
+        let split: LevelSplit = "plain:0..1".parse().expect("valid");
+        let result = |level, success, total_reward| EpisodeResult {
+            level,
+            end: EpisodeEnd::LOST,
+            success,
+            ticks: 10,
+            clipped: 0,
+            total_reward,
+        };
+        let summary = summarize("bot", &split, &[result(0, true, 3.0), result(1, false, 2.0)]);
+        let shortfall = |text: &str| text.parse::<AtLeast>().expect("valid").shortfall(&summary);
+        assert_eq!(shortfall("success=0.5"), None, "equal is enough");
+        assert_eq!(shortfall("return=-1"), None);
+        let words = "bot on plain:0..1: success is 0.5, below the required 0.75";
+        assert_eq!(shortfall("success=0.75").as_deref(), Some(words));
+        let words = "bot on plain:0..1: return is 2.5, below the required 2.6";
+        assert_eq!(shortfall(" return = 2.6").as_deref(), Some(words));
+        assert!(shortfall("return=0").is_none() && summary.return_mean == 2.5);
+        let nothing = summarize("bot", &split, &[]);
+        let bound = AtLeast { measure: EvalMeasure::Return, least: 0.0 };
+        assert!(bound.shortfall(&nothing).is_some(), "nothing was measured");
+    }
+
+    #[test]
+    fn text_that_is_no_bound_is_refused_with_an_example() {
+        let error = |text: &str| text.parse::<AtLeast>().expect_err("refused").to_string();
+        for text in ["success", "wins=3", "return=much", "return=NaN", "return=inf"] {
+            assert_eq!(error(text), format!("`{text}` is not a lower bound: write success=0.9 or return=8.5"));
+        }
+        assert_eq!(error("success=90"), "`success=90`: success is a share from 0 to 1; write success=0.9 for 90 %");
     }
 
     #[test]

@@ -57,9 +57,23 @@ pub trait Learner: Debug + Send {
     /// [`FileError::Io`] if it cannot be written.
     fn save(&self, path: &Path) -> Result<(), FileError>;
 
-    /// Sets the number of updates over which a decreasing learning rate decreases, for a run that is extended. Has no
-    /// effect on learners with a constant learning rate.
-    fn set_total_updates(&mut self, _: Option<u64>) {}
+    /// Sets the number of updates of the whole run, for a run that is prolonged. A learning rate and a weight of the
+    /// penalty that change over the run go on from their last values, which are returned. Has no effect on learners
+    /// whose values do not change.
+    fn set_total_updates(&mut self, _: Option<u64>) -> Option<ContinuedSchedule> {
+        None
+    }
+
+    /// Takes over weights and normalisers from the checkpoint of another run, before the first update. Counters and the
+    /// optimiser stay those of a new learner.
+    ///
+    /// # Errors
+    /// [`FileError`] if the file cannot be read, its networks are not those of this learner, or the algorithm cannot
+    /// start from another run.
+    fn start_from(&mut self, path: &Path) -> Result<(), FileError> {
+        let source = LearnError::Config("only ppo and score-ppo can start from the weights of another run".to_owned());
+        Err(FileError::Learner { path: path.to_owned(), source })
+    }
 
     /// Returns the inputs and outputs of the policy. With a skill model rollouts need skills even if `latent` is 0
     /// ([`Self::rollout_latent`]).
@@ -104,6 +118,15 @@ pub trait Learner: Debug + Send {
         let base = self.base();
         base.teacher.as_ref().map(|teacher| teacher.source(base.device))
     }
+}
+
+/// The values from which a prolonged run goes on to those of its end. Values that do not change are `None`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContinuedSchedule {
+    /// The learning rate of the last update. It falls to 0.
+    pub lr: Option<f64>,
+    /// The weight of the decoder's penalty in the last update, and that at the end of the run.
+    pub kl_coef: Option<(f64, f64)>,
 }
 
 /// The metrics of an update of any learner: numbers by their TensorBoard tags.

@@ -63,7 +63,7 @@ pub use crate::{
     disk::{write_atomically, write_atomically_with},
     error::{FileError, HasExitCode, LearnError, SettingError, brief_number, io_exit_code},
     file::{BrokenSeal, Unsealed, seal_json, seal_text, unseal_json, unseal_text},
-    learner::{Learner, LearnerBase, LearnerMetrics},
+    learner::{ContinuedSchedule, Learner, LearnerBase, LearnerMetrics},
     norm::RewardReset,
     observation::{Augmentation, ImageShape, ObsKind, ObsSlice, Observations, PictureMetadata},
     policy::{Policy, PolicyOutput, StdKind},

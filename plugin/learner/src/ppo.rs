@@ -6,6 +6,7 @@
 //! - `batch`: the data of an update: a rollout with its advantages, and its minibatches in host memory.
 //! - `objective`: the formulas of PPO: generalised advantage estimation on the host, and the losses as pure functions
 //!   of tensors.
+//! - `schedule`: the learning rate and the penalty's weight of each update.
 //! - `step`: one gradient step: minibatch → loss → gradient → Adam.
 //! - `on_device`: an update on a graphics card: the rollout is sent once, and the numbers of all steps are read back
 //!   together.
@@ -16,19 +17,21 @@ mod config;
 mod metrics;
 mod objective;
 mod on_device;
+mod schedule;
 mod step;
 
 use crate::{
     DeviceKind, FileError, LearnError, ObsKind, ObsSlice, Observations, PolicySpec, Rollout,
     device::{guarded, update_on},
     file::{FileKind, TensorFile},
-    learner::{Checkpoint, Learner, LearnerBase, LearnerMetrics},
+    learner::{Checkpoint, ContinuedSchedule, Learner, LearnerBase, LearnerMetrics},
     nn::{Adam, AdamConfig, ParamVisitor, Parameters, RandomInit, path, tracked},
     policy::{Actor, ActorShape, Critic, NetShape, Policy, StateBatch, StdShape},
     ppo::{
         batch::{Batch, JoinedRows, minibatches},
         metrics::Has,
         on_device::{Reports, SentRollout},
+        schedule::{Schedule, TakenUp},
         step::{UpdateSettings, step_in_parts},
     },
     rng::ChaCha8Rng,
@@ -58,6 +61,9 @@ pub struct PpoLearner {
     pub(crate) base: LearnerBase,
     pub(crate) nets: PpoNets,
     adam: Adam,
+    taken_up: Option<TakenUp>,
+    /// True if it began with the weights of another run, and so is no copy of the decoder.
+    is_continuation: bool,
 }
 
 impl PpoLearner {
@@ -117,7 +123,7 @@ impl PpoLearner {
     fn with_nets(config: PpoConfig, base: LearnerBase, nets: &PpoNets) -> Self {
         let PpoConfig { adam_eps: eps, weight_decay, .. } = config;
         let adam = Adam::new(AdamConfig { eps, weight_decay, ..AdamConfig::default() });
-        Self { config, base, nets: tracked(nets), adam }
+        Self { config, base, nets: tracked(nets), adam, taken_up: None, is_continuation: false }
     }
 
     /// Returns the settings.
@@ -142,13 +148,15 @@ impl PpoLearner {
         let nets = PpoNets::stored(&saved.config, &base, &mut saved.file)?;
         let mut learner = Self::with_nets(saved.config.clone(), base, &nets);
         saved.file.take_adam(&mut learner.adam, "", &mut learner.nets, saved.counters.adam_steps)?;
+        (learner.taken_up, learner.is_continuation) = (saved.counters.taken_up, saved.counters.is_continuation);
         saved.finish(&mut learner.base)?;
         Ok(learner)
     }
 
     /// Returns the file that [`Learner::save`] writes.
     pub(crate) fn checkpoint(&self, path: &Path) -> Result<TensorFile, FileError> {
-        let counters = Counters { adam_steps: self.adam.steps };
+        let Self { taken_up, is_continuation, .. } = *self;
+        let counters = Counters { adam_steps: self.adam.steps, taken_up, is_continuation };
         self.base.checkpoint(path, FILE, &self.config, &counters, |file| {
             file.put_network("", &self.nets)?;
             file.put_adam(&self.adam)?;
@@ -172,7 +180,8 @@ impl Learner for PpoLearner {
     }
 
     fn initial_kl(&self, z: &[f32], obs: ObsSlice<'_>, n: usize) -> Result<Option<f32>, LearnError> {
-        self.base.initial_kl(&self.policy(), self.base.updates == 0, StateBatch { z, left: &[], obs, n })
+        let is_copy = self.base.updates == 0 && !self.is_continuation;
+        self.base.initial_kl(&self.policy(), is_copy, StateBatch { z, left: &[], obs, n })
     }
 
     /// Saves the learner. Weights are called `actor.l0.weight` (`[inputs, outputs]`), moments
@@ -181,8 +190,20 @@ impl Learner for PpoLearner {
         self.checkpoint(path)?.write()
     }
 
-    fn set_total_updates(&mut self, total: Option<u64>) {
+    fn start_from(&mut self, path: &Path) -> Result<(), FileError> {
+        let other = Self::load(path, self.base.device)?;
+        self.take_over(other).map_err(|source| FileError::Learner { path: path.to_owned(), source })
+    }
+
+    fn set_total_updates(&mut self, total: Option<u64>) -> Option<ContinuedSchedule> {
+        if total == self.config.total_updates {
+            return None;
+        }
+        let taken_up = self.schedule().take_up(self.base.updates);
         self.config.total_updates = total;
+        let (taken_up, continued) = taken_up?;
+        self.taken_up = Some(taken_up);
+        Some(continued)
     }
 }
 
@@ -223,8 +244,7 @@ impl PpoLearner {
             augment: (config.augment.clone(), self.base.streams.stream("ppo.augment", self.base.updates).into()),
             gathering: Cell::new(start.elapsed()),
         };
-        let lr = config.lr_at(self.base.updates);
-        let score = self.base.score_config().map(|score| score.at(self.base.updates, config.total_updates));
+        let (lr, score) = (self.schedule().lr(self.base.updates), self.schedule().score(self.base.updates));
         let is_warming_up = self.base.updates < config.critic_warmup;
         self.prepare_adam(is_warming_up);
         let moment = UpdateSettings { lr, score: score.as_ref(), is_warming_up };
@@ -242,6 +262,37 @@ impl PpoLearner {
         let steps = self.config.epochs * self.config.minibatches.min(rollout.rows());
         let has = Has { penalty: batch.teacher.is_some(), augmentation: !self.config.augment.is_empty() };
         Ok(UpdateMetrics::mean(&sum, steps, has, explained_variance, lr))
+    }
+
+    /// Takes over weights and normalisers.
+    ///
+    /// # Errors
+    /// [`LearnError::Config`] names the part in which the networks differ.
+    fn take_over(&mut self, other: Self) -> Result<(), LearnError> {
+        let shape = |learner: &Self| actor_shape(&learner.config, &learner.base);
+        let critic = |learner: &Self| critic_shape(&learner.config, &shape(learner));
+        let counts = |learner: &Self| learner.base.score_config().is_some_and(|score| score.critic_clock);
+        let norm_obs = |learner: &Self| learner.base.observations.is_some();
+        let differences = [
+            ("other observations, actions or skills", self.base.spec != other.base.spec),
+            ("other hidden layers or convolutions", shape(self) != shape(&other) || critic(self) != critic(&other)),
+            ("another `score.critic_clock`", counts(self) != counts(&other)),
+            ("another `ppo.norm_obs`", norm_obs(self) != norm_obs(&other)),
+        ];
+        if let Some((what, _)) = differences.into_iter().find(|(_, differs)| *differs) {
+            return Err(LearnError::Config(format!("it has {what} than the new run: give both the same")));
+        }
+        self.nets = tracked(&other.nets);
+        self.base.observations = other.base.observations;
+        if let (Some(own), Some(theirs)) = (&mut self.base.rewards, other.base.rewards) {
+            own.stats = theirs.stats;
+        }
+        self.is_continuation = true;
+        Ok(())
+    }
+
+    fn schedule(&self) -> Schedule<'_> {
+        Schedule { config: &self.config, score: self.base.score_config(), taken_up: self.taken_up }
     }
 
     /// Restarts Adam when the policy begins to learn. While the critic warms up the policy's gradients are zero. The
@@ -302,6 +353,12 @@ impl PpoLearner {
 #[derive(Serialize, Deserialize, Debug)]
 struct Counters {
     adam_steps: u64,
+    /// Only in runs that got another length.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    taken_up: Option<TakenUp>,
+    /// Only in runs that began with the weights of another.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    is_continuation: bool,
 }
 
 // Actor and critic as one set of parameters.

@@ -16,7 +16,7 @@ mod skill_steps;
 use crate::{
     DeviceKind, FileError, LearnError, ObsSlice, PolicySpec, PpoLearner, Rollout, SacLearner, TimeLimit,
     file::{FileKind, TensorFile},
-    learner::{Learner, LearnerBase, LearnerMetrics},
+    learner::{ContinuedSchedule, Learner, LearnerBase, LearnerMetrics},
     policy::Policy,
     ppo::PpoConfig,
     sac::{EntropyCoef, SacConfig},
@@ -187,13 +187,13 @@ impl Learner for SpirlLearner {
         self.checkpoint(path)?.write()
     }
 
-    fn set_total_updates(&mut self, total: Option<u64>) {
-        if let OverSkills::Ppo(learner) = &mut self.over_skills {
-            learner.set_total_updates(total);
-        }
-        if let Some(below) = &mut self.below {
-            below.set_total_updates(total);
-        }
+    fn set_total_updates(&mut self, total: Option<u64>) -> Option<ContinuedSchedule> {
+        let of_skills = match &mut self.over_skills {
+            OverSkills::Ppo(learner) => learner.set_total_updates(total),
+            OverSkills::Sac(_) => None,
+        };
+        let of_actions = self.below.as_mut().and_then(|below| below.set_total_updates(total));
+        of_skills.or(of_actions)
     }
 
     /// Returns the inputs and outputs of the acting policy.

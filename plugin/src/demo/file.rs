@@ -6,6 +6,7 @@
 //!
 //! - `header`, `episode`: the header, and one episode in memory.
 //! - `writer`, `reader`, [`mod@repair`]: writing, reading, and recovery of a damaged recording.
+//! - `copying`: new recordings of the episodes of others: joined, selected, or with another player's name.
 //! - `preamble`, `bytes`: the text at the top of the file, and the bytes of a frame.
 //! - `error`: errors, and their messages.
 //!
@@ -33,6 +34,7 @@
 //!   Rewards and deciders are stored as runs.
 
 mod bytes;
+mod copying;
 mod episode;
 mod error;
 mod header;
@@ -56,6 +58,7 @@ pub use crate::demo::file::header::DEMO_FORMAT;
 pub use crate::demo::file::preamble::DEMO_MAGIC;
 pub use crate::demo::file::repair::{DroppedRegion, RepairReport, repair};
 pub use crate::demo::file::{
+    copying::{MergeReport, merge_demos, relabel_demo, select_demos},
     episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions},
     error::{DemoFault, DemoFileError, EpisodeFault},
     header::{DemoActions, DemoHeader},
@@ -199,121 +202,4 @@ fn list(folder: &Path, folders: &mut Vec<PathBuf>, found: &mut Vec<PathBuf>) -> 
         }
     }
     Ok(())
-}
-
-// Merging of recordings.
-
-/// Writes the episodes of several recordings of one game into a new file, in the order of `files`.
-///
-/// They must agree in everything that a replay depends on: game, version, mode, tick rate, actions, names of kept
-/// observations and noise. Testers may differ: the new file names all of them. The input files stay unchanged.
-///
-/// ```no_run
-/// use bevy_playbot::demo::file::{DemoFileError, merge_demos};
-///
-/// let report = merge_demos(&["ada.demo", "bob.demo"], "all.demo")?;
-/// assert!(report.episodes() >= 2, "of the game {}", report.header.game);
-/// # Ok::<(), DemoFileError>(())
-/// ```
-///
-/// # Errors
-///
-/// The first file that belongs to another game, version or mode ([`DemoFault::ForeignGame`] and its kin), differs
-/// otherwise ([`DemoFault::MergeDiffers`]), is damaged, or is named twice. [`DemoFault::Exists`] when there is a file
-/// at `out`, and [`DemoFault::NothingToMerge`] without files. After an error there is no file at `out`.
-pub fn merge_demos(files: &[impl AsRef<Path>], out: impl AsRef<Path>) -> Result<MergeReport, DemoFileError> {
-    let out = out.as_ref();
-    let Some(first) = files.first() else { return Err(DemoFileError::new(out, DemoFault::NothingToMerge)) };
-    let mut readers = Vec::new();
-    for (index, path) in files.iter().enumerate() {
-        let path = path.as_ref();
-        if files[..index].iter().any(|before| is_same(before.as_ref(), path)) {
-            return Err(DemoFileError::new(path, DemoFault::NamedTwice));
-        }
-        if let Some(before) = files[..index].iter().find(|before| has_same_bytes(before.as_ref(), path)) {
-            return Err(DemoFileError::new(path, DemoFault::CopyOf(before.as_ref().into())));
-        }
-        readers.push(DemoReader::open(path)?);
-    }
-    let header = common_header(first.as_ref(), &readers)?;
-    let mut writer = DemoWriter::create(out, header.clone())?;
-    let mut report = MergeReport { header, files: Vec::new(), steps: 0 };
-    let copied = readers.into_iter().try_for_each(|mut reader| {
-        for episode in reader.by_ref() {
-            let episode = episode?;
-            report.steps += episode.len();
-            writer.push(&episode)?;
-        }
-        report.files.push((reader.path().to_owned(), reader.episodes_read()));
-        Ok(())
-    });
-    if let Err(error) = copied {
-        drop(writer);
-        // An unfinished merge would look like a whole one.
-        let _ = playbot_learner::disk::remove_file(out);
-        return Err(error);
-    }
-    Ok(report)
-}
-
-/// The result of a merge.
-#[derive(Clone, Debug, PartialEq)]
-pub struct MergeReport {
-    /// Header of the new file.
-    pub header: DemoHeader,
-    /// Each merged file with its number of episodes, in order.
-    pub files: Vec<(PathBuf, usize)>,
-    /// Ticks over all episodes.
-    pub steps: usize,
-}
-
-impl MergeReport {
-    /// Episodes of the new file.
-    pub fn episodes(&self) -> usize {
-        self.files.iter().map(|(_, episodes)| episodes).sum()
-    }
-}
-
-/// Returns whether two paths lead to one file.
-fn is_same(one: &Path, other: &Path) -> bool {
-    match (one.canonicalize(), other.canonicalize()) {
-        (Ok(one), Ok(other)) => one == other,
-        _ => one == other,
-    }
-}
-
-/// Returns whether two files are equal. Only files of one length are read.
-fn has_same_bytes(one: &Path, other: &Path) -> bool {
-    let length = |path: &Path| fs::metadata(path).ok().map(|data| data.len());
-    // What cannot be read is an error when it is opened.
-    length(one).is_some()
-        && length(one) == length(other)
-        && fs::read(one).is_ok_and(|bytes| fs::read(other).is_ok_and(|other| other == bytes))
-}
-
-/// Returns the common header of all these recordings.
-fn common_header(first: &Path, readers: &[DemoReader]) -> Result<DemoHeader, DemoFileError> {
-    let mut common = readers[0].header().clone();
-    let mut names: Vec<String> = Vec::new();
-    for reader in readers {
-        let header = reader.header();
-        let refuse = |fault| DemoFileError::new(reader.path(), fault);
-        header.check_game(&common.game, common.game_version, Some(&common.mode)).map_err(refuse)?;
-        let testers = DemoHeader { demonstrator: common.demonstrator.clone(), ..header.clone() };
-        if let Err(fault) = testers.check_append(&common) {
-            return Err(refuse(match fault {
-                DemoFault::HeaderDiffers { field, found, wanted } => {
-                    DemoFault::MergeDiffers { field, found, expected: wanted, first: first.to_owned() }
-                }
-                other => other,
-            }));
-        }
-        for name in header.demonstrator.split(", ").filter(|name| !name.is_empty()) {
-            if !names.iter().any(|known| known == name) {
-                names.push(name.to_owned());
-            }
-        }
-    }
-    common.demonstrator = names.join(", ");
-    Ok(common)
 }

@@ -152,8 +152,8 @@ impl Demonstrations {
     }
 
     /// Pairs each action with the observation before it, in the order of the recordings. Each distinct demonstration
-    /// that needs a replay is replayed once, on at most `threads` threads. `progress` receives numbers of finished
-    /// steps, from several threads.
+    /// that needs a replay is replayed once, on at most `threads` threads. Idle starts are left out: they are replayed,
+    /// and demonstrate nothing. `progress` receives numbers of finished steps, from several threads.
     ///
     /// # Errors
     ///
@@ -193,7 +193,11 @@ impl Demonstrations {
             };
             episodes.push(DatasetEpisode { observations, actions: learner_actions(&demo.episode) });
         }
-        let dataset = Dataset::new(self.observation_config.obs_kind(game), game.actions(), episodes)?;
+        let (kind, space) = (self.observation_config.obs_kind(game), game.actions());
+        for (demo, episode) in self.episodes.iter().zip(&mut episodes) {
+            leave_out(demo.episode.idle_start(), episode, &kind, &space)?;
+        }
+        let dataset = Dataset::new(kind, space, episodes)?;
         Ok(dataset.with_levels(self.levels())?)
     }
 
@@ -251,6 +255,24 @@ impl Demonstrations {
         }
         Ok(rollouts)
     }
+}
+
+/// Removes the first steps of an episode.
+fn leave_out(
+    start: usize,
+    episode: &mut DatasetEpisode,
+    kind: &ObsKind,
+    space: &ActionSpace,
+) -> Result<(), LearnError> {
+    if start == 0 {
+        return Ok(());
+    }
+    let steps = episode.actions.len();
+    let (mut observations, mut actions) = (Observations::empty(kind), Actions::empty(space));
+    observations.push(episode.observations.rows(start..steps, kind.numbers()))?;
+    actions.extend_rows(&episode.actions, start, steps)?;
+    *episode = DatasetEpisode { observations, actions };
+    Ok(())
 }
 
 /// Returns the steps of an episode with a known outcome, if there are any.
@@ -328,6 +350,22 @@ pub(super) mod tests {
         }));
         assert_eq!(demos.levels(), [0, 1, 0, 3, 4, 3]);
         assert_eq!(demos.originals(), [0, 1, 0, 3, 4, 3], "all of them were left before their first action");
+    }
+
+    #[test]
+    fn steps_that_are_left_out_take_their_observations_along() {
+        let (kind, space) = (ObsKind::Vector(2), ActionSpace::Discrete(3));
+        let whole = DatasetEpisode {
+            observations: Observations::Vector(vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0]),
+            actions: Actions::Discrete(vec![0, 0, 2]),
+        };
+        let mut episode = whole.clone();
+        leave_out(0, &mut episode, &kind, &space).expect("fits");
+        assert_eq!(episode, whole);
+        leave_out(2, &mut episode, &kind, &space).expect("fits");
+        let rest =
+            DatasetEpisode { observations: Observations::Vector(vec![4.0, 5.0]), actions: Actions::Discrete(vec![2]) };
+        assert_eq!(episode, rest);
     }
 
     #[test]

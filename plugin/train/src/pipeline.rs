@@ -226,7 +226,12 @@ pub fn train(
         Training::resume(game, opened, &wanted, setup)?
     } else {
         let (skill_file, skills) = skills.unzip();
-        Training::begin(game, &NewRun { path: run, experiment, skills, skill_file, force: false }, setup, observer)?
+        Training::begin(
+            game,
+            &NewRun { path: run, experiment, skills, skill_file, init_from: None, force: false },
+            setup,
+            observer,
+        )?
     };
     match training.drive(observer)? {
         true => Ok(training.trainer),

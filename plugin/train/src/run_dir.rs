@@ -66,9 +66,21 @@ pub struct RunInfo {
     /// The levels that it sees, with those of its recordings and its skills; missing in older runs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub seen: Option<SeenLevels>,
+    /// The run whose weights it began with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub begun_from: Option<BegunFrom>,
     /// Device that it was started on; the default one if the run does not name it.
     #[serde(default)]
     pub device: DeviceKind,
+}
+
+/// The run whose weights another run began with.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BegunFrom {
+    /// Its folder, as it was named then.
+    pub run: PathBuf,
+    /// Environment steps of the checkpoint.
+    pub step: u64,
 }
 
 /// Saved state of training besides the learner.
@@ -237,13 +249,13 @@ impl RunDir {
     ) -> Result<Trainer, RunError> {
         trainer::check(game, experiment)?;
         let (mut learner, state) = self.last_readable(experiment.algorithm, device)?;
-        learner.set_length(experiment);
+        let continued_schedule = learner.set_length(experiment);
         let mut trainer = Trainer::with_learner(game, experiment, learner, threads)?;
         trainer.report_panics_to(&self.path);
         for (collector, saved) in trainer.collectors.iter_mut().zip(&state.arenas) {
             restore_arenas(collector, saved).map_err(TrainError::from)?;
         }
-        trainer.progress = state.progress;
+        (trainer.progress, trainer.continued_schedule) = (state.progress, continued_schedule);
         trainer.seen = read_sealed::<RunInfo>(&self.path.join("run.json"))?.0.seen;
         checkpoint::set_aside_after(&self.path, trainer.progress.steps)?;
         self.metrics_log().rewind(trainer.progress.steps, trainer.progress.updates)?;

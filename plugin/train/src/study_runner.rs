@@ -384,7 +384,7 @@ impl<'a> StudyRunner<'a> {
         recorded: Option<SeenLevels>,
     ) -> Result<RunDir, StudyRunError> {
         let (file, path, experiment) = (self.skill_file(run)?, lock.folder().to_owned(), &run.experiment);
-        let new = NewRun { path: &path, experiment, skills, skill_file: Some(&file), force: true };
+        let new = NewRun { path: &path, experiment, skills, skill_file: Some(&file), init_from: None, force: true };
         let info = run_info(game, &new, recorded, &self.setup)?;
         Ok(RunDir::begin(lock, experiment, &info)?)
     }

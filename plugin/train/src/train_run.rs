@@ -5,13 +5,17 @@ use crate::{
     error::{RunError, TrainError},
     experiment::{Experiment, LearnerKind},
     recordings::{Recorded, RecordingsError, read_rollouts},
-    run_dir::{OpenedRun, RunDir, RunInfo, check_new},
+    run_dir::{BegunFrom, OpenedRun, RunDir, RunInfo, check_new},
     run_observer::{RunEvent, RunObserver},
     trainer,
     trainer::Trainer,
 };
-use playbot_harness::{game::Game, held_out::seen_by_training, sealed_file::file_checksum};
-use playbot_learner::{DeviceKind, HasExitCode, SeenLevels, SkillModel};
+use playbot_harness::{
+    game::Game,
+    held_out::{HeldOut, seen_by_training},
+    sealed_file::file_checksum,
+};
+use playbot_learner::{ContinuedSchedule, DeviceKind, HasExitCode, SeenLevels, SkillModel};
 use playbot_report::whole;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -54,6 +58,14 @@ pub enum TrainingError {
         /// Folder of the run.
         run: PathBuf,
     },
+    /// A new run cannot begin with the weights of this run.
+    #[error("no run can begin with the weights of {}: {why}", run.display())]
+    BadStart {
+        /// Folder of the run with the weights.
+        run: PathBuf,
+        /// The reason.
+        why: String,
+    },
     /// The experiment, game and skills do not fit one another, or the training cannot go on.
     #[error(transparent)]
     Train(Box<TrainError>),
@@ -87,6 +99,7 @@ impl HasExitCode for TrainingError {
     fn exit_code(&self) -> u8 {
         match self {
             Self::Diverged { .. } => 2,
+            Self::BadStart { .. } => 3,
             Self::NeverSaved { error, .. } | Self::NotSaved { error, .. } => error.exit_code(),
             Self::Train(error) => error.exit_code(),
             Self::Run(error) => error.exit_code(),
@@ -126,6 +139,8 @@ pub struct NewRun<'a> {
     pub skills: Option<&'a SkillModel>,
     /// The file of the skill model, whose checksum the run notes.
     pub skill_file: Option<&'a Path>,
+    /// The run with whose weights and normalisers of the last checkpoint it begins, if it does not begin anew.
+    pub init_from: Option<&'a Path>,
     /// Replace an existing run.
     pub force: bool,
 }
@@ -163,7 +178,10 @@ impl Training {
         if let Some(seen) = &seen {
             trainer.note_seen(seen);
         }
-        let info = run_info(game, new, seen, setup)?;
+        let mut info = run_info(game, new, seen, setup)?;
+        if let Some(path) = new.init_from {
+            start_from(game, path, experiment, &mut trainer, &mut info)?;
+        }
         let run = RunDir::create(new.path, &experiment.without_study(), &info, new.force)?;
         Ok(Self { run, trainer })
     }
@@ -224,6 +242,47 @@ impl Training {
     }
 }
 
+/// Gives a new run the weights of another one, and notes it with the levels that the other one has seen.
+fn start_from(
+    game: &dyn Game,
+    path: &Path,
+    experiment: &Experiment,
+    trainer: &mut Trainer,
+    info: &mut RunInfo,
+) -> Result<(), TrainingError> {
+    let OpenedRun { run, experiment: theirs, info: other } = RunDir::open(path)?;
+    let refuse = |why: String| Err(TrainingError::BadStart { run: path.to_owned(), why });
+    if theirs.game != experiment.game || other.game_version != info.game_version {
+        let (game, version) = (&experiment.game, info.game_version);
+        return refuse(format!("it is of {} {}, and the new one of {game} {version}", theirs.game, other.game_version));
+    }
+    if other.algorithm != info.algorithm {
+        let (found, wanted) = (other.algorithm, info.algorithm);
+        return refuse(format!("it was trained by {found}, and the new one is by {wanted}: add --algorithm {found}"));
+    }
+    if other.skills != info.skills {
+        return refuse("its skill model is another one: name its own with --skills".to_owned());
+    }
+    if let Some(seen) = HeldOut::new(game, &experiment.test).shown_by(other.seen.as_ref()) {
+        return refuse(format!("it has learned from {seen}, and the new run holds out {} (`test`)", experiment.test));
+    }
+    let checkpoint = run.checkpoint(CheckpointChoice::Last)?;
+    trainer
+        .learner
+        .start_from(&checkpoint.learner_file())
+        .map_err(|error| TrainingError::BadStart { run: path.to_owned(), why: error.to_string() })?;
+    match &other.seen {
+        Some(seen) => {
+            trainer.note_seen(seen);
+            info.seen.iter_mut().for_each(|levels| levels.extend(seen));
+        }
+        // A run of an older version, whose levels are unknown.
+        None => (trainer.seen, info.seen) = (None, None),
+    }
+    info.begun_from = Some(BegunFrom { run: path.to_owned(), step: checkpoint.summary.step });
+    Ok(())
+}
+
 /// Returns the metadata of a new run. `recorded` are the levels of the recordings that it trains on.
 ///
 /// # Errors
@@ -249,6 +308,7 @@ pub(crate) fn run_info(
         game_version: game.version(),
         skills: skill_file.map(file_checksum).transpose()?,
         seen,
+        begun_from: None,
         device: setup.device,
     })
 }
@@ -333,6 +393,17 @@ pub fn rounded(experiment: &Experiment) -> Option<String> {
     })
 }
 
+/// Returns a message about the values from which a prolonged training goes on; `None` if it has none that change.
+pub fn goes_on_from(experiment: &Experiment, continued: &ContinuedSchedule) -> Option<String> {
+    let lr = continued.lr.map(|lr| format!("the learning rate falls from {lr:.2e} to 0"));
+    let kl_coef = continued.kl_coef.map(|(from, to)| format!("the penalty's weight goes from {from:.2e} to {to}"));
+    let values: Vec<String> = lr.into_iter().chain(kl_coef).collect();
+    (!values.is_empty()).then(|| {
+        let last = whole(experiment.whole_steps() as f64);
+        format!("the length is new: until step {last} {}, beginning with the last value", values.join(", and "))
+    })
+}
+
 /// Returns a message about a training that ends before its policy learns; `None` for others.
 pub fn never_learns(experiment: &Experiment) -> Option<String> {
     let algorithm = experiment.algorithm;
@@ -401,6 +472,23 @@ mod tests {
         assert_eq!(said(1).as_deref(), Some("1 step is rounded up to 1 update of 4,096: training for 4,096"));
         assert_eq!(said(4097).as_deref(), Some("4,097 steps are rounded up to 2 updates of 4,096: training for 8,192"));
         assert_eq!(said(8192), None);
+    }
+
+    #[test]
+    fn the_values_of_a_prolonged_training_are_reported() {
+        let text = r#"(game: "g", train: "a:0..3", test: "a:4..7", steps: 8000, algorithm: "ppo", arenas: 32,
+            ppo: (num_steps: 128))"#;
+        let experiment = parse_experiment(text, Path::new("x.ron")).expect("valid");
+        let said = |lr, kl_coef| goes_on_from(&experiment, &ContinuedSchedule { lr, kl_coef });
+        assert_eq!(
+            said(Some(0.000_05), None).as_deref(),
+            Some(
+                "the length is new: until step 8,192 the learning rate falls from 5.00e-5 to 0, beginning with the last value"
+            )
+        );
+        let both = said(Some(0.000_05), Some((0.25, 0.0))).expect("both change");
+        assert!(both.contains("to 0, and the penalty's weight goes from 2.50e-1 to 0, beginning"), "{both}");
+        assert_eq!(said(None, None), None);
     }
 
     #[test]

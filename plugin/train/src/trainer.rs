@@ -24,8 +24,9 @@ use playbot_harness::{
     sensors::GameSensors,
 };
 use playbot_learner::{
-    ActionSpace, DeviceKind, FileError, LearnError, Learner, LearnerMetrics, ObsColumns, ObsKind, Observations, Policy,
-    PolicySpec, PpoLearner, Rollout, SacLearner, SeenLevels, SkillModel, SkillSource, SpirlLearner,
+    ActionSpace, ContinuedSchedule, DeviceKind, FileError, LearnError, Learner, LearnerMetrics, ObsColumns, ObsKind,
+    Observations, Policy, PolicySpec, PpoLearner, Rollout, SacLearner, SeenLevels, SkillModel, SkillSource,
+    SpirlLearner,
 };
 use serde::{Deserialize, Serialize};
 use std::{
@@ -46,6 +47,7 @@ pub struct Trainer {
     pub(crate) collectors: Vec<Collector>,
     pub(crate) progress: Progress,
     pub(crate) seen: Option<SeenLevels>,
+    pub(crate) continued_schedule: Option<ContinuedSchedule>,
     obs_kind: ObsKind,
     /// Memory of the last rollout's observations, reused for the next.
     obs: Observations,
@@ -110,7 +112,8 @@ impl Trainer {
         let (experiment, collectors) = (experiment.clone(), collectors?);
         let obs_kind = observation_config.obs_kind(game);
         let (progress, obs) = (Progress::default(), Observations::empty(&obs_kind));
-        Ok(Self { experiment, threads, learner, collectors, progress, seen: None, obs_kind, obs })
+        let (seen, continued_schedule) = (None, None);
+        Ok(Self { experiment, threads, learner, collectors, progress, seen, continued_schedule, obs_kind, obs })
     }
 
     /// Plays one rollout in every arena and learns from it.
@@ -200,6 +203,11 @@ impl Trainer {
     /// Returns the updates done.
     pub fn updates(&self) -> u64 {
         self.progress.updates
+    }
+
+    /// Returns the values from which the learner of a run that was just prolonged goes on, if they change over the run.
+    pub fn continued_schedule(&self) -> Option<&ContinuedSchedule> {
+        self.continued_schedule.as_ref()
     }
 
     /// Returns the experiment.
@@ -432,9 +440,9 @@ impl TrainedLearner {
     }
 
     /// Takes over the settings that may change while training is stopped: the length, over which a learning rate
-    /// falls.
-    pub(crate) fn set_length(&mut self, experiment: &Experiment) {
-        self.set_total_updates(experiment.ppo_config().total_updates);
+    /// falls. Returns the values from which a run of another length goes on.
+    pub(crate) fn set_length(&mut self, experiment: &Experiment) -> Option<ContinuedSchedule> {
+        self.set_total_updates(experiment.ppo_config().total_updates)
     }
 
     /// Loads a learner of this algorithm.

@@ -26,6 +26,7 @@ use playbot_mutation::{
     bugs::{BugError, BugSet, MakePlan, MissingMutants, PlantedPart, Source, make_bugs},
     score::{Score, ScoreTable},
 };
+use playbot_report::counted;
 use playbot_test::verdict::RESULTS;
 use serde_json::json;
 use std::{collections::BTreeMap, path::PathBuf, str::FromStr};
@@ -265,7 +266,8 @@ fn print(set: &BugSet, without_place: &[MissingMutants], json: bool) -> Result<(
     for ((game, class), (levels, rules)) in &classes {
         print_line(format!("{game:<width$}  {class:<24}  {levels:>6}  {rules:>5}"))?;
     }
-    print_line(format!("{} mutants, {sound} sound levels", set.mutants.len()))
+    let mutants = counted(set.mutants.len() as u64, "mutant");
+    print_line(format!("{mutants}, {}", counted(sound, "sound level")))
 }
 
 #[cfg(test)]

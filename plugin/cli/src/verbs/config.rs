@@ -3,7 +3,7 @@
 use crate::{
     arguments::experiment::ExperimentArgs,
     error::{CliError, Outcome},
-    output::print_line,
+    output::{print_line, print_or_write},
 };
 use clap::Subcommand;
 use playbot_harness::{game::Game, games::Games, sensors::GameSensors};
@@ -12,11 +12,13 @@ use playbot_train::{
     experiment::{ExperimentError, ExperimentFile, PRESETS, find_preset},
 };
 use serde_json::json;
+use std::path::PathBuf;
 
 /// Show experiments with all their values, and the presets to build them on.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot config show --experiment my.ron --set ppo.lr=0.0003
+  playbot config show --out my.ron
   playbot config presets
   playbot config presets skill-paper")]
 pub struct Args {
@@ -30,6 +32,9 @@ enum Verb {
     Show {
         #[command(flatten)]
         from: ExperimentArgs,
+        /// File to write it to instead of standard output. It must not exist.
+        #[arg(long, value_name = "FILE")]
+        out: Option<PathBuf>,
     },
     /// List the presets that `base: [...]` in an experiment file can name, or print one.
     Presets {
@@ -65,10 +70,11 @@ fn check(experiment: &Experiment, from: &ExperimentArgs, games: &Games) -> Resul
 
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     match args.verb {
-        Verb::Show { from } => {
+        Verb::Show { from, out } => {
             let experiment = from.load(games, [])?;
             check(&experiment, &from, games)?;
-            print_line(experiment.to_ron().map_err(|error| CliError::Usage(error.to_string()))?)?;
+            let text = experiment.to_ron().map_err(|error| CliError::Usage(error.to_string()))?;
+            print_or_write(&text, out.as_deref())?;
         }
         Verb::Presets { name, json } => {
             let chosen_by_name = name.is_some();

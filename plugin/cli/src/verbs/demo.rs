@@ -1,7 +1,9 @@
-//! `playbot demo ls|show|verify|repair|merge`.
+//! `playbot demo ls|show|verify|repair|merge|filter|label`.
 //!
 //! - `show`: `playbot demo show`: the header, the episodes and the ticks of a recording.
+//! - `filter`: `playbot demo filter` and `playbot demo label`.
 
+mod filter;
 mod show;
 
 use crate::{
@@ -10,7 +12,10 @@ use crate::{
     output::{prepare, print_line, program},
     progress,
     progress::{interrupt, interrupt::NothingToSave},
-    verbs::demo::show::show,
+    verbs::demo::{
+        filter::{FilterArgs, filter, label},
+        show::show,
+    },
 };
 use bevy_playbot::{
     demo::file::{DemoSummary, repair},
@@ -26,7 +31,7 @@ use std::path::{Path, PathBuf};
 
 pub use crate::verbs::demo::show::deciders;
 
-/// Look at, check, repair and join recordings.
+/// Look at, check, repair, join and filter recordings.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot demo ls
@@ -35,7 +40,10 @@ pub use crate::verbs::demo::show::deciders;
   playbot demo verify a.demo b.demo --json
   playbot demo repair torn.demo --out whole.demo
   playbot demo repair torn.demo --header-from other.demo
-  playbot demo merge --out all.demo alice.demo bob.demo")]
+  playbot demo merge --out all.demo alice.demo bob.demo
+  playbot demo filter all.demo --success --min-return 5 --out good.demo
+  playbot demo filter alice.demo --levels MODE:0..63 --without-idle-start --out quick.demo
+  playbot demo label mine.demo --player alice --out alice.demo")]
 pub struct Args {
     #[command(subcommand)]
     verb: Verb,
@@ -99,6 +107,22 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
+    /// Keep the episodes that meet all conditions, in a new recording. Exit code 1 if no episode does.
+    Filter(FilterArgs),
+    /// Change the name of the player, in a new recording.
+    Label {
+        /// The recording.
+        file: PathBuf,
+        /// Name of the player.
+        #[arg(long, value_name = "NAME")]
+        player: String,
+        /// File to write, which must not exist.
+        #[arg(long)]
+        out: PathBuf,
+        /// Print the result as a line of JSON.
+        #[arg(long)]
+        json: bool,
+    },
 }
 
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
@@ -110,6 +134,8 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             mend(&file, out.as_deref().unwrap_or(&file), header_from.as_deref(), json)
         }
         Verb::Merge { files, out, json } => merge(&files, &out, json),
+        Verb::Filter(args) => filter(args, games),
+        Verb::Label { file, player, out, json } => label(&file, &player, &out, json),
     }
 }
 

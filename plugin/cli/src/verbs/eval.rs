@@ -14,7 +14,7 @@ use crate::{
 };
 use bevy_playbot::vision::{ObservationConfig, ObservationKind};
 use playbot_harness::{
-    eval::{EvalPlan, Player},
+    eval::{AtLeast, EvalPlan, Player},
     game::Game,
     games::{Artifact, Games},
     mode::ModeError,
@@ -41,7 +41,8 @@ use std::{
   playbot eval --skills skills.safetensors
   playbot eval --run runs/pixels --observation camera
   playbot eval --run runs/first --bot random --levels MODE:64..66 --plot where.png
-  playbot eval --run runs/first --bot BOT --levels MODE:64..127 --levels MODE:500..599")]
+  playbot eval --run runs/first --bot BOT --levels MODE:64..127 --levels MODE:500..599
+  playbot eval --policy bot.policy --at-least success=0.9 --at-least return=8")]
 pub struct Args {
     /// Folder of a run (repeatable).
     #[arg(long)]
@@ -86,6 +87,10 @@ pub struct Args {
     /// Also draw the players' paths, and how often they were at each position, into this .png or .svg.
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
+    /// Smallest value of a measure: success=0.9, a share of the episodes, or return=8.5 (repeatable). Exit code 1 if a
+    /// player is below it on a range of levels.
+    #[arg(long, value_name = "MEASURE=N")]
+    at_least: Vec<AtLeast>,
     /// One line of JSON per player and range of levels.
     #[arg(long)]
     json: bool,
@@ -123,7 +128,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     interrupt::leave(kept.to_owned());
     let measuring = NothingToSave::listen();
     let mut footprints = args.plot.as_deref().map(|path| Footprints::new(path, game, &splits)).transpose()?;
-    let mut rows = Vec::new();
+    let (mut rows, mut shortfalls) = (Vec::new(), Vec::new());
     for (split, left_out) in splits.iter().zip(&left_out) {
         for LoadedPlayer { name, player, observation_config, .. } in &players {
             let observation_config = *observation_config;
@@ -139,6 +144,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             if args.json {
                 player::print_json(&measured.summary)?;
             }
+            shortfalls.extend(args.at_least.iter().filter_map(|bound| bound.shortfall(&measured.summary)));
             rows.push(measured.into_row());
         }
     }
@@ -150,7 +156,8 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if let Some(footprints) = footprints {
         footprints.write(game)?;
     }
-    Ok(Outcome::Pass)
+    shortfalls.iter().for_each(|shortfall| report!("{shortfall}"));
+    Ok(if shortfalls.is_empty() { Outcome::Pass } else { Outcome::Findings })
 }
 
 /// Returns the levels of each range that are not measured: of held-out levels, and with --new-layouts of any, those that

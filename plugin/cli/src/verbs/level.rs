@@ -3,7 +3,7 @@
 use crate::{
     arguments::{LevelsArg, default_mode},
     error::{CliError, Outcome},
-    output::print_line,
+    output::print_or_write,
     pictures::{plot, plot::PlotFile},
 };
 use playbot_harness::{
@@ -18,7 +18,7 @@ use std::path::PathBuf;
 #[command(after_help = "Examples:
   playbot level GAME --mode MODE --level 7
   playbot level GAME --levels MODE:7
-  playbot level GAME --level 0 --json
+  playbot level GAME --level 0 --json --out my-level.json
   playbot level GAME --level 7 --png level.png
   playbot level GAME --file my-level.json
   playbot level antmaze --map large
@@ -50,6 +50,9 @@ pub struct Args {
     /// Print one line of JSON instead of a picture.
     #[arg(long)]
     json: bool,
+    /// File to write it to instead of standard output. It must not exist.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
     /// Also draw the whole level into this .png (maps also into a .svg).
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
@@ -63,7 +66,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         plot::write(&file, picture, game.tick_hz())?;
         report!("picture: {}", file.path().display());
     }
-    print_line(if args.json { level.json } else { level.text })?;
+    print_or_write(if args.json { &level.json } else { &level.text }, args.out.as_deref())?;
     Ok(Outcome::Pass)
 }
 

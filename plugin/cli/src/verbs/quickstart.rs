@@ -240,7 +240,8 @@ fn train_one(
     let experiment = Experiment { algorithm, ..experiment.clone() };
     let skills = algorithm.needs_skills().then_some(skills);
     let (folder, skill_file) = (args.run.join(algorithm.name()), args.run.join(SKILLS));
-    let new = NewRun { path: &folder, experiment: &experiment, skills, skill_file: Some(&skill_file), force: true };
+    let skill_file = Some(skill_file.as_path());
+    let new = NewRun { path: &folder, experiment: &experiment, skills, skill_file, init_from: None, force: true };
     let mut curve = Vec::new();
     let mut console = Console::new(format!("train {algorithm}")).on_update(|report| {
         if let Some(kl) = report.initial_kl {

@@ -185,6 +185,7 @@ pub(crate) fn to_json(run: &RunRecord) -> Value {
         "version": run.info.version,
         "revision": run.info.revision,
         "skills": run.info.skills,
+        "begun_from": run.info.begun_from,
         "device": run.info.device,
     })
 }

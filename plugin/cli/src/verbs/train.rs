@@ -21,7 +21,7 @@ use playbot_learner::SkillModel;
 use playbot_train::{
     Algorithm, Experiment, LearnerKind, TrainError,
     run_dir::{OpenedRun, RunDir},
-    train_run::{NewRun, Training, TrainingError, TrainingSetup, never_learns, rounded},
+    train_run::{NewRun, Training, TrainingError, TrainingSetup, goes_on_from, never_learns, rounded},
 };
 use std::path::{Path, PathBuf};
 
@@ -31,6 +31,7 @@ use std::path::{Path, PathBuf};
   playbot train GAME --skills skills.safetensors --run runs/first
   playbot train --algorithm ppo --run runs/baseline --steps 200000
   playbot train --skills skills.safetensors --run runs/weak --set score.kl_coef=0.01 --set ppo.lr=0.0003
+  playbot train --algorithm ppo --init-from runs/baseline --run runs/slow --set ppo.lr=0.0001
   playbot train --run runs/first --resume
   playbot train --run runs/first --resume --steps 1000000")]
 pub struct Args {
@@ -50,6 +51,10 @@ pub struct Args {
     /// values, --steps and --checkpoint-every with new ones.
     #[arg(long)]
     resume: bool,
+    /// Begin with the weights and normalisers of another run's last checkpoint. Algorithm, skills and networks must be
+    /// the same, other settings may differ. For ppo and score-ppo.
+    #[arg(long, value_name = "RUN", conflicts_with = "resume")]
+    init_from: Option<PathBuf>,
     /// Delete the folder of the run first if it exists.
     #[arg(long, conflicts_with = "resume")]
     force: bool,
@@ -157,11 +162,15 @@ fn start(
     skills.iter().try_for_each(|model| check_asked(args, &experiment, model))?;
     interrupt::leave("nothing is trained yet".to_owned());
     let (path, skill_file) = (args.run.as_path(), args.skills.as_deref());
-    let new = NewRun { path, experiment: &experiment, skills: skills.as_ref(), skill_file, force: args.force };
+    let (skills, init_from, force) = (skills.as_ref(), args.init_from.as_deref(), args.force);
+    let new = NewRun { path, experiment: &experiment, skills, skill_file, init_from, force };
     let training = Training::begin(game, &new, setup, console).map_err(|error| match error {
         TrainingError::Train(error) => explain(*error, args, &experiment, games),
         other => other.into(),
     })?;
+    if let Some(from) = &args.init_from {
+        report!("beginning with the weights of {}", from.display());
+    }
     if args.from.experiment.is_none() {
         report!(
             "no --experiment is named: training on {}, held out for the test {}",
@@ -234,6 +243,10 @@ fn resume(args: &Args, games: &Games, setup: &TrainingSetup<'_>) -> Result<Train
         return Ok(training);
     }
     report!("going on at step {steps} of {}", experiment.whole_steps());
+    let continued = training.trainer.continued_schedule();
+    if let Some(words) = continued.and_then(|continued| goes_on_from(&experiment, continued)) {
+        report!("{words}");
+    }
     if setup.device != begun_on {
         report!(
             "it was begun on {begun_on} and goes on on {}: the result will be similar, but not equal",

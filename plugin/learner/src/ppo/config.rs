@@ -22,7 +22,8 @@ settings! {
 
     /// Learning rate of Adam.
     lr: f64 = 5e-4, in Range::RATE;
-    /// True if the learning rate decreases linearly to 0 over `ppo.total_updates`.
+    /// True if the learning rate decreases linearly to 0 over `ppo.total_updates`. A run that is prolonged goes on from
+    /// its last rate.
     anneal_lr: bool = false;
     /// Updates of the whole run. Only `ppo.anneal_lr` and `score.kl_coef_end` need it. An experiment sets it to the
     /// length of its run.

@@ -132,6 +132,11 @@ impl DemoEpisode {
         steps
     }
 
+    /// Returns the number of leading ticks that no source decided: they replay, and demonstrate nothing.
+    pub fn idle_start(&self) -> usize {
+        self.deciders.iter().take_while(|decider| **decider == Decider::Idle).count()
+    }
+
     /// Returns whether the episode terminated with the goal reached.
     pub fn is_success(&self) -> bool {
         self.end == DemoEnd::Terminated { success: true }
@@ -212,6 +217,14 @@ mod tests {
         assert_eq!(episode().check(&header()), Ok(()));
         assert_eq!((episode().len(), episode().episode_return(), episode().is_success()), (2, 10.5, true));
         assert_eq!(DemoEpisode::new(7, DemoActions::Discrete(4)).check(&header()), Ok(()));
+    }
+
+    #[test]
+    fn only_leading_ticks_without_a_decider_are_an_idle_start() {
+        let of = |deciders: &[Decider]| DemoEpisode { deciders: deciders.to_vec(), ..episode() }.idle_start();
+        assert_eq!(of(&[Decider::Idle, Decider::Idle, Decider::Human, Decider::Idle]), 2);
+        assert_eq!(of(&[Decider::Human, Decider::Idle]), 0);
+        assert_eq!(of(&[]), 0);
     }
 
     #[test]

@@ -67,7 +67,7 @@ fn way_out(path: &Path, error: &io::Error) -> String {
     if error.kind() != io::ErrorKind::NotFound {
         return String::new();
     }
-    format!("; name an experiment file that exists, or begin one with `playbot config show > {}`", path.display())
+    format!("; name an experiment file that exists, or begin one with `playbot config show --out {}`", path.display())
 }
 
 /// Formats the texts `key=value` and their error, without naming the key twice.

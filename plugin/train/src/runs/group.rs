@@ -291,6 +291,7 @@ mod tests {
             game_version: 1,
             skills: None,
             seen: None,
+            begun_from: None,
             device: DeviceKind::Flex,
         };
         let path = format!("{algorithm}-{seed}").into();

@@ -13,6 +13,7 @@ use playbot_train::{
     Experiment,
     checkpoint::{Checkpoint, CheckpointSummary},
     metrics_log::{EPISODIC_RETURN, SUCCESS_RATE, range_of},
+    run_dir::BegunFrom,
     runs::{RunCurves, RunRecord, changed_settings, with_defaults},
 };
 use serde_json::{Value, json};
@@ -90,6 +91,9 @@ fn print_head(run: &RunRecord, games: &Games) -> Result<(), CliError> {
         info.device,
         info.skills.as_ref().map_or(String::new(), |skills| format!(", skill model {skills}"))
     ))?;
+    if let Some(BegunFrom { run, step }) = &info.begun_from {
+        print_line(format!("begun with the weights of {} at step {}", run.display(), whole(*step as f64)))?;
+    }
     let state = match (run.is_finished(), run.is_training) {
         (true, _) => "finished",
         (false, true) => "training",

@@ -5,7 +5,7 @@ use crate::{
     error::CliError,
     verbs::train::Args,
 };
-use playbot_harness::{games::Games, sealed_file::file_checksum};
+use playbot_harness::{brief::shell_word, games::Games, sealed_file::file_checksum};
 use playbot_train::{Experiment, run_dir::RunInfo};
 use std::path::Path;
 
@@ -38,10 +38,12 @@ pub(super) fn resumed(args: &Args, saved: &Experiment, info: &RunInfo, games: &G
         return Ok(wanted);
     }
     Err(CliError::Usage(format!(
-        "{} is resumed with other settings: {}; drop the option, or start a new run with another --run and \
-         without --resume (--steps and --checkpoint-every may change)",
+        "{} is resumed with other settings: {}; drop the option, or start a new run with another --run, \
+         without --resume, and with --init-from {} to begin with the weights of this one (--steps and --checkpoint-every \
+         may change)",
         args.run.display(),
-        in_words(differences)
+        in_words(differences),
+        shell_word(&args.run.display().to_string())
     )))
 }
 
@@ -97,7 +99,17 @@ mod tests {
         let saved = from.load(&games, []).expect("valid");
         let (version, revision) = ("1".to_owned(), "r".to_owned());
         let (algorithm, seed, device) = (Algorithm::Ppo, 1, DeviceKind::default());
-        let info = RunInfo { algorithm, seed, version, revision, game_version: 1, skills: None, seen: None, device };
+        let info = RunInfo {
+            algorithm,
+            seed,
+            version,
+            revision,
+            game_version: 1,
+            skills: None,
+            seen: None,
+            begun_from: None,
+            device,
+        };
         let words = ["train", "--run", "runs/first", "--resume"].into_iter().chain(options.iter().copied());
         let args = Train::try_parse_from(words).unwrap_or_else(|error| panic!("{error}")).args;
         resumed(&args, &saved, &info, &games).map_err(|error| error.to_string())
@@ -150,7 +162,9 @@ mod tests {
             let text = again(&BEGUN, options).expect_err("another value");
             assert!(text.contains(words), "{text}");
             assert!(
-                text.starts_with("runs/first is resumed with other settings") && text.contains("another --run"),
+                text.starts_with("runs/first is resumed with other settings")
+                    && text.contains("another --run")
+                    && text.contains("--init-from runs/first to begin"),
                 "{text}"
             );
         }

@@ -206,7 +206,10 @@ fn files_can_be_built_on_files_and_errors_name_the_right_one() {
 #[test]
 fn a_file_that_is_not_there_is_named_with_the_command_that_begins_one() {
     let text = read_experiment(Path::new("none.ron")).expect_err("not there").to_string();
-    assert!(text.starts_with("cannot read none.ron: ") && text.ends_with("`playbot config show > none.ron`"), "{text}");
+    assert!(
+        text.starts_with("cannot read none.ron: ") && text.ends_with("`playbot config show --out none.ron`"),
+        "{text}"
+    );
 }
 
 #[test]
