@@ -207,14 +207,18 @@ pub struct OverwriteArgs {
 }
 
 impl OverwriteArgs {
+    /// Returns whether the file exists and is added to.
+    pub fn adds_to(self, path: &Path) -> bool {
+        self.append && path.is_file()
+    }
+
     /// Opens the file, and makes its folder.
     ///
     /// # Errors
     ///
     /// The file exists without --append or --force, was recorded under other conditions, or cannot be written.
     pub fn open(self, path: &Path, header: DemoHeader) -> Result<DemoWriter, CliError> {
-        let grows = self.append && path.is_file();
-        if !grows {
+        if !self.adds_to(path) {
             prepare(path)?;
         }
         let opened = match self {
@@ -335,7 +339,7 @@ mod tests {
         let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {});
         let default = default_experiment_of(&game).expect("the plainest");
         assert_eq!(default.origin, "the experiment of runner");
-        assert_eq!(default_mode(&game), game.modes()[0]);
+        assert_eq!(default_mode(&game), Game::modes(&game)[0]);
         let held_out = default_held_out(&game).expect("a mode of the game");
         assert_eq!(held_out, default.experiment.test);
         assert!(!held_out.overlaps(&default.experiment.train));

@@ -8,6 +8,7 @@
 //! The files of the folder, in reading order:
 //!
 //! - `runtime`: the plugin's state of a foreign game in its World, and the systems of its description.
+//! - `levels`: modes, level files, plans and proofs.
 //! - `restart`: the start of an episode.
 //! - `input`: the path from an action into the game.
 //! - `observe`, `paths`: observation, position, reward and end after a tick, and observations by the paths of their
@@ -51,6 +52,7 @@
 //! ```
 
 mod input;
+mod levels;
 mod observe;
 mod paths;
 mod restart;
@@ -58,15 +60,14 @@ mod runtime;
 
 use crate::{
     defect::DefectKind,
-    detector::Detector,
-    floor_plan::FloorPlan,
+    detector::{Detector, LevelProof},
     foreign::{
         input::{ForeignBot, Input},
-        observe::ForeignPosition,
+        levels::LevelParts,
         paths::ObservedPath,
-        runtime::{Baseline, Foreign, ForeignCell, Sensor, SystemFactory},
+        runtime::{Baseline, Foreign, ForeignCell, ReaderFactory, Sensor, SystemFactory},
     },
-    game::{BotTools, Game, GameTools, HostTools, InputTools, LevelTools, PictureTools, StateTools, TestTools},
+    game::{BotTools, Game, GameTools, HostTools, InputTools, PictureTools, TestTools},
 };
 use bevy::{
     app::{MainScheduleOrder, PluginGroupBuilder},
@@ -92,6 +93,8 @@ use bevy_playbot::{
 use std::sync::Arc;
 
 pub use crate::foreign::{
+    levels::{IntoLevelTextError, LevelFromFile, PlayedMode},
+    observe::IntoPlanPosition,
     paths::PathError,
     runtime::{IntoActionValue, IntoValues, LevelSeed, Restart},
 };
@@ -103,7 +106,7 @@ const PATIENCE: u32 = 3600;
 /// [module](self).
 ///
 /// Its player and its resources are global, so each World has one arena with one agent. An experiment with more arenas
-/// gets more Worlds. Its mode is called `default`.
+/// gets more Worlds. Its mode is called `default`, unless it names [`modes`](Self::modes).
 #[derive(Clone)]
 pub struct ForeignGame {
     description: Arc<Description>,
@@ -118,7 +121,9 @@ impl ForeignGame {
             version,
             plugin: Arc::new(plugin),
             hz: 60.0,
+            modes: &["default"],
             levels: None,
+            level_parts: LevelParts::default(),
             input: Input::default(),
             act: None,
             agent: Vec::new(),
@@ -127,14 +132,17 @@ impl ForeignGame {
             paths: Vec::new(),
             has_camera: false,
             position: None,
-            plan: None,
+            cell: None,
+            proof: None,
             rewards: Vec::new(),
             end: None,
+            end_cause: None,
             limit: None,
             restart: Restart::Startup,
             ready: None,
             patience: PATIENCE,
             level: None,
+            loaded: None,
             demonstrator: None,
             hash: None,
             plugins: None,
@@ -288,19 +296,6 @@ impl ForeignGame {
         self.with(|description| description.has_camera = true)
     }
 
-    /// Declares the position of the agent, from above or from the side, in any units, for detectors of progress, for
-    /// explorers and for pictures. The system may run more than once in a tick, so it must change nothing. While it is
-    /// skipped, because an entity that it asks for does not exist, the position is unknown.
-    pub fn position<M: 'static>(self, system: impl IntoSystem<(), Vec2, M> + Clone + Send + Sync + 'static) -> Self {
-        self.with(|description| description.position = Some(SystemFactory::new(system, |position| position)))
-    }
-
-    /// Declares the plan of a level by its number, in the units of [`position`](Self::position). It is for pictures of
-    /// paths, and for detectors that need walls, bounds or the goal.
-    pub fn plan(self, plan: impl Fn(u64) -> FloorPlan + Send + Sync + 'static) -> Self {
-        self.with(|description| description.plan = Some(Arc::new(plan)))
-    }
-
     /// Adds a reward of each tick to other rewards.
     pub fn reward<M: 'static>(self, system: impl IntoSystem<(), f32, M> + Clone + Send + Sync + 'static) -> Self {
         self.with(|description| description.rewards.push((SystemFactory::new(system, |reward| reward), false)))
@@ -343,9 +338,33 @@ impl ForeignGame {
     }
 
     /// Creates the level after the restart, with a system that runs once. It finds the level's number in
-    /// [`LevelSeed`], to seed the game's generator, and to reset what the restart leaves unchanged.
+    /// [`LevelSeed`], to seed the game's generator, and to reset what the restart leaves unchanged. A level of a file is
+    /// in [`LevelFromFile`], and the mode in [`PlayedMode`].
     pub fn level<M: 'static>(self, system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static) -> Self {
         self.with(|description| description.level = Some(SystemFactory::new(system, |()| ())))
+    }
+
+    /// Prepares the level once it can be played, with a system that runs once: after [`ready`](Self::ready) has returned
+    /// true, and before the first observation. It places entities that a file brings after [`level`](Self::level) has
+    /// run.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::foreign::{ForeignGame, LevelSeed};
+    ///
+    /// #[derive(Component)]
+    /// struct Hero;
+    ///
+    /// fn placed(game: ForeignGame) -> ForeignGame {
+    ///     game.ready(|heroes: Query<&Hero>| !heroes.is_empty()).loaded(
+    ///         |level: Res<LevelSeed>, mut hero: Single<&mut Transform, With<Hero>>| {
+    ///             hero.translation.x = 10.0 * level.0 as f32;
+    ///         },
+    ///     )
+    /// }
+    /// ```
+    pub fn loaded<M: 'static>(self, system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.loaded = Some(SystemFactory::new(system, |()| ())))
     }
 
     /// Sets the number of levels: level n is the same as level 0, and so on. Default: endless.
@@ -400,7 +419,7 @@ impl Game for ForeignGame {
     }
 
     fn modes(&self) -> &'static [&'static str] {
-        &["default"]
+        self.description.modes
     }
 
     fn tick_hz(&self) -> f64 {
@@ -419,8 +438,8 @@ impl Game for ForeignGame {
         self.description.observation()
     }
 
-    fn build(&self, app: &mut App, _mode: &str) {
-        app.add_plugins(ForeignPlugin(self.clone()));
+    fn build(&self, app: &mut App, mode: &str) {
+        app.add_plugins(ForeignPlugin { game: self.clone(), mode: mode.to_owned() });
     }
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
@@ -482,20 +501,15 @@ impl HostTools for ForeignGame {
         if observe.is_some() && names.is_empty() {
             return Some(format!("`.observe` of the game `{name}` names no values"));
         }
+        if self.description.modes.is_empty() {
+            return Some(format!("`.modes` of the game `{name}` names no mode: name one, or leave it out"));
+        }
+        let problem = self.description.level_parts.problem(name);
+        if problem.is_some() {
+            return problem;
+        }
         let is_sound = self.description.hz.is_finite() && self.description.hz > 0.0;
         (!is_sound).then(|| format!("`.hz` of the game `{name}` is {}, not a number of frames", self.description.hz))
-    }
-}
-
-impl LevelTools for ForeignGame {
-    fn floor_plan(&self, _mode: &str, level: u64) -> Option<FloorPlan> {
-        self.description.plan.as_ref().map(|plan| plan(self.level_of(level)))
-    }
-}
-
-impl StateTools for ForeignGame {
-    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        world.get::<ForeignPosition>(agent).map(|position| position.0)
     }
 }
 
@@ -543,7 +557,10 @@ struct Description {
     version: u32,
     plugin: Arc<dyn Fn(&mut App) + Send + Sync>,
     hz: f64,
+    modes: &'static [&'static str],
     levels: Option<u64>,
+    /// Level files, plans and proofs.
+    level_parts: LevelParts,
     input: Input,
     act: Option<SystemFactory<()>>,
     /// Functions that prepare an agent when it is spawned.
@@ -555,11 +572,15 @@ struct Description {
     has_camera: bool,
     /// Position of the agent on the plan of its level.
     position: Option<SystemFactory<Vec2>>,
-    /// The plan of a level.
-    plan: Option<Arc<dyn Fn(u64) -> FloorPlan + Send + Sync>>,
+    /// The agent's state for explorers.
+    cell: Option<SystemFactory<Vec<i32>>>,
+    /// The proof about the state of an episode.
+    proof: Option<ReaderFactory<LevelProof>>,
     /// Reward systems; the flag says whether the growth of the value is paid.
     rewards: Vec<(SystemFactory<f32>, bool)>,
     end: Option<SystemFactory<Option<EpisodeEnd>>>,
+    /// The reason of an end without the goal.
+    end_cause: Option<SystemFactory<Option<&'static str>>>,
     /// Ticks after which an episode is truncated.
     limit: Option<u32>,
     restart: Restart,
@@ -567,6 +588,8 @@ struct Description {
     /// Frames that a level may take to load.
     patience: u32,
     level: Option<SystemFactory<()>>,
+    /// Prepares a level that can be played.
+    loaded: Option<SystemFactory<()>>,
     demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
     hash: Option<SystemFactory<u64>>,
     plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
@@ -577,6 +600,11 @@ struct Description {
 }
 
 impl Description {
+    /// Returns whether the agent's state is read for explorers, detectors or proofs.
+    fn has_state(&self) -> bool {
+        self.position.is_some() || self.cell.is_some() || self.proof.is_some()
+    }
+
     fn sensor(&self) -> Sensor {
         match &self.observe {
             Some(system) => Sensor::System(system.make()),
@@ -622,16 +650,21 @@ fn lists<T>(sets: impl IntoIterator<Item = impl IntoIterator<Item = T>>) -> Vec<
 struct BeforeGame;
 
 /// The game, with the systems between it and its agent.
-struct ForeignPlugin(ForeignGame);
+struct ForeignPlugin {
+    game: ForeignGame,
+    mode: String,
+}
 
 impl Plugin for ForeignPlugin {
     fn build(&self, app: &mut App) {
-        let description = &self.0.description;
+        let description = &self.game.description;
+        app.insert_resource(PlayedMode(self.mode.clone()));
         add_game(app, description.name, &*description.plugin);
         if !app.is_plugin_added::<VirtualInputPlugin>() {
             app.add_plugins(VirtualInputPlugin { route: InputRoute::Messages });
         }
         app.init_resource::<LevelSeed>()
+            .init_resource::<LevelFromFile>()
             .add_observer(restart::start)
             .add_observer(restart::announce)
             .init_schedule(BeforeGame)
@@ -653,8 +686,8 @@ impl Plugin for ForeignPlugin {
         )
         .add_systems(judge, observe::read_outcome.before(PlaybotSystems::Judge).run_if(is_tick));
         observe::add_observation(app);
-        if description.position.is_some() {
-            observe::add_position(app);
+        if description.has_state() {
+            observe::add_state(app);
         }
     }
 
@@ -662,7 +695,7 @@ impl Plugin for ForeignPlugin {
         let mut order = app.world_mut().resource_mut::<MainScheduleOrder>();
         let startup = order.startup_labels.clone();
         order.startup_labels.insert(0, BeforeGame.intern());
-        app.insert_resource(ForeignCell::new(Foreign::new(&self.0, startup)));
+        app.insert_resource(ForeignCell::new(Foreign::new(&self.game, startup)));
     }
 }
 

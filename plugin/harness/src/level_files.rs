@@ -93,11 +93,20 @@ impl LevelDesigns {
     ///
     /// A message if there is no such level, or it is of another type.
     pub fn get<T: Any + Send + Sync>(&self, level: u64) -> Result<Arc<T>, String> {
-        let Some(DrawnLevel { path, design }) = self.drawn(level) else {
+        let design = self.design(level)?;
+        design.level().ok_or_else(|| format!("{} was read by another game", self.path(level).unwrap_or_default()))
+    }
+
+    /// Returns a level with its hash.
+    ///
+    /// # Errors
+    ///
+    /// A message if there is no such level.
+    pub fn design(&self, level: u64) -> Result<&LevelDesign, String> {
+        self.drawn(level).map(|drawn| &drawn.design).ok_or_else(|| {
             let count = self.count();
-            return Err(format!("level {level} does not exist: the number of level files is {count}, counted from 0"));
-        };
-        design.level().ok_or_else(|| format!("{path} was read by another game"))
+            format!("level {level} does not exist: the number of level files is {count}, counted from 0")
+        })
     }
 
     /// Returns the path of a level's file.

@@ -1,10 +1,13 @@
-//! Tests that the first tick of a level finds the same clock, however long it takes to load.
+//! Tests that the first tick of a level finds the same clock and a prepared level, however long it takes to load.
 
 use std::time::Duration;
 
 use bevy::prelude::*;
 use playbot::prelude::*;
-use playbot_harness::{foreign::ForeignGame, worlds::build_world};
+use playbot_harness::{
+    foreign::{ForeignGame, LevelSeed},
+    worlds::build_world,
+};
 
 /// Frames that the level still takes.
 #[derive(Resource)]
@@ -50,4 +53,43 @@ fn the_first_tick_finds_the_same_clock_however_long_the_level_took() {
     for frames in [1, 2, 5, 37] {
         assert_eq!(clocks(frames), quick, "{frames} frames");
     }
+}
+
+/// The part of a level that a file brings: it appears some frames after the restart.
+#[derive(Component)]
+struct Prop;
+
+/// Returns a game whose prop comes after three frames, and an agent that sees where it is.
+fn late() -> ForeignGame {
+    let bring = |mut left: ResMut<Left>, mut commands: Commands| {
+        left.0 = left.0.saturating_sub(1);
+        if left.0 == 1 {
+            commands.spawn((Prop, Transform::default()));
+        }
+    };
+    let game = move |app: &mut App| {
+        app.insert_resource(Left(4)).add_systems(Update, bring);
+    };
+    ForeignGame::new("late", 1, game)
+        .keys([vec![], vec![KeyCode::Space]])
+        .observe(["x"], |prop: Single<&Transform, With<Prop>>| [prop.translation.x])
+        .time_limit(3)
+        .level(|mut left: ResMut<Left>| left.0 = 4)
+        .ready(|props: Query<&Prop>| !props.is_empty())
+        .loaded(|level: Res<LevelSeed>, mut prop: Single<&mut Transform, With<Prop>>| {
+            prop.translation.x += level.0 as f32;
+        })
+}
+
+#[test]
+fn a_part_that_loads_late_is_placed_once_before_the_first_observation() {
+    let (mut world, agents) = build_world(&late(), "default", 0, 0, 1);
+    let bot = BlindBot::Constant(ActionValue::Discrete(0));
+    world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list([5, 9])));
+    let mut tick = || {
+        world.tick().expect("sound");
+        world.get::<Observation>(agents[0]).expect("an agent").vector[0]
+    };
+    let seen: Vec<f32> = (0..6).map(|_| tick()).collect();
+    assert_eq!(seen, [5.0, 5.0, 5.0, 9.0, 9.0, 9.0]);
 }

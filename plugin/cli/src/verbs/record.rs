@@ -13,8 +13,12 @@ use bevy_playbot::{demo::recorder::Recorder, engine::flush_unfinished};
 use playbot_harness::{
     demo::demonstration::DemonstrationPlan, game::Game, games::Games, held_out::HeldOut, prelude::*,
 };
+use playbot_learner::disk;
 use playbot_report::counted;
-use std::path::PathBuf;
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 /// Record the game's demonstrator, or another player.
 ///
@@ -111,18 +115,27 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         header.demonstrator.clone_from(&chosen.name);
         warn_of_pupils(chosen);
     }
+    let is_new = !args.overwrite.adds_to(&args.out);
     let writer = args.overwrite.open(&args.out, header)?;
-    let (mut world, agent) = match &chosen_player {
+    let built = match &chosen_player {
         Some(LoadedPlayer { player, observation_config, .. }) => {
-            plan.build_world_of(game, player, observation_config, writer)?
+            plan.build_world_of(game, player, observation_config, writer)
         }
-        None => plan.build_world(game, writer),
+        None => Ok(plan.build_world(game, writer)),
     };
+    let (mut world, agent) = built.inspect_err(|_| leave_nothing(&args.out, is_new))?;
     let finished = play(&mut world, agent, count, args.steps);
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let counts = format!("{}, {}", counted(episodes, "episode"), counted(steps, "step"));
+    if finished.is_err() && episodes == 0 {
+        // The file is closed before it is removed.
+        world.remove_resource::<Recorder>();
+        leave_nothing(&args.out, is_new);
+    }
     let finished = finished.inspect_err(|_| {
-        report!("{}: the part recorded before the error is kept: {counts}", args.out.display());
+        if episodes > 0 {
+            report!("{}: the part recorded before the error is kept: {counts}", args.out.display());
+        }
     })?;
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
     let wins = match ended.successes {
@@ -138,6 +151,13 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let stopped = StoppedRecording { level, steps, left_out };
     report!("stopped, so the recording is incomplete: {}", stopped.how_to_go_on(&args, &levels));
     Ok(Outcome::Stopped)
+}
+
+/// Removes a new recording without an episode, which would be in the way of the next attempt. Devices and links stay.
+fn leave_nothing(path: &Path, is_new: bool) {
+    if is_new && fs::symlink_metadata(path).is_ok_and(|found| found.is_file()) && disk::remove_file(path).is_ok() {
+        report!("{}: nothing was recorded before the error, so no file is left", path.display());
+    }
 }
 
 /// Position at which a recording was stopped.
@@ -248,4 +268,62 @@ fn play(
     bar.finish_and_clear();
     flush_unfinished(world)?;
     Ok(finished)
+}
+
+#[cfg(test)]
+mod tests {
+    use bevy::prelude::{App, KeyCode, Res};
+    use bevy_playbot::demo::file::DemoReader;
+    use clap::Parser;
+    use playbot_harness::{foreign::ForeignGame, level_files::LevelDesigns};
+
+    use super::*;
+
+    /// The words of the verb.
+    #[derive(Parser)]
+    struct Record {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    /// A game whose episodes last three ticks.
+    fn sound() -> ForeignGame {
+        ForeignGame::new("wait", 1, |_: &mut App| {})
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["x"], || [0.0])
+            .time_limit(3)
+            .demonstrator("idler", || 0_u32)
+    }
+
+    /// The same game, in which no level can start: no level is from a file.
+    fn broken() -> ForeignGame {
+        sound().level(|_: Res<LevelDesigns>| {})
+    }
+
+    fn record(game: &ForeignGame, path: &Path, more: &[&str]) -> Result<(), CliError> {
+        let out = path.display().to_string();
+        let words = [&["record", "wait", "--levels", "default:0..0", "--out", &out], more].concat();
+        let args = Record::try_parse_from(words).unwrap_or_else(|error| panic!("{error}")).args;
+        let games = [game as &dyn Game];
+        run(args, &Games::new(&games).expect("one game")).map(drop)
+    }
+
+    #[test]
+    fn a_recording_that_fails_before_its_first_episode_leaves_no_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("new.demo");
+        record(&broken(), &path, &[]).expect_err("no level starts");
+        assert!(!path.exists());
+        record(&sound(), &path, &[]).expect("nothing is in the way");
+    }
+
+    #[test]
+    fn a_recording_that_fails_while_it_grows_keeps_its_episodes() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("old.demo");
+        record(&sound(), &path, &[]).expect("recorded");
+        record(&broken(), &path, &["--append"]).expect_err("no level starts");
+        let episodes = DemoReader::open(&path).and_then(DemoReader::read_all).expect("sound");
+        assert_eq!(episodes.len(), 1);
+    }
 }

@@ -1,8 +1,17 @@
-//! Readings of a foreign game after a tick: its agent's observation and position, reward and end, and the default
-//! state hash.
+//! Readings of a foreign game after a tick: its agent's observation and state, reward and end, and the default state
+//! hash.
 
-use crate::foreign::runtime::{Baseline, Sensor, playing_agent, with_foreign};
-use bevy::prelude::*;
+use crate::{
+    detector::LevelProof,
+    foreign::{
+        ForeignGame,
+        runtime::{
+            Baseline, ForeignCell, OwnedSystem, ReaderFactory, Sensor, SystemFactory, playing_agent, with_foreign,
+        },
+    },
+    game::StateTools,
+};
+use bevy::{ecs::system::ReadOnlySystem, prelude::*};
 use bevy_playbot::{
     engine::{TickSchedules, is_tick},
     episode::{Episode, EpisodeEnd},
@@ -47,29 +56,230 @@ pub(super) fn observe(world: &mut World) {
     }
 }
 
+// State of the agent, for explorers, detectors and proofs.
+
+impl ForeignGame {
+    /// Declares the position of the agent, from above or from the side, in any units, for detectors of progress, for
+    /// explorers and for pictures. The system may run more than once in a tick, so it must change nothing. While it is
+    /// skipped, because an entity that it asks for does not exist, the position is unknown.
+    ///
+    /// The system returns a `Vec2`, or in three dimensions a `Vec3`: see [`IntoPlanPosition`].
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::foreign::ForeignGame;
+    ///
+    /// #[derive(Component)]
+    /// struct Hero;
+    ///
+    /// fn flat(game: ForeignGame) -> ForeignGame {
+    ///     game.position(|hero: Single<&Transform, With<Hero>>| hero.translation.truncate())
+    /// }
+    ///
+    /// fn in_space(game: ForeignGame) -> ForeignGame {
+    ///     game.position(|hero: Single<&Transform, With<Hero>>| hero.translation)
+    /// }
+    /// ```
+    pub fn position<Position: IntoPlanPosition, M: 'static>(
+        self,
+        system: impl IntoSystem<(), Position, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| {
+            description.position = Some(SystemFactory::new(system, Position::into_plan_position));
+        })
+    }
+
+    /// Declares the state of the agent for explorers, in a few whole numbers: states with the same numbers are the same.
+    /// Name it where a position says too little, such as in a game with keys or switches. The system may run more than
+    /// once in a tick, so it must change nothing.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::foreign::ForeignGame;
+    ///
+    /// #[derive(Component)]
+    /// struct Hero {
+    ///     has_key: bool,
+    /// }
+    ///
+    /// fn explored(game: ForeignGame) -> ForeignGame {
+    ///     game.cell(|hero: Single<(&Transform, &Hero)>| {
+    ///         let (at, hero) = *hero;
+    ///         [at.translation.x as i32, at.translation.y as i32, i32::from(hero.has_key)]
+    ///     })
+    /// }
+    /// ```
+    pub fn cell<Cell: IntoIterator<Item = i32> + 'static, M: 'static>(
+        self,
+        system: impl IntoSystem<(), Cell, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        let convert = |cell: Cell| -> Vec<i32> { cell.into_iter().collect() };
+        self.with(|description| description.cell = Some(SystemFactory::new(system, convert)))
+    }
+
+    /// Declares the reason why an episode has ended without the goal, in a word or two for people: `saw`, `fall`. The
+    /// system runs in `Last`, after [`end`](Self::end), when an episode has ended and was not won; also if its time is
+    /// up.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::foreign::ForeignGame;
+    ///
+    /// #[derive(Component)]
+    /// struct Hero {
+    ///     health: u32,
+    /// }
+    ///
+    /// fn explained(game: ForeignGame) -> ForeignGame {
+    ///     game.end_cause(|hero: Single<(&Transform, &Hero)>| {
+    ///         let (at, hero) = *hero;
+    ///         if at.translation.y < 0.0 { Some("fall") } else { (hero.health == 0).then_some("enemy") }
+    ///     })
+    /// }
+    /// ```
+    pub fn end_cause<M: 'static>(
+        self,
+        system: impl IntoSystem<(), Option<&'static str>, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| description.end_cause = Some(SystemFactory::new(system, |cause| cause)))
+    }
+
+    /// Declares a proof about the state of an episode: whether the goal can still be reached. The detector `soft-lock`
+    /// calls it now and then. The system takes a millisecond at most and only reads the World, so it has no `Commands`,
+    /// `ResMut` or `&mut`. Only a search to its end is a proof: see [`LevelProof`].
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{detector::LevelProof, foreign::ForeignGame};
+    ///
+    /// /// Keys that the level still has, and doors that are closed.
+    /// #[derive(Resource)]
+    /// struct Left {
+    ///     keys: u32,
+    ///     doors: u32,
+    /// }
+    ///
+    /// fn proved(game: ForeignGame) -> ForeignGame {
+    ///     game.prove_from(|left: Res<Left>| {
+    ///         let why = "more doors are closed than there are keys".to_owned();
+    ///         if left.doors > left.keys { LevelProof::Unsolvable { why } } else { LevelProof::Unknown }
+    ///     })
+    /// }
+    /// ```
+    pub fn prove_from<M: 'static>(
+        self,
+        system: impl IntoSystem<(), LevelProof, M, System: ReadOnlySystem> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| description.proof = Some(ReaderFactory::new(system)))
+    }
+}
+
+/// A position that has a place on the plan of its level.
+pub trait IntoPlanPosition: 'static {
+    /// Returns the position on the plan.
+    fn into_plan_position(self) -> Vec2;
+}
+
+impl IntoPlanPosition for Vec2 {
+    fn into_plan_position(self) -> Vec2 {
+        self
+    }
+}
+
+/// A position in space, seen from above: x and z of the World are x and y of the plan.
+impl IntoPlanPosition for Vec3 {
+    fn into_plan_position(self) -> Vec2 {
+        self.xz()
+    }
+}
+
 /// Position of the agent on its level's plan. Missing while it is unknown.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
-pub(super) struct ForeignPosition(pub(super) Vec2);
+struct ForeignPosition(Vec2);
 
-/// Adds the systems that read the position: before each tick, so that the start of an episode is known, and after it.
-pub(super) fn add_position(app: &mut App) {
-    let judge = TickSchedules::of(app).judge;
-    app.add_systems(ObserveSchedule, locate.before(observe).before(VisionSystems::Sync))
-        .add_systems(judge, locate.before(read_outcome).before(PlaybotSystems::Judge).run_if(is_tick));
+/// State of the agent for explorers. Missing while it is unknown.
+#[derive(Component, Clone, Debug, PartialEq, Reflect)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+struct ForeignExploreCell(Vec<i32>);
+
+/// The reason why the agent's episode has just ended without the goal. Missing if there is no reason.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+struct ForeignEndCause(&'static str);
+
+/// Removes the state of an agent in its last episode, which is stale in the next one.
+pub(super) fn forget_state(world: &mut World, agent: Entity) {
+    world.entity_mut(agent).remove::<(ForeignPosition, ForeignExploreCell, ForeignEndCause)>();
 }
 
-fn locate(world: &mut World) {
+impl StateTools for ForeignGame {
+    fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
+        world.get::<ForeignPosition>(agent).map(|position| position.0)
+    }
+
+    fn end_cause(&self, world: &World, agent: Entity) -> Option<&'static str> {
+        world.get::<ForeignEndCause>(agent).map(|cause| cause.0)
+    }
+
+    fn explore_cell(&self, world: &World, agent: Entity) -> Option<Vec<i32>> {
+        world.get::<ForeignExploreCell>(agent).map(|cell| cell.0.clone())
+    }
+
+    fn prove_from(&self, world: &World, agent: Entity) -> LevelProof {
+        let is_playing = world.get::<Episode>(agent).is_some_and(Episode::is_running);
+        let Some(cell) = world.get_resource::<ForeignCell>().filter(|_| is_playing) else {
+            return LevelProof::Unknown;
+        };
+        let mut foreign = cell.lock();
+        match foreign.proof.as_mut().map(|proof| proof.read(world)) {
+            Some(Ok(proof)) => proof.unwrap_or_default(),
+            Some(Err(why)) => {
+                foreign.failed_proof = Some(why);
+                LevelProof::Unknown
+            }
+            None => LevelProof::Unknown,
+        }
+    }
+}
+
+/// Adds the systems that read the state: before each tick, so that the start of an episode is known, and after it.
+pub(super) fn add_state(app: &mut App) {
+    let judge = TickSchedules::of(app).judge;
+    app.add_systems(ObserveSchedule, read_state.before(observe).before(VisionSystems::Sync))
+        .add_systems(judge, read_state.before(read_outcome).before(PlaybotSystems::Judge).run_if(is_tick));
+}
+
+fn read_state(world: &mut World) {
     let Some(agent) = playing_agent(world) else { return };
-    let position = with_foreign(world, agent, |world, foreign| match &mut foreign.position {
-        Some(system) => system.run(world),
-        None => Ok(None),
+    let state = with_foreign(world, agent, |world, foreign| {
+        if let Some(why) = foreign.failed_proof.take() {
+            return Err(why);
+        }
+        if let Some(proof) = &mut foreign.proof {
+            proof.prepare(world);
+        }
+        Ok((run(&mut foreign.position, world)?, run(&mut foreign.cell, world)?))
     });
-    match position.flatten() {
-        Some(position) => world.entity_mut(agent).insert(ForeignPosition(position)),
-        None => world.entity_mut(agent).remove::<ForeignPosition>(),
+    let (position, cell) = state.unwrap_or_default();
+    note(world, agent, position.map(ForeignPosition));
+    note(world, agent, cell.map(ForeignExploreCell));
+}
+
+/// Runs a system of the description, if there is one.
+fn run<Out: 'static>(system: &mut Option<OwnedSystem<Out>>, world: &mut World) -> Result<Option<Out>, String> {
+    system.as_mut().map_or(Ok(None), |system| system.run(world))
+}
+
+/// Replaces a component of the agent, or removes it.
+fn note<C: Component>(world: &mut World, agent: Entity, component: Option<C>) {
+    match component {
+        Some(component) => world.entity_mut(agent).insert(component),
+        None => world.entity_mut(agent).remove::<C>(),
     };
 }
+
+// Reward and end.
 
 /// Reads reward and end, after the game's frame.
 pub(super) fn read_outcome(world: &mut World) {
@@ -83,19 +293,21 @@ pub(super) fn read_outcome(world: &mut World) {
             reward += if part.is_delta { value - part.last.unwrap_or(value) } else { value };
             part.last = Some(value);
         }
-        let end = match &mut foreign.end {
-            Some(system) => system.run(world)?.flatten(),
-            None => None,
-        };
+        let end = run(&mut foreign.end, world)?.flatten();
         let time_is_up = foreign.game.description.limit.is_some_and(|limit| tick + 1 >= limit);
         let end = end.or(time_is_up.then_some(EpisodeEnd::Truncated));
+        let is_lost = end.is_some_and(|end| end != EpisodeEnd::WON);
+        let cause = if is_lost { run(&mut foreign.end_cause, world)?.flatten() } else { None };
         let state = match &mut foreign.hash {
             Some(system) => system.demand(world)?,
             None => foreign.baseline.as_ref().map_or(0, |baseline| of_transforms(world, baseline)),
         };
-        Ok((reward, end, state))
+        Ok((reward, end, cause, state))
     });
-    let Some((reward, end, state)) = outcome else { return };
+    let Some((reward, end, cause, state)) = outcome else { return };
+    if cause.is_some() {
+        note(world, agent, cause.map(ForeignEndCause));
+    }
     let mut agent = world.entity_mut(agent);
     if let Some(mut paid) = agent.get_mut::<Reward>() {
         paid.add(reward);
@@ -140,6 +352,7 @@ mod tests {
     use crate::{
         floor_plan::FloorPlan,
         foreign::{ForeignGame, Restart},
+        level_files::LevelDesigns,
         prelude::*,
         worlds::build_world,
     };
@@ -190,5 +403,114 @@ mod tests {
         assert_eq!([goal(1), goal(7)], [Some(1.0), Some(1.0)]);
         let bare = ForeignGame::new("bare", 1, |_: &mut App| {});
         assert_eq!(bare.tools().levels.floor_plan("default", 0), None);
+    }
+
+    /// Plays a level to its end without a key, and calls `look` after each tick.
+    fn play(game: &ForeignGame, mut look: impl FnMut(&World, Entity)) {
+        let (mut world, agents) = build_world(game, "default", 0, 0, 1);
+        let bot = BlindBot::Constant(ActionValue::Discrete(0));
+        world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list([7])));
+        while Control::of(&world, agents[0]).is_active() {
+            world.tick().expect("sound");
+            if Control::of(&world, agents[0]).is_active() {
+                look(&world, agents[0]);
+            }
+        }
+    }
+
+    #[test]
+    fn a_position_in_space_is_seen_from_above() {
+        let game = snail().position(|at: Single<&Transform, With<Snail>>| at.translation + Vec3::Z);
+        let mut seen = Vec::new();
+        play(&game, |world, agent| seen.extend(game.tools().state.position(world, agent)));
+        // The snail is 5 high, which a view from above does not show.
+        assert_eq!(seen.last(), Some(&Vec2::new(6.0, 1.0)), "{seen:?}");
+    }
+
+    #[test]
+    fn an_explorer_reads_the_cell_of_each_tick() {
+        let game = snail().cell(|at: Single<&Transform, With<Snail>>| [at.translation.x as i32, 8]);
+        let mut seen = Vec::new();
+        play(&game, |world, agent| seen.extend(game.tools().state.explore_cell(world, agent)));
+        seen.dedup();
+        assert_eq!(seen, [vec![4, 8], vec![5, 8], vec![6, 8]]);
+        let (world, agents) = build_world(&game, "default", 0, 0, 1);
+        assert_eq!(game.tools().state.explore_cell(&world, agents[0]), None, "nothing is played");
+    }
+
+    #[test]
+    fn a_lost_episode_has_a_cause_from_its_last_tick() {
+        let lost = |at: Single<&Transform, With<Snail>>| (at.translation.x >= 5.0).then_some(EpisodeEnd::LOST);
+        let game = snail().end(lost).end_cause(|at: Single<&Transform, With<Snail>>| {
+            Some(if at.translation.x >= 5.0 { "salt" } else { "sun" })
+        });
+        let mut seen = Vec::new();
+        play(&game, |world, agent| seen.push(game.tools().state.end_cause(world, agent)));
+        assert_eq!(seen.last(), Some(&Some("salt")));
+        assert_eq!(seen.iter().flatten().count(), 1, "the other ticks have no cause: {seen:?}");
+    }
+
+    #[test]
+    fn an_episode_whose_time_is_up_has_a_cause_as_well() {
+        let game = snail().end_cause(|| Some("too slow"));
+        let mut last = None;
+        play(&game, |world, agent| last = game.tools().state.end_cause(world, agent));
+        assert_eq!(last, Some("too slow"));
+    }
+
+    #[test]
+    fn a_won_episode_has_no_cause() {
+        let game = snail().end(|| Some(EpisodeEnd::WON)).end_cause(|| Some("salt"));
+        let mut ticks = 0;
+        play(&game, |world, agent| {
+            ticks += 1;
+            assert_eq!(game.tools().state.end_cause(world, agent), None);
+        });
+        assert!(ticks > 0);
+    }
+
+    #[test]
+    fn the_cause_of_one_episode_is_not_that_of_the_next() {
+        let game = snail().end_cause(|| Some("too slow"));
+        let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+        world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::list([1, 2])));
+        let mut seen = Vec::new();
+        while Control::of(&world, agents[0]).is_active() {
+            world.tick().expect("sound");
+            if world.get::<Episode>(agents[0]).is_some_and(|episode| episode.is_running() && episode.end().is_none()) {
+                seen.push(game.tools().state.end_cause(&world, agents[0]));
+            }
+        }
+        assert!(!seen.is_empty() && seen.iter().all(Option::is_none), "{seen:?}");
+    }
+
+    #[test]
+    fn a_proof_reads_the_current_state() {
+        let game = snail().prove_from(|at: Single<&Transform, With<Snail>>| {
+            let why = format!("at {}", at.translation.x);
+            if at.translation.x >= 5.0 { LevelProof::Unsolvable { why } } else { LevelProof::Unknown }
+        });
+        let mut seen = Vec::new();
+        play(&game, |world, agent| {
+            seen.extend(game.tools().state.prove_from(world, agent).why_unsolvable().map(str::to_owned));
+        });
+        assert_eq!(seen.first().map(String::as_str), Some("at 5"), "{seen:?}");
+        let (world, agents) = build_world(&game, "default", 0, 0, 1);
+        assert_eq!(game.tools().state.prove_from(&world, agents[0]), LevelProof::Unknown, "nothing is played");
+    }
+
+    #[test]
+    fn a_proof_that_cannot_run_is_a_fault() {
+        // There is no such resource, since no level is from a file.
+        let game = snail().prove_from(|_: Res<LevelDesigns>| LevelProof::Unknown);
+        let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+        world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::list([1])));
+        let fault = (0..20).find_map(|_| {
+            let fault = world.tick().err();
+            assert_eq!(game.tools().state.prove_from(&world, agents[0]), LevelProof::Unknown);
+            fault
+        });
+        let fault = fault.expect("the proof cannot run").to_string();
+        assert!(fault.contains("the game `snail`: ") && fault.contains("LevelDesigns"), "{fault}");
     }
 }

@@ -1,8 +1,12 @@
 //! The start of an episode.
 
-use crate::foreign::{
-    observe::ForeignPosition,
-    runtime::{Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agent, with_foreign},
+use crate::{
+    foreign::{
+        levels::{LevelFromFile, level_ahead},
+        observe::forget_state,
+        runtime::{Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agent, with_foreign},
+    },
+    level_files::LevelDesigns,
 };
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -20,10 +24,11 @@ pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, 
 }
 
 fn begin(world: &mut World, agent: Entity, level: u64) {
-    // The last position of the previous episode is stale.
-    world.entity_mut(agent).remove::<ForeignPosition>();
+    forget_state(world, agent);
     with_foreign(world, agent, |world, foreign| {
-        world.insert_resource(LevelSeed(foreign.level_of(level)));
+        let (seed, file) = level_ahead(&foreign.game, world.get_resource::<LevelDesigns>(), level)?;
+        world.insert_resource(seed);
+        world.insert_resource(file);
         restart(world, foreign)?;
         if let Some(system) = &mut foreign.level {
             system.demand(world)?;
@@ -75,8 +80,17 @@ fn demand_a_new_world(world: &mut World, foreign: &mut Foreign) -> Result<(), St
 }
 
 /// Stores the level for the systems of the game's start.
-pub(super) fn announce(event: On<NextEpisode>, cell: Res<ForeignCell>, mut seed: ResMut<LevelSeed>) {
-    seed.0 = cell.lock().level_of(event.level);
+pub(super) fn announce(
+    event: On<NextEpisode>,
+    cell: Res<ForeignCell>,
+    designs: Option<Res<LevelDesigns>>,
+    mut seed: ResMut<LevelSeed>,
+    mut file: ResMut<LevelFromFile>,
+) {
+    // A level that does not exist is reported when its episode begins.
+    if let Ok(ahead) = level_ahead(&cell.lock().game, designs.as_deref(), event.level) {
+        (*seed, *file) = ahead;
+    }
 }
 
 /// Despawns the game's entities, and runs the schedules of a program's start again.
@@ -163,6 +177,9 @@ pub(super) fn check(world: &mut World) {
         }
         if foreign.ready.is_some() {
             leave_loading_out(world);
+        }
+        if let Some(system) = &mut foreign.loaded {
+            system.demand(world)?;
         }
         // A reward by growth starts from the value before the first tick.
         for part in foreign.rewards.iter_mut().filter(|part| part.is_delta) {

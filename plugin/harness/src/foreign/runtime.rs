@@ -1,13 +1,16 @@
 //! A foreign game in one World.
 
-use crate::foreign::{ForeignGame, paths::ObservedPath};
+use crate::{
+    detector::LevelProof,
+    foreign::{ForeignGame, paths::ObservedPath},
+};
 use bevy::{
     ecs::{
         component::ComponentId,
         entity::EntityHashSet,
         resource::IsResource,
         schedule::InternedScheduleLabel,
-        system::{BoxedSystem, RunSystemError, SystemIdMarker},
+        system::{BoxedReadOnlySystem, BoxedSystem, ReadOnlySystem, RunSystemError, SystemIdMarker},
     },
     input::gamepad::Gamepad,
     prelude::*,
@@ -67,10 +70,16 @@ pub(super) struct Foreign {
     pub(super) game: ForeignGame,
     pub(super) sensor: Sensor,
     pub(super) position: Option<OwnedSystem<Vec2>>,
+    pub(super) cell: Option<OwnedSystem<Vec<i32>>>,
+    pub(super) proof: Option<OwnedReader<LevelProof>>,
+    /// The error of a proof, until the next tick reports it.
+    pub(super) failed_proof: Option<String>,
     pub(super) rewards: Vec<RewardPart>,
     pub(super) end: Option<OwnedSystem<Option<EpisodeEnd>>>,
+    pub(super) end_cause: Option<OwnedSystem<Option<&'static str>>>,
     pub(super) ready: Option<OwnedSystem<bool>>,
     pub(super) level: Option<OwnedSystem<()>>,
+    pub(super) loaded: Option<OwnedSystem<()>>,
     pub(super) restart: Option<OwnedSystem<()>>,
     pub(super) act: Option<OwnedSystem<()>>,
     pub(super) bot: Option<OwnedSystem<ActionValue>>,
@@ -103,10 +112,15 @@ impl Foreign {
         Self {
             sensor: description.sensor(),
             position: description.position.as_ref().map(|system| system.make()),
+            cell: description.cell.as_ref().map(|system| system.make()),
+            proof: description.proof.as_ref().map(|system| system.make()),
+            failed_proof: None,
             rewards: description.rewards.iter().map(part).collect(),
             end: description.end.as_ref().map(|system| system.make()),
+            end_cause: description.end_cause.as_ref().map(|system| system.make()),
             ready: description.ready.as_ref().map(|system| system.make()),
             level: description.level.as_ref().map(|system| system.make()),
+            loaded: description.loaded.as_ref().map(|system| system.make()),
             restart,
             act: description.act.as_ref().map(|system| system.make()),
             bot: description.demonstrator.as_ref().map(|(_, system)| system.make()),
@@ -117,11 +131,6 @@ impl Foreign {
             frames: 0,
             has_begun: false,
         }
-    }
-
-    /// Returns the level that is played for this number.
-    pub(super) fn level_of(&self, level: u64) -> u64 {
-        self.game.level_of(level)
     }
 }
 
@@ -333,13 +342,7 @@ impl<Out: 'static> OwnedSystem<Out> {
             self.system.initialize(world);
             self.is_initialized = true;
         }
-        match self.system.run((), world) {
-            Ok(out) => Ok(Some(out)),
-            Err(RunSystemError::Skipped(_)) => Ok(None),
-            Err(RunSystemError::Failed(error)) => {
-                Err(system_errors::explain(&format!("system `{}`", self.name), &error))
-            }
-        }
+        outcome(self.name, self.system.run((), world))
     }
 
     /// Runs the system as [`run`](Self::run) does, where skipping is an error.
@@ -352,6 +355,73 @@ impl<Out: 'static> OwnedSystem<Out> {
         self.run(world)?.ok_or_else(|| {
             format!("system `{name}` was skipped: an entity that it asks for does not exist, or there are several")
         })
+    }
+}
+
+/// A factory of copies of a system that changes nothing.
+pub(super) struct ReaderFactory<Out: 'static> {
+    name: &'static str,
+    make: Arc<dyn Fn() -> BoxedReadOnlySystem<(), Out> + Send + Sync>,
+}
+
+impl<Out: 'static> Clone for ReaderFactory<Out> {
+    fn clone(&self) -> Self {
+        Self { name: self.name, make: self.make.clone() }
+    }
+}
+
+impl<Out: 'static> ReaderFactory<Out> {
+    /// Creates a factory of copies of `system`.
+    pub(super) fn new<S, M>(system: S) -> Self
+    where
+        S: IntoSystem<(), Out, M, System: ReadOnlySystem> + Clone + Send + Sync + 'static,
+    {
+        let make = move || -> BoxedReadOnlySystem<(), Out> { Box::new(IntoSystem::into_system(system.clone())) };
+        Self { name: type_name::<S>(), make: Arc::new(make) }
+    }
+
+    /// Creates a system for one World.
+    pub(super) fn make(&self) -> OwnedReader<Out> {
+        OwnedReader { name: self.name, system: (self.make)(), is_initialized: false }
+    }
+}
+
+/// A system of one World that needs no more than a view of it, once it is prepared.
+pub(super) struct OwnedReader<Out: 'static> {
+    name: &'static str,
+    system: BoxedReadOnlySystem<(), Out>,
+    is_initialized: bool,
+}
+
+impl<Out: 'static> OwnedReader<Out> {
+    /// Prepares the system for its World.
+    pub(super) fn prepare(&mut self, world: &mut World) {
+        if !self.is_initialized {
+            self.system.initialize(world);
+            self.is_initialized = true;
+        }
+    }
+
+    /// Runs the system; `None` if it is skipped, because an entity that it asks for does not exist, or if it is not
+    /// prepared yet.
+    ///
+    /// # Errors
+    ///
+    /// The reason why it cannot run, in words.
+    pub(super) fn read(&mut self, world: &World) -> Result<Option<Out>, String> {
+        if !self.is_initialized {
+            return Ok(None);
+        }
+        outcome(self.name, self.system.run_readonly((), world))
+    }
+}
+
+/// Returns the output of a system; `None` if it was skipped.
+fn outcome<Out>(name: &str, result: Result<Out, RunSystemError>) -> Result<Option<Out>, String> {
+    match result {
+        Ok(out) => Ok(Some(out)),
+        Err(RunSystemError::Skipped(_)) => Ok(None),
+        Err(RunSystemError::Failed(error)) => Err(system_errors::explain(&format!("system `{name}`"), &error)),
     }
 }
 

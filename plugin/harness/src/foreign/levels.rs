@@ -1,0 +1,479 @@
+//! Levels of a foreign game: its modes, level files, plans and proofs.
+
+use crate::{
+    detector::LevelProof,
+    floor_plan::FloorPlan,
+    foreign::{ForeignGame, runtime::LevelSeed},
+    game::{LevelTools, level_designs},
+    level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
+};
+use bevy::prelude::*;
+use std::{
+    any::{Any, TypeId, type_name},
+    fmt::Display,
+    sync::Arc,
+};
+
+/// The mode that is played: see [`ForeignGame::modes`]. Inserted before the game is added to the app.
+///
+/// While levels from files are played, it is their pattern, such as `files:levels/*.txt`.
+#[derive(Resource, Clone, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
+pub struct PlayedMode(pub String);
+
+/// The level that is played, if it is from a file: see [`ForeignGame::level_files`]. Inserted before every restart.
+#[derive(Resource, Clone, Debug, Default, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug)]
+pub struct LevelFromFile(Option<(String, LevelDesign)>);
+
+impl LevelFromFile {
+    /// Returns the level as [`level_files`](ForeignGame::level_files) has read it. Returns `None` if the level is not
+    /// from a file, or if it is of another type.
+    pub fn get<T: Any + Send + Sync>(&self) -> Option<Arc<T>> {
+        self.0.as_ref().and_then(|(_, design)| design.level())
+    }
+
+    /// Returns the path of the file, if the level is from one.
+    pub fn path(&self) -> Option<&str> {
+        self.0.as_ref().map(|(path, _)| path.as_str())
+    }
+}
+
+/// Returns the number of a level for the systems of a game, and the level if it is from a file.
+pub(super) fn level_ahead(
+    game: &ForeignGame,
+    designs: Option<&LevelDesigns>,
+    level: u64,
+) -> Result<(LevelSeed, LevelFromFile), String> {
+    let Some(designs) = designs else { return Ok((LevelSeed(game.level_of(level)), LevelFromFile::default())) };
+    let design = designs.design(level)?.clone();
+    let path = designs.path(level).unwrap_or_default().to_owned();
+    Ok((LevelSeed(level), LevelFromFile(Some((path, design)))))
+}
+
+/// The error of a text that is not a level: any error that can be displayed, or a [`LevelTextError`] with its line.
+pub trait IntoLevelTextError {
+    /// Returns the error as the plugin reports it.
+    fn into_level_text_error(self) -> LevelTextError;
+}
+
+impl IntoLevelTextError for LevelTextError {
+    fn into_level_text_error(self) -> LevelTextError {
+        self
+    }
+}
+
+impl<E: Display> IntoLevelTextError for E {
+    fn into_level_text_error(self) -> LevelTextError {
+        LevelTextError::whole(self.to_string())
+    }
+}
+
+/// A function of a level by its mode and number.
+type OfNumber<Out> = Arc<dyn Fn(&str, u64) -> Out + Send + Sync>;
+
+/// The parser of level files.
+#[derive(Clone)]
+struct FileParser {
+    level: LevelType,
+    parse: Arc<dyn Fn(&str) -> Result<LevelDesign, LevelTextError> + Send + Sync>,
+}
+
+/// A function of the level in a file.
+#[derive(Clone)]
+struct OfFile<Out> {
+    level: LevelType,
+    /// Returns `None` for a level of another type.
+    read: Arc<dyn Fn(&LevelDesign) -> Option<Out> + Send + Sync>,
+}
+
+impl<Out> OfFile<Out> {
+    fn new<T: Any + Send + Sync>(read: impl Fn(&T) -> Out + Send + Sync + 'static) -> Self {
+        let read = move |design: &LevelDesign| design.level::<T>().map(|level| read(&level));
+        Self { level: LevelType::of::<T>(), read: Arc::new(read) }
+    }
+}
+
+/// The game's own type of levels.
+#[derive(Clone, Copy)]
+struct LevelType {
+    id: TypeId,
+    name: &'static str,
+}
+
+impl LevelType {
+    fn of<T: Any>() -> Self {
+        Self { id: TypeId::of::<T>(), name: type_name::<T>() }
+    }
+}
+
+/// The part of a game's description that needs no World.
+#[derive(Clone, Default)]
+pub(super) struct LevelParts {
+    parser: Option<FileParser>,
+    plan: Option<OfNumber<FloorPlan>>,
+    plan_of_file: Option<OfFile<FloorPlan>>,
+    proof: Option<OfNumber<LevelProof>>,
+    proof_of_file: Option<OfFile<LevelProof>>,
+}
+
+impl LevelParts {
+    /// Returns the reason why the parts do not fit together, if there is one.
+    pub(super) fn problem(&self, game: &str) -> Option<String> {
+        let plan = self.plan_of_file.as_ref().map(|plan| (".plan_of_file", plan.level));
+        let proof = self.proof_of_file.as_ref().map(|proof| (".prove_file", proof.level));
+        plan.into_iter().chain(proof).find_map(|(method, level)| {
+            let Some(parser) = &self.parser else {
+                return Some(format!("`{method}` of the game `{game}` has no files: add `.level_files`"));
+            };
+            (level.id != parser.level.id).then(|| {
+                format!(
+                    "`{method}` of the game `{game}` takes a `{}`, and `.level_files` reads a `{}`: use the same type",
+                    level.name, parser.level.name
+                )
+            })
+        })
+    }
+}
+
+impl ForeignGame {
+    /// Sets the names of the modes, such as difficulties; the first one is the default. The game finds the mode that is
+    /// played in [`PlayedMode`], in its systems and already when it is added to the app. Default: one mode, `default`.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::{ForeignGame, PlayedMode}, prelude::*};
+    ///
+    /// /// The game's own resource.
+    /// #[derive(Resource, Default)]
+    /// struct Enemies(u32);
+    ///
+    /// fn game(app: &mut App) {
+    ///     app.init_resource::<Enemies>();
+    /// }
+    ///
+    /// let game = ForeignGame::new("invaders", 1, game).modes(&["easy", "hard"]).level(
+    ///     |mode: Res<PlayedMode>, mut enemies: ResMut<Enemies>| {
+    ///         enemies.0 = if mode.0 == "hard" { 40 } else { 10 };
+    ///     },
+    /// );
+    /// assert!(game.check_mode("hard").is_ok() && game.check_mode("default").is_err());
+    /// ```
+    pub fn modes(self, modes: &'static [&'static str]) -> Self {
+        self.with(|description| description.modes = modes)
+    }
+
+    /// Reads levels that somebody drew, in the game's own text format. All verbs that take levels then take files, as
+    /// `files:levels/*.txt`. The game finds the level of an episode in [`LevelFromFile`].
+    ///
+    /// An error is any that can be displayed, or a [`LevelTextError`] with the line. Levels are the same if their texts
+    /// are, apart from the kind of line ends. [`levels`](Self::levels) does not apply to files: each of them is a level.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::{ForeignGame, LevelFromFile}, prelude::*};
+    ///
+    /// /// The game's own level: the height of each column.
+    /// #[derive(Resource, Clone, Debug, Default, PartialEq)]
+    /// struct Ground(Vec<u32>);
+    ///
+    /// fn read(text: &str) -> Result<Ground, std::num::ParseIntError> {
+    ///     text.split_whitespace().map(str::parse).collect::<Result<_, _>>().map(Ground)
+    /// }
+    ///
+    /// let game = ForeignGame::new("hills", 1, |app: &mut App| {
+    ///     app.init_resource::<Ground>();
+    /// })
+    /// .level_files(read)
+    /// .level(|file: Res<LevelFromFile>, mut ground: ResMut<Ground>| {
+    ///     *ground = file.get::<Ground>().map_or_else(Ground::default, |level| (*level).clone());
+    /// });
+    /// let level = game.parse_level("1 2 2").expect("a level").level::<Ground>();
+    /// assert_eq!(level.as_deref(), Some(&Ground(vec![1, 2, 2])));
+    /// assert_eq!(game.parse_level("1 x").expect_err("no height").what, "invalid digit found in string");
+    /// ```
+    pub fn level_files<T: Any + Send + Sync, E: IntoLevelTextError>(
+        self,
+        parse: impl Fn(&str) -> Result<T, E> + Send + Sync + 'static,
+    ) -> Self {
+        let parse = move |text: &str| -> Result<LevelDesign, LevelTextError> {
+            let level = parse(text).map_err(IntoLevelTextError::into_level_text_error)?;
+            Ok(LevelDesign::new(level, &text.lines().collect::<Vec<_>>().join("\n")))
+        };
+        let parser = FileParser { level: LevelType::of::<T>(), parse: Arc::new(parse) };
+        self.with(|description| description.level_parts.parser = Some(parser))
+    }
+
+    /// Declares the plan of a level by its number, in the units of [`position`](Self::position). It is for pictures of
+    /// paths, and for detectors that need walls, bounds or the goal.
+    pub fn plan(self, plan: impl Fn(u64) -> FloorPlan + Send + Sync + 'static) -> Self {
+        self.plan_by_mode(move |_, level| plan(level))
+    }
+
+    /// Declares the plan of a level by its mode and number, as [`plan`](Self::plan) does for all modes at once.
+    pub fn plan_by_mode(self, plan: impl Fn(&str, u64) -> FloorPlan + Send + Sync + 'static) -> Self {
+        self.with(|description| description.level_parts.plan = Some(Arc::new(plan)))
+    }
+
+    /// Declares the plan of a level from a file, in the type that [`level_files`](Self::level_files) reads.
+    pub fn plan_of_file<T: Any + Send + Sync>(self, plan: impl Fn(&T) -> FloorPlan + Send + Sync + 'static) -> Self {
+        self.with(|description| description.level_parts.plan_of_file = Some(OfFile::new(plan)))
+    }
+
+    /// Declares a proof about a level by its mode and number: whether its goal can be reached at all. It is called for
+    /// levels that no tester has solved. Only a search to its end is a proof: see [`LevelProof`].
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{detector::LevelProof, foreign::ForeignGame, prelude::*};
+    ///
+    /// /// The widths of the pits, by level. No jump is wider than 4.
+    /// const PITS: [u32; 3] = [2, 3, 5];
+    ///
+    /// let game = ForeignGame::new("pits", 1, |_: &mut App| {}).levels(3).prove(|_, level| {
+    ///     let pit = PITS[level as usize];
+    ///     let why = format!("the pit is {pit} wide, and a jump 4 at most");
+    ///     if pit > 4 { LevelProof::Unsolvable { why } } else { LevelProof::Unknown }
+    /// });
+    /// let proof = game.tools().levels.prove("default", 2);
+    /// assert_eq!(proof.why_unsolvable(), Some("the pit is 5 wide, and a jump 4 at most"));
+    /// ```
+    pub fn prove(self, prove: impl Fn(&str, u64) -> LevelProof + Send + Sync + 'static) -> Self {
+        self.with(|description| description.level_parts.proof = Some(Arc::new(prove)))
+    }
+
+    /// Declares a proof about a level from a file, in the type that [`level_files`](Self::level_files) reads, as
+    /// [`prove`](Self::prove) does for levels of numbers.
+    pub fn prove_file<T: Any + Send + Sync>(self, prove: impl Fn(&T) -> LevelProof + Send + Sync + 'static) -> Self {
+        self.with(|description| description.level_parts.proof_of_file = Some(OfFile::new(prove)))
+    }
+
+    /// Returns a function's output for a level: of the file for levels from files, or of its mode and number.
+    fn of_level<Out>(
+        &self,
+        (mode, level): (&str, u64),
+        of_number: Option<&OfNumber<Out>>,
+        of_file: Option<&OfFile<Out>>,
+    ) -> Option<Out> {
+        if !is_level_files(mode) {
+            return of_number.map(|of| of(mode, self.level_of(level)));
+        }
+        let designs = level_designs(self, mode).ok()?;
+        (of_file?.read)(designs.design(level).ok()?)
+    }
+}
+
+impl LevelTools for ForeignGame {
+    fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
+        self.description.level_parts.parser.as_ref().map(|parser| (parser.parse)(text))
+    }
+
+    fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        let LevelParts { plan, plan_of_file, .. } = &self.description.level_parts;
+        self.of_level((mode, level), plan.as_ref(), plan_of_file.as_ref())
+    }
+
+    fn prove(&self, mode: &str, level: u64) -> LevelProof {
+        let LevelParts { proof, proof_of_file, .. } = &self.description.level_parts;
+        self.of_level((mode, level), proof.as_ref(), proof_of_file.as_ref()).unwrap_or_default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        foreign::Restart,
+        level_files::{level_file_pattern, level_files_mode},
+        prelude::*,
+        worlds::build_world,
+    };
+    use std::fs;
+
+    /// The level of the game: the cell of its goal.
+    #[derive(Debug, PartialEq)]
+    struct Goal(u32);
+
+    /// The game's own resource: the goal that it has found, and the mode in which it was added.
+    #[derive(Resource, Clone, Debug, Default, PartialEq)]
+    struct Found {
+        goal: u32,
+        path: Option<String>,
+        mode: String,
+        seed: u64,
+    }
+
+    /// Reads a goal, from the second line of a text.
+    fn read(text: &str) -> Result<Goal, LevelTextError> {
+        let line = text.lines().nth(1).unwrap_or_default();
+        let what = format!("`{line}` is not a cell: write a number");
+        line.parse().map(Goal).map_err(|_| LevelTextError { line: Some(2), what })
+    }
+
+    /// A game that keeps what it finds.
+    fn game() -> ForeignGame {
+        let add = |app: &mut App| {
+            let mode = app.world().resource::<PlayedMode>().0.clone();
+            app.insert_resource(Found { mode, ..Found::default() });
+        };
+        ForeignGame::new("finder", 1, add)
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["x"], || [0.0])
+            .time_limit(2)
+            .modes(&["easy", "hard"])
+            .levels(3)
+            .level_files(read)
+            .level(|file: Res<LevelFromFile>, seed: Res<LevelSeed>, mut found: ResMut<Found>| {
+                found.goal = file.get::<Goal>().map_or(99, |goal| goal.0);
+                found.path = file.path().map(str::to_owned);
+                found.seed = seed.0;
+            })
+    }
+
+    /// Returns the mode of a folder with these level files.
+    fn drawn(folder: &tempfile::TempDir, texts: &[&str]) -> String {
+        for (number, text) in texts.iter().enumerate() {
+            fs::write(folder.path().join(format!("{number}.txt")), text).expect("writable");
+        }
+        format!("{}/*.txt", level_files_mode(&folder.path().to_string_lossy()))
+    }
+
+    /// Returns the finds of the game in each episode on these levels.
+    fn finds(game: &ForeignGame, mode: &str, levels: &[u64]) -> Vec<Found> {
+        let (mut world, agents) = build_world(game, mode, 0, 0, 1);
+        world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::list(levels)));
+        let mut found: Vec<Found> = Vec::new();
+        while Control::of(&world, agents[0]).is_active() {
+            world.tick().expect("sound");
+            let now = world.resource::<Found>();
+            if found.last() != Some(now) {
+                found.push(now.clone());
+            }
+        }
+        found.retain(|found| found.goal > 0);
+        found
+    }
+
+    #[test]
+    fn a_game_finds_the_level_of_each_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = drawn(&folder, &["goal\n4", "goal\n5", "goal\n6", "goal\n7"]);
+        let found = finds(&game(), &mode, &[1, 3]);
+        let goals: Vec<_> = found.iter().map(|found| (found.goal, found.seed)).collect();
+        assert_eq!(goals, [(5, 1), (7, 3)], "`.levels` does not apply to files");
+        let path = found[1].path.as_deref().expect("a file");
+        assert!(path.ends_with("3.txt"), "{path}");
+        assert_eq!(found[0].mode, mode);
+    }
+
+    #[test]
+    fn a_level_of_a_number_is_from_no_file() {
+        let found = finds(&game(), "hard", &[4]);
+        assert_eq!(found, [Found { goal: 99, path: None, mode: "hard".to_owned(), seed: 1 }]);
+    }
+
+    #[test]
+    fn a_rebuilt_world_has_the_level_of_its_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = drawn(&folder, &["goal\n4", "goal\n5"]);
+        let found = finds(&game().restart(Restart::Rebuild), &mode, &[1, 0]);
+        assert_eq!(found.iter().map(|found| found.goal).collect::<Vec<_>>(), [5, 4]);
+    }
+
+    #[test]
+    fn an_error_in_a_level_file_names_file_and_line() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = drawn(&folder, &["goal\n4", "goal\nfar"]);
+        let error = game().check_mode(&mode).expect_err("no cell").to_string();
+        assert!(error.ends_with("1.txt, line 2: `far` is not a cell: write a number"), "{error}");
+    }
+
+    #[test]
+    fn any_error_that_can_be_displayed_explains_a_text() {
+        let game = ForeignGame::new("plain", 1, |_: &mut App| {}).level_files(|text: &str| text.parse::<u8>());
+        let error = game.parse_level("300").expect_err("too large");
+        assert_eq!(error, LevelTextError::whole("number too large to fit in target type"));
+    }
+
+    #[test]
+    fn the_hash_of_a_level_file_is_the_same_for_all_line_ends() {
+        let hash = |text: &str| game().parse_level(text).expect("a level").hash();
+        assert_eq!(hash("goal\r\n4\r\n"), hash("goal\n4"));
+        assert_ne!(hash("goal\n4"), hash("goal\n5"));
+    }
+
+    #[test]
+    fn a_game_without_a_parser_has_no_level_files() {
+        let bare = ForeignGame::new("bare", 1, |_: &mut App| {});
+        let error = bare.parse_level("").expect_err("no files");
+        assert_eq!(error.what, "`bare` has no level files: name one of its modes");
+    }
+
+    #[test]
+    fn plans_and_proofs_are_those_of_the_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = drawn(&folder, &["goal\n4", "goal\n5"]);
+        let at = |x: u32| FloorPlan { goal: Vec2::new(x as f32, 0.0), ..FloorPlan::default() };
+        let game = game()
+            .plan(|_| FloorPlan::default())
+            .plan_of_file(move |goal: &Goal| at(goal.0))
+            .prove(|_, _| LevelProof::Solvable)
+            .prove_file(|goal: &Goal| LevelProof::Unsolvable { why: format!("{} is far", goal.0) });
+        let GameTools { levels, .. } = game.tools();
+        assert_eq!((levels.floor_plan(&mode, 1), levels.floor_plan(&mode, 2)), (Some(at(5)), None));
+        assert_eq!(levels.prove(&mode, 0).why_unsolvable(), Some("4 is far"));
+        assert_eq!(levels.prove("easy", 0), LevelProof::Solvable);
+        assert_eq!(game.problem(), None);
+    }
+
+    #[test]
+    fn numbered_plans_and_proofs_say_nothing_about_files() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = drawn(&folder, &["goal\n4"]);
+        let game = game().plan(|_| FloorPlan::default()).prove(|_, _| LevelProof::Solvable);
+        let GameTools { levels, .. } = game.tools();
+        assert_eq!((levels.floor_plan(&mode, 0), levels.prove(&mode, 0)), (None, LevelProof::Unknown));
+        assert!(level_file_pattern(&mode).is_some());
+    }
+
+    #[test]
+    fn plans_and_proofs_depend_on_mode_and_level() {
+        let plan = |mode: &str, level: u64| FloorPlan {
+            goal: Vec2::new(level as f32, f32::from(u8::from(mode == "hard"))),
+            ..FloorPlan::default()
+        };
+        let game = game()
+            .plan_by_mode(plan)
+            .prove(|mode, level| if (mode, level) == ("hard", 2) { LevelProof::Solvable } else { LevelProof::Unknown });
+        let GameTools { levels, .. } = game.tools();
+        let goal = |mode: &str, level| levels.floor_plan(mode, level).map(|plan| plan.goal.to_array());
+        // There are three levels, so level 5 is level 2.
+        assert_eq!([goal("easy", 5), goal("hard", 1)], [Some([2.0, 0.0]), Some([1.0, 1.0])]);
+        assert_eq!([levels.prove("hard", 5), levels.prove("easy", 5)], [LevelProof::Solvable, LevelProof::Unknown]);
+    }
+
+    #[test]
+    fn modes_are_those_that_the_game_names() {
+        assert_eq!(Game::modes(&game()), ["easy", "hard"]);
+        assert!(game().check_mode("hard").is_ok());
+        let error = game().check_mode("default").expect_err("no such mode").to_string();
+        assert!(error.contains("`default`") && error.contains("easy"), "{error}");
+        let problem = game().modes(&[]).problem().expect("no mode");
+        assert_eq!(problem, "`.modes` of the game `finder` names no mode: name one, or leave it out");
+    }
+
+    #[test]
+    fn a_plan_of_another_type_is_a_problem() {
+        let problem = game().plan_of_file(|_: &String| FloorPlan::default()).problem().expect("another type");
+        for part in ["`.plan_of_file` of the game `finder` takes a `", "String`", "Goal`: use the same type"] {
+            assert!(problem.contains(part), "`{part}` is missing in: {problem}");
+        }
+        let bare = ForeignGame::new("bare", 1, |_: &mut App| {})
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["x"], || [0.0])
+            .prove_file(|_: &Goal| LevelProof::Unknown);
+        let problem = bare.problem().expect("no files");
+        assert_eq!(problem, "`.prove_file` of the game `bare` has no files: add `.level_files`");
+    }
+}
