@@ -9,7 +9,8 @@
 //!
 //! - `runtime`: the plugin's state of a foreign game in its World, and the systems of its description.
 //! - `restart`: the start of an episode.
-//! - `input`: the path from an action into the game.
+//! - `input`: the path from an action into the game, and the mask of actions.
+//! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `observe`, `paths`: observation, position, reward and end after a tick, and observations by the paths of their
 //!   values.
 //!
@@ -50,6 +51,8 @@
 //! assert_eq!((count.finished, count.successes), (1, 1));
 //! ```
 
+#[cfg(feature = "ui")]
+mod clicks;
 mod input;
 mod observe;
 mod paths;
@@ -84,6 +87,7 @@ use bevy_playbot::{
     fault::Faults,
     headless::HeadlessPlugins,
     key_bindings::KeyBindings,
+    legal::LegalActions,
     observation::{ObservationSpace, VectorSensor},
     placement::TickPlacement,
     systems::PlaybotSystems,
@@ -91,6 +95,8 @@ use bevy_playbot::{
 };
 use std::sync::Arc;
 
+#[cfg(feature = "ui")]
+pub use crate::foreign::clicks::ButtonClicks;
 pub use crate::foreign::{
     paths::PathError,
     runtime::{IntoActionValue, IntoValues, LevelSeed, Restart},
@@ -121,6 +127,7 @@ impl ForeignGame {
             levels: None,
             input: Input::default(),
             act: None,
+            legal: None,
             agent: Vec::new(),
             names: Vec::new(),
             observe: None,
@@ -429,6 +436,13 @@ impl Game for ForeignGame {
         if let Some(input) = self.description.input.pressed() {
             agent.insert(input);
         }
+        if self.description.legal.is_some()
+            && let ActionSpace::Discrete(actions) = self.actions()
+        {
+            agent.insert(LegalActions::new(std::iter::repeat_n(true, actions)));
+        }
+        #[cfg(feature = "ui")]
+        clicks::equip(&mut agent, self);
         self.description.agent.iter().for_each(|equip| equip(&mut agent));
         agent.id()
     }
@@ -546,6 +560,8 @@ struct Description {
     levels: Option<u64>,
     input: Input,
     act: Option<SystemFactory<()>>,
+    /// The mask of the actions.
+    legal: Option<SystemFactory<Vec<bool>>>,
     /// Functions that prepare an agent when it is spawned.
     agent: Vec<Arc<dyn Fn(&mut EntityWorldMut) + Send + Sync>>,
     /// Names of the values that `observe` returns.
@@ -653,6 +669,11 @@ impl Plugin for ForeignPlugin {
         )
         .add_systems(judge, observe::read_outcome.before(PlaybotSystems::Judge).run_if(is_tick));
         observe::add_observation(app);
+        if description.legal.is_some() {
+            input::add_mask(app);
+        }
+        #[cfg(feature = "ui")]
+        clicks::add_clicks(app, &description.input);
         if description.position.is_some() {
             observe::add_position(app);
         }

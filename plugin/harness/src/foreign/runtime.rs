@@ -73,6 +73,7 @@ pub(super) struct Foreign {
     pub(super) level: Option<OwnedSystem<()>>,
     pub(super) restart: Option<OwnedSystem<()>>,
     pub(super) act: Option<OwnedSystem<()>>,
+    pub(super) legal: Option<OwnedSystem<Vec<bool>>>,
     pub(super) bot: Option<OwnedSystem<ActionValue>>,
     pub(super) hash: Option<OwnedSystem<u64>>,
     /// The World before the game started.
@@ -109,6 +110,7 @@ impl Foreign {
             level: description.level.as_ref().map(|system| system.make()),
             restart,
             act: description.act.as_ref().map(|system| system.make()),
+            legal: description.legal.as_ref().map(|system| system.make()),
             bot: description.demonstrator.as_ref().map(|(_, system)| system.make()),
             hash: description.hash.as_ref().map(|system| system.make()),
             game: game.clone(),
