@@ -22,6 +22,7 @@ use crate::{
     agent::{Agent, Control},
     carry_over::ReflectCarryComponent,
     episode::Episode,
+    legal::LegalActions,
     streams::AgentStreams,
 };
 use bevy::prelude::*;
@@ -58,9 +59,16 @@ pub struct HeldAction {
 
 impl HeldAction {
     /// Returns the action of this tick of the episode.
-    fn next(&mut self, tick: u32, space: &ActionSpace, rng: &mut impl rand::Rng) -> &ActionValue {
-        if tick == 0 || self.left == 0 {
-            self.action = Action(uniform(space, rng));
+    fn next(
+        &mut self,
+        tick: u32,
+        space: &ActionSpace,
+        legal: Option<&LegalActions>,
+        rng: &mut impl rand::Rng,
+    ) -> &ActionValue {
+        let is_legal = legal.is_none_or(|legal| legal.allows(&self.action.0));
+        if tick == 0 || self.left == 0 || !is_legal {
+            self.action = Action(legal_uniform(space, legal, rng));
             self.left = rng.random_range(1..=LONGEST_HOLD);
         }
         self.left -= 1;
@@ -69,17 +77,26 @@ impl HeldAction {
 }
 
 pub(crate) fn run_blind_bots(
-    mut agents: Query<(&Agent, &Control, &BlindBot, &Episode, &mut HeldAction, &mut AgentStreams, &mut Action)>,
+    mut agents: Query<(
+        &Agent,
+        &Control,
+        &BlindBot,
+        &Episode,
+        Option<&LegalActions>,
+        &mut HeldAction,
+        &mut AgentStreams,
+        &mut Action,
+    )>,
 ) {
-    for (agent, control, bot, episode, mut held, mut streams, mut action) in &mut agents {
+    for (agent, control, bot, episode, legal, mut held, mut streams, mut action) in &mut agents {
         if *control != Control::Bot || !episode.is_running() {
             continue;
         }
         match bot {
             BlindBot::Constant(value) => action.0.clone_from(value),
-            BlindBot::Uniform => action.0 = uniform(&agent.actions, &mut streams.action),
+            BlindBot::Uniform => action.0 = legal_uniform(&agent.actions, legal, &mut streams.action),
             BlindBot::Chaos => {
-                action.0.clone_from(held.next(episode.tick, &agent.actions, &mut streams.action));
+                action.0.clone_from(held.next(episode.tick, &agent.actions, legal, &mut streams.action));
             }
         }
     }
@@ -93,12 +110,26 @@ pub fn uniform(space: &ActionSpace, rng: &mut impl rand::Rng) -> ActionValue {
     }
 }
 
+/// Returns a uniformly random action of a space, among the legal ones.
+pub fn legal_uniform(space: &ActionSpace, legal: Option<&LegalActions>, rng: &mut impl rand::Rng) -> ActionValue {
+    let Some(legal) = legal else { return uniform(space, rng) };
+    // A mask without a legal action is a fault of this tick, so the action does not matter.
+    let number = rng.random_range(0..legal.count().max(1) as u32);
+    legal.pick(number).unwrap_or(ActionValue::Discrete(0))
+}
+
 /// Returns the planned action of a demonstrator with noise. For discrete actions, the noise is the probability of
-/// replacing one by a uniformly random one. For continuous ones, it is the standard deviation of the normal noise on
-/// each value. Zero noise draws no random number and keeps the action.
-pub fn with_noise(planned: ActionValue, space: &ActionSpace, noise: f64, rng: &mut impl rand::Rng) -> ActionValue {
+/// replacing one by a uniformly random one, among the legal ones. For continuous ones, it is the standard deviation of
+/// the normal noise on each value. Zero noise draws no random number and keeps the action.
+pub fn with_noise(
+    planned: ActionValue,
+    space: &ActionSpace,
+    legal: Option<&LegalActions>,
+    noise: f64,
+    rng: &mut impl rand::Rng,
+) -> ActionValue {
     match planned {
-        ActionValue::Discrete(_) if noise > 0.0 && rng.random_bool(noise.min(1.0)) => uniform(space, rng),
+        ActionValue::Discrete(_) if noise > 0.0 && rng.random_bool(noise.min(1.0)) => legal_uniform(space, legal, rng),
         ActionValue::Continuous(values) if noise > 0.0 => {
             let noisy = |value: f32| (value + noise as f32 * normal(rng)).clamp(-1.0, 1.0);
             ActionValue::Continuous(values.into_iter().map(noisy).collect())

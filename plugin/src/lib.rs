@@ -99,6 +99,7 @@ pub mod episode;
 pub mod fault;
 pub mod headless;
 pub mod key_bindings;
+pub mod legal;
 pub mod level;
 pub mod observation;
 mod panics;

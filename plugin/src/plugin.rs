@@ -16,7 +16,7 @@ use crate::{
     action, agent, bot, episode,
     fault::{FaultSystems, Faults, announce_faults},
     key_bindings::KeyboardPlugin,
-    observation, placement,
+    legal, observation, placement,
     placement::{FrameGate, TickPlacement, TickSchedules},
     policy, reward, skill_prior, streams,
     systems::{ObserveSchedule, PlaybotSystems, run_observe_schedule},
@@ -104,11 +104,12 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
             )
                 .chain()
                 .in_set(PlaybotSystems::Begin),
-            (run_observe_schedule, observation::check_observations, vision::check_images)
+            (run_observe_schedule, observation::check_observations, vision::check_images, legal::check_legal_actions)
                 .chain()
                 .in_set(PlaybotSystems::Observe),
             (
                 bot::run_blind_bots,
+                legal::redraw_illegal,
                 crate::demo::replay::run_replays,
                 skill_prior::draw_skills.run_if(resource_exists::<skill_prior::SkillPrior>),
                 policy::run_policy.run_if(resource_exists::<policy::ActivePolicy>),

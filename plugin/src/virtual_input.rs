@@ -18,7 +18,8 @@
 //!
 //! The files of the folder, in reading order:
 //!
-//! - `button`, `devices`: inputs that can be held down, and those that are held down now.
+//! - `button`, `pointer`, `devices`: inputs that can be held down, positions in the window, and the inputs that are
+//!   held down now.
 //! - `act`, `claims`: the way from the actions of a tick to held inputs, and claims to keyboard and mouse.
 //! - `input_state`, `messages`: Bevy's own state of the devices, and its messages.
 //! - `leafwing`, `enhanced_input`: actions of input managers, driven without any key.
@@ -54,6 +55,7 @@ mod input_state;
 #[cfg(feature = "leafwing-input-manager")]
 pub mod leafwing;
 mod messages;
+mod pointer;
 
 use crate::{
     action::{ActionSpace, ActionValue, check_actions},
@@ -80,14 +82,17 @@ use bevy::{
             AccumulatedMouseMotion, AccumulatedMouseScroll, MouseButtonInput, MouseMotion, MouseWheel,
             accumulate_mouse_motion_system, accumulate_mouse_scroll_system, mouse_button_input_system,
         },
+        touch::TouchInput,
     },
     prelude::*,
+    window::{CursorLeft, CursorMoved, WindowEvent},
 };
 
 pub use crate::virtual_input::{
     button::{UnknownInput, VirtualAxis, VirtualButton},
     devices::{ActionAxis, HeldInput, VirtualDevices},
     messages::VirtualGamepad,
+    pointer::PointerPosition,
 };
 
 /// The inputs that each action of an agent holds down. It maps the agent's [`Action`](crate::action::Action) to the
@@ -145,18 +150,89 @@ impl VirtualInput {
         self.also(sets)
     }
 
-    fn also<B: Into<VirtualButton>>(mut self, sets: impl IntoIterator<Item = impl IntoIterator<Item = B>>) -> Self {
+    /// Adds a position of the mouse cursor to each discrete action, in order; `None` leaves the cursor where it is.
+    /// Mouse buttons of actions with a position are pressed anew in each tick, as clicks. Use
+    /// [`HeldInput::at`] to drag instead.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use bevy_playbot::{prelude::*, virtual_input::{HeldInput, PointerPosition, VirtualInput}};
+    ///
+    /// // Nothing, and clicks on the two halves of a board.
+    /// let [left, right] = [0.25, 0.75].map(|x| PointerPosition::fraction(x, 0.5));
+    /// let input = VirtualInput::keys([[]; 3])
+    ///     .mouse_buttons([vec![], vec![MouseButton::Left], vec![MouseButton::Left]])
+    ///     .cursor([None, Some(left), Some(right)]);
+    /// assert_eq!(input.held(&ActionValue::Discrete(2)), HeldInput::default().click(right, MouseButton::Left));
+    /// ```
+    pub fn cursor(self, positions: impl IntoIterator<Item = impl Into<Option<PointerPosition>>>) -> Self {
+        self.each(positions, |held, position| match position.into() {
+            Some(position) => HeldInput { clicks: true, ..held.at(position) },
+            None => held,
+        })
+    }
+
+    /// Adds a tap on the touch screen to each discrete action, in order; `None` taps nowhere.
+    ///
+    /// A finger is down in the tick of its action and up before the next one. `Touches` shows it in the same tick on
+    /// the route [`InputRoute::Messages`], and in the next frame on [`InputRoute::Direct`].
+    pub fn taps(self, positions: impl IntoIterator<Item = impl Into<Option<PointerPosition>>>) -> Self {
+        self.each(positions, |held, position| match position.into() {
+            Some(position) => held.tap(position),
+            None => held,
+        })
+    }
+
+    fn also<B: Into<VirtualButton>>(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = B>>) -> Self {
+        self.each(sets, HeldInput::hold)
+    }
+
+    /// Adds a part to each discrete action, in order.
+    fn each<T>(mut self, parts: impl IntoIterator<Item = T>, add: impl Fn(HeldInput, T) -> HeldInput) -> Self {
         let Mapping::Discrete(actions) = &mut self.mapping else {
-            self.is_mixed |= sets.into_iter().next().is_some();
+            self.is_mixed |= parts.into_iter().next().is_some();
             return self;
         };
-        for (index, set) in sets.into_iter().enumerate() {
+        for (index, part) in parts.into_iter().enumerate() {
             if index == actions.len() {
                 actions.push(HeldInput::default());
             }
-            actions[index] = std::mem::take(&mut actions[index]).hold(set);
+            actions[index] = add(std::mem::take(&mut actions[index]), part);
         }
         self
+    }
+
+    /// Adds discrete actions after the others. Has no effect on continuous actions.
+    pub fn and_actions(mut self, more: impl IntoIterator<Item = HeldInput>) -> Self {
+        if let Mapping::Discrete(actions) = &mut self.mapping {
+            actions.extend(more);
+        }
+        self
+    }
+
+    /// Replaces the inputs of a discrete action, such as a click on something that moves. Has no effect on an action
+    /// outside [`space`](Self::space).
+    pub fn set_action(&mut self, index: usize, held: HeldInput) {
+        if let Mapping::Discrete(actions) = &mut self.mapping
+            && let Some(action) = actions.get_mut(index)
+        {
+            *action = held;
+        }
+    }
+
+    /// Returns the first action that points at a position outside of any window, and that position.
+    pub fn impossible_position(&self) -> Option<(usize, PointerPosition)> {
+        self.positions().find(|(_, position)| !position.is_possible())
+    }
+
+    /// Returns the positions that discrete actions point at, with the number of the action.
+    fn positions(&self) -> impl Iterator<Item = (usize, PointerPosition)> + '_ {
+        let actions = match &self.mapping {
+            Mapping::Discrete(actions) => actions.as_slice(),
+            Mapping::Continuous(_) => &[],
+        };
+        let positions = |held: &HeldInput| [held.cursor, held.tap].into_iter().flatten();
+        actions.iter().enumerate().flat_map(move |(index, held)| positions(held).map(move |position| (index, position)))
     }
 
     /// Returns the actions that it can express: as many as it names.
@@ -188,6 +264,7 @@ impl VirtualInput {
     /// Returns all inputs that any of its actions may hold or move.
     fn reach(&self) -> HeldInput {
         let join = |all: HeldInput, part: HeldInput| {
+            let all = HeldInput { cursor: all.cursor.or(part.cursor), tap: all.tap.or(part.tap), ..all };
             let all = all.hold(part.buttons);
             part.axes.into_iter().fold(all, |all, (axis, _)| all.push(axis, 0.0))
         };
@@ -243,6 +320,7 @@ impl Plugin for VirtualInputPlugin {
                     (check_claims.before(note_actions), act::send_messages)
                         .chain()
                         .after(check_actions)
+                        .in_set(PressSystems)
                         .in_set(PlaybotSystems::Act)
                         .before(InputSystems),
                 );
@@ -253,6 +331,7 @@ impl Plugin for VirtualInputPlugin {
                     (check_claims.before(note_actions), act::write_directly)
                         .chain()
                         .after(check_actions)
+                        .in_set(PressSystems)
                         .in_set(PlaybotSystems::Act),
                 )
                 .add_systems(RunFixedMainLoop, act::show_frame.in_set(RunFixedMainLoopSystems::AfterFixedMainLoop))
@@ -289,6 +368,10 @@ fn add_what_is_written(app: &mut App) {
         .add_message::<MouseButtonInput>()
         .add_message::<MouseMotion>()
         .add_message::<MouseWheel>()
+        .add_message::<CursorMoved>()
+        .add_message::<CursorLeft>()
+        .add_message::<TouchInput>()
+        .add_message::<WindowEvent>()
         .add_message::<GamepadConnectionEvent>()
         .add_message::<RawGamepadEvent>()
         .add_message::<RawGamepadButtonChangedEvent>()
@@ -303,6 +386,11 @@ fn add_what_is_written(app: &mut App) {
         .init_resource::<AccumulatedMouseMotion>()
         .init_resource::<AccumulatedMouseScroll>();
 }
+
+/// The systems that press the inputs of this tick's actions. A system that changes a [`VirtualInput`] for this tick, as
+/// [`set_action`](VirtualInput::set_action) does, runs before them, in [`PlaybotSystems::Act`].
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct PressSystems;
 
 /// The route from an action to the game.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]

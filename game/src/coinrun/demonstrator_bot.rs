@@ -54,7 +54,7 @@ pub(super) fn decide(
             continue;
         }
         let planned = ActionValue::Discrete(planner.act(sim).into());
-        action.0 = with_noise(planned, &agent.actions, *noise, &mut streams.action);
+        action.0 = with_noise(planned, &agent.actions, None, *noise, &mut streams.action);
     }
 }
 

@@ -10,7 +10,8 @@
 //! - `runtime`: the plugin's state of a foreign game in its World, and the systems of its description.
 //! - `levels`: modes, level files, plans and proofs.
 //! - `restart`: the start of an episode.
-//! - `input`: the path from an action into the game.
+//! - `input`: the path from an action into the game, and the mask of actions.
+//! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `observe`, `paths`: observation, position, reward and end after a tick, and observations by the paths of their
 //!   values.
 //!
@@ -51,6 +52,8 @@
 //! assert_eq!((count.finished, count.successes), (1, 1));
 //! ```
 
+#[cfg(feature = "ui")]
+mod clicks;
 mod input;
 mod levels;
 mod observe;
@@ -85,6 +88,7 @@ use bevy_playbot::{
     fault::Faults,
     headless::HeadlessPlugins,
     key_bindings::KeyBindings,
+    legal::LegalActions,
     observation::{ObservationSpace, VectorSensor},
     placement::TickPlacement,
     systems::PlaybotSystems,
@@ -92,6 +96,8 @@ use bevy_playbot::{
 };
 use std::sync::Arc;
 
+#[cfg(feature = "ui")]
+pub use crate::foreign::clicks::ButtonClicks;
 pub use crate::foreign::{
     levels::{IntoLevelTextError, LevelFromFile, PlayedMode},
     observe::IntoPlanPosition,
@@ -126,6 +132,7 @@ impl ForeignGame {
             level_parts: LevelParts::default(),
             input: Input::default(),
             act: None,
+            legal: None,
             agent: Vec::new(),
             names: Vec::new(),
             observe: None,
@@ -448,6 +455,13 @@ impl Game for ForeignGame {
         if let Some(input) = self.description.input.pressed() {
             agent.insert(input);
         }
+        if self.description.legal.is_some()
+            && let ActionSpace::Discrete(actions) = self.actions()
+        {
+            agent.insert(LegalActions::new(std::iter::repeat_n(true, actions)));
+        }
+        #[cfg(feature = "ui")]
+        clicks::equip(&mut agent, self);
         self.description.agent.iter().for_each(|equip| equip(&mut agent));
         agent.id()
     }
@@ -563,6 +577,8 @@ struct Description {
     level_parts: LevelParts,
     input: Input,
     act: Option<SystemFactory<()>>,
+    /// The mask of the actions.
+    legal: Option<SystemFactory<Vec<bool>>>,
     /// Functions that prepare an agent when it is spawned.
     agent: Vec<Arc<dyn Fn(&mut EntityWorldMut) + Send + Sync>>,
     /// Names of the values that `observe` returns.
@@ -686,6 +702,11 @@ impl Plugin for ForeignPlugin {
         )
         .add_systems(judge, observe::read_outcome.before(PlaybotSystems::Judge).run_if(is_tick));
         observe::add_observation(app);
+        if description.legal.is_some() {
+            input::add_mask(app);
+        }
+        #[cfg(feature = "ui")]
+        clicks::add_clicks(app, &description.input);
         if description.has_state() {
             observe::add_state(app);
         }

@@ -33,10 +33,17 @@ pub(super) fn wanted(order: &AgentOrder, players: &Players, pads: &Pads, state: 
         let pad = pads.iter().find(|(_, owner)| owner.agent == agent).map(|(pad, _)| pad);
         let pad = pad.filter(|pad| state.is_connected(*pad));
         let held = input.held(&action.0);
+        wanted.agents.push(agent);
+        wanted.cursor = held.cursor.map(|position| (agent, position)).or(wanted.cursor);
+        wanted.tap = held.tap.map(|position| (agent, position)).or(wanted.tap);
         for button in held.buttons {
             let is_pad = matches!(button, VirtualButton::Gamepad(_));
             if !is_pad || pad.is_some() {
-                wanted.switches.push((agent, Switch { button, pad: pad.filter(|_| is_pad) }));
+                let switch = Switch { button, pad: pad.filter(|_| is_pad) };
+                wanted.switches.push((agent, switch));
+                if held.clicks && matches!(button, VirtualButton::Mouse(_)) {
+                    wanted.anew.push((agent, switch));
+                }
             }
         }
         for (axis, value) in held.axes {
@@ -63,10 +70,18 @@ pub(super) fn send_messages(
     mut messages: InputMessages,
 ) {
     let wanted = wanted(&order, &players, &pads, &state);
-    for change in devices.change(&wanted, |switch| switch.pad.is_some() || state.is_down(switch)) {
-        messages.send(change);
-    }
+    let changes = devices.change(&wanted, |switch| switch.pad.is_some() || state.is_down(switch));
+    let (released, others) = releases_first(changes);
+    released.into_iter().for_each(|change| messages.send(change));
+    messages.point(&mut devices, &wanted);
+    others.into_iter().for_each(|change| messages.send(change));
     messages.send_motion(wanted.motion, wanted.wheel);
+}
+
+/// Splits changes into released buttons and the others. A mouse button is released before the cursor moves, and
+/// pressed afterwards.
+fn releases_first(changes: Vec<Change>) -> (Vec<Change>, Vec<Change>) {
+    changes.into_iter().partition(|change| matches!(change, Change::Button { down: false, .. }))
 }
 
 /// The parameters for releasing an agent's inputs.
@@ -101,6 +116,7 @@ impl InputReleaser<'_, '_> {
                 InputRoute::Direct => self.messages.send_processed(change, before, after),
             }
         }
+        self.messages.leave(&mut self.devices, agent);
     }
 }
 
@@ -189,20 +205,13 @@ pub(super) fn write_directly(
         state.touch(switch, Touch::Settle);
     }
     let wanted = wanted(&order, &players, &pads, &state);
-    for change in devices.change(&wanted, |switch| state.is_down(switch)) {
-        let before = change.read(&state);
-        match change {
-            Change::Button { switch, down } => {
-                state.touch(switch, if down { Touch::Press } else { Touch::Release });
-                direct.note(switch, down);
-            }
-            Change::Axis { pad, axis, value } => {
-                if let Some((switch, down)) = state.set_axis(pad, axis, value) {
-                    direct.note(switch, down);
-                }
-            }
-        }
-        messages.send_processed(change, before, change.read(&state));
+    let (released, others) = releases_first(devices.change(&wanted, |switch| state.is_down(switch)));
+    for change in released {
+        write_change(change, &mut state, &mut direct, &mut messages);
+    }
+    messages.point(&mut devices, &wanted);
+    for change in others {
+        write_change(change, &mut state, &mut direct, &mut messages);
     }
     let now = Motion { mouse: wanted.motion, wheel: wanted.wheel };
     if now != Motion::default() || past.motion != Motion::default() {
@@ -213,6 +222,23 @@ pub(super) fn write_directly(
     direct.tick.motion = now;
     direct.frame.motion.add(now);
     direct.sent_motion.add(now);
+}
+
+/// Writes a change into the state that games read, and sends its messages.
+fn write_change(change: Change, state: &mut InputState, direct: &mut DirectInput, messages: &mut InputMessages) {
+    let before = change.read(state);
+    match change {
+        Change::Button { switch, down } => {
+            state.touch(switch, if down { Touch::Press } else { Touch::Release });
+            direct.note(switch, down);
+        }
+        Change::Axis { pad, axis, value } => {
+            if let Some((switch, down)) = state.set_axis(pad, axis, value) {
+                direct.note(switch, down);
+            }
+        }
+    }
+    messages.send_processed(change, before, change.read(state));
 }
 
 /// Shows `Update` everything that happened in the frame, after its last fixed tick.

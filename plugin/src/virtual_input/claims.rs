@@ -8,7 +8,7 @@ use crate::{
         button::{VirtualAxis, VirtualButton},
     },
 };
-use bevy::prelude::*;
+use bevy::{prelude::*, window::PrimaryWindow};
 
 /// Returns whether virtual input plays under this control; `for_people` includes people.
 pub(super) fn is_virtual(control: Control, for_people: bool) -> bool {
@@ -24,6 +24,8 @@ pub(super) fn is_virtual(control: Control, for_people: bool) -> bool {
 pub(super) enum Claim {
     Button(VirtualButton),
     Axis(VirtualAxis),
+    Cursor,
+    TouchScreen,
 }
 
 impl Claim {
@@ -31,6 +33,8 @@ impl Claim {
         match self {
             Self::Button(button) => button.to_string(),
             Self::Axis(axis) => format!("{axis:?}"),
+            Self::Cursor => "the mouse cursor".to_owned(),
+            Self::TouchScreen => "the touch screen".to_owned(),
         }
     }
 }
@@ -40,17 +44,21 @@ impl Claim {
 pub(super) fn check_claims(
     order: Res<AgentOrder>,
     mut agents: Query<(&Agent, &VirtualInput, &mut Control, Has<PressesForPeople>)>,
+    windows: Query<&Window, With<PrimaryWindow>>,
     mut faults: ResMut<Faults>,
     mut claims: Local<Vec<(Claim, u32)>>,
 ) {
     claims.clear();
+    let window = windows.single().ok().map(Window::size);
     for &entity in order.entities() {
         let Ok((agent, input, mut control, for_people)) = agents.get_mut(entity) else { continue };
         if !is_virtual(*control, for_people) {
             continue;
         }
         let wanted = claims_of(input);
-        if let Some(fault) = misfit(agent, input).or_else(|| conflict(agent, &wanted, &claims)) {
+        if let Some(fault) =
+            misfit(agent, input).or_else(|| outside(agent, input, window)).or_else(|| conflict(agent, &wanted, &claims))
+        {
             faults.report(fault);
             *control = Control::Idle;
             continue;
@@ -64,7 +72,9 @@ fn claims_of(input: &VirtualInput) -> Vec<Claim> {
     let reach = input.reach();
     let buttons = reach.buttons.iter().filter(|button| !matches!(button, VirtualButton::Gamepad(_)));
     let axes = reach.axes.iter().filter(|(axis, _)| !axis.is_gamepad());
-    buttons.copied().map(Claim::Button).chain(axes.map(|(axis, _)| Claim::Axis(*axis))).collect()
+    let pointers = [reach.cursor.map(|_| Claim::Cursor), reach.tap.map(|_| Claim::TouchScreen)];
+    let axes = axes.map(|(axis, _)| Claim::Axis(*axis));
+    buttons.copied().map(Claim::Button).chain(axes).chain(pointers.into_iter().flatten()).collect()
 }
 
 /// Returns why a mapping does not fit the actions of its agent.
@@ -83,6 +93,27 @@ fn misfit(agent: &Agent, input: &VirtualInput) -> Option<String> {
              press buttons with an axis made by `ActionAxis::buttons`"
         )
     })
+}
+
+/// Returns why a position of a mapping cannot be pointed at in a window of this size, if there is one.
+fn outside(agent: &Agent, input: &VirtualInput, window: Option<Vec2>) -> Option<String> {
+    let index = agent.index;
+    for (action, position) in input.positions() {
+        let Some(size) = window else {
+            return Some(format!(
+                "agent {index}: action {action} of its `VirtualInput` points at {position}, and the app has no primary \
+                 window: add Bevy's `WindowPlugin`, which is part of `DefaultPlugins`"
+            ));
+        };
+        if position.within(size).is_none() {
+            return Some(format!(
+                "agent {index}: action {action} of its `VirtualInput` points at {position}, outside of the window of {} \
+                 by {}: give a position inside, or a fraction of the window, `PointerPosition::fraction`",
+                size.x, size.y
+            ));
+        }
+    }
+    None
 }
 
 /// Returns why an agent cannot have its inputs: an earlier agent has claimed them.

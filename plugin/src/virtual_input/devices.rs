@@ -3,6 +3,7 @@
 use crate::virtual_input::{
     button::{VirtualAxis, VirtualButton},
     input_state::{InputState, Switch},
+    pointer::{Cursor, Finger, PointerPosition},
 };
 use bevy::prelude::*;
 
@@ -22,6 +23,12 @@ pub struct VirtualDevices {
     held: Vec<(Entity, Switch)>,
     /// Sticks and triggers that are not at rest.
     pushed: Vec<Push>,
+    /// The mouse cursor, if an agent has moved it.
+    pub(super) cursor: Option<Cursor>,
+    /// The finger that is down on the touch screen.
+    pub(super) finger: Option<Finger>,
+    /// Number of the next finger. Bevy needs a new one for each touch.
+    pub(super) next_finger: u64,
 }
 
 /// A stick or trigger of an agent's gamepad, with its value.
@@ -49,6 +56,14 @@ pub(super) struct Wanted {
     pub motion: Vec2,
     /// Motion of the wheel, lines.
     pub wheel: Vec2,
+    /// Agents that play in this tick.
+    pub agents: Vec<Entity>,
+    /// Mouse buttons that are pressed anew, even if they are down.
+    pub anew: Vec<(Entity, Switch)>,
+    /// The agent that moves the mouse cursor, and the position.
+    pub cursor: Option<(Entity, PointerPosition)>,
+    /// The agent that taps on the touch screen, and the position.
+    pub tap: Option<(Entity, PointerPosition)>,
 }
 
 /// A button that goes down or up, or a stick that moves.
@@ -102,7 +117,11 @@ impl VirtualDevices {
             if !is_held {
                 self.held.push((agent, switch));
             }
-            if !is_held || !is_down(switch) {
+            let is_anew = is_held && wanted.anew.contains(&(agent, switch));
+            if is_anew {
+                changes.push(Change::Button { switch, down: false });
+            }
+            if !is_held || is_anew || !is_down(switch) {
                 changes.push(Change::Button { switch, down: true });
             }
         }
@@ -162,6 +181,12 @@ pub struct HeldInput {
     pub buttons: Vec<VirtualButton>,
     /// Motions and sticks, with their values.
     pub axes: Vec<(VirtualAxis, f32)>,
+    /// Position of the mouse cursor, which stays there until another action moves it.
+    pub cursor: Option<PointerPosition>,
+    /// Position of a tap on the touch screen. A finger is down during the tick, and each tick is a tap of its own.
+    pub tap: Option<PointerPosition>,
+    /// True if mouse buttons are pressed anew in each tick, as clicks. Otherwise they stay down from tick to tick.
+    pub clicks: bool,
 }
 
 impl HeldInput {
@@ -178,6 +203,24 @@ impl HeldInput {
                 self.buttons.push(button);
             }
         }
+        self
+    }
+
+    /// Moves the mouse cursor to this position.
+    pub fn at(mut self, position: PointerPosition) -> Self {
+        self.cursor = Some(position);
+        self
+    }
+
+    /// Moves the mouse cursor to this position and clicks there: the button is pressed anew in each tick that takes the
+    /// action.
+    pub fn click(self, position: PointerPosition, button: MouseButton) -> Self {
+        Self { clicks: true, ..self.at(position).hold([button]) }
+    }
+
+    /// Taps on the touch screen at this position.
+    pub fn tap(mut self, position: PointerPosition) -> Self {
+        self.tap = Some(position);
         self
     }
 
@@ -319,6 +362,19 @@ mod tests {
         assert_eq!(change(&[a], false), [button(a, true)], "something else let go of it");
         assert_eq!(change(&[b], true), [button(a, false), button(b, true)]);
         assert_eq!(change(&[], true), [button(b, false)]);
+    }
+
+    #[test]
+    fn a_click_presses_its_button_anew_in_each_tick() {
+        let agent = Entity::from_raw_u32(1).expect("a number");
+        let left = Switch { button: MouseButton::Left.into(), pad: None };
+        let mut devices = VirtualDevices::default();
+        let mut change = |anew: Vec<(Entity, Switch)>| {
+            devices.change(&Wanted { switches: vec![(agent, left)], anew, ..default() }, |_| true)
+        };
+        assert_eq!(change(vec![(agent, left)]), [button(left, true)]);
+        assert_eq!(change(vec![(agent, left)]), [button(left, false), button(left, true)]);
+        assert_eq!(change(vec![]), [], "held from the click on");
     }
 
     #[test]

@@ -5,8 +5,9 @@ use crate::{
     virtual_input::{
         VirtualInput,
         button::{VirtualAxis, VirtualButton},
-        devices::{Change, Reading},
+        devices::{Change, Reading, VirtualDevices, Wanted},
         input_state::{Switch, logical_key},
+        pointer::{Cursor, Finger},
     },
 };
 use bevy::{
@@ -20,10 +21,10 @@ use bevy::{
         },
         keyboard::KeyboardInput,
         mouse::{MouseButtonInput, MouseMotion, MouseScrollUnit, MouseWheel},
-        touch::TouchPhase,
+        touch::{TouchInput, TouchPhase},
     },
     prelude::*,
-    window::PrimaryWindow,
+    window::{CursorLeft, CursorMoved, PrimaryWindow, WindowEvent},
 };
 
 /// The writers of messages.
@@ -33,14 +34,19 @@ pub(super) struct InputMessages<'w, 's> {
     mouse: MessageWriter<'w, MouseButtonInput>,
     motion: MessageWriter<'w, MouseMotion>,
     wheel: MessageWriter<'w, MouseWheel>,
+    cursor: MessageWriter<'w, CursorMoved>,
+    cursor_left: MessageWriter<'w, CursorLeft>,
+    touch: MessageWriter<'w, TouchInput>,
+    /// All of the above once more, as a window sends them. Bevy's picking reads these.
+    events: MessageWriter<'w, WindowEvent>,
     pads: GamepadMessages<'w, 's>,
-    windows: Query<'w, 's, Entity, With<PrimaryWindow>>,
+    windows: Query<'w, 's, (Entity, &'static mut Window), With<PrimaryWindow>>,
 }
 
 impl InputMessages<'_, '_> {
     /// Returns the window that messages come from; a placeholder without a window.
     fn window(&self) -> Entity {
-        self.windows.single().unwrap_or(Entity::PLACEHOLDER)
+        self.windows.single().map_or(Entity::PLACEHOLDER, |(window, _)| window)
     }
 
     /// Sends a change as a window and a gamepad driver would. Bevy's own systems do the rest.
@@ -84,10 +90,14 @@ impl InputMessages<'_, '_> {
             VirtualButton::Key(key_code) => {
                 let (logical_key, text) = logical_key(key_code);
                 let text = text.filter(|_| down).map(|text| text.as_str().into());
-                self.keys.write(KeyboardInput { key_code, logical_key, state, text, repeat: false, window });
+                let input = KeyboardInput { key_code, logical_key, state, text, repeat: false, window };
+                self.events.write(input.clone().into());
+                self.keys.write(input);
             }
             VirtualButton::Mouse(button) => {
-                self.mouse.write(MouseButtonInput { button, state, window });
+                let input = MouseButtonInput { button, state, window };
+                self.events.write(input.into());
+                self.mouse.write(input);
             }
             // A call without a gamepad cannot reach this.
             VirtualButton::Gamepad(_) => {}
@@ -97,17 +107,80 @@ impl InputMessages<'_, '_> {
     /// Sends motion: pixels to the right and downwards, and lines of the wheel.
     pub fn send_motion(&mut self, delta: Vec2, wheel: Vec2) {
         if delta != Vec2::ZERO {
-            self.motion.write(MouseMotion { delta });
+            let motion = MouseMotion { delta };
+            self.events.write(motion.into());
+            self.motion.write(motion);
         }
         if wheel != Vec2::ZERO {
             let (unit, window) = (MouseScrollUnit::Line, self.window());
-            self.wheel.write(MouseWheel { unit, x: wheel.x, y: wheel.y, window, phase: TouchPhase::Moved });
+            let turn = MouseWheel { unit, x: wheel.x, y: wheel.y, window, phase: TouchPhase::Moved };
+            self.events.write(turn.into());
+            self.wheel.write(turn);
         }
     }
 
-    pub fn send_connection(&mut self, pad: Entity, name: String) {
-        let connection = GamepadConnection::Connected { name, vendor_id: None, product_id: None };
-        self.pads.send(GamepadConnectionEvent::new(pad, connection).into());
+    /// Moves the mouse cursor and the finger as the agents of this tick want it, in the window and by messages. Those
+    /// of agents that do not play any more leave.
+    pub fn point(&mut self, devices: &mut VirtualDevices, wanted: &Wanted) {
+        if let Some(Cursor { agent, .. }) = devices.cursor.filter(|cursor| !wanted.agents.contains(&cursor.agent)) {
+            self.leave(devices, agent);
+        }
+        let size = self.windows.single().ok().map(|(_, window)| window.size());
+        if let Some((agent, position)) = wanted.cursor
+            && let Some(at) = size.and_then(|size| position.within(size))
+        {
+            let before = devices.cursor.replace(Cursor { agent, at }).map(|cursor| cursor.at);
+            if before != Some(at) {
+                let delta = before.map(|before| at - before);
+                let moved = CursorMoved { window: self.window(), position: at, delta };
+                self.events.write(moved.clone().into());
+                self.cursor.write(moved);
+            }
+        }
+        // A window that keeps a person's devices from the game forgets the position in each frame.
+        if let Some(Cursor { at, .. }) = devices.cursor {
+            self.show_cursor(Some(at));
+        }
+        if let Some(Finger { id, at, .. }) = devices.finger.take() {
+            self.send_touch(TouchPhase::Ended, id, at);
+        }
+        if let Some((agent, position)) = wanted.tap
+            && let Some(at) = size.and_then(|size| position.within(size))
+        {
+            let id = devices.next_finger;
+            devices.next_finger += 1;
+            devices.finger = Some(Finger { agent, id, at });
+            self.send_touch(TouchPhase::Started, id, at);
+        }
+    }
+
+    /// Takes the mouse cursor of this agent out of the window, and its finger from the touch screen.
+    pub fn leave(&mut self, devices: &mut VirtualDevices, agent: Entity) {
+        if devices.cursor.take_if(|cursor| cursor.agent == agent).is_some() {
+            self.show_cursor(None);
+            let left = CursorLeft { window: self.window() };
+            self.events.write(left.clone().into());
+            self.cursor_left.write(left);
+        }
+        if let Some(Finger { id, at, .. }) = devices.finger.take_if(|finger| finger.agent == agent) {
+            self.send_touch(TouchPhase::Canceled, id, at);
+        }
+        // An episode counts its fingers from 0, so that it replays the same alone.
+        devices.next_finger = 0;
+    }
+
+    fn show_cursor(&mut self, at: Option<Vec2>) {
+        if let Ok((_, mut window)) = self.windows.single_mut()
+            && window.cursor_position() != at
+        {
+            window.set_cursor_position(at);
+        }
+    }
+
+    fn send_touch(&mut self, phase: TouchPhase, id: u64, position: Vec2) {
+        let touch = TouchInput { phase, position, window: self.window(), force: None, id };
+        self.events.write(touch.into());
+        self.touch.write(touch);
     }
 }
 
@@ -125,7 +198,7 @@ pub struct VirtualGamepad {
 pub(super) fn connect_gamepads(
     agents: Query<(Entity, &Agent, &VirtualInput)>,
     pads: Query<(Entity, &VirtualGamepad)>,
-    mut messages: InputMessages,
+    mut messages: GamepadMessages,
     mut commands: Commands,
 ) {
     for (pad, owner) in &pads {
@@ -158,6 +231,11 @@ pub(super) struct GamepadMessages<'w, 's> {
 }
 
 impl GamepadMessages<'_, '_> {
+    fn send_connection(&mut self, pad: Entity, name: String) {
+        let connection = GamepadConnection::Connected { name, vendor_id: None, product_id: None };
+        self.send(GamepadConnectionEvent::new(pad, connection).into());
+    }
+
     /// Sends a message as a driver would: Bevy's own system reads it in its next run.
     pub fn send(&mut self, event: RawGamepadEvent) {
         self.send_part(&event);

@@ -12,7 +12,12 @@ use bevy_playbot::{
 };
 use playbot::prelude::*;
 use playbot_games::GAMES;
-use playbot_harness::{demo::verify_file, foreign::Restart, game::StateTools, games::Games};
+use playbot_harness::{
+    demo::verify_file,
+    foreign::{ForeignGame, Restart},
+    game::StateTools,
+    games::Games,
+};
 use playbot_learner::{Actions, PpoConfig, Prior, SkillDraw};
 use playbot_test::explore::{
     Exploration, ExploreError, ExplorePlan, ExploredCell, Explorer, Stop, Until, explore, follow_route, record_route,
@@ -234,4 +239,37 @@ fn plans_that_make_no_sense_are_refused() {
         let text = refused(&Cells, &wrong).to_string();
         assert!(text.contains(words), "`{words}` is missing in: {text}");
     }
+}
+
+/// The turn of a game in which actions take turns.
+#[derive(Resource)]
+struct Turn(u32);
+
+#[test]
+fn explorers_take_legal_actions_only() {
+    static LEGAL: AtomicU64 = AtomicU64::new(0);
+    static ILLEGAL: AtomicU64 = AtomicU64::new(0);
+    let game = |app: &mut App| {
+        app.insert_resource(Turn(0)).add_systems(Startup, |mut turn: ResMut<Turn>| turn.0 = 0).add_systems(
+            Update,
+            |keys: Res<ButtonInput<KeyCode>>, mut turn: ResMut<Turn>| {
+                let wanted = if turn.0.is_multiple_of(2) { KeyCode::KeyA } else { KeyCode::KeyB };
+                // Frames in which a level loads hold no key.
+                if keys.get_pressed().next().is_some() {
+                    let count = if keys.pressed(wanted) { &LEGAL } else { &ILLEGAL };
+                    count.fetch_add(1, Ordering::Relaxed);
+                    turn.0 += 1;
+                }
+            },
+        );
+    };
+    let game = ForeignGame::new("turns", 1, game)
+        .keys([vec![KeyCode::KeyA], vec![KeyCode::KeyB], vec![KeyCode::KeyC]])
+        .legal(|turn: Res<Turn>| [turn.0.is_multiple_of(2), !turn.0.is_multiple_of(2), false])
+        .observe(["turn"], |turn: Res<Turn>| [turn.0 as f32])
+        .time_limit(20)
+        .restart(Restart::Startup);
+    found(&game, &plan("default", 0, 200));
+    assert!(LEGAL.load(Ordering::Relaxed) > 50, "{LEGAL:?}");
+    assert_eq!(ILLEGAL.load(Ordering::Relaxed), 0);
 }

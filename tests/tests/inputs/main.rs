@@ -1,7 +1,10 @@
 //! Tests of the input of agents' actions, and of the actions of people's keys.
 
+mod clicks;
 mod foreign;
 mod foreign_managers;
 mod keyboard;
+mod legal;
 mod managers;
+mod pointers;
 mod virtual_input;

@@ -32,6 +32,7 @@ use bevy_playbot::{
     bot::with_noise,
     demo::file::{DemoHeader, DemoWriter},
     engine::{TickSchedules, is_tick},
+    legal::LegalActions,
     prelude::*,
     vision::{ObservationConfig, VisionError},
 };
@@ -139,11 +140,11 @@ impl ActionNoise {
     }
 }
 
-fn add_noise(mut agents: Query<(&Agent, &Episode, &mut ActionNoise, &mut Action)>) {
-    for (agent, episode, mut noise, mut action) in &mut agents {
+fn add_noise(mut agents: Query<(&Agent, &Episode, Option<&LegalActions>, &mut ActionNoise, &mut Action)>) {
+    for (agent, episode, legal, mut noise, mut action) in &mut agents {
         if episode.is_running() {
             let share = noise.noise;
-            action.0 = with_noise(action.0.clone(), &agent.actions, share, &mut noise.rng);
+            action.0 = with_noise(action.0.clone(), &agent.actions, legal, share, &mut noise.rng);
         }
     }
 }

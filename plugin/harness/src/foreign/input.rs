@@ -1,15 +1,100 @@
-//! The input of a foreign game's agent.
+//! The input of a foreign game's agent, and the mask of its actions.
 
-use crate::foreign::runtime::{playing_agent, with_foreign};
+use crate::foreign::{
+    ForeignGame,
+    runtime::{SystemFactory, playing_agent, with_foreign},
+};
 use bevy::prelude::*;
 use bevy_playbot::{
     action::{Action, ActionSpace},
     agent::{Agent, Control},
     bot::with_noise,
     key_bindings::KeyBindings,
+    legal::LegalActions,
     streams::AgentStreams,
-    virtual_input::{ActionAxis, HeldInput, UnknownInput, VirtualButton, VirtualInput},
+    systems::ObserveSchedule,
+    virtual_input::{ActionAxis, HeldInput, PointerPosition, UnknownInput, VirtualButton, VirtualInput},
 };
+
+impl ForeignGame {
+    /// Adds positions of the mouse cursor to discrete actions, in the order of the actions; `None` leaves the cursor
+    /// where it is. Mouse buttons of an action with a position are clicks: each tick presses them anew.
+    ///
+    /// A position outside of the window is a [`problem`](crate::game::Game::problem), or a fault of the first tick if
+    /// only this window is too small.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use bevy_playbot::virtual_input::PointerPosition;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// // One action for each cell of a board of 3 by 3, which fills the window.
+    /// let cells = |scale: f32| (0..9).map(move |cell| {
+    ///     let (column, row) = ((cell % 3) as f32, (cell / 3) as f32);
+    ///     Some(PointerPosition::fraction(scale * (column + 0.5), scale * (row + 0.5)))
+    /// });
+    /// let board = |scale: f32| {
+    ///     let game = ForeignGame::new("board", 1, |_: &mut App| {}).observe(["x"], || [0.0]);
+    ///     game.cursor(cells(scale)).mouse_buttons([[MouseButton::Left]; 9])
+    /// };
+    /// assert_eq!(board(1.0 / 3.0).problem(), None);
+    /// let problem = board(0.5).problem().expect("the last column lies outside");
+    /// assert!(problem.contains("fraction (1.25, 0.25) in action 2"), "{problem}");
+    /// ```
+    pub fn cursor(self, positions: impl IntoIterator<Item = impl Into<Option<PointerPosition>>>) -> Self {
+        self.with(|description| description.input.cursor = positions.into_iter().map(Into::into).collect())
+    }
+
+    /// Adds taps on the touch screen to discrete actions, in the order of the actions; `None` taps nowhere. The finger
+    /// is down in the tick of the action, and up before the next one. Positions are those of [`cursor`](Self::cursor).
+    pub fn taps(self, positions: impl IntoIterator<Item = impl Into<Option<PointerPosition>>>) -> Self {
+        self.with(|description| description.input.taps = positions.into_iter().map(Into::into).collect())
+    }
+
+    /// Adds discrete actions after all others, each of which clicks on a button of Bevy's UI. A button is named by its
+    /// text, by its `Name`, or by a path of `Name`s above it, such as `Options/Back`. It needs the feature `ui` of this
+    /// crate.
+    ///
+    /// The mouse cursor moves to the middle of the button, and the left mouse button goes down, and up before the next
+    /// tick. So `Interaction`, `ButtonInput<MouseButton>` and Bevy's picking see a person's click. Without a renderer
+    /// there is no layout, and only `Interaction` is set.
+    ///
+    /// A click has no effect if its button does not exist in this tick, is hidden, is disabled, or shares its name with
+    /// another one. `ButtonClicks` on the agent counts them. The log has a warning that names the buttons if two share
+    /// a name. It has another one if a button never existed in an episode that clicked on it.
+    pub fn clicks(self, buttons: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.with(|description| description.input.clicks = buttons.into_iter().map(Into::into).collect())
+    }
+
+    /// Declares the legal actions of each tick: one value for each discrete action, true if it is legal. Random bots,
+    /// the noise of demonstrators and explorers then draw among legal actions only. Policies do not know it yet, and
+    /// may choose any action. The system may run more than once in a tick, so it must change nothing.
+    ///
+    /// A mask that forbids every action, or that has another length, is a fault.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// #[derive(Resource)]
+    /// struct IsOpen(bool);
+    ///
+    /// let game = ForeignGame::new("door", 1, |app: &mut App| { app.insert_resource(IsOpen(false)); })
+    ///     .keys([vec![], vec![KeyCode::KeyE]])
+    ///     .observe(["open"], |open: Res<IsOpen>| [f32::from(u8::from(open.0))])
+    ///     .legal(|open: Res<IsOpen>| [true, open.0]);
+    /// assert_eq!(game.problem(), None);
+    /// ```
+    pub fn legal<Mask, M>(self, system: impl IntoSystem<(), Mask, M> + Clone + Send + Sync + 'static) -> Self
+    where
+        Mask: IntoIterator<Item = bool> + 'static,
+        M: 'static,
+    {
+        self.with(|description| {
+            description.legal = Some(SystemFactory::new(system, |mask: Mask| mask.into_iter().collect()));
+        })
+    }
+}
 
 /// The parts of the path from an action into the game, set in any order.
 #[derive(Clone, Default)]
@@ -22,6 +107,12 @@ pub(super) struct Input {
     pub(super) mouse: Vec<Vec<MouseButton>>,
     /// The gamepad buttons of each discrete action.
     pub(super) pads: Vec<Vec<GamepadButton>>,
+    /// The position of the mouse cursor in each discrete action.
+    pub(super) cursor: Vec<Option<PointerPosition>>,
+    /// The tap on the touch screen in each discrete action.
+    pub(super) taps: Vec<Option<PointerPosition>>,
+    /// The buttons of Bevy's UI that further actions click on, after those above.
+    pub(super) clicks: Vec<String>,
     /// The axis that each value of a continuous action moves.
     pub(super) axes: Option<Vec<ActionAxis>>,
     /// The complete input, if it was set as a whole.
@@ -61,9 +152,20 @@ impl Input {
         self.space.or_else(pressed).unwrap_or(ActionSpace::Discrete(0))
     }
 
-    /// Returns the input that the parts press together; `None` for a game in which nothing is pressed.
+    /// Returns the input that the parts press together; `None` for a game in which nothing is pressed. Clicks on the UI
+    /// press nothing yet: each tick aims them anew.
     pub(super) fn pressed(&self) -> Option<VirtualInput> {
-        let is_discrete = !(self.keys.is_empty() && self.mouse.is_empty() && self.pads.is_empty());
+        let Some(held) = self.held() else {
+            let nothing = self.clicks.iter().map(|_| HeldInput::default());
+            return (!self.clicks.is_empty()).then(|| VirtualInput::discrete(nothing));
+        };
+        Some(held.and_actions(self.clicks.iter().map(|_| HeldInput::default())))
+    }
+
+    /// Returns the input of all actions but clicks on the UI.
+    fn held(&self) -> Option<VirtualInput> {
+        let is_pointed = !(self.cursor.is_empty() && self.taps.is_empty());
+        let is_discrete = is_pointed || !(self.keys.is_empty() && self.mouse.is_empty() && self.pads.is_empty());
         let base = match (&self.whole, &self.axes) {
             (Some(whole), _) => whole.clone(),
             (None, Some(axes)) => VirtualInput::axes(axes.iter().cloned()),
@@ -71,7 +173,10 @@ impl Input {
             (None, None) => return None,
         };
         match base.space() {
-            ActionSpace::Discrete(_) => Some(base.mouse_buttons(self.mouse.clone()).gamepad_buttons(self.pads.clone())),
+            ActionSpace::Discrete(_) => {
+                let buttons = base.mouse_buttons(self.mouse.clone()).gamepad_buttons(self.pads.clone());
+                Some(buttons.cursor(self.cursor.clone()).taps(self.taps.clone()))
+            }
             ActionSpace::Continuous(_) => Some(base),
         }
     }
@@ -88,15 +193,56 @@ impl Input {
         if said.len() > 1 {
             return Some(format!("has {}, and each of them declares every action: keep one", said.join(" and ")));
         }
-        let buttons = if self.mouse.is_empty() { "`.gamepad_buttons`" } else { "`.mouse_buttons`" };
-        let has_buttons = !(self.mouse.is_empty() && self.pads.is_empty());
-        let is_continuous = matches!(self.pressed()?.space(), ActionSpace::Continuous(_));
-        (has_buttons && is_continuous).then(|| {
+        if let Some(problem) = self.problem_of_clicks() {
+            return Some(problem);
+        }
+        let pressed = self.pressed()?;
+        if let Some((action, position)) = pressed.impossible_position() {
+            return Some(format!(
+                "points at {position} in action {action}, outside of any window: positions are logical pixels from the \
+                 top left corner, or fractions from 0 to below 1"
+            ));
+        }
+        let discrete = [
+            ("`.mouse_buttons`", !self.mouse.is_empty()),
+            ("`.gamepad_buttons`", !self.pads.is_empty()),
+            ("`.cursor`", !self.cursor.is_empty()),
+            ("`.taps`", !self.taps.is_empty()),
+            ("`.clicks`", !self.clicks.is_empty()),
+        ];
+        let (part, _) = discrete.into_iter().find(|(_, is_said)| *is_said)?;
+        let is_continuous = matches!(pressed.space(), ActionSpace::Continuous(_));
+        is_continuous.then(|| {
             format!(
-                "has {buttons}, which belong to discrete actions, and continuous ones: buttons of these are \
+                "has {part}, which belong to discrete actions, and continuous ones: buttons of these are \
                  `ActionAxis::buttons` in `.axes`"
             )
         })
+    }
+
+    /// Returns the problem of the clicks on the UI.
+    fn problem_of_clicks(&self) -> Option<String> {
+        if self.clicks.is_empty() {
+            return None;
+        }
+        if self.space.is_some() {
+            return Some("has `.clicks` and `.actions`, and the latter declares every action: keep one".to_owned());
+        }
+        if self.clicks.iter().any(|name| name.trim().is_empty()) {
+            return Some("has `.clicks` with an empty name: give the text or the `Name` of a button".to_owned());
+        }
+        (!cfg!(feature = "ui"))
+            .then(|| "has `.clicks`, which needs the feature `ui` of `playbot`: build with it".to_owned())
+    }
+
+    /// Returns the number of the first action that clicks on the UI, and the names of the buttons.
+    #[cfg(feature = "ui")]
+    pub(super) fn clicked(&self) -> (usize, &[String]) {
+        let others = match self.held().map(|held| held.space()) {
+            Some(ActionSpace::Discrete(others)) => others,
+            _ => 0,
+        };
+        (others, &self.clicks)
     }
 
     /// Returns the names that were set, or those of the keys.
@@ -105,8 +251,10 @@ impl Input {
             [] => "nothing".to_owned(),
             keys => keys.iter().map(VirtualButton::to_string).collect::<Vec<_>>().join("+"),
         };
-        let is_of_keys = self.names.is_empty() && self.space() == ActionSpace::Discrete(self.keys.len());
-        if is_of_keys { self.keys.iter().map(of_keys).collect() } else { self.names.clone() }
+        let of_clicks = self.clicks.iter().map(|name| format!("click {name}"));
+        let named = self.keys.len() + self.clicks.len();
+        let is_of_keys = self.names.is_empty() && self.space() == ActionSpace::Discrete(named);
+        if is_of_keys { self.keys.iter().map(of_keys).chain(of_clicks).collect() } else { self.names.clone() }
     }
 
     /// Returns the keys of a person: for games that are played with keys alone.
@@ -156,7 +304,24 @@ pub(super) fn decide(world: &mut World) {
     let Some(planned) = planned else { return };
     let mut entity = world.entity_mut(agent);
     let Some(space) = entity.get::<Agent>().map(|agent| agent.actions) else { return };
+    let legal = entity.get::<LegalActions>().cloned();
     let Some(mut streams) = entity.get_mut::<AgentStreams>() else { return };
-    let chosen = with_noise(planned, &space, noise, &mut streams.action);
+    let chosen = with_noise(planned, &space, legal.as_ref(), noise, &mut streams.action);
     entity.insert(Action(chosen));
+}
+
+/// Adds the system that keeps the mask of the agent's actions up to date.
+pub(super) fn add_mask(app: &mut App) {
+    app.add_systems(ObserveSchedule, mask);
+}
+
+fn mask(world: &mut World) {
+    let Some(agent) = playing_agent(world) else { return };
+    let legal = with_foreign(world, agent, |world, foreign| match &mut foreign.legal {
+        Some(system) => system.demand(world).map(Some),
+        None => Ok(None),
+    });
+    if let Some(legal) = legal.flatten() {
+        world.entity_mut(agent).insert(LegalActions::new(legal));
+    }
 }

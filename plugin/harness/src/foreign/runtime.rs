@@ -82,6 +82,7 @@ pub(super) struct Foreign {
     pub(super) loaded: Option<OwnedSystem<()>>,
     pub(super) restart: Option<OwnedSystem<()>>,
     pub(super) act: Option<OwnedSystem<()>>,
+    pub(super) legal: Option<OwnedSystem<Vec<bool>>>,
     pub(super) bot: Option<OwnedSystem<ActionValue>>,
     pub(super) hash: Option<OwnedSystem<u64>>,
     /// The World before the game started.
@@ -123,6 +124,7 @@ impl Foreign {
             loaded: description.loaded.as_ref().map(|system| system.make()),
             restart,
             act: description.act.as_ref().map(|system| system.make()),
+            legal: description.legal.as_ref().map(|system| system.make()),
             bot: description.demonstrator.as_ref().map(|(_, system)| system.make()),
             hash: description.hash.as_ref().map(|system| system.make()),
             game: game.clone(),

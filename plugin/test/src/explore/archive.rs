@@ -11,6 +11,7 @@ use bevy_playbot::{
     bot::uniform,
     demo::replay::Divergence,
     episode::{Episode, EpisodeResult},
+    legal::{LegalActions, RedrawsIllegal},
     level::LevelQueue,
     skill_prior::ActiveSkill,
     state_hash::StateHash,
@@ -18,7 +19,7 @@ use bevy_playbot::{
 };
 use playbot_learner::{
     ActionSpace, Streams,
-    rng::{ChaCha8Rng, unit},
+    rng::{ChaCha8Rng, below, unit},
 };
 use std::{collections::BTreeMap, iter};
 
@@ -226,6 +227,8 @@ pub(super) struct Visit {
     last: Option<ActionValue>,
     /// The next action.
     next: Option<ActionValue>,
+    /// The random number that replaces the next action if it is illegal, for games with masks.
+    redraw: Option<u32>,
     /// Whether the goal was reached on the path back.
     was_solved: bool,
 }
@@ -238,6 +241,7 @@ impl Visit {
         }
         // The streams of replays, for games that draw from the streams of their agents.
         agent.insert((Control::Bot, LevelQueue::Always(level), AgentStreams::new(0, 0)));
+        agent.remove::<RedrawsIllegal>();
         let destination = job.destination.clone();
         let sight = Sight { ticks: destination.path.ticks, is_over: false, is_passed: destination.is_passed };
         let here = destination.cell.clone().map(|cell| (cell, sight));
@@ -246,7 +250,19 @@ impl Visit {
         let visited = Visited { destination, piece, seen, solved: None, steps: 0, end: None };
         let rng = draws.streams.stream("explore", job.number);
         let (ticks, left) = (0, job.patience);
-        Self { level, job, visited, ticks, left, position: None, rng, last: None, next: None, was_solved: false }
+        Self {
+            level,
+            job,
+            visited,
+            ticks,
+            left,
+            position: None,
+            rng,
+            last: None,
+            next: None,
+            redraw: None,
+            was_solved: false,
+        }
     }
 
     /// Sets the agent's next action, or lets the policy decide.
@@ -264,9 +280,16 @@ impl Visit {
             // Drawn once, even if the level takes several ticks to load.
             let action = match self.next.take() {
                 Some(action) => action,
-                None => self.draw(draws),
+                None => {
+                    // The mask of the tick is not known yet.
+                    self.redraw = agent.contains::<LegalActions>().then(|| below(&mut self.rng, 1 << 32) as u32);
+                    self.draw(draws)
+                }
             };
             agent.insert(Action(action.clone()));
+            if let Some(random) = self.redraw {
+                agent.insert(RedrawsIllegal { random });
+            }
             self.next = Some(action);
         }
     }

@@ -3,10 +3,11 @@
 use bevy::{
     input::mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll, MouseMotion},
     prelude::*,
+    window::PrimaryWindow,
 };
 use bevy_playbot::{
     prelude::*,
-    virtual_input::{ActionAxis, InputRoute, VirtualInput},
+    virtual_input::{ActionAxis, InputRoute, PointerPosition, VirtualInput},
 };
 
 use super::scripted::{STEP, Script, actions, app_with, frames_of};
@@ -92,4 +93,45 @@ fn two_agents_that_claim_one_motion_are_a_fault_that_names_both() {
     let other = VirtualInput::axes([ActionAxis::mouse_y(1.0), ActionAxis::wheel(1.0)]);
     let fault = second(mouse(), other, vec![ActionValue::Continuous(vec![0.0, 0.0])]);
     assert!(fault.contains("agents 0 and 4 both claim WheelY"), "{fault}");
+}
+
+/// The cursor, and whether the left button was pressed just now, in each tick.
+#[derive(Resource, Default)]
+struct Clicks(Vec<(Option<Vec2>, bool)>);
+
+#[test]
+fn each_fixed_tick_sees_its_own_click() {
+    let [left, right] = [PointerPosition::fraction(0.25, 0.5), PointerPosition::pixels(900.0, 10.0)];
+    let input = VirtualInput::keys([[]; 3])
+        .mouse_buttons([vec![], vec![MouseButton::Left], vec![MouseButton::Left]])
+        .cursor([None, Some(left), Some(right)]);
+    let (mut app, _) = app_with(InputRoute::Direct, input, actions(&[1, 2, 0]));
+    app.world_mut().spawn((Window::default(), PrimaryWindow));
+    let note = |window: Single<&Window>, buttons: Res<ButtonInput<MouseButton>>, mut clicks: ResMut<Clicks>| {
+        clicks.0.push((window.cursor_position(), buttons.just_pressed(MouseButton::Left)));
+    };
+    app.init_resource::<Clicks>().add_systems(FixedUpdate, note.ambiguous_with_all());
+    frames_of(&mut app, STEP * 3);
+    app.update();
+    let [left, right] = [Vec2::new(320.0, 360.0), Vec2::new(900.0, 10.0)];
+    let expected = [(Some(left), true), (Some(right), true), (Some(right), false)];
+    assert_eq!(app.world().resource::<Clicks>().0, expected);
+}
+
+#[test]
+fn two_agents_that_claim_the_cursor_are_a_fault_that_names_both() {
+    let at = |x: f32| VirtualInput::keys([vec![]]).cursor([Some(PointerPosition::pixels(x, 1.0))]);
+    let (mut app, _) = app_with(InputRoute::Direct, at(1.0), actions(&[0]));
+    app.world_mut().spawn((Window::default(), PrimaryWindow));
+    app.world_mut().spawn((Agent::new(4, ActionSpace::Discrete(1)), at(2.0), Control::Policy));
+    let fault = app.tick().expect_err("both claim it").to_string();
+    assert!(fault.contains("agents 0 and 4 both claim the mouse cursor"), "{fault}");
+}
+
+#[test]
+fn a_position_in_an_app_without_a_window_is_a_fault() {
+    let input = VirtualInput::keys([vec![]]).cursor([Some(PointerPosition::pixels(1.0, 1.0))]);
+    let (mut app, _) = app_with(InputRoute::Direct, input, actions(&[0]));
+    let fault = app.tick().expect_err("there is no window").to_string();
+    assert!(fault.contains("pixel (1, 1)") && fault.contains("no primary window"), "{fault}");
 }

@@ -1,0 +1,350 @@
+//! Clicks on buttons of Bevy's UI.
+
+use crate::foreign::{
+    ForeignGame,
+    input::Input,
+    runtime::{ForeignCell, playing_agent},
+};
+use bevy::{
+    camera::RenderTarget,
+    input::InputSystems,
+    prelude::*,
+    ui::{
+        ComputedNode, ComputedUiRenderTargetInfo, ComputedUiTargetCamera, InteractionDisabled, UiGlobalTransform,
+        UiSystems,
+    },
+    window::{PrimaryWindow, WindowRef},
+};
+use bevy_playbot::{
+    action::Action,
+    agent::Control,
+    engine::{Renewal, TickSchedules, check_actions, panics::note_actions},
+    episode::EpisodeEnded,
+    systems::PlaybotSystems,
+    unknown_name::nearest,
+    virtual_input::{HeldInput, PointerPosition, PressSystems, VirtualInput},
+};
+
+/// The clicks of an agent's actions on buttons of Bevy's UI, counted from its first episode on.
+#[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Clone, Debug, Default, PartialEq)]
+pub struct ButtonClicks {
+    game: String,
+    clicked: u32,
+    missed: u32,
+    warnings: Vec<String>,
+    /// Buttons that were clicked on in this episode, and never existed then.
+    absent: Vec<String>,
+    /// Buttons that were clicked on in this episode, and existed.
+    present: Vec<String>,
+    /// Names of the buttons that existed at the last click that missed.
+    others: Vec<String>,
+    /// The button whose `Interaction` is set in this frame, for want of a layout.
+    next: Option<Entity>,
+    /// The button whose `Interaction` was set in the last frame.
+    down: Option<Entity>,
+}
+
+impl ButtonClicks {
+    /// Returns the number of clicks on a button that was there.
+    pub fn clicked(&self) -> u32 {
+        self.clicked
+    }
+
+    /// Returns the number of clicks without effect: the button did not exist, was hidden or disabled, or shared its
+    /// name with another one.
+    pub fn missed(&self) -> u32 {
+        self.missed
+    }
+
+    /// Returns the warnings about names, each once.
+    pub fn warnings(&self) -> &[String] {
+        &self.warnings
+    }
+
+    fn warn(&mut self, warning: String) {
+        if !self.warnings.contains(&warning) {
+            tracing::warn!("{warning}");
+            self.warnings.push(warning);
+        }
+    }
+
+    /// Counts a click on the button of this name.
+    fn note(&mut self, name: &str, found: &Found) {
+        match found {
+            Found::One(_) => self.clicked += 1,
+            Found::Unreachable | Found::Missing(_) | Found::Several(_) => self.missed += 1,
+        }
+        match found {
+            Found::Missing(others) => {
+                self.others.clone_from(others);
+                if !self.present.iter().chain(&self.absent).any(|known| known == name) {
+                    self.absent.push(name.to_owned());
+                }
+            }
+            Found::One(_) | Found::Unreachable | Found::Several(_) => {
+                self.absent.retain(|absent| absent != name);
+                if !self.present.iter().any(|present| present == name) {
+                    self.present.push(name.to_owned());
+                }
+            }
+        }
+        if let Found::Several(paths) = found {
+            let paths: Vec<String> = paths.iter().map(|path| format!("`{path}`")).collect();
+            self.warn(format!(
+                "the game `{}`: {} buttons are called `{name}`, so a click on it has no effect: name one of them in \
+                 `.clicks` by a path of `Name`s. There are {}",
+                self.game,
+                paths.len(),
+                paths.join(", ")
+            ));
+        }
+    }
+
+    /// Warns about buttons that never existed in the episode that ends.
+    fn end_episode(&mut self) {
+        self.present.clear();
+        let others = std::mem::take(&mut self.others);
+        for name in std::mem::take(&mut self.absent) {
+            let known: Vec<&str> = others.iter().map(String::as_str).collect();
+            let near = nearest(&name, &known).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
+            let there = match known.as_slice() {
+                [] => "There was no button".to_owned(),
+                known => format!("There was `{}`", known.join("`, `")),
+            };
+            self.warn(format!(
+                "the game `{}`: in a whole episode there was no button `{name}` whenever an action of `.clicks` clicked \
+                 on it{near}. {there}",
+                self.game
+            ));
+        }
+    }
+}
+
+/// Gives the agent its counts, if the game has clicks.
+pub(super) fn equip(agent: &mut EntityWorldMut, game: &ForeignGame) {
+    if game.description.input.clicks.is_empty() {
+        return;
+    }
+    agent.insert(ButtonClicks { game: game.description.name.to_owned(), ..ButtonClicks::default() });
+}
+
+/// Adds the systems that click, if the game has clicks.
+pub(super) fn add_clicks(app: &mut App, input: &Input) {
+    if input.clicks.is_empty() {
+        return;
+    }
+    let decide = TickSchedules::of(app).decide;
+    app.add_systems(
+        decide,
+        // No other system changes the inputs of the agent's actions.
+        aim.in_set(PlaybotSystems::Act)
+            .after(check_actions)
+            .after(note_actions)
+            .before(PressSystems)
+            .ambiguous_with(PlaybotSystems::Act),
+    )
+    .add_systems(PreUpdate, set_interactions.after(InputSystems).after(UiSystems::Focus))
+    .add_observer(end_episode);
+}
+
+fn end_episode(event: On<EpisodeEnded>, mut agents: Query<&mut ButtonClicks>, mut buttons: Query<&mut Interaction>) {
+    let Ok(mut clicks) = agents.get_mut(event.entity) else { return };
+    clicks.end_episode();
+    // In the next episode it may be another entity, in a World that is built anew.
+    if let Some(mut interaction) = clicks.down.take().and_then(|button| buttons.get_mut(button).ok()) {
+        *interaction = Interaction::None;
+    }
+}
+
+/// Aims the click of this tick's action at its button.
+fn aim(world: &mut World) {
+    let Some(agent) = playing_agent(world) else { return };
+    if world.get(agent) == Some(&Control::Human) {
+        return;
+    }
+    // The counts of this agent outlive a World that is built anew.
+    Renewal::carry_component::<ButtonClicks>(world);
+    let Some(game) = world.get_resource::<ForeignCell>().map(|cell| cell.lock().game.clone()) else { return };
+    let (first, names) = game.description.input.clicked();
+    let action = world.get::<Action>(agent).and_then(Action::discrete);
+    let chosen = action.and_then(|action| (action as usize).checked_sub(first)).filter(|&number| number < names.len());
+    let mut held = HeldInput::default();
+    if let Some(number) = chosen {
+        let found = find(world, &names[number]);
+        if let Some(mut clicks) = world.get_mut::<ButtonClicks>(agent) {
+            clicks.note(&names[number], &found);
+            match found {
+                Found::One(Target::At(position)) => held = held.click(position, MouseButton::Left),
+                Found::One(Target::Interaction(button)) => clicks.next = Some(button),
+                Found::Unreachable | Found::Missing(_) | Found::Several(_) => {}
+            }
+        }
+    }
+    if let Some(mut input) = world.get_mut::<VirtualInput>(agent) {
+        for number in 0..names.len() {
+            let held = if chosen == Some(number) { held.clone() } else { HeldInput::default() };
+            input.set_action(first + number, held);
+        }
+    }
+}
+
+/// Sets `Interaction` for a frame where there is no layout. Bevy's own system sets it otherwise.
+fn set_interactions(mut agents: Query<&mut ButtonClicks>, mut buttons: Query<&mut Interaction>) {
+    for mut clicks in &mut agents {
+        if clicks.down.is_none() && clicks.next.is_none() {
+            continue;
+        }
+        if let Some(button) = clicks.down.take()
+            && let Ok(mut interaction) = buttons.get_mut(button)
+        {
+            *interaction = Interaction::None;
+        }
+        if let Some(button) = clicks.next.take()
+            && let Ok(mut interaction) = buttons.get_mut(button)
+        {
+            *interaction = Interaction::Pressed;
+            clicks.down = Some(button);
+        }
+    }
+}
+
+/// The result of a search for a button.
+#[derive(Debug, PartialEq)]
+enum Found {
+    One(Target),
+    /// Hidden, disabled, outside of the window, or in another one.
+    Unreachable,
+    /// The paths of all buttons.
+    Missing(Vec<String>),
+    /// The paths of those that share the name.
+    Several(Vec<String>),
+}
+
+/// The way in which a button is clicked on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Target {
+    /// The mouse, at this position.
+    At(PointerPosition),
+    /// Its `Interaction` alone, for want of a layout.
+    Interaction(Entity),
+}
+
+/// Finds the button of this name. Buttons that cannot be clicked on do not make a name ambiguous.
+fn find(world: &mut World, name: &str) -> Found {
+    let mut nodes = world.query_filtered::<(Entity, Has<Interaction>), With<Node>>();
+    let nodes: Vec<(Entity, bool)> = nodes.iter(world).collect();
+    let mut windows = world.query_filtered::<(Entity, &Window), With<PrimaryWindow>>();
+    let windows = windows.single(world).ok().map(|(entity, window)| (entity, window.size(), window.scale_factor()));
+    let world: &World = world;
+    let buttons = || nodes.iter().filter(|(_, is_button)| *is_button).map(|(entity, _)| *entity);
+    let mut meant: Vec<Entity> = buttons().filter(|&button| is_called(world, button, name)).collect();
+    if meant.is_empty() {
+        // Some buttons have no `Interaction`, such as those of `bevy_ui_widgets`. Their texts may be any text.
+        let has_name = |&entity: &Entity| world.get::<Name>(entity).is_some() && is_called(world, entity, name);
+        meant = nodes.iter().map(|(entity, _)| *entity).filter(has_name).collect();
+    }
+    let paths = |entities: &mut dyn Iterator<Item = Entity>| {
+        let mut paths: Vec<String> = entities.map(|entity| path(world, entity)).collect();
+        paths.sort();
+        paths
+    };
+    if meant.is_empty() {
+        return Found::Missing(paths(&mut buttons()));
+    }
+    let reachable = meant.iter().filter_map(|&button| Some((button, target(world, button, windows)?)));
+    let reachable: Vec<(Entity, Target)> = reachable.collect();
+    match reachable.as_slice() {
+        [] => Found::Unreachable,
+        [(_, target)] => Found::One(*target),
+        several => Found::Several(paths(&mut several.iter().map(|(button, _)| *button))),
+    }
+}
+
+/// Returns whether a name means this button: its text, its `Name`, or a path of `Name`s above it.
+fn is_called(world: &World, button: Entity, name: &str) -> bool {
+    if is_labelled(world, button, name) {
+        return true;
+    }
+    let Some((above, own)) = name.rsplit_once('/') else { return false };
+    if !is_labelled(world, button, own) {
+        return false;
+    }
+    let mut above = above.rsplit('/').peekable();
+    for ancestor in ancestors(world, button) {
+        let Some(wanted) = above.peek() else { break };
+        if world.get::<Name>(ancestor).is_some_and(|name| name.as_str() == *wanted) {
+            above.next();
+        }
+    }
+    above.peek().is_none()
+}
+
+fn is_labelled(world: &World, button: Entity, label: &str) -> bool {
+    world.get::<Name>(button).is_some_and(|name| name.as_str() == label) || text(world, button) == label.trim()
+}
+
+/// Returns the path of a button, for messages: the `Name`s above it and its own, or its text.
+fn path(world: &World, button: Entity) -> String {
+    let name = |entity: Entity| world.get::<Name>(entity).map(|name| name.as_str().to_owned());
+    let mut parts: Vec<String> = ancestors(world, button).filter_map(name).collect();
+    parts.reverse();
+    let text = text(world, button);
+    let own = if text.is_empty() { name(button) } else { Some(text) };
+    parts.push(own.unwrap_or_else(|| button.to_string()));
+    parts.join("/")
+}
+
+fn ancestors(world: &World, entity: Entity) -> impl Iterator<Item = Entity> + '_ {
+    std::iter::successors(Some(entity), move |&entity| world.get::<ChildOf>(entity).map(ChildOf::parent)).skip(1)
+}
+
+/// Returns the texts in a button, from first to last.
+fn text(world: &World, entity: Entity) -> String {
+    let mut all = String::new();
+    add_text(world, entity, &mut all);
+    all.trim().to_owned()
+}
+
+fn add_text(world: &World, entity: Entity, all: &mut String) {
+    if let Some(text) = world.get::<Text>(entity) {
+        all.push(' ');
+        all.push_str(text.0.trim());
+    } else if let Some(span) = world.get::<TextSpan>(entity) {
+        all.push_str(&span.0);
+    }
+    for &child in world.get::<Children>(entity).into_iter().flatten() {
+        add_text(world, child, all);
+    }
+}
+
+/// Returns the way to click on a button, if a person could; `window` is the primary one, with its logical size and its
+/// scale.
+fn target(world: &World, button: Entity, window: Option<(Entity, Vec2, f32)>) -> Option<Target> {
+    let is_hidden = world.get::<InheritedVisibility>(button).is_some_and(|visibility| !visibility.get());
+    let is_folded = |entity: Entity| world.get::<Node>(entity).is_some_and(|node| node.display == Display::None);
+    let is_gone = is_hidden || is_folded(button) || ancestors(world, button).any(is_folded);
+    if is_gone || world.get::<InteractionDisabled>(button).is_some() {
+        return None;
+    }
+    let info = world.get::<ComputedUiRenderTargetInfo>(button).copied().unwrap_or_default();
+    let camera = world.get::<ComputedUiTargetCamera>(button).and_then(ComputedUiTargetCamera::get);
+    let (true, Some(camera)) = (info.physical_size().min_element() > 0, camera) else {
+        return world.get::<Interaction>(button).map(|_| Target::Interaction(button));
+    };
+    let (entity, size, scale) = window?;
+    let is_shown = match world.get::<RenderTarget>(camera) {
+        Some(RenderTarget::Window(WindowRef::Primary)) => true,
+        Some(RenderTarget::Window(WindowRef::Entity(other))) => *other == entity,
+        // Pictures for agents are drawn into images, and Bevy finds no cursor there.
+        _ => return world.get::<Interaction>(button).map(|_| Target::Interaction(button)),
+    };
+    let is_empty = world.get::<ComputedNode>(button).is_none_or(ComputedNode::is_empty);
+    if !is_shown || is_empty {
+        return None;
+    }
+    let corner = world.get::<Camera>(camera).and_then(Camera::physical_viewport_rect).map_or(UVec2::ZERO, |it| it.min);
+    let middle = world.get::<UiGlobalTransform>(button)?.translation + corner.as_vec2();
+    let position = PointerPosition::Pixels(middle / scale);
+    position.within(size).map(|_| Target::At(position))
+}

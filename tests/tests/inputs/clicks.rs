@@ -1,0 +1,202 @@
+//! Tests of actions that click on buttons of Bevy's UI.
+
+use bevy::{
+    input::{ButtonState, mouse::MouseButtonInput},
+    prelude::*,
+    ui::InteractionDisabled,
+    window::{PrimaryWindow, WindowEvent},
+};
+use bevy_playbot::virtual_input::ActionAxis;
+use playbot::prelude::*;
+use playbot_harness::{
+    foreign::{ButtonClicks, ForeignGame},
+    worlds::build_world,
+};
+
+/// The names of the buttons that the game has seen pressed.
+#[derive(Resource, Default)]
+struct Presses(Vec<String>);
+
+/// The events of the mouse that Bevy's picking reads.
+#[derive(Resource, Default)]
+struct MouseEvents(Vec<&'static str>);
+
+fn button(name: &'static str, text: &'static str) -> impl Bundle {
+    let node = Node { width: Val::Px(200.0), height: Val::Px(50.0), ..default() };
+    (Button, Name::new(name), node, children![Text::new(text)])
+}
+
+/// Spawns a row of buttons. `Start` covers the pixels from (0, 0) to (200, 50), and two others have the text `Back`.
+fn build_menu(mut commands: Commands) {
+    let whole = Node { width: Val::Percent(100.0), height: Val::Percent(100.0), ..default() };
+    commands.spawn((
+        whole,
+        children![
+            button("StartButton", "Start"),
+            (Node::default(), Name::new("Options"), children![button("OptionsBack", "Back")]),
+            (Node::default(), Name::new("Credits"), children![button("CreditsBack", "Back")]),
+            (Node::default(), Visibility::Hidden, children![button("HiddenButton", "Secret")]),
+            (button("OffButton", "Off"), InteractionDisabled),
+        ],
+    ));
+}
+
+fn note_presses(buttons: Query<(&Interaction, &Name), Changed<Interaction>>, mut presses: ResMut<Presses>) {
+    let pressed = buttons.iter().filter(|(interaction, _)| **interaction == Interaction::Pressed);
+    presses.0.extend(pressed.map(|(_, name)| name.to_string()));
+}
+
+fn note_events(mut events: MessageReader<WindowEvent>, mut seen: ResMut<MouseEvents>) {
+    seen.0.extend(events.read().filter_map(|event| match event {
+        WindowEvent::CursorMoved(_) => Some("moved"),
+        WindowEvent::MouseButtonInput(MouseButtonInput { state: ButtonState::Pressed, .. }) => Some("down"),
+        WindowEvent::MouseButtonInput(_) => Some("up"),
+        _ => None,
+    }));
+}
+
+/// The menu, without a camera, so that nothing lays it out.
+fn bare_menu(app: &mut App) {
+    app.init_resource::<Presses>()
+        .init_resource::<MouseEvents>()
+        .add_systems(Startup, build_menu)
+        .add_systems(Update, (note_presses, note_events));
+}
+
+fn menu(app: &mut App) {
+    bare_menu(app);
+    app.add_systems(Startup, |mut commands: Commands| {
+        commands.spawn(Camera2d);
+    });
+}
+
+fn game(menu: fn(&mut App)) -> ForeignGame {
+    ForeignGame::new("menu", 1, menu).observe(["nothing"], || [0.0])
+}
+
+/// Plays these actions, one in each tick.
+fn played(game: &ForeignGame, actions: &[u32]) -> (World, Entity) {
+    assert_eq!(game.problem(), None);
+    let (mut world, agents) = build_world(game, "default", 0, 0, 1);
+    world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(0)));
+    for &action in actions {
+        world.entity_mut(agents[0]).insert(Action(ActionValue::Discrete(action)));
+        world.tick().expect("sound");
+    }
+    (world, agents[0])
+}
+
+fn pressed(world: &World) -> &[String] {
+    &world.resource::<Presses>().0
+}
+
+fn counts(world: &World, agent: Entity) -> (u32, u32) {
+    let clicks = world.get::<ButtonClicks>(agent).expect("it clicks");
+    (clicks.clicked(), clicks.missed())
+}
+
+/// Returns the number of buttons that are pressed now.
+fn still_pressed(world: &mut World) -> usize {
+    let mut buttons = world.query::<&Interaction>();
+    buttons.iter(world).filter(|interaction| **interaction == Interaction::Pressed).count()
+}
+
+#[test]
+fn buttons_are_clicked_on_by_text_by_name_and_by_path() {
+    for menu in [menu as fn(&mut App), bare_menu] {
+        let game = game(menu).keys([Vec::<KeyCode>::new()]).clicks(["Start", "StartButton", "Options/Back"]);
+        assert_eq!(Game::actions(&game), ActionSpace::Discrete(4));
+        for (action, name) in [(1, "StartButton"), (2, "StartButton"), (3, "OptionsBack")] {
+            let (mut world, agent) = played(&game, &[action]);
+            assert_eq!(pressed(&world), [name], "action {action}");
+            assert_eq!((still_pressed(&mut world), counts(&world, agent)), (1, (1, 0)), "action {action}");
+        }
+    }
+}
+
+#[test]
+fn a_button_is_let_go_of_in_the_next_tick() {
+    for menu in [menu as fn(&mut App), bare_menu] {
+        let game = game(menu).keys([Vec::<KeyCode>::new()]).clicks(["Start"]);
+        let (mut world, _) = played(&game, &[1, 0]);
+        assert_eq!(pressed(&world).len(), 1);
+        assert_eq!(still_pressed(&mut world), 0);
+        assert!(!world.resource::<ButtonInput<MouseButton>>().pressed(MouseButton::Left));
+    }
+}
+
+#[test]
+fn each_tick_is_a_click_of_its_own() {
+    for menu in [menu as fn(&mut App), bare_menu] {
+        let (world, agent) = played(&game(menu).clicks(["Start", "Credits/Back"]), &[0, 0, 1, 0]);
+        assert_eq!(pressed(&world), ["StartButton", "StartButton", "CreditsBack", "StartButton"]);
+        assert_eq!(counts(&world, agent), (4, 0));
+    }
+}
+
+#[test]
+fn the_mouse_does_what_a_persons_does() {
+    let game = game(menu).keys([Vec::<KeyCode>::new()]).clicks(["Start"]);
+    let (mut world, _) = played(&game, &[1, 1, 0]);
+    assert_eq!(world.resource::<MouseEvents>().0, ["moved", "down", "up", "down", "up"]);
+    let mut windows = world.query_filtered::<&Window, With<PrimaryWindow>>();
+    let window = windows.single(&world).expect("one window");
+    assert_eq!(window.cursor_position(), Some(Vec2::new(100.0, 25.0)), "the middle of the button");
+}
+
+#[test]
+fn a_click_on_a_hidden_or_disabled_button_is_counted_and_has_no_effect() {
+    for name in ["Secret", "OffButton"] {
+        let (world, agent) = played(&game(menu).clicks([name]).time_limit(2), &[0, 0]);
+        assert_eq!(counts(&world, agent), (0, 2), "{name}");
+        assert!(pressed(&world).is_empty(), "{name}");
+        let clicks = world.get::<ButtonClicks>(agent).expect("it clicks");
+        assert!(clicks.warnings().is_empty(), "{name} exists: {:?}", clicks.warnings());
+    }
+}
+
+#[test]
+fn a_name_that_two_buttons_share_is_a_warning_that_names_both_paths() {
+    let (world, agent) = played(&game(menu).clicks(["Back"]), &[0, 0]);
+    assert_eq!(counts(&world, agent), (0, 2));
+    assert!(pressed(&world).is_empty());
+    let clicks = world.get::<ButtonClicks>(agent).expect("it clicks");
+    let [warning] = clicks.warnings() else { panic!("once: {:?}", clicks.warnings()) };
+    for part in ["`menu`", "2 buttons are called `Back`", "`Credits/Back`, `Options/Back`"] {
+        assert!(warning.contains(part), "`{part}` is missing in: {warning}");
+    }
+}
+
+#[test]
+fn a_button_that_never_existed_in_an_episode_is_a_warning_with_the_nearest_name() {
+    let game = game(menu).clicks(["Strat"]).time_limit(2);
+    let (world, agent) = played(&game, &[0]);
+    let warnings = |world: &World| world.get::<ButtonClicks>(agent).expect("it clicks").warnings().to_vec();
+    assert!(warnings(&world).is_empty(), "it may still appear");
+    let (world, _) = played(&game, &[0, 0]);
+    assert_eq!(counts(&world, agent), (0, 2));
+    let warnings = warnings(&world);
+    let [warning] = warnings.as_slice() else { panic!("once: {warnings:?}") };
+    for part in ["no button `Strat`", "did you mean `Start`?", "`Credits/Back`", "`Options/Back`"] {
+        assert!(warning.contains(part), "`{part}` is missing in: {warning}");
+    }
+}
+
+#[test]
+fn actions_that_click_are_named_after_their_buttons() {
+    let game = game(menu).keys([vec![], vec![KeyCode::Space]]).clicks(["Start"]);
+    assert_eq!(game.tools().input.action_names(), ["nothing", "Space", "click Start"]);
+    assert!(game.tools().input.key_bindings().is_none(), "keys alone do not play it");
+}
+
+#[test]
+fn clicks_that_contradict_other_settings_are_reported() {
+    let problem = |game: ForeignGame| game.problem().expect("they do not go together");
+    let text = problem(game(menu).clicks(["Start"]).actions(ActionSpace::Discrete(2), || {}));
+    assert!(text.contains("has `.clicks` and `.actions`") && text.contains("keep one"), "{text}");
+    let steer = [ActionAxis::keys([KeyCode::KeyA], [KeyCode::KeyD])];
+    let text = problem(game(menu).clicks(["Start"]).axes(steer));
+    assert!(text.contains("`menu` has `.clicks`, which belong to discrete actions"), "{text}");
+    let text = problem(game(menu).clicks(["Start", " "]));
+    assert!(text.contains("`.clicks` with an empty name"), "{text}");
+}
