@@ -155,6 +155,7 @@ mod tests {
         "FrameGate",
         "HeldAction",
         "MissingImages",
+        "MissingSet",
         "Observation",
         "PaintedVelocity",
         "PictureStack",

@@ -35,7 +35,7 @@
 //! ```
 
 use crate::{
-    agent::Control,
+    agent::{Agent, Control},
     episode::{Episode, Tick},
     fault::{Fault, Faults},
     panics,
@@ -85,6 +85,20 @@ pub fn set_fixed_step(app: &mut App, hz: f64) -> Duration {
 /// window limits the rate of drawing.
 pub fn set_frame_rate(app: &mut App, hz: f64) {
     app.insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(1.0 / hz)));
+    allow_whole_frames(app.world_mut());
+}
+
+/// Lets the game's clock advance by the whole length that [`set_frame_rate`] gives to frames. Bevy cuts
+/// steps of the clock that are longer than a limit, by default 250 ms.
+///
+/// [`set_frame_rate`] calls it. Call it again after plugins that insert a clock of their own.
+pub fn allow_whole_frames(world: &mut World) {
+    let Some(&TimeUpdateStrategy::ManualDuration(frame)) = world.get_resource() else { return };
+    if let Some(mut clock) = world.get_resource_mut::<Time<Virtual>>()
+        && clock.max_delta() < frame
+    {
+        clock.set_max_delta(frame);
+    }
 }
 
 /// Creates an app for games in which a frame is a tick, with all of Bevy but a screen. It has
@@ -146,6 +160,9 @@ pub fn tick_world(world: &mut World) -> Result<(), Fault> {
 /// Frames of a level under construction that do not wait for the clock.
 const QUICK_FRAMES: u32 = 60;
 
+/// Frames without a tick in which a game may let its clock stand or run slowly.
+const PATIENT_FRAMES: u32 = 600;
+
 /// Runs frames up to and including the next tick.
 fn run_frames(world: &mut World) -> Result<(), Fault> {
     let before = *world.resource::<Tick>();
@@ -153,6 +170,7 @@ fn run_frames(world: &mut World) -> Result<(), Fault> {
         world.insert_resource(before);
     }
     system_errors::clear();
+    let mut obstacle = None;
     for frame in 1.. {
         world.run_schedule(Main);
         world.clear_trackers();
@@ -160,12 +178,22 @@ fn run_frames(world: &mut World) -> Result<(), Fault> {
             world.resource_mut::<Faults>().report(failure);
         }
         world.resource_mut::<Faults>().take()?;
-        // The first run of the main schedule only starts the clock.
-        let waits = frame < 2 || is_loading(world);
-        if *world.resource::<Tick>() != before || !waits {
+        if *world.resource::<Tick>() != before {
             break;
         }
-        if frame > QUICK_FRAMES {
+        // The first run of the main schedule only starts the clock.
+        if frame < 2 {
+            continue;
+        }
+        if !is_loading(world) {
+            // A pause that the game ends by itself takes a few frames. Each of them without a tick would be played twice.
+            obstacle = slow_clock(world).or(obstacle);
+            match &obstacle {
+                None => break,
+                Some(why) if frame >= PATIENT_FRAMES => return Err(standstill(world, why)),
+                Some(_) => {}
+            }
+        } else if frame > QUICK_FRAMES {
             #[allow(
                 clippy::disallowed_methods,
                 reason = "what is loaded arrives by the clock; no tick passes meanwhile"
@@ -183,6 +211,35 @@ fn is_loading(world: &mut World) -> bool {
     }
     let mut agents = world.query::<(&Control, &Episode)>();
     agents.iter(world).any(|(control, episode)| control.is_active() && episode.is_loading())
+}
+
+/// Returns the reason why a frame may have no tick, if ticks are fixed steps of a clock that stands or runs slowly.
+fn slow_clock(world: &World) -> Option<String> {
+    let is_by_hand = !matches!(world.get_resource(), None | Some(TimeUpdateStrategy::Automatic));
+    if world.contains_resource::<FrameGate>() || !is_by_hand {
+        return None;
+    }
+    let clock = world.get_resource::<Time<Virtual>>()?;
+    let speed = clock.relative_speed_f64();
+    match clock.is_paused() {
+        true => Some("is paused".to_owned()),
+        false => (speed < 1.0).then(|| format!("runs at {speed} of its speed")),
+    }
+}
+
+/// Returns the fault of a game whose clock makes no fixed step any more.
+fn standstill(world: &mut World, why: &str) -> Fault {
+    let mut agents = world.query::<(&Agent, &Control, &Episode)>();
+    let active = agents.iter(world).filter(|(_, control, _)| control.is_active());
+    let first = active.min_by_key(|(agent, ..)| agent.index);
+    let (place, tick) = match first {
+        Some((agent, _, episode)) => (format!("{}: ", episode.moment(agent)), u64::from(episode.tick)),
+        None => (String::new(), world.resource::<Tick>().0),
+    };
+    Fault(format!(
+        "{place}no tick passes since tick {tick}: the game's clock (`Time<Virtual>`) {why}, and a tick is a fixed step of \
+         this clock; leave the clock alone, and pause the game by a state or a resource that its systems ask for"
+    ))
 }
 
 /// Methods that tick an app by hand.
@@ -277,4 +334,85 @@ fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
 #[cfg(not(feature = "window"))]
 fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
     plugins
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::level::LevelQueue;
+    use playbot_learner::ActionSpace;
+
+    /// Returns an app of fixed ticks, in which an agent plays level 7 and `system` runs in each of them.
+    fn app_with<M>(system: impl IntoScheduleConfigs<bevy::ecs::system::ScheduleSystem, M>) -> App {
+        let mut app = headless_app();
+        app.add_systems(FixedUpdate, system);
+        app.world_mut().spawn((Agent::new(0, ActionSpace::Discrete(2)), Control::Human, LevelQueue::Always(7)));
+        app
+    }
+
+    #[test]
+    fn frames_longer_than_a_quarter_of_a_second_count_in_full() {
+        let mut app = App::new();
+        app.add_plugins((TimePlugin, PlaybotPlugin { placement: TickPlacement::Frame }));
+        set_frame_rate(&mut app, 2.0);
+        app.ticks(20).expect("there is no agent");
+        assert_eq!(app.world().resource::<Time<Virtual>>().elapsed(), Duration::from_secs(10));
+    }
+
+    #[test]
+    fn short_frames_leave_the_limit_of_the_clock_alone() {
+        let mut app = App::new();
+        app.add_plugins(TimePlugin);
+        set_frame_rate(&mut app, 60.0);
+        assert_eq!(app.world().resource::<Time<Virtual>>().max_delta(), Duration::from_millis(250));
+    }
+
+    #[test]
+    fn a_paused_clock_is_a_fault_where_ticks_are_fixed_steps() {
+        let mut app = app_with(|episodes: Query<&Episode>, mut clock: ResMut<Time<Virtual>>| {
+            if episodes.iter().any(|episode| episode.tick == 2) {
+                clock.pause();
+            }
+        });
+        app.ticks(3).expect("the clock runs");
+        for _ in 0..2 {
+            let text = app.tick().expect_err("the clock is paused").to_string();
+            let place = "agent 0, level 7, tick 3: no tick passes since tick 3: ";
+            assert!(text.starts_with(place), "{text}");
+            assert!(text.contains("the game's clock (`Time<Virtual>`) is paused"), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_clock_of_speed_0_is_a_fault_where_ticks_are_fixed_steps() {
+        let mut app = app_with(|mut clock: ResMut<Time<Virtual>>| clock.set_relative_speed(0.0));
+        app.tick().expect("the clock runs");
+        let text = app.tick().expect_err("the clock stands").to_string();
+        assert!(text.contains("since tick 1: the game's clock (`Time<Virtual>`) runs at 0 of its speed"), "{text}");
+    }
+
+    #[test]
+    fn slow_motion_takes_more_frames_for_each_fixed_tick() {
+        let mut app = app_with(|mut clock: ResMut<Time<Virtual>>| clock.set_relative_speed(0.25));
+        for tick in 1..=9 {
+            app.tick().expect("the clock runs");
+            assert_eq!(*app.world().resource::<Tick>(), Tick(tick));
+        }
+    }
+
+    #[test]
+    fn a_pause_that_the_game_ends_by_itself_is_no_fault() {
+        let mut app = app_with(|mut clock: ResMut<Time<Virtual>>| clock.pause());
+        app.add_systems(Update, |mut clock: ResMut<Time<Virtual>>, mut frames: Local<u32>| {
+            *frames += u32::from(clock.is_paused());
+            if *frames == 5 {
+                *frames = 0;
+                clock.unpause();
+            }
+        });
+        for tick in 1..=3 {
+            app.tick().expect("the pause ends");
+            assert_eq!(*app.world().resource::<Tick>(), Tick(tick));
+        }
+    }
 }

@@ -71,8 +71,11 @@ impl KeyAxis {
 #[derive(Component, Clone, Reflect)]
 #[reflect(opaque)]
 #[reflect(Component, Clone, Debug)]
+#[require(MissingSet)]
 pub struct KeyBindings {
     axes: Vec<KeyAxis>,
+    /// The keys that each discrete action holds, if the bindings were made from them.
+    sets: Vec<Vec<KeyCode>>,
     action: Arc<dyn Fn(&[i8]) -> ActionValue + Send + Sync>,
     help: Cow<'static, str>,
 }
@@ -91,12 +94,14 @@ impl KeyBindings {
         action: impl Fn(&[i8]) -> ActionValue + Send + Sync + 'static,
         help: impl Into<Cow<'static, str>>,
     ) -> Self {
-        Self { axes: axes.into(), action: Arc::new(action), help: help.into() }
+        Self { axes: axes.into(), sets: Vec::new(), action: Arc::new(action), help: help.into() }
     }
 
     /// Creates bindings from a game's own keys: discrete action i means that the keys of set i are
-    /// held. Of several sets that are held, the one with the most keys counts.
+    /// held. Of several sets that are held, the one with the most keys counts. Where no set is held, action 0 counts:
+    /// [`missing_set`](Self::missing_set) says so.
     pub fn of_sets(sets: &[Vec<KeyCode>]) -> Self {
+        let of_game = sets.to_vec();
         let mut keys = Vec::new();
         for key in sets.iter().flatten() {
             if !keys.contains(key) {
@@ -114,7 +119,7 @@ impl KeyBindings {
             ActionValue::Discrete(best.map_or(0, |(action, _)| *action as u32))
         };
         let help = keys.iter().map(|key| format!("{key:?}")).collect::<Vec<_>>().join(", ");
-        Self::new(axes, action, help)
+        Self { sets: of_game, ..Self::new(axes, action, help) }
     }
 
     /// Returns the action of the keys that are held.
@@ -123,11 +128,45 @@ impl KeyBindings {
         (self.action)(&values)
     }
 
+    /// Returns the keys that are held, if the bindings are [`of_sets`](Self::of_sets) and no action holds exactly these.
+    /// The list is empty if no key is held, and no action holds nothing.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use bevy_playbot::key_bindings::KeyBindings;
+    ///
+    /// let [left, right] = [KeyCode::ArrowLeft, KeyCode::ArrowRight];
+    /// let keys = KeyBindings::of_sets(&[vec![left], vec![right]]);
+    /// assert_eq!(keys.missing_set(|key| key == left), None);
+    /// assert_eq!(keys.missing_set(|_| true), Some(vec![left, right]));
+    /// assert_eq!(keys.missing_set(|_| false), Some(vec![]));
+    /// ```
+    pub fn missing_set(&self, held: impl Fn(KeyCode) -> bool) -> Option<Vec<KeyCode>> {
+        let known = self.axes.iter().flat_map(|axis| &axis.positive).copied();
+        let is_held = |key: &KeyCode| held(*key);
+        let is_exact =
+            |set: &Vec<KeyCode>| set.iter().all(is_held) && known.clone().filter(is_held).all(|key| set.contains(&key));
+        let is_missing = !self.sets.is_empty() && !self.sets.iter().any(is_exact);
+        is_missing.then(|| known.clone().filter(is_held).collect())
+    }
+
+    /// Returns false if the bindings are [`of_sets`](Self::of_sets), none of which is empty: a person who holds no key
+    /// then gets action 0.
+    pub fn has_idle_action(&self) -> bool {
+        self.sets.is_empty() || self.sets.iter().any(Vec::is_empty)
+    }
+
     /// Returns the description of the keys, for people.
     pub fn help(&self) -> &str {
         &self.help
     }
 }
+
+/// The keys that a person held in the last tick without an action that holds exactly these: see
+/// [`KeyBindings::missing_set`]. Written together with the [`Action`] of agents under [`Control::Human`].
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component, Clone, Debug, PartialEq)]
+pub struct MissingSet(pub Option<Vec<KeyCode>>);
 
 /// Turns keys into the actions of agents under [`Control::Human`] that have [`KeyBindings`]. Add it
 /// after [`PlaybotPlugin`](crate::plugin::PlaybotPlugin).
@@ -170,11 +209,13 @@ pub(crate) fn note_taps(keys: Res<ButtonInput<KeyCode>>, mut tapped: ResMut<Tapp
 fn decide(
     keys: Res<ButtonInput<KeyCode>>,
     mut tapped: ResMut<TappedKeys>,
-    mut agents: Query<(&Control, &KeyBindings, &Episode, &mut Action)>,
+    mut agents: Query<(&Control, &KeyBindings, &Episode, &mut Action, &mut MissingSet)>,
 ) {
-    for (control, map, episode, mut action) in &mut agents {
+    for (control, map, episode, mut action, mut missing) in &mut agents {
         if *control == Control::Human && episode.is_running() {
-            action.0 = map.action(|key| keys.pressed(key) || tapped.0.contains(&key));
+            let is_held = |key| keys.pressed(key) || tapped.0.contains(&key);
+            action.0 = map.action(is_held);
+            missing.0 = map.missing_set(is_held);
         }
     }
     tapped.clear();
@@ -219,5 +260,32 @@ mod tests {
             assert_eq!(bindings.action(|key| held.contains(&key)), ActionValue::Discrete(action), "{held:?}");
         }
         assert_eq!(bindings.help(), "ArrowLeft, Space");
+    }
+
+    #[test]
+    fn keys_that_no_action_holds_together_are_named() {
+        let [left, right, space] = [KeyCode::ArrowLeft, KeyCode::ArrowRight, KeyCode::Space];
+        let bindings = KeyBindings::of_sets(&[vec![], vec![left], vec![right], vec![space], vec![space, right]]);
+        assert!(bindings.has_idle_action());
+        for (held, missing) in [
+            (&[][..], None),
+            (&[left], None),
+            (&[right, space], None),
+            (&[left, KeyCode::KeyQ], None),
+            (&[left, space], Some(vec![left, space])),
+            (&[space, right, left], Some(vec![left, right, space])),
+        ] {
+            assert_eq!(bindings.missing_set(|key| held.contains(&key)), missing, "{held:?}");
+        }
+    }
+
+    #[test]
+    fn a_game_without_an_idle_action_says_so_while_no_key_is_held() {
+        let bindings = KeyBindings::of_sets(&[vec![KeyCode::ArrowLeft, KeyCode::Space]]);
+        assert!(!bindings.has_idle_action());
+        assert_eq!(bindings.missing_set(|_| false), Some(vec![]));
+        assert_eq!(bindings.missing_set(|key| key == KeyCode::Space), Some(vec![KeyCode::Space]), "half of a set");
+        assert!(map().has_idle_action(), "axes rest at 0");
+        assert_eq!(map().missing_set(|_| true), None);
     }
 }

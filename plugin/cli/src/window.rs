@@ -12,7 +12,7 @@
 //!
 //! - `deciders`: the deciders in a window: the person, and the autopilot.
 //! - `playlist`: the order of the levels, and the result of the last episode.
-//! - `keys`: the window's own keys; `devices`: the person's devices, kept from the game or handed on to it.
+//! - `keys`: the window's own keys; `unbound`: keys of the person that no action holds; `devices`: the person's devices, kept from the game or handed on to it.
 //! - `camera`: the person's view from above; `solid`: the view in space.
 //! - `title`: the window's title, and pauses of game time.
 //! - `frames`: windows of games whose ticks are frames.
@@ -29,6 +29,7 @@ mod playlist;
 #[cfg(feature = "view3d")]
 mod solid;
 mod title;
+mod unbound;
 
 use crate::window::{deciders::Deciders, ending::Verdict, error::catch};
 use bevy::{
@@ -55,7 +56,12 @@ use playbot_harness::{
 };
 use std::time::Duration;
 
-pub use crate::window::{deciders::Autopilot, error::WindowError, playlist::Playlist};
+pub use crate::window::{
+    deciders::Autopilot,
+    error::WindowError,
+    playlist::Playlist,
+    unbound::{UnboundKeys, idle_warning},
+};
 
 /// Width and height of the window at first: eleven pixels for each of the bots' 64.
 const SIDE: u32 = 704;
@@ -69,6 +75,7 @@ pub struct GameWindow {
     agent: Entity,
     /// The game, if a person's actions in it cannot be recorded.
     unrecorded: Option<&'static str>,
+    unbound: UnboundKeys,
 }
 
 impl GameWindow {
@@ -118,7 +125,9 @@ impl GameWindow {
         title::build_pace(&mut app);
         playlist::build(&mut app);
         title::build(&mut app, game.name(), Update);
-        Ok(Self { app, agent, unrecorded: None })
+        let unbound = UnboundKeys::new(game);
+        unbound::build(&mut app, unbound.clone());
+        Ok(Self { app, agent, unrecorded: None, unbound })
     }
 
     /// Builds the window of a game that draws itself, and whose ticks are frames. The window is like its headless one.
@@ -158,7 +167,9 @@ impl GameWindow {
         ending::build(&mut app, stop);
         frames::build(&mut app, game.name(), hz);
         playlist::build(&mut app);
-        Ok(Self { app, agent, unrecorded })
+        let unbound = UnboundKeys::new(game);
+        unbound::build(&mut app, unbound.clone());
+        Ok(Self { app, agent, unrecorded, unbound })
     }
 
     /// Checks that a person's actions can be recorded.
@@ -168,6 +179,11 @@ impl GameWindow {
     /// The game is not played with keys alone.
     pub fn check_recording(&self) -> Result<(), WindowError> {
         self.unrecorded.map_or(Ok(()), |game| Err(WindowError::NotRecorded(game)))
+    }
+
+    /// Returns the keys that a person holds in this window without an action for them, up to the time of asking.
+    pub fn unbound_keys(&self) -> UnboundKeys {
+        self.unbound.clone()
     }
 
     /// Records every episode from now on, of any decider.

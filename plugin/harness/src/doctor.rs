@@ -14,6 +14,7 @@
 //! - `game_copy`: a running copy of the game, with its entities and types.
 //! - `compare`, `field`: the comparison of two copies, down to the first field that differs.
 //! - `cause`, `observed`: causes of a difference, observations of the agents, and the uses that the game is safe for.
+//! - `steps`: frames and fixed steps of different lengths.
 //! - `text`: the report for people.
 
 mod cause;
@@ -21,6 +22,7 @@ mod compare;
 mod field;
 mod game_copy;
 mod observed;
+mod steps;
 mod text;
 mod trial;
 
@@ -40,6 +42,7 @@ pub use crate::doctor::{
     cause::{Cause, CauseKind},
     game_copy::TypesReport,
     observed::{ConstantValue, NonFiniteValue, ObservationReport, Safety, Verdict},
+    steps::UnequalSteps,
 };
 
 /// Plays copies of a game with the same random actions, compares them after every tick, and reports the differences.
@@ -58,7 +61,7 @@ pub fn examine(
     let mut known_types = KnownTypes::new(&bare_world());
     let mut comparisons: Vec<ComparisonReport> = Vec::new();
     let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
-    let mut suspicions = Vec::new();
+    let (mut suspicions, mut unequal_steps) = (Vec::new(), None);
     for comparison in DoctorComparison::ALL {
         if let Some(why) = reason_to_skip(comparison, game, &comparisons) {
             comparisons.push(skipped(comparison, why));
@@ -73,6 +76,7 @@ pub fn examine(
             observation = monitor.report();
             types = known_types.report(&trial.copies[0], &result.incomparable);
             suspicions = known_types.suspicions(&trial.copies[0]);
+            unequal_steps = UnequalSteps::of(&trial.copies[0].world);
         }
         comparisons.push(result.report);
     }
@@ -88,6 +92,7 @@ pub fn examine(
         comparisons,
         observation,
         types,
+        unequal_steps,
         ticks_per_second: None,
     })
 }
@@ -135,6 +140,8 @@ pub struct DoctorReport {
     pub observation: ObservationReport,
     /// The types that could be compared.
     pub types: TypesReport,
+    /// Lengths of frames and of fixed steps, if they differ and the game may notice it.
+    pub unequal_steps: Option<UnequalSteps>,
     /// The uses that the game is safe for.
     pub safety: Safety,
     /// The findings, worst first.

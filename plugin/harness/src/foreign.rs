@@ -3,13 +3,13 @@
 //! A [`ForeignGame`] wraps the function that adds a game to an app, as it is, and declares the agent's actions,
 //! observations and rewards. In such a game one tick is one frame of a fixed length, headless and in a window: the
 //! game's own schedules run as always. The agent's action presses keys before Bevy's own input systems run; reward and
-//! end are read in `Last`.
+//! end are read in `Last`. A pause of the game's clock is part of the game: ticks go on.
 //!
 //! The files of the folder, in reading order:
 //!
 //! - `runtime`: the plugin's state of a foreign game in its World, and the systems of its description.
 //! - `levels`: modes, level files, plans and proofs.
-//! - `restart`: the start of an episode.
+//! - `restart`, `clocks`: the start of an episode, and the game's clocks at that time.
 //! - `input`: the path from an action into the game, and the mask of actions.
 //! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `observe`, `paths`: observation, position, reward and end after a tick, and observations by the paths of their
@@ -54,6 +54,7 @@
 
 #[cfg(feature = "ui")]
 mod clicks;
+mod clocks;
 mod input;
 mod levels;
 mod observe;
@@ -65,6 +66,7 @@ use crate::{
     defect::DefectKind,
     detector::{Detector, LevelProof},
     foreign::{
+        clocks::ClockSettings,
         input::{ForeignBot, Input},
         levels::LevelParts,
         paths::ObservedPath,
@@ -86,7 +88,7 @@ use bevy_playbot::{
     },
     episode::EpisodeEnd,
     fault::Faults,
-    headless::HeadlessPlugins,
+    headless::{HeadlessPlugins, allow_whole_frames},
     key_bindings::KeyBindings,
     legal::LegalActions,
     observation::{ObservationSpace, VectorSensor},
@@ -146,6 +148,7 @@ impl ForeignGame {
             end_cause: None,
             limit: None,
             restart: Restart::Startup,
+            forgotten: Vec::new(),
             ready: None,
             patience: PATIENCE,
             level: None,
@@ -303,7 +306,8 @@ impl ForeignGame {
         self.with(|description| description.has_camera = true)
     }
 
-    /// Adds a reward of each tick to other rewards.
+    /// Adds a reward of each tick to other rewards. The system also runs once before the first tick, to read what
+    /// happened before it, and pays nothing for that.
     pub fn reward<M: 'static>(self, system: impl IntoSystem<(), f32, M> + Clone + Send + Sync + 'static) -> Self {
         self.with(|description| description.rewards.push((SystemFactory::new(system, |reward| reward), false)))
     }
@@ -314,7 +318,8 @@ impl ForeignGame {
         self.with(|description| description.rewards.push((SystemFactory::new(system, |value| value), true)))
     }
 
-    /// Declares whether and how the game is over after a tick. The system runs in `Last`.
+    /// Declares whether and how the game is over after a tick. The system runs in `Last`, and once before the first tick,
+    /// where its answer does not count.
     pub fn end<M: 'static>(
         self,
         system: impl IntoSystem<(), Option<EpisodeEnd>, M> + Clone + Send + Sync + 'static,
@@ -330,6 +335,34 @@ impl ForeignGame {
     /// Sets how the game restarts. Default: [`Restart::Startup`].
     pub fn restart(self, restart: Restart) -> Self {
         self.with(|description| description.restart = restart)
+    }
+
+    /// Drops all messages of this type at a restart, so that the game does not read in an episode what happened in the
+    /// last one. Several calls add up.
+    ///
+    /// An observer of despawned entities writes such messages while [`Restart::Startup`] takes the game down; the
+    /// messages of `Startup` are kept. With a restart of the game's own, those that it writes are dropped as well. The
+    /// systems of [`reward`](Self::reward) and [`end`](Self::end) do not need this: messages and removed components from
+    /// before the first tick do not count for them.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// #[derive(Message)]
+    /// struct Died;
+    ///
+    /// let game = ForeignGame::new("walk", 1, |app: &mut App| _ = app.add_message::<Died>());
+    /// let game = game.keys([vec![], vec![KeyCode::Space]]).observe(["x"], || [0.0]).forget_messages::<Died>();
+    /// assert_eq!(game.problem(), None);
+    /// ```
+    pub fn forget_messages<M: Message>(self) -> Self {
+        let forget = |world: &mut World| {
+            if let Some(mut messages) = world.get_resource_mut::<Messages<M>>() {
+                messages.clear();
+            }
+        };
+        self.with(|description| description.forgotten.push(Arc::new(forget)))
     }
 
     /// Declares whether a level can be played. The system runs in each frame from the second one after the restart, and
@@ -600,6 +633,8 @@ struct Description {
     /// Ticks after which an episode is truncated.
     limit: Option<u32>,
     restart: Restart,
+    /// Functions that drop all messages of one type each.
+    forgotten: Vec<Arc<dyn Fn(&mut World) + Send + Sync>>,
     ready: Option<SystemFactory<bool>>,
     /// Frames that a level may take to load.
     patience: u32,
@@ -716,6 +751,8 @@ impl Plugin for ForeignPlugin {
         let mut order = app.world_mut().resource_mut::<MainScheduleOrder>();
         let startup = order.startup_labels.clone();
         order.startup_labels.insert(0, BeforeGame.intern());
+        // The game may have brought a clock of its own.
+        allow_whole_frames(app.world_mut());
         app.insert_resource(ForeignCell::new(Foreign::new(&self.game, startup)));
     }
 }
@@ -731,11 +768,12 @@ fn add_game(app: &mut App, name: &str, plugin: &dyn Fn(&mut App)) {
     app.world_mut().resource_mut::<Faults>().report(fault);
 }
 
-/// Marks all current entities as not the game's.
+/// Marks all current entities as not the game's, and notes the clocks.
 fn note_baseline(world: &mut World) {
-    let baseline = Baseline::of(world);
+    let (baseline, clocks) = (Baseline::of(world), ClockSettings::of(world));
     if let Some(cell) = world.get_resource::<ForeignCell>().cloned() {
-        cell.lock().baseline = Some(baseline);
+        let mut foreign = cell.lock();
+        (foreign.baseline, foreign.clocks) = (Some(baseline), Some(clocks));
     }
 }
 

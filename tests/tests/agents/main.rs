@@ -15,6 +15,7 @@ mod leaps;
 mod level_detectors;
 mod one_world;
 mod orders;
+mod paused;
 mod pipeline;
 mod recorded_players;
 mod recorded_rewards;

@@ -1,6 +1,7 @@
 //! Tests of foreign games and their adapters.
 
 mod actions;
+mod clocks;
 mod experiments;
 mod faults;
 mod headless;
@@ -9,3 +10,4 @@ mod loading;
 mod namesakes;
 mod play;
 mod rebuild;
+mod restarts;

@@ -11,13 +11,14 @@ use bevy::{
             Gamepad, GamepadInput, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent, RawGamepadEvent,
             gamepad_connection_system, gamepad_event_processing_system,
         },
-        keyboard::KeyboardInput,
+        keyboard::{Key, KeyboardFocusLost, KeyboardInput},
         mouse::{MouseButtonInput, MouseMotion, MouseWheel},
     },
     prelude::*,
     window::{CursorMoved, PrimaryWindow, WindowEvent, WindowFocused},
 };
 use bevy_playbot::virtual_input::VirtualGamepad;
+use std::hash::Hash;
 
 /// Visibility of the person's devices for the game.
 #[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
@@ -37,6 +38,7 @@ struct StashedMessages<M: Message>(#[reflect(ignore)] Messages<M>);
 pub(super) fn build(app: &mut App) {
     app.init_resource::<OwnKeys>();
     add_stash::<KeyboardInput>(app);
+    add_stash::<KeyboardFocusLost>(app);
     add_stash::<MouseButtonInput>(app);
     add_stash::<MouseMotion>(app);
     add_stash::<MouseWheel>(app);
@@ -70,8 +72,14 @@ pub(super) fn take(world: &mut World) {
         own.release_all();
     }
     hand_on(world, keys, is_open);
-    // Bevy answers the loss of focus by letting go of keys, which virtual input goes on holding.
     hand_on(world, focus, is_open);
+    // Bevy answers the loss of focus by letting go of keys, which virtual input goes on holding.
+    let lost: Vec<KeyboardFocusLost> = lift(world);
+    if is_open && !lost.is_empty() {
+        // Bevy lets go of physical keys only.
+        release_all::<Key>(world);
+    }
+    hand_on(world, lost, is_open);
     take_all::<MouseButtonInput>(world, is_open);
     take_all::<MouseMotion>(world, is_open);
     take_all::<MouseWheel>(world, is_open);
@@ -86,6 +94,7 @@ pub(super) fn take(world: &mut World) {
 /// Makes room for the window system's messages at the end of a frame.
 pub(super) fn give_back(world: &mut World) {
     swap::<KeyboardInput>(world);
+    swap::<KeyboardFocusLost>(world);
     swap::<MouseButtonInput>(world);
     swap::<MouseMotion>(world);
     swap::<MouseWheel>(world);
@@ -100,11 +109,14 @@ pub(super) fn set(world: &mut World, devices: Devices) {
         return;
     }
     world.insert_resource(devices);
-    if let Some(mut keys) = world.get_resource_mut::<ButtonInput<KeyCode>>() {
-        keys.release_all();
-    }
-    if let Some(mut buttons) = world.get_resource_mut::<ButtonInput<MouseButton>>() {
-        buttons.release_all();
+    release_all::<KeyCode>(world);
+    release_all::<Key>(world);
+    release_all::<MouseButton>(world);
+}
+
+fn release_all<T: Clone + Eq + Hash + Send + Sync + 'static>(world: &mut World) {
+    if let Some(mut input) = world.get_resource_mut::<ButtonInput<T>>() {
+        input.release_all();
     }
 }
 
@@ -224,7 +236,6 @@ mod tests {
     use bevy::input::{
         ButtonState, InputPlugin,
         gamepad::{GamepadConnection, GamepadConnectionEvent},
-        keyboard::Key,
     };
 
     use super::*;
@@ -279,6 +290,41 @@ mod tests {
         take(world);
         assert!(!world.resource::<OwnKeys>().pressed(KeyCode::KeyA));
         assert!(world.resource::<Messages<WindowFocused>>().is_empty(), "the game does not hear of it");
+    }
+
+    #[test]
+    fn a_hand_over_lets_go_of_the_meaning_of_keys_as_of_the_keys() {
+        let mut app = App::new();
+        app.add_plugins(InputPlugin).insert_resource(Devices::Open);
+        build(&mut app);
+        let world = app.world_mut();
+        send(world, KeyCode::KeyA, ButtonState::Pressed);
+        take(world);
+        world.run_schedule(PreUpdate);
+        give_back(world);
+        let x = Key::Character("x".into());
+        assert!(world.resource::<ButtonInput<Key>>().pressed(x.clone()));
+        set(world, Devices::Kept);
+        assert!(!world.resource::<ButtonInput<Key>>().pressed(x));
+        assert!(!world.resource::<ButtonInput<KeyCode>>().pressed(KeyCode::KeyA));
+    }
+
+    #[test]
+    fn a_bot_goes_on_holding_its_keys_when_the_window_loses_the_focus() {
+        let mut app = App::new();
+        app.add_plugins(InputPlugin).insert_resource(Devices::Kept);
+        build(&mut app);
+        let world = app.world_mut();
+        take(world);
+        send(world, KeyCode::KeyB, ButtonState::Pressed);
+        world.run_schedule(PreUpdate);
+        give_back(world);
+        world.write_message(KeyboardFocusLost);
+        take(world);
+        world.run_schedule(PreUpdate);
+        give_back(world);
+        assert!(world.resource::<ButtonInput<KeyCode>>().pressed(KeyCode::KeyB));
+        assert!(world.resource::<ButtonInput<Key>>().pressed(Key::Character("x".into())));
     }
 
     /// Input of the next frame, as from a plugin: gamepad and value.

@@ -22,7 +22,7 @@ use bevy_playbot::{
     engine::{TickSchedules, run_on_one_thread, system_errors},
     episode::Episode,
     fault::Faults,
-    key_bindings::KeyBindings,
+    key_bindings::{KeyBindings, MissingSet},
 };
 use playbot_harness::prelude::*;
 use std::sync::Arc;
@@ -117,10 +117,15 @@ fn choose_devices(world: &mut World) {
 
 /// Turns the keys of this frame into the action, which then presses the game's keys in the same frame. A short tap
 /// counts for one tick.
-fn decide_by_hand(keys: Res<OwnKeys>, mut agents: Query<(&Control, &KeyBindings, &Episode, &mut Action)>) {
-    for (control, bindings, episode, mut action) in &mut agents {
+fn decide_by_hand(
+    keys: Res<OwnKeys>,
+    mut agents: Query<(&Control, &KeyBindings, &Episode, &mut Action, &mut MissingSet)>,
+) {
+    for (control, bindings, episode, mut action, mut missing) in &mut agents {
         if *control == Control::Human && episode.is_running() {
-            action.0 = bindings.action(|key| keys.pressed(key) || keys.just_pressed(key));
+            let is_held = |key| keys.pressed(key) || keys.just_pressed(key);
+            action.0 = bindings.action(is_held);
+            missing.0 = bindings.missing_set(is_held);
         }
     }
 }

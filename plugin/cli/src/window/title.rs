@@ -11,7 +11,7 @@ use bevy::{
 };
 use bevy_playbot::{engine::TappedKeys, episode::Tick, vision::VisionSystems};
 use playbot_harness::prelude::*;
-use std::time::Duration;
+use std::{borrow::Cow, time::Duration};
 
 /// Time for which a notice is shown.
 const NOTICE: Duration = Duration::from_secs(3);
@@ -31,14 +31,14 @@ struct GameName(&'static str);
 #[derive(Resource, Default, Reflect)]
 #[reflect(Resource)]
 pub(super) struct Notice {
-    words: Option<&'static str>,
+    words: Option<Cow<'static, str>>,
     age: Duration,
 }
 
 impl Notice {
     /// Shows these words for a while.
-    pub fn say(&mut self, words: &'static str) {
-        *self = Self { words: Some(words), age: Duration::ZERO };
+    pub fn say(&mut self, words: impl Into<Cow<'static, str>>) {
+        *self = Self { words: Some(words.into()), age: Duration::ZERO };
     }
 }
 
@@ -81,7 +81,7 @@ fn write_title(
     if pace.is_paused() {
         parts.push("PAUSED".to_owned());
     }
-    parts.extend(notice.words.map(str::to_owned));
+    parts.extend(notice.words.as_deref().map(str::to_owned));
     let title = parts.join(" · ");
     if window.title != title {
         window.title = title;

@@ -76,8 +76,8 @@ impl CauseKind {
                 "set it back when an episode starts: insert the resource anew, despawn what the level spawned, keep no \
                  state of the simulation in a Local; what is meant to last, such as a high score, can be left out with \
                  --ignore. For what a foreign game cannot set back there is `Restart::Rebuild`, which builds the World anew \
-                 for each episode. State that this comparison does not see, but agents may: a Local, a static, an asset, a \
-                 type that does not derive Reflect, and a field with #[reflect(ignore)]"
+                 for each episode, and for messages that the end of an episode leaves in a queue `.forget_messages`. State that \
+                 this comparison does not see, but agents may: a Local, a static, an asset, a queue of messages, a type that does not derive Reflect, and a field with #[reflect(ignore)]"
             }
             Self::Loading => {
                 "wait for the files before an episode starts, with a `ready` that says when they are there"
@@ -145,7 +145,8 @@ mod tests {
     #[test]
     fn what_survives_a_restart_has_a_remedy_and_what_hides_it_is_named() {
         let advice = CauseKind::SurvivesRestart.advice();
-        for words in ["insert the resource anew", "--ignore", "`Restart::Rebuild`", "a Local", "a static", "Reflect"] {
+        let remedies = ["insert the resource anew", "--ignore", "`Restart::Rebuild`", "`.forget_messages`"];
+        for words in remedies.into_iter().chain(["a Local", "a static", "a queue of messages", "Reflect"]) {
             assert!(advice.contains(words), "`{words}` is missing in: {advice}");
         }
     }

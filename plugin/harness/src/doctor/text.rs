@@ -25,6 +25,9 @@ impl Display for DoctorReport {
         }
         self.write_safety(f)?;
         write!(f, "{}{}", self.observation, self.types)?;
+        if let Some(steps) = &self.unequal_steps {
+            write!(f, "{steps}")?;
+        }
         if let Some(speed) = self.ticks_per_second {
             writeln!(f, "Speed: {speed:.0} ticks per second of one arena in one World")?;
         }

@@ -2,6 +2,7 @@
 
 use crate::{
     foreign::{
+        clocks::{ClockSettings, leave_loading_out},
         levels::{LevelFromFile, level_ahead},
         observe::forget_state,
         runtime::{Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agent, with_foreign},
@@ -40,17 +41,23 @@ fn begin(world: &mut World, agent: Entity, level: u64) {
 }
 
 fn restart(world: &mut World, foreign: &mut Foreign) -> Result<(), String> {
+    // Before the first episode the clocks are as the start of the program has left them. A game's own restart goes on
+    // from there; `Restart::Startup` goes back to the time before it.
+    let begun = *foreign.begun.get_or_insert_with(|| ClockSettings::of(world).running());
     if let Some(system) = &mut foreign.restart {
-        set_clock_back(world);
-        return system.demand(world);
+        begun.start(world);
+        system.demand(world)?;
+        forget_messages(world, foreign);
+        return Ok(());
     }
     match foreign.game.description.restart.clone() {
         Restart::Own(own) => {
-            set_clock_back(world);
-            match own.0 {
-                OwnRestartKind::State(enter) => enter(world),
-                OwnRestartKind::System(_) => Ok(()),
+            begun.start(world);
+            if let OwnRestartKind::State(enter) = own.0 {
+                enter(world)?;
             }
+            forget_messages(world, foreign);
+            Ok(())
         }
         Restart::Startup => {
             start_again(world, foreign);
@@ -75,7 +82,9 @@ fn demand_a_new_world(world: &mut World, foreign: &mut Foreign) -> Result<(), St
              `tick_world`, or let the game restart with {others}"
         ));
     }
-    set_clock_back(world);
+    if let Some(begun) = foreign.begun {
+        begun.start(world);
+    }
     Ok(())
 }
 
@@ -103,51 +112,22 @@ fn start_again(world: &mut World, foreign: &Foreign) {
         }
     }
     world.flush();
-    set_clock_back(world);
+    forget_messages(world, foreign);
+    if let Some(clocks) = foreign.clocks {
+        clocks.start(world);
+    }
     for &label in &foreign.startup {
         // Some schedules have no system.
         let _ = world.try_run_schedule(label);
     }
 }
 
-/// Resets the clock to the start of a program: this frame has no length, and the next one is the first that has. Fixed
-/// steps are reset as well, for any remainder of the last episode.
-fn set_clock_back(world: &mut World) {
-    if let Some(mut clock) = world.get_resource_mut::<Time<Virtual>>() {
-        let mut fresh = Time::<Virtual>::from_max_delta(clock.max_delta());
-        fresh.set_relative_speed_f64(clock.relative_speed_f64());
-        *clock = fresh;
-    }
-    if let Some(mut clock) = world.get_resource_mut::<Time<Fixed>>() {
-        *clock = Time::<Fixed>::from_duration(clock.timestep());
-    }
-    if let Some(mut clock) = world.get_resource_mut::<Time>() {
-        *clock = Time::default();
-    }
-}
-
-/// Sets the clock of the first tick after loading, for any number of frames. The game entered the level in the frame
-/// before, and that counts as the first with a length. The clock keeps its speed.
-pub(super) fn leave_loading_out(world: &mut World) {
-    let Some(clock) = world.get_resource::<Time<Virtual>>() else { return };
-    let (frame, mut fresh) = (clock.delta(), Time::new_with(*clock.context()));
-    fresh.advance_by(frame);
-    fresh.advance_by(frame);
-    set_clock_back(world);
-    if let Some(mut clock) = world.get_resource_mut::<Time<Fixed>>() {
-        let step = clock.timestep();
-        clock.accumulate_overstep(frame);
-        while clock.overstep() >= step {
-            clock.discard_overstep(step);
-            clock.advance_by(step);
-        }
-    }
-    if let Some(mut clock) = world.get_resource_mut::<Time<Virtual>>() {
-        *clock = fresh;
-    }
-    if let Some(mut clock) = world.get_resource_mut::<Time>() {
-        *clock = fresh.as_generic();
-    }
+/// Drops the messages of the last episode, and those that its end has written while the game was taken down.
+///
+/// Only types that the game names are dropped. Others may carry work that is still to be done: loaded files for Bevy,
+/// or removed bodies for a physics engine.
+fn forget_messages(world: &mut World, foreign: &Foreign) {
+    foreign.game.description.forgotten.iter().for_each(|forget| forget(world));
 }
 
 /// Checks whether the level is ready. Each restart gets one frame to settle: commands, states and transforms.
@@ -185,6 +165,7 @@ pub(super) fn check(world: &mut World) {
         for part in foreign.rewards.iter_mut().filter(|part| part.is_delta) {
             part.last = part.system.run(world)?;
         }
+        read_what_is_left(world, foreign);
         Ok(true)
     });
     match is_ready {
@@ -200,5 +181,17 @@ pub(super) fn check(world: &mut World) {
                 episode.abandon();
             }
         }
+    }
+}
+
+/// Lets rewards and end read the messages, and the records of removed components, of the time before the first tick.
+/// Otherwise the death of the last episode's player would end this one.
+fn read_what_is_left(world: &mut World, foreign: &mut Foreign) {
+    // If one of them cannot run, the first tick reports it.
+    for part in foreign.rewards.iter_mut().filter(|part| !part.is_delta) {
+        let _ = part.system.run(world);
+    }
+    if let Some(end) = &mut foreign.end {
+        let _ = end.run(world);
     }
 }

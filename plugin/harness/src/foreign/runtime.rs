@@ -2,7 +2,7 @@
 
 use crate::{
     detector::LevelProof,
-    foreign::{ForeignGame, paths::ObservedPath},
+    foreign::{ForeignGame, clocks::ClockSettings, paths::ObservedPath},
 };
 use bevy::{
     ecs::{
@@ -87,6 +87,10 @@ pub(super) struct Foreign {
     pub(super) hash: Option<OwnedSystem<u64>>,
     /// The World before the game started.
     pub(super) baseline: Option<Baseline>,
+    /// The clocks before the game started.
+    pub(super) clocks: Option<ClockSettings>,
+    /// The clocks when the first episode was about to begin.
+    pub(super) begun: Option<ClockSettings>,
     /// The schedules that run once when a program starts, in order.
     pub(super) startup: Vec<InternedScheduleLabel>,
     /// Frames since the last restart.
@@ -129,6 +133,8 @@ impl Foreign {
             hash: description.hash.as_ref().map(|system| system.make()),
             game: game.clone(),
             baseline: None,
+            clocks: None,
+            begun: None,
             startup,
             frames: 0,
             has_begun: false,
@@ -183,9 +189,10 @@ fn report(world: &mut World, agent: Entity, game: &str, why: &str) {
 #[derive(Clone)]
 #[non_exhaustive]
 pub enum Restart {
-    /// Despawns everything that the game has spawned since the program started, resets the clock to 0, and runs
-    /// `PreStartup`, `Startup` and `PostStartup` again. Resources stay unchanged, unless those systems insert them:
-    /// reset them in [`ForeignGame::level`].
+    /// Despawns everything that the game has spawned since the program started, resets the clock to 0 at the speed that
+    /// the program began with, and runs `PreStartup`, `Startup` and `PostStartup` again. Resources stay unchanged,
+    /// unless those systems insert them: reset them in [`ForeignGame::level`]. Messages that the game writes while its
+    /// entities are despawned stay as well: see [`ForeignGame::forget_messages`].
     Startup,
     /// Rebuilds the World, as if the program were started again for each episode. It is the last resort, for games
     /// whose resources, `Local`s or timers survive [`Startup`](Self::Startup). It takes far longer, loads assets again,
@@ -206,13 +213,13 @@ pub(super) enum OwnRestartKind {
 }
 
 impl Restart {
-    /// Restarts the game with a system. The clock is reset to 0 before it.
+    /// Restarts the game with a system. The clock is reset to 0 before it, and runs at the speed of the program's start.
     pub fn system<M: 'static>(system: impl IntoSystem<(), (), M> + Clone + Send + Sync + 'static) -> Self {
         Self::Own(OwnRestart(OwnRestartKind::System(SystemFactory::new(system, |()| ()))))
     }
 
     /// Restarts the game by a state: the state is left, if the game is in it, and entered again, with all systems of
-    /// these transitions. The clock is reset to 0 before it.
+    /// these transitions. The clock is reset to 0 before it, and runs at the speed of the program's start.
     pub fn state<S: FreelyMutableState + Clone>(state: S) -> Self {
         Self::Own(OwnRestart(OwnRestartKind::State(Arc::new(move |world: &mut World| enter(world, state.clone())))))
     }

@@ -6,7 +6,7 @@ use crate::{
     output::program,
     progress::interrupt,
     verbs::{demo::deciders, play::Args},
-    window::{Autopilot, GameWindow, Playlist, WindowSetup},
+    window::{Autopilot, GameWindow, Playlist, UnboundKeys, WindowSetup, idle_warning},
 };
 use bevy_playbot::{
     demo::file::{DemoHeader, DemoSummary},
@@ -35,8 +35,9 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
     interrupt::listen();
     announce(game, &args);
+    let unbound = window.unbound_keys();
     window.run()?;
-    args.record.as_deref().map_or(Ok(Outcome::Pass), conclude)
+    args.record.as_deref().map_or(Ok(Outcome::Pass), |path| conclude(path, &unbound))
 }
 
 fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
@@ -83,6 +84,9 @@ fn announce(game: &dyn Game, args: &Args) {
     } else {
         report!("the game's own keys and mouse; R again, N next level, P pause, Escape ends");
     }
+    if let Some(warning) = idle_warning(game) {
+        report!("{warning}");
+    }
     if args.autopilot.is_named() {
         report!("Tab hands over and takes over again");
     } else {
@@ -90,8 +94,8 @@ fn announce(game: &dyn Game, args: &Args) {
     }
 }
 
-/// Prints the path of the recording, its contents and the next commands.
-fn conclude(path: &Path) -> Result<Outcome, CliError> {
+/// Prints the path of the recording, its contents, the keys that are not in it, and the next commands.
+fn conclude(path: &Path, unbound: &UnboundKeys) -> Result<Outcome, CliError> {
     let summary = DemoSummary::read(path)?;
     let file = path.display();
     report!(
@@ -100,6 +104,7 @@ fn conclude(path: &Path) -> Result<Outcome, CliError> {
         counted(summary.steps as u64, "step"),
         deciders("decided by", &summary.steps_by_decider)
     );
+    unbound.notes().iter().for_each(|note| report!("  {note}"));
     let program = program::name();
     report!("  {program} demo verify {file}   proves that it replays");
     report!("  {program} learn-skills --set demos={file} --out skills.safetensors   learns from it");
