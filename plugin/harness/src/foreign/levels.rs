@@ -116,6 +116,7 @@ pub(super) struct LevelParts {
     plan_of_file: Option<OfFile<FloorPlan>>,
     proof: Option<OfNumber<LevelProof>>,
     proof_of_file: Option<OfFile<LevelProof>>,
+    layout: Option<OfNumber<u64>>,
 }
 
 impl LevelParts {
@@ -249,6 +250,13 @@ impl ForeignGame {
         self.with(|description| description.level_parts.proof_of_file = Some(OfFile::new(prove)))
     }
 
+    /// Declares a hash of the layout of a level by its mode and number: of all that play meets, without pictures. By it
+    /// equal levels under different numbers are found, and results leave out held-out levels that a training has seen.
+    /// Levels from files are compared by their text.
+    pub fn layout(self, layout: impl Fn(&str, u64) -> u64 + Send + Sync + 'static) -> Self {
+        self.with(|description| description.level_parts.layout = Some(Arc::new(layout)))
+    }
+
     /// Returns a function's output for a level: of the file for levels from files, or of its mode and number.
     fn of_level<Out>(
         &self,
@@ -267,6 +275,10 @@ impl ForeignGame {
 impl LevelTools for ForeignGame {
     fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
         self.description.level_parts.parser.as_ref().map(|parser| (parser.parse)(text))
+    }
+
+    fn layout_hash(&self, mode: &str, level: u64) -> Option<u64> {
+        self.of_level((mode, level), self.description.level_parts.layout.as_ref(), None)
     }
 
     fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
@@ -435,6 +447,14 @@ mod tests {
         let GameTools { levels, .. } = game.tools();
         assert_eq!((levels.floor_plan(&mode, 0), levels.prove(&mode, 0)), (None, LevelProof::Unknown));
         assert!(level_file_pattern(&mode).is_some());
+    }
+
+    #[test]
+    fn layouts_are_those_that_the_game_declares_and_numbers_repeat() {
+        let game = game().layout(|mode, level| if mode == "hard" { 7 } else { level });
+        let layouts = |game: &dyn Game| ["easy", "hard"].map(|mode| game.layout(mode, 4));
+        assert_eq!(layouts(&game), [Some(1), Some(7)], "there are three levels");
+        assert_eq!(layouts(&self::game()), [None, None], "nothing is declared");
     }
 
     #[test]
