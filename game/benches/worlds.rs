@@ -1,14 +1,15 @@
-//! Duration of a tick in one World of each game: simulation and observation of its arenas, under random actions.
+//! Duration of a tick in one World of each game: simulation and observation of its arenas, under random actions. Duration
+//! of building a World, also of a game that has all of Bevy's plugins.
 //!
 //! `cargo bench -p playbot_games`. `playbot bench` measures whole machines, with pictures and learning.
 
 use std::time::Duration;
 
-use bevy::prelude::World;
+use bevy::prelude::{App, KeyCode, World};
 use criterion::{Criterion, Throughput};
 use playbot::prelude::*;
 use playbot_games::GAMES;
-use playbot_harness::{arrangement::Arrangement, worlds::build_world};
+use playbot_harness::{arrangement::Arrangement, foreign::ForeignGame, worlds::build_world};
 
 const ARENAS: u32 = 16;
 const TICKS: u64 = 10;
@@ -24,6 +25,19 @@ fn ticks(criterion: &mut Criterion) {
             group.finish();
         }
     }
+}
+
+fn buildings(criterion: &mut Criterion) {
+    let foreign = ForeignGame::new("foreign", 1, |_: &mut App| {})
+        .keys([vec![], vec![KeyCode::Space]])
+        .observe(["one"], || [1.0])
+        .time_limit(1);
+    let games = GAMES.iter().copied().chain([&foreign as &dyn Game]);
+    let mut group = criterion.benchmark_group("build");
+    for game in games {
+        group.bench_function(game.name(), |bencher| bencher.iter(|| build_world(game, game.modes()[0], 1, 0, 1)));
+    }
+    group.finish();
 }
 
 /// Returns a World whose agents play at random.
@@ -42,6 +56,6 @@ criterion::criterion_group! {
         .sample_size(20)
         .warm_up_time(Duration::from_secs(1))
         .measurement_time(Duration::from_secs(3));
-    targets = ticks
+    targets = ticks, buildings
 }
 criterion::criterion_main!(worlds);

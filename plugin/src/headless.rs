@@ -38,6 +38,7 @@ use crate::{
     agent::{Agent, Control},
     episode::{Episode, Tick},
     fault::{Fault, Faults},
+    loading::wait_for_assets,
     panics,
     placement::{FrameGate, TickPlacement},
     plugin::PlaybotPlugin,
@@ -138,7 +139,8 @@ pub fn run_on_one_thread(world: &mut World) {
 }
 
 /// Runs one tick. Under [`TickPlacement::Frame`] this may take several frames, while a level is
-/// being built. A World with a [`Renewal`](crate::renewal::Renewal) is replaced by a new one before an
+/// being built. After each of these frames it waits for assets that the game has asked for, so that
+/// they are there in the next one however fast the machine is. A World with a [`Renewal`](crate::renewal::Renewal) is replaced by a new one before an
 /// episode begins in it.
 ///
 /// # Errors
@@ -174,6 +176,9 @@ fn run_frames(world: &mut World) -> Result<(), Fault> {
     for frame in 1.. {
         world.run_schedule(Main);
         world.clear_trackers();
+        if world.contains_resource::<FrameGate>() {
+            wait_for_assets(world);
+        }
         if let Some(failure) = system_errors::take() {
             world.resource_mut::<Faults>().report(failure);
         }

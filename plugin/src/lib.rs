@@ -101,6 +101,7 @@ pub mod headless;
 pub mod key_bindings;
 pub mod legal;
 pub mod level;
+mod loading;
 pub mod observation;
 mod panics;
 pub mod placement;

@@ -7,7 +7,7 @@ use crate::{
     machine::{MemoryError, check_bytes},
     parallel::on_threads,
     split::LevelSplit,
-    worlds::build_observing_world,
+    worlds::{BuildingCosts, build_observing_world},
 };
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -218,17 +218,31 @@ fn play(
     }
     plan.check_memory()?;
     let arrangement = Arrangement::new(game, plan.arenas, plan.worlds);
-    let worlds: Result<Vec<_>, _> =
-        arrangement.first_agents().map(|first| build_eval_world(game, player, plan, arrangement, first)).collect();
-    let mut worlds = worlds?;
-    let followed = follow.then_some(game);
-    let parts = on_threads(&mut worlds, plan.threads, |world| play_out(world, followed, &progress));
+    let (costs, followed) = (BuildingCosts::default(), follow.then_some(game));
+    let build = |first| costs.of(|| build_eval_world(game, player, plan, arrangement, first));
+    // Worlds that draw share graphics cards, and are built one after the other. The others live as long as they play.
+    let draws = observation_of(player, plan).is_image();
+    let busy = arrangement.first_agents().filter(|first| u64::from(*first) < plan.episodes());
+    let shares = busy.map(|first| Ok((first, if draws { Some(build(first)?) } else { None })));
+    let mut shares = shares.collect::<Result<Vec<_>, VisionError>>()?;
+    let parts = on_threads(&mut shares, plan.threads, |(first, built)| -> Result<Vec<Trail>, EvalError> {
+        match built {
+            Some(world) => Ok(play_out(world, followed, &progress)?),
+            None => Ok(play_out(&mut build(*first)?, followed, &progress)?),
+        }
+    });
+    tracing::info!("{costs} for `{}`", game.name());
     let mut trails = Vec::new();
     for part in parts {
         trails.extend(part?);
     }
     trails.sort_by_key(|trail| trail.result.level);
     Ok(trails)
+}
+
+/// Returns the observation of a player. Bots have vectors.
+fn observation_of(player: &Player, plan: &EvalPlan) -> ObservationConfig {
+    if matches!(player, Player::Policy { .. }) { plan.observation_config } else { ObservationConfig::default() }
 }
 
 /// Builds a World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
@@ -240,8 +254,7 @@ fn build_eval_world(
     first: u32,
 ) -> Result<World, VisionError> {
     let (per_world, total) = (arrangement.arenas, arrangement.total() as usize);
-    let observation_config =
-        if matches!(player, Player::Policy { .. }) { plan.observation_config } else { ObservationConfig::default() };
+    let observation_config = observation_of(player, plan);
     let (mut world, agents) =
         build_observing_world(game, &plan.split.mode, &observation_config, plan.seed, first, per_world)?;
     EndedEpisodes::note_in(&mut world);

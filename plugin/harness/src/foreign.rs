@@ -366,8 +366,14 @@ impl ForeignGame {
     }
 
     /// Declares whether a level can be played. The system runs in each frame from the second one after the restart, and
-    /// no tick passes until it returns true. The clock of the first tick is always two frames after the restart, for
-    /// any number of frames. So timers are unchanged, and a time that the game stored meanwhile may lie ahead.
+    /// no tick passes until it returns true. The game's clock stands meanwhile, so timers and fixed steps do not
+    /// advance. The clock of the first tick is always two frames after the restart.
+    ///
+    /// Without a window, each frame also waits for the assets that the game has asked for. They arrive in the next
+    /// frame on every machine. Tasks of the game's own take any number of frames.
+    ///
+    /// A level that needs the clock to get ready, such as one behind a splash screen, gets it in the second half of the
+    /// frames of [`ready_within`](Self::ready_within).
     pub fn ready<M: 'static>(self, system: impl IntoSystem<(), bool, M> + Clone + Send + Sync + 'static) -> Self {
         self.with(|description| description.ready = Some(SystemFactory::new(system, |is_ready| is_ready)))
     }

@@ -19,6 +19,39 @@ use bevy_playbot::{
     streams::PlaybotSeed,
     vision::{ObservationConfig, VisionError},
 };
+use std::{
+    fmt,
+    sync::atomic::{AtomicU64, Ordering},
+    time::Instant,
+};
+
+/// The number of Worlds that were built, and the time that this took. It is for the log: no result depends on it.
+#[derive(Debug, Default)]
+pub(crate) struct BuildingCosts {
+    worlds: AtomicU64,
+    microseconds: AtomicU64,
+}
+
+impl BuildingCosts {
+    /// Builds a World, on any thread, and counts it.
+    pub(crate) fn of<T>(&self, build: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let built = build();
+        let spent = u64::try_from(start.elapsed().as_micros()).unwrap_or(u64::MAX);
+        self.worlds.fetch_add(1, Ordering::Relaxed);
+        self.microseconds.fetch_add(spent, Ordering::Relaxed);
+        built
+    }
+}
+
+impl fmt::Display for BuildingCosts {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let worlds = self.worlds.load(Ordering::Relaxed);
+        let each = self.microseconds.load(Ordering::Relaxed) / worlds.max(1);
+        let noun = if worlds == 1 { "World" } else { "Worlds" };
+        write!(formatter, "{worlds} {noun} built, {:.3} s each", each as f64 / 1e6)
+    }
+}
 
 /// Builds a World of a game with agents `first..first + count`, all idle, ready to be ticked on any thread. They see
 /// vectors.
@@ -134,4 +167,20 @@ pub fn spawn_agents(
         observation_config.equip(game, world, agent);
     }
     agents
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_costs_of_worlds_are_counted_and_averaged() {
+        let costs = BuildingCosts::default();
+        assert_eq!(costs.to_string(), "0 Worlds built, 0.000 s each");
+        assert_eq!(costs.of(|| 7), 7);
+        costs.microseconds.store(408_000, Ordering::Relaxed);
+        assert_eq!(costs.to_string(), "1 World built, 0.408 s each");
+        costs.worlds.store(4, Ordering::Relaxed);
+        assert_eq!(costs.to_string(), "4 Worlds built, 0.102 s each");
+    }
 }

@@ -1,11 +1,19 @@
-//! Tests of a game without its window: a picture from the disk, states, text, a mesh and a material.
+//! Tests of a game without its window: a picture from the disk, states, text, a mesh and a material; and the number of
+//! Worlds that an evaluation builds.
+
+use std::sync::{
+    Arc,
+    atomic::{AtomicUsize, Ordering},
+};
 
 use bevy::prelude::*;
 use playbot::prelude::*;
 use playbot_harness::{
+    eval::{EvalPlan, Player, evaluate},
     foreign::{ForeignGame, Restart},
     worlds::build_world,
 };
+use playbot_tests::measuring::plan;
 
 #[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 enum Stage {
@@ -97,4 +105,52 @@ fn it_plays_without_a_screen() {
     let (mesh, material) = grounds.single(&world).expect("one ground");
     assert!(world.resource::<Assets<Mesh>>().contains(mesh));
     assert!(world.resource::<Assets<ColorMaterial>>().contains(material));
+}
+
+/// Worlds of a game: all that were built, those that are alive, and the most that were alive at a time.
+#[derive(Default)]
+struct Worlds {
+    built: AtomicUsize,
+    alive: AtomicUsize,
+    most: AtomicUsize,
+}
+
+/// Lives as long as its World.
+#[derive(Resource)]
+struct Life(Arc<Worlds>);
+
+impl Drop for Life {
+    fn drop(&mut self) {
+        self.0.alive.fetch_sub(1, Ordering::SeqCst);
+    }
+}
+
+#[test]
+fn an_evaluation_builds_a_world_only_for_episodes_and_only_while_they_are_played() {
+    let measure = |threads| {
+        let worlds = Arc::new(Worlds::default());
+        let counted = worlds.clone();
+        let game = move |app: &mut App| {
+            counted.built.fetch_add(1, Ordering::SeqCst);
+            let alive = counted.alive.fetch_add(1, Ordering::SeqCst) + 1;
+            counted.most.fetch_max(alive, Ordering::SeqCst);
+            app.insert_resource(Life(counted.clone()));
+        };
+        let game = ForeignGame::new("counted", 1, game)
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["pressed"], |keys: Res<ButtonInput<KeyCode>>| [f32::from(u8::from(keys.pressed(KeyCode::Space)))])
+            .reward(|keys: Res<ButtonInput<KeyCode>>| f32::from(u8::from(keys.pressed(KeyCode::Space))))
+            .time_limit(10);
+        let plan = EvalPlan { arenas: 8, worlds: 8, threads, ..plan("default:0..5") };
+        let player = Player::Blind(BlindBot::Uniform);
+        let results = evaluate(&game, &player, &plan, |_| {}).expect("can be played");
+        let count = |number: &AtomicUsize| number.load(Ordering::SeqCst);
+        (results, [&worlds.built, &worlds.alive, &worlds.most].map(count))
+    };
+    let (alone, counts) = measure(1);
+    assert_eq!((alone.len(), counts), (6, [6, 0, 1]), "two of eight Worlds have no episode");
+    let (together, [built, alive, most]) = measure(3);
+    assert_eq!((built, alive), (6, 0));
+    assert!((1..=3).contains(&most), "{most} Worlds at a time on three threads");
+    assert_eq!(alone, together);
 }

@@ -55,6 +55,58 @@ fn the_first_tick_finds_the_same_clock_however_long_the_level_took() {
     }
 }
 
+/// The game's time since the restart.
+#[derive(Resource, Default)]
+struct Passed(Duration);
+
+/// Returns a game that adds up its time while the level loads, and an agent that sees the sum.
+fn adding_up(frames: u32) -> ForeignGame {
+    let game = move |app: &mut App| {
+        app.insert_resource(Left(frames))
+            .init_resource::<Passed>()
+            .add_systems(Update, |mut left: ResMut<Left>| left.0 = left.0.saturating_sub(1))
+            .add_systems(Update, |time: Res<Time>, mut passed: ResMut<Passed>| passed.0 += time.delta());
+    };
+    ForeignGame::new("adding", 1, game)
+        .keys([vec![], vec![KeyCode::Space]])
+        .observe(["passed"], |passed: Res<Passed>| [passed.0.as_secs_f32()])
+        .time_limit(3)
+        .level(move |mut left: ResMut<Left>, mut passed: ResMut<Passed>| {
+            (left.0, passed.0) = (frames, Duration::ZERO);
+        })
+        .ready(|left: Res<Left>| left.0 == 0)
+}
+
+#[test]
+fn no_game_time_passes_while_a_level_is_not_ready() {
+    let frame = Duration::from_secs_f64(1.0 / 60.0);
+    for frames in [0, 1, 5, 37] {
+        let (mut world, agents) = build_world(&adding_up(frames), "default", 0, 0, 1);
+        let bot = BlindBot::Constant(ActionValue::Discrete(0));
+        world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list([1, 2])));
+        for tick in (1..=3).chain(1..=3) {
+            world.tick().expect("sound");
+            let seen = world.get::<Observation>(agents[0]).expect("an agent").vector[0];
+            assert_eq!(seen, ((tick - 1) * frame).as_secs_f32(), "{frames} frames, tick {tick}");
+        }
+    }
+}
+
+#[test]
+fn a_level_behind_a_splash_screen_gets_the_clock_in_the_second_half_of_its_frames() {
+    let splash = ForeignGame::new("splash", 1, |_: &mut App| {})
+        .keys([vec![], vec![KeyCode::Space]])
+        .observe(["elapsed"], |time: Res<Time>| [time.elapsed_secs()])
+        .time_limit(3)
+        .ready(|time: Res<Time>| time.elapsed() > Duration::from_millis(500))
+        .ready_within(80);
+    let (mut world, agents) = build_world(&splash, "default", 0, 0, 1);
+    world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::list([1])));
+    world.tick().expect("40 frames are more than half a second");
+    let seen = world.get::<Observation>(agents[0]).expect("an agent").vector[0];
+    assert_eq!(seen, (2 * Duration::from_secs_f64(1.0 / 60.0)).as_secs_f32());
+}
+
 /// The part of a level that a file brings: it appears some frames after the restart.
 #[derive(Component)]
 struct Prop;

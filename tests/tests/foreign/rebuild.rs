@@ -85,7 +85,7 @@ fn a_world_that_cannot_be_built_anew_says_what_to_do() {
 }
 
 /// Replays a recording, the last episode first.
-fn replayed_backwards(game: &ForeignGame, path: &Path) -> Vec<Option<Divergence>> {
+pub(crate) fn replayed_backwards(game: &ForeignGame, path: &Path) -> Vec<Option<Divergence>> {
     let reader = DemoReader::open_for_game(path, game.name(), game.version(), None).expect("readable");
     let mut episodes: Vec<DemoEpisode> = reader.map(|episode| episode.expect("whole")).collect();
     episodes.reverse();

@@ -44,6 +44,19 @@ impl ClockSettings {
     }
 }
 
+/// Lets the game's clocks stand in this frame, at the time of the last one, as if it had no length. Timers and fixed
+/// steps do not advance.
+pub(super) fn stand_still(world: &mut World) {
+    let Some(clock) = world.get_resource::<Time<Virtual>>() else { return };
+    let mut standing = Time::new_with(*clock.context());
+    standing.advance_by(clock.elapsed().saturating_sub(clock.delta()));
+    standing.advance_by(Duration::ZERO);
+    if let Some(mut clock) = world.get_resource_mut::<Time>() {
+        *clock = standing.as_generic();
+    }
+    world.insert_resource(standing);
+}
+
 /// Sets the clock of the first tick after loading, for any number of frames. The game entered the level in the frame
 /// before, and that counts as the first with a length. The clock keeps its speed.
 pub(super) fn leave_loading_out(world: &mut World) {
@@ -90,6 +103,26 @@ mod tests {
         assert_eq!((clock.relative_speed(), clock.is_paused(), clock.elapsed()), (1.0, false, Duration::ZERO));
         assert_eq!(clock.max_delta(), Duration::from_millis(250));
         assert_eq!(world.resource::<Time<Fixed>>().timestep(), Duration::from_millis(20));
+    }
+
+    #[test]
+    fn a_standing_clock_is_at_the_time_of_the_last_frame_and_goes_on_from_there() {
+        let mut world = World::new();
+        world.init_resource::<Time>();
+        let mut clock = Time::<Virtual>::default();
+        clock.set_relative_speed(2.0);
+        clock.advance_by(Duration::from_millis(30));
+        clock.advance_by(Duration::from_millis(20));
+        world.insert_resource(clock);
+        for _ in 0..2 {
+            stand_still(&mut world);
+            let (clock, game) = (world.resource::<Time<Virtual>>(), world.resource::<Time>());
+            assert_eq!((clock.elapsed(), clock.delta()), (Duration::from_millis(30), Duration::ZERO));
+            assert_eq!((game.elapsed(), game.delta()), (Duration::from_millis(30), Duration::ZERO));
+            assert_eq!(clock.relative_speed(), 2.0);
+        }
+        world.resource_mut::<Time<Virtual>>().advance_by(Duration::from_millis(20));
+        assert_eq!(world.resource::<Time<Virtual>>().elapsed(), Duration::from_millis(50));
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::{
     foreign::{
-        clocks::{ClockSettings, leave_loading_out},
+        clocks::{ClockSettings, leave_loading_out, stand_still},
         levels::{LevelFromFile, level_ahead},
         observe::forget_state,
         runtime::{Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agent, with_foreign},
@@ -11,7 +11,7 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_playbot::{
-    engine::{NextEpisode, Renewal},
+    engine::{NextEpisode, Renewal, UnloadedAssets},
     episode::{Episode, StartEpisode},
 };
 
@@ -147,11 +147,11 @@ pub(super) fn check(world: &mut World) {
             let description = &foreign.game.description;
             if foreign.frames > description.patience {
                 let name = description.ready.as_ref().map_or("", |system| system.name());
-                return Err(format!(
-                    "it was not ready after {} frames: the system `{name}` of `.ready` has not said so; let it return true \
-                     once the level can be played, or wait longer with `.ready_within`",
-                    description.patience
-                ));
+                return Err(not_ready(name, description.patience, &UnloadedAssets::of(world)));
+            }
+            // A splash screen that waits for the clock ends in the second half.
+            if foreign.frames <= description.patience / 2 {
+                stand_still(world);
             }
             return Ok(false);
         }
@@ -184,6 +184,15 @@ pub(super) fn check(world: &mut World) {
     }
 }
 
+/// Returns the error of a level that was not ready in time, with the assets that it may be waiting for.
+fn not_ready(system: &str, frames: u32, assets: &UnloadedAssets) -> String {
+    let separator = if assets.is_empty() { "" } else { "; assets " };
+    format!(
+        "it was not ready after {frames} frames: the system `{system}` of `.ready` has not said so; let it return true once \
+         the level can be played, or wait longer with `.ready_within`{separator}{assets}"
+    )
+}
+
 /// Lets rewards and end read the messages, and the records of removed components, of the time before the first tick.
 /// Otherwise the death of the last episode's player would end this one.
 fn read_what_is_left(world: &mut World, foreign: &mut Foreign) {
@@ -193,5 +202,24 @@ fn read_what_is_left(world: &mut World, foreign: &mut Foreign) {
     }
     if let Some(end) = &mut foreign.end {
         let _ = end.run(world);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_of_a_level_that_is_not_ready_names_the_assets_that_are_missing() {
+        let text = not_ready("arrived", 20, &UnloadedAssets::default());
+        assert!(text.ends_with("or wait longer with `.ready_within`"), "{text}");
+        let assets = UnloadedAssets {
+            loading: vec!["level.tiles".to_owned()],
+            failed: vec!["hero.png".to_owned()],
+            ..default()
+        };
+        let text = not_ready("arrived", 20, &assets);
+        assert!(text.contains("after 20 frames: the system `arrived` of `.ready`"), "{text}");
+        assert!(text.ends_with("; assets still loading: `level.tiles`; failed to load: `hero.png`"), "{text}");
     }
 }

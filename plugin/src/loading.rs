@@ -1,0 +1,293 @@
+//! Assets that Bevy's asset server is still loading, and headless frames that wait for them.
+
+use crate::carry_over::ReflectCarryResource;
+use bevy::{
+    asset::{AssetPath, handle_internal_asset_events, publish_asset_server_diagnostics},
+    diagnostic::DiagnosticsStore,
+    ecs::system::BoxedSystem,
+    prelude::*,
+    tasks::{IoTaskPool, block_on, poll_once},
+};
+use std::{fmt, time::Duration};
+
+/// Assets of a World that are not loaded, by their paths, each list in alphabetical order.
+///
+/// Its text names them: "still loading: `level.ron`; failed to load: `hero.png`".
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct UnloadedAssets {
+    /// Assets that are being loaded.
+    pub loading: Vec<String>,
+    /// Assets that stay unloaded, because a plugin has announced their loader and has not brought it. Bevy's loader of
+    /// pictures comes with its renderer.
+    pub without_loader: Vec<String>,
+    /// Assets whose loading failed.
+    pub failed: Vec<String>,
+}
+
+impl UnloadedAssets {
+    /// Returns the assets of a World; nothing if it has no asset server.
+    pub fn of(world: &World) -> Self {
+        let Some(server) = world.get_resource::<AssetServer>() else { return Self::default() };
+        let mut assets = Self::read(&format!("{server:?}"));
+        assets.without_loader = assets.loading.extract_if(.., |path| !has_loader(server, path)).collect();
+        assets
+    }
+
+    /// Returns whether every asset is loaded.
+    pub fn is_empty(&self) -> bool {
+        self.loading.is_empty() && self.without_loader.is_empty() && self.failed.is_empty()
+    }
+
+    /// Reads the description that the asset server gives of itself. No function of it lists its assets.
+    fn read(text: &str) -> Self {
+        let mut assets = Self::default();
+        for asset in text.split("AssetInfo { ").skip(1) {
+            let Some((before, state)) = asset.split_once(", load_state: ") else { continue };
+            let path = before.split_once("path: Some(").and_then(|(_, path)| path.strip_suffix(')'));
+            let path = path.unwrap_or("an asset without a path").to_owned();
+            if state.starts_with("Loading") {
+                assets.loading.push(path);
+            } else if state.starts_with("Failed") {
+                assets.failed.push(path);
+            }
+        }
+        for paths in [&mut assets.loading, &mut assets.failed] {
+            paths.sort();
+            // The same file can be two assets, of two types.
+            paths.dedup();
+        }
+        assets
+    }
+}
+
+/// Returns whether the loader of a file is there, or is known not to exist.
+fn has_loader(server: &AssetServer, path: &str) -> bool {
+    let Ok(path) = AssetPath::try_parse(path) else { return true };
+    // A loader that is only announced is waited for, however long that takes.
+    block_on(poll_once(server.get_path_asset_loader(path))).is_some()
+}
+
+/// Paths that a message names.
+const NAMED: usize = 8;
+
+impl fmt::Display for UnloadedAssets {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let lists = [
+            ("still loading: ", &self.loading),
+            ("without a loader in this build: ", &self.without_loader),
+            ("failed to load: ", &self.failed),
+        ];
+        let mut separator = "";
+        for (what, paths) in lists.into_iter().filter(|(_, paths)| !paths.is_empty()) {
+            write!(formatter, "{separator}{what}")?;
+            for (place, path) in paths.iter().take(NAMED).enumerate() {
+                write!(formatter, "{}`{path}`", if place == 0 { "" } else { ", " })?;
+            }
+            if let Some(more) = paths.len().checked_sub(NAMED).filter(|more| *more > 0) {
+                write!(formatter, " and {more} more")?;
+            }
+            separator = "; ";
+        }
+        Ok(())
+    }
+}
+
+/// Looks, one a millisecond, in which no asset may arrive before the frames go on without those that are missing.
+const PATIENT_LOOKS: u32 = 10_000;
+
+/// The record of loads that frames have waited for.
+#[derive(Resource, Default)]
+struct AwaitedLoads {
+    /// The system that counts loads.
+    count: Option<BoxedSystem>,
+    /// Loads that had begun when the last wait was over.
+    begun: Option<u64>,
+}
+
+/// Assets that did not arrive in time, which no frame waits for again.
+#[derive(Resource, Default, Reflect)]
+#[reflect(Resource, CarryResource)]
+struct OverdueAssets(Vec<String>);
+
+/// Waits until the asset server has loaded everything that the game has asked for, so that the next frame finds it on
+/// every machine. No game time passes.
+///
+/// A World without new loads is left at once. An asset that does not arrive for ten seconds is left behind.
+pub(crate) fn wait_for_assets(world: &mut World) {
+    if !world.contains_resource::<AssetServer>() {
+        return;
+    }
+    world.init_resource::<AwaitedLoads>();
+    world.init_resource::<OverdueAssets>();
+    world.resource_scope(|world, mut awaited: Mut<AwaitedLoads>| {
+        let begun = count_loads(&mut awaited, world);
+        if begun.is_none() || begun != awaited.begun {
+            wait_for_arrivals(world);
+            awaited.begun = count_loads(&mut awaited, world);
+        }
+    });
+}
+
+/// Returns the number of loads that have begun; `None` if the game has switched off Bevy's diagnostic of it.
+fn count_loads(awaited: &mut AwaitedLoads, world: &mut World) -> Option<u64> {
+    if !world.contains_resource::<DiagnosticsStore>() {
+        return None;
+    }
+    // Bevy counts in `PreUpdate`, before the game has asked for the assets of a frame.
+    let count = awaited.count.get_or_insert_with(|| {
+        let mut count: BoxedSystem = Box::new(IntoSystem::into_system(publish_asset_server_diagnostics));
+        count.initialize(world);
+        count
+    });
+    count.run((), world).ok()?;
+    let loads = world.resource::<DiagnosticsStore>().get_measurement(&AssetServer::STARTED_LOAD_COUNT)?;
+    Some(loads.value as u64)
+}
+
+fn wait_for_arrivals(world: &mut World) {
+    let mut missing = Vec::new();
+    let mut looks = 0;
+    loop {
+        run_tasks();
+        handle_internal_asset_events(world);
+        let mut loading = UnloadedAssets::of(world).loading;
+        loading.retain(|path| !world.resource::<OverdueAssets>().0.contains(path));
+        if loading.is_empty() {
+            return;
+        }
+        looks = if loading == missing { looks + 1 } else { 0 };
+        missing = loading;
+        if looks >= PATIENT_LOOKS {
+            let assets = UnloadedAssets { loading: missing, ..default() };
+            tracing::warn!("no asset has arrived for ten seconds, and the game goes on without them; {assets}");
+            world.resource_mut::<OverdueAssets>().0.extend(assets.loading);
+            return;
+        }
+        #[allow(clippy::disallowed_methods, reason = "files arrive by the clock; no game time passes meanwhile")]
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+/// Runs tasks that belong to this thread: those of the program's main loop, and without Bevy's feature
+/// `multi_threaded` all of them.
+fn run_tasks() {
+    if let Some(pool) = IoTaskPool::try_get() {
+        pool.with_local_executor(|tasks| {
+            // As many as Bevy runs in a frame. A task that never rests must not hold the game up.
+            for _ in 0..100 {
+                if !tasks.try_tick() {
+                    break;
+                }
+            }
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::{
+        app::TaskPoolPlugin,
+        asset::{
+            AssetLoader, LoadContext,
+            io::{AssetReader, AssetReaderError, AssetSourceBuilder, PathStream, Reader, VecReader},
+        },
+        image::ImageLoader,
+    };
+    use std::path::Path;
+
+    #[derive(Asset, TypePath)]
+    struct Tiles;
+
+    #[derive(Default, TypePath)]
+    struct TilesLoader;
+
+    impl AssetLoader for TilesLoader {
+        type Asset = Tiles;
+        type Settings = ();
+        type Error = std::io::Error;
+
+        async fn load(
+            &self,
+            _reader: &mut dyn Reader,
+            _settings: &(),
+            _context: &mut LoadContext<'_>,
+        ) -> Result<Tiles, std::io::Error> {
+            Ok(Tiles)
+        }
+
+        fn extensions(&self) -> &[&str] {
+            &["tiles"]
+        }
+    }
+
+    /// Files that never arrive.
+    struct Never;
+
+    impl AssetReader for Never {
+        async fn read<'a>(&'a self, _path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
+            std::future::pending::<()>().await;
+            Ok(VecReader::new(Vec::new()))
+        }
+
+        async fn read_meta<'a>(&'a self, _path: &'a Path) -> Result<impl Reader + 'a, AssetReaderError> {
+            std::future::pending::<()>().await;
+            Ok(VecReader::new(Vec::new()))
+        }
+
+        async fn read_directory<'a>(&'a self, path: &'a Path) -> Result<Box<PathStream>, AssetReaderError> {
+            Err(AssetReaderError::NotFound(path.to_path_buf()))
+        }
+
+        async fn is_directory<'a>(&'a self, _path: &'a Path) -> Result<bool, AssetReaderError> {
+            Ok(false)
+        }
+    }
+
+    #[test]
+    fn assets_that_load_and_assets_that_failed_are_named_by_their_paths() {
+        let mut app = App::new();
+        app.register_asset_source("never", AssetSourceBuilder::new(|| Box::new(Never)))
+            .add_plugins((TaskPoolPlugin::default(), AssetPlugin::default()))
+            .init_asset::<Tiles>()
+            .init_asset_loader::<TilesLoader>()
+            .init_asset::<Image>()
+            .preregister_asset_loader::<ImageLoader>(&["png"]);
+        assert!(UnloadedAssets::of(app.world()).is_empty(), "nothing is asked for");
+        let server = app.world().resource::<AssetServer>().clone();
+        let _slow: [Handle<Tiles>; 2] = ["never://b.tiles", "never://a.tiles"].map(|path| server.load(path));
+        let _picture: Handle<Image> = server.load("never://hero.png");
+        let _missing: Handle<Tiles> = server.load("no/such.tiles");
+        let named = UnloadedAssets {
+            loading: vec!["never://a.tiles".to_owned(), "never://b.tiles".to_owned()],
+            without_loader: vec!["never://hero.png".to_owned()],
+            failed: vec!["no/such.tiles".to_owned()],
+        };
+        while UnloadedAssets::of(app.world()).failed.is_empty() {
+            run_tasks();
+            handle_internal_asset_events(app.world_mut());
+            std::thread::yield_now();
+        }
+        assert_eq!(UnloadedAssets::of(app.world()), named);
+        let text = "still loading: `never://a.tiles`, `never://b.tiles`; without a loader in this build: \
+                    `never://hero.png`; failed to load: `no/such.tiles`";
+        assert_eq!(named.to_string(), text);
+    }
+
+    #[test]
+    fn a_message_names_eight_assets_and_counts_the_others() {
+        let loading = (0..11).map(|number| format!("{number:02}.png")).collect();
+        let text = UnloadedAssets { loading, ..default() }.to_string();
+        assert!(text.starts_with("still loading: `00.png`, `01.png`, "), "{text}");
+        assert!(text.ends_with("`07.png` and 3 more"), "{text}");
+        assert_eq!(UnloadedAssets::default().to_string(), "");
+    }
+
+    #[test]
+    fn a_world_without_an_asset_server_has_no_assets_to_wait_for() {
+        let mut world = World::new();
+        wait_for_assets(&mut world);
+        assert!(UnloadedAssets::of(&world).is_empty());
+        assert!(!world.contains_resource::<AwaitedLoads>());
+    }
+}
