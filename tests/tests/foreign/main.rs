@@ -11,3 +11,4 @@ mod namesakes;
 mod play;
 mod rebuild;
 mod restarts;
+mod snapshots;
