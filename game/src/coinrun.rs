@@ -13,6 +13,7 @@
 //! - [`planner`] and `demonstrator_bot`: plans to the coin, and the bot that follows them; `proof`: proofs about
 //!   levels.
 //! - [`picture`]: what sensors and people see.
+//! - `snapshot`: episodes that are saved in the middle.
 //! - [`text`], `level_text` and `show_level`: levels as text, as files, and on the command line.
 //! - `detectors` and `defects`: the game's own detectors, and the defects that can be planted.
 
@@ -33,6 +34,7 @@ mod proof;
 pub mod rules;
 mod show_level;
 pub mod sim;
+mod snapshot;
 pub mod text;
 pub mod tile;
 pub mod view;
@@ -138,6 +140,7 @@ impl Game for CoinRun {
         GameTools {
             levels: self,
             state: self,
+            snapshots: self,
             trace: self,
             pictures: self,
             input: self,

@@ -39,7 +39,7 @@ use crate::{
     },
     maze2d::{
         against_rules::AgainstRules,
-        arena::{Maze2dRules, MazeBall, OBSERVED, PlaysIn, WithPhysics, drawn, level_of},
+        arena::{Maze2dRules, MazeArena, MazeBall, OBSERVED, PlaysIn, WithPhysics, drawn, level_of},
         level_text::LevelText,
         picture::{Maze2dPicturePlugin, VIEW, point},
     },
@@ -53,7 +53,8 @@ use playbot_harness::{
     detector::{Detector, LevelProof},
     floor_plan::FloorPlan,
     game::{
-        BenchmarkTools, BotTools, InputTools, LevelTools, PictureTools, StateTools, TestTools, TraceTools, TrainTools,
+        BenchmarkTools, BotTools, InputTools, LevelTools, PictureTools, Snapshot, SnapshotTools, StateTools, TestTools,
+        TraceTools, TrainTools,
     },
     inspect::{ExperimentText, InspectError, LevelRequest, LevelView, Print, TraceRequest},
     level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
@@ -138,6 +139,7 @@ impl Game for Maze2d {
         GameTools {
             levels: self,
             state: self,
+            snapshots: self,
             trace: self,
             pictures: self,
             input: self,
@@ -187,6 +189,23 @@ impl LevelTools for Maze2d {
 impl StateTools for Maze2d {
     fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
         world.get::<MazeBall>(agent).map(|ball| point(ball.0.position))
+    }
+}
+
+/// The ball is all that moves. With rapier's contacts the solver has a state of its own, and nothing is saved.
+impl SnapshotTools for Maze2d {
+    fn save(&self, world: &World, agent: Entity) -> Option<Snapshot> {
+        let arena = world.get::<MazeArena>(world.get::<PlaysIn>(agent)?.0)?;
+        let is_saved = arena.rules.contact == ContactModel::Soft;
+        world.get::<MazeBall>(agent).filter(|_| is_saved).copied().map(Snapshot::new)
+    }
+
+    fn load(&self, world: &mut World, agent: Entity, snapshot: &Snapshot) -> bool {
+        let arena = world.get::<PlaysIn>(agent).map(|plays_in| plays_in.0);
+        let has_level = arena.is_some_and(|arena| world.get::<MazeArena>(arena).is_some());
+        let Some(ball) = snapshot.get::<MazeBall>().filter(|_| has_level) else { return false };
+        world.entity_mut(agent).insert(*ball);
+        true
     }
 }
 

@@ -37,6 +37,19 @@ fn a_maze_is_covered_and_its_solution_recorded_and_drawn() {
 }
 
 #[test]
+fn snapshots_change_the_speed_and_not_the_result() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let explored = |more: &[&str]| done(temporary.path(), &[&MAZE[..], &["--json"], more].concat());
+    let (restored, fast) = explored(&[]);
+    let (replayed, slow) = explored(&["--no-snapshots"]);
+    assert_eq!(restored, replayed);
+    assert!(json_lines(&restored)[0]["exhausted"].is_null(), "continuous actions: {restored}");
+    assert!(fast.contains(" cells in ") && fast.contains("; snapshots restored "), "{fast}");
+    assert!(!fast.contains("snapshots restored 0 % of the steps"), "{fast}");
+    assert!(slow.contains("snapshots restored 0 % of the steps"), "{slow}");
+}
+
+#[test]
 fn a_goal_that_is_not_found_is_a_finding() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();

@@ -12,6 +12,7 @@
 //! - `restart`, `clocks`: the start of an episode, and the game's clocks at that time.
 //! - `input`: the path from an action into the game, and the mask of actions.
 //! - `clicks`: clicks on buttons of Bevy's UI.
+//! - `snapshot`: the state of an episode, saved and loaded.
 //! - `observe`, `paths`: observation, position, reward and end after a tick, and observations by the paths of their
 //!   values.
 //!
@@ -61,6 +62,7 @@ mod observe;
 mod paths;
 mod restart;
 mod runtime;
+mod snapshot;
 
 use crate::{
     defect::DefectKind,
@@ -71,6 +73,7 @@ use crate::{
         levels::LevelParts,
         paths::ObservedPath,
         runtime::{Baseline, Foreign, ForeignCell, ReaderFactory, Sensor, SystemFactory},
+        snapshot::SnapshotParts,
     },
     game::{BotTools, Game, GameTools, HostTools, InputTools, PictureTools, TestTools},
 };
@@ -143,6 +146,7 @@ impl ForeignGame {
             position: None,
             cell: None,
             proof: None,
+            snapshot: None,
             rewards: Vec::new(),
             end: None,
             end_cause: None,
@@ -510,6 +514,7 @@ impl Game for ForeignGame {
             host: self,
             levels: self,
             state: self,
+            snapshots: self,
             pictures: self,
             input: self,
             bots: self,
@@ -631,6 +636,8 @@ struct Description {
     cell: Option<SystemFactory<Vec<i32>>>,
     /// The proof about the state of an episode.
     proof: Option<ReaderFactory<LevelProof>>,
+    /// How the state of an episode is saved and loaded.
+    snapshot: Option<SnapshotParts>,
     /// Reward systems; the flag says whether the growth of the value is paid.
     rewards: Vec<(SystemFactory<f32>, bool)>,
     end: Option<SystemFactory<Option<EpisodeEnd>>>,
@@ -657,9 +664,9 @@ struct Description {
 }
 
 impl Description {
-    /// Returns whether the agent's state is read for explorers, detectors or proofs.
+    /// Returns whether the agent's state is read for explorers, detectors, proofs or snapshots.
     fn has_state(&self) -> bool {
-        self.position.is_some() || self.cell.is_some() || self.proof.is_some()
+        self.position.is_some() || self.cell.is_some() || self.proof.is_some() || self.snapshot.is_some()
     }
 
     fn sensor(&self) -> Sensor {

@@ -63,7 +63,7 @@ use bevy_playbot::{
     unknown_name::UnknownName,
     vision::Picture,
 };
-use std::sync::Arc;
+use std::{any::Any, sync::Arc};
 
 /// Words that begin the names of actions that do nothing.
 const IDLE_WORDS: [&str; 8] = ["none", "nothing", "noop", "no-op", "idle", "stay", "wait", "stand"];
@@ -207,6 +207,8 @@ pub struct GameTools<'a> {
     pub levels: &'a dyn LevelTools,
     /// The state of an agent that plays.
     pub state: &'a dyn StateTools,
+    /// Episodes that are saved in the middle.
+    pub snapshots: &'a dyn SnapshotTools,
     /// Steps as lines of numbers.
     pub trace: &'a dyn TraceTools,
     /// Pictures for agents and windows.
@@ -232,6 +234,8 @@ impl LevelTools for NoTools {}
 
 impl StateTools for NoTools {}
 
+impl SnapshotTools for NoTools {}
+
 impl TraceTools for NoTools {}
 
 impl PictureTools for NoTools {}
@@ -252,6 +256,7 @@ impl Default for GameTools<'_> {
             host: &NoTools,
             levels: &NoTools,
             state: &NoTools,
+            snapshots: &NoTools,
             trace: &NoTools,
             pictures: &NoTools,
             input: &NoTools,
@@ -371,6 +376,44 @@ pub trait StateTools: Send + Sync {
     /// now and then during an episode, so it takes a millisecond at most. By default nothing is proved.
     fn prove_from(&self, _world: &World, _agent: Entity) -> LevelProof {
         LevelProof::Unknown
+    }
+}
+
+/// The game's state of an episode at the end of a tick, of a type that only the game knows.
+///
+/// It is shared: a copy costs nothing.
+#[derive(Clone)]
+pub struct Snapshot(Arc<dyn Any + Send + Sync>);
+
+impl Snapshot {
+    /// Keeps a state of the game.
+    pub fn new<State: Any + Send + Sync>(state: State) -> Self {
+        Self(Arc::new(state))
+    }
+
+    /// Returns the state; `None` if it is of another type.
+    pub fn get<State: Any>(&self) -> Option<&State> {
+        self.0.downcast_ref()
+    }
+}
+
+/// Saving of an episode at the end of a tick, and going on from there.
+///
+/// An explorer then returns to a cell at once, instead of playing the path again. Save all state of the game that
+/// decides how the episode goes on: after a load each tick must equal the tick of the first time to the bit. State of
+/// the plugin is saved with it by [`SavedEpisode`](crate::saved_episode::SavedEpisode). The explorer compares both ways
+/// of returning now and then, and does without snapshots if they differ.
+pub trait SnapshotTools: Send + Sync {
+    /// Returns the game's state of an agent's running episode. It must name no entities: another agent, in another
+    /// World, may go on from it. Returns `None`, by default, for a game that saves nothing.
+    fn save(&self, _world: &World, _agent: Entity) -> Option<Snapshot> {
+        None
+    }
+
+    /// Puts an agent into a saved state. The agent has played the same level before, to its end or not. Returns false if
+    /// that is impossible, for instance because no level was built yet; the level is then started again.
+    fn load(&self, _world: &mut World, _agent: Entity, _snapshot: &Snapshot) -> bool {
+        false
     }
 }
 

@@ -11,7 +11,8 @@
 //!   plugin; [`games`], the games of a program; [`mode`], errors of modes; [`prelude`], the imports of a game.
 //! - its levels: [`split`], named ranges of levels; [`level_files`], levels from files; [`floor_plan`], their plans.
 //! - its Worlds: [`worlds`], headless Worlds with any number of agents; [`sensors`], what their agents see;
-//!   [`arrangement`], the distribution of arenas over Worlds; [`ended_episodes`], the list of episodes that ended.
+//!   [`arrangement`], the distribution of arenas over Worlds; [`ended_episodes`], the list of episodes that ended;
+//!   [`saved_episode`], episodes that are saved in the middle.
 //! - its players: [`eval`], evaluation of players on levels; [`demo`], recordings made and verified; [`detector`], the
 //!   contract of detectors of defects; [`defect`], the kinds of planted defects.
 //! - views: [`doctor`], the examination of a game's determinism; [`inspect`], single levels and steps; [`trace`], given
@@ -64,6 +65,7 @@ pub mod machine;
 pub mod mode;
 pub mod parallel;
 pub mod prelude;
+pub mod saved_episode;
 pub mod sealed_file;
 pub mod sensors;
 pub mod split;

@@ -2,9 +2,10 @@
 //! return, then explore") over exact replay.
 //!
 //! An archive holds the reached [`ExploredCell`]s, each with the shortest known path to it. Each visit draws a rarely
-//! seen cell, returns to it by the same actions, and explores from there. A game need not store its state: it must be
-//! deterministic, so the level and the actions restore it. A game that is not deterministic causes an error at the
-//! first tick that differs.
+//! seen cell, returns to it, and explores from there. A game need not store its state: it must be deterministic, so the
+//! level and the actions restore it. A game that is not deterministic causes an error at the first tick that differs.
+//! A game that saves its state ([`SnapshotTools`](playbot_harness::game::SnapshotTools)) returns at once, with the same
+//! result.
 //!
 //! Games with positions ([`StateTools::position`](playbot_harness::game::StateTools::position)) have a grid of cells
 //! over the level. Others have cells of their own
@@ -33,11 +34,15 @@
 //! - `cell`: the cells, and the grid over a level.
 //! - `archive`: the archive, and one visit.
 //! - `known_paths`: the paths to cells, their replay, and the summary.
+//! - `snapshots`: snapshots on these paths.
+//! - `tried`: the actions that were tried from each cell.
 
 mod archive;
 mod cell;
 mod known_paths;
 pub mod round;
+mod snapshots;
+mod tried;
 
 use crate::explore::archive::Archive;
 use bevy::prelude::*;
@@ -66,6 +71,8 @@ pub use crate::explore::{
     cell::{CellGrid, ExploredCell, NoCell},
     known_paths::{ExplorationSummary, Route, follow_route, record_route},
     round::{Round, check_cell, explore, open_cells},
+    snapshots::SnapshotFault,
+    tried::Exhaustion,
 };
 
 /// The plan of an exploration of a level. All fields but the threads affect the result.
@@ -103,6 +110,9 @@ pub struct ExplorePlan {
     pub threads: usize,
     /// Whether the actions before a panic of the game are written to a file.
     pub keeps_panics: bool,
+    /// Whether random actions go on from snapshots, if the game has them. They change no result, unless a snapshot
+    /// forgets something that no comparison shows.
+    pub snapshots: bool,
 }
 
 impl ExplorePlan {
@@ -124,6 +134,7 @@ impl ExplorePlan {
             worlds: 4,
             threads: default_threads(),
             keeps_panics: true,
+            snapshots: true,
         }
     }
 
@@ -164,17 +175,20 @@ pub enum Until {
     /// A solution, if the level has a goal, and all open cells, if they are known.
     #[default]
     Covered,
+    /// Every action was tried from every cell: see [`Exploration::exhausted`].
+    Exhausted,
     /// No condition: shorter paths are searched for until the budget is used up.
     Spent,
 }
 
 impl Until {
-    const ALL: [Self; 3] = [Self::Solved, Self::Covered, Self::Spent];
+    const ALL: [Self; 4] = [Self::Solved, Self::Covered, Self::Exhausted, Self::Spent];
 
     fn name(self) -> &'static str {
         match self {
             Self::Solved => "solved",
             Self::Covered => "covered",
+            Self::Exhausted => "exhausted",
             Self::Spent => "spent",
         }
     }
@@ -251,8 +265,13 @@ pub struct Exploration {
     pub seed: u64,
     /// Name of the explorer.
     pub explorer: &'static str,
-    /// Environment steps, with the paths back.
+    /// Environment steps, with the paths back. A path back counts in full if a snapshot saves it, too, so that a budget
+    /// leads equally far.
     pub steps: u64,
+    /// Steps of these that were not played, because snapshots restored them.
+    pub restored_steps: u64,
+    /// The difference that made the exploration do without snapshots, if there was one.
+    pub snapshot_fault: Option<SnapshotFault>,
     /// Visits.
     pub visits: u64,
     /// Ends of their episodes.
@@ -268,6 +287,10 @@ pub struct Exploration {
     /// The cells that no wall cuts off from the start, if cells are positions and there is a floor plan: see
     /// [`open_cells`].
     pub open: Option<BTreeSet<ExploredCell>>,
+    /// Whether every discrete action was tried from every cell in which the episode goes on, and no other cell came up.
+    /// `None` if some are left, for continuous actions, and for games that keep no
+    /// [`StateHash`](bevy_playbot::state_hash::StateHash), whose replays prove nothing.
+    pub exhausted: Option<Exhaustion>,
     archive: Archive,
 }
 
@@ -320,6 +343,8 @@ pub enum Stop {
     Solved,
     /// All open cells were reached, and a solution was found if the level has a goal.
     Covered,
+    /// Every action was tried from every cell.
+    Exhausted,
     /// The caller stopped it.
     Asked,
 }

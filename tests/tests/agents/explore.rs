@@ -20,7 +20,8 @@ use playbot_harness::{
 };
 use playbot_learner::{Actions, PpoConfig, Prior, SkillDraw};
 use playbot_test::explore::{
-    Exploration, ExploreError, ExplorePlan, ExploredCell, Explorer, Stop, Until, explore, follow_route, record_route,
+    Exhaustion, Exploration, ExploreError, ExplorePlan, ExploredCell, Explorer, Stop, Until, explore, follow_route,
+    record_route,
 };
 use playbot_tests::{
     Cell, Corridor, Drift, as_corridor, corridor_plugin, foreign::stubborn::stubborn_game, spawn_walker,
@@ -132,6 +133,45 @@ fn threads_arenas_and_worlds_change_nothing() {
     assert_eq!(everything(&Cells, &two), expected);
     assert_eq!(everything(&Cells, &few), expected);
     assert_ne!(everything(&Cells, &ExplorePlan { seed: 1, ..one }), expected);
+}
+
+#[test]
+fn snapshots_lead_to_the_same_result_as_replays() {
+    let games = Games::new(&GAMES).expect("each has a name of its own");
+    for (name, mode, level) in [("coinrun", "hard", 1), ("maze2d", "random+size=7x7", 3)] {
+        let game = games.get(name).expect("a game");
+        let restoring = plan(mode, level, 40_000);
+        let replaying = ExplorePlan { snapshots: false, ..restoring.clone() };
+        let few = ExplorePlan { arenas: 3, worlds: 1, ..restoring.clone() };
+        let restored = found(game, &restoring);
+        assert_eq!(restored.snapshot_fault, None, "{name}");
+        assert!(restored.restored_steps > 1000, "{name}: {} steps", restored.restored_steps);
+        assert_eq!(found(game, &replaying).restored_steps, 0, "{name}");
+        let expected = everything(game, &replaying);
+        assert!(everything(game, &restoring) == expected, "{name} finds something else");
+        assert!(everything(game, &few) == expected, "{name} finds something else with fewer arenas");
+    }
+}
+
+#[test]
+fn a_level_is_exhausted_once_each_action_was_tried_from_each_cell() {
+    let plan = ExplorePlan { until: Until::Exhausted, ..plan("plain", 1, 50_000) };
+    let all = found(&Cells, &plan);
+    let rests_on = "the game's own cells; states within one cell are taken as equal".to_owned();
+    // The episode is over in cells 0 and 6.
+    assert_eq!((all.stop, all.cells().len()), (Stop::Exhausted, 7));
+    assert_eq!(all.exhausted, Some(Exhaustion { actions: 3, cells: 5, rests_on }));
+    assert!(all.steps < plan.steps);
+    // Fewer ticks than there are cells and actions.
+    let few = found(&Cells, &ExplorePlan { explore_ticks: 1, batch: 1, steps: 10, ..plan });
+    assert_eq!((few.exhausted, few.stop), (None, Stop::Spent));
+}
+
+#[test]
+fn levels_of_continuous_actions_are_never_exhausted() {
+    let maze = Games::new(&GAMES).expect("each has a name of its own").get("maze2d").expect("a game");
+    let found = found(maze, &ExplorePlan { until: Until::Exhausted, ..plan("random+size=7x7", 3, 4000) });
+    assert_eq!((found.exhausted, found.stop), (None, Stop::Spent));
 }
 
 #[test]

@@ -12,3 +12,4 @@ mod namesakes;
 mod play;
 mod rebuild;
 mod restarts;
+mod snapshots;

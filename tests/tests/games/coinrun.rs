@@ -10,7 +10,7 @@ use playbot_games::coinrun::{
     components::{ArenaBody, Crate, InArena, LastOutcome, PlayerBody, PlaysIn, Saw},
     generator::generate,
 };
-use playbot_harness::worlds::build_world;
+use playbot_harness::{saved_episode::SavedEpisode, worlds::build_world};
 
 /// Random numbers without a crate: a linear congruential generator is plenty for choosing buttons.
 struct Buttons(u64);
@@ -44,6 +44,45 @@ fn the_game_and_the_pure_simulation_never_differ() {
             }
             assert_eq!(world.get::<LastOutcome>(agent).expect("a player").0, sim.end());
         }
+    }
+}
+
+/// Plays ticks with these buttons, and returns the state hash, the observation and the reward after each.
+fn play(world: &mut World, agent: Entity, buttons: &[u8]) -> Vec<(u64, Vec<f32>, f32)> {
+    let mut states = Vec::new();
+    for &button in buttons {
+        world.entity_mut(agent).insert(Action(ActionValue::Discrete(button.into())));
+        world.tick().expect("sound");
+        let hash = world.get::<StateHash>(agent).expect("an agent").0;
+        let seen = world.get::<Observation>(agent).expect("an agent").vector.clone();
+        states.push((hash, seen, world.get::<Reward>(agent).expect("an agent").get()));
+    }
+    states
+}
+
+#[test]
+fn an_episode_goes_on_to_the_bit_from_a_snapshot_in_another_world() {
+    let game = CoinRun::default();
+    for level in 0..20_u64 {
+        let mut buttons = Buttons(level);
+        let mut draw = |count: usize| -> Vec<u8> { (0..count).map(|_| buttons.next()).collect() };
+        let [before, after, other] = [30, 40, 9].map(&mut draw);
+        let world = || {
+            let (mut world, agents) = build_world(&game, "hard", 0, 0, 2);
+            world.entity_mut(agents[1]).insert((Control::Human, LevelQueue::Always(level)));
+            (world, agents[1])
+        };
+        let (mut first, agent) = world();
+        play(&mut first, agent, &before);
+        let saved = SavedEpisode::of(&game, &first, agent);
+        let expected = play(&mut first, agent, &after);
+        // An episode may end earlier, by a saw.
+        let Some(saved) = saved else { continue };
+        let (mut second, agent) = world();
+        assert!(!saved.restore(&game, &mut second, agent), "no level was built yet");
+        play(&mut second, agent, &other);
+        assert!(saved.restore(&game, &mut second, agent), "{level}");
+        assert_eq!(play(&mut second, agent, &after), expected, "{level}");
     }
 }
 

@@ -20,6 +20,7 @@ use playbot_harness::{
     demo::verify_file,
     eval::{EvalPlan, Player, evaluate, summarize},
     parallel::on_threads,
+    saved_episode::SavedEpisode,
     worlds::build_world,
 };
 use playbot_tests::{measuring::plan, recording::record_demonstrator};
@@ -39,6 +40,34 @@ fn one_agent(mode: &str, level: u64) -> (World, Entity) {
     let (mut world, agents) = build_world(&GAME, mode, 0, 0, 1);
     world.entity_mut(agents[0]).insert((Control::Human, LevelQueue::Always(level), push(0.0, 0.0)));
     (world, agents[0])
+}
+
+/// Plays ticks in which the ball is pushed in a circle of squares, and returns the state hash after each.
+fn pushed(world: &mut World, agent: Entity, ticks: u32) -> Vec<u64> {
+    let mut hashes = Vec::new();
+    for tick in 0..ticks {
+        let [x, y] = [[1.0, 0.3], [-0.2, 1.0], [-1.0, -0.4], [0.5, -1.0]][(tick / 20 % 4) as usize];
+        world.entity_mut(agent).insert(push(x, y));
+        world.tick().expect("sound");
+        hashes.push(world.get::<StateHash>(agent).expect("an agent").0);
+    }
+    hashes
+}
+
+#[test]
+fn a_ball_goes_on_to_the_bit_from_a_snapshot_in_another_world() {
+    let (mut first, agent) = one_agent("medium", 7);
+    pushed(&mut first, agent, 50);
+    let saved = SavedEpisode::of(&GAME, &first, agent).expect("soft contacts are saved");
+    let expected = pushed(&mut first, agent, 90);
+    let (mut second, agent) = one_agent("medium", 7);
+    assert!(!saved.restore(&GAME, &mut second, agent), "no level was built yet");
+    pushed(&mut second, agent, 13);
+    assert!(saved.restore(&GAME, &mut second, agent));
+    assert_eq!(pushed(&mut second, agent, 90), expected);
+    let (mut solved, agent) = one_agent("medium+contact=rapier", 7);
+    pushed(&mut solved, agent, 5);
+    assert!(SavedEpisode::of(&GAME, &solved, agent).is_none(), "rapier has a state of its own");
 }
 
 #[test]

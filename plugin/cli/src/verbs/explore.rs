@@ -28,7 +28,11 @@ use playbot_test::explore::{
     round::check_cell,
 };
 use serde_json::json;
-use std::{ops::ControlFlow, path::PathBuf};
+use std::{
+    ops::ControlFlow,
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 pub use crate::verbs::explore::explorer::ExplorerSetup;
 
@@ -57,7 +61,8 @@ pub struct Args {
     #[arg(long, default_value_t = 500_000, value_parser = clap::value_parser!(u64).range(1..))]
     steps: u64,
     /// End earlier: solved (a path to the goal is found), covered (every open cell is reached, too), or spent (never).
-    /// For covered the number of open cells must be known. Use spent to find shorter paths.
+    /// For covered the number of open cells must be known. Or exhausted: every action was tried from every cell. Use
+    /// spent to find shorter paths.
     #[arg(long, default_value_t, value_name = "WHEN")]
     until: Until,
     /// Skill model: explores with skills drawn from its prior.
@@ -79,6 +84,9 @@ pub struct Args {
     /// Visits between two updates of the known cells.
     #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(1..))]
     batch: u32,
+    /// Return to known cells by replays alone, even if the game saves its state.
+    #[arg(long)]
+    no_snapshots: bool,
     /// Random seed.
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -131,7 +139,12 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             Some((PlotFile::new(path)?, floor_plan))
         }
     };
+    let begin = Instant::now();
     let exploration = search(game, &plan)?;
+    if let Some(fault) = &exploration.snapshot_fault {
+        report!("warning: {fault}");
+    }
+    report!("{}", pace(&exploration, begin.elapsed()));
     let to_cell = args.cell.as_ref().map(|cell| (cell, exploration.route_to(cell)));
     print(&exploration.summary(game), to_cell.as_ref(), args.json)?;
     let is_missed = matches!(to_cell, Some((_, None)));
@@ -220,6 +233,7 @@ fn plan(args: &Args, split: &LevelSplit, explorer: Explorer, observation_config:
         cell_size: args.cell_size,
         batch: args.batch,
         seed: args.seed,
+        snapshots: !args.no_snapshots,
         threads: args.compute.threads(),
         ..ExplorePlan::new(split.mode.clone(), split.first)
     }
@@ -241,6 +255,18 @@ fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> 
     );
     bar.finish_and_clear();
     Ok(explored?)
+}
+
+/// Returns how fast the exploration was, and what snapshots have saved. The speed differs from run to run, so it is no
+/// part of the result.
+fn pace(exploration: &Exploration, time: Duration) -> String {
+    let (cells, seconds) = (exploration.cells().len(), time.as_secs_f64());
+    let restored = 100.0 * exploration.restored_steps as f64 / exploration.steps.max(1) as f64;
+    format!(
+        "{} in {seconds:.1} s, {:.0} a second; snapshots restored {restored:.0} % of the steps",
+        counted(cells as u64, "cell"),
+        cells as f64 / seconds.max(1e-9)
+    )
 }
 
 fn why_nothing(cell: Option<&ExploredCell>, is_missed: bool) -> String {

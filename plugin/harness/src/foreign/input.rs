@@ -181,6 +181,14 @@ impl Input {
         }
     }
 
+    /// Returns whether actions hold nothing but keys and mouse buttons, or are passed on by the game's own system.
+    pub(super) fn is_of_buttons(&self) -> bool {
+        let is_pad = |button: &VirtualButton| matches!(button, VirtualButton::Gamepad(_));
+        let has_others = !(self.pads.is_empty() && self.cursor.is_empty() && self.taps.is_empty());
+        let has_parts = !self.clicks.is_empty() || self.axes.is_some() || self.whole.is_some();
+        !(has_others || has_parts || self.keys.iter().flatten().any(is_pad))
+    }
+
     /// Returns the problem of the input: an unknown key, or parts that contradict each other. The text follows the name
     /// of the game.
     pub(super) fn problem(&self) -> Option<String> {

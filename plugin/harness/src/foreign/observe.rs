@@ -196,17 +196,32 @@ impl IntoPlanPosition for Vec3 {
 /// Position of the agent on its level's plan. Missing while it is unknown.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
-struct ForeignPosition(Vec2);
+pub(super) struct ForeignPosition(Vec2);
 
 /// State of the agent for explorers. Missing while it is unknown.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
-struct ForeignExploreCell(Vec<i32>);
+pub(super) struct ForeignExploreCell(Vec<i32>);
 
 /// The reason why the agent's episode has just ended without the goal. Missing if there is no reason.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
 struct ForeignEndCause(&'static str);
+
+/// Position and cell of an agent, for a snapshot.
+pub(super) type KeptState = (Option<ForeignPosition>, Option<ForeignExploreCell>);
+
+/// Returns the state of an agent after its last tick.
+pub(super) fn kept_state(world: &World, agent: Entity) -> KeptState {
+    (world.get(agent).cloned(), world.get(agent).cloned())
+}
+
+/// Puts an agent into a state that was kept.
+pub(super) fn put_state(world: &mut World, agent: Entity, (position, cell): &KeptState) {
+    note(world, agent, *position);
+    note(world, agent, cell.clone());
+    note::<ForeignEndCause>(world, agent, None);
+}
 
 /// Removes the state of an agent in its last episode, which is stale in the next one.
 pub(super) fn forget_state(world: &mut World, agent: Entity) {
@@ -258,6 +273,9 @@ fn read_state(world: &mut World) {
         }
         if let Some(proof) = &mut foreign.proof {
             proof.prepare(world);
+        }
+        if let Some(save) = &mut foreign.save {
+            save.prepare(world);
         }
         Ok((run(&mut foreign.position, world)?, run(&mut foreign.cell, world)?))
     });

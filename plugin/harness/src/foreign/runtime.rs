@@ -3,6 +3,7 @@
 use crate::{
     detector::LevelProof,
     foreign::{ForeignGame, clocks::ClockSettings, paths::ObservedPath},
+    game::Snapshot,
 };
 use bevy::{
     ecs::{
@@ -72,6 +73,7 @@ pub(super) struct Foreign {
     pub(super) position: Option<OwnedSystem<Vec2>>,
     pub(super) cell: Option<OwnedSystem<Vec<i32>>>,
     pub(super) proof: Option<OwnedReader<LevelProof>>,
+    pub(super) save: Option<OwnedReader<Snapshot>>,
     /// The error of a proof, until the next tick reports it.
     pub(super) failed_proof: Option<String>,
     pub(super) rewards: Vec<RewardPart>,
@@ -119,6 +121,7 @@ impl Foreign {
             position: description.position.as_ref().map(|system| system.make()),
             cell: description.cell.as_ref().map(|system| system.make()),
             proof: description.proof.as_ref().map(|system| system.make()),
+            save: description.snapshot.as_ref().map(|parts| parts.save.make()),
             failed_proof: None,
             rewards: description.rewards.iter().map(part).collect(),
             end: description.end.as_ref().map(|system| system.make()),
@@ -386,6 +389,19 @@ impl<Out: 'static> ReaderFactory<Out> {
         S: IntoSystem<(), Out, M, System: ReadOnlySystem> + Clone + Send + Sync + 'static,
     {
         let make = move || -> BoxedReadOnlySystem<(), Out> { Box::new(IntoSystem::into_system(system.clone())) };
+        Self { name: type_name::<S>(), make: Arc::new(make) }
+    }
+
+    /// Creates a factory of copies of `system`, whose output is converted.
+    pub(super) fn converting<S, Given, M>(system: S, convert: fn(Given) -> Out) -> Self
+    where
+        S: IntoSystem<(), Given, M, System: ReadOnlySystem> + Clone + Send + Sync + 'static,
+        Given: 'static,
+        M: 'static,
+    {
+        let make = move || -> BoxedReadOnlySystem<(), Out> {
+            Box::new(IntoSystem::into_system(IntoSystem::<(), Given, M>::map(system.clone(), convert)))
+        };
         Self { name: type_name::<S>(), make: Arc::new(make) }
     }
 

@@ -109,7 +109,8 @@ impl<G: Deref<Target: Game> + Send + Sync> Game for Mutant<G> {
     }
 
     fn tools(&self) -> GameTools<'_> {
-        self.game.tools()
+        // A planted defect may have state of its own, which the game's snapshots do not know.
+        GameTools { snapshots: GameTools::default().snapshots, ..self.game.tools() }
     }
 
     fn built_anew(&self) -> Option<Arc<dyn Game>> {

@@ -194,6 +194,7 @@ fn exploration_plan(trial: &Trial, explorer: &Explorer) -> ExplorePlan {
         worlds: 1,
         threads: 1,
         keeps_panics: false,
+        snapshots: false,
         ..ExplorePlan::new(trial.mode, trial.level)
     }
 }

@@ -3,6 +3,8 @@
 use crate::explore::{
     cell::{ExploredCell, Spotted},
     known_paths::{KnownPath, KnownPaths, Route},
+    snapshots::SPACING,
+    tried::{Trial, TrialNotes, TriedActions},
 };
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -10,18 +12,19 @@ use bevy_playbot::{
     agent::Control,
     bot::uniform,
     demo::replay::Divergence,
-    episode::{Episode, EpisodeResult},
+    episode::{Episode, EpisodeEnd, EpisodeResult},
     legal::{LegalActions, RedrawsIllegal},
     level::LevelQueue,
     skill_prior::ActiveSkill,
     state_hash::StateHash,
     streams::AgentStreams,
 };
+use playbot_harness::{game::Game, saved_episode::SavedEpisode};
 use playbot_learner::{
     ActionSpace, Streams,
     rng::{ChaCha8Rng, below, unit},
 };
-use std::{collections::BTreeMap, iter};
+use std::{collections::BTreeMap, iter, sync::Arc};
 
 /// A cell that was reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,13 +71,25 @@ pub(super) struct Archive {
     cells: BTreeMap<ExploredCell, ReachedCell>,
     paths: KnownPaths,
     solution: Option<KnownPath>,
+    space: ActionSpace,
+    tried: TriedActions,
+    /// Whether the game hashes its state, so that replays prove something.
+    is_hashed: bool,
 }
 
 impl Archive {
     /// Creates an archive with the start of a level alone.
     pub fn new(space: ActionSpace) -> Self {
         let start = ReachedCell { path: KnownPath::START, is_over: false, is_passed: false, visits: 0 };
-        Self { start, cells: BTreeMap::new(), paths: KnownPaths::new(space), solution: None }
+        Self {
+            start,
+            cells: BTreeMap::new(),
+            paths: KnownPaths::new(space),
+            solution: None,
+            space,
+            tried: TriedActions::default(),
+            is_hashed: false,
+        }
     }
 
     /// Returns all cells, in their order.
@@ -95,6 +110,22 @@ impl Archive {
     /// Returns the path to a cell.
     pub fn route_to(&self, cell: &ExploredCell) -> Option<Route> {
         self.cells.get(cell).map(|reached| self.route(reached.path))
+    }
+
+    /// Returns the last snapshot on a path.
+    pub fn nearest(&self, path: KnownPath) -> Option<Arc<SavedEpisode>> {
+        self.paths.nearest(path).cloned()
+    }
+
+    /// Returns the number of actions and cells, if every action was tried from every cell in which the episode goes on.
+    pub fn exhausted(&self) -> Option<(u32, usize)> {
+        let ActionSpace::Discrete(actions) = self.space else { return None };
+        let actions = u32::try_from(actions).ok().filter(|_| self.is_hashed)?;
+        let mut open = self.cells.iter().filter(|(_, reached)| !reached.is_over).map(|(cell, _)| cell);
+        let count = open.clone().count();
+        let is_exhausted =
+            self.tried.has_all(None, actions) && open.all(|cell| self.tried.has_all(Some(cell), actions));
+        is_exhausted.then_some((actions, count))
     }
 
     /// Returns whether a cell is new, or reached sooner than before.
@@ -123,7 +154,9 @@ impl Archive {
 
     /// Adds the cells of a visit.
     pub fn merge(&mut self, visit: Visited) {
-        let Visited { destination, piece, seen, solved, .. } = visit;
+        let Visited { destination, piece, seen, solved, saved, tried, .. } = visit;
+        self.is_hashed |= piece.hashes.iter().any(|hash| *hash != 0);
+        self.tried.merge(tried);
         if destination.cell.is_none() {
             self.start.visits += 1;
         }
@@ -131,6 +164,9 @@ impl Archive {
         let news = seen.iter().filter(|(cell, sight)| self.is_news(cell, sight)).map(|(_, sight)| sight.ticks);
         let farthest = news.chain(solved).max();
         let path = farthest.map(|ticks| self.paths.extend(destination.path, &piece, ticks));
+        if let Some(path) = path {
+            saved.into_iter().filter(|saved| saved.tick() <= path.ticks).for_each(|saved| self.paths.keep(path, saved));
+        }
         for (cell, sight) in seen {
             let is_news = self.is_news(&cell, &sight);
             let found = ReachedCell {
@@ -154,6 +190,7 @@ impl Archive {
 // Visits of agents.
 
 /// A path back to a cell, and the ticks to explore there.
+#[derive(Clone)]
 pub(super) struct Job {
     /// Number of the visit in the whole exploration. Its random numbers are derived from it, so that any World may make
     /// it.
@@ -161,6 +198,8 @@ pub(super) struct Job {
     pub destination: Destination,
     /// The path back.
     pub route: Route,
+    /// The last snapshot on it.
+    pub saved: Option<Arc<SavedEpisode>>,
     /// Ticks to explore without a find.
     pub patience: u32,
     /// Most ticks to explore.
@@ -195,10 +234,32 @@ pub(super) struct Visited {
     pub seen: BTreeMap<ExploredCell, Sight>,
     /// Ticks after which the level's goal was reached.
     pub solved: Option<u32>,
-    /// Ticks played, with the path back.
+    /// Ticks of the episode, with the path back.
     pub steps: u64,
+    /// Ticks of these that a snapshot has saved.
+    pub restored: u32,
     /// The result of the episode, if it ended.
     pub end: Option<EpisodeResult>,
+    /// Snapshots after the path to the destination.
+    pub saved: Vec<SavedEpisode>,
+    /// The actions that were tried from each cell.
+    pub tried: TriedActions,
+}
+
+impl Visited {
+    /// Returns the first tick in which this visit differs from the same one by a replay.
+    pub fn first_difference(&self, replayed: &Self) -> Option<u32> {
+        let begin = self.destination.path.ticks;
+        let hashes = self.piece.hashes.iter().zip(&replayed.piece.hashes);
+        if let Some(at) = hashes.clone().position(|(one, other)| one != other) {
+            return Some(begin + at as u32);
+        }
+        let is_same = self.piece == replayed.piece
+            && self.seen == replayed.seen
+            && self.tried == replayed.tried
+            && (self.solved, self.steps, self.end) == (replayed.solved, replayed.steps, replayed.end);
+        (!is_same).then_some(begin + hashes.len() as u32)
+    }
 }
 
 /// The random numbers of actions.
@@ -231,6 +292,10 @@ pub(super) struct Visit {
     redraw: Option<u32>,
     /// Whether the goal was reached on the path back.
     was_solved: bool,
+    /// The actions from cell to cell.
+    notes: TrialNotes,
+    /// Whether a cell of this tick is news.
+    has_news: bool,
 }
 
 impl Visit {
@@ -247,7 +312,17 @@ impl Visit {
         let here = destination.cell.clone().map(|cell| (cell, sight));
         let piece = Route::empty(&draws.space);
         let seen = here.into_iter().collect();
-        let visited = Visited { destination, piece, seen, solved: None, steps: 0, end: None };
+        let visited = Visited {
+            destination,
+            piece,
+            seen,
+            solved: None,
+            steps: 0,
+            restored: 0,
+            end: None,
+            saved: Vec::new(),
+            tried: TriedActions::default(),
+        };
         let rng = draws.streams.stream("explore", job.number);
         let (ticks, left) = (0, job.patience);
         Self {
@@ -262,6 +337,33 @@ impl Visit {
             next: None,
             redraw: None,
             was_solved: false,
+            notes: TrialNotes::default(),
+            has_news: false,
+        }
+    }
+
+    /// Goes on from the snapshot of the path back, if there is one that the agent can load. Returns whether it did.
+    pub fn restore(&mut self, game: &dyn Game, world: &mut World, agent: Entity) -> bool {
+        let Some(saved) = self.job.saved.take().filter(|saved| saved.restore(game, world, agent)) else { return false };
+        self.ticks = saved.tick();
+        (self.visited.steps, self.visited.restored) = (self.ticks.into(), self.ticks);
+        self.was_solved = world.get::<Episode>(agent).is_some_and(Episode::is_success);
+        true
+    }
+
+    /// Looks at the cell of a snapshot at the end of the path back, as after a tick.
+    ///
+    /// # Errors
+    ///
+    /// The agent is in another cell than on the known path.
+    pub fn look_around(
+        &mut self,
+        archive: &Archive,
+        spot: impl FnOnce(u32, Option<Vec2>) -> Option<Spotted>,
+    ) -> Result<(), Divergence> {
+        match spot(self.ticks, None).filter(|_| self.ticks >= self.visited.destination.path.ticks) {
+            Some(spotted) => self.look(spotted, None, archive),
+            None => Ok(()),
         }
     }
 
@@ -303,7 +405,7 @@ impl Visit {
     }
 
     /// Updates the visit after a tick; true if the visit is over. `spot` returns the cell of the agent after this many
-    /// ticks, and the cells that it has passed since a position.
+    /// ticks, and the cells that it has passed since a position. `save` returns a snapshot of this tick.
     ///
     /// # Errors
     ///
@@ -315,6 +417,7 @@ impl Visit {
         end: Option<EpisodeResult>,
         archive: &Archive,
         spot: impl FnOnce(u32, Option<Vec2>) -> Option<Spotted>,
+        save: impl FnOnce() -> Option<SavedEpisode>,
     ) -> Result<bool, Divergence> {
         let episode = world.get::<Episode>(agent);
         let ticks = end.map_or_else(|| episode.map_or(0, |episode| episode.tick), |end| end.ticks);
@@ -341,14 +444,56 @@ impl Visit {
                 self.visited.solved = Some(ticks);
             }
         }
+        // After the end of an episode, the mask may be that of the next state.
+        let mask = world.get::<LegalActions>(agent).filter(|_| !is_on_its_way && end.is_none());
+        self.forbid(mask);
         if ticks >= self.visited.destination.path.ticks
             && let Some(spotted) = spot(ticks, self.position.take())
         {
-            self.look(spotted, end.is_some(), archive)?;
+            self.look(spotted, end, archive)?;
+        }
+        self.forbid(mask);
+        if !is_on_its_way {
+            self.note_end(end);
+            self.save_news(end, save);
         }
         let explored = self.visited.piece.len();
         let is_spent = !is_on_its_way && (self.left == 0 || explored >= self.job.most as usize);
         Ok(end.is_some() || is_spent)
+    }
+
+    /// Notes illegal actions of this tick. They belong to the state before it.
+    fn forbid(&mut self, mask: Option<&LegalActions>) {
+        if let Some(mask) = mask {
+            self.notes.forbid(self.ticks - 1, mask.mask());
+        }
+    }
+
+    /// Notes the action that ended the game.
+    fn note_end(&mut self, end: Option<EpisodeResult>) {
+        if is_terminated(end)
+            && let Some(trial) = self.trial(self.ticks, true)
+        {
+            self.notes.end(self.ticks, trial.action);
+        }
+    }
+
+    /// Keeps a snapshot if a cell of this tick is news, and the last one is some ticks old.
+    fn save_news(&mut self, end: Option<EpisodeResult>, save: impl FnOnce() -> Option<SavedEpisode>) {
+        let has_news = std::mem::take(&mut self.has_news) && end.is_none();
+        let last = self.visited.saved.last().map(SavedEpisode::tick);
+        if has_news && last.is_none_or(|last| self.ticks - last >= SPACING) {
+            self.visited.saved.extend(save());
+        }
+    }
+
+    /// Returns the discrete action that led to this many ticks, if it belongs to the visit and not to the path back.
+    fn trial(&self, ticks: u32, is_over: bool) -> Option<Trial> {
+        let index = ticks.checked_sub(1)?.checked_sub(self.visited.destination.path.ticks)? as usize;
+        let ActionValue::Discrete(action) = self.visited.piece.actions.get(index)? else { return None };
+        let hashes = &self.visited.piece.hashes;
+        let before = index.checked_sub(1).map_or_else(|| self.job.route.hashes.last(), |before| hashes.get(before));
+        Some(Trial { action, has_changed: hashes.get(index) != before, is_over })
     }
 
     /// Checks that this tick equals that of the known path.
@@ -367,7 +512,7 @@ impl Visit {
     }
 
     /// Adds the cell of the agent, and those that it has passed.
-    fn look(&mut self, spotted: Spotted, is_last: bool, archive: &Archive) -> Result<(), Divergence> {
+    fn look(&mut self, spotted: Spotted, end: Option<EpisodeResult>, archive: &Archive) -> Result<(), Divergence> {
         let Spotted { ticks, cell, position, passed } = spotted;
         let Destination { cell: wanted, path, is_passed } = &self.visited.destination;
         if ticks < path.ticks {
@@ -380,7 +525,10 @@ impl Visit {
             return Err(self.divergence(ticks.saturating_sub(1), what));
         }
         // An earlier sighting was not the end.
-        let is_over = is_last && ticks == self.ticks;
+        let is_now = ticks == self.ticks;
+        let is_over = end.is_some() && is_now;
+        let trial = self.trial(ticks, is_now && is_terminated(end));
+        self.notes.arrive(ticks, &cell, trial);
         for cell in passed {
             self.see(cell, Sight { ticks, is_over, is_passed: true }, archive);
         }
@@ -396,6 +544,7 @@ impl Visit {
         }
         if archive.is_news(&cell, &sight) {
             self.left = self.job.patience;
+            self.has_news = true;
         }
         self.visited.seen.insert(cell, sight);
     }
@@ -406,8 +555,13 @@ impl Visit {
 
     /// Returns the result, with the number of the visit.
     pub fn finish(self) -> (u64, Visited) {
-        (self.job.number, self.visited)
+        (self.job.number, Visited { tried: self.notes.tried, ..self.visited })
     }
+}
+
+/// Returns whether the game is over, and not only the time.
+fn is_terminated(end: Option<EpisodeResult>) -> bool {
+    end.is_some_and(|end| matches!(end.end, EpisodeEnd::Terminated { .. }))
 }
 
 #[cfg(test)]
@@ -433,7 +587,10 @@ mod tests {
             seen: seen.collect(),
             solved: None,
             steps: u64::from(path.ticks) + actions.len() as u64,
+            restored: 0,
             end: None,
+            saved: Vec::new(),
+            tried: TriedActions::default(),
         }
     }
 
@@ -501,6 +658,17 @@ mod tests {
         archive.merge(solved(&archive, &[5, 5, 5, 5], 4));
         archive.merge(solved(&archive, &[6, 6], 2));
         assert_eq!(archive.solution().map(|path| archive.route(path).hashes), Some(vec![6, 6]));
+    }
+
+    #[test]
+    fn a_visit_that_goes_another_way_differs_in_its_first_other_tick() {
+        let archive = archive();
+        let seen = [(2, 2, false), (4, 4, false)];
+        let restored = visit(&archive, Some(2), &[4, 5], &seen);
+        let same = Visited { restored: 2, ..visit(&archive, Some(2), &[4, 5], &seen) };
+        assert_eq!(restored.first_difference(&same), None);
+        assert_eq!(restored.first_difference(&visit(&archive, Some(2), &[4, 6], &seen)), Some(3));
+        assert_eq!(restored.first_difference(&visit(&archive, Some(2), &[4, 5], &seen[..1])), Some(4));
     }
 
     #[test]

@@ -134,6 +134,16 @@ impl<'a> Lookout<'a> {
         self.kind == Some(CellKind::Positions)
     }
 
+    /// Returns the kind of the cells in words, and the assumption behind it; `None` before the first agent was seen.
+    pub fn describe(&self) -> Option<String> {
+        let cells = match self.kind? {
+            CellKind::Own => "the game's own cells".to_owned(),
+            CellKind::Positions => format!("cells of size {}", self.grid.size),
+            CellKind::Values => format!("observations in steps of {}", self.fineness),
+        };
+        Some(format!("{cells}; states within one cell are taken as equal"))
+    }
+
     /// Returns the cell of an agent after this many ticks, with its position a tick before, if that is known. An
     /// observation is older by a tick, since it is made before the action.
     pub fn spot(

@@ -1,6 +1,10 @@
 //! Paths to cells. They share their beginnings: each is a piece of its own after a path that was known before.
 
-use crate::explore::{EndCounts, Exploration, ExploreError, Stop};
+use crate::explore::{
+    EndCounts, Exploration, ExploreError, Stop,
+    snapshots::{MOST_SNAPSHOTS, SnapshotStore},
+    tried::Exhaustion,
+};
 use bevy::prelude::*;
 use bevy_playbot::{
     action::Action,
@@ -15,11 +19,11 @@ use bevy_playbot::{
     level::LevelQueue,
     streams::AgentStreams,
 };
-use playbot_harness::{game::Game, worlds::build_world};
+use playbot_harness::{game::Game, saved_episode::SavedEpisode, worlds::build_world};
 use playbot_learner::{ActionSpace, Actions};
 use playbot_report::counted;
 use serde::Serialize;
-use std::{collections::BTreeSet, fmt};
+use std::{collections::BTreeSet, fmt, sync::Arc};
 
 /// Actions from the start of a level, with the state hash after each.
 #[derive(Clone, Debug, PartialEq)]
@@ -82,13 +86,14 @@ struct Segment {
 pub(super) struct KnownPaths {
     space: ActionSpace,
     segments: Vec<Segment>,
+    snapshots: SnapshotStore<Arc<SavedEpisode>>,
 }
 
 impl KnownPaths {
     /// Creates it with the path to the start alone.
     pub fn new(space: ActionSpace) -> Self {
         let start = Segment { parent: KnownPath::START, piece: Route::empty(&space) };
-        Self { space, segments: vec![start] }
+        Self { space, segments: vec![start], snapshots: SnapshotStore::new(MOST_SNAPSHOTS) }
     }
 
     /// Adds a path of this many ticks, which extends a known one by the beginning of a piece.
@@ -100,6 +105,23 @@ impl KnownPaths {
         kept.extend(piece, (ticks - parent.ticks) as usize);
         self.segments.push(Segment { parent, piece: kept });
         KnownPath { segment: self.segments.len() - 1, ticks }
+    }
+
+    /// Keeps a snapshot of a path that was added last.
+    pub fn keep(&mut self, path: KnownPath, saved: SavedEpisode) {
+        self.snapshots.add(path.segment, saved.tick(), Arc::new(saved));
+    }
+
+    /// Returns the last snapshot on a path.
+    pub fn nearest(&self, path: KnownPath) -> Option<&Arc<SavedEpisode>> {
+        let mut rest = path;
+        while rest.ticks > 0 {
+            if let Some(saved) = self.snapshots.last_up_to(rest.segment, rest.ticks) {
+                return Some(saved);
+            }
+            rest = self.segments[rest.segment].parent.cut(rest.ticks);
+        }
+        None
     }
 
     /// Returns a whole path.
@@ -217,6 +239,8 @@ pub struct ExplorationSummary {
     pub has_goal: bool,
     /// Ticks of the shortest solution.
     pub solution_ticks: Option<u32>,
+    /// Whether every action was tried from every cell; `None` if not, or if that is unknown.
+    pub exhausted: Option<Exhaustion>,
     /// Ends of episodes.
     pub ends: EndCounts,
     /// Steps and cells after each round.
@@ -242,6 +266,7 @@ impl Exploration {
             other_cells: self.open_reached().map(|open| self.cells().len() - open),
             has_goal: self.has_goal,
             solution_ticks: self.solution_ticks(),
+            exhausted: self.exhausted.clone(),
             ends: self.ends,
             curve: self.curve.clone(),
         }
@@ -274,6 +299,9 @@ impl fmt::Display for ExplorationSummary {
             (Some(ticks), _) => writeln!(f, "solution  {}", counted(ticks.into(), "tick"))?,
             (None, true) => writeln!(f, "solution  none was found")?,
             (None, false) => writeln!(f, "solution  none was found, and no goal is known")?,
+        }
+        if let Some(exhausted) = &self.exhausted {
+            writeln!(f, "exhausted {exhausted}")?;
         }
         if *ends == EndCounts::default() {
             return write!(f, "episodes  none has ended");
@@ -331,6 +359,7 @@ mod tests {
             other_cells: Some(6),
             has_goal: true,
             solution_ticks: None,
+            exhausted: None,
             ends: EndCounts { won: 0, lost: 2, out_of_time: 1 },
             curve: vec![(3000, 30)],
         }
@@ -351,6 +380,17 @@ mod tests {
         assert!(none_else.contains("24 of 40 open cells (60.0 %)\n"), "{none_else}");
         let bare = ExplorationSummary { open_cells: None, coverage: None, has_goal: false, ..summary() }.to_string();
         assert!(bare.contains("cells     30\n") && bare.contains("no goal is known"), "{bare}");
+    }
+
+    #[test]
+    fn an_exhausted_level_has_a_line_of_its_own_with_what_it_rests_on() {
+        assert!(!summary().to_string().contains("exhausted"));
+        let rests_on = "cells of size 1; states within one cell are taken as equal".to_owned();
+        let exhausted = Some(Exhaustion { actions: 3, cells: 5, rests_on });
+        let text = ExplorationSummary { exhausted, ..summary() }.to_string();
+        let line = "exhausted each of 3 actions was tried from the start and from each of 5 cells; no proof, it rests on \
+                    cells of size 1; states within one cell are taken as equal\n";
+        assert!(text.contains("solution  none was found\n") && text.contains(line), "{text}");
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! The exploration from its first round to its last.
 
 use crate::explore::{
-    EndCounts, Exploration, ExploreError, ExplorePlan, Stop, Until,
+    EndCounts, Exhaustion, Exploration, ExploreError, ExplorePlan, Stop, Until,
     archive::{Archive, Destination, Draws, Job, Visit, Visited},
     cell::{CellGrid, ExploredCell, Lookout, tile_size},
     known_paths::Route,
+    snapshots::SnapshotFault,
 };
 use bevy::{
     math::{Rect, Vec2},
@@ -12,12 +13,13 @@ use bevy::{
 };
 use bevy_playbot::{
     agent::Control,
+    demo::replay::Divergence,
     engine::{panics::PanicReports, tick_world},
     vision::VisionError,
 };
 use playbot_harness::{
     arrangement::Arrangement, ended_episodes::EndedEpisodes, floor_plan::FloorPlan, game::Game, parallel::on_threads,
-    worlds::build_observing_world,
+    saved_episode::SavedEpisode, worlds::build_observing_world,
 };
 use playbot_learner::{Streams, rng::ChaCha8Rng};
 use std::{
@@ -48,7 +50,9 @@ struct Crew<'a> {
 /// Explores a level. `progress` receives the ticks of each visit, from several threads. `after_round` may end the
 /// exploration, whose result is then that of the last finished round.
 ///
-/// The same plan has the same result for any number of threads, arenas and Worlds.
+/// The same plan has the same result for any number of threads, arenas and Worlds, with and without snapshots. In the
+/// first round that uses snapshots, and in the second, fourth, eighth and so on, all visits are made by replays, too. If
+/// one of them differs, the exploration begins anew without snapshots.
 ///
 /// # Errors
 ///
@@ -60,23 +64,55 @@ pub fn explore(
     mut after_round: impl FnMut(Round) -> ControlFlow<()>,
 ) -> Result<Exploration, ExploreError> {
     plan.check(game)?;
+    // Skills, and stacks of pictures, are no part of a snapshot. A World that is built anew has none either.
+    let mut has_snapshots = plan.snapshots && !plan.explorer.is_policy() && game.built_anew().is_none();
+    let mut snapshot_fault = None;
+    loop {
+        match search(game, plan, has_snapshots, &progress, &mut after_round)? {
+            Attempt::Done(exploration) => return Ok(Exploration { snapshot_fault, ..*exploration }),
+            Attempt::Distrusted(fault) => (has_snapshots, snapshot_fault) = (false, Some(fault)),
+        }
+    }
+}
+
+/// The outcome of a whole exploration.
+enum Attempt {
+    Done(Box<Exploration>),
+    /// A snapshot does not restore everything.
+    Distrusted(SnapshotFault),
+}
+
+fn search(
+    game: &dyn Game,
+    plan: &ExplorePlan,
+    has_snapshots: bool,
+    progress: &(impl Fn(u64) + Sync),
+    after_round: &mut impl FnMut(Round) -> ControlFlow<()>,
+) -> Result<Attempt, ExploreError> {
     let floor_plan = game.tools().levels.floor_plan(&plan.mode, plan.level);
     let grid = CellGrid::new(floor_plan.as_ref(), plan.cell_size);
     let open = floor_plan.as_ref().and_then(|floor_plan| open_cells(floor_plan, &grid));
     let tile = CellGrid::new(floor_plan.as_ref(), None).size;
-    let mut crews = build_crews(game, plan, Lookout::new(grid, plan.cell_size, open.as_ref(), tile))?;
+    let mut crews = build_crews(game, plan, Lookout::new(grid, plan.cell_size, open.as_ref(), tile), has_snapshots)?;
     let mut chance = Streams::new(plan.seed).stream("explore/choose", 0);
     let mut archive = Archive::new(game.actions());
-    let (mut steps, mut visits, mut ends) = (0, 0, EndCounts::default());
+    let (mut steps, mut restored_steps, mut visits, mut ends) = (0, 0, 0, EndCounts::default());
     let mut curve = Vec::new();
+    let mut restoring_rounds = 0;
     let stop = loop {
         let jobs = choose_jobs(plan, &archive, &mut chance, steps, visits);
         if jobs.is_empty() {
             break Stop::Spent;
         }
         visits += jobs.len() as u64;
-        for visited in play_round(&mut crews, jobs, plan.threads, &archive, &progress)? {
+        let round = Jobs { game, plan, archive: &archive, jobs };
+        let visited = match round.play(&mut crews, &mut restoring_rounds, progress)? {
+            Ok(visited) => visited,
+            Err(fault) => return Ok(Attempt::Distrusted(fault)),
+        };
+        for visited in visited {
             steps += visited.steps;
+            restored_steps += u64::from(visited.restored);
             ends.count(visited.end);
             archive.merge(visited);
         }
@@ -92,14 +128,19 @@ pub fn explore(
         }
     };
     let grid = has_positions(&crews).then_some(grid);
+    let rests_on = crews.iter().find_map(|crew| crew.world.lookout.describe());
     // They borrow the open cells, which are part of the result.
     drop(crews);
-    Ok(Exploration {
+    let exhausted =
+        archive.exhausted().zip(rests_on).map(|((actions, cells), rests_on)| Exhaustion { actions, cells, rests_on });
+    Ok(Attempt::Done(Box::new(Exploration {
         mode: plan.mode.clone(),
         level: plan.level,
         seed: plan.seed,
         explorer: plan.explorer.describe(),
         steps,
+        restored_steps,
+        snapshot_fault: None,
         visits,
         ends,
         curve,
@@ -107,8 +148,9 @@ pub fn explore(
         grid,
         has_goal: floor_plan.is_some(),
         open: open.filter(|_| grid.is_some()),
+        exhausted,
         archive,
-    })
+    })))
 }
 
 /// Returns whether cells are squares of the grid, which is equal for all Worlds.
@@ -122,12 +164,14 @@ fn build_crews<'a>(
     game: &'a dyn Game,
     plan: &'a ExplorePlan,
     lookout: Lookout<'a>,
+    has_snapshots: bool,
 ) -> Result<Vec<Crew<'a>>, ExploreError> {
     let worlds = if game.built_anew().is_some() { plan.arenas } else { plan.worlds.min(plan.arenas) };
     let arrangement = Arrangement::new(game, plan.arenas, worlds);
     let mut crews = Vec::new();
     for first in arrangement.first_agents() {
-        let world = ExploreWorld::new(game, plan, lookout, first, arrangement.arenas)?;
+        let mut world = ExploreWorld::new(game, plan, lookout, first, arrangement.arenas)?;
+        world.has_snapshots = has_snapshots;
         crews.push(Crew { world, jobs: Vec::new() });
     }
     Ok(crews)
@@ -147,12 +191,54 @@ fn choose_jobs(plan: &ExplorePlan, archive: &Archive, chance: &mut ChaCha8Rng, s
         jobs.push(Job {
             number: visits + jobs.len() as u64,
             route: archive.route(destination.path),
+            saved: archive.nearest(destination.path),
             destination,
             patience,
             most: patience.saturating_mul(LONGEST),
         });
     }
     jobs
+}
+
+/// The visits of a round.
+struct Jobs<'a> {
+    game: &'a dyn Game,
+    plan: &'a ExplorePlan,
+    archive: &'a Archive,
+    jobs: Vec<Job>,
+}
+
+impl Jobs<'_> {
+    /// Makes the visits. Some of the rounds that use snapshots are played by replays, too, and compared.
+    ///
+    /// # Errors
+    ///
+    /// The game broke its contract, or does not replay. The inner error is a difference that snapshots have made.
+    fn play(
+        self,
+        crews: &mut [Crew<'_>],
+        restoring_rounds: &mut u32,
+        progress: &(impl Fn(u64) + Sync),
+    ) -> Result<Result<Vec<Visited>, SnapshotFault>, ExploreError> {
+        let Self { game, plan, archive, jobs } = self;
+        let threads = plan.threads;
+        if jobs.iter().all(|job| job.saved.is_none()) {
+            return play_round(crews, jobs, threads, archive, progress).map(Ok);
+        }
+        *restoring_rounds += 1;
+        let is_checked = restoring_rounds.is_power_of_two();
+        let replays = jobs.iter().filter(|_| is_checked).map(|job| Job { saved: None, ..job.clone() }).collect();
+        let fault = |tick| Ok(Err(SnapshotFault { game: game.name(), level: plan.level, tick }));
+        let restored = match play_round(crews, jobs, threads, archive, progress) {
+            Ok(restored) => restored,
+            // If the game itself is at fault, replays show it.
+            Err(ExploreError::Diverged { divergence, .. }) => return fault(Some(divergence.tick)),
+            Err(_) => return fault(None),
+        };
+        let replayed = play_round(crews, replays, threads, archive, &|_| {})?;
+        let difference = restored.iter().zip(&replayed).find_map(|(one, other)| one.first_difference(other));
+        if difference.is_some() { fault(difference) } else { Ok(Ok(restored)) }
+    }
 }
 
 /// Makes all visits of a round, and returns their results in order.
@@ -186,6 +272,7 @@ fn stop_of(until: Until, archive: &Archive, open: Option<&BTreeSet<ExploredCell>
     match until {
         Until::Solved => is_solved.then_some(Stop::Solved),
         Until::Covered => ((is_solved || !has_goal) && is_covered()).then_some(Stop::Covered),
+        Until::Exhausted => archive.exhausted().map(|_| Stop::Exhausted),
         Until::Spent => None,
     }
 }
@@ -199,6 +286,8 @@ pub(super) struct ExploreWorld<'a> {
     agents: Vec<Entity>,
     draws: Draws,
     lookout: Lookout<'a>,
+    /// Whether snapshots are saved.
+    has_snapshots: bool,
 }
 
 impl<'a> ExploreWorld<'a> {
@@ -226,7 +315,7 @@ impl<'a> ExploreWorld<'a> {
             is_policy: plan.explorer.is_policy(),
             space: game.actions(),
         };
-        Ok(Self { game, mode: &plan.mode, level: plan.level, world, agents, draws, lookout })
+        Ok(Self { game, mode: &plan.mode, level: plan.level, world, agents, draws, lookout, has_snapshots: false })
     }
 
     /// Returns whether cells are squares of the grid.
@@ -250,10 +339,19 @@ impl<'a> ExploreWorld<'a> {
         let mut done = Vec::new();
         loop {
             for (visit, &agent) in visits.iter_mut().zip(&self.agents) {
-                let mut entity = self.world.entity_mut(agent);
-                if visit.is_none() {
-                    *visit = jobs.next().map(|job| Visit::begin(job, self.level, &self.draws, &mut entity));
+                let (game, mode) = (self.game, self.mode);
+                if visit.is_none()
+                    && let Some(job) = jobs.next()
+                {
+                    let mut begun = Visit::begin(job, self.level, &self.draws, &mut self.world.entity_mut(agent));
+                    if begun.restore(game, &mut self.world, agent) {
+                        let (world, lookout) = (&self.world, &mut self.lookout);
+                        let spot = |ticks, before| lookout.spot(game, world, agent, ticks, before);
+                        begun.look_around(archive, spot).map_err(|divergence| diverged(game, mode, divergence))?;
+                    }
+                    *visit = Some(begun);
                 }
+                let mut entity = self.world.entity_mut(agent);
                 match visit {
                     Some(visit) => visit.act(&self.draws, &mut entity),
                     None => {
@@ -269,13 +367,13 @@ impl<'a> ExploreWorld<'a> {
             for (visit, &agent) in visits.iter_mut().zip(&self.agents) {
                 let Some(running) = visit.as_mut() else { continue };
                 let end = ended.iter().find(|(entity, _)| *entity == agent).map(|(_, result)| *result);
-                let (game, world, lookout) = (self.game, &self.world, &mut self.lookout);
+                let (game, mode, world, lookout) = (self.game, self.mode, &self.world, &mut self.lookout);
                 let spot = |ticks, before| lookout.spot(game, world, agent, ticks, before);
-                let diverged = |divergence| {
-                    let mode = self.mode.to_owned();
-                    ExploreError::Diverged { game: game.name(), mode, divergence }
-                };
-                let is_over = running.note(world, agent, end, archive, spot).map_err(diverged)?;
+                let has_snapshots = self.has_snapshots;
+                let save = || if has_snapshots { SavedEpisode::of(game, world, agent) } else { None };
+                let is_over = running
+                    .note(world, agent, end, archive, spot, save)
+                    .map_err(|divergence| diverged(game, mode, divergence))?;
                 if let Some(visit) = visit.take_if(|_| is_over) {
                     let (number, visited) = visit.finish();
                     progress(visited.steps);
@@ -284,6 +382,10 @@ impl<'a> ExploreWorld<'a> {
             }
         }
     }
+}
+
+fn diverged(game: &dyn Game, mode: &str, divergence: Divergence) -> ExploreError {
+    ExploreError::Diverged { game: game.name(), mode: mode.to_owned(), divergence }
 }
 
 /// Cells beyond each side of a level that are accepted: agents can be there, for instance above it.
@@ -306,7 +408,7 @@ pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &ExploredCell) -> R
     let one = ExplorePlan { arenas: 1, worlds: 1, threads: 1, ..plan.clone() };
     let mut world = ExploreWorld::new(game, &one, lookout, 0, 1)?;
     let route = Route::empty(&game.actions());
-    let job = Job { number: 0, destination: Destination::START, route, patience: 1, most: 1 };
+    let job = Job { number: 0, destination: Destination::START, route, saved: None, patience: 1, most: 1 };
     let visits = world.play(vec![job], &Archive::new(game.actions()), &|_| {})?;
     let Some(seen) = visits.iter().find_map(|(_, visited)| visited.seen.keys().next()) else { return Ok(()) };
     if seen.0.len() != cell.0.len() {
