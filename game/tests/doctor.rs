@@ -56,6 +56,14 @@ fn an_unknown_type_to_ignore_is_reported() {
 }
 
 #[test]
+fn diagnostics_of_engines_can_be_compared_too() {
+    let (text, _) = doctor(&["coinrun", "--ticks", "2", "--no-default-ignores", "--json"], 0);
+    let report: Value = serde_json::from_str(text.trim_end()).expect("one line of JSON");
+    assert_eq!(report["types"]["left_out"].as_array().map(Vec::len), Some(0));
+    assert_eq!(report["notes"].as_array().map(Vec::len), Some(0));
+}
+
+#[test]
 fn wrong_names_and_numbers_are_usage_errors() {
     for (args, words) in [
         (&["coinrunn"][..], "did you mean `coinrun`?"),

@@ -5,6 +5,7 @@
 use std::{
     collections::HashMap,
     hash::{BuildHasher, Hasher, RandomState},
+    time::Duration,
 };
 
 use bevy::{prelude::*, time::Real};
@@ -29,6 +30,14 @@ pub enum Fault {
     LeftOvers,
     /// An unread [`Record`] lasts for ever.
     LastingRecord,
+    /// The time that [`Labour`] takes differs from run to run, and nothing depends on it.
+    Measured,
+    /// It differs, and so does the [`Wind`], which is an effect of it.
+    MeasuredWind,
+    /// The [`Favourite`] is any plant, and nothing depends on it.
+    Favourite,
+    /// An unseeded [`Record`] is paid out in the last tick of an episode.
+    Sleeper,
     /// The [`Secret`] of the plant is drawn without a seed, and reflection cannot see it.
     Hidden,
     /// The observed height is infinite at tick 7.
@@ -105,6 +114,18 @@ pub struct Soil {
 #[reflect(Resource)]
 pub struct Record(u32);
 
+/// Time that the last tick took.
+#[derive(Resource, Clone, Debug, Default, Reflect)]
+#[reflect(Resource)]
+pub struct Labour {
+    took: Duration,
+}
+
+/// The plant that everybody likes best.
+#[derive(Resource, Clone, Debug, Default, Reflect)]
+#[reflect(Resource)]
+pub struct Favourite(Option<Entity>);
+
 /// The fault of this copy.
 #[derive(Resource, Clone, Copy)]
 struct Planted(Fault);
@@ -146,6 +167,7 @@ fn weather(
     mut sun: ResMut<Sun>,
     mut soil: ResMut<Soil>,
     mut record: ResMut<Record>,
+    mut labour: ResMut<Labour>,
     mut tick: Local<u32>,
 ) {
     *tick += 1;
@@ -154,8 +176,21 @@ fn weather(
         Fault::WallClock => sun.pace = real.delta_secs(),
         Fault::Survivor => soil.wet *= 0.99,
         Fault::LastingRecord => record.0 += 1,
+        Fault::Sleeper => record.0 = (random() >> 40) as u32,
+        Fault::Measured => labour.took = Duration::from_nanos(random()),
+        Fault::MeasuredWind => {
+            labour.took = Duration::from_nanos(random());
+            wind.force = labour.took.as_secs_f32();
+        }
         Fault::Panic => assert!(*tick <= 5, "the garden burns"),
         _ => {}
+    }
+}
+
+fn favour(planted: Res<Planted>, plants: Query<Entity, With<Plant>>, mut favourite: ResMut<Favourite>) {
+    let all: Vec<Entity> = plants.iter().collect();
+    if planted.0 == Fault::Favourite && !all.is_empty() {
+        favourite.0 = Some(all[random() as usize % all.len()]);
     }
 }
 
@@ -165,6 +200,7 @@ struct Garden<'w> {
     wind: Res<'w, Wind>,
     sun: Res<'w, Sun>,
     soil: Res<'w, Soil>,
+    record: Res<'w, Record>,
     herbs: Res<'w, Herbs>,
     score: ResMut<'w, Score>,
 }
@@ -213,6 +249,9 @@ fn work(
         reward.add(earned as f32 + secret.0);
         hash.0 = u64::from(gardener.x.to_bits()) << 32 | u64::from(earned);
         if episode.tick + 1 >= LIMIT {
+            if planted == Fault::Sleeper {
+                reward.add(garden.record.0 as f32);
+            }
             episode.truncate();
         }
     }
@@ -269,9 +308,11 @@ impl Game for Fault {
             .init_resource::<Sun>()
             .init_resource::<Score>()
             .init_resource::<Record>()
+            .init_resource::<Labour>()
+            .init_resource::<Favourite>()
             .add_observer(start)
             .add_systems(ObserveSchedule, see)
-            .add_systems(FixedUpdate, (weather, work).chain());
+            .add_systems(FixedUpdate, (weather, favour, work).chain());
     }
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {

@@ -1,12 +1,19 @@
 //! Recordings: making them with a demonstrator, and verifying them by replay.
 //!
-//! [`verify_file`] replays a recording: each tick must repeat as recorded. In the folder, [`demonstration`] records a
+//! [`verify_file`] replays a recording: each tick must repeat as recorded, in a new World and after another episode. In the folder, [`demonstration`] records a
 //! game's demonstrator or another player, and [`mod@filter`] selects episodes by outcome, level and player.
 
 pub mod demonstration;
 pub mod filter;
 
-use crate::{game::Game, mode::ModeError, split::LevelSplit, worlds::build_world};
+use crate::{
+    brief::shell_word,
+    game::Game,
+    mode::ModeError,
+    parallel::{default_threads, on_threads},
+    split::LevelSplit,
+    worlds::build_world,
+};
 use bevy::prelude::*;
 use bevy_playbot::{
     demo::{
@@ -27,7 +34,10 @@ use std::{
 };
 use thiserror::Error;
 
-/// Replays every episode of a file; `progress` receives the number of finished episodes.
+/// Replays every episode of a file twice; `progress` receives the number of checked episodes.
+///
+/// Each episode is played in a new World, and in a World that has played another episode before it. Data sets are read
+/// from Worlds of both kinds, in any order and on several threads, so an accepted file is read there too.
 ///
 /// # Errors
 ///
@@ -36,22 +46,80 @@ pub fn verify_file(game: &dyn Game, path: &Path, mut progress: impl FnMut(u64)) 
     let reader = DemoReader::open_for_game(path, game.name(), game.version(), None)?;
     let mode = reader.header().mode.clone();
     game.check_mode(&mode).map_err(|source| VerifyError::Mode { path: path.into(), source })?;
-    let mut replayer = EpisodeReplayer::new(game, &mode);
-    let mut report = VerifyReport { episodes: 0, ticks: 0, divergences: Vec::new() };
+    let mut episodes = Vec::new();
     for episode in reader {
-        let episode = Arc::new(episode?);
-        let played = replayer.play(episode.clone(), |_, _| {}).map_err(|fault| {
-            let replayed = ReplayedEpisodes::new([(path.to_owned(), report.episodes as usize)]);
-            VerifyError::Fault { replayed, fault }
-        })?;
-        if let Some(divergence) = played {
-            report.divergences.push((report.episodes, divergence.to_string()));
-        }
-        report.episodes += 1;
-        report.ticks += episode.len() as u64;
-        progress(report.episodes);
+        let mut episode = episode?;
+        // They are not compared, and would only take memory.
+        episode.observations = Vec::new();
+        episodes.push(Arc::new(episode));
     }
-    Ok(report)
+    let (threads, count) = (default_threads(), episodes.len());
+    let mut replays = vec![TwoReplays::default(); count];
+    let all: Vec<usize> = (0..count).collect();
+    for share in all.chunks(EPISODES_PER_THREAD * threads) {
+        let played = on_threads(&mut share.to_vec(), threads, |index| play_two(game, &mode, &episodes, *index));
+        for (&index, played) in share.iter().zip(played) {
+            let [in_new_world, after_another] = played.map_err(|(episode, fault)| {
+                let replayed = ReplayedEpisodes::new([(path.to_owned(), episode)]);
+                VerifyError::Fault { replayed, fault }
+            })?;
+            replays[index].in_new_world = in_new_world;
+            replays[before(index, count)].after_another = after_another;
+        }
+        progress(share.last().map_or(0, |last| *last as u64 + 1));
+    }
+    let described =
+        replays.iter().zip(0..).filter_map(|(replays, episode)| Some((episode, replays.describe(game, &mode)?)));
+    Ok(VerifyReport {
+        episodes: count as u64,
+        ticks: episodes.iter().map(|episode| episode.len() as u64).sum(),
+        divergences: described.collect(),
+    })
+}
+
+/// Episodes that each thread checks between two reports of progress.
+const EPISODES_PER_THREAD: usize = 4;
+
+/// Returns the index of the episode before this one; the last one is before the first.
+fn before(index: usize, count: usize) -> usize {
+    (index + count - 1) % count
+}
+
+/// Plays an episode in a new World, and after it the one that is recorded before it: another order than the recorded
+/// one. Returns the divergence of each, or the episode that broke the game.
+fn play_two(
+    game: &dyn Game,
+    mode: &str,
+    episodes: &[Arc<DemoEpisode>],
+    index: usize,
+) -> Result<[Option<Divergence>; 2], (usize, Fault)> {
+    let mut replayer = EpisodeReplayer::new(game, mode);
+    let mut play = |index: usize| replayer.play(episodes[index].clone(), |_, _| {}).map_err(|fault| (index, fault));
+    Ok([play(index)?, play(before(index, episodes.len()))?])
+}
+
+/// The first divergence of both replays of an episode.
+#[derive(Clone, Debug, Default)]
+struct TwoReplays {
+    in_new_world: Option<Divergence>,
+    after_another: Option<Divergence>,
+}
+
+impl TwoReplays {
+    /// Returns the divergence in words, and which of the two replays differs if one of them does not.
+    fn describe(&self, game: &dyn Game, mode: &str) -> Option<String> {
+        let (sound, wrong, divergence) = match (&self.in_new_world, &self.after_another) {
+            (None, None) => return None,
+            (Some(divergence), Some(_)) => return Some(divergence.to_string()),
+            (None, Some(divergence)) => ("in a new World", "after another episode", divergence),
+            (Some(divergence), None) => ("after another episode", "in a new World", divergence),
+        };
+        let (game, mode, level) = (game.name(), shell_word(mode), divergence.level);
+        Some(format!(
+            "replays {sound}, but not {wrong} ({divergence}): the game keeps something from one episode to the next, and \
+             `playbot doctor {game} --mode {mode} --level {level}` names it"
+        ))
+    }
 }
 
 /// The result of a verification.
@@ -61,7 +129,8 @@ pub struct VerifyReport {
     pub episodes: u64,
     /// Ticks replayed.
     pub ticks: u64,
-    /// First divergence of each episode that diverged: index of the episode, and tick with the difference.
+    /// First divergence of each episode that diverged: index of the episode, and tick with the difference. It says which
+    /// replay diverged if the other one did not.
     pub divergences: Vec<(u64, String)>,
 }
 
@@ -233,6 +302,12 @@ impl fmt::Display for ReplayedEpisodes {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn each_episode_is_replayed_after_the_one_that_follows_it_in_the_file() {
+        assert_eq!([0, 1, 2, 3].map(|index| before(index, 4)), [3, 0, 1, 2]);
+        assert_eq!(before(0, 1), 0, "a single episode is replayed after itself");
+    }
 
     #[test]
     fn episodes_are_named_by_their_files() {

@@ -3,7 +3,8 @@
 //!
 //! Recording, replay, resume and training in many arenas need games that are a function of their level and their
 //! actions. [`examine`] plays copies of a game with the same random actions and compares them after every tick, by
-//! reflection: see [`DoctorComparison`] for the pairs. No finding in some ticks of one level is no proof: more ticks
+//! reflection: see [`DoctorComparison`] for the pairs. A difference in state is a finding if agents notice it before the
+//! episodes end: in what they observe, in rewards, in ends of episodes or in the state hash. Otherwise it is a note. No finding in some ticks of one level is no proof: more ticks
 //! and other levels show more. Components and resources that are `Reflect` and have `#[reflect(Component)]` or
 //! `#[reflect(Resource)]` are compared field by field. The rest shows only in observations, rewards and ends of
 //! episodes.
@@ -13,6 +14,7 @@
 //! - `trial`: one comparison, tick by tick.
 //! - `game_copy`: a running copy of the game, with its entities and types.
 //! - `compare`, `field`: the comparison of two copies, down to the first field that differs.
+//! - `known`: diagnostics of known engines, which are left out.
 //! - `cause`, `observed`: causes of a difference, observations of the agents, and the uses that the game is safe for.
 //! - `steps`: frames and fixed steps of different lengths.
 //! - `text`: the report for people.
@@ -21,6 +23,7 @@ mod cause;
 mod compare;
 mod field;
 mod game_copy;
+mod known;
 mod observed;
 mod steps;
 mod text;
@@ -31,12 +34,13 @@ use crate::{
         cause::causes,
         game_copy::{KnownTypes, Plan, bare_world},
         observed::{ObservationMonitor, assess_safety},
-        trial::Trial,
+        trial::{LeftOut, Trial},
     },
     game::Game,
     mode::ModeError,
 };
 use serde::Serialize;
+use std::collections::BTreeSet;
 
 pub use crate::doctor::{
     cause::{Cause, CauseKind},
@@ -58,7 +62,7 @@ pub fn examine(
 ) -> Result<DoctorReport, ModeError> {
     game.check_mode(&options.mode)?;
     let plan = Plan { mode: &options.mode, level: options.level, seed: options.seed };
-    let mut known_types = KnownTypes::new(&bare_world());
+    let mut known_types = KnownTypes::new(&bare_world(), options.default_ignores);
     let mut comparisons: Vec<ComparisonReport> = Vec::new();
     let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
     let (mut suspicions, mut unequal_steps) = (Vec::new(), None);
@@ -71,7 +75,10 @@ pub fn examine(
         let mut trial = Trial::new(comparison, game, &plan, options.ticks);
         let is_first = comparison == DoctorComparison::Repeat;
         let mut monitor = is_first.then(|| ObservationMonitor::new(trial.copies[0].observed_names()));
-        let result = trial.run(options.ticks, &mut known_types, &options.ignored, monitor.as_mut());
+        let noted = comparisons.iter().filter(|of| of.comparison == DoctorComparison::Repeat && of.is_note());
+        let noted = noted.flat_map(ComparisonReport::names).map(str::to_owned).collect();
+        let left_out = LeftOut { ignored: &options.ignored, noted };
+        let result = trial.run(options.ticks, &mut known_types, &left_out, monitor.as_mut());
         if let Some(monitor) = monitor {
             observation = monitor.report();
             types = known_types.report(&trial.copies[0], &result.incomparable);
@@ -80,6 +87,7 @@ pub fn examine(
         }
         comparisons.push(result.report);
     }
+    let (findings, notes) = findings(&comparisons, &observation, &suspicions);
     Ok(DoctorReport {
         game: game.name().to_owned(),
         version: game.version(),
@@ -88,7 +96,8 @@ pub fn examine(
         seed: options.seed,
         ticks: options.ticks,
         safety: assess_safety(&comparisons, &observation),
-        findings: findings(&comparisons, &observation, &suspicions),
+        findings,
+        notes,
         comparisons,
         observation,
         types,
@@ -110,12 +119,14 @@ pub struct DoctorOptions {
     pub seed: u64,
     /// Components and resources whose path contains one of these are ignored, such as a high score that should last.
     pub ignored: Vec<String>,
+    /// True if diagnostics, counters and clocks of known engines are left out, such as avian's. The report names them.
+    pub default_ignores: bool,
 }
 
 impl DoctorOptions {
     /// Creates options for 300 ticks of a mode.
     pub fn new(mode: impl Into<String>) -> Self {
-        Self { mode: mode.into(), ticks: 300, level: 0, seed: 0, ignored: Vec::new() }
+        Self { mode: mode.into(), ticks: 300, level: 0, seed: 0, ignored: Vec::new(), default_ignores: true }
     }
 }
 
@@ -146,12 +157,14 @@ pub struct DoctorReport {
     pub safety: Safety,
     /// The findings, worst first.
     pub findings: Vec<DoctorFinding>,
+    /// State that differs, and that no agent noticed to the end of the episodes: each type once.
+    pub notes: Vec<DoctorFinding>,
     /// Ticks per second of one arena, if they were measured: the examination itself reads no clock.
     pub ticks_per_second: Option<f64>,
 }
 
 impl DoctorReport {
-    /// Returns whether there is no finding.
+    /// Returns whether there is no finding. Notes are none.
     pub fn is_healthy(&self) -> bool {
         self.findings.is_empty()
     }
@@ -169,13 +182,14 @@ pub struct ComparisonReport {
     pub comparison: DoctorComparison,
     /// The reason that it was skipped, if it was.
     pub skipped: Option<String>,
-    /// Ticks compared.
+    /// Ticks compared. If state differs and no agent has noticed it, an episode is played on to its end.
     pub ticks: u32,
     /// Episodes that started in these ticks, in the copy on the left; the last one may be unfinished.
     pub episodes: u32,
     /// The first difference, the one nearest to its cause if a tick has several.
     pub first: Option<DoctorDifference>,
-    /// A few further differences of that tick.
+    /// Further fields that differ, until agents notice it. Earlier ticks come first, and in a tick likelier causes:
+    /// clocks, randomness, the order of entities and systems, then state that is left over.
     pub others: Vec<DoctorDifference>,
     /// The first difference in observations, rewards or ends of episodes, if there is one.
     pub effect: Option<DoctorDifference>,
@@ -201,9 +215,19 @@ impl ComparisonReport {
         }
     }
 
-    /// Returns whether the copies played the same game to the end; `None` if they were not compared.
+    /// Returns whether agents played the same game to the end; `None` if it was not compared.
     pub fn same(&self) -> Option<bool> {
-        self.skipped.is_none().then(|| self.first.is_none() && self.effect.is_none() && self.fault.is_none())
+        self.skipped.is_none().then(|| self.effect.is_none() && self.fault.is_none())
+    }
+
+    /// Returns whether state differs, and no agent noticed it.
+    pub fn is_note(&self) -> bool {
+        self.first.is_some() && self.same() == Some(true)
+    }
+
+    /// Returns the types that differ, and kinds of entities.
+    fn names(&self) -> impl Iterator<Item = &str> {
+        self.first.iter().chain(&self.others).map(|difference| difference.name.as_str())
     }
 
     /// Returns the first difference of any kind.
@@ -278,6 +302,8 @@ pub struct DoctorDifference {
     pub left: String,
     /// The value in the right copy.
     pub right: String,
+    /// Path of the type of both values; empty for values without one, such as a length.
+    pub value_type: String,
 }
 
 /// The kind of value that differs.
@@ -321,6 +347,8 @@ pub struct DoctorFinding {
 pub enum FindingKind {
     /// Two copies did not play the same game.
     Differs,
+    /// State differs, and no agent noticed it: a note.
+    Unnoticed,
     /// The game broke its contract, or panicked.
     Fault,
     /// An observed value was not a finite number.
@@ -349,23 +377,35 @@ fn skipped(comparison: DoctorComparison, why: String) -> ComparisonReport {
 
 // Findings of an examination.
 
-/// Returns all findings, worst first.
+/// Returns all findings, worst first, and all notes.
 fn findings(
     comparisons: &[ComparisonReport],
     observation: &ObservationReport,
     suspicions: &[(CauseKind, String)],
-) -> Vec<DoctorFinding> {
-    let mut findings = of_observation(observation);
+) -> (Vec<DoctorFinding>, Vec<DoctorFinding>) {
+    let (mut findings, mut notes) = (of_observation(observation), Vec::new());
+    let clock = comparisons.iter().filter(|of| of.comparison == DoctorComparison::Clock);
+    let of_clock: BTreeSet<&str> = clock.flat_map(ComparisonReport::names).collect();
+    let mut noted: BTreeSet<&str> = BTreeSet::new();
     let is_of_observation = !findings.is_empty();
     for report in comparisons {
-        if let Some(difference) = report.difference() {
-            findings.push(DoctorFinding {
-                kind: FindingKind::Differs,
+        let differs = |kind, difference: &DoctorDifference| {
+            let follows_clock =
+                report.comparison != DoctorComparison::Clock && of_clock.contains(difference.name.as_str());
+            DoctorFinding {
+                kind,
                 what: sentence(report.comparison, difference),
                 comparison: Some(report.comparison),
                 difference: Some(difference.clone()),
-                causes: causes(report.comparison, Some(difference), suspicions),
-            });
+                causes: causes(report.comparison, Some(difference), suspicions, follows_clock),
+            }
+        };
+        if report.is_note() {
+            let all = report.first.iter().chain(&report.others);
+            let new: Vec<_> = all.filter(|difference| noted.insert(difference.name.as_str())).collect();
+            notes.extend(new.into_iter().map(|difference| differs(FindingKind::Unnoticed, difference)));
+        } else if let Some(difference) = report.difference() {
+            findings.push(differs(FindingKind::Differs, difference));
         }
         let Some(fault) = &report.fault else { continue };
         // A bad observation has its own message already, and one fault shows in every comparison.
@@ -374,7 +414,7 @@ fn findings(
             findings.push(plain(FindingKind::Fault, fault.clone(), Some(report.comparison)));
         }
     }
-    findings
+    (findings, notes)
 }
 
 fn plain(kind: FindingKind, what: String, comparison: Option<DoctorComparison>) -> DoctorFinding {

@@ -2,3 +2,4 @@
 
 mod foreign;
 mod planted;
+mod replays;

@@ -43,6 +43,15 @@ fn named(
     (finding, report)
 }
 
+/// Returns the only note on a copy with this fault, which has no findings.
+fn note(fault: Fault) -> (DoctorFinding, DoctorReport) {
+    let report = examined(&fault, 60, &[]);
+    assert!(report.is_healthy(), "{fault:?}:\n{report}");
+    assert_eq!(report.notes.len(), 1, "{fault:?}:\n{report}");
+    assert_eq!(report.notes[0].kind, FindingKind::Unnoticed);
+    (report.notes[0].clone(), report)
+}
+
 fn likeliest(finding: &DoctorFinding) -> CauseKind {
     finding.causes.first().expect("every difference has common causes").kind
 }
@@ -55,7 +64,7 @@ fn constant(report: &DoctorReport) -> Vec<&str> {
 #[test]
 fn a_healthy_game_has_no_findings() {
     let report = examined(&Fault::None, 60, &[]);
-    assert!(report.is_healthy(), "{report}");
+    assert!(report.is_healthy() && report.notes.is_empty(), "{report}");
     assert_eq!(report.comparisons.len(), DoctorComparison::ALL.len());
     for comparison in &report.comparisons {
         assert_eq!((comparison.same(), comparison.ticks, comparison.unmatched), (Some(true), 60, 0), "{report}");
@@ -88,10 +97,12 @@ fn unseeded_randomness_is_found_at_its_source() {
 
 #[test]
 fn iteration_over_a_hash_map_is_found_and_the_map_is_named() {
-    let (finding, _) =
-        named(Fault::HashOrder, DoctorComparison::Repeat, DifferenceKind::Component, "::Smells", ".mixture");
-    assert_eq!(likeliest(&finding), CauseKind::HashOrder);
-    let evidence = &finding.causes[0].evidence;
+    let (note, _) = note(Fault::HashOrder);
+    let difference = note.difference.clone().expect("a difference");
+    assert_eq!((note.comparison, difference.kind), (Some(DoctorComparison::Repeat), DifferenceKind::Component));
+    assert!(difference.name.ends_with("::Smells") && difference.field == ".mixture", "{}", note.what);
+    assert_eq!(likeliest(&note), CauseKind::HashOrder);
+    let evidence = &note.causes[0].evidence;
     assert!(evidence.iter().any(|hint| hint.contains("Herbs.strengths")), "{evidence:?}");
 }
 
@@ -134,11 +145,60 @@ fn entities_that_survive_a_restart_are_counted() {
 }
 
 #[test]
-fn what_is_meant_to_last_can_be_left_out() {
-    let (_, report) =
-        named(Fault::LastingRecord, DoctorComparison::Restart, DifferenceKind::Resource, "::Record", ".0");
-    assert!(report.to_string().contains("agents have noticed nothing"), "{report}");
-    assert!(examined(&Fault::LastingRecord, 60, &["::Record"]).is_healthy());
+fn a_record_that_lasts_and_that_no_agent_notices_is_a_note_and_can_be_left_out() {
+    let (note, report) = note(Fault::LastingRecord);
+    assert_eq!(note.comparison, Some(DoctorComparison::Restart), "{report}");
+    let difference = note.difference.clone().expect("a difference");
+    assert!(difference.name.ends_with("::Record") && difference.field == ".0", "{report}");
+    assert_eq!(likeliest(&note), CauseKind::SurvivesRestart);
+    assert_eq!(report.safety.resume.safe, Some(true));
+    let text = report.to_string();
+    for words in [
+        "Notes: state that differs, and that no agent noticed",
+        "no difference that agents notice in ",
+        "but see the notes on state that differs",
+        "for 60 ticks. 1 note.",
+    ] {
+        assert!(text.contains(words), "`{words}` is missing in:\n{text}");
+    }
+    assert!(examined(&Fault::LastingRecord, 60, &["::Record"]).notes.is_empty());
+}
+
+#[test]
+fn a_measurement_that_no_agent_notices_is_noted_once_as_a_clock() {
+    let (note, report) = note(Fault::Measured);
+    assert_eq!((note.comparison, likeliest(&note)), (Some(DoctorComparison::Repeat), CauseKind::WallClock), "{report}");
+    assert!(note.causes[0].evidence[0].starts_with("`Labour.took` is a `"), "{:?}", note.causes[0]);
+    let compared = report.comparisons.iter().filter(|comparison| comparison.skipped.is_none());
+    assert_eq!(compared.count(), DoctorComparison::ALL.len(), "a note hides no other comparison");
+}
+
+#[test]
+fn another_entity_that_no_agent_notices_is_a_note_that_names_both() {
+    let (note, report) = note(Fault::Favourite);
+    assert_eq!(likeliest(&note), CauseKind::EntityOrder, "{report}");
+    let difference = note.difference.clone().expect("a difference");
+    assert!(difference.left.starts_with("[Plant], number "), "{}", difference.left);
+    assert_ne!(difference.left, difference.right);
+}
+
+#[test]
+fn a_clock_comes_before_its_effects_in_the_list_of_a_finding() {
+    let (finding, report) =
+        named(Fault::MeasuredWind, DoctorComparison::Repeat, DifferenceKind::Resource, "::Labour", ".took");
+    assert_eq!(likeliest(&finding), CauseKind::WallClock);
+    let others = report.of(DoctorComparison::Repeat).map(|repeat| repeat.others.clone()).expect("it was made");
+    assert!(others.iter().any(|other| other.name.ends_with("::Wind")), "{report}");
+}
+
+#[test]
+fn a_difference_is_a_finding_if_agents_notice_it_only_when_their_episode_ends() {
+    let report = examined(&Fault::Sleeper, 10, &[]);
+    assert_eq!((report.findings.len(), report.notes.len()), (1, 0), "{report}");
+    let repeat = report.of(DoctorComparison::Repeat).expect("it was made");
+    let (first, effect) = (repeat.first.as_ref().expect("it differs"), repeat.effect.as_ref().expect("it is paid out"));
+    assert_eq!((first.tick, effect.kind), (0, DifferenceKind::Reward), "{report}");
+    assert!(effect.tick >= 10, "an episode lasts longer than the ten ticks: {report}");
 }
 
 #[test]

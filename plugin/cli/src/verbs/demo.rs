@@ -72,6 +72,9 @@ enum Verb {
         json: bool,
     },
     /// Replay recordings. Exit code 1 if one diverges, is damaged or cannot be replayed.
+    ///
+    /// Each episode is replayed in a new World, and in a World that has played another episode. The message says which
+    /// of the two differs. `learn-skills` and `train` accept every recording that this accepts.
     Verify {
         /// Files or folders.
         #[arg(default_value = "demos")]
@@ -225,7 +228,10 @@ fn replay(file: &Path, games: &Games) -> Result<VerifyReport, CliError> {
     let bar = progress::bar("replay", summary.episodes as u64, "episodes");
     let report = verify_file(game, file, |done| bar.set_position(done));
     bar.finish_and_clear();
-    Ok(report?)
+    let mut report = report?;
+    // They name the doctor.
+    report.divergences.iter_mut().for_each(|(_, divergence)| *divergence = program::named(divergence));
+    Ok(report)
 }
 
 /// Formats an error with its file.

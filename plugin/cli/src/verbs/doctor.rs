@@ -22,7 +22,8 @@ use std::time::Instant;
 /// twice in one thread. They play them with another wall clock, with more archetypes in the World, and on two threads.
 /// They play two arenas in one World against each alone, and the same level again after a restart. The first difference
 /// is printed with its tick and with advice. A clean result holds for the ticks and the level that were played, so try
-/// more ticks and other levels too. Exit code 1 if something was found.
+/// more ticks and other levels too. State that differs is only a note if agents never notice it: not in observations,
+/// rewards, ends of episodes or the state hash. Exit code 1 if something was found; notes are no findings.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot doctor GAME
@@ -48,6 +49,10 @@ pub struct Args {
     /// (repeatable).
     #[arg(long, value_name = "TYPE")]
     ignore: Vec<String>,
+    /// Compare diagnostics, counters and clocks of known engines, too. By default those of avian, bevy_rapier and Bevy
+    /// are left out, and the report names them.
+    #[arg(long)]
+    no_default_ignores: bool,
     /// One line of JSON.
     #[arg(long)]
     json: bool,
@@ -66,6 +71,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         level,
         seed: args.seed.unwrap_or(0),
         ignored: args.ignore,
+        default_ignores: !args.no_default_ignores,
         ..DoctorOptions::new(mode)
     };
     interrupt::leave("no comparison is kept: call it again, or with fewer --ticks".to_owned());

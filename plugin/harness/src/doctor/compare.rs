@@ -4,7 +4,7 @@ use crate::{
     doctor,
     doctor::{
         DifferenceKind, DoctorComparison, DoctorDifference,
-        field::{FieldComparison, FieldDifference, each_entity},
+        field::{EntityMatch, FieldComparison, FieldDifference, each_entity},
         game_copy::{GameCopy, GroupKey, Groups, KnownType, KnownTypes, types_of},
     },
 };
@@ -40,45 +40,59 @@ pub(super) struct Found {
 /// Group and index of an entity.
 type Places = EntityHashMap<(usize, usize)>;
 
-impl Comparer<'_> {
-    /// Returns all differences, nearest to their cause first. These are types of the game before those of the engine,
-    /// and resources before components, whose values often come from them.
-    pub fn compare(&mut self, left: &GameCopy, right: &GameCopy, tick: u32) -> Found {
-        let mut found = Found::default();
-        let pairs = self.pair_up(left, right, tick, &mut found);
+/// The partners of the entities of two copies.
+struct Matching<'a> {
+    known_types: &'a KnownTypes,
+    pairs: &'a [Pairs],
+    left: Places,
+    right: Places,
+    /// True if entities of one kind may have another order: that of their spawning may differ from a first episode's.
+    is_loose: bool,
+}
+
+impl<'a> Matching<'a> {
+    fn new(known_types: &'a KnownTypes, pairs: &'a [Pairs], is_loose: bool) -> Self {
         let places = |side: fn(&Pairs) -> &Vec<Entity>| -> Places {
             let numbered = pairs.iter().enumerate();
             let placed = numbered
                 .flat_map(|(group, pairs)| side(pairs).iter().enumerate().map(move |(at, e)| (*e, (group, at))));
             placed.collect()
         };
-        let (left_places, right_places) = (places(|pairs| &pairs.left), places(|pairs| &pairs.right));
-        let loose = self.is_loose();
-        let same_entity = |a: Entity, b: Entity| match (left_places.get(&a), right_places.get(&b)) {
-            // A list of entities has the order of their spawning, which may differ from that of a first episode.
-            (Some(a), Some(b)) => {
-                if loose {
-                    a.0 == b.0
-                } else {
-                    a == b
-                }
-            }
+        let (left, right) = (places(|pairs| &pairs.left), places(|pairs| &pairs.right));
+        Self { known_types, pairs, left, right, is_loose }
+    }
+}
+
+impl EntityMatch for Matching<'_> {
+    fn is_same(&self, left: Entity, right: Entity) -> bool {
+        match (self.left.get(&left), self.right.get(&right)) {
+            (Some(left), Some(right)) => left == right || (self.is_loose && left.0 == right.0),
             // Entities outside of the game, such as observers, have no partner and are not compared.
             _ => true,
-        };
-        self.compare_resources(left, right, tick, &same_entity, &mut found);
-        for group in &pairs {
-            found.differences.extend(self.compare_group(left, right, tick, group, &same_entity));
         }
-        // After a restart, a surplus of entities is itself the cause, so it comes early. In other comparisons it is the
-        // effect of another difference, and comes last.
-        let is_cause = self.comparison == DoctorComparison::Restart;
-        let rank = |difference: &DoctorDifference| match difference.kind {
-            DifferenceKind::Entities => (false, if is_cause { 1 } else { 3 }),
-            DifferenceKind::Resource => (doctor::is_engine(&difference.name), 0),
-            _ => (doctor::is_engine(&difference.name), 2),
+    }
+
+    fn describe(&self, left: Entity, right: Entity) -> [String; 2] {
+        let in_words = |places: &Places, entity: Entity| match places.get(&entity) {
+            Some(&(group, at)) => describe(self.known_types, &self.pairs[group], at, entity),
+            None => entity.to_string(),
         };
-        found.differences.sort_by_key(rank);
+        [in_words(&self.left, left), in_words(&self.right, right)]
+    }
+}
+
+impl Comparer<'_> {
+    /// Returns all differences, nearest to their cause first. These are types of the game before those of the engine,
+    /// and resources before components, whose values often come from them.
+    pub fn compare(&mut self, left: &GameCopy, right: &GameCopy, tick: u32) -> Found {
+        let mut found = Found::default();
+        let pairs = self.pair_up(left, right, tick, &mut found);
+        let entities = Matching::new(self.known_types, &pairs, self.is_loose());
+        self.compare_resources(left, right, tick, &entities, &mut found);
+        for group in &pairs {
+            found.differences.extend(self.compare_group(left, right, tick, group, &entities));
+        }
+        found.differences.sort_by_key(|difference| rank(self.comparison, difference));
         found
     }
 
@@ -99,7 +113,7 @@ impl Comparer<'_> {
         left: &GameCopy,
         right: &GameCopy,
         tick: u32,
-        same_entity: &dyn Fn(Entity, Entity) -> bool,
+        entities: &dyn EntityMatch,
         found: &mut Found,
     ) {
         // Lists in resources contain both agents of a shared World, so the second one has another index than alone.
@@ -112,7 +126,7 @@ impl Comparer<'_> {
             let Some(known) = self.known_types.get(id).filter(|known| self.is_wanted(known)) else { continue };
             let name = known.path.clone().unwrap_or_default();
             let difference = match (lefts.get(&id), rights.get(&id)) {
-                (Some(&a), Some(&b)) => self.field(known, (&left.world, a), (&right.world, b), same_entity),
+                (Some(&a), Some(&b)) => self.field(known, (&left.world, a), (&right.world, b), entities),
                 (a, b) => presence(a.is_some(), b.is_some()),
             };
             found.differences.extend(difference.map(|field| DoctorDifference {
@@ -123,6 +137,7 @@ impl Comparer<'_> {
                 field: field.path,
                 left: field.left,
                 right: field.right,
+                value_type: field.value_type,
             }));
         }
     }
@@ -139,13 +154,13 @@ impl Comparer<'_> {
         known: &KnownType,
         left: (&World, Entity),
         right: (&World, Entity),
-        same_entity: &dyn Fn(Entity, Entity) -> bool,
+        entities: &dyn EntityMatch,
     ) -> Option<FieldDifference> {
         let reflect = known.reflect.as_ref()?;
         let (a, b) = (reflect.reflect(left.0.entity(left.1)), reflect.reflect(right.0.entity(right.1)));
         let (Some(a), Some(b)) = (a, b) else { return presence(a.is_some(), b.is_some()) };
         let mut comparison = FieldComparison {
-            same_entity,
+            entities,
             handles: !self.is_loose(),
             right_may_hold_more: self.comparison == DoctorComparison::Arenas,
             incomparable: &mut self.incomparable,
@@ -159,32 +174,27 @@ impl Comparer<'_> {
         right: &GameCopy,
         tick: u32,
         group: &Pairs,
-        same_entity: &dyn Fn(Entity, Entity) -> bool,
+        entities: &dyn EntityMatch,
     ) -> Vec<DoctorDifference> {
         let mut differences = Vec::new();
         for (place, (&a, &b)) in group.left.iter().zip(&group.right).enumerate() {
-            for (name, field) in self.components(left, a, right, b, same_entity) {
-                let entity = self.describe(group, place, a);
-                let (kind, FieldDifference { path, left, right }) = (DifferenceKind::Component, field);
-                differences.push(DoctorDifference { tick, kind, name, entity: Some(entity), field: path, left, right });
+            for (name, field) in self.components(left, a, right, b, entities) {
+                let entity = describe(self.known_types, group, place, a);
+                let (kind, FieldDifference { path, left, right, value_type }) = (DifferenceKind::Component, field);
+                let (entity, field) = (Some(entity), path);
+                differences.push(DoctorDifference { tick, kind, name, entity, field, left, right, value_type });
             }
         }
         let in_another_order =
-            self.is_loose() && !differences.is_empty() && self.is_reordered(left, right, group, same_entity);
+            self.is_loose() && !differences.is_empty() && self.is_reordered(left, right, group, entities);
         if in_another_order { Vec::new() } else { differences }
     }
 
     /// Returns whether every entity on the left has an equal one on the right, in any order.
-    fn is_reordered(
-        &mut self,
-        left: &GameCopy,
-        right: &GameCopy,
-        group: &Pairs,
-        same_entity: &dyn Fn(Entity, Entity) -> bool,
-    ) -> bool {
+    fn is_reordered(&mut self, left: &GameCopy, right: &GameCopy, group: &Pairs, entities: &dyn EntityMatch) -> bool {
         let mut free = group.right.clone();
         group.left.iter().all(|&a| {
-            let equal = free.iter().position(|&b| self.components(left, a, right, b, same_entity).is_empty());
+            let equal = free.iter().position(|&b| self.components(left, a, right, b, entities).is_empty());
             equal.map(|at| free.remove(at)).is_some()
         })
     }
@@ -197,7 +207,7 @@ impl Comparer<'_> {
         a: Entity,
         right: &GameCopy,
         b: Entity,
-        same_entity: &dyn Fn(Entity, Entity) -> bool,
+        entities: &dyn EntityMatch,
     ) -> Vec<(String, FieldDifference)> {
         let types = types_of(&left.world, left.world.entity(a).archetype().components());
         let shared = types.into_iter().filter(|id| right.world.entity(b).contains_type_id(*id));
@@ -205,7 +215,7 @@ impl Comparer<'_> {
         let mut differences = Vec::new();
         for known in shared.filter_map(|id| known_types.get(id)) {
             if self.is_wanted(known)
-                && let Some(field) = self.field(known, (&left.world, a), (&right.world, b), same_entity)
+                && let Some(field) = self.field(known, (&left.world, a), (&right.world, b), entities)
             {
                 differences.push((known.path.clone().unwrap_or_default(), field));
             }
@@ -216,7 +226,23 @@ impl Comparer<'_> {
 
 fn presence(left: bool, right: bool) -> Option<FieldDifference> {
     let word = |there: bool| if there { "there" } else { "not there" }.to_owned();
-    (left != right).then(|| FieldDifference { path: String::new(), left: word(left), right: word(right) })
+    let [left_word, right_word] = [left, right].map(word);
+    let empty = String::new;
+    let difference = FieldDifference { path: empty(), left: left_word, right: right_word, value_type: empty() };
+    (left != right).then_some(difference)
+}
+
+/// Returns the place of a difference among those of its tick. Differences in types of the game come before those of the
+/// engine, and resources before components.
+pub(super) fn rank(comparison: DoctorComparison, difference: &DoctorDifference) -> (bool, u8) {
+    // After a restart, a surplus of entities is itself the cause, so it comes early. In other comparisons it is the
+    // effect of another difference, and comes last.
+    let is_cause = comparison == DoctorComparison::Restart;
+    match difference.kind {
+        DifferenceKind::Entities => (false, if is_cause { 1 } else { 3 }),
+        DifferenceKind::Resource => (doctor::is_engine(&difference.name), 0),
+        _ => (doctor::is_engine(&difference.name), 2),
+    }
 }
 
 /// Entities of one kind, pair by pair.
@@ -277,35 +303,36 @@ impl Comparer<'_> {
         (!key.types.iter().any(ignored)).then(|| DoctorDifference {
             tick,
             kind: DifferenceKind::Entities,
-            name: self.describe_kind(key),
+            name: describe_kind(self.known_types, key),
             entity: None,
             field: String::new(),
             left: left.to_string(),
             right: right.to_string(),
+            value_type: String::new(),
         })
     }
+}
 
-    /// Returns the kind, such as `"Paddle" [Velocity, Collider]`.
-    fn describe_kind(&self, key: &GroupKey) -> String {
-        let types = key.types.iter().filter_map(|id| self.known_types.get(*id)?.short_name());
-        let types: Vec<_> = types.collect();
-        let is_nameless = types.is_empty();
-        let types = format!("[{}]", types.join(", "));
-        match (&key.agent, &key.name) {
-            (Some(number), _) => format!("agent {number}"),
-            (None, Some(name)) => format!("\"{name}\" {types}"),
-            (None, None) if is_nameless => "entities without components of the game that have a name".to_owned(),
-            (None, None) => types,
-        }
+/// Returns the kind, such as `"Paddle" [Velocity, Collider]`.
+fn describe_kind(known_types: &KnownTypes, key: &GroupKey) -> String {
+    let types = key.types.iter().filter_map(|id| known_types.get(*id)?.short_name());
+    let types: Vec<_> = types.collect();
+    let is_nameless = types.is_empty();
+    let types = format!("[{}]", types.join(", "));
+    match (&key.agent, &key.name) {
+        (Some(number), _) => format!("agent {number}"),
+        (None, Some(name)) => format!("\"{name}\" {types}"),
+        (None, None) if is_nameless => "entities without components of the game that have a name".to_owned(),
+        (None, None) => types,
     }
+}
 
-    /// Returns the entity, such as `entity 3v0, number 2 of 5 [Brick]`.
-    pub(super) fn describe(&self, group: &Pairs, place: usize, entity: Entity) -> String {
-        let kind = self.describe_kind(&group.key);
-        match group.left.len() {
-            1 => kind,
-            count => format!("{kind}, number {} of {count} in the order of spawning (entity {entity})", place + 1),
-        }
+/// Returns the entity, such as `entity 3v0, number 2 of 5 [Brick]`.
+fn describe(known_types: &KnownTypes, group: &Pairs, place: usize, entity: Entity) -> String {
+    let kind = describe_kind(known_types, &group.key);
+    match group.left.len() {
+        1 => kind,
+        count => format!("{kind}, number {} of {count} in the order of spawning (entity {entity})", place + 1),
     }
 }
 

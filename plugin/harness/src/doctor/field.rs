@@ -13,15 +13,35 @@ pub(super) struct FieldDifference {
     pub path: String,
     pub left: String,
     pub right: String,
+    /// Path of the type of the values; empty if only one of them is there.
+    pub value_type: String,
+}
+
+/// The correspondence of the entities of two Worlds.
+pub(super) trait EntityMatch {
+    /// Returns whether an entity of the left World corresponds to one of the right World.
+    fn is_same(&self, left: Entity, right: Entity) -> bool;
+    /// Returns both entities in words. Their ids may be equal although the entities differ.
+    fn describe(&self, left: Entity, right: Entity) -> [String; 2];
 }
 
 impl FieldDifference {
     fn between(left: &dyn PartialReflect, right: &dyn PartialReflect) -> Option<Self> {
-        Some(Self { path: String::new(), left: show(left), right: show(right) })
+        Some(Self::in_words(left, show_apart(&format!("{left:?}"), &format!("{right:?}"))))
+    }
+
+    /// Describes two values of this one's type.
+    fn in_words(value: &dyn PartialReflect, [left, right]: [String; 2]) -> Self {
+        Self { path: String::new(), left, right, value_type: value.reflect_type_path().to_owned() }
     }
 
     fn of_lengths(left: usize, right: usize) -> Option<Self> {
-        Some(Self { path: ".len()".to_owned(), left: left.to_string(), right: right.to_string() })
+        Some(Self {
+            path: ".len()".to_owned(),
+            left: left.to_string(),
+            right: right.to_string(),
+            value_type: String::new(),
+        })
     }
 
     fn inside(mut self, part: impl std::fmt::Display) -> Self {
@@ -32,8 +52,7 @@ impl FieldDifference {
 
 /// The settings of a comparison of values.
 pub(super) struct FieldComparison<'a> {
-    /// Returns true if an entity of the left World corresponds to one of the right World.
-    pub same_entity: &'a dyn Fn(Entity, Entity) -> bool,
+    pub entities: &'a dyn EntityMatch,
     /// True if handles of assets are compared. A second episode creates new ones.
     pub handles: bool,
     /// True if a list or map on the right may have more entries, as for agents that are not on the left.
@@ -48,8 +67,9 @@ impl FieldComparison<'_> {
         if let (Some(&left_entity), Some(&right_entity)) =
             (left.try_downcast_ref::<Entity>(), right.try_downcast_ref::<Entity>())
         {
-            let same = (self.same_entity)(left_entity, right_entity);
-            return if same { None } else { FieldDifference::between(left, right) };
+            let is_same = self.entities.is_same(left_entity, right_entity);
+            let described = || apart(self.entities.describe(left_entity, right_entity));
+            return (!is_same).then(|| FieldDifference::in_words(left, described()));
         }
         if !self.handles && left.reflect_type_path().starts_with("bevy_asset::") {
             return None;
@@ -102,7 +122,12 @@ impl FieldComparison<'_> {
             .filter_map(|(key, value)| {
                 let difference = match right.get(key) {
                     Some(other) => self.first(value, other)?,
-                    None => FieldDifference { path: String::new(), left: show(value), right: "nothing".to_owned() },
+                    None => FieldDifference {
+                        path: String::new(),
+                        left: show(value),
+                        right: "nothing".to_owned(),
+                        value_type: value.reflect_type_path().to_owned(),
+                    },
                 };
                 Some(difference.inside(format!("[{}]", show(key))))
             })
@@ -117,6 +142,7 @@ impl FieldComparison<'_> {
             path: format!("[{value}]"),
             left: "in it".to_owned(),
             right: "not in it".to_owned(),
+            value_type: String::new(),
         });
         difference.or_else(|| self.lengths(left.len(), right.len()))
     }
@@ -140,13 +166,31 @@ impl FieldComparison<'_> {
 /// Most characters of a value in a report.
 const LONGEST: usize = 96;
 
+/// Most characters that two long values are shown with before the first one that differs.
+const BEFORE: usize = 32;
+
 /// Returns a value as text, cut if it is long.
 pub(super) fn show(value: &dyn PartialReflect) -> String {
-    let text = format!("{value:?}");
-    if text.chars().count() <= LONGEST {
-        return text;
-    }
-    text.chars().take(LONGEST).chain("…".chars()).collect()
+    cut(&format!("{value:?}"), 0)
+}
+
+/// Returns the characters of a text from this one on, at most [`LONGEST`] of them.
+fn cut(text: &str, from: usize) -> String {
+    let (before, after) = (if from > 0 { "…" } else { "" }, text.chars().count() > from + LONGEST);
+    let part: String = text.chars().skip(from).take(LONGEST).collect();
+    format!("{before}{part}{}", if after { "…" } else { "" })
+}
+
+/// Returns two texts with the place where they differ.
+fn show_apart(left: &str, right: &str) -> [String; 2] {
+    let shared = left.chars().zip(right.chars()).take_while(|(a, b)| a == b).count();
+    let from = if shared < LONGEST { 0 } else { shared - BEFORE };
+    apart([cut(left, from), cut(right, from)])
+}
+
+/// Replaces the second of two equal texts: values may differ in a part that is not printed.
+fn apart([left, right]: [String; 2]) -> [String; 2] {
+    if left == right { [left, "another one that is printed the same".to_owned()] } else { [left, right] }
 }
 
 /// Returns whether two values without parts are equal to the bit; `None` if their type cannot say.
@@ -209,18 +253,26 @@ mod tests {
 
     fn bag() -> Bag {
         let prices = HashMap::from([("ale".to_owned(), 3), ("bread".to_owned(), 2)]);
-        Bag { weights: vec![1.0, 2.0], owner: Entity::PLACEHOLDER, prices, kind: Kind::Full { of: 1 } }
+        let owner = World::new().spawn_empty().id();
+        Bag { weights: vec![1.0, 2.0], owner, prices, kind: Kind::Full { of: 1 } }
+    }
+
+    /// Each entity corresponds to itself, except the placeholder, which has the same id on both sides.
+    struct Crossed;
+
+    impl EntityMatch for Crossed {
+        fn is_same(&self, left: Entity, right: Entity) -> bool {
+            left == right && left != Entity::PLACEHOLDER
+        }
+        fn describe(&self, left: Entity, right: Entity) -> [String; 2] {
+            [left, right].map(|entity| format!("the entity {entity}"))
+        }
     }
 
     fn first(left: &Bag, right: &Bag, right_may_hold_more: bool) -> Option<FieldDifference> {
         let mut incomparable = BTreeSet::new();
-        let same_entity = |a: Entity, b: Entity| a == b;
-        let mut comparison = FieldComparison {
-            same_entity: &same_entity,
-            handles: true,
-            right_may_hold_more,
-            incomparable: &mut incomparable,
-        };
+        let mut comparison =
+            FieldComparison { entities: &Crossed, handles: true, right_may_hold_more, incomparable: &mut incomparable };
         comparison.first(left, right)
     }
 
@@ -246,6 +298,25 @@ mod tests {
         assert_eq!(difference(|bag| bag.kind = Kind::Empty).path, ".kind");
         let found = difference(|bag| *bag.prices.get_mut("ale").expect("it is there") = 4);
         assert_eq!((found.path.as_str(), found.right.as_str()), (".prices[\"ale\"]", "4"));
+    }
+
+    #[test]
+    fn different_entities_with_equal_ids_are_printed_differently() {
+        let placed = Bag { owner: Entity::PLACEHOLDER, ..bag() };
+        let found = first(&placed, &placed, false).expect("other entities");
+        assert_eq!(found.path, ".owner");
+        assert_eq!(found.left, format!("the entity {}", Entity::PLACEHOLDER));
+        assert_eq!(found.right, "another one that is printed the same");
+        assert!(found.value_type.ends_with("::Entity"), "{}", found.value_type);
+    }
+
+    #[test]
+    fn long_values_are_shown_where_they_differ() {
+        let text = |end: &str| format!("{}{end}", "x".repeat(200));
+        let [left, right] = show_apart(&text("1"), &text("2"));
+        assert_eq!((left, right), (format!("…{}1", "x".repeat(32)), format!("…{}2", "x".repeat(32))));
+        let [left, right] = show_apart("1", &text("2"));
+        assert_eq!((left.as_str(), right), ("1", format!("{}…", "x".repeat(96))));
     }
 
     #[test]

@@ -1,6 +1,11 @@
 //! A running copy of a game, whose agents play a script of random actions.
 
-use crate::{doctor, doctor::cause::CauseKind, game::Game, worlds::build_world};
+use crate::{
+    doctor,
+    doctor::{cause::CauseKind, known},
+    game::Game,
+    worlds::build_world,
+};
 use bevy::{
     ecs::{
         component::ComponentInfo, entity::EntityHashMap, observer::Observer, reflect::AppTypeRegistry,
@@ -274,6 +279,8 @@ pub struct TypesReport {
     pub unnamed: usize,
     /// Types of fields that are reflected and cannot be compared.
     pub incomparable: Vec<String>,
+    /// Diagnostics, counters and clocks of known engines, which are not compared by default.
+    pub left_out: Vec<String>,
 }
 
 /// One type of component or resource.
@@ -284,6 +291,8 @@ pub(super) struct KnownType {
     pub reflect: Option<ReflectComponent>,
     /// True if it belongs to the engine or to the plugin.
     pub engine: bool,
+    /// True if it is left out by default, and nothing else was asked for.
+    pub is_left_out: bool,
     /// Possible causes of a difference in it, and why.
     pub suspicions: Vec<(CauseKind, String)>,
 }
@@ -291,7 +300,7 @@ pub(super) struct KnownType {
 impl KnownType {
     /// Returns whether values of this type are compared.
     pub fn is_compared(&self) -> bool {
-        self.reflect.is_some() && self.path.as_deref().is_some_and(doctor::is_compared)
+        self.reflect.is_some() && !self.is_left_out && self.path.as_deref().is_some_and(doctor::is_compared)
     }
 
     /// Returns the last part of the path.
@@ -306,13 +315,15 @@ pub(super) struct KnownTypes {
     known: BTreeMap<TypeId, KnownType>,
     /// Types of a World without a game.
     bare: BTreeSet<TypeId>,
+    /// True if diagnostics of known engines are left out.
+    default_ignores: bool,
 }
 
 impl KnownTypes {
     /// Starts with a World without a game, which has only the engine's and the plugin's types.
-    pub fn new(bare: &World) -> Self {
+    pub fn new(bare: &World, default_ignores: bool) -> Self {
         let engine = bare.components().iter_registered().filter_map(ComponentInfo::type_id);
-        Self { known: BTreeMap::new(), bare: engine.collect() }
+        Self { known: BTreeMap::new(), bare: engine.collect(), default_ignores }
     }
 
     /// Adds types that are new in a World.
@@ -326,10 +337,13 @@ impl KnownTypes {
             let registration = registry.as_ref().and_then(|registry| registry.get(id));
             let path = registration.map(|known| known.type_info().type_path().to_owned()).or_else(|| named(info));
             let is_engine = self.bare.contains(&id) || path.as_deref().is_some_and(doctor::is_engine);
+            let reflect = registration.and_then(|known| known.data::<ReflectComponent>().cloned());
+            let is_diagnostic = reflect.is_some() && path.as_deref().is_some_and(known::is_diagnostic);
             let known = KnownType {
                 path,
-                reflect: registration.and_then(|known| known.data::<ReflectComponent>().cloned()),
+                reflect,
                 engine: is_engine,
+                is_left_out: self.default_ignores && is_diagnostic,
                 suspicions: registration.map(suspicions).unwrap_or_default(),
             };
             self.known.insert(id, known);
@@ -346,6 +360,7 @@ impl KnownTypes {
         let mut report = TypesReport { incomparable: incomparable.iter().cloned().collect(), ..Default::default() };
         for known in copy.present_types().into_iter().filter_map(|id| self.get(id)) {
             match (&known.path, known.is_compared(), known.engine) {
+                (Some(path), ..) if known.is_left_out => report.left_out.push(path.clone()),
                 (Some(path), true, _) => report.compared.push(path.clone()),
                 (_, _, true) => {}
                 (Some(path), ..) => report.not_reflected.push(path.clone()),
@@ -354,6 +369,7 @@ impl KnownTypes {
         }
         report.compared.sort();
         report.not_reflected.sort();
+        report.left_out.sort();
         report
     }
 
@@ -502,7 +518,7 @@ mod tests {
     struct Brick;
 
     fn order(world: &World, census: &Census) -> Vec<Entity> {
-        let groups = census.groups(world, &KnownTypes::new(&World::new()));
+        let groups = census.groups(world, &KnownTypes::new(&World::new(), true));
         groups.into_values().flatten().collect()
     }
 

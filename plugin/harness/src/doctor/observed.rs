@@ -169,9 +169,13 @@ fn verdict(reports: &[ComparisonReport], needed: &[DoctorComparison]) -> Verdict
             if bad.fault.is_some() && bad.difference().is_none() { "the game has a fault".to_owned() } else { why };
         return Verdict { safe: Some(false), why, comparisons };
     }
+    let has_note = of_needed.clone().any(ComparisonReport::is_note);
     match of_needed.find_map(|report| report.skipped.clone()) {
         Some(why) => Verdict { safe: None, why, comparisons },
-        None => Verdict { safe: Some(true), why: String::new(), comparisons },
+        None => {
+            let why = if has_note { "but see the notes on state that differs" } else { "" };
+            Verdict { safe: Some(true), why: why.to_owned(), comparisons }
+        }
     }
 }
 

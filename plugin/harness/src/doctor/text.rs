@@ -23,6 +23,7 @@ impl Display for DoctorReport {
         for (number, finding) in self.findings.iter().enumerate() {
             self.write_finding(f, number + 1, finding)?;
         }
+        self.write_notes(f)?;
         self.write_safety(f)?;
         write!(f, "{}{}", self.observation, self.types)?;
         if let Some(steps) = &self.unequal_steps {
@@ -36,11 +37,34 @@ impl Display for DoctorReport {
             1 => "1 finding.".to_owned(),
             count => format!("{count} findings."),
         };
-        write!(f, "{end}")
+        let notes = match self.notes.len() {
+            0 => String::new(),
+            1 => " 1 note.".to_owned(),
+            count => format!(" {count} notes."),
+        };
+        write!(f, "{end}{notes}")
     }
 }
 
 impl DoctorReport {
+    fn write_notes(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if self.notes.is_empty() {
+            return Ok(());
+        }
+        writeln!(f, "Notes: state that differs, and that no agent noticed to the end of the episodes: not in what it")?;
+        writeln!(f, "observes, not in rewards, ends of episodes or the state hash. They are no findings.")?;
+        for note in &self.notes {
+            writeln!(f, "  {}", note.what)?;
+            if let Some(difference) = &note.difference {
+                writeln!(f, "    {} against {}", difference.left, difference.right)?;
+            }
+            if let Some(cause) = note.causes.first() {
+                writeln!(f, "    common cause: {}", cause.kind.describe())?;
+            }
+        }
+        writeln!(f)
+    }
+
     fn write_safety(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { level, seed, ticks, .. } = self;
         writeln!(f, "Safe for")?;
@@ -68,9 +92,12 @@ impl DoctorReport {
         if let (Some(difference), Some(report)) = (&finding.difference, report) {
             let (left, right) = report.comparison.sides();
             writeln!(f, "     {left}: {}\n     {right}: {}", difference.left, difference.right)?;
-            for other in &report.others {
-                writeln!(f, "     in the same tick: {}", in_one_line(other))?;
-            }
+            let others = report.others.iter().map(|other| {
+                let is_same_tick = other.tick == difference.tick;
+                let when = if is_same_tick { "in the same tick".to_owned() } else { format!("at tick {}", other.tick) };
+                format!("{when}: {}", in_one_line(other))
+            });
+            write_list(f, "     ", others)?;
             match report.effect.as_ref().filter(|effect| *effect != difference) {
                 Some(effect) => writeln!(f, "     agents notice it at tick {}: {}", effect.tick, in_one_line(effect))?,
                 None if report.effect.is_none() => {
@@ -97,6 +124,9 @@ fn outcome(report: &ComparisonReport) -> String {
     };
     match (&report.skipped, report.difference(), &report.fault) {
         (Some(why), ..) => format!("not compared: {why}"),
+        (_, Some(_), _) if report.is_note() => {
+            format!("no difference that agents notice in {} ticks{unmatched}; see the notes", report.ticks)
+        }
         (_, Some(difference), _) => format!("DIFFERS at tick {}{unmatched}", difference.tick),
         (_, _, Some(_)) => format!("ended by a fault at tick {}", report.ticks),
         _ => {
@@ -167,6 +197,14 @@ impl Display for TypesReport {
                  or let the state hash depend on it (`StateHash`, or `.state_hash` of a `ForeignGame`)."
             )?;
         }
+        if !self.left_out.is_empty() {
+            writeln!(
+                f,
+                "  left out by default: diagnostics, counters and clocks of engines, which measure the computer"
+            )?;
+            write_list(f, "    ", self.left_out.iter().map(|path| quoted(path)))?;
+            writeln!(f, "  `--no-default-ignores` compares them, too.")?;
+        }
         if !self.incomparable.is_empty() {
             writeln!(f, "  Fields of these types cannot be compared:")?;
             write_list(f, "    ", self.incomparable.iter().map(|path| quoted(path)))?;
@@ -206,6 +244,16 @@ mod tests {
         assert_eq!(lines.len(), 3, "{text}");
         assert_eq!(lines[1][..4], ["`x`", "inf", "at", "tick"], "{text}");
         assert_eq!(lines[2], ["`wall_0`", "always", "0.5"], "{text}");
+    }
+
+    #[test]
+    fn diagnostics_that_are_left_out_are_named() {
+        let path = "avian2d::dynamics::solver::diagnostics::SolverDiagnostics".to_owned();
+        let text = TypesReport { left_out: vec![path], ..TypesReport::default() }.to_string();
+        for words in ["left out by default", "solver::diagnostics::SolverDiagnostics`\n", "`--no-default-ignores`"] {
+            assert!(text.contains(words), "`{words}` is missing in: {text}");
+        }
+        assert!(!TypesReport::default().to_string().contains("left out"));
     }
 
     #[test]

@@ -3,16 +3,22 @@
 use crate::{
     doctor::{
         ComparisonReport, DifferenceKind, DoctorComparison, DoctorDifference,
-        compare::Comparer,
+        cause::likelihood,
+        compare::{Comparer, rank},
         game_copy::{GameCopy, KnownTypes, Outcome, Plan, VARIANTS, add_archetypes, add_wall_clock},
         observed::ObservationMonitor,
     },
     game::Game,
     parallel::on_threads,
 };
+use std::collections::BTreeSet;
 
-/// Further differences of a tick that a report names.
-const OTHERS: usize = 5;
+/// Most differences of a comparison that are kept, one for each field.
+const MOST_DIFFERENCES: usize = 24;
+
+/// Times that the ticks of a comparison are multiplied with, at most, to end an episode in which state differs and no
+/// agent has noticed it yet.
+const LONGER: u32 = 4;
 
 /// Copies of a game that are compared.
 pub(super) struct Trial {
@@ -54,20 +60,26 @@ impl Trial {
         Self { comparison, copies, pairs, on_threads }
     }
 
-    /// Plays, and compares after every tick.
+    /// Plays, and compares after every tick. State is compared until an agent notices a difference, and if none does,
+    /// to the end of the episode.
     pub fn run(
         &mut self,
         ticks: u32,
         known_types: &mut KnownTypes,
-        ignored: &[String],
+        left_out: &LeftOut,
         mut monitor: Option<&mut ObservationMonitor>,
     ) -> TrialResult {
         let mut report = ComparisonReport::new(self.comparison);
         let mut incomparable = Default::default();
         let mut is_over = true;
-        for tick in 0..ticks {
+        let mut all: Vec<DoctorDifference> = Vec::new();
+        for tick in 0..ticks.saturating_mul(LONGER) {
+            let is_undecided = !all.is_empty() && report.effect.is_none() && !is_over;
+            if tick >= ticks && !is_undecided {
+                break;
+            }
             self.tick();
-            if let Some(monitor) = &mut monitor {
+            if let Some(monitor) = monitor.as_mut().filter(|_| tick < ticks) {
                 monitor.note(tick, &self.copies[0].outcome(0));
             }
             report.fault = self.copies.iter().find_map(|copy| copy.fault.clone());
@@ -78,9 +90,10 @@ impl Trial {
             report.episodes += u32::from(is_over);
             is_over = self.copies[0].end(0).is_some();
             self.copies.iter().for_each(|copy| known_types.learn(&copy.world));
-            if report.first.is_none() {
-                let mut comparer = Comparer { known_types, comparison: self.comparison, ignored, incomparable };
-                self.compare(tick, &mut comparer, &mut report);
+            if report.effect.is_none() && all.len() < MOST_DIFFERENCES {
+                let (comparison, ignored) = (self.comparison, left_out.ignored);
+                let mut comparer = Comparer { known_types, comparison, ignored, incomparable };
+                self.compare(tick, &mut comparer, left_out, &mut report, &mut all);
                 incomparable = comparer.incomparable;
             }
             if report.effect.is_none() {
@@ -89,9 +102,12 @@ impl Trial {
             }
         }
         if self.comparison == DoctorComparison::Archetypes && report.effect.is_none() {
-            report.first = None;
-            report.others.clear();
+            all.clear();
         }
+        // What comes later has no part in what came before.
+        all.sort_by_key(|of| (of.tick, likelihood(self.comparison, of), rank(self.comparison, of)));
+        let mut all = all.into_iter();
+        (report.first, report.others) = (all.next(), all.collect());
         TrialResult { report, incomparable }
     }
 
@@ -102,17 +118,40 @@ impl Trial {
         on_threads(threaded, self.on_threads, GameCopy::tick);
     }
 
-    fn compare(&self, tick: u32, comparer: &mut Comparer, report: &mut ComparisonReport) {
+    /// Adds the differences of this tick in fields that did not differ before.
+    fn compare(
+        &self,
+        tick: u32,
+        comparer: &mut Comparer,
+        left_out: &LeftOut,
+        report: &mut ComparisonReport,
+        all: &mut Vec<DoctorDifference>,
+    ) {
         for &(left, right) in &self.pairs {
             let found = comparer.compare(&self.copies[left], &self.copies[right], tick);
             report.unmatched = report.unmatched.max(found.unmatched);
-            let mut differences = found.differences.into_iter();
-            if let Some(first) = differences.next() {
-                report.first = Some(first);
-                report.others = differences.take(OTHERS).collect();
-                return;
+            for difference in found.differences {
+                let is_known = all.iter().any(|known| known.has_field_of(&difference));
+                if !is_known && !left_out.noted.contains(&difference.name) && all.len() < MOST_DIFFERENCES {
+                    all.push(difference);
+                }
             }
         }
+    }
+}
+
+/// State that a comparison leaves out.
+pub(super) struct LeftOut<'a> {
+    /// Parts of type paths that the user ignores.
+    pub ignored: &'a [String],
+    /// Types that differ in two equal copies already, and that no agent noticed there.
+    pub noted: BTreeSet<String>,
+}
+
+impl DoctorDifference {
+    /// Returns whether both are in the same field of the same type.
+    fn has_field_of(&self, other: &Self) -> bool {
+        (self.kind, &self.name, &self.field) == (other.kind, &other.name, &other.field)
     }
 }
 
@@ -120,7 +159,7 @@ impl Trial {
 pub(super) struct TrialResult {
     pub report: ComparisonReport,
     /// Types of fields that could not be compared.
-    pub incomparable: std::collections::BTreeSet<String>,
+    pub incomparable: BTreeSet<String>,
 }
 
 /// Returns the first difference in the observation, reward or end of the left copy's agent and its double on the right.
@@ -129,7 +168,7 @@ fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<DoctorDifferen
     let double = (0..right.agents.len()).find(|&agent| right.number(agent) == number)?;
     let differs = |kind, name: &str, left: String, right: String| {
         let (name, entity, field) = (name.to_owned(), Some(format!("agent {number}")), String::new());
-        DoctorDifference { tick, kind, name, entity, field, left, right }
+        DoctorDifference { tick, kind, name, entity, field, left, right, value_type: String::new() }
     };
     first_of_outcomes(&left.outcome(0), &right.outcome(double), &left.observed_names(), differs)
 }

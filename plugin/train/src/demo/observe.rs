@@ -50,6 +50,10 @@ impl Demonstrations {
         for (mode, jobs) in by_mode {
             let observed = observe_replays(game, &self.observation_config, mode, jobs, threads, progress);
             for observed in observed.map_err(|error| self.explained(error))? {
+                let observed = match observed.divergence {
+                    None => observed,
+                    Some(_) => self.observe_alone(game, mode, observed, &replay)?,
+                };
                 if let Some(divergence) = observed.divergence {
                     let Demonstration { file, index, .. } = &self.episodes[observed.id];
                     return Err(VerifyError::Diverged { path: file.to_path_buf(), episode: *index, divergence });
@@ -58,6 +62,21 @@ impl Demonstrations {
             }
         }
         Ok(all)
+    }
+
+    /// Replays an episode again, alone in a new World, where a game that keeps something from other episodes has none
+    /// of it. Every recording that `demo verify` accepts replays there, and its observations are those of its states.
+    fn observe_alone(
+        &self,
+        game: &dyn Game,
+        mode: &str,
+        observed: ObservedEpisode,
+        replay: &impl Fn(Arc<DemoEpisode>) -> Replay,
+    ) -> Result<ObservedEpisode, VerifyError> {
+        let job = (observed.id, replay(self.episodes[observed.id].episode.clone()));
+        let again = observe_replays(game, &self.observation_config, mode, vec![job], 1, &|_| {});
+        let again = again.map_err(|error| self.explained(error))?;
+        Ok(again.into_iter().next().unwrap_or(observed))
     }
 
     /// Returns an error with the files of the episodes that were played.
