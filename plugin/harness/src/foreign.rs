@@ -82,12 +82,8 @@ use bevy::{
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     agent::Agent,
-    engine::{
-        Renewal, TickSchedules, check_actions, has_no_actions, is_tick,
-        panics::{self, note_actions},
-    },
+    engine::{Renewal, TickSchedules, check_actions, has_no_actions, is_tick, panics::note_actions},
     episode::EpisodeEnd,
-    fault::Faults,
     headless::{HeadlessPlugins, allow_whole_frames},
     key_bindings::KeyBindings,
     legal::LegalActions,
@@ -155,7 +151,7 @@ impl ForeignGame {
             loaded: None,
             demonstrator: None,
             hash: None,
-            plugins: None,
+            headless_plugins: None,
             detectors: Vec::new(),
             defects: Vec::new(),
         };
@@ -433,7 +429,7 @@ impl ForeignGame {
     /// Changes Bevy's plugins for headless Worlds, to leave out some default ones:
     /// `|plugins| plugins.build().disable::<AudioPlugin>()`.
     pub fn headless(self, plugins: impl Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync + 'static) -> Self {
-        self.with(|description| description.plugins = Some(Arc::new(plugins)))
+        self.with(|description| description.headless_plugins = Some(Arc::new(plugins)))
     }
 }
 
@@ -519,7 +515,7 @@ impl HostTools for ForeignGame {
     }
 
     fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
-        match &self.description.plugins {
+        match &self.description.headless_plugins {
             Some(change) => change(plugins),
             None => plugins.build(),
         }
@@ -643,7 +639,7 @@ struct Description {
     loaded: Option<SystemFactory<()>>,
     demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
     hash: Option<SystemFactory<u64>>,
-    plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
+    headless_plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
     /// Factories of the game's own detectors.
     detectors: Vec<Arc<dyn Fn() -> Box<dyn Detector> + Send + Sync>>,
     /// Defects that can be planted into it.
@@ -710,7 +706,7 @@ impl Plugin for ForeignPlugin {
     fn build(&self, app: &mut App) {
         let description = &self.game.description;
         app.insert_resource(PlayedMode(self.mode.clone()));
-        add_game(app, description.name, &*description.plugin);
+        (description.plugin)(app);
         if !app.is_plugin_added::<VirtualInputPlugin>() {
             app.add_plugins(VirtualInputPlugin { route: InputRoute::Messages });
         }
@@ -755,17 +751,6 @@ impl Plugin for ForeignPlugin {
         allow_whole_frames(app.world_mut());
         app.insert_resource(ForeignCell::new(Foreign::new(&self.game, startup)));
     }
-}
-
-/// Adds the game. Its panic becomes a fault of the first tick, so that it is reported as the game's.
-fn add_game(app: &mut App, name: &str, plugin: &dyn Fn(&mut App)) {
-    let Err(words) = panics::hear(|| plugin(app)) else { return };
-    let mut fault = format!("the game `{name}` panicked when it was added to the app: {words}");
-    if words.contains("plugin was already added") {
-        fault += ". Playbot adds Bevy's own plugins: leave `DefaultPlugins`, or this one of them, out of the function that \
-                  is given to `ForeignGame::new`";
-    }
-    app.world_mut().resource_mut::<Faults>().report(fault);
 }
 
 /// Marks all current entities as not the game's, and notes the clocks.

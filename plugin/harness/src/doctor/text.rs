@@ -136,6 +136,7 @@ impl Display for ObservationReport {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { values, ticks, constant, .. } = self;
         match constant.len() {
+            _ if *ticks == 0 => writeln!(f, "Observation: {values} values, none of which was seen")?,
             0 => writeln!(f, "Observation: {values} values, all of which changed in {ticks} ticks")?,
             count => writeln!(f, "Observation: {values} values, {count} of which never changed in {ticks} ticks")?,
         }
@@ -206,6 +207,12 @@ mod tests {
         assert_eq!(lines.len(), 3, "{text}");
         assert_eq!(lines[1][..4], ["`x`", "inf", "at", "tick"], "{text}");
         assert_eq!(lines[2], ["`wall_0`", "always", "0.5"], "{text}");
+    }
+
+    #[test]
+    fn values_of_a_game_that_stopped_before_its_first_tick_are_not_judged() {
+        let report = ObservationReport { values: 2, ..Default::default() };
+        assert_eq!(report.to_string(), "Observation: 2 values, none of which was seen\n");
     }
 
     #[test]
