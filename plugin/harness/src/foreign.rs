@@ -151,6 +151,7 @@ impl ForeignGame {
             loaded: None,
             demonstrator: None,
             hash: None,
+            default_plugins: None,
             headless_plugins: None,
             detectors: Vec::new(),
             defects: Vec::new(),
@@ -426,8 +427,28 @@ impl ForeignGame {
         self.with(|description| description.hash = Some(SystemFactory::new(system, |hash| hash)))
     }
 
+    /// Changes Bevy's plugins in a window and in headless Worlds, where it is called after [`headless`](Self::headless).
+    /// It sets up plugins as the game's `main` does. The window itself is playbot's.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// let game = ForeignGame::new("walk", 1, |_: &mut App| {})
+    ///     .default_plugins(|plugins| plugins.set(ImagePlugin::default_nearest()));
+    /// let window = game.tools().host.windowed_plugins(DefaultPlugins.build());
+    /// assert!(window.enabled::<ImagePlugin>());
+    /// ```
+    pub fn default_plugins(
+        self,
+        change: impl Fn(PluginGroupBuilder) -> PluginGroupBuilder + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| description.default_plugins = Some(Arc::new(change)))
+    }
+
     /// Changes Bevy's plugins for headless Worlds, to leave out some default ones:
-    /// `|plugins| plugins.build().disable::<AudioPlugin>()`.
+    /// `|plugins| plugins.build().disable::<AudioPlugin>()`. For the window as well, there is
+    /// [`default_plugins`](Self::default_plugins).
     pub fn headless(self, plugins: impl Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync + 'static) -> Self {
         self.with(|description| description.headless_plugins = Some(Arc::new(plugins)))
     }
@@ -515,9 +536,17 @@ impl HostTools for ForeignGame {
     }
 
     fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
-        match &self.description.headless_plugins {
+        let plugins = match &self.description.headless_plugins {
             Some(change) => change(plugins),
             None => plugins.build(),
+        };
+        self.windowed_plugins(plugins)
+    }
+
+    fn windowed_plugins(&self, plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+        match &self.description.default_plugins {
+            Some(change) => change(plugins),
+            None => plugins,
         }
     }
 
@@ -639,6 +668,8 @@ struct Description {
     loaded: Option<SystemFactory<()>>,
     demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
     hash: Option<SystemFactory<u64>>,
+    /// Changes Bevy's plugins in a window and without.
+    default_plugins: Option<Arc<dyn Fn(PluginGroupBuilder) -> PluginGroupBuilder + Send + Sync>>,
     headless_plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
     /// Factories of the game's own detectors.
     detectors: Vec<Arc<dyn Fn() -> Box<dyn Detector> + Send + Sync>>,

@@ -1,6 +1,8 @@
 //! Tests of a game without its window: a picture from the disk, states, text, a mesh and a material.
 
 use bevy::{
+    app::PluginGroupBuilder,
+    diagnostic::{FrameCount, FrameCountPlugin},
     prelude::*,
     render::{Render, RenderApp, RenderPlugin},
     winit::WinitPlugin,
@@ -156,4 +158,18 @@ fn a_plugin_that_needs_the_render_app_when_it_is_finished_gets_advice() {
     for part in ["in `finish` of the plugin `", "::Late`)", "`get_sub_app_mut(RenderApp)`"] {
         assert!(words.contains(part), "`{part}` is missing in: {words}");
     }
+}
+
+#[test]
+fn default_plugins_are_changed_for_the_window_and_for_headless_worlds() {
+    fn uncounted(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+        plugins.disable::<FrameCountPlugin>()
+    }
+    let (world, _) = build_world(&ball_game().default_plugins(uncounted), "default", 1, 0, 1);
+    assert!(!world.contains_resource::<FrameCount>());
+    let (world, _) = build_world(&ball_game(), "default", 1, 0, 1);
+    assert!(world.contains_resource::<FrameCount>());
+    let changed = ball_game().default_plugins(uncounted);
+    let window = changed.tools().host.windowed_plugins(DefaultPlugins.build());
+    assert!(!window.enabled::<FrameCountPlugin>());
 }
