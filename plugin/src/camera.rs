@@ -67,7 +67,7 @@ use bevy::{
 use thiserror::Error;
 
 pub use crate::camera::readback::ReadbackDelay;
-pub(crate) use crate::camera::renderer::{RenderListPlugin, creation as drawing, none as not_drawing};
+pub(crate) use crate::camera::renderer::creation as drawing;
 pub use crate::camera::tiles::TileLayerPlugin;
 pub use crate::camera::{sensor_view::SensorCamera, tiles::TileBorder};
 

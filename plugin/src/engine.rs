@@ -68,7 +68,9 @@ pub use crate::{
 
 /// Panics of a game: turned into faults, with a file that replays to the panic.
 pub mod panics {
-    pub use crate::panics::{EpisodeTrace, PanicReports, hear, note_actions};
+    pub use crate::panics::{
+        EpisodeTrace, PanicReports, hear, lacks_render_app, note_actions, place_of_panic, refusal, refuse,
+    };
 }
 
 /// Errors of systems in a headless World: reported as text instead of a panic.

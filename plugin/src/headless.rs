@@ -34,6 +34,8 @@
 //! assert!(app.world().contains_resource::<Assets<Image>>());
 //! ```
 
+mod bevy_parts;
+
 use crate::{
     agent::{Agent, Control},
     episode::{Episode, Tick},
@@ -282,20 +284,27 @@ impl PlaybotAppExt for World {
 /// Input, assets, states, text, meshes and materials are there, and a window of 1280 by 720 that
 /// only the game sees. There is no event loop, and the renderer has no surface to draw on.
 ///
-/// With Bevy's feature `bevy_winit`, it needs the feature `window` of this crate; with `bevy_render`, the feature
-/// `camera`. A plugin can be left out only by its type. Leave out others with
+/// No feature of this crate has to match one of Bevy's. Leave out others with
 /// [`disable`](bevy::app::PluginGroupBuilder::disable), as with any group.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HeadlessPlugins {
     /// True if pictures are drawn for agents that see through a camera.
     draws: bool,
+    /// True if the renderer's sub-app exists while plugins are built, although it draws nothing.
+    shows_sub_app: bool,
 }
 
 impl HeadlessPlugins {
     /// Creates the plugins with a renderer that draws for [`CameraSensor`](crate::camera::CameraSensor)s.
     #[cfg(feature = "camera")]
     pub fn drawing() -> Self {
-        Self { draws: true }
+        Self { draws: true, ..default() }
+    }
+
+    /// Lets plugins find Bevy's `RenderApp` while they are built, for plugins that panic without it. What they add to it
+    /// has no effect, since the sub-app is removed before plugins are finished. It makes a World slower to build.
+    pub fn with_render_app(self) -> Self {
+        Self { shows_sub_app: true, ..self }
     }
 }
 
@@ -311,33 +320,27 @@ impl PluginGroup for HeadlessPlugins {
                     ..default()
                 },
             );
-        without_screen(plugins, self.draws)
+        let plugins = bevy_parts::without_event_loop(plugins);
+        if self.draws { drawing(plugins) } else { not_drawing(plugins, self.shows_sub_app) }
     }
 }
 
 #[cfg(feature = "camera")]
-fn without_screen(plugins: PluginGroupBuilder, draws: bool) -> PluginGroupBuilder {
-    use bevy::render::{RenderPlugin, pipelined_rendering::PipelinedRenderingPlugin};
-    let render_creation = if draws { crate::camera::drawing() } else { crate::camera::not_drawing() };
-    let renderer = RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() };
-    let plugins = without_event_loop(plugins.set(renderer))
-        .add(crate::camera::RenderListPlugin)
-        .add(crate::camera::NoScreenPlugin);
-    if plugins.contains::<PipelinedRenderingPlugin>() { plugins.disable::<PipelinedRenderingPlugin>() } else { plugins }
+fn drawing(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+    let render_creation = crate::camera::drawing();
+    let renderer = bevy::render::RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() };
+    plugins.set(renderer).add(crate::camera::NoScreenPlugin)
 }
 
 #[cfg(not(feature = "camera"))]
-fn without_screen(plugins: PluginGroupBuilder, _draws: bool) -> PluginGroupBuilder {
-    without_event_loop(plugins)
+fn drawing(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+    plugins
 }
 
-#[cfg(feature = "window")]
-fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
-    plugins.disable::<bevy::winit::WinitPlugin>()
-}
-
-#[cfg(not(feature = "window"))]
-fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+fn not_drawing(plugins: PluginGroupBuilder, shows_sub_app: bool) -> PluginGroupBuilder {
+    let plugins = bevy_parts::without_drawing(plugins, shows_sub_app);
+    #[cfg(feature = "camera")]
+    let plugins = plugins.add(crate::camera::NoScreenPlugin);
     plugins
 }
 

@@ -1,5 +1,7 @@
 //! Panics of a game: turned into faults, with a file that replays to the panic.
 
+mod origin;
+
 use crate::{
     action::{Action, check_actions},
     agent::{Agent, AgentOrder, Control},
@@ -11,6 +13,7 @@ use crate::{
     episode::Episode,
     fault::Fault,
     level::LevelFiles,
+    panics::origin::panic_origin,
     placement::TickSchedules,
     reward::Reward,
     state_hash::StateHash,
@@ -19,7 +22,7 @@ use crate::{
 use bevy::prelude::*;
 use std::{
     cell::{Cell, RefCell},
-    panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
+    panic::{AssertUnwindSafe, PanicHookInfo, catch_unwind, set_hook, take_hook},
     path::PathBuf,
     sync::Once,
 };
@@ -41,10 +44,20 @@ pub struct PanicReports {
 #[reflect(Component, CarryComponent, Clone, Debug)]
 pub struct EpisodeTrace(Option<DemoEpisode>);
 
-/// Marks a World that has panicked: its state may be inconsistent.
+/// Marks a World that cannot be ticked, with the reason. A panic may have left an inconsistent state behind.
 #[derive(Resource, Reflect)]
 #[reflect(Resource)]
-struct Broken;
+struct Broken(String);
+
+/// Makes each tick of a World a fault with this text. It is for Worlds whose game could not be added.
+pub fn refuse(world: &mut World, why: String) {
+    world.insert_resource(Broken(why));
+}
+
+/// Returns the fault of each tick of a World that was refused or has panicked.
+pub fn refusal(world: &World) -> Option<Fault> {
+    world.get_resource::<Broken>().map(|Broken(why)| Fault(why.clone()))
+}
 
 impl PanicReports {
     /// Reports for recordings with this header, written below `folder`.
@@ -116,39 +129,61 @@ fn hear_panics() {
             if !GUARDED.get() {
                 return default_hook(panic);
             }
-            let words = panic.payload_as_str().unwrap_or("no reason given");
-            let place = panic.location().map_or_else(String::new, |place| format!(" ({place})"));
-            WORDS.with_borrow_mut(|first| {
-                if first.is_empty() {
-                    *first = format!("{}{place}", words.split_whitespace().collect::<Vec<_>>().join(" "));
-                }
-            });
+            let is_first = WORDS.with_borrow(String::is_empty);
+            if is_first {
+                let words = panic.payload_as_str().unwrap_or("no reason given");
+                let words = words.split_whitespace().collect::<Vec<_>>().join(" ");
+                let place = place_of_panic(panic);
+                WORDS.set(format!("{words}{place}"));
+            }
         }));
     });
 }
 
+/// Returns the file and the line of a panic, and its plugin or system if they are known, in parentheses after a space.
+pub fn place_of_panic(panic: &PanicHookInfo<'_>) -> String {
+    let line = panic.location().map(|place| without_registry(&place.to_string()).to_owned());
+    let known: Vec<String> = line.into_iter().chain(panic_origin()).collect();
+    if known.is_empty() { String::new() } else { format!(" ({})", known.join(", ")) }
+}
+
+/// Returns a path from the name of the package on, if it is in Cargo's registry.
+fn without_registry(path: &str) -> &str {
+    let package = path.split_once("/registry/src/").and_then(|(_, rest)| rest.split_once('/'));
+    package.map_or(path, |(_, package)| package)
+}
+
 /// Runs a World. A panic in it becomes a fault if it has [`PanicReports`].
 pub(crate) fn guard(world: &mut World, work: impl FnOnce(&mut World) -> Result<(), Fault>) -> Result<(), Fault> {
+    if let Some(fault) = refusal(world) {
+        return Err(fault);
+    }
     if !world.contains_resource::<PanicReports>() {
         return work(world);
     }
-    if world.contains_resource::<Broken>() {
-        return Err(Fault("the game has panicked before, and its World cannot go on".to_owned()));
-    }
     hear(|| work(world)).unwrap_or_else(|words| {
-        world.insert_resource(Broken);
+        refuse(world, "the game has panicked before, and its World cannot go on".to_owned());
         Err(Fault(report(world, &words)))
     })
 }
 
-/// Runs work that may panic. Returns the message of a panic instead of printing it. After a panic
-/// the work may leave inconsistent state behind.
+/// Runs work that may panic. Returns the message of a panic instead of printing it, with its file, its line and its
+/// plugin or system. After a panic the work may leave inconsistent state behind.
 pub fn hear<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     hear_panics();
     let outer = GUARDED.replace(true);
+    if !outer {
+        // The work before may have caught a panic of its own.
+        WORDS.take();
+    }
     let result = catch_unwind(AssertUnwindSafe(work));
     GUARDED.set(outer);
     result.map_err(|_| WORDS.take())
+}
+
+/// Returns whether the message of a panic says that Bevy's `RenderApp` does not exist.
+pub fn lacks_render_app(words: &str) -> bool {
+    words.contains("No sub-app with label 'RenderApp'")
 }
 
 /// Returns a report of where the game has panicked, and writes the recording that leads there.
@@ -213,4 +248,41 @@ fn keep(
     let mut writer = DemoWriter::replace(&path, DemoHeader { note, ..reports.header.clone() })?;
     episodes.iter().try_for_each(|episode| writer.push(episode))?;
     Ok(Some(path))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_path_in_the_registry_begins_with_its_package() {
+        let path = "/home/x/.cargo/registry/src/index.crates.io-1949cf8c6b5b557f/bevy_app-0.19.1/src/app.rs:1235:13";
+        assert_eq!(without_registry(path), "bevy_app-0.19.1/src/app.rs:1235:13");
+        assert_eq!(without_registry("src/game.rs:3:9"), "src/game.rs:3:9");
+    }
+
+    #[test]
+    fn only_a_missing_render_app_is_taken_for_one() {
+        assert!(lacks_render_app("No sub-app with label 'RenderApp' exists. (bevy_app-0.19.1/src/app.rs:1235:13)"));
+        assert!(!lacks_render_app("No sub-app with label 'Physics' exists."));
+        assert!(!lacks_render_app("the RenderApp burns"));
+    }
+
+    #[test]
+    fn a_refused_world_says_why_in_each_tick_and_runs_nothing() {
+        let mut world = World::new();
+        refuse(&mut world, "the game `x` has no floor".to_owned());
+        for _ in 0..2 {
+            let ticked = guard(&mut world, |_| panic!("it runs"));
+            assert_eq!(ticked, Err(Fault("the game `x` has no floor".to_owned())));
+        }
+    }
+
+    #[test]
+    fn a_panic_that_the_work_caught_itself_is_not_taken_for_a_later_one() {
+        let caught = hear(|| catch_unwind(|| panic!("caught")).is_err());
+        assert_eq!(caught, Ok(true));
+        let words = hear(|| panic!("not\n  caught")).expect_err("it panics");
+        assert!(words.starts_with("not caught (") && words.contains("panics.rs:"), "{words}");
+    }
 }

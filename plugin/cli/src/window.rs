@@ -33,7 +33,7 @@ mod unbound;
 
 use crate::window::{deciders::Deciders, ending::Verdict, error::catch};
 use bevy::{
-    app::{PanicHandlerPlugin, TerminalCtrlCHandlerPlugin},
+    app::{PanicHandlerPlugin, PluginGroupBuilder, TerminalCtrlCHandlerPlugin},
     prelude::*,
     window::{ExitCondition, PresentMode, WindowResolution},
     winit::{UpdateMode, WinitSettings},
@@ -44,7 +44,7 @@ use bevy_playbot::{
         file::{DemoEpisode, DemoWriter},
         recorder::Recorder,
     },
-    engine::PressesForPeople,
+    engine::{PressesForPeople, panics},
     headless::{set_fixed_step, set_frame_rate},
     key_bindings::KeyboardPlugin,
     placement::TickPlacement,
@@ -52,7 +52,7 @@ use bevy_playbot::{
 };
 use playbot_harness::{
     prelude::*,
-    worlds::{add_game, spawn_agents},
+    worlds::{add_game, build_panic, spawn_agents},
 };
 use std::time::Duration;
 
@@ -99,11 +99,11 @@ impl GameWindow {
         let picture = game.tools().pictures.picture().ok_or(VisionError::NoPicture { game: game.name() })?;
         let resolution = WindowResolution::new(SIDE, SIDE);
         let window = Window { title: game.name().to_owned(), resolution, ..default() };
-        let mut app = bevy_app(window, ImagePlugin::default_nearest())?;
+        let mut app = bevy_app(window, |plugins| plugins.set(ImagePlugin::default_nearest()))?;
         set_pace(&mut app, UpdateMode::reactive(FRAME), UpdateMode::reactive_low_power(FRAME));
         app.add_plugins((PlaybotPlugin::default(), KeyboardPlugin, TileLayerPlugin));
         set_fixed_step(&mut app, game.tick_hz());
-        add_game(game, &mut app, playlist.mode(), &observation_config, seed)?;
+        add(game, &mut app, playlist.mode(), &observation_config, seed)?;
         if !observation_config.is_image() {
             // Sensors of pictures have added it already.
             game.tools().pictures.build_picture(&mut app);
@@ -142,9 +142,9 @@ impl GameWindow {
             present_mode: PresentMode::AutoNoVsync,
             ..default()
         };
-        let mut app = bevy_app(window, ImagePlugin::default())?;
+        let mut app = bevy_app(window, |plugins| game.tools().host.windowed_plugins(plugins))?;
         app.add_plugins(PlaybotPlugin { placement: TickPlacement::Frame });
-        add_game(game, &mut app, playlist.mode(), &observation_config, seed)?;
+        add(game, &mut app, playlist.mode(), &observation_config, seed)?;
         let hz = game.tick_hz();
         set_frame_rate(&mut app, hz);
         // Only the clock starts a frame.
@@ -205,7 +205,7 @@ impl GameWindow {
     pub fn run(mut self) -> Result<(), WindowError> {
         let verdict = self.app.world().resource::<Verdict>().clone();
         match catch(|| self.app.run()) {
-            Err(words) => Err(WindowError::of_panic(words)),
+            Err(panic) => Err(panic.into()),
             Ok(exit) => verdict.take(exit),
         }
     }
@@ -225,6 +225,18 @@ pub struct WindowSetup<'a> {
     pub seed: u64,
     /// Returns true when the window must close; called every frame.
     pub stop: fn() -> bool,
+}
+
+/// Adds the game and the autopilot's sensors. A panic of the game is its fault.
+fn add(
+    game: &dyn Game,
+    app: &mut App,
+    mode: &str,
+    observation_config: &ObservationConfig,
+    seed: u64,
+) -> Result<(), WindowError> {
+    let added = panics::hear(|| add_game(game, app, mode, observation_config, seed));
+    Ok(added.map_err(|words| build_panic(game, &words))??)
 }
 
 /// Prepares the agent under a person's control, and the autopilot.
@@ -247,8 +259,9 @@ fn set_pace(app: &mut App, focused_mode: UpdateMode, unfocused_mode: UpdateMode)
     app.insert_resource(WinitSettings { focused_mode, unfocused_mode });
 }
 
-/// Makes a Bevy app with a window, without log output and without its own ways of stopping.
-fn bevy_app(window: Window, images: ImagePlugin) -> Result<App, WindowError> {
+/// Makes a Bevy app with a window, without log output and without its own ways of stopping. `change` comes before
+/// the window.
+fn bevy_app(window: Window, change: impl FnOnce(PluginGroupBuilder) -> PluginGroupBuilder) -> Result<App, WindowError> {
     let no_display = std::env::var_os("DISPLAY").is_none_or(|display| display.is_empty());
     if cfg!(target_os = "linux") && no_display {
         return Err(WindowError::NoDisplay("DISPLAY is not set".to_owned()));
@@ -260,13 +273,12 @@ fn bevy_app(window: Window, images: ImagePlugin) -> Result<App, WindowError> {
         close_when_requested: false,
         ..default()
     };
-    let plugins =
-        DefaultPlugins.set(window).set(images).disable::<PanicHandlerPlugin>().disable::<TerminalCtrlCHandlerPlugin>();
     let mut app = App::new();
     // Bevy's plugins panic where there is no display or no adapter.
     catch(|| {
+        let plugins = change(DefaultPlugins.build());
+        let plugins = plugins.set(window).disable::<PanicHandlerPlugin>().disable::<TerminalCtrlCHandlerPlugin>();
         app.add_plugins(plugins);
-    })
-    .map_err(WindowError::of_panic)?;
+    })?;
     Ok(app)
 }

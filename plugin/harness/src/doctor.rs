@@ -383,7 +383,10 @@ fn findings(
     observation: &ObservationReport,
     suspicions: &[(CauseKind, String)],
 ) -> (Vec<DoctorFinding>, Vec<DoctorFinding>) {
+    let has_fault = comparisons.iter().any(|report| report.fault.is_some());
     let (mut findings, mut notes) = (of_observation(observation), Vec::new());
+    // A game that stops early has not shown all that it does.
+    findings.retain(|finding| finding.kind != FindingKind::Blind || !has_fault);
     let clock = comparisons.iter().filter(|of| of.comparison == DoctorComparison::Clock);
     let of_clock: BTreeSet<&str> = clock.flat_map(ComparisonReport::names).collect();
     let mut noted: BTreeSet<&str> = BTreeSet::new();
@@ -408,10 +411,17 @@ fn findings(
             findings.push(differs(FindingKind::Differs, difference));
         }
         let Some(fault) = &report.fault else { continue };
-        // A bad observation has its own message already, and one fault shows in every comparison.
-        let is_known = findings.iter().any(|finding| finding.kind == FindingKind::Fault && finding.what == *fault);
-        if !is_of_observation && !is_known {
-            findings.push(plain(FindingKind::Fault, fault.clone(), Some(report.comparison)));
+        // One fault shows in every comparison.
+        if findings.iter().any(|finding| finding.kind == FindingKind::Fault && finding.what == *fault) {
+            continue;
+        }
+        let finding = plain(FindingKind::Fault, fault.clone(), Some(report.comparison));
+        match fault.contains("panicked: ") {
+            // Everything else may follow from a panic.
+            true => findings.insert(0, finding),
+            // A bad observation has its own message already.
+            false if is_of_observation => {}
+            false => findings.push(finding),
         }
     }
     (findings, notes)

@@ -85,12 +85,8 @@ use bevy::{
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     agent::Agent,
-    engine::{
-        Renewal, TickSchedules, check_actions, has_no_actions, is_tick,
-        panics::{self, note_actions},
-    },
+    engine::{Renewal, TickSchedules, check_actions, has_no_actions, is_tick, panics::note_actions},
     episode::EpisodeEnd,
-    fault::Faults,
     headless::{HeadlessPlugins, allow_whole_frames},
     key_bindings::KeyBindings,
     legal::LegalActions,
@@ -159,7 +155,8 @@ impl ForeignGame {
             loaded: None,
             demonstrator: None,
             hash: None,
-            plugins: None,
+            default_plugins: None,
+            headless_plugins: None,
             detectors: Vec::new(),
             defects: Vec::new(),
         };
@@ -440,10 +437,30 @@ impl ForeignGame {
         self.with(|description| description.hash = Some(SystemFactory::new(system, |hash| hash)))
     }
 
+    /// Changes Bevy's plugins in a window and in headless Worlds, where it is called after [`headless`](Self::headless).
+    /// It sets up plugins as the game's `main` does. The window itself is playbot's.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// let game = ForeignGame::new("walk", 1, |_: &mut App| {})
+    ///     .default_plugins(|plugins| plugins.set(ImagePlugin::default_nearest()));
+    /// let window = game.tools().host.windowed_plugins(DefaultPlugins.build());
+    /// assert!(window.enabled::<ImagePlugin>());
+    /// ```
+    pub fn default_plugins(
+        self,
+        change: impl Fn(PluginGroupBuilder) -> PluginGroupBuilder + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| description.default_plugins = Some(Arc::new(change)))
+    }
+
     /// Changes Bevy's plugins for headless Worlds, to leave out some default ones:
-    /// `|plugins| plugins.build().disable::<AudioPlugin>()`.
+    /// `|plugins| plugins.build().disable::<AudioPlugin>()`. For the window as well, there is
+    /// [`default_plugins`](Self::default_plugins).
     pub fn headless(self, plugins: impl Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync + 'static) -> Self {
-        self.with(|description| description.plugins = Some(Arc::new(plugins)))
+        self.with(|description| description.headless_plugins = Some(Arc::new(plugins)))
     }
 }
 
@@ -530,9 +547,17 @@ impl HostTools for ForeignGame {
     }
 
     fn headless_plugins(&self, plugins: HeadlessPlugins) -> PluginGroupBuilder {
-        match &self.description.plugins {
+        let plugins = match &self.description.headless_plugins {
             Some(change) => change(plugins),
             None => plugins.build(),
+        };
+        self.windowed_plugins(plugins)
+    }
+
+    fn windowed_plugins(&self, plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+        match &self.description.default_plugins {
+            Some(change) => change(plugins),
+            None => plugins,
         }
     }
 
@@ -656,7 +681,9 @@ struct Description {
     loaded: Option<SystemFactory<()>>,
     demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
     hash: Option<SystemFactory<u64>>,
-    plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
+    /// Changes Bevy's plugins in a window and without.
+    default_plugins: Option<Arc<dyn Fn(PluginGroupBuilder) -> PluginGroupBuilder + Send + Sync>>,
+    headless_plugins: Option<Arc<dyn Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync>>,
     /// Factories of the game's own detectors.
     detectors: Vec<Arc<dyn Fn() -> Box<dyn Detector> + Send + Sync>>,
     /// Defects that can be planted into it.
@@ -723,7 +750,7 @@ impl Plugin for ForeignPlugin {
     fn build(&self, app: &mut App) {
         let description = &self.game.description;
         app.insert_resource(PlayedMode(self.mode.clone()));
-        add_game(app, description.name, &*description.plugin);
+        (description.plugin)(app);
         if !app.is_plugin_added::<VirtualInputPlugin>() {
             app.add_plugins(VirtualInputPlugin { route: InputRoute::Messages });
         }
@@ -768,17 +795,6 @@ impl Plugin for ForeignPlugin {
         allow_whole_frames(app.world_mut());
         app.insert_resource(ForeignCell::new(Foreign::new(&self.game, startup)));
     }
-}
-
-/// Adds the game. Its panic becomes a fault of the first tick, so that it is reported as the game's.
-fn add_game(app: &mut App, name: &str, plugin: &dyn Fn(&mut App)) {
-    let Err(words) = panics::hear(|| plugin(app)) else { return };
-    let mut fault = format!("the game `{name}` panicked when it was added to the app: {words}");
-    if words.contains("plugin was already added") {
-        fault += ". Playbot adds Bevy's own plugins: leave `DefaultPlugins`, or this one of them, out of the function that \
-                  is given to `ForeignGame::new`";
-    }
-    app.world_mut().resource_mut::<Faults>().report(fault);
 }
 
 /// Marks all current entities as not the game's, and notes the clocks.

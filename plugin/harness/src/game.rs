@@ -283,6 +283,11 @@ pub trait HostTools: Send + Sync {
         plugins.build()
     }
 
+    /// Returns Bevy's plugins for a window under [`TickPlacement::Frame`]: these, unless the game changes some.
+    fn windowed_plugins(&self, plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+        plugins
+    }
+
     /// Returns the most arenas that one World can hold: 1 for a game with one player or with global resources. Returns
     /// `None` for any number. More arenas are spread over more Worlds; one agent too many is a fault.
     fn arenas_per_world(&self) -> Option<u32> {

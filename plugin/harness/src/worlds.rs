@@ -8,13 +8,15 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_playbot::{
+    agent::Agent,
     engine::{
         AgentLimit, Renewal, headless_frame_app, into_world,
-        panics::{EpisodeTrace, PanicReports},
+        panics::{self, EpisodeTrace, PanicReports},
         set_tick_rate,
     },
     fault::{Fault, Faults},
-    headless::headless_app,
+    headless::{HeadlessPlugins, headless_app},
+    observation::VectorSensor,
     placement::TickPlacement,
     streams::PlaybotSeed,
     vision::{ObservationConfig, VisionError},
@@ -56,7 +58,8 @@ impl fmt::Display for BuildingCosts {
 /// Builds a World of a game with agents `first..first + count`, all idle, ready to be ticked on any thread. They see
 /// vectors.
 ///
-/// Returns the World and its agents in the order of their numbers.
+/// Returns the World and its agents in the order of their numbers. If the game panics meanwhile, each tick of the World is
+/// a fault that says so.
 pub fn build_world(game: &dyn Game, mode: &str, seed: u64, first: u32, count: u32) -> (World, Vec<Entity>) {
     build_observing_world(game, mode, &ObservationConfig::default(), seed, first, count)
         .expect("nothing can be wrong with a vector")
@@ -80,13 +83,25 @@ pub fn build_observing_world(
         let (mode, observation_config) = (mode.to_owned(), *observation_config);
         world.insert_resource(Renewal::new(move || {
             let built = build_once(&*game, &mode, &observation_config, seed, first, count);
-            built.map(|(world, _)| world).map_err(|error| Fault(error.to_string()))
+            let (world, _) = built.map_err(|error| Fault(error.to_string()))?;
+            panics::refusal(&world).map_or(Ok(world), Err)
         }));
         Renewal::carry_resource::<StageClock>(&mut world);
     }
     Ok((world, agents))
 }
 
+/// Checks that a World of the game can be built, and drops it.
+///
+/// # Errors
+///
+/// The game panicked: the panic's message, with its file, its line and, if they are known, its plugin or system.
+pub fn check_build(game: &dyn Game, mode: &str) -> Result<(), Fault> {
+    let (world, _) = build_world(game, mode, 0, 0, 1);
+    panics::refusal(&world).map_or(Ok(()), Err)
+}
+
+/// Builds a World. If the game panics meanwhile, the World has no game, and each of its ticks is this fault.
 fn build_once(
     game: &dyn Game,
     mode: &str,
@@ -96,25 +111,73 @@ fn build_once(
     count: u32,
 ) -> Result<(World, Vec<Entity>), VisionError> {
     observation_config.check(game)?;
-    let mut app = match game.tools().host.placement() {
+    let build = |plugins: HeadlessPlugins| {
+        panics::hear(|| -> Result<(World, Vec<Entity>), VisionError> {
+            let mut world = build_game(game, mode, observation_config, seed, plugins)?;
+            let agents = spawn_agents(game, &mut world, observation_config, first, count);
+            Ok((world, agents))
+        })
+    };
+    let plugins = observation_config.headless_plugins();
+    let mut built = build(plugins);
+    if built.as_ref().is_err_and(|words| panics::lacks_render_app(words)) {
+        built = build(plugins.with_render_app());
+    }
+    let (mut world, agents) = match built {
+        Ok(built) => built?,
+        Err(words) => refused_world(game, mode, &words, first, count),
+    };
+    for &agent in &agents {
+        world.entity_mut(agent).insert(EpisodeTrace::default());
+    }
+    Ok((world, agents))
+}
+
+fn build_game(
+    game: &dyn Game,
+    mode: &str,
+    observation_config: &ObservationConfig,
+    seed: u64,
+    plugins: HeadlessPlugins,
+) -> Result<World, VisionError> {
+    let host = game.tools().host;
+    let mut app = match host.placement() {
         TickPlacement::Fixed => {
             let mut app = headless_app();
             set_tick_rate(&mut app, game.tick_hz());
             app
         }
-        TickPlacement::Frame => headless_frame_app(
-            game.tools().host.headless_plugins(observation_config.headless_plugins()),
-            game.tick_hz(),
-        ),
+        TickPlacement::Frame => headless_frame_app(host.headless_plugins(plugins), game.tick_hz()),
     };
     add_game(game, &mut app, mode, observation_config, seed)?;
     PanicReports::new(game.demo_header(mode), std::env::temp_dir()).add_to(&mut app);
+    Ok(into_world(app))
+}
+
+/// Builds a World with agents and without the game, whose ticks all say how the game panicked.
+fn refused_world(game: &dyn Game, mode: &str, words: &str, first: u32, count: u32) -> (World, Vec<Entity>) {
+    let mut app = headless_app();
+    PanicReports::new(game.demo_header(mode), std::env::temp_dir()).add_to(&mut app);
     let mut world = into_world(app);
-    let agents = spawn_agents(game, &mut world, observation_config, first, count);
-    for &agent in &agents {
-        world.entity_mut(agent).insert(EpisodeTrace::default());
+    panics::refuse(&mut world, build_panic(game, words).0);
+    let sensor = || VectorSensor::new(game.observation().names);
+    let agents = (first..first + count).map(|index| world.spawn((Agent::new(index, game.actions()), sensor())).id());
+    let agents = agents.collect();
+    (world, agents)
+}
+
+/// Returns the fault of a game that panicked while it was added to an app, with these words, and what to do.
+pub fn build_panic(game: &dyn Game, words: &str) -> Fault {
+    let mut fault = format!("the game `{}` panicked when it was added to the app: {words}", game.name());
+    if words.contains("plugin was already added") {
+        fault += ". Playbot adds Bevy's own plugins: leave `DefaultPlugins`, or this one of them, out of the function that \
+                  is given to `ForeignGame::new`";
     }
-    Ok((world, agents))
+    if panics::lacks_render_app(words) {
+        fault += ". A World without a screen has no renderer when plugins are finished: let the plugin ask with \
+                  `get_sub_app_mut(RenderApp)`, or add it only where `app.get_sub_app(RenderApp)` is there";
+    }
+    Fault(fault)
 }
 
 /// Adds a game and the sensors of its agents to an app that has the

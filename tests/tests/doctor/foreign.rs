@@ -4,12 +4,12 @@ use bevy::prelude::*;
 use playbot_harness::{
     doctor::{
         CauseKind, DifferenceKind, DoctorComparison, DoctorDifference, DoctorFinding, DoctorOptions, DoctorReport,
-        examine,
+        FindingKind, examine,
     },
     foreign::ForeignGame,
 };
 use playbot_tests::foreign::{
-    catch::catch_game,
+    catch::{catch_game, game},
     faulty_catch::{CatchFault, Mood, faulty_catch},
 };
 
@@ -46,6 +46,23 @@ fn a_healthy_foreign_game_has_no_findings() {
         let compared = report.of(comparison).expect("it was made");
         assert_eq!((compared.same(), compared.ticks), (Some(true), 120), "{report}");
     }
+}
+
+#[test]
+fn a_panic_in_a_startup_system_is_the_only_finding() {
+    fn open_door() {
+        panic!("the door is locked");
+    }
+    let broken = ForeignGame::new("broken", 1, |app: &mut App| {
+        game(app);
+        app.add_systems(Startup, open_door);
+    });
+    let broken = broken.keys([vec![], vec![KeyCode::ArrowLeft]]).observe(["a", "b"], || [0.0, 1.0]);
+    let report = examined(&broken);
+    assert_eq!(report.findings.len(), 1, "{report}");
+    assert_eq!(report.findings[0].kind, FindingKind::Fault, "{report}");
+    assert!(report.findings[0].what.contains("the game panicked: the door is locked"), "{report}");
+    assert_eq!((report.observation.length, report.observation.ticks), (None, 0), "{report}");
 }
 
 #[test]

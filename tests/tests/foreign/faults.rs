@@ -10,7 +10,7 @@ use playbot_harness::{
     demo::verify_file,
     eval::{Player, evaluate},
     foreign::{ForeignGame, Restart},
-    worlds::build_world,
+    worlds::{build_world, check_build},
 };
 use playbot_learner::DeviceKind;
 use playbot_tests::{
@@ -18,6 +18,7 @@ use playbot_tests::{
     measuring::plan,
 };
 use playbot_train::{Trainer, experiment::file::parse_experiment};
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Plays until the first fault, for at most this many ticks.
 fn fault(game: &ForeignGame, ticks: u64) -> String {
@@ -66,6 +67,74 @@ fn bevys_plugins_that_a_game_adds_again_are_named_with_what_to_do() {
     }
     let text = fault(&catch_game_with(|_| panic!("no saved game")), 1);
     assert!(text.contains("`broken` panicked when it was added to the app: no saved game"), "{text}");
+}
+
+/// A plugin that panics in one of its steps.
+struct Fragile(&'static str);
+
+impl Plugin for Fragile {
+    fn build(&self, _: &mut App) {
+        assert!(self.0 != "build", "it breaks in build");
+    }
+
+    fn finish(&self, _: &mut App) {
+        assert!(self.0 != "finish", "it breaks in finish");
+    }
+
+    fn cleanup(&self, _: &mut App) {
+        assert!(self.0 != "cleanup", "it breaks in cleanup");
+    }
+}
+
+#[test]
+fn a_panic_in_a_plugin_is_the_fault_of_each_tick_with_the_name_of_the_plugin() {
+    let games: [(&str, fn(&mut App)); 3] = [
+        ("build", |app| _ = app.add_plugins(Fragile("build"))),
+        ("finish", |app| _ = app.add_plugins(Fragile("finish"))),
+        ("cleanup", |app| _ = app.add_plugins(Fragile("cleanup"))),
+    ];
+    for (step, add) in games {
+        let (mut world, _) = build_world(&catch_game_with(add), "default", 0, 0, 1);
+        for _ in 0..2 {
+            let text = world.tick().expect_err("it panicked").to_string();
+            let words = format!("the game `broken` panicked when it was added to the app: it breaks in {step} (");
+            assert!(text.starts_with(&words) && text.contains("faults.rs:"), "{text}");
+            assert!(text.contains(&format!("in `{step}` of the plugin `")) && text.contains("::Fragile`)"), "{text}");
+        }
+    }
+}
+
+#[test]
+fn a_game_that_panics_when_it_is_added_is_refused_before_any_level() {
+    let broken = catch_game_with(|app| _ = app.add_plugins(Fragile("finish")));
+    let words = check_build(&broken, "default").expect_err("it panics").to_string();
+    assert!(words.contains("it breaks in finish"), "{words}");
+    let error =
+        evaluate(&broken, &Player::Blind(BlindBot::Uniform), &plan("default:0..3"), |_| {}).expect_err("it panics");
+    assert_eq!(error.to_string(), words);
+    assert_eq!(check_build(&catch_game(), "default"), Ok(()));
+}
+
+#[test]
+fn a_game_that_panics_when_its_world_is_built_anew_is_a_fault_of_that_tick() {
+    let built = AtomicU32::new(0);
+    let broken = ForeignGame::new("broken", 1, move |app: &mut App| {
+        game(app);
+        assert!(built.fetch_add(1, Ordering::Relaxed) == 0, "no second World");
+    });
+    let broken = broken.keys([vec![], vec![KeyCode::ArrowLeft]]).observe(["x"], || [0.0]).time_limit(2);
+    let text = fault(&broken.restart(Restart::Rebuild), 4);
+    assert!(text.starts_with("the game `broken` panicked when it was added to the app: no second World ("), "{text}");
+}
+
+#[test]
+fn a_panic_in_a_startup_system_names_the_system() {
+    #[inline(never)]
+    fn open_door() {
+        panic!("the door is locked");
+    }
+    let text = fault(&catch_game_with(|app| _ = app.add_systems(Startup, open_door)), 1);
+    assert!(text.contains("the game panicked: the door is locked (") && text.contains("open_door`)"), "{text}");
 }
 
 #[test]

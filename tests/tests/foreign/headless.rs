@@ -6,12 +6,19 @@ use std::sync::{
     atomic::{AtomicUsize, Ordering},
 };
 
-use bevy::prelude::*;
+use bevy::{
+    app::PluginGroupBuilder,
+    diagnostic::{FrameCount, FrameCountPlugin},
+    prelude::*,
+    render::{Render, RenderApp, RenderPlugin},
+    winit::WinitPlugin,
+};
+use bevy_playbot::headless::HeadlessPlugins;
 use playbot::prelude::*;
 use playbot_harness::{
     eval::{EvalPlan, Player, evaluate},
     foreign::{ForeignGame, Restart},
-    worlds::build_world,
+    worlds::{build_world, check_build},
 };
 use playbot_tests::measuring::plan;
 
@@ -105,6 +112,74 @@ fn it_plays_without_a_screen() {
     let (mesh, material) = grounds.single(&world).expect("one ground");
     assert!(world.resource::<Assets<Mesh>>().contains(mesh));
     assert!(world.resource::<Assets<ColorMaterial>>().contains(material));
+}
+
+#[test]
+fn the_event_loop_is_left_out_and_the_renderer_draws_nothing() {
+    let plugins = HeadlessPlugins::default().build();
+    assert!(plugins.contains::<WinitPlugin>() && !plugins.enabled::<WinitPlugin>());
+    assert!(plugins.enabled::<RenderPlugin>());
+    let mut app = App::new();
+    app.add_plugins(plugins);
+    assert!(app.get_sub_app(RenderApp).is_none());
+}
+
+/// A plugin that does not ask whether there is a renderer.
+struct Shine;
+
+impl Plugin for Shine {
+    fn build(&self, app: &mut App) {
+        app.sub_app_mut(RenderApp).add_systems(Render, draw);
+    }
+}
+
+fn draw() {
+    panic!("it draws");
+}
+
+#[test]
+fn a_plugin_finds_the_render_app_while_it_is_built_and_its_systems_there_never_run() {
+    let shiny = ForeignGame::new("shiny", 1, |app: &mut App| {
+        app.add_plugins(Shine);
+        game(app);
+    });
+    let shiny = shiny.keys([vec![], vec![KeyCode::ArrowRight]]).observe(["x"], || [0.0]).time_limit(60);
+    let (mut world, agents) = build_world(&shiny, "default", 1, 0, 1);
+    let right = BlindBot::Constant(ActionValue::Discrete(1));
+    world.entity_mut(agents[0]).insert((Control::Bot, right, LevelQueue::Always(1)));
+    world.ticks(3).expect("there is no renderer");
+}
+
+#[test]
+fn a_plugin_that_needs_the_render_app_when_it_is_finished_gets_advice() {
+    struct Late;
+    impl Plugin for Late {
+        fn build(&self, _: &mut App) {}
+
+        fn finish(&self, app: &mut App) {
+            app.sub_app_mut(RenderApp).add_systems(Render, draw);
+        }
+    }
+    let late = ForeignGame::new("late", 1, |app: &mut App| _ = app.add_plugins(Late));
+    let late = late.keys([vec![], vec![KeyCode::ArrowRight]]).observe(["x"], || [0.0]);
+    let words = check_build(&late, "default").expect_err("there is no renderer").to_string();
+    for part in ["in `finish` of the plugin `", "::Late`)", "`get_sub_app_mut(RenderApp)`"] {
+        assert!(words.contains(part), "`{part}` is missing in: {words}");
+    }
+}
+
+#[test]
+fn default_plugins_are_changed_for_the_window_and_for_headless_worlds() {
+    fn uncounted(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+        plugins.disable::<FrameCountPlugin>()
+    }
+    let (world, _) = build_world(&ball_game().default_plugins(uncounted), "default", 1, 0, 1);
+    assert!(!world.contains_resource::<FrameCount>());
+    let (world, _) = build_world(&ball_game(), "default", 1, 0, 1);
+    assert!(world.contains_resource::<FrameCount>());
+    let changed = ball_game().default_plugins(uncounted);
+    let window = changed.tools().host.windowed_plugins(DefaultPlugins.build());
+    assert!(!window.enabled::<FrameCountPlugin>());
 }
 
 /// Worlds of a game: all that were built, those that are alive, and the most that were alive at a time.

@@ -12,7 +12,7 @@ use playbot_harness::{
     games::Games,
     prelude::*,
     split::check_level,
-    worlds::build_world,
+    worlds::{build_world, check_build},
 };
 use std::time::Instant;
 
@@ -66,6 +66,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let mode = args.mode.unwrap_or_else(|| default_mode(game).to_owned());
     let level = level_number(args.level, args.seed).unwrap_or(0);
     check_level(game, &mode, level)?;
+    check_build(game, &mode)?;
     let options = DoctorOptions {
         ticks: args.ticks,
         level,

@@ -1,6 +1,6 @@
 //! Errors of opening a window and of running it.
 
-use bevy_playbot::{demo::file::DemoFileError, fault::Fault, vision::VisionError};
+use bevy_playbot::{demo::file::DemoFileError, engine::panics::place_of_panic, fault::Fault, vision::VisionError};
 use playbot_learner::HasExitCode;
 use std::{
     panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook},
@@ -65,9 +65,18 @@ impl HasExitCode for WindowError {
     }
 }
 
-impl WindowError {
+/// A panic in a window.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct WindowPanic {
+    /// The message on one line.
+    words: String,
+    /// File, line and, if they are known, plugin or system, in parentheses after a space.
+    place: String,
+}
+
+impl From<WindowPanic> for WindowError {
     /// Turns a panic of Bevy's plugins into an error. They have no other way to report that something is missing.
-    pub(super) fn of_panic(words: String) -> Self {
+    fn from(WindowPanic { words, place }: WindowPanic) -> Self {
         if words.contains("XOpenDisplayFailed") {
             let display = std::env::var("DISPLAY").unwrap_or_default();
             Self::NoDisplay(format!("no X server answers at DISPLAY={display}"))
@@ -80,28 +89,27 @@ impl WindowError {
         } else if ["adapter", "surface"].iter().any(|part| words.contains(part)) {
             Self::NoAdapter(words)
         } else {
-            Self::Lost(words)
+            Self::Lost(format!("{words}{place}"))
         }
     }
 }
 
-/// Runs work that may panic, silently, and returns the panic's message on one line.
-pub(super) fn catch<T>(work: impl FnOnce() -> T) -> Result<T, String> {
-    let words = Arc::new(Mutex::new(String::new()));
-    let heard = words.clone();
+/// Runs work that may panic, silently, and returns its panic.
+pub(super) fn catch<T>(work: impl FnOnce() -> T) -> Result<T, WindowPanic> {
+    let first = Arc::new(Mutex::new(None));
+    let heard = first.clone();
     let hook = take_hook();
     set_hook(Box::new(move |panic| {
         let said = panic.payload_as_str().unwrap_or("no reason given");
-        let mut words = heard.lock().unwrap_or_else(PoisonError::into_inner);
+        let words = said.split_whitespace().collect::<Vec<_>>().join(" ");
         // Later panics only follow from the first.
-        if words.is_empty() {
-            *words = said.split_whitespace().collect::<Vec<_>>().join(" ");
-        }
+        let mut first = heard.lock().unwrap_or_else(PoisonError::into_inner);
+        first.get_or_insert_with(|| WindowPanic { words, place: place_of_panic(panic) });
         tracing::debug!("{panic}");
     }));
     let result = catch_unwind(AssertUnwindSafe(work));
     set_hook(hook);
-    result.map_err(|_| std::mem::take(&mut *words.lock().unwrap_or_else(PoisonError::into_inner)))
+    result.map_err(|_| first.lock().unwrap_or_else(PoisonError::into_inner).take().unwrap_or_default())
 }
 
 #[cfg(test)]
@@ -111,15 +119,18 @@ mod tests {
     #[test]
     fn panics_become_words() {
         assert_eq!(catch(|| 7), Ok(7));
-        assert_eq!(catch(|| panic!("no\n  luck")), Err::<(), _>("no luck".to_owned()));
+        let panic = catch(|| panic!("no\n  luck")).expect_err("it panics");
+        assert_eq!(panic.words, "no luck");
+        assert!(panic.place.starts_with(" (") && panic.place.contains("error.rs:"), "{}", panic.place);
         for (words, kind) in [
             ("Failed to build event loop: XNotSupported(XOpenDisplayFailed)", "no X server answers at DISPLAY="),
             ("Failed to build event loop: no libX11.so", "install libx11-6"),
             ("Unable to find a GPU! Make sure", "mesa-vulkan-drivers"),
             ("No supported formats for surface", "nothing here can draw a window (No supported formats"),
-            ("index out of bounds", "the window is gone (index out of bounds)"),
+            ("index out of bounds", "the window is gone (index out of bounds (src/game.rs:3:9))"),
         ] {
-            let error = WindowError::of_panic(words.to_owned()).to_string();
+            let panic = WindowPanic { words: words.to_owned(), place: " (src/game.rs:3:9)".to_owned() };
+            let error = WindowError::from(panic).to_string();
             assert!(error.contains(kind), "{error}");
         }
     }

@@ -166,6 +166,7 @@ impl Display for ObservationReport {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { values, ticks, constant, .. } = self;
         match constant.len() {
+            _ if *ticks == 0 => writeln!(f, "Observation: {values} values, none of which was seen")?,
             0 => writeln!(f, "Observation: {values} values, all of which changed in {ticks} ticks")?,
             count => writeln!(f, "Observation: {values} values, {count} of which never changed in {ticks} ticks")?,
         }
@@ -254,6 +255,12 @@ mod tests {
             assert!(text.contains(words), "`{words}` is missing in: {text}");
         }
         assert!(!TypesReport::default().to_string().contains("left out"));
+    }
+
+    #[test]
+    fn values_of_a_game_that_stopped_before_its_first_tick_are_not_judged() {
+        let report = ObservationReport { values: 2, ..Default::default() };
+        assert_eq!(report.to_string(), "Observation: 2 values, none of which was seen\n");
     }
 
     #[test]

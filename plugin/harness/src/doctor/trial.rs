@@ -79,8 +79,11 @@ impl Trial {
                 break;
             }
             self.tick();
-            if let Some(monitor) = monitor.as_mut().filter(|_| tick < ticks) {
-                monitor.note(tick, &self.copies[0].outcome(0));
+            let seen = self.copies[0].outcome(0);
+            // A copy with a fault may have ended before it observed anything in this tick.
+            let is_seen = self.copies[0].fault.is_none() || !seen.observation.is_empty();
+            if let Some(monitor) = monitor.as_mut().filter(|_| tick < ticks && is_seen) {
+                monitor.note(tick, &seen);
             }
             report.fault = self.copies.iter().find_map(|copy| copy.fault.clone());
             if report.fault.is_some() {

@@ -30,6 +30,9 @@ const MOST_TICKS: u32 = 1_000_000;
 /// Beginning of the message of a game's panic, after its position.
 const PANICKED: &str = "the game panicked: ";
 
+/// Part of the message of a game that panicked while its World was built.
+const UNBUILT: &str = "panicked when it was added to the app: ";
+
 /// Beginning of the message of an agent whose pictures were all blank.
 const BLANK: &str = "each picture of an episode of ";
 
@@ -414,7 +417,7 @@ impl Breakage {
 
 /// Returns the detector of a fault with this message.
 pub(crate) fn detector_of(message: &str) -> &'static str {
-    if message.contains(PANICKED) {
+    if [PANICKED, UNBUILT].iter().any(|part| message.contains(part)) {
         "panic"
     } else if message.contains(BLANK) {
         "blank-picture"

@@ -1,0 +1,189 @@
+//! Parts of Bevy that a build may lack, and their place in a World without a screen: the event loop and the renderer.
+//!
+//! A game may switch on Bevy's `bevy_winit` and `bevy_render` without the features `window` and `camera` of this crate,
+//! and Cargo does not say so. The functions here therefore import all of `bevy` within their own block. Where Bevy has
+//! the module `winit` or `render`, that import hides the module of this name beside them. Where Bevy lacks it, the
+//! types beside them stand in, which no group of plugins contains.
+
+use bevy::{
+    app::{PanicHandlerPlugin, PluginGroupBuilder, SubApp},
+    platform::cell::SyncCell,
+    prelude::*,
+};
+
+/// The event loop of a Bevy without `bevy_winit`.
+#[allow(dead_code, reason = "used only where Bevy has no event loop")]
+mod winit {
+    use bevy::prelude::*;
+
+    pub(super) struct WinitPlugin;
+
+    impl Plugin for WinitPlugin {
+        fn build(&self, _: &mut App) {}
+    }
+}
+
+/// The renderer of a Bevy without `bevy_render`.
+#[allow(dead_code, reason = "used only where Bevy has no renderer")]
+mod render {
+    use bevy::{app::AppLabel, prelude::*};
+
+    #[derive(AppLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+    pub(crate) struct RenderApp;
+
+    #[derive(Default)]
+    pub(crate) struct RenderPlugin {
+        pub(crate) render_creation: settings::RenderCreation,
+        pub(crate) synchronous_pipeline_compilation: bool,
+        pub(crate) rest: (),
+    }
+
+    impl Plugin for RenderPlugin {
+        fn build(&self, _: &mut App) {}
+    }
+
+    pub(crate) mod settings {
+        #[derive(Default)]
+        pub(crate) struct RenderCreation;
+
+        #[derive(Default)]
+        pub(crate) struct WgpuSettings {
+            pub(crate) backends: Option<()>,
+            pub(crate) rest: (),
+        }
+
+        impl From<WgpuSettings> for RenderCreation {
+            fn from(_: WgpuSettings) -> Self {
+                Self
+            }
+        }
+    }
+
+    pub(crate) mod extract_plugin {
+        use bevy::prelude::*;
+
+        #[derive(Default)]
+        pub(crate) struct ExtractPlugin {
+            pub(crate) rest: (),
+        }
+
+        impl Plugin for ExtractPlugin {
+            fn build(&self, _: &mut App) {}
+        }
+    }
+
+    pub(crate) mod pipelined_rendering {
+        use bevy::prelude::*;
+
+        pub(crate) struct PipelinedRenderingPlugin;
+
+        impl Plugin for PipelinedRenderingPlugin {
+            fn build(&self, _: &mut App) {}
+        }
+    }
+}
+
+/// Leaves out the event loop, and the thread that draws beside the World.
+pub(super) fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+    #[allow(unused_imports, reason = "Bevy may lack these modules")]
+    use bevy::*;
+    let plugins = without::<winit::WinitPlugin>(plugins);
+    without::<render::pipelined_rendering::PipelinedRenderingPlugin>(plugins)
+}
+
+fn without<P: Plugin>(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+    if plugins.contains::<P>() { plugins.disable::<P>() } else { plugins }
+}
+
+/// Sets up the renderer to draw nothing. With `shows_sub_app` its sub-app exists while plugins are built.
+pub(super) fn without_drawing(plugins: PluginGroupBuilder, shows_sub_app: bool) -> PluginGroupBuilder {
+    #[allow(unused_imports, reason = "Bevy may lack these modules")]
+    use bevy::*;
+    if !plugins.contains::<render::RenderPlugin>() {
+        return plugins;
+    }
+    let render_creation = render::settings::WgpuSettings { backends: None, ..default() }.into();
+    let plugins =
+        plugins.set(render::RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() });
+    if shows_sub_app {
+        // Plugins are finished in this order, and those of the renderer need a graphics adapter then.
+        plugins.add_before::<PanicHandlerPlugin>(HiddenRenderer).add_before::<render::RenderPlugin>(ShownRenderer)
+    } else {
+        plugins.add(RenderListPlugin)
+    }
+}
+
+// Bevy's list of changes for a renderer, in apps without one.
+
+/// Empties the list in place of a renderer.
+#[derive(Resource, Reflect)]
+#[reflect(from_reflect = false)]
+#[reflect(Component)]
+struct NoRenderer(#[reflect(ignore)] SyncCell<SubApp>);
+
+/// Bevy notes changes of sprites, meshes and cameras for the renderer, and fails if the list is not kept. The plugin
+/// keeps the list and empties it.
+struct RenderListPlugin;
+
+impl Plugin for RenderListPlugin {
+    fn build(&self, app: &mut App) {
+        #[allow(unused_imports, reason = "Bevy may lack these modules")]
+        use bevy::*;
+        if app.get_sub_app(render::RenderApp).is_some()
+            || app.is_plugin_added::<render::extract_plugin::ExtractPlugin>()
+        {
+            return;
+        }
+        app.add_plugins(render::extract_plugin::ExtractPlugin::default());
+        // Removed at once: plugins that find the sub-app would assume a renderer and add their systems to it.
+        if let Some(renderer) = app.remove_sub_app(render::RenderApp) {
+            keep_list(app, renderer);
+        }
+    }
+}
+
+/// Empties the list in place of a renderer, by its sub-app.
+fn keep_list(app: &mut App, renderer: SubApp) {
+    // Nothing else reads the list.
+    app.insert_resource(NoRenderer(SyncCell::new(renderer))).add_systems(Last, empty_list.ambiguous_with_all());
+}
+
+fn empty_list(world: &mut World) {
+    world.resource_scope(|world, mut renderer: Mut<NoRenderer>| {
+        // Each frame, as a renderer does. The list changes entities, and these changes must not depend on the World's
+        // age.
+        renderer.0.get().extract(world);
+    });
+}
+
+/// Creates the renderer's sub-app, to which plugins add systems that never run.
+struct ShownRenderer;
+
+impl Plugin for ShownRenderer {
+    fn build(&self, app: &mut App) {
+        #[allow(unused_imports, reason = "Bevy may lack these modules")]
+        use bevy::*;
+        app.add_plugins(render::extract_plugin::ExtractPlugin::default());
+    }
+}
+
+/// Takes the renderer's sub-app away before plugins are finished.
+struct HiddenRenderer;
+
+impl Plugin for HiddenRenderer {
+    fn build(&self, _: &mut App) {}
+
+    fn finish(&self, app: &mut App) {
+        #[allow(unused_imports, reason = "Bevy may lack these modules")]
+        use bevy::*;
+        if app.remove_sub_app(render::RenderApp).is_none() {
+            return;
+        }
+        // Another one, without the systems that plugins have added.
+        let mut empty = App::new();
+        empty.add_plugins(render::extract_plugin::ExtractPlugin::default());
+        if let Some(renderer) = empty.remove_sub_app(render::RenderApp) {
+            keep_list(app, renderer);
+        }
+    }
+}
