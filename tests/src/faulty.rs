@@ -22,6 +22,8 @@ pub enum Fault {
     HashOrder,
     /// The [`Sun`] moves at the pace of `Time<Real>`.
     WallClock,
+    /// The [`Sun`] moves faster with the time of `Time<Real>`, which also goes on from episode to episode.
+    WallTime,
     /// All gardeners count into one [`Score`].
     SharedScore,
     /// The [`Soil`] dries from episode to episode.
@@ -174,6 +176,7 @@ fn weather(
     match planted.0 {
         Fault::UnseededRandomness => wind.force = (random() >> 40) as f32,
         Fault::WallClock => sun.pace = real.delta_secs(),
+        Fault::WallTime => sun.pace = real.elapsed_secs(),
         Fault::Survivor => soil.wet *= 0.99,
         Fault::LastingRecord => record.0 += 1,
         Fault::Sleeper => record.0 = (random() >> 40) as u32,

@@ -1,7 +1,8 @@
 //! Recordings: making them with a demonstrator, and verifying them by replay.
 //!
-//! [`verify_file`] replays a recording: each tick must repeat as recorded, in a new World and after another episode. In the folder, [`demonstration`] records a
-//! game's demonstrator or another player, and [`mod@filter`] selects episodes by outcome, level and player.
+//! [`verify_file`] replays a recording: each tick must repeat as recorded, in a new World and after another episode. In
+//! the folder, [`demonstration`] records a game's demonstrator or another player, and [`mod@filter`] selects episodes by
+//! outcome, level and player.
 
 pub mod demonstration;
 pub mod filter;
@@ -129,8 +130,8 @@ pub struct VerifyReport {
     pub episodes: u64,
     /// Ticks replayed.
     pub ticks: u64,
-    /// First divergence of each episode that diverged: index of the episode, and tick with the difference. It says which
-    /// replay diverged if the other one did not.
+    /// First divergence of each episode that diverged: index of the episode, and tick with the difference. It says
+    /// which replay diverged if the other one did not.
     pub divergences: Vec<(u64, String)>,
 }
 

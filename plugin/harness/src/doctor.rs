@@ -3,11 +3,13 @@
 //!
 //! Recording, replay, resume and training in many arenas need games that are a function of their level and their
 //! actions. [`examine`] plays copies of a game with the same random actions and compares them after every tick, by
-//! reflection: see [`DoctorComparison`] for the pairs. A difference in state is a finding if agents notice it before the
-//! episodes end: in what they observe, in rewards, in ends of episodes or in the state hash. Otherwise it is a note. No finding in some ticks of one level is no proof: more ticks
-//! and other levels show more. Components and resources that are `Reflect` and have `#[reflect(Component)]` or
-//! `#[reflect(Resource)]` are compared field by field. The rest shows only in observations, rewards and ends of
-//! episodes.
+//! reflection: see [`DoctorComparison`] for the pairs. No finding in some ticks of one level is no proof: more ticks
+//! and other levels show more.
+//!
+//! A difference in state is a finding if agents notice it before the episode ends: in observations, rewards, ends of
+//! episodes or the state hash. Otherwise it is a note. Components and resources that are `Reflect` and have
+//! `#[reflect(Component)]` or `#[reflect(Resource)]` are compared field by field. The rest shows only in observations,
+//! rewards and ends of episodes.
 //!
 //! The files of the folder, in reading order:
 //!

@@ -116,6 +116,18 @@ fn a_reader_of_the_wall_clock_is_found_although_no_clock_runs_without_a_window()
 }
 
 #[test]
+fn a_wall_clock_that_goes_on_after_a_restart_is_named_as_a_clock_there_too() {
+    let report = examined(&Fault::WallTime, 60, &[]);
+    let of = |comparison| report.findings.iter().find(|finding| finding.comparison == Some(comparison));
+    for comparison in [DoctorComparison::Clock, DoctorComparison::Restart] {
+        let finding = of(comparison).unwrap_or_else(|| panic!("{report}"));
+        assert_eq!(likeliest(finding), CauseKind::WallClock, "{report}");
+    }
+    assert_eq!(report.findings.len(), 2, "{report}");
+    assert!(report.to_string().contains("it differs with another wall clock, too"), "{report}");
+}
+
+#[test]
 fn a_score_that_two_arenas_share_is_found() {
     let (finding, report) =
         named(Fault::SharedScore, DoctorComparison::Arenas, DifferenceKind::Resource, "::Score", ".0");

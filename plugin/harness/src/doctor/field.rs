@@ -137,7 +137,7 @@ impl FieldComparison<'_> {
     }
 
     fn sets(&mut self, left: &dyn Set, right: &dyn Set) -> Option<FieldDifference> {
-        let missing = left.iter().filter(|value| right.get(*value).is_none()).map(show).min();
+        let missing = left.iter().filter(|value| !self.holds(right, *value)).map(show).min();
         let difference = missing.map(|value| FieldDifference {
             path: format!("[{value}]"),
             left: "in it".to_owned(),
@@ -145,6 +145,13 @@ impl FieldComparison<'_> {
             value_type: String::new(),
         });
         difference.or_else(|| self.lengths(left.len(), right.len()))
+    }
+
+    /// Returns whether a set holds a value of the left World, or its partner if it is an entity.
+    fn holds(&self, set: &dyn Set, value: &dyn PartialReflect) -> bool {
+        let Some(&entity) = value.try_downcast_ref::<Entity>() else { return set.get(value).is_some() };
+        let mut others = set.iter().filter_map(|other| other.try_downcast_ref::<Entity>());
+        others.any(|other| self.entities.is_same(entity, *other))
     }
 
     fn enums(&mut self, left: &dyn Enum, right: &dyn Enum) -> Option<FieldDifference> {
@@ -231,7 +238,7 @@ pub(super) fn each_entity(value: &dyn PartialReflect, hear: &mut dyn FnMut(Entit
 
 #[cfg(test)]
 mod tests {
-    use std::collections::HashMap;
+    use std::collections::{HashMap, HashSet};
 
     use bevy::prelude::*;
 
@@ -308,6 +315,30 @@ mod tests {
         assert_eq!(found.left, format!("the entity {}", Entity::PLACEHOLDER));
         assert_eq!(found.right, "another one that is printed the same");
         assert!(found.value_type.ends_with("::Entity"), "{}", found.value_type);
+    }
+
+    #[test]
+    fn sets_of_entities_hold_partners_whatever_their_ids_are() {
+        /// Every entity corresponds to all others.
+        struct Swapped;
+        impl EntityMatch for Swapped {
+            fn is_same(&self, left: Entity, right: Entity) -> bool {
+                left != right
+            }
+            fn describe(&self, left: Entity, right: Entity) -> [String; 2] {
+                [left.to_string(), right.to_string()]
+            }
+        }
+        let mut comparison = FieldComparison {
+            entities: &Swapped,
+            handles: true,
+            right_may_hold_more: false,
+            incomparable: &mut BTreeSet::new(),
+        };
+        let [left, right] = [bag().owner, Entity::PLACEHOLDER].map(|entity| HashSet::from([entity]));
+        assert_eq!(comparison.first(&left, &right), None);
+        let found = comparison.first(&left, &left).expect("its partner is missing");
+        assert_eq!((found.left.as_str(), found.right.as_str()), ("in it", "not in it"));
     }
 
     #[test]

@@ -3,8 +3,8 @@
 /// Crates of physics engines.
 const PHYSICS: [&str; 4] = ["avian2d::", "avian3d::", "bevy_rapier2d::", "bevy_rapier3d::"];
 
-/// Types of theirs that count runs or follow the screen, by the last part of the path. Their modules differ from version
-/// to version.
+/// Types of theirs that count runs or follow the screen, by the last part of the path: modules differ from version to
+/// version.
 const COUNTERS: [&str; 4] =
     ["LastPhysicsTick", "PhysicsDiagnosticsUiSettings", "SimulationToRenderTime", "DebugRenderContext"];
 

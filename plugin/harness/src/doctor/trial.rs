@@ -107,7 +107,7 @@ impl Trial {
         if self.comparison == DoctorComparison::Archetypes && report.effect.is_none() {
             all.clear();
         }
-        // What comes later has no part in what came before.
+        // A later difference is not the cause of an earlier one.
         all.sort_by_key(|of| (of.tick, likelihood(self.comparison, of), rank(self.comparison, of)));
         let mut all = all.into_iter();
         (report.first, report.others) = (all.next(), all.collect());
