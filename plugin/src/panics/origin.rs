@@ -44,7 +44,10 @@ fn functions(backtrace: &str) -> impl Iterator<Item = &str> {
 
 /// Returns the plugin's type and the step, if Bevy has called this function for a plugin.
 fn step_of_plugin(frame: &str) -> Option<(&str, &'static str)> {
-    let (plugin, rest) = frame.strip_prefix('<')?.split_once(" as bevy_app::plugin::Plugin>::")?;
+    let beside_type = frame.strip_prefix('<').and_then(|rest| rest.split_once(" as bevy_app::plugin::Plugin>::"));
+    // An implementation in another module than its type has another form.
+    let elsewhere = || frame.split_once("<impl bevy_app::plugin::Plugin for ")?.1.rsplit_once(">::");
+    let (plugin, rest) = beside_type.or_else(elsewhere)?;
     let step = rest.split("::").next()?;
     STEPS.iter().find(|known| **known == step).map(|step| (plugin, *step))
 }
@@ -91,6 +94,12 @@ mod tests {
             "main",
         ]);
         assert_eq!(words.as_deref(), Some("in `finish` of the plugin `tilemap::TilemapPlugin`"));
+    }
+
+    #[test]
+    fn a_plugin_that_is_implemented_in_another_module_than_its_type_is_named() {
+        let frame = "game::setup::<impl bevy_app::plugin::Plugin for game::Levels<game::Forest>>::build::{{closure}}";
+        assert_eq!(after_panic(&[frame]).as_deref(), Some("in `build` of the plugin `game::Levels<game::Forest>`"));
     }
 
     #[test]
