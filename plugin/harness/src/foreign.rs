@@ -12,8 +12,8 @@
 //! - `restart`, `clocks`: the start of an episode, and the game's clocks at that time.
 //! - `input`: the path from an action into the game, and the mask of actions.
 //! - `clicks`: clicks on buttons of Bevy's UI.
-//! - `observe`, `paths`: observation, position, reward and end after a tick, and observations by the paths of their
-//!   values.
+//! - `observe`, `paths`, `guess`: observation, position, reward and end after a tick, observations by the paths of
+//!   their values, and the position that is not declared.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -55,6 +55,7 @@
 #[cfg(feature = "ui")]
 mod clicks;
 mod clocks;
+mod guess;
 mod input;
 mod levels;
 mod observe;

@@ -2,7 +2,7 @@
 
 use crate::{
     detector::LevelProof,
-    foreign::{ForeignGame, clocks::ClockSettings, paths::ObservedPath},
+    foreign::{ForeignGame, clocks::ClockSettings, guess::Guess, paths::ObservedPath},
 };
 use bevy::{
     ecs::{
@@ -70,6 +70,8 @@ pub(super) struct Foreign {
     pub(super) game: ForeignGame,
     pub(super) sensor: Sensor,
     pub(super) position: Option<OwnedSystem<Vec2>>,
+    /// The position, if none is declared.
+    pub(super) guess: Guess,
     pub(super) cell: Option<OwnedSystem<Vec<i32>>>,
     pub(super) proof: Option<OwnedReader<LevelProof>>,
     /// The error of a proof, until the next tick reports it.
@@ -117,6 +119,7 @@ impl Foreign {
         Self {
             sensor: description.sensor(),
             position: description.position.as_ref().map(|system| system.make()),
+            guess: Guess::default(),
             cell: description.cell.as_ref().map(|system| system.make()),
             proof: description.proof.as_ref().map(|system| system.make()),
             failed_proof: None,
