@@ -203,6 +203,7 @@ pub(crate) fn compared(comparison: &Comparison) -> String {
         list("New findings", &comparison.new_findings),
         list("Easier", &comparison.easier),
         list("Gone findings", &comparison.gone_findings),
+        list("No longer reached", &comparison.unreached),
     ];
     if lists.iter().all(String::is_empty) {
         out += "<p>Nothing has changed by more than chance.</p>\n";

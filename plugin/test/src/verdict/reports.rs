@@ -167,7 +167,9 @@ fn compared(comparison: &Comparison) -> Vec<String> {
     list("Easier", texts(&comparison.easier));
     list("New findings", texts(&comparison.new_findings));
     list("Gone findings", texts(&comparison.gone_findings));
-    if !comparison.has_alarms() && comparison.easier.is_empty() && comparison.gone_findings.is_empty() {
+    list("No longer reached", texts(&comparison.unreached));
+    let is_better = !(comparison.easier.is_empty() && comparison.gone_findings.is_empty());
+    if !comparison.has_alarms() && !is_better && comparison.unreached.is_empty() {
         lines.extend([String::new(), "Nothing has changed by more than chance.".to_owned()]);
     }
     lines

@@ -184,6 +184,7 @@ fn report_comparison(comparison: &Comparison) {
         ("easier", texts(&comparison.easier)),
         ("new finding", texts(&comparison.new_findings)),
         ("gone finding", texts(&comparison.gone_findings)),
+        ("no longer reached", texts(&comparison.unreached)),
     ];
     for (what, changes) in &lists {
         changes.iter().for_each(|change| report!("{what}: {change}"));
