@@ -13,8 +13,8 @@
 //! - `input`: the path from an action into the game, and the mask of actions.
 //! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `snapshot`: the state of an episode, saved and loaded.
-//! - `observe`, `paths`: observation, position, reward and end after a tick, and observations by the paths of their
-//!   values.
+//! - `observe`, `paths`, `guess`: observation, position, reward and end after a tick, observations by the paths of
+//!   their values, and the position that is not declared.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -56,6 +56,7 @@
 #[cfg(feature = "ui")]
 mod clicks;
 mod clocks;
+mod guess;
 mod input;
 mod levels;
 mod observe;

@@ -356,11 +356,26 @@ pub trait LevelTools: Send + Sync {
     }
 }
 
+/// The likely position of an agent, by the entity that it probably is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GuessedPosition {
+    /// The position.
+    pub position: Vec2,
+    /// Description of the entity, such as "the entity with `Player`".
+    pub entity: String,
+}
+
 /// Readings of the state of an agent that plays.
 pub trait StateTools: Send + Sync {
     /// Returns the position of an agent on the [floor plan](LevelTools::floor_plan); `None` if there is no plan, or no
     /// level is played.
     fn position(&self, _world: &World, _agent: Entity) -> Option<Vec2> {
+        None
+    }
+
+    /// Returns the likely position of an agent in a game that does not declare [`position`](Self::position). Reports of
+    /// unsolved levels use it and name the entity; detectors and explorers do not. By default nothing is guessed.
+    fn guessed_position(&self, _world: &World, _agent: Entity) -> Option<GuessedPosition> {
         None
     }
 

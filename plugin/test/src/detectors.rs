@@ -10,7 +10,7 @@
 //! - `selection`: the detectors of a test, with their settings.
 //! - `positions`, `soft_lock`, `frozen`, `error_log`: detectors that watch play, tick by tick.
 //! - `goals`, `rewards`, `clocks`: detectors of play, and of levels after play.
-//! - `dead_action`, `determinism`, `entity_leak`: detectors that play a tested level again.
+//! - `dead_action`, `fading_action`, `determinism`, `entity_leak`: detectors that play a tested level again.
 //! - `par`: pars of levels, for the detectors of slow and fast play.
 
 mod clocks;
@@ -18,6 +18,7 @@ mod dead_action;
 mod determinism;
 mod entity_leak;
 mod error_log;
+mod fading_action;
 mod frozen;
 mod goals;
 mod par;
@@ -34,6 +35,7 @@ use crate::detectors::{
     determinism::Determinism,
     entity_leak::EntityLeak,
     error_log::ErrorLog,
+    fading_action::FadingAction,
     frozen::{BlankPicture, FrozenWorld, Runaway},
     goals::{Shortcut, UnreachableRegion},
     positions::{FellThrough, OutOfBounds, PhysicsExplosion, Stuck},
@@ -259,6 +261,7 @@ fn general() -> impl Iterator<Item = Known> {
         Box::<UnreachableRegion>::default(),
         Box::<Determinism>::default(),
         Box::<DeadAction>::default(),
+        Box::<FadingAction>::default(),
         Box::<RewardFarm>::default(),
     ];
     let known = ticks.into_iter().map(Known::Ticks).chain(levels.into_iter().map(Known::Level));

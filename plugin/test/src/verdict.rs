@@ -12,8 +12,8 @@
 //! The files of the folder, in reading order:
 //!
 //! - `plan`, `run`: the plan of a test, and the test.
-//! - `test_world`, `played`, `walk`: the World in which testers play, the result of an episode, and the walk of its
-//!   agent.
+//! - `test_world`, `played`, `walk`, `track`: the World in which testers play, the result of an episode, and the walk
+//!   and the progress of its agent.
 //! - `walked`, [`maps`]: the walks of a level, as maps.
 //! - `folder`, `results`, [`mod@merge`], `shard`: the folder of a test and its `results.json`, and parts of a test.
 //! - `compare`, `statistics`: the comparison with earlier results.
@@ -34,12 +34,14 @@ mod statistics;
 mod test_world;
 #[cfg(test)]
 mod testing;
+mod track;
 mod walk;
 mod walked;
 
 use crate::verdict::{
     played::{Played, PlayedEnd},
     run::{inspect, seen},
+    track::common_stop,
     walked::LevelVisits,
 };
 use bevy::math::{Rect, Vec2};
@@ -49,7 +51,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 pub use crate::verdict::{
-    compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange},
+    compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange, UnreachedSquares},
     error::TestError,
     folder::{Earlier, TestFolder},
     maps::{FailurePath, LevelMaps, LevelPars, MapScope, SkillTicks, hash_of_files, level_name},
@@ -60,6 +62,7 @@ pub use crate::verdict::{
     run::{TestEnd, TestObserver, run_tests, run_tests_keeping, test_in_turn},
     shard::{Shard, ShardError},
     statistics::{Trials, benjamini_hochberg, fisher_exact, wilson},
+    track::{CommonStop, StopKind},
 };
 
 /// Squares along the longer side of a floor plan to which [`SquareEnds`]s are rounded.
@@ -87,6 +90,12 @@ pub struct LevelVerdict {
     /// How often each cause ended an episode without the goal, if the game reports causes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub causes: BTreeMap<String, u64>,
+    /// The position at which most episodes stopped, of a level that no tester solved.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub stop: Option<CommonStop>,
+    /// True if every episode reached the goal in its first tick.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub solved_at_start: bool,
     /// Open squares that all testers together visited, for levels with maps.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub places: Option<Places>,
@@ -288,6 +297,7 @@ fn judge(
         }
     };
     let failed: Vec<FailedEnd> = all().filter_map(failed_end).collect();
+    let stops = (outcome == LevelOutcome::BotFailed).then(|| common_stop(all().map(|episode| &episode.track)));
     let mut verdict = LevelVerdict {
         level: name,
         index,
@@ -297,6 +307,8 @@ fn judge(
         seconds: seconds(all(), game.tick_hz()),
         ends: Vec::new(),
         causes: causes(&failed),
+        stop: stops.flatten(),
+        solved_at_start: is_solved_at_start(all()),
         places: None,
         maps: None,
         testers: testers.collect(),
@@ -337,6 +349,12 @@ fn score<'a>(episodes: impl Iterator<Item = &'a Played>) -> EpisodeScore {
     }
     let interval = wilson(solved, count);
     EpisodeScore { solved, episodes: count, interval, ticks: FinishTime::of(ticks), lost, timed_out, broken }
+}
+
+/// Returns whether every episode that did not break the game reached the goal in its first tick.
+fn is_solved_at_start<'a>(episodes: impl Iterator<Item = &'a Played>) -> bool {
+    let mut ended = episodes.filter(|episode| matches!(episode.end, PlayedEnd::Ended { .. })).peekable();
+    ended.peek().is_some() && ended.all(|episode| episode.track.is_solved_at_start)
 }
 
 /// Returns the game time of episodes in seconds; `None` if the game has no ticks per second.
@@ -437,20 +455,22 @@ fn add_cause(causes: &mut BTreeMap<String, u64>, cause: Option<&'static str>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict::{maps::LevelMaps, testing::verdict};
+    use crate::verdict::{maps::LevelMaps, testing::verdict, track::Track};
     use bevy_playbot::episode::EpisodeResult;
 
     #[test]
     fn older_results_are_read_and_newer_ones_read_back() {
         let old = serde_json::to_string(&verdict(3, 1, 2)).expect("serialises");
-        for name in ["maps", "places", "causes", "seconds"] {
+        for name in ["maps", "places", "causes", "seconds", "stop", "solved_at_start"] {
             assert!(!old.contains(name), "{old}");
         }
         assert_eq!(serde_json::from_str::<LevelVerdict>(&old).expect("whole"), verdict(3, 1, 2));
         let places = Some(Places { visited: 3, open: 9 });
         let maps = Some(LevelMaps { x: -0.1, side: 0.3, visits: vec![[4, 70]], ..LevelMaps::default() });
         let causes = [("saw".to_owned(), 1)].into();
-        let new = LevelVerdict { places, maps, causes, seconds: Some(0.1 + 0.2), ..verdict(3, 1, 2) };
+        let stop = CommonStop { kind: StopKind::End, x: 0.1, y: 0.7, within: 0.3, episodes: 2, of: 3, entity: None };
+        let new = LevelVerdict { places, maps, causes, stop: Some(stop), solved_at_start: true, ..verdict(3, 1, 2) };
+        let new = LevelVerdict { seconds: Some(0.1 + 0.2), ..new };
         let text = serde_json::to_string(&new).expect("serialises");
         assert_eq!(serde_json::from_str::<LevelVerdict>(&text).expect("whole"), new);
     }
@@ -489,9 +509,28 @@ mod tests {
             PlayedEnd::Broken { detector: "panic", tick: Some(5), message: String::new() },
             PlayedEnd::Broken { detector: "panic", tick: None, message: String::new() },
         ];
-        let played = ends.map(|end| Played { end, exact: true, found: Vec::new(), walk: None });
+        let played =
+            ends.map(|end| Played { end, exact: true, found: Vec::new(), walk: None, track: Track::default() });
         assert_eq!(seconds(played.iter(), 15.0), Some(3.0));
         assert_eq!(seconds(played.iter(), 0.0), None, "it has no ticks per second");
+    }
+
+    #[test]
+    fn a_level_is_solved_at_its_start_if_every_sound_episode_is() {
+        let end = EpisodeEnd::WON;
+        let result = EpisodeResult { level: 0, end, success: true, ticks: 1, clipped: 0, total_reward: 0.0 };
+        let episode = |is_solved_at_start: bool| Played {
+            end: PlayedEnd::Ended { result, position: None, cause: None },
+            exact: true,
+            found: Vec::new(),
+            walk: None,
+            track: Track { is_solved_at_start, route: None },
+        };
+        let end = PlayedEnd::Broken { detector: "panic", tick: Some(5), message: String::new() };
+        let broken = Played { end, ..episode(false) };
+        assert!(is_solved_at_start([episode(true), broken.clone(), episode(true)].iter()));
+        assert!(!is_solved_at_start([episode(true), episode(false)].iter()), "some actions do not solve it");
+        assert!(!is_solved_at_start([broken].iter()), "it was not played");
     }
 
     #[test]

@@ -168,7 +168,11 @@ pub(crate) fn numbers(overview: &Overview) -> String {
         let _ =
             writeln!(out, "<div><dt>open squares visited</dt><dd class=\"places\">{share}</dd><dd>{note}</dd></div>");
     }
-    out += "</dl>\n</section>\n<section>\n<h2>Testers</h2>\n<div class=\"table\" role=\"region\" \
+    out += "</dl>\n";
+    if let Some(levels) = overview.first_tick() {
+        let _ = writeln!(out, "<p>{}.</p>", text(&levels));
+    }
+    out += "</section>\n<section>\n<h2>Testers</h2>\n<div class=\"table\" role=\"region\" \
             aria-label=\"Testers\" tabindex=\"0\"><table>\n<thead><tr><th scope=\"col\">tester</th>\
             <th scope=\"col\">levels solved</th><th scope=\"col\">95 % interval</th><th scope=\"col\">episodes solved</th>\
             <th scope=\"col\">95 % interval</th><th scope=\"col\">open squares visited</th></tr></thead>\n<tbody>\n";
@@ -199,6 +203,7 @@ pub(crate) fn compared(comparison: &Comparison) -> String {
         list("New findings", &comparison.new_findings),
         list("Easier", &comparison.easier),
         list("Gone findings", &comparison.gone_findings),
+        list("No longer reached", &comparison.unreached),
     ];
     if lists.iter().all(String::is_empty) {
         out += "<p>Nothing has changed by more than chance.</p>\n";
@@ -246,7 +251,8 @@ pub(crate) fn what(level: &LevelVerdict) -> String {
     let Some(finding) = level.findings.first() else {
         let causes = causes(level);
         let causes = if causes.is_empty() { String::new() } else { format!(" ({causes})") };
-        return format!("{}{causes}", ends(&level.score));
+        let stop = level.stop.as_ref().map_or_else(String::new, |stop| format!("; {}", text(&stop.to_string())));
+        return format!("{}{causes}{stop}", ends(&level.score));
     };
     let more = level.findings.len() - 1;
     let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };

@@ -135,6 +135,22 @@ fn detectors_by_the_plan_and_the_clock_are_silent_on_sound_levels() {
 }
 
 #[test]
+fn actions_of_sound_levels_do_not_fade() {
+    let (coinrun, maze) = (CoinRun::default(), Maze2d::default());
+    let games: [(&dyn Game, &str); 4] = [
+        (&coinrun, "hard:0..3"),
+        (&coinrun, "easy:0..1"),
+        (&maze, "medium+goal=random:0..1"),
+        (&Corridor, "plain:0..1"),
+    ];
+    for (game, levels) in games {
+        let settings = ["fading-action.every=1", "fading-action.tries=12", "fading-action.last=2"];
+        let found = findings(game, levels, vec![random()], only(game, &["fading-action"], &settings));
+        assert!(found.is_empty(), "{} {levels}: {found:?}", game.name());
+    }
+}
+
+#[test]
 fn default_detectors_are_silent_on_sound_levels() {
     let (coinrun, maze, ants) = (CoinRun::default(), Maze2d::default(), AntMaze);
     let games: [(&dyn Game, u64); 3] = [(&coinrun, 9), (&maze, 1), (&ants, 0)];

@@ -7,6 +7,7 @@ use playbot::prelude::*;
 use playbot_harness::{
     eval::Player,
     floor_plan::FloorPlan,
+    foreign::ForeignGame,
     game::{LevelTools, StateTools},
 };
 use playbot_learner::{DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearner, Prior, SkillDraw};
@@ -89,17 +90,83 @@ fn plan(levels: &str, testers: Vec<Tester>, episodes: u32, threads: usize) -> Te
     TestPlan { split, testers, episodes, seed: 2, detectors, shard: None, threads }
 }
 
-/// Returns all verdicts, in the order of the levels.
+/// Returns all verdicts on the corridor, in the order of the levels.
 fn verdicts(plan: &TestPlan) -> Vec<LevelVerdict> {
+    verdicts_of(&Charted, plan)
+}
+
+/// Returns all verdicts on a game, in the order of the levels.
+fn verdicts_of(game: &dyn Game, plan: &TestPlan) -> Vec<LevelVerdict> {
     let mut found = Vec::new();
     let mut keep = |verdict: LevelVerdict| -> Result<(), TestError> {
         found.push(verdict);
         Ok(())
     };
     let watch = TestObserver { progress: &|_| {}, stop: &|| false };
-    run_tests(&Charted, plan, &BTreeSet::new(), &mut keep, &watch).expect("it can be played");
+    run_tests(game, plan, &BTreeSet::new(), &mut keep, &watch).expect("it can be played");
     found.sort_by_key(|verdict| verdict.index);
     found
+}
+
+#[test]
+fn an_unsolved_level_says_where_most_episodes_stopped() {
+    let stop = |testers: Vec<Tester>| verdicts(&plan("plain:0..0", testers, 3, 1))[0].stop.clone();
+    // Level 0 starts in square 4, and the first tick leads to square 3: the abyss is 3 squares from there.
+    let stopped = |tester| stop(vec![tester]).map(|stop| stop.to_string());
+    let left = "all 3 episodes got no further than (0.5, 0.5), within 0.0";
+    assert_eq!(stopped(constant("left", 0)).as_deref(), Some(left));
+    let rest = "all 3 episodes stayed within 0.0 of (4.5, 0.5)";
+    assert_eq!(stopped(constant("rest", 2)).as_deref(), Some(rest));
+    assert_eq!(stop(vec![constant("left", 0), constant("right", 1)]), None, "it is solved");
+    // Three of six is not most, so two that rest and one to the left have no common stop furthest away.
+    let both = stop(vec![constant("rest", 2), constant("left", 0)]);
+    assert_eq!(both, None, "three rest and three fall");
+}
+
+#[test]
+fn a_level_whose_every_episode_is_won_in_its_first_tick_is_known() {
+    let at_start = |levels: &str, testers: Vec<Tester>| verdicts(&plan(levels, testers, 1, 1))[0].solved_at_start;
+    assert!(!at_start("plain:0..0", vec![constant("right", 1)]), "it takes two ticks");
+    let won = ForeignGame::new("won", 1, |_: &mut App| {})
+        .keys([vec![], vec![KeyCode::ArrowRight]])
+        .observe(["x"], || [0.0])
+        .end(|| Some(EpisodeEnd::WON))
+        .time_limit(20);
+    let found = verdicts_of(&won, &plan("default:0..1", vec![constant("rest", 0), constant("right", 1)], 2, 1));
+    let known: Vec<_> = found.iter().map(|level| (level.score.solved, level.solved_at_start)).collect();
+    assert_eq!(known, [(4, true); 2]);
+}
+
+#[test]
+fn an_invisible_wall_shows_in_a_game_without_position_and_plan() {
+    #[derive(Component)]
+    struct Player;
+
+    let game = |app: &mut App| {
+        app.add_systems(Startup, |mut commands: Commands| {
+            commands.spawn((Player, Transform::default()));
+        })
+        .add_systems(
+            Update,
+            |keys: Res<ButtonInput<KeyCode>>, mut at: Single<&mut Transform, With<Player>>| {
+                let step = f32::from(u8::from(keys.pressed(KeyCode::ArrowRight)));
+                at.translation.x = (at.translation.x + step).min(3.0);
+            },
+        );
+    };
+    let walled = ForeignGame::new("walled", 1, game)
+        .keys([vec![], vec![KeyCode::ArrowRight]])
+        .observe(["x"], |at: Single<&Transform, With<Player>>| [at.translation.x])
+        .end(|at: Single<&Transform, With<Player>>| (at.translation.x >= 6.0).then_some(EpisodeEnd::WON))
+        .time_limit(20);
+    let stopped = |game: &ForeignGame| {
+        let found = verdicts_of(game, &plan("default:0..0", vec![constant("right", 1)], 3, 1));
+        found[0].stop.as_ref().map(ToString::to_string).unwrap_or_default()
+    };
+    let words = "all 3 episodes got no further than (3.0, 0.0), within 0.0";
+    assert_eq!(stopped(&walled), format!("{words}, by the position of the entity with `Player`"));
+    let declared = walled.position(|at: Single<&Transform, With<Player>>| at.translation.truncate());
+    assert_eq!(stopped(&declared), words, "a declared position needs no guess");
 }
 
 #[test]

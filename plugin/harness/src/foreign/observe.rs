@@ -9,7 +9,7 @@ use crate::{
             Baseline, ForeignCell, OwnedSystem, ReaderFactory, Sensor, SystemFactory, playing_agent, with_foreign,
         },
     },
-    game::StateTools,
+    game::{GuessedPosition, StateTools},
 };
 use bevy::{ecs::system::ReadOnlySystem, prelude::*};
 use bevy_playbot::{
@@ -61,7 +61,8 @@ pub(super) fn observe(world: &mut World) {
 impl ForeignGame {
     /// Declares the position of the agent, from above or from the side, in any units, for detectors of progress, for
     /// explorers and for pictures. The system may run more than once in a tick, so it must change nothing. While it is
-    /// skipped, because an entity that it asks for does not exist, the position is unknown.
+    /// skipped, because an entity that it asks for does not exist, the position is unknown. Without it, reports of
+    /// unsolved levels use the only entity with a component `Player`, if there is one.
     ///
     /// The system returns a `Vec2`, or in three dimensions a `Vec3`: see [`IntoPlanPosition`].
     ///
@@ -231,6 +232,12 @@ pub(super) fn forget_state(world: &mut World, agent: Entity) {
 impl StateTools for ForeignGame {
     fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
         world.get::<ForeignPosition>(agent).map(|position| position.0)
+    }
+
+    fn guessed_position(&self, world: &World, _agent: Entity) -> Option<GuessedPosition> {
+        let description = &self.description;
+        let cell = world.get_resource::<ForeignCell>().filter(|_| description.position.is_none())?;
+        cell.lock().guess.position(world, &description.paths)
     }
 
     fn end_cause(&self, world: &World, agent: Entity) -> Option<&'static str> {

@@ -117,7 +117,7 @@ fn reflected(world: &mut World, name: &str) -> Option<(ComponentId, ReflectCompo
 
 /// Returns a component by its short name: from the type registry, or by the name that Bevy keeps with its feature
 /// `debug`.
-fn component_of(world: &World, name: &str) -> Option<ComponentId> {
+pub(super) fn component_of(world: &World, name: &str) -> Option<ComponentId> {
     let components = world.components();
     let by_type = |may_be_ours: bool| {
         let registry = world.get_resource::<AppTypeRegistry>()?.read();
@@ -141,7 +141,7 @@ fn registered<'a>(registry: &'a TypeRegistry, name: &str) -> Option<&'a TypeRegi
 }
 
 /// Returns whether a type belongs to the plugin.
-fn is_ours(path: &str) -> bool {
+pub(super) fn is_ours(path: &str) -> bool {
     ["bevy_playbot::", "playbot::", "playbot_harness::", "playbot_mutation::", "playbot_test::", "playbot_train::"]
         .iter()
         .any(|of| path.starts_with(of))

@@ -2,7 +2,7 @@
 
 use crate::{
     detector::LevelProof,
-    foreign::{ForeignGame, clocks::ClockSettings, paths::ObservedPath},
+    foreign::{ForeignGame, clocks::ClockSettings, guess::Guess, paths::ObservedPath},
     game::Snapshot,
 };
 use bevy::{
@@ -71,6 +71,8 @@ pub(super) struct Foreign {
     pub(super) game: ForeignGame,
     pub(super) sensor: Sensor,
     pub(super) position: Option<OwnedSystem<Vec2>>,
+    /// The position, if none is declared.
+    pub(super) guess: Guess,
     pub(super) cell: Option<OwnedSystem<Vec<i32>>>,
     pub(super) proof: Option<OwnedReader<LevelProof>>,
     pub(super) save: Option<OwnedReader<Snapshot>>,
@@ -119,6 +121,7 @@ impl Foreign {
         Self {
             sensor: description.sensor(),
             position: description.position.as_ref().map(|system| system.make()),
+            guess: Guess::default(),
             cell: description.cell.as_ref().map(|system| system.make()),
             proof: description.proof.as_ref().map(|system| system.make()),
             save: description.snapshot.as_ref().map(|parts| parts.save.make()),

@@ -132,7 +132,7 @@ fn gets_around(script: &Script<'_>, course: &Course, moments: &[usize]) -> bool 
 
 /// Returns the actions to try: each choice that is not named as doing nothing, or each continuous value, far up and far
 /// down.
-fn tried(game: &dyn Game) -> Vec<(String, Vec<ActionValue>)> {
+pub(super) fn tried(game: &dyn Game) -> Vec<(String, Vec<ActionValue>)> {
     let (names, idle) = (game.tools().input.action_names(), idle_action(game));
     let named =
         |number: usize| names.get(number).map_or_else(|| format!("action {number}"), |name| format!("`{name}`"));

@@ -175,6 +175,16 @@ pub struct Course {
     pub is_solved: bool,
 }
 
+/// The known state after a tick.
+pub struct SeenState {
+    /// Its hash: see [`hash_of_state`].
+    pub hash: u64,
+    /// What the agent observes.
+    pub observation: Vec<f32>,
+    /// The agent's position, if the game reports it.
+    pub position: Option<Vec2>,
+}
+
 /// Most ticks and frames to wait.
 const MOST_RUNS: u32 = 200_000;
 
@@ -208,6 +218,34 @@ impl<'a> Script<'a> {
         }
         course.is_solved = probe.world.get::<EpisodeCount>(probe.agent).is_some_and(|count| count.successes > 0);
         Ok(course)
+    }
+
+    /// Plays these actions. Returns the state after each of them; fewer if the episode ends before.
+    ///
+    /// # Errors
+    ///
+    /// The game broke its contract, or the test was stopped.
+    pub fn states(&self, actions: &[ActionValue]) -> Result<Vec<SeenState>, Fault> {
+        let probe = Probe::led(self.game, self.mode, self.level, self.seed);
+        let mut probe = probe.map_err(broken)?.until(self.stop);
+        let mut states = Vec::new();
+        for _ in 0..MOST_RUNS {
+            let Some(action) = actions.get(states.len()) else { break };
+            probe.world.entity_mut(probe.agent).insert(Action(action.clone()));
+            let is_active = probe.tick()?;
+            if !is_active || probe.is_over() {
+                break;
+            }
+            if ticks(&probe) > states.len() {
+                let seen = probe.world.get::<Observation>(probe.agent);
+                states.push(SeenState {
+                    hash: hash_of_state(&probe.world, probe.agent),
+                    observation: seen.map_or_else(Vec::new, |seen| seen.vector.clone()),
+                    position: self.game.tools().state.position(&probe.world, probe.agent),
+                });
+            }
+        }
+        Ok(states)
     }
 
     /// Plays these actions, then another one for this many ticks. Returns the hashes of the states of the latter.

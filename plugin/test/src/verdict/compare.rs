@@ -6,11 +6,14 @@ mod tests;
 use crate::verdict::{
     LevelVerdict, Shard, TesterVerdict,
     error::TestError,
+    maps::LevelMaps,
     plan::TestRecord,
     results::ResultLines,
     statistics::{Trials, benjamini_hochberg, fisher_exact},
 };
+use bevy::math::Vec2;
 use playbot_harness::level_files::is_level_files;
+use playbot_report::counted;
 use serde::Serialize;
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -49,6 +52,8 @@ pub struct Comparison {
     pub new_findings: Vec<FindingChange>,
     /// Findings that are gone.
     pub gone_findings: Vec<FindingChange>,
+    /// Squares of levels that are no longer solved, where no tester comes any more.
+    pub unreached: Vec<UnreachedSquares>,
 }
 
 impl Comparison {
@@ -109,6 +114,7 @@ impl Comparison {
             };
             added.map(change).collect::<Vec<_>>()
         };
+        self.unreached.extend(UnreachedSquares::between(level, known, now));
         self.new_findings.extend(changes(now, known));
         self.gone_findings.extend(changes(known, now));
         let change = |before: Trials, now: Trials| Change {
@@ -223,8 +229,84 @@ impl fmt::Display for FindingChange {
     }
 }
 
+/// Squares of a level that was solved before and no longer is: testers visited them before, and none does now.
+///
+/// It needs maps of both results, of the same squares and the same testers. It explains a change and is no alarm of its
+/// own.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct UnreachedSquares {
+    /// The level.
+    pub level: String,
+    /// Number of these squares.
+    pub squares: u64,
+    /// Middle of the one that is closest to a square that is still visited.
+    pub at: [f32; 2],
+    /// Middle of that square.
+    pub nearest: [f32; 2],
+}
+
+impl UnreachedSquares {
+    fn between(level: &str, before: &Known, now: &Known) -> Option<Self> {
+        let (was, is) = (before.visited.as_ref()?, now.visited.as_ref()?);
+        let is_lost = before.total.successes > 0 && now.total.successes == 0;
+        if !is_lost || !was.has_squares_of(is) {
+            return None;
+        }
+        let lost: Vec<u64> = was.squares.difference(&is.squares).copied().collect();
+        let mut closest: Option<(f32, [u64; 2])> = None;
+        for square in &lost {
+            for reached in &is.squares {
+                let distance = was.middle(*square).distance_squared(was.middle(*reached));
+                // Of equal ones the first.
+                if closest.is_none_or(|(least, _)| distance < least) {
+                    closest = Some((distance, [*square, *reached]));
+                }
+            }
+        }
+        let (_, pair) = closest?;
+        let [at, nearest] = pair.map(|square| was.middle(square).to_array());
+        Some(Self { level: level.to_owned(), squares: lost.len() as u64, at, nearest })
+    }
+}
+
+impl fmt::Display for UnreachedSquares {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { level, squares, at: [x, y], nearest: [left, below] } = self;
+        let squares = counted(*squares, "square");
+        write!(f, "{level}: {squares} visited before, such as ({x:.1}, {y:.1}); now no tester comes further than ")?;
+        write!(f, "({left:.1}, {below:.1}) there")
+    }
+}
+
+/// Squares that testers visited.
+struct VisitedSquares {
+    corner: Vec2,
+    side: f32,
+    columns: u64,
+    squares: BTreeSet<u64>,
+}
+
+impl VisitedSquares {
+    fn of(maps: &LevelMaps) -> Self {
+        let squares = maps.visits.iter().map(|[square, _]| *square).collect();
+        Self { corner: Vec2::new(maps.x, maps.y), side: maps.side, columns: maps.columns.max(1), squares }
+    }
+
+    fn has_squares_of(&self, other: &Self) -> bool {
+        self.corner == other.corner && self.side == other.side && self.columns == other.columns
+    }
+
+    /// Returns the middle of a square.
+    fn middle(&self, square: u64) -> Vec2 {
+        let place = Vec2::new((square % self.columns) as f32, (square / self.columns) as f32);
+        self.corner + (place + 0.5) * self.side
+    }
+}
+
 /// Results of an earlier level that are kept in memory.
 struct Known {
+    /// Squares that the testers visited, if the level has maps of these testers alone.
+    visited: Option<VisitedSquares>,
     testers: Vec<TesterVerdict>,
     total: Trials,
     is_unsolvable: bool,
@@ -241,6 +323,8 @@ impl Known {
             .into_iter()
             .filter(|finding| is_common(&finding.tester) && !other_detectors.contains(&finding.detector));
         let findings = findings.map(|finding| (finding.detector, finding.tester)).collect();
+        let is_theirs = level.testers.len() == testers.len();
+        let visited = level.maps.as_ref().filter(|_| is_theirs).map(VisitedSquares::of);
         let mut verdicts = level.testers;
         let own: Vec<TesterVerdict> = testers
             .iter()
@@ -251,7 +335,7 @@ impl Known {
             .collect();
         let mut total = Trials::default();
         own.iter().for_each(|tester| add(&mut total, tester.score.trials()));
-        Self { testers: own, total, is_unsolvable, findings }
+        Self { visited, testers: own, total, is_unsolvable, findings }
     }
 }
 

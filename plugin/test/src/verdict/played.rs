@@ -1,6 +1,6 @@
 //! Episodes to play, and their results.
 
-use crate::verdict::walk::Walk;
+use crate::verdict::{track::Track, walk::Walk};
 use bevy::math::Vec2;
 use bevy_playbot::episode::EpisodeResult;
 
@@ -24,6 +24,8 @@ pub(super) struct Played {
     pub found: Vec<EpisodeFinding>,
     /// Walk of its agent, if the game reports positions.
     pub walk: Option<Walk>,
+    /// Progress of its agent.
+    pub track: Track,
 }
 
 impl Played {

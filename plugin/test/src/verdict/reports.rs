@@ -112,6 +112,7 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
     if overview.places.percent().is_some() {
         lines.push(format!("{} of the open squares were visited.", overview.places.describe()));
     }
+    lines.extend(overview.first_tick().map(|levels| format!("{}.", markdown_cell(&levels))));
     let head = ["", "| tester | levels solved | episodes solved | squares visited |", "|---|---:|---:|---:|"];
     lines.extend(head.map(str::to_owned));
     for tester in &overview.testers {
@@ -166,7 +167,9 @@ fn compared(comparison: &Comparison) -> Vec<String> {
     list("Easier", texts(&comparison.easier));
     list("New findings", texts(&comparison.new_findings));
     list("Gone findings", texts(&comparison.gone_findings));
-    if !comparison.has_alarms() && comparison.easier.is_empty() && comparison.gone_findings.is_empty() {
+    list("No longer reached", texts(&comparison.unreached));
+    let is_better = !(comparison.easier.is_empty() && comparison.gone_findings.is_empty());
+    if !comparison.has_alarms() && !is_better && comparison.unreached.is_empty() {
         lines.extend([String::new(), "Nothing has changed by more than chance.".to_owned()]);
     }
     lines
@@ -187,7 +190,8 @@ pub(super) fn message(level: &LevelVerdict) -> String {
     let finding = level.findings.first().map(|finding| format!("; {}: {}", finding.detector, finding.message));
     let more = level.findings.len().saturating_sub(1);
     let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };
-    format!("{solved}{}{}{more}", lost(level), finding.unwrap_or_default())
+    let stop = level.stop.as_ref().map_or_else(String::new, |stop| format!("; {stop}"));
+    format!("{solved}{}{stop}{}{more}", lost(level), finding.unwrap_or_default())
 }
 
 /// Describes how, why and where episodes ended without the goal; empty without such episodes.
@@ -310,13 +314,13 @@ fn seen(tester: &TesterRecord) -> String {
 mod tests {
     use super::*;
     use crate::verdict::{
-        Finding, LevelVerdict, MapScope, Places, TestRecord, TestedRun, TesterRecord,
+        CommonStop, Finding, LevelVerdict, MapScope, Places, StopKind, TestRecord, TestedRun, TesterRecord,
         folder::{Earlier, TestFolder},
         testing::{tester, verdict},
     };
 
     #[test]
-    fn the_share_of_visited_places_is_reported_where_it_is_known() {
+    fn shares_of_visited_places_and_levels_solved_in_their_first_tick_are_reported() {
         let record = TestRecord {
             game: "garden".to_owned(),
             game_version: 1,
@@ -339,7 +343,9 @@ mod tests {
         };
         let plain = said(&verdict(0, 2, 2));
         assert!(plain.contains("| random | 1 of 1") && plain.contains(" | – |"), "{plain}");
-        assert!(!plain.contains("open squares"), "{plain}");
+        assert!(!plain.contains("open squares") && !plain.contains("first tick"), "{plain}");
+        let at_start = said(&LevelVerdict { solved_at_start: true, ..verdict(0, 2, 2) });
+        assert!(at_start.contains("\n1 level is solved in its first tick: hard:0.\n"), "{at_start}");
         let mut level = LevelVerdict { places: Some(Places { visited: 3, open: 4 }), ..verdict(0, 2, 2) };
         level.testers[0].places = Some(Places { visited: 1, open: 4 });
         let mapped = said(&level);
@@ -375,6 +381,10 @@ mod tests {
         level.ends.clear();
         assert_eq!(message(&level), start, "nor positions");
         assert_eq!(message(&verdict(0, 4, 4)), "solved 4 of 4 episodes");
+        let (kind, entity) = (StopKind::Furthest, None);
+        level.stop = Some(CommonStop { kind, x: 12.4, y: 3.0, within: 0.5, episodes: 4, of: 4, entity });
+        let stopped = "all 4 episodes got no further than (12.4, 3.0), within 0.5";
+        assert_eq!(message(&level), format!("{start}; {stopped}"));
     }
 
     #[test]

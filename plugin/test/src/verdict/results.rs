@@ -14,6 +14,7 @@ use crate::verdict::{
 };
 use crc32fast::Hasher;
 use playbot_learner::BrokenSeal;
+use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::{
@@ -225,6 +226,9 @@ fn hash_line(hasher: &mut Hasher, line: &str) {
 
 // Totals of a test.
 
+/// Most levels that are named in a line.
+const MOST_NAMES: usize = 5;
+
 /// Totals of a tester over all levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TesterTotal {
@@ -251,6 +255,10 @@ pub struct Overview {
     pub bot_failed: u64,
     /// Levels whose goal cannot be reached.
     pub proved_unsolvable: u64,
+    /// Levels that are solved in their first tick, in every episode.
+    pub solved_at_start: u64,
+    /// The names of the first few of these.
+    pub first_solved_at_start: Vec<String>,
     /// Findings of all levels.
     pub findings: u64,
     /// Open squares that any tester visited, over all levels with maps.
@@ -285,14 +293,31 @@ impl Overview {
             places,
         };
         let testers = record.testers.iter().map(|tester| total(&tester.name)).collect();
-        let worst = Vec::new();
-        Self { record, levels: 0, solved: 0, bot_failed: 0, proved_unsolvable: 0, findings: 0, places, testers, worst }
+        Self {
+            record,
+            levels: 0,
+            solved: 0,
+            bot_failed: 0,
+            proved_unsolvable: 0,
+            solved_at_start: 0,
+            first_solved_at_start: Vec::new(),
+            findings: 0,
+            places,
+            testers,
+            worst: Vec::new(),
+        }
     }
 
     fn add(&mut self, level: LevelVerdict) {
         self.levels += 1;
         self.findings += level.findings.len() as u64;
         self.places.add(level.places);
+        if level.solved_at_start {
+            self.solved_at_start += 1;
+            if self.first_solved_at_start.len() < MOST_NAMES {
+                self.first_solved_at_start.push(level.level.clone());
+            }
+        }
         *match level.outcome {
             LevelOutcome::Solved => &mut self.solved,
             LevelOutcome::BotFailed => &mut self.bot_failed,
@@ -313,6 +338,17 @@ impl Overview {
                 self.worst.truncate(MOST_WORST);
             }
         }
+    }
+
+    /// Returns a sentence about the levels that are solved in their first tick, without a full stop; `None` without such
+    /// levels.
+    pub fn first_tick(&self) -> Option<String> {
+        let count = self.solved_at_start;
+        let (are, their) = if count == 1 { ("is", "its") } else { ("are", "their") };
+        let more = count.saturating_sub(self.first_solved_at_start.len() as u64);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let names = self.first_solved_at_start.join(", ");
+        (count > 0).then(|| format!("{} {are} solved in {their} first tick: {names}{more}", counted(count, "level")))
     }
 
     /// Returns whether every level was solved and has no finding.

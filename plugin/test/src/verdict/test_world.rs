@@ -6,6 +6,7 @@ use crate::{
     verdict::{
         plan::Tester,
         played::{EpisodeFinding, Played, PlayedEnd, Task},
+        track::{Track, TrackCounter},
         walk::{Walk, WalkCounter},
     },
 };
@@ -104,7 +105,8 @@ fn play_alone(
     };
     let found = std::mem::take(&mut test_world.found);
     let walk = test_world.take_walk(0);
-    Ok(Some(Played { end, exact: test_world.is_untouched(0, task.seed), found, walk }))
+    let exact = test_world.is_untouched(0, task.seed);
+    Ok(Some(Played { end, exact, found, walk, track: Track::default() }))
 }
 
 /// Observers of an episode during play.
@@ -162,7 +164,8 @@ impl TestWorld {
             world.entity_mut(agent).insert((LevelQueue::list(levels), EpisodeSeeds::new(seeds)));
             let control = player.seat(game, &mut world, agent);
             world.entity_mut(agent).insert(control);
-            seats.push(Seat { agent, tasks: own, done: 0, walk: WalkCounter::new(agent, game.tick_hz()) });
+            let (walk, track) = (WalkCounter::new(agent, game.tick_hz()), TrackCounter::new(agent));
+            seats.push(Seat { agent, tasks: own, done: 0, walk, track });
         }
         player.install(&mut world);
         Ok(Self { world, seats, found: Vec::new() })
@@ -206,8 +209,9 @@ impl TestWorld {
     fn count_places(&mut self, game: &dyn Game, watch: &EpisodeObserver) {
         let ended = EndedEpisodes::of(&self.world);
         for seat in &mut self.seats {
-            let has_ended = ended.iter().any(|(agent, _)| *agent == seat.agent);
-            seat.walk.tick(game, watch.mode, &self.world, has_ended);
+            let result = ended.iter().find(|(agent, _)| *agent == seat.agent).map(|(_, result)| result);
+            seat.walk.tick(game, watch.mode, &self.world, result.is_some());
+            seat.track.tick(game, &self.world, result);
         }
     }
 
@@ -227,13 +231,14 @@ impl TestWorld {
         for (agent, result) in ended {
             let Some(seat) = self.seats.iter().position(|seat| seat.agent == agent) else { continue };
             let walk = self.take_walk(seat);
+            let track = self.seats[seat].track.take();
             let Some((task, seed)) = self.seats[seat].current() else { continue };
             let position = game.tools().state.position(&self.world, agent);
             let cause = if result.success { None } else { game.tools().state.end_cause(&self.world, agent) };
             let exact = self.is_untouched(seat, seed);
             let found = watched.take_found(seat);
             let end = PlayedEnd::Ended { result, position, cause };
-            played[task] = Some(Played { end, exact, found, walk });
+            played[task] = Some(Played { end, exact, found, walk, track });
             self.seats[seat].done += 1;
             (watch.progress)(1);
         }
@@ -323,6 +328,8 @@ struct Seat {
     done: usize,
     /// Walk of the agent.
     walk: WalkCounter,
+    /// Progress of the agent.
+    track: TrackCounter,
 }
 
 impl Seat {

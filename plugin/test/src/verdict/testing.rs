@@ -31,6 +31,8 @@ pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
         seconds: None,
         ends: Vec::new(),
         causes: BTreeMap::new(),
+        stop: None,
+        solved_at_start: false,
         places: None,
         maps: None,
         testers: vec![tester("random", solved, episodes, false)],

@@ -127,7 +127,7 @@ mod tests {
     use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
 
     use super::*;
-    use crate::verdict::walk::SquareCount;
+    use crate::verdict::{track::Track, walk::SquareCount};
 
     /// Makes a plan of four squares in a row and a wall.
     fn plan() -> FloorPlan {
@@ -152,7 +152,8 @@ mod tests {
             skills: skills.to_vec(),
         };
         let walk = Some(Walk { squares, counts: counts.iter().map(count).collect(), trail });
-        Played { end: PlayedEnd::Ended { result, position: None, cause: None }, exact: true, found: Vec::new(), walk }
+        let end = PlayedEnd::Ended { result, position: None, cause: None };
+        Played { end, exact: true, found: Vec::new(), walk, track: Track::default() }
     }
 
     #[test]

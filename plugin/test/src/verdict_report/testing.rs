@@ -106,6 +106,8 @@ pub(crate) fn level(index: u64, solved: u64, episodes: u64, ticks: u32) -> Level
         seconds: None,
         ends: Vec::new(),
         causes: BTreeMap::new(),
+        stop: None,
+        solved_at_start: false,
         places: None,
         maps: None,
         testers: vec![TesterVerdict { tester: "random".to_owned(), score, exact: false, places: None }],

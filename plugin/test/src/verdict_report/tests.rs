@@ -2,8 +2,8 @@
 
 use crate::{
     verdict::{
-        Comparison, FailurePath, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard, SkillTicks,
-        SquareEnds, TestError, TestRecord, TesterVerdict, merge,
+        CommonStop, Comparison, FailurePath, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard,
+        SkillTicks, SquareEnds, StopKind, TestError, TestRecord, TesterVerdict, merge,
     },
     verdict_report::{
         HtmlReport, REPORT, STYLE, html,
@@ -60,6 +60,19 @@ fn long(index: u64) -> LevelVerdict {
         findings: (0..3).map(|_| finding("panic", &"index out of bounds ".repeat(100))).collect(),
         ..short
     }
+}
+
+#[test]
+fn common_stops_and_levels_that_are_solved_in_their_first_tick_are_on_the_page() {
+    let (kind, entity) = (StopKind::Furthest, Some("the entity with `Player<T>`".to_owned()));
+    let stop = Some(CommonStop { kind, x: 12.4, y: 3.0, within: 0.5, episodes: 3, of: 3, entity });
+    let stopped = LevelVerdict { stop, ..level(0, 0, 3, 0) };
+    let at_start = LevelVerdict { solved_at_start: true, ..level(1, 3, 3, 1) };
+    let html = page(&[stopped, at_start], &PLAIN);
+    let words = "lost 3; all 3 episodes got no further than (12.4, 3.0), within 0.5, by the position of the entity with \
+                 `Player&lt;T&gt;`";
+    assert!(html.contains(words), "{html}");
+    assert!(html.contains("<p>1 level is solved in its first tick: hard:1.</p>"), "{html}");
 }
 
 #[test]

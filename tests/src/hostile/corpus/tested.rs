@@ -7,9 +7,9 @@ use playbot_games::coinrun::CoinRun;
 use playbot_harness::detector::LevelProof;
 use playbot_test::{
     verdict::{
-        Comparison, Earlier, EpisodeScore, FailurePath, Finding, FinishTime, LevelMaps, LevelOutcome, LevelVerdict,
-        MapScope, Overview, Places, RESULTS, ResultLines, Shard, SkillTicks, SquareEnds, TestFolder, TestRecord,
-        TesterRecord, TesterVerdict, merge, wilson, write_reports,
+        CommonStop, Comparison, Earlier, EpisodeScore, FailurePath, Finding, FinishTime, LevelMaps, LevelOutcome,
+        LevelVerdict, MapScope, Overview, Places, RESULTS, ResultLines, Shard, SkillTicks, SquareEnds, StopKind,
+        TestFolder, TestRecord, TesterRecord, TesterVerdict, merge, wilson, write_reports,
     },
     verdict_report::{HtmlReport, html},
 };
@@ -109,11 +109,18 @@ fn verdict(index: u64) -> LevelVerdict {
         seconds: Some(8.0),
         ends: vec![SquareEnds { x: 3.5, y: 2.5, lost: 2, timed_out: 1, causes: causes.clone() }],
         causes,
+        stop: Some(stop()),
+        solved_at_start: true,
         places,
         maps: Some(maps()),
         testers: ["random", "chaos"].map(tester).to_vec(),
         findings: vec![finding],
     }
+}
+
+fn stop() -> CommonStop {
+    let entity = Some("the entity with `Player`".to_owned());
+    CommonStop { kind: StopKind::Furthest, x: 12.5, y: 3.0, within: 0.5, episodes: 8, of: 9, entity }
 }
 
 fn maps() -> LevelMaps {

@@ -20,6 +20,9 @@ use std::{fs, path::Path};
 /// Most findings whose replay command is printed.
 const MOST_REPLAYS: usize = 3;
 
+/// Most levels whose common stop is printed.
+const MOST_STOPS: usize = 3;
+
 /// Results and the form of their report.
 pub struct Results<'a> {
     /// Their folder.
@@ -78,6 +81,8 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
         }
     }
     report!("{}", counts(&overview));
+    overview.first_tick().iter().for_each(|levels| report!("{levels}"));
+    stops(&overview).iter().for_each(|line| report!("{line}"));
     replays(results.folder, &overview).iter().for_each(|line| report!("{line}"));
     if let Some(comparison) = &comparison {
         report_comparison(comparison);
@@ -86,6 +91,12 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     report!("{folder}: {}", names.collect::<Vec<_>>().join(", "));
     let is_sound = comparison.as_ref().map_or(overview.is_sound(), |comparison| !comparison.has_alarms());
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
+}
+
+/// Returns the positions at which most episodes of the worst levels stopped.
+fn stops(overview: &Overview) -> Vec<String> {
+    let stop = |level: &LevelVerdict| level.stop.as_ref().map(|stop| format!("{}: {stop}", level.level));
+    overview.worst.iter().filter_map(stop).take(MOST_STOPS).collect()
 }
 
 /// Returns the commands that show findings of the worst levels, and the list of other files.
@@ -173,6 +184,7 @@ fn report_comparison(comparison: &Comparison) {
         ("easier", texts(&comparison.easier)),
         ("new finding", texts(&comparison.new_findings)),
         ("gone finding", texts(&comparison.gone_findings)),
+        ("no longer reached", texts(&comparison.unreached)),
     ];
     for (what, changes) in &lists {
         changes.iter().for_each(|change| report!("{what}: {change}"));

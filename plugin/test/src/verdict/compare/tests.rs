@@ -1,7 +1,7 @@
 //! Tests of the comparison of results.
 
 use crate::verdict::{
-    Finding, LevelOutcome, MapScope, TesterRecord,
+    Finding, LevelMaps, LevelOutcome, MapScope, TesterRecord,
     compare::*,
     folder::{Earlier, TestFolder},
     results::RESULTS,
@@ -106,6 +106,30 @@ fn a_new_proof_and_a_new_finding_are_always_reported() {
     let back = compared(&now, &before, &["random"]);
     assert_eq!((names(&back.easier), back.gone_findings.len()), (vec!["hard:0"], 1));
     assert!(!back.has_alarms());
+}
+
+#[test]
+fn squares_of_a_level_that_is_no_longer_solved_are_reported_where_no_tester_comes_now() {
+    // Four squares in a row and four above them, each of side 2, from -1, 0.
+    let walked = |solved: u64, squares: &[u64]| {
+        let visits = squares.iter().map(|square| [*square, 5]).collect();
+        let maps = LevelMaps { x: -1.0, side: 2.0, columns: 4, rows: 2, visits, ..LevelMaps::default() };
+        LevelVerdict { maps: Some(maps), ..exact(0, solved) }
+    };
+    let unreached = |before: LevelVerdict, now: LevelVerdict| compared(&[before], &[now], &["plan"]).unreached;
+    let found = unreached(walked(1, &[0, 1, 2, 3, 7]), walked(0, &[0, 1, 4]));
+    // Squares 2, 3 and 7; square 2 is beside square 1.
+    let expected = UnreachedSquares { level: "hard:0".to_owned(), squares: 3, at: [4.0, 1.0], nearest: [2.0, 1.0] };
+    assert_eq!(found, [expected]);
+    let words =
+        "hard:0: 3 squares visited before, such as (4.0, 1.0); now no tester comes further than (2.0, 1.0) there";
+    assert_eq!(found[0].to_string(), words);
+    assert!(unreached(walked(1, &[0, 1, 2]), walked(1, &[0, 1])).is_empty(), "another path leads to the goal");
+    assert!(unreached(walked(1, &[0, 1]), walked(0, &[0, 1, 2])).is_empty(), "no square is missing");
+    assert!(unreached(walked(1, &[0, 1]), exact(0, 0)).is_empty(), "there is no map now");
+    let mut moved = walked(0, &[0]);
+    moved.maps.iter_mut().for_each(|maps| maps.side = 3.0);
+    assert!(unreached(walked(1, &[0, 1]), moved).is_empty(), "the squares are others");
 }
 
 #[test]

@@ -175,6 +175,21 @@ fn the_worst_come_first_and_perfect_ones_not_at_all() {
 }
 
 #[test]
+fn levels_that_are_solved_in_their_first_tick_are_counted_and_the_first_few_are_named() {
+    let mut overview = Overview::empty(record());
+    assert_eq!(overview.first_tick(), None);
+    overview.add(verdict(0, 2, 2));
+    let mut add = |index| {
+        overview.add(LevelVerdict { solved_at_start: true, ..verdict(index, 2, 2) });
+        overview.first_tick().expect("there is one")
+    };
+    assert_eq!(add(7), "1 level is solved in its first tick: hard:7");
+    assert_eq!(add(31), "2 levels are solved in their first tick: hard:7, hard:31");
+    let last = (40..45).map(add).last().expect("five more");
+    assert_eq!(last, "7 levels are solved in their first tick: hard:7, hard:31, hard:40, hard:41, hard:42 and 2 more");
+}
+
+#[test]
 fn quartiles_lie_between_the_values() {
     let of = |ticks: &[u32]| FinishTime::of(ticks.to_vec());
     let time = |lower_quartile, median, upper_quartile| FinishTime { lower_quartile, median, upper_quartile };

@@ -1,0 +1,222 @@
+//! The position of an agent in a game that declares none, guessed from the game's entities.
+//!
+//! The entity is the one whose `Transform` the game's `.observe_paths` read, or else the only one with a component
+//! `Player`, with a component whose name contains `Player`, or with the `Name` `Player`. Where several entities match,
+//! the guess is not certain, and there is none.
+
+use crate::{
+    foreign::paths::{component_of, is_ours},
+    game::GuessedPosition,
+};
+use bevy::{ecs::component::ComponentId, prelude::*};
+use std::collections::BTreeSet;
+
+/// The word by which games call what a person plays.
+const WORD: &str = "Player";
+
+/// Crates of Bevy, whose components such as `AudioPlayer` mark no agent.
+const ENGINE: [&str; 3] = ["bevy::", "bevy_", "core::"];
+
+/// The signs of the agent's entity in a World.
+#[derive(Default)]
+pub(super) struct Guess {
+    /// Number of components when the signs were looked up.
+    known: usize,
+    /// The signs, the most certain first.
+    signs: Vec<Sign>,
+    /// The component of cameras in space.
+    camera: Option<ComponentId>,
+}
+
+/// A sign of the agent's entity.
+enum Sign {
+    /// One of these components, with their names.
+    Components(Vec<(String, ComponentId)>),
+    /// This `Name`.
+    Name(String),
+}
+
+impl Guess {
+    /// Returns the position of the one entity with the most certain sign that any entity has; `None` if there are
+    /// several. `paths` are those of `.observe_paths`.
+    pub(super) fn position(&mut self, world: &World, paths: &[String]) -> Option<GuessedPosition> {
+        let components = world.components().num_registered();
+        if self.known != components {
+            *self = Self { known: components, signs: signs(world, paths), camera: component_of(world, "Camera3d") };
+        }
+        for sign in &self.signs {
+            let found = sign.entities(world);
+            if let [entity] = found.as_slice() {
+                let at = translation(world, *entity)?;
+                let is_in_space = self.camera.is_some_and(|camera| has_any(world, camera));
+                // Seen from above, as positions in space are.
+                let position = if is_in_space { at.xz() } else { at.truncate() };
+                return Some(GuessedPosition { position, entity: sign.describe(world, *entity) });
+            }
+            if !found.is_empty() {
+                return None;
+            }
+        }
+        None
+    }
+}
+
+impl Sign {
+    /// Returns the entities that have the sign and a `Transform`.
+    fn entities(&self, world: &World) -> Vec<Entity> {
+        let Some(transform) = world.components().component_id::<Transform>() else { return Vec::new() };
+        let is_meant = |entity: Entity| match self {
+            Self::Components(any) => any.iter().any(|(_, component)| world.entity(entity).contains_id(*component)),
+            Self::Name(name) => world.get::<Name>(entity).is_some_and(|found| found.as_str() == name),
+        };
+        let archetypes = world.archetypes().iter().filter(|archetype| archetype.contains(transform));
+        let entities = archetypes.flat_map(|archetype| archetype.entities().iter().map(|entity| entity.id()));
+        entities.filter(|entity| is_meant(*entity)).collect()
+    }
+
+    /// Describes the entity by the sign.
+    fn describe(&self, world: &World, entity: Entity) -> String {
+        match self {
+            Self::Components(any) => {
+                let own = any.iter().find(|(_, component)| world.entity(entity).contains_id(*component));
+                format!("the entity with `{}`", own.map_or(WORD, |(name, _)| name.as_str()))
+            }
+            Self::Name(name) => format!("the entity named `{name}`"),
+        }
+    }
+}
+
+/// Returns the signs, the most certain first.
+fn signs(world: &World, paths: &[String]) -> Vec<Sign> {
+    let read = paths.iter().filter_map(|path| {
+        let mut parts = path.split('.');
+        let (marker, component) = (parts.next()?, parts.next()?);
+        ["Transform", "GlobalTransform"].contains(&component).then_some(marker)
+    });
+    let read: BTreeSet<&str> = read.collect();
+    let mut signs = Vec::new();
+    if let (Some(marker), 1) = (read.first(), read.len()) {
+        let name = (*marker).to_owned();
+        signs.push(match component_of(world, marker) {
+            Some(component) => Sign::Components(vec![(name, component)]),
+            None => Sign::Name(name),
+        });
+    }
+    let all = named(world);
+    let exact = all.iter().filter(|(name, _)| name == WORD).cloned().collect();
+    signs.extend([Sign::Components(exact), Sign::Components(all), Sign::Name(WORD.to_owned())]);
+    signs
+}
+
+/// Returns the game's components whose short names contain the word, in the order of their names.
+fn named(world: &World) -> Vec<(String, ComponentId)> {
+    let components = world.components();
+    let mut found = BTreeSet::new();
+    let mut note = |path: &str, component: ComponentId| {
+        let plain = path.split('<').next().unwrap_or_default();
+        let short = plain.rsplit("::").next().unwrap_or_default();
+        let is_engine = is_ours(path) || ENGINE.iter().any(|of| path.starts_with(of));
+        if short.contains(WORD) && !is_engine {
+            found.insert((short.to_owned(), component));
+        }
+    };
+    // Bevy keeps these names with its feature `debug` only.
+    components.iter_registered().for_each(|info| note(&info.name(), info.id()));
+    if let Some(registry) = world.get_resource::<AppTypeRegistry>() {
+        for known in registry.read().iter() {
+            if let Some(component) = components.get_id(known.type_id()) {
+                note(known.type_info().type_path(), component);
+            }
+        }
+    }
+    found.into_iter().collect()
+}
+
+/// Returns where an entity is in the World.
+fn translation(world: &World, entity: Entity) -> Option<Vec3> {
+    let place = world.get::<GlobalTransform>(entity).filter(|_| world.get::<ChildOf>(entity).is_some());
+    let own = || world.get::<Transform>(entity).map(|transform| transform.translation);
+    place.map(GlobalTransform::translation).or_else(own)
+}
+
+fn has_any(world: &World, component: ComponentId) -> bool {
+    world.archetypes().iter().any(|archetype| archetype.contains(component) && !archetype.is_empty())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[derive(Component)]
+    struct Player;
+
+    #[derive(Component)]
+    struct PlayerHat;
+
+    #[derive(Component)]
+    struct Hero;
+
+    fn guessed(world: &World, paths: &[&str]) -> Option<(f32, String)> {
+        let paths: Vec<String> = paths.iter().map(|path| (*path).to_owned()).collect();
+        // The tests' own components are those of this crate, which a guess leaves out.
+        let mut guess = Guess {
+            known: world.components().num_registered(),
+            signs: signs(world, &paths),
+            camera: component_of(world, "Camera3d"),
+        };
+        let mine = [
+            ("Player", world.components().component_id::<Player>()),
+            ("PlayerHat", world.components().component_id::<PlayerHat>()),
+        ];
+        let mine = mine.into_iter().filter_map(|(name, component)| Some((name.to_owned(), component?)));
+        let mine: Vec<_> = mine.collect();
+        let exact = mine.iter().filter(|(name, _)| name == WORD).cloned().collect();
+        let at = guess.signs.len() - 3;
+        guess.signs.splice(at..at + 2, [Sign::Components(exact), Sign::Components(mine)]);
+        guess.position(world, &paths).map(|found| (found.position.x, found.entity))
+    }
+
+    #[test]
+    fn the_only_player_is_the_agent_and_two_are_no_guess() {
+        let mut world = World::new();
+        assert_eq!(guessed(&world, &[]), None);
+        world.spawn((PlayerHat, Transform::from_xyz(9.0, 0.0, 0.0)));
+        assert_eq!(guessed(&world, &[]), Some((9.0, "the entity with `PlayerHat`".to_owned())));
+        world.spawn((Player, Transform::from_xyz(2.0, 0.0, 0.0)));
+        assert_eq!(
+            guessed(&world, &[]),
+            Some((2.0, "the entity with `Player`".to_owned())),
+            "its hat is another entity"
+        );
+        world.spawn((Player, Transform::from_xyz(3.0, 0.0, 0.0)));
+        assert_eq!(guessed(&world, &[]), None, "which of the two is meant is not certain");
+    }
+
+    #[test]
+    fn the_entity_of_observed_transforms_comes_before_a_player() {
+        let mut world = World::new();
+        world.spawn((Player, Transform::from_xyz(2.0, 0.0, 0.0)));
+        world.spawn((Hero, Name::new("Ball"), Transform::from_xyz(5.0, 0.0, 0.0)));
+        let by_name = Some((5.0, "the entity named `Ball`".to_owned()));
+        assert_eq!(guessed(&world, &["Ball.Transform.translation.x", "Score.0"]), by_name);
+        let by_both = guessed(&world, &["Ball.Transform.translation.x", "Paddle.Transform.translation.x"]);
+        assert_eq!(by_both, Some((2.0, "the entity with `Player`".to_owned())), "two are observed");
+    }
+
+    #[test]
+    fn a_child_is_where_its_parents_have_put_it() {
+        let mut world = World::new();
+        let place = GlobalTransform::from_translation(Vec3::new(7.0, 0.0, 0.0));
+        let child = world.spawn((Name::new("Player"), Transform::from_xyz(1.0, 0.0, 0.0))).id();
+        world.spawn(Transform::from_xyz(6.0, 0.0, 0.0)).add_child(child);
+        world.entity_mut(child).insert(place);
+        assert_eq!(guessed(&world, &[]), Some((7.0, "the entity named `Player`".to_owned())));
+    }
+
+    #[test]
+    fn components_of_the_engine_and_of_the_plugin_mark_no_agent() {
+        let mut world = World::new();
+        world.spawn((Player, Transform::default()));
+        assert!(named(&world).is_empty(), "this crate is a part of the plugin");
+    }
+}

@@ -1,0 +1,266 @@
+//! Progress of agents without a floor plan: success in the first tick, and the position at which most episodes of an
+//! unsolved level stop.
+
+use bevy::{math::Vec2, prelude::*};
+use bevy_playbot::episode::{Episode, EpisodeResult};
+use playbot_harness::game::Game;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Fewest episodes with positions of which a common stop is reported.
+const FEWEST: usize = 3;
+
+/// Radius of a common stop, as a share of the distance that the best episode came from its start.
+const RADIUS: f32 = 0.1;
+
+/// Share of that distance that a common stop must have from the start.
+const FAR: f32 = 0.5;
+
+/// Progress of an agent in an episode.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Track {
+    /// True if the goal was reached in the first tick.
+    pub is_solved_at_start: bool,
+    /// Its positions, if they are known.
+    pub route: Option<Route>,
+}
+
+/// Positions of an agent in an episode.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Route {
+    /// Position after the first tick.
+    pub start: Vec2,
+    /// Position with the largest distance from the start.
+    pub furthest: Vec2,
+    /// Last position.
+    pub end: Vec2,
+    /// The entity whose position it is, if the game does not declare positions.
+    pub entity: Option<String>,
+}
+
+impl Route {
+    /// Returns the largest distance from the start.
+    fn length(&self) -> f32 {
+        self.start.distance(self.furthest)
+    }
+}
+
+/// Progress of one agent, episode after episode.
+pub(super) struct TrackCounter {
+    agent: Entity,
+    now: Track,
+}
+
+impl TrackCounter {
+    /// Makes a counter for an agent.
+    pub fn new(agent: Entity) -> Self {
+        Self { agent, now: Track::default() }
+    }
+
+    /// Notes the tick that was just played; `result` is the result of the episode if it is over.
+    pub fn tick(&mut self, game: &dyn Game, world: &World, result: Option<&EpisodeResult>) {
+        let Some(episode) = world.get::<Episode>(self.agent) else { return };
+        if episode.tick == 0 || !(episode.is_running() || result.is_some()) {
+            return;
+        }
+        if episode.tick == 1 {
+            let is_solved_at_start = result.map_or_else(|| episode.is_success(), |result| result.success);
+            self.now = Track { is_solved_at_start, route: None };
+        }
+        let state = game.tools().state;
+        let declared = state.position(world, self.agent).map(|position| (position, None));
+        let guessed = || state.guessed_position(world, self.agent).map(|guess| (guess.position, Some(guess.entity)));
+        if let Some((position, entity)) = declared.or_else(guessed).filter(|(position, _)| position.is_finite()) {
+            self.note(position, entity);
+        }
+    }
+
+    fn note(&mut self, position: Vec2, entity: Option<String>) {
+        match &mut self.now.route {
+            // Distances from another entity's start mean nothing.
+            Some(route) if route.entity == entity => {
+                route.end = position;
+                if route.start.distance(position) > route.length() {
+                    route.furthest = position;
+                }
+            }
+            route => *route = Some(Route { start: position, furthest: position, end: position, entity }),
+        }
+    }
+
+    /// Returns the progress in the episode that is over, and forgets it.
+    pub fn take(&mut self) -> Track {
+        std::mem::take(&mut self.now)
+    }
+}
+
+/// The position at which most episodes of an unsolved level stop.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CommonStop {
+    /// The part of an episode that is meant.
+    pub kind: StopKind,
+    /// The position, in the units of the game's positions.
+    pub x: f32,
+    /// The position.
+    pub y: f32,
+    /// Largest distance of these episodes from it.
+    pub within: f32,
+    /// Episodes that stopped there.
+    pub episodes: u64,
+    /// All episodes whose positions are known.
+    pub of: u64,
+    /// The entity whose position it is, if the game does not declare positions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub entity: Option<String>,
+}
+
+/// The part of an episode that a [`CommonStop`] is about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum StopKind {
+    /// The position furthest from the start.
+    Furthest,
+    /// The last position.
+    End,
+    /// The start, which no episode left.
+    Start,
+}
+
+impl fmt::Display for CommonStop {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { kind, x, y, within, episodes, of, entity } = self;
+        if episodes == of {
+            write!(f, "all {of} episodes ")?;
+        } else {
+            write!(f, "{episodes} of {of} episodes ")?;
+        }
+        match kind {
+            StopKind::Furthest => write!(f, "got no further than ({x:.1}, {y:.1}), within {within:.1}")?,
+            StopKind::End => write!(f, "ended within {within:.1} of ({x:.1}, {y:.1})")?,
+            StopKind::Start => write!(f, "stayed within {within:.1} of ({x:.1}, {y:.1})")?,
+        }
+        entity.iter().try_for_each(|entity| write!(f, ", by the position of {entity}"))
+    }
+}
+
+/// Returns the position at which more than half of these episodes stopped: the furthest one from the start, or else
+/// the last one. `None` if they stopped at different positions, or if less than three positions are known.
+pub(super) fn common_stop<'a>(tracks: impl Iterator<Item = &'a Track>) -> Option<CommonStop> {
+    let routes: Vec<&Route> = tracks.filter_map(|track| track.route.as_ref()).collect();
+    let entity = routes.first()?.entity.clone();
+    // Positions of different entities are not comparable.
+    if routes.len() < FEWEST || routes.iter().any(|route| route.entity != entity) {
+        return None;
+    }
+    let length = routes.iter().map(|route| route.length()).fold(0.0, f32::max);
+    let of = routes.len() as u64;
+    let stop = |kind, (position, within, episodes): (Vec2, f32, u64)| CommonStop {
+        kind,
+        x: position.x,
+        y: position.y,
+        within,
+        episodes,
+        of,
+        entity: entity.clone(),
+    };
+    let is_most = |(_, _, episodes): &(Vec2, f32, u64)| 2 * episodes > of;
+    let ends: Vec<Vec2> = routes.iter().map(|route| route.end).collect();
+    if length <= 0.0 {
+        // An entity that never moves may not be the agent's.
+        let found = densest(&ends, 0.0).filter(is_most).filter(|_| entity.is_none())?;
+        return Some(stop(StopKind::Start, found));
+    }
+    let radius = RADIUS * length;
+    // Episodes that hardly left the start show no obstacle.
+    let far = routes.iter().filter(|route| route.length() >= FAR * length);
+    let furthest: Vec<Vec2> = far.map(|route| route.furthest).collect();
+    if let Some(found) = densest(&furthest, radius).filter(is_most) {
+        return Some(stop(StopKind::Furthest, found));
+    }
+    let found = densest(&ends, radius).filter(is_most)?;
+    Some(stop(StopKind::End, found))
+}
+
+/// Returns the first of these positions with the most others within this distance: with the largest distance of these
+/// from it, and their number.
+fn densest(positions: &[Vec2], radius: f32) -> Option<(Vec2, f32, u64)> {
+    let mut best: Option<(Vec2, f32, u64)> = None;
+    for &position in positions {
+        let distances = positions.iter().map(|other| position.distance(*other)).filter(|distance| *distance <= radius);
+        let (within, count) = distances.fold((0.0, 0), |(within, count), one| (f32::max(within, one), count + 1));
+        if best.is_none_or(|(.., most)| count > most) {
+            best = Some((position, within, count));
+        }
+    }
+    best
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Makes the track of an episode that goes from 0, 0 to `furthest` and ends at `end`.
+    fn track(furthest: [f32; 2], end: [f32; 2]) -> Track {
+        let [furthest, end] = [furthest, end].map(Vec2::from_array);
+        Track { is_solved_at_start: false, route: Some(Route { start: Vec2::ZERO, furthest, end, entity: None }) }
+    }
+
+    fn words(tracks: &[Track]) -> Option<String> {
+        common_stop(tracks.iter()).map(|stop| stop.to_string())
+    }
+
+    #[test]
+    fn episodes_that_meet_an_obstacle_stop_at_the_same_distance() {
+        let walled = [track([12.0, 3.0], [1.0, 0.0]), track([12.5, 3.0], [5.0, 0.0]), track([12.25, 3.0], [9.0, 0.0])];
+        // Each is within a tenth of 12.9 of all, and the first counts.
+        assert_eq!(words(&walled).as_deref(), Some("all 3 episodes got no further than (12.0, 3.0), within 0.5"));
+        let mut rested = walled.to_vec();
+        rested.push(track([0.5, 0.0], [0.0, 0.0]));
+        let most = "3 of 4 episodes got no further than (12.0, 3.0), within 0.5";
+        assert_eq!(words(&rested).as_deref(), Some(most));
+        assert_eq!(words(&walled[..2]), None, "two episodes may meet by chance");
+    }
+
+    #[test]
+    fn episodes_that_rest_show_no_obstacle_beside_one_that_goes_far() {
+        let tracks = [track([0.1, 0.0], [0.1, 0.0]), track([0.2, 0.0], [0.2, 0.0]), track([40.0, 0.0], [40.0, 0.0])];
+        assert_eq!(words(&tracks).as_deref(), Some("2 of 3 episodes ended within 0.1 of (0.1, 0.0)"));
+    }
+
+    #[test]
+    fn episodes_that_end_at_one_position_are_reported_by_their_ends() {
+        let tracks = [track([10.0, 0.0], [2.0, 1.0]), track([0.0, 10.0], [2.0, 1.5]), track([-10.0, 0.0], [2.0, 1.0])];
+        assert_eq!(words(&tracks).as_deref(), Some("all 3 episodes ended within 0.5 of (2.0, 1.0)"));
+        let apart = [track([10.0, 0.0], [9.0, 1.0]), track([0.0, 10.0], [2.0, 9.0]), track([-10.0, 0.0], [-5.0, 0.0])];
+        assert_eq!(words(&apart), None);
+    }
+
+    #[test]
+    fn agents_that_never_move_are_reported_unless_they_are_guessed() {
+        let still = vec![track([0.0, 0.0], [0.0, 0.0]); 4];
+        assert_eq!(words(&still).as_deref(), Some("all 4 episodes stayed within 0.0 of (0.0, 0.0)"));
+        let guessed = |mut track: Track, entity: &str| {
+            track.route.iter_mut().for_each(|route| route.entity = Some(entity.to_owned()));
+            track
+        };
+        let all = |tracks: &[Track]| tracks.iter().map(|track| guessed(track.clone(), "the one")).collect::<Vec<_>>();
+        assert_eq!(words(&all(&still)), None);
+        let moved = vec![track([4.0, 0.0], [4.0, 0.0]); 3];
+        let named = "all 3 episodes got no further than (4.0, 0.0), within 0.0, by the position of the one";
+        assert_eq!(words(&all(&moved)).as_deref(), Some(named));
+        let mixed: Vec<Track> =
+            moved.iter().zip(["a", "b", "b"]).map(|(one, name)| guessed(one.clone(), name)).collect();
+        assert_eq!(words(&mixed), None, "these are positions of two entities");
+    }
+
+    #[test]
+    fn a_route_keeps_its_first_furthest_and_last_position() {
+        let mut counter = TrackCounter::new(Entity::PLACEHOLDER);
+        for x in [1.0, 4.0, -1.0, 2.0] {
+            counter.note(Vec2::new(x, 0.0), None);
+        }
+        let [start, furthest, end] = [1.0, 4.0, 2.0].map(|x| Vec2::new(x, 0.0));
+        assert_eq!(counter.take().route, Some(Route { start, furthest, end, entity: None }));
+        assert_eq!(counter.take(), Track::default(), "the next episode has its own");
+    }
+}
