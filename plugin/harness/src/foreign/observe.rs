@@ -173,6 +173,27 @@ impl ForeignGame {
     ) -> Self {
         self.with(|description| description.proof = Some(ReaderFactory::new(system)))
     }
+
+    /// Adds a reward of each tick to other rewards. The system also runs once before the first tick, to read what
+    /// happened before it, and pays nothing for that.
+    pub fn reward<M: 'static>(self, system: impl IntoSystem<(), f32, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.rewards.push((SystemFactory::new(system, |reward| reward), false)))
+    }
+
+    /// Adds a reward by the growth of a value, such as a score, since the last tick. The value need not begin at 0 in
+    /// an episode.
+    pub fn reward_delta<M: 'static>(self, system: impl IntoSystem<(), f32, M> + Clone + Send + Sync + 'static) -> Self {
+        self.with(|description| description.rewards.push((SystemFactory::new(system, |value| value), true)))
+    }
+
+    /// Declares whether and how the game is over after a tick. The system runs in `Last`, and once before the first tick,
+    /// where its answer does not count.
+    pub fn end<M: 'static>(
+        self,
+        system: impl IntoSystem<(), Option<EpisodeEnd>, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| description.end = Some(SystemFactory::new(system, |end| end)))
+    }
 }
 
 /// A position that has a place on the plan of its level.
