@@ -203,7 +203,16 @@ mod tests {
         };
         assert_eq!(
             names(carried.resources.iter().map(|(id, _)| *id).collect()),
-            ["ActivePolicy", "AgentOrder", "Faults", "PanicReports", "PlaybotSeed", "Recorder", "SkillPrior"]
+            [
+                "ActivePolicy",
+                "AgentOrder",
+                "Faults",
+                "OverdueAssets",
+                "PanicReports",
+                "PlaybotSeed",
+                "Recorder",
+                "SkillPrior"
+            ]
         );
         assert_eq!(
             names(carried.components.iter().map(|(id, _)| *id).collect()),

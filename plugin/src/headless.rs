@@ -301,8 +301,9 @@ impl HeadlessPlugins {
         Self { draws: true, ..default() }
     }
 
-    /// Lets plugins find Bevy's `RenderApp` while they are built, for plugins that panic without it. What they add to it
-    /// has no effect, since the sub-app is removed before plugins are finished. It makes a World slower to build.
+    /// Lets plugins of the game find Bevy's `RenderApp` while they are built, for plugins that panic without it. What
+    /// they add to it has no effect, since the sub-app is removed before plugins are finished. It makes a World slower to
+    /// build.
     pub fn with_render_app(self) -> Self {
         Self { shows_sub_app: true, ..self }
     }

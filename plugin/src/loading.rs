@@ -96,9 +96,12 @@ impl fmt::Display for UnloadedAssets {
 const PATIENT_LOOKS: u32 = 10_000;
 
 /// The record of loads that frames have waited for.
-#[derive(Resource, Default)]
+#[derive(Resource, Default, Reflect)]
+#[reflect(from_reflect = false)]
+#[reflect(Component)]
 struct AwaitedLoads {
     /// The system that counts loads.
+    #[reflect(ignore)]
     count: Option<BoxedSystem>,
     /// Loads that had begun when the last wait was over.
     begun: Option<u64>,

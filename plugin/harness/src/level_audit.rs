@@ -2,7 +2,7 @@
 
 use crate::{
     eval::{EpisodeResult, EvalError, EvalPlan, Player, evaluate},
-    game::Game,
+    game::{Game, idle_action, is_named_idle},
     held_out::{HeldOut, by_layout},
     split::LevelSplit,
 };
@@ -53,8 +53,8 @@ pub fn levels_in(game: &dyn Game, split: &LevelSplit, others: &LevelSplit) -> BT
 /// Levels that need no player.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PlainLevels {
-    /// Levels that are solved at their start: in the first tick, by every action.
-    pub at_start: BTreeSet<u64>,
+    /// Levels that need no action: solved by the idle action alone, or in the first tick by every action.
+    pub without_action: BTreeSet<u64>,
     /// Other levels that are solved by holding one action all the time, by its name.
     pub by_one_action: Vec<(String, BTreeSet<u64>)>,
 }
@@ -85,7 +85,8 @@ impl PlainLevels {
         };
         let mut solved = Vec::new();
         let mut first_ticks = BTreeMap::<u64, u64>::new();
-        let actions = held_actions(game);
+        let mut without_action = BTreeSet::new();
+        let (actions, idle) = (held_actions(game), known_idle_action(game));
         for (name, action) in &actions {
             let player = Player::Blind(BlindBot::Constant(action.clone()));
             let results = evaluate(game, &player, &plan, &progress)?;
@@ -93,14 +94,17 @@ impl PlainLevels {
             for result in wins().filter(|result: &&EpisodeResult| result.ticks <= 1) {
                 *first_ticks.entry(result.level).or_default() += 1;
             }
+            if idle.as_ref() == Some(action) {
+                without_action.extend(wins().map(|result| result.level));
+            }
             solved.push((name.clone(), wins().map(|result| result.level).collect::<BTreeSet<u64>>()));
         }
         let is_at_start = |(level, count): (u64, u64)| (count == actions.len() as u64).then_some(level);
-        let at_start: BTreeSet<u64> = first_ticks.into_iter().filter_map(is_at_start).collect();
-        let others = |levels: BTreeSet<u64>| levels.difference(&at_start).copied().collect::<BTreeSet<_>>();
+        without_action.extend(first_ticks.into_iter().filter_map(is_at_start));
+        let others = |levels: BTreeSet<u64>| levels.difference(&without_action).copied().collect::<BTreeSet<_>>();
         let by_one_action = solved.into_iter().map(|(name, levels)| (name, others(levels)));
         let by_one_action = by_one_action.filter(|(_, levels)| !levels.is_empty()).collect();
-        Ok(Self { at_start, by_one_action })
+        Ok(Self { without_action, by_one_action })
     }
 
     /// Returns the levels that some held action solves.
@@ -112,6 +116,16 @@ impl PlainLevels {
 /// Returns the number of episodes that [`PlainLevels::of`] plays.
 pub fn plain_episodes(game: &dyn Game, split: &LevelSplit) -> u64 {
     split.len().saturating_mul(held_actions(game).len() as u64)
+}
+
+/// Returns the action that holds nothing, if the game has one by its name.
+fn known_idle_action(game: &dyn Game) -> Option<ActionValue> {
+    let names = game.tools().input.action_names();
+    let idle = idle_action(game);
+    match idle {
+        ActionValue::Discrete(choice) if !is_named_idle(&names, choice) => None,
+        _ => Some(idle),
+    }
 }
 
 /// Returns the actions that are held, with their names.

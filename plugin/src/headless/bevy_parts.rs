@@ -95,7 +95,7 @@ fn without<P: Plugin>(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
     if plugins.contains::<P>() { plugins.disable::<P>() } else { plugins }
 }
 
-/// Sets up the renderer to draw nothing. With `shows_sub_app` its sub-app exists while plugins are built.
+/// Sets up the renderer to draw nothing. With `shows_sub_app` its sub-app exists while the game's plugins are built.
 pub(super) fn without_drawing(plugins: PluginGroupBuilder, shows_sub_app: bool) -> PluginGroupBuilder {
     #[allow(unused_imports, reason = "Bevy may lack these modules")]
     use bevy::*;
@@ -106,8 +106,9 @@ pub(super) fn without_drawing(plugins: PluginGroupBuilder, shows_sub_app: bool) 
     let plugins =
         plugins.set(render::RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() });
     if shows_sub_app {
-        // Plugins are finished in this order, and those of the renderer need a graphics adapter then.
-        plugins.add_before::<PanicHandlerPlugin>(HiddenRenderer).add_before::<render::RenderPlugin>(ShownRenderer)
+        // Shown after Bevy's own plugins, which would need a graphics adapter if they found it, and hidden before any
+        // plugin is finished.
+        plugins.add_before::<PanicHandlerPlugin>(HiddenRenderer).add(ShownRenderer)
     } else {
         plugins.add(RenderListPlugin)
     }

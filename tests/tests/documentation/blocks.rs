@@ -128,8 +128,12 @@ fn every_block_is_of_a_kind_that_is_checked() {
                 "toml" => {
                     assert!(block.contains("[dependencies]") || block.contains("-dependencies]"), "{path}:{line}")
                 }
-                // A workflow that runs a command, in spaces, as YAML has it.
-                "yaml" => assert!(block.contains("runs-on:") && block.contains("- run: ") && !block.contains('\t')),
+                // A workflow of GitHub or a job of GitLab that runs a command, in spaces, as YAML has it.
+                "yaml" => {
+                    let runs =
+                        block.contains("runs-on:") && block.contains("- run: ") || block.contains("\n  script: ");
+                    assert!(runs && !block.contains('\t'), "{path}:{line}");
+                }
                 // Output of a command: the command stands above it, and can be called (see `commands`).
                 "text" => assert!(
                     !marker.is_empty() || text.lines().take(line - 1).any(|line| line == "```sh"),

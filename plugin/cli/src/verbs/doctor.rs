@@ -65,6 +65,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let mode = args.mode.unwrap_or_else(|| default_mode(game).to_owned());
     let level = level_number(args.level, args.seed).unwrap_or(0);
+    game.check_mode(&mode)?;
     check_level(game, &mode, level)?;
     check_build(game, &mode)?;
     let options = DoctorOptions {

@@ -21,9 +21,9 @@ use std::collections::BTreeSet;
 ///
 /// Two levels are equal if their layouts are: all that play meets, without pictures. Different numbers, or a number and
 /// a file, can have one layout. Then each level is played once with each action, held from the start to the end. That
-/// shows the levels that are solved at their start, and those that one held action solves.
+/// shows the levels that are solved without an action, and those that one held action solves.
 ///
-/// Exit code 1 if levels are equal, among those of another set, or solved at their start.
+/// Exit code 1 if levels are equal, among those of another set, or solved without an action.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot levels GAME --levels MODE:0..99
@@ -94,9 +94,9 @@ struct Audit {
 
 impl Audit {
     fn is_clean(&self) -> bool {
-        let at_start = self.plain.iter().any(|plain| !plain.at_start.is_empty());
+        let needs_none = self.plain.iter().any(|plain| !plain.without_action.is_empty());
         let is_equal = self.equal.iter().any(|equal| !equal.groups.is_empty());
-        !at_start && !is_equal && self.among.iter().all(|(_, known)| known.is_empty())
+        !needs_none && !is_equal && self.among.iter().all(|(_, known)| known.is_empty())
     }
 
     fn to_json(&self, game: &dyn Game) -> String {
@@ -111,14 +111,14 @@ impl Audit {
             "layouts": self.equal.as_ref().map(|equal| equal.layouts),
             "equal": self.equal.as_ref().map(|equal| &equal.groups),
             "among": among.collect::<Vec<_>>(),
-            "solved_at_start": self.plain.as_ref().map(|plain| &plain.at_start),
+            "solved_without_action": self.plain.as_ref().map(|plain| &plain.without_action),
             "solved_by_one_action": self.plain.as_ref().map(by_one_action),
         })
         .to_string()
     }
 
     fn to_text(&self, game: &dyn Game) -> String {
-        let mut lines = vec![format!("{} {}: {}", game.name(), self.levels, counted(self.levels.len(), "level"))];
+        let mut lines = vec![format!("{} {}: {} levels", game.name(), self.levels, whole(self.levels.len() as f64))];
         match &self.equal {
             None => lines.push(format!(
                 "equal levels: unknown, since {} does not compare the layouts of these levels",
@@ -145,8 +145,8 @@ impl Audit {
             lines.push(format!("among {others}: {}{}", whole(known.len() as f64), listed(known)));
         }
         if let Some(plain) = &self.plain {
-            let at_start = &plain.at_start;
-            lines.push(format!("solved at the start: {}{}", at_start.len(), listed(at_start)));
+            let none = &plain.without_action;
+            lines.push(format!("solved without an action: {}{}", none.len(), listed(none)));
             let any = plain.by_any_action();
             lines.push(format!("solved by holding one action: {}", whole(any.len() as f64)));
             let by_action = plain.by_one_action.iter();

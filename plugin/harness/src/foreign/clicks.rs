@@ -18,7 +18,7 @@ use bevy::{
 use bevy_playbot::{
     action::Action,
     agent::Control,
-    engine::{Renewal, TickSchedules, check_actions, panics::note_actions},
+    engine::{Renewal, TickSchedules, check_actions},
     episode::EpisodeEnded,
     systems::PlaybotSystems,
     unknown_name::nearest,
@@ -138,11 +138,7 @@ pub(super) fn add_clicks(app: &mut App, input: &Input) {
     app.add_systems(
         decide,
         // No other system changes the inputs of the agent's actions.
-        aim.in_set(PlaybotSystems::Act)
-            .after(check_actions)
-            .after(note_actions)
-            .before(PressSystems)
-            .ambiguous_with(PlaybotSystems::Act),
+        aim.in_set(PlaybotSystems::Act).after(check_actions).before(PressSystems).ambiguous_with(PlaybotSystems::Act),
     )
     .add_systems(PreUpdate, set_interactions.after(InputSystems).after(UiSystems::Focus))
     .add_observer(end_episode);
