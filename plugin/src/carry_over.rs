@@ -119,6 +119,7 @@ mod tests {
         // Part of the game's construction.
         "Agent",
         "AgentLimit",
+        "AwaitedLoads",
         "CameraSensor",
         "EnhancedAction",
         "GameIdentity",
