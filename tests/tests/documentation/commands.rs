@@ -56,13 +56,12 @@ fn foreign_games() -> Vec<String> {
     games.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect()
 }
 
-/// Replaces `foreign_NAME` by the command of each of these games that has results, and `NAME` elsewhere by the game.
+/// Replaces `foreign_NAME` by the command of each of these games, and `NAME` elsewhere by the game.
 fn for_each_game(words: Vec<String>) -> Vec<Vec<String>> {
     if words.first().is_none_or(|program| program != "foreign_NAME") {
         return vec![words];
     }
-    let has_results = |game: &String| workspace().join("tests/foreign").join(game).join("experiment.ron").exists();
-    let games: Vec<String> = foreign_games().into_iter().filter(has_results).collect();
+    let games = foreign_games();
     games.iter().map(|game| words.iter().map(|word| word.replace("NAME", game)).collect()).collect()
 }
 
@@ -117,7 +116,7 @@ fn commands_of_foreign_games_are_checked_for_each_game() {
     let games = foreign_games();
     assert!(["breakout", "alien_cake_addict", "gem_hop"].iter().all(|name| games.iter().any(|game| game == name)));
     let expanded = for_each_game(words("foreign_NAME record NAME --out runs/NAME.demo"));
-    assert_eq!(expanded.len(), 3, "the sliding puzzle has no results");
+    assert_eq!(expanded.len(), games.len());
     assert!(expanded.contains(&words("foreign_breakout record breakout --out runs/breakout.demo")), "{expanded:?}");
     assert_eq!(for_each_game(words("playbot record NAME")), [words("playbot record NAME")]);
     assert_eq!(arguments(&expanded[0]).map(|all| all[..2].join(" ")).as_deref(), Some("playbot record"));

@@ -209,14 +209,12 @@ fn slow_game(restart: Restart) -> ForeignGame {
 #[test]
 fn recordings_of_a_level_that_arrives_late_replay_in_other_worlds_and_orders() {
     let folder = tempfile::tempdir().expect("a folder");
-    for (name, restart) in [("startup", Restart::Startup), ("rebuild", Restart::Rebuild)] {
-        let path = folder.path().join(format!("{name}.demo"));
-        let game = slow_game(restart);
-        record_demonstrator(&game, "default", 0.3, &path, [0, 1, 2, 0]);
-        let report = verify_file(&game, &path, |_| {}).expect("readable");
-        assert_eq!((report.episodes, &report.divergences), (4, &Vec::new()), "{name}");
-        assert_eq!(replayed_backwards(&game, &path), vec![None; 4], "{name}");
-    }
+    let path = folder.path().join("slow.demo");
+    let game = slow_game(Restart::Startup);
+    record_demonstrator(&game, "default", 0.3, &path, [0, 1, 2, 0]);
+    let report = verify_file(&game, &path, |_| {}).expect("readable");
+    assert_eq!((report.episodes, &report.divergences), (4, &Vec::new()));
+    assert_eq!(replayed_backwards(&game, &path), vec![None; 4]);
 }
 
 #[test]

@@ -169,7 +169,7 @@ fn a_name_that_two_buttons_share_is_a_warning_that_names_both_paths() {
 
 #[test]
 fn a_button_that_never_existed_in_an_episode_is_a_warning_with_the_nearest_name() {
-    let game = game(menu).clicks(["Strat"]).time_limit(2);
+    let game = game(menu).clicks(["Stort"]).time_limit(2);
     let (world, agent) = played(&game, &[0]);
     let warnings = |world: &World| world.get::<ButtonClicks>(agent).expect("it clicks").warnings().to_vec();
     assert!(warnings(&world).is_empty(), "it may still appear");
@@ -177,7 +177,7 @@ fn a_button_that_never_existed_in_an_episode_is_a_warning_with_the_nearest_name(
     assert_eq!(counts(&world, agent), (0, 2));
     let warnings = warnings(&world);
     let [warning] = warnings.as_slice() else { panic!("once: {warnings:?}") };
-    for part in ["no button `Strat`", "did you mean `Start`?", "`Credits/Back`", "`Options/Back`"] {
+    for part in ["no button `Stort`", "did you mean `Start`?", "`Credits/Back`", "`Options/Back`"] {
         assert!(warning.contains(part), "`{part}` is missing in: {warning}");
     }
 }

@@ -29,8 +29,9 @@ fn main() -> ExitCode {
         .reward(|screen: Res<State<Screen>>| f32::from(u8::from(**screen == Screen::Solved)))
         .end(|screen: Res<State<Screen>>| (**screen == Screen::Solved).then_some(EpisodeEnd::WON))
         .time_limit(120)
-        .level(|seed: Res<LevelSeed>, mut puzzle: ResMut<Puzzle>, mut next: ResMut<NextState<Screen>>| {
-            puzzle.0 = seed.0;
+        .level(|seed: Res<LevelSeed>, mut commands: Commands, mut next: ResMut<NextState<Screen>>| {
+            commands.insert_resource(Puzzle(seed.0));
+            commands.insert_resource(Board::default());
             next.set(Screen::Menu);
         })
         .demonstrator("solver", |board: Res<Board>, screen: Res<State<Screen>>| match **screen {
