@@ -135,7 +135,25 @@ pub struct EvalPlan {
     pub threads: usize,
 }
 
+/// Most Worlds of a plan for bots.
+const BOT_WORLDS: u32 = 8;
+
 impl EvalPlan {
+    /// Makes the plan of a bot: one episode on each level, with random seed 0, by at most `arenas` arenas.
+    pub fn of_bot(split: LevelSplit, arenas: u32, threads: usize) -> Self {
+        let arenas = arenas.min(u32::try_from(split.len()).unwrap_or(arenas));
+        Self {
+            split,
+            left_out: BTreeSet::new(),
+            observation_config: ObservationConfig::default(),
+            episodes_per_level: 1,
+            seed: 0,
+            arenas,
+            worlds: BOT_WORLDS.min(arenas),
+            threads,
+        }
+    }
+
     /// Returns the levels to play, in order.
     pub fn levels(&self) -> impl Iterator<Item = u64> + '_ {
         self.split.levels().filter(|level| !self.left_out.contains(level))

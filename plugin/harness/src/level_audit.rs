@@ -6,14 +6,12 @@ use crate::{
     held_out::{HeldOut, by_layout},
     split::LevelSplit,
 };
-use bevy_playbot::{bot::BlindBot, vision::ObservationConfig};
+use bevy_playbot::bot::BlindBot;
 use playbot_learner::{ActionSpace, ActionValue};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Arenas and Worlds in which actions are tried. The result does not depend on them.
+/// Most arenas in which actions are tried. The result does not depend on them.
 const ARENAS: u32 = 64;
-
-const WORLDS: u32 = 8;
 
 /// Levels of one layout under different numbers.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -72,17 +70,7 @@ impl PlainLevels {
         threads: usize,
         progress: impl Fn(u64) + Sync,
     ) -> Result<Self, EvalError> {
-        let arenas = ARENAS.min(u32::try_from(split.len()).unwrap_or(ARENAS));
-        let plan = EvalPlan {
-            split: split.clone(),
-            left_out: BTreeSet::new(),
-            observation_config: ObservationConfig::default(),
-            episodes_per_level: 1,
-            seed: 0,
-            arenas,
-            worlds: WORLDS.min(arenas),
-            threads,
-        };
+        let plan = EvalPlan::of_bot(split.clone(), ARENAS, threads);
         let mut solved = Vec::new();
         let mut first_ticks = BTreeMap::<u64, u64>::new();
         let mut without_action = BTreeSet::new();

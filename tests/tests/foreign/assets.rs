@@ -22,7 +22,7 @@ use bevy::{
 use playbot::prelude::*;
 use playbot_harness::{
     demo::verify_file,
-    foreign::{ForeignGame, LevelSeed, Restart},
+    foreign::{ForeignGame, LevelSeed},
     worlds::build_world,
 };
 use playbot_tests::recording::record_demonstrator;
@@ -185,7 +185,7 @@ fn walk(keys: Res<ButtonInput<KeyCode>>, time: Res<Time>, mut heroes: Query<&mut
 }
 
 /// Returns the adapter.
-fn slow_game(restart: Restart) -> ForeignGame {
+fn slow_game() -> ForeignGame {
     ForeignGame::new("slow", 1, game)
         .keys([vec![], vec![KeyCode::ArrowRight]])
         .observe(
@@ -196,7 +196,6 @@ fn slow_game(restart: Restart) -> ForeignGame {
         )
         .reward_delta(|hero: Single<&Transform, With<Hero>>| hero.translation.x)
         .time_limit(30)
-        .restart(restart)
         .level(|level: Res<LevelSeed>, mut wind: ResMut<Wind>, mut next: ResMut<NextDrop>| {
             wind.0 = level.0.wrapping_mul(0x9e37_79b9_7f4a_7c15);
             next.0.reset();
@@ -210,7 +209,7 @@ fn slow_game(restart: Restart) -> ForeignGame {
 fn recordings_of_a_level_that_arrives_late_replay_in_other_worlds_and_orders() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("slow.demo");
-    let game = slow_game(Restart::Startup);
+    let game = slow_game();
     record_demonstrator(&game, "default", 0.3, &path, [0, 1, 2, 0]);
     let report = verify_file(&game, &path, |_| {}).expect("readable");
     assert_eq!((report.episodes, &report.divergences), (4, &Vec::new()));

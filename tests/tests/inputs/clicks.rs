@@ -8,10 +8,9 @@ use bevy::{
 };
 use bevy_playbot::virtual_input::ActionAxis;
 use playbot::prelude::*;
-use playbot_harness::{
-    foreign::{ButtonClicks, ForeignGame},
-    worlds::build_world,
-};
+use playbot_harness::foreign::{ButtonClicks, ForeignGame};
+
+use crate::pointers::played;
 
 /// The names of the buttons that the game has seen pressed.
 #[derive(Resource, Default)]
@@ -72,18 +71,6 @@ fn menu(app: &mut App) {
 
 fn game(menu: fn(&mut App)) -> ForeignGame {
     ForeignGame::new("menu", 1, menu).observe(["nothing"], || [0.0])
-}
-
-/// Plays these actions, one in each tick.
-fn played(game: &ForeignGame, actions: &[u32]) -> (World, Entity) {
-    assert_eq!(game.problem(), None);
-    let (mut world, agents) = build_world(game, "default", 0, 0, 1);
-    world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(0)));
-    for &action in actions {
-        world.entity_mut(agents[0]).insert(Action(ActionValue::Discrete(action)));
-        world.tick().expect("sound");
-    }
-    (world, agents[0])
 }
 
 fn pressed(world: &World) -> &[String] {

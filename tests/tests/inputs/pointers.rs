@@ -53,8 +53,8 @@ const RIGHT: PointerPosition = PointerPosition::Pixels(Vec2::new(960.0, 360.0));
 const LEFT_PIXELS: Vec2 = Vec2::new(320.0, 360.0);
 const RIGHT_PIXELS: Vec2 = Vec2::new(960.0, 360.0);
 
-/// Plays these actions, one in each tick.
-fn played(game: &ForeignGame, actions: &[u32]) -> World {
+/// Plays these actions, one in each tick. Returns the World and its agent.
+pub fn played(game: &ForeignGame, actions: &[u32]) -> (World, Entity) {
     assert_eq!(game.problem(), None);
     let (mut world, agents) = build_world(game, "default", 0, 0, 1);
     world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(0)));
@@ -62,7 +62,7 @@ fn played(game: &ForeignGame, actions: &[u32]) -> World {
         world.entity_mut(agents[0]).insert(Action(ActionValue::Discrete(action)));
         world.tick().expect("sound");
     }
-    world
+    (world, agents[0])
 }
 
 fn clicking() -> ForeignGame {
@@ -75,7 +75,7 @@ fn clicking() -> ForeignGame {
 
 #[test]
 fn the_cursor_moves_before_its_button_is_pressed_and_each_tick_is_a_click() {
-    let world = played(&clicking(), &[1, 2, 2, 0]);
+    let (world, _) = played(&clicking(), &[1, 2, 2, 0]);
     let expected = [
         (Some(LEFT_PIXELS), true, true),
         (Some(RIGHT_PIXELS), true, true),
@@ -88,7 +88,7 @@ fn the_cursor_moves_before_its_button_is_pressed_and_each_tick_is_a_click() {
 
 #[test]
 fn an_episode_begins_with_the_cursor_outside_of_the_window() {
-    let world = played(&clicking().time_limit(1), &[1, 0]);
+    let (world, _) = played(&clicking().time_limit(1), &[1, 0]);
     let seen = &world.resource::<Seen>().mouse;
     assert_eq!(seen.last(), Some(&(None, false, false)), "{seen:?}");
     assert!(seen.contains(&(Some(LEFT_PIXELS), true, true)), "the episode before has moved it: {seen:?}");
@@ -97,14 +97,14 @@ fn an_episode_begins_with_the_cursor_outside_of_the_window() {
 #[test]
 fn a_button_that_is_held_from_one_position_to_another_drags() {
     let at = |position| HeldInput::default().at(position).hold([MouseButton::Left]);
-    let world = played(&game().input(VirtualInput::discrete([at(LEFT), at(RIGHT)])), &[0, 1]);
+    let (world, _) = played(&game().input(VirtualInput::discrete([at(LEFT), at(RIGHT)])), &[0, 1]);
     let seen = &world.resource::<Seen>().mouse;
     assert!(seen.ends_with(&[(Some(LEFT_PIXELS), true, true), (Some(RIGHT_PIXELS), true, false)]), "{seen:?}");
 }
 
 #[test]
 fn a_finger_is_down_for_one_tick_and_each_tick_is_a_tap() {
-    let world = played(&game().taps([None, Some(LEFT)]), &[1, 1, 0, 0]);
+    let (world, _) = played(&game().taps([None, Some(LEFT)]), &[1, 1, 0, 0]);
     let expected = [(vec![LEFT_PIXELS], false), (vec![LEFT_PIXELS], true), (vec![], true), (vec![], false)];
     let seen = &world.resource::<Seen>().touches;
     assert!(seen.ends_with(&expected), "{seen:?}");
@@ -112,7 +112,7 @@ fn a_finger_is_down_for_one_tick_and_each_tick_is_a_tap() {
 
 #[test]
 fn logical_keys_and_typed_text_come_and_go_with_a_key() {
-    let world = played(&game().keys([vec![], vec![KeyCode::KeyQ]]), &[1, 1, 0]);
+    let (world, _) = played(&game().keys([vec![], vec![KeyCode::KeyQ]]), &[1, 1, 0]);
     let expected = [(true, "q".to_owned()), (true, String::new()), (false, String::new())];
     let seen = &world.resource::<Seen>().typed;
     assert!(seen.ends_with(&expected), "{seen:?}");

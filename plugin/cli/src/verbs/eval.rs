@@ -163,10 +163,11 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 /// Returns the levels of each range that are not measured: of held-out levels, and with --new-layouts of any, those that
 /// some player knows. All players are measured on the same levels.
 fn left_out(splits: &[LevelSplit], known: Vec<BTreeSet<u64>>, args: &Args) -> Result<Vec<BTreeSet<u64>>, CliError> {
+    let keeps_all = !args.levels.is_empty() && !args.new_layouts;
     for (split, known) in splits.iter().zip(&known).filter(|(_, known)| !known.is_empty()) {
         let (is, it) = if known.len() == 1 { ("is", "it") } else { ("are", "them") };
         let levels = format!("{} of {split} {is}", counted(known.len() as u64, "level"));
-        if !args.levels.is_empty() && !args.new_layouts {
+        if keeps_all {
             report!("{levels} measured with the others: --new-layouts leaves {it} out");
         } else if known.len() as u64 == split.len() {
             return Err(CliError::Usage(format!(
@@ -176,7 +177,6 @@ fn left_out(splits: &[LevelSplit], known: Vec<BTreeSet<u64>>, args: &Args) -> Re
             report!("{levels} left out");
         }
     }
-    let keeps_all = !args.levels.is_empty() && !args.new_layouts;
     Ok(if keeps_all { vec![BTreeSet::new(); splits.len()] } else { known })
 }
 

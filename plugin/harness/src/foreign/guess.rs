@@ -8,7 +8,10 @@ use crate::{
     foreign::paths::{component_of, is_ours},
     game::GuessedPosition,
 };
-use bevy::{ecs::component::ComponentId, prelude::*};
+use bevy::{
+    ecs::{archetype::Archetype, component::ComponentId},
+    prelude::*,
+};
 use std::collections::BTreeSet;
 
 /// The word by which games call what a person plays.
@@ -65,13 +68,17 @@ impl Sign {
     /// Returns the entities that have the sign and a `Transform`.
     fn entities(&self, world: &World) -> Vec<Entity> {
         let Some(transform) = world.components().component_id::<Transform>() else { return Vec::new() };
-        let is_meant = |entity: Entity| match self {
-            Self::Components(any) => any.iter().any(|(_, component)| world.entity(entity).contains_id(*component)),
-            Self::Name(name) => world.get::<Name>(entity).is_some_and(|found| found.as_str() == name),
+        let may_match = |archetype: &&Archetype| match self {
+            Self::Components(any) => any.iter().any(|(_, component)| archetype.contains(*component)),
+            Self::Name(_) => true,
         };
-        let archetypes = world.archetypes().iter().filter(|archetype| archetype.contains(transform));
+        let is_meant = |entity: &Entity| match self {
+            Self::Components(_) => true,
+            Self::Name(name) => world.get::<Name>(*entity).is_some_and(|found| found.as_str() == name),
+        };
+        let archetypes = world.archetypes().iter().filter(|archetype| archetype.contains(transform)).filter(may_match);
         let entities = archetypes.flat_map(|archetype| archetype.entities().iter().map(|entity| entity.id()));
-        entities.filter(|entity| is_meant(*entity)).collect()
+        entities.filter(is_meant).collect()
     }
 
     /// Describes the entity by the sign.

@@ -8,7 +8,7 @@ use crate::bugs::{
     mutant::{Mutant, plant_level},
     set::{BugGame, BugSet, PlantedBug, PlantedPart, UnmutatedLevels, level_path},
 };
-use bevy_playbot::{bot::BlindBot, episode::EpisodeEnd, level::LevelFile, vision::ObservationConfig};
+use bevy_playbot::{bot::BlindBot, episode::EpisodeEnd, level::LevelFile};
 use playbot_harness::{
     defect::{DefectKind, Plant},
     eval::{EpisodeResult, EvalPlan, Player, blind_bots, evaluate},
@@ -315,8 +315,6 @@ const CHUNK: u64 = 128;
 
 const ARENAS: u32 = 32;
 
-const WORLDS: u32 = 8;
-
 /// The search gives up after this many times the levels that are needed.
 const MOST_TRIES: u64 = 8;
 
@@ -397,17 +395,7 @@ pub(super) fn sound_levels(
 }
 
 fn play(source: &Source, chunk: &LevelSplit, threads: usize) -> Result<Vec<EpisodeResult>, BugError> {
-    let arenas = ARENAS.min(u32::try_from(chunk.len()).unwrap_or(ARENAS));
-    let plan = EvalPlan {
-        split: chunk.clone(),
-        left_out: BTreeSet::new(),
-        observation_config: ObservationConfig::default(),
-        episodes_per_level: 1,
-        seed: 0,
-        arenas,
-        worlds: WORLDS.min(arenas),
-        threads,
-    };
+    let plan = EvalPlan::of_bot(chunk.clone(), ARENAS, threads);
     Ok(evaluate(source.game, &Player::Demonstrator, &plan, |_| {})?)
 }
 

@@ -6,14 +6,14 @@ use crate::{
     explore::{CellGrid, ExplorePlan, explore},
 };
 use bevy::math::Vec2;
-use bevy_playbot::{episode::EpisodeResult, vision::ObservationConfig};
+use bevy_playbot::episode::EpisodeResult;
 use playbot_harness::{
     detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead},
     eval::{EvalPlan, Player, evaluate},
     game::Game,
     split::LevelSplit,
 };
-use std::{collections::BTreeSet, ops::ControlFlow};
+use std::ops::ControlFlow;
 
 /// A finding for agents that succeed far from the goal of their level's plan.
 ///
@@ -240,16 +240,7 @@ impl Shortcut {
         }
         level.game.tools().bots.demonstrator()?;
         let split = LevelSplit { mode: level.mode.to_owned(), first: level.level, last: level.level };
-        let plan = EvalPlan {
-            split,
-            left_out: BTreeSet::new(),
-            observation_config: ObservationConfig::default(),
-            episodes_per_level: 1,
-            seed: 0,
-            arenas: 1,
-            worlds: 1,
-            threads: 1,
-        };
+        let plan = EvalPlan::of_bot(split, 1, 1);
         // Other detectors report a panic.
         let results = evaluate(level.game, &Player::Demonstrator, &plan, |_| {}).ok()?;
         results.iter().find(|result| result.success).map(|result| f64::from(result.ticks))

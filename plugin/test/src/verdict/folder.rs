@@ -272,24 +272,12 @@ fn whole_lines(file: &mut DiskFile) -> io::Result<(BTreeMap<u64, (u64, usize)>, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict::{MapScope, TesterRecord, results::ResultLines, testing::verdict};
+    use crate::verdict::{results::ResultLines, testing, testing::verdict};
     use playbot_learner::HasExitCode as _;
     use std::fs;
 
     fn record() -> TestRecord {
-        TestRecord {
-            game: "garden".to_owned(),
-            game_version: 1,
-            range: "hard:0..2".parse().expect("a split"),
-            files: None,
-            seed: 0,
-            testers: vec![TesterRecord::bot("random")],
-            episodes: 1,
-            detectors: Vec::new(),
-            options: Vec::new(),
-            maps: MapScope::default(),
-            shard: None,
-        }
+        testing::record("hard:0..2")
     }
 
     #[test]

@@ -100,25 +100,13 @@ mod tests {
 
     use super::*;
     use crate::verdict::{
-        MapScope, TesterRecord,
         folder::{Earlier, TestFolder},
+        testing,
         testing::verdict,
     };
 
     fn record(shard: Option<&str>) -> TestRecord {
-        TestRecord {
-            game: "garden".to_owned(),
-            game_version: 1,
-            range: "hard:0..10".parse().expect("a split"),
-            files: None,
-            seed: 0,
-            testers: vec![TesterRecord::bot("random")],
-            episodes: 1,
-            detectors: Vec::new(),
-            options: Vec::new(),
-            maps: MapScope::default(),
-            shard: shard.map(|shard| shard.parse().expect("a shard")),
-        }
+        TestRecord { shard: shard.map(|shard| shard.parse().expect("a shard")), ..testing::record("hard:0..10") }
     }
 
     /// Makes the results of a test, in the folder of this name.

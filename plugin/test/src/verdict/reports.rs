@@ -314,26 +314,15 @@ fn seen(tester: &TesterRecord) -> String {
 mod tests {
     use super::*;
     use crate::verdict::{
-        CommonStop, Finding, LevelVerdict, MapScope, Places, StopKind, TestRecord, TestedRun, TesterRecord,
+        CommonStop, Finding, LevelVerdict, Places, StopKind, TestRecord, TestedRun, TesterRecord,
         folder::{Earlier, TestFolder},
+        testing,
         testing::{tester, verdict},
     };
 
     #[test]
     fn shares_of_visited_places_and_levels_solved_in_their_first_tick_are_reported() {
-        let record = TestRecord {
-            game: "garden".to_owned(),
-            game_version: 1,
-            range: "hard:0..0".parse().expect("a split"),
-            files: None,
-            seed: 0,
-            testers: vec![TesterRecord::bot("random")],
-            episodes: 2,
-            detectors: Vec::new(),
-            options: Vec::new(),
-            maps: MapScope::default(),
-            shard: None,
-        };
+        let record = TestRecord { episodes: 2, ..testing::record("hard:0..0") };
         let said = |level: &LevelVerdict| {
             let parent = tempfile::tempdir().expect("a folder");
             let (mut folder, _) = TestFolder::open(parent.path(), &record, Earlier::Keep).expect("new");
@@ -405,17 +394,10 @@ mod tests {
     fn the_tester_that_failed_plays_again() {
         let trained = TesterRecord { checksum: Some("0f".to_owned()), greedy: true, ..TesterRecord::bot("ppo.policy") };
         let record = TestRecord {
-            game: "garden".to_owned(),
-            game_version: 1,
-            range: "bed:5..9".parse().expect("a split"),
-            files: None,
             seed: 3,
             testers: vec![TesterRecord::bot("random"), trained],
             episodes: 2,
-            detectors: Vec::new(),
-            options: Vec::new(),
-            maps: MapScope::default(),
-            shard: None,
+            ..testing::record("bed:5..9")
         };
         let testers = vec![tester("random", 2, 2, true), tester("ppo.policy", 1, 2, true)];
         let level = LevelVerdict { level: "bed:6".to_owned(), testers, ..verdict(1, 3, 4) };

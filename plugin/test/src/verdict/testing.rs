@@ -1,7 +1,8 @@
 //! Verdicts for unit tests.
 
 use crate::verdict::{
-    EpisodeScore, LevelOutcome, LevelVerdict, TesterVerdict, results::FinishTime, statistics::wilson,
+    EpisodeScore, LevelOutcome, LevelVerdict, MapScope, TestRecord, TesterRecord, TesterVerdict, results::FinishTime,
+    statistics::wilson,
 };
 use playbot_harness::detector::LevelProof;
 use std::collections::BTreeMap;
@@ -17,6 +18,23 @@ pub(super) fn score(solved: u64, episodes: u64) -> EpisodeScore {
         lost: episodes - solved,
         timed_out: 0,
         broken: 0,
+    }
+}
+
+/// Makes the record of a test of these levels, with one episode of `random` on each.
+pub(super) fn record(range: &str) -> TestRecord {
+    TestRecord {
+        game: "garden".to_owned(),
+        game_version: 1,
+        range: range.parse().expect("a split"),
+        files: None,
+        seed: 0,
+        testers: vec![TesterRecord::bot("random")],
+        episodes: 1,
+        detectors: Vec::new(),
+        options: Vec::new(),
+        maps: MapScope::default(),
+        shard: None,
     }
 }
 

@@ -1,27 +1,19 @@
 //! Tests of the comparison of results.
 
 use crate::verdict::{
-    Finding, LevelMaps, LevelOutcome, MapScope, TesterRecord,
+    Finding, LevelMaps, LevelOutcome, TesterRecord,
     compare::*,
     folder::{Earlier, TestFolder},
     results::RESULTS,
+    testing,
     testing::{tester, verdict},
 };
 use playbot_harness::detector::LevelProof;
 
 fn record(testers: &[&str]) -> TestRecord {
     TestRecord {
-        game: "garden".to_owned(),
-        game_version: 1,
-        range: "hard:0..499".parse().expect("a split"),
-        files: None,
-        seed: 0,
         testers: testers.iter().map(|name| TesterRecord::bot(*name)).collect(),
-        episodes: 1,
-        detectors: Vec::new(),
-        options: Vec::new(),
-        maps: MapScope::default(),
-        shard: None,
+        ..testing::record("hard:0..499")
     }
 }
 

@@ -139,8 +139,9 @@ fn description(record: &TestRecord, level: &LevelVerdict, program: &str) -> Stri
 mod tests {
     use super::*;
     use crate::verdict::{
-        Finding, MapScope, TestedRun,
+        Finding, TestedRun,
         folder::{Earlier, TestFolder},
+        testing,
         testing::verdict,
     };
     use playbot_harness::split::LevelSplit;
@@ -207,17 +208,9 @@ mod tests {
 
     fn record(mode: &str) -> TestRecord {
         TestRecord {
-            game: "garden".to_owned(),
-            game_version: 1,
             range: LevelSplit { mode: mode.to_owned(), first: 0, last: 9 },
-            files: None,
-            seed: 0,
-            testers: vec![TesterRecord::bot("random")],
             episodes: 2,
-            detectors: Vec::new(),
-            options: Vec::new(),
-            maps: MapScope::default(),
-            shard: None,
+            ..testing::record("hard:0..9")
         }
     }
 
