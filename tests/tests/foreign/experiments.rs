@@ -27,7 +27,7 @@ fn comments(text: &str) -> impl Iterator<Item = &str> {
 #[test]
 fn every_experiment_of_a_foreign_game_makes_sense() {
     let all = experiments();
-    assert_eq!(all.len(), 3, "{all:?}");
+    assert!(all.len() > 3, "{all:?}");
     for (game, file) in all {
         let experiment = read_experiment(&file).unwrap_or_else(|error| panic!("{error}"));
         experiment.check().unwrap_or_else(|error| panic!("{}: {error}", file.display()));
