@@ -5,6 +5,7 @@ mod detectors;
 mod eval;
 mod explore;
 mod findings;
+mod init;
 mod levels;
 mod merging;
 mod named_policies;
@@ -18,3 +19,7 @@ mod testing;
 mod trace;
 mod usage;
 mod work;
+
+// The adapter that `playbot init` writes names the game's crate.
+extern crate self as my_game;
+pub use init::{Player, plugin};

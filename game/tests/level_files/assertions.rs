@@ -42,9 +42,9 @@ fn sound_files_pass_and_a_walled_coin_is_reported_with_its_proof() {
     assert_levels_solvable(&game, &sound);
     assert_levels_solved_by(&game, "search", &sound);
     assert_deterministic(&game, &sound);
-    let test = LevelTest::new(&game, &levels(folder, "broken/*.json")).without_detector("all");
+    let test = playbot::test(&game).levels(&levels(folder, "broken/*.json")).without_detector("all");
     let test = test.findings_in(folder.join("found"));
-    let found = message(|| test.assert_solvable());
+    let found = message(|| test.assert_levels_solvable());
     assert!(found.starts_with("1 of 2 levels was not solved by any tester (`coinrun`, files:"), "{found}");
     assert!(found.contains("broken/walled.json: proved-unsolvable\n  search: solved 0 of 1"), "{found}");
     assert!(found.contains("\n  unreachable-goal: the coin cannot be reached: a search over all moves"), "{found}");

@@ -7,8 +7,8 @@ use crate::{
     output::{log, program},
     progress::interrupt,
     verbs::{
-        bench, bugs, completions, config, demo, doctor, eval, explore, eyes, learn_skills, level, levels, play, policy,
-        quickstart, record, replay, report, runs, study, test, trace, train, view,
+        bench, bugs, completions, config, demo, doctor, eval, explore, eyes, init, learn_skills, level, levels, play,
+        policy, quickstart, record, replay, report, runs, study, test, trace, train, view,
     },
 };
 use clap::{
@@ -43,6 +43,7 @@ const WIDEST: usize = 100;
 
 const EXAMPLES: &str = "\
 Examples:
+  playbot init --dry-run   which files would describe the game in this folder?
   playbot   learn from recordings of GAME, train, test, and write a report
   playbot level GAME --level 7   show a level
   playbot record GAME --levels MODE:0..9 --out my.demo
@@ -68,6 +69,7 @@ Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or co
 // Each is described where its arguments are.
 #[derive(Subcommand)]
 enum Verb {
+    Init(init::Args),
     Quickstart(quickstart::Args),
     Record(record::Args),
     Play(play::Args),
@@ -214,6 +216,7 @@ fn with_width(command: Command, is_on_terminal: bool) -> Command {
 
 fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
     match verb {
+        Verb::Init(args) => init::run(&args),
         Verb::Quickstart(args) => quickstart::run(args, games),
         Verb::Record(args) => record::run(args, games),
         Verb::Play(args) => play::run(args, games),

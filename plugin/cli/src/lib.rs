@@ -27,7 +27,7 @@
 //!
 //! #[test]
 //! fn levels_can_be_solved() {
-//!     playbot::assert_levels_solvable(&my_game(), "default:0..9");
+//!     playbot::test(&my_game()).levels("default:0..9").assert_levels_solvable();
 //! }
 //! ```
 //!
@@ -35,7 +35,7 @@
 //!
 //! - [`prelude`]: the imports of a game's bots and tests.
 //! - [`ForeignGame`] wraps a game as it is. [`Game`] is the contract behind it, for games that want more.
-//! - [`assert_levels_solvable`], [`assert_deterministic`] and [`LevelTest`]: assertions for `cargo test`.
+//! - [`test()`](fn@test) and [`LevelTest`]: assertions for `cargo test`.
 //! - [`main`](main()): the command line. [`check_usage`] checks a command line, [`mod@reference`] describes all verbs.
 //! - [`harness`], [`mod@test`], [`train`], [`mutation`], [`learner`], [`report`]: the crates behind it, for programs
 //!   that call them directly.
@@ -79,5 +79,5 @@ pub use playbot_train as train;
 pub use playbot_harness::{foreign::ForeignGame, game::Game};
 pub use playbot_test::assertions::{
     LevelTest, assert_deterministic, assert_findings_gone, assert_levels_solvable, assert_levels_solved_by,
-    assert_no_findings, assert_replays,
+    assert_no_findings, assert_replays, test,
 };

@@ -5,7 +5,8 @@ use clap::{Arg, Command, CommandFactory};
 use std::fmt::Write;
 
 /// The groups of verbs on the page, in the order of the page.
-const GROUPS: [(&str, &[&str]); 5] = [
+const GROUPS: [(&str, &[&str]); 6] = [
+    ("Begin", &["init"]),
     ("Test levels", &["test", "doctor", "replay", "explore", "levels", "report", "bugs"]),
     ("See levels and episodes", &["level", "trace", "view", "eyes", "play"]),
     ("Record", &["record", "demo"]),

@@ -1,5 +1,6 @@
 //! The verbs of the command line: a module each, with its options (`Args`) and its `run`.
 //!
+//! - Begin: [`init`].
 //! - Test levels: [`mod@test`], [`doctor`], [`replay`], [`explore`], [`levels`], [`report`], [`bugs`].
 //! - See levels and episodes: [`level`], [`trace`], [`view`], [`eyes`], [`play`].
 //! - Record: [`record`], [`demo`].
@@ -21,6 +22,7 @@ pub(crate) mod doctor;
 pub(crate) mod eval;
 pub(crate) mod explore;
 pub(crate) mod eyes;
+pub(crate) mod init;
 pub(crate) mod learn_skills;
 pub(crate) mod level;
 pub(crate) mod levels;

@@ -4,7 +4,7 @@
 //! use bevy::prelude::*;
 //! use playbot_harness::prelude::*;
 //! use playbot_harness::foreign::{ForeignGame, Restart};
-//! use playbot_test::assertions::{LevelTest, assert_deterministic, assert_levels_solvable};
+//! use playbot_test::assertions::test;
 //!
 //! #[derive(Component)]
 //! struct Walker;
@@ -29,9 +29,9 @@
 //! }
 //!
 //! // In a function with `#[test]`:
-//! assert_levels_solvable(&walk(), "default:0..3");
-//! assert_deterministic(&walk(), "default:0..1");
-//! LevelTest::new(&walk(), "default:0..3").bot("walker").episodes(2).assert_solved();
+//! test(&walk()).levels("default:0..3").assert_levels_solvable();
+//! test(&walk()).levels("default:0..1").assert_deterministic();
+//! test(&walk()).levels("default:0..3").bots(["walker"]).episodes(2).assert_levels_solved();
 //! ```
 //!
 //! Levels are named as on the command line: `MODE:first..last`, both included, or `files:levels/**/*.json`. Paths are
@@ -40,7 +40,7 @@
 //!
 //! A failure names each broken level with its defect, and the commands that show it. Failed episodes and findings are
 //! written below `target/playbot-findings`, so that `playbot replay` shows them; `playbot` stands for the program with
-//! the game.
+//! the game. Without such a program, [`LevelTest::assert_replays`] plays a file again in a test.
 //!
 //! The files of the folder, in reading order:
 //!
@@ -65,17 +65,35 @@ use std::{
     path::{Path, PathBuf},
 };
 
-pub use crate::assertions::{
-    assert_recordings::{assert_findings_gone, assert_replays},
-    testers::LevelTestError,
-};
+pub use crate::assertions::testers::LevelTestError;
+
+/// The program in the commands of a failure, unless another is named.
+const DEFAULT_PROGRAM: &str = "playbot";
 
 /// The finding that a goal is out of reach. It says nothing about determinism.
 const UNREACHABLE: &str = "unreachable-goal";
 
-/// A test of levels: set up first, then asserted.
+/// Begins a test of a game: `playbot::test(&game).levels("default:0..29").assert_no_findings()`. Each tester plays one
+/// episode on each level, with the default detectors, on all cores, unless the test says otherwise.
+pub fn test(game: &dyn Game) -> LevelTest<'_> {
+    LevelTest {
+        game,
+        levels: String::new(),
+        named: Vec::new(),
+        draw: ActionDraw::Sample,
+        episodes: 1,
+        seed: 0,
+        detectors: DetectorChoice::default(),
+        threads: default_threads(),
+        folder: default_folder(game.name()),
+        minimise: false,
+        program: DEFAULT_PROGRAM.to_owned(),
+    }
+}
+
+/// A test of levels, recordings or findings: set up first, then asserted. [`test()`] begins one.
 ///
-/// Testers are named with [`bot`](Self::bot), [`policy`](Self::policy) and [`player`](Self::player). Without them, the
+/// Testers are named with [`bots`](Self::bots), [`policy`](Self::policy) and [`player`](Self::player). Without them, the
 /// game's demonstrator or else its first bot must solve the levels, and all of its bots play when findings are
 /// asserted.
 #[derive(Clone)]
@@ -94,29 +112,23 @@ pub struct LevelTest<'a> {
     program: String,
 }
 
-impl<'a> LevelTest<'a> {
-    /// Creates a test of these levels: `MODE:first..last`, both included, or `files:levels/*.json`. Each tester plays
-    /// one episode on each level, with the default detectors, on all cores.
-    pub fn new(game: &'a dyn Game, levels: &str) -> Self {
-        Self {
-            game,
-            levels: levels.to_owned(),
-            named: Vec::new(),
-            draw: ActionDraw::Sample,
-            episodes: 1,
-            seed: 0,
-            detectors: DetectorChoice::default(),
-            threads: default_threads(),
-            folder: default_folder(game.name()),
-            minimise: false,
-            program: "playbot".to_owned(),
-        }
+impl LevelTest<'_> {
+    /// Names the levels: `MODE:first..last`, both included, or `files:levels/*.json`. Assertions about recordings and
+    /// findings need no levels.
+    pub fn levels(mut self, levels: &str) -> Self {
+        levels.clone_into(&mut self.levels);
+        self
     }
 
     /// Adds a bot of the game.
     pub fn bot(mut self, name: &str) -> Self {
         self.named.push(Named::Bot(name.to_owned()));
         self
+    }
+
+    /// Adds bots of the game.
+    pub fn bots<'b>(self, names: impl IntoIterator<Item = &'b str>) -> Self {
+        names.into_iter().fold(self, Self::bot)
     }
 
     /// Adds the policy in a file that `playbot policy export` has written.
@@ -199,7 +211,7 @@ impl<'a> LevelTest<'a> {
     /// A level was not solved. The message names each, with the results of its testers, the proof if it is unsolvable,
     /// and the commands that show it. Or the levels cannot be tested.
     #[track_caller]
-    pub fn assert_solvable(&self) {
+    pub fn assert_levels_solvable(&self) {
         if let Err(message) = self.check(Wanted::Solvable) {
             panic!("{message}");
         }
@@ -209,9 +221,9 @@ impl<'a> LevelTest<'a> {
     ///
     /// # Panics
     ///
-    /// As for [`assert_solvable`](Self::assert_solvable).
+    /// As for [`assert_levels_solvable`](Self::assert_levels_solvable).
     #[track_caller]
-    pub fn assert_solved(&self) {
+    pub fn assert_levels_solved(&self) {
         if let Err(message) = self.check(Wanted::Solved) {
             panic!("{message}");
         }
@@ -239,6 +251,36 @@ impl<'a> LevelTest<'a> {
     #[track_caller]
     pub fn assert_deterministic(&self) {
         if let Err(message) = self.check(Wanted::Deterministic) {
+            panic!("{message}");
+        }
+    }
+
+    /// Asserts that a recording replays bit for bit, or that a finding (a `.finding`) happens again in the same tick and
+    /// with the same state. For a folder, this is asserted of all recordings and findings in it. Levels, testers and
+    /// detectors are those of the files.
+    ///
+    /// # Panics
+    ///
+    /// A replay differs: the message has the first tick that differs, and the command that shows it. Or the path has no
+    /// recording or finding, holds no episode, is damaged, or is of another game or version.
+    #[track_caller]
+    pub fn assert_replays(&self, path: impl AsRef<Path>) {
+        if let Err(message) = self.check_replays(path.as_ref()) {
+            panic!("{message}");
+        }
+    }
+
+    /// Asserts that no finding in this folder happens any more, so that repaired defects stay repaired:
+    /// `playbot test --regress` for `cargo test`. Findings that are pinned in the folder's `pins.ron` do not count up to
+    /// their last day. Levels, testers and detectors are those of the files.
+    ///
+    /// # Panics
+    ///
+    /// A finding still happens or cannot be played: the message has the commands that show it. Or the folder has no
+    /// findings.
+    #[track_caller]
+    pub fn assert_findings_gone(&self, folder: impl AsRef<Path>) {
+        if let Err(message) = self.check_gone(folder.as_ref()) {
             panic!("{message}");
         }
     }
@@ -318,26 +360,26 @@ fn target_of(program: &Path) -> Option<&Path> {
     program.ancestors().skip(1).find(|folder| folder.join("CACHEDIR.TAG").is_file())
 }
 
-// Assertions without settings.
+// Assertions without settings, each in one call.
 
 /// Asserts that each of these levels can be solved: the game's demonstrator, or else its first bot, reaches the goal.
 ///
 /// # Panics
 ///
-/// A level was not solved, or the levels cannot be tested: see [`LevelTest::assert_solvable`].
+/// A level was not solved, or the levels cannot be tested: see [`LevelTest::assert_levels_solvable`].
 #[track_caller]
 pub fn assert_levels_solvable(game: &dyn Game, levels: &str) {
-    LevelTest::new(game, levels).assert_solvable();
+    test(game).levels(levels).assert_levels_solvable();
 }
 
 /// Asserts that a bot of the game solves each of these levels. Other testers are named with [`LevelTest`].
 ///
 /// # Panics
 ///
-/// A level was not solved, or the levels cannot be tested: see [`LevelTest::assert_solved`].
+/// A level was not solved, or the levels cannot be tested: see [`LevelTest::assert_levels_solved`].
 #[track_caller]
 pub fn assert_levels_solved_by(game: &dyn Game, bot: &str, levels: &str) {
-    LevelTest::new(game, levels).bot(bot).assert_solved();
+    test(game).levels(levels).bot(bot).assert_levels_solved();
 }
 
 /// Asserts that levels have no findings: no default [detector](crate::detectors) reports anything while all bots of the
@@ -348,7 +390,7 @@ pub fn assert_levels_solved_by(game: &dyn Game, bot: &str, levels: &str) {
 /// Something was found, or the levels cannot be tested: see [`LevelTest::assert_no_findings`].
 #[track_caller]
 pub fn assert_no_findings(game: &dyn Game, levels: &str) {
-    LevelTest::new(game, levels).assert_no_findings();
+    test(game).levels(levels).assert_no_findings();
 }
 
 /// Asserts that each bot of the game repeats its episode bit for bit on each of these levels.
@@ -358,7 +400,27 @@ pub fn assert_no_findings(game: &dyn Game, levels: &str) {
 /// An episode differed, or the levels cannot be tested: see [`LevelTest::assert_deterministic`].
 #[track_caller]
 pub fn assert_deterministic(game: &dyn Game, levels: &str) {
-    LevelTest::new(game, levels).assert_deterministic();
+    test(game).levels(levels).assert_deterministic();
+}
+
+/// Asserts that a recording or a finding plays again, or all in a folder.
+///
+/// # Panics
+///
+/// A replay differs, or there is nothing to replay: see [`LevelTest::assert_replays`].
+#[track_caller]
+pub fn assert_replays(game: &dyn Game, path: impl AsRef<Path>) {
+    test(game).assert_replays(path);
+}
+
+/// Asserts that no finding in this folder happens any more.
+///
+/// # Panics
+///
+/// A finding still happens, or there is none: see [`LevelTest::assert_findings_gone`].
+#[track_caller]
+pub fn assert_findings_gone(game: &dyn Game, folder: impl AsRef<Path>) {
+    test(game).assert_findings_gone(folder);
 }
 
 #[cfg(test)]

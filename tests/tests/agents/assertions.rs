@@ -110,21 +110,27 @@ fn assertions_hold_for_what_is_sound() {
     assert_no_findings(&Lane::Sound, "plain:5..9");
     assert_deterministic(&Lane::Sound, "plain:0..3");
     let right = Player::Blind(BlindBot::Constant(ActionValue::Discrete(1)));
-    LevelTest::new(&Corridor, "plain:7").player("mine", right).episodes(2).seed(5).threads(1).assert_solved();
-    let verdicts = LevelTest::new(&Lane::Sound, "plain:2..5").bot("left").verdicts().expect("levels");
+    playbot::test(&Corridor)
+        .levels("plain:7")
+        .player("mine", right)
+        .episodes(2)
+        .seed(5)
+        .threads(1)
+        .assert_levels_solved();
+    let verdicts = playbot::test(&Lane::Sound).levels("plain:2..5").bot("left").verdicts().expect("levels");
     let levels: Vec<&str> = verdicts.iter().map(|level| level.level.as_str()).collect();
     assert_eq!(levels, ["plain:2", "plain:3", "plain:4", "plain:5"]);
-    LevelTest::new(&Lane::Sound, "plain:2..5").bot("left").bot("right").assert_solvable();
+    playbot::test(&Lane::Sound).levels("plain:2..5").bots(["left", "right"]).assert_levels_solvable();
 }
 
 #[test]
 fn a_failure_names_each_level_with_its_proof_and_the_commands_that_show_it() {
     let folder = tempfile::tempdir().expect("a folder");
     let test = |levels: &str| {
-        let test = LevelTest::new(&Lane::Sound, levels).bot("left").episodes(2).seed(3);
+        let test = playbot::test(&Lane::Sound).levels(levels).bot("left").episodes(2).seed(3);
         test.without_detector("all").findings_in(folder.path()).program("jump")
     };
-    let found = message(|| test("plain:4..5").assert_solvable());
+    let found = message(|| test("plain:4..5").assert_levels_solvable());
     let of = |begin: &str| file(folder.path(), begin).display().to_string();
     let again = |level: &str| {
         format!(
@@ -151,9 +157,9 @@ fn a_failure_names_each_level_with_its_proof_and_the_commands_that_show_it() {
     assert_eq!(found, expected.join("\n"));
     assert_replays(&Lane::Sound, folder.path());
     // The first levels are reported in full, all others by name.
-    let many = message(|| test("plain:10..21").assert_solvable());
+    let many = message(|| test("plain:10..21").assert_levels_solvable());
     assert!(many.starts_with("12 of 12 levels ") && many.ends_with("\nand plain:20, plain:21"), "{many}");
-    let mixed = message(|| test("plain:5..6").bot("right").assert_solved());
+    let mixed = message(|| test("plain:5..6").bot("right").assert_levels_solved());
     assert!(mixed.contains("  left: solved 0 of 2, 2 lost\n  right: solved 2 of 2\n"), "{mixed}");
     assert!(message(|| assert_levels_solved_by(&Lane::Sound, "left", "plain:7")).contains("1 of 1 level was not"));
 }
@@ -161,22 +167,28 @@ fn a_failure_names_each_level_with_its_proof_and_the_commands_that_show_it() {
 #[test]
 fn a_finding_is_reported_until_it_is_mended() {
     let folder = tempfile::tempdir().expect("a folder");
-    let test = LevelTest::new(&Lane::Burning, "plain:0..3").bot("right").findings_in(folder.path()).minimise();
+    let test = playbot::test(&Lane::Burning).levels("plain:0..3").bot("right").findings_in(folder.path()).minimise();
     let found = message(|| test.assert_no_findings());
     let file = file(folder.path(), "plain-3.panic.right-");
     assert!(found.starts_with("something was found on 1 of 4 levels (`lane`, plain:0..3, right, "), "{found}");
     assert!(found.contains("\n  panic (right, episode 0, tick 1): the corridor burns"), "{found}");
     assert!(found.contains(&format!("\n    playbot replay {}\n", file.display())), "{found}");
     assert!(!found.contains("plain:2"), "{found}");
+    assert!(
+        found.ends_with("`playbot::test(&game).assert_replays(\"FILE\")` in a test plays such a file again"),
+        "{found}"
+    );
 
-    assert_replays(&Lane::Burning, &file);
-    assert_findings_gone(&Lane::Sound, folder.path());
+    playbot::test(&Lane::Burning).assert_replays(&file);
+    playbot::test(&Lane::Sound).assert_findings_gone(folder.path());
     let mended = message(|| assert_replays(&Lane::Sound, &file));
     assert!(mended.contains(": it does not happen again (plain:3: panic: the corridor burns"), "{mended}");
     let there = message(|| assert_findings_gone(&Lane::Burning, folder.path()));
     assert!(there.contains("1 of 1 findings are not gone:") && there.contains("(still-there): plain:3"), "{there}");
     assert!(there.ends_with(&format!("playbot replay {}", file.display())), "{there}");
     let empty = tempfile::tempdir().expect("a folder");
+    let own = message(|| playbot::test(&Lane::Burning).program("jump").assert_findings_gone(folder.path()));
+    assert!(own.ends_with(&format!("\n    jump replay {}", file.display())), "{own}");
     let none = message(|| assert_findings_gone(&Lane::Sound, empty.path()));
     assert!(none.contains("has no findings"), "{none}");
 }
@@ -201,7 +213,12 @@ fn what_cannot_be_tested_is_a_failure_in_words() {
         let found = message(|| assert_levels_solvable(&Lane::Sound, levels));
         assert!(found.contains(words), "{found}");
     }
-    let test = || LevelTest::new(&Lane::Sound, "plain:0..1");
+    let none = message(|| playbot::test(&Lane::Sound).assert_no_findings());
+    assert!(
+        none.starts_with("cannot test `lane`: no levels are named: write `.levels(\"MODE:first..last\")`"),
+        "{none}"
+    );
+    let test = || playbot::test(&Lane::Sound).levels("plain:0..1");
     for (test, words) in [
         (test().bot("right2"), "did you mean `right`?"),
         (test().bot("right").bot("right"), "two testers are called `right`"),
@@ -209,7 +226,7 @@ fn what_cannot_be_tested_is_a_failure_in_words() {
         (test().detect("stuck2"), "did you mean `stuck`?"),
         (test().set_detector("stuck.ticks=-1"), "at least 1"),
     ] {
-        let found = message(|| test.assert_solvable());
+        let found = message(|| test.assert_levels_solvable());
         assert!(found.starts_with("cannot test plain:0..1 of `lane`: ") && found.contains(words), "{found}");
     }
 }

@@ -46,7 +46,7 @@ mod red {
     use super::{super::hand_made::runner, *};
 
     fn every_level_can_be_finished() {
-        assert_levels_solvable(&runner(), "default:0..7");
+        playbot::test(&runner()).levels("default:0..7").assert_levels_solvable();
     }
 
     #[test]
@@ -71,8 +71,8 @@ fn repaired() -> ForeignGame {
 fn the_repair_that_is_shown_makes_all_levels_solvable() {
     assert!(read("docs/tutorial/test-your-levels.md").contains("| `[4.0, 7.5]` | `[4.0, 5.5]` |"));
     assert_eq!(PITS[4], [4.0, 7.5]);
-    assert_levels_solvable(&repaired(), "default:0..7");
-    assert_no_findings(&repaired(), "default:0..7");
+    playbot::test(&repaired()).levels("default:0..7").assert_levels_solvable();
+    playbot::test(&repaired()).levels("default:0..7").assert_no_findings();
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use crate::{
     assertions::{
-        LevelTest, Wanted,
+        DEFAULT_PROGRAM, LevelTest, Wanted,
         testers::{LevelTestError, Named, bot_names},
     },
     detectors::{DetectorChoice, Detectors},
@@ -36,7 +36,10 @@ impl LevelTest<'_> {
         match self.failure(wanted) {
             Ok(None) => Ok(()),
             Ok(Some(failure)) => Err(failure),
-            Err(error) => Err(format!("cannot test {} of `{}`: {error}", self.levels, self.game.name())),
+            Err(error) => Err(match self.levels.as_str() {
+                "" => format!("cannot test `{}`: {error}", self.game.name()),
+                levels => format!("cannot test {levels} of `{}`: {error}", self.game.name()),
+            }),
         }
     }
 
@@ -81,6 +84,9 @@ impl LevelTest<'_> {
     }
 
     fn plan(&self, wanted: Wanted) -> Result<TestPlan, LevelTestError> {
+        if self.levels.is_empty() {
+            return Err(LevelTestError::NoLevels);
+        }
         let split: LevelSplit = self.levels.parse()?;
         split.check(self.game)?;
         let plan = TestPlan {
@@ -226,6 +232,15 @@ impl Failure<'_> {
             let more = rest.len().saturating_sub(MOST_NAMED);
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
             lines.push(format!("and {}{more}", names.join(", ")));
+        }
+        let has_files = self.broken.iter().flat_map(|level| &level.findings).any(|finding| finding.file.is_some());
+        // The test may be all that the game has of playbot.
+        if self.commands.program == DEFAULT_PROGRAM && (has_files || self.episodes.iter().any(Option::is_some)) {
+            lines.push(
+                "without a program that has the game: `playbot::test(&game).assert_replays(\"FILE\")` in a test plays such \
+                 a file again"
+                    .to_owned(),
+            );
         }
         if is_level_files(&self.plan.split.mode) {
             let folder = std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."));

@@ -93,6 +93,9 @@ fn policy(game: &dyn Game, path: &Path, draw: ActionDraw) -> Result<Tester, Leve
 /// The reason why levels cannot be tested.
 #[derive(Debug, Error)]
 pub enum LevelTestError {
+    /// No levels were named.
+    #[error("no levels are named: write `.levels(\"MODE:first..last\")`, such as `.levels(\"default:0..9\")`")]
+    NoLevels,
     /// The text names no levels.
     #[error(transparent)]
     Levels(#[from] SplitError),

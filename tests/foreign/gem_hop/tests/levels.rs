@@ -7,7 +7,7 @@ mod game;
 use bevy::prelude::*;
 use game::{Hero, Level, Map, Screen, game};
 use playbot::harness::foreign::{ForeignGame, LevelSeed, Restart};
-use playbot::prelude::{EpisodeEnd, LevelTest, assert_deterministic, assert_levels_solvable};
+use playbot::prelude::EpisodeEnd;
 use playbot::test::verdict::LevelOutcome;
 
 /// Returns the game with a bot that runs and hops, as in `src/main.rs`, and with smaller observations.
@@ -35,14 +35,14 @@ fn gem_hop() -> ForeignGame {
 
 #[test]
 fn the_runner_solves_most_levels() {
-    let verdicts = LevelTest::new(&gem_hop(), "default:0..7").verdicts().expect("levels");
+    let verdicts = playbot::test(&gem_hop()).levels("default:0..7").verdicts().expect("levels");
     let solved: Vec<_> = verdicts.iter().filter(|level| level.outcome == LevelOutcome::Solved).collect();
     assert!(solved.len() >= 5, "{verdicts:?}");
     // A test can name the levels that must stay solvable: here the first of them.
-    assert_levels_solvable(&gem_hop(), &solved[0].level);
+    playbot::test(&gem_hop()).levels(&solved[0].level).assert_levels_solvable();
 }
 
 #[test]
 fn the_game_plays_the_same_again() {
-    assert_deterministic(&gem_hop(), "default:0..1");
+    playbot::test(&gem_hop()).levels("default:0..1").assert_deterministic();
 }

@@ -1,0 +1,207 @@
+//! Tests of `playbot init` on games in temporary folders.
+
+use std::{fs, path::Path};
+
+use bevy::prelude::*;
+use playbot::Game;
+
+use crate::program::{done, ended, lines, playbot};
+
+/// The adapter that is written for [`LIBRARY`]. That it is compiled here shows that it compiles for users.
+#[path = "../fixtures/init_adapter.rs"]
+mod adapter;
+
+/// The component that the adapter observes.
+#[derive(Component)]
+pub struct Player;
+
+/// The game of the adapter.
+pub fn plugin(app: &mut App) {
+    app.add_systems(Startup, |mut commands: Commands| {
+        commands.spawn((Player, Transform::default()));
+    });
+}
+
+const MANIFEST: &str = "[package]\nname = \"my-game\"\nedition = \"2024\"\n\n[dependencies]\nbevy = \"0.19\"\n";
+
+const LIBRARY: &str = "\
+#[derive(Component)]
+pub struct Player;
+#[derive(States)]
+pub enum Screen { Menu, Playing }
+pub fn plugin(app: &mut App) { app.add_systems(Update, walk); }
+fn walk(keys: Res<ButtonInput<KeyCode>>) {
+    let _ = [KeyCode::ArrowLeft, KeyCode::ArrowRight, KeyCode::Escape].map(|key| keys.pressed(key));
+    let _ = rand::rng();
+}
+";
+
+const MAIN: &str = "\
+use bevy::prelude::*;
+mod rules;
+fn main() {
+    App::new()
+        .add_plugins(DefaultPlugins)
+        .run();
+}
+";
+
+/// Writes files, with their folders.
+fn write(folder: &Path, files: &[(&str, &str)]) {
+    for (name, text) in files {
+        let path = folder.join(name);
+        fs::create_dir_all(path.parent().expect("a folder")).expect("writable");
+        fs::write(path, text).expect("writable");
+    }
+}
+
+fn read(folder: &Path, name: &str) -> String {
+    fs::read_to_string(folder.join(name)).unwrap_or_else(|error| panic!("{name}: {error}"))
+}
+
+const WRITTEN: [&str; 4] = ["bots/Cargo.toml", "bots/src/lib.rs", "bots/src/main.rs", "bots/tests/levels.rs"];
+
+#[test]
+fn the_adapter_of_a_game_with_a_library_is_one_that_compiles() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write(folder, &[("Cargo.toml", MANIFEST), ("src/lib.rs", LIBRARY)]);
+    let (found, reported) = done(folder, &["init"]);
+    assert_eq!(read(folder, "bots/src/lib.rs"), include_str!("../fixtures/init_adapter.rs"));
+    assert_eq!(adapter::adapter().problem(), None);
+    for line in [
+        "game: my-game, Bevy 0.19",
+        "functions of `&mut App`: plugin (src/lib.rs:5)",
+        "states: Screen (src/lib.rs:4): Menu | Playing",
+        "input: keyboard",
+        "player: Player (src/lib.rs:2)",
+        "random numbers without a seed: rand::rng() (src/lib.rs:8)",
+        "to do: make it the same every time: docs/how-to/make-it-deterministic.md",
+    ] {
+        assert!(found.lines().any(|found| found == line), "{line}: {found}");
+    }
+    let manifest = read(folder, "bots/Cargo.toml");
+    for line in ["bevy = { version = \"0.19\", default-features = false }", "my-game = { path = \"..\" }"] {
+        assert!(manifest.lines().any(|found| found == line), "{line}: {manifest}");
+    }
+    assert!(
+        manifest.contains("playbot = { path = \"") && manifest.ends_with("features = [\"window\"] }\n"),
+        "{manifest}"
+    );
+    assert!(read(folder, "bots/src/main.rs").contains("playbot::main(&[&bots::adapter()])"));
+    assert!(read(folder, "bots/tests/levels.rs").contains("playbot::test(&adapter())"));
+    assert!(reported.contains("written: bots/tests/levels.rs") && reported.contains("--edit-workspace"), "{reported}");
+    assert_eq!((read(folder, "Cargo.toml"), read(folder, "src/lib.rs")), (MANIFEST.to_owned(), LIBRARY.to_owned()));
+}
+
+#[test]
+fn a_second_run_leaves_all_files_alone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write(folder, &[("Cargo.toml", MANIFEST), ("src/lib.rs", LIBRARY), ("bots/src/lib.rs", "// Mine.\n")]);
+    let (_, first) = done(folder, &["init", "--edit-workspace"]);
+    assert!(first.contains("left alone: bots/src/lib.rs exists already"), "{first}");
+    assert!(first.contains("written: bots/Cargo.toml"), "{first}");
+    assert_eq!(read(folder, "bots/src/lib.rs"), "// Mine.\n");
+    assert_eq!(read(folder, "Cargo.toml"), format!("{MANIFEST}\n[workspace]\nmembers = [\"bots\"]\n"));
+    let before = [&["Cargo.toml"][..], &WRITTEN].concat().into_iter().map(|name| (name, read(folder, name)));
+    let before: Vec<_> = before.collect();
+    let (_, second) = done(folder, &["init", "--edit-workspace"]);
+    assert!(!second.contains("written: ") && !second.contains("[workspace]"), "{second}");
+    for (name, text) in before {
+        assert_eq!(read(folder, name), text, "{name}");
+    }
+}
+
+#[test]
+fn a_game_in_its_main_alone_gets_a_library_and_the_lines_to_move() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write(folder, &[("Cargo.toml", MANIFEST), ("src/main.rs", MAIN)]);
+    let (found, reported) = done(folder, &["init"]);
+    assert!(found.contains("library: none\n"), "{found}");
+    assert!(read(folder, "src/lib.rs").contains("pub fn plugin(app: &mut App) {"));
+    assert!(read(folder, "bots/src/lib.rs").contains("ForeignGame::new(\"my-game\", 1, my_game::plugin)\n"));
+    for line in [
+        "to do: move the game from src/main.rs to src/lib.rs:",
+        "  lines 4 to 6, all but `DefaultPlugins` and `run`, into `plugin`",
+        "  line 2, `mod rules;`, as `pub mod rules;`",
+    ] {
+        assert!(reported.lines().any(|reported| reported == line), "{line}: {reported}");
+    }
+    assert_eq!(read(folder, "src/main.rs"), MAIN);
+}
+
+#[test]
+fn the_game_of_a_workspace_gets_the_bots_beside_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let shared = "[workspace]\nmembers = [\"crates/*\"]\n[workspace.dependencies]\nbevy = \"0.19.1\"\n";
+    let inherited = MANIFEST.replace("bevy = \"0.19\"", "bevy.workspace = true");
+    let tools = "[package]\nname = \"tools\"\n";
+    write(
+        folder,
+        &[("Cargo.toml", shared), ("crates/game/Cargo.toml", &inherited), ("crates/game/src/lib.rs", LIBRARY)],
+    );
+    write(folder, &[("crates/tools/Cargo.toml", tools)]);
+    let (found, reported) = done(folder, &["init"]);
+    assert!(found.starts_with("game: my-game, Bevy 0.19.1\n"), "{found}");
+    assert!(read(folder, "bots/Cargo.toml").contains("\nmy-game = { path = \"../crates/game\" }\n"));
+    assert!(reported.contains("add \"bots\" to `members` of [workspace] in "), "{reported}");
+    let (_, refused) = ended(&folder.join("crates/game"), &["init"], 3);
+    assert!(refused.contains("is a member of the workspace in ") && refused.contains("--package NAME"), "{refused}");
+}
+
+#[test]
+fn a_dry_run_prints_the_files_and_writes_none() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write(folder, &[("Cargo.toml", MANIFEST), ("src/lib.rs", LIBRARY)]);
+    let (printed, _) = done(folder, &["init", "--dry-run", "--edit-workspace"]);
+    assert!(printed.contains("\n--- bots/src/lib.rs\n//! The adapter of `my-game`"), "{printed}");
+    let (printed, _) = done(folder, &["init", "--dry-run", "--json", "--playbot", "https://example.org/playbot"]);
+    assert_eq!(printed.lines().count(), 1, "{printed}");
+    let json = &lines(&playbot(folder, &["init", "--dry-run", "--json"]))[0];
+    assert_eq!(json["package"], "my-game");
+    assert_eq!(json["bevy"], "0.19");
+    assert_eq!(json["found"]["keys"], serde_json::json!(["ArrowLeft", "ArrowRight", "Escape"]));
+    assert_eq!(json["found"]["unseeded"][0]["line"], 8);
+    assert_eq!(json["written"], serde_json::json!(WRITTEN));
+    assert!(!folder.join("bots").exists());
+    assert_eq!(read(folder, "Cargo.toml"), MANIFEST);
+}
+
+#[test]
+fn a_folder_without_a_game_for_this_bevy_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let older = MANIFEST.replace("0.19", "0.18");
+    write(folder, &[("older/Cargo.toml", &older), ("plain/Cargo.toml", "[package]\nname = \"plain\"\n")]);
+    write(folder, &[("two/Cargo.toml", "[workspace]\nmembers = [\"a\", \"b\"]\n")]);
+    write(folder, &[("two/a/Cargo.toml", MANIFEST), ("two/b/Cargo.toml", &MANIFEST.replace("my-game", "other"))]);
+    for (args, words) in [
+        (&["init", "none"][..], "none/Cargo.toml does not exist: call `playbot init` in the folder of a Bevy game"),
+        (&["init", "plain"], "plain/Cargo.toml does not depend on `bevy`: playbot tests games"),
+        (
+            &["init", "older"],
+            "older/Cargo.toml has Bevy 0.18, and this playbot is for Bevy 0.19: update the game first",
+        ),
+        (&["init", "two"], "use Bevy: name the game with --package; valid: my-game, other"),
+        (&["init", "two", "--package", "c"], "has no package `c`; valid: my-game, other"),
+        (&["init", "two", "--package", "other", "--playbot", "none"], "with --playbot"),
+    ] {
+        let (_, refused) = ended(folder, args, 3);
+        assert!(refused.contains(words), "{args:?}: {refused}");
+    }
+    assert!(!folder.join("two/bots").exists() && !folder.join("plain/bots").exists());
+}
+
+#[test]
+fn a_file_in_the_way_of_the_bots_is_an_error_of_writing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write(folder, &[("Cargo.toml", MANIFEST), ("src/lib.rs", LIBRARY), ("bots", "in the way")]);
+    let (_, refused) = ended(folder, &["init"], 2);
+    assert!(refused.contains("cannot create ") && refused.contains("bots"), "{refused}");
+    assert_eq!(read(folder, "bots"), "in the way");
+}

@@ -1,0 +1,623 @@
+//! `playbot init`.
+//!
+//! In the folder:
+//!
+//! - `found`: facts about a game that its `Cargo.toml` and its sources show.
+
+mod found;
+
+use crate::{
+    error::{CliError, Outcome},
+    output::{print_line, write},
+    verbs::init::found::{GameFacts, GameManifest, NamedItem, SourceLine, SourceText, major_minor},
+};
+use serde_json::json;
+use std::{
+    fmt::Write as _,
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+/// The version of Bevy that this program is for.
+const BEVY: (u32, u32) = (0, 19);
+
+/// Keys that leave games or open tools, more often than they play.
+const TOOL_KEYS: [&str; 14] =
+    ["Escape", "F1", "F2", "F3", "F4", "F5", "F6", "F7", "F8", "F9", "F10", "F11", "F12", "PrintScreen"];
+
+/// Write the crate of the bots beside a Bevy game: its adapter, its program and its tests.
+///
+/// The game's Cargo.toml and sources are read as text, and nothing is built. The adapter presses the keys that the
+/// sources name, and its comments say what is left to do. Existing files are left alone. The game that ships does not
+/// depend on the bots.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  playbot init --dry-run   what is found, and what would be written
+  playbot init
+  playbot init --edit-workspace   also append `bots` to Cargo.toml as a member
+  playbot init my_workspace --package my_game")]
+pub struct Args {
+    /// Folder of the game, or of its workspace.
+    #[arg(value_name = "FOLDER", default_value = ".")]
+    folder: PathBuf,
+    /// Package of the game, if several of a workspace use Bevy.
+    #[arg(long, value_name = "NAME")]
+    package: Option<String>,
+    /// Source of the crate `playbot`: a clone of its repository, or a URL of git (default: the clone from which this
+    /// program was built).
+    #[arg(long, value_name = "SOURCE")]
+    playbot: Option<String>,
+    /// Append a table `[workspace]` with the member `bots` to Cargo.toml, if it has no such table.
+    #[arg(long)]
+    edit_workspace: bool,
+    /// Print the files instead of writing them.
+    #[arg(long)]
+    dry_run: bool,
+    /// Print one line of JSON instead of text.
+    #[arg(long)]
+    json: bool,
+}
+
+/// Writes the files that are missing, and reports what was found.
+pub(crate) fn run(args: &Args) -> Result<Outcome, CliError> {
+    let game = GameFolder::find(&args.folder, args.package.as_deref())?;
+    let sources = read_sources(&game.root.join(&game.package))?;
+    let facts = GameFacts::read(&game.manifest, &game.library_file(), &sources);
+    let files = game.files(&facts, &playbot_source(args.playbot.as_deref())?);
+    let (missing, kept): (Vec<_>, Vec<_>) = files.into_iter().partition(|(path, _)| !game.root.join(path).exists());
+    let moves = if facts.has_library { Vec::new() } else { moves(&sources) };
+    let should_edit = args.edit_workspace && !game.root_manifest.is_workspace;
+    if args.json {
+        let names = |files: &[(String, String)]| files.iter().map(|(path, _)| path.clone()).collect::<Vec<_>>();
+        print_line(json!({
+            "package": game.name(),
+            "bevy": game.bevy.version,
+            "bevy_features": game.bevy.features,
+            "found": facts,
+            "to_move": moves,
+            "dry_run": args.dry_run,
+            "written": names(&missing),
+            "kept": names(&kept),
+            "edits_workspace": should_edit,
+        }))?;
+    } else {
+        for line in game.description(&facts) {
+            print_line(line)?;
+        }
+    }
+    if args.dry_run {
+        for (path, text) in missing.iter().filter(|_| !args.json) {
+            print_line(format!("\n--- {path}\n{}", text.trim_end()))?;
+        }
+    } else {
+        for (path, text) in &missing {
+            write(&game.root.join(path), text.as_bytes())?;
+            report!("written: {path}");
+        }
+    }
+    for (path, _) in &kept {
+        report!("left alone: {path} exists already");
+    }
+    moves.iter().for_each(|line| report!("{line}"));
+    game.report_workspace(should_edit, args.dry_run)?;
+    if !args.dry_run {
+        report!("next: fill in what bots/src/lib.rs marks with TODO, then run `cargo test --release` in bots");
+    }
+    Ok(Outcome::Pass)
+}
+
+/// A game's package and the folder that gets the bots.
+struct GameFolder {
+    /// The folder that gets `bots`: of the workspace, or of the package.
+    root: PathBuf,
+    /// The `Cargo.toml` there.
+    root_manifest: GameManifest,
+    /// The folder of the package within it, with `/`; empty if it is the same.
+    package: String,
+    /// The `Cargo.toml` of the package.
+    manifest: GameManifest,
+    /// Its dependency on Bevy, with what the workspace says.
+    bevy: found::BevyDependency,
+}
+
+impl GameFolder {
+    /// Finds the package of the game in a folder.
+    fn find(folder: &Path, wanted: Option<&str>) -> Result<Self, CliError> {
+        let file = folder.join("Cargo.toml");
+        let Some(root_manifest) = read_manifest(folder)? else {
+            return Err(CliError::Usage(format!(
+                "{} does not exist: call `playbot init` in the folder of a Bevy game, or name the folder, as in \
+                 `playbot init my_game`",
+                file.display()
+            )));
+        };
+        let (package, manifest) = Self::choose(folder, &root_manifest, wanted)?;
+        if !root_manifest.is_workspace {
+            check_not_member(folder)?;
+        }
+        let Some(mut bevy) = manifest.bevy.clone() else {
+            return Err(CliError::Usage(format!(
+                "{} does not depend on `bevy`: playbot tests games that are made with Bevy {}.{}",
+                folder.join(&package).join("Cargo.toml").display(),
+                BEVY.0,
+                BEVY.1
+            )));
+        };
+        if let Some(shared) = root_manifest.workspace_bevy.as_ref().filter(|_| bevy.is_inherited) {
+            bevy.version.clone_from(&shared.version);
+            bevy.features.extend(shared.features.iter().cloned());
+        }
+        let numbers = bevy.version.as_deref().and_then(major_minor);
+        if let (Some(version), Some(numbers)) = (&bevy.version, numbers)
+            && numbers != BEVY
+        {
+            return Err(CliError::Usage(format!(
+                "{} has Bevy {version}, and this playbot is for Bevy {}.{}: update the game first",
+                folder.join(&package).join("Cargo.toml").display(),
+                BEVY.0,
+                BEVY.1
+            )));
+        }
+        Ok(Self { root: folder.to_owned(), root_manifest, package, manifest, bevy })
+    }
+
+    /// Chooses the package of the game: the one that is named, the root's own, or the only member with Bevy.
+    fn choose(folder: &Path, root: &GameManifest, wanted: Option<&str>) -> Result<(String, GameManifest), CliError> {
+        let mut all = Vec::new();
+        if root.package.is_some() {
+            all.push((String::new(), root.clone()));
+        }
+        for member in members(folder, root) {
+            if let Some(manifest) = read_manifest(&folder.join(&member))? {
+                all.push((member, manifest));
+            }
+        }
+        let names = |all: &[(String, GameManifest)]| {
+            let names: Vec<&str> = all.iter().filter_map(|(_, manifest)| manifest.package.as_deref()).collect();
+            names.join(", ")
+        };
+        let file = folder.join("Cargo.toml");
+        if let Some(wanted) = wanted {
+            let known = names(&all);
+            let found = all.into_iter().find(|(_, manifest)| manifest.package.as_deref() == Some(wanted));
+            return found.ok_or_else(|| {
+                CliError::Usage(format!("{} has no package `{wanted}`; valid: {known}", file.display()))
+            });
+        }
+        if root.package.is_some() && (root.bevy.is_some() || all.len() == 1) {
+            return Ok(all.swap_remove(0));
+        }
+        // The crate of the bots is no game.
+        all.retain(|(_, manifest)| manifest.bevy.is_some() && !manifest.depends_on("playbot"));
+        match all.len() {
+            1 => Ok(all.swap_remove(0)),
+            0 => Err(CliError::Usage(format!(
+                "no package of {} depends on `bevy`: playbot tests games that are made with Bevy {}.{}",
+                file.display(),
+                BEVY.0,
+                BEVY.1
+            ))),
+            _ => Err(CliError::Usage(format!(
+                "several packages of {} use Bevy: name the game with --package; valid: {}",
+                file.display(),
+                names(&all)
+            ))),
+        }
+    }
+
+    fn name(&self) -> &str {
+        self.manifest.package.as_deref().unwrap_or("my-game")
+    }
+
+    /// Returns the name of the library in Rust.
+    fn library(&self) -> String {
+        self.manifest.library.clone().unwrap_or_else(|| self.name().to_owned()).replace('-', "_")
+    }
+
+    fn library_file(&self) -> String {
+        self.manifest.library_path.clone().unwrap_or_else(|| "src/lib.rs".to_owned())
+    }
+
+    /// Returns the files of the layout, with their paths below the root.
+    fn files(&self, facts: &GameFacts, playbot: &str) -> Vec<(String, String)> {
+        let mut files = Vec::new();
+        if !facts.has_library {
+            let folder = if self.package.is_empty() { String::new() } else { format!("{}/", self.package) };
+            files.push((format!("{folder}{}", self.library_file()), LIBRARY.to_owned()));
+        }
+        files.push(("bots/Cargo.toml".to_owned(), self.bots_manifest(facts, playbot)));
+        files.push(("bots/src/lib.rs".to_owned(), adapter(self.name(), &self.library(), facts)));
+        files.push(("bots/src/main.rs".to_owned(), PROGRAM.to_owned()));
+        files.push(("bots/tests/levels.rs".to_owned(), TESTS.to_owned()));
+        files
+    }
+
+    fn bots_manifest(&self, facts: &GameFacts, playbot: &str) -> String {
+        let folder = if self.package.is_empty() { String::new() } else { format!("/{}", self.package) };
+        let features = if has_clicks(facts) { r#""ui", "window""# } else { r#""window""# };
+        format!(
+            "[package]\nname = \"bots\"\nversion = \"0.1.0\"\nedition = \"2024\"\npublish = false\n\n[dependencies]\n\
+             bevy = {{ version = \"{}.{}\", default-features = false }}\n{} = {{ path = \"..{folder}\" }}\n\
+             playbot = {{ {playbot}, features = [{features}] }}\n",
+            BEVY.0,
+            BEVY.1,
+            self.name()
+        )
+    }
+
+    /// Returns lines for people about all that was found.
+    fn description(&self, facts: &GameFacts) -> Vec<String> {
+        let or_none = |names: Vec<String>| if names.is_empty() { "none found".to_owned() } else { names.join(", ") };
+        let at = |lines: &[SourceLine]| {
+            or_none(lines.iter().map(|found| format!("{} ({}:{})", found.name, found.file, found.line)).collect())
+        };
+        let items = |items: &[NamedItem]| at(&items.iter().map(|item| item.at.clone()).collect::<Vec<_>>());
+        let names = |names: &[&str]| or_none(names.iter().map(|name| (*name).to_owned()).collect());
+        let states = facts.states.iter().map(|state| {
+            format!("{} ({}:{}): {}", state.at.name, state.at.file, state.at.line, state.variants.join(" | "))
+        });
+        let version = self.bevy.version.as_deref().unwrap_or("without a number");
+        let library = if facts.has_library { self.library_file() } else { "none".to_owned() };
+        let mut rows = vec![
+            ("game", format!("{}, Bevy {version}", self.name())),
+            ("features of Bevy", or_none(self.bevy.features.clone())),
+            ("library", library),
+            ("functions of `&mut App`", items(&facts.functions)),
+            ("plugins", items(&facts.plugins)),
+            ("states", or_none(states.collect())),
+            ("input", names(&facts.inputs)),
+            ("keys", or_none(facts.keys.clone())),
+            ("mouse buttons", or_none(facts.mouse_buttons.clone())),
+            ("buttons", or_none(facts.buttons.clone())),
+            ("player", items(facts.player.as_slice())),
+            ("physics", names(&facts.physics)),
+            ("loading", names(&facts.loaders)),
+            ("loads of assets", at(&facts.loads)),
+            ("random numbers with a seed", at(&facts.seeded)),
+            ("random numbers without a seed", at(&facts.unseeded)),
+            ("clocks of the machine", at(&facts.clocks)),
+        ];
+        if !facts.unseeded.is_empty() || !facts.clocks.is_empty() {
+            rows.push(("to do", "make it the same every time: docs/how-to/make-it-deterministic.md".to_owned()));
+        }
+        rows.into_iter().map(|(what, found)| format!("{what}: {found}")).collect()
+    }
+
+    /// Makes `bots` a member of the workspace, or reports what to write for it.
+    fn report_workspace(&self, should_edit: bool, is_dry: bool) -> Result<(), CliError> {
+        let file = self.root.join("Cargo.toml");
+        if should_edit {
+            if !is_dry {
+                let text = fs::read_to_string(&file).map_err(|error| unreadable(&file, &error))?;
+                write(&file, format!("{}\n\n{WORKSPACE}", text.trim_end()).as_bytes())?;
+            }
+            let done = if is_dry { "would be appended" } else { "appended" };
+            report!("{done} to {}: [workspace] with the member `bots`", file.display());
+        } else if !self.root_manifest.is_workspace {
+            report!(
+                "to build the bots into the same folder as the game, add these lines to {} or call `playbot init \
+                 --edit-workspace`:\n{}",
+                file.display(),
+                WORKSPACE.trim_end()
+            );
+        } else if !has_member(&self.root_manifest.members, "bots") {
+            report!("add \"bots\" to `members` of [workspace] in {}", file.display());
+        }
+        Ok(())
+    }
+}
+
+/// The lines that make the bots a member.
+const WORKSPACE: &str = "[workspace]\nmembers = [\"bots\"]\n";
+
+/// The library of a game that has none yet.
+const LIBRARY: &str = "\
+//! The game: all but `DefaultPlugins`.
+
+use bevy::prelude::*;
+
+/// Adds the game to an app.
+pub fn plugin(app: &mut App) {
+    // TODO: move here what `main` adds to the app, but for `DefaultPlugins`.
+    let _ = app;
+}
+";
+
+/// The program of the bots.
+const PROGRAM: &str = "\
+//! The game with every verb of playbot.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    playbot::main(&[&bots::adapter()])
+}
+";
+
+/// The tests of the bots.
+const TESTS: &str = "\
+//! Assertions about the levels of the game.
+
+use bots::adapter;
+
+#[test]
+fn the_game_plays_the_same_again() {
+    playbot::test(&adapter()).levels(\"default:0\").assert_deterministic();
+}
+
+#[test]
+fn nothing_is_found_on_any_level() {
+    playbot::test(&adapter()).levels(\"default:0\").assert_no_findings();
+}
+
+// TODO: assert that levels can be finished, once the adapter has `.end` and a `.demonstrator`:
+//
+// #[test]
+// fn every_level_can_be_finished() {
+//     playbot::test(&adapter()).levels(\"default:0\").assert_levels_solvable();
+// }
+";
+
+/// Returns true if the adapter clicks on buttons, for which playbot needs its feature `ui`.
+fn has_clicks(facts: &GameFacts) -> bool {
+    !facts.buttons.is_empty()
+}
+
+/// Returns the source of an adapter.
+fn adapter(name: &str, library: &str, facts: &GameFacts) -> String {
+    let path = |items: &[NamedItem]| items.first().and_then(|item| item.path.clone());
+    let mut own = String::new();
+    let game = match (path(&facts.functions), path(&facts.plugins)) {
+        (Some(path), _) => format!("{library}::{path}"),
+        (None, Some(path)) => {
+            format!("|app: &mut App| {{\n        app.add_plugins({library}::{path});\n    }}")
+        }
+        (None, None) if !facts.has_library => format!("{library}::plugin"),
+        (None, None) => {
+            own = "\n/// Adds the game to an app.\nfn plugin(app: &mut App) {\n    \
+                   // TODO: write this function into the game's library, make it public, and name it above.\n    \
+                   let _ = app;\n}\n"
+                .to_owned();
+            "plugin".to_owned()
+        }
+    };
+    let mut text = format!(
+        "//! The adapter of `{name}`: what bots press and see, and when an episode ends.\n\n\
+         use bevy::prelude::*;\nuse playbot::prelude::*;\n\n\
+         /// Returns the game for testers and bots.\npub fn adapter() -> ForeignGame {{\n    \
+         ForeignGame::new(\"{name}\", 1, {game})\n"
+    );
+    add_input(&mut text, facts);
+    add_sight(&mut text, library, facts);
+    text.push_str(
+        "        // TODO: the reward, such as the growth of a score:\n        \
+         // .reward_delta(|score: Res<Score>| score.0 as f32)\n        \
+         // TODO: the end of an episode, without which no level is ever solved:\n        \
+         // .end(|score: Res<Score>| (score.0 >= 10).then_some(EpisodeEnd::WON))\n        \
+         .time_limit(600)\n",
+    );
+    if let Some(state) = facts.states.first() {
+        let (name, variants) = (&state.at.name, state.variants.join(", "));
+        let _ = writeln!(
+            text,
+            "        // TODO: if a state begins the game anew, `Restart::state({name}::…)`, with one of {variants}."
+        );
+    }
+    text.push_str("        .restart(Restart::Startup)\n");
+    if !facts.loads.is_empty() || !facts.loaders.is_empty() {
+        text.push_str("        // TODO: if a level loads while the game runs, when it is ready: .ready(condition)\n");
+    }
+    text.push_str(
+        "        // TODO: the number of levels, and a system that begins level `level.0` or seeds its generator.\n        \
+         .levels(1)\n        .level(|_level: Res<LevelSeed>| {})\n}\n",
+    );
+    text + &own
+}
+
+/// Adds the actions.
+fn add_input(text: &mut String, facts: &GameFacts) {
+    let (tools, keys): (Vec<&str>, Vec<&str>) =
+        facts.keys.iter().map(String::as_str).partition(|key| TOOL_KEYS.contains(key));
+    if !tools.is_empty() {
+        let _ = writeln!(text, "        // Left out, because they seldom play: {}.", tools.join(", "));
+    }
+    let has_only_buttons = !facts.buttons.is_empty() && facts.mouse_buttons.is_empty();
+    if keys.is_empty() && !facts.mouse_buttons.is_empty() {
+        text.push_str(
+            "        // TODO: one position of the mouse cursor for each action, with `.cursor`.\n        \
+             .mouse_buttons([vec![]",
+        );
+        for button in &facts.mouse_buttons {
+            let _ = write!(text, ", vec![MouseButton::{button}]");
+        }
+        text.push_str("])\n");
+    } else if keys.is_empty() && has_only_buttons {
+        text.push_str("        // An action that does nothing, before the clicks.\n        .keys([Vec::new()])\n");
+    } else if keys.is_empty() {
+        text.push_str(
+            "        // TODO: no key was found in the sources: the keys that the game reads.\n        \
+             .keys([vec![], vec![KeyCode::Space]])\n",
+        );
+    } else {
+        text.push_str(
+            "        .keys([\n            // One action for each set of keys. TODO: add sets that are held together.\n            \
+             vec![],\n",
+        );
+        for key in keys {
+            let _ = writeln!(text, "            vec![KeyCode::{key}],");
+        }
+        text.push_str("        ])\n");
+        if !facts.mouse_buttons.is_empty() {
+            text.push_str("        // TODO: mouse buttons, one set for each action above: .mouse_buttons(sets)\n");
+        }
+    }
+    if has_clicks(facts) {
+        let names: Vec<_> = facts.buttons.iter().map(|name| format!("\"{name}\"")).collect();
+        let _ = writeln!(text, "        .clicks([{}])", names.join(", "));
+    }
+    if facts.inputs.contains(&"gamepad") {
+        text.push_str("        // TODO: if the gamepad can do more than the keys: .gamepad_buttons(sets)\n");
+    }
+}
+
+/// Adds the observation and the position.
+fn add_sight(text: &mut String, library: &str, facts: &GameFacts) {
+    let Some(player) = &facts.player else {
+        text.push_str("        // TODO: what bots see, and `.position` of the player.\n");
+        text.push_str("        .observe([\"time\"], |time: Res<Time>| [time.elapsed_secs()])\n");
+        return;
+    };
+    let Some(path) = &player.path else {
+        let SourceLine { name, file, line } = &player.at;
+        let _ = write!(
+            text,
+            "        // TODO: make `{name}` ({file}:{line}) public in the game's library, for `.observe` and:\n        \
+             // .position(|player: Single<&Transform, With<{library}::{name}>>| player.translation.truncate())\n        \
+             .observe([\"time\"], |time: Res<Time>| [time.elapsed_secs()])\n"
+        );
+        return;
+    };
+    let (names, values, at) = if facts.is_in_space {
+        ("\"x\", \"y\", \"z\"", "at.x, at.y, at.z", "player.translation")
+    } else {
+        ("\"x\", \"y\"", "at.x, at.y", "player.translation.truncate()")
+    };
+    let _ = write!(
+        text,
+        "        // TODO: what else a player sees, such as the goal and what is dangerous.\n        \
+         .observe([{names}], |players: Query<&Transform, With<{library}::{path}>>| {{\n            \
+         let at = players.iter().next().map_or(Vec3::ZERO, |player| player.translation);\n            \
+         [{values}]\n        }})\n        \
+         .position(|player: Single<&Transform, With<{library}::{path}>>| {at})\n"
+    );
+}
+
+/// Returns what to move from the program into the library, a line each.
+fn moves(sources: &[SourceText]) -> Vec<String> {
+    let Some(program) = sources.iter().find(|source| source.path == "src/main.rs") else { return Vec::new() };
+    let line_of = |word: &str| program.code.lines().position(|line| line.contains(word)).map(|at| at + 1);
+    let mut lines = vec!["to do: move the game from src/main.rs to src/lib.rs:".to_owned()];
+    if let (Some(first), Some(last)) = (line_of("App::new()"), line_of(".run()")) {
+        lines.push(format!("  lines {first} to {last}, all but `DefaultPlugins` and `run`, into `plugin`"));
+    }
+    for (at, line) in program.code.lines().enumerate() {
+        if let Some(module) = line.strip_prefix("mod ").and_then(|rest| rest.trim_end().strip_suffix(';')) {
+            lines.push(format!("  line {}, `mod {module};`, as `pub mod {module};`", at + 1));
+        }
+    }
+    lines.push("  all other functions and types but `main`".to_owned());
+    lines.push("  `main` then adds `DefaultPlugins` and the function `plugin` of the library".to_owned());
+    lines
+}
+
+/// Returns the text of the dependency `playbot`, up to its features.
+fn playbot_source(wanted: Option<&str>) -> Result<String, CliError> {
+    if let Some(url) = wanted.filter(|wanted| wanted.contains("://") || wanted.starts_with("git@")) {
+        return Ok(format!("git = {url:?}"));
+    }
+    let built_from = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let clone = wanted.map_or(built_from, Path::new);
+    let inner = clone.join("plugin/cli");
+    let folder = if inner.join("Cargo.toml").is_file() { inner } else { clone.to_owned() };
+    if !folder.join("Cargo.toml").is_file() {
+        let advice = "name a clone of the repository of playbot, or its URL, with --playbot";
+        return Err(CliError::Usage(format!("{} has no Cargo.toml: {advice}", folder.display())));
+    }
+    let folder = std::path::absolute(&folder).unwrap_or(folder);
+    // The form of a text in Rust is one of TOML for all paths that a keyboard writes.
+    Ok(format!("path = {:?}", folder.display().to_string()))
+}
+
+fn unreadable(path: &Path, error: &io::Error) -> CliError {
+    CliError::Io(format!("cannot read {}: {error}", path.display()))
+}
+
+/// Reads the `Cargo.toml` of a folder, if there is one.
+fn read_manifest(folder: &Path) -> Result<Option<GameManifest>, CliError> {
+    let file = folder.join("Cargo.toml");
+    match fs::read_to_string(&file) {
+        Ok(text) => Ok(Some(GameManifest::read(&text))),
+        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
+        Err(error) => Err(unreadable(&file, &error)),
+    }
+}
+
+/// Returns the names in a folder, in their order, and whether each is a folder. Links and hidden names are left out.
+fn names_in(folder: &Path) -> Result<Vec<(String, bool)>, CliError> {
+    let refused = |error: io::Error| unreadable(folder, &error);
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder).map_err(refused)? {
+        let entry = entry.map_err(refused)?;
+        let (name, kind) = (entry.file_name().to_string_lossy().into_owned(), entry.file_type().map_err(refused)?);
+        if !name.starts_with('.') && !kind.is_symlink() {
+            names.push((name, kind.is_dir()));
+        }
+    }
+    names.sort();
+    Ok(names)
+}
+
+/// Returns the folders of a workspace's members. A star at the end of a path stands for each folder there.
+fn members(root: &Path, manifest: &GameManifest) -> Vec<String> {
+    let mut found = Vec::new();
+    for member in &manifest.members {
+        match member.strip_suffix('*') {
+            Some(folder) => {
+                // A folder that cannot be read has no game, as cargo says itself.
+                let names = names_in(&root.join(folder)).unwrap_or_default().into_iter();
+                found.extend(names.filter(|(_, is_folder)| *is_folder).map(|(name, _)| format!("{folder}{name}")));
+            }
+            None => found.push(member.clone()),
+        }
+    }
+    found
+}
+
+/// Returns true if a folder is among the members of a workspace.
+fn has_member(members: &[String], folder: &str) -> bool {
+    let is_it = |member: &String| match member.trim_start_matches("./").strip_suffix('*') {
+        Some(begin) => folder.strip_prefix(begin).is_some_and(|rest| !rest.contains('/')),
+        None => member.trim_start_matches("./").trim_end_matches('/') == folder,
+    };
+    members.iter().any(is_it)
+}
+
+/// Refuses a member of a workspace above it, because the bots belong beside all members.
+fn check_not_member(folder: &Path) -> Result<(), CliError> {
+    let whole = folder.canonicalize().map_err(|error| unreadable(folder, &error))?;
+    for above in whole.ancestors().skip(1) {
+        let Ok(Some(manifest)) = read_manifest(above) else { continue };
+        let inner = whole.strip_prefix(above).unwrap_or(&whole).display().to_string().replace('\\', "/");
+        if manifest.is_workspace && has_member(&manifest.members, &inner) {
+            let root = above.display();
+            return Err(CliError::Usage(format!(
+                "{} is a member of the workspace in {root}: write `playbot init {root} --package NAME`, with the name \
+                 of its package",
+                folder.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+/// Reads the sources of a package, in the order of their paths.
+fn read_sources(package: &Path) -> Result<Vec<SourceText>, CliError> {
+    let (mut sources, mut folders) = (Vec::new(), vec!["src".to_owned()]);
+    while let Some(folder) = folders.pop() {
+        if !package.join(&folder).is_dir() {
+            continue;
+        }
+        for (name, is_folder) in names_in(&package.join(&folder))? {
+            let path = format!("{folder}/{name}");
+            if is_folder {
+                folders.push(path);
+            } else if name.ends_with(".rs") {
+                let file = package.join(&path);
+                let bytes = fs::read(&file).map_err(|error| unreadable(&file, &error))?;
+                sources.push(SourceText::new(&path, &String::from_utf8_lossy(&bytes)));
+            }
+        }
+    }
+    sources.sort_by(|one, other| one.path.cmp(&other.path));
+    Ok(sources)
+}

@@ -1,0 +1,697 @@
+//! Facts about a game that its `Cargo.toml` and its sources show, read as text.
+
+use serde::Serialize;
+
+/// Names of components that look like the player, the likeliest first.
+const PLAYERS: [&str; 10] =
+    ["Player", "Hero", "Paddle", "Character", "Avatar", "Ship", "PlayerShip", "Snake", "Bird", "Car"];
+
+/// Random numbers that differ from run to run.
+const RANDOM: [&str; 9] = [
+    "rand::rng()",
+    " rng()",
+    "thread_rng()",
+    "fastrand::",
+    "from_os_rng(",
+    "from_entropy(",
+    "rand::random",
+    "OsRng",
+    "SysRng",
+];
+
+/// Clocks of the machine.
+const CLOCKS: [&str; 5] = ["Instant::now", "SystemTime", "Time<Real>", "Utc::now", "Local::now"];
+
+/// Crates that load levels or assets while the game runs.
+const LOADERS: [&str; 3] = ["bevy_ecs_ldtk", "bevy_ecs_tiled", "bevy_asset_loader"];
+
+/// Crates that turn devices into actions.
+const MANAGERS: [&str; 2] = ["leafwing-input-manager", "bevy_enhanced_input"];
+
+/// Crates of physics.
+const PHYSICS: [&str; 4] = ["avian2d", "avian3d", "bevy_rapier2d", "bevy_rapier3d"];
+
+/// A dependency on Bevy.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct BevyDependency {
+    /// The version as it is written; `None` for a path or a revision of git.
+    pub version: Option<String>,
+    /// The features that are named.
+    pub features: Vec<String>,
+    /// Whether the workspace says the rest.
+    pub is_inherited: bool,
+}
+
+/// The parts of a `Cargo.toml` that matter here.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct GameManifest {
+    /// Name of the package, if there is one.
+    pub package: Option<String>,
+    /// Name of its library, if it is given.
+    pub library: Option<String>,
+    /// File of its library, if it is given.
+    pub library_path: Option<String>,
+    /// Whether there is a table `[workspace]`.
+    pub is_workspace: bool,
+    /// The members of the workspace, as they are written.
+    pub members: Vec<String>,
+    /// Names of the dependencies.
+    pub dependencies: Vec<String>,
+    /// The dependency on Bevy.
+    pub bevy: Option<BevyDependency>,
+    /// The dependency on Bevy that members inherit.
+    pub workspace_bevy: Option<BevyDependency>,
+}
+
+impl GameManifest {
+    /// Reads the text of a `Cargo.toml`. Lines that are no TOML are passed over, because cargo reports them better.
+    pub fn read(text: &str) -> Self {
+        let (tables, entries) = entries(text);
+        let value = |table: &str, key: &str| {
+            let entry = entries.iter().find(|entry| entry.table == table && entry.key == key)?;
+            Some(texts(&entry.value))
+        };
+        let one = |table: &str, key: &str| value(table, key).and_then(|texts| texts.into_iter().next());
+        let dependencies = entries.iter().filter_map(|entry| match entry.table.strip_prefix("dependencies") {
+            Some("") => entry.key.split('.').next(),
+            Some(rest) => rest.strip_prefix('.'),
+            None => None,
+        });
+        let mut dependencies: Vec<String> = dependencies.map(str::to_owned).collect();
+        dependencies.sort();
+        dependencies.dedup();
+        Self {
+            package: one("package", "name"),
+            library: one("lib", "name"),
+            library_path: one("lib", "path"),
+            is_workspace: tables.iter().any(|table| table == "workspace" || table.starts_with("workspace.")),
+            members: value("workspace", "members").unwrap_or_default(),
+            dependencies,
+            bevy: bevy(&entries, "dependencies"),
+            workspace_bevy: bevy(&entries, "workspace.dependencies"),
+        }
+    }
+
+    /// Returns true if the package needs this crate.
+    pub fn depends_on(&self, name: &str) -> bool {
+        self.dependencies.iter().any(|dependency| dependency == name)
+    }
+}
+
+/// A line `key = value` with its table. A value over several lines is one.
+struct Entry {
+    table: String,
+    key: String,
+    value: String,
+}
+
+/// Returns the tables and the entries of a text in TOML.
+fn entries(text: &str) -> (Vec<String>, Vec<Entry>) {
+    let (mut tables, mut found) = (vec![String::new()], Vec::<Entry>::new());
+    let mut is_open = false;
+    for line in text.lines().map(|line| without_comment(line).trim()) {
+        if let Some(last) = found.last_mut().filter(|_| is_open) {
+            last.value.push_str(&line.replace('\'', "\""));
+            is_open = is_unclosed(&last.value);
+        } else if line.starts_with('[') {
+            tables.push(line.trim_matches(['[', ']']).replace(['"', ' '], ""));
+        } else if let Some((key, value)) = line.split_once('=') {
+            let value = value.trim().replace('\'', "\"");
+            is_open = is_unclosed(&value);
+            let table = tables.last().cloned().unwrap_or_default();
+            found.push(Entry { table, key: key.trim().replace('"', ""), value });
+        }
+    }
+    (tables, found)
+}
+
+/// Returns a line of TOML up to its comment.
+fn without_comment(line: &str) -> &str {
+    let mut quote = None;
+    for (at, c) in line.char_indices() {
+        match (c, quote) {
+            ('#', None) => return &line[..at],
+            ('"' | '\'', None) => quote = Some(c),
+            (c, Some(open)) if c == open => quote = None,
+            _ => {}
+        }
+    }
+    line
+}
+
+/// Returns true if an array or a table goes on in the next line.
+fn is_unclosed(value: &str) -> bool {
+    let outside = value.split('"').step_by(2);
+    let count = |signs: [char; 2]| outside.clone().map(|text| text.matches(signs).count()).sum::<usize>();
+    count(['[', '{']) > count([']', '}'])
+}
+
+/// Returns the texts of a value: of an array, or of one text.
+fn texts(value: &str) -> Vec<String> {
+    let within = value.strip_prefix('[').map_or(value, |rest| rest.split(']').next().unwrap_or_default());
+    within.split('"').skip(1).step_by(2).map(str::to_owned).collect()
+}
+
+/// Returns the dependency on Bevy in a table, in any of the forms that TOML has for it.
+fn bevy(entries: &[Entry], table: &str) -> Option<BevyDependency> {
+    let own = format!("{table}.bevy");
+    let parts = entries.iter().filter_map(|entry| {
+        if entry.table == own {
+            return Some(format!("{} = {}", entry.key, entry.value));
+        }
+        match entry.key.strip_prefix("bevy").filter(|_| entry.table == table)? {
+            "" if entry.value.starts_with('{') => Some(entry.value.trim_matches(['{', '}']).to_owned()),
+            "" => Some(format!("version = {}", entry.value)),
+            rest => rest.strip_prefix('.').map(|key| format!("{key} = {}", entry.value)),
+        }
+    });
+    let parts: Vec<String> = parts.collect();
+    if parts.is_empty() {
+        return None;
+    }
+    let all = parts.join(", ");
+    Some(BevyDependency {
+        version: value_of(&all, "version").and_then(|value| texts(value).into_iter().next()),
+        features: value_of(&all, "features").map(texts).unwrap_or_default(),
+        is_inherited: value_of(&all, "workspace").is_some_and(|value| value.starts_with("true")),
+    })
+}
+
+/// Returns the text from the value of a key on.
+fn value_of<'a>(inline: &'a str, key: &str) -> Option<&'a str> {
+    inline.match_indices(key).find_map(|(at, _)| {
+        let goes_on = inline[..at].ends_with(|c: char| c.is_alphanumeric() || "_-\"".contains(c));
+        let rest = inline[at + key.len()..].trim_start().strip_prefix('=')?;
+        (!goes_on).then(|| rest.trim_start())
+    })
+}
+
+/// Returns major and minor number of a version such as `^0.19.1`.
+pub(super) fn major_minor(version: &str) -> Option<(u32, u32)> {
+    let mut numbers = version.trim_start_matches(|c: char| !c.is_ascii_digit()).split(['.', '-', ',', ' ']);
+    Some((numbers.next()?.parse().ok()?, numbers.next().unwrap_or("0").parse().ok()?))
+}
+
+/// A source file of a game.
+pub(super) struct SourceText {
+    /// Its path in the package, with `/`.
+    pub path: String,
+    /// Its text; comments are blank.
+    pub code: String,
+}
+
+impl SourceText {
+    /// Creates the source of a text.
+    pub fn new(path: &str, text: &str) -> Self {
+        Self { path: path.to_owned(), code: without_comments(text) }
+    }
+
+    fn at(&self, name: &str, offset: usize) -> SourceLine {
+        let line = self.code[..offset].matches('\n').count() + 1;
+        SourceLine { name: name.to_owned(), file: self.path.clone(), line }
+    }
+
+    /// Returns the lines that have one of these words, but for imports.
+    fn lines_with(&self, words: &[&str]) -> Vec<SourceLine> {
+        let lines = self.code.lines().enumerate();
+        let found = lines.filter_map(|(at, line)| {
+            let is_import = line.trim_start().trim_start_matches("pub ").starts_with("use ");
+            let word = words.iter().find(|word| line.contains(**word)).filter(|_| !is_import)?;
+            Some(SourceLine { name: word.trim().to_owned(), file: self.path.clone(), line: at + 1 })
+        });
+        found.collect()
+    }
+}
+
+/// Blanks the comments of a source. Lines keep their numbers.
+fn without_comments(text: &str) -> String {
+    let (mut code, mut rest) = (String::with_capacity(text.len()), text);
+    while let Some(first) = rest.chars().next() {
+        let (kept, skipped) = if rest.starts_with("//") {
+            (0, rest.find('\n').unwrap_or(rest.len()))
+        } else if rest.starts_with("/*") {
+            (0, length_of_comment(rest))
+        } else if first == '"' {
+            (length_of_text(rest), 0)
+        } else if first == 'r' && !code.ends_with(is_of_name) {
+            (length_of_raw_text(rest).unwrap_or(1), 0)
+        } else if rest.starts_with("'\"'") {
+            (3, 0)
+        } else {
+            (first.len_utf8(), 0)
+        };
+        code.push_str(&rest[..kept]);
+        code.extend(rest[kept..kept + skipped].chars().filter(|c| *c == '\n'));
+        rest = &rest[kept + skipped..];
+    }
+    code
+}
+
+/// Returns the length of a comment between signs, with those inside it.
+fn length_of_comment(text: &str) -> usize {
+    let (mut depth, mut at) = (0_u32, 0);
+    while at < text.len() {
+        let rest = &text.as_bytes()[at..];
+        if rest.starts_with(b"/*") {
+            (depth, at) = (depth + 1, at + 2);
+        } else if rest.starts_with(b"*/") {
+            (depth, at) = (depth.saturating_sub(1), at + 2);
+            if depth == 0 {
+                return at;
+            }
+        } else {
+            at += 1;
+        }
+    }
+    text.len()
+}
+
+/// Returns the length of a text with its quotes.
+fn length_of_text(text: &str) -> usize {
+    let mut is_escaped = false;
+    for (at, c) in text.char_indices().skip(1) {
+        match c {
+            '"' if !is_escaped => return at + 1,
+            _ => is_escaped = c == '\\' && !is_escaped,
+        }
+    }
+    text.len()
+}
+
+/// Returns the length of a raw text, if it is one.
+fn length_of_raw_text(text: &str) -> Option<usize> {
+    let hashes = text[1..].len() - text[1..].trim_start_matches('#').len();
+    let inner = text[1 + hashes..].strip_prefix('"')?;
+    let end = format!("\"{}", "#".repeat(hashes));
+    Some(inner.find(&end).map_or(text.len(), |at| 2 + hashes + at + end.len()))
+}
+
+/// A name with its line in the sources.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct SourceLine {
+    /// The name.
+    pub name: String,
+    /// The file, in the package.
+    pub file: String,
+    /// The line, counted from 1.
+    pub line: usize,
+}
+
+/// A name that a program beside the game can use.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct NamedItem {
+    /// Where it is defined.
+    #[serde(flatten)]
+    pub at: SourceLine,
+    /// Its path behind the name of the crate; `None` if it is not public.
+    pub path: Option<String>,
+}
+
+/// The enum of a state.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct StateEnum {
+    /// Where it is defined.
+    #[serde(flatten)]
+    pub at: SourceLine,
+    /// Its variants.
+    pub variants: Vec<String>,
+}
+
+/// All that the sources show.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub(super) struct GameFacts {
+    /// Whether there is a library.
+    pub has_library: bool,
+    /// Public functions of the library that take `&mut App`, the likeliest first.
+    pub functions: Vec<NamedItem>,
+    /// Public plugins of the library that are unit structs.
+    pub plugins: Vec<NamedItem>,
+    /// The states.
+    pub states: Vec<StateEnum>,
+    /// Keys that are read.
+    pub keys: Vec<String>,
+    /// Mouse buttons that are read.
+    pub mouse_buttons: Vec<String>,
+    /// Devices and managers of input.
+    pub inputs: Vec<&'static str>,
+    /// Texts of buttons.
+    pub buttons: Vec<String>,
+    /// Crates of physics.
+    pub physics: Vec<&'static str>,
+    /// Whether a camera is in space.
+    pub is_in_space: bool,
+    /// Random numbers that differ from run to run.
+    pub unseeded: Vec<SourceLine>,
+    /// Random numbers from a seed.
+    pub seeded: Vec<SourceLine>,
+    /// Clocks of the machine.
+    pub clocks: Vec<SourceLine>,
+    /// Crates that load while the game runs.
+    pub loaders: Vec<&'static str>,
+    /// Lines that load assets.
+    pub loads: Vec<SourceLine>,
+    /// The component that looks like the player.
+    pub player: Option<NamedItem>,
+}
+
+impl GameFacts {
+    /// Reads the sources of a package, of which `library` is the file of the library.
+    pub fn read(manifest: &GameManifest, library: &str, sources: &[SourceText]) -> Self {
+        let mut facts = Self::default();
+        let door = sources.iter().find(|source| source.path == library);
+        facts.has_library = door.is_some();
+        for source in sources {
+            let prefix = door.and_then(|door| prefix(door, source));
+            facts.read_source(source, prefix.as_deref());
+        }
+        let rank = |item: &NamedItem| match item.at.name.as_str() {
+            "plugin" => 0,
+            "game" => 1,
+            _ => 2,
+        };
+        facts.functions.sort_by_key(rank);
+        facts.physics.extend(PHYSICS.into_iter().filter(|name| manifest.depends_on(name)));
+        facts.loaders.extend(LOADERS.into_iter().filter(|name| manifest.depends_on(name)));
+        facts.add_inputs(sources);
+        facts.inputs.extend(MANAGERS.into_iter().filter(|name| manifest.depends_on(name)));
+        facts
+    }
+
+    /// Reads one source. `prefix` is the path of its module, if that is public.
+    fn read_source(&mut self, source: &SourceText, prefix: Option<&str>) {
+        let code = source.code.as_str();
+        if let Some(prefix) = prefix {
+            let item = |(name, offset): (&str, usize)| NamedItem {
+                at: source.at(name, offset),
+                path: Some(format!("{prefix}{name}")),
+            };
+            self.functions.extend(functions_of_apps(code).into_iter().map(item));
+            self.plugins.extend(unit_plugins(code).into_iter().map(item));
+        }
+        for item in ["States", "SubStates"].into_iter().flat_map(|derived| deriving(code, derived, "enum ")) {
+            self.states.push(StateEnum { at: source.at(item.name, item.offset), variants: variants(item.rest) });
+        }
+        add_new(&mut self.keys, names_behind(code, "KeyCode::"));
+        add_new(&mut self.mouse_buttons, names_behind(code, "MouseButton::"));
+        if code.contains("Interaction") || code.contains("Pointer<") {
+            add_new(&mut self.buttons, button_texts(code));
+        }
+        self.is_in_space |= code.contains("Camera3d");
+        let random = source.lines_with(&RANDOM).into_iter().filter(|found| {
+            let line = code.lines().nth(found.line - 1).unwrap_or_default();
+            !line.contains("with_seed") && !line.contains("fn rng")
+        });
+        self.unseeded.extend(random);
+        self.seeded.extend(source.lines_with(&["seed_from_u64", "from_seed(", "with_seed("]));
+        self.clocks.extend(source.lines_with(&CLOCKS));
+        if code.contains("AssetServer") {
+            self.loads.extend(source.lines_with(&[".load(", ".load_folder("]));
+        }
+        for item in deriving(code, "Component", "struct ") {
+            let Some(rank) = PLAYERS.iter().position(|name| *name == item.name) else { continue };
+            let earlier =
+                self.player.as_ref().and_then(|player| PLAYERS.iter().position(|name| *name == player.at.name));
+            if earlier.is_none_or(|earlier| rank < earlier) {
+                let path = prefix.filter(|_| item.is_public).map(|prefix| format!("{prefix}{}", item.name));
+                self.player = Some(NamedItem { at: source.at(item.name, item.offset), path });
+            }
+        }
+    }
+
+    fn add_inputs(&mut self, sources: &[SourceText]) {
+        let any = |words: &[&str]| sources.iter().any(|source| words.iter().any(|word| source.code.contains(word)));
+        let rows: [(&'static str, bool); 6] = [
+            ("keyboard", !self.keys.is_empty() || any(&["ButtonInput<KeyCode>", "ButtonInput<Key>", "KeyboardInput"])),
+            ("mouse buttons", !self.mouse_buttons.is_empty() || any(&["ButtonInput<MouseButton>"])),
+            ("mouse cursor", any(&["cursor_position(", "CursorMoved", "Pointer<"])),
+            ("gamepad", any(&["Gamepad"])),
+            ("touch", any(&["Touches", "TouchInput"])),
+            ("buttons of bevy_ui", any(&["Interaction"]) || !self.buttons.is_empty()),
+        ];
+        self.inputs.extend(rows.into_iter().filter(|(_, is_read)| *is_read).map(|(name, _)| name));
+    }
+}
+
+/// Returns the path of a source's module behind the name of the crate, if a program beside it can name the module.
+fn prefix(door: &SourceText, source: &SourceText) -> Option<String> {
+    if source.path == door.path {
+        return Some(String::new());
+    }
+    let folder = door.path.rsplit_once('/').map_or("", |(folder, _)| folder);
+    let inner = source.path.strip_prefix(folder)?.trim_start_matches('/');
+    let module = inner.strip_suffix("/mod.rs").or_else(|| inner.strip_suffix(".rs"))?;
+    door.code.contains(&format!("pub mod {module};")).then(|| format!("{module}::"))
+}
+
+fn is_of_name(c: char) -> bool {
+    c.is_alphanumeric() || c == '_'
+}
+
+/// Returns the name at the start of a text.
+fn name(text: &str) -> &str {
+    &text[..text.find(|c| !is_of_name(c)).unwrap_or(text.len())]
+}
+
+fn add_new(all: &mut Vec<String>, more: Vec<String>) {
+    for name in more {
+        if !all.contains(&name) {
+            all.push(name);
+        }
+    }
+}
+
+/// Returns the names behind a path such as `KeyCode::`, also those in braces.
+fn names_behind(code: &str, path: &str) -> Vec<String> {
+    let mut found = Vec::new();
+    for (at, _) in code.match_indices(path).filter(|(at, _)| !code[..*at].ends_with(is_of_name)) {
+        let rest = &code[at + path.len()..];
+        let names: Vec<&str> = match rest.strip_prefix('{') {
+            Some(list) => list.split('}').next().unwrap_or_default().split(',').map(|part| name(part.trim())).collect(),
+            None => vec![name(rest)],
+        };
+        let is_variant = |name: &&str| name.starts_with(|c: char| c.is_uppercase()) && *name != "Unidentified";
+        add_new(&mut found, names.into_iter().filter(is_variant).map(str::to_owned).collect());
+    }
+    found
+}
+
+/// Returns the public functions that take `&mut App` alone, with their offsets.
+fn functions_of_apps(code: &str) -> Vec<(&str, usize)> {
+    let found = code.match_indices("pub fn ").filter_map(|(at, words)| {
+        let offset = at + words.len();
+        let name = name(&code[offset..]);
+        let (arguments, _) = code[offset + name.len()..].strip_prefix('(')?.split_once(')')?;
+        let arguments = arguments.trim().trim_end_matches(',');
+        let is_app = arguments.contains("&mut ") && arguments.ends_with("App") && !arguments.contains(',');
+        is_app.then_some((name, offset))
+    });
+    found.collect()
+}
+
+/// Returns the public unit structs that are plugins, with their offsets.
+fn unit_plugins(code: &str) -> Vec<(&str, usize)> {
+    let found = code.match_indices("impl Plugin for ").filter_map(|(at, words)| {
+        let offset = at + words.len();
+        let name = name(&code[offset..]);
+        code.contains(&format!("pub struct {name};")).then_some((name, offset))
+    });
+    found.collect()
+}
+
+/// A struct or an enum that derives something.
+struct Deriving<'a> {
+    name: &'a str,
+    offset: usize,
+    is_public: bool,
+    rest: &'a str,
+}
+
+/// Returns the structs or enums that derive this trait.
+fn deriving<'a>(code: &'a str, derived: &str, kind: &str) -> Vec<Deriving<'a>> {
+    let found = code.match_indices("#[derive(").filter_map(|(at, words)| {
+        let (list, rest) = code[at + words.len()..].split_once(")]")?;
+        list.split(',').find(|name| name.trim().rsplit("::").next() == Some(derived))?;
+        let mut rest = rest.trim_start();
+        while rest.starts_with("#[") {
+            rest = rest.split_once(']')?.1.trim_start();
+        }
+        let is_public = rest.starts_with("pub ");
+        if rest.starts_with("pub") {
+            rest = rest.split_once(' ')?.1;
+        }
+        let rest = rest.strip_prefix(kind)?;
+        let name = name(rest);
+        Some(Deriving { name, offset: code.len() - rest.len(), is_public, rest: &rest[name.len()..] })
+    });
+    found.collect()
+}
+
+/// Returns the variants of an enum, from the text behind its name.
+fn variants(rest: &str) -> Vec<String> {
+    let body = rest.split_once('{').map_or("", |(_, body)| body.split('}').next().unwrap_or_default());
+    let names = body.split(',').map(|part| {
+        let mut part = part.trim();
+        while let Some((_, behind)) = part.split_once(']').filter(|_| part.starts_with("#[")) {
+            part = behind.trim_start();
+        }
+        name(part).to_owned()
+    });
+    names.filter(|name| !name.is_empty()).collect()
+}
+
+/// Returns the texts that stand within 20 lines behind a `Button`.
+fn button_texts(code: &str) -> Vec<String> {
+    const REACH: usize = 20;
+    let (mut found, mut near) = (Vec::new(), 0_usize);
+    for line in code.lines() {
+        let is_import = line.trim_start().starts_with("use ");
+        let is_button = line
+            .match_indices("Button")
+            .any(|(at, word)| !line[..at].ends_with(is_of_name) && !line[at + word.len()..].starts_with(is_of_name));
+        near = if is_button && !is_import { REACH } else { near.saturating_sub(1) };
+        if near == 0 {
+            continue;
+        }
+        let texts = line.split("Text::new(\"").skip(1).filter_map(|rest| rest.split('"').next());
+        let is_plain = |text: &&str| !text.is_empty() && text.len() <= 30 && !text.contains(['{', '\\']);
+        add_new(&mut found, texts.filter(is_plain).map(str::to_owned).collect());
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn facts(sources: &[(&str, &str)]) -> GameFacts {
+        let sources: Vec<_> = sources.iter().map(|(path, text)| SourceText::new(path, text)).collect();
+        GameFacts::read(&GameManifest::default(), "src/lib.rs", &sources)
+    }
+
+    #[test]
+    fn a_manifest_has_its_bevy_in_every_form_that_toml_has() {
+        for (text, version, features) in [
+            ("[dependencies]\nbevy = \"0.19\" # \"0.18\"", Some("0.19"), &[] as &[&str]),
+            ("[dependencies]\nbevy = { version = '0.19.1', features = [\"a\", \"b\"] }", Some("0.19.1"), &["a", "b"]),
+            (
+                "[dependencies]\nbevy = { default-features = false, features = [\n  \"a\", # why\n  \"b\",\n] }",
+                None,
+                &["a", "b"],
+            ),
+            ("[dependencies.bevy]\nversion = \"0.18\"\nfeatures = [\"a\"]", Some("0.18"), &["a"]),
+            ("[dependencies]\nbevy.version = \"0.19\"\nbevy.features = [\"a\"]", Some("0.19"), &["a"]),
+            ("[dependencies]\nbevy = { git = \"https://example.org/bevy#main\" }", None, &[]),
+        ] {
+            let found = GameManifest::read(text).bevy.unwrap_or_else(|| panic!("no bevy in {text}"));
+            assert_eq!((found.version.as_deref(), found.is_inherited), (version, false), "{text}");
+            assert_eq!(found.features, features, "{text}");
+        }
+        let other = GameManifest::read("[dependencies]\nbevy_rapier2d = \"0.36\"\n[dev-dependencies]\nbevy = \"0.19\"");
+        assert_eq!((other.bevy.clone(), other.depends_on("bevy_rapier2d")), (None, true));
+    }
+
+    #[test]
+    fn a_manifest_has_its_package_its_library_and_its_members() {
+        let text = "[package]\nname = \"my-game\"\n[lib]\nname = \"mine\"\npath = \"code/lib.rs\"\n[workspace]\nmembers = [\n  \"a\",\n  \"crates/*\",\n]\n\
+            [workspace.dependencies]\nbevy = \"0.19\"\n[dependencies]\nbevy.workspace = true\n";
+        let manifest = GameManifest::read(text);
+        assert_eq!(manifest.package.as_deref(), Some("my-game"));
+        assert_eq!(
+            (manifest.library.as_deref(), manifest.library_path.as_deref()),
+            (Some("mine"), Some("code/lib.rs"))
+        );
+        assert!(manifest.is_workspace && manifest.members == ["a", "crates/*"], "{manifest:?}");
+        assert!(manifest.bevy.is_some_and(|bevy| bevy.is_inherited));
+        assert_eq!(manifest.workspace_bevy.and_then(|bevy| bevy.version).as_deref(), Some("0.19"));
+        assert!(!GameManifest::read("[package]\nname = \"a\"").is_workspace);
+    }
+
+    #[test]
+    fn versions_have_two_numbers_that_count() {
+        for (text, numbers) in [
+            ("0.19", Some((0, 19))),
+            ("^0.19.1", Some((0, 19))),
+            ("=0.19.0-rc.1", Some((0, 19))),
+            (">=0.18, <0.20", Some((0, 18))),
+            ("1", Some((1, 0))),
+            ("*", None),
+        ] {
+            assert_eq!(major_minor(text), numbers, "{text}");
+        }
+    }
+
+    #[test]
+    fn comments_are_blank_and_lines_keep_their_numbers() {
+        let text = "a // \"b\n/* c /* d */ \n e */ f\nlet g = \"// h\"; // i\nr#\"j // \"k\"# '\"' // l";
+        assert_eq!(without_comments(text), "a \n\n f\nlet g = \"// h\"; \nr#\"j // \"k\"# '\"' ");
+    }
+
+    #[test]
+    fn keys_are_those_that_the_code_names() {
+        let code = "use bevy::prelude::KeyCode::{self, Space};\n// KeyCode::KeyQ\n\
+            keys.pressed(KeyCode::ArrowLeft) || keys.any_pressed([KeyCode::KeyA, KeyCode::ArrowLeft]);\nMyKeyCode::B;";
+        let found = facts(&[("src/main.rs", code)]);
+        assert_eq!(found.keys, ["Space", "ArrowLeft", "KeyA"]);
+        assert_eq!(found.inputs, ["keyboard"]);
+    }
+
+    #[test]
+    fn public_functions_and_plugins_of_the_library_are_found() {
+        let library = "pub mod rules;\nmod hidden;\npub fn level(number: u64) {}\npub fn add(app: &mut App) {}\n\
+            pub struct All;\nimpl Plugin for All { fn build(&self, app: &mut App) {} }\nfn own(app: &mut App) {}";
+        let rules = "pub fn plugin(app: &mut bevy::prelude::App) {}\npub fn two(app: &mut App, other: u32) {}";
+        let found = facts(&[("src/lib.rs", library), ("src/rules.rs", rules), ("src/hidden.rs", rules)]);
+        let paths =
+            |items: &[NamedItem]| items.iter().map(|item| item.path.clone().unwrap_or_default()).collect::<Vec<_>>();
+        assert!(found.has_library);
+        assert_eq!(paths(&found.functions), ["rules::plugin", "add"]);
+        assert_eq!(paths(&found.plugins), ["All"]);
+        assert_eq!(
+            found.functions[1].at,
+            SourceLine { name: "add".to_owned(), file: "src/lib.rs".to_owned(), line: 4 }
+        );
+    }
+
+    #[test]
+    fn states_have_their_variants() {
+        let code = "#[derive(Clone, Default, States)]\npub enum Screen {\n    #[default]\n    Menu,\n    Playing,\n}\n\
+            #[derive(Debug)]\nenum Other { A }";
+        let found = facts(&[("src/main.rs", code)]);
+        assert_eq!(found.states.len(), 1);
+        assert_eq!((found.states[0].at.name.as_str(), found.states[0].at.line), ("Screen", 2));
+        assert_eq!(found.states[0].variants, ["Menu", "Playing"]);
+    }
+
+    #[test]
+    fn the_likeliest_player_is_found_and_usable_only_if_public() {
+        let code = "#[derive(Component)]\npub struct Ship;\n#[derive(Component, Default)]\n#[require(Transform)]\nstruct Hero { speed: f32 }\n\
+            #[derive(Resource)]\npub struct Player;";
+        let player = facts(&[("src/lib.rs", code)]).player.expect("a hero");
+        assert_eq!((player.at.name.as_str(), player.at.line, player.path), ("Hero", 5, None));
+        let player = facts(&[("src/lib.rs", &code.replace("struct Hero", "pub struct Hero"))]).player.expect("a hero");
+        assert_eq!(player.path.as_deref(), Some("Hero"));
+    }
+
+    #[test]
+    fn randomness_clocks_and_loads_have_their_lines() {
+        let code = "use rand::rng;\nuse std::time::SystemTime;\nlet a = rand::rng();\nlet b = fastrand::Rng::with_seed(7);\n\
+            let c = SmallRng::from_os_rng();\nlet d = StdRng::seed_from_u64(7);\nlet e = Instant::now();\n\
+            fn load(assets: Res<AssetServer>) { assets.load(\"hero.png\"); }\nlet f = rng();";
+        let found = facts(&[("src/main.rs", code)]);
+        let lines = |found: &[SourceLine]| found.iter().map(|at| at.line).collect::<Vec<_>>();
+        assert_eq!(lines(&found.unseeded), [3, 5, 9], "{:?}", found.unseeded);
+        assert_eq!(lines(&found.seeded), [4, 6]);
+        assert_eq!((lines(&found.clocks), lines(&found.loads)), (vec![7], vec![8]));
+    }
+
+    #[test]
+    fn texts_near_buttons_are_names_of_buttons() {
+        let code = "use bevy::ui::Button;\nfn menu() { (Node::default(), Text::new(\"Title\")); }\n\
+            fn start() { (Button, children![(Text::new(\"Start\"))]); }\nfn press(query: Query<&Interaction>) {}";
+        let found = facts(&[("src/main.rs", code)]);
+        assert_eq!(found.buttons, ["Start"]);
+        assert_eq!(found.inputs, ["buttons of bevy_ui"]);
+        let without = code.replace("Interaction", "Transform");
+        assert_eq!(facts(&[("src/main.rs", &without)]).buttons, Vec::<String>::new());
+    }
+}
