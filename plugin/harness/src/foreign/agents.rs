@@ -185,7 +185,7 @@ impl SharingAgents {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::game::Game;
+    use crate::{arrangement::Arrangement, game::Game};
 
     /// A game of two agents without observations of their own; `right` has these keys.
     fn pair(right: &[KeyCode]) -> ForeignGame {
@@ -248,6 +248,14 @@ mod tests {
     fn a_name_that_two_agents_share_is_a_problem() {
         let text = problem(&pair(&[KeyCode::ArrowUp]).agents(["right", "right"]));
         assert!(text.contains("names the agent `right` twice in `.agents`"), "{text}");
+    }
+
+    #[test]
+    fn agents_that_play_together_share_a_world_and_others_play_alone() {
+        let game = pair(&[KeyCode::ArrowUp]);
+        assert_eq!(Arrangement::of_agents(&game, 8, 2), Arrangement { worlds: 4, arenas: 2 });
+        assert_eq!(Arrangement::of_agents(&game, 3, 1), Arrangement { worlds: 2, arenas: 2 }, "rounded up");
+        assert_eq!(Arrangement::new(&game, 8, 2), Arrangement { worlds: 8, arenas: 1 });
     }
 
     #[test]
