@@ -2,6 +2,7 @@
 
 pub mod catch;
 pub mod faulty_catch;
+pub mod pong;
 pub mod rooms;
 pub mod stubborn;
 mod traces;

@@ -278,6 +278,17 @@ pub(crate) fn first_levels(game: &dyn Game, last: u64) -> LevelSplit {
     LevelSplit { mode: default_mode(game).to_owned(), first: 0, last }
 }
 
+/// Warns that a verb plays one agent of a game in which several play together.
+pub(crate) fn warn_of_idle_agents(game: &dyn Game) {
+    let agents = game.tools().host.agents_per_arena();
+    if agents > 1 {
+        tracing::warn!(
+            "`{}` has {agents} agents that play together; here the first one plays alone, and the others do nothing",
+            game.name()
+        );
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use bevy_playbot::demo::file::DemoActions;

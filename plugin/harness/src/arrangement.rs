@@ -7,7 +7,7 @@ use crate::game::Game;
 pub struct Arrangement {
     /// Number of Worlds.
     pub worlds: u32,
-    /// Arenas in each of them, with one agent each.
+    /// Arenas in each of them, with one agent each; or the agents that share one arena.
     pub arenas: u32,
 }
 
@@ -23,6 +23,16 @@ impl Arrangement {
         let total = wanted * worlds.max(1);
         let fitting = (1..=most).rev().find(|arenas| total.is_multiple_of(*arenas)).unwrap_or(1);
         Self { worlds: total / fitting, arenas: fitting }
+    }
+
+    /// Distributes `agents` over `worlds` as [`new`](Self::new) does. Agents that share an arena, as
+    /// [`HostTools::agents_per_arena`](crate::game::HostTools::agents_per_arena) says, share a World. A number that is no
+    /// multiple of theirs is rounded up.
+    pub fn of_agents(game: &dyn Game, agents: u32, worlds: u32) -> Self {
+        match game.tools().host.agents_per_arena() {
+            0 | 1 => Self::new(game, agents, worlds),
+            sharing => Self { worlds: agents.div_ceil(sharing).max(1), arenas: sharing },
+        }
     }
 
     /// Returns the number of the first agent of each World.

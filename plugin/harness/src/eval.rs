@@ -235,12 +235,15 @@ fn play(
         return Err(Fault(problem).into());
     }
     plan.check_memory()?;
-    let arrangement = Arrangement::new(game, plan.arenas, plan.worlds);
+    let arrangement = Arrangement::of_agents(game, plan.arenas, plan.worlds);
+    // Agents that share an arena play the same episode.
+    let sharing = game.tools().host.agents_per_arena().max(1);
+    let progress = |ended: u64| progress(ended.div_ceil(u64::from(sharing)));
     let (costs, followed) = (BuildingCosts::default(), follow.then_some(game));
     let build = |first| costs.of(|| build_eval_world(game, player, plan, arrangement, first));
     // Worlds that draw share graphics cards, and are built one after the other. The others live as long as they play.
     let draws = observation_of(player, plan).is_image();
-    let busy = arrangement.first_agents().filter(|first| u64::from(*first) < plan.episodes());
+    let busy = arrangement.first_agents().filter(|first| u64::from(*first / sharing) < plan.episodes());
     let shares = busy.map(|first| Ok((first, if draws { Some(build(first)?) } else { None })));
     let mut shares = shares.collect::<Result<Vec<_>, VisionError>>()?;
     let parts = on_threads(&mut shares, plan.threads, |(first, built)| -> Result<Vec<Trail>, EvalError> {
@@ -263,7 +266,8 @@ fn observation_of(player: &Player, plan: &EvalPlan) -> ObservationConfig {
     if matches!(player, Player::Policy { .. }) { plan.observation_config } else { ObservationConfig::default() }
 }
 
-/// Builds a World whose agents hold their share of the plan: agent i plays the i-th episode of every round.
+/// Builds a World whose agents hold their share of the plan: agent i plays the i-th episode of every round. Agents that
+/// share an arena play the same episodes.
 fn build_eval_world(
     game: &dyn Game,
     player: &Player,
@@ -271,14 +275,16 @@ fn build_eval_world(
     arrangement: Arrangement,
     first: u32,
 ) -> Result<World, VisionError> {
-    let (per_world, total) = (arrangement.arenas, arrangement.total() as usize);
+    let sharing = game.tools().host.agents_per_arena().max(1);
+    let (per_world, total) = (arrangement.arenas, (arrangement.total() / sharing) as usize);
     let observation_config = observation_of(player, plan);
     let (mut world, agents) =
         build_observing_world(game, &plan.split.mode, &observation_config, plan.seed, first, per_world)?;
     EndedEpisodes::note_in(&mut world);
     let all: Vec<u64> = (0..plan.episodes_per_level).flat_map(|_| plan.levels()).collect();
     for (offset, &agent) in agents.iter().enumerate() {
-        let levels: Vec<u64> = all.iter().skip(first as usize + offset).step_by(total).copied().collect();
+        let levels: Vec<u64> =
+            all.iter().skip((first as usize + offset) / sharing as usize).step_by(total).copied().collect();
         world.entity_mut(agent).insert(LevelQueue::list(levels));
         let control = player.seat(game, &mut world, agent);
         world.entity_mut(agent).insert(control);

@@ -11,6 +11,7 @@
 //! - `levels`: modes, level files, plans and proofs.
 //! - `restart`, `clocks`: the start of an episode, and the game's clocks at that time.
 //! - `input`: the path from an action into the game, and the mask of actions.
+//! - `agents`: several agents in one World, and their inputs.
 //! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `snapshot`: the state of an episode, saved and loaded.
 //! - `observe`, `paths`, `guess`: observation, position, reward and end after a tick, observations by the paths of
@@ -53,6 +54,7 @@
 //! assert_eq!((count.finished, count.successes), (1, 1));
 //! ```
 
+mod agents;
 #[cfg(feature = "ui")]
 mod clicks;
 mod clocks;
@@ -70,10 +72,11 @@ use crate::{
     defect::DefectKind,
     detector::Detector,
     foreign::{
+        agents::SharingAgents,
         description::{Description, ForeignPlugin, nothing_seen},
         input::{ForeignBot, Input},
         levels::LevelParts,
-        runtime::SystemFactory,
+        runtime::{AgentPlace, SystemFactory},
     },
     game::{BotTools, Game, GameTools, HostTools, InputTools, PictureTools, TestTools},
 };
@@ -97,7 +100,7 @@ pub use crate::foreign::{
     levels::{IntoLevelTextError, LevelFromFile, PlayedMode},
     observe::IntoPlanPosition,
     paths::PathError,
-    runtime::{IntoActionValue, IntoValues, LevelSeed, Restart},
+    runtime::{IntoActionValue, IntoValues, LevelSeed, PlayedAgent, Restart},
 };
 
 /// Default number of frames that a level may take to load.
@@ -106,8 +109,8 @@ const PATIENCE: u32 = 3600;
 /// A game without this plugin, with the actions, observations and rewards of its agent: see the
 /// [module](self).
 ///
-/// Its player and its resources are global, so each World has one arena with one agent. An experiment with more arenas
-/// gets more Worlds. Its mode is called `default`, unless it names [`modes`](Self::modes).
+/// Its player and its resources are global, so each World has one arena, with one agent or with the
+/// [`agents`](Self::agents) that play together. An experiment with more arenas gets more Worlds. Its mode is called `default`, unless it names [`modes`](Self::modes).
 #[derive(Clone)]
 pub struct ForeignGame {
     description: Arc<Description>,
@@ -126,6 +129,7 @@ impl ForeignGame {
             levels: None,
             level_parts: LevelParts::default(),
             input: Input::default(),
+            agents: SharingAgents::default(),
             act: None,
             legal: None,
             agent: Vec::new(),
@@ -471,7 +475,7 @@ impl Game for ForeignGame {
     }
 
     fn actions(&self) -> ActionSpace {
-        self.description.input.space()
+        self.description.input_of(0).space()
     }
 
     fn observation(&self) -> ObservationSpace {
@@ -484,8 +488,9 @@ impl Game for ForeignGame {
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         let sensor = VectorSensor::new(self.description.observation().names);
-        let mut agent = world.spawn((Agent::new(index, self.actions()), sensor));
-        if let Some(input) = self.description.input.pressed() {
+        let place = world.query::<&Agent>().iter(world).count();
+        let mut agent = world.spawn((Agent::new(index, self.actions()), sensor, AgentPlace(place)));
+        if let Some(input) = self.description.input_of(place).pressed() {
             agent.insert(input);
         }
         if self.description.legal.is_some()
@@ -538,12 +543,16 @@ impl HostTools for ForeignGame {
         Some(1)
     }
 
+    fn agents_per_arena(&self) -> u32 {
+        u32::try_from(self.description.agents.count()).unwrap_or(u32::MAX)
+    }
+
     fn unplayable(&self) -> Option<String> {
-        let Description { name, input, observe, paths, has_camera, names, .. } = &*self.description;
-        if let Some(problem) = input.problem() {
+        let Description { name, input, agents, observe, paths, has_camera, names, .. } = &*self.description;
+        if let Some(problem) = agents.problem(input) {
             return Some(format!("the game `{name}` {problem}"));
         }
-        if has_no_actions(&input.space()) {
+        if has_no_actions(&self.actions()) {
             return Some(format!(
                 "the game `{name}` has no actions: say what an agent can do, for instance with `.keys`"
             ));
@@ -577,11 +586,11 @@ impl PictureTools for ForeignGame {
 
 impl InputTools for ForeignGame {
     fn action_names(&self) -> Vec<String> {
-        self.description.input.names()
+        self.description.input_of(0).names()
     }
 
     fn key_bindings(&self) -> Option<KeyBindings> {
-        self.description.input.bindings()
+        self.description.input_of(0).bindings()
     }
 }
 

@@ -294,6 +294,12 @@ pub trait HostTools: Send + Sync {
         None
     }
 
+    /// Returns the number of agents that share each arena: its level, its episode and its ticks. In a World of trainings
+    /// and evaluations all of them play. Everything that plays one agent leaves out all but the first.
+    fn agents_per_arena(&self) -> u32 {
+        1
+    }
+
     /// Returns the reason that the game cannot be played at all, if there is one. That it has no actions is checked for
     /// every game.
     fn unplayable(&self) -> Option<String> {

@@ -194,7 +194,9 @@ pub fn add_game(
     seed: u64,
 ) -> Result<(), VisionError> {
     app.insert_resource(PlaybotSeed(seed));
-    if let Some(most) = game.tools().host.arenas_per_world() {
+    let host = game.tools().host;
+    if let Some(arenas) = host.arenas_per_world() {
+        let most = arenas.saturating_mul(host.agents_per_arena().max(1));
         app.insert_resource(AgentLimit { game: game.name(), most });
     }
     if let (Some(problem), Some(mut faults)) = (game.problem(), app.world_mut().get_resource_mut::<Faults>()) {

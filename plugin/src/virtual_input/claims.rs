@@ -67,6 +67,15 @@ pub(super) fn check_claims(
     }
 }
 
+impl VirtualInput {
+    /// Returns the name of an input of keyboard, mouse or touch screen that both mappings may press or move. Two agents of
+    /// one World cannot have such mappings. Each of them has a gamepad of its own.
+    pub fn shared_with(&self, other: &Self) -> Option<String> {
+        let others = claims_of(other);
+        claims_of(self).into_iter().find(|claim| others.contains(claim)).map(Claim::name)
+    }
+}
+
 /// Returns all inputs that a mapping may press or move, except the agent's own gamepad.
 fn claims_of(input: &VirtualInput) -> Vec<Claim> {
     let reach = input.reach();

@@ -102,7 +102,7 @@ impl Trainer {
         threads: usize,
     ) -> Result<Self, TrainError> {
         let prior = learner.skills().as_ref().map(SkillPrior::from);
-        let arrangement = Arrangement::new(game, experiment.arenas, experiment.worlds);
+        let arrangement = Arrangement::of_agents(game, experiment.arenas, experiment.worlds);
         let share = arrangement.arenas;
         let (levels, observation_config, seed) = (&experiment.train, experiment.observation_config(), experiment.seed);
         let collectors: Result<_, _> = arrangement

@@ -1,6 +1,7 @@
 //! Tests of foreign games and their adapters.
 
 mod actions;
+mod agents;
 mod assets;
 mod clocks;
 mod experiments;

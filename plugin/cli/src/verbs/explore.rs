@@ -7,7 +7,7 @@ mod explorer;
 mod recorded;
 
 use crate::{
-    arguments::{Compute, first_levels},
+    arguments::{Compute, first_levels, warn_of_idle_agents},
     error::{CliError, Outcome},
     output,
     output::print_line,
@@ -111,6 +111,7 @@ pub struct Args {
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
+    warn_of_idle_agents(game);
     let split = level(game, args.level.as_ref())?;
     split.check(game)?;
     let device = args.compute.device();

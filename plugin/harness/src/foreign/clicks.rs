@@ -3,7 +3,7 @@
 use crate::foreign::{
     ForeignGame,
     input::Input,
-    runtime::{ForeignCell, playing_agent},
+    runtime::{ForeignCell, playing_agents},
 };
 use bevy::{
     camera::RenderTarget,
@@ -155,7 +155,8 @@ fn end_episode(event: On<EpisodeEnded>, mut agents: Query<&mut ButtonClicks>, mu
 
 /// Aims the click of this tick's action at its button.
 fn aim(world: &mut World) {
-    let Some(agent) = playing_agent(world) else { return };
+    // A game with several agents has no clicks.
+    let Some(&agent) = playing_agents(world).first() else { return };
     if world.get(agent) == Some(&Control::Human) {
         return;
     }

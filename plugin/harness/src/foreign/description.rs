@@ -7,6 +7,7 @@ use crate::{
     detector::{Detector, LevelProof},
     foreign::{
         ForeignGame, Restart,
+        agents::SharingAgents,
         clocks::ClockSettings,
         input,
         input::Input,
@@ -14,7 +15,7 @@ use crate::{
         observe,
         paths::ObservedPath,
         restart,
-        runtime::{Baseline, Foreign, ForeignCell, LevelSeed, ReaderFactory, Sensor, SystemFactory},
+        runtime::{Baseline, Foreign, ForeignCell, LevelSeed, PlayedAgent, ReaderFactory, Sensor, SystemFactory},
         snapshot::SnapshotParts,
     },
 };
@@ -45,7 +46,9 @@ pub(super) struct Description {
     pub(super) levels: Option<u64>,
     /// Level files, plans and proofs.
     pub(super) level_parts: LevelParts,
+    /// The input of all agents, as far as they have none of their own.
     pub(super) input: Input,
+    pub(super) agents: SharingAgents,
     pub(super) act: Option<SystemFactory<()>>,
     /// The mask of the actions.
     pub(super) legal: Option<SystemFactory<Vec<bool>>>,
@@ -92,6 +95,11 @@ pub(super) struct Description {
 }
 
 impl Description {
+    /// Returns the input of the agent at this place.
+    pub(super) fn input_of(&self, place: usize) -> Input {
+        self.agents.input_of(place % self.agents.count(), &self.input)
+    }
+
     /// Returns whether the agent's state is read for explorers, detectors, proofs or snapshots.
     pub(super) fn has_state(&self) -> bool {
         self.position.is_some() || self.cell.is_some() || self.proof.is_some() || self.snapshot.is_some()
@@ -150,6 +158,7 @@ impl Plugin for ForeignPlugin {
             app.add_plugins(VirtualInputPlugin { route: InputRoute::Messages });
         }
         app.init_resource::<LevelSeed>()
+            .init_resource::<PlayedAgent>()
             .init_resource::<LevelFromFile>()
             .add_observer(restart::start)
             .add_observer(restart::announce)

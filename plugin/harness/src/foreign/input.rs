@@ -2,7 +2,7 @@
 
 use crate::foreign::{
     ForeignGame,
-    runtime::{SystemFactory, playing_agent, with_foreign},
+    runtime::{SystemFactory, playing_agents, with_foreign},
 };
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -282,14 +282,15 @@ impl Input {
 
 /// Lets the game's own system pass the action on, except for people, who have their own devices.
 pub(super) fn act(world: &mut World) {
-    let Some(agent) = playing_agent(world) else { return };
-    if world.get(agent) == Some(&Control::Human) {
-        return;
+    for agent in playing_agents(world) {
+        if world.get(agent) == Some(&Control::Human) {
+            continue;
+        }
+        with_foreign(world, agent, |world, foreign| match &mut foreign.asked().act {
+            Some(system) => system.demand(world),
+            None => Ok(()),
+        });
     }
-    with_foreign(world, agent, |world, foreign| match &mut foreign.act {
-        Some(system) => system.demand(world),
-        None => Ok(()),
-    });
 }
 
 /// Marks an agent that the game's demonstrator plays while its control is [`Control::Bot`].
@@ -301,11 +302,16 @@ pub(super) struct ForeignBot {
 }
 
 pub(super) fn decide(world: &mut World) {
-    let Some(agent) = playing_agent(world) else { return };
+    for agent in playing_agents(world) {
+        decide_for(world, agent);
+    }
+}
+
+fn decide_for(world: &mut World, agent: Entity) {
     let (Some(&ForeignBot { noise }), Some(Control::Bot)) = (world.get(agent), world.get::<Control>(agent)) else {
         return;
     };
-    let planned = with_foreign(world, agent, |world, foreign| match &mut foreign.bot {
+    let planned = with_foreign(world, agent, |world, foreign| match &mut foreign.asked().bot {
         Some(bot) => bot.demand(world),
         None => Err("it has no demonstrator".to_owned()),
     });
@@ -324,12 +330,13 @@ pub(super) fn add_mask(app: &mut App) {
 }
 
 fn mask(world: &mut World) {
-    let Some(agent) = playing_agent(world) else { return };
-    let legal = with_foreign(world, agent, |world, foreign| match &mut foreign.legal {
-        Some(system) => system.demand(world).map(Some),
-        None => Ok(None),
-    });
-    if let Some(legal) = legal.flatten() {
-        world.entity_mut(agent).insert(LegalActions::new(legal));
+    for agent in playing_agents(world) {
+        let legal = with_foreign(world, agent, |world, foreign| match &mut foreign.asked().legal {
+            Some(system) => system.demand(world).map(Some),
+            None => Ok(None),
+        });
+        if let Some(legal) = legal.flatten() {
+            world.entity_mut(agent).insert(LegalActions::new(legal));
+        }
     }
 }

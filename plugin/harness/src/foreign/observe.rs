@@ -6,7 +6,7 @@ use crate::{
     foreign::{
         ForeignGame,
         runtime::{
-            Baseline, ForeignCell, OwnedSystem, ReaderFactory, Sensor, SystemFactory, playing_agent, with_foreign,
+            Baseline, ForeignCell, OwnedSystem, ReaderFactory, Sensor, SystemFactory, playing_agents, with_foreign,
         },
     },
     game::{GuessedPosition, StateTools},
@@ -27,12 +27,17 @@ pub(super) fn add_observation(app: &mut App) {
     app.add_systems(ObserveSchedule, observe.before(VisionSystems::Sync));
 }
 
-/// Fills the agent's vector, unless it has no sensor for one.
+/// Fills the vector of each agent, unless it has no sensor for one.
 pub(super) fn observe(world: &mut World) {
-    let Some(agent) = playing_agent(world) else { return };
+    for agent in playing_agents(world) {
+        observe_for(world, agent);
+    }
+}
+
+fn observe_for(world: &mut World, agent: Entity) {
     let Some(expected) = world.get::<VectorSensor>(agent).map(|sensor| sensor.space().len()) else { return };
     let values = with_foreign(world, agent, |world, foreign| {
-        let values = match &mut foreign.sensor {
+        let values = match &mut foreign.asked().sensor {
             Sensor::System(system) => system.demand(world)?,
             Sensor::Paths(paths) => paths
                 .iter_mut()
@@ -294,7 +299,12 @@ pub(super) fn add_state(app: &mut App) {
 }
 
 fn read_state(world: &mut World) {
-    let Some(agent) = playing_agent(world) else { return };
+    for agent in playing_agents(world) {
+        read_state_of(world, agent);
+    }
+}
+
+fn read_state_of(world: &mut World, agent: Entity) {
     let state = with_foreign(world, agent, |world, foreign| {
         if let Some(why) = foreign.failed_proof.take() {
             return Err(why);
@@ -305,7 +315,8 @@ fn read_state(world: &mut World) {
         if let Some(save) = &mut foreign.save {
             save.prepare(world);
         }
-        Ok((run(&mut foreign.position, world)?, run(&mut foreign.cell, world)?))
+        let parts = foreign.asked();
+        Ok((run(&mut parts.position, world)?, run(&mut parts.cell, world)?))
     });
     let (position, cell) = state.unwrap_or_default();
     note(world, agent, position.map(ForeignPosition));
@@ -327,30 +338,49 @@ fn note<C: Component>(world: &mut World, agent: Entity, component: Option<C>) {
 
 // Reward and end.
 
-/// Reads reward and end, after the game's frame.
+/// Reads rewards and ends, after the game's frame. The end of one agent's episode ends those of all others.
 pub(super) fn read_outcome(world: &mut World) {
-    let Some(agent) = playing_agent(world) else { return };
+    let mut outcomes = Vec::new();
+    for agent in playing_agents(world) {
+        outcomes.extend(outcome_of(world, agent).map(|(reward, end)| (agent, reward, end)));
+    }
+    let is_over = outcomes.iter().any(|(_, _, end)| end.is_some());
+    for (agent, reward, end) in outcomes {
+        judge(world, agent, reward, end.or(is_over.then_some(EpisodeEnd::Truncated)));
+    }
+}
+
+/// Returns the agent's reward of this tick, and the end of the game as the agent sees it.
+fn outcome_of(world: &mut World, agent: Entity) -> Option<(f32, Option<EpisodeEnd>)> {
     let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
-    let outcome = with_foreign(world, agent, |world, foreign| {
+    with_foreign(world, agent, |world, foreign| {
+        let limit = foreign.game.description.limit;
+        let parts = foreign.asked();
         let mut reward = 0.0;
-        for part in &mut foreign.rewards {
+        for part in &mut parts.rewards {
             // A value of an entity that does not exist now pays nothing.
             let Some(value) = part.system.run(world)? else { continue };
             reward += if part.is_delta { value - part.last.unwrap_or(value) } else { value };
             part.last = Some(value);
         }
-        let end = run(&mut foreign.end, world)?.flatten();
-        let time_is_up = foreign.game.description.limit.is_some_and(|limit| tick + 1 >= limit);
-        let end = end.or(time_is_up.then_some(EpisodeEnd::Truncated));
+        let end = run(&mut parts.end, world)?.flatten();
+        let time_is_up = limit.is_some_and(|limit| tick + 1 >= limit);
+        Ok((reward, end.or(time_is_up.then_some(EpisodeEnd::Truncated))))
+    })
+}
+
+/// Pays the agent, and ends its episode if there is an end.
+fn judge(world: &mut World, agent: Entity, reward: f32, end: Option<EpisodeEnd>) {
+    let outcome = with_foreign(world, agent, |world, foreign| {
         let is_lost = end.is_some_and(|end| end != EpisodeEnd::WON);
-        let cause = if is_lost { run(&mut foreign.end_cause, world)?.flatten() } else { None };
+        let cause = if is_lost { run(&mut foreign.asked().end_cause, world)?.flatten() } else { None };
         let state = match &mut foreign.hash {
             Some(system) => system.demand(world)?,
             None => foreign.baseline.as_ref().map_or(0, |baseline| of_transforms(world, baseline)),
         };
-        Ok((reward, end, cause, state))
+        Ok((cause, state))
     });
-    let Some((reward, end, cause, state)) = outcome else { return };
+    let Some((cause, state)) = outcome else { return };
     if cause.is_some() {
         note(world, agent, cause.map(ForeignEndCause));
     }

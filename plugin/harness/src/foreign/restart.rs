@@ -5,12 +5,13 @@ use crate::{
         clocks::{ClockSettings, leave_loading_out, stand_still},
         levels::{LevelFromFile, level_ahead},
         observe::forget_state,
-        runtime::{Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agent, with_foreign},
+        runtime::{AgentParts, Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agents, with_foreign},
     },
     level_files::LevelDesigns,
 };
 use bevy::prelude::*;
 use bevy_playbot::{
+    agent::{Agent, Control},
     engine::{NextEpisode, Renewal, UnloadedAssets},
     episode::{Episode, StartEpisode},
 };
@@ -26,6 +27,16 @@ pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, 
 
 fn begin(world: &mut World, agent: Entity, level: u64) {
     forget_state(world, agent);
+    let agents = active_agents(world);
+    if agents.first().is_some_and(|&first| first != agent) {
+        return;
+    }
+    // All agents play the level of the first one, and one restart begins it for them.
+    for other in agents {
+        if let Some(mut episode) = world.get_mut::<Episode>(other) {
+            episode.level = level;
+        }
+    }
     with_foreign(world, agent, |world, foreign| {
         let (seed, file) = level_ahead(&foreign.game, world.get_resource::<LevelDesigns>(), level)?;
         world.insert_resource(seed);
@@ -35,7 +46,7 @@ fn begin(world: &mut World, agent: Entity, level: u64) {
             system.demand(world)?;
         }
         foreign.frames = 0;
-        foreign.rewards.iter_mut().for_each(|part| part.last = None);
+        foreign.rewards().for_each(|part| part.last = None);
         Ok(())
     });
 }
@@ -88,14 +99,20 @@ fn demand_a_new_world(world: &mut World, foreign: &mut Foreign) -> Result<(), St
     Ok(())
 }
 
-/// Stores the level for the systems of the game's start.
+/// Stores the level for the systems of the game's start: that of the first agent.
 pub(super) fn announce(
     event: On<NextEpisode>,
+    agents: Query<(Entity, &Agent, &Control)>,
     cell: Res<ForeignCell>,
     designs: Option<Res<LevelDesigns>>,
     mut seed: ResMut<LevelSeed>,
     mut file: ResMut<LevelFromFile>,
 ) {
+    let active = agents.iter().filter(|(_, _, control)| control.is_active());
+    let first = active.min_by_key(|(_, agent, _)| agent.index);
+    if first.is_some_and(|(first, _, _)| first != event.entity) {
+        return;
+    }
     // A level that does not exist is reported when its episode begins.
     if let Ok(ahead) = level_ahead(&cell.lock().game, designs.as_deref(), event.level) {
         (*seed, *file) = ahead;
@@ -132,11 +149,10 @@ fn forget_messages(world: &mut World, foreign: &Foreign) {
 
 /// Checks whether the level is ready. Each restart gets one frame to settle: commands, states and transforms.
 pub(super) fn check(world: &mut World) {
-    let Some(agent) = active_agent(world) else { return };
-    if !world.get::<Episode>(agent).is_some_and(Episode::is_loading) {
-        return;
-    }
-    let is_ready = with_foreign(world, agent, |world, foreign| {
+    let mut agents = active_agents(world);
+    agents.retain(|&agent| world.get::<Episode>(agent).is_some_and(Episode::is_loading));
+    let Some(&first) = agents.first() else { return };
+    let is_ready = with_foreign(world, first, |world, foreign| {
         foreign.frames += 1;
         if foreign.frames == 1 {
             return Ok(false);
@@ -161,27 +177,34 @@ pub(super) fn check(world: &mut World) {
         if let Some(system) = &mut foreign.loaded {
             system.demand(world)?;
         }
-        // A reward by growth starts from the value before the first tick.
-        for part in foreign.rewards.iter_mut().filter(|part| part.is_delta) {
-            part.last = part.system.run(world)?;
-        }
-        read_what_is_left(world, foreign);
         Ok(true)
     });
-    match is_ready {
-        Some(true) => {
-            if let Some(mut episode) = world.get_mut::<Episode>(agent) {
-                episode.ready();
-            }
-        }
-        Some(false) => {}
-        // The fault has stopped the agent; its level was never played.
-        None => {
-            if let Some(mut episode) = world.get_mut::<Episode>(agent) {
-                episode.abandon();
-            }
+    if is_ready == Some(false) {
+        return;
+    }
+    let is_sound = is_ready.is_some() && agents.iter().all(|&agent| read_first_values(world, agent).is_some());
+    for agent in agents {
+        let Some(mut episode) = world.get_mut::<Episode>(agent) else { continue };
+        if is_sound {
+            episode.ready();
+        } else {
+            // The fault has stopped an agent; the level was never played.
+            episode.abandon();
         }
     }
+}
+
+/// Reads the values of an agent's rewards before the first tick.
+fn read_first_values(world: &mut World, agent: Entity) -> Option<()> {
+    with_foreign(world, agent, |world, foreign| {
+        let parts = foreign.asked();
+        // A reward by growth starts from the value before the first tick.
+        for part in parts.rewards.iter_mut().filter(|part| part.is_delta) {
+            part.last = part.system.run(world)?;
+        }
+        read_what_is_left(world, parts);
+        Ok(())
+    })
 }
 
 /// Returns the error of a level that was not ready in time, with the assets that it may be waiting for.
@@ -195,12 +218,12 @@ fn not_ready(system: &str, frames: u32, assets: &UnloadedAssets) -> String {
 
 /// Lets rewards and end read the messages, and the records of removed components, of the time before the first tick.
 /// Otherwise the death of the last episode's player would end this one.
-fn read_what_is_left(world: &mut World, foreign: &mut Foreign) {
+fn read_what_is_left(world: &mut World, parts: &mut AgentParts) {
     // If one of them cannot run, the first tick reports it.
-    for part in foreign.rewards.iter_mut().filter(|part| !part.is_delta) {
+    for part in parts.rewards.iter_mut().filter(|part| !part.is_delta) {
         let _ = part.system.run(world);
     }
-    if let Some(end) = &mut foreign.end {
+    if let Some(end) = &mut parts.end {
         let _ = end.run(world);
     }
 }

@@ -35,6 +35,17 @@ use std::{
 #[reflect(Resource)]
 pub struct LevelSeed(pub u64);
 
+/// The agent that a system of the adapter is asked about: its place in [`ForeignGame::agents`]. In a game with one agent
+/// it is 0.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Resource)]
+pub struct PlayedAgent(pub usize);
+
+/// The place of an agent among those of its World, in the order in which they were spawned.
+#[derive(Component, Clone, Copy, Debug, Reflect)]
+#[reflect(Component)]
+pub(super) struct AgentPlace(pub(super) usize);
+
 /// The source of the observation.
 pub(super) enum Sensor {
     System(OwnedSystem<Vec<f32>>),
@@ -48,6 +59,41 @@ pub(super) struct RewardPart {
     /// True if the growth of the value since the last tick is paid.
     pub(super) is_delta: bool,
     pub(super) last: Option<f32>,
+}
+
+/// The systems that are asked about one agent. Each agent has copies of its own, so each of them reads every message.
+pub(super) struct AgentParts {
+    pub(super) sensor: Sensor,
+    pub(super) position: Option<OwnedSystem<Vec2>>,
+    pub(super) cell: Option<OwnedSystem<Vec<i32>>>,
+    pub(super) rewards: Vec<RewardPart>,
+    pub(super) end: Option<OwnedSystem<Option<EpisodeEnd>>>,
+    pub(super) end_cause: Option<OwnedSystem<Option<&'static str>>>,
+    pub(super) act: Option<OwnedSystem<()>>,
+    pub(super) legal: Option<OwnedSystem<Vec<bool>>>,
+    pub(super) bot: Option<OwnedSystem<ActionValue>>,
+}
+
+impl AgentParts {
+    fn new(game: &ForeignGame) -> Self {
+        let description = &game.description;
+        let part = |(system, is_delta): &(SystemFactory<f32>, bool)| RewardPart {
+            system: system.make(),
+            is_delta: *is_delta,
+            last: None,
+        };
+        Self {
+            sensor: description.sensor(),
+            position: description.position.as_ref().map(|system| system.make()),
+            cell: description.cell.as_ref().map(|system| system.make()),
+            rewards: description.rewards.iter().map(part).collect(),
+            end: description.end.as_ref().map(|system| system.make()),
+            end_cause: description.end_cause.as_ref().map(|system| system.make()),
+            act: description.act.as_ref().map(|system| system.make()),
+            legal: description.legal.as_ref().map(|system| system.make()),
+            bot: description.demonstrator.as_ref().map(|(_, system)| system.make()),
+        }
+    }
 }
 
 /// The [`Foreign`] of a World. It is shared, so that it can be used while its systems have the whole World.
@@ -69,25 +115,20 @@ impl ForeignCell {
 /// The plugin's state of a foreign game in its World.
 pub(super) struct Foreign {
     pub(super) game: ForeignGame,
-    pub(super) sensor: Sensor,
-    pub(super) position: Option<OwnedSystem<Vec2>>,
+    /// The systems of each agent, in the order of the agents.
+    agents: Vec<AgentParts>,
+    /// The place of the agent that is asked about.
+    asked: usize,
     /// The position, if none is declared.
     pub(super) guess: Guess,
-    pub(super) cell: Option<OwnedSystem<Vec<i32>>>,
     pub(super) proof: Option<OwnedReader<LevelProof>>,
     pub(super) save: Option<OwnedReader<Snapshot>>,
     /// The error of a proof, until the next tick reports it.
     pub(super) failed_proof: Option<String>,
-    pub(super) rewards: Vec<RewardPart>,
-    pub(super) end: Option<OwnedSystem<Option<EpisodeEnd>>>,
-    pub(super) end_cause: Option<OwnedSystem<Option<&'static str>>>,
     pub(super) ready: Option<OwnedSystem<bool>>,
     pub(super) level: Option<OwnedSystem<()>>,
     pub(super) loaded: Option<OwnedSystem<()>>,
     pub(super) restart: Option<OwnedSystem<()>>,
-    pub(super) act: Option<OwnedSystem<()>>,
-    pub(super) legal: Option<OwnedSystem<Vec<bool>>>,
-    pub(super) bot: Option<OwnedSystem<ActionValue>>,
     pub(super) hash: Option<OwnedSystem<u64>>,
     /// The World before the game started.
     pub(super) baseline: Option<Baseline>,
@@ -113,29 +154,17 @@ impl Foreign {
             },
             Restart::Startup | Restart::Rebuild => None,
         };
-        let part = |(system, is_delta): &(SystemFactory<f32>, bool)| RewardPart {
-            system: system.make(),
-            is_delta: *is_delta,
-            last: None,
-        };
         Self {
-            sensor: description.sensor(),
-            position: description.position.as_ref().map(|system| system.make()),
+            agents: (0..description.agents.count()).map(|_| AgentParts::new(game)).collect(),
+            asked: 0,
             guess: Guess::default(),
-            cell: description.cell.as_ref().map(|system| system.make()),
             proof: description.proof.as_ref().map(|system| system.make()),
             save: description.snapshot.as_ref().map(|parts| parts.save.make()),
             failed_proof: None,
-            rewards: description.rewards.iter().map(part).collect(),
-            end: description.end.as_ref().map(|system| system.make()),
-            end_cause: description.end_cause.as_ref().map(|system| system.make()),
             ready: description.ready.as_ref().map(|system| system.make()),
             level: description.level.as_ref().map(|system| system.make()),
             loaded: description.loaded.as_ref().map(|system| system.make()),
             restart,
-            act: description.act.as_ref().map(|system| system.make()),
-            legal: description.legal.as_ref().map(|system| system.make()),
-            bot: description.demonstrator.as_ref().map(|(_, system)| system.make()),
             hash: description.hash.as_ref().map(|system| system.make()),
             game: game.clone(),
             baseline: None,
@@ -146,21 +175,36 @@ impl Foreign {
             has_begun: false,
         }
     }
+
+    /// Returns the systems of the agent that is asked about.
+    pub(super) fn asked(&mut self) -> &mut AgentParts {
+        &mut self.agents[self.asked]
+    }
+
+    /// Returns the parts of the rewards of all agents.
+    pub(super) fn rewards(&mut self) -> impl Iterator<Item = &mut RewardPart> {
+        self.agents.iter_mut().flat_map(|parts| &mut parts.rewards)
+    }
 }
 
-/// Returns the agent of the World, if it has a controller.
-pub(super) fn active_agent(world: &mut World) -> Option<Entity> {
-    let mut agents = world.query_filtered::<(Entity, &Control), With<Agent>>();
-    agents.iter(world).find(|(_, control)| control.is_active()).map(|(entity, _)| entity)
+/// Returns the agents of the World that have a controller, in the order of their numbers.
+pub(super) fn active_agents(world: &mut World) -> Vec<Entity> {
+    let mut agents = world.query::<(Entity, &Agent, &Control)>();
+    let active = agents.iter(world).filter(|(_, _, control)| control.is_active());
+    let mut active: Vec<(u32, Entity)> = active.map(|(entity, agent, _)| (agent.index, entity)).collect();
+    active.sort_by_key(|(index, _)| *index);
+    active.into_iter().map(|(_, entity)| entity).collect()
 }
 
-/// Returns the agent of the World, if it is playing.
-pub(super) fn playing_agent(world: &mut World) -> Option<Entity> {
-    let agent = active_agent(world)?;
-    world.get::<Episode>(agent).filter(|episode| episode.is_running()).map(|_| agent)
+/// Returns the agents of the World that are playing, in the order of their numbers.
+pub(super) fn playing_agents(world: &mut World) -> Vec<Entity> {
+    let mut agents = active_agents(world);
+    agents.retain(|&agent| world.get::<Episode>(agent).is_some_and(Episode::is_running));
+    agents
 }
 
-/// Runs a part of the game's description. An error is a fault, and stops the agent.
+/// Runs a part of the game's description for an agent, which [`PlayedAgent`] names. An error is a fault, and stops the
+/// agent.
 pub(super) fn with_foreign<T>(
     world: &mut World,
     agent: Entity,
@@ -168,6 +212,9 @@ pub(super) fn with_foreign<T>(
 ) -> Option<T> {
     let cell = world.get_resource::<ForeignCell>()?.clone();
     let mut foreign = cell.lock();
+    let place = world.get::<AgentPlace>(agent).map_or(0, |place| place.0);
+    foreign.asked = place % foreign.agents.len();
+    world.insert_resource(PlayedAgent(foreign.asked));
     let result = work(world, &mut foreign);
     let name = foreign.game.description.name;
     match result {

@@ -113,7 +113,7 @@ impl SnapshotTools for ForeignGame {
             game,
             agent,
             state: kept_state(world, agent),
-            rewards: foreign.rewards.iter().map(|part| part.last).collect(),
+            rewards: foreign.rewards().map(|part| part.last).collect(),
             devices: world.get_resource().cloned(),
             keys: world.get_resource().cloned(),
             letters: world.get_resource().cloned(),
@@ -138,7 +138,7 @@ impl SnapshotTools for ForeignGame {
             return false;
         }
         world.flush();
-        for (part, last) in cell.lock().rewards.iter_mut().zip(&saved.rewards) {
+        for (part, last) in cell.lock().rewards().zip(&saved.rewards) {
             part.last = *last;
         }
         put_state(world, agent, &saved.state);

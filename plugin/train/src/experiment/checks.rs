@@ -171,7 +171,22 @@ impl Experiment {
     /// [`ExperimentError`] with the key to change.
     pub fn check_game(&self, game: &dyn Game) -> Result<(), ExperimentError> {
         self.check_levels(game)?;
+        self.check_sharing(game)?;
         self.check_agent(game)
+    }
+
+    /// Checks that each World of a game whose agents play together gets all of them.
+    fn check_sharing(&self, game: &dyn Game) -> Result<(), ExperimentError> {
+        let sharing = game.tools().host.agents_per_arena().max(1);
+        if !self.algorithm.is_trained() || self.arenas.is_multiple_of(sharing) {
+            return Ok(());
+        }
+        let near = self.arenas.div_ceil(sharing).saturating_mul(sharing);
+        let why = format!(
+            "must be a multiple of {sharing}, since that many agents of `{}` play together in each World; {near} is",
+            game.name()
+        );
+        refuse("arenas", self.arenas, why)
     }
 
     /// Checks the settings that depend on the game's actions and observations: all that matters if no level is
@@ -357,7 +372,7 @@ impl Experiment {
         if !self.algorithm.is_trained() {
             return Ok(());
         }
-        let arrangement = Arrangement::new(game, self.arenas, self.worlds);
+        let arrangement = Arrangement::of_agents(game, self.arenas, self.worlds);
         let mut parts = vec![MemoryPart::of_worlds(arrangement), self.rollout_part(&sizes)];
         match self.algorithm.learner() {
             LearnerKind::Ppo => parts.extend(self.ppo_parts(&sizes)),

@@ -1,0 +1,280 @@
+//! Several agents that share one World of a foreign game, and one episode.
+
+use crate::foreign::{ForeignGame, input::Input};
+use bevy::prelude::*;
+use bevy_playbot::{
+    unknown_name::nearest,
+    virtual_input::{VirtualButton, VirtualInput},
+};
+
+impl ForeignGame {
+    /// Names the agents that play together, such as two paddles. Default: one agent.
+    ///
+    /// They act in the same tick, on one level, in one episode: a restart is for all of them. The systems of observation,
+    /// reward, end, position, mask and demonstrator run once for each agent, and
+    /// [`PlayedAgent`](crate::foreign::PlayedAgent) says for which. As soon as [`end`](Self::end) returns an end for one
+    /// agent, the episode ends for all of them, as [`Truncated`](bevy_playbot::episode::EpisodeEnd::Truncated) for those
+    /// without an end of their own. An agent that is out of the game earlier goes on without effect until then.
+    ///
+    /// Agents share keyboard, mouse and touch screen, so each needs keys of its own: see [`keys_of`](Self::keys_of). Each
+    /// has a gamepad of its own. Keys that two agents hold are a [`problem`](crate::game::Game::problem).
+    ///
+    /// Trainings and evaluations play all agents by one policy, each with its own observation. Everything that records,
+    /// replays or tests plays the first agent alone, while the others do nothing.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::{ForeignGame, PlayedAgent}, prelude::*};
+    ///
+    /// /// The heights of the paddles, from left to right.
+    /// #[derive(Resource)]
+    /// struct Paddles([f32; 2]);
+    ///
+    /// let pong = |right: [KeyCode; 2]| {
+    ///     ForeignGame::new("pong", 1, |app: &mut App| _ = app.insert_resource(Paddles([0.0; 2])))
+    ///         .agents(["left", "right"])
+    ///         .keys([vec![], vec![KeyCode::KeyS], vec![KeyCode::KeyW]])
+    ///         .keys_of("right", [vec![], vec![right[0]], vec![right[1]]])
+    ///         .observe(["own", "other"], |paddles: Res<Paddles>, agent: Res<PlayedAgent>| {
+    ///             [paddles.0[agent.0], paddles.0[1 - agent.0]]
+    ///         })
+    /// };
+    /// assert_eq!(pong([KeyCode::ArrowDown, KeyCode::ArrowUp]).problem(), None);
+    /// let problem = pong([KeyCode::KeyS, KeyCode::ArrowUp]).problem().expect("both press S");
+    /// assert!(problem.contains("agents `left` and `right` both hold KeyS"), "{problem}");
+    /// ```
+    pub fn agents(self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.with(|description| description.agents.names = Some(names.into_iter().map(Into::into).collect()))
+    }
+
+    /// Replaces the sets of [`keys`](Self::keys) for one of the [`agents`](Self::agents): as many, in the same order.
+    pub fn keys_of(
+        self,
+        agent: impl Into<String>,
+        sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>,
+    ) -> Self {
+        let keys = sets.into_iter().map(|set| set.into_iter().map(VirtualButton::Key).collect()).collect();
+        self.with(|description| description.agents.own.push((agent.into(), OwnInput::Keys(keys))))
+    }
+
+    /// Replaces the complete input for one of the [`agents`](Self::agents). It has as many actions as those of the others,
+    /// in the same order.
+    pub fn input_of(self, agent: impl Into<String>, input: VirtualInput) -> Self {
+        self.with(|description| description.agents.own.push((agent.into(), OwnInput::Whole(input))))
+    }
+}
+
+/// The input of one agent, in place of the common one.
+#[derive(Clone)]
+enum OwnInput {
+    Keys(Vec<Vec<VirtualButton>>),
+    Whole(VirtualInput),
+}
+
+impl OwnInput {
+    /// Returns the method that declares it, for messages.
+    fn method(&self) -> &'static str {
+        match self {
+            Self::Keys(_) => "`.keys_of`",
+            Self::Whole(_) => "`.input_of`",
+        }
+    }
+}
+
+/// The agents of a World, and the inputs that only one of them has. Both are set in any order.
+#[derive(Clone, Default)]
+pub(super) struct SharingAgents {
+    names: Option<Vec<String>>,
+    own: Vec<(String, OwnInput)>,
+}
+
+impl SharingAgents {
+    fn names(&self) -> &[String] {
+        self.names.as_deref().unwrap_or_default()
+    }
+
+    /// Returns the number of agents in a World.
+    pub(super) fn count(&self) -> usize {
+        self.names().len().max(1)
+    }
+
+    /// Returns the input of the agent at this place, with its own parts in place of those of `common`.
+    pub(super) fn input_of(&self, place: usize, common: &Input) -> Input {
+        let mut input = common.clone();
+        let Some(name) = self.names().get(place) else { return input };
+        for (_, own) in self.own.iter().filter(|(agent, _)| agent == name) {
+            match own {
+                OwnInput::Keys(keys) => (input.keys, input.unknown_key) = (keys.clone(), None),
+                OwnInput::Whole(whole) => {
+                    input = Input { whole: Some(whole.clone()), names: input.names, ..Input::default() };
+                }
+            }
+        }
+        input
+    }
+
+    /// Returns the problem of the inputs of all agents. The text follows the name of the game.
+    pub(super) fn problem(&self, common: &Input) -> Option<String> {
+        if let Some(problem) = self.problem_of_names() {
+            return Some(problem);
+        }
+        if self.count() > 1 {
+            if !common.clicks.is_empty() {
+                return Some(
+                    "has `.clicks` and several `.agents`, and there is one mouse: leave one of them out".to_owned(),
+                );
+            }
+            if common.space.is_some() {
+                return Some(
+                    "has `.actions` and several `.agents`, and its system passes on the action of one agent: declare \
+                     inputs with `.keys` and `.keys_of`, or with `.input_of`"
+                        .to_owned(),
+                );
+            }
+        }
+        let inputs: Vec<Input> = (0..self.count()).map(|place| self.input_of(place, common)).collect();
+        inputs.iter().find_map(Input::problem).or_else(|| self.conflict(&inputs))
+    }
+
+    fn problem_of_names(&self) -> Option<String> {
+        let names = self.names();
+        if self.names.is_some() && names.is_empty() {
+            return Some("names no agent in `.agents`: name one, or leave it out".to_owned());
+        }
+        let twice = names.iter().enumerate().find(|(place, name)| names[..*place].contains(name));
+        if let Some((_, name)) = twice {
+            return Some(format!("names the agent `{name}` twice in `.agents`: give each a name of its own"));
+        }
+        let (agent, own) = self.own.iter().find(|(agent, _)| !names.contains(agent))?;
+        let method = own.method();
+        if names.is_empty() {
+            return Some(format!("has {method} for the agent `{agent}`, and names no agents: add `.agents`"));
+        }
+        let known: Vec<&str> = names.iter().map(String::as_str).collect();
+        let near = nearest(agent, &known).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
+        let known = known.join("`, `");
+        Some(format!("has {method} for an agent `{agent}`{near}, and `.agents` names `{known}`"))
+    }
+
+    /// Returns why the agents cannot act together: they have different actions, or share an input.
+    fn conflict(&self, inputs: &[Input]) -> Option<String> {
+        let named: Vec<(&String, &Input)> = self.names().iter().zip(inputs).collect();
+        for (place, (other, input)) in named.iter().enumerate().skip(1) {
+            let (name, first) = named[0];
+            if input.space() != first.space() {
+                let (has, others) = (first.space(), input.space());
+                return Some(format!(
+                    "has {has} for the agent `{name}`, and {others} for `{other}`: all agents need the same actions, with \
+                     an empty set for those that hold nothing"
+                ));
+            }
+            for (earlier, others) in &named[..place] {
+                let (Some(one), Some(another)) = (others.pressed(), input.pressed()) else { continue };
+                if let Some(shared) = one.shared_with(&another) {
+                    return Some(format!(
+                        "lets the agents `{earlier}` and `{other}` both hold {shared}: a World has one keyboard, one mouse \
+                         and one touch screen. Give each agent keys of its own with `.keys_of`, or inputs with `.input_of`"
+                    ));
+                }
+            }
+        }
+        None
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{arrangement::Arrangement, game::Game};
+
+    /// A game of two agents without observations of their own; `right` has these keys.
+    fn pair(right: &[KeyCode]) -> ForeignGame {
+        ForeignGame::new("pair", 1, |_: &mut App| {})
+            .agents(["left", "right"])
+            .keys([vec![], vec![KeyCode::KeyW]])
+            .keys_of("right", std::iter::once(vec![]).chain(right.iter().map(|&key| vec![key])))
+            .observe(["x"], || [0.0])
+    }
+
+    fn problem(game: &ForeignGame) -> String {
+        game.problem().expect("it has a problem")
+    }
+
+    #[test]
+    fn agents_with_keys_of_their_own_are_no_problem() {
+        assert_eq!(pair(&[KeyCode::ArrowUp]).problem(), None);
+    }
+
+    #[test]
+    fn a_key_that_two_agents_share_is_a_problem() {
+        let text = problem(&pair(&[KeyCode::KeyW]));
+        assert!(text.starts_with("the game `pair` lets the agents `left` and `right` both hold KeyW: "), "{text}");
+        assert!(text.ends_with("with `.keys_of`, or inputs with `.input_of`"), "{text}");
+    }
+
+    #[test]
+    fn one_mouse_for_two_agents_is_a_problem() {
+        let text = problem(&pair(&[KeyCode::ArrowUp]).mouse_buttons([vec![], vec![MouseButton::Left]]));
+        assert!(text.contains("both hold MouseLeft"), "{text}");
+        let middle = bevy_playbot::virtual_input::PointerPosition::fraction(0.5, 0.5);
+        let text = problem(&pair(&[KeyCode::ArrowUp]).cursor([None, Some(middle)]));
+        assert!(text.contains("both hold the mouse cursor"), "{text}");
+    }
+
+    #[test]
+    fn each_agent_has_a_gamepad_of_its_own() {
+        let game = pair(&[KeyCode::ArrowUp]).gamepad_buttons([vec![], vec![GamepadButton::South]]);
+        assert_eq!(game.problem(), None);
+    }
+
+    #[test]
+    fn keys_of_an_unknown_agent_are_a_problem_with_the_nearest_name() {
+        let text = problem(&pair(&[KeyCode::ArrowUp]).keys_of("rigth", [[KeyCode::KeyA]]));
+        let expected = "the game `pair` has `.keys_of` for an agent `rigth` (did you mean `right`?), and `.agents` names \
+                        `left`, `right`";
+        assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn other_numbers_of_actions_are_a_problem() {
+        let text = problem(&pair(&[KeyCode::ArrowUp, KeyCode::ArrowDown]));
+        assert!(
+            text.contains("has 2 discrete actions for the agent `left`, and 3 discrete actions for `right`"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_name_that_two_agents_share_is_a_problem() {
+        let text = problem(&pair(&[KeyCode::ArrowUp]).agents(["right", "right"]));
+        assert!(text.contains("names the agent `right` twice in `.agents`"), "{text}");
+    }
+
+    #[test]
+    fn agents_that_play_together_share_a_world_and_others_play_alone() {
+        let game = pair(&[KeyCode::ArrowUp]);
+        assert_eq!(Arrangement::of_agents(&game, 8, 2), Arrangement { worlds: 4, arenas: 2 });
+        assert_eq!(Arrangement::of_agents(&game, 3, 1), Arrangement { worlds: 2, arenas: 2 }, "rounded up");
+        assert_eq!(Arrangement::new(&game, 8, 2), Arrangement { worlds: 8, arenas: 1 });
+    }
+
+    #[test]
+    fn an_input_as_a_whole_takes_the_place_of_the_keys() {
+        let input = VirtualInput::keys([vec![], vec![KeyCode::Enter]]);
+        let game = pair(&[KeyCode::KeyW]).input_of("right", input.clone());
+        assert_eq!(game.problem(), None);
+        let mut world = World::new();
+        let agents = [0, 1].map(|index| game.spawn_agent(&mut world, index));
+        assert_eq!(world.get::<VirtualInput>(agents[1]), Some(&input));
+        let left = VirtualInput::keys([vec![], vec![KeyCode::KeyW]]);
+        assert_eq!(world.get::<VirtualInput>(agents[0]), Some(&left));
+    }
+
+    #[test]
+    fn a_system_of_actions_cannot_serve_two_agents() {
+        let space = bevy_playbot::action::ActionSpace::Discrete(2);
+        let game = ForeignGame::new("pair", 1, |_: &mut App| {}).agents(["left", "right"]).actions(space, || {});
+        let text = problem(&game.observe(["x"], || [0.0]));
+        assert!(text.contains("has `.actions` and several `.agents`"), "{text}");
+    }
+}

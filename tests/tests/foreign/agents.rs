@@ -1,0 +1,172 @@
+//! Tests of two agents in one World of a foreign game: two paddles that play against each other.
+
+use std::path::Path;
+
+use bevy::prelude::*;
+use playbot::prelude::*;
+use playbot_harness::{
+    eval::{EvalPlan, Player, evaluate},
+    foreign::{ForeignGame, PlayedAgent, Restart},
+    worlds::build_world,
+};
+use playbot_learner::DeviceKind;
+use playbot_tests::{
+    foreign::pong::{Loser, Paddle, pong_game},
+    measuring::plan,
+    training::check_resuming,
+};
+use playbot_train::{Trainer, experiment::file::parse_experiment};
+
+/// The episodes that have ended, in order.
+#[derive(Resource, Default)]
+struct Ended(Vec<EpisodeEnded>);
+
+/// Builds a World with a left agent that goes up, and a right one that goes down, with the levels of each.
+fn world_of(game: &ForeignGame, levels: [&[u64]; 2]) -> (World, Vec<Entity>) {
+    let (mut world, agents) = build_world(game, "default", 0, 0, 2);
+    for ((&agent, action), levels) in agents.iter().zip([1, 2]).zip(levels) {
+        let bot = BlindBot::Constant(ActionValue::Discrete(action));
+        world.entity_mut(agent).insert((Control::Bot, bot, LevelQueue::list(levels)));
+    }
+    world.init_resource::<Ended>();
+    world.add_observer(|event: On<EpisodeEnded>, mut ended: ResMut<Ended>| ended.0.push(*event));
+    (world, agents)
+}
+
+/// Plays all levels, and returns level, end, ticks and return of each episode, with the place of its agent.
+fn results(game: &ForeignGame, levels: [&[u64]; 2]) -> Vec<(usize, u64, EpisodeEnd, u32, f64)> {
+    let (mut world, agents) = world_of(game, levels);
+    while agents.iter().any(|&agent| Control::of(&world, agent).is_active()) {
+        world.tick().expect("sound");
+    }
+    let place = |agent: Entity| agents.iter().position(|other| *other == agent).expect("one of them");
+    let ended = &world.resource::<Ended>().0;
+    ended.iter().map(|it| (place(it.entity), it.level, it.end, it.ticks, it.total_reward)).collect()
+}
+
+/// Returns the heights of the left and the right paddle.
+fn heights(world: &mut World) -> [f32; 2] {
+    let mut paddles = world.query::<(&Paddle, &Transform)>();
+    let mut heights = [0.0; 2];
+    for (paddle, at) in paddles.iter(world) {
+        heights[paddle.side] = at.translation.y;
+    }
+    heights
+}
+
+#[test]
+fn both_agents_act_in_the_same_tick_and_see_their_own_side() {
+    let (mut world, agents) = world_of(&pong_game(), [&[0], &[0]]);
+    world.tick().expect("sound");
+    assert_eq!(heights(&mut world), [0.5, -0.5]);
+    world.tick().expect("sound");
+    assert_eq!(heights(&mut world), [1.0, -1.0]);
+    // Before the second tick, two frames of 0.5 to the left after the serve.
+    let seen = |agent: Entity| world.get::<Observation>(agent).expect("an agent").vector.clone();
+    assert_eq!(seen(agents[0]), [0.5, -0.5, 7.0, 0.0, 0.0]);
+    assert_eq!(seen(agents[1]), [-0.5, 0.5, 9.0, 0.0, 0.0]);
+}
+
+#[test]
+fn an_episode_ends_for_both_agents_with_a_result_for_each() {
+    // The ball is at a paddle after 16 frames, one of which passes before the first tick.
+    let expected = [
+        (0, 0, EpisodeEnd::LOST, 15, -1.0),
+        (1, 0, EpisodeEnd::WON, 15, 1.0),
+        (0, 1, EpisodeEnd::WON, 15, 1.0),
+        (1, 1, EpisodeEnd::LOST, 15, -1.0),
+    ];
+    assert_eq!(results(&pong_game(), [&[0, 1], &[0, 1]]), expected);
+}
+
+#[test]
+fn both_agents_play_the_level_of_the_first_one() {
+    let levels: Vec<u64> = results(&pong_game(), [&[4], &[9]]).iter().map(|result| result.1).collect();
+    assert_eq!(levels, [4, 4]);
+}
+
+#[test]
+fn an_agent_without_an_end_of_its_own_is_truncated_with_the_others() {
+    let game = pong_game().end(|loser: Res<Loser>, agent: Res<PlayedAgent>| {
+        (agent.0 == 0 && loser.0.is_some()).then_some(EpisodeEnd::LOST)
+    });
+    let ends: Vec<_> = results(&game, [&[0], &[0]]).iter().map(|result| (result.0, result.2, result.3)).collect();
+    assert_eq!(ends, [(0, EpisodeEnd::LOST, 15), (1, EpisodeEnd::Truncated, 15)]);
+}
+
+#[test]
+fn a_rebuilt_world_has_both_agents() {
+    let game = pong_game().restart(Restart::Rebuild);
+    let (mut world, agents) = world_of(&game, [&[0, 1], &[0, 1]]);
+    while agents.iter().any(|&agent| Control::of(&world, agent).is_active()) {
+        world.tick().expect("sound");
+    }
+    for agent in agents {
+        let count = world.get::<EpisodeCount>(agent).expect("an agent");
+        assert_eq!((count.finished, count.successes), (2, 1));
+    }
+}
+
+#[test]
+fn an_agent_alone_leaves_the_other_paddle_where_it_is() {
+    let (mut world, agents) = build_world(&pong_game(), "default", 0, 7, 1);
+    let up = BlindBot::Constant(ActionValue::Discrete(1));
+    world.entity_mut(agents[0]).insert((Control::Bot, up, LevelQueue::list([0])));
+    world.ticks(3).expect("sound");
+    assert_eq!(heights(&mut world), [1.5, 0.0], "the first agent of a World is on the left");
+}
+
+#[test]
+fn a_third_agent_is_a_fault() {
+    let (mut world, agents) = build_world(&pong_game(), "default", 0, 0, 3);
+    for agent in agents {
+        world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform));
+    }
+    let text = world.tick().expect_err("room for two").to_string();
+    assert!(text.contains("`pong` has room for 2 agents,") && text.contains("it has 3"), "{text}");
+}
+
+#[test]
+fn an_evaluation_plays_each_level_once_by_both_agents_on_any_number_of_threads() {
+    let measure = |threads| {
+        let plan = EvalPlan { threads, ..plan("default:0..7") };
+        let results = evaluate(&pong_game(), &Player::Blind(BlindBot::Uniform), &plan, |_| {}).expect("playable");
+        results.iter().map(|result| (result.level, result.ticks, result.total_reward)).collect::<Vec<_>>()
+    };
+    let results = measure(1);
+    assert_eq!(results, measure(2), "threads do not count");
+    assert_eq!(results.len(), 16);
+    for (level, pair) in results.chunks(2).enumerate() {
+        assert!(pair.iter().all(|result| result.0 == level as u64), "{results:?}");
+        assert_eq!(pair[0].1, pair[1].1, "one episode has one length");
+        assert_eq!(pair[0].2 + pair[1].2, 0.0, "one wins as much as the other loses");
+    }
+    assert!(results.iter().any(|result| result.2 == 1.0), "an agent has won: {results:?}");
+}
+
+fn fresh(arenas: &str, threads: usize) -> Result<Trainer, String> {
+    let text = format!(
+        r#"(
+            game: "pong", train: "default:0..7", test: "default:8..15",
+            steps: 2048, {arenas}, algorithm: "ppo",
+            ppo: (num_steps: 64, minibatches: 4, hidden: [16, 16], lr: 0.003),
+        )"#
+    );
+    let experiment = parse_experiment(&text, Path::new("test.ron")).expect("valid");
+    Trainer::new(&pong_game(), &experiment, None, DeviceKind::Flex, threads).map_err(|error| error.to_string())
+}
+
+#[test]
+fn self_play_that_was_killed_goes_on_bit_for_bit() {
+    let trainer = |threads| fresh("arenas: 8, worlds: 2", threads).expect("fits");
+    assert_eq!(trainer(2).worlds_mut().count(), 4, "two agents in each World");
+    check_resuming(&pong_game(), trainer, 2);
+}
+
+#[test]
+fn a_training_without_an_agent_for_each_paddle_is_refused() {
+    let text = fresh("arenas: 7, worlds: 1", 1).err().expect("one is left over");
+    let expected = "`arenas` is 7: must be a multiple of 2, since that many agents of `pong` play together in each World; \
+                    8 is";
+    assert_eq!(text, expected);
+}
