@@ -7,6 +7,7 @@
 
 use bevy::{
     app::{PanicHandlerPlugin, PluginGroupBuilder, SubApp},
+    asset::{AssetLoader, LoadContext, io::Reader},
     platform::cell::SyncCell,
     prelude::*,
 };
@@ -83,6 +84,37 @@ mod render {
     }
 }
 
+/// The shaders of a Bevy without `bevy_shader`.
+#[allow(dead_code, reason = "used only where Bevy has no shaders")]
+mod shader {
+    use bevy::{
+        asset::{AssetLoader, LoadContext, io::Reader},
+        prelude::*,
+    };
+
+    #[derive(Asset, TypePath)]
+    pub(crate) struct Shader;
+
+    impl Shader {
+        pub(crate) fn from_wgsl(_: &'static str, _: String) -> Self {
+            Self
+        }
+    }
+
+    #[derive(TypePath)]
+    pub(crate) struct ShaderLoader;
+
+    impl AssetLoader for ShaderLoader {
+        type Asset = Shader;
+        type Settings = ();
+        type Error = std::io::Error;
+
+        async fn load(&self, _: &mut dyn Reader, _: &(), _: &mut LoadContext<'_>) -> Result<Shader, Self::Error> {
+            Ok(Shader)
+        }
+    }
+}
+
 /// Leaves out the event loop, and the thread that draws beside the World.
 pub(super) fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
     #[allow(unused_imports, reason = "Bevy may lack these modules")]
@@ -103,14 +135,56 @@ pub(super) fn without_drawing(plugins: PluginGroupBuilder, shows_sub_app: bool) 
         return plugins;
     }
     let render_creation = render::settings::WgpuSettings { backends: None, ..default() }.into();
-    let plugins =
-        plugins.set(render::RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() });
+    let plugins = plugins
+        .set(render::RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
+        .add_before::<render::RenderPlugin>(EmptyShaders);
     if shows_sub_app {
         // Shown after Bevy's own plugins, which would need a graphics adapter if they found it, and hidden before any
         // plugin is finished.
         plugins.add_before::<PanicHandlerPlugin>(HiddenRenderer).add(ShownRenderer)
     } else {
         plugins.add(RenderListPlugin)
+    }
+}
+
+// Bevy's shaders, in apps without a renderer.
+
+/// Loads every shader as an empty one.
+///
+/// Bevy's plugins load about a hundred of them, and reading what each imports is most of the work of building a World.
+struct EmptyShaders;
+
+impl Plugin for EmptyShaders {
+    fn build(&self, app: &mut App) {
+        #[allow(unused_imports, reason = "Bevy may lack these modules")]
+        use bevy::*;
+
+        #[derive(TypePath)]
+        struct EmptyShaderLoader;
+
+        impl AssetLoader for EmptyShaderLoader {
+            type Asset = shader::Shader;
+            type Settings = ();
+            type Error = std::io::Error;
+
+            async fn load(
+                &self,
+                _: &mut dyn Reader,
+                _: &(),
+                context: &mut LoadContext<'_>,
+            ) -> Result<shader::Shader, Self::Error> {
+                Ok(shader::Shader::from_wgsl("", context.path().to_string()))
+            }
+
+            fn extensions(&self) -> &[&str] {
+                &["spv", "wgsl", "vert", "frag", "comp", "wesl"]
+            }
+        }
+
+        if app.world().contains_resource::<AssetServer>() {
+            // Announced for no files, Bevy's own loader gets none when the renderer brings it.
+            app.preregister_asset_loader::<shader::ShaderLoader>(&[]).register_asset_loader(EmptyShaderLoader);
+        }
     }
 }
 
