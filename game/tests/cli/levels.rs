@@ -21,6 +21,7 @@ fn equal_levels_are_counted_and_named_within_a_set_and_among_another() {
     let groups = all["equal"].as_array().expect("groups");
     assert!(groups.iter().any(|group| group.as_array().is_some_and(|all| all.contains(&json!(142)))));
     assert_eq!(all["solved_without_action"], Value::Null);
+    assert!(all["equal_plans"].is_array(), "levels of one floor plan and of different layouts");
     let among = ["--among", "hard:0..63", "--among", "easy:0..499"];
     let held_out =
         audit(folder, &[&["coinrun", "--levels", "hard:64..1087", "--layouts-only"], &among[..]].concat(), 1);

@@ -20,6 +20,9 @@ fn traces_stop_at_the_end_and_read_back_exactly() {
     let from_file =
         playbot(folder.path(), &["trace", "coinrun", "--level", "0", "--actions-file", "actions.txt", "--json"]);
     assert_eq!(output.stdout, from_file.stdout);
+    let names = actions.replace('8', "Right+Jump");
+    let from_names = playbot(folder.path(), &["trace", "coinrun", "--level", "0", "--actions", &names, "--json"]);
+    assert_eq!(output.stdout, from_names.stdout);
     let wrong = playbot(folder.path(), &["trace", "coinrun", "--actions", "99", "--json"]);
     assert_eq!(code(&wrong), 3);
     assert!(errors(&wrong).contains("action 99 is outside 0..15"), "{}", errors(&wrong));

@@ -34,7 +34,10 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["record", "maze2d", "--noise", "-0.5", "--out", "o"], "--noise is -0.5; a standard deviation is"),
         (&["view", "coinrun", "--seed", "-1"], "it must be a whole number, 0 or more"),
         (&["view", "coinrun", "--seed", "18446744073709551616"], "the number is too large"),
-        (&["trace", "coinrun", "--actions", "a"], "it must be a whole number, 0 or more"),
+        (
+            &["trace", "coinrun", "--actions", "a"],
+            "`a` is not an action of `coinrun`: write numbers from 0, or the names",
+        ),
         (&["runs", "compare", "r", "--threshold", "abc"], "it must be a number, such as 0.5"),
         (&["eval", "--bot", "robot"], "unknown bot `robot`"),
         (&["level", "maze2d", "--map", "lrage"], "; and there is no file of that name"),

@@ -28,7 +28,8 @@ const USUAL_STOPS: usize = 18;
 /// Programs that run at a time.
 const AT_ONCE: usize = 2;
 
-const SIGNALS: [&str; 3] = ["INT", "TERM", "HUP"];
+/// The signals, and the exit codes after them.
+const SIGNALS: [(&str, i32); 3] = [("INT", 130), ("TERM", 143), ("HUP", 129)];
 
 /// Work that takes minutes.
 struct Work {
@@ -150,7 +151,7 @@ fn end(child: &mut Child) -> Option<ExitStatus> {
 /// Begins work, stops it at a random time, and returns how long it took to end.
 fn stop(folder: &Path, index: usize) -> Duration {
     let (kind, round) = (index % WORKS.len(), index / WORKS.len());
-    let (work, signal) = (&WORKS[kind], SIGNALS[(kind + round) % SIGNALS.len()]);
+    let (work, (signal, code)) = (&WORKS[kind], SIGNALS[(kind + round) % SIGNALS.len()]);
     let name = format!("x{index}");
     let named = |text: &str| text.replace("NAME", &name);
     let line = named(work.line);
@@ -172,7 +173,7 @@ fn stop(folder: &Path, index: usize) -> Duration {
     assert!(kill.is_ok_and(|kill| kill.success()), "it had ended by itself: {what}");
     assert!(took <= PATIENCE, "{what}");
     let status = status.expect("it ended in time");
-    assert_eq!(status.code(), Some(130), "{what}");
+    assert_eq!(status.code(), Some(code), "{what}");
     let last = said.trim_end().lines().last().unwrap_or_default();
     assert!(work.kept.iter().any(|words| last.contains(&named(words))), "{what}");
     took

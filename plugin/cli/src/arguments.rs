@@ -25,7 +25,7 @@ use playbot_train::{
     Experiment,
     experiment::{experiment_of, file::parse_experiment},
 };
-use std::path::Path;
+use std::{num::IntErrorKind, path::Path};
 
 /// More threads than any machine has cores.
 pub(crate) const MOST_THREADS: usize = 1024;
@@ -102,6 +102,41 @@ impl Compute {
 /// Returns the revision of playbot that this program was built from.
 pub(crate) fn revision() -> &'static str {
     env!("PLAYBOT_REVISION")
+}
+
+/// Parses a number of steps, also as `1_000_000`, `1e6` or `2.5e6`.
+///
+/// # Errors
+///
+/// It is no whole number, is below 0, or is too large.
+pub(crate) fn number_of_steps(text: &str) -> Result<u64, String> {
+    let wanted = || "it must be a whole number, 0 or more, such as 1000000 or 1e6".to_owned();
+    let too_large = || "the number is too large".to_owned();
+    let (digits, power) = match text.split_once(['e', 'E']) {
+        Some((digits, power)) => (digits, power.parse::<u32>().map_err(|_| wanted())?),
+        None => (text, 0),
+    };
+    let digits = digits.replace('_', "");
+    let (whole, fraction) = digits.split_once('.').unwrap_or((digits.as_str(), ""));
+    let fraction = fraction.trim_end_matches('0');
+    let zeros = power.checked_sub(fraction.len() as u32).ok_or_else(wanted)?;
+    let number = format!("{whole}{fraction}").parse::<u64>().map_err(|error| match error.kind() {
+        IntErrorKind::PosOverflow => too_large(),
+        _ => wanted(),
+    })?;
+    10_u64.checked_pow(zeros).and_then(|factor| number.checked_mul(factor)).ok_or_else(too_large)
+}
+
+/// Parses a number of steps that is at least 1.
+///
+/// # Errors
+///
+/// As for [`number_of_steps`], and it is 0.
+pub(crate) fn at_least_one_step(text: &str) -> Result<u64, String> {
+    match number_of_steps(text)? {
+        0 => Err("it must be at least 1".to_owned()),
+        steps => Ok(steps),
+    }
 }
 
 /// Parses a number of at least one.
@@ -295,6 +330,31 @@ mod tests {
     use playbot_harness::foreign::ForeignGame;
 
     use super::*;
+
+    #[test]
+    fn steps_are_read_with_underscores_and_powers_of_ten() {
+        for (text, steps) in [
+            ("0", 0),
+            ("200000", 200_000),
+            ("1_000_000", 1_000_000),
+            ("1e6", 1_000_000),
+            ("2.5E6", 2_500_000),
+            ("3e0", 3),
+            ("10.0", 10),
+            ("18446744073709551615", u64::MAX),
+        ] {
+            assert_eq!(number_of_steps(text), Ok(steps), "{text}");
+        }
+        for text in ["", "_", "e6", "1e", "1.5", "1e-3", "2.55e1", "-1", "many", "1e6e6", "1.2.3e9"] {
+            let words = number_of_steps(text).expect_err(text);
+            assert_eq!(words, "it must be a whole number, 0 or more, such as 1000000 or 1e6", "{text}");
+        }
+        for text in ["18446744073709551616", "1e20", "2e19", "1e4000000000"] {
+            assert_eq!(number_of_steps(text), Err("the number is too large".to_owned()), "{text}");
+        }
+        assert_eq!(at_least_one_step("0"), Err("it must be at least 1".to_owned()));
+        assert_eq!(at_least_one_step("5e5"), Ok(500_000));
+    }
 
     #[test]
     fn the_first_level_is_meant_unless_another_one_is_named() {

@@ -64,7 +64,7 @@ Examples:
   playbot bugs make --seed 1 --out runs/bugs   plant defects, to measure testers
 
 Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration,
-130 stopped by Ctrl-C before it was done.";
+130 stopped by Ctrl-C before it was done, 143 and 129 by the signals TERM and HUP.";
 
 // Each is described where its arguments are.
 #[derive(Subcommand)]
@@ -128,7 +128,8 @@ fn is_about_missing_files(error: &clap::Error) -> bool {
 /// Runs the command line on the process's arguments, for these games. The first game is the default of verbs that name
 /// no game.
 ///
-/// Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration, 130 stopped by Ctrl-C.
+/// Exit codes: 0 all is well, 1 findings, 2 the program failed, 3 wrong usage or configuration, 130 stopped by Ctrl-C,
+/// 143 and 129 stopped by the signals TERM and HUP.
 pub fn main(games: &[&dyn Game]) -> ExitCode {
     #[cfg(all(target_os = "linux", feature = "camera"))]
     log::silence_mesa();
@@ -167,7 +168,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
     match ended {
         Ok(Ok(Outcome::Pass)) => ExitCode::SUCCESS,
         Ok(Ok(Outcome::Findings)) => ExitCode::from(1),
-        Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::EXIT_CODE),
+        Ok(Ok(Outcome::Stopped)) => ExitCode::from(interrupt::exit_code()),
         Ok(Err(CliError::BrokenPipe)) => ExitCode::SUCCESS,
         Ok(Err(error)) => {
             report!("error: {}", program::named(&error.to_string()));

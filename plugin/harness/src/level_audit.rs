@@ -1,12 +1,15 @@
-//! Audits of sets of levels: equal levels under different numbers, and levels that one held action solves.
+//! Audits of sets of levels: equal levels under different numbers, levels of one floor plan, and levels that one held
+//! action solves.
 
 use crate::{
     eval::{EpisodeResult, EvalError, EvalPlan, Player, evaluate},
+    floor_plan::FloorPlan,
     game::{Game, idle_action, is_named_idle},
     held_out::{HeldOut, by_layout},
     split::LevelSplit,
 };
-use bevy_playbot::bot::BlindBot;
+use bevy::math::{Rect, Vec2};
+use bevy_playbot::{bot::BlindBot, state_hash::StateHash};
 use playbot_learner::{ActionSpace, ActionValue};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -30,8 +33,7 @@ impl EqualLevels {
             return None;
         }
         let count = layouts.len() as u64;
-        let mut groups: Vec<_> = layouts.into_values().filter(|levels| levels.len() > 1).collect();
-        groups.sort_by_key(|levels| (usize::MAX - levels.len(), levels[0]));
+        let groups = largest_first(layouts.into_values().filter(|levels| levels.len() > 1));
         Some(Self { layouts: count, groups })
     }
 
@@ -39,6 +41,56 @@ impl EqualLevels {
     pub fn shared(&self) -> u64 {
         self.groups.iter().map(|levels| levels.len() as u64).sum()
     }
+}
+
+/// Levels that differ in nothing that their floor plan draws.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct EqualPlans {
+    /// Levels of one plan whose layouts are different, or are unknown, in ascending order: the largest groups first,
+    /// then by their first level.
+    pub groups: Vec<Vec<u64>>,
+}
+
+impl EqualPlans {
+    /// Compares levels of a game; `None` if the game has no [floor plans](crate::game::LevelTools::floor_plan).
+    pub fn of(game: &dyn Game, split: &LevelSplit) -> Option<Self> {
+        let mut by_plan = BTreeMap::<u64, Vec<u64>>::new();
+        for level in split.levels() {
+            if let Some(plan) = game.tools().levels.floor_plan(&split.mode, level) {
+                by_plan.entry(plan_hash(&plan)).or_default().push(level);
+            }
+        }
+        if by_plan.is_empty() {
+            return None;
+        }
+        let differ = |levels: &Vec<u64>| {
+            let layouts: BTreeSet<_> = levels.iter().map(|level| game.layout(&split.mode, *level)).collect();
+            layouts.len() > 1 || layouts.contains(&None)
+        };
+        Some(Self { groups: largest_first(by_plan.into_values().filter(|levels| levels.len() > 1 && differ(levels))) })
+    }
+
+    /// Returns the number of levels in all groups.
+    pub fn shared(&self) -> u64 {
+        self.groups.iter().map(|levels| levels.len() as u64).sum()
+    }
+}
+
+/// Returns groups of levels, the largest ones first.
+fn largest_first(groups: impl Iterator<Item = Vec<u64>>) -> Vec<Vec<u64>> {
+    let mut groups: Vec<_> = groups.collect();
+    groups.sort_by_key(|levels| (usize::MAX - levels.len(), levels[0]));
+    groups
+}
+
+/// Returns a hash of all that a plan draws.
+fn plan_hash(plan: &FloorPlan) -> u64 {
+    let FloorPlan { bounds, walls, hazards, platforms, start, goal } = plan;
+    let point = |point: &Vec2| point.to_array().map(|number| u64::from(number.to_bits()));
+    let corners = |area: &Rect| [point(&area.min), point(&area.max)].concat();
+    let areas = [walls, hazards, platforms].into_iter();
+    let areas = areas.flat_map(|areas| [vec![areas.len() as u64], areas.iter().flat_map(corners).collect()].concat());
+    StateHash::of(areas.chain(corners(bounds)).chain(point(start)).chain(point(goal))).0
 }
 
 /// Returns the levels of a split that are among others: by number, as a file, or by their layout.
@@ -134,5 +186,29 @@ fn held_actions(game: &dyn Game) -> Vec<(String, ActionValue)> {
             let ends = (0..axes).flat_map(|axis| [pushed(axis, -1.0), pushed(axis, 1.0)]);
             std::iter::once(("rest".to_owned(), ActionValue::Continuous(rest.clone()))).chain(ends).collect()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::foreign::ForeignGame;
+    use bevy::app::App;
+
+    #[test]
+    fn levels_of_one_plan_are_named_unless_their_layouts_are_equal() {
+        let plan = |level: u64| FloorPlan { goal: Vec2::new((level % 3) as f32, 0.0), ..FloorPlan::default() };
+        let bare = ForeignGame::new("rooms", 1, |_: &mut App| {});
+        let levels: LevelSplit = "default:0..7".parse().expect("levels");
+        assert_eq!(EqualPlans::of(&bare, &levels), None, "the game has no plans");
+        let drawn = bare.plan(plan);
+        let all = vec![vec![0, 3, 6], vec![1, 4, 7], vec![2, 5]];
+        let unknown = EqualPlans::of(&drawn, &levels).expect("plans");
+        assert_eq!((&unknown.groups, unknown.shared()), (&all, 8));
+        // 0 and 6 are equal, and so are 1 and 7.
+        let other = EqualPlans::of(&drawn.clone().layout(|_, level| level % 6), &levels).expect("plans");
+        assert_eq!(other.groups, all);
+        let equal = EqualPlans::of(&drawn.layout(|_, level| level % 3), &levels).expect("plans");
+        assert_eq!(equal.groups, Vec::<Vec<u64>>::new());
     }
 }

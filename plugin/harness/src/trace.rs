@@ -6,7 +6,6 @@ use crate::{
     worlds::build_world,
 };
 use bevy_playbot::{engine::misfit, prelude::*};
-use std::path::Path;
 
 /// Plays given discrete actions and prints the columns of [`TraceTools::row`](crate::game::TraceTools::row), the
 /// reward and whether the episode ended.
@@ -64,9 +63,8 @@ fn read_actions(game: &dyn Game, request: &TraceRequest) -> Result<Vec<u32>, Ins
         Some(path) => {
             let text = read_text(path).map_err(|error| InspectError::Usage(format!("{error}; {HOW}")))?;
             let words = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
-            let parsed: Result<Vec<u32>, _> =
-                words.map(|word| word.parse().map_err(|_| no_action(path, word))).collect();
-            let parsed = parsed?;
+            let parsed: Result<Vec<u32>, _> = words.map(|word| action_number(game, word)).collect();
+            let parsed = parsed.map_err(|why| InspectError::Usage(format!("{}: {why}", path.display())))?;
             if parsed.is_empty() {
                 return Err(InspectError::Usage(format!("{} has no actions; {HOW}", path.display())));
             }
@@ -83,9 +81,19 @@ fn read_actions(game: &dyn Game, request: &TraceRequest) -> Result<Vec<u32>, Ins
 /// Hint for the form of actions.
 const HOW: &str = "give actions with --actions 0,1,2, or with --actions-file and a file of such numbers";
 
-fn no_action(path: &Path, word: &str) -> InspectError {
-    InspectError::Usage(format!(
-        "{}: `{word}` is not an action; write numbers from 0, separated by commas, spaces or line ends",
-        path.display()
-    ))
+/// Returns the number of a discrete action that is given by its number or by its name, in small or capital letters.
+///
+/// # Errors
+///
+/// It is neither: the message names the actions.
+pub fn action_number(game: &dyn Game, word: &str) -> Result<u32, String> {
+    if let Ok(number) = word.parse() {
+        return Ok(number);
+    }
+    let names = game.tools().input.action_names();
+    if let Some(number) = names.iter().position(|name| name.eq_ignore_ascii_case(word)) {
+        return Ok(number as u32);
+    }
+    let known = if names.is_empty() { String::new() } else { format!(", or the names {}", names.join(", ")) };
+    Err(format!("`{word}` is not an action of `{}`: write numbers from 0{known}", game.name()))
 }

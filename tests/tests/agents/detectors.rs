@@ -1,8 +1,9 @@
 //! Tests of detectors on games with planted defects, and on unmutated ones.
 
+use bevy::prelude::*;
 use playbot::prelude::*;
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
-use playbot_harness::eval::Player;
+use playbot_harness::{eval::Player, foreign::ForeignGame};
 use playbot_mutation::bugs::{Mutant, defect_kinds};
 use playbot_test::detectors::{DetectorChoice, Detectors};
 use playbot_tests::{Corridor, faulty::Fault as Garden};
@@ -184,4 +185,52 @@ fn mistakes_are_reported_with_what_would_be_right() {
     }
     let record = only(&Corridor, &["stuck"], &["stuck.ticks=200"]).record().to_vec();
     assert_eq!(record, ["stuck ticks=200 distance=0.01"]);
+}
+
+/// The screens of a game with a menu.
+#[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Reflect)]
+enum Screen {
+    #[default]
+    Title,
+    Playing,
+}
+
+/// A game that starts in a menu, which `Enter` leaves. No mouse is needed.
+fn titled(keys: [KeyCode; 1]) -> ForeignGame {
+    let game = |app: &mut App| {
+        let leave = |keys: Res<ButtonInput<KeyCode>>, mut next: ResMut<NextState<Screen>>| {
+            if keys.just_pressed(KeyCode::Enter) {
+                next.set(Screen::Playing);
+            }
+        };
+        let menu = |mut commands: Commands| {
+            commands.spawn((Button, children![Text::new("New game")]));
+            commands.spawn((Button, Name::new("QuitButton")));
+        };
+        let play = |mut clock: Local<u32>, mut commands: Commands| {
+            *clock += 1;
+            commands.spawn(Transform::from_xyz(*clock as f32, 0.0, 0.0));
+        };
+        app.init_state::<Screen>()
+            .register_type_state::<Screen>()
+            .add_systems(Startup, menu)
+            .add_systems(Update, leave.run_if(in_state(Screen::Title)))
+            .add_systems(Update, play.run_if(in_state(Screen::Playing)));
+    };
+    ForeignGame::new("titled", 1, game).keys([Vec::new(), keys.to_vec()]).observe(["nothing"], || [0.0]).time_limit(60)
+}
+
+#[test]
+fn a_menu_that_no_action_leaves_is_found_with_its_state_and_its_buttons() {
+    let found = |key: KeyCode| {
+        let game = titled([key]);
+        let detectors = only(&game, &["frozen-world"], &["frozen-world.ticks=40"]);
+        findings(&game, "default:0..0", vec![random()], detectors)
+    };
+    let frozen = found(KeyCode::Space);
+    assert_eq!(frozen.len(), 1, "{frozen:?}");
+    let words = "nothing has changed since the start of the episode, for 40 ticks, whatever the agent did: the state \
+                 `Screen` is `Title`; the buttons are `New game`, `QuitButton`";
+    assert_eq!(frozen[0].1.message, words);
+    assert_silent(&found(KeyCode::Enter));
 }

@@ -1,5 +1,6 @@
 //! Tests of agents in apps of their own: episodes, rewards, recordings, skills, policies and training.
 
+mod any_recordings;
 mod assertions;
 mod calibration;
 mod collecting;

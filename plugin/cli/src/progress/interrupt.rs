@@ -8,18 +8,21 @@ use signal_hook::{
     flag,
 };
 #[cfg(unix)]
-use std::{fs, io, sync::Arc};
+use std::{
+    fs, io,
+    sync::{Arc, atomic::AtomicUsize},
+};
 use std::{
     sync::{
         Mutex, OnceLock, PoisonError,
-        atomic::{AtomicBool, Ordering},
+        atomic::{AtomicBool, AtomicU8, Ordering},
     },
     thread,
     time::Duration,
 };
 
-/// The exit code of stopped work, as in shells: 128 and the number of the signal.
-pub(crate) const EXIT_CODE: u8 = 130;
+/// The number of Ctrl-C's signal.
+const INTERRUPT: u8 = 2;
 
 /// Time in which work must reach a safe point to stop. The user waits for two seconds at most, some of which the end
 /// needs.
@@ -28,6 +31,9 @@ const PATIENCE: Duration = Duration::from_millis(1400);
 /// Time between two looks for a signal.
 #[cfg(unix)]
 const GLANCE: Duration = Duration::from_millis(20);
+
+/// The number of the first signal.
+static FIRST: AtomicU8 = AtomicU8::new(INTERRUPT);
 
 /// Ctrl-C was pressed; a second one stops at once.
 static HEARD: AtomicBool = AtomicBool::new(false);
@@ -72,24 +78,26 @@ pub(crate) fn listen() {
 fn install() -> io::Result<()> {
     let ignored = ignored_signals(&fs::read_to_string("/proc/self/status").unwrap_or_default());
     let mut heard = [SIGHUP, SIGINT, SIGTERM].into_iter().filter(|signal| ignored >> (signal - 1) & 1 == 0);
-    let sent = Arc::new(AtomicBool::new(false));
+    // The number of the last signal, or 0.
+    let sent = Arc::new(AtomicUsize::new(0));
     let seen = Arc::clone(&sent);
     // A handler may do next to nothing, so a thread looks whether it was called. It comes first: a signal that is
     // caught is no longer deadly, and must be seen.
     thread::Builder::new().spawn(move || {
         loop {
             thread::park_timeout(GLANCE);
-            if seen.swap(false, Ordering::SeqCst) {
-                hear();
+            match u8::try_from(seen.swap(0, Ordering::SeqCst)) {
+                Ok(0) | Err(_) => {}
+                Ok(signal) => hear(signal),
             }
         }
     })?;
-    heard.try_for_each(|signal| flag::register(signal, Arc::clone(&sent)).map(drop))
+    heard.try_for_each(|signal| flag::register_usize(signal, Arc::clone(&sent), signal as usize).map(drop))
 }
 
 #[cfg(not(unix))]
 fn install() -> Result<(), ctrlc::Error> {
-    ctrlc::set_handler(hear)
+    ctrlc::set_handler(|| hear(INTERRUPT))
 }
 
 /// Returns the ignored signals of a process, a bit for each from signal 1 on, by Linux' description of the process.
@@ -119,15 +127,16 @@ impl Drop for NothingToSave {
     }
 }
 
-/// Handles a signal.
-fn hear() {
+/// Handles the signal of this number.
+fn hear(signal: u8) {
     if HEARD.swap(true, Ordering::SeqCst) {
         stop("stopped at once");
     }
+    FIRST.store(signal, Ordering::SeqCst);
     if NOTHING_TO_SAVE.load(Ordering::SeqCst) {
         stop("stopped");
     }
-    report!("\nstopping after this step, or within two seconds; press Ctrl-C again to stop at once and lose it");
+    report!("\nstopping after this step, or within two seconds; {}", second(signal));
     // Set after the message, since the last words are for the saved parts.
     ASKED.store(true, Ordering::SeqCst);
     if thread::Builder::new().spawn(stop_in_time).is_err() {
@@ -148,7 +157,20 @@ fn stop(how: &str) -> ! {
     // Held to the end, so that only one of several stopping threads prints.
     let remains = REMAINS.lock().unwrap_or_else(PoisonError::into_inner);
     report!("\n{how}; {}", remains.words());
-    std::process::exit(EXIT_CODE.into())
+    std::process::exit(exit_code().into())
+}
+
+/// Describes the effect of a second signal.
+fn second(signal: u8) -> &'static str {
+    match signal {
+        INTERRUPT => "press Ctrl-C again to stop at once and lose it",
+        _ => "another signal stops at once and loses it",
+    }
+}
+
+/// Returns the exit code of stopped work, as in shells: 128 and the number of the signal.
+pub(crate) fn exit_code() -> u8 {
+    128 + FIRST.load(Ordering::SeqCst)
 }
 
 /// Returns true if Ctrl-C was pressed.
@@ -182,6 +204,16 @@ mod tests {
             "Name:\tplaybot\nSigBlk:\t0000000000000000\nSigIgn:\t0000000000001003\nSigCgt:\t0000000000000440\n";
         assert_eq!(ignored_signals(status), 0b1_0000_0000_0011);
         assert_eq!(ignored_signals(""), 0);
+    }
+
+    #[test]
+    fn without_another_signal_stopped_work_counts_as_interrupted() {
+        assert_eq!(exit_code(), 130);
+        let words = [INTERRUPT, 15].map(second);
+        assert_eq!(
+            words,
+            ["press Ctrl-C again to stop at once and lose it", "another signal stops at once and loses it"]
+        );
     }
 
     #[test]

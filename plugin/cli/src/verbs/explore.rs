@@ -7,7 +7,7 @@ mod explorer;
 mod recorded;
 
 use crate::{
-    arguments::{Compute, first_levels, warn_of_idle_agents},
+    arguments::{Compute, at_least_one_step, first_levels, warn_of_idle_agents},
     error::{CliError, Outcome},
     output,
     output::print_line,
@@ -58,7 +58,7 @@ pub struct Args {
     #[arg(long, value_name = "MODE:N", value_parser = one_level)]
     level: Option<LevelSplit>,
     /// Environment steps to use, including returns to known cells. The last visits may take some more.
-    #[arg(long, default_value_t = 500_000, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = 500_000, value_parser = at_least_one_step)]
     steps: u64,
     /// End earlier: solved (a path to the goal is found), covered (every open cell is reached, too), or spent (never).
     /// For covered the number of open cells must be known. Or exhausted: every action was tried from every cell. Use

@@ -2,7 +2,7 @@
 
 use crate::{
     arguments::{
-        Compute,
+        Compute, at_least_one_step,
         experiment::{ExperimentArgs, Options, in_words, option, quoted},
     },
     error::{CliError, Outcome},
@@ -34,7 +34,7 @@ pub struct Args {
     demos: Option<PathBuf>,
     /// Learn from at most this many recorded steps, instead of the experiment's `demo_steps`. Whole episodes are taken,
     /// and at least one, however long it is.
-    #[arg(long, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, value_parser = at_least_one_step)]
     max_steps: Option<u64>,
     /// Passes over the recordings, instead of the experiment's.
     #[arg(long)]

@@ -10,7 +10,7 @@ use crate::{
 use playbot_harness::{
     game::Game,
     games::Games,
-    level_audit::{EqualLevels, PlainLevels, levels_in, plain_episodes},
+    level_audit::{EqualLevels, EqualPlans, PlainLevels, levels_in, plain_episodes},
     split::LevelSplit,
 };
 use playbot_report::{counted, whole};
@@ -20,7 +20,8 @@ use std::collections::BTreeSet;
 /// Audit a set of levels: equal ones, those of another set, and those that need no player.
 ///
 /// Two levels are equal if their layouts are: all that play meets, without pictures. Different numbers, or a number and
-/// a file, can have one layout. Then each level is played once with each action, held from the start to the end. That
+/// a file, can have one layout. Levels of different layouts may share their floor plan: their difference is not drawn,
+/// which is no finding. Then each level is played once with each action, held from the start to the end. That
 /// shows the levels that are solved without an action, and those that one held action solves.
 ///
 /// Exit code 1 if levels are equal, among those of another set, or solved without an action.
@@ -67,6 +68,7 @@ pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let _nothing = NothingToSave::listen();
     let audit = Audit {
         equal: EqualLevels::of(game, &levels),
+        plans: EqualPlans::of(game, &levels),
         among: args.among.iter().map(|others| (others.clone(), levels_in(game, &levels, others))).collect(),
         plain: (!args.layouts_only).then(|| play(game, &levels, args.threads.count())).transpose()?,
         levels,
@@ -87,6 +89,8 @@ struct Audit {
     levels: LevelSplit,
     /// `None` if the game does not compare layouts.
     equal: Option<EqualLevels>,
+    /// `None` if the game has no floor plans.
+    plans: Option<EqualPlans>,
     among: Vec<(LevelSplit, BTreeSet<u64>)>,
     /// `None` if nothing was played.
     plain: Option<PlainLevels>,
@@ -110,6 +114,7 @@ impl Audit {
             "count": self.levels.len(),
             "layouts": self.equal.as_ref().map(|equal| equal.layouts),
             "equal": self.equal.as_ref().map(|equal| &equal.groups),
+            "equal_plans": self.plans.as_ref().map(|plans| &plans.groups),
             "among": among.collect::<Vec<_>>(),
             "solved_without_action": self.plain.as_ref().map(|plain| &plain.without_action),
             "solved_by_one_action": self.plain.as_ref().map(by_one_action),
@@ -130,16 +135,14 @@ impl Audit {
                     whole(equal.layouts as f64),
                     whole(equal.shared() as f64)
                 ));
-                lines.extend(
-                    equal.groups.iter().take(SHOWN).map(|group| format!("  equal: {}", first_few(group.iter()))),
-                );
-                if equal.groups.len() > SHOWN {
-                    lines.push(format!(
-                        "  and {} (--json has all)",
-                        counted((equal.groups.len() - SHOWN) as u64, "more group")
-                    ));
-                }
+                lines.extend(first_groups("equal", &equal.groups));
             }
+        }
+        if let Some(plans) = self.plans.as_ref().filter(|plans| !plans.groups.is_empty()) {
+            let other = if self.equal.is_some() { "a level of another layout" } else { "another level" };
+            let count = whole(plans.shared() as f64);
+            lines.push(format!("floor plans: {count} of the levels share theirs with {other}"));
+            lines.extend(first_groups("equal plan", &plans.groups));
         }
         for (others, known) in &self.among {
             lines.push(format!("among {others}: {}{}", whole(known.len() as f64), listed(known)));
@@ -154,6 +157,17 @@ impl Audit {
         }
         lines.join("\n")
     }
+}
+
+/// Describes the first groups of levels, one a line, and counts the others.
+fn first_groups(what: &str, groups: &[Vec<u64>]) -> Vec<String> {
+    let shown = groups.iter().take(SHOWN).map(|group| format!("  {what}: {}", first_few(group.iter())));
+    let mut lines: Vec<String> = shown.collect();
+    if groups.len() > SHOWN {
+        let more = counted((groups.len() - SHOWN) as u64, "more group");
+        lines.push(format!("  and {more} (--json has all)"));
+    }
+    lines
 }
 
 /// Lists the first of some levels, behind a colon.

@@ -8,7 +8,7 @@ use crate::{
     arguments::{
         Threads,
         experiment::{ExperimentArgs, option},
-        player, revision,
+        number_of_steps, player, revision,
     },
     error::{CliError, Outcome},
     output::{print_line, program},
@@ -76,7 +76,7 @@ pub struct Args {
     #[arg(long, default_value_t = SEEDS, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
     /// Environment steps for each learner, instead of the experiment's.
-    #[arg(long)]
+    #[arg(long, value_parser = number_of_steps)]
     steps: Option<u64>,
     /// Passes over the recordings, instead of the experiment's.
     #[arg(long)]

@@ -2,7 +2,7 @@
 
 use crate::{
     arguments::{
-        OverwriteArgs, default_held_out, first_levels,
+        OverwriteArgs, default_held_out, first_levels, number_of_steps,
         player::{LoadedPlayer, PlayerArgs},
         warn_of_idle_agents,
     },
@@ -58,7 +58,7 @@ pub struct Args {
     #[arg(long, default_value_t = 0.0)]
     noise: f64,
     /// Stop after exactly this many steps, not counting those that --append finds (default: one round of the levels).
-    #[arg(long)]
+    #[arg(long, value_parser = number_of_steps)]
     steps: Option<u64>,
     /// Random seed of the noise.
     #[arg(long, default_value_t = 1)]

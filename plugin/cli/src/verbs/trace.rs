@@ -7,10 +7,12 @@ use crate::{
 };
 use clap::ArgGroup;
 use playbot_harness::{
+    game::Game,
     games::Games,
     inspect::{InspectError, TraceRequest},
-    trace::trace_actions,
+    trace::{action_number, trace_actions},
 };
+use playbot_learner::ActionSpace;
 use std::path::PathBuf;
 
 /// Play given actions and print the state after each.
@@ -36,9 +38,9 @@ pub struct Args {
     /// Old spelling of --level.
     #[arg(long, hide = true, conflicts_with = "level")]
     seed: Option<u64>,
-    /// Discrete actions: their numbers, from 0, separated by commas.
+    /// Discrete actions: their numbers, from 0, or their names, separated by commas.
     #[arg(long, value_delimiter = ',')]
-    actions: Vec<u32>,
+    actions: Vec<String>,
     /// File of actions. Discrete ones are numbers, separated by commas, spaces or line ends. Continuous ones, in games
     /// that can trace them, are one action per line, with values separated by spaces.
     #[arg(long, value_name = "FILE")]
@@ -54,11 +56,12 @@ pub struct Args {
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let (mode, level) = args.levels.choose(game, args.mode.as_deref(), args.seed)?;
+    let actions = read_actions(game, &args.actions)?;
     let request = TraceRequest {
         mode,
         level,
         start: &args.start,
-        actions: &args.actions,
+        actions: &actions,
         file: args.actions_file.as_deref(),
         json: args.json,
     };
@@ -83,4 +86,13 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             Ok(Outcome::Pass)
         }
     }
+}
+
+/// Returns the numbers of discrete actions. A game with continuous ones refuses them itself.
+fn read_actions(game: &dyn Game, words: &[String]) -> Result<Vec<u32>, CliError> {
+    if matches!(game.actions(), ActionSpace::Continuous(_)) {
+        return Ok(Vec::new());
+    }
+    let numbers: Result<Vec<u32>, String> = words.iter().map(|word| action_number(game, word.trim())).collect();
+    numbers.map_err(|why| CliError::Usage(format!("--actions: {why}")))
 }

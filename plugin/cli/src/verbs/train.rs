@@ -8,7 +8,7 @@ use crate::{
     arguments::{
         Compute,
         experiment::{ExperimentArgs, Options, in_words, option, sets_key},
-        open, revision,
+        number_of_steps, open, revision,
     },
     error::{CliError, Outcome},
     output::program,
@@ -59,7 +59,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "resume")]
     force: bool,
     /// Environment steps from the beginning, instead of the experiment's, rounded up to whole updates.
-    #[arg(long)]
+    #[arg(long, value_parser = number_of_steps)]
     steps: Option<u64>,
     /// Random seed, instead of the experiment's.
     #[arg(long)]

@@ -1,13 +1,19 @@
 //! Detectors of broken Worlds: games that stand still, cameras that see nothing, and numbers that run away.
 
 use crate::detectors::Efforts;
-use bevy::{ecs::world::WorldId, prelude::*};
+use bevy::{
+    ecs::world::WorldId,
+    prelude::*,
+    reflect::{Reflect, TypeRegistry},
+};
 use bevy_playbot::{agent::AgentOrder, engine::BlankEpisodes};
 use playbot_harness::detector::{
     Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher,
 };
+use std::collections::BTreeMap;
 
-/// A finding for games in which nothing changes for any action: not the state and not the observations.
+/// A finding for games in which nothing changes for any action: not the state and not the observations. A menu that no
+/// action leaves is such a game, so the message names the game's states and buttons.
 pub struct FrozenWorld {
     ticks: f64,
 }
@@ -53,9 +59,85 @@ impl EpisodeWatcher for Still {
             (self.state, self.same) = (Some(state), 0);
             self.efforts.restart();
         }
-        (self.same >= self.ticks && self.efforts.are_many(self.same))
-            .then(|| format!("nothing has changed for {} ticks, whatever the agent did", self.same))
+        (self.same >= self.ticks && self.efforts.are_many(self.same)).then(|| {
+            let since = if self.same == moment.tick { "since the start of the episode, " } else { "" };
+            let screen = screen(moment.world).map_or_else(String::new, |screen| format!(": {screen}"));
+            format!("nothing has changed {since}for {} ticks, whatever the agent did{screen}", self.same)
+        })
     }
+}
+
+// The screen of a game, by reflection: the game may have parts of Bevy that this crate is built without.
+
+/// Beginning of the type paths of Bevy's states.
+const STATE: &str = "bevy_state::state::resources::State<";
+
+/// Type paths of texts, whose first field is the string.
+const TEXTS: [&str; 2] = ["bevy_ui::widget::text::Text", "bevy_text::text::TextSpan"];
+
+/// Describes the screen by the states whose types are registered, and by the buttons of Bevy's UI. Returns `None` if
+/// there are neither.
+fn screen(world: &World) -> Option<String> {
+    let registry = world.get_resource::<AppTypeRegistry>()?.read();
+    let states = values(world, &registry, |path| path.starts_with(STATE)).into_iter().map(|(_, state)| {
+        let (name, value) = (state.reflect_short_type_path(), format!("{state:?}"));
+        format!("the state `{}` is `{}`", inside(name, '<', '>'), inside(&value, '(', ')'))
+    });
+    let mut parts: Vec<String> = states.collect();
+    // The registry has no order.
+    parts.sort();
+    let texts = values(world, &registry, |path| TEXTS.contains(&path)).into_iter();
+    let texts = texts.filter_map(|(entity, text)| {
+        let text = text.reflect_path(".0").ok()?.try_downcast_ref::<String>()?;
+        Some((entity, text.trim().to_owned()))
+    });
+    let texts: BTreeMap<Entity, String> = texts.collect();
+    let buttons = values(world, &registry, |path| path.starts_with("bevy_ui") && path.ends_with("::Button"));
+    let is_shown = |entity: Entity| world.get::<InheritedVisibility>(entity).is_none_or(|shown| shown.get());
+    let buttons = buttons.into_iter().map(|(entity, _)| entity).filter(|entity| is_shown(*entity));
+    let mut buttons: Vec<String> = buttons.map(|entity| format!("`{}`", label(world, &texts, entity))).collect();
+    buttons.sort();
+    buttons.dedup();
+    if !buttons.is_empty() {
+        let noun = if buttons.len() == 1 { "button is" } else { "buttons are" };
+        parts.push(format!("the {noun} {}", buttons.join(", ")));
+    }
+    (!parts.is_empty()).then(|| parts.join("; "))
+}
+
+/// Returns the values of the registered components and resources whose type path is wanted, with their entities.
+fn values<'w>(
+    world: &'w World,
+    registry: &TypeRegistry,
+    is_wanted: impl Fn(&str) -> bool,
+) -> Vec<(Entity, &'w dyn Reflect)> {
+    let mut found = Vec::new();
+    for known in registry.iter().filter(|known| is_wanted(known.type_info().type_path())) {
+        let Some(reflect) = known.data::<ReflectComponent>() else { continue };
+        let Some(component) = world.components().get_id(known.type_id()) else { continue };
+        let archetypes = world.archetypes().iter().filter(|archetype| archetype.contains(component));
+        let entities = archetypes.flat_map(|archetype| archetype.entities().iter().map(|entity| entity.id()));
+        found.extend(entities.filter_map(|entity| Some((entity, reflect.reflect(world.entity(entity))?))));
+    }
+    found
+}
+
+/// Returns the part of a text between its first `open` and a `close` at its end, or else the text.
+fn inside(text: &str, open: char, close: char) -> &str {
+    text.split_once(open).and_then(|(_, rest)| rest.strip_suffix(close)).unwrap_or(text)
+}
+
+/// Returns the texts in a button, or else its name.
+fn label(world: &World, texts: &BTreeMap<Entity, String>, button: Entity) -> String {
+    let (mut words, mut waiting) = (Vec::new(), vec![button]);
+    while let Some(entity) = waiting.pop() {
+        words.extend(texts.get(&entity).filter(|text| !text.is_empty()).cloned());
+        waiting.extend(world.get::<Children>(entity).into_iter().flatten().rev().copied());
+    }
+    if !words.is_empty() {
+        return words.join(" ");
+    }
+    world.get::<Name>(button).map_or_else(|| button.to_string(), Name::to_string)
 }
 
 /// A finding for episodes in which every picture was of one colour. Only testers with pictures have any. An agent that
@@ -193,6 +275,34 @@ mod tests {
         let clock = |tick: usize| Step { seen: (tick / 200) as f32, ..Step::at(tick, 5.0, 5.0) };
         let steps: Vec<Step> = (0..600).map(clock).collect();
         assert_eq!(found(&FrozenWorld::default(), &room(), &steps), None);
+    }
+
+    #[test]
+    fn a_world_that_never_changed_says_so_and_one_that_stopped_does_not() {
+        let message = |moving: usize| {
+            let at = |tick: usize| Step { seen: tick.min(moving) as f32, ..Step::at(tick, 5.0, 5.0) };
+            let steps: Vec<Step> = (0..400).map(at).collect();
+            found(&FrozenWorld::default(), &room(), &steps)
+        };
+        let start = "nothing has changed since the start of the episode, for 300 ticks, whatever the agent did";
+        assert_eq!(message(0), Some((300, start.to_owned())));
+        let later = "nothing has changed for 300 ticks, whatever the agent did";
+        assert_eq!(message(9), Some((309, later.to_owned())));
+    }
+
+    #[test]
+    fn a_screen_is_described_by_the_registered_states() {
+        #[derive(States, Clone, Debug, PartialEq, Eq, Hash, Reflect)]
+        enum Stage {
+            Title { page: u8 },
+        }
+        let mut world = World::new();
+        assert_eq!(screen(&world), None, "nothing is registered");
+        world.init_resource::<AppTypeRegistry>();
+        world.insert_resource(State::new(Stage::Title { page: 2 }));
+        assert_eq!(screen(&world), None, "the type of the state is not registered");
+        world.resource::<AppTypeRegistry>().write().register::<State<Stage>>();
+        assert_eq!(screen(&world).as_deref(), Some("the state `Stage` is `Title { page: 2 }`"));
     }
 
     #[test]

@@ -70,7 +70,14 @@ impl ResultLines {
             Some(Ok(record)) => record,
             Some(Err(error)) => return Err(TestError::Damaged { path, line: 1, message: json_fault(&error) }),
             None => {
-                let message = "this is not the head of results".to_owned();
+                let message = match head.trim() {
+                    "{" => {
+                        "the line breaks are not those of `playbot test`, whose results are read line by line: keep the file \
+                         as it was written, and format a copy"
+                    }
+                    _ => "this is not the head of results",
+                };
+                let message = message.to_owned();
                 return Err(TestError::Damaged { path, line: 1, message });
             }
         };

@@ -153,6 +153,7 @@ pub(crate) fn syntax_message(error: &ron::Error) -> String {
         Fault::ExpectedAttribute => {
             "there is no experiment behind this #: an experiment is in round brackets, as `playbot config show` prints one"
         }
+        Fault::ExceededRecursionLimit => "too many brackets are open at once: an experiment needs a few levels of them",
         Fault::UnclosedBlockComment => "a comment has no end: a */ is missing",
         other => return other.to_string(),
     };

@@ -1,7 +1,7 @@
 //! `playbot bugs score`.
 
 use crate::{
-    arguments::{Compute, experiment::quoted},
+    arguments::{Compute, at_least_one_step, experiment::quoted},
     error::{CliError, Outcome},
     output,
     output::{print_line, program},
@@ -55,7 +55,7 @@ pub struct Args {
     #[arg(long, default_value_t = ScoreBudget::default().episodes, value_parser = clap::value_parser!(u32).range(1..))]
     episodes: u32,
     /// Environment steps of each explorer, on each mutant and unmutated level.
-    #[arg(long, default_value_t = ScoreBudget::default().steps, value_parser = clap::value_parser!(u64).range(1..))]
+    #[arg(long, default_value_t = ScoreBudget::default().steps, value_parser = at_least_one_step)]
     steps: u64,
     /// Paths of each explorer to play again under the detectors.
     #[arg(long, default_value_t = ScoreBudget::default().routes)]

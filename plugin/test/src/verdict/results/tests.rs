@@ -198,3 +198,12 @@ fn quartiles_lie_between_the_values() {
     assert_eq!(of(&[7]), Some(time(7.0, 7.0, 7.0)));
     assert_eq!(of(&[]), None);
 }
+
+#[test]
+fn results_with_other_line_breaks_are_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let value: Value = serde_json::from_str(&written(&[r#"{"index":0}"#])).expect("JSON");
+    fs::write(folder.path().join(RESULTS), serde_json::to_string_pretty(&value).expect("JSON")).expect("writable");
+    let found = ResultLines::open(folder.path()).map(|_| ()).expect_err("other lines").to_string();
+    assert!(found.contains(&format!("{RESULTS}, line 1: the line breaks are not those of `playbot test`")), "{found}");
+}

@@ -1,6 +1,6 @@
 //! Files made to take forever.
 
-use crate::experiment::file::*;
+use crate::experiment::{file::*, keys::syntax_message};
 use std::{
     fs,
     path::Path,
@@ -95,4 +95,10 @@ fn what_is_no_regular_file_is_refused_and_not_waited_for() {
             assert!(error.contains(name) && error.contains("not a regular file"), "{error}");
         }
     }
+}
+
+#[test]
+fn too_many_open_brackets_are_named_in_plain_words() {
+    let words = syntax_message(&ron::Error::ExceededRecursionLimit);
+    assert_eq!(words, "too many brackets are open at once: an experiment needs a few levels of them");
 }

@@ -21,6 +21,18 @@ fn values(text: &str) -> String {
 }
 
 #[test]
+fn an_experiment_in_utf_16_or_behind_a_mark_is_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("marked.ron");
+    let marked = format!("\u{feff}{GOOD}");
+    let utf_16: Vec<u8> = marked.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    for bytes in [marked.into_bytes(), utf_16] {
+        std::fs::write(&path, bytes).expect("writable");
+        assert_eq!(read_experiment(&path).expect("valid"), good(GOOD));
+    }
+}
+
+#[test]
 fn defaults_fill_in() {
     let experiment = good(GOOD);
     assert_eq!(experiment.ppo.gamma, 0.99);
