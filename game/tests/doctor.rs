@@ -27,7 +27,7 @@ fn the_report_is_one_line_of_json_for_programs() {
     let report: Value = serde_json::from_str(text.trim_end()).expect("one line of JSON");
     assert_eq!((&report["game"], &report["mode"], &report["level"]), (&"coinrun".into(), &"hard".into(), &7.into()));
     assert_eq!(report["seed"], 0);
-    assert_eq!(report["comparisons"].as_array().map(Vec::len), Some(6));
+    assert_eq!(report["comparisons"].as_array().map(Vec::len), Some(7));
     assert_eq!(report["safety"]["recording"]["safe"], true);
     assert_eq!(report["findings"].as_array().map(Vec::len), Some(0));
     assert!(report["ticks_per_second"].as_f64().is_some_and(|speed| speed > 0.0));

@@ -40,7 +40,7 @@ use crate::{
     agent::{Agent, Control},
     episode::{Episode, Tick},
     fault::{Fault, Faults},
-    loading::wait_for_assets,
+    loading::{deliver_between_frames, wait_for_assets},
     panics,
     placement::{FrameGate, TickPlacement},
     plugin::PlaybotPlugin,
@@ -122,6 +122,9 @@ pub fn into_world(mut app: App) -> World {
     app.finish();
     app.cleanup();
     run_on_one_thread(app.world_mut());
+    if app.world().contains_resource::<FrameGate>() {
+        deliver_between_frames(app.world_mut());
+    }
     std::mem::take(app.world_mut())
 }
 

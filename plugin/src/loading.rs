@@ -4,7 +4,10 @@ use crate::carry_over::ReflectCarryResource;
 use bevy::{
     asset::{AssetPath, handle_internal_asset_events, publish_asset_server_diagnostics},
     diagnostic::DiagnosticsStore,
-    ecs::system::BoxedSystem,
+    ecs::{
+        schedule::{BoxedCondition, ConditionWithAccess, InternedSystemSet},
+        system::BoxedSystem,
+    },
     prelude::*,
     tasks::{IoTaskPool, block_on, poll_once},
 };
@@ -112,6 +115,30 @@ struct AwaitedLoads {
 #[reflect(Resource, CarryResource)]
 struct OverdueAssets(Vec<String>);
 
+/// Keeps Bevy from delivering loaded assets in the middle of a frame, where some machines are fast enough for the assets
+/// of `Startup`, and others are not. [`wait_for_assets`] delivers them after it. Call it before the schedules run.
+pub(crate) fn deliver_between_frames(world: &mut World) {
+    let Some(mut schedules) = world.get_resource_mut::<Schedules>() else { return };
+    let Some(schedule) = schedules.get_mut(PreUpdate) else { return };
+    let delivery = set_of(handle_internal_asset_events);
+    let systems = &mut schedule.graph_mut().systems;
+    // Conditions are prepared with the systems that they belong to.
+    if systems.is_initialized() {
+        return;
+    }
+    let of_delivery = systems.iter().find(|(_, system, _)| system.default_system_sets().contains(&delivery));
+    let key = of_delivery.map(|(key, ..)| key);
+    if let Some(conditions) = key.and_then(|key| systems.get_conditions_mut(key)) {
+        let never: BoxedCondition = Box::new(IntoSystem::into_system(|| false));
+        conditions.push(ConditionWithAccess::new(never));
+    }
+}
+
+/// Returns the set of a system, or a set itself.
+fn set_of<M>(system: impl IntoSystemSet<M>) -> InternedSystemSet {
+    system.into_system_set().intern()
+}
+
 /// Waits until the asset server has loaded everything that the game has asked for, so that the next frame finds it on
 /// every machine. No game time passes.
 ///
@@ -122,6 +149,8 @@ pub(crate) fn wait_for_assets(world: &mut World) {
     }
     world.init_resource::<AwaitedLoads>();
     world.init_resource::<OverdueAssets>();
+    // Assets that arrive late, and those that no load has announced.
+    handle_internal_asset_events(world);
     world.resource_scope(|world, mut awaited: Mut<AwaitedLoads>| {
         let begun = count_loads(&mut awaited, world);
         if begun.is_none() || begun != awaited.begun {
@@ -284,6 +313,37 @@ mod tests {
         assert!(text.starts_with("still loading: `00.png`, `01.png`, "), "{text}");
         assert!(text.ends_with("`07.png` and 3 more"), "{text}");
         assert_eq!(UnloadedAssets::default().to_string(), "");
+    }
+
+    /// Loads a file and runs a frame as soon as its task is done. Returns whether the file is there in the frame, and
+    /// after it.
+    fn delivery(is_between_frames: bool) -> [bool; 2] {
+        let mut app = App::new();
+        app.add_plugins((TaskPoolPlugin::default(), AssetPlugin::default()));
+        app.init_asset::<Tiles>().init_asset_loader::<TilesLoader>();
+        if is_between_frames {
+            deliver_between_frames(app.world_mut());
+        }
+        let server = app.world().resource::<AssetServer>().clone();
+        // A file that is missing fails to load, and the failure is delivered in the same way.
+        let missing: Handle<Tiles> = server.load("no/such.tiles");
+        let is_there = || server.load_state(&missing).is_failed();
+        let mut in_a_frame = false;
+        for _ in 0..200 {
+            run_tasks();
+            #[allow(clippy::disallowed_methods, reason = "a file that is missing needs some time")]
+            std::thread::sleep(Duration::from_millis(1));
+            app.world_mut().run_schedule(PreUpdate);
+            in_a_frame |= is_there();
+        }
+        wait_for_assets(app.world_mut());
+        [in_a_frame, is_there()]
+    }
+
+    #[test]
+    fn assets_are_delivered_between_frames_and_not_in_them() {
+        assert_eq!(delivery(false), [true, true], "as Bevy does it");
+        assert_eq!(delivery(true), [false, true]);
     }
 
     #[test]

@@ -255,12 +255,14 @@ pub enum DoctorComparison {
     Arenas,
     /// The first episode of a World, and the second episode of the same level in another one.
     Restart,
+    /// A World that plays on, and one that returns to the same tick by a snapshot of the game, as explorers do.
+    Snapshots,
 }
 
 impl DoctorComparison {
     /// All comparisons, in the order in which they are made.
-    pub const ALL: [Self; 6] =
-        [Self::Repeat, Self::Archetypes, Self::Clock, Self::Threads, Self::Arenas, Self::Restart];
+    pub const ALL: [Self; 7] =
+        [Self::Repeat, Self::Archetypes, Self::Clock, Self::Threads, Self::Arenas, Self::Restart, Self::Snapshots];
 
     /// Returns the comparison in words.
     pub fn describe(self) -> &'static str {
@@ -271,6 +273,7 @@ impl DoctorComparison {
             Self::Threads => "on two threads",
             Self::Arenas => "two arenas in one World",
             Self::Restart => "again after a restart",
+            Self::Snapshots => "after loading a snapshot",
         }
     }
 
@@ -283,6 +286,7 @@ impl DoctorComparison {
             Self::Threads => ("one thread", "two threads"),
             Self::Arenas => ("alone", "with another arena"),
             Self::Restart => ("first episode", "second episode"),
+            Self::Snapshots => ("played on", "snapshot loaded"),
         }
     }
 }
@@ -365,6 +369,9 @@ pub enum FindingKind {
 fn reason_to_skip(comparison: DoctorComparison, game: &dyn Game, done: &[ComparisonReport]) -> Option<String> {
     if comparison == DoctorComparison::Arenas && game.tools().host.arenas_per_world() == Some(1) {
         return Some("a World of this game holds only one arena (its `arenas_per_world` is 1)".to_owned());
+    }
+    if comparison == DoctorComparison::Snapshots && game.built_anew().is_some() {
+        return Some("a game that is built anew for each episode is explored by replays".to_owned());
     }
     let broken = done.iter().find(|of| of.comparison == DoctorComparison::Repeat && of.same() == Some(false))?;
     Some(match broken.fault.is_some() {
@@ -513,7 +520,7 @@ const HOUSEKEEPING: [&str; 34] = [
 /// The parts of the engine's entity system that belong to the game.
 const HIERARCHY: [&str; 2] = ["bevy_ecs::hierarchy::ChildOf", "bevy_ecs::hierarchy::Children"];
 
-/// Clocks and keys go on from one episode to the next.
+/// Clocks and keys go on from one episode to the next. The plugin restores those that a snapshot needs.
 const GOES_ON: [&str; 4] = ["bevy_time::", "bevy_input::", "leafwing_input_manager::", "bevy_enhanced_input::"];
 
 /// Bevy's real-time clock. Without a window it is a mock; [`DoctorComparison::Clock`] reveals its readers.
@@ -532,7 +539,8 @@ fn is_compared(path: &str) -> bool {
 
 /// Returns whether they are part of this comparison.
 fn is_compared_in(comparison: DoctorComparison, path: &str) -> bool {
-    comparison != DoctorComparison::Restart || !GOES_ON.iter().any(|prefix| path.starts_with(prefix))
+    let continues = matches!(comparison, DoctorComparison::Restart | DoctorComparison::Snapshots);
+    !continues || !GOES_ON.iter().any(|prefix| path.starts_with(prefix))
 }
 
 #[cfg(test)]

@@ -46,7 +46,7 @@ use crate::{
     detector::{Detector, LevelProof},
     floor_plan::FloorPlan,
     inspect::{ExperimentText, InspectError, LevelRequest, LevelView, Print, TraceRequest},
-    level_files::{LevelDesign, LevelDesigns, LevelFileError, LevelTextError, is_level_files},
+    level_files::{LevelDesign, LevelDesigns, LevelFileError, LevelTextError, is_level_files, read::Parse},
     mode::ModeError,
 };
 use bevy::{app::PluginGroupBuilder, prelude::*};
@@ -343,6 +343,12 @@ pub trait LevelTools: Send + Sync {
         None
     }
 
+    /// Reads a level from the bytes of a file, as [`parse`](Self::parse) does from its text, in a format that is not text.
+    /// Returns `None`, by default: files are texts. It must be `None` for all files or for none.
+    fn parse_bytes(&self, _bytes: &[u8]) -> Option<Result<LevelDesign, LevelTextError>> {
+        None
+    }
+
     /// Returns a level from above, for pictures of agents' paths; `None` if there is no such picture.
     fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
         None
@@ -566,7 +572,7 @@ pub trait BenchmarkTools: Send + Sync {
 ///
 /// The mode names no files, or one of them cannot be read or is no level of this game.
 pub fn level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDesigns, LevelFileError> {
-    LevelDesigns::of(game.name(), mode, &|text| game.parse_level(text))
+    with_parser(game, |parse| LevelDesigns::of_with(game.name(), mode, parse))
 }
 
 /// Returns the level files of a mode, as they are on disk now: [`LevelDesigns::read`] for this game.
@@ -575,7 +581,20 @@ pub fn level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDes
 ///
 /// As for [`level_designs`].
 pub fn read_level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<LevelDesigns, LevelFileError> {
-    LevelDesigns::read(game.name(), mode, &|text| game.parse_level(text))
+    with_parser(game, |parse| LevelDesigns::read_with(game.name(), mode, parse))
+}
+
+/// Calls a function with the game's parser of level files: of bytes if it has one, else of texts.
+fn with_parser<Out>(game: &(impl Game + ?Sized), read: impl FnOnce(Parse) -> Out) -> Out {
+    let levels = game.tools().levels;
+    if levels.parse_bytes(&[]).is_none() {
+        return read(Parse::Text(&|text| game.parse_level(text)));
+    }
+    let parse = |bytes: &[u8]| {
+        let no_level = || Err(LevelTextError::whole("it is no level of the game".to_owned()));
+        levels.parse_bytes(bytes).unwrap_or_else(no_level)
+    };
+    read(Parse::Bytes(&parse))
 }
 
 /// Returns the game's idle action: the first choice with an idle name, else choice 0; zeros for continuous actions.

@@ -12,7 +12,7 @@
 mod error;
 pub mod read;
 
-use crate::level_files::read::DrawnLevels;
+use crate::level_files::read::{DrawnLevels, Parse};
 use bevy::prelude::*;
 use bevy_playbot::{engine::LevelFiles, level::LevelFile, state_hash::StateHash};
 use std::{any::Any, path::Path, sync::Arc};
@@ -45,7 +45,7 @@ impl LevelDesigns {
         mode: &str,
         parse: &dyn Fn(&str) -> Result<LevelDesign, LevelTextError>,
     ) -> Result<Self, LevelFileError> {
-        read::read_now(game, level_file_pattern(mode).unwrap_or(mode), parse).map(Self)
+        Self::read_with(game, mode, Parse::Text(parse))
     }
 
     /// Returns the files of a mode as last read, and reads them first if needed.
@@ -58,6 +58,16 @@ impl LevelDesigns {
         mode: &str,
         parse: &dyn Fn(&str) -> Result<LevelDesign, LevelTextError>,
     ) -> Result<Self, LevelFileError> {
+        Self::of_with(game, mode, Parse::Text(parse))
+    }
+
+    /// Reads the files of a mode as [`read`](Self::read) does, with a parser of texts or of bytes.
+    pub(crate) fn read_with(game: &str, mode: &str, parse: Parse) -> Result<Self, LevelFileError> {
+        read::read_now(game, level_file_pattern(mode).unwrap_or(mode), parse).map(Self)
+    }
+
+    /// Returns the files of a mode as [`of`](Self::of) does, with a parser of texts or of bytes.
+    pub(crate) fn of_with(game: &str, mode: &str, parse: Parse) -> Result<Self, LevelFileError> {
         read::as_read(game, level_file_pattern(mode).unwrap_or(mode), parse).map(Self)
     }
 
@@ -70,7 +80,7 @@ impl LevelDesigns {
         path: &str,
         parse: &dyn Fn(&str) -> Result<LevelDesign, LevelTextError>,
     ) -> Result<Self, LevelFileError> {
-        Ok(Self(Arc::new(vec![read::read_one(path, parse)?])))
+        Ok(Self(Arc::new(vec![read::read_one(path, Parse::Text(parse))?])))
     }
 
     /// Wraps a single level as level 0, under a name instead of a path.
@@ -145,7 +155,13 @@ impl LevelDesign {
     /// `content` is all of the level that affects play, in one canonical form. So the level has the same hash under
     /// any layout of its file.
     pub fn new<T: Any + Send + Sync>(level: T, content: &str) -> Self {
-        Self { level: Arc::new(level), hash: StateHash::of(content.bytes().map(u64::from)).0, layout: None }
+        Self::of_bytes(level, content.as_bytes())
+    }
+
+    /// Wraps a level of the game's own type as [`new`](Self::new) does, where its content is not a text.
+    pub fn of_bytes<T: Any + Send + Sync>(level: T, content: &[u8]) -> Self {
+        let hash = StateHash::of(content.iter().copied().map(u64::from)).0;
+        Self { level: Arc::new(level), hash, layout: None }
     }
 
     /// Adds the hash of the level's [layout](crate::game::LevelTools::layout_hash), by which it is found among the levels

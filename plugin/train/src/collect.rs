@@ -6,7 +6,7 @@ use bevy_playbot::{
     agent::{Agent, AgentOrder, Control},
     demo::recorder,
     engine::{PolicyBatch, Renewal, SharedBatch, TickSchedules, draw_skills, tick_world},
-    episode::{Episode, EpisodeEnd, EpisodeEnded},
+    episode::{Episode, EpisodeEnd, EpisodeEnded, Tick},
     fault::{Fault, Faults},
     level::LevelQueue,
     observation::Observation,
@@ -29,6 +29,8 @@ use thiserror::Error;
 pub struct Collector {
     world: World,
     agents: Vec<Entity>,
+    /// Number of the first agent.
+    first: u32,
 }
 
 /// Rows of the rollout under construction.
@@ -110,7 +112,7 @@ impl Collector {
                 ActionLog::default(),
             ));
         }
-        Ok(Self { world, agents })
+        Ok(Self { world, agents, first })
     }
 
     /// Plays `steps` ticks with this policy; `latent` is the width of the skills to keep, 0 for no skills.
@@ -174,7 +176,13 @@ impl Collector {
         let empty = Rollout::new(self.agents.len(), kind, latent, &policy.action_space());
         world.resource_mut::<Collecting>().rollout = empty.clone();
         for _ in 0..steps {
-            tick_world(world)?;
+            let ticked = tick_world(world);
+            // What follows from a panic, or from another number of agents, says less.
+            let is_panic = ticked.as_ref().is_err_and(|fault| fault.0.contains("panicked: "));
+            if let Some(why) = other_agents(world, &self.agents, self.first).filter(|_| !is_panic) {
+                return Err(Fault(why));
+            }
+            ticked?;
             let seen = world.resource::<PolicyBatch>().observations();
             columns.fill_next(seen.as_slice()).map_err(|error| Fault(error.to_string()))?;
         }
@@ -193,6 +201,23 @@ impl Collector {
     pub fn agents(&self) -> &[Entity] {
         &self.agents
     }
+}
+
+/// Returns why the agents are no longer those that the rollout has rows for, if the game has despawned or spawned one.
+fn other_agents(world: &World, agents: &[Entity], first: u32) -> Option<String> {
+    let tick = world.get_resource::<Tick>().map_or(0, |tick| tick.0);
+    let why = |index: u32, what: &str| {
+        format!(
+            "agent {index}: the game {what} it in tick {tick} of its World, and a training has the same agents in every \
+             tick: end the episode of an agent that dies (`Episode::terminate`), and use the agent again in the next one"
+        )
+    };
+    if let Some(row) = agents.iter().position(|&agent| world.get::<Agent>(agent).is_none()) {
+        return Some(why(first + row as u32, "despawned"));
+    }
+    let order = world.get_resource::<AgentOrder>().filter(|order| order.entities().len() > agents.len())?;
+    let other = order.entities().iter().find(|entity| !agents.contains(entity))?;
+    world.get::<Agent>(*other).map(|agent| why(agent.index, "spawned"))
 }
 
 /// Adds the states in which the rollout stopped, with the skills active there, and their values.

@@ -40,6 +40,66 @@ fn a_collector_that_met_a_fault_goes_on() {
     assert_eq!((rollout.steps, rollout.rewards.len()), (10, 20));
 }
 
+/// A corridor that despawns agent 2 in its hundredth tick.
+struct Deadly;
+
+impl Game for Deadly {
+    as_corridor!(but build);
+
+    fn build(&self, app: &mut App, _mode: &str) {
+        corridor_plugin(app);
+        app.add_systems(FixedUpdate, kill);
+    }
+}
+
+fn kill(mut ticks: Local<u32>, agents: Query<(Entity, &Agent)>, mut commands: Commands) {
+    *ticks += 1;
+    for (entity, _) in agents.iter().filter(|(_, agent)| *ticks == 100 && agent.index == 2) {
+        commands.entity(entity).despawn();
+    }
+}
+
+/// A corridor that spawns agent 9 in its fifth tick.
+struct Crowded;
+
+impl Game for Crowded {
+    as_corridor!(but build);
+
+    fn build(&self, app: &mut App, _mode: &str) {
+        corridor_plugin(app);
+        app.add_systems(FixedUpdate, join);
+    }
+}
+
+fn join(mut ticks: Local<u32>, mut commands: Commands) {
+    *ticks += 1;
+    if *ticks == 5 {
+        commands.spawn(Agent::new(9, ActionSpace::Discrete(2)));
+    }
+}
+
+/// Returns the fault of a rollout with four agents.
+fn fault_of(game: &dyn Game) -> String {
+    let observation_config = ObservationConfig::default();
+    let split: LevelSplit = "plain:0..7".parse().expect("a split");
+    let mut collector = Collector::new(game, &split, &observation_config, 1, 0, 4, None).expect("can be seen");
+    let policy = untrained(game, &observation_config, PpoConfig { hidden: vec![8], ..PpoConfig::default() });
+    collector.collect(&policy, 0, 120).expect_err("the agents change").to_string()
+}
+
+#[test]
+fn an_agent_that_is_despawned_in_a_rollout_is_a_fault_with_its_number_and_the_tick() {
+    let fault = fault_of(&Deadly);
+    assert!(fault.starts_with("agent 2: the game despawned it in tick 100 of its World, "), "{fault}");
+    assert!(fault.contains("`Episode::terminate`"), "{fault}");
+}
+
+#[test]
+fn an_agent_that_is_spawned_in_a_rollout_is_a_fault_with_its_number() {
+    let fault = fault_of(&Crowded);
+    assert!(fault.starts_with("agent 9: the game spawned it in tick "), "{fault}");
+}
+
 #[test]
 fn worlds_that_decide_together_do_not_wait_for_one_that_met_a_fault() {
     let experiment = r#"(

@@ -3,3 +3,4 @@
 mod foreign;
 mod planted;
 mod replays;
+mod snapshots;

@@ -22,10 +22,10 @@ use bevy::{
 use playbot::prelude::*;
 use playbot_harness::{
     demo::verify_file,
-    foreign::{ForeignGame, LevelSeed},
+    foreign::{ForeignGame, LevelSeed, Restart},
     worlds::build_world,
 };
-use playbot_tests::recording::record_demonstrator;
+use playbot_tests::{foreign::traces, recording::record_demonstrator};
 
 use crate::rebuild::replayed_backwards;
 
@@ -184,8 +184,13 @@ fn walk(keys: Res<ButtonInput<KeyCode>>, time: Res<Time>, mut heroes: Query<&mut
     }
 }
 
-/// Returns the adapter.
+/// Returns the game with its adapter.
 fn slow_game() -> ForeignGame {
+    adapted(game)
+}
+
+/// Returns the adapter.
+fn adapted(game: fn(&mut App)) -> ForeignGame {
     ForeignGame::new("slow", 1, game)
         .keys([vec![], vec![KeyCode::ArrowRight]])
         .observe(
@@ -214,6 +219,25 @@ fn recordings_of_a_level_that_arrives_late_replay_in_other_worlds_and_orders() {
     let report = verify_file(&game, &path, |_| {}).expect("readable");
     assert_eq!((report.episodes, &report.divergences), (4, &Vec::new()));
     assert_eq!(replayed_backwards(&game, &path), vec![None; 4]);
+}
+
+/// The game with a start that takes so long that most loads end before the first frame does.
+fn game_with_a_slow_start(app: &mut App) {
+    game(app);
+    app.add_systems(PostStartup, || {
+        #[allow(clippy::disallowed_methods, reason = "a slow start")]
+        thread::sleep(Duration::from_millis(50));
+    });
+}
+
+#[test]
+fn a_world_that_is_built_anew_begins_the_same_however_soon_its_level_arrives() {
+    for game in [game as fn(&mut App), game_with_a_slow_start] {
+        let played = traces(&adapted(game).restart(Restart::Rebuild), 1, &[4; 8]);
+        for (episode, trace) in played.iter().enumerate() {
+            assert_eq!(trace, &played[0], "episode {episode}");
+        }
+    }
 }
 
 #[test]

@@ -20,10 +20,11 @@ use std::time::Instant;
 ///
 /// Recording, replay, resume and training in many arenas depend on it. Copies of the game play the same random actions
 /// twice in one thread. They play them with another wall clock, with more archetypes in the World, and on two threads.
-/// They play two arenas in one World against each alone, and the same level again after a restart. The first difference
-/// is printed with its tick and with advice. A clean result holds for the ticks and the level that were played, so try
-/// more ticks and other levels too. State that differs is only a note if agents never notice it: not in observations,
-/// rewards, ends of episodes or the state hash. Exit code 1 if something was found; notes are no findings.
+/// They play two arenas in one World against each alone, and the same level again after a restart. If the game
+/// saves snapshots, one copy plays on, and another one returns to the same tick by a snapshot. The first difference is
+/// printed with its tick and with advice. A clean result holds for the ticks and the level that were played, so try more
+/// ticks and other levels too. State that differs is only a note if agents never notice it: not in observations, rewards,
+/// ends of episodes or the state hash. Exit code 1 if something was found; notes are no findings.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot doctor GAME

@@ -23,6 +23,8 @@ pub enum CauseKind {
     SharedByArenas,
     /// State that a restart does not reset.
     SurvivesRestart,
+    /// State that a snapshot does not hold.
+    IncompleteSnapshot,
     /// Files that are still loading while the game runs.
     Loading,
 }
@@ -44,6 +46,7 @@ impl CauseKind {
             Self::SurvivesRestart => {
                 "state that survives a restart: a resource, a Local, a static or an entity that is not reset"
             }
+            Self::IncompleteSnapshot => "state that the game's snapshot does not hold, or does not put back",
             Self::Loading => "assets that are still loading when the game begins",
         }
     }
@@ -54,7 +57,7 @@ impl CauseKind {
             Self::WallClock => 0,
             Self::Randomness | Self::HashOrder | Self::ThreadState => 1,
             Self::ArchetypeOrder | Self::EntityOrder | Self::Loading => 2,
-            Self::SharedByArenas | Self::SurvivesRestart => 3,
+            Self::SharedByArenas | Self::SurvivesRestart | Self::IncompleteSnapshot => 3,
         }
     }
 
@@ -96,6 +99,11 @@ impl CauseKind {
                  for each episode, and for messages that the end of an episode leaves in a queue `.forget_messages`. State that \
                  this comparison does not see, but agents may: a Local, a static, an asset, a queue of messages, a type that does not derive Reflect, and a field with #[reflect(ignore)]"
             }
+            Self::IncompleteSnapshot => {
+                "return it in `save`, and put it back in `load` (`.snapshot` of a `ForeignGame`, or `SnapshotTools`); keep a \
+                 Local in a resource, and despawn in `load` what was spawned since. Explorers that notice it return by \
+                 replays, and --no-snapshots always does"
+            }
             Self::Loading => {
                 "wait for the files before an episode starts, with a `ready` that says when they are there"
             }
@@ -123,6 +131,7 @@ fn kinds(comparison: DoctorComparison) -> &'static [CauseKind] {
         DoctorComparison::Threads => &[CauseKind::ThreadState],
         DoctorComparison::Arenas => &[CauseKind::SharedByArenas],
         DoctorComparison::Restart => &[CauseKind::SurvivesRestart],
+        DoctorComparison::Snapshots => &[CauseKind::IncompleteSnapshot],
     }
 }
 
@@ -268,6 +277,7 @@ mod tests {
         assert_eq!(kinds(DoctorComparison::Archetypes, &[]), [CauseKind::ArchetypeOrder]);
         assert_eq!(kinds(DoctorComparison::Arenas, &[]), [CauseKind::SharedByArenas]);
         assert_eq!(kinds(DoctorComparison::Restart, &[]), [CauseKind::SurvivesRestart]);
+        assert_eq!(kinds(DoctorComparison::Snapshots, &[]), [CauseKind::IncompleteSnapshot]);
         assert_eq!(kinds(DoctorComparison::Repeat, &[])[0], CauseKind::Randomness);
     }
 

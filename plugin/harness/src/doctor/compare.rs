@@ -98,7 +98,11 @@ impl Comparer<'_> {
 
     /// Returns whether entities of one kind may have another order.
     fn is_loose(&self) -> bool {
-        matches!(self.comparison, DoctorComparison::Archetypes | DoctorComparison::Restart | DoctorComparison::Arenas)
+        match self.comparison {
+            DoctorComparison::Repeat | DoctorComparison::Clock | DoctorComparison::Threads => false,
+            DoctorComparison::Archetypes | DoctorComparison::Arenas => true,
+            DoctorComparison::Restart | DoctorComparison::Snapshots => true,
+        }
     }
 
     fn is_wanted(&self, known: &KnownType) -> bool {
@@ -235,9 +239,9 @@ fn presence(left: bool, right: bool) -> Option<FieldDifference> {
 /// Returns the place of a difference among those of its tick. Differences in types of the game come before those of the
 /// engine, and resources before components.
 pub(super) fn rank(comparison: DoctorComparison, difference: &DoctorDifference) -> (bool, u8) {
-    // After a restart, a surplus of entities is itself the cause, so it comes early. In other comparisons it is the
-    // effect of another difference, and comes last.
-    let is_cause = comparison == DoctorComparison::Restart;
+    // After a restart or a snapshot, a surplus of entities is itself the cause, so it comes early. In other comparisons
+    // it is the effect of another difference, and comes last.
+    let is_cause = matches!(comparison, DoctorComparison::Restart | DoctorComparison::Snapshots);
     match difference.kind {
         DifferenceKind::Entities => (false, if is_cause { 1 } else { 3 }),
         DifferenceKind::Resource => (doctor::is_engine(&difference.name), 0),

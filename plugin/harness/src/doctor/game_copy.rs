@@ -4,6 +4,7 @@ use crate::{
     doctor,
     doctor::{cause::CauseKind, known},
     game::Game,
+    saved_episode::SavedEpisode,
     worlds::build_world,
 };
 use bevy::{
@@ -103,6 +104,23 @@ impl GameCopy {
         self.in_prelude = false;
     }
 
+    /// Saves the first agent's episode, plays on with other actions for at most `limit` ticks or to the end, and returns
+    /// to the saved tick. A fault on the way stays in this copy.
+    pub fn make_detour(&mut self, game: &dyn Game, limit: u32) -> Detour {
+        let agent = self.agents[0];
+        let Some(saved) = SavedEpisode::of(game, &self.world, agent) else { return Detour::NotSaved };
+        self.in_prelude = true;
+        for _ in 0..limit {
+            self.tick();
+            if self.fault.is_some() || self.end(0).is_some() {
+                break;
+            }
+        }
+        self.in_prelude = false;
+        let is_back = self.fault.is_some() || saved.restore(game, &mut self.world, agent);
+        if is_back { Detour::Made } else { Detour::NotLoaded }
+    }
+
     /// Returns an agent's outcome of the tick.
     pub fn outcome(&self, agent: usize) -> Outcome {
         let entity = self.agents[agent];
@@ -142,6 +160,17 @@ pub(super) struct Plan<'a> {
     pub level: u64,
     /// Random seed of the World and of the actions.
     pub seed: u64,
+}
+
+/// The result of leaving an episode and returning to it by a snapshot.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Detour {
+    /// The copy is back, or has a fault.
+    Made,
+    /// The game saved nothing in this tick, and the copy has not left it.
+    NotSaved,
+    /// The game could not load the snapshot, so the copy is elsewhere.
+    NotLoaded,
 }
 
 /// An agent's observation, reward and end in a tick.

@@ -125,17 +125,20 @@ pub struct Safety {
     pub threads: Verdict,
     /// Play in a window, where frames take the time they take.
     pub window: Verdict,
+    /// Exploration from snapshots.
+    pub snapshots: Verdict,
 }
 
 impl Safety {
     /// Returns all uses, with their names.
-    pub fn all(&self) -> [(&'static str, &Verdict); 5] {
+    pub fn all(&self) -> [(&'static str, &Verdict); 6] {
         [
             ("recording and replay", &self.recording),
             ("resume of a run", &self.resume),
             ("many arenas per World", &self.arenas),
             ("several threads", &self.threads),
             ("a window", &self.window),
+            ("snapshots of explorers", &self.snapshots),
         ]
     }
 }
@@ -156,6 +159,7 @@ pub(super) fn assess_safety(comparisons: &[ComparisonReport], observation: &Obse
         arenas: verdict(&[DoctorComparison::Repeat, DoctorComparison::Arenas]),
         threads: verdict(&[DoctorComparison::Repeat, DoctorComparison::Threads]),
         window: verdict(&[DoctorComparison::Repeat, DoctorComparison::Clock, DoctorComparison::Archetypes]),
+        snapshots: verdict(&[DoctorComparison::Repeat, DoctorComparison::Snapshots]),
     }
 }
 

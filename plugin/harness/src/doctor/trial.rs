@@ -5,7 +5,7 @@ use crate::{
         ComparisonReport, DifferenceKind, DoctorComparison, DoctorDifference,
         cause::likelihood,
         compare::{Comparer, rank},
-        game_copy::{GameCopy, KnownTypes, Outcome, Plan, VARIANTS, add_archetypes, add_wall_clock},
+        game_copy::{Detour, GameCopy, KnownTypes, Outcome, Plan, VARIANTS, add_archetypes, add_wall_clock},
         observed::ObservationMonitor,
     },
     game::Game,
@@ -20,25 +20,37 @@ const MOST_DIFFERENCES: usize = 24;
 /// agent has noticed it yet.
 const LONGER: u32 = 4;
 
+/// Least ticks that a copy plays on with other actions, before it returns by a snapshot.
+const DETOUR: u32 = 40;
+
+/// Ticks after which a game that has saved no snapshot is taken to have none.
+const WITHOUT_SNAPSHOT: u32 = 64;
+
 /// Copies of a game that are compared.
-pub(super) struct Trial {
+pub(super) struct Trial<'a> {
     comparison: DoctorComparison,
+    game: &'a dyn Game,
     /// The copies. The observations of the first one are monitored.
     pub copies: Vec<GameCopy>,
     /// Indices of the copies that are compared with each other.
     pairs: Vec<(usize, usize)>,
     /// Number of the last copies that are ticked on threads of their own.
     on_threads: usize,
+    /// Returns by a snapshot, of the second copy.
+    returns: u32,
+    /// The tick whose snapshot could not be loaded.
+    not_loaded: Option<u32>,
 }
 
-impl Trial {
+impl<'a> Trial<'a> {
     /// Builds the copies.
-    pub fn new(comparison: DoctorComparison, game: &dyn Game, plan: &Plan, ticks: u32) -> Self {
+    pub fn new(comparison: DoctorComparison, game: &'a dyn Game, plan: &Plan, ticks: u32) -> Self {
         let one = |number: u32| GameCopy::new(game, plan, number, 1);
         let (mut copies, pairs) = match comparison {
-            DoctorComparison::Repeat | DoctorComparison::Clock | DoctorComparison::Restart => {
-                (vec![one(0), one(0)], vec![(0, 1)])
-            }
+            DoctorComparison::Repeat
+            | DoctorComparison::Clock
+            | DoctorComparison::Restart
+            | DoctorComparison::Snapshots => (vec![one(0), one(0)], vec![(0, 1)]),
             DoctorComparison::Archetypes => {
                 ((0..=VARIANTS).map(|_| one(0)).collect(), (1..=VARIANTS as usize).map(|right| (0, right)).collect())
             }
@@ -57,7 +69,7 @@ impl Trial {
             _ => {}
         }
         let on_threads = if comparison == DoctorComparison::Threads { 2 } else { 0 };
-        Self { comparison, copies, pairs, on_threads }
+        Self { comparison, game, copies, pairs, on_threads, returns: 0, not_loaded: None }
     }
 
     /// Plays, and compares after every tick. State is compared until an agent notices a difference, and if none does,
@@ -76,6 +88,9 @@ impl Trial {
         for tick in 0..ticks.saturating_mul(LONGER) {
             let is_undecided = !all.is_empty() && report.effect.is_none() && !is_over;
             if tick >= ticks && !is_undecided {
+                break;
+            }
+            if self.comparison == DoctorComparison::Snapshots && !self.return_by_snapshot(tick) {
                 break;
             }
             self.tick();
@@ -107,11 +122,40 @@ impl Trial {
         if self.comparison == DoctorComparison::Archetypes && report.effect.is_none() {
             all.clear();
         }
+        if self.comparison == DoctorComparison::Snapshots && report.same() == Some(true) {
+            report.skipped = self.reason_without_snapshots(report.ticks);
+            if report.skipped.is_some() {
+                all.clear();
+            }
+        }
         // A later difference is not the cause of an earlier one.
         all.sort_by_key(|of| (of.tick, likelihood(self.comparison, of), rank(self.comparison, of)));
         let mut all = all.into_iter();
         (report.first, report.others) = (all.next(), all.collect());
         TrialResult { report, incomparable }
+    }
+
+    /// Lets the second copy leave the episode and return to it by a snapshot, in ticks that are powers of two. Returns
+    /// false if nothing is left to compare, because the game saves no snapshot or cannot load one.
+    fn return_by_snapshot(&mut self, tick: u32) -> bool {
+        if tick.is_power_of_two() {
+            // Later detours are longer, so that some of them go on to the end of the episode.
+            match self.copies[1].make_detour(self.game, tick.max(DETOUR)) {
+                Detour::Made => self.returns += 1,
+                Detour::NotSaved => {}
+                Detour::NotLoaded => self.not_loaded = Some(tick),
+            }
+        }
+        self.not_loaded.is_none() && (self.returns > 0 || tick < WITHOUT_SNAPSHOT)
+    }
+
+    /// Returns why no snapshot was compared, if none was.
+    fn reason_without_snapshots(&self, ticks: u32) -> Option<String> {
+        let why = match self.not_loaded {
+            Some(tick) => format!("the snapshot before tick {tick} could not be loaded"),
+            None => format!("no snapshot was saved in {ticks} ticks"),
+        };
+        (self.returns == 0).then(|| format!("{why}, so explorers return by replays"))
     }
 
     fn tick(&mut self) {

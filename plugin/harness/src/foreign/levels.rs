@@ -76,8 +76,17 @@ type OfNumber<Out> = Arc<dyn Fn(&str, u64) -> Out + Send + Sync>;
 /// The parser of level files.
 #[derive(Clone)]
 struct FileParser {
+    /// Name of the method that has declared it.
+    method: &'static str,
     level: LevelType,
-    parse: Arc<dyn Fn(&str) -> Result<LevelDesign, LevelTextError> + Send + Sync>,
+    parse: ParseFile,
+}
+
+/// The function that reads a level file.
+#[derive(Clone)]
+enum ParseFile {
+    Text(Arc<dyn Fn(&str) -> Result<LevelDesign, LevelTextError> + Send + Sync>),
+    Bytes(Arc<dyn Fn(&[u8]) -> Result<LevelDesign, LevelTextError> + Send + Sync>),
 }
 
 /// A function of the level in a file.
@@ -130,8 +139,8 @@ impl LevelParts {
             };
             (level.id != parser.level.id).then(|| {
                 format!(
-                    "`{method}` of the game `{game}` takes a `{}`, and `.level_files` reads a `{}`: use the same type",
-                    level.name, parser.level.name
+                    "`{method}` of the game `{game}` takes a `{}`, and `{}` reads a `{}`: use the same type",
+                    level.name, parser.method, parser.level.name
                 )
             })
         })
@@ -202,7 +211,44 @@ impl ForeignGame {
             let level = parse(text).map_err(IntoLevelTextError::into_level_text_error)?;
             Ok(LevelDesign::new(level, &text.lines().collect::<Vec<_>>().join("\n")))
         };
-        let parser = FileParser { level: LevelType::of::<T>(), parse: Arc::new(parse) };
+        let parse = ParseFile::Text(Arc::new(parse));
+        let parser = FileParser { method: ".level_files", level: LevelType::of::<T>(), parse };
+        self.with(|description| description.level_parts.parser = Some(parser))
+    }
+
+    /// Reads levels that somebody drew, in a format of the game's own that is not text. It replaces
+    /// [`level_files`](Self::level_files), and all that is said there holds. Levels are the same if their bytes are.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, game::GameTools, prelude::*};
+    ///
+    /// /// The game's own level: the height of each column.
+    /// #[derive(Debug, PartialEq)]
+    /// struct Ground(Vec<u8>);
+    ///
+    /// fn read(bytes: &[u8]) -> Result<Ground, String> {
+    ///     let heights = bytes.strip_prefix(b"HILL").ok_or("it does not begin with `HILL`")?;
+    ///     Ok(Ground(heights.to_vec()))
+    /// }
+    ///
+    /// let game = ForeignGame::new("hills", 1, |_: &mut App| {}).level_files_of_bytes(read);
+    /// let GameTools { levels, .. } = game.tools();
+    /// let level = levels.parse_bytes(b"HILL\x00\xff\x02").expect("it has files").expect("a level");
+    /// assert_eq!(level.level::<Ground>().as_deref(), Some(&Ground(vec![0, 255, 2])));
+    /// let error = levels.parse_bytes(b"\x89PNG").expect("it has files").expect_err("no level");
+    /// assert_eq!(error.what, "it does not begin with `HILL`");
+    /// ```
+    pub fn level_files_of_bytes<T: Any + Send + Sync, E: IntoLevelTextError>(
+        self,
+        parse: impl Fn(&[u8]) -> Result<T, E> + Send + Sync + 'static,
+    ) -> Self {
+        let parse = move |bytes: &[u8]| -> Result<LevelDesign, LevelTextError> {
+            let level = parse(bytes).map_err(IntoLevelTextError::into_level_text_error)?;
+            Ok(LevelDesign::of_bytes(level, bytes))
+        };
+        let parse = ParseFile::Bytes(Arc::new(parse));
+        let parser = FileParser { method: ".level_files_of_bytes", level: LevelType::of::<T>(), parse };
         self.with(|description| description.level_parts.parser = Some(parser))
     }
 
@@ -274,7 +320,17 @@ impl ForeignGame {
 
 impl LevelTools for ForeignGame {
     fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
-        self.description.level_parts.parser.as_ref().map(|parser| (parser.parse)(text))
+        self.description.level_parts.parser.as_ref().map(|parser| match &parser.parse {
+            ParseFile::Text(parse) => parse(text),
+            ParseFile::Bytes(parse) => parse(text.as_bytes()),
+        })
+    }
+
+    fn parse_bytes(&self, bytes: &[u8]) -> Option<Result<LevelDesign, LevelTextError>> {
+        match &self.description.level_parts.parser.as_ref()?.parse {
+            ParseFile::Text(_) => None,
+            ParseFile::Bytes(parse) => Some(parse(bytes)),
+        }
     }
 
     fn layout_hash(&self, mode: &str, level: u64) -> Option<u64> {
@@ -406,6 +462,44 @@ mod tests {
         let game = ForeignGame::new("plain", 1, |_: &mut App| {}).level_files(|text: &str| text.parse::<u8>());
         let error = game.parse_level("300").expect_err("too large");
         assert_eq!(error, LevelTextError::whole("number too large to fit in target type"));
+    }
+
+    /// The game with files of two bytes: a mark that is not UTF-8, and the goal.
+    fn game_of_bytes() -> ForeignGame {
+        game().level_files_of_bytes(|bytes| match bytes {
+            [0xfe, goal] => Ok(Goal(u32::from(*goal))),
+            _ => Err("it does not have a mark and a goal"),
+        })
+    }
+
+    /// Writes files of bytes, and returns their mode.
+    fn binary(folder: &tempfile::TempDir, files: &[&[u8]]) -> String {
+        for (number, bytes) in files.iter().enumerate() {
+            fs::write(folder.path().join(format!("{number}.bin")), bytes).expect("writable");
+        }
+        format!("{}/*.bin", level_files_mode(&folder.path().to_string_lossy()))
+    }
+
+    #[test]
+    fn a_game_finds_the_level_of_each_binary_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = binary(&folder, &[b"\xfe\x04", b"\xfe\x00", b"\xfe\xff"]);
+        game_of_bytes().check_mode(&mode).expect("they are levels");
+        let found = finds(&game_of_bytes(), &mode, &[0, 2]);
+        assert_eq!(found.iter().map(|found| found.goal).collect::<Vec<_>>(), [4, 255]);
+        let designs = level_designs(&game_of_bytes(), &mode).expect("they are levels");
+        assert_eq!(designs.hash(0), Some(LevelDesign::of_bytes((), b"\xfe\x04").hash()));
+        assert_ne!(designs.hash(0), designs.hash(1));
+    }
+
+    #[test]
+    fn an_error_in_a_binary_level_file_names_the_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = binary(&folder, &[b"\xfe\x04", b"\x89PNG"]);
+        let error = game_of_bytes().check_mode(&mode).expect_err("no level").to_string();
+        assert!(error.ends_with("1.bin: it does not have a mark and a goal"), "{error}");
+        let error = game().check_mode(&mode).expect_err("no text").to_string();
+        assert!(error.contains("0.bin, line 1: byte 1 of the line is not UTF-8"), "{error}");
     }
 
     #[test]

@@ -23,12 +23,18 @@ const MOST_BYTES: u64 = 32 << 20;
 pub(super) type DrawnLevels = Arc<Vec<DrawnLevel>>;
 
 /// A game's parser of levels.
-pub(super) type Parse<'a> = &'a dyn Fn(&str) -> Result<LevelDesign, LevelTextError>;
+#[derive(Clone, Copy)]
+pub(crate) enum Parse<'a> {
+    /// The parser of a text.
+    Text(&'a dyn Fn(&str) -> Result<LevelDesign, LevelTextError>),
+    /// The parser of a file of any kind.
+    Bytes(&'a dyn Fn(&[u8]) -> Result<LevelDesign, LevelTextError>),
+}
 
 /// The files of a pattern as last read.
 struct Snapshot {
-    /// Path and text of each.
-    texts: Vec<(String, String)>,
+    /// Path and bytes of each.
+    files: Vec<(String, Vec<u8>)>,
     /// Parsed levels by the game's name.
     designs: Mutex<BTreeMap<String, DrawnLevels>>,
 }
@@ -39,9 +45,9 @@ static READ: Mutex<BTreeMap<String, Arc<Snapshot>>> = Mutex::new(BTreeMap::new()
 
 /// Reads the files from the disk.
 pub(super) fn read_now(game: &str, pattern: &str, parse: Parse) -> Result<DrawnLevels, LevelFileError> {
-    let texts: Result<Vec<_>, _> =
-        find_level_files(pattern)?.into_iter().map(|path| read_text(&path).map(|text| (path, text))).collect();
-    let snapshot = Arc::new(Snapshot { texts: texts?, designs: Mutex::default() });
+    let files: Result<Vec<_>, _> =
+        find_level_files(pattern)?.into_iter().map(|path| read_file(&path).map(|bytes| (path, bytes))).collect();
+    let snapshot = Arc::new(Snapshot { files: files?, designs: Mutex::default() });
     let designs = snapshot.designs(game, parse)?;
     READ.lock().unwrap_or_else(PoisonError::into_inner).insert(pattern.to_owned(), snapshot);
     Ok(designs)
@@ -62,17 +68,17 @@ impl Snapshot {
         if let Some(designs) = known.get(game) {
             return Ok(designs.clone());
         }
-        let designs = Arc::new(understand_all(&self.texts, parse)?);
+        let designs = Arc::new(understand_all(&self.files, parse)?);
         known.insert(game.to_owned(), designs.clone());
         Ok(designs)
     }
 }
 
 /// Parses all levels. If several are invalid, the error names them all.
-fn understand_all(texts: &[(String, String)], parse: Parse) -> Result<Vec<DrawnLevel>, LevelFileError> {
+fn understand_all(files: &[(String, Vec<u8>)], parse: Parse) -> Result<Vec<DrawnLevel>, LevelFileError> {
     let (mut drawn, mut first, mut others) = (Vec::new(), None, Vec::new());
-    for (path, text) in texts {
-        match understand(path, text, parse) {
+    for (path, bytes) in files {
+        match understand(path, bytes, parse) {
             Ok(level) => drawn.push(level),
             Err(error) if first.is_none() => first = Some(error),
             Err(_) => others.push(path.clone()),
@@ -87,24 +93,33 @@ fn understand_all(texts: &[(String, String)], parse: Parse) -> Result<Vec<DrawnL
 
 /// Reads the level in a file.
 pub(super) fn read_one(path: &str, parse: Parse) -> Result<DrawnLevel, LevelFileError> {
-    understand(path, &read_text(path)?, parse)
+    understand(path, &read_file(path)?, parse)
 }
 
-fn understand(path: &str, text: &str, parse: Parse) -> Result<DrawnLevel, LevelFileError> {
-    match parse(text) {
+fn understand(path: &str, bytes: &[u8], parse: Parse) -> Result<DrawnLevel, LevelFileError> {
+    let parsed = match parse {
+        Parse::Text(parse) => parse(&decode(bytes).map_err(|error| named(path, error))?),
+        Parse::Bytes(parse) => parse(bytes),
+    };
+    match parsed {
         Ok(design) => Ok(DrawnLevel { path: path.to_owned(), design }),
         Err(error) => Err(LevelFileError::Text { path: path.to_owned(), error }),
     }
 }
 
-fn read_text(path: &str) -> Result<String, LevelFileError> {
+fn read_file(path: &str) -> Result<Vec<u8>, LevelFileError> {
+    read_bytes(Path::new(path), MOST_BYTES).map_err(|error| named(path, error))
+}
+
+/// Returns an error with the path of its file.
+fn named(path: &str, error: TextFileError) -> LevelFileError {
     let path = path.to_owned();
-    read_text_file(Path::new(&path), MOST_BYTES).map_err(|error| match error {
+    match error {
         TextFileError::Unreadable(error) => LevelFileError::Unreadable { path, why: error.to_string() },
         TextFileError::NotAFile => LevelFileError::NotAFile { path },
         TextFileError::TooLarge { bytes, most } => LevelFileError::TooLarge { path, bytes, most },
         TextFileError::NoText { line, byte } => LevelFileError::NoText { path, line, byte },
-    })
+    }
 }
 
 /// Failure to read a file as text.
@@ -150,6 +165,11 @@ impl From<TextFileError> for io::Error {
 ///
 /// [`TextFileError`].
 pub fn read_text_file(path: &Path, most: u64) -> Result<String, TextFileError> {
+    decode(&read_bytes(path, most)?)
+}
+
+/// Returns the bytes of a regular file of at most `most` bytes.
+fn read_bytes(path: &Path, most: u64) -> Result<Vec<u8>, TextFileError> {
     // Opening a pipe would wait for a writer.
     if !fs::metadata(path)?.is_file() {
         return Err(TextFileError::NotAFile);
@@ -165,11 +185,11 @@ pub fn read_text_file(path: &Path, most: u64) -> Result<String, TextFileError> {
     if read.len() as u64 > most {
         return Err(TextFileError::TooLarge { bytes: read.len() as u64, most });
     }
-    decode(read)
+    Ok(read)
 }
 
 /// Returns the text of bytes in UTF-8, or in UTF-16 with a mark. Marks, which some editors put in front, are left out.
-fn decode(bytes: Vec<u8>) -> Result<String, TextFileError> {
+fn decode(bytes: &[u8]) -> Result<String, TextFileError> {
     let no_text = |bytes: &[u8], at: usize| {
         let before = &bytes[..at];
         let line = 1 + before.iter().filter(|&&byte| byte == b'\n').count();
@@ -179,23 +199,19 @@ fn decode(bytes: Vec<u8>) -> Result<String, TextFileError> {
     let utf16 = |number: fn([u8; 2]) -> u16| {
         let (pairs, rest) = bytes[2..].as_chunks::<2>();
         let text = String::from_utf16(&pairs.iter().copied().map(number).collect::<Vec<_>>());
-        text.ok().filter(|_| rest.is_empty()).ok_or_else(|| no_text(&bytes, 0))
+        text.ok().filter(|_| rest.is_empty()).ok_or_else(|| no_text(bytes, 0))
     };
-    match bytes.as_slice() {
+    match bytes {
         [0xff, 0xfe, ..] => return utf16(u16::from_le_bytes),
         [0xfe, 0xff, ..] => return utf16(u16::from_be_bytes),
         _ => {}
     }
     // UTF-16 without a mark would pass for UTF-8.
     if let Some(zero) = bytes.iter().position(|&byte| byte == 0) {
-        return Err(no_text(&bytes, zero));
+        return Err(no_text(bytes, zero));
     }
-    let mut text =
-        String::from_utf8(bytes).map_err(|error| no_text(error.as_bytes(), error.utf8_error().valid_up_to()))?;
-    if text.starts_with('\u{feff}') {
-        text.remove(0);
-    }
-    Ok(text)
+    let text = str::from_utf8(bytes).map_err(|error| no_text(bytes, error.valid_up_to()))?;
+    Ok(text.strip_prefix('\u{feff}').unwrap_or(text).to_owned())
 }
 
 #[cfg(all(test, unix))]
@@ -216,7 +232,7 @@ mod tests {
             refused.push(pipe.display().to_string());
         }
         for path in refused {
-            let error = read_one(&path, &parse).map(drop).expect_err("no file");
+            let error = read_one(&path, Parse::Text(&parse)).map(drop).expect_err("no file");
             assert_eq!(error, LevelFileError::NotAFile { path: path.clone() });
         }
     }
