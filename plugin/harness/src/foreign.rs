@@ -75,7 +75,7 @@ use crate::{
         levels::LevelParts,
         runtime::SystemFactory,
     },
-    game::{BotTools, Game, GameTools, HostTools, InputTools, PictureTools, TestTools},
+    game::{BotTools, Game, GameTools, HostTools, PictureTools, TestTools},
 };
 use bevy::{app::PluginGroupBuilder, prelude::*};
 use bevy_playbot::{
@@ -83,7 +83,6 @@ use bevy_playbot::{
     agent::Agent,
     engine::{Renewal, has_no_actions},
     headless::HeadlessPlugins,
-    key_bindings::KeyBindings,
     legal::LegalActions,
     observation::{ObservationSpace, VectorSensor},
     placement::TickPlacement,
@@ -572,16 +571,6 @@ impl HostTools for ForeignGame {
 impl PictureTools for ForeignGame {
     fn has_camera(&self) -> bool {
         self.description.has_camera
-    }
-}
-
-impl InputTools for ForeignGame {
-    fn action_names(&self) -> Vec<String> {
-        self.description.input.names()
-    }
-
-    fn key_bindings(&self) -> Option<KeyBindings> {
-        self.description.input.bindings()
     }
 }
 
