@@ -194,7 +194,7 @@ mod tests {
             (action, app.world().get::<MissingSet>(agent).cloned())
         };
         assert_eq!(decided(MouseButton::Right), (Some(2), Some(MissingSet(None))));
-        let both = [MouseButton::Left, MouseButton::Right].map(Into::into).to_vec();
+        let both = vec![MouseButton::Left.into(), MouseButton::Right.into()];
         assert_eq!(decided(MouseButton::Left), (Some(1), Some(MissingSet(Some(both)))));
     }
 
