@@ -148,6 +148,7 @@ mod tests {
         "Atlas",
         "BorrowedTargets",
         "Broken",
+        "ClickAreas",
         "DirectInput",
         "DrawnStamp",
         "Episode",

@@ -37,6 +37,7 @@ use crate::{
     episode::Episode,
     placement::{TickPlacement, TickSchedules, is_tick},
     systems::PlaybotSystems,
+    virtual_input::VirtualButton,
 };
 use bevy::{input::InputSystems, prelude::*};
 use std::{borrow::Cow, fmt, sync::Arc};
@@ -162,11 +163,18 @@ impl KeyBindings {
     }
 }
 
-/// The keys that a person held in the last tick without an action that holds exactly these: see
+/// The keys and buttons that a person held in the last tick without an action that holds exactly these: see
 /// [`KeyBindings::missing_set`]. Written together with the [`Action`] of agents under [`Control::Human`].
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
-pub struct MissingSet(pub Option<Vec<KeyCode>>);
+pub struct MissingSet(pub Option<Vec<VirtualButton>>);
+
+impl MissingSet {
+    /// Replaces the set by one of keys.
+    pub fn set_keys(&mut self, keys: Option<Vec<KeyCode>>) {
+        self.0 = keys.map(|keys| keys.into_iter().map(VirtualButton::Key).collect());
+    }
+}
 
 /// Turns keys into the actions of agents under [`Control::Human`] that have [`KeyBindings`]. Add it
 /// after [`PlaybotPlugin`](crate::plugin::PlaybotPlugin).
@@ -215,7 +223,7 @@ fn decide(
         if *control == Control::Human && episode.is_running() {
             let is_held = |key| keys.pressed(key) || tapped.0.contains(&key);
             action.0 = map.action(is_held);
-            missing.0 = map.missing_set(is_held);
+            missing.set_keys(map.missing_set(is_held));
         }
     }
     tapped.clear();

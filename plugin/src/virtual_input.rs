@@ -21,6 +21,7 @@
 //! - `button`, `pointer`, `devices`: inputs that can be held down, positions in the window, and the inputs that are
 //!   held down now.
 //! - `act`, `claims`: the way from the actions of a tick to held inputs, and claims to keyboard and mouse.
+//! - `person`: a person's devices, and the action that they mean.
 //! - `input_state`, `messages`: Bevy's own state of the devices, and its messages.
 //! - `leafwing`, `enhanced_input`: actions of input managers, driven without any key.
 //!
@@ -55,6 +56,7 @@ mod input_state;
 #[cfg(feature = "leafwing-input-manager")]
 pub mod leafwing;
 mod messages;
+mod person;
 mod pointer;
 
 use crate::{
@@ -92,6 +94,7 @@ pub use crate::virtual_input::{
     button::{UnknownInput, VirtualAxis, VirtualButton},
     devices::{ActionAxis, HeldInput, VirtualDevices},
     messages::VirtualGamepad,
+    person::{ClickAreas, PersonInput},
     pointer::PointerPosition,
 };
 
@@ -183,6 +186,12 @@ impl VirtualInput {
         })
     }
 
+    /// Adds a turn of the mouse wheel to each discrete action, in order and in lines: 1 is a notch upwards, -1 one
+    /// downwards, 0 none. Each tick turns it anew.
+    pub fn wheel(self, lines: impl IntoIterator<Item = f32>) -> Self {
+        self.each(lines, |held, lines| if lines == 0.0 { held } else { held.push(VirtualAxis::WheelY, lines) })
+    }
+
     fn also<B: Into<VirtualButton>>(self, sets: impl IntoIterator<Item = impl IntoIterator<Item = B>>) -> Self {
         self.each(sets, HeldInput::hold)
     }
@@ -223,6 +232,16 @@ impl VirtualInput {
     /// Returns the first action that points at a position outside of any window, and that position.
     pub fn impossible_position(&self) -> Option<(usize, PointerPosition)> {
         self.positions().find(|(_, position)| !position.is_possible())
+    }
+
+    /// Returns the first discrete action that needs the mouse cursor and a finger at once.
+    pub fn two_pointers(&self) -> Option<usize> {
+        match &self.mapping {
+            Mapping::Discrete(actions) => {
+                actions.iter().position(|action| action.cursor.is_some() && action.tap.is_some())
+            }
+            Mapping::Continuous(_) => None,
+        }
     }
 
     /// Returns the positions that discrete actions point at, with the number of the action.

@@ -6,7 +6,7 @@
 //!
 //! Games whose ticks are frames draw themselves, and are shown as they are. A person's keys there become an action
 //! first, which then presses the game's keys as a bot's would. The game therefore sees no input that the recording
-//! lacks.
+//! lacks. In games with other inputs, this is so for a recording; otherwise they see the devices as they are.
 //!
 //! The folder, in reading order:
 //!
@@ -46,8 +46,9 @@ use bevy_playbot::{
     },
     engine::{PressesForPeople, panics},
     headless::{set_fixed_step, set_frame_rate},
-    key_bindings::KeyboardPlugin,
+    key_bindings::{KeyBindings, KeyboardPlugin, MissingSet},
     placement::TickPlacement,
+    virtual_input::VirtualInput,
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{
@@ -157,13 +158,12 @@ impl GameWindow {
         };
         set_pace(&mut app, by_the_clock, by_the_clock);
         let agent = seat(&mut app, game, &observation_config, autopilot, playlist);
-        let unrecorded = match game.tools().input.key_bindings() {
-            Some(keys) => {
-                app.world_mut().entity_mut(agent).insert((keys, PressesForPeople));
-                None
-            }
-            None => Some(game.name()),
-        };
+        let keys = game.tools().input.key_bindings();
+        let is_recorded = keys.is_some() || game.tools().input.records_people();
+        let unrecorded = (!is_recorded).then_some(game.name());
+        if let Some(keys) = keys {
+            app.world_mut().entity_mut(agent).insert((keys, PressesForPeople));
+        }
         ending::build(&mut app, stop);
         frames::build(&mut app, game.name(), hz);
         playlist::build(&mut app);
@@ -176,7 +176,7 @@ impl GameWindow {
     ///
     /// # Errors
     ///
-    /// The game is not played with keys alone.
+    /// The game's actions are passed on by a system of its own.
     pub fn check_recording(&self) -> Result<(), WindowError> {
         self.unrecorded.map_or(Ok(()), |game| Err(WindowError::NotRecorded(game)))
     }
@@ -186,10 +186,15 @@ impl GameWindow {
         self.unbound.clone()
     }
 
-    /// Records every episode from now on, of any decider.
+    /// Records every episode from now on, of any decider. What a person does then reaches the game as its actions only.
     pub fn record(&mut self, writer: DemoWriter) {
         self.app.insert_resource(Recorder::new(writer));
-        self.app.world_mut().entity_mut(self.agent).insert(Recording::default());
+        let mut agent = self.app.world_mut().entity_mut(self.agent);
+        agent.insert(Recording::default());
+        // Windows of games that are drawn here turn keys into actions by themselves.
+        if agent.contains::<VirtualInput>() && !agent.contains::<KeyBindings>() {
+            agent.insert((PressesForPeople, MissingSet::default()));
+        }
     }
 
     /// Plays this episode first. After its end the person plays on.

@@ -78,7 +78,7 @@ use crate::{
         levels::LevelParts,
         runtime::{AgentPlace, SystemFactory},
     },
-    game::{BotTools, Game, GameTools, HostTools, InputTools, PictureTools, TestTools},
+    game::{BotTools, Game, GameTools, HostTools, PictureTools, TestTools},
 };
 use bevy::{app::PluginGroupBuilder, prelude::*};
 use bevy_playbot::{
@@ -86,7 +86,6 @@ use bevy_playbot::{
     agent::Agent,
     engine::{Renewal, has_no_actions},
     headless::HeadlessPlugins,
-    key_bindings::KeyBindings,
     legal::LegalActions,
     observation::{ObservationSpace, VectorSensor},
     placement::TickPlacement,
@@ -581,16 +580,6 @@ impl HostTools for ForeignGame {
 impl PictureTools for ForeignGame {
     fn has_camera(&self) -> bool {
         self.description.has_camera
-    }
-}
-
-impl InputTools for ForeignGame {
-    fn action_names(&self) -> Vec<String> {
-        self.description.input_of(0).names()
-    }
-
-    fn key_bindings(&self) -> Option<KeyBindings> {
-        self.description.input_of(0).bindings()
     }
 }
 

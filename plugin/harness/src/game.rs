@@ -507,6 +507,16 @@ pub trait InputTools: Send + Sync {
     fn key_bindings(&self) -> Option<KeyBindings> {
         None
     }
+
+    /// Returns true if a person's play in a window can be recorded as actions.
+    fn records_people(&self) -> bool {
+        self.key_bindings().is_some()
+    }
+
+    /// Returns false if a person without any input gets action 0, since no action holds nothing.
+    fn has_idle_action(&self) -> bool {
+        self.key_bindings().is_none_or(|keys| keys.has_idle_action())
+    }
 }
 
 /// Bots that come with a game.

@@ -36,6 +36,7 @@ pub(super) fn wanted(order: &AgentOrder, players: &Players, pads: &Pads, state: 
         wanted.agents.push(agent);
         wanted.cursor = held.cursor.map(|position| (agent, position)).or(wanted.cursor);
         wanted.tap = held.tap.map(|position| (agent, position)).or(wanted.tap);
+        wanted.text.push_str(&held.text);
         for button in held.buttons {
             let is_pad = matches!(button, VirtualButton::Gamepad(_));
             if !is_pad || pad.is_some() {
@@ -75,6 +76,7 @@ pub(super) fn send_messages(
     released.into_iter().for_each(|change| messages.send(change));
     messages.point(&mut devices, &wanted);
     others.into_iter().for_each(|change| messages.send(change));
+    messages.send_text(&wanted.text);
     messages.send_motion(wanted.motion, wanted.wheel);
 }
 
@@ -213,6 +215,7 @@ pub(super) fn write_directly(
     for change in others {
         write_change(change, &mut state, &mut direct, &mut messages);
     }
+    messages.send_text(&wanted.text);
     let now = Motion { mouse: wanted.motion, wheel: wanted.wheel };
     if now != Motion::default() || past.motion != Motion::default() {
         move_by(&mut state, past.motion, now);

@@ -64,6 +64,8 @@ pub(super) struct Wanted {
     pub cursor: Option<(Entity, PointerPosition)>,
     /// The agent that taps on the touch screen, and the position.
     pub tap: Option<(Entity, PointerPosition)>,
+    /// The text that agents type.
+    pub text: String,
 }
 
 /// A button that goes down or up, or a stick that moves.
@@ -187,6 +189,8 @@ pub struct HeldInput {
     pub tap: Option<PointerPosition>,
     /// True if mouse buttons are pressed anew in each tick, as clicks. Otherwise they stay down from tick to tick.
     pub clicks: bool,
+    /// Text that is typed in each tick: see [`types`](Self::types).
+    pub text: String,
 }
 
 impl HeldInput {
@@ -221,6 +225,13 @@ impl HeldInput {
     /// Taps on the touch screen at this position.
     pub fn tap(mut self, position: PointerPosition) -> Self {
         self.tap = Some(position);
+        self
+    }
+
+    /// Types this text: in each tick of the action, each of its characters goes down and up. Games that read text from
+    /// `KeyboardInput` see it; so do those that read logical keys. A line feed is the Enter key.
+    pub fn types(mut self, text: impl Into<String>) -> Self {
+        self.text = text.into();
         self
     }
 

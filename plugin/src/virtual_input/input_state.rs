@@ -1,11 +1,11 @@
 //! Bevy's own state of keys, mouse and gamepads.
 
-use crate::virtual_input::button::{VirtualAxis, VirtualButton, unit_variant};
+use crate::virtual_input::button::{VirtualAxis, VirtualButton, unit_names, unit_variant};
 use bevy::{
     ecs::system::SystemParam,
     input::{
         gamepad::GamepadInput,
-        keyboard::{Key, NativeKey},
+        keyboard::{Key, NativeKey, NativeKeyCode},
         mouse::{AccumulatedMouseMotion, AccumulatedMouseScroll},
     },
     prelude::*,
@@ -176,6 +176,26 @@ pub(super) fn logical_key(code: KeyCode) -> (Key, Option<String>) {
     (key.unwrap_or(Key::Unidentified(NativeKey::Unidentified)), None)
 }
 
+/// Returns the key that types this character on an American keyboard, its meaning, and the text of its message.
+/// Characters that no key has there have a meaning only.
+pub(super) fn typing_key(character: char) -> (KeyCode, Key, Option<String>) {
+    let named = match character {
+        '\n' => Some((KeyCode::Enter, Key::Enter)),
+        '\t' => Some((KeyCode::Tab, Key::Tab)),
+        '\u{8}' => Some((KeyCode::Backspace, Key::Backspace)),
+        _ => None,
+    };
+    if let Some((code, key)) = named {
+        return (code, key, None);
+    }
+    let text = character.to_string();
+    let plain = text.to_ascii_lowercase();
+    let code = unit_names::<KeyCode>().into_iter().find(|name| typed(name).as_deref() == Some(plain.as_str()));
+    let code = code.and_then(unit_variant).unwrap_or(KeyCode::Unidentified(NativeKeyCode::Unidentified));
+    let key = if character == ' ' { Key::Space } else { Key::Character(text.as_str().into()) };
+    (code, key, Some(text))
+}
+
 /// Returns the text that a key types without shift.
 fn typed(name: &str) -> Option<String> {
     let text = match name {
@@ -220,6 +240,20 @@ mod tests {
             (KeyCode::Lang5, Key::Unidentified(NativeKey::Unidentified), None),
         ] {
             assert_eq!(logical_key(code), (key, text.map(str::to_owned)), "{code:?}");
+        }
+    }
+
+    #[test]
+    fn characters_are_typed_with_the_keys_of_a_us_keyboard() {
+        for (character, code, key, text) in [
+            ('q', KeyCode::KeyQ, Key::Character("q".into()), Some("q")),
+            ('Q', KeyCode::KeyQ, Key::Character("Q".into()), Some("Q")),
+            ('7', KeyCode::Digit7, Key::Character("7".into()), Some("7")),
+            (' ', KeyCode::Space, Key::Space, Some(" ")),
+            ('\n', KeyCode::Enter, Key::Enter, None),
+            ('é', KeyCode::Unidentified(NativeKeyCode::Unidentified), Key::Character("é".into()), Some("é")),
+        ] {
+            assert_eq!(typing_key(character), (code, key, text.map(str::to_owned)), "{character:?}");
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::{
         VirtualInput,
         button::{VirtualAxis, VirtualButton},
         devices::{Change, Reading, VirtualDevices, Wanted},
-        input_state::{Switch, logical_key},
+        input_state::{Switch, logical_key, typing_key},
         pointer::{Cursor, Finger},
     },
 };
@@ -101,6 +101,21 @@ impl InputMessages<'_, '_> {
             }
             // A call without a gamepad cannot reach this.
             VirtualButton::Gamepad(_) => {}
+        }
+    }
+
+    /// Types this text: each of its characters goes down and up. Bevy's own system presses the keys.
+    pub fn send_text(&mut self, text: &str) {
+        let window = self.window();
+        for character in text.chars() {
+            let (key_code, logical_key, typed) = typing_key(character);
+            for state in [ButtonState::Pressed, ButtonState::Released] {
+                let text = typed.clone().filter(|_| state.is_pressed()).map(|text| text.as_str().into());
+                let logical_key = logical_key.clone();
+                let input = KeyboardInput { key_code, logical_key, state, text, repeat: false, window };
+                self.events.write(input.clone().into());
+                self.keys.write(input);
+            }
         }
     }
 

@@ -209,7 +209,7 @@ fn advice(game: &dyn Game, experiment: &Experiment, path: &Path) -> String {
         format!(
             "record the game's demonstrator with `playbot record {name} --levels {levels} --steps 200000 --out {file}`{rule}"
         )
-    } else if game.tools().input.key_bindings().is_some() {
+    } else if game.tools().input.records_people() {
         let file = file("mine.demo");
         format!("play and record it yourself with `playbot play {name} --levels {levels} --record {file}`{rule}")
     } else {

@@ -48,6 +48,13 @@ impl Desk {
         desk
     }
 
+    /// Starts the program in a scaled window: it has this many pixels for each logical one.
+    pub fn open_scaled(&self, folder: &Path, args: &[&str], scale: &str) -> Seat<'_> {
+        let mut command = self.command(folder, args);
+        command.env("WINIT_X11_SCALE_FACTOR", scale);
+        self.sit_down(command, args[1])
+    }
+
     /// Returns the program with these arguments, on this display.
     pub fn command(&self, folder: &Path, args: &[&str]) -> Command {
         let mut command = Command::new(self.program);
@@ -57,15 +64,19 @@ impl Desk {
 
     /// Starts the program with these arguments, of which the second names the game, and waits for its window.
     pub fn open(&self, folder: &Path, args: &[&str]) -> Seat<'_> {
+        self.sit_down(self.command(folder, args), args[1])
+    }
+
+    /// Starts a program that plays this game, and waits for its window.
+    fn sit_down(&self, mut command: Command, game: &str) -> Seat<'_> {
         // Out of the way of the window, which would otherwise have the keyboard before it is given it.
         self.xdotool(&["mousemove", "1000", "790"]);
-        let mut command = self.command(folder, args);
         let mut program = command.stderr(Stdio::piped()).spawn().expect("the program starts");
         let errors = Heard::of(program.stderr.take().expect("piped"));
         let mut seat = Seat { desk: self, program, errors, window: String::new() };
         seat.wait("a window", |seat| {
             // Only the title of a running game begins like this: the window has started to play.
-            let found = seat.desk.xdotool(&["search", "--name", &format!("^{} .* tick", args[1])]);
+            let found = seat.desk.xdotool(&["search", "--name", &format!("^{game} .* tick")]);
             seat.window = String::from_utf8_lossy(&found.stdout).trim().to_owned();
             !seat.window.is_empty()
         });
@@ -126,6 +137,13 @@ impl Seat<'_> {
     /// Presses and releases a key.
     pub fn tap(&self, key: &str) {
         self.xdotool(&["key", "--delay", "1", key]);
+    }
+
+    /// Moves the mouse to a position in the window, in pixels from its upper left corner, and clicks.
+    pub fn click(&self, x: u32, y: u32) {
+        let at = [x, y].map(|place| place.to_string());
+        self.xdotool(&["mousemove", "--window", &self.window, &at[0], &at[1]]);
+        self.xdotool(&["click", "1"]);
     }
 
     /// Presses keys and does not let go.

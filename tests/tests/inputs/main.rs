@@ -7,5 +7,6 @@ mod foreign_managers;
 mod keyboard;
 mod legal;
 mod managers;
+mod people;
 mod pointers;
 mod virtual_input;

@@ -198,7 +198,7 @@ fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
     }
     let name = game.name();
     let mut advice = "train a policy without recordings (`playbot train --algorithm ppo --run runs/first`)".to_owned();
-    if game.tools().input.key_bindings().is_some() {
+    if game.tools().input.records_people() {
         advice += &format!(", or play and record it yourself: `playbot play {name} --record FILE`");
     }
     Err(CliError::Usage(format!("`{name}` has no demonstrator that could be recorded: {advice}")))

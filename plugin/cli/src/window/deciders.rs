@@ -1,6 +1,10 @@
 //! The deciders in a window: the person, and the autopilot.
 
-use bevy::{input::InputSystems, prelude::*};
+use bevy::{
+    input::{ButtonState, InputSystems},
+    prelude::*,
+};
+use bevy_playbot::virtual_input::PersonInput;
 use playbot_harness::{eval::Player, prelude::*};
 
 /// The player that takes over from the person, and gives back.
@@ -52,6 +56,33 @@ impl Deciders {
 #[derive(Resource, Clone, Default, Deref, DerefMut, Reflect)]
 #[reflect(Resource)]
 pub(super) struct OwnKeys(pub(super) ButtonInput<KeyCode>);
+
+/// All devices of the person, as of this frame of the window.
+#[derive(Resource, Clone, Default, Reflect)]
+#[reflect(Resource)]
+pub(super) struct OwnDevices {
+    pub input: PersonInput,
+    /// Buttons of gamepads that went down or up in this frame. Their messages come after its decision.
+    changes: Vec<(GamepadButton, ButtonState)>,
+}
+
+impl OwnDevices {
+    /// Notes a button of a gamepad that goes down or up, in time for the next decision.
+    pub fn note_gamepad(&mut self, button: GamepadButton, state: ButtonState) {
+        self.changes.push((button, state));
+    }
+
+    /// Forgets what happened in the frame before, except for the buttons of gamepads.
+    pub fn begin_frame(&mut self) {
+        self.input.begin_frame();
+        for (button, state) in std::mem::take(&mut self.changes) {
+            match state {
+                ButtonState::Pressed => self.input.press(button),
+                ButtonState::Released => self.input.release(button),
+            }
+        }
+    }
+}
 
 /// The set in which they are read, in `PreUpdate`, where the game sees the same keyboard.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -3,21 +3,22 @@
 //! Between two frames the window system writes its messages into empty lists, while those of the game are stashed. This
 //! keeps the person's input apart from virtual input, message by message.
 
-use crate::window::deciders::OwnKeys;
+use crate::window::deciders::{OwnDevices, OwnKeys};
 use bevy::{
     input::{
-        InputSystems,
+        ButtonState, InputSystems,
         gamepad::{
-            Gamepad, GamepadInput, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent, RawGamepadEvent,
-            gamepad_connection_system, gamepad_event_processing_system,
+            Gamepad, GamepadConnection, GamepadInput, RawGamepadAxisChangedEvent, RawGamepadButtonChangedEvent,
+            RawGamepadEvent, gamepad_connection_system, gamepad_event_processing_system,
         },
         keyboard::{Key, KeyboardFocusLost, KeyboardInput},
-        mouse::{MouseButtonInput, MouseMotion, MouseWheel},
+        mouse::{MouseButtonInput, MouseMotion, MouseScrollUnit, MouseWheel},
+        touch::{TouchInput, TouchPhase},
     },
     prelude::*,
-    window::{CursorMoved, PrimaryWindow, WindowEvent, WindowFocused},
+    window::{CursorEntered, CursorLeft, CursorMoved, Ime, PrimaryWindow, WindowEvent, WindowFocused},
 };
-use bevy_playbot::virtual_input::VirtualGamepad;
+use bevy_playbot::virtual_input::{PersonInput, VirtualAxis, VirtualGamepad};
 use std::hash::Hash;
 
 /// Visibility of the person's devices for the game.
@@ -36,13 +37,17 @@ pub(super) enum Devices {
 struct StashedMessages<M: Message>(#[reflect(ignore)] Messages<M>);
 
 pub(super) fn build(app: &mut App) {
-    app.init_resource::<OwnKeys>();
+    app.init_resource::<OwnKeys>().init_resource::<OwnDevices>();
     add_stash::<KeyboardInput>(app);
     add_stash::<KeyboardFocusLost>(app);
     add_stash::<MouseButtonInput>(app);
     add_stash::<MouseMotion>(app);
     add_stash::<MouseWheel>(app);
     add_stash::<CursorMoved>(app);
+    add_stash::<CursorEntered>(app);
+    add_stash::<CursorLeft>(app);
+    add_stash::<TouchInput>(app);
+    add_stash::<Ime>(app);
     add_stash::<WindowFocused>(app);
     add_stash::<WindowEvent>(app);
 }
@@ -53,7 +58,10 @@ fn add_stash<M: Message + TypePath>(app: &mut App) {
         .register_type::<StashedMessages<M>>();
 }
 
-/// Reads the person's keys at the start of a frame, and hands on the messages that the game may see.
+/// Pixels of a touchpad that are a line of the wheel.
+const PIXELS_PER_LINE: f32 = MouseScrollUnit::SCROLL_UNIT_CONVERSION_FACTOR;
+
+/// Reads the person's devices at the start of a frame, and hands on the messages that the game may see.
 pub(super) fn take(world: &mut World) {
     let is_open = *world.resource::<Devices>() == Devices::Open;
     let keys: Vec<KeyboardInput> = lift(world);
@@ -68,8 +76,24 @@ pub(super) fn take(world: &mut World) {
         }
     }
     // Without focus no key of this window is held.
-    if focus.iter().any(|change| !change.focused) {
+    let is_unfocused = focus.iter().any(|change| !change.focused);
+    if is_unfocused {
         own.release_all();
+    }
+    let mouse = Mouse {
+        buttons: lift(world),
+        motions: lift(world),
+        turns: lift(world),
+        moves: lift(world),
+        entries: lift(world),
+        exits: lift(world),
+        touches: lift(world),
+    };
+    let mut devices = world.resource_mut::<OwnDevices>();
+    devices.begin_frame();
+    note(&mut devices.input, &keys, &mouse);
+    if is_unfocused {
+        devices.input.lose_focus();
     }
     hand_on(world, keys, is_open);
     hand_on(world, focus, is_open);
@@ -80,15 +104,64 @@ pub(super) fn take(world: &mut World) {
         release_all::<Key>(world);
     }
     hand_on(world, lost, is_open);
-    take_all::<MouseButtonInput>(world, is_open);
-    take_all::<MouseMotion>(world, is_open);
-    take_all::<MouseWheel>(world, is_open);
-    take_all::<CursorMoved>(world, is_open);
+    hand_on(world, mouse.buttons, is_open);
+    hand_on(world, mouse.motions, is_open);
+    hand_on(world, mouse.turns, is_open);
+    hand_on(world, mouse.moves, is_open);
+    hand_on(world, mouse.entries, is_open);
+    hand_on(world, mouse.exits, is_open);
+    hand_on(world, mouse.touches, is_open);
+    let composed: Vec<Ime> = lift(world);
+    hand_on(world, composed, is_open);
     let events: Vec<WindowEvent> = lift(world);
     hand_on(world, events.into_iter().filter(|event| is_open || !is_of_person(event)).collect(), true);
     if !is_open {
         forget_cursor(world);
     }
+}
+
+/// The messages of a person's mouse and touch screen.
+struct Mouse {
+    buttons: Vec<MouseButtonInput>,
+    motions: Vec<MouseMotion>,
+    turns: Vec<MouseWheel>,
+    moves: Vec<CursorMoved>,
+    entries: Vec<CursorEntered>,
+    exits: Vec<CursorLeft>,
+    touches: Vec<TouchInput>,
+}
+
+/// Notes the person's keys, mouse and touch screen, for games in which they become an action.
+fn note(person: &mut PersonInput, keys: &[KeyboardInput], mouse: &Mouse) {
+    for key in keys {
+        match key.state {
+            ButtonState::Pressed => person.press(key.key_code),
+            ButtonState::Released => person.release(key.key_code),
+        }
+    }
+    for click in &mouse.buttons {
+        match click.state {
+            ButtonState::Pressed => person.press(click.button),
+            ButtonState::Released => person.release(click.button),
+        }
+    }
+    mouse.motions.iter().for_each(|motion| person.move_by(motion.delta));
+    for turn in &mouse.turns {
+        let lines = match turn.unit {
+            MouseScrollUnit::Line => 1.0,
+            MouseScrollUnit::Pixel => 1.0 / PIXELS_PER_LINE,
+        };
+        person.turn(lines * Vec2::new(turn.x, turn.y));
+    }
+    // A cursor that leaves and comes back sends its position afterwards.
+    if !mouse.exits.is_empty() {
+        person.point(None);
+    }
+    if let Some(moved) = mouse.moves.last() {
+        person.point(Some(moved.position));
+    }
+    let starts = mouse.touches.iter().filter(|touch| touch.phase == TouchPhase::Started);
+    starts.for_each(|touch| person.tap(touch.position));
 }
 
 /// Makes room for the window system's messages at the end of a frame.
@@ -99,6 +172,10 @@ pub(super) fn give_back(world: &mut World) {
     swap::<MouseMotion>(world);
     swap::<MouseWheel>(world);
     swap::<CursorMoved>(world);
+    swap::<CursorEntered>(world);
+    swap::<CursorLeft>(world);
+    swap::<TouchInput>(world);
+    swap::<Ime>(world);
     swap::<WindowFocused>(world);
     swap::<WindowEvent>(world);
 }
@@ -136,11 +213,6 @@ fn hand_on<M: Message>(world: &mut World, messages: Vec<M>, is_open: bool) {
     if is_open && !messages.is_empty() {
         world.resource_mut::<Messages<M>>().write_batch(messages);
     }
-}
-
-fn take_all<M: Message>(world: &mut World, is_open: bool) {
-    let messages: Vec<M> = lift(world);
-    hand_on(world, messages, is_open);
 }
 
 /// Returns true if the event is input to the game, and not to the window.
@@ -183,7 +255,13 @@ pub(super) fn build_gamepads(app: &mut App) {
         .add_message::<RawGamepadAxisChangedEvent>()
         .add_systems(
             PreUpdate,
-            (let_go.run_if(resource_changed::<Devices>), keep_events, keep_buttons, keep_axes)
+            (
+                let_go.run_if(resource_changed::<Devices>),
+                note_gamepads.before(keep_events),
+                keep_events,
+                keep_buttons,
+                keep_axes,
+            )
                 .in_set(InputSystems)
                 .before(gamepad_connection_system)
                 .before(gamepad_event_processing_system)
@@ -203,6 +281,37 @@ fn let_go(mut gamepads: Query<&mut Gamepad, Without<VirtualGamepad>>) {
 }
 
 type VirtualGamepads<'w, 's> = Query<'w, 's, (), With<VirtualGamepad>>;
+
+/// Values above which a button of a gamepad goes down, and below which it goes up: Bevy's defaults.
+const PRESSED: f32 = 0.75;
+const RELEASED: f32 = 0.65;
+
+/// Notes the person's gamepads, for games in which they become an action of the next tick.
+fn note_gamepads(
+    events: Res<Messages<RawGamepadEvent>>,
+    virtual_gamepads: VirtualGamepads,
+    mut own: ResMut<OwnDevices>,
+) {
+    for event in events.iter_current_update_messages() {
+        match event {
+            RawGamepadEvent::Button(change) if !virtual_gamepads.contains(change.gamepad) => {
+                own.input.push(VirtualAxis::Trigger(change.button), change.value);
+                if change.value >= PRESSED {
+                    own.note_gamepad(change.button, ButtonState::Pressed);
+                } else if change.value <= RELEASED {
+                    own.note_gamepad(change.button, ButtonState::Released);
+                }
+            }
+            RawGamepadEvent::Axis(change) if !virtual_gamepads.contains(change.gamepad) => {
+                own.input.push(change.axis, change.value);
+            }
+            RawGamepadEvent::Connection(change) if matches!(change.connection, GamepadConnection::Disconnected) => {
+                own.input.release_gamepads();
+            }
+            RawGamepadEvent::Button(_) | RawGamepadEvent::Axis(_) | RawGamepadEvent::Connection(_) => {}
+        }
+    }
+}
 
 fn keep_events(events: ResMut<Messages<RawGamepadEvent>>, virtual_gamepads: VirtualGamepads) {
     keep(events, |event| match event {
@@ -327,6 +436,33 @@ mod tests {
         assert!(world.resource::<ButtonInput<Key>>().pressed(Key::Character("x".into())));
     }
 
+    #[test]
+    fn a_persons_mouse_is_noted_and_kept_from_the_game() {
+        let mut app = App::new();
+        app.add_plugins(InputPlugin).insert_resource(Devices::Kept);
+        build(&mut app);
+        let (world, window) = (app.world_mut(), Entity::PLACEHOLDER);
+        take(world);
+        give_back(world);
+        let at = Vec2::new(30.0, 40.0);
+        world.write_message(CursorMoved { window, position: at, delta: None });
+        world.write_message(MouseButtonInput { button: MouseButton::Left, state: ButtonState::Pressed, window });
+        world.write_message(MouseMotion { delta: Vec2::new(3.0, 0.0) });
+        take(world);
+        world.run_schedule(PreUpdate);
+        give_back(world);
+        let mut expected = PersonInput::default();
+        expected.point(Some(at));
+        expected.press(MouseButton::Left);
+        expected.move_by(Vec2::new(3.0, 0.0));
+        assert_eq!(world.resource::<OwnDevices>().input, expected);
+        assert!(!world.resource::<ButtonInput<MouseButton>>().pressed(MouseButton::Left));
+        world.write_message(WindowFocused { window, focused: false });
+        world.write_message(CursorLeft { window });
+        take(world);
+        assert_eq!(world.resource::<OwnDevices>().input, PersonInput::default(), "nothing is held without focus");
+    }
+
     /// Input of the next frame, as from a plugin: gamepad and value.
     #[derive(Resource, Default)]
     struct Next(Vec<(Entity, f32)>);
@@ -353,7 +489,7 @@ mod tests {
     fn a_persons_gamepad_rests_while_it_is_kept_and_virtual_ones_play() {
         let mut app = App::new();
         app.add_plugins(InputPlugin).insert_resource(Devices::Open).init_resource::<Next>();
-        app.add_systems(PreUpdate, press.before(InputSystems));
+        app.init_resource::<OwnDevices>().add_systems(PreUpdate, press.before(InputSystems));
         build_gamepads(&mut app);
         let world = app.world_mut();
         let real = world.spawn_empty().id();
@@ -374,6 +510,13 @@ mod tests {
         assert_eq!(play(&mut app, Devices::Open, &[(real, 1.0), (own, 1.0)]), [(true, 1.0), (true, 1.0)]);
         assert_eq!(play(&mut app, Devices::Kept, &[]), [(false, 0.0), (true, 1.0)], "let go of");
         assert_eq!(play(&mut app, Devices::Kept, &[(real, 1.0), (own, 0.0)]), [(false, 0.0), (false, 0.0)], "kept");
+        let mut own_devices = app.world().resource::<OwnDevices>().clone();
+        own_devices.begin_frame();
+        let mut expected = PersonInput::default();
+        expected.push(VirtualAxis::Trigger(GamepadButton::South), 1.0);
+        expected.push(GamepadAxis::LeftStickX, 1.0);
+        expected.press(GamepadButton::South);
+        assert_eq!(own_devices.input, expected, "the next decision knows them");
         assert_eq!(play(&mut app, Devices::Open, &[(real, 1.0)]), [(true, 1.0), (false, 0.0)]);
     }
 }

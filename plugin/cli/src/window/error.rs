@@ -37,8 +37,8 @@ pub enum WindowError {
     NoKeys(&'static str),
     /// A person's actions in the game cannot be recorded.
     #[error(
-        "a person's actions in {0} cannot be recorded, since it is not played with keys alone: leave out --record, or \
-         record its bots with `playbot record`"
+        "a person's actions in {0} cannot be recorded, since a system of its own passes them on (`.actions`): declare them \
+         with `.keys`, `.axes` or `.input`, leave out --record, or record its bots with `playbot record`"
     )]
     NotRecorded(&'static str),
     /// The game, or the policy's observation, cannot be drawn.

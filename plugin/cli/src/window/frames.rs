@@ -4,7 +4,7 @@
 //! recording would lack that.
 
 use crate::window::{
-    deciders::{Deciders, OwnKeys},
+    deciders::{Deciders, OwnDevices, OwnKeys},
     devices,
     devices::Devices,
     ending, keys, title,
@@ -14,15 +14,17 @@ use bevy::{
     ecs::schedule::{ScheduleLabel, SingleThreadedExecutor},
     prelude::*,
     time::TimeReceiver,
+    window::PrimaryWindow,
 };
 use bevy_playbot::{
     action::Action,
     agent::Control,
     demo::file::DemoEpisode,
-    engine::{TickSchedules, run_on_one_thread, system_errors},
+    engine::{PressesForPeople, TickSchedules, run_on_one_thread, system_errors},
     episode::Episode,
     fault::Faults,
     key_bindings::{KeyBindings, MissingSet},
+    virtual_input::{ClickAreas, VirtualInput},
 };
 use playbot_harness::prelude::*;
 use std::sync::Arc;
@@ -65,7 +67,7 @@ pub(super) fn build(app: &mut App, game: &'static str, hz: f64) {
     ending::listen_in(app, StandStill);
     title::build(app, game, WindowEnd);
     let decide = TickSchedules::of(app).decide;
-    app.add_systems(decide, decide_by_hand.in_set(PlaybotSystems::Decide));
+    app.add_systems(decide, (decide_by_hand, decide_by_devices).chain().in_set(PlaybotSystems::Decide));
     // Virtual input and title need the window's thread.
     app.edit_schedule(WindowFrame, |schedule| {
         schedule.set_executor(SingleThreadedExecutor::new());
@@ -107,11 +109,11 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
     devices::give_back(world);
 }
 
-/// Opens the devices to the game where a person plays without bindings, and keeps them otherwise.
+/// Opens the devices to the game where what a person does is no action, and keeps them otherwise.
 fn choose_devices(world: &mut World) {
     let agent = world.resource::<Deciders>().agent;
     let is_person = world.get::<Control>(agent) == Some(&Control::Human);
-    let is_open = is_person && world.get::<KeyBindings>(agent).is_none();
+    let is_open = is_person && world.get::<PressesForPeople>(agent).is_none();
     devices::set(world, if is_open { Devices::Open } else { Devices::Kept });
 }
 
@@ -125,7 +127,32 @@ fn decide_by_hand(
         if *control == Control::Human && episode.is_running() {
             let is_held = |key| keys.pressed(key) || keys.just_pressed(key);
             action.0 = bindings.action(is_held);
-            missing.0 = bindings.missing_set(is_held);
+            missing.set_keys(bindings.missing_set(is_held));
+        }
+    }
+}
+
+/// The agents that a person plays with other devices than keys alone.
+type Played<'w, 's> = Query<
+    'w,
+    's,
+    (
+        &'static Control,
+        &'static VirtualInput,
+        Option<&'static ClickAreas>,
+        &'static Episode,
+        &'static mut Action,
+        &'static mut MissingSet,
+    ),
+    (With<PressesForPeople>, Without<KeyBindings>),
+>;
+
+/// Turns what a person does in this frame into the action, which then presses the game's inputs in the same frame.
+fn decide_by_devices(devices: Res<OwnDevices>, windows: Query<&Window, With<PrimaryWindow>>, mut agents: Played) {
+    let size = windows.single().map_or(Vec2::ZERO, Window::size);
+    for (control, input, clicks, episode, mut action, mut missing) in &mut agents {
+        if *control == Control::Human && episode.is_running() {
+            (action.0, missing.0) = input.meant_by(&devices.input, size, clicks);
         }
     }
 }
@@ -151,6 +178,25 @@ mod tests {
     use bevy_playbot::demo::file::{Decider, DemoActions, EpisodeActions};
 
     use super::*;
+
+    #[test]
+    fn buttons_of_the_mouse_become_the_action_and_those_without_one_are_noted() {
+        let mut app = headless_app();
+        app.init_resource::<OwnDevices>().add_systems(FixedPreUpdate, decide_by_devices.in_set(PlaybotSystems::Decide));
+        let sets = [vec![], vec![MouseButton::Left], vec![MouseButton::Right]];
+        let input = VirtualInput::keys([[]; 3]).mouse_buttons(sets);
+        let agent = (Agent::new(0, input.space()), input, Control::Human, PressesForPeople, MissingSet::default());
+        let agent = app.world_mut().spawn(agent).id();
+        let mut decided = |button: MouseButton| {
+            app.world_mut().resource_mut::<OwnDevices>().input.press(button);
+            app.tick().expect("no agent broke its contract");
+            let action = app.world().get::<Action>(agent).and_then(Action::discrete);
+            (action, app.world().get::<MissingSet>(agent).cloned())
+        };
+        assert_eq!(decided(MouseButton::Right), (Some(2), Some(MissingSet(None))));
+        let both = vec![MouseButton::Left.into(), MouseButton::Right.into()];
+        assert_eq!(decided(MouseButton::Left), (Some(1), Some(MissingSet(Some(both)))));
+    }
 
     #[test]
     fn the_person_goes_on_behind_the_last_tick() {

@@ -1,13 +1,13 @@
-//! Keys of a person that no action holds: reported at once, and counted for the end of a recording.
+//! Keys and buttons of a person that no action holds: reported at once, and counted for the end of a recording.
 
 use crate::window::title::Notice;
 use bevy::prelude::*;
-use bevy_playbot::{action::Action, engine::TickSchedules, key_bindings::MissingSet};
+use bevy_playbot::{action::Action, engine::TickSchedules, key_bindings::MissingSet, virtual_input::VirtualButton};
 use playbot_harness::prelude::*;
 use playbot_report::counted;
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The sets of keys that a person has held in a window, and that no action of the game holds. It outlives the window.
+/// The sets of keys and buttons that a person has held in a window, and that no action of the game holds. It outlives the window.
 #[derive(Resource, Clone, Reflect)]
 #[reflect(opaque)]
 #[reflect(Resource, Clone)]
@@ -21,10 +21,10 @@ struct Tally {
     sets: Vec<UnboundSet>,
 }
 
-/// A set of keys that no action holds.
+/// A set of keys and buttons that no action holds.
 #[derive(Debug)]
 struct UnboundSet {
-    keys: Vec<KeyCode>,
+    keys: Vec<VirtualButton>,
     /// The action that the game got instead.
     action: u32,
     ticks: u64,
@@ -38,7 +38,7 @@ impl UnboundKeys {
     }
 
     /// Counts a tick in which a person held these keys, and returns a message if they are held for the first time.
-    fn count(&self, keys: Vec<KeyCode>, action: u32) -> Option<String> {
+    fn count(&self, keys: Vec<VirtualButton>, action: u32) -> Option<String> {
         let mut tally = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = tally.sets.iter_mut().find(|set| set.keys == keys) {
             known.ticks += 1;
@@ -53,14 +53,13 @@ impl UnboundKeys {
     pub fn notes(&self) -> Vec<String> {
         let tally = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let note = |UnboundSet { keys, action, ticks }: &UnboundSet| {
-            let codes: Vec<String> = keys.iter().map(|key| format!("KeyCode::{key:?}")).collect();
             format!(
-                "you held {} for {}, which no action of {} does, and the game got {}: add `vec![{}]` to its keys",
+                "you held {} for {}, which no action of {} does, and the game got {}: add {}",
                 in_words(keys),
                 counted(*ticks, "tick"),
                 tally.game,
                 tally.action(*action),
-                codes.join(", ")
+                remedy(keys)
             )
         };
         tally.sets.iter().map(note).collect()
@@ -82,20 +81,50 @@ fn name_action(names: &[String], action: u32) -> String {
 /// Returns a warning if a person who holds no key gets an action that holds one.
 pub fn idle_warning(game: &dyn Game) -> Option<String> {
     let input = game.tools().input;
-    let is_fine = input.key_bindings().is_none_or(|keys| keys.has_idle_action());
-    (!is_fine).then(|| {
+    let (held, remedy) = match input.key_bindings() {
+        Some(_) => ("hold no key", "`vec![]` to its keys"),
+        None => ("do nothing", "one, such as `vec![]` in its keys"),
+    };
+    (!input.has_idle_action()).then(|| {
         format!(
-            "warning: no action of {} holds nothing: while you hold no key, it gets {}; add `vec![]` to its keys",
+            "warning: no action of {} holds nothing: while you {held}, it gets {}; add {remedy}",
             game.name(),
             name_action(&input.action_names(), 0)
         )
     })
 }
 
-fn in_words(keys: &[KeyCode]) -> String {
+fn in_words(keys: &[VirtualButton]) -> String {
     match keys {
         [] => "no key".to_owned(),
-        keys => keys.iter().map(|key| format!("{key:?}")).collect::<Vec<_>>().join("+"),
+        keys => keys.iter().map(VirtualButton::to_string).collect::<Vec<_>>().join("+"),
+    }
+}
+
+/// Returns the sets to add to the game's actions, for each device.
+fn remedy(keys: &[VirtualButton]) -> String {
+    let mut sets = [Vec::new(), Vec::new(), Vec::new()];
+    for key in keys {
+        match key {
+            VirtualButton::Key(key) => sets[0].push(format!("KeyCode::{key:?}")),
+            VirtualButton::Mouse(button) => sets[1].push(format!("MouseButton::{button:?}")),
+            VirtualButton::Gamepad(button) => sets[2].push(format!("GamepadButton::{button:?}")),
+        }
+    }
+    let places = ["keys", "mouse buttons", "gamepad buttons"];
+    let parts: Vec<(String, &str)> = sets
+        .iter()
+        .zip(places)
+        .filter(|(set, _)| !set.is_empty())
+        .map(|(set, place)| (format!("`vec![{}]`", set.join(", ")), place))
+        .collect();
+    match parts.as_slice() {
+        [] => "`vec![]` to its keys".to_owned(),
+        [(set, place)] => format!("{set} to its {place}"),
+        parts => {
+            let parts: Vec<String> = parts.iter().map(|(set, place)| format!("{set} in its {place}")).collect();
+            format!("an action with {}", parts.join(" and "))
+        }
     }
 }
 
@@ -137,7 +166,7 @@ mod tests {
     #[test]
     fn a_set_of_keys_is_reported_once_and_counted_to_the_end() {
         let unbound = UnboundKeys::new(&game(&SETS));
-        let chord = || vec![KeyCode::ArrowLeft, KeyCode::Space];
+        let chord = || vec![KeyCode::ArrowLeft.into(), KeyCode::Space.into()];
         let first = unbound.count(chord(), 0);
         assert_eq!(first.as_deref(), Some("no action holds ArrowLeft+Space: the game gets action 0 (ArrowLeft)"));
         assert_eq!(unbound.count(chord(), 0), None);
@@ -154,6 +183,32 @@ mod tests {
     }
 
     #[test]
+    fn buttons_of_mouse_and_gamepad_are_named_with_their_places() {
+        let unbound = UnboundKeys::new(&game(&SETS));
+        let chord = vec![KeyCode::Space.into(), MouseButton::Left.into(), GamepadButton::South.into()];
+        let first = unbound.count(chord, 0).expect("it is new");
+        assert!(first.starts_with("no action holds Space+MouseLeft+GamepadSouth: the game gets"), "{first}");
+        unbound.count(vec![MouseButton::Right.into()], 1);
+        let notes = unbound.notes();
+        let [whole, single] = notes.as_slice() else { panic!("two sets: {notes:?}") };
+        assert!(
+            whole.ends_with(
+                ": add an action with `vec![KeyCode::Space]` in its keys and `vec![MouseButton::Left]` in its mouse \
+                 buttons and `vec![GamepadButton::South]` in its gamepad buttons"
+            ),
+            "{whole}"
+        );
+        assert!(single.ends_with(": add `vec![MouseButton::Right]` to its mouse buttons"), "{single}");
+    }
+
+    #[test]
+    fn a_game_for_the_mouse_in_which_no_action_holds_nothing_is_warned_of() {
+        let game = ForeignGame::new("hop", 1, |_: &mut App| {}).mouse_buttons([[MouseButton::Left]]);
+        let warning = idle_warning(&game).expect("its only action is a button");
+        assert!(warning.contains("while you do nothing, it gets action 0; add one, such as `vec![]`"), "{warning}");
+    }
+
+    #[test]
     fn a_game_in_which_no_action_holds_nothing_is_warned_of() {
         let warning = idle_warning(&game(&SETS)).expect("both actions hold a key");
         let words = "no action of hop holds nothing: while you hold no key, it gets action 0 (ArrowLeft); add `vec![]`";
@@ -167,7 +222,7 @@ mod tests {
         let unbound = UnboundKeys::new(&game(&SETS));
         world.insert_resource(unbound.clone());
         world.init_resource::<Notice>();
-        let missing = || MissingSet(Some(vec![KeyCode::KeyA]));
+        let missing = || MissingSet(Some(vec![KeyCode::KeyA.into()]));
         let person = world.spawn((Control::Human, Action::default(), missing())).id();
         world.spawn((Control::Policy, Action::default(), missing()));
         let mut schedule = Schedule::default();

@@ -2,7 +2,7 @@
 
 use crate::foreign::{
     ForeignGame,
-    input::Input,
+    input::{Input, mask},
     runtime::{ForeignCell, playing_agents},
 };
 use bevy::{
@@ -10,8 +10,8 @@ use bevy::{
     input::InputSystems,
     prelude::*,
     ui::{
-        ComputedNode, ComputedUiRenderTargetInfo, ComputedUiTargetCamera, InteractionDisabled, UiGlobalTransform,
-        UiSystems,
+        ComputedNode, ComputedStackIndex, ComputedUiRenderTargetInfo, ComputedUiTargetCamera, InteractionDisabled,
+        UiGlobalTransform, UiSystems,
     },
     window::{PrimaryWindow, WindowRef},
 };
@@ -20,9 +20,9 @@ use bevy_playbot::{
     agent::Control,
     engine::{Renewal, TickSchedules, check_actions},
     episode::EpisodeEnded,
-    systems::PlaybotSystems,
+    systems::{ObserveSchedule, PlaybotSystems},
     unknown_name::nearest,
-    virtual_input::{HeldInput, PointerPosition, PressSystems, VirtualInput},
+    virtual_input::{ClickAreas, HeldInput, PointerPosition, PressSystems, PressesForPeople, VirtualInput},
 };
 
 /// The clicks of an agent's actions on buttons of Bevy's UI, counted from its first episode on.
@@ -72,7 +72,7 @@ impl ButtonClicks {
     /// Counts a click on the button of this name.
     fn note(&mut self, name: &str, found: &Found) {
         match found {
-            Found::One(_) => self.clicked += 1,
+            Found::One(..) => self.clicked += 1,
             Found::Unreachable | Found::Missing(_) | Found::Several(_) => self.missed += 1,
         }
         match found {
@@ -82,7 +82,7 @@ impl ButtonClicks {
                     self.absent.push(name.to_owned());
                 }
             }
-            Found::One(_) | Found::Unreachable | Found::Several(_) => {
+            Found::One(..) | Found::Unreachable | Found::Several(_) => {
                 self.absent.retain(|absent| absent != name);
                 if !self.present.iter().any(|present| present == name) {
                     self.present.push(name.to_owned());
@@ -141,6 +141,7 @@ pub(super) fn add_clicks(app: &mut App, input: &Input) {
         aim.in_set(PlaybotSystems::Act).after(check_actions).before(PressSystems).ambiguous_with(PlaybotSystems::Act),
     )
     .add_systems(PreUpdate, set_interactions.after(InputSystems).after(UiSystems::Focus))
+    .add_systems(ObserveSchedule, note_areas.after(mask))
     .add_observer(end_episode);
 }
 
@@ -157,7 +158,7 @@ fn end_episode(event: On<EpisodeEnded>, mut agents: Query<&mut ButtonClicks>, mu
 fn aim(world: &mut World) {
     // A game with several agents has no clicks.
     let Some(&agent) = playing_agents(world).first() else { return };
-    if world.get(agent) == Some(&Control::Human) {
+    if world.get(agent) == Some(&Control::Human) && world.get::<PressesForPeople>(agent).is_none() {
         return;
     }
     // The counts of this agent outlive a World that is built anew.
@@ -172,8 +173,8 @@ fn aim(world: &mut World) {
         if let Some(mut clicks) = world.get_mut::<ButtonClicks>(agent) {
             clicks.note(&names[number], &found);
             match found {
-                Found::One(Target::At(position)) => held = held.click(position, MouseButton::Left),
-                Found::One(Target::Interaction(button)) => clicks.next = Some(button),
+                Found::One(_, Target::At(position)) => held = held.click(position, MouseButton::Left),
+                Found::One(_, Target::Interaction(button)) => clicks.next = Some(button),
                 Found::Unreachable | Found::Missing(_) | Found::Several(_) => {}
             }
         }
@@ -184,6 +185,29 @@ fn aim(world: &mut World) {
             input.set_action(first + number, held);
         }
     }
+}
+
+/// Notes the areas of the buttons for a person whose clicks become actions.
+fn note_areas(world: &mut World) {
+    let Some(agent) = playing_agent(world) else { return };
+    if world.get(agent) != Some(&Control::Human) || world.get::<PressesForPeople>(agent).is_none() {
+        return;
+    }
+    let Some(game) = world.get_resource::<ForeignCell>().map(|cell| cell.lock().game.clone()) else { return };
+    let mut windows = world.query_filtered::<&Window, With<PrimaryWindow>>();
+    let Ok(scale) = windows.single(world).map(Window::scale_factor) else { return };
+    let (first, names) = game.description.input.clicked();
+    let mut buttons: Vec<(u32, u32, Rect)> = Vec::new();
+    for (number, name) in names.iter().enumerate() {
+        if let Found::One(button, Target::At(_)) = find(world, name)
+            && let Some((depth, area)) = area(world, button, scale)
+        {
+            buttons.push((depth, (first + number) as u32, area));
+        }
+    }
+    buttons.sort_by_key(|(depth, ..)| std::cmp::Reverse(*depth));
+    let areas = buttons.into_iter().map(|(_, action, area)| (action, area)).collect();
+    world.entity_mut(agent).insert(ClickAreas { first: first as u32, areas });
 }
 
 /// Sets `Interaction` for a frame where there is no layout. Bevy's own system sets it otherwise.
@@ -209,7 +233,7 @@ fn set_interactions(mut agents: Query<&mut ButtonClicks>, mut buttons: Query<&mu
 /// The result of a search for a button.
 #[derive(Debug, PartialEq)]
 enum Found {
-    One(Target),
+    One(Entity, Target),
     /// Hidden, disabled, outside of the window, or in another one.
     Unreachable,
     /// The paths of all buttons.
@@ -253,7 +277,7 @@ fn find(world: &mut World, name: &str) -> Found {
     let reachable: Vec<(Entity, Target)> = reachable.collect();
     match reachable.as_slice() {
         [] => Found::Unreachable,
-        [(_, target)] => Found::One(*target),
+        [(button, target)] => Found::One(*button, *target),
         several => Found::Several(paths(&mut several.iter().map(|(button, _)| *button))),
     }
 }
@@ -340,8 +364,21 @@ fn target(world: &World, button: Entity, window: Option<(Entity, Vec2, f32)>) ->
     if !is_shown || is_empty {
         return None;
     }
-    let corner = world.get::<Camera>(camera).and_then(Camera::physical_viewport_rect).map_or(UVec2::ZERO, |it| it.min);
-    let middle = world.get::<UiGlobalTransform>(button)?.translation + corner.as_vec2();
-    let position = PointerPosition::Pixels(middle / scale);
+    let position = PointerPosition::Pixels(middle(world, button, camera)? / scale);
     position.within(size).map(|_| Target::At(position))
+}
+
+/// Returns the middle of a button in physical pixels of the window.
+fn middle(world: &World, button: Entity, camera: Entity) -> Option<Vec2> {
+    let corner = world.get::<Camera>(camera).and_then(Camera::physical_viewport_rect).map_or(UVec2::ZERO, |it| it.min);
+    Some(world.get::<UiGlobalTransform>(button)?.translation + corner.as_vec2())
+}
+
+/// Returns the depth of a button, where a larger number is nearer to the front, and its area in logical pixels.
+fn area(world: &World, button: Entity, scale: f32) -> Option<(u32, Rect)> {
+    let camera = world.get::<ComputedUiTargetCamera>(button).and_then(ComputedUiTargetCamera::get)?;
+    let node = world.get::<ComputedNode>(button)?;
+    let depth = world.get::<ComputedStackIndex>(button)?.0;
+    let middle = middle(world, button, camera)?;
+    Some((depth, Rect::from_center_size(middle / scale, node.size / scale)))
 }

@@ -1,8 +1,11 @@
 //! The input of a foreign game's agent, and the mask of its actions.
 
-use crate::foreign::{
-    ForeignGame,
-    runtime::{SystemFactory, playing_agents, with_foreign},
+use crate::{
+    foreign::{
+        ForeignGame,
+        runtime::{SystemFactory, playing_agents, with_foreign},
+    },
+    game::InputTools,
 };
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -16,7 +19,36 @@ use bevy_playbot::{
     virtual_input::{ActionAxis, HeldInput, PointerPosition, UnknownInput, VirtualButton, VirtualInput},
 };
 
+/// Most discrete actions that `.choices` may bring.
+const MOST_CHOICES: usize = 4096;
+
 impl ForeignGame {
+    /// Declares several choices at once, such as a direction and whether to jump: each combination of them is a
+    /// discrete action. It holds the keys and buttons of all that were chosen. The last choice changes first from
+    /// action to action. Takes the place of [`keys`](Self::keys).
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// let walk = vec![vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]];
+    /// let jump = vec![vec![], vec![KeyCode::Space]];
+    /// let game = ForeignGame::new("hop", 1, |_: &mut App| {}).choices([walk, jump]).observe(["x"], || [0.0]);
+    /// assert_eq!(game.actions(), ActionSpace::Discrete(6));
+    /// let names = game.tools().input.action_names();
+    /// assert_eq!(names[..4], ["nothing", "Space", "ArrowLeft", "ArrowLeft+Space"]);
+    /// ```
+    pub fn choices<B: Into<VirtualButton>>(
+        self,
+        choices: impl IntoIterator<Item = impl IntoIterator<Item = impl IntoIterator<Item = B>>>,
+    ) -> Self {
+        let choices = choices.into_iter();
+        let choices = choices
+            .map(|choice| choice.into_iter().map(|held| held.into_iter().map(Into::into).collect()).collect())
+            .collect();
+        self.with(|description| description.input.choices = choices)
+    }
+
     /// Adds positions of the mouse cursor to discrete actions, in the order of the actions; `None` leaves the cursor
     /// where it is. Mouse buttons of an action with a position are clicks: each tick presses them anew.
     ///
@@ -49,6 +81,27 @@ impl ForeignGame {
     /// is down in the tick of the action, and up before the next one. Positions are those of [`cursor`](Self::cursor).
     pub fn taps(self, positions: impl IntoIterator<Item = impl Into<Option<PointerPosition>>>) -> Self {
         self.with(|description| description.input.taps = positions.into_iter().map(Into::into).collect())
+    }
+
+    /// Adds turns of the mouse wheel to discrete actions, in the order of the actions and in lines: 1 is a notch upwards,
+    /// -1 one downwards, 0 none. Each tick of the action turns it anew.
+    pub fn wheel(self, lines: impl IntoIterator<Item = f32>) -> Self {
+        self.with(|description| description.input.wheel = lines.into_iter().collect())
+    }
+
+    /// Adds discrete actions after those of keys, each of which types a text: in each tick of the action, each character
+    /// goes down and up, as `KeyboardInput` with text. A line feed is the Enter key.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// let game = ForeignGame::new("name", 1, |_: &mut App| {}).observe(["x"], || [0.0]);
+    /// let game = game.keys([vec![], vec![KeyCode::Escape]]).types(["Ada", "\n"]);
+    /// assert_eq!(game.tools().input.action_names(), ["nothing", "Escape", "type \"Ada\"", "type \"\\n\""]);
+    /// ```
+    pub fn types(self, texts: impl IntoIterator<Item = impl Into<String>>) -> Self {
+        self.with(|description| description.input.texts = texts.into_iter().map(Into::into).collect())
     }
 
     /// Adds discrete actions after all others, each of which clicks on a button of Bevy's UI. A button is named by its
@@ -101,6 +154,8 @@ impl ForeignGame {
 pub(super) struct Input {
     /// The keys of each discrete action, and other buttons that were set by name.
     pub(super) keys: Vec<Vec<VirtualButton>>,
+    /// The choices whose combinations are the discrete actions, in place of keys.
+    pub(super) choices: Vec<Vec<Vec<VirtualButton>>>,
     /// The first unknown name of a key, and its action.
     pub(super) unknown_key: Option<(usize, UnknownInput)>,
     /// The mouse buttons of each discrete action.
@@ -111,6 +166,10 @@ pub(super) struct Input {
     pub(super) cursor: Vec<Option<PointerPosition>>,
     /// The tap on the touch screen in each discrete action.
     pub(super) taps: Vec<Option<PointerPosition>>,
+    /// The lines by which each discrete action turns the mouse wheel.
+    pub(super) wheel: Vec<f32>,
+    /// The texts that further actions type, after those above.
+    pub(super) texts: Vec<String>,
     /// The buttons of Bevy's UI that further actions click on, after those above.
     pub(super) clicks: Vec<String>,
     /// The axis that each value of a continuous action moves.
@@ -164,18 +223,21 @@ impl Input {
 
     /// Returns the input of all actions but clicks on the UI.
     fn held(&self) -> Option<VirtualInput> {
-        let is_pointed = !(self.cursor.is_empty() && self.taps.is_empty());
-        let is_discrete = is_pointed || !(self.keys.is_empty() && self.mouse.is_empty() && self.pads.is_empty());
+        let sets = self.sets();
+        let is_pointed = !(self.cursor.is_empty() && self.taps.is_empty() && self.wheel.is_empty());
+        let is_held = !(sets.is_empty() && self.mouse.is_empty() && self.pads.is_empty());
+        let is_discrete = is_pointed || is_held || !self.texts.is_empty();
         let base = match (&self.whole, &self.axes) {
             (Some(whole), _) => whole.clone(),
             (None, Some(axes)) => VirtualInput::axes(axes.iter().cloned()),
-            (None, None) if is_discrete => VirtualInput::discrete(self.keys.iter().cloned().map(HeldInput::new)),
+            (None, None) if is_discrete => VirtualInput::discrete(sets.into_iter().map(HeldInput::new)),
             (None, None) => return None,
         };
         match base.space() {
             ActionSpace::Discrete(_) => {
                 let buttons = base.mouse_buttons(self.mouse.clone()).gamepad_buttons(self.pads.clone());
-                Some(buttons.cursor(self.cursor.clone()).taps(self.taps.clone()))
+                let pointed = buttons.cursor(self.cursor.clone()).taps(self.taps.clone()).wheel(self.wheel.clone());
+                Some(pointed.and_actions(self.texts.iter().map(|text| HeldInput::default().types(text))))
             }
             ActionSpace::Continuous(_) => Some(base),
         }
@@ -185,8 +247,10 @@ impl Input {
     pub(super) fn is_of_buttons(&self) -> bool {
         let is_pad = |button: &VirtualButton| matches!(button, VirtualButton::Gamepad(_));
         let has_others = !(self.pads.is_empty() && self.cursor.is_empty() && self.taps.is_empty());
+        let has_texts = !(self.texts.is_empty() && self.wheel.is_empty());
         let has_parts = !self.clicks.is_empty() || self.axes.is_some() || self.whole.is_some();
-        !(has_others || has_parts || self.keys.iter().flatten().any(is_pad))
+        let sets = self.sets();
+        !(has_others || has_texts || has_parts || sets.iter().flatten().any(is_pad))
     }
 
     /// Returns the problem of the input: an unknown key, or parts that contradict each other. The text follows the name
@@ -195,8 +259,15 @@ impl Input {
         if let Some((action, unknown)) = &self.unknown_key {
             return Some(format!("names a key that does not exist, in action {action}: {unknown}"));
         }
-        let said =
-            [("`.keys`", !self.keys.is_empty()), ("`.axes`", self.axes.is_some()), ("`.input`", self.whole.is_some())];
+        if let Some(problem) = self.problem_of_choices() {
+            return Some(problem);
+        }
+        let said = [
+            ("`.keys`", !self.keys.is_empty()),
+            ("`.choices`", !self.choices.is_empty()),
+            ("`.axes`", self.axes.is_some()),
+            ("`.input`", self.whole.is_some()),
+        ];
         let said: Vec<&str> = said.into_iter().filter_map(|(name, is_said)| is_said.then_some(name)).collect();
         if said.len() > 1 {
             return Some(format!("has {}, and each of them declares every action: keep one", said.join(" and ")));
@@ -211,11 +282,19 @@ impl Input {
                  top left corner, or fractions from 0 to below 1"
             ));
         }
+        if let Some(action) = pressed.two_pointers() {
+            return Some(format!(
+                "moves the mouse cursor and taps on the screen in action {action}, and games expect one pointer: give \
+                 each an action of its own in `.cursor` and `.taps`, and `None` in the other one"
+            ));
+        }
         let discrete = [
             ("`.mouse_buttons`", !self.mouse.is_empty()),
             ("`.gamepad_buttons`", !self.pads.is_empty()),
             ("`.cursor`", !self.cursor.is_empty()),
             ("`.taps`", !self.taps.is_empty()),
+            ("`.wheel`", !self.wheel.is_empty()),
+            ("`.types`", !self.texts.is_empty()),
             ("`.clicks`", !self.clicks.is_empty()),
         ];
         let (part, _) = discrete.into_iter().find(|(_, is_said)| *is_said)?;
@@ -225,6 +304,45 @@ impl Input {
                 "has {part}, which belong to discrete actions, and continuous ones: buttons of these are \
                  `ActionAxis::buttons` in `.axes`"
             )
+        })
+    }
+
+    /// Returns the problem of the choices and of the texts.
+    fn problem_of_choices(&self) -> Option<String> {
+        if let Some(number) = self.choices.iter().position(Vec::is_empty) {
+            return Some(format!("has `.choices` with nothing to choose in choice {number}: give it sets of keys"));
+        }
+        if self.combinations().is_none() {
+            return Some(format!(
+                "has `.choices` with more than {MOST_CHOICES} combinations: leave some out, or use `ActionAxis::buttons` in \
+                 `.axes`"
+            ));
+        }
+        if self.wheel.iter().any(|lines| !lines.is_finite()) {
+            return Some("has `.wheel` with a number that is not finite: give lines, such as 1 and -1".to_owned());
+        }
+        let is_empty = self.texts.iter().any(String::is_empty);
+        is_empty.then(|| "has `.types` with an empty text: give one or more characters".to_owned())
+    }
+
+    /// Returns the number of combinations of the choices; `None` if there are too many.
+    fn combinations(&self) -> Option<usize> {
+        let number = self.choices.iter().try_fold(1_usize, |number, choice| number.checked_mul(choice.len()))?;
+        (number <= MOST_CHOICES).then_some(number)
+    }
+
+    /// Returns the keys and buttons of each discrete action: those that were set, or the combinations of the choices.
+    fn sets(&self) -> Vec<Vec<VirtualButton>> {
+        if self.choices.is_empty() || self.combinations().is_none() {
+            return self.keys.clone();
+        }
+        self.choices.iter().fold(vec![Vec::new()], |sets, choice| {
+            let with = |set: &Vec<VirtualButton>, more: &Vec<VirtualButton>| {
+                let mut all = set.clone();
+                more.iter().filter(|button| !set.contains(button)).for_each(|button| all.push(*button));
+                all
+            };
+            sets.iter().flat_map(|set| choice.iter().map(move |more| with(set, more))).collect()
         })
     }
 
@@ -259,10 +377,16 @@ impl Input {
             [] => "nothing".to_owned(),
             keys => keys.iter().map(VirtualButton::to_string).collect::<Vec<_>>().join("+"),
         };
+        let of_texts = self.texts.iter().map(|text| format!("type {text:?}"));
         let of_clicks = self.clicks.iter().map(|name| format!("click {name}"));
-        let named = self.keys.len() + self.clicks.len();
+        let sets = self.sets();
+        let named = sets.len() + self.texts.len() + self.clicks.len();
         let is_of_keys = self.names.is_empty() && self.space() == ActionSpace::Discrete(named);
-        if is_of_keys { self.keys.iter().map(of_keys).chain(of_clicks).collect() } else { self.names.clone() }
+        if is_of_keys {
+            sets.iter().map(of_keys).chain(of_texts).chain(of_clicks).collect()
+        } else {
+            self.names.clone()
+        }
     }
 
     /// Returns the keys of a person: for games that are played with keys alone.
@@ -271,12 +395,37 @@ impl Input {
             VirtualButton::Key(key) => Some(*key),
             VirtualButton::Mouse(_) | VirtualButton::Gamepad(_) => None,
         };
-        let sets = self.keys.iter().map(|set| set.iter().map(key).collect::<Option<Vec<KeyCode>>>());
+        let sets = self.sets();
+        let sets = sets.iter().map(|set| set.iter().map(key).collect::<Option<Vec<KeyCode>>>());
         let sets: Vec<Vec<KeyCode>> = sets.collect::<Option<_>>()?;
         let is_keys = self.space.is_none()
             && !sets.is_empty()
             && self.pressed() == Some(VirtualInput::keys(sets.iter().cloned()));
         is_keys.then(|| KeyBindings::of_sets(&sets))
+    }
+}
+
+impl InputTools for ForeignGame {
+    fn action_names(&self) -> Vec<String> {
+        self.description.input_of(0).names()
+    }
+
+    fn key_bindings(&self) -> Option<KeyBindings> {
+        self.description.input_of(0).bindings()
+    }
+
+    fn records_people(&self) -> bool {
+        let input = self.description.input_of(0);
+        input.space.is_none() && input.pressed().is_some()
+    }
+
+    fn has_idle_action(&self) -> bool {
+        let input = self.description.input_of(0);
+        let pressed = input.pressed().filter(|_| input.space.is_none());
+        pressed.is_none_or(|pressed| match pressed.space() {
+            ActionSpace::Discrete(actions) => pressed.has_idle_action(actions - input.clicks.len()),
+            ActionSpace::Continuous(_) => true,
+        })
     }
 }
 
@@ -329,7 +478,7 @@ pub(super) fn add_mask(app: &mut App) {
     app.add_systems(ObserveSchedule, mask);
 }
 
-fn mask(world: &mut World) {
+pub(super) fn mask(world: &mut World) {
     for agent in playing_agents(world) {
         let legal = with_foreign(world, agent, |world, foreign| match &mut foreign.asked().legal {
             Some(system) => system.demand(world).map(Some),

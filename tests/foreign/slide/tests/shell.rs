@@ -1,4 +1,4 @@
-//! Tests of the verbs through the command line. Bots play with the mouse, and people have no keys.
+//! Tests of the verbs through the command line. Bots and people play with the mouse.
 
 use playbot_shell::GameProgram;
 
@@ -11,3 +11,49 @@ const GAME: GameProgram = GameProgram {
 };
 
 playbot_shell::tests!(GAME: recordings_replay, a_killed_training_goes_on_bit_for_bit, a_policy_file_plays_as_its_run, the_doctor_finds_nothing);
+
+/// Plays with the mouse in a window of this scale, and returns the recorded actions. Positions are in pixels.
+#[cfg(feature = "screen")]
+fn recorded_by_mouse(scale: Option<&str>, start: [u32; 2], cell: [u32; 2]) -> Vec<u64> {
+    use playbot_shell::{Desk, Shell};
+
+    let (desk, shell) = (Desk::new(GAME.program), Shell::new(GAME.program));
+    let args = ["play", "slide", "--levels", "0..0", "--record", "mine.demo"];
+    let seat = match scale {
+        Some(scale) => desk.open_scaled(shell.folder(), &args, scale),
+        None => desk.open(shell.folder(), &args),
+    };
+    // An episode has 120 ticks, and this one begins anew.
+    seat.tap("r");
+    seat.sit_out(6);
+    seat.click(start[0], start[1]);
+    seat.sit_out(6);
+    seat.click(cell[0], cell[1]);
+    seat.sit_out(4);
+    seat.tap("Escape");
+    let (status, said) = seat.leave();
+    assert!(status.success(), "{said}");
+    let verified = shell.answer(&["demo", "verify", "mine.demo", "--json"]);
+    assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
+    let episodes = shell.answers(&["demo", "show", "mine.demo", "--json"]).len();
+    let ticks = (0..episodes)
+        .flat_map(|episode| shell.answers(&["demo", "show", "mine.demo", "--episode", &episode.to_string(), "--json"]));
+    ticks.filter_map(|tick| tick["action"].as_u64()).filter(|action| *action != 0).collect()
+}
+
+/// The action that clicks on Start, behind nothing and nine cells.
+#[cfg(feature = "screen")]
+const START: u64 = 10;
+
+#[cfg(feature = "screen")]
+#[test]
+fn clicks_of_a_person_are_recorded_as_actions_and_replay() {
+    assert_eq!(recorded_by_mouse(None, [160, 80], [640, 360]), [START, 5], "the middle cell is the fifth");
+}
+
+#[cfg(feature = "screen")]
+#[test]
+fn clicks_in_a_scaled_window_are_the_same_actions() {
+    // The window is larger than the screen, so the test clicks on the first cell.
+    assert_eq!(recorded_by_mouse(Some("2"), [320, 160], [320, 160]), [START, 1]);
+}

@@ -81,10 +81,16 @@ fn announce(game: &dyn Game, args: &Args) {
     if let Some(keys) = game.tools().input.key_bindings() {
         let zoom = if game.tools().host.placement() == TickPlacement::Fixed { ", - and = zoom" } else { "" };
         report!("{}; R again, N next level, P pause{zoom}, Escape ends", keys.help());
+    } else if args.record.is_some() {
+        report!(
+            "the game gets the actions that your keys, mouse and gamepad mean, and nothing else; R again, N next level, P \
+             pause, Escape ends"
+        );
     } else {
         report!("the game's own keys and mouse; R again, N next level, P pause, Escape ends");
     }
-    if let Some(warning) = idle_warning(game) {
+    let is_by_actions = game.tools().input.key_bindings().is_some() || args.record.is_some();
+    if let Some(warning) = idle_warning(game).filter(|_| is_by_actions) {
         report!("{warning}");
     }
     if args.autopilot.is_named() {
