@@ -3,7 +3,7 @@
 use crate::{
     foreign::{
         clocks::{ClockSettings, leave_loading_out, stand_still},
-        levels::{LevelFromFile, level_ahead},
+        levels::{EditorLevel, LevelFromFile, editor_level_ahead, level_ahead},
         observe::forget_state,
         runtime::{Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agent, with_foreign},
     },
@@ -27,7 +27,11 @@ pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, 
 fn begin(world: &mut World, agent: Entity, level: u64) {
     forget_state(world, agent);
     with_foreign(world, agent, |world, foreign| {
-        let (seed, file) = level_ahead(&foreign.game, world.get_resource::<LevelDesigns>(), level)?;
+        let designs = world.get_resource::<LevelDesigns>();
+        let (seed, file) = level_ahead(&foreign.game, designs, level)?;
+        if let Some(drawn) = editor_level_ahead(&foreign.game, designs, level) {
+            world.insert_resource(drawn);
+        }
         world.insert_resource(seed);
         world.insert_resource(file);
         restart(world, foreign)?;
@@ -95,10 +99,17 @@ pub(super) fn announce(
     designs: Option<Res<LevelDesigns>>,
     mut seed: ResMut<LevelSeed>,
     mut file: ResMut<LevelFromFile>,
+    mut editor: Option<ResMut<EditorLevel>>,
 ) {
     // A level that does not exist is reported when its episode begins.
-    if let Ok(ahead) = level_ahead(&cell.lock().game, designs.as_deref(), event.level) {
+    let foreign = cell.lock();
+    if let Ok(ahead) = level_ahead(&foreign.game, designs.as_deref(), event.level) {
         (*seed, *file) = ahead;
+    }
+    if let Some(played) = &mut editor
+        && let Some(drawn) = editor_level_ahead(&foreign.game, designs.as_deref(), event.level)
+    {
+        **played = drawn;
     }
 }
 
