@@ -141,8 +141,8 @@ impl ForeignGame {
     /// them with `bevy_ecs_ldtk` or by itself. The game finds the level that is played as the resource [`EditorLevel`]. A
     /// [`level`](Self::level) system passes it on, such as `LevelSelection::iid(&level.iid)`.
     ///
-    /// The path is that of an `AssetServer`, in the folder `assets`. Otherwise it is looked for in the program's own
-    /// folder. The legend names the values of integer grids that are walls in plans, and the entities at the start and at
+    /// The path is that of an `AssetServer`, in the folder `assets`. Otherwise it is looked for below the
+    /// current folder. The legend names the values of integer grids that are walls in plans, and the entities at the start and at
     /// the goal. Plans have (0, 0) in the lower left corner of their level, as `bevy_ecs_ldtk` places it by default.
     ///
     /// A project that cannot be read is a [`problem`](crate::game::Game::problem) of the game: files of another format,
@@ -205,7 +205,7 @@ fn read(path: &str, legend: &MapLegend) -> Result<Vec<EditorLevel>, String> {
 /// Returns the text of a file.
 fn text_of(file: &Path, shown: &str) -> Result<String, String> {
     read_text_file(file, MOST_BYTES).map_err(|error| {
-        format!("cannot read {shown}: {error}; name a project of LDtk in the folder `assets`, or in the program's own folder")
+        format!("cannot read {shown}: {error}; name a project of LDtk below `assets`, or below the current folder")
     })
 }
 
@@ -236,8 +236,8 @@ fn json<T: DeserializeOwned>(text: &str, shown: &str) -> Result<T, String> {
 
 /// Checks that the pictures of all tiles exist.
 fn check_tilesets(project: &Project, folder: &Path, shown: &str) -> Result<(), String> {
-    let pictures = project.defs.tilesets.iter().filter_map(|tiles| Some((tiles, tiles.rel_path.as_ref()?)));
-    match pictures.into_iter().find(|(_, picture)| !folder.join(picture).is_file()) {
+    let mut pictures = project.defs.tilesets.iter().filter_map(|tiles| Some((tiles, tiles.rel_path.as_ref()?)));
+    match pictures.find(|(_, picture)| !folder.join(picture).is_file()) {
         None => Ok(()),
         Some((Tileset { identifier, .. }, picture)) => Err(format!(
             "{shown}: the tileset `{identifier}` is in {picture}, which does not exist beside the project: add the file, or \
@@ -531,7 +531,7 @@ mod tests {
         let levels = game.tools().levels;
         assert_eq!(levels.level_name("default", 3).as_deref(), Some("Two"));
         assert!(levels.floor_plan("default", 1).is_some_and(|plan| plan.goal.x == 40.0));
-        assert_eq!(game.layout("default", 0), game.layout("default", 1), "they are copies");
+        assert_eq!(Game::layout(&game, "default", 0), Game::layout(&game, "default", 1), "they are copies");
     }
 
     #[test]

@@ -19,7 +19,7 @@ impl ForeignGame {
     /// [`level`](Self::level) system passes it on: `assets.load(&level.file)`.
     ///
     /// The pattern is that of [`level_files`](Self::level_files), such as `maps/*.tmx`, in the folder `assets`. Otherwise
-    /// it is looked for in the program's own folder. The legend names the layers or the classes of tiles that are walls in
+    /// it is looked for below the current folder. The legend names the layers or the classes of tiles that are walls in
     /// plans, and the objects at the start and at the goal. Plans have (0, 0) in the lower left corner of their map.
     ///
     /// Maps that cannot be read are a [`problem`](crate::game::Game::problem) of the game: no map at all, missing files
@@ -49,7 +49,7 @@ fn read(pattern: &str, legend: &MapLegend) -> Result<Vec<EditorLevel>, String> {
     }
     if files.is_empty() {
         return Err(format!(
-            "no file matches {pattern}: name maps of Tiled in the folder `assets`, or in the program's own folder"
+            "no file matches {pattern}: name maps of Tiled below `assets`, or below the current folder"
         ));
     }
     let (mut names, mut levels) = (BTreeSet::new(), Vec::with_capacity(files.len()));
@@ -93,8 +93,9 @@ fn check(map: &Map) -> Result<(), String> {
     }
     for tiles in map.tilesets() {
         let own = tiles.image.iter();
-        let pictures = own.chain(tiles.tiles().filter_map(|(_, tile)| tile.image.as_ref()));
-        if let Some(missing) = pictures.map(|image| &image.source).find(|source| !source.is_file()) {
+        let others = tiles.tiles().filter_map(|(_, tile)| tile.image.clone());
+        let mut pictures = own.cloned().chain(others).map(|image| image.source);
+        if let Some(missing) = pictures.find(|source| !source.is_file()) {
             let picture = missing.file_name().unwrap_or_default().to_string_lossy();
             return Err(format!(
                 "the tileset `{}` is in {picture}, which does not exist in its folder: add the file, or choose another in Tiled",
@@ -159,21 +160,16 @@ fn layers_of(map: &Map) -> Vec<Layer<'_>> {
 
 /// Checks that the map has all that the legend names as walls or hazards. A map may do without a class of tiles.
 fn check_legend(map: &Map, layers: &[Layer], legend: &MapLegend) -> Result<(), String> {
-    let names: BTreeSet<&str> = layers
-        .iter()
-        .filter(|layer| layer.as_tile_layer().is_some())
-        .map(|layer| layer.name.as_str())
-        .chain(
-            map.tilesets()
-                .iter()
-                .flat_map(|tiles| tiles.tiles().map(|(_, tile)| tile.user_type.as_str()).collect::<Vec<_>>()),
-        )
-        .filter(|name| !name.is_empty())
-        .collect();
-    match legend.walls.iter().chain(&legend.hazards).find(|name| !names.contains(name.as_str())) {
+    let tile_layers = layers.iter().filter(|layer| layer.as_tile_layer().is_some());
+    let mut names: BTreeSet<String> = tile_layers.map(|layer| layer.name.clone()).collect();
+    for tiles in map.tilesets() {
+        names.extend(tiles.tiles().map(|(_, tile)| tile.user_type.clone()));
+    }
+    names.remove("");
+    match legend.walls.iter().chain(&legend.hazards).find(|name| !names.contains(*name)) {
         None => Ok(()),
         Some(missing) => {
-            let names: Vec<&str> = names.into_iter().collect();
+            let names: Vec<String> = names.into_iter().collect();
             Err(format!(
                 "it has no layer of tiles, and no class of tiles, with the name `{missing}`: there are {}",
                 if names.is_empty() { "none".to_owned() } else { names.join(", ") }
@@ -279,8 +275,8 @@ mod tests {
         assert_eq!(game.level_count(), Some(3));
         let name = |level| levels.level_name("default", level);
         assert_eq!([name(0), name(1)].map(Option::unwrap_or_default), ["a", "b"]);
-        assert_eq!(game.layout("default", 0), game.layout("default", 1), "they are copies");
-        assert_ne!(game.layout("default", 0), game.layout("default", 2));
+        assert_eq!(Game::layout(&game, "default", 0), Game::layout(&game, "default", 1), "they are copies");
+        assert_ne!(Game::layout(&game, "default", 0), Game::layout(&game, "default", 2));
     }
 
     #[test]
@@ -316,10 +312,7 @@ mod tests {
     #[test]
     fn a_pattern_without_maps_is_an_error() {
         let error = read("no/such/*.tmx", &legend()).expect_err("no maps");
-        assert!(
-            error.starts_with("no file matches no/such/*.tmx: name maps of Tiled in the folder `assets`"),
-            "{error}"
-        );
+        assert!(error.starts_with("no file matches no/such/*.tmx: name maps of Tiled below `assets`"), "{error}");
         let error = read("maps/[.tmx", &legend()).expect_err("no pattern");
         assert!(error.starts_with("the pattern maps/[.tmx is invalid: "), "{error}");
     }
