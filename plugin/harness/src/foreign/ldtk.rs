@@ -252,7 +252,9 @@ fn external_layers(level: &Level, is_external: bool, folder: &Path) -> Result<Op
         return Err("it has no layers: save the project with LDtk again".to_owned());
     };
     let text = read_text_file(&folder.join(file), MOST_BYTES).map_err(|error| {
-        format!("cannot read its file {file}: {error}; save the project with LDtk again, or leave out `Save levels separately`")
+        format!(
+            "cannot read its file {file}: {error}; save the project with LDtk again, or leave out `Save levels separately`"
+        )
     })?;
     let level: Level = json(&text, file)?;
     Ok(Some(level.layer_instances.unwrap_or_default()))

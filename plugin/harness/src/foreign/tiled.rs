@@ -98,7 +98,8 @@ fn check(map: &Map) -> Result<(), String> {
         if let Some(missing) = pictures.find(|source| !source.is_file()) {
             let picture = missing.file_name().unwrap_or_default().to_string_lossy();
             return Err(format!(
-                "the tileset `{}` is in {picture}, which does not exist in its folder: add the file, or choose another in Tiled",
+                "the tileset `{}` is in {picture}, which does not exist in its folder: add the file, or choose another \
+                 in Tiled",
                 tiles.name
             ));
         }

@@ -8,7 +8,6 @@ UIDS = {letter: 10 + number for number, letter in enumerate(THINGS)}
 HERE = pathlib.Path(__file__).parent
 ASSETS = HERE.parent / "assets"
 
-
 def steps(rows):
     """Returns the length of the shortest path from the start to the exit, or nothing."""
     cells = {(x, y): letter for y, row in enumerate(rows) for x, letter in enumerate(row)}
@@ -29,7 +28,6 @@ def steps(rows):
                 known[then] = known[state] + 1
                 queue.append(then)
 
-
 def room(number):
     """Draws a room with a path of 10 steps or more."""
     dice = random.Random(number)
@@ -43,27 +41,22 @@ def room(number):
         if (steps(rows) or 0) >= 10:
             return rows
 
-
 def iid(*parts):
     return str(uuid.uuid5(uuid.NAMESPACE_URL, "/".join(map(str, parts))))
 
-
 def tile(letter):
     return dict(tilesetUid=1, x=SIDE * list(THINGS).index(letter), y=0, w=SIDE, h=SIDE)
-
 
 def entity(name, x, y, letter):
     return dict(__identifier=THINGS[letter], __grid=[x, y], __pivot=[0, 0], __tags=[], __tile=tile(letter), __smartColor="#BE4A2F",
                 __worldX=None, __worldY=None, iid=iid(name, x, y), width=SIDE, height=SIDE, defUid=UIDS[letter], px=[SIDE * x, SIDE * y],
                 fieldInstances=[])
 
-
 def layer(name, kind, number, uid, csv, entities):
     return dict(__identifier=kind, __type=kind, __cWid=WIDTH, __cHei=HEIGHT, __gridSize=SIDE, __opacity=1, __pxTotalOffsetX=0,
                 __pxTotalOffsetY=0, __tilesetDefUid=None, __tilesetRelPath=None, iid=iid(name, kind), levelId=number, layerDefUid=uid,
                 pxOffsetX=0, pxOffsetY=0, visible=True, optionalRules=[], intGridCsv=csv, autoLayerTiles=[], seed=number,
                 overrideTilesetUid=None, gridTiles=[], entityInstances=entities)
-
 
 def level(number, name, rows):
     csv = [".#^".find(letter) if letter in "#^" else 0 for row in rows for letter in row]
@@ -73,7 +66,6 @@ def level(number, name, rows):
                 pxHei=HEIGHT * SIDE, __bgColor="#262B44", bgColor=None, useAutoIdentifier=False, bgRelPath=None, bgPos=None, bgPivotX=0.5,
                 bgPivotY=0.5, __smartColor="#ADADB5", __bgPos=None, externalRelPath=None, fieldInstances=[], layerInstances=layers,
                 __neighbours=[])
-
 
 def project(levels):
     values = [dict(value=1, identifier="wall", color="#8B9BB4", tile=None, groupUid=0),
@@ -103,7 +95,6 @@ def project(levels):
                 backupLimit=10, backupRelPath=None, levelNamePattern="Room_%idx", tutorialDesc=None, customCommands=[], flags=[],
                 defs=definitions, levels=levels, worlds=[], dummyWorldIid=iid("world"))
 
-
 def picture():
     """Draws a walker, a key, a door and an exit."""
     colour = {"P": (0, 149, 233), "k": (254, 231, 97), "d": (184, 111, 80), "E": (99, 199, 77)}
@@ -114,7 +105,6 @@ def picture():
     chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
     header = struct.pack(">IIBBBBB", SIDE * len(THINGS), SIDE, 8, 6, 0, 0, 0)
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"".join(lines))) + chunk(b"IEND", b"")
-
 
 drawn = [text.splitlines() for text in (HERE / "rooms.txt").read_text().strip().split("\n\n")]
 rooms = [(name, rows) for name, *rows in drawn] + [(f"Room_{number}", room(number)) for number in range(len(drawn), ROOMS)]

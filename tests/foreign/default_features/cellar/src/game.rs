@@ -1,7 +1,7 @@
 //! Cellar: a walk through rooms that are drawn in LDtk, from the start to the exit. Walls and locked doors are in the way,
 //! pits are deadly, and each key opens one door.
 
-use std::collections::{HashMap, VecDeque};
+use std::collections::{HashMap, VecDeque, hash_map::Entry};
 
 use bevy::prelude::*;
 use bevy_ecs_ldtk::{prelude::*, utils::grid_coords_to_translation};
@@ -102,8 +102,8 @@ impl Room {
                     Some(Cell::Exit) => return Some(first.unwrap_or(index)),
                     Some(_) => {}
                 }
-                if !known.contains_key(&next) {
-                    known.insert(next.clone(), Some(first.unwrap_or(index)));
+                if let Entry::Vacant(free) = known.entry(next.clone()) {
+                    free.insert(Some(first.unwrap_or(index)));
                     open.push_back(next);
                 }
             }
