@@ -68,8 +68,8 @@ def level(number, name, rows):
                 __neighbours=[])
 
 def project(levels):
-    values = [dict(value=1, identifier="wall", color="#8B9BB4", tile=None, groupUid=0),
-              dict(value=2, identifier="pit", color="#A22633", tile=None, groupUid=0)]
+    kinds = [("wall", "#8B9BB4"), ("pit", "#A22633")]
+    values = [dict(value=at + 1, identifier=name, color=colour, tile=None, groupUid=0) for at, (name, colour) in enumerate(kinds)]
     entity_defs = [dict(
         identifier=name, uid=UIDS[letter], tags=[], exportToToc=False, allowOutOfBounds=False, doc=None, width=SIDE, height=SIDE,
         resizableX=False, resizableY=False, minWidth=None, maxWidth=None, minHeight=None, maxHeight=None, keepAspectRatio=False,
