@@ -8,7 +8,8 @@
 //! The files of the folder, in reading order:
 //!
 //! - `runtime`: the plugin's state of a foreign game in its World, and the systems of its description.
-//! - `levels`: modes, level files, plans and proofs.
+//! - `levels`: modes, level files, levels of an editor, plans and proofs.
+//! - `ldtk`, `tiled`: levels of these two editors, with the features of the same names.
 //! - `restart`, `clocks`: the start of an episode, and the game's clocks at that time.
 //! - `input`: the path from an action into the game, and the mask of actions.
 //! - `agents`: several agents in one World, and their inputs.
@@ -61,12 +62,16 @@ mod clocks;
 mod description;
 mod guess;
 mod input;
+#[cfg(feature = "ldtk")]
+mod ldtk;
 mod levels;
 mod observe;
 mod paths;
 mod restart;
 mod runtime;
 mod snapshot;
+#[cfg(feature = "tiled")]
+mod tiled;
 
 use crate::{
     defect::DefectKind,
@@ -95,8 +100,10 @@ use std::sync::Arc;
 
 #[cfg(feature = "ui")]
 pub use crate::foreign::clicks::ButtonClicks;
+#[cfg(any(feature = "ldtk", feature = "tiled"))]
+pub use crate::foreign::levels::MapLegend;
 pub use crate::foreign::{
-    levels::{IntoLevelTextError, LevelFromFile, PlayedMode},
+    levels::{EditorLevel, IntoLevelTextError, LevelFromFile, PlayedMode},
     observe::IntoPlanPosition,
     paths::PathError,
     runtime::{IntoActionValue, IntoValues, LevelSeed, PlayedAgent, Restart},

@@ -334,6 +334,12 @@ pub trait LevelTools: Send + Sync {
         None
     }
 
+    /// Returns the name of a level for people, such as its identifier in a level editor. Returns `None`, by default: the
+    /// level has no name but its mode and number.
+    fn level_name(&self, _mode: &str, _level: u64) -> Option<String> {
+        None
+    }
+
     /// Reads a level in the game's own format, or says what is wrong with it and on which line. Returns `None`, by
     /// default: the game has no level files.
     ///

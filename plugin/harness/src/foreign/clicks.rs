@@ -189,7 +189,7 @@ fn aim(world: &mut World) {
 
 /// Notes the areas of the buttons for a person whose clicks become actions.
 fn note_areas(world: &mut World) {
-    let Some(agent) = playing_agent(world) else { return };
+    let Some(&agent) = playing_agents(world).first() else { return };
     if world.get(agent) != Some(&Control::Human) || world.get::<PressesForPeople>(agent).is_none() {
         return;
     }

@@ -153,6 +153,9 @@ impl Plugin for ForeignPlugin {
     fn build(&self, app: &mut App) {
         let description = &self.game.description;
         app.insert_resource(PlayedMode(self.mode.clone()));
+        if let Some(first) = self.game.editor_level("", 0) {
+            app.insert_resource(first.clone());
+        }
         (description.plugin)(app);
         if !app.is_plugin_added::<VirtualInputPlugin>() {
             app.add_plugins(VirtualInputPlugin { route: InputRoute::Messages });

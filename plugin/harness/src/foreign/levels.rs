@@ -1,13 +1,16 @@
-//! Levels of a foreign game: its modes, level files, plans and proofs.
+//! Levels of a foreign game: its modes, level files, levels of an editor, plans and proofs.
 
 use crate::{
     detector::LevelProof,
-    floor_plan::FloorPlan,
+    drawing::{Drawing, MarkForm, Rgb, Shape},
+    floor_plan::{FloorPlan, joined_tiles},
     foreign::{ForeignGame, runtime::LevelSeed},
-    game::{LevelTools, level_designs},
+    game::{Game, LevelTools, level_designs},
+    inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
     level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
 };
 use bevy::prelude::*;
+use bevy_playbot::state_hash::StateHash;
 use std::{
     any::{Any, TypeId, type_name},
     fmt::Display,
@@ -40,6 +43,182 @@ impl LevelFromFile {
     }
 }
 
+/// A level that a level editor has drawn: see [`ForeignGame::editor_levels`]. A game with such levels finds the one that
+/// is played as this resource. Inserted before the game is added to the app, and before every restart.
+#[derive(Resource, Clone, Debug, Default, PartialEq, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone, Debug, Default, PartialEq)]
+pub struct EditorLevel {
+    /// Its name: the identifier in LDtk, or the name of the file without its ending for Tiled.
+    pub name: String,
+    /// The unique identifier that LDtk gives it; empty for other editors.
+    pub iid: String,
+    /// Path of its file or project, as an `AssetServer` takes it.
+    pub file: String,
+    /// A letter for each cell, row by row from the top: see [`of_rows`](Self::of_rows).
+    pub rows: Vec<String>,
+    /// Its plan.
+    pub plan: FloorPlan,
+    /// A hash of its layout: see [`ForeignGame::layout`].
+    pub layout: u64,
+}
+
+impl EditorLevel {
+    /// Creates a level of cells with this width and height, row by row from the top: `#` is a wall, `^` kills, `S` is the
+    /// start, and `G` the goal. Other letters are free. The lower left corner is (0, 0). The layout is that of the rows.
+    ///
+    /// ```
+    /// use bevy::math::Vec2;
+    /// use playbot_harness::foreign::EditorLevel;
+    ///
+    /// let level = EditorLevel::of_rows("pantry", ["###", "S.G"].map(str::to_owned).into(), Vec2::splat(16.0));
+    /// assert_eq!((level.plan.start, level.plan.goal), (Vec2::new(8.0, 8.0), Vec2::new(40.0, 8.0)));
+    /// assert_eq!(level.plan.walls.len(), 1);
+    /// ```
+    pub fn of_rows(name: impl Into<String>, rows: Vec<String>, cell: Vec2) -> Self {
+        let cells: Vec<Vec<char>> = rows.iter().map(|row| row.chars().collect()).collect();
+        let size = [cells.len(), cells.iter().map(Vec::len).max().unwrap_or(0)];
+        let is_one = |letter: char| {
+            let cells = &cells;
+            move |row: usize, column: usize| cells[row].get(column) == Some(&letter)
+        };
+        let square = |row: usize, column: usize| {
+            let corner = Vec2::new(column as f32, (size[0] - 1 - row) as f32) * cell;
+            Rect::from_corners(corner, corner + cell)
+        };
+        let middle = |letter: char| joined_tiles(size, is_one(letter), square).first().map_or(Vec2::ZERO, Rect::center);
+        let plan = FloorPlan {
+            bounds: Rect::from_corners(Vec2::ZERO, Vec2::new(size[1] as f32, size[0] as f32) * cell),
+            walls: joined_tiles(size, is_one('#'), square),
+            hazards: joined_tiles(size, is_one('^'), square),
+            start: middle('S'),
+            goal: middle('G'),
+            ..FloorPlan::default()
+        };
+        let layout = StateHash::of(rows.join("\n").bytes().map(u64::from)).0;
+        Self { name: name.into(), rows, plan, layout, ..Self::default() }
+    }
+
+    /// Draws the plan.
+    fn picture(&self) -> Drawing {
+        let (longest, bounds) = (640.0, self.plan.bounds);
+        let scale = longest / bounds.size().max_element().max(f32::MIN_POSITIVE);
+        let at = |point: Vec2| Vec2::new(point.x - bounds.min.x, bounds.max.y - point.y) * scale;
+        let blocks = |areas: &[Rect], fill: Rgb| -> Vec<Shape> {
+            let block = |area: &Rect| Shape::Block { area: Rect::from_corners(at(area.min), at(area.max)), fill };
+            areas.iter().map(block).collect()
+        };
+        let mark = |form, centre: Vec2, fill: Rgb| Shape::Mark {
+            form,
+            centre: at(centre),
+            radius: longest / 80.0,
+            fill,
+            outline: [255; 3],
+        };
+        let mut shapes = blocks(&[bounds], [238, 238, 238]);
+        shapes.extend(blocks(&self.plan.walls, [96, 96, 96]));
+        shapes.extend(blocks(&self.plan.hazards, [213, 94, 0]));
+        shapes.push(mark(MarkForm::Disc, self.plan.start, [0, 114, 178]));
+        shapes.push(mark(MarkForm::Diamond, self.plan.goal, [0, 158, 115]));
+        Drawing { label: format!("the level {}", self.name), size: bounds.size() * scale, shapes }
+    }
+}
+
+/// The meaning of the parts of a level editor's map, for the plan of the level: see [`ForeignGame`]'s methods `ldtk` and
+/// `tiled`.
+#[cfg(any(feature = "ldtk", feature = "tiled"))]
+#[derive(Clone, Debug, Default)]
+pub struct MapLegend {
+    pub(super) walls: Vec<String>,
+    pub(super) hazards: Vec<String>,
+    start: Option<String>,
+    goal: Option<String>,
+    in_cells: bool,
+}
+
+#[cfg(any(feature = "ldtk", feature = "tiled"))]
+impl MapLegend {
+    /// Names the walls. In LDtk they are values of an integer grid, by number or by identifier. In Tiled they are layers
+    /// of tiles, by name, or tiles, by class.
+    pub fn walls(mut self, names: impl IntoIterator<Item = impl ToString>) -> Self {
+        self.walls = names.into_iter().map(|name| name.to_string()).collect();
+        self
+    }
+
+    /// Names all that kills, as [`walls`](Self::walls) names walls.
+    pub fn hazards(mut self, names: impl IntoIterator<Item = impl ToString>) -> Self {
+        self.hazards = names.into_iter().map(|name| name.to_string()).collect();
+        self
+    }
+
+    /// Names the entity at the start of a level, or the object by name or class. Each level must have one.
+    pub fn start(mut self, name: impl Into<String>) -> Self {
+        self.start = Some(name.into());
+        self
+    }
+
+    /// Names the entity at the goal of a level, as [`start`](Self::start) does. Each level must have one.
+    pub fn goal(mut self, name: impl Into<String>) -> Self {
+        self.goal = Some(name.into());
+        self
+    }
+
+    /// Counts the lengths of plans in cells instead of pixels.
+    pub fn in_cells(mut self) -> Self {
+        self.in_cells = true;
+        self
+    }
+
+    /// Returns the level of a map, from a letter for each cell and the things in it, with their names and positions in
+    /// pixels from the upper left corner.
+    ///
+    /// # Errors
+    ///
+    /// The start or the goal is missing.
+    pub(super) fn level(
+        &self,
+        name: &str,
+        mut letters: Vec<Vec<char>>,
+        cell: Vec2,
+        things: &[(Vec<&str>, Vec2)],
+    ) -> Result<EditorLevel, String> {
+        let find = |wanted: &Option<String>, method: &str| -> Result<Option<Vec2>, String> {
+            let Some(wanted) = wanted else { return Ok(None) };
+            let thing = things.iter().find(|(names, _)| names.contains(&wanted.as_str()));
+            thing.map(|(_, at)| Some(*at)).ok_or_else(|| {
+                format!("it has no `{wanted}`, which `.{method}` names: place one in the level, or name another")
+            })
+        };
+        let (start, goal) = (find(&self.start, "start")?, find(&self.goal, "goal")?);
+        let others = things.iter().map(|(names, at)| (names.first().and_then(|name| name.chars().next()), *at));
+        let marks = [(Some('S'), start), (Some('G'), goal)].into_iter();
+        let marks = marks.filter_map(|(letter, at)| Some((letter, at?)));
+        for (letter, at) in
+            marks.chain(others.map(|(letter, at)| (letter.map(|letter| letter.to_ascii_lowercase()), at)))
+        {
+            let [column, row] = (at / cell).to_array().map(|at| at.floor().max(0.0) as usize);
+            if let Some(free) = letters.get_mut(row).and_then(|row| row.get_mut(column)).filter(|cell| **cell == '.') {
+                *free = letter.filter(char::is_ascii_alphanumeric).unwrap_or('*');
+            }
+        }
+        let unit = if self.in_cells { Vec2::ONE } else { cell };
+        let height = letters.len() as f32;
+        let rows = letters.into_iter().map(String::from_iter).collect();
+        let mut level = EditorLevel::of_rows(name, rows, unit);
+        // Things may stand anywhere in their cells.
+        let exact = |at: Vec2| Vec2::new(at.x / cell.x, height - at.y / cell.y) * unit;
+        level.plan.start = start.map_or(level.plan.start, exact);
+        level.plan.goal = goal.map_or(level.plan.goal, exact);
+        Ok(level)
+    }
+}
+
+/// Returns the folder of the game's assets, if Bevy's settings are its defaults.
+#[cfg(any(feature = "ldtk", feature = "tiled"))]
+pub(super) fn asset_folder() -> std::path::PathBuf {
+    bevy::asset::io::file::FileAssetReader::get_base_path().join("assets")
+}
+
 /// Returns the number of a level for the systems of a game, and the level if it is from a file.
 pub(super) fn level_ahead(
     game: &ForeignGame,
@@ -50,6 +229,15 @@ pub(super) fn level_ahead(
     let design = designs.design(level)?.clone();
     let path = designs.path(level).unwrap_or_default().to_owned();
     Ok((LevelSeed(level), LevelFromFile(Some((path, design)))))
+}
+
+/// Returns the level of an editor that is played for a number, if the levels are not from files.
+pub(super) fn editor_level_ahead(
+    game: &ForeignGame,
+    designs: Option<&LevelDesigns>,
+    level: u64,
+) -> Option<EditorLevel> {
+    if designs.is_some() { None } else { game.editor_level("", level).cloned() }
 }
 
 /// The error of a text that is not a level: any error that can be displayed, or a [`LevelTextError`] with its line.
@@ -126,11 +314,16 @@ pub(super) struct LevelParts {
     proof: Option<OfNumber<LevelProof>>,
     proof_of_file: Option<OfFile<LevelProof>>,
     layout: Option<OfNumber<u64>>,
+    /// Levels of an editor, or the reason that there are none.
+    editor: Option<Result<Arc<[EditorLevel]>, String>>,
 }
 
 impl LevelParts {
     /// Returns the reason why the parts do not fit together, if there is one.
     pub(super) fn problem(&self, game: &str) -> Option<String> {
+        if let Some(Err(why)) = &self.editor {
+            return Some(format!("the levels of the game `{game}`: {why}"));
+        }
         let plan = self.plan_of_file.as_ref().map(|plan| (".plan_of_file", plan.level));
         let proof = self.proof_of_file.as_ref().map(|proof| (".prove_file", proof.level));
         plan.into_iter().chain(proof).find_map(|(method, level)| {
@@ -303,6 +496,49 @@ impl ForeignGame {
         self.with(|description| description.level_parts.layout = Some(Arc::new(layout)))
     }
 
+    /// Declares the levels that a level editor has drawn, or the reason that they cannot be read. They are numbered from 0.
+    /// Their names are in `playbot level`, their plans in pictures, and levels with the same layout are found by
+    /// `playbot levels`. The game finds the level that is played as the resource [`EditorLevel`].
+    ///
+    /// The methods `ldtk` and `tiled`, features of the same names, read the files of these editors. For any other format
+    /// this takes what a reader of the game's own returns. [`plan`](Self::plan) and [`layout`](Self::layout) replace
+    /// those of the levels.
+    ///
+    /// ```
+    /// use bevy::{math::Vec2, prelude::*};
+    /// use playbot_harness::{foreign::{EditorLevel, ForeignGame}, prelude::*};
+    ///
+    /// let rows = |text: &str| text.lines().map(str::to_owned).collect();
+    /// let levels = vec![
+    ///     EditorLevel::of_rows("pantry", rows("####\nS..G"), Vec2::ONE),
+    ///     EditorLevel::of_rows("stairs", rows("S..^G"), Vec2::ONE),
+    /// ];
+    /// let game = ForeignGame::new("walk", 1, |_: &mut App| {}).editor_levels(Ok(levels)).level(
+    ///     |level: Res<EditorLevel>| info!("the game loads {}", level.name),
+    /// );
+    /// assert_eq!(game.level_count(), Some(2));
+    /// assert_eq!(game.tools().levels.level_name("default", 3).as_deref(), Some("stairs"));
+    /// ```
+    pub fn editor_levels(self, levels: Result<Vec<EditorLevel>, String>) -> Self {
+        let levels = levels.and_then(|levels| {
+            let none = || "there is none: draw one in the level editor".to_owned();
+            if levels.is_empty() { Err(none()) } else { Ok(Arc::<[EditorLevel]>::from(levels)) }
+        });
+        self.with(|description| {
+            if let Ok(levels) = &levels {
+                description.levels = Some(levels.len() as u64);
+            }
+            description.level_parts.editor = Some(levels);
+        })
+    }
+
+    /// Returns the level of an editor for a mode and number, if the game has such levels.
+    pub(super) fn editor_level(&self, mode: &str, level: u64) -> Option<&EditorLevel> {
+        let levels = self.description.level_parts.editor.as_ref()?.as_ref().ok()?;
+        let index = self.level_of(level) % levels.len() as u64;
+        levels.get(usize::try_from(index).ok()?).filter(|_| !is_level_files(mode))
+    }
+
     /// Returns a function's output for a level: of the file for levels from files, or of its mode and number.
     fn of_level<Out>(
         &self,
@@ -315,6 +551,33 @@ impl ForeignGame {
         }
         let designs = level_designs(self, mode).ok()?;
         (of_file?.read)(designs.design(level).ok()?)
+    }
+}
+
+impl ForeignGame {
+    /// Shows a level of an editor: its name and its rows.
+    fn show_drawn(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
+        let name = self.name();
+        if let Some(why) = self.problem() {
+            return Err(InspectError::Usage(why));
+        }
+        if request.map.is_some() || request.file.is_some() {
+            let why = format!("`{name}` shows levels by their numbers: name one with --level");
+            return Err(InspectError::Usage(why));
+        }
+        let mode = request.mode.unwrap_or_else(|| Game::modes(self)[0]);
+        self.check_mode(mode)?;
+        let level = request.level.unwrap_or(0);
+        let Some(drawn) = self.editor_level(mode, level) else {
+            return Err(InspectError::Usage(format!("`{name}` shows no level files: name one of its modes")));
+        };
+        let EditorLevel { name: title, file, rows, .. } = drawn;
+        let json = serde_json::json!({ "mode": mode, "level": level, "name": title, "file": file, "rows": rows });
+        Ok(LevelView {
+            text: format!("{mode}:{level} is `{title}` of {file}\n{}", rows.join("\n")),
+            json: json.to_string(),
+            picture: request.picture.then(|| LevelPicture::Drawing(drawn.picture())),
+        })
     }
 }
 
@@ -334,12 +597,23 @@ impl LevelTools for ForeignGame {
     }
 
     fn layout_hash(&self, mode: &str, level: u64) -> Option<u64> {
-        self.of_level((mode, level), self.description.level_parts.layout.as_ref(), None)
+        let declared = self.of_level((mode, level), self.description.level_parts.layout.as_ref(), None);
+        declared.or_else(|| self.editor_level(mode, level).map(|drawn| drawn.layout))
+    }
+
+    fn level_name(&self, mode: &str, level: u64) -> Option<String> {
+        self.editor_level(mode, level).map(|drawn| drawn.name.clone())
+    }
+
+    fn show(&self, request: &LevelRequest) -> Option<Result<LevelView, InspectError>> {
+        self.description.level_parts.editor.as_ref()?;
+        Some(self.show_drawn(request))
     }
 
     fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
         let LevelParts { plan, plan_of_file, .. } = &self.description.level_parts;
-        self.of_level((mode, level), plan.as_ref(), plan_of_file.as_ref())
+        let declared = self.of_level((mode, level), plan.as_ref(), plan_of_file.as_ref());
+        declared.or_else(|| self.editor_level(mode, level).map(|drawn| drawn.plan.clone()))
     }
 
     fn prove(&self, mode: &str, level: u64) -> LevelProof {

@@ -3,7 +3,7 @@
 use crate::{
     foreign::{
         clocks::{ClockSettings, leave_loading_out, stand_still},
-        levels::{LevelFromFile, level_ahead},
+        levels::{EditorLevel, LevelFromFile, editor_level_ahead, level_ahead},
         observe::forget_state,
         runtime::{AgentParts, Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agents, with_foreign},
     },
@@ -38,7 +38,11 @@ fn begin(world: &mut World, agent: Entity, level: u64) {
         }
     }
     with_foreign(world, agent, |world, foreign| {
-        let (seed, file) = level_ahead(&foreign.game, world.get_resource::<LevelDesigns>(), level)?;
+        let designs = world.get_resource::<LevelDesigns>();
+        let (seed, file) = level_ahead(&foreign.game, designs, level)?;
+        if let Some(drawn) = editor_level_ahead(&foreign.game, designs, level) {
+            world.insert_resource(drawn);
+        }
         world.insert_resource(seed);
         world.insert_resource(file);
         restart(world, foreign)?;
@@ -107,6 +111,7 @@ pub(super) fn announce(
     designs: Option<Res<LevelDesigns>>,
     mut seed: ResMut<LevelSeed>,
     mut file: ResMut<LevelFromFile>,
+    mut editor: Option<ResMut<EditorLevel>>,
 ) {
     let active = agents.iter().filter(|(_, _, control)| control.is_active());
     let first = active.min_by_key(|(_, agent, _)| agent.index);
@@ -114,8 +119,14 @@ pub(super) fn announce(
         return;
     }
     // A level that does not exist is reported when its episode begins.
-    if let Ok(ahead) = level_ahead(&cell.lock().game, designs.as_deref(), event.level) {
+    let foreign = cell.lock();
+    if let Ok(ahead) = level_ahead(&foreign.game, designs.as_deref(), event.level) {
         (*seed, *file) = ahead;
+    }
+    if let Some(played) = &mut editor
+        && let Some(drawn) = editor_level_ahead(&foreign.game, designs.as_deref(), event.level)
+    {
+        **played = drawn;
     }
 }
 

@@ -123,8 +123,10 @@ pub(crate) fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str
     let share = score.solved as f64 / score.episodes.max(1) as f64;
     let median = score.ticks.map(|ticks| ticks.median);
     let places = level.places.unwrap_or_default();
+    let name =
+        drawn.and_then(|drawn| drawn.name.as_deref()).map_or_else(String::new, |name| format!(" {}", text(name)));
     let mut out = format!(
-        "<tbody data-k=\"{kinds}\"><tr><th scope=\"row\" data-v=\"{}\">{}</th><td data-v=\"{}\" class=\"{outcome}\">\
+        "<tbody data-k=\"{kinds}\"><tr><th scope=\"row\" data-v=\"{}\">{}{name}</th><td data-v=\"{}\" class=\"{outcome}\">\
          {outcome}</td><td data-v=\"{share:.4}\">{} of {}</td><td data-v=\"{:.4}\">{}</td><td data-v=\"{}\">{}</td>\
          <td data-v=\"{:.1}\">{}</td><td data-v=\"{}\">{}</td></tr>\n",
         level.index,
@@ -171,7 +173,7 @@ pub(crate) fn details(record: &TestRecord, level: &LevelVerdict, program: &str, 
         let more = if more > 0 { format!("<li>and {more} more</li>\n") } else { String::new() };
         let _ = write!(out, "<ul class=\"findings\">\n{listed}{more}</ul>\n");
     }
-    if let Some(Drawn { picture, clip }) = drawn {
+    if let Some(Drawn { picture, clip, .. }) = drawn {
         let clip = clip.as_ref().map_or_else(String::new, |clip| {
             format!("<button type=\"button\" class=\"clip\" data-clip=\"{clip}\" hidden>Play the failure</button>")
         });

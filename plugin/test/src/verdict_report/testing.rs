@@ -51,6 +51,9 @@ impl LevelTools for Garden {
     fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
         Some(garden())
     }
+    fn level_name(&self, _mode: &str, level: u64) -> Option<String> {
+        (level == 64).then(|| "Thicket".to_owned())
+    }
 }
 
 /// Makes a floor with a pit of thorns and many bushes.

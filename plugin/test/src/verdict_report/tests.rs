@@ -63,6 +63,13 @@ fn long(index: u64) -> LevelVerdict {
 }
 
 #[test]
+fn a_level_that_is_drawn_has_its_name_in_an_editor_beside_its_number() {
+    let levels: Vec<LevelVerdict> = (0..65).map(|index| level(index, 1, 9, 5)).collect();
+    let html = page(&levels, &PLAIN);
+    assert!(html.contains(">hard:64 Thicket</th>") && html.contains(">hard:63</th>"), "{html}");
+}
+
+#[test]
 fn common_stops_and_levels_that_are_solved_in_their_first_tick_are_on_the_page() {
     let (kind, entity) = (StopKind::Furthest, Some("the entity with `Player<T>`".to_owned()));
     let stop = Some(CommonStop { kind, x: 12.4, y: 3.0, within: 0.5, episodes: 3, of: 3, entity });
