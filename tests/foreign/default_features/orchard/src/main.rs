@@ -1,19 +1,17 @@
 //! Orchard, a platformer without any code for playbot, with every verb of it.
 
-mod game;
-
 use std::process::ExitCode;
 
 use EpisodeEnd::Terminated;
 use KeyCode::{ArrowLeft, ArrowRight, Space};
 use Screen::{Lost, Menu, Won};
 use bevy::prelude::*;
-use game::{ASSETS, Body, FEET, Hero, JUMP_SPEED, Level, Map, RUN_SPEED, Run, Screen};
+use foreign_orchard::{ASSETS, Body, FEET, Hero, JUMP_SPEED, Level, Map, RUN_SPEED, Run, Screen, game};
 use playbot::harness::foreign::{ForeignGame, LevelSeed};
 use playbot::prelude::EpisodeEnd;
 
 fn main() -> ExitCode {
-    playbot::main(&[&ForeignGame::new("orchard", 1, game::game)
+    playbot::main(&[&ForeignGame::new("orchard", 1, game)
         .hz(64.0)
         .default_plugins(|plugins| plugins.set(AssetPlugin { file_path: ASSETS.into(), ..default() }))
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])

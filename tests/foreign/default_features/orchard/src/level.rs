@@ -11,7 +11,7 @@ use bevy::{
 use chacha20::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
-use super::{ACCELERATION, GRAVITY, RUN_SPEED};
+use crate::{ACCELERATION, GRAVITY, RUN_SPEED};
 
 /// Rows of each chunk.
 const HEIGHT: usize = 8;
@@ -111,6 +111,7 @@ pub struct Map {
 }
 
 impl Map {
+    /// Joins chunks from left to right.
     pub fn of<'a>(chunks: impl IntoIterator<Item = &'a Chunk>) -> Self {
         Self { columns: chunks.into_iter().flat_map(|chunk| chunk.0.iter().copied()).collect() }
     }

@@ -19,37 +19,49 @@ pub const ASSETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets");
 const HERO: [f32; 2] = [0.3, 0.3];
 /// The distance from the middle of the hero to its feet.
 pub const FEET: f32 = HERO[0] + HERO[1] / 2.0;
+/// Speed on the ground, tiles per second.
 pub const RUN_SPEED: f32 = 6.5;
+/// Upward speed of a jump, tiles per second.
 pub const JUMP_SPEED: f32 = 13.0;
 const ACCELERATION: f32 = 40.0;
 const GRAVITY: f32 = 36.0;
 /// Seconds after an edge in which a jump is still possible.
 const COYOTE_TIME: f32 = 0.08;
 
+/// The part of the game that is shown.
 #[derive(States, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 pub enum Screen {
+    /// The menu with Play and Quit.
     #[default]
     Menu,
+    /// The level's drawings are on their way.
     Loading,
+    /// The hero runs.
     Playing,
+    /// The hero is through the gate.
     Won,
+    /// The hero has touched thorns, or is in a pit.
     Lost,
 }
 
 /// The number of the level that Play starts, and the drawings that it is made of.
 #[derive(Resource, Default)]
 pub struct Level {
+    /// The number, from which the drawings follow.
     pub number: u64,
     chunks: Vec<Handle<Chunk>>,
 }
 
-/// Fruit picked, and the farthest distance from the start.
+/// The success of the present run.
 #[derive(Resource, Default)]
 pub struct Run {
+    /// Fruit picked.
     pub fruit: u32,
+    /// The farthest place, tiles from the left.
     pub distance: f32,
 }
 
+/// The player's figure.
 #[derive(Component, Default)]
 pub struct Hero {
     /// Seconds in which a jump is possible.
@@ -89,6 +101,7 @@ enum MenuButton {
     Menu,
 }
 
+/// The game, without Bevy's own plugins.
 pub fn game(app: &mut App) {
     app.add_plugins(PhysicsPlugins::default())
         .insert_resource(Gravity(Vec2::NEG_Y * GRAVITY))
