@@ -182,14 +182,21 @@ fn win(commands: Commands, mut level: ResMut<Level>) {
     panel(commands, Screen::Won, "Through the gate!", &BACK);
 }
 
-fn clear(mut commands: Commands, old: Query<Entity, With<InLevel>>, mut map: ResMut<Map>, mut run: ResMut<Run>) {
+/// Takes the level down, with its drawings: each level loads as long as the first.
+fn clear(
+    mut commands: Commands,
+    old: Query<Entity, With<InLevel>>,
+    mut level: ResMut<Level>,
+    mut map: ResMut<Map>,
+    mut run: ResMut<Run>,
+) {
     old.iter().for_each(|entity| commands.entity(entity).despawn());
+    level.chunks.clear();
     *map = Map::default();
     *run = Run::default();
 }
 
 fn load(mut level: ResMut<Level>, server: Res<AssetServer>) {
-    // The chunks of the last level go once the new ones are asked for, so that both keep what they share.
     level.chunks = chunks_of(level.number).into_iter().map(|path| server.load(path)).collect();
 }
 
