@@ -10,7 +10,8 @@ use playbot_train::experiment::file::read_experiment;
 
 /// Returns every `experiment.ron` below `foreign`, with the name of its folder.
 fn experiments() -> Vec<(String, PathBuf)> {
-    let entries = fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join("foreign")).expect("it is there");
+    let below = |folder: &str| fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(folder)).expect("it is there");
+    let entries = below("foreign").chain(below("foreign/default_features"));
     let folders = entries.map(|entry| entry.expect("readable"));
     let files =
         folders.map(|folder| (folder.file_name().to_string_lossy().into_owned(), folder.path().join("experiment.ron")));

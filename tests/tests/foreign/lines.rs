@@ -6,7 +6,8 @@ use std::{
 };
 
 /// Foreign games.
-const GAMES: [&str; 5] = ["alien_cake_addict", "breakout", "default_features/cellar", "gem_hop", "slide"];
+const GAMES: [&str; 6] =
+    ["alien_cake_addict", "breakout", "default_features/cellar", "default_features/orchard", "gem_hop", "slide"];
 
 fn crate_of(game: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("foreign").join(game)

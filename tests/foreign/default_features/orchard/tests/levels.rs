@@ -1,0 +1,67 @@
+//! Tests of levels, as a game's own tests write them, and of what physics keeps from one episode to the next.
+
+use bevy::prelude::*;
+use foreign_orchard::{Body, FEET, Hero, Level, Map, Screen, game};
+use playbot::harness::{
+    foreign::{ForeignGame, LevelSeed},
+    game::Game,
+    worlds::build_world,
+};
+use playbot::prelude::*;
+
+/// Returns the game with the picker, as in `src/main.rs`, and with smaller observations.
+fn orchard() -> ForeignGame {
+    let (left, right, jump) = (KeyCode::ArrowLeft, KeyCode::ArrowRight, KeyCode::Space);
+    ForeignGame::new("orchard", 1, game)
+        .hz(64.0)
+        .keys([vec![], vec![left], vec![right], vec![right, jump]])
+        .clicks(["Play"])
+        .observe(["x", "y"], |hero: Option<Single<&Transform, With<Hero>>>| {
+            hero.map_or([0.0, 0.0], |at| [at.translation.x, at.translation.y])
+        })
+        .end(|screen: Res<State<Screen>>| match **screen {
+            Screen::Won => Some(EpisodeEnd::WON),
+            Screen::Lost => Some(EpisodeEnd::LOST),
+            Screen::Menu | Screen::Loading | Screen::Playing => None,
+        })
+        .time_limit(1500)
+        .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>, mut next: ResMut<NextState<Screen>>| {
+            level.number = seed.0;
+            next.set(Screen::Menu);
+        })
+        .demonstrator("picker", |hero: Option<Single<Body>>, map: Res<Map>| {
+            let Some((at, speed, hero)) = hero.map(Single::into_inner) else { return 4 };
+            let (right, jump) = map.hint(at.translation.truncate() - Vec2::Y * FEET, speed.0, hero.coyote > 0.0);
+            1 + u32::from(right) + u32::from(jump)
+        })
+}
+
+/// Plays these levels one after another in one World, and returns the state hashes of each.
+fn played(levels: &[u64]) -> Vec<Vec<u64>> {
+    let game = orchard();
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::list(levels.iter().copied())));
+    game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.0);
+    let mut episodes = vec![Vec::new(); levels.len()];
+    for _ in 0..1500 * levels.len() {
+        let finished = world.get::<EpisodeCount>(agents[0]).expect("an agent").finished as usize;
+        let Some(episode) = episodes.get_mut(finished) else { break };
+        world.tick().expect("sound");
+        episode.push(world.get::<StateHash>(agents[0]).expect("an agent").0);
+    }
+    episodes
+}
+
+#[test]
+fn an_episode_is_the_same_after_another_level_and_in_a_new_world() {
+    let episodes = played(&[3, 8, 3]);
+    assert!(episodes.iter().all(|episode| episode.len() > 300), "each level is played to its gate");
+    assert_eq!(episodes[0], episodes[2]);
+    assert_eq!(episodes[1], played(&[8])[0]);
+    assert_ne!(episodes[0], episodes[1]);
+}
+
+#[test]
+fn every_level_can_be_finished() {
+    assert_levels_solvable(&orchard(), "default:0..7");
+}
