@@ -76,6 +76,7 @@ fn loss_metrics_and_gradient_are_those_of_the_tensors() {
         let batch = Minibatch {
             augmented: None,
             left: None,
+            logit_offsets: None,
             inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
             ppo: PpoBatch { actions, old_log_probs: vector(old_log_probs, &device), advantages, old_values, returns },
             teacher: penalised.then(|| TeacherBatch {
@@ -127,6 +128,7 @@ fn actions_of_the_other_kind_are_refused() {
     let batch = Minibatch {
         augmented: None,
         left: None,
+        logit_offsets: None,
         inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
         ppo: PpoBatch {
             actions,
