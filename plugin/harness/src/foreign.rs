@@ -10,7 +10,7 @@
 //! - `runtime`: the plugin's state of a foreign game in its World, and the systems of its description.
 //! - `levels`: modes, level files, plans and proofs.
 //! - `restart`, `clocks`: the start of an episode, and the game's clocks at that time.
-//! - `input`: the path from an action into the game, and the mask of actions.
+//! - `input`: the path from an action into the game, the mask of actions, and the ticks that a decision holds.
 //! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `snapshot`: the state of an episode, saved and loaded.
 //! - `observe`, `paths`, `guess`: observation, position, reward and end after a tick, observations by the paths of
@@ -488,7 +488,7 @@ impl Game for ForeignGame {
         if let Some(input) = self.description.input.pressed() {
             agent.insert(input);
         }
-        if self.description.legal.is_some()
+        if (self.description.legal.is_some() || self.description.input.holds())
             && let ActionSpace::Discrete(actions) = self.actions()
         {
             agent.insert(LegalActions::new(std::iter::repeat_n(true, actions)));

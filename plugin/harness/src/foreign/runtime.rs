@@ -87,6 +87,8 @@ pub(super) struct Foreign {
     pub(super) restart: Option<OwnedSystem<()>>,
     pub(super) act: Option<OwnedSystem<()>>,
     pub(super) legal: Option<OwnedSystem<Vec<bool>>>,
+    /// The last decision, if decisions hold for several ticks.
+    pub(super) held: Option<u32>,
     pub(super) bot: Option<OwnedSystem<ActionValue>>,
     pub(super) hash: Option<OwnedSystem<u64>>,
     /// The World before the game started.
@@ -135,6 +137,7 @@ impl Foreign {
             restart,
             act: description.act.as_ref().map(|system| system.make()),
             legal: description.legal.as_ref().map(|system| system.make()),
+            held: None,
             bot: description.demonstrator.as_ref().map(|(_, system)| system.make()),
             hash: description.hash.as_ref().map(|system| system.make()),
             game: game.clone(),
@@ -145,6 +148,13 @@ impl Foreign {
             frames: 0,
             has_begun: false,
         }
+    }
+}
+
+impl Foreign {
+    /// Returns the decision that still holds in this tick of an episode; `None` if the agent decides.
+    pub(super) fn held_in(&self, tick: u32) -> Option<u32> {
+        if self.game.description.input.is_decision(tick) { None } else { self.held }
     }
 }
 

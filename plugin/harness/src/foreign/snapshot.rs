@@ -91,6 +91,8 @@ struct SavedGame {
     state: KeptState,
     /// The last value of each part of the reward.
     rewards: Vec<Option<f32>>,
+    /// The last decision, if decisions hold for several ticks.
+    held: Option<u32>,
     devices: Option<VirtualDevices>,
     keys: Option<ButtonInput<KeyCode>>,
     letters: Option<ButtonInput<Key>>,
@@ -114,6 +116,7 @@ impl SnapshotTools for ForeignGame {
             agent,
             state: kept_state(world, agent),
             rewards: foreign.rewards.iter().map(|part| part.last).collect(),
+            held: foreign.held,
             devices: world.get_resource().cloned(),
             keys: world.get_resource().cloned(),
             letters: world.get_resource().cloned(),
@@ -141,6 +144,7 @@ impl SnapshotTools for ForeignGame {
         for (part, last) in cell.lock().rewards.iter_mut().zip(&saved.rewards) {
             part.last = *last;
         }
+        cell.lock().held = saved.held;
         put_state(world, agent, &saved.state);
         put(world, saved.devices.clone());
         put(world, saved.keys.clone());
