@@ -85,17 +85,17 @@ fn trained(algorithm: Algorithm) -> [u64; 2] {
     let counted = counts.clone();
     let game = move |app: &mut App| {
         let counted = counted.clone();
-        let play = move |keys: Res<ButtonInput<KeyCode>>, mut turn: ResMut<Turn>| {
-            let illegal = if turn.0.is_multiple_of(2) { KeyCode::KeyB } else { KeyCode::KeyA };
-            // Frames in which a level loads hold no key.
-            if keys.get_pressed().next().is_some() {
-                counted[usize::from(keys.pressed(illegal))].fetch_add(1, Ordering::Relaxed);
-                turn.0 += 1;
-            }
-        };
-        app.insert_resource(Turn(0))
-            .add_systems(Startup, |mut turn: ResMut<Turn>| turn.0 = 0)
-            .add_systems(Update, play);
+        app.insert_resource(Turn(0)).add_systems(Startup, |mut turn: ResMut<Turn>| turn.0 = 0).add_systems(
+            Update,
+            move |keys: Res<ButtonInput<KeyCode>>, mut turn: ResMut<Turn>| {
+                let illegal = if turn.0.is_multiple_of(2) { KeyCode::KeyB } else { KeyCode::KeyA };
+                // Frames in which a level loads hold no key.
+                if keys.get_pressed().next().is_some() {
+                    counted[usize::from(keys.pressed(illegal))].fetch_add(1, Ordering::Relaxed);
+                    turn.0 += 1;
+                }
+            },
+        );
     };
     let game = ForeignGame::new("turns", 1, game)
         .keys([vec![KeyCode::KeyA], vec![KeyCode::KeyB], vec![KeyCode::KeyC]])

@@ -172,11 +172,11 @@ fn the_loss_under_a_mask_is_that_of_the_legal_choices_alone() {
     let n = 40;
     let fewer = [0.7, 0.5].map(|scale| numbers(&mut rng, 2 * n, scale));
     // Between the two legal choices there is an illegal one with the largest logit.
-    let more = fewer.clone().map(|logits| logits.chunks(2).flat_map(|row| [row[0], 9.0, row[1]]).collect());
+    let more = fewer.clone().map(|logits| logits.chunks(2).flat_map(|row| [row[0], 9.0, row[1]]).collect::<Vec<f32>>());
     let columns = [0.2, 1.0, 0.3, 1.0, 0.5, 0.3].map(|scale| numbers(&mut rng, n, scale));
     let rows: Vec<usize> = (0..n).collect();
     let offsets = logit_offsets(&[true, false, true].repeat(n), &rows, 3, &device).expect("a mask");
-    let actions = |step: u32| (0..n as u32).map(|row| row % 2 * step).collect();
+    let actions = |step: u32| (0..n as u32).map(|row| row % 2 * step).collect::<Vec<u32>>();
     let (want, want_grads) = penalised(fewer, None, actions(1), &columns);
     let (got, grads) = penalised(more, Some(&offsets), actions(2), &columns);
     for (name, got, want) in [
