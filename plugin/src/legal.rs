@@ -1,8 +1,8 @@
 //! Action masks: the discrete actions that are legal in a tick.
 //!
 //! A game keeps the [`LegalActions`] of its agents up to date in [`ObserveSchedule`](crate::systems::ObserveSchedule).
-//! Random bots, the noise of demonstrators and explorers then draw among legal actions. Policies do not know masks
-//! yet: they may choose any action, and the game has to ignore those that are illegal, as it does with a person's.
+//! Random bots, the noise of demonstrators and explorers then draw among legal actions. Policies give illegal actions
+//! probability 0, in play and in training. A person may press anything, so the game has to ignore illegal actions.
 //!
 //! ```
 //! use bevy::prelude::*;

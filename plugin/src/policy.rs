@@ -30,6 +30,7 @@ use crate::{
     carry_over::{ReflectCarryComponent, ReflectCarryResource},
     episode::Episode,
     fault::Faults,
+    legal::LegalActions,
     observation::Observation,
     policy_batch::{PolicyBatch, SharedBatch},
     skill_prior::{ActiveSkill, SkillPrior},
@@ -87,7 +88,7 @@ pub(crate) fn plugin(app: &mut App) {
     app.init_resource::<PolicyBatch>().register_required_components::<Agent, Decision>();
 }
 
-/// Decides for all agents under [`Control::Policy`] in one batched forward pass.
+/// Decides for all agents under [`Control::Policy`] in one batched forward pass, among their [`LegalActions`].
 pub(crate) fn run_policy(
     active: Res<ActivePolicy>,
     (shared, prior): (Option<Res<SharedBatch>>, Option<Res<SkillPrior>>),
@@ -96,7 +97,7 @@ pub(crate) fn run_policy(
         &Agent,
         &Control,
         &Episode,
-        (&Observation, Option<&ImageSensor>),
+        (&Observation, Option<&ImageSensor>, Option<&LegalActions>),
         &ActiveSkill,
         &mut AgentStreams,
         &mut Action,
@@ -108,7 +109,9 @@ pub(crate) fn run_policy(
     let skill_interval = prior.map(|prior| prior.skill_interval);
     batch.start(&active.policy.observation());
     for &entity in order.entities() {
-        let Ok((agent, control, episode, (observation, sensor), skill, ..)) = agents.get(entity) else { continue };
+        let Ok((agent, control, episode, (observation, sensor, legal), skill, ..)) = agents.get(entity) else {
+            continue;
+        };
         if *control != Control::Policy || !episode.is_running() {
             continue;
         }
@@ -116,7 +119,7 @@ pub(crate) fn run_policy(
             faults.report(why);
             return;
         }
-        batch.push(entity, observation, skill, skill_interval);
+        batch.push(entity, observation, legal, skill, skill_interval);
     }
     if batch.agents().is_empty() {
         return;

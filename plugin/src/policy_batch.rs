@@ -4,6 +4,7 @@
 mod shared_batch_tests;
 
 use crate::{
+    legal::LegalActions,
     observation::{Observation, start_batch},
     skill_prior::ActiveSkill,
 };
@@ -34,25 +35,32 @@ impl PolicyBatch {
         &self.rows.left
     }
 
+    /// Returns the masks of their actions, one after the other; empty if no agent has one.
+    pub fn legal(&self) -> &[bool] {
+        &self.rows.legal
+    }
+
     /// Returns the agents.
     pub(crate) fn agents(&self) -> &[Entity] {
         &self.agents
     }
 
     pub(crate) fn start(&mut self, kind: &ObsKind) {
-        let PolicyRows { observations, skills, left, count } = &mut self.rows;
+        let PolicyRows { observations, skills, left, legal, count } = &mut self.rows;
         start_batch(observations, kind);
         skills.clear();
         left.clear();
+        legal.clear();
         *count = 0;
         self.agents.clear();
     }
 
-    /// Adds an agent with its observation and its skill, which is drawn anew every `skill_interval` ticks.
+    /// Adds an agent with its observation, its mask, and its skill, which is drawn anew every `skill_interval` ticks.
     pub(crate) fn push(
         &mut self,
         agent: Entity,
         observation: &Observation,
+        legal: Option<&LegalActions>,
         skill: &ActiveSkill,
         skill_interval: Option<u32>,
     ) {
@@ -60,6 +68,7 @@ impl PolicyBatch {
         observation.push_to(&mut self.rows.observations);
         self.rows.skills.extend_from_slice(&skill.z);
         self.rows.left.extend(skill_interval.map(|skill_interval| skill.left(skill_interval)));
+        self.rows.push_legal(legal.map_or(&[], LegalActions::mask), 1);
         self.rows.count += 1;
     }
 
@@ -81,30 +90,49 @@ pub struct PolicyRows {
     pub skills: Vec<f32>,
     /// The remaining share of each skill's ticks, this one included; empty without skills.
     pub left: Vec<f32>,
+    /// True for each legal action of each state, one after the other; empty if all are legal.
+    pub legal: Vec<bool>,
     /// Number of states.
     pub count: usize,
 }
 
 impl Default for PolicyRows {
     fn default() -> Self {
-        Self { observations: Observations::Vector(Vec::new()), skills: Vec::new(), left: Vec::new(), count: 0 }
+        let observations = Observations::Vector(Vec::new());
+        Self { observations, skills: Vec::new(), left: Vec::new(), legal: Vec::new(), count: 0 }
     }
 }
 
 impl PolicyRows {
-    /// Returns the policy's output for the states.
+    /// Returns the policy's output for the states. Illegal actions have probability 0.
     ///
     /// # Errors
     ///
     /// As [`Policy::forward_held`].
     pub fn decide(&self, policy: &Policy) -> Result<PolicyOutput, LearnError> {
-        policy.forward_held(&self.skills, &self.left, &self.observations, self.count)
+        let mut output = policy.forward_held(&self.skills, &self.left, &self.observations, self.count)?;
+        output.restrict(&self.legal);
+        Ok(output)
+    }
+
+    /// Adds the masks of `count` further states, or none. In states without a mask, beside others, all actions are
+    /// legal.
+    fn push_legal(&mut self, more: &[bool], count: usize) {
+        if self.legal.is_empty() && more.is_empty() {
+            return;
+        }
+        let width = more.len().checked_div(count).filter(|&width| width > 0);
+        let actions = width.or(self.legal.len().checked_div(self.count)).unwrap_or_default();
+        self.legal.resize(self.count * actions, true);
+        self.legal.extend_from_slice(more);
+        self.legal.resize((self.count + count) * actions, true);
     }
 
     pub(crate) fn append(&mut self, more: &Self) -> Result<(), LearnError> {
         self.observations.push(&more.observations)?;
         self.skills.extend_from_slice(&more.skills);
         self.left.extend_from_slice(&more.left);
+        self.push_legal(&more.legal, more.count);
         self.count += more.count;
         Ok(())
     }

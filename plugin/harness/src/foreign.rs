@@ -11,7 +11,7 @@
 //! - `levels`: modes, level files, levels of an editor, plans and proofs.
 //! - `ldtk`, `tiled`: levels of these two editors, with the features of the same names.
 //! - `restart`, `clocks`: the start of an episode, and the game's clocks at that time.
-//! - `input`: the path from an action into the game, and the mask of actions.
+//! - `input`: the path from an action into the game, the mask of actions, and the ticks that a decision holds.
 //! - `agents`: several agents in one World, and their inputs.
 //! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `snapshot`: the state of an episode, saved and loaded.
@@ -499,7 +499,7 @@ impl Game for ForeignGame {
         if let Some(input) = self.description.input_of(place).pressed() {
             agent.insert(input);
         }
-        if self.description.legal.is_some()
+        if (self.description.legal.is_some() || self.description.input.holds())
             && let ActionSpace::Discrete(actions) = self.actions()
         {
             agent.insert(LegalActions::new(std::iter::repeat_n(true, actions)));

@@ -42,6 +42,7 @@ mod error;
 mod file;
 mod learner;
 pub mod legacy;
+mod legal;
 pub mod nn;
 pub mod norm;
 mod observation;

@@ -11,6 +11,7 @@ mod inputs;
 use crate::{
     ActionSpace, ActionValue, LearnError, ObsKind, ObsSlice, PolicySpec,
     device::guarded,
+    legal::restrict,
     nn::{
         CnnKind, HostDist, ImageNet, argmax, categorical_log_prob, frozen, gaussian_log_prob, host, sample_categorical,
         sample_gaussian, squashed_log_prob, unsquashed_action, vector,
@@ -320,6 +321,12 @@ impl PolicyOutput {
             }
             (space, action) => Err(LearnError::Action(format!("{action:?} among {space}"))),
         }
+    }
+
+    /// Removes the illegal choices of each row, `n * choices`, true if legal: the others share their probability.
+    /// Values stay unchanged. An empty mask changes nothing.
+    pub fn restrict(&mut self, legal: &[bool]) {
+        restrict(&mut self.head, self.space.dim(), legal);
     }
 
     /// Splits the outputs into these numbers of rows, in order.

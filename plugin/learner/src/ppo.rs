@@ -345,7 +345,7 @@ impl PpoLearner {
         let Some(teacher) = &self.base.teacher else { return Ok(None) };
         let mut rng = self.base.streams.stream("score.own_samples", self.base.updates);
         let states = StateBatch { z: &rollout.z, left: &[], obs: rollout.obs.as_slice(), n: rollout.rows() };
-        teacher.output(states, &rollout.actions, false, &mut rng, self.base.device)
+        teacher.output(states, (&rollout.actions, &rollout.legal), false, &mut rng, self.base.device)
     }
 }
 

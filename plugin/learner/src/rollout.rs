@@ -3,7 +3,7 @@
 #[cfg(test)]
 mod tests;
 
-use crate::{ActionSpace, Actions, LearnError, ObsKind, ObsSlice, Observations, Policy, PolicySpec};
+use crate::{ActionSpace, Actions, LearnError, ObsKind, ObsSlice, Observations, Policy, PolicySpec, legal};
 
 /// Steps of B environments over T ticks, flat and row-major: row `t * envs + b`.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,6 +25,8 @@ pub struct Rollout {
     pub left: Vec<f32>,
     /// The actions taken, `T * B`.
     pub actions: Actions,
+    /// True for each discrete action that was legal, `T * B * choices`. Empty if all were, or actions are continuous.
+    pub legal: Vec<bool>,
     /// Their log-probabilities when taken.
     pub log_probs: Vec<f32>,
     /// Values of the observations when seen.
@@ -80,6 +82,7 @@ impl Rollout {
             z: Vec::new(),
             left: Vec::new(),
             actions: Actions::empty(space),
+            legal: Vec::new(),
             log_probs: Vec::new(),
             values: Vec::new(),
             rewards: Vec::new(),
@@ -117,6 +120,7 @@ impl Rollout {
         ] {
             values.clear();
         }
+        self.legal.clear();
         self.terminated.clear();
         self.truncated.clear();
         self.ends.clear();
@@ -140,6 +144,24 @@ impl Rollout {
     /// Adds the remaining shares of the skills of the newest step, `B`.
     pub fn push_left(&mut self, left: &[f32]) {
         self.left.extend_from_slice(left);
+    }
+
+    /// Adds the mask of the newest step, `B * choices`, or nothing if the game has none.
+    ///
+    /// # Panics
+    /// If no step was pushed yet.
+    pub fn push_legal(&mut self, legal: &[bool]) {
+        let before = (self.steps - 1) * self.envs;
+        let choices = match legal.len().checked_div(self.envs) {
+            Some(choices) if choices > 0 => choices,
+            _ => self.legal.len().checked_div(before).unwrap_or_default(),
+        };
+        legal::extend(&mut self.legal, before, legal, self.envs, choices);
+    }
+
+    /// Returns the number of discrete actions that its mask is about; 0 without a mask.
+    pub(crate) fn choices(&self) -> usize {
+        self.legal.len().checked_div(self.rows()).unwrap_or_default()
     }
 
     /// Adds one tick.
@@ -257,6 +279,8 @@ impl Rollout {
     pub(crate) fn check_for(&self, spec: &PolicySpec, latent: usize) -> Result<(), LearnError> {
         self.check()?;
         spec.action_space.check(&self.actions)?;
+        legal::check(&self.legal, &spec.action_space, &self.actions)?;
+        self.check_legal_ends(spec.action_space.dim())?;
         spec.obs.same_as(&self.obs_kind, "the rollout")?;
         LearnError::check("latent of the rollout", latent, self.latent)?;
         if self.rows() == 0 {
@@ -278,6 +302,22 @@ impl Rollout {
             ("rollout ends next_z", self.latent, &ends.next_z),
         ] {
             LearnError::check_finite(name, width, values)?;
+        }
+        Ok(())
+    }
+}
+
+impl Rollout {
+    /// Checks that the masks of the end states have `choices` entries each, if there are any.
+    fn check_legal_ends(&self, choices: usize) -> Result<(), LearnError> {
+        let ends = &self.ends;
+        for (name, states, legal) in [
+            ("rollout ends cut_legal", ends.cut_rows.len(), &ends.cut_legal),
+            ("rollout ends next_legal", self.envs, &ends.next_legal),
+        ] {
+            if !legal.is_empty() {
+                LearnError::check(name, states * choices, legal.len())?;
+            }
         }
         Ok(())
     }
@@ -367,12 +407,16 @@ pub struct EndStates {
     pub cut_z: Vec<f32>,
     /// Remaining share of that skill, as in [`Rollout::left`].
     pub cut_left: Vec<f32>,
+    /// The mask in that state, as in [`Rollout::legal`].
+    pub cut_legal: Vec<bool>,
     /// Observation after the last row of each environment, `B`; zeros where that row ended an episode.
     pub next_obs: Observations,
     /// The skill active there, `B * latent`.
     pub next_z: Vec<f32>,
     /// Remaining share of that skill, `B`, or empty.
     pub next_left: Vec<f32>,
+    /// The mask in that state, `B * choices`, or empty.
+    pub next_legal: Vec<bool>,
 }
 
 impl EndStates {
@@ -385,9 +429,11 @@ impl EndStates {
             cut_obs: none(),
             cut_z: empty(),
             cut_left: empty(),
+            cut_legal: Vec::new(),
             next_obs: none(),
             next_z: empty(),
             next_left: empty(),
+            next_legal: Vec::new(),
         }
     }
 
@@ -397,9 +443,11 @@ impl EndStates {
         self.cut_obs.clear();
         self.cut_z.clear();
         self.cut_left.clear();
+        self.cut_legal.clear();
         self.next_obs.clear();
         self.next_z.clear();
         self.next_left.clear();
+        self.next_legal.clear();
     }
 }
 
@@ -444,11 +492,13 @@ impl Rollout {
             Self { actions: first.actions.clone(), ..Self::new(0, kind, first.latent, &ActionSpace::Discrete(0)) };
         all.actions.clear();
         all.steps = first.steps;
+        let choices = parts.iter().map(Self::choices).max().unwrap_or_default();
         for part in parts {
             part.check_beside_obs()?;
             LearnError::check("steps of a joined rollout", first.steps, part.steps)?;
             kind.same_as(&part.obs_kind, "a joined rollout")?;
             LearnError::check("latent of a joined rollout", first.latent, part.latent)?;
+            legal::extend(&mut all.ends.next_legal, all.envs, &part.ends.next_legal, part.envs, choices);
             all.envs += part.envs;
             all.next_values.extend_from_slice(&part.next_values);
             all.ends.next_obs.push(&part.ends.next_obs)?;
@@ -461,6 +511,9 @@ impl Rollout {
                 all.actions.extend_rows(&part.actions, rows.start, rows.end)?;
                 all.z.extend_from_slice(&part.z[rows.start * part.latent..rows.end * part.latent]);
                 all.left.extend_from_slice(part.left.get(rows.clone()).unwrap_or_default());
+                let legal = part.legal.get(rows.start * choices..rows.end * choices).unwrap_or_default();
+                let before = all.rewards.len();
+                legal::extend(&mut all.legal, before, legal, part.envs, choices);
                 all.log_probs.extend_from_slice(&part.log_probs[rows.clone()]);
                 all.values.extend_from_slice(&part.values[rows.clone()]);
                 all.rewards.extend_from_slice(&part.rewards[rows.clone()]);
@@ -469,12 +522,12 @@ impl Rollout {
                 all.final_values.extend_from_slice(&part.final_values[rows]);
             }
         }
-        all.join_cuts(parts)?;
+        all.join_cuts(parts, choices)?;
         Ok(all)
     }
 
     /// Adds the cut episodes of all parts, in ascending order of their joined rows.
-    fn join_cuts(&mut self, parts: &[Self]) -> Result<(), LearnError> {
+    fn join_cuts(&mut self, parts: &[Self], choices: usize) -> Result<(), LearnError> {
         let mut cuts = Vec::new();
         let mut offset = 0;
         for part in parts {
@@ -489,6 +542,8 @@ impl Rollout {
             self.ends.cut_rows.push(row);
             self.ends.cut_obs.push(part.ends.cut_obs.row(i, self.obs_kind.numbers()))?;
             self.ends.cut_left.extend(part.ends.cut_left.get(i));
+            let legal = part.ends.cut_legal.get(i * choices..(i + 1) * choices).unwrap_or_default();
+            legal::extend(&mut self.ends.cut_legal, self.ends.cut_rows.len() - 1, legal, 1, choices);
             self.ends.cut_z.extend_from_slice(&part.ends.cut_z[i * self.latent..(i + 1) * self.latent]);
         }
         Ok(())

@@ -171,6 +171,7 @@ impl SacLearner {
             latent: base.rollout_latent(),
             clock: clock_width(&base),
             weight: usize::from(base.prior_origin().is_some()),
+            legal: 0,
         };
         Self {
             nets,
@@ -217,7 +218,8 @@ impl SacLearner {
         let mut learner = Self::with_nets(saved.config.clone(), base, nets);
         let counters = &saved.counters;
         learner.optimizers.take(&mut saved.file, &mut learner.nets, counters)?;
-        learner.buffer.take(&mut saved.file, "buffer", counters.transitions)?;
+        let space = learner.base.spec.action_space;
+        learner.buffer.take(&mut saved.file, "buffer", counters.transitions, &space)?;
         learner.demos = match counters.demos {
             Some((rows, share)) => Some(Demos::stored(&mut saved.file, rows, share, &learner.base.spec)?),
             None => None,
@@ -427,6 +429,8 @@ impl SacLearner {
         let (nets, adam) = (&mut self.nets, &mut self.optimizers.actor);
         sums.add_actor(&actor_step(nets, adam, batch, noise.as_ref(), temperature, score, lr)?);
         if let Some(target) = self.config.target_entropy(self.base.spec.action_space) {
+            // A state with few legal actions has little entropy, whatever the temperature.
+            let target = target * batch.entropy_share;
             let noise = self.noise(rng);
             let (nets, adam, lr) = (&mut self.nets, &mut self.optimizers.temperature, self.config.temperature_lr);
             sums.add_temperature(&temperature_step(nets, adam, batch, noise.as_ref(), target, lr)?);

@@ -50,6 +50,23 @@ fn everybody_gets_what_it_would_get_alone() {
 }
 
 #[test]
+fn masks_hold_for_their_own_rows_in_shared_passes_too() {
+    let policy = policy();
+    let masked = PolicyRows { legal: vec![true, false, true, false, true, false], ..rows(1, 0) };
+    assert_eq!((masked.count, rows(0, 0).count), (2, 1));
+    let mut all = PolicyRows { observations: Observations::empty(&policy.observation()), ..PolicyRows::default() };
+    for world in [&rows(0, 0), &masked, &rows(0, 1)] {
+        all.append(world).expect("of one kind");
+    }
+    assert_eq!(all.legal[..3], [true; 3]);
+    assert_eq!(all.legal[9..], [true; 3]);
+    let outputs = all.decide(&policy).expect("fits").split(&[1, 2, 1]);
+    assert_eq!(outputs[0], rows(0, 0).decide(&policy).expect("fits"), "without a mask");
+    assert_eq!(outputs[1], masked.decide(&policy).expect("fits"));
+    assert_eq!(outputs[1].greedy(1), playbot_learner::ActionValue::Discrete(1), "the only legal action");
+}
+
+#[test]
 fn worlds_that_have_left_are_not_waited_for() {
     let played = play(7, 3, |world| 3 * world);
     assert_eq!(played.iter().map(Vec::len).collect::<Vec<_>>(), [0, 3, 6, 9, 12, 15, 18]);

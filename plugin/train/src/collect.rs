@@ -8,6 +8,7 @@ use bevy_playbot::{
     engine::{PolicyBatch, Renewal, SharedBatch, TickSchedules, draw_skills, tick_world},
     episode::{Episode, EpisodeEnd, EpisodeEnded, Tick},
     fault::{Fault, Faults},
+    legal::LegalActions,
     level::LevelQueue,
     observation::Observation,
     policy::{ActionDraw, ActivePolicy, Decision},
@@ -256,6 +257,8 @@ fn bootstrap_values(world: &mut World, policy: &Policy, rollout: &mut Rollout) -
         rollout.ends.next_obs.set_row(row, observations.row(i, kind.numbers()))?;
         rollout.ends.next_z[row * latent..(row + 1) * latent].copy_from_slice(&skills[i * latent..(i + 1) * latent]);
     }
+    // Masks of agents between two episodes are not used, either.
+    rollout.ends.next_legal = masks(world, entities.iter().copied());
     Ok(())
 }
 
@@ -276,7 +279,9 @@ fn collect_tick(world: &mut World) {
         }
         let tick = tick_of(world, &entities, AgentsTick::new(&policy, &kind))?;
         collecting.rollout.push_left(world.resource::<PolicyBatch>().left());
-        push_tick(&mut collecting.rollout, &tick, &final_values, &cut)
+        push_tick(&mut collecting.rollout, &tick, &final_values, &cut)?;
+        collecting.rollout.push_legal(world.resource::<PolicyBatch>().legal());
+        Ok::<(), LearnError>(())
     });
     if let Some(Err(error)) = pushed {
         world.resource_mut::<Faults>().report(error.to_string());
@@ -316,6 +321,7 @@ fn push_tick(
         rollout.push_cut(row, cut.obs.row(i, width), z)?;
         rollout.ends.cut_left.extend(cut.left.get(i));
     }
+    rollout.ends.cut_legal.extend_from_slice(&cut.legal);
     Ok(())
 }
 
@@ -370,12 +376,15 @@ pub(crate) struct CutEpisodes {
     pub(crate) z: Vec<f32>,
     /// Remaining ticks of these skills; empty without a prior.
     pub(crate) left: Vec<f32>,
+    /// Masks of their actions; empty without any.
+    pub(crate) legal: Vec<bool>,
     pub(crate) values: Vec<f32>,
 }
 
 impl CutEpisodes {
     pub(crate) fn new(agents: Vec<usize>, kind: &ObsKind) -> Self {
-        Self { agents, obs: Observations::empty(kind), z: Vec::new(), left: Vec::new(), values: Vec::new() }
+        let (z, left, legal, values) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        Self { agents, obs: Observations::empty(kind), z, left, legal, values }
     }
 }
 
@@ -412,6 +421,7 @@ pub(crate) fn cut_episodes(
             cut.z.extend(drawn);
         }
     }
+    cut.legal = masks(world, cut.agents.iter().map(|&row| entities[row]));
     cut.values = policy.values_held(&cut.z, &cut.left, &cut.obs, cut.agents.len())?;
     // The current row belongs to the state before the action.
     for (&entity, before) in entities.iter().zip(before) {
@@ -435,6 +445,23 @@ pub(crate) fn push_state(
         left.extend(world.get_resource::<SkillPrior>().map(|prior| skill.left(prior.skill_interval)));
         observation.push_to(observations);
     }
+}
+
+/// Returns the masks of agents in their present states, one after the other; nothing if no agent has one. All actions
+/// of agents without a mask are legal.
+fn masks(world: &World, agents: impl Iterator<Item = Entity> + Clone) -> Vec<bool> {
+    let mut all = Vec::new();
+    if !agents.clone().any(|agent| world.get::<LegalActions>(agent).is_some()) {
+        return all;
+    }
+    for agent in agents {
+        match (world.get::<LegalActions>(agent), world.get::<Agent>(agent)) {
+            (Some(legal), _) => all.extend_from_slice(legal.mask()),
+            (None, Some(agent)) => all.extend(std::iter::repeat_n(true, agent.actions.dim())),
+            (None, None) => {}
+        }
+    }
+    all
 }
 
 // Saved arenas in the middle of their episodes.

@@ -1,10 +1,14 @@
-//! Tests of actions that reach a game without keys.
+//! Tests of actions that reach a game without keys, and of decisions that hold for several ticks.
 
 use bevy::{input::mouse::AccumulatedMouseMotion, prelude::*};
-use bevy_playbot::virtual_input::ActionAxis;
+use bevy_playbot::{policy::Decision, virtual_input::ActionAxis, vision::ObservationConfig};
 use playbot::prelude::*;
 use playbot_harness::{foreign::ForeignGame, worlds::build_world};
-use playbot_tests::foreign::catch::{Paddle, game};
+use playbot_learner::PpoConfig;
+use playbot_tests::{
+    foreign::catch::{Paddle, game},
+    training::untrained,
+};
 
 /// Returns the position of the paddle after three ticks of this action.
 fn paddle_after(game: &ForeignGame, control: Control, action: ActionValue) -> Vec2 {
@@ -52,4 +56,120 @@ fn axes_move_the_mouse_and_a_stick() {
     let after = |mouse, stick| paddle_after(&slid, Control::Bot, ActionValue::Continuous(vec![mouse, stick]));
     assert_eq!(after(0.25, 0.0), Vec2::new(5.5, 0.0), "half a pixel to the right in each of three ticks");
     assert_eq!(after(0.0, -0.5), Vec2::new(4.0, -1.5));
+}
+
+/// The numbers of ticks in which the right arrow was held, and in which it was newly pressed.
+#[derive(Resource, Default)]
+struct Presses {
+    held: u32,
+    new: u32,
+}
+
+/// Returns a game with three actions, whose decisions hold for so many ticks.
+fn slow(ticks: u32) -> ForeignGame {
+    fn count(keys: Res<ButtonInput<KeyCode>>, mut presses: ResMut<Presses>) {
+        presses.held += u32::from(keys.pressed(KeyCode::ArrowRight));
+        presses.new += u32::from(keys.just_pressed(KeyCode::ArrowRight));
+    }
+    let game = |app: &mut App| {
+        app.init_resource::<Presses>().add_systems(Update, count);
+    };
+    ForeignGame::new("slow", 1, game)
+        .keys([vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]])
+        .observe(["held"], |presses: Res<Presses>| [presses.held as f32])
+        .every(ticks)
+}
+
+/// Returns the actions of 24 ticks of a bot in this game.
+fn played(game: &ForeignGame, equip: impl Fn(&mut World, Entity)) -> Vec<u32> {
+    assert_eq!(game.problem(), None);
+    let (mut world, agents) = build_world(game, "default", 0, 0, 1);
+    world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(3)));
+    equip(&mut world, agents[0]);
+    let mut next = || {
+        world.tick().expect("the held action is legal");
+        world.get::<Action>(agents[0]).and_then(Action::discrete).expect("a choice")
+    };
+    (0..24).map(|_| next()).collect()
+}
+
+/// Checks that all actions of four ticks from a decision on are equal, and that some decisions differ.
+fn check_held(actions: &[u32]) {
+    for decision in actions.chunks(4) {
+        assert!(decision.iter().all(|action| *action == decision[0]), "{actions:?}");
+    }
+    assert!(actions.iter().any(|action| *action != actions[0]), "{actions:?}");
+}
+
+#[test]
+fn random_bots_hold_each_decision_for_its_ticks() {
+    for bot in [BlindBot::Uniform, BlindBot::Chaos] {
+        let actions = played(&slow(4), |world, agent| {
+            world.entity_mut(agent).insert(bot.clone());
+        });
+        for decision in actions.chunks(4) {
+            assert!(decision.iter().all(|action| *action == decision[0]), "{bot:?}: {actions:?}");
+        }
+    }
+}
+
+#[test]
+fn a_demonstrator_holds_each_decision_for_its_ticks_with_noise_and_without() {
+    let game = slow(4).demonstrator("counter", |mut ticks: Local<u32>| {
+        *ticks += 1;
+        (*ticks / 3) % 3
+    });
+    for noise in [0.0, 0.5] {
+        check_held(&played(&game, |world, agent| game.tools().bots.attach_demonstrator(world, agent, noise)));
+    }
+}
+
+#[test]
+fn a_legal_action_that_becomes_illegal_holds_until_the_next_decision() {
+    let game = slow(4).legal(|presses: Res<Presses>| [false, presses.held > 0, presses.held == 0]);
+    let actions = played(&game, |world, agent| {
+        world.entity_mut(agent).insert(BlindBot::Uniform);
+    });
+    assert_eq!(actions[..8], [2, 2, 2, 2, 1, 1, 1, 1]);
+}
+
+#[test]
+fn a_held_key_is_pressed_once() {
+    let game = slow(4).legal(|| [false, false, true]);
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Always(3)));
+    world.ticks(8).expect("sound");
+    let presses = world.resource::<Presses>();
+    assert_eq!((presses.held, presses.new), (8, 1));
+}
+
+#[test]
+fn a_policy_holds_each_decision_with_certainty() {
+    let game = slow(4);
+    let config = PpoConfig { hidden: vec![8], ..PpoConfig::default() };
+    let policy = untrained(&game, &ObservationConfig::default(), config);
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    ActivePolicy { policy, draw: ActionDraw::Sample }.install(&mut world, None);
+    world.entity_mut(agents[0]).insert((Control::Policy, LevelQueue::Always(3)));
+    let mut actions = Vec::new();
+    for tick in 0..40 {
+        world.tick().expect("the policy fits");
+        let decision = world.get::<Decision>(agents[0]).expect("an agent");
+        assert_eq!(decision.log_prob == 0.0, tick % 4 != 0, "tick {tick}: {decision:?}");
+        actions.push(world.get::<Action>(agents[0]).and_then(Action::discrete).expect("a choice"));
+    }
+    check_held(&actions);
+}
+
+#[test]
+fn decisions_that_cannot_hold_are_problems_that_say_what_to_type() {
+    let problem = slow(0).problem().expect("no tick is a decision");
+    assert!(problem.contains("`slow`") && problem.contains("type `.every(1)`"), "{problem}");
+    let continuous = ForeignGame::new("slid", 1, |_: &mut App| {})
+        .axes([ActionAxis::mouse_x(2.0)])
+        .observe(["x"], || [0.0])
+        .every(4);
+    let problem = continuous.problem().expect("it cannot be held");
+    assert!(problem.contains("continuous actions") && problem.contains("lower `.hz`"), "{problem}");
+    assert_eq!(slow(1).problem(), None);
 }

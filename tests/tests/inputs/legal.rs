@@ -1,8 +1,23 @@
 //! Tests of action masks of foreign games.
 
+use std::{
+    path::Path,
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+};
+
 use bevy::prelude::*;
+use bevy_playbot::vision::ObservationConfig;
 use playbot::prelude::*;
-use playbot_harness::{foreign::ForeignGame, worlds::build_world};
+use playbot_harness::{
+    foreign::{ForeignGame, Restart},
+    worlds::build_world,
+};
+use playbot_learner::{DeviceKind, PpoConfig};
+use playbot_tests::training::untrained;
+use playbot_train::{Algorithm, Experiment, Trainer, experiment::file::parse_experiment};
 
 /// The number of ticks that the game has run.
 #[derive(Resource)]
@@ -18,11 +33,11 @@ fn turns() -> ForeignGame {
         .observe(["turn"], |turn: Res<Turn>| [turn.0 as f32])
 }
 
-/// Checks that each action of a bot is the one that is legal in its tick.
+/// Checks that each action of a bot, or of the controller that `equip` adds, is the one that is legal in its tick.
 fn check(game: &ForeignGame, equip: impl Fn(&mut World, Entity)) {
     let (mut world, agents) = build_world(game, "default", 0, 0, 1);
-    equip(&mut world, agents[0]);
     world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(0)));
+    equip(&mut world, agents[0]);
     for _ in 0..20 {
         world.tick().expect("one action is legal");
         // The turn that the agent has seen is the one before the game's system has run.
@@ -49,6 +64,66 @@ fn random_bots_take_legal_actions_only() {
 fn the_noise_of_a_demonstrator_draws_legal_actions_only() {
     let game = masked().demonstrator("lazy", || 0_u32);
     check(&game, |world, agent| game.tools().bots.attach_demonstrator(world, agent, 1.0));
+}
+
+#[test]
+fn a_policy_takes_legal_actions_only() {
+    for draw in [ActionDraw::Sample, ActionDraw::Greedy] {
+        check(&masked(), |world, agent| {
+            let config = PpoConfig { hidden: vec![8], ..PpoConfig::default() };
+            let policy = untrained(&masked(), &ObservationConfig::default(), config);
+            ActivePolicy { policy, draw }.install(world, None);
+            world.entity_mut(agent).insert(Control::Policy);
+        });
+    }
+}
+
+/// Returns the ticks of a training with a legal action, and those with an illegal one. The first two actions take
+/// turns in being illegal.
+fn trained(algorithm: Algorithm) -> [u64; 2] {
+    let counts: Arc<[AtomicU64; 2]> = Arc::default();
+    let counted = counts.clone();
+    let game = move |app: &mut App| {
+        let counted = counted.clone();
+        app.insert_resource(Turn(0)).add_systems(Startup, |mut turn: ResMut<Turn>| turn.0 = 0).add_systems(
+            Update,
+            move |keys: Res<ButtonInput<KeyCode>>, mut turn: ResMut<Turn>| {
+                let illegal = if turn.0.is_multiple_of(2) { KeyCode::KeyB } else { KeyCode::KeyA };
+                // Frames in which a level loads hold no key.
+                if keys.get_pressed().next().is_some() {
+                    counted[usize::from(keys.pressed(illegal))].fetch_add(1, Ordering::Relaxed);
+                    turn.0 += 1;
+                }
+            },
+        );
+    };
+    let game = ForeignGame::new("turns", 1, game)
+        .keys([vec![KeyCode::KeyA], vec![KeyCode::KeyB], vec![KeyCode::KeyC]])
+        .legal(|turn: Res<Turn>| [turn.0.is_multiple_of(2), !turn.0.is_multiple_of(2), true])
+        .observe(["turn"], |turn: Res<Turn>| [turn.0 as f32])
+        .reward(|keys: Res<ButtonInput<KeyCode>>| f32::from(u8::from(keys.pressed(KeyCode::KeyA))))
+        .time_limit(20)
+        .restart(Restart::Startup);
+    let text = r#"(
+        game: "turns", train: "default:0..7", test: "default:8..15", steps: 4096, arenas: 2, worlds: 2,
+        ppo: (num_steps: 64, minibatches: 2, hidden: [8], lr: 0.003),
+        sac: (num_steps: 8, batch: 32, buffer: 1024, learning_starts: 200, hidden: [8], updates_per_step: 0.1),
+    )"#;
+    let experiment = Experiment { algorithm, ..parse_experiment(text, Path::new("x.ron")).expect("sound") };
+    let mut trainer = Trainer::new(&game, &experiment, None, DeviceKind::Flex, 2).expect("it fits");
+    while !trainer.is_done() {
+        trainer.update().expect("no action is illegal");
+    }
+    [0, 1].map(|at: usize| counts[at].load(Ordering::Relaxed))
+}
+
+#[test]
+fn trainings_take_legal_actions_only() {
+    for algorithm in [Algorithm::Ppo, Algorithm::Sac] {
+        let [legal, illegal] = trained(algorithm);
+        assert!(legal > 4000, "{algorithm:?}: {legal}");
+        assert_eq!(illegal, 0, "{algorithm:?}");
+    }
 }
 
 #[test]

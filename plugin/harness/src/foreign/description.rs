@@ -184,8 +184,18 @@ impl Plugin for ForeignPlugin {
         )
         .add_systems(judge, observe::read_outcome.before(PlaybotSystems::Judge).run_if(is_tick));
         observe::add_observation(app);
-        if description.legal.is_some() {
+        if description.legal.is_some() || description.input.holds() {
             input::add_mask(app);
+        }
+        if description.input.holds() {
+            app.add_systems(
+                decide,
+                input::hold
+                    .in_set(PlaybotSystems::Act)
+                    .after(check_actions)
+                    .after(note_actions)
+                    .ambiguous_with(PlaybotSystems::Act),
+            );
         }
         #[cfg(feature = "ui")]
         clicks::add_clicks(app, &description.input);

@@ -1,4 +1,4 @@
-//! The input of a foreign game's agent, and the mask of its actions.
+//! The input of a foreign game's agent, the mask of its actions, and the ticks that a decision holds.
 
 use crate::{
     foreign::{
@@ -9,9 +9,10 @@ use crate::{
 };
 use bevy::prelude::*;
 use bevy_playbot::{
-    action::{Action, ActionSpace},
+    action::{Action, ActionSpace, ActionValue},
     agent::{Agent, Control},
     bot::with_noise,
+    episode::Episode,
     key_bindings::KeyBindings,
     legal::LegalActions,
     streams::AgentStreams,
@@ -120,8 +121,8 @@ impl ForeignGame {
     }
 
     /// Declares the legal actions of each tick: one value for each discrete action, true if it is legal. Random bots,
-    /// the noise of demonstrators and explorers then draw among legal actions only. Policies do not know it yet, and
-    /// may choose any action. The system may run more than once in a tick, so it must change nothing.
+    /// the noise of demonstrators and explorers then draw among legal actions only, and policies give the others
+    /// probability 0. The system may run more than once in a tick, so it must change nothing.
     ///
     /// A mask that forbids every action, or that has another length, is a fault.
     ///
@@ -146,6 +147,32 @@ impl ForeignGame {
         self.with(|description| {
             description.legal = Some(SystemFactory::new(system, |mask: Mask| mask.into_iter().collect()));
         })
+    }
+}
+
+impl ForeignGame {
+    /// Lets each decision hold for so many ticks, instead of one. An episode begins with a decision. Until the next
+    /// one, bots, explorers and policies repeat it: it is the only legal action. Held keys stay pressed, while clicks
+    /// and taps are made in each tick. Rewards, recordings, time limits and skill intervals count ticks, as ever.
+    ///
+    /// People decide in each tick. Continuous actions have no mask, so they cannot be held: that is a
+    /// [`problem`](crate::game::Game::problem).
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// let walk = || {
+    ///     let game = ForeignGame::new("walk", 1, |_: &mut App| {}).observe(["x"], || [0.0]);
+    ///     game.keys([vec![], vec![KeyCode::ArrowRight]])
+    /// };
+    /// // Of 60 ticks a second, 15 are decisions.
+    /// assert_eq!(walk().every(4).problem(), None);
+    /// let problem = walk().every(0).problem().expect("no tick is a decision");
+    /// assert!(problem.contains("`.every(1)`"), "{problem}");
+    /// ```
+    pub fn every(self, ticks: u32) -> Self {
+        self.with(|description| description.input.every = Some(ticks))
     }
 }
 
@@ -180,6 +207,8 @@ pub(super) struct Input {
     pub(super) space: Option<ActionSpace>,
     /// Names of the actions.
     pub(super) names: Vec<String>,
+    /// Ticks that a decision holds; 1 if not set.
+    pub(super) every: Option<u32>,
 }
 
 impl Input {
@@ -272,7 +301,7 @@ impl Input {
         if said.len() > 1 {
             return Some(format!("has {}, and each of them declares every action: keep one", said.join(" and ")));
         }
-        if let Some(problem) = self.problem_of_clicks() {
+        if let Some(problem) = self.problem_of_clicks().or_else(|| self.problem_of_period()) {
             return Some(problem);
         }
         let pressed = self.pressed()?;
@@ -359,6 +388,31 @@ impl Input {
         }
         (!cfg!(feature = "ui"))
             .then(|| "has `.clicks`, which needs the feature `ui` of `playbot`: build with it".to_owned())
+    }
+
+    /// Returns the problem of the ticks that a decision holds.
+    fn problem_of_period(&self) -> Option<String> {
+        match (self.every?, self.space()) {
+            (0, _) => Some(
+                "has `.every(0)`, but a decision holds for at least one tick: type `.every(1)`, or leave it out".to_owned(),
+            ),
+            (2.., ActionSpace::Continuous(_)) => Some(
+                "has `.every` and continuous actions, which cannot be held: leave `.every` out, and lower `.hz` for fewer \
+                 decisions a second"
+                    .to_owned(),
+            ),
+            _ => None,
+        }
+    }
+
+    /// Returns whether decisions hold for more than one tick.
+    pub(super) fn holds(&self) -> bool {
+        self.every.is_some_and(|ticks| ticks > 1)
+    }
+
+    /// Returns whether the agent decides in this tick of an episode.
+    pub(super) fn is_decision(&self, tick: u32) -> bool {
+        !self.holds() || self.every.is_some_and(|ticks| tick.is_multiple_of(ticks))
     }
 
     /// Returns the number of the first action that clicks on the UI, and the names of the buttons.
@@ -460,9 +514,14 @@ fn decide_for(world: &mut World, agent: Entity) {
     let (Some(&ForeignBot { noise }), Some(Control::Bot)) = (world.get(agent), world.get::<Control>(agent)) else {
         return;
     };
-    let planned = with_foreign(world, agent, |world, foreign| match &mut foreign.asked().bot {
-        Some(bot) => bot.demand(world),
-        None => Err("it has no demonstrator".to_owned()),
+    let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
+    let planned = with_foreign(world, agent, |world, foreign| {
+        let held = foreign.held_in(tick);
+        match &mut foreign.asked().bot {
+            // It sees every tick, since it may count them.
+            Some(bot) => bot.demand(world).map(|planned| held.map_or(planned, ActionValue::Discrete)),
+            None => Err("it has no demonstrator".to_owned()),
+        }
     });
     let Some(planned) = planned else { return };
     let mut entity = world.entity_mut(agent);
@@ -473,6 +532,20 @@ fn decide_for(world: &mut World, agent: Entity) {
     entity.insert(Action(chosen));
 }
 
+/// Notes the action of a tick in which the agent decides, which holds until the next decision.
+pub(super) fn hold(world: &mut World) {
+    for agent in playing_agents(world) {
+        let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
+        let action = world.get::<Action>(agent).and_then(Action::discrete);
+        with_foreign(world, agent, |_, foreign| {
+            if foreign.game.description.input.is_decision(tick) {
+                foreign.asked().held = action;
+            }
+            Ok(())
+        });
+    }
+}
+
 /// Adds the system that keeps the mask of the agent's actions up to date.
 pub(super) fn add_mask(app: &mut App) {
     app.add_systems(ObserveSchedule, mask);
@@ -480,11 +553,16 @@ pub(super) fn add_mask(app: &mut App) {
 
 pub(super) fn mask(world: &mut World) {
     for agent in playing_agents(world) {
-        let legal = with_foreign(world, agent, |world, foreign| match &mut foreign.asked().legal {
-            Some(system) => system.demand(world).map(Some),
-            None => Ok(None),
+        let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
+        let legal = with_foreign(world, agent, |world, foreign| {
+            let actions = foreign.game.description.input.space().dim() as u32;
+            match (foreign.held_in(tick), &mut foreign.asked().legal) {
+                (Some(held), _) => Ok((0..actions).map(|action| action == held).collect()),
+                (None, Some(system)) => system.demand(world),
+                (None, None) => Ok(vec![true; actions as usize]),
+            }
         });
-        if let Some(legal) = legal.flatten() {
+        if let Some(legal) = legal {
             world.entity_mut(agent).insert(LegalActions::new(legal));
         }
     }

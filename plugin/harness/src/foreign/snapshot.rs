@@ -91,6 +91,8 @@ struct SavedGame {
     state: KeptState,
     /// The last value of each part of the reward.
     rewards: Vec<Option<f32>>,
+    /// The last decision, if decisions hold for several ticks.
+    held: Vec<Option<u32>>,
     devices: Option<VirtualDevices>,
     keys: Option<ButtonInput<KeyCode>>,
     letters: Option<ButtonInput<Key>>,
@@ -114,6 +116,7 @@ impl SnapshotTools for ForeignGame {
             agent,
             state: kept_state(world, agent),
             rewards: foreign.rewards().map(|part| part.last).collect(),
+            held: foreign.held().map(|held| *held).collect(),
             devices: world.get_resource().cloned(),
             keys: world.get_resource().cloned(),
             letters: world.get_resource().cloned(),
@@ -140,6 +143,9 @@ impl SnapshotTools for ForeignGame {
         world.flush();
         for (part, last) in cell.lock().rewards().zip(&saved.rewards) {
             part.last = *last;
+        }
+        for (held, last) in cell.lock().held().zip(&saved.held) {
+            *held = *last;
         }
         put_state(world, agent, &saved.state);
         put(world, saved.devices.clone());

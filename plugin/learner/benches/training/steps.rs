@@ -64,6 +64,7 @@ pub fn ppo(criterion: &mut Criterion) {
         inputs: Tensor::<2>::from_data(inputs, &device).into(),
         augmented: None,
         left: None,
+        logit_offsets: None,
         ppo: PpoBatch {
             actions: ActionBatch::new(&actions, &device),
             old_log_probs: column() * 0.01 - (CHOICES as f32).ln(),

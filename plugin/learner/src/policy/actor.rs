@@ -157,19 +157,28 @@ impl Actor {
     /// Returns the distributions for joined inputs `[z, s]`, `[n, latent + obs_dim]`, where s is the result of
     /// [`Self::observe`].
     pub fn forward(&self, x: Tensor<2>) -> Dist {
-        self.head(self.net.features(x))
+        self.forward_legal(x, None)
+    }
+
+    /// Does [`Self::forward`] with numbers that are added to the logits, `[n, choices]`, if there are any: 0 for legal
+    /// choices, and for illegal ones a negative number so large that their probability is 0.
+    pub fn forward_legal(&self, x: Tensor<2>, logit_offsets: Option<&Tensor<2>>) -> Dist {
+        self.head(self.net.features(x), logit_offsets)
     }
 
     /// Returns the distributions for skills `z` `[B, latent]` that are each used for `steps` observations. Row `t * B
     /// + b` of `states` `[steps * B, obs_dim]`, the result of [`Self::observe`], goes with row `b` of `z`.
     pub fn forward_held(&self, z: Tensor<2>, states: Tensor<2>, steps: usize) -> Dist {
-        self.head(self.net.features_held(z, states, steps))
+        self.head(self.net.features_held(z, states, steps), None)
     }
 
-    fn head(&self, features: Tensor<2>) -> Dist {
+    fn head(&self, features: Tensor<2>, logit_offsets: Option<&Tensor<2>>) -> Dist {
         let head = self.net.head.forward(features.clone());
         match &self.log_std {
-            LogStd::None => Dist::categorical(head),
+            LogStd::None => Dist::categorical(match logit_offsets {
+                Some(offsets) => head + offsets.clone(),
+                None => head,
+            }),
             LogStd::Vector(log_std) => Dist::Gaussian { mean: head, log_std: log_std.clone().unsqueeze() },
             LogStd::State(layer) => {
                 let (low, high) = LOG_STD_RANGE;

@@ -2,6 +2,7 @@
 
 use crate::{
     Augmentation, ObsKind, ObsSlice, Observations, Rollout,
+    legal::logit_offsets,
     nn::{ActionBatch, ImageNet, ObsBatch, vector},
     norm::ObsStats,
     observation::augmented,
@@ -142,6 +143,7 @@ impl Batch<'_> {
             augmented: self.augmented(&inputs, rows, device),
             inputs,
             left: (!rollout.left.is_empty()).then(|| vector(pick(&rollout.left), device)),
+            logit_offsets: logit_offsets(&rollout.legal, rows, rollout.choices(), device),
             ppo: PpoBatch {
                 actions: ActionBatch::new(&rollout.actions.gather(rows), device),
                 old_log_probs: vector(pick(&rollout.log_probs), device),

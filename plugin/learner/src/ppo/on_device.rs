@@ -2,6 +2,7 @@
 
 use crate::{
     LearnError, ObsKind, ObsSlice,
+    legal::logit_offsets,
     nn::{ActionBatch, Adam, Dist, PackedPixels, host, matrix, vector},
     policy::NetInput,
     ppo::{
@@ -19,6 +20,7 @@ pub(super) struct SentRollout<'a> {
     batch: &'a Batch<'a>,
     states: States,
     left: Option<Tensor<1>>,
+    logit_offsets: Option<Tensor<2>>,
     ppo: PpoBatch,
     teacher: Option<(Dist, Tensor<1>)>,
     device: Device,
@@ -38,6 +40,7 @@ impl<'a> SentRollout<'a> {
         Self {
             states: States::send(batch, &all, device),
             left: (!rollout.left.is_empty()).then(|| column(&rollout.left)),
+            logit_offsets: logit_offsets(&rollout.legal, &all, rollout.choices(), device),
             ppo: PpoBatch {
                 actions: ActionBatch::new(&rollout.actions, device),
                 old_log_probs: column(&rollout.log_probs),
@@ -61,6 +64,7 @@ impl<'a> SentRollout<'a> {
             augmented: self.batch.augmented(&inputs, rows, &self.device),
             inputs,
             left: self.left.as_ref().map(column),
+            logit_offsets: self.logit_offsets.as_ref().map(|offsets| offsets.clone().select(0, at.clone())),
             ppo: PpoBatch {
                 actions: match &self.ppo.actions {
                     ActionBatch::Discrete(actions) => ActionBatch::Discrete(actions.clone().select(0, at.clone())),

@@ -49,6 +49,9 @@ pub struct Minibatch {
     pub augmented: Option<NetInput>,
     /// Remaining share of each skill, `[n]`, if ticks are counted.
     pub left: Option<Tensor<1>>,
+    /// Numbers that are added to the logits, `[n, choices]`, if some choices are illegal: see
+    /// [`Actor::forward_legal`](crate::policy::Actor::forward_legal).
+    pub logit_offsets: Option<Tensor<2>>,
     /// Constants of the PPO loss.
     pub ppo: PpoBatch,
     /// Constants of the penalty, if there is one.
@@ -162,7 +165,7 @@ pub(super) fn outputs(
     moment: &UpdateSettings<'_>,
 ) -> Result<(Dist, Tensor<1>), LearnError> {
     let inputs = nets.actor.join(inputs)?;
-    let dist = nets.actor.forward(inputs.clone());
+    let dist = nets.actor.forward_legal(inputs.clone(), batch.logit_offsets.as_ref());
     let is_apart = moment.is_warming_up || !config.critic_trains_cnn;
     Ok((dist, nets.critic.forward(if is_apart { inputs.detach() } else { inputs }, batch.left.clone())))
 }

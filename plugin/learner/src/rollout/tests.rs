@@ -39,6 +39,29 @@ fn joined_rollouts_lie_side_by_side() {
 }
 
 #[test]
+fn masks_of_joined_rollouts_lie_side_by_side_and_allow_everything_where_there_are_none() {
+    let mut masked = part(1, 100.0);
+    masked.legal = [vec![true; 9], vec![false; 9]].concat();
+    (masked.ends.cut_legal, masked.ends.next_legal) = (vec![false; 9], vec![false; 9]);
+    let joined = Rollout::join(vec![part(2, 0.0), masked]).expect("they fit");
+    let of_rows: Vec<bool> = joined.legal.chunks(9).map(|row| row[0]).collect();
+    assert_eq!((joined.legal.len(), of_rows), (54, vec![true, true, true, true, true, false]));
+    assert_eq!(joined.ends.next_legal, [vec![true; 18], vec![false; 9]].concat());
+    assert_eq!(joined.ends.cut_legal, [vec![true; 9], vec![false; 9]].concat());
+    let plain = Rollout::join(vec![part(2, 0.0), part(1, 100.0)]).expect("they fit");
+    assert!(plain.legal.is_empty() && plain.ends.next_legal.is_empty() && plain.ends.cut_legal.is_empty());
+}
+
+#[test]
+fn steps_without_a_mask_allow_everything_beside_others() {
+    let mut rollout = part(2, 0.0);
+    rollout.push_legal(&[]);
+    assert!(rollout.legal.is_empty());
+    rollout.push_legal(&[[true, false], [false, true]].concat());
+    assert_eq!(rollout.legal, [true, true, true, true, true, false, false, true]);
+}
+
+#[test]
 fn a_wrong_length_is_named() {
     let mut rollout = part(2, 0.0);
     rollout.rewards.pop();

@@ -2,6 +2,7 @@
 
 use crate::{
     LearnError,
+    legal::{entropy_share, logit_offsets},
     nn::{ActionBatch, Dist, matrix, vector},
     policy::{StateBatch, joined_rows},
     sac::{SacLearner, buffer::ReplayBuffer},
@@ -29,6 +30,12 @@ pub struct SacBatch {
     pub teacher: Option<TeacherBatch>,
     /// Numbers of the critics whose least value is the target; empty for all of them.
     pub seen_by_target: Vec<usize>,
+    /// Numbers that are added to the logits in the states and in the next states, `[n, choices]`, if some choices are
+    /// illegal: see [`Actor::forward_legal`](crate::policy::Actor::forward_legal).
+    pub logit_offsets: Option<(Tensor<2>, Tensor<2>)>,
+    /// The mean of the largest entropies that the legal choices allow, as a share of that of all choices: 1 without
+    /// illegal ones.
+    pub entropy_share: f64,
     /// The prior's distributions for states and next states, for a policy over skills: the divergence from it takes
     /// the place of the entropy.
     pub prior: Option<(Dist, Dist)>,
@@ -44,6 +51,14 @@ impl SacBatch {
     /// Returns the same for the next states.
     pub(super) fn next_of_critics(&self) -> Tensor<2> {
         with_clock(&self.next_inputs, self.left.as_ref().map(|(_, next)| next))
+    }
+
+    pub(super) fn offsets_of_states(&self) -> Option<&Tensor<2>> {
+        self.logit_offsets.as_ref().map(|(states, _)| states)
+    }
+
+    pub(super) fn offsets_of_next(&self) -> Option<&Tensor<2>> {
+        self.logit_offsets.as_ref().map(|(_, next)| next)
     }
 
     pub(super) fn prior_of_states(&self) -> Option<&Dist> {
@@ -95,13 +110,15 @@ impl SacLearner {
                 let squashed = self.nets.actor.is_squashed();
                 let mut rng = base.streams.stream("score.own_samples", self.gradient_steps);
                 let states = StateBatch { z: &buffer.z, left: &[], obs: (&buffer.obs).into(), n };
-                teacher.output(states, &buffer.actions, squashed, &mut rng, base.device)?
+                teacher.output(states, (&buffer.actions, &buffer.legal), squashed, &mut rng, base.device)?
             }
         };
         let (here, next) = (inputs(&buffer.z, &buffer.obs), inputs(&buffer.next_z, &buffer.next_obs));
         let prior = base.prior_origin().map(|prior| (prior.forward(here.clone()), prior.forward(next.clone())));
         let column = |values: &[f32]| matrix(values.to_vec(), n, 1, &device);
         let left = (buffer.widths.clock > 0).then(|| (column(&buffer.left), column(&buffer.next_left)));
+        let choices = buffer.widths.legal;
+        let offsets = |legal: &[bool]| logit_offsets(legal, &all, choices, &device);
         let continues = all.iter().map(|&slot| buffer.continues(slot, self.config.time_limit)).collect();
         Ok(SacBatch {
             inputs: here,
@@ -111,6 +128,8 @@ impl SacLearner {
             continues: vector(continues, &device),
             next_inputs: next,
             teacher: teacher.map(|output| output.batch(&all, &device)),
+            logit_offsets: offsets(&buffer.legal).zip(offsets(&buffer.next_legal)),
+            entropy_share: entropy_share(&buffer.legal, choices),
             prior,
             seen_by_target,
         })

@@ -17,6 +17,8 @@ pub(super) struct Widths {
     pub(super) clock: usize,
     /// 1 if the value of the next state has a weight of its own, else 0.
     pub(super) weight: usize,
+    /// Number of discrete actions if masks are kept, else 0. It is set by the first rollout with a mask.
+    pub(super) legal: usize,
 }
 
 /// The newest transitions, raw: a ring of `capacity` slots in flat memory, which grows as it fills.
@@ -37,6 +39,9 @@ pub(super) struct ReplayBuffer {
     pub(super) next_left: Vec<f32>,
     /// Weights of the next states' values, beside the discount: not 1 for a skill that was cut off early.
     pub(super) weights: Vec<f32>,
+    /// Masks of the actions, in the states and in the next states.
+    pub(super) legal: Vec<bool>,
+    pub(super) next_legal: Vec<bool>,
     pub(super) actions: Actions,
     pub(super) rewards: Vec<f32>,
     pub(super) terminated: Vec<bool>,
@@ -61,6 +66,8 @@ impl ReplayBuffer {
             left: Vec::new(),
             next_left: Vec::new(),
             weights: Vec::new(),
+            legal: Vec::new(),
+            next_legal: Vec::new(),
             actions,
             rewards: Vec::new(),
             terminated: Vec::new(),
@@ -94,7 +101,9 @@ impl ReplayBuffer {
     /// [`LearnError::Config`] if the observations are images, [`LearnError::Shape`] as [`Self::check_clock`] or for
     /// another number of weights.
     pub(super) fn push(&mut self, rollout: &Rollout, weights: &[f32]) -> Result<(), LearnError> {
-        let Widths { obs: obs_dim, latent, clock, weight } = self.widths;
+        self.keep_masks_of(rollout);
+        let Widths { obs: obs_dim, latent, clock, weight, legal } = self.widths;
+        let all_legal = vec![true; legal];
         let (no_obs, no_z) = (vec![0.0; obs_dim], vec![0.0; latent]);
         let obs = rollout.obs.as_slice().vectors("SAC")?;
         self.check_clock(rollout)?;
@@ -108,6 +117,8 @@ impl ReplayBuffer {
             write(&mut self.left, at, slice(&rollout.left, clock, row));
             write(&mut self.next_left, at, &[transition.next_left.unwrap_or_default()][..clock]);
             write(&mut self.weights, at, slice(weights, weight, row));
+            write(&mut self.legal, at, mask_of(&rollout.legal, row, &all_legal));
+            write(&mut self.next_legal, at, transition.next_legal.unwrap_or(&all_legal));
             self.actions.write(at, &rollout.actions, row)?;
             write(&mut self.rewards, at, &[rollout.rewards[row]]);
             write(&mut self.terminated, at, &[rollout.terminated[row]]);
@@ -115,6 +126,15 @@ impl ReplayBuffer {
             self.seen += 1;
         }
         Ok(())
+    }
+
+    /// Makes room for masks at the first rollout that has some. Everything was legal before.
+    fn keep_masks_of(&mut self, rollout: &Rollout) {
+        if self.widths.legal == 0 && !rollout.legal.is_empty() {
+            self.widths.legal = rollout.choices();
+            let mask = vec![true; self.len() * self.widths.legal];
+            (self.legal, self.next_legal) = (mask.clone(), mask);
+        }
     }
 
     /// Draws `n` slots uniformly from all that are filled. At least one must be.
@@ -130,7 +150,8 @@ impl ReplayBuffer {
     pub(super) fn picked(&self, slots: &[usize], more: Option<(&Self, &[usize])>) -> Result<Self, LearnError> {
         let n = slots.len() + more.map_or(0, |(_, slots)| slots.len());
         let mut all = Self { seen: n as u64, ..Self::empty(n, self.widths, self.actions.gather(slots)) };
-        let Widths { obs, latent, clock, weight } = self.widths;
+        let Widths { obs, latent, clock, weight, legal } = self.widths;
+        let all_legal = vec![true; legal];
         let parts = [Some((self, slots)), more];
         for (from, slots) in parts.iter().flatten() {
             for &slot in *slots {
@@ -141,6 +162,8 @@ impl ReplayBuffer {
                 all.left.extend_from_slice(slice(&from.left, clock, slot));
                 all.next_left.extend_from_slice(slice(&from.next_left, clock, slot));
                 all.weights.extend_from_slice(slice(&from.weights, weight, slot));
+                all.legal.extend_from_slice(mask_of(&from.legal, slot, &all_legal));
+                all.next_legal.extend_from_slice(mask_of(&from.next_legal, slot, &all_legal));
                 all.rewards.push(from.rewards[slot]);
                 all.terminated.push(from.terminated[slot]);
                 all.truncated.push(from.truncated[slot]);
@@ -160,6 +183,12 @@ impl ReplayBuffer {
     }
 }
 
+/// Returns the mask of a row, or `all_legal` without masks.
+fn mask_of<'a>(masks: &'a [bool], row: usize, all_legal: &'a [bool]) -> &'a [bool] {
+    let width = all_legal.len();
+    masks.get(row * width..(row + 1) * width).unwrap_or(all_legal)
+}
+
 /// Puts `from` in slot `at` of `to`, or behind its end if that is where the slot lies.
 fn write<T: Copy>(to: &mut Vec<T>, at: usize, from: &[T]) {
     let start = at * from.len();
@@ -175,7 +204,7 @@ fn write<T: Copy>(to: &mut Vec<T>, at: usize, from: &[T]) {
 impl ReplayBuffer {
     /// Adds all transitions to a file, under names that begin with `prefix`.
     pub(super) fn put(&self, file: &mut TensorFile, prefix: &str) {
-        let (n, Widths { obs, latent, clock, weight }) = (self.len(), self.widths);
+        let (n, Widths { obs, latent, clock, weight, legal }) = (self.len(), self.widths);
         file.put(&path(prefix, "obs"), &[n, obs], &self.obs);
         file.put(&path(prefix, "z"), &[n, latent], &self.z);
         file.put(&path(prefix, "next_obs"), &[n, obs], &self.next_obs);
@@ -187,6 +216,10 @@ impl ReplayBuffer {
         if weight > 0 {
             file.put(&path(prefix, "weights"), &[n], &self.weights);
         }
+        if legal > 0 {
+            file.put_flags(&path(prefix, "legal"), &self.legal);
+            file.put_flags(&path(prefix, "next_legal"), &self.next_legal);
+        }
         match &self.actions {
             Actions::Discrete(values) => file.put_u32(&path(prefix, "actions"), values),
             Actions::Continuous { dim, values } => file.put(&path(prefix, "actions"), &[n, *dim], values),
@@ -197,9 +230,15 @@ impl ReplayBuffer {
     }
 
     /// Takes all transitions out of a file, of which `seen` were ever added.
-    pub(super) fn take(&mut self, file: &mut TensorFile, prefix: &str, seen: u64) -> Result<(), FileError> {
+    pub(super) fn take(
+        &mut self,
+        file: &mut TensorFile,
+        prefix: &str,
+        seen: u64,
+        space: &ActionSpace,
+    ) -> Result<(), FileError> {
         self.seen = seen;
-        let (n, Widths { obs, latent, clock, weight }) = (self.len(), self.widths);
+        let (n, Widths { obs, latent, clock, weight, .. }) = (self.len(), self.widths);
         self.obs = file.take(&path(prefix, "obs"), &[n, obs])?;
         self.z = file.take(&path(prefix, "z"), &[n, latent])?;
         self.next_obs = file.take(&path(prefix, "next_obs"), &[n, obs])?;
@@ -215,6 +254,11 @@ impl ReplayBuffer {
             _ if !file.has(&weights) => vec![1.0; n],
             _ => file.take(&weights, &[n])?,
         };
+        if let (true, ActionSpace::Discrete(choices)) = (file.has(&path(prefix, "legal")), space) {
+            self.widths.legal = *choices;
+            self.legal = file.take_flags(&path(prefix, "legal"), n * choices)?;
+            self.next_legal = file.take_flags(&path(prefix, "next_legal"), n * choices)?;
+        }
         match &mut self.actions {
             Actions::Discrete(values) => *values = file.take_u32(&path(prefix, "actions"), n)?,
             Actions::Continuous { dim, values } => *values = file.take(&path(prefix, "actions"), &[n, *dim])?,
@@ -239,6 +283,8 @@ pub(super) struct Transition<'a> {
     pub(super) next_z: Option<&'a [f32]>,
     /// The remaining share of that skill's ticks; `None` likewise, and if the rollout does not have it.
     pub(super) next_left: Option<f32>,
+    /// The mask in that state; `None` likewise, and if the rollout does not have it.
+    pub(super) next_legal: Option<&'a [bool]>,
 }
 
 /// Checks that a checked rollout holds the states where episodes were cut off and where it stops.
@@ -268,28 +314,30 @@ pub(crate) fn check_ends(rollout: &Rollout) -> Result<(), LearnError> {
 ///
 /// # Errors
 /// [`LearnError::Config`] if the observations are images.
-pub(super) fn transitions(rollout: &Rollout) -> Result<impl Iterator<Item = Transition<'_>>, LearnError> {
+pub(super) fn transitions<'a>(rollout: &'a Rollout) -> Result<impl Iterator<Item = Transition<'a>>, LearnError> {
     let ends = &rollout.ends;
     let width = rollout.obs_kind.numbers();
     let (obs, cut_obs, next_obs) = (vectors(&rollout.obs)?, vectors(&ends.cut_obs)?, vectors(&ends.next_obs)?);
     let mut cut = 0;
     Ok((0..rollout.rows()).map(move |row| {
-        let next = |obs, z, left: &[f32], at: usize| Transition {
+        let choices = rollout.choices();
+        let next = |obs, z, left: &[f32], legal: &'a [bool], at: usize| Transition {
             row,
             next_obs: Some(slice(obs, width, at)),
             next_z: Some(slice(z, rollout.latent, at)),
             next_left: left.get(at).copied(),
+            next_legal: legal.get(at * choices..(at + 1) * choices).filter(|legal| !legal.is_empty()),
         };
         let following = row + rollout.envs;
         if rollout.terminated[row] {
-            Transition { row, next_obs: None, next_z: None, next_left: None }
+            Transition { row, next_obs: None, next_z: None, next_left: None, next_legal: None }
         } else if is_cut(rollout, row) {
             cut += 1;
-            next(cut_obs, &ends.cut_z, &ends.cut_left, cut - 1)
+            next(cut_obs, &ends.cut_z, &ends.cut_left, &ends.cut_legal, cut - 1)
         } else if following < rollout.rows() {
-            next(obs, &rollout.z, &rollout.left, following)
+            next(obs, &rollout.z, &rollout.left, &rollout.legal, following)
         } else {
-            next(next_obs, &ends.next_z, &ends.next_left, following - rollout.rows())
+            next(next_obs, &ends.next_z, &ends.next_left, &ends.next_legal, following - rollout.rows())
         }
     }))
 }
@@ -357,7 +405,7 @@ impl Demos {
         }
         let widths = Widths { obs: spec.obs.numbers(), ..Widths::default() };
         let mut buffer = ReplayBuffer::new(rows as usize, widths, &spec.action_space);
-        buffer.take(file, "demos", rows)?;
+        buffer.take(file, "demos", rows, &spec.action_space)?;
         spec.action_space.check(&buffer.actions).map_err(|error| file.learner(error))?;
         Ok(Self { buffer, share })
     }
@@ -375,7 +423,7 @@ mod tests {
     use crate::rng::Streams;
     use crate::sac::buffer::transitions_tests::rollout;
 
-    const PLAIN: Widths = Widths { obs: 1, latent: 1, clock: 0, weight: 0 };
+    const PLAIN: Widths = Widths { obs: 1, latent: 1, clock: 0, weight: 0, legal: 0 };
 
     fn new(capacity: usize, widths: Widths) -> ReplayBuffer {
         ReplayBuffer::new(capacity, widths, &ActionSpace::Discrete(3))
@@ -416,6 +464,35 @@ mod tests {
         assert!(error.to_string().contains("weights"), "{error}");
     }
 
+    /// Returns the rollout with a mask that forbids action 0 in state 4, and action 1 where it was cut off.
+    fn masked() -> Rollout {
+        let mut rollout = rollout();
+        rollout.legal = vec![true; 18];
+        rollout.legal[12] = false;
+        rollout.ends.cut_legal = vec![true, false, true];
+        rollout.ends.next_legal = vec![true; 6];
+        rollout
+    }
+
+    #[test]
+    fn masks_of_states_and_next_states_are_kept_from_the_first_one_on() {
+        let mut buffer = new(100, PLAIN);
+        buffer.push(&rollout(), &[]).expect("it fits");
+        assert!(buffer.legal.is_empty());
+        buffer.push(&masked(), &[]).expect("it fits");
+        buffer.push(&rollout(), &[]).expect("it fits");
+        let forbidden = |mask: &[bool]| {
+            let places = mask.iter().enumerate().filter(|(_, is_legal)| !**is_legal);
+            places.map(|(at, _)| at).collect::<Vec<_>>()
+        };
+        assert_eq!((buffer.legal.len(), buffer.next_legal.len()), (54, 54));
+        // Row 4 of the second rollout is state 4, to which row 2 leads; row 0 was cut off.
+        assert_eq!(forbidden(&buffer.legal), [(6 + 4) * 3]);
+        assert_eq!(forbidden(&buffer.next_legal), [6 * 3 + 1, (6 + 2) * 3]);
+        let picked = buffer.picked(&[10, 0], None).expect("the same actions");
+        assert_eq!(picked.legal, [false, true, true, true, true, true]);
+    }
+
     #[test]
     fn only_filled_slots_are_drawn_and_all_of_them() {
         let buffer = filled(100);
@@ -444,6 +521,21 @@ mod buffer_file_tests {
     use std::path::Path;
 
     #[test]
+    fn masks_go_into_files_and_come_back() {
+        let (widths, actions) = (Widths { obs: 1, latent: 1, ..Widths::default() }, ActionSpace::Discrete(3));
+        let mut masked = ReplayBuffer::new(6, widths, &actions);
+        let mut played = rollout();
+        played.legal = (0..18).map(|at| at % 4 != 1).collect();
+        masked.push(&played, &[]).expect("it fits");
+        let kind = FileKind { name: "buffer", version: 1 };
+        let mut file = TensorFile::new(Path::new("buffer"), kind, &serde_json::json!({})).expect("a header");
+        masked.put(&mut file, "new");
+        let mut loaded = ReplayBuffer::new(6, widths, &actions);
+        loaded.take(&mut file, "new", masked.seen, &actions).expect("read");
+        assert_eq!(loaded, masked);
+    }
+
+    #[test]
     fn files_from_before_there_were_weights_hold_transitions_that_all_count_alike() {
         let plain_widths = Widths { obs: 1, latent: 1, ..Widths::default() };
         let actions = ActionSpace::Discrete(3);
@@ -453,7 +545,7 @@ mod buffer_file_tests {
         let mut file = TensorFile::new(Path::new("buffer"), kind, &serde_json::json!({})).expect("a header");
         plain.put(&mut file, "old");
         let mut loaded = ReplayBuffer::new(6, Widths { weight: 1, ..plain_widths }, &actions);
-        loaded.take(&mut file, "old", plain.seen).expect("read");
+        loaded.take(&mut file, "old", plain.seen, &actions).expect("read");
         assert_eq!((loaded.weights.as_slice(), &loaded.obs), (&[1.0; 6][..], &plain.obs));
     }
 }
@@ -461,7 +553,7 @@ mod buffer_file_tests {
 #[cfg(test)]
 pub(super) mod transitions_tests {
     use super::*;
-    use crate::{ActionSpace, Actions, EndStates};
+    use crate::{ActionSpace, Actions, EndStates, ObsKind};
 
     /// Returns a rollout of two environments, three steps, observations 0 to 5 and skills 10 to 15. Environment 0 is
     /// cut off at step 0 (its last observation is 50), environment 1 terminates at step 1 with both flags set.
@@ -489,6 +581,7 @@ pub(super) mod transitions_tests {
                 cut_z: vec![60.0],
                 next_obs: vec![70.0, 71.0].into(),
                 next_z: vec![80.0, 81.0],
+                ..EndStates::new(&ObsKind::Vector(1))
             },
             ..Rollout::new(2, 1, 1, &ActionSpace::Discrete(3))
         }

@@ -120,8 +120,8 @@ pub fn target_of(
     temperature: f64,
     gamma: f64,
 ) -> Result<Tensor<1>, LearnError> {
-    let actions =
-        PolicyActions::new(frozen(&nets.actor).forward(batch.next_inputs.clone()), batch.prior_of_next(), noise)?;
+    let dist = frozen(&nets.actor).forward_legal(batch.next_inputs.clone(), batch.offsets_of_next());
+    let actions = PolicyActions::new(dist, batch.prior_of_next(), noise)?;
     let targets = nets.targets.some(&batch.seen_by_target);
     let next = actions.soft_value(&targets, Pool::Least, batch.next_of_critics(), temperature);
     Ok(q_target(batch.rewards.clone(), batch.continues.clone(), next, gamma))
@@ -170,7 +170,7 @@ pub fn actor_step(
     score: Option<&ScoreConfig>,
     lr: f64,
 ) -> Result<ActorStep, LearnError> {
-    let dist = nets.actor.forward(batch.inputs.clone());
+    let dist = nets.actor.forward_legal(batch.inputs.clone(), batch.offsets_of_states());
     let actions = PolicyActions::new(dist.clone(), batch.prior_of_states(), noise)?;
     // If a target uses only some critics, the actor follows the mean of all.
     let pool = if batch.seen_by_target.is_empty() { Pool::Least } else { Pool::Mean };
@@ -209,7 +209,7 @@ pub fn temperature_step(
     target_entropy: f64,
     lr: f64,
 ) -> Result<TemperatureStep, LearnError> {
-    let dist = frozen(&nets.actor).forward(batch.inputs.clone());
+    let dist = frozen(&nets.actor).forward_legal(batch.inputs.clone(), batch.offsets_of_states());
     let actions = PolicyActions::new(dist, batch.prior_of_states(), noise)?;
     let log_prob = actions.log_prob();
     let loss = temperature_loss(nets.log_temperature.0.clone(), actions.cost(), target_entropy);

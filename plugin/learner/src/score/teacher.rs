@@ -266,11 +266,12 @@ impl TeacherOutput {
 
 impl Teacher {
     /// Returns the distributions of the network that the policy is tied to, and its confidence, in `states` where
-    /// `actions` were taken. Returns `None` if there is no penalty. `squashed`: the policy is a squashed Gaussian.
+    /// `actions` were taken. Returns `None` if there is no penalty. `legal` is the mask of the states, or empty.
+    /// `squashed`: the policy is a squashed Gaussian.
     pub(crate) fn output<R: Rng + ?Sized>(
         &self,
         states: StateBatch<'_>,
-        actions: &Actions,
+        (actions, legal): (&Actions, &[bool]),
         squashed: bool,
         own_samples_from: &mut R,
         device: DeviceKind,
@@ -278,7 +279,9 @@ impl Teacher {
         if !self.config.kl {
             return Ok(None);
         }
-        let dist = self.origin_policy(device).forward(states.z, states.obs, states.n)?.into_dist();
+        let mut output = self.origin_policy(device).forward(states.z, states.obs, states.n)?;
+        output.restrict(legal);
+        let dist = output.into_dist();
         let confidence = penalty_weights(&self.config, &dist, actions, own_samples_from)?;
         let dist = if squashed { unsquashed(&dist) } else { dist };
         Ok(Some(TeacherOutput { dist, confidence }))
@@ -312,7 +315,7 @@ mod tests {
         let (z, obs) = (numbers(teacher.latent()), numbers(obs_dim));
         let actions = Actions::Discrete(vec![0; n]);
         let states = StateBatch { z: &z, left: &[], obs: (&obs).into(), n };
-        let rows = teacher.output(states, &actions, false, &mut Streams::new(1).stream("own", 0), device);
+        let rows = teacher.output(states, (&actions, &[]), false, &mut Streams::new(1).stream("own", 0), device);
         let rows = rows.expect("finite").expect("there is a penalty");
         // The same row among others.
         let tail = |values: &[f32], width: usize| values[(n - 3) * width..].to_vec();

@@ -106,6 +106,8 @@ impl Continuous {
             teacher: None,
             prior: None,
             seen_by_target: Vec::new(),
+            logit_offsets: None,
+            entropy_share: 1.0,
         }
     }
 

@@ -80,6 +80,8 @@ impl Variant<'_> {
             next_inputs: case.tensor("in.next_obs", &device),
             teacher: None,
             seen_by_target: case.sizes("seen_by_target"),
+            logit_offsets: None,
+            entropy_share: 1.0,
             prior: case.has("in.prior_mean").then(|| (prior("prior"), prior("next_prior"))),
         }
     }

@@ -153,6 +153,7 @@ impl<'a> Update<'a> {
             inputs: inputs.into(),
             augmented: None,
             left: None,
+            logit_offsets: None,
             ppo: PpoBatch {
                 actions: ActionBatch::new(&actions("in.actions"), &device),
                 old_log_probs: vector(pick("in.old_log_probs")),

@@ -207,6 +207,7 @@ fn minibatch(rows: usize) -> Minibatch {
     Minibatch {
         augmented: None,
         left: None,
+        logit_offsets: None,
         inputs: NetInput::Images {
             z: None,
             pixels: Tensor::from_data(TensorData::new(pixels, [rows, 1, SHAPE.height, SHAPE.width]), &device),

@@ -2,6 +2,7 @@
 
 use crate::{
     DeviceKind,
+    legal::logit_offsets,
     nn::{ActionBatch, matrix, vector},
     policy::NetInput,
     ppo::{
@@ -76,6 +77,7 @@ fn loss_metrics_and_gradient_are_those_of_the_tensors() {
         let batch = Minibatch {
             augmented: None,
             left: None,
+            logit_offsets: None,
             inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
             ppo: PpoBatch { actions, old_log_probs: vector(old_log_probs, &device), advantages, old_values, returns },
             teacher: penalised.then(|| TeacherBatch {
@@ -118,6 +120,79 @@ fn loss_metrics_and_gradient_are_those_of_the_tensors() {
     }
 }
 
+/// Returns the loss with a penalty for policy and decoder with these logits, and its gradient by the policy's.
+fn penalised(
+    [policy, decoder]: [Vec<f32>; 2],
+    offsets: Option<&Tensor<2>>,
+    actions: Vec<u32>,
+    columns: &[Vec<f32>; 6],
+) -> (StepMetrics, Vec<f32>) {
+    let device = DeviceKind::Flex.plain();
+    let (n, choices) = (actions.len(), policy.len() / actions.len());
+    let of = |logits: Tensor<2>| match offsets {
+        Some(offsets) => Dist::categorical(logits + offsets.clone()),
+        None => Dist::categorical(logits),
+    };
+    let logits = matrix(policy, n, choices, &device.clone().autodiff()).require_grad();
+    let dist = of(logits.clone());
+    let [old_log_probs, advantages, old_values, returns, confidence, values] = columns;
+    let column = |numbers: &[f32]| vector(numbers.to_vec(), &device);
+    let values = vector(values.clone(), &device.clone().autodiff()).require_grad();
+    let batch = Minibatch {
+        augmented: None,
+        left: None,
+        logit_offsets: offsets.cloned(),
+        inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
+        ppo: PpoBatch {
+            actions: ActionBatch::new(&Actions::Discrete(actions), &device),
+            old_log_probs: column(old_log_probs),
+            advantages: column(advantages),
+            old_values: column(old_values),
+            returns: column(returns),
+        },
+        teacher: Some(TeacherBatch {
+            dist: of(matrix(decoder, n, choices, &device)),
+            confidence: column(confidence),
+            mean_confidence: 0.0,
+        }),
+    };
+    let score = ScoreConfig { kl_coef: 0.3, ..ScoreConfig::default() };
+    let config = PpoConfig { ent_coef: 0.02, ..PpoConfig::default() };
+    let moment = UpdateSettings { lr: 1e-3, score: Some(&score), is_warming_up: false };
+    let loss = HostLoss::of(&dist, &values, &batch, &config, &moment, 0).expect("finite");
+    let metrics = loss.metrics;
+    let grads = loss.tensor(&dist, values).backward();
+    (metrics, host(logits.grad(&grads).expect("tracked")).expect("readable"))
+}
+
+#[test]
+fn the_loss_under_a_mask_is_that_of_the_legal_choices_alone() {
+    let device = DeviceKind::Flex.plain();
+    let mut rng = Streams::new(3).stream("loss", 0);
+    let n = 40;
+    let fewer = [0.7, 0.5].map(|scale| numbers(&mut rng, 2 * n, scale));
+    // Between the two legal choices there is an illegal one with the largest logit.
+    let more = fewer.clone().map(|logits| logits.chunks(2).flat_map(|row| [row[0], 9.0, row[1]]).collect::<Vec<f32>>());
+    let columns = [0.2, 1.0, 0.3, 1.0, 0.5, 0.3].map(|scale| numbers(&mut rng, n, scale));
+    let rows: Vec<usize> = (0..n).collect();
+    let offsets = logit_offsets(&[true, false, true].repeat(n), &rows, 3, &device).expect("a mask");
+    let actions = |step: u32| (0..n as u32).map(|row| row % 2 * step).collect::<Vec<u32>>();
+    let (want, want_grads) = penalised(fewer, None, actions(1), &columns);
+    let (got, grads) = penalised(more, Some(&offsets), actions(2), &columns);
+    for (name, got, want) in [
+        ("policy_loss", got.policy_loss, want.policy_loss),
+        ("entropy", got.entropy, want.entropy),
+        ("decoder_kl", got.decoder_kl, want.decoder_kl),
+        ("total_loss", got.total_loss, want.total_loss),
+    ] {
+        assert!(close(got, want), "{name} {got}, expected {want}");
+    }
+    for (got, want) in grads.chunks(3).zip(want_grads.chunks(2)) {
+        assert!((got[0] - want[0]).abs() < 1e-6 && (got[2] - want[1]).abs() < 1e-6, "{got:?}, expected {want:?}");
+        assert!(got[1].abs() < 1e-20, "{got:?}");
+    }
+}
+
 #[test]
 fn actions_of_the_other_kind_are_refused() {
     let device = DeviceKind::Flex.plain();
@@ -127,6 +202,7 @@ fn actions_of_the_other_kind_are_refused() {
     let batch = Minibatch {
         augmented: None,
         left: None,
+        logit_offsets: None,
         inputs: NetInput::Joined(matrix(vec![0.0], 1, 1, &device)),
         ppo: PpoBatch {
             actions,
