@@ -1,7 +1,7 @@
 //! Evaluation: each level equally often, every episode counted once.
 
 use crate::{
-    arrangement::Arrangement,
+    arrangement::{Arrangement, at_most},
     ended_episodes::EndedEpisodes,
     game::Game,
     machine::{MemoryError, check_bytes},
@@ -154,6 +154,14 @@ impl EvalPlan {
         }
     }
 
+    /// Returns the arenas that play the plan: those of the plan, or fewer in a game of few arenas for each World. It gets
+    /// no more Worlds than the plan has, since building one takes as long as many episodes.
+    fn arrangement(&self, game: &dyn Game) -> Arrangement {
+        let worlds = self.worlds.max(1);
+        let per_world = at_most(game, (self.arenas / worlds) as usize) as u32;
+        Arrangement::of_agents(game, self.arenas.min(worlds * per_world), worlds)
+    }
+
     /// Returns the levels to play, in order.
     pub fn levels(&self) -> impl Iterator<Item = u64> + '_ {
         self.split.levels().filter(|level| !self.left_out.contains(level))
@@ -235,7 +243,7 @@ fn play(
         return Err(Fault(problem).into());
     }
     plan.check_memory()?;
-    let arrangement = Arrangement::of_agents(game, plan.arenas, plan.worlds);
+    let arrangement = plan.arrangement(game);
     // Agents that share an arena play the same episode.
     let sharing = game.tools().host.agents_per_arena().max(1);
     let progress = |ended: u64| progress(ended.div_ceil(u64::from(sharing)));

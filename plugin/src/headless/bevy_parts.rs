@@ -115,6 +115,59 @@ mod shader {
     }
 }
 
+/// What draws cameras, of a Bevy without `bevy_core_pipeline`.
+#[allow(dead_code, unused_imports, reason = "used only where Bevy draws no cameras")]
+mod core_pipeline {
+    use bevy::prelude::*;
+
+    #[derive(Default)]
+    pub(crate) struct CorePipelinePlugin;
+
+    impl Plugin for CorePipelinePlugin {
+        fn build(&self, _: &mut App) {}
+    }
+
+    pub(crate) mod core_2d {
+        pub(crate) use super::super::Nothing as Core2dPlugin;
+    }
+
+    pub(crate) mod core_3d {
+        pub(crate) use super::super::Nothing as Core3dPlugin;
+    }
+
+    pub(crate) mod oit {
+        pub(crate) use super::super::Nothing as OrderIndependentTransparencyPlugin;
+    }
+
+    pub(crate) mod prepass {
+        pub(crate) use super::super::Nothing as BackgroundMotionVectorsPlugin;
+    }
+
+    pub(crate) mod tonemapping {
+        pub(crate) use super::super::Nothing as TonemappingPlugin;
+        use bevy::prelude::*;
+
+        #[derive(Resource)]
+        pub(crate) struct TonemappingLuts {
+            pub(crate) blender_filmic: Handle<Image>,
+            pub(crate) agx: Handle<Image>,
+            pub(crate) tony_mc_mapface: Handle<Image>,
+        }
+    }
+}
+
+/// A plugin in place of one that Bevy lacks.
+#[allow(dead_code, reason = "used only where Bevy lacks a plugin")]
+pub(crate) struct Nothing;
+
+impl Plugin for Nothing {
+    fn build(&self, _: &mut App) {}
+
+    fn is_unique(&self) -> bool {
+        false
+    }
+}
+
 /// Leaves out the event loop, and the thread that draws beside the World.
 pub(super) fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
     #[allow(unused_imports, reason = "Bevy may lack these modules")]
@@ -138,6 +191,13 @@ pub(super) fn without_drawing(plugins: PluginGroupBuilder, shows_sub_app: bool) 
     let plugins = plugins
         .set(render::RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
         .add_before::<render::RenderPlugin>(EmptyShaders);
+    let plugins = if plugins.contains::<core_pipeline::CorePipelinePlugin>() {
+        plugins
+            .add_after::<core_pipeline::CorePipelinePlugin>(CamerasWithoutPictures)
+            .disable::<core_pipeline::CorePipelinePlugin>()
+    } else {
+        plugins
+    };
     if shows_sub_app {
         // Shown after Bevy's own plugins, which would need a graphics adapter if they found it, and hidden before any
         // plugin is finished.
@@ -185,6 +245,31 @@ impl Plugin for EmptyShaders {
             // Announced for no files, Bevy's own loader gets none when the renderer brings it.
             app.preregister_asset_loader::<shader::ShaderLoader>(&[]).register_asset_loader(EmptyShaderLoader);
         }
+    }
+}
+
+/// Gives cameras all components that they have where they are drawn.
+///
+/// It takes the place of Bevy's plugin, which reads a shader for each of forty formats of pictures besides, and three
+/// tables of colours.
+struct CamerasWithoutPictures;
+
+impl Plugin for CamerasWithoutPictures {
+    fn build(&self, app: &mut App) {
+        #[allow(unused_imports, reason = "Bevy may lack these modules")]
+        use bevy::*;
+        app.insert_resource(core_pipeline::tonemapping::TonemappingLuts {
+            blender_filmic: Handle::default(),
+            agx: Handle::default(),
+            tony_mc_mapface: Handle::default(),
+        })
+        .add_plugins((
+            core_pipeline::core_2d::Core2dPlugin,
+            core_pipeline::core_3d::Core3dPlugin,
+            core_pipeline::tonemapping::TonemappingPlugin,
+            core_pipeline::oit::OrderIndependentTransparencyPlugin,
+            core_pipeline::prepass::BackgroundMotionVectorsPlugin,
+        ));
     }
 }
 

@@ -193,10 +193,13 @@ fn furnish(
     next.set(Screen::Walking);
 }
 
+/// Keys and doors, without the walker.
+type Things = (With<Thing>, Without<Walker>);
+
 fn walk(
     (time, keys): (Res<Time>, Res<ButtonInput<KeyCode>>),
     walker: Single<(&mut GridCoords, &mut Walker)>,
-    things: Query<(Entity, &GridCoords), (With<Thing>, Without<Walker>)>,
+    things: Query<(Entity, &GridCoords), Things>,
     mut room: ResMut<Room>,
     mut next: ResMut<NextState<Screen>>,
     mut commands: Commands,
@@ -218,7 +221,10 @@ fn walk(
     }
 }
 
-fn show(mut walkers: Query<(&mut Transform, &GridCoords), (With<Walker>, Changed<GridCoords>)>) {
+/// The walker after a step.
+type HasStepped = (With<Walker>, Changed<GridCoords>);
+
+fn show(mut walkers: Query<(&mut Transform, &GridCoords), HasStepped>) {
     for (mut transform, at) in &mut walkers {
         transform.translation = grid_coords_to_translation(*at, IVec2::splat(SIDE)).extend(transform.translation.z);
     }

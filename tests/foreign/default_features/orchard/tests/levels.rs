@@ -40,7 +40,7 @@ fn orchard() -> ForeignGame {
 fn played(levels: &[u64]) -> Vec<Vec<u64>> {
     let game = orchard();
     let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
-    world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::list(levels.iter().copied())));
+    world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::list(levels)));
     game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.0);
     let mut episodes = vec![Vec::new(); levels.len()];
     for _ in 0..1500 * levels.len() {
