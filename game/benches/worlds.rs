@@ -9,7 +9,10 @@ use bevy::prelude::{App, KeyCode, World};
 use criterion::{Criterion, Throughput};
 use playbot::prelude::*;
 use playbot_games::GAMES;
-use playbot_harness::{arrangement::Arrangement, foreign::ForeignGame, worlds::build_world};
+use playbot_harness::{
+    foreign::ForeignGame,
+    worlds::{Arrangement, build_world},
+};
 
 const ARENAS: u32 = 16;
 const TICKS: u64 = 10;

@@ -11,7 +11,6 @@
 pub mod ant;
 pub mod antmaze;
 pub mod coinrun;
-mod defect_variant;
 pub mod maze;
 pub mod maze2d;
 mod pictures;

@@ -8,11 +8,13 @@ use crate::{
         geometry::{distance, wall_boxes},
         level_text,
     },
-    defect_variant::{pick, place, variants},
     maze::defects::{ChangeMaze, of_levels, of_walls, take_back},
 };
 use bevy::prelude::*;
-use playbot_harness::{defect::DefectKind, prelude::*};
+use playbot_harness::{
+    defect::{DefectKind, pick, place, variants},
+    prelude::*,
+};
 
 /// Returns the defects of the game, those of levels first.
 pub(super) fn defects() -> Vec<DefectKind> {
@@ -172,6 +174,7 @@ mod tests {
     use bevy::prelude::*;
     use bevy_playbot::test_app::{PlaybotTestExt, test_app};
     use playbot_harness::{
+        defect::PLACES,
         defect::{ChangeRules, Plant},
         prelude::*,
     };
@@ -181,7 +184,6 @@ mod tests {
     use crate::{
         ant::WallBox,
         antmaze::{AntMaze, DemonstratorBot, generate, level_text::LevelText, spawn_agent},
-        defect_variant::PLACES,
         maze::Maze,
     };
 

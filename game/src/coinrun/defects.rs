@@ -11,20 +11,17 @@
 mod hazards;
 mod walls;
 
-use crate::{
-    coinrun::{
-        components::{Arena, PlayerBody, Tiles},
-        defects::walls::column,
-        level::{Level, LevelParts, Spawn},
-        level_text,
-        play::CoinRunSystems,
-        rules::Body,
-        tile::{SIZE, Tile},
-    },
-    defect_variant::{PLACES, pick, variants},
+use crate::coinrun::{
+    components::{Arena, PlayerBody, Tiles},
+    defects::walls::column,
+    level::{Level, LevelParts, Spawn},
+    level_text,
+    play::CoinRunSystems,
+    rules::Body,
+    tile::{SIZE, Tile},
 };
 use bevy::prelude::*;
-use playbot_harness::defect::DefectKind;
+use playbot_harness::defect::{DefectKind, PLACES, pick, variants};
 use playbot_learner::rng::{ChaCha8Rng, below};
 
 /// Returns the defects of the game, those of levels first.

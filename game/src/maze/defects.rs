@@ -1,14 +1,14 @@
 //! Shared defects of the games in mazes: see `playbot_mutation`.
 
-use crate::{
-    defect_variant::{PLACES, place},
-    maze::{Cell, Maze, planner::prove},
-};
+use crate::maze::{Cell, Maze, planner::prove};
 use bevy::{
     prelude::*,
     reflect::{GetPath, enums::DynamicEnum},
 };
-use playbot_harness::{defect::DefectKind, prelude::*};
+use playbot_harness::{
+    defect::{DefectKind, PLACES, place},
+    prelude::*,
+};
 use playbot_learner::rng::{ChaCha8Rng, shuffle};
 use serde::Deserialize;
 use serde_json::Value;

@@ -1,7 +1,6 @@
 //! Defects that can be planted into Maze2D, to measure testers: see `playbot_mutation`.
 
 use crate::{
-    defect_variant::{pick, place, variants},
     maze::defects::{ChangeMaze, of_levels, of_walls, take_back},
     maze2d::{
         Maze2dSystems,
@@ -15,7 +14,10 @@ use crate::{
     },
 };
 use bevy::prelude::*;
-use playbot_harness::{defect::DefectKind, prelude::*};
+use playbot_harness::{
+    defect::{DefectKind, pick, place, variants},
+    prelude::*,
+};
 use std::sync::Arc;
 
 /// Returns the defects of the game, those of levels first.

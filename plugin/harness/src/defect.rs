@@ -66,3 +66,34 @@ impl fmt::Debug for DefectKind {
         f.debug_struct("DefectKind").field("class", &self.class).field("plant", &how).finish_non_exhaustive()
     }
 }
+
+// Variants: first positions along the path, then strengths. So testers that get further find more.
+
+/// Places: at the start, further on and late.
+pub const PLACES: u32 = 3;
+
+/// Returns the place of a variant, from 0.
+pub fn place(variant: u32) -> usize {
+    (variant % PLACES) as usize
+}
+
+/// Returns the strength of a variant.
+pub fn pick<T: Copy>(strengths: &[T], variant: u32) -> T {
+    strengths[(variant / PLACES) as usize % strengths.len()]
+}
+
+/// Returns the number of variants of a defect with so many strengths.
+pub const fn variants(strengths: usize) -> u32 {
+    PLACES * strengths as u32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn variants_go_through_the_places_and_then_through_the_strengths() {
+        assert_eq!((0..6).map(place).collect::<Vec<_>>(), [0, 1, 2, 0, 1, 2]);
+        assert_eq!((variants(2), [2, 3].map(|variant| pick(&['a', 'b'], variant))), (6, ['a', 'b']));
+    }
+}

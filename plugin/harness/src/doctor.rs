@@ -16,7 +16,6 @@
 //! - `trial`: one comparison, tick by tick.
 //! - `game_copy`: a running copy of the game, with its entities and types.
 //! - `compare`, `field`: the comparison of two copies, down to the first field that differs.
-//! - `known`: diagnostics of known engines, which are left out.
 //! - `cause`, `observed`: causes of a difference, observations of the agents, and the uses that the game is safe for.
 //! - `steps`: frames and fixed steps of different lengths.
 //! - `text`: the report for people.
@@ -25,7 +24,6 @@ mod cause;
 mod compare;
 mod field;
 mod game_copy;
-mod known;
 mod observed;
 mod steps;
 mod text;

@@ -1,13 +1,11 @@
 //! Evaluation: each level equally often, every episode counted once.
 
 use crate::{
-    arrangement::{Arrangement, at_most},
-    ended_episodes::EndedEpisodes,
     game::Game,
     machine::{MemoryError, check_bytes},
     parallel::on_threads,
     split::LevelSplit,
-    worlds::{BuildingCosts, build_observing_world},
+    worlds::{Arrangement, BuildingCosts, EndedEpisodes, at_most, build_observing_world},
 };
 use bevy::prelude::*;
 use bevy_playbot::{

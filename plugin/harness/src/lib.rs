@@ -10,9 +10,8 @@
 //! - a game: [`game`], the contract of games and their optional tools; [`foreign`], games that are not written for this
 //!   plugin; [`games`], the games of a program; [`mode`], errors of modes; [`prelude`], the imports of a game.
 //! - its levels: [`split`], named ranges of levels; [`level_files`], levels from files; [`floor_plan`], their plans.
-//! - its Worlds: [`worlds`], headless Worlds with any number of agents; [`sensors`], what their agents see;
-//!   [`arrangement`], the distribution of arenas over Worlds; [`ended_episodes`], the list of episodes that ended;
-//!   [`saved_episode`], episodes that are saved in the middle.
+//! - its Worlds: [`worlds`], headless Worlds with any number of agents, and the episodes that ended in them;
+//!   [`sensors`], what their agents see; [`saved_episode`], episodes that are saved in the middle.
 //! - its players: [`eval`], evaluation of players on levels; [`demo`], recordings made and verified; [`detector`], the
 //!   contract of detectors of defects; [`defect`], the kinds of planted defects.
 //! - views: [`doctor`], the examination of a game's determinism; [`inspect`], single levels and steps; [`trace`], given
@@ -43,7 +42,6 @@
 //! assert_eq!(world.get::<EpisodeCount>(agents[0]).expect("an agent").finished, 1);
 //! ```
 
-pub mod arrangement;
 pub mod benchmark;
 pub mod brief;
 pub mod defect;
@@ -51,7 +49,6 @@ pub mod demo;
 pub mod detector;
 pub mod doctor;
 pub mod drawing;
-pub mod ended_episodes;
 pub mod eval;
 pub mod floor_plan;
 pub mod foreign;

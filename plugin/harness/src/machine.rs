@@ -3,7 +3,7 @@
 //! The numbers are those of Linux: `/proc`, `ulimit` and control groups of the second version. Other systems have no
 //! such numbers, and are taken to have enough.
 
-use crate::{arrangement::Arrangement, parallel::default_threads};
+use crate::{parallel::default_threads, worlds::Arrangement};
 use playbot_learner::HasExitCode;
 use std::{fs, path::Path, str::FromStr};
 use thiserror::Error;

@@ -7,7 +7,7 @@ use bevy_playbot::{
     skill_prior::SkillPrior,
     vision::{ObservationConfig, UnknownObservation, VisionError},
 };
-use playbot_harness::{arrangement::at_most, game::Game, split::LevelSplit};
+use playbot_harness::{game::Game, split::LevelSplit, worlds::at_most};
 use playbot_learner::{
     FileError, HasExitCode, Observations, Policy, PolicyFile, PolicyMetadata, SeenLevels, SkillSource,
 };

@@ -17,11 +17,11 @@ use bevy_playbot::{
     vision::ObservationConfig,
 };
 use playbot_harness::{
-    arrangement::Arrangement,
     game::Game,
     held_out::{HeldOut, seen_by_training},
     parallel::{on_own_threads, on_threads},
     sensors::GameSensors,
+    worlds::Arrangement,
 };
 use playbot_learner::{
     ActionSpace, ContinuedSchedule, DeviceKind, FileError, LearnError, Learner, LearnerMetrics, ObsColumns, ObsKind,

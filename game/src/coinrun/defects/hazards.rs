@@ -1,18 +1,18 @@
 //! Defects of hazards, harmless ones and deaths without one, and levels with missing ground or a trap.
 
-use crate::{
-    coinrun::{
-        components::{Arena, ArenaBody, ArenaEntities, Enemy, InArena, PlayerBody, PlaysIn, Saw, Tiles},
-        defects::{between, dig, fill, of_levels, summit, surface, walls::begins, while_played},
-        level::{LevelParts, Spawn},
-        play::CoinRunSystems,
-        rules::{BLOCK_HALF, Body},
-        tile::{SIZE, Tile, TileGrid},
-    },
-    defect_variant::{PLACES, pick, variants},
+use crate::coinrun::{
+    components::{Arena, ArenaBody, ArenaEntities, Enemy, InArena, PlayerBody, PlaysIn, Saw, Tiles},
+    defects::{between, dig, fill, of_levels, summit, surface, walls::begins, while_played},
+    level::{LevelParts, Spawn},
+    play::CoinRunSystems,
+    rules::{BLOCK_HALF, Body},
+    tile::{SIZE, Tile, TileGrid},
 };
 use bevy::prelude::*;
-use playbot_harness::{defect::DefectKind, prelude::*};
+use playbot_harness::{
+    defect::{DefectKind, PLACES, pick, variants},
+    prelude::*,
+};
 use playbot_learner::rng::{ChaCha8Rng, below};
 
 /// Distance from a hazard at which a player dies, tiles.

@@ -1,17 +1,17 @@
 //! Levels with an unreachable coin, behind rock or without any, and defects of the player's motion.
 
-use crate::{
-    coinrun::{
-        components::{Arena, PlayerBody, PlayerMemory, PlaysIn},
-        defects::{between, fill, of_levels, summit, surface},
-        level::{Level, LevelParts, Spawn},
-        rules::{Body, PlayerState},
-        tile::{SIZE, Tile},
-    },
-    defect_variant::{PLACES, pick, place, variants},
+use crate::coinrun::{
+    components::{Arena, PlayerBody, PlayerMemory, PlaysIn},
+    defects::{between, fill, of_levels, summit, surface},
+    level::{Level, LevelParts, Spawn},
+    rules::{Body, PlayerState},
+    tile::{SIZE, Tile},
 };
 use bevy::prelude::*;
-use playbot_harness::{defect::DefectKind, prelude::*};
+use playbot_harness::{
+    defect::{DefectKind, PLACES, pick, place, variants},
+    prelude::*,
+};
 use playbot_learner::rng::{ChaCha8Rng, below};
 
 /// Thickness of the rock around a coin. Upwards a player may slip through a single layer, never through two.

@@ -8,13 +8,12 @@ use crate::{
 use bevy::prelude::World;
 use bevy_playbot::vision::{ObservationConfig, ObservationKind, VisionError};
 use playbot_harness::{
-    arrangement::Arrangement,
     benchmark::{Benchmark, StageClock},
     game::Game,
     games::Games,
     parallel::{default_threads, on_threads},
     prelude::*,
-    worlds::build_observing_world,
+    worlds::{Arrangement, build_observing_world},
 };
 use playbot_learner::waited;
 use playbot_train::Trainer;

@@ -1,13 +1,17 @@
 //! `playbot explore`.
 //!
-//! - `explorer`: the explorers that a user can ask for.
 //! - `recorded`: recording of a path that was found.
 
-mod explorer;
 mod recorded;
 
 use crate::{
-    arguments::{Compute, at_least_one_step, first_levels, warn_of_idle_agents},
+    arguments::{
+        Compute, at_least_one_step, default_experiment_of,
+        experiment::ExperimentArgs,
+        first_levels,
+        player::{LoadedPlayer, check_skills},
+        warn_of_idle_agents,
+    },
     error::{CliError, Outcome},
     output,
     output::print_line,
@@ -16,12 +20,14 @@ use crate::{
     progress::interrupt,
     verbs::explore::recorded::{RecordingFile, chart},
 };
-use bevy_playbot::vision::ObservationConfig;
+use bevy_playbot::{policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
 use playbot_harness::{
+    eval::Player,
     game::Game,
     games::Games,
     split::{LevelSplit, SplitError},
 };
+use playbot_learner::{DeviceKind, ScoreConfig, SkillDraw, SkillModel, SkillSource};
 use playbot_report::counted;
 use playbot_test::explore::{
     Exploration, ExplorationSummary, ExplorePlan, ExploredCell, Explorer, Route, Stop, Until, explore,
@@ -30,11 +36,9 @@ use playbot_test::explore::{
 use serde_json::json;
 use std::{
     ops::ControlFlow,
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
-
-pub use crate::verbs::explore::explorer::ExplorerSetup;
 
 /// Explore a level without training: print the reachable cells and the actions that lead there.
 ///
@@ -299,6 +303,54 @@ pub(crate) fn one_level(text: &str) -> Result<LevelSplit, String> {
         }
         other => other.to_string(),
     })
+}
+
+// The explorers that a user can ask for: random actions, skills of a model, or a policy.
+
+/// An explorer and its observation.
+pub struct ExplorerSetup {
+    pub explorer: Explorer,
+    pub observation_config: ObservationConfig,
+}
+
+impl ExplorerSetup {
+    /// Returns an explorer with random actions.
+    pub fn none() -> Self {
+        Self { explorer: Explorer::Random, observation_config: ObservationConfig::default() }
+    }
+
+    /// Skills of a model, drawn from its prior, with the skill interval of the game's experiment.
+    ///
+    /// # Errors
+    ///
+    /// The model cannot be read, or was learned for another game.
+    pub fn skills(path: &Path, game: &dyn Game, games: &Games, device: DeviceKind) -> Result<Self, CliError> {
+        let model = SkillModel::load(path, device)?;
+        // The game is named, so that errors do not ask for an experiment.
+        let named = ExperimentArgs::of_game(game.name());
+        let observation_config = check_skills(path, &model, game, &named, games)?;
+        let skill_interval = default_experiment_of(game)
+            .map_or_else(ScoreConfig::default, |default| default.experiment.score)
+            .skill_interval;
+        let source =
+            SkillSource { prior: model.prior(), decoder: model.policy(), skill_interval, draw: SkillDraw::Sample };
+        Ok(Self { explorer: Explorer::skills(SkillPrior::from(&source), source.decoder), observation_config })
+    }
+
+    /// Returns the policy of a file, whose actions are drawn.
+    ///
+    /// # Errors
+    ///
+    /// It cannot be loaded, or was made for another game.
+    pub fn policy(path: &Path, game: &dyn Game, device: DeviceKind) -> Result<Self, CliError> {
+        let chosen = LoadedPlayer::policy_file(game, path, ActionDraw::Sample, device)?;
+        chosen.check_fit(game)?;
+        let explorer = match chosen.player {
+            Player::Policy { policy, prior, draw } => Explorer::Policy { policy, prior, draw },
+            Player::Blind(_) | Player::Demonstrator => Explorer::Random,
+        };
+        Ok(Self { explorer, observation_config: chosen.observation_config })
+    }
 }
 
 #[cfg(test)]

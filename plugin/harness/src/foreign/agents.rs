@@ -185,7 +185,7 @@ impl SharingAgents {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{arrangement::Arrangement, game::Game};
+    use crate::{game::Game, worlds::Arrangement};
 
     /// A game of two agents without observations of their own; `right` has these keys.
     fn pair(right: &[KeyCode]) -> ForeignGame {

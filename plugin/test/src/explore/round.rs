@@ -18,8 +18,11 @@ use bevy_playbot::{
     vision::VisionError,
 };
 use playbot_harness::{
-    arrangement::Arrangement, ended_episodes::EndedEpisodes, floor_plan::FloorPlan, game::Game, parallel::on_threads,
-    saved_episode::SavedEpisode, worlds::build_observing_world,
+    floor_plan::FloorPlan,
+    game::Game,
+    parallel::on_threads,
+    saved_episode::SavedEpisode,
+    worlds::{Arrangement, EndedEpisodes, build_observing_world},
 };
 use playbot_learner::{Streams, rng::ChaCha8Rng};
 use std::{

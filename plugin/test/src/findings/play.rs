@@ -15,11 +15,10 @@ use bevy_playbot::{
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{
-    ended_episodes::EndedEpisodes,
     eval::Player,
     game::{Game, idle_action, read_level_designs},
     level_files::{LevelFileError, is_level_files},
-    worlds::build_observing_world,
+    worlds::{EndedEpisodes, build_observing_world},
 };
 use playbot_learner::HasExitCode;
 use thiserror::Error;

@@ -11,11 +11,11 @@ use crate::{
 };
 use bevy_playbot::{state_hash::StateHash, vision::ObservationConfig};
 use playbot_harness::{
-    arrangement::Arrangement,
     eval::{EvalError, Player},
     game::Game,
     machine::{MemoryError, check_bytes},
     split::LevelSplit,
+    worlds::Arrangement,
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -25,12 +25,10 @@ use bevy_playbot::{
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{
-    arrangement::at_most,
     detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher},
-    ended_episodes::EndedEpisodes,
     eval::Player,
     game::Game,
-    worlds::build_observing_world,
+    worlds::{EndedEpisodes, at_most, build_observing_world},
 };
 use std::{sync::Arc, time::Instant};
 

@@ -15,12 +15,11 @@ use bevy_playbot::{
     vision::{ObservationConfig, VisionError},
 };
 use playbot_harness::{
-    arrangement::at_most,
     demo::{ReplayedEpisodes, VerifyError},
     game::Game,
     parallel::on_threads,
     sensors::GameSensors,
-    worlds::build_observing_world,
+    worlds::{at_most, build_observing_world},
 };
 use playbot_learner::{ObsKind, Observations};
 use std::{collections::BTreeMap, sync::Arc};

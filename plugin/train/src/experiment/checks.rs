@@ -8,13 +8,13 @@ use crate::{
     experiment::{Experiment, LearnerKind},
 };
 use playbot_harness::{
-    arrangement::Arrangement,
     game::Game,
     held_out::HeldOut,
     machine::{MemoryError, MemoryPart, ThreadLimit, check_parts, free_memory, product},
     mode::ModeError,
     sensors::GameSensors,
     split::LevelSplit,
+    worlds::Arrangement,
 };
 use playbot_learner::{
     ActionSpace, Augmentation, HasExitCode, ImageShape, LearnError, ObsKind, PriorKind, SettingError, SkillDraw,

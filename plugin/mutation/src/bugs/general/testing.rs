@@ -5,11 +5,10 @@ use bevy::prelude::*;
 use bevy_playbot::engine::{panics::PanicReports, tick_world};
 use playbot_harness::{
     defect::DefectKind,
-    ended_episodes::EndedEpisodes,
     foreign::ForeignGame,
     game::{BotTools, InputTools},
     prelude::*,
-    worlds::build_world,
+    worlds::{EndedEpisodes, build_world},
 };
 
 /// Steps to the goal.
