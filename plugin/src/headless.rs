@@ -324,7 +324,7 @@ impl PluginGroup for HeadlessPlugins {
                     ..default()
                 },
             );
-        let plugins = bevy_parts::without_event_loop(plugins);
+        let plugins = bevy_parts::without_devices(plugins);
         if self.draws { drawing(plugins) } else { not_drawing(plugins, self.shows_sub_app) }
     }
 }

@@ -235,6 +235,12 @@ pub fn spawn_agents(
     agents
 }
 
+/// Returns whether only the thread that built this World may tick it: it holds Bevy's non-send data, such as the
+/// registrations of `bevy_ecs_ldtk`.
+pub fn is_bound_to_its_thread(world: &World) -> bool {
+    world.storages().non_sends.iter().any(|(_, data)| data.is_present())
+}
+
 // The distribution of arenas over Worlds.
 
 /// Worlds of equal size.

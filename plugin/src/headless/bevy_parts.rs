@@ -8,6 +8,7 @@
 use bevy::{
     app::{PanicHandlerPlugin, PluginGroupBuilder, SubApp},
     asset::{AssetLoader, LoadContext, io::Reader},
+    image::{CompressedImageFormatSupport, CompressedImageFormats},
     platform::cell::SyncCell,
     prelude::*,
 };
@@ -156,6 +157,58 @@ mod core_pipeline {
     }
 }
 
+/// The gamepads of a Bevy without `bevy_gilrs`.
+#[allow(dead_code, unused_imports, reason = "used only where Bevy has no gamepads")]
+mod gilrs {
+    pub(crate) use super::Nothing as GilrsPlugin;
+}
+
+/// The drawn gizmos of a Bevy without `bevy_gizmos_render`.
+#[allow(dead_code, unused_imports, reason = "used only where Bevy draws no gizmos")]
+mod gizmos_render {
+    pub(crate) use super::Nothing as GizmoRenderPlugin;
+}
+
+/// The sounds of a Bevy without `bevy_audio`.
+#[allow(dead_code, unused_imports, reason = "used only where Bevy has no sounds")]
+mod audio {
+    use bevy::{
+        asset::{AssetLoader, LoadContext, io::Reader},
+        prelude::*,
+    };
+
+    #[derive(Default)]
+    pub(crate) struct AudioPlugin {
+        pub(crate) global_volume: GlobalVolume,
+    }
+
+    impl Plugin for AudioPlugin {
+        fn build(&self, _: &mut App) {}
+    }
+
+    #[derive(Resource, Default)]
+    pub(crate) struct GlobalVolume;
+
+    #[derive(Asset, TypePath)]
+    pub(crate) struct Pitch;
+
+    #[derive(Asset, TypePath)]
+    pub(crate) struct AudioSource;
+
+    #[derive(Default, TypePath)]
+    pub(crate) struct AudioLoader;
+
+    impl AssetLoader for AudioLoader {
+        type Asset = AudioSource;
+        type Settings = ();
+        type Error = std::io::Error;
+
+        async fn load(&self, _: &mut dyn Reader, _: &(), _: &mut LoadContext<'_>) -> Result<AudioSource, Self::Error> {
+            Ok(AudioSource)
+        }
+    }
+}
+
 /// A plugin in place of one that Bevy lacks.
 #[allow(dead_code, reason = "used only where Bevy lacks a plugin")]
 pub(crate) struct Nothing;
@@ -168,12 +221,18 @@ impl Plugin for Nothing {
     }
 }
 
-/// Leaves out the event loop, and the thread that draws beside the World.
-pub(super) fn without_event_loop(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+/// Leaves out the event loop, the thread that draws beside the World, and the gamepads and loudspeakers of the computer.
+pub(super) fn without_devices(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
     #[allow(unused_imports, reason = "Bevy may lack these modules")]
     use bevy::*;
     let plugins = without::<winit::WinitPlugin>(plugins);
-    without::<render::pipelined_rendering::PipelinedRenderingPlugin>(plugins)
+    let plugins = without::<gilrs::GilrsPlugin>(plugins);
+    let plugins = without::<render::pipelined_rendering::PipelinedRenderingPlugin>(plugins);
+    if plugins.contains::<audio::AudioPlugin>() {
+        plugins.add_after::<audio::AudioPlugin>(SilentSounds).disable::<audio::AudioPlugin>()
+    } else {
+        plugins
+    }
 }
 
 fn without<P: Plugin>(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
@@ -191,6 +250,7 @@ pub(super) fn without_drawing(plugins: PluginGroupBuilder, shows_sub_app: bool) 
     let plugins = plugins
         .set(render::RenderPlugin { render_creation, synchronous_pipeline_compilation: true, ..default() })
         .add_before::<render::RenderPlugin>(EmptyShaders);
+    let plugins = without::<gizmos_render::GizmoRenderPlugin>(plugins);
     let plugins = if plugins.contains::<core_pipeline::CorePipelinePlugin>() {
         plugins
             .add_after::<core_pipeline::CorePipelinePlugin>(CamerasWithoutPictures)
@@ -204,6 +264,20 @@ pub(super) fn without_drawing(plugins: PluginGroupBuilder, shows_sub_app: bool) 
         plugins.add_before::<PanicHandlerPlugin>(HiddenRenderer).add(ShownRenderer)
     } else {
         plugins.add(RenderListPlugin)
+    }
+}
+
+/// Lets a game load sounds and play them to no loudspeaker, as on a computer without one.
+struct SilentSounds;
+
+impl Plugin for SilentSounds {
+    fn build(&self, app: &mut App) {
+        #[allow(unused_imports, reason = "Bevy may lack these modules")]
+        use bevy::*;
+        app.init_resource::<audio::GlobalVolume>()
+            .init_asset::<audio::AudioSource>()
+            .init_asset::<audio::Pitch>()
+            .init_asset_loader::<audio::AudioLoader>();
     }
 }
 
@@ -224,13 +298,13 @@ impl Plugin for EmptyShaders {
 
         impl AssetLoader for EmptyShaderLoader {
             type Asset = shader::Shader;
-            type Settings = ();
+            type Settings = <shader::ShaderLoader as AssetLoader>::Settings;
             type Error = std::io::Error;
 
             async fn load(
                 &self,
                 _: &mut dyn Reader,
-                _: &(),
+                _: &Self::Settings,
                 context: &mut LoadContext<'_>,
             ) -> Result<shader::Shader, Self::Error> {
                 Ok(shader::Shader::from_wgsl("", context.path().to_string()))
@@ -241,6 +315,8 @@ impl Plugin for EmptyShaders {
             }
         }
 
+        // Loaders of pictures ask which compressed formats a graphics card has.
+        app.insert_resource(CompressedImageFormatSupport(CompressedImageFormats::NONE));
         if app.world().contains_resource::<AssetServer>() {
             // Announced for no files, Bevy's own loader gets none when the renderer brings it.
             app.preregister_asset_loader::<shader::ShaderLoader>(&[]).register_asset_loader(EmptyShaderLoader);

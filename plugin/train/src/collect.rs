@@ -193,6 +193,10 @@ impl Collector {
         Ok((rollout, std::mem::take(&mut world.resource_mut::<Finished>().0)))
     }
 
+    pub(crate) fn world(&self) -> &World {
+        &self.world
+    }
+
     /// Returns the World, for saving and restoring its arenas.
     pub(crate) fn world_mut(&mut self) -> &mut World {
         &mut self.world

@@ -21,7 +21,7 @@ use playbot_harness::{
     held_out::{HeldOut, seen_by_training},
     parallel::{on_own_threads, on_threads},
     sensors::GameSensors,
-    worlds::Arrangement,
+    worlds::{Arrangement, is_bound_to_its_thread},
 };
 use playbot_learner::{
     ActionSpace, ContinuedSchedule, DeviceKind, FileError, LearnError, Learner, LearnerMetrics, ObsColumns, ObsKind,
@@ -160,7 +160,10 @@ impl Trainer {
         let shares: Vec<usize> = self.collectors.iter().map(|collector| collector.agents().len()).collect();
         let columns = obs.columns(&self.obs_kind, steps, &shares);
         let mut work: Vec<_> = self.collectors.iter_mut().zip(columns).collect();
-        let collected = if work.len() > self.threads || !policy.is_on_host() {
+        let is_bound = work.iter().any(|(collector, _)| is_bound_to_its_thread(collector.world()));
+        let collected = if is_bound {
+            on_threads(&mut work, 1, |(collector, columns)| collector.collect_into(columns, policy, latent, steps))
+        } else if work.len() > self.threads || !policy.is_on_host() {
             collect_together(work, self.threads, policy, latent, steps)?
         } else {
             // A World with a core of its own gains nothing from shared passes.

@@ -13,7 +13,7 @@ use playbot_harness::{
     games::Games,
     parallel::{default_threads, on_threads},
     prelude::*,
-    worlds::{Arrangement, build_observing_world},
+    worlds::{Arrangement, build_observing_world, is_bound_to_its_thread},
 };
 use playbot_learner::waited;
 use playbot_train::Trainer;
@@ -187,10 +187,11 @@ fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: 
         worlds.iter_mut().try_for_each(|world| world.ticks(10))?;
     }
     worlds.iter_mut().for_each(|world| world.insert_resource(StageClock::default()));
+    let threads = if worlds.iter().any(is_bound_to_its_thread) { 1 } else { args.threads };
     const TICKS: u64 = 100;
     let (start, mut ticks, busy) = (Instant::now(), 0, busy_s());
     while start.elapsed().as_secs_f64() < args.seconds {
-        for done in on_threads(&mut worlds, args.threads, |world| world.ticks(TICKS)) {
+        for done in on_threads(&mut worlds, threads, |world| world.ticks(TICKS)) {
             done?;
         }
         ticks += TICKS;

@@ -10,6 +10,7 @@ use crate::{
     },
     game::Game,
     parallel::on_threads,
+    worlds::is_bound_to_its_thread,
 };
 use std::collections::BTreeSet;
 
@@ -83,6 +84,11 @@ impl<'a> Trial<'a> {
     ) -> TrialResult {
         let mut report = ComparisonReport::new(self.comparison);
         let mut incomparable = Default::default();
+        if self.on_threads > 0 && is_bound_to_its_thread(&self.copies[0].world) {
+            let why = "the game has data for one thread alone (Bevy's non-send data), so its Worlds are not shared out";
+            report.skipped = Some(why.to_owned());
+            return TrialResult { report, incomparable };
+        }
         let mut is_over = true;
         let mut all: Vec<DoctorDifference> = Vec::new();
         for tick in 0..ticks.saturating_mul(LONGER) {

@@ -22,7 +22,7 @@ use playbot_harness::{
     game::Game,
     parallel::on_threads,
     saved_episode::SavedEpisode,
-    worlds::{Arrangement, EndedEpisodes, build_observing_world},
+    worlds::{Arrangement, EndedEpisodes, at_most, build_observing_world, is_bound_to_its_thread},
 };
 use playbot_learner::{Streams, rng::ChaCha8Rng};
 use std::{
@@ -170,7 +170,9 @@ fn build_crews<'a>(
     has_snapshots: bool,
 ) -> Result<Vec<Crew<'a>>, ExploreError> {
     let worlds = if game.built_anew().is_some() { plan.arenas } else { plan.worlds.min(plan.arenas) };
-    let arrangement = Arrangement::new(game, plan.arenas, worlds);
+    // A game of few arenas for each World gets no more Worlds: building one takes as long as many visits.
+    let per_world = at_most(game, (plan.arenas / worlds.max(1)) as usize) as u32;
+    let arrangement = Arrangement::new(game, worlds.max(1) * per_world, worlds);
     let mut crews = Vec::new();
     for first in arrangement.first_agents() {
         let mut world = ExploreWorld::new(game, plan, lookout, first, arrangement.arenas)?;
@@ -253,6 +255,7 @@ fn play_round(
     progress: &(impl Fn(u64) + Sync),
 ) -> Result<Vec<Visited>, ExploreError> {
     let count = crews.len();
+    let threads = if crews.iter().any(|crew| crew.world.is_bound_to_its_thread()) { 1 } else { threads };
     for (index, job) in jobs.into_iter().enumerate() {
         crews[index % count].jobs.push(job);
     }
@@ -324,6 +327,11 @@ impl<'a> ExploreWorld<'a> {
     /// Returns whether cells are squares of the grid.
     pub fn has_positions(&self) -> bool {
         self.lookout.has_positions()
+    }
+
+    /// Returns whether only the thread that built the World may tick it.
+    pub fn is_bound_to_its_thread(&self) -> bool {
+        is_bound_to_its_thread(&self.world)
     }
 
     /// Makes visits, several of them at a time. `progress` receives the ticks of each.
