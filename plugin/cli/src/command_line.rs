@@ -183,11 +183,11 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
 
 /// Parses the arguments of the process.
 fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
-    let mut command = with_own_name(Cli::command());
+    let mut command = with_only_game(with_own_name(Cli::command()), games);
     let matches = match command.try_get_matches_from_mut(std::env::args_os()) {
         Err(error) if is_help(&error) => {
             // Not before: to know which examples work, games are asked for a level, which takes them some work.
-            let helpful = with_own_name(help::named(Cli::command(), program::name(), games));
+            let helpful = with_only_game(with_own_name(help::named(Cli::command(), program::name(), games)), games);
             helpful.try_get_matches_from(std::env::args_os())?
         }
         matches => matches?,
@@ -207,6 +207,18 @@ fn with_own_name(command: Command) -> Command {
     }
     // The version is this crate's, since the game's is not known here.
     command.version(concat!("(playbot ", env!("CARGO_PKG_VERSION"), ")"))
+}
+
+/// Lets verbs that need the name of a game go without it in a program of one game.
+fn with_only_game(command: Command, games: &[&dyn Game]) -> Command {
+    let [only] = games else { return command };
+    let name = only.name();
+    command.mut_subcommands(|verb| {
+        verb.mut_args(|arg| {
+            let is_needed = arg.get_id() == "game" && arg.is_positional() && arg.is_required_set();
+            if is_needed { arg.required(false).default_value(name) } else { arg }
+        })
+    })
 }
 
 /// Breaks lines of help between words, at the width of the terminal. Help in a file or a pipe is not broken, so it is the

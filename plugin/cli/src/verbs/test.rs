@@ -107,7 +107,8 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     if let Some(outcome) = args.regress.run(games, &args.detectors, args.compute.threads(), args.json) {
         return outcome;
     }
-    let Some(name) = &args.game else {
+    let only = games.iter().map(|game| game.name()).next().filter(|_| games.iter().count() == 1);
+    let Some(name) = args.game.as_deref().or(only) else {
         let names: Vec<&str> = games.iter().map(|game| game.name()).collect();
         return Err(CliError::Usage(format!(
             "name the game to test ({}), or a folder of findings with --regress",
