@@ -28,7 +28,7 @@ use super::{
 };
 
 fn measure(player: &Player) -> EvalSummary {
-    let plan = plan("default:64..83");
+    let plan = plan("default:64..163");
     summarize("player", &plan.split, &evaluate(&runner(), player, &plan, |_| {}).expect("it can be played"))
 }
 
@@ -92,7 +92,7 @@ fn the_trained_bot_finishes_unplayed_levels() {
     let (game, games) = (runner(), [&runner() as &dyn Game]);
     let default = default_experiment(&Games::new(&games).expect("one game"));
     let default = parse_experiment(&default.text, Path::new(&*default.origin)).expect("valid");
-    let mut experiment = Experiment { demos: Some(demos), steps: 8192, arenas: 8, worlds: 2, ..default };
+    let mut experiment = Experiment { demos: Some(demos), steps: 32768, arenas: 8, worlds: 2, ..default };
     experiment.skills.epochs = 5;
     let (file, run) = (folder.path().join("skills.safetensors"), folder.path().join("run"));
     let setup = TrainingSetup::new(DeviceKind::Flex, 2);
@@ -101,5 +101,6 @@ fn the_trained_bot_finishes_unplayed_levels() {
     let trainer = pipeline::train(&game, &experiment, with_file, &run, &setup, &mut Unobserved).expect("trained");
     let trained = measure(&Player::of_file(&pipeline::policy(&game, &trainer), ActionDraw::Sample));
     let random = measure(&Player::Blind(BlindBot::Uniform));
-    assert!(trained.success >= 0.7 && random.success <= 0.5, "{trained:?}\n{random:?}");
+    // Standard errors are 0.05 at most.
+    assert!(trained.success >= random.success + 0.2, "{} of the trained bot, {}", trained.success, random.success);
 }
