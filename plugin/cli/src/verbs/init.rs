@@ -400,7 +400,7 @@ fn adapter(name: &str, library: &str, facts: &GameFacts) -> String {
         let (name, variants) = (&state.at.name, state.variants.join(", "));
         let _ = writeln!(
             text,
-            "        // TODO: if a state begins the game anew, `Restart::state({name}::…)`, with one of {variants}."
+            "        // TODO: if a state begins the game, set it in `.level`, which runs last: one of {variants} of `{name}`."
         );
     }
     text.push_str("        .restart(Restart::Startup)\n");
