@@ -65,6 +65,11 @@ impl PersonInput {
         self.cursor = cursor;
     }
 
+    /// Returns the noted position of the mouse cursor.
+    pub fn pointed(&self) -> Option<Vec2> {
+        self.cursor
+    }
+
     /// Notes a finger that touches the screen, in logical pixels.
     pub fn tap(&mut self, position: Vec2) {
         self.tap = Some(position);

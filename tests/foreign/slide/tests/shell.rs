@@ -8,6 +8,8 @@ const GAME: GameProgram = GameProgram {
     game: "slide",
     demonstrator: "solver",
     key: "Right",
+    recorded: "default:1000..1002",
+    held_out: "default:100000..100001",
 };
 
 playbot_shell::tests!(GAME: recordings_replay, a_killed_training_goes_on_bit_for_bit, a_policy_file_plays_as_its_run, the_doctor_finds_nothing);

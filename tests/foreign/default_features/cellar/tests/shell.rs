@@ -8,6 +8,8 @@ const GAME: GameProgram = GameProgram {
     game: "cellar",
     demonstrator: "guide",
     key: "Right",
+    recorded: "default:0..2",
+    held_out: "default:118..119",
 };
 
 playbot_shell::tests!(GAME: recordings_replay, a_killed_training_goes_on_bit_for_bit, a_policy_file_plays_as_its_run, the_doctor_finds_nothing);

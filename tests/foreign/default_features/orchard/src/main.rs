@@ -40,7 +40,7 @@ fn main() -> ExitCode {
 /// Returns the hero's motion, and the height and safety of the ground ahead.
 fn see(hero: Option<Single<Body>>, map: Res<Map>) -> Vec<f32> {
     let Some((at, speed, hero)) = hero.map(Single::into_inner) else {
-        return (0..21).map(|i| f32::from(i == 0)).collect();
+        return (0..21).map(|i| (i == 0).into()).collect();
     };
     let ahead = (0..8).map(|i| map.ground(at.translation.x + i as f32 * 0.6));
     let ahead = ahead.flat_map(|(height, is_safe)| [height - at.translation.y, f32::from(is_safe)]);
