@@ -18,8 +18,8 @@ pub struct GameProgram {
     pub demonstrator: &'static str,
     /// A key of the game, by its name in xdotool.
     pub key: &'static str,
-    /// Levels to record.
-    pub recorded: &'static str,
+    /// The first of three levels to record.
+    pub recorded: u64,
     /// Levels that policies are measured on.
     pub held_out: &'static str,
 }
@@ -46,7 +46,8 @@ impl GameProgram {
     /// Returns a shell in whose folder lies `few.demo`, of three levels.
     pub(crate) fn with_recording(&self) -> Shell {
         let shell = Shell::new(self.program);
-        let record = ["record", self.game, "--levels", self.recorded, "--noise", "0.1", "--out", "few.demo"];
+        let levels = format!("default:{}..{}", self.recorded, self.recorded + 2);
+        let record = ["record", self.game, "--levels", &levels, "--noise", "0.1", "--out", "few.demo"];
         shell.done(&record);
         shell
     }

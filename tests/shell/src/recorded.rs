@@ -29,7 +29,7 @@ impl GameProgram {
         assert_eq!(summary["header"]["demonstrator"], self.demonstrator);
         let episodes = shell.answers(&["demo", "show", "few.demo", "--json"]);
         let levels: Vec<_> = episodes.iter().map(|episode| episode["level"].as_u64()).collect();
-        assert_eq!(levels, [1000, 1001, 1002].map(Some));
+        assert_eq!(levels, [0, 1, 2].map(|place| Some(self.recorded + place)));
         let earned = episodes.iter().filter(|episode| episode["return"].as_f64().is_some_and(|sum| sum > 0.0)).count();
         assert!(earned > 0, "the demonstrator earns something: {episodes:?}");
 
@@ -46,7 +46,7 @@ impl GameProgram {
         let recording = ["view", self.game, "--demo", "few.demo", "--episode-number", "1", "--tick", "20"];
         let recording = [&recording[..], &["--out", "demo.png", "--json"]].concat();
         for (args, name, player, level) in
-            [(&bot[..], "bot.png", self.demonstrator, 3), (&recording, "demo.png", "recording", 1001)]
+            [(&bot[..], "bot.png", self.demonstrator, 3), (&recording, "demo.png", "recording", self.recorded + 1)]
         {
             let said = shell.answer(args);
             assert_eq!((&said["player"], &said["level"]), (&player.into(), &level.into()), "{said}");

@@ -8,7 +8,7 @@ const GAME: GameProgram = GameProgram {
     game: "alien_cake_addict",
     demonstrator: "glutton",
     key: "Up",
-    recorded: "default:1000..1002",
+    recorded: 1000,
     held_out: "default:100000..100001",
 };
 

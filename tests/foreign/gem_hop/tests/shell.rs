@@ -8,7 +8,7 @@ const GAME: GameProgram = GameProgram {
     game: "gem_hop",
     demonstrator: "runner",
     key: "Right",
-    recorded: "default:1000..1002",
+    recorded: 1000,
     held_out: "default:100000..100001",
 };
 
