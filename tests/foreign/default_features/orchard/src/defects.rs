@@ -78,20 +78,19 @@ fn kinds() -> [DefectKind; 10] {
             let column = COLUMNS[variant as usize % 3];
             let drop = move |mut commands: Commands, hero: Single<(Entity, &Transform), With<Hero>>| {
                 if hero.1.translation.x > column {
-                    commands.entity(hero.0).insert(CollisionLayers::NONE);
+                    commands.entity(hero.0).try_insert(CollisionLayers::NONE);
                 }
             };
             app.add_systems(PreUpdate, drop.run_if(in_state(Screen::Playing)));
         }),
         DefectKind::rules("sticky-ground", "the hero stays where it is in one column", 3, |app, variant| {
             let column = COLUMNS[variant as usize % 3];
-            let stick = move |hero: Single<(&Transform, &mut LinearVelocity), With<Hero>>| {
-                let (at, mut velocity) = hero.into_inner();
-                if (column..column + 1.0).contains(&at.translation.x) {
-                    velocity.0 = Vec2::ZERO;
+            let stick = move |mut commands: Commands, hero: Single<(Entity, &Transform), With<Hero>>| {
+                if (column..column + 1.0).contains(&hero.1.translation.x) {
+                    commands.entity(hero.0).try_insert(LinearDamping(5000.0));
                 }
             };
-            app.add_systems(FixedPreUpdate, stick.run_if(in_state(Screen::Playing)));
+            app.add_systems(PreUpdate, stick.run_if(in_state(Screen::Playing)));
         }),
         DefectKind::rules("dead-menu", "the menu's button does nothing", 3, |app, variant| {
             forbid(app, Screen::Loading, variant);
