@@ -311,7 +311,7 @@ impl ForeignGame {
         self.with(|description| description.has_camera = true)
     }
 
-    /// Ends episodes after this many ticks, as [`Truncated`](EpisodeEnd::Truncated).
+    /// Ends episodes after this many ticks, as [`Truncated`](bevy_playbot::episode::EpisodeEnd::Truncated).
     pub fn time_limit(self, ticks: u32) -> Self {
         self.with(|description| description.limit = Some(ticks))
     }
