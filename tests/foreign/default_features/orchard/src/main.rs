@@ -39,10 +39,8 @@ fn main() -> ExitCode {
 
 /// Returns the hero's motion, and the height and safety of the ground ahead.
 fn see(hero: Option<Single<Body>>, map: Res<Map>) -> Vec<f32> {
-    let Some((at, speed, hero)) = hero.map(Single::into_inner) else {
-        return (0..21).map(|i| (i == 0).into()).collect();
-    };
+    let Some((at, pace, hero)) = hero.map(Single::into_inner) else { return (0..21).map(|i| (i < 1).into()).collect() };
     let ahead = (0..8).map(|i| map.ground(at.translation.x + i as f32 * 0.6));
     let ahead = ahead.flat_map(|(height, is_safe)| [height - at.translation.y, f32::from(is_safe)]);
-    [0.0, at.translation.y, speed.x / RUN_SPEED, speed.y / JUMP_SPEED, hero.coyote].into_iter().chain(ahead).collect()
+    [0.0, at.translation.y, pace.x / RUN_SPEED, pace.y / JUMP_SPEED, hero.coyote].into_iter().chain(ahead).collect()
 }
