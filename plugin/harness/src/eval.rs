@@ -5,7 +5,7 @@ use crate::{
     machine::{MemoryError, check_bytes},
     parallel::on_threads,
     split::LevelSplit,
-    worlds::{Arrangement, BuildingCosts, EndedEpisodes, at_most, build_observing_world},
+    worlds::{Arrangement, BuildingCosts, EndedEpisodes, arenas_within, build_observing_world},
 };
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -153,11 +153,9 @@ impl EvalPlan {
     }
 
     /// Returns the arenas that play the plan: those of the plan, or fewer in a game of few arenas for each World. It gets
-    /// no more Worlds than the plan has, since building one takes as long as many episodes.
+    /// no more Worlds than the plan has.
     fn arrangement(&self, game: &dyn Game) -> Arrangement {
-        let worlds = self.worlds.max(1);
-        let per_world = at_most(game, (self.arenas / worlds) as usize) as u32;
-        Arrangement::of_agents(game, self.arenas.min(worlds * per_world), worlds)
+        Arrangement::of_agents(game, arenas_within(game, self.arenas, self.worlds), self.worlds)
     }
 
     /// Returns the levels to play, in order.

@@ -287,6 +287,13 @@ impl Arrangement {
     }
 }
 
+/// Returns the number of arenas, up to `wanted`, that so many Worlds of the game hold. Callers whose results do not need
+/// more of them build no further Worlds, each of which takes as long as many episodes.
+pub fn arenas_within(game: &dyn Game, wanted: u32, worlds: u32) -> u32 {
+    let worlds = worlds.max(1);
+    worlds * at_most(game, (wanted / worlds) as usize) as u32
+}
+
 /// Returns the largest number of arenas, up to `wanted`, that one World of the game holds.
 pub fn at_most(game: &dyn Game, wanted: usize) -> usize {
     game.tools().host.arenas_per_world().map_or(wanted, |most| wanted.min(most.max(1) as usize))

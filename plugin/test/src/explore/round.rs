@@ -22,7 +22,7 @@ use playbot_harness::{
     game::Game,
     parallel::on_threads,
     saved_episode::SavedEpisode,
-    worlds::{Arrangement, EndedEpisodes, at_most, build_observing_world, is_bound_to_its_thread},
+    worlds::{Arrangement, EndedEpisodes, arenas_within, build_observing_world, is_bound_to_its_thread},
 };
 use playbot_learner::{Streams, rng::ChaCha8Rng};
 use std::{
@@ -170,9 +170,7 @@ fn build_crews<'a>(
     has_snapshots: bool,
 ) -> Result<Vec<Crew<'a>>, ExploreError> {
     let worlds = if game.built_anew().is_some() { plan.arenas } else { plan.worlds.min(plan.arenas) };
-    // A game of few arenas for each World gets no more Worlds: building one takes as long as many visits.
-    let per_world = at_most(game, (plan.arenas / worlds.max(1)) as usize) as u32;
-    let arrangement = Arrangement::new(game, worlds.max(1) * per_world, worlds);
+    let arrangement = Arrangement::new(game, arenas_within(game, plan.arenas, worlds), worlds);
     let mut crews = Vec::new();
     for first in arrangement.first_agents() {
         let mut world = ExploreWorld::new(game, plan, lookout, first, arrangement.arenas)?;

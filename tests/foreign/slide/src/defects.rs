@@ -5,7 +5,10 @@ use bevy::{
     ecs::{schedule::ScheduleConfigs, system::ScheduleSystem},
     prelude::*,
 };
-use playbot::harness::{defect::DefectKind, foreign::ForeignGame};
+use playbot::harness::{
+    defect::{DefectKind, place},
+    foreign::ForeignGame,
+};
 
 use crate::game::{Board, CELLS, Puzzle, SIDE, Screen};
 
@@ -68,7 +71,7 @@ fn take_back(before: &Before, board: &mut Board, next: &mut NextState<Screen>) {
 fn kinds() -> [DefectKind; 10] {
     [
         DefectKind::rules("dead-cell", "clicks on one cell do nothing", 3, |app, variant| {
-            let dead = CELL[variant as usize % CELL.len()];
+            let dead = CELL[place(variant)];
             let change = move |before: Res<Before>, mut board: ResMut<Board>, mut next: ResMut<NextState<Screen>>| {
                 if before.moved(&board) == Some(dead) {
                     take_back(&before, &mut board, &mut next);
@@ -77,7 +80,7 @@ fn kinds() -> [DefectKind; 10] {
             after_clicks(app, change.into_configs());
         }),
         DefectKind::rules("stuck-tile", "one tile never moves", 3, |app, variant| {
-            let stuck = TILE[variant as usize % TILE.len()];
+            let stuck = TILE[place(variant)];
             let change = move |before: Res<Before>, mut board: ResMut<Board>, mut next: ResMut<NextState<Screen>>| {
                 if before.moved(&board).is_some_and(|cell| before.board.0[cell] == stuck) {
                     take_back(&before, &mut board, &mut next);
@@ -86,7 +89,7 @@ fn kinds() -> [DefectKind; 10] {
             after_clicks(app, change.into_configs());
         }),
         DefectKind::rules("tired-mouse", "clicks do nothing after some moves", 3, |app, variant| {
-            let last = MOVES[variant as usize % MOVES.len()];
+            let last = MOVES[place(variant)];
             let change = move |before: Res<Before>, mut board: ResMut<Board>, mut next: ResMut<NextState<Screen>>| {
                 if before.moves > last && before.moved(&board).is_some() {
                     take_back(&before, &mut board, &mut next);
@@ -108,7 +111,7 @@ fn kinds() -> [DefectKind; 10] {
             after_clicks(app, change.into_configs());
         }),
         DefectKind::rules("jumping-gap", "the gap changes places with the tile in a corner", 3, |app, variant| {
-            let at = MOVES[variant as usize % MOVES.len()];
+            let at = MOVES[place(variant)];
             let change = move |before: Res<Before>, mut board: ResMut<Board>, mut next: ResMut<NextState<Screen>>| {
                 if let Some(cell) = before.moved(&board).filter(|_| before.moves == at) {
                     board.0.swap(cell, if cell == 0 { CELLS - 1 } else { 0 });
@@ -118,7 +121,7 @@ fn kinds() -> [DefectKind; 10] {
             after_clicks(app, change.into_configs());
         }),
         DefectKind::rules("twin-tile", "a tile turns into a copy of another", 3, |app, variant| {
-            let at = MOVES[variant as usize % MOVES.len()];
+            let at = MOVES[place(variant)];
             let change = move |before: Res<Before>, mut board: ResMut<Board>, mut next: ResMut<NextState<Screen>>| {
                 if before.moves == at && before.moved(&board).is_some() {
                     board.0.iter_mut().filter(|tile| **tile == 2).for_each(|tile| *tile = 7);
@@ -150,7 +153,7 @@ fn kinds() -> [DefectKind; 10] {
             after_clicks(app, change.into_configs());
         }),
         DefectKind::rules("early-end", "the puzzle is solved before all tiles are in order", 3, |app, variant| {
-            let order = [3, 6, 2][variant as usize % 3];
+            let order = [3, 6, 2][place(variant)];
             let change = move |before: Res<Before>, board: Res<Board>, mut next: ResMut<NextState<Screen>>| {
                 if before.moves > 0 && board.0[..order] == Board::default().0[..order] {
                     next.set(Screen::Solved);
@@ -160,7 +163,7 @@ fn kinds() -> [DefectKind; 10] {
         }),
         DefectKind::rules("dead-menu", "the menu's button does nothing", 3, |app, variant| {
             let change = move |puzzle: Res<Puzzle>, mut next: ResMut<NextState<Screen>>| {
-                let is_dead = [true, puzzle.0 % 2 == 1, puzzle.0 % 3 == 2][variant as usize % 3];
+                let is_dead = [true, puzzle.0 % 2 == 1, puzzle.0 % 3 == 2][place(variant)];
                 if is_dead && matches!(*next, NextState::Pending(Screen::Playing)) {
                     next.reset();
                 }

@@ -3,7 +3,10 @@
 use avian2d::prelude::*;
 use bevy::prelude::*;
 use foreign_orchard::{Hero, JUMP_SPEED, Level, Run, Screen};
-use playbot::harness::{defect::DefectKind, foreign::ForeignGame};
+use playbot::harness::{
+    defect::{DefectKind, place},
+    foreign::ForeignGame,
+};
 
 /// Columns at which a defect begins: at the start, further on and late.
 const COLUMNS: [f32; 3] = [10.5, 20.5, 32.5];
@@ -30,20 +33,20 @@ fn forbid(app: &mut App, screen: Screen, variant: u32) {
 fn kinds() -> [DefectKind; 10] {
     [
         DefectKind::rules("invisible-wall", "an empty column blocks players", 3, |app, variant| {
-            let column = COLUMNS[variant as usize % 3];
+            let column = COLUMNS[place(variant)];
             app.add_systems(OnEnter(Screen::Playing), move |mut commands: Commands| {
                 let wall = (RigidBody::Static, Collider::rectangle(0.4, 60.0), Transform::from_xyz(column, 0.0, 0.0));
                 commands.spawn((DespawnOnExit(Screen::Playing), wall));
             });
         }),
         DefectKind::rules("wrong-gravity", "the hero is too light or too heavy", 3, |app, variant| {
-            let scale = [0.5, 1.6, 0.25][variant as usize % 3];
+            let scale = [0.5, 1.6, 0.25][place(variant)];
             app.add_systems(PreUpdate, move |mut commands: Commands, heroes: Query<Entity, Added<Hero>>| {
                 heroes.iter().for_each(|hero| _ = commands.entity(hero).insert(GravityScale(scale)));
             });
         }),
         DefectKind::rules("tired-legs", "the hero no longer jumps after some jumps", 3, |app, variant| {
-            let last = [1, 3, 6][variant as usize % 3];
+            let last = [1, 3, 6][place(variant)];
             let tire = move |hero: Single<(Ref<Hero>, &mut LinearVelocity)>, mut jumps: Local<(u32, bool)>| {
                 let (hero, mut velocity) = hero.into_inner();
                 if hero.is_added() {
@@ -59,14 +62,14 @@ fn kinds() -> [DefectKind; 10] {
             app.add_systems(FixedPreUpdate, tire.run_if(in_state(Screen::Playing)));
         }),
         DefectKind::rules("lost-fruit", "fruit that is picked is not counted", 3, |app, variant| {
-            let most = [0, 2, 4][variant as usize % 3];
+            let most = [0, 2, 4][place(variant)];
             app.add_systems(PostUpdate, move |mut run: ResMut<Run>| run.fruit = run.fruit.min(most));
         }),
         DefectKind::rules("dead-gate", "the gate can be touched and the run goes on", 3, |app, variant| {
             forbid(app, Screen::Won, variant);
         }),
         DefectKind::rules("sudden-loss", "the run is lost in an empty column", 3, |app, variant| {
-            let column = COLUMNS[variant as usize % 3];
+            let column = COLUMNS[place(variant)];
             let lose = move |at: Single<&Transform, With<Hero>>, mut next: ResMut<NextState<Screen>>| {
                 if (column..column + 1.0).contains(&at.translation.x) {
                     next.set(Screen::Lost);
@@ -75,7 +78,7 @@ fn kinds() -> [DefectKind; 10] {
             app.add_systems(PostUpdate, lose.run_if(in_state(Screen::Playing)));
         }),
         DefectKind::rules("hole-in-the-ground", "the hero falls through the earth", 3, |app, variant| {
-            let column = COLUMNS[variant as usize % 3];
+            let column = COLUMNS[place(variant)];
             let drop = move |mut commands: Commands, hero: Single<(Entity, &Transform), With<Hero>>| {
                 if hero.1.translation.x > column {
                     commands.entity(hero.0).try_insert(CollisionLayers::NONE);
@@ -84,7 +87,7 @@ fn kinds() -> [DefectKind; 10] {
             app.add_systems(PreUpdate, drop.run_if(in_state(Screen::Playing)));
         }),
         DefectKind::rules("sticky-ground", "the hero stays where it is in one column", 3, |app, variant| {
-            let column = COLUMNS[variant as usize % 3];
+            let column = COLUMNS[place(variant)];
             let stick = move |mut commands: Commands, hero: Single<(Entity, &Transform), With<Hero>>| {
                 if (column..column + 1.0).contains(&hero.1.translation.x) {
                     commands.entity(hero.0).try_insert(LinearDamping(5000.0));
