@@ -148,8 +148,7 @@ mod core_pipeline {
         pub(crate) use super::super::Nothing as TonemappingPlugin;
         use bevy::prelude::*;
 
-        #[derive(Resource, Reflect)]
-        #[reflect(Resource)]
+        #[derive(Resource)]
         pub(crate) struct TonemappingLuts {
             pub(crate) blender_filmic: Handle<Image>,
             pub(crate) agx: Handle<Image>,
@@ -187,8 +186,7 @@ mod audio {
         fn build(&self, _: &mut App) {}
     }
 
-    #[derive(Resource, Default, Reflect)]
-    #[reflect(Resource)]
+    #[derive(Resource, Default)]
     pub(crate) struct GlobalVolume;
 
     #[derive(Asset, TypePath)]
