@@ -90,7 +90,7 @@ pub struct LevelVerdict {
     /// How often each cause ended an episode without the goal, if the game reports causes.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub causes: BTreeMap<String, u64>,
-    /// The position at which most episodes stopped, of a level that no tester solved.
+    /// The position at which the episodes stopped, of a level that no tester solved.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub stop: Option<CommonStop>,
     /// True if every episode reached the goal in its first tick.

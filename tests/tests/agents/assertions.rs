@@ -13,6 +13,7 @@ use playbot::prelude::*;
 use playbot_harness::{
     detector::LevelProof,
     eval::Player,
+    foreign::ForeignGame,
     game::{BotTools, LevelTools},
 };
 use playbot_test::findings::list_findings;
@@ -121,6 +122,36 @@ fn assertions_hold_for_what_is_sound() {
     let levels: Vec<&str> = verdicts.iter().map(|level| level.level.as_str()).collect();
     assert_eq!(levels, ["plain:2", "plain:3", "plain:4", "plain:5"]);
     playbot::test(&Lane::Sound).levels("plain:2..5").bots(["left", "right"]).assert_levels_solvable();
+}
+
+#[test]
+fn a_failure_says_where_the_episodes_stopped() {
+    #[derive(Component)]
+    struct Hero;
+
+    let game = |app: &mut App| {
+        app.add_systems(Startup, |mut commands: Commands| {
+            commands.spawn((Hero, Transform::default()));
+        })
+        .add_systems(
+            Update,
+            |keys: Res<ButtonInput<KeyCode>>, mut hero: Single<&mut Transform, With<Hero>>| {
+                let step = f32::from(u8::from(keys.pressed(KeyCode::ArrowRight)));
+                hero.translation.x = (hero.translation.x + step).min(3.0);
+            },
+        );
+    };
+    let walled = ForeignGame::new("walled", 1, game)
+        .keys([vec![], vec![KeyCode::ArrowRight]])
+        .observe(["x"], |hero: Single<&Transform, With<Hero>>| [hero.translation.x])
+        .position(|hero: Single<&Transform, With<Hero>>| hero.translation.truncate())
+        .end(|hero: Single<&Transform, With<Hero>>| (hero.translation.x >= 6.0).then_some(EpisodeEnd::WON))
+        .time_limit(20)
+        .demonstrator("runner", || 1);
+    let folder = tempfile::tempdir().expect("a folder");
+    let test = playbot::test(&walled).levels("default:0..0").bot("runner").findings_in(folder.path());
+    let found = message(|| test.assert_levels_solved());
+    assert!(found.contains("\n  the only episode got no further than (3.0, 0.0)\n"), "{found}");
 }
 
 #[test]

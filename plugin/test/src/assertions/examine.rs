@@ -261,6 +261,7 @@ impl Failure<'_> {
     fn level(&self, level: &LevelVerdict, episode: Option<&str>) -> Vec<String> {
         let mut lines = vec![format!("{}: {}", level.level, level.outcome.name())];
         lines.extend(level.testers.iter().map(|tester| format!("  {}", of_tester(tester))));
+        lines.extend(level.stop.iter().map(|stop| format!("  {stop}")));
         for finding in level.findings.iter().take(MOST_FINDINGS) {
             lines.push(format!("  {}", of_finding(finding)));
             lines.extend(finding.file.iter().map(|file| self.replay(file)));

@@ -1,4 +1,4 @@
-//! Progress of agents without a floor plan: success in the first tick, and the position at which most episodes of an
+//! Progress of agents without a floor plan: success in the first tick, and the position at which the episodes of an
 //! unsolved level stop.
 
 use bevy::{math::Vec2, prelude::*};
@@ -6,9 +6,6 @@ use bevy_playbot::episode::{Episode, EpisodeResult};
 use playbot_harness::game::Game;
 use serde::{Deserialize, Serialize};
 use std::fmt;
-
-/// Fewest episodes with positions of which a common stop is reported.
-const FEWEST: usize = 3;
 
 /// Radius of a common stop, as a share of the distance that the best episode came from its start.
 const RADIUS: f32 = 0.1;
@@ -94,7 +91,7 @@ impl TrackCounter {
     }
 }
 
-/// The position at which most episodes of an unsolved level stop.
+/// The position at which the episodes of an unsolved level stop.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CommonStop {
     /// The part of an episode that is meant.
@@ -124,18 +121,25 @@ pub enum StopKind {
     End,
     /// The start, which no episode left.
     Start,
+    /// The position furthest from the start of all episodes, which stopped at different ones.
+    Best,
 }
 
 impl fmt::Display for CommonStop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { kind, x, y, within, episodes, of, entity } = self;
-        if episodes == of {
-            write!(f, "all {of} episodes ")?;
-        } else {
-            write!(f, "{episodes} of {of} episodes ")?;
+        match (kind, of) {
+            (StopKind::Best, _) => write!(f, "the best of {of} episodes ")?,
+            (_, 1) => f.write_str("the only episode ")?,
+            (_, 2) => f.write_str("both episodes ")?,
+            _ if episodes == of => write!(f, "all {of} episodes ")?,
+            _ => write!(f, "{episodes} of {of} episodes ")?,
         }
         match kind {
-            StopKind::Furthest => write!(f, "got no further than ({x:.1}, {y:.1}), within {within:.1}")?,
+            StopKind::Best | StopKind::Furthest if *episodes == 1 => write!(f, "got no further than ({x:.1}, {y:.1})")?,
+            StopKind::Best | StopKind::Furthest => {
+                write!(f, "got no further than ({x:.1}, {y:.1}), within {within:.1}")?;
+            }
             StopKind::End => write!(f, "ended within {within:.1} of ({x:.1}, {y:.1})")?,
             StopKind::Start => write!(f, "stayed within {within:.1} of ({x:.1}, {y:.1})")?,
         }
@@ -144,12 +148,12 @@ impl fmt::Display for CommonStop {
 }
 
 /// Returns the position at which more than half of these episodes stopped: the furthest one from the start, or else
-/// the last one. `None` if they stopped at different positions, or if less than three positions are known.
+/// the last one, or else how far the best episode came. `None` without positions, or with those of different entities.
 pub(super) fn common_stop<'a>(tracks: impl Iterator<Item = &'a Track>) -> Option<CommonStop> {
     let routes: Vec<&Route> = tracks.filter_map(|track| track.route.as_ref()).collect();
     let entity = routes.first()?.entity.clone();
     // Positions of different entities are not comparable.
-    if routes.len() < FEWEST || routes.iter().any(|route| route.entity != entity) {
+    if routes.iter().any(|route| route.entity != entity) {
         return None;
     }
     let length = routes.iter().map(|route| route.length()).fold(0.0, f32::max);
@@ -177,8 +181,11 @@ pub(super) fn common_stop<'a>(tracks: impl Iterator<Item = &'a Track>) -> Option
     if let Some(found) = densest(&furthest, radius).filter(is_most) {
         return Some(stop(StopKind::Furthest, found));
     }
-    let found = densest(&ends, radius).filter(is_most)?;
-    Some(stop(StopKind::End, found))
+    if let Some(found) = densest(&ends, radius).filter(is_most) {
+        return Some(stop(StopKind::End, found));
+    }
+    let best = routes.iter().find(|route| route.length() == length)?;
+    Some(stop(StopKind::Best, (best.furthest, 0.0, 1)))
 }
 
 /// Returns the first of these positions with the most others within this distance: with the largest distance of these
@@ -218,7 +225,9 @@ mod tests {
         rested.push(track([0.5, 0.0], [0.0, 0.0]));
         let most = "3 of 4 episodes got no further than (12.0, 3.0), within 0.5";
         assert_eq!(words(&rested).as_deref(), Some(most));
-        assert_eq!(words(&walled[..2]), None, "two episodes may meet by chance");
+        let both = "both episodes got no further than (12.0, 3.0), within 0.5";
+        assert_eq!(words(&walled[..2]).as_deref(), Some(both));
+        assert_eq!(words(&walled[..1]).as_deref(), Some("the only episode got no further than (12.0, 3.0)"));
     }
 
     #[test]
@@ -232,7 +241,11 @@ mod tests {
         let tracks = [track([10.0, 0.0], [2.0, 1.0]), track([0.0, 10.0], [2.0, 1.5]), track([-10.0, 0.0], [2.0, 1.0])];
         assert_eq!(words(&tracks).as_deref(), Some("all 3 episodes ended within 0.5 of (2.0, 1.0)"));
         let apart = [track([10.0, 0.0], [9.0, 1.0]), track([0.0, 10.0], [2.0, 9.0]), track([-10.0, 0.0], [-5.0, 0.0])];
-        assert_eq!(words(&apart), None);
+        let best = "the best of 3 episodes got no further than (10.0, 0.0)";
+        assert_eq!(words(&apart).as_deref(), Some(best), "they stopped at different positions");
+        let two = "the best of 2 episodes got no further than (10.0, 0.0)";
+        assert_eq!(words(&apart[..2]).as_deref(), Some(two));
+        assert_eq!(words(&[]), None);
     }
 
     #[test]

@@ -93,7 +93,7 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
 }
 
-/// Returns the positions at which most episodes of the worst levels stopped.
+/// Returns the positions at which the episodes of the worst levels stopped.
 fn stops(overview: &Overview) -> Vec<String> {
     let stop = |level: &LevelVerdict| level.stop.as_ref().map(|stop| format!("{}: {stop}", level.level));
     overview.worst.iter().filter_map(stop).take(MOST_STOPS).collect()
