@@ -521,7 +521,7 @@ const HIERARCHY: [&str; 2] = ["bevy_ecs::hierarchy::ChildOf", "bevy_ecs::hierarc
 /// Clocks and keys go on from one episode to the next. The plugin restores those that a snapshot needs.
 const GOES_ON: [&str; 4] = ["bevy_time::", "bevy_input::", "leafwing_input_manager::", "bevy_enhanced_input::"];
 
-/// Bevy's real-time clock. Without a window it is a mock; [`DoctorComparison::Clock`] reveals its readers.
+/// Bevy's wall clock. Without a window it is a mock; [`DoctorComparison::Clock`] reveals its readers.
 const WALL_CLOCK: &str = "bevy_time::time::Time<bevy_time::real::Real>";
 
 /// Returns whether a type is the engine's or the plugin's, so that it says little about the cause of a difference.

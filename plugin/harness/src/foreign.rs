@@ -414,7 +414,7 @@ impl ForeignGame {
     }
 
     /// Sets the hash that a replay compares after each tick, instead of the transforms of all entities that the game
-    /// has spawned. It is for games that spawn or move some of them by the real-time clock, or when a file is loaded.
+    /// has spawned. It is for games that spawn or move some of them by the wall clock, or when a file is loaded.
     /// Observation and reward are always compared.
     pub fn state_hash<M: 'static>(self, system: impl IntoSystem<(), u64, M> + Clone + Send + Sync + 'static) -> Self {
         self.with(|description| description.hash = Some(SystemFactory::new(system, |hash| hash)))

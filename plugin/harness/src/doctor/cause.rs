@@ -11,7 +11,7 @@ pub enum CauseKind {
     Randomness,
     /// The order of a `HashMap` or `HashSet`.
     HashOrder,
-    /// The clock on the wall.
+    /// The wall clock.
     WallClock,
     /// The order in which queries go over archetypes.
     ArchetypeOrder,
@@ -35,7 +35,7 @@ impl CauseKind {
         match self {
             Self::Randomness => "random numbers without a seed",
             Self::HashOrder => "iteration over a HashMap or HashSet of std, whose order differs from run to run",
-            Self::WallClock => "the clock on the wall: Time<Real>, Instant or SystemTime",
+            Self::WallClock => "the wall clock: Time<Real>, Instant or SystemTime",
             Self::ArchetypeOrder => {
                 "the order in which queries go over archetypes, which depends on how many archetypes there were before: a \
                  recorder, a window and other plugins add some"

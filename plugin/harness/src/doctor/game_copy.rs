@@ -482,7 +482,7 @@ fn add_archetype(world: &mut World, kinds: u32) {
     entity.despawn();
 }
 
-// Slower real-time clock, to reveal games that read it.
+// Slower wall clock, to reveal games that read it.
 
 /// `Time<Real>` before this frame, and whether it runs slower in this World.
 #[derive(Resource, Reflect)]
@@ -495,7 +495,7 @@ struct WallClock {
 /// Makes `Time<Real>` of a World run slower than its ticks say if `is_slow`, by a little more in some frames than in
 /// others.
 ///
-/// Without a window a frame lasts exactly a tick, so reading the real-time clock changes nothing there. In a window it
+/// Without a window a frame lasts exactly a tick, so reading the wall clock changes nothing there. In a window it
 /// changes everything.
 ///
 /// A World with the normal clock gets the same resource and systems. So two Worlds differ only in the clock, and have
