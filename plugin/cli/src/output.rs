@@ -14,6 +14,7 @@ pub(crate) mod program;
 use crate::{error::CliError, output::messages::for_programs};
 use playbot_harness::sealed_file::write_atomically;
 use playbot_learner::{disk, disk::DiskFile};
+use playbot_report::PlainTable;
 use playbot_test::verdict::TestError;
 use std::{
     io::{self, Write},
@@ -34,6 +35,17 @@ pub(crate) fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
         io::ErrorKind::BrokenPipe => CliError::BrokenPipe,
         _ => CliError::Io(format!("cannot write to standard output: {error}")),
     })
+}
+
+/// Prints a table of data. On a terminal it is no wider than that, if words can be shortened; elsewhere it is whole.
+///
+/// # Errors
+///
+/// [`CliError::BrokenPipe`] if the reader is gone.
+pub(crate) fn print_table(table: &PlainTable) -> Result<(), CliError> {
+    let terminal = terminal_size::terminal_size_of(io::stdout());
+    let width = terminal.map_or(usize::MAX, |(width, _)| width.0.into());
+    print_line(table.to_text_within(width).trim_end())
 }
 
 /// Makes the folder of a file, and tests whether the file can be written.

@@ -22,13 +22,21 @@ pub struct PlainTable {
 impl PlainTable {
     /// Returns the table for the console, with aligned columns; ends with a line feed.
     pub fn to_text(&self) -> String {
+        self.to_text_within(usize::MAX)
+    }
+
+    /// Returns the table for a console of this width. If it is too wide, long words lose their middle, but keep at least
+    /// [`FEWEST_LETTERS`]. Numbers are never shortened.
+    pub fn to_text_within(&self, most: usize) -> String {
         let numbers = number_columns(self);
-        let rows: Vec<Vec<String>> = std::iter::once(&self.columns)
+        let mut rows: Vec<Vec<String>> = std::iter::once(&self.columns)
             .chain(&self.rows)
             .map(|row| (0..numbers.len()).map(|c| row.get(c).map_or(String::new(), |cell| one_line(cell))).collect())
             .collect();
         let width = |c: usize| rows.iter().map(|row| row[c].chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..numbers.len()).map(width).collect();
+        let mut widths: Vec<usize> = (0..numbers.len()).map(width).collect();
+        fit(&mut widths, &numbers, most);
+        rows.iter_mut().for_each(|row| row.iter_mut().zip(&widths).for_each(|(cell, width)| shorten(cell, *width)));
         let line = |row: &[String]| {
             let cells = row.iter().zip(&widths).zip(&numbers).map(|((cell, &width), number)| {
                 if *number { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
@@ -41,6 +49,35 @@ impl PlainTable {
         out += &line(&ruler);
         rows[1..].iter().for_each(|row| out += &line(row));
         out
+    }
+}
+
+/// Fewest letters that are left of a word in a table that is too wide.
+pub const FEWEST_LETTERS: usize = 12;
+
+/// Space between two columns.
+const GAP: usize = 2;
+
+/// Takes letters from the widest column of words, again and again, until the table is no wider than `most`.
+fn fit(widths: &mut [usize], numbers: &[bool], most: usize) {
+    let total = |widths: &[usize]| widths.iter().map(|width| width + GAP).sum::<usize>().saturating_sub(GAP);
+    while total(widths) > most {
+        let words = widths.iter_mut().zip(numbers).filter(|(_, number)| !**number).map(|(width, _)| width);
+        match words.max() {
+            Some(widest) if *widest > FEWEST_LETTERS => *widest -= 1,
+            _ => return,
+        }
+    }
+}
+
+/// Replaces the middle of a text that is longer than `width`. More is kept of its end: paths differ there.
+fn shorten(text: &mut String, width: usize) {
+    let length = text.chars().count();
+    if length > width {
+        let begin = width.saturating_sub(1) / 3;
+        let end = width.saturating_sub(1) - begin;
+        let kept = text.chars().take(begin).chain(['…']).chain(text.chars().skip(length - end));
+        *text = kept.collect();
     }
 }
 
@@ -292,5 +329,24 @@ mod tests {
             "",
         ];
         assert_eq!(table.to_text(), expected.join("\n"));
+    }
+
+    #[test]
+    fn a_table_fits_a_narrow_console_and_keeps_its_numbers() {
+        let table = PlainTable {
+            caption: String::new(),
+            columns: vec!["level".into(), "steps".into(), "state".into()],
+            rows: vec![
+                vec!["broken/levels/walled-goal-00.json".into(), "123,456".into(), "finished".into()],
+                vec!["7".into(), "1".into(), "stopped".into()],
+            ],
+        };
+        let text = table.to_text_within(40);
+        let lines: Vec<&str> = text.lines().collect();
+        assert!(lines.iter().all(|line| line.chars().count() <= 40), "{text}");
+        assert_eq!(lines[2], "broken…d-goal-00.json  123,456  finished");
+        assert_eq!(table.to_text_within(usize::MAX), table.to_text());
+        let least = table.to_text_within(1);
+        assert!(least.contains("bro…-00.json  123,456  finished"), "{least}");
     }
 }

@@ -4,7 +4,7 @@ use crate::{
     arguments::open,
     error::{CliError, Outcome},
     output,
-    output::{print_line, program},
+    output::{print_line, print_table, program},
     pictures::plot::PlotFile,
     verbs::test::{Results, report_results},
 };
@@ -223,8 +223,9 @@ pub(crate) fn run_calibrate(args: &CalibrateArgs, games: &Games) -> Result<Outco
             .map_err(|error| CliError::Io(format!("the comparison cannot be written as JSON: {error}")))?;
         print_line(line)?;
     } else {
-        print_line(found.agreement_table().to_text())?;
-        print_line(found.level_table(MOST_PRINTED).to_text().trim_end())?;
+        print_table(&found.agreement_table())?;
+        print_line("")?;
+        print_table(&found.level_table(MOST_PRINTED))?;
     }
     found.words().iter().for_each(|words| report!("{words}"));
     if let Some(out) = &args.out {

@@ -10,7 +10,7 @@ mod show;
 
 use crate::{
     error::{CliError, Outcome},
-    output::{print_line, program},
+    output::{print_line, print_table, program},
 };
 use playbot_harness::{games::Games, sealed_file::write_atomically};
 use playbot_report::{PlainTable, percent, readable, whole};
@@ -107,15 +107,15 @@ pub(crate) fn run_ls(args: &LsArgs) -> Result<Outcome, CliError> {
         }
     }
     if !args.json {
-        print_table(&table, &damaged)?;
+        print_runs(&table, &damaged)?;
     }
     found.leftovers.iter().try_for_each(|leftover| print_leftover(leftover, args.json))?;
     Ok(if damaged.is_empty() { Outcome::Pass } else { Outcome::Findings })
 }
 
-fn print_table(table: &PlainTable, damaged: &[RunsError]) -> Result<(), CliError> {
+fn print_runs(table: &PlainTable, damaged: &[RunsError]) -> Result<(), CliError> {
     if !table.rows.is_empty() {
-        print_line(table.to_text().trim_end())?;
+        print_table(table)?;
     }
     for error in damaged {
         print_line(format!("damaged: {error}"))?;

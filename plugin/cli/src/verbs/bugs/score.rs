@@ -4,7 +4,7 @@ use crate::{
     arguments::{Compute, at_least_one_step, experiment::quoted},
     error::{CliError, Outcome},
     output,
-    output::{print_line, program},
+    output::{print_line, print_table, program},
     progress,
     progress::interrupt,
     verbs::bugs::testers::ContestantArgs,
@@ -210,8 +210,10 @@ fn report_score(path: &Path, score: Score, json: bool) -> Result<Outcome, CliErr
     if json {
         print_line(as_json(&table)?)?;
     } else {
-        print_line(table.class_table().to_text())?;
-        print_line(table.tester_table().to_text())?;
+        print_table(&table.class_table())?;
+        print_line("")?;
+        print_table(&table.tester_table())?;
+        print_line("")?;
         ScoreTable::meanings().into_iter().try_for_each(print_line)?;
         print_line("")?;
         table.headlines().into_iter().try_for_each(print_line)?;

@@ -3,7 +3,7 @@
 use crate::{
     error::{CliError, Outcome},
     output,
-    output::print_line,
+    output::{print_line, print_table},
     verbs::runs::write_plot,
 };
 use playbot_report::{Chart, Curve, PlainTable, readable, readable_with_spread, statistics::mean_and_sd, whole};
@@ -75,7 +75,7 @@ pub(crate) fn run(args: &Args) -> Result<Outcome, CliError> {
             }))?;
         }
     } else {
-        print_line(table(metric, threshold, &rows).to_text().trim_end())?;
+        print_table(&table(metric, threshold, &rows))?;
         print_settings(&groups)?;
     }
     if let Some(path) = &args.plot {

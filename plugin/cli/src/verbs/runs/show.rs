@@ -4,7 +4,7 @@ use crate::{
     arguments::default_experiment_of,
     error::{CliError, Outcome},
     output,
-    output::print_line,
+    output::{print_line, print_table},
     verbs::runs::{UNKNOWN, age_s, duration, to_json, write_plot},
 };
 use playbot_harness::games::Games;
@@ -57,7 +57,7 @@ pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     } else {
         print_head(&run, games)?;
         print_curves(&curves)?;
-        print_line(metrics(&run).to_text().trim_end())?;
+        print_table(&metrics(&run))?;
     }
     if let Some(path) = &args.plot {
         let charts: Vec<Chart> = curves.into_iter().map(|(tag, curve)| chart(&run, tag, curve)).collect();

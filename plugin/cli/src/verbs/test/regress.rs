@@ -2,7 +2,7 @@
 
 use crate::{
     error::{CliError, Outcome},
-    output::print_line,
+    output::{print_line, print_table},
     progress,
     progress::interrupt,
 };
@@ -75,7 +75,7 @@ fn play(
             print_line(line)?;
         }
     } else {
-        print_line(table(folder, &regression).to_text().trim_end())?;
+        print_table(&table(folder, &regression))?;
     }
     report_all(&regression);
     if regression.left > 0 {

@@ -3,7 +3,7 @@
 use crate::{
     error::{CliError, Outcome},
     output,
-    output::{print_line, program},
+    output::{print_line, print_table, program},
 };
 use playbot_harness::{brief::shell_word, game::Game};
 use playbot_report::{PlainTable, counted, ticks, whole};
@@ -75,9 +75,10 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
             print_line(line)?;
         }
     } else {
-        print_line(testers(&overview).to_text().trim_end())?;
+        print_table(&testers(&overview))?;
         if !overview.worst.is_empty() {
-            print_line(format!("\n{}", worst(&overview).to_text().trim_end()))?;
+            print_line("")?;
+            print_table(&worst(&overview))?;
         }
     }
     report!("{}", counts(&overview));
