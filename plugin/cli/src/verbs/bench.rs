@@ -190,7 +190,8 @@ fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: 
     let threads = if worlds.iter().any(is_bound_to_its_thread) { 1 } else { args.threads };
     const TICKS: u64 = 100;
     let (start, mut ticks, busy) = (Instant::now(), 0, busy_s());
-    while start.elapsed().as_secs_f64() < args.seconds {
+    // At least once, so that a busy machine has a figure as well.
+    while ticks == 0 || start.elapsed().as_secs_f64() < args.seconds {
         for done in on_threads(&mut worlds, threads, |world| world.ticks(TICKS)) {
             done?;
         }
@@ -211,7 +212,7 @@ fn train(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, games:
     trainer.worlds_mut().for_each(|world| world.insert_resource(StageClock::default()));
     let (start, before, gathered, busy) = (Instant::now(), trainer.steps(), trainer.gathering(), busy_s());
     let mut learn_s = 0.0;
-    while start.elapsed().as_secs_f64() < args.seconds {
+    while trainer.steps() == before || start.elapsed().as_secs_f64() < args.seconds {
         learn_s += trainer.update()?.timing.learn_s;
     }
     let steps = (trainer.steps() - before) as f64;
