@@ -63,5 +63,5 @@ fn an_episode_is_the_same_after_another_level_and_in_a_new_world() {
 
 #[test]
 fn every_level_can_be_finished() {
-    assert_levels_solvable(&orchard(), "default:0..7");
+    playbot::test(&orchard()).levels("default:0..7").assert_levels_solvable();
 }
