@@ -9,7 +9,7 @@ use playbot_harness::{
     inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
     level_files::{
         LevelDesigns, is_level_files,
-        read::{TextFileError, read_text_file},
+        read::{TextFileError, read_text_file, shown_path},
     },
 };
 use serde_json::{Value, json};
@@ -118,7 +118,7 @@ fn no_file(error: &io::Error) -> String {
 
 /// Reads the maze in a file of rows; `unknown` explains that the text names no map.
 fn from_file(path: &Path, request: &LevelRequest, unknown: &str) -> Result<Maze, InspectError> {
-    let shown = path.display();
+    let shown = shown_path(path);
     let text = read_text_file(path, MAX_BYTES).map_err(|error| {
         InspectError::Usage(match error {
             TextFileError::Unreadable(error) => format!("{unknown}; {}", no_file(&error)),
@@ -129,7 +129,7 @@ fn from_file(path: &Path, request: &LevelRequest, unknown: &str) -> Result<Maze,
         })
     })?;
     if request.level.is_some() {
-        return Err(no_levels(&shown.to_string()));
+        return Err(no_levels(&shown));
     }
     let rows: Vec<&str> =
         text.lines().map(str::trim_end).skip_while(|row| row.is_empty()).take_while(|row| !row.is_empty()).collect();

@@ -28,7 +28,7 @@ use std::{
 pub struct ExperimentArgs {
     /// Name of the game, whose own experiment is the default (default: the program's first game).
     pub game: Option<String>,
-    /// Experiment file (default: that of the game, for `eval --run` the run's own).
+    /// Experiment file, or - for standard input (default: that of the game, for `eval --run` the run's own).
     #[arg(long, value_name = "FILE")]
     pub experiment: Option<PathBuf>,
     /// Change a setting of the experiment, such as ppo.lr=0.0003 (repeatable).
