@@ -12,6 +12,7 @@ use playbot_harness::{
         read::{TextFileError, read_text_file, shown_path},
     },
 };
+use playbot_report::counted;
 use serde_json::{Value, json};
 use std::{io, path::Path};
 
@@ -63,7 +64,7 @@ pub fn unfit(error: MazeError) -> InspectError {
 pub fn show(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Result<LevelView, InspectError> {
     let ShownMaze { maze, json } = shown(game, request, source)?;
     let way = match moves(&maze) {
-        Some(moves) => format!(". shortest path: {moves} move{}", if moves == 1 { "" } else { "s" }),
+        Some(moves) => format!(". shortest path: {}", counted(moves as u64, "move")),
         None => "there is no path from the start to the goal".to_owned(),
     };
     // The empty line ends the rows, so that the output can be read as a file.

@@ -187,7 +187,7 @@ fn a_finding_is_reported_until_it_is_mended() {
     let mended = message(|| playbot::test(&Lane::Sound).assert_replays(&file));
     assert!(mended.contains(": it does not happen again (plain:3: panic: the corridor burns"), "{mended}");
     let there = message(|| playbot::test(&Lane::Burning).assert_findings_gone(folder.path()));
-    assert!(there.contains("1 of 1 findings are not gone:") && there.contains("(still-there): plain:3"), "{there}");
+    assert!(there.contains("1 of 1 finding is not gone:") && there.contains("(still-there): plain:3"), "{there}");
     assert!(there.ends_with(&format!("playbot replay {}", file.display())), "{there}");
     let empty = tempfile::tempdir().expect("a folder");
     let own = message(|| playbot::test(&Lane::Burning).program("jump").assert_findings_gone(folder.path()));
