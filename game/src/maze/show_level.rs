@@ -2,6 +2,7 @@
 
 use crate::maze::{Cell, MAX_CELLS, Map, Maze, MazeError, MazeModeError};
 use bevy::math::{Rect, Vec2};
+use playbot::report::counted;
 use playbot_harness::{
     drawing::{Drawing, MarkForm, Rgb, Shape},
     floor_plan::FloorPlan,
@@ -12,7 +13,6 @@ use playbot_harness::{
         read::{TextFileError, read_text_file, shown_path},
     },
 };
-use playbot_report::counted;
 use serde_json::{Value, json};
 use std::{io, path::Path};
 
