@@ -287,6 +287,8 @@ impl PlaybotAppExt for World {
 /// Input, assets, states, text, meshes and materials are there, and a window of 1280 by 720 that
 /// only the game sees. There is no event loop, and the renderer has no surface to draw on.
 ///
+/// The first World of a program that logs nowhere sets up Bevy's log, and no other.
+///
 /// No feature of this crate has to match one of Bevy's. Leave out others with
 /// [`disable`](bevy::app::PluginGroupBuilder::disable), as with any group.
 #[derive(Clone, Copy, Debug, Default)]
@@ -324,7 +326,7 @@ impl PluginGroup for HeadlessPlugins {
                     ..default()
                 },
             );
-        let plugins = bevy_parts::without_devices(plugins);
+        let plugins = bevy_parts::with_one_log(bevy_parts::without_devices(plugins));
         if self.draws { drawing(plugins) } else { not_drawing(plugins, self.shows_sub_app) }
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::maze::{Cell, MAX_CELLS, Map, Maze, MazeError, MazeModeError};
 use bevy::math::{Rect, Vec2};
+use playbot::report::counted;
 use playbot_harness::{
     drawing::{Drawing, MarkForm, Rgb, Shape},
     floor_plan::FloorPlan,
@@ -9,7 +10,7 @@ use playbot_harness::{
     inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
     level_files::{
         LevelDesigns, is_level_files,
-        read::{TextFileError, read_text_file},
+        read::{TextFileError, read_text_file, shown_path},
     },
 };
 use serde_json::{Value, json};
@@ -63,7 +64,7 @@ pub fn unfit(error: MazeError) -> InspectError {
 pub fn show(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Result<LevelView, InspectError> {
     let ShownMaze { maze, json } = shown(game, request, source)?;
     let way = match moves(&maze) {
-        Some(moves) => format!(". shortest path: {moves} move{}", if moves == 1 { "" } else { "s" }),
+        Some(moves) => format!(". shortest path: {}", counted(moves as u64, "move")),
         None => "there is no path from the start to the goal".to_owned(),
     };
     // The empty line ends the rows, so that the output can be read as a file.
@@ -118,7 +119,7 @@ fn no_file(error: &io::Error) -> String {
 
 /// Reads the maze in a file of rows; `unknown` explains that the text names no map.
 fn from_file(path: &Path, request: &LevelRequest, unknown: &str) -> Result<Maze, InspectError> {
-    let shown = path.display();
+    let shown = shown_path(path);
     let text = read_text_file(path, MAX_BYTES).map_err(|error| {
         InspectError::Usage(match error {
             TextFileError::Unreadable(error) => format!("{unknown}; {}", no_file(&error)),
@@ -129,7 +130,7 @@ fn from_file(path: &Path, request: &LevelRequest, unknown: &str) -> Result<Maze,
         })
     })?;
     if request.level.is_some() {
-        return Err(no_levels(&shown.to_string()));
+        return Err(no_levels(&shown));
     }
     let rows: Vec<&str> =
         text.lines().map(str::trim_end).skip_while(|row| row.is_empty()).take_while(|row| !row.is_empty()).collect();

@@ -9,6 +9,7 @@ use crate::maze2d::{
 use playbot_harness::{
     game::Game,
     inspect::{InspectError, Print, TraceRequest, plain, read_text},
+    level_files::read::shown_path,
 };
 use std::{path::Path, sync::Arc};
 
@@ -44,7 +45,7 @@ pub(super) fn run(game: &dyn Game, request: &TraceRequest, print: Print) -> Resu
             print(format!("{:>5} {x:>22} {y:>22} {vx:>22} {vy:>22}", step + 1))?;
         }
     }
-    let note = format!("{}: {clipped} pushes lay outside -1 to 1 and were clipped", path.display());
+    let note = format!("{}: {clipped} pushes lay outside -1 to 1 and were clipped", shown_path(path));
     Ok((clipped > 0).then_some(note))
 }
 
@@ -70,7 +71,7 @@ fn pushes(text: &str, path: &Path) -> Result<(Vec<Vec2d>, usize), InspectError> 
     let mut pushes = Vec::new();
     for (index, line) in text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty()) {
         let push = push(line).ok_or_else(|| {
-            let (path, line_number) = (path.display(), index + 1);
+            let (path, line_number) = (shown_path(path), index + 1);
             InspectError::Usage(format!(
                 "{path}, line {line_number}: `{line}` is no push; write two finite numbers, `ux uy`, each from -1 to 1"
             ))
@@ -80,7 +81,7 @@ fn pushes(text: &str, path: &Path) -> Result<(Vec<Vec2d>, usize), InspectError> 
         pushes.push(push);
     }
     if pushes.is_empty() {
-        return Err(InspectError::Usage(format!("{} has no pushes: write one `ux uy` a line", path.display())));
+        return Err(InspectError::Usage(format!("{} has no pushes: write one `ux uy` a line", shown_path(path))));
     }
     Ok((pushes, clipped))
 }

@@ -39,9 +39,9 @@ fn sound_files_pass_and_a_walled_coin_is_reported_with_its_proof() {
     draw(folder, "broken/flat.json", &["############", "#........C.#", "#..........#"]);
 
     let sound = levels(folder, "sound/*.json");
-    assert_levels_solvable(&game, &sound);
-    assert_levels_solved_by(&game, "search", &sound);
-    assert_deterministic(&game, &sound);
+    playbot::test(&game).levels(&sound).assert_levels_solvable();
+    playbot::test(&game).levels(&sound).bot("search").assert_levels_solved();
+    playbot::test(&game).levels(&sound).assert_deterministic();
     let test = playbot::test(&game).levels(&levels(folder, "broken/*.json")).without_detector("all");
     let test = test.findings_in(folder.join("found"));
     let found = message(|| test.assert_levels_solvable());
@@ -53,8 +53,8 @@ fn sound_files_pass_and_a_walled_coin_is_reported_with_its_proof() {
     // Each named file replays.
     let named: Vec<&str> = found.lines().filter_map(|line| line.strip_prefix("    playbot replay ")).collect();
     assert_eq!(named.len(), 2, "{found}");
-    named.iter().for_each(|file| assert_replays(&game, file.trim_matches('\'')));
+    named.iter().for_each(|file| playbot::test(&game).assert_replays(file.trim_matches('\'')));
     fs::write(folder.join("broken/bad.json"), "{\n\"rows\": [\n\"####\",\n\"#?C#\"]}").expect("writable");
-    let bad = message(|| assert_levels_solvable(&game, &levels(folder, "broken/b*.json")));
+    let bad = message(|| playbot::test(&game).levels(&levels(folder, "broken/b*.json")).assert_levels_solvable());
     assert!(bad.contains("broken/bad.json, line 4: unknown letter `?`"), "{bad}");
 }

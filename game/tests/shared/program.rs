@@ -3,6 +3,7 @@
 #![allow(dead_code, unused_imports, reason = "no test needs all of it")]
 
 use std::{
+    io::{Seek, Write},
     path::Path,
     process::{Command, Output},
 };
@@ -17,6 +18,14 @@ pub fn command(folder: &Path, args: &[&str]) -> Command {
 
 pub fn playbot(folder: &Path, args: &[&str]) -> Output {
     playbot_shell::output(&mut command(folder, args)).unwrap_or_else(|error| panic!("{args:?}: {error}"))
+}
+
+/// Returns the output of a call with this text as its standard input.
+pub fn piped(folder: &Path, args: &[&str], input: &str) -> Output {
+    let mut file = tempfile::tempfile().expect("writable");
+    file.write_all(input.as_bytes()).expect("writable");
+    file.rewind().expect("a file");
+    command(folder, args).stdin(file).output().expect("it starts")
 }
 
 /// Returns the program with a limit on the size of its files, in blocks of 512 bytes: a full disk.

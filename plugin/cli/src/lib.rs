@@ -77,7 +77,4 @@ pub use playbot_test as test;
 pub use playbot_train as train;
 
 pub use playbot_harness::{foreign::ForeignGame, game::Game};
-pub use playbot_test::assertions::{
-    LevelTest, assert_deterministic, assert_findings_gone, assert_levels_solvable, assert_levels_solved_by,
-    assert_no_findings, assert_replays, test,
-};
+pub use playbot_test::assertions::{LevelTest, test};

@@ -5,7 +5,4 @@ pub use bevy_playbot::virtual_input::PointerPosition;
 pub use playbot_harness::floor_plan::FloorPlan;
 pub use playbot_harness::foreign::{ForeignGame, LevelFromFile, LevelSeed, PlayedAgent, PlayedMode, Restart};
 pub use playbot_harness::prelude::*;
-pub use playbot_test::assertions::{
-    LevelTest, assert_deterministic, assert_findings_gone, assert_levels_solvable, assert_levels_solved_by,
-    assert_no_findings, assert_replays,
-};
+pub use playbot_test::assertions::LevelTest;

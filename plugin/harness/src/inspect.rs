@@ -1,6 +1,10 @@
 //! Views of single levels and single steps.
 
-use crate::{drawing::Drawing, level_files::read::read_text_file, mode::ModeError};
+use crate::{
+    drawing::Drawing,
+    level_files::read::{read_text_file, shown_path},
+    mode::ModeError,
+};
 use bevy::prelude::*;
 use bevy_playbot::{
     fault::Fault,
@@ -50,7 +54,7 @@ pub struct LevelRequest<'a> {
     pub mode: Option<&'a str>,
     /// Map, for games whose levels are maps: a name, a whole mode, or a file.
     pub map: Option<&'a str>,
-    /// File with a level in the game's own format, if one is named.
+    /// File with a level in the game's own format, if one is named; `-` is standard input.
     pub file: Option<&'a Path>,
     /// Number of the level, if one is named.
     pub level: Option<u64>,
@@ -95,7 +99,7 @@ pub struct TraceRequest<'a> {
     pub start: &'a [f64],
     /// Discrete actions.
     pub actions: &'a [u32],
-    /// File of actions, instead.
+    /// File of actions, instead; `-` is standard input.
     pub file: Option<&'a Path>,
     /// True for one line of JSON per step, false for a table.
     pub json: bool,
@@ -107,14 +111,17 @@ pub type Print<'a> = &'a mut dyn FnMut(String) -> Result<(), InspectError>;
 /// Largest size of a file that is shown, bytes.
 const MOST_BYTES: u64 = 32 << 20;
 
-/// Reads a text file.
+/// Reads a text file, or standard input for the path `-`.
 ///
 /// # Errors
 ///
 /// The file cannot be read.
 pub fn read_text(path: &Path) -> Result<String, InspectError> {
     read_text_file(path, MOST_BYTES).map_err(|error| {
-        InspectError::Usage(format!("cannot read {}: {error}; name an existing file that you may read", path.display()))
+        InspectError::Usage(format!(
+            "cannot read {}: {error}; name an existing file that you may read",
+            shown_path(path)
+        ))
     })
 }
 

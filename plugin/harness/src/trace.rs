@@ -3,6 +3,7 @@
 use crate::{
     game::Game,
     inspect::{InspectError, Print, TraceRequest, plain, read_text},
+    level_files::read::shown_path,
     worlds::build_world,
 };
 use bevy_playbot::{engine::misfit, prelude::*};
@@ -64,14 +65,14 @@ fn read_actions(game: &dyn Game, request: &TraceRequest) -> Result<Vec<u32>, Ins
             let text = read_text(path).map_err(|error| InspectError::Usage(format!("{error}; {HOW}")))?;
             let words = text.split(|c: char| c == ',' || c.is_whitespace()).filter(|word| !word.is_empty());
             let parsed: Result<Vec<u32>, _> = words.map(|word| action_number(game, word)).collect();
-            let parsed = parsed.map_err(|why| InspectError::Usage(format!("{}: {why}", path.display())))?;
+            let parsed = parsed.map_err(|why| InspectError::Usage(format!("{}: {why}", shown_path(path))))?;
             if parsed.is_empty() {
-                return Err(InspectError::Usage(format!("{} has no actions; {HOW}", path.display())));
+                return Err(InspectError::Usage(format!("{} has no actions; {HOW}", shown_path(path))));
             }
             parsed
         }
     };
-    let from = request.file.map_or("--actions".to_owned(), |path| path.display().to_string());
+    let from = request.file.map_or("--actions".to_owned(), shown_path);
     match actions.iter().find_map(|&action| misfit(&ActionValue::Discrete(action), &space)) {
         Some(why) => Err(InspectError::Usage(format!("{from}: {why}, the actions of `{}`", game.name()))),
         None => Ok(actions),

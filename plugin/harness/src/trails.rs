@@ -15,7 +15,7 @@ use crate::{
     trails::cells::{HAZARD, INK, LINES, PAPER, PLATFORM, SOFT, WALL, heat},
 };
 use bevy::math::{Rect, Vec2};
-use playbot_report::text_table::text_width;
+use playbot_report::{counted, text_table::text_width};
 
 pub use crate::trails::{cells::CellChart, visits::Visits};
 
@@ -112,7 +112,8 @@ pub(crate) fn draw(chart: &TrailChart) -> Drawing {
     }
     let left_out = chart.floors.len().saturating_sub(MOST_FLOORS);
     if left_out > 0 {
-        paper.text(0.0, TEXT, SOFT, &format!("{left_out} more floors are not drawn"));
+        let are = if left_out == 1 { "is" } else { "are" };
+        paper.text(0.0, TEXT, SOFT, &format!("{} {are} not drawn", counted(left_out as u64, "more floor")));
     }
     let size = Vec2::new(paper.width + GAP, paper.y + GAP / 2.0);
     Drawing { label: chart.title.clone(), size, shapes: paper.shapes }

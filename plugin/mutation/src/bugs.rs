@@ -25,6 +25,7 @@ use playbot_harness::{
     mode::ModeError, sealed_file::SealedFileError,
 };
 use playbot_learner::HasExitCode;
+use playbot_report::counted;
 use std::path::PathBuf;
 use thiserror::Error;
 
@@ -96,8 +97,8 @@ pub enum BugError {
     },
     /// There are fewer unmutated levels than needed.
     #[error(
-        "`{game}`: {levels} has {count} sound levels, and {wanted} are needed: name more with --levels {game}=MODE:first..last, or \
-         ask for fewer with --sound and --per-kind"
+        "`{game}`: {levels} has {}, and {wanted} are needed: name more with --levels {game}=MODE:first..last, or \
+         ask for fewer with --sound and --per-kind", counted(*count, "sound level")
     )]
     TooFewLevels {
         /// The game.

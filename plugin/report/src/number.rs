@@ -40,11 +40,11 @@ pub fn ticks(value: f64) -> String {
     if value.fract() == 0.0 { whole(value) } else { fixed(value, 1) }
 }
 
-/// Formats `1 step`, `2 steps`; `1 try`, `2 tries`; `1 class`, `2 classes`.
+/// Formats `1 step`, `2 steps`; `1 key`, `2 keys`; `1 entity`, `2 entities`; `1 class`, `2 classes`.
 pub fn counted(count: u64, what: &str) -> String {
-    match what.strip_suffix("ry") {
+    match what.strip_suffix('y').filter(|stem| !stem.ends_with(['a', 'e', 'i', 'o', 'u'])) {
         _ if count == 1 => format!("1 {what}"),
-        Some(stem) => format!("{count} {stem}ries"),
+        Some(stem) => format!("{count} {stem}ies"),
         None if what.ends_with('s') => format!("{count} {what}es"),
         None => format!("{count} {what}s"),
     }
@@ -137,6 +137,8 @@ mod tests {
         assert_eq!(percent(0.9744), "97.4 %");
         assert_eq!([counted(0, "step"), counted(1, "try"), counted(2, "try")], ["0 steps", "1 try", "2 tries"]);
         assert_eq!([counted(1, "class"), counted(2, "class")], ["1 class", "2 classes"]);
+        assert_eq!([counted(1, "entity"), counted(0, "entity")], ["1 entity", "0 entities"]);
+        assert_eq!([counted(3, "try"), counted(2, "key")], ["3 tries", "2 keys"]);
         let shown = [0.0, 8.53125, -0.00312, 0.00002, 81920.4, 1.0, f64::NAN, f64::INFINITY].map(readable);
         assert_eq!(shown, ["0", "8.531", "−0.003120", "2e−5", "81,920", "1.000", "–", "inf"]);
         assert_eq!(readable_with_spread(8.53125, 0.04041), "8.531 ± 0.040");

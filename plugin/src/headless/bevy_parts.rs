@@ -12,6 +12,8 @@ use bevy::{
     platform::cell::SyncCell,
     prelude::*,
 };
+use std::sync::atomic::{AtomicBool, Ordering};
+use tracing::{dispatcher, subscriber::NoSubscriber};
 
 /// The event loop of a Bevy without `bevy_winit`.
 #[allow(dead_code, reason = "used only where Bevy has no event loop")]
@@ -169,6 +171,21 @@ mod gizmos_render {
     pub(crate) use super::Nothing as GizmoRenderPlugin;
 }
 
+/// The log of a Bevy without `bevy_log`.
+#[allow(dead_code, reason = "used only where Bevy has no log")]
+mod log {
+    use bevy::prelude::*;
+
+    #[derive(Default)]
+    pub(crate) struct LogPlugin {
+        pub(crate) rest: (),
+    }
+
+    impl Plugin for LogPlugin {
+        fn build(&self, _: &mut App) {}
+    }
+}
+
 /// The sounds of a Bevy without `bevy_audio`.
 #[allow(dead_code, unused_imports, reason = "used only where Bevy has no sounds")]
 mod audio {
@@ -232,6 +249,35 @@ pub(super) fn without_devices(plugins: PluginGroupBuilder) -> PluginGroupBuilder
         plugins.add_after::<audio::AudioPlugin>(SilentSounds).disable::<audio::AudioPlugin>()
     } else {
         plugins
+    }
+}
+
+/// Leaves the log to the first World of a program that has none.
+pub(super) fn with_one_log(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
+    #[allow(unused_imports, reason = "Bevy may lack these modules")]
+    use bevy::*;
+    if plugins.contains::<log::LogPlugin>() {
+        plugins.add_after::<log::LogPlugin>(FirstLog).disable::<log::LogPlugin>()
+    } else {
+        plugins
+    }
+}
+
+/// Sets up Bevy's log once. A program has one log, and Bevy's plugin logs an error in each further World.
+struct FirstLog;
+
+impl Plugin for FirstLog {
+    fn build(&self, app: &mut App) {
+        #[allow(unused_imports, reason = "Bevy may lack these modules")]
+        use bevy::*;
+
+        /// Whether a World has looked after the log.
+        static SEEN: AtomicBool = AtomicBool::new(false);
+
+        let is_first = !SEEN.swap(true, Ordering::Relaxed);
+        if is_first && dispatcher::get_default(|log| log.is::<NoSubscriber>()) {
+            app.add_plugins(log::LogPlugin::default());
+        }
     }
 }
 

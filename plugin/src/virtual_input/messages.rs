@@ -11,7 +11,8 @@ use crate::{
     },
 };
 use bevy::{
-    ecs::system::SystemParam,
+    app::MainScheduleOrder,
+    ecs::{query::QueryFilter, schedule::ScheduleLabel, system::SystemParam},
     input::{
         ButtonState,
         gamepad::{
@@ -24,7 +25,7 @@ use bevy::{
         touch::{TouchInput, TouchPhase},
     },
     prelude::*,
-    window::{CursorLeft, CursorMoved, PrimaryWindow, WindowEvent},
+    window::{CursorLeft, CursorMoved, PrimaryWindow, RawHandleWrapper, WindowEvent},
 };
 
 /// The writers of messages.
@@ -199,6 +200,71 @@ impl InputMessages<'_, '_> {
     }
 }
 
+// The pointer of a window on a screen, which stays the person's.
+//
+// A game asks its window where the cursor is, and the event loop moves the real pointer to a position that was set there.
+// So the window has the agent's cursor while the game's systems run, and the person's when the event loop looks.
+
+/// After `First`: the window gets the agent's cursor.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct CursorShown;
+
+/// Before `Last`, in which the event loop looks: the window gets the person's cursor.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+struct CursorGivenBack;
+
+/// Position of the person's cursor in this frame, physical pixels. Without a screen it is `None`.
+#[derive(Resource, Clone, Copy, Debug, Default, Reflect)]
+#[reflect(Resource)]
+pub(super) struct PersonsCursor(Option<Vec2>);
+
+/// Lets the real pointer be where the person has moved it, in windows on a screen.
+pub(super) fn leave_pointer(app: &mut App) {
+    app.init_resource::<PersonsCursor>();
+    leave_pointer_in::<With<RawHandleWrapper>>(app);
+    if let Some(mut order) = app.world_mut().get_resource_mut::<MainScheduleOrder>() {
+        order.insert_after(First, CursorShown);
+        order.insert_before(Last, CursorGivenBack);
+    }
+}
+
+/// Adds the systems for windows that pass a filter.
+fn leave_pointer_in<F: QueryFilter + 'static>(app: &mut App) {
+    app.add_systems(CursorShown, show_cursor::<F>).add_systems(CursorGivenBack, give_cursor_back::<F>);
+}
+
+type PrimaryWindows<'w, 's, F> = Query<'w, 's, &'static mut Window, (With<PrimaryWindow>, F)>;
+
+fn show_cursor<F: QueryFilter + 'static>(
+    devices: Res<VirtualDevices>,
+    mut persons: ResMut<PersonsCursor>,
+    mut windows: PrimaryWindows<F>,
+) {
+    let Ok(mut window) = windows.single_mut() else { return };
+    persons.0 = window.physical_cursor_position();
+    if let Some(Cursor { at, .. }) = devices.cursor {
+        window.set_cursor_position(Some(at));
+    }
+}
+
+/// Leaves a position alone that the game has set.
+fn give_cursor_back<F: QueryFilter + 'static>(
+    devices: Res<VirtualDevices>,
+    persons: Res<PersonsCursor>,
+    mut windows: PrimaryWindows<F>,
+) {
+    let Ok(mut window) = windows.single_mut() else { return };
+    let is_agents = match (window.cursor_position(), devices.cursor) {
+        // Factors between logical and physical pixels round positions.
+        (Some(at), Some(cursor)) => at.distance(cursor.at) < 1.0,
+        (None, None) => true,
+        _ => false,
+    };
+    if is_agents && window.physical_cursor_position() != persons.0 {
+        window.set_physical_cursor_position(persons.0.map(|at| at.as_dvec2()));
+    }
+}
+
 /// The gamepad of an agent. Games see it as one that is plugged in.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Component)]
@@ -344,6 +410,61 @@ fn scaled_axis(settings: &AxisSettings, value: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        agent::Control,
+        bot::BlindBot,
+        headless::{PlaybotAppExt, headless_app},
+        level::LevelQueue,
+        virtual_input::{PointerPosition, VirtualInputPlugin},
+    };
+    use bevy::{input::InputPlugin, math::DVec2};
+    use playbot_learner::ActionValue;
+
+    /// The cursor that the game sees in `Update`, and the one that the event loop sees in `Last`.
+    #[derive(Resource, Default)]
+    struct Seen {
+        game: Option<Vec2>,
+        event_loop: Option<Vec2>,
+    }
+
+    #[test]
+    fn the_real_pointer_stays_where_the_person_has_it_while_an_agent_points() {
+        let mut app = headless_app();
+        app.add_plugins((InputPlugin, VirtualInputPlugin::default())).init_resource::<Seen>();
+        // The window of this test stands for one on a screen.
+        leave_pointer_in::<()>(&mut app);
+        app.add_systems(Update, |window: Single<&Window>, mut seen: ResMut<Seen>| seen.game = window.cursor_position())
+            .add_systems(Last, |window: Single<&Window>, mut seen: ResMut<Seen>| {
+                seen.event_loop = window.cursor_position();
+            });
+        let world = app.world_mut();
+        let window = world.spawn((Window::default(), PrimaryWindow)).id();
+        let input = VirtualInput::keys([[]; 2]).cursor([None, Some(PointerPosition::pixels(30.0, 40.0))]);
+        let bot = BlindBot::Constant(ActionValue::Discrete(1));
+        let agent = (Agent::new(0, input.space()), input, bot, LevelQueue::Always(0));
+        let agent = world.spawn((agent, Control::Bot)).id();
+        let mut frame = |moved: Option<Vec2>, control: Control| {
+            let world = app.world_mut();
+            world.entity_mut(agent).insert(control);
+            if let Some(at) = moved {
+                let at = Some(DVec2::new(at.x.into(), at.y.into()));
+                world.get_mut::<Window>(window).expect("a window").set_physical_cursor_position(at);
+            }
+            app.tick().expect("no agent broke its contract");
+            let seen = app.world().resource::<Seen>();
+            (seen.game, seen.event_loop)
+        };
+        let [first, second, aim] = [Vec2::new(5.0, 6.0), Vec2::new(7.0, 8.0), Vec2::new(30.0, 40.0)];
+        // The first frame may only start the clock.
+        frame(Some(first), Control::Bot);
+        assert_eq!(frame(None, Control::Bot), (Some(aim), Some(first)));
+        assert_eq!(frame(Some(second), Control::Bot), (Some(aim), Some(second)), "the person moves the mouse");
+        assert_eq!(frame(None, Control::Bot), (Some(aim), Some(second)));
+        let (_, pointer) = frame(None, Control::Human);
+        assert_eq!(pointer, Some(second));
+        assert_eq!(frame(None, Control::Human), (Some(second), Some(second)), "the person plays");
+        assert_eq!(frame(Some(first), Control::Human), (Some(first), Some(first)));
+    }
 
     #[test]
     fn values_are_scaled_as_bevy_scales_them() {

@@ -360,69 +360,6 @@ fn target_of(program: &Path) -> Option<&Path> {
     program.ancestors().skip(1).find(|folder| folder.join("CACHEDIR.TAG").is_file())
 }
 
-// Assertions without settings, each in one call.
-
-/// Asserts that each of these levels can be solved: the game's demonstrator, or else its first bot, reaches the goal.
-///
-/// # Panics
-///
-/// A level was not solved, or the levels cannot be tested: see [`LevelTest::assert_levels_solvable`].
-#[track_caller]
-pub fn assert_levels_solvable(game: &dyn Game, levels: &str) {
-    test(game).levels(levels).assert_levels_solvable();
-}
-
-/// Asserts that a bot of the game solves each of these levels. Other testers are named with [`LevelTest`].
-///
-/// # Panics
-///
-/// A level was not solved, or the levels cannot be tested: see [`LevelTest::assert_levels_solved`].
-#[track_caller]
-pub fn assert_levels_solved_by(game: &dyn Game, bot: &str, levels: &str) {
-    test(game).levels(levels).bot(bot).assert_levels_solved();
-}
-
-/// Asserts that levels have no findings: no default [detector](crate::detectors) reports anything while all bots of the
-/// game play. The game does not panic, and no goal is proved to be out of reach. Levels need not be solved.
-///
-/// # Panics
-///
-/// Something was found, or the levels cannot be tested: see [`LevelTest::assert_no_findings`].
-#[track_caller]
-pub fn assert_no_findings(game: &dyn Game, levels: &str) {
-    test(game).levels(levels).assert_no_findings();
-}
-
-/// Asserts that each bot of the game repeats its episode bit for bit on each of these levels.
-///
-/// # Panics
-///
-/// An episode differed, or the levels cannot be tested: see [`LevelTest::assert_deterministic`].
-#[track_caller]
-pub fn assert_deterministic(game: &dyn Game, levels: &str) {
-    test(game).levels(levels).assert_deterministic();
-}
-
-/// Asserts that a recording or a finding plays again, or all in a folder.
-///
-/// # Panics
-///
-/// A replay differs, or there is nothing to replay: see [`LevelTest::assert_replays`].
-#[track_caller]
-pub fn assert_replays(game: &dyn Game, path: impl AsRef<Path>) {
-    test(game).assert_replays(path);
-}
-
-/// Asserts that no finding in this folder happens any more.
-///
-/// # Panics
-///
-/// A finding still happens, or there is none: see [`LevelTest::assert_findings_gone`].
-#[track_caller]
-pub fn assert_findings_gone(game: &dyn Game, folder: impl AsRef<Path>) {
-    test(game).assert_findings_gone(folder);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

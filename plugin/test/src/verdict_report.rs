@@ -31,7 +31,7 @@ use crate::{
     },
 };
 use playbot_harness::game::Game;
-use playbot_report::{PAGE_STYLE, escape::escape, whole};
+use playbot_report::{PAGE_STYLE, counted, escape::escape, whole};
 use std::{
     cmp::Reverse,
     collections::BTreeMap,
@@ -126,7 +126,7 @@ impl Page<'_> {
         let subtitle = format!(
             "Version {} of the game{shard}, {} of each tester on each level, seed {}",
             record.game_version,
-            if record.episodes == 1 { "1 episode".to_owned() } else { format!("{} episodes", record.episodes) },
+            counted(u64::from(record.episodes), "episode"),
             record.seed
         );
         let body = numbers(self.overview)

@@ -54,7 +54,8 @@ settings! {
     train: LevelSplit, such as "\"hard:0..63\"";
     /// Held-out levels to evaluate on; never trained on.
     test: LevelSplit, such as "\"hard:64..127\"";
-    /// File or folder of recordings; `None` for algorithms that learn nothing from any.
+    /// File or folder of recordings; `None` for algorithms that learn nothing from any. A relative path in a file, also
+    /// one of level files in `train` and `test`, starts in the folder of that file, or else in the current one.
     demos: Option<PathBuf> = None, such as "\"demos/coinrun\"", serde(default, serialize_with = "plain");
     /// Learn from at most so many recorded steps: whole episodes, drawn evenly over the recordings. `None` takes all.
     demo_steps: Option<u64> = None, in Range::COUNT, serde(default);

@@ -18,7 +18,10 @@ use crate::{
     checkpoint::{Checkpoint, CheckpointChoice},
     collect::{ArenaState, restore_arenas, save_arenas},
     error::{TrainError, edited, unreadable},
-    experiment::{Algorithm, Experiment, file::read_experiment},
+    experiment::{
+        Algorithm, Experiment,
+        file::{parse_experiment_with, read_experiment_text},
+    },
     metrics_log::{MetricsLog, UpdateReport},
     trainer,
     trainer::{Progress, TrainedLearner, Trainer},
@@ -142,7 +145,9 @@ impl RunDir {
         check_is_run(path)?;
         let experiment_path = path.join(EXPERIMENT);
         check_text_seal(&experiment_path).map_err(|error| with_remedy(error, edited))?;
-        let experiment = read_experiment(&experiment_path)?;
+        // Paths were resolved when the run began.
+        let text = read_experiment_text(&experiment_path)?;
+        let experiment = parse_experiment_with::<&str>(&text, &experiment_path, &[])?;
         let info_path = path.join("run.json");
         let (info, had_seal) = read_sealed(&info_path).map_err(|error| with_remedy(error, unreadable))?;
         if !had_seal {

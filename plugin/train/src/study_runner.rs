@@ -28,7 +28,7 @@ use playbot_harness::{
     split::LevelSplit,
 };
 use playbot_learner::{Dataset, FileError, HasExitCode, SeenLevels, SkillModel, disk};
-use playbot_report::{statistics::steps_to_reach, to_svg};
+use playbot_report::{counted, statistics::steps_to_reach, to_svg};
 use serde::{Deserialize, Serialize};
 use std::{
     collections::BTreeSet,
@@ -706,7 +706,7 @@ fn cost_table(runs: &[StudyRun], folder: &Path, command: &str, threads: usize) -
          {}. A skill model is learned within the first run that needs it.\n",
         markdown_table(&["variant", "runs", "environment steps", "CPU hours", "hours"], rows.into_iter()),
         hours(Some(total.1)),
-        if threads == 1 { "1 thread".to_owned() } else { format!("{threads} threads") },
+        counted(threads as u64, "thread"),
     )
 }
 

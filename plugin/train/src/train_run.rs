@@ -16,7 +16,7 @@ use playbot_harness::{
     sealed_file::file_checksum,
 };
 use playbot_learner::{ContinuedSchedule, DeviceKind, HasExitCode, SeenLevels, SkillModel};
-use playbot_report::whole;
+use playbot_report::{counted, whole};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -386,7 +386,7 @@ pub fn rounded(experiment: &Experiment) -> Option<String> {
         format!(
             "{} rounded up to {} of {}: training for {}",
             if asked == 1 { "1 step is".to_owned() } else { format!("{} steps are", whole(asked as f64)) },
-            if experiment.updates() == 1 { "1 update".to_owned() } else { format!("{} updates", experiment.updates()) },
+            counted(experiment.updates(), "update"),
             whole(experiment.steps_per_update() as f64),
             whole(trained as f64)
         )

@@ -106,10 +106,10 @@ fn file(folder: &Path, begin: &str) -> PathBuf {
 
 #[test]
 fn assertions_hold_for_what_is_sound() {
-    assert_levels_solvable(&Lane::Sound, "plain:0..9");
-    assert_levels_solved_by(&Lane::Sound, "right", "plain:0..9");
-    assert_no_findings(&Lane::Sound, "plain:5..9");
-    assert_deterministic(&Lane::Sound, "plain:0..3");
+    playbot::test(&Lane::Sound).levels("plain:0..9").assert_levels_solvable();
+    playbot::test(&Lane::Sound).levels("plain:0..9").bot("right").assert_levels_solved();
+    playbot::test(&Lane::Sound).levels("plain:5..9").assert_no_findings();
+    playbot::test(&Lane::Sound).levels("plain:0..3").assert_deterministic();
     let right = Player::Blind(BlindBot::Constant(ActionValue::Discrete(1)));
     playbot::test(&Corridor)
         .levels("plain:7")
@@ -186,13 +186,16 @@ fn a_failure_names_each_level_with_its_proof_and_the_commands_that_show_it() {
         again("plain:5"),
     ];
     assert_eq!(found, expected.join("\n"));
-    assert_replays(&Lane::Sound, folder.path());
+    playbot::test(&Lane::Sound).assert_replays(folder.path());
     // The first levels are reported in full, all others by name.
     let many = message(|| test("plain:10..21").assert_levels_solvable());
     assert!(many.starts_with("12 of 12 levels ") && many.ends_with("\nand plain:20, plain:21"), "{many}");
     let mixed = message(|| test("plain:5..6").bot("right").assert_levels_solved());
     assert!(mixed.contains("  left: solved 0 of 2, 2 lost\n  right: solved 2 of 2\n"), "{mixed}");
-    assert!(message(|| assert_levels_solved_by(&Lane::Sound, "left", "plain:7")).contains("1 of 1 level was not"));
+    assert!(
+        message(|| playbot::test(&Lane::Sound).levels("plain:7").bot("left").assert_levels_solved())
+            .contains("1 of 1 level was not")
+    );
 }
 
 #[test]
@@ -212,21 +215,21 @@ fn a_finding_is_reported_until_it_is_mended() {
 
     playbot::test(&Lane::Burning).assert_replays(&file);
     playbot::test(&Lane::Sound).assert_findings_gone(folder.path());
-    let mended = message(|| assert_replays(&Lane::Sound, &file));
+    let mended = message(|| playbot::test(&Lane::Sound).assert_replays(&file));
     assert!(mended.contains(": it does not happen again (plain:3: panic: the corridor burns"), "{mended}");
-    let there = message(|| assert_findings_gone(&Lane::Burning, folder.path()));
-    assert!(there.contains("1 of 1 findings are not gone:") && there.contains("(still-there): plain:3"), "{there}");
+    let there = message(|| playbot::test(&Lane::Burning).assert_findings_gone(folder.path()));
+    assert!(there.contains("1 of 1 finding is not gone:") && there.contains("(still-there): plain:3"), "{there}");
     assert!(there.ends_with(&format!("playbot replay {}", file.display())), "{there}");
     let empty = tempfile::tempdir().expect("a folder");
     let own = message(|| playbot::test(&Lane::Burning).program("jump").assert_findings_gone(folder.path()));
     assert!(own.ends_with(&format!("\n    jump replay {}", file.display())), "{own}");
-    let none = message(|| assert_findings_gone(&Lane::Sound, empty.path()));
+    let none = message(|| playbot::test(&Lane::Sound).assert_findings_gone(empty.path()));
     assert!(none.contains("has no findings"), "{none}");
 }
 
 #[test]
 fn a_game_that_does_not_play_the_same_is_reported_with_the_tick() {
-    let found = message(|| assert_deterministic(&Lane::Drifting, "plain:1..2"));
+    let found = message(|| playbot::test(&Lane::Drifting).levels("plain:1..2").assert_deterministic());
     assert!(found.starts_with("2 of 2 levels did not play the same again (`lane`, plain:1..2, right + left + "));
     assert!(found.contains("\n  determinism (right, episode 0, tick 0): the episode differed"), "{found}");
     let options = "--detect determinism --no-detect all --detector determinism.every=1";
@@ -241,7 +244,7 @@ fn what_cannot_be_tested_is_a_failure_in_words() {
         ("plane:0..3", "did you mean `plain`?"),
         ("files:none/*.json", "files:none/*.json matches no file"),
     ] {
-        let found = message(|| assert_levels_solvable(&Lane::Sound, levels));
+        let found = message(|| playbot::test(&Lane::Sound).levels(levels).assert_levels_solvable());
         assert!(found.contains(words), "{found}");
     }
     let none = message(|| playbot::test(&Lane::Sound).assert_no_findings());
@@ -267,25 +270,25 @@ fn recordings_play_again_or_the_first_tick_that_differs_is_reported() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("walk.demo");
     record_random(&Corridor, "plain", 3, &path, 0..4);
-    assert_replays(&Corridor, &path);
-    assert_replays(&Corridor, folder.path());
-    let other = message(|| assert_replays(&Lane::Impostor, &path));
+    playbot::test(&Corridor).assert_replays(&path);
+    playbot::test(&Corridor).assert_replays(folder.path());
+    let other = message(|| playbot::test(&Lane::Impostor).assert_replays(&path));
     assert!(
         other.contains("walk.demo: 4 of 4 episodes do not play the same game again:\n  episode 0: level 0, tick 0")
     );
     assert!(other.ends_with(&format!("\n    playbot demo verify {}", path.display())), "{other}");
-    let foreign = message(|| assert_replays(&Lane::Sound, &path));
+    let foreign = message(|| playbot::test(&Lane::Sound).assert_replays(&path));
     assert!(foreign.contains("walk.demo: a recording of the game `corridor`, not of `lane`"), "{foreign}");
 
     let bytes = fs::read(&path).expect("written");
     fs::write(&path, &bytes[..bytes.len() - 3]).expect("writable");
-    let cut = message(|| assert_replays(&Corridor, &path));
+    let cut = message(|| playbot::test(&Corridor).assert_replays(&path));
     assert!(cut.contains("walk.demo") && cut.contains("is cut off"), "{cut}");
     drop(DemoWriter::replace(&path, Corridor.demo_header("plain")).expect("writable"));
-    let empty = message(|| assert_replays(&Corridor, folder.path()));
+    let empty = message(|| playbot::test(&Corridor).assert_replays(folder.path()));
     assert!(empty.ends_with("walk.demo holds no episode: nothing was replayed"), "{empty}");
     fs::remove_file(&path).expect("it is there");
-    let none = message(|| assert_replays(&Corridor, folder.path()));
+    let none = message(|| playbot::test(&Corridor).assert_replays(folder.path()));
     assert!(none.contains("has neither recordings nor findings"), "{none}");
-    assert!(message(|| assert_replays(&Corridor, &path)).contains("walk.demo"));
+    assert!(message(|| playbot::test(&Corridor).assert_replays(&path)).contains("walk.demo"));
 }

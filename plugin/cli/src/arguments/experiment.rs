@@ -28,7 +28,7 @@ use std::{
 pub struct ExperimentArgs {
     /// Name of the game, whose own experiment is the default (default: the program's first game).
     pub game: Option<String>,
-    /// Experiment file (default: that of the game, for `eval --run` the run's own).
+    /// Experiment file, or - for standard input (default: that of the game, for `eval --run` the run's own).
     #[arg(long, value_name = "FILE")]
     pub experiment: Option<PathBuf>,
     /// Change a setting of the experiment, such as ppo.lr=0.0003 (repeatable).
@@ -165,12 +165,17 @@ impl ExperimentArgs {
         Ok(found)
     }
 
-    /// Returns the path of recordings that an experiment names, relative to this folder. Missing recordings of
-    /// experiments that come with the program are also looked for in its sources, so that `cargo run` works from any
-    /// folder.
+    /// Returns the path of recordings that an experiment names, relative to this folder: those beside its file were
+    /// found when it was read. Missing recordings of experiments that come with the program are also looked for in its
+    /// sources, so that `cargo run` works from any folder.
     pub fn find_recordings(&self, path: &Path, games: &Games) -> PathBuf {
         let beside = sources().join(path);
-        let is_default = self.experiment.is_none() && !self.set.iter().any(|set| sets_key(set, "demos"));
+        let is_set = self.set.iter().any(|set| sets_key(set, "demos"));
+        let is_default = self.experiment.is_none() && !is_set;
+        let folder = self.experiment.as_deref().and_then(Path::parent).filter(|folder| *folder != Path::new(""));
+        if let Some(folder) = folder.filter(|_| !is_set && path.is_relative() && !path.exists()) {
+            report!("there are no recordings at {}, beside the experiment", folder.join(path).display());
+        }
         let is_beside = is_default && !path.exists() && beside.exists();
         if is_beside && is_shipped(path, &unnamed(games, &self.sets([]))) { beside } else { path.into() }
     }

@@ -45,7 +45,8 @@ const MOST_LISTED: usize = 10;
 /// Without both, a message of a game is written once, and the result has how often it came again.
 pub(crate) fn init(verbose: u8, hears_games: bool) -> Repeats {
     let quiet = if hears_games { QUIET } else { WITHOUT_GAMES };
-    let level = [quiet, "info", "debug"][usize::from(verbose.min(2))];
+    // Windows have Bevy's own log too, which reports that this one is there.
+    let level = [quiet, "info,bevy_log=off", "debug,bevy_log=off"][usize::from(verbose.min(2))];
     let asked = EnvFilter::try_from_default_env().ok();
     let is_plain = verbose == 0 && asked.is_none();
     let filter = asked.unwrap_or_else(|| EnvFilter::new(level));

@@ -16,6 +16,7 @@ use playbot_harness::{
     worlds::{Arrangement, build_observing_world, is_bound_to_its_thread},
 };
 use playbot_learner::waited;
+use playbot_report::counted;
 use playbot_train::Trainer;
 use serde_json::{Value, json};
 use std::time::Instant;
@@ -105,10 +106,10 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             print_line(measured.to_json(name, &args))?;
         } else {
             print_line(format!(
-                "{name}: {:.0} steps/s with {} arenas on {} threads{}; peak memory {:.0} MiB; in a step {}",
+                "{name}: {:.0} steps/s with {} on {}{}; peak memory {:.0} MiB; in a step {}",
                 measured.steps_per_s,
-                args.arenas,
-                args.threads,
+                counted(u64::from(args.arenas), "arena"),
+                counted(args.threads as u64, "thread"),
                 measured.idle.map_or(String::new(), |idle| format!(", {:.0} % idle", 100.0 * idle)),
                 peak_rss_mib(),
                 measured.parts_in_words()

@@ -265,10 +265,14 @@ fn mend(file: &Path, out: &Path, header_from: Option<&Path>, as_json: bool) -> R
     } else {
         let kept = match report.kept_episodes {
             0 => "no episode is whole, so nothing is kept and there is nothing to replay or to learn from".to_owned(),
-            episodes => format!("kept {} with {} steps", counted(episodes as u64, "episode"), report.kept_steps),
+            episodes => {
+                let (episodes, steps) = (episodes as u64, report.kept_steps as u64);
+                format!("kept {} with {}", counted(episodes, "episode"), counted(steps, "step"))
+            }
         };
         let places = counted(report.dropped_regions.len() as u64, "place");
-        print_line(format!("{}: {kept}; dropped {} bytes in {places}", out.display(), report.dropped_bytes))?;
+        let bytes = counted(report.dropped_bytes, "byte");
+        print_line(format!("{}: {kept}; dropped {bytes} in {places}", out.display()))?;
         if let Some(from) = &report.header_from {
             let from = if from == file { "its second copy".to_owned() } else { from.display().to_string() };
             print_line(format!("its header was damaged, and is taken from {from}"))?;

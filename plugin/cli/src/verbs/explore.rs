@@ -163,7 +163,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         match &route {
             Some(route) => {
                 recording.write(game, &exploration, route)?;
-                report!("recorded: {}, {} ticks", recording.path().display(), route.len());
+                report!("recorded: {}, {}", recording.path().display(), counted(route.len() as u64, "tick"));
             }
             None => report!("nothing is recorded: {}", why_nothing(args.cell.as_ref(), is_missed)),
         }
@@ -253,8 +253,10 @@ fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> 
         plan,
         |ticks| bar.inc(ticks),
         |round| {
-            let solved = round.solution.map_or_else(String::new, |ticks| format!(", solved in {ticks} ticks"));
-            bar.set_message(format!("{} cells{solved}", round.cells));
+            let solved = round
+                .solution
+                .map_or_else(String::new, |ticks| format!(", solved in {}", counted(ticks.into(), "tick")));
+            bar.set_message(format!("{}{solved}", counted(round.cells as u64, "cell")));
             if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         },
     );

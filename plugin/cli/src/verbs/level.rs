@@ -21,6 +21,7 @@ use std::path::PathBuf;
   playbot level GAME --level 0 --json --out my-level.json
   playbot level GAME --level 7 --png level.png
   playbot level GAME --file my-level.json
+  playbot level GAME --file -
   playbot level antmaze --map large
   playbot level maze2d --mode medium --level 7 --json
   playbot level maze2d --map random+size=21x21+loops=0.2 --level 7
@@ -35,11 +36,11 @@ pub struct Args {
     /// Mode of the game (default: the one that `train` trains in).
     #[arg(long)]
     mode: Option<String>,
-    /// Map, for games whose levels are maps. It is a name, with options where it takes any, or a file of rows. --mode
-    /// also takes the start and goal of the level.
+    /// Map, for games whose levels are maps. It is a name, with options where it takes any, or a file of rows (- for
+    /// standard input). --mode also takes the start and goal of the level.
     #[arg(long, value_name = "MAP", conflicts_with_all = ["mode", "levels"])]
     map: Option<String>,
-    /// Level file to show, in the form that --json prints.
+    /// Level file to show, in the form that --json prints, or - for standard input.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["mode", "levels", "map", "level", "seed"])]
     file: Option<PathBuf>,
     #[command(flatten)]

@@ -123,7 +123,11 @@ impl Audit {
     }
 
     fn to_text(&self, game: &dyn Game) -> String {
-        let mut lines = vec![format!("{} {}: {} levels", game.name(), self.levels, whole(self.levels.len() as f64))];
+        let count = match self.levels.len() {
+            1 => "1 level".to_owned(),
+            count => format!("{} levels", whole(count as f64)),
+        };
+        let mut lines = vec![format!("{} {}: {count}", game.name(), self.levels)];
         match &self.equal {
             None => lines.push(format!(
                 "equal levels: unknown, since {} does not compare the layouts of these levels",

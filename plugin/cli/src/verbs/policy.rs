@@ -20,7 +20,7 @@ use playbot_harness::{
     split::LevelSplit,
 };
 use playbot_learner::{DeviceKind, PolicyFile};
-use playbot_report::whole;
+use playbot_report::{counted, whole};
 use playbot_train::{
     Experiment,
     checkpoint::CheckpointChoice,
@@ -217,14 +217,17 @@ fn show(path: &Path, device: DeviceKind, as_json: bool, games: &Games) -> Result
         observation_config if observation_config.is_image() => format!("observation   {observation_config}"),
         _ => {
             let normalised = if policy.normalises() { ", normalised" } else { "" };
-            let values = format!("{} values{normalised}", policy.obs_dim());
+            let values = format!("{}{normalised}", counted(policy.obs_dim() as u64, "value"));
             format!("observation   {}", output::with_names(&values, &metadata.observations))
         }
     })?;
     let actions = policy.action_space().to_string();
     print_line(format!("actions       {}", output::with_names(&actions, &metadata.actions)))?;
     print_line(match skills {
-        Some(skills) => format!("skills        {} numbers, held for {} ticks", policy.latent(), skills.skill_interval),
+        Some(skills) => {
+            let (numbers, ticks) = (policy.latent() as u64, skills.skill_interval as u64);
+            format!("skills        {}, held for {}", counted(numbers, "number"), counted(ticks, "tick"))
+        }
         None => "skills        none".to_owned(),
     })?;
     Ok(Outcome::Pass)

@@ -267,7 +267,8 @@ fn report_idle_settings(experiment: &Experiment, runs: &[StudyRun], sets: &[Stri
 /// Returns the folder of the runs: runs of different games lie apart.
 fn runs_folder(args: &Args, experiment: &Experiment) -> PathBuf {
     let default = if args.from.names_game() { &experiment.game } else { "study" };
-    let name = args.from.experiment.as_deref().and_then(Path::file_stem).unwrap_or(default.as_ref());
+    let file = args.from.experiment.as_deref().filter(|file| *file != Path::new("-"));
+    let name = file.and_then(Path::file_stem).unwrap_or(default.as_ref());
     args.runs.clone().unwrap_or_else(|| Path::new("runs").join(name))
 }
 

@@ -4,6 +4,7 @@ use crate::window::deciders::Deciders;
 use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
 use playbot_harness::prelude::*;
+use playbot_report::counted;
 
 /// The levels of a session. A won level is followed by the next, a lost one comes again, and the first follows the
 /// last.
@@ -57,7 +58,7 @@ impl LastEpisode {
             EpisodeEnd::Truncated if success => "reached the goal, time was up",
             EpisodeEnd::Truncated => "out of time",
         };
-        Some(format!("level {level} {how} after {ticks} ticks"))
+        Some(format!("level {level} {how} after {}", counted(u64::from(ticks), "tick")))
     }
 }
 

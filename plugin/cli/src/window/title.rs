@@ -11,6 +11,7 @@ use bevy::{
 };
 use bevy_playbot::{engine::TappedKeys, episode::Tick, vision::VisionSystems};
 use playbot_harness::prelude::*;
+use playbot_report::counted;
 use std::{borrow::Cow, time::Duration};
 
 /// Time for which a notice is shown.
@@ -75,7 +76,7 @@ fn write_title(
     ];
     parts.extend(last.words());
     parts.push(match recorder {
-        Some(recorder) => format!("recording, {} episodes", recorder.episodes()),
+        Some(recorder) => format!("recording, {}", counted(recorder.episodes(), "episode")),
         None => "not recording".to_owned(),
     });
     if pace.is_paused() {

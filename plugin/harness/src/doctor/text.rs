@@ -5,6 +5,7 @@ use crate::doctor::{
     game_copy::TypesReport,
     observed::{NonFiniteValue, ObservationReport, Verdict},
 };
+use playbot_report::counted;
 use std::{
     fmt,
     fmt::{Display, Formatter},
@@ -14,7 +15,8 @@ impl Display for DoctorReport {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { game, version, mode, level, ticks, .. } = self;
         writeln!(f, "{game} (version {version}), mode {mode}, level {level}\n")?;
-        writeln!(f, "Copies of the game played this level for {ticks} ticks with the same random actions, and were")?;
+        let ticks = counted(u64::from(*ticks), "tick");
+        writeln!(f, "Copies of the game played this level for {ticks} with the same random actions, and were")?;
         writeln!(f, "compared after each tick. When an episode ended, the same level began again.")?;
         for report in &self.comparisons {
             writeln!(f, "  {:<26}{}", report.comparison.describe(), outcome(report))?;
@@ -33,14 +35,12 @@ impl Display for DoctorReport {
             writeln!(f, "Speed: {speed:.0} ticks per second of one arena in one World")?;
         }
         let end = match self.findings.len() {
-            0 => format!("No findings: the same actions played the same game for {ticks} ticks."),
-            1 => "1 finding.".to_owned(),
-            count => format!("{count} findings."),
+            0 => format!("No findings: the same actions played the same game for {ticks}."),
+            count => format!("{}.", counted(count as u64, "finding")),
         };
         let notes = match self.notes.len() {
             0 => String::new(),
-            1 => " 1 note.".to_owned(),
-            count => format!(" {count} notes."),
+            count => format!(" {}.", counted(count as u64, "note")),
         };
         write!(f, "{end}{notes}")
     }
@@ -76,7 +76,8 @@ impl DoctorReport {
             let (longer, level, seed) = (ticks.saturating_mul(10), level.wrapping_add(1), seed.wrapping_add(1));
             writeln!(
                 f,
-                "  \"yes\" means that no difference was found in {ticks} ticks of this one level, not that there"
+                "  \"yes\" means that no difference was found in {} of this one level, not that there",
+                counted(u64::from(*ticks), "tick")
             )?;
             writeln!(
                 f,
@@ -101,7 +102,7 @@ impl DoctorReport {
             match report.effect.as_ref().filter(|effect| *effect != difference) {
                 Some(effect) => writeln!(f, "     agents notice it at tick {}: {}", effect.tick, in_one_line(effect))?,
                 None if report.effect.is_none() => {
-                    writeln!(f, "     agents have noticed nothing of it in {} ticks", report.ticks)?;
+                    writeln!(f, "     agents have noticed nothing of it in {}", ticks(report))?;
                 }
                 None => {}
             }
@@ -117,21 +118,28 @@ impl DoctorReport {
     }
 }
 
+fn ticks(report: &ComparisonReport) -> String {
+    counted(u64::from(report.ticks), "tick")
+}
+
 fn outcome(report: &ComparisonReport) -> String {
     let unmatched = match report.unmatched {
         0 => String::new(),
-        count => format!(" ({count} entities could not be matched, and were left out)"),
+        count => {
+            let were = if count == 1 { "was" } else { "were" };
+            format!(" ({} could not be matched, and {were} left out)", counted(count as u64, "entity"))
+        }
     };
     match (&report.skipped, report.difference(), &report.fault) {
         (Some(why), ..) => format!("not compared: {why}"),
         (_, Some(_), _) if report.is_note() => {
-            format!("no difference that agents notice in {} ticks{unmatched}; see the notes", report.ticks)
+            format!("no difference that agents notice in {}{unmatched}; see the notes", ticks(report))
         }
         (_, Some(difference), _) => format!("DIFFERS at tick {}{unmatched}", difference.tick),
         (_, _, Some(_)) => format!("ended by a fault at tick {}", report.ticks),
         _ => {
-            let episodes = if report.episodes == 1 { "episode" } else { "episodes" };
-            format!("no difference in {} ticks, {} {episodes}{unmatched}", report.ticks, report.episodes)
+            let episodes = counted(u64::from(report.episodes), "episode");
+            format!("no difference in {}, {episodes}{unmatched}", ticks(report))
         }
     }
 }
@@ -165,10 +173,11 @@ const LISTED: usize = 8;
 impl Display for ObservationReport {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { values, ticks, constant, .. } = self;
+        let (all, in_ticks) = (counted(*values as u64, "value"), counted(u64::from(*ticks), "tick"));
         match constant.len() {
-            _ if *ticks == 0 => writeln!(f, "Observation: {values} values, none of which was seen")?,
-            0 => writeln!(f, "Observation: {values} values, all of which changed in {ticks} ticks")?,
-            count => writeln!(f, "Observation: {values} values, {count} of which never changed in {ticks} ticks")?,
+            _ if *ticks == 0 => writeln!(f, "Observation: {all}, none of which was seen")?,
+            0 => writeln!(f, "Observation: {all}, all of which changed in {in_ticks}")?,
+            count => writeln!(f, "Observation: {all}, {count} of which never changed in {in_ticks}")?,
         }
         if let Some(NonFiniteValue { tick, name, value }) = &self.not_finite {
             writeln!(f, "  {:<26}{value} at tick {tick}: not a number that a policy can read", quoted(name))?;
@@ -183,10 +192,14 @@ impl Display for ObservationReport {
 
 impl Display for TypesReport {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        writeln!(f, "State: {} types of components and resources were compared field by field", self.compared.len())?;
+        let (compared, were) = (self.compared.len() as u64, if self.compared.len() == 1 { "was" } else { "were" });
+        let compared = counted(compared, "type");
+        writeln!(f, "State: {compared} of components and resources {were} compared field by field")?;
         let hidden = self.not_reflected.len() + self.unnamed;
         if hidden > 0 {
-            writeln!(f, "  {hidden} types of the game were not, since they are not reflected:")?;
+            let types = counted(hidden as u64, "type");
+            let (were, they_are) = if hidden == 1 { ("was", "it is") } else { ("were", "they are") };
+            writeln!(f, "  {types} of the game {were} not, since {they_are} not reflected:")?;
             write_list(f, "    ", self.not_reflected.iter().map(|path| quoted(path)))?;
             if self.unnamed > 0 {
                 writeln!(f, "    {} whose names are known only to a Bevy with its feature `debug`", self.unnamed)?;

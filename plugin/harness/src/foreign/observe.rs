@@ -21,6 +21,7 @@ use bevy_playbot::{
     systems::{ObserveSchedule, PlaybotSystems},
     vision::VisionSystems,
 };
+use playbot_report::counted;
 
 /// Adds the system that reads the observation.
 pub(super) fn add_observation(app: &mut App) {
@@ -51,8 +52,9 @@ fn observe_for(world: &mut World, agent: Entity) {
         }
         let system = foreign.game.description.sensor_name();
         Err(format!(
-            "`.observe` names {expected} values, but its system `{system}` returned {} in this tick: it must return every \
-             value in each tick",
+            "`.observe` names {}, but its system `{system}` returned {} in this tick: it must return every value in each \
+             tick",
+            counted(expected as u64, "value"),
             values.len()
         ))
     });

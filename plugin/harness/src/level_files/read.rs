@@ -12,7 +12,7 @@ use std::{
     io,
     io::Read,
     path::Path,
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, LazyLock, Mutex, PoisonError},
 };
 use thiserror::Error;
 
@@ -91,9 +91,12 @@ fn understand_all(files: &[(String, Vec<u8>)], parse: Parse) -> Result<Vec<Drawn
     }
 }
 
-/// Reads the level in a file.
+/// Reads the level in a file, or from standard input.
 pub(super) fn read_one(path: &str, parse: Parse) -> Result<DrawnLevel, LevelFileError> {
-    understand(path, &read_file(path)?, parse)
+    let path = Path::new(path);
+    let name = shown_path(path);
+    let bytes = read_input(path, MOST_BYTES).map_err(|error| named(&name, error))?;
+    understand(&name, &bytes, parse)
 }
 
 fn understand(path: &str, bytes: &[u8], parse: Parse) -> Result<DrawnLevel, LevelFileError> {
@@ -158,14 +161,43 @@ impl From<TextFileError> for io::Error {
     }
 }
 
-/// Returns the text of a regular file of at most `most` bytes. Neither waits nor takes more memory, whatever the path
-/// is.
+/// Returns the text of a regular file of at most `most` bytes, or that of standard input for the path `-`. Takes no more
+/// memory, whatever the path is, and waits for nothing but standard input.
 ///
 /// # Errors
 ///
 /// [`TextFileError`].
 pub fn read_text_file(path: &Path, most: u64) -> Result<String, TextFileError> {
-    decode(&read_bytes(path, most)?)
+    decode(&read_input(path, most)?)
+}
+
+/// The path of standard input. `./-` is a file of that name.
+const STANDARD_INPUT: &str = "-";
+
+/// Standard input up to the size of the largest file. It comes once, and an experiment is read again for its errors.
+static PIPED: LazyLock<Result<Vec<u8>, (io::ErrorKind, String)>> = LazyLock::new(|| {
+    let mut read = Vec::new();
+    match io::stdin().take(MOST_BYTES + 1).read_to_end(&mut read) {
+        Ok(_) => Ok(read),
+        Err(error) => Err((error.kind(), error.to_string())),
+    }
+});
+
+/// Returns a path for messages: the words `standard input` for `-`.
+pub fn shown_path(path: &Path) -> String {
+    if path == Path::new(STANDARD_INPUT) { "standard input".to_owned() } else { path.display().to_string() }
+}
+
+/// Returns the bytes of a regular file or of standard input, of at most `most` bytes.
+fn read_input(path: &Path, most: u64) -> Result<Vec<u8>, TextFileError> {
+    if path != Path::new(STANDARD_INPUT) {
+        return read_bytes(path, most);
+    }
+    let read = PIPED.as_ref().map_err(|(kind, why)| io::Error::new(*kind, why.clone()))?;
+    match read.len() as u64 {
+        bytes if bytes > most => Err(TextFileError::TooLarge { bytes, most }),
+        _ => Ok(read.clone()),
+    }
 }
 
 /// Returns the bytes of a regular file of at most `most` bytes.

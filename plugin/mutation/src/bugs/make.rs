@@ -21,6 +21,7 @@ use playbot_learner::{
     Streams,
     rng::{ChaCha8Rng, below, shuffle},
 };
+use playbot_report::counted;
 use playbot_test::findings::{Replayed, course_of, keeps_course};
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -116,7 +117,10 @@ impl MissingMutants {
     /// Returns a message that says how many are missing, and why.
     pub fn describe(&self) -> String {
         let Self { game, class, planted, wanted, without_effect } = self;
-        let start = format!("{game}: only {planted} of {wanted} mutants with the defect {class} were made");
+        let start = format!(
+            "{game}: only {planted} of {} with the defect {class} were made",
+            counted(u64::from(*wanted), "mutant")
+        );
         if without_effect.is_empty() {
             return format!("{start}: no other level has a place for it");
         }

@@ -544,7 +544,7 @@ impl ScoreTable {
             format!(
                 "A sound level has no planted defect. Each tester has the same budget on each mutant and sound level. \
                  Testers that play have {}, and explorers {steps} steps and {routes} replayed paths. Seed: {seed}.",
-                if episodes == 1 { "1 episode".to_owned() } else { format!("{episodes} episodes") }
+                counted(u64::from(episodes), "episode")
             ),
             "A mutant is found if a detector reports something, the game breaks, or the level is proved to be \
              unsolvable. The failure of a tester counts if it solves at least 99 % of the sound levels of the game. A tester \

@@ -9,6 +9,7 @@ use crate::{
 };
 use bevy_playbot::{demo::file::DemoFault, engine::find_demos};
 use playbot_harness::{brief::shell_word, demo::verify_file, games::Games};
+use playbot_report::counted;
 use std::path::{Path, PathBuf};
 
 /// Most episodes of a recording that a failure lists.
@@ -41,7 +42,8 @@ impl LevelTest<'_> {
             return Ok(());
         }
         let (wrong, all) = (report.divergences.len(), report.episodes);
-        let mut lines = vec![format!("{}: {wrong} of {all} episodes do not play the same game again:", path.display())];
+        let play = if wrong == 1 { "does not play" } else { "do not play" };
+        let mut lines = vec![format!("{}: {wrong} of {all} episodes {play} the same game again:", path.display())];
         let reported = report.divergences.iter().take(MOST_EPISODES);
         lines.extend(reported.map(|(episode, what)| format!("  episode {episode}: {what}")));
         let more = wrong.saturating_sub(MOST_EPISODES);
@@ -71,7 +73,9 @@ impl LevelTest<'_> {
         if wrong.is_empty() {
             return Ok(());
         }
-        let headline = format!("{}: {} of {} findings are not gone:", folder.display(), wrong.len(), rows.len());
+        let all = counted(rows.len() as u64, "finding");
+        let are = if wrong.len() == 1 { "is" } else { "are" };
+        let headline = format!("{}: {} of {all} {are} not gone:", folder.display(), wrong.len());
         let lines = wrong.into_iter().flat_map(|row| {
             let what = [row.level.as_deref(), row.detector.as_deref(), Some(row.message.as_str())];
             let what: Vec<&str> = what.into_iter().flatten().collect();

@@ -9,6 +9,7 @@ use bevy::math::Vec2;
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
 use playbot_harness::detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead};
 use playbot_learner::{disk, disk::DiskFile};
+use playbot_report::counted;
 use serde::Serialize;
 use std::{
     io,
@@ -87,8 +88,9 @@ impl LevelDetector for ClockEnd {
             tick: longest.checked_sub(1),
             settings: Vec::new(),
             message: format!(
-                "{} episodes are lost after {longest} ticks at different positions, and none lasts longer",
-                positions.len()
+                "{} episodes are lost after {} at different positions, and none lasts longer",
+                positions.len(),
+                counted(u64::from(longest), "tick")
             ),
         });
         defect.into_iter().collect()
@@ -248,7 +250,10 @@ impl LevelDetector for TooLong {
             episode: Some(episode),
             tick: result.ticks.checked_sub(1),
             settings: Vec::new(),
-            message: format!("solved in {} ticks at best, where {most} should be enough", result.ticks),
+            message: format!(
+                "solved in {} at best, where {most} should be enough",
+                counted(u64::from(result.ticks), "tick")
+            ),
         });
         defect.into_iter().collect()
     }

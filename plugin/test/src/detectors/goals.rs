@@ -13,6 +13,7 @@ use playbot_harness::{
     game::Game,
     split::LevelSplit,
 };
+use playbot_report::counted;
 use std::ops::ControlFlow;
 
 /// A finding for agents that succeed far from the goal of their level's plan.
@@ -276,7 +277,7 @@ impl LevelDetector for Shortcut {
         if !is_too_fast(fastest, par, self.factor) {
             return Vec::new();
         }
-        let message = format!("solved in {} ticks, where {par} are expected", fastest.ticks);
+        let message = format!("solved in {}, where {par} are expected", counted(u64::from(fastest.ticks), "tick"));
         let (tester, episode, tick) = (Some(tester.to_owned()), Some(episode), fastest.ticks.checked_sub(1));
         let settings = vec![format!("shortcut.par={par}")];
         vec![LevelDefect { tester, episode, tick, message, settings }]

@@ -19,6 +19,7 @@ use playbot_harness::{
     detector::{Detector, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher},
     game::Game,
 };
+use playbot_report::counted;
 use std::{cell::RefCell, rc::Rc, sync::Arc};
 
 /// The check that reproduces a detector's findings.
@@ -130,13 +131,11 @@ pub(super) fn failure_of(end: &EpisodeResult) -> Option<(&'static str, String)> 
     if end.success {
         return None;
     }
-    let ticks = end.ticks;
+    let ticks = counted(u64::from(end.ticks), "tick");
     match end.end {
         EpisodeEnd::Terminated { success: true } => None,
-        EpisodeEnd::Terminated { success: false } => {
-            Some((LOST, format!("the game ended the episode after {ticks} ticks")))
-        }
-        EpisodeEnd::Truncated => Some((NOT_SOLVED, format!("time was up after {ticks} ticks"))),
+        EpisodeEnd::Terminated { success: false } => Some((LOST, format!("the game ended the episode after {ticks}"))),
+        EpisodeEnd::Truncated => Some((NOT_SOLVED, format!("time was up after {ticks}"))),
     }
 }
 

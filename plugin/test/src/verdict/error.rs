@@ -3,6 +3,7 @@
 use crate::{findings::FindingError, verdict::shard::Shard};
 use playbot_harness::eval::EvalError;
 use playbot_learner::HasExitCode;
+use playbot_report::counted;
 use std::{
     io,
     path::{Path, PathBuf},
@@ -185,7 +186,7 @@ fn next_step(source: &io::Error) -> &'static str {
 }
 
 fn shards_of(levels: u64) -> String {
-    if levels == 1 { "1 shard".to_owned() } else { format!("{levels} shards") }
+    counted(levels, "shard")
 }
 
 fn no_results(folder: &Path) -> &'static str {

@@ -151,7 +151,7 @@ pub(super) fn interval(of: Trials) -> String {
 fn compared(comparison: &Comparison) -> Vec<String> {
     let mut lines = vec![String::new(), "## Since the earlier results".to_owned(), String::new()];
     let Comparison { levels, only_now, only_before, .. } = comparison;
-    lines.push(format!("{levels} levels in both, {only_now} only now, {only_before} only before."));
+    lines.push(format!("{} in both, {only_now} only now, {only_before} only before.", counted(*levels, "level")));
     lines.extend(comparison.left_out.iter().map(|why| format!("Left out: {}.", markdown_cell(why))));
     let mut list = |title: &str, changes: Vec<String>| {
         if changes.is_empty() {
@@ -186,7 +186,7 @@ const MOST_CAUSES: usize = 3;
 
 /// Describes the failure of a level in one line.
 pub(super) fn message(level: &LevelVerdict) -> String {
-    let solved = format!("solved {} of {} episodes", level.score.solved, level.score.episodes);
+    let solved = format!("solved {} of {}", level.score.solved, counted(level.score.episodes, "episode"));
     let finding = level.findings.first().map(|finding| format!("; {}: {}", finding.detector, finding.message));
     let more = level.findings.len().saturating_sub(1);
     let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };

@@ -1,7 +1,7 @@
 //! Errors of experiment files and of `--set`, with their positions.
 
 use crate::experiment::checks::ExperimentError;
-use playbot_harness::brief::brief;
+use playbot_harness::{brief::brief, level_files::read::shown_path};
 use playbot_learner::HasExitCode;
 use std::{
     io,
@@ -13,7 +13,7 @@ use thiserror::Error;
 #[derive(Debug, Error)]
 pub enum ConfigError {
     /// The file cannot be read.
-    #[error("cannot read {}: {source}{}", path.display(), way_out(path, source))]
+    #[error("cannot read {}: {source}{}", shown_path(path), way_out(path, source))]
     Read {
         /// The file.
         path: PathBuf,
@@ -21,7 +21,7 @@ pub enum ConfigError {
         source: io::Error,
     },
     /// The text is not an experiment.
-    #[error("{}:{line}:{column}: {}", path.display(), brief(message))]
+    #[error("{}:{line}:{column}: {}", shown_path(path), brief(message))]
     Syntax {
         /// The file.
         path: PathBuf,
@@ -49,7 +49,7 @@ pub enum ConfigError {
         source: Box<ExperimentError>,
     },
     /// The values contradict one another.
-    #[error("{}:{}:{}: {}", path.display(), at.0, at.1, brief(&source.to_string()))]
+    #[error("{}:{}:{}: {}", shown_path(path), at.0, at.1, brief(&source.to_string()))]
     Values {
         /// The file.
         path: PathBuf,

@@ -7,6 +7,9 @@
 //! the file's own folder. Each overrides the ones before it, and the file's own keys override all of them, key by key;
 //! a list is one value. A base may have a base of its own. The number of bases and the length of a file are limited,
 //! which keeps hostile files from taking forever.
+//!
+//! Other relative paths in a file, those of recordings and of level files, start in the file's own folder too if
+//! something is there, and else in the current folder.
 
 #[cfg(test)]
 mod limits_tests;
@@ -14,12 +17,15 @@ mod limits_tests;
 mod tests;
 
 use crate::experiment::{
-    Experiment, ExperimentError,
+    Experiment, ExperimentError, Variant,
     error::Origin,
     find_preset,
     keys::{all, find, is_section, missing_key, no_value, renamed, syntax_message, type_message, unknown_key},
 };
-use playbot_harness::level_files::read::read_text_file;
+use playbot_harness::{
+    level_files::{LevelFileError, find_level_files, level_file_pattern, level_files_mode, read::read_text_file},
+    split::{LevelSplit, SplitError},
+};
 use playbot_learner::settings::Reader;
 use ron::{Options, error::SpannedError, extensions::Extensions, value::RawValue};
 use serde::{
@@ -50,7 +56,7 @@ const MAX_BYTES: u64 = 1 << 20;
 ///
 /// [`ConfigError`] with file, line and column.
 pub fn read_experiment(path: &Path) -> Result<Experiment, ConfigError> {
-    parse_experiment_with::<&str>(&read_experiment_text(path)?, path, &[])
+    read_experiment_with::<&str>(path, &[])
 }
 
 /// Reads an experiment, puts each `key=value` into it (see [`Experiment::with_set`]) and checks the result.
@@ -59,7 +65,7 @@ pub fn read_experiment(path: &Path) -> Result<Experiment, ConfigError> {
 ///
 /// [`ConfigError`] with file, line and column, or with the `key=value` that does not fit.
 pub fn read_experiment_with<S: AsRef<str>>(path: &Path, sets: &[S]) -> Result<Experiment, ConfigError> {
-    parse_experiment_with(&read_experiment_text(path)?, path, sets)
+    checked(&read_experiment_text(path)?, path, path.parent(), sets)
 }
 
 /// Reads an experiment as [`read_experiment_with`] does, from a text; `path` as for [`parse_experiment`].
@@ -68,7 +74,17 @@ pub fn read_experiment_with<S: AsRef<str>>(path: &Path, sets: &[S]) -> Result<Ex
 ///
 /// [`ConfigError`].
 pub fn parse_experiment_with<S: AsRef<str>>(text: &str, path: &Path, sets: &[S]) -> Result<Experiment, ConfigError> {
-    let keys = gather(text, path, &mut Reading::default())?;
+    checked(text, path, None, sets)
+}
+
+/// Reads and checks an experiment; `folder` as for [`gather`].
+fn checked<S: AsRef<str>>(
+    text: &str,
+    path: &Path,
+    folder: Option<&Path>,
+    sets: &[S],
+) -> Result<Experiment, ConfigError> {
+    let keys = gather(text, path, folder, &mut Reading::default())?;
     let own = keys.parse(&Origin::start_of(path))?;
     let experiment = own.with_set(sets)?;
     match experiment.check() {
@@ -93,7 +109,8 @@ pub fn locate<S: AsRef<str>>(text: &str, path: &Path, sets: &[S], source: Experi
         keys.iter().any(|key| name == *key || is_within(key, name) || is_within(name, key))
     };
     let sets = sets.iter().map(AsRef::as_ref).filter(sets_it).map(str::to_owned).collect();
-    placed(&gather(text, path, &mut Reading::default()).unwrap_or_default(), sets, source, path)
+    let keys = gather(text, path, path.parent(), &mut Reading::default()).unwrap_or_default();
+    placed(&keys, sets, source, path)
 }
 
 /// Returns an error of these sets, or of the position in a file if there are none.
@@ -115,13 +132,14 @@ fn blame<S: AsRef<str>>(sets: &[S], fails: impl Fn(&[&str]) -> bool) -> Vec<Stri
     if guilty.is_empty() { all.into_iter().map(str::to_owned).collect() } else { guilty }
 }
 
-/// Parses the text of an experiment. Messages name `path`, and paths of bases start in its folder.
+/// Parses the text of an experiment. Messages name `path`, and paths of bases start in its folder. Other relative paths
+/// in the text start in the current folder.
 ///
 /// # Errors
 ///
 /// [`ConfigError::Syntax`], also for its bases; [`ConfigError::Read`] if one of them cannot be read.
 pub fn parse_experiment(text: &str, path: &Path) -> Result<Experiment, ConfigError> {
-    gather(text, path, &mut Reading::default())?.parse(&Origin::start_of(path))
+    gather(text, path, None, &mut Reading::default())?.parse(&Origin::start_of(path))
 }
 
 /// Reads the text of an experiment file, of at most 1 MiB.
@@ -143,12 +161,15 @@ struct Reading {
 }
 
 /// Collects the keys of a file over those of its bases. Each file is checked alone: a wrong value is reported even if a
-/// later one overrides it.
-fn gather(text: &str, path: &Path, reading: &mut Reading) -> Result<Keys, ConfigError> {
+/// later one overrides it. Relative paths start in `folder` if something is there.
+fn gather(text: &str, path: &Path, folder: Option<&Path>, reading: &mut Reading) -> Result<Keys, ConfigError> {
     let start = Origin::start_of(path);
     let mut own = Keys::of_text(text, path)?;
     let base = own.take("base");
     own.check_names()?;
+    if let Some(folder) = folder.filter(|folder| !is_current(folder)) {
+        own.start_in(folder)?;
+    }
     Keys::all().clone().overlaid(&own).parse(&start)?;
     let mut keys = Keys::default();
     if let Some(base) = base {
@@ -194,11 +215,96 @@ fn gather_base(name: &str, reading: &mut Reading, origin: &Origin) -> Result<Key
         let text = read_text_file(&path, MAX_BYTES).map_err(|error| {
             origin.error((1, 1), format!("`base` names {}, which cannot be read: {error}", path.display()))
         })?;
-        return gather(&text, &path, reading);
+        return gather(&text, &path, path.parent(), reading);
     }
     let preset = find_preset(name)
         .map_err(|error| origin.error((1, 1), format!("{error}; or a file, by its path ending in .ron")))?;
-    gather(preset.text, &path, reading)
+    gather(preset.text, &path, None, reading)
+}
+
+// Paths in a file.
+
+/// Keys with paths: recordings, and levels that may be files.
+const PATHS: [&str; 3] = ["demos", "train", "test"];
+
+/// Returns true if a folder is the current one.
+fn is_current(folder: &Path) -> bool {
+    folder.as_os_str().is_empty()
+        || folder.canonicalize().is_ok_and(|folder| Path::new(".").canonicalize().is_ok_and(|here| here == folder))
+}
+
+/// Returns the value of a key with its path behind `folder`, if something is there.
+///
+/// # Errors
+///
+/// Level files that are neither there nor in the current folder.
+fn beside(folder: &Path, key: &str, value: &str) -> Result<Option<String>, String> {
+    if key == "demos" {
+        let path = folder.join(value);
+        let is_there = Path::new(value).is_relative() && !["", "None"].contains(&value) && path.exists();
+        return Ok(path.to_str().filter(|_| is_there).map(str::to_owned));
+    }
+    let Some(pattern) = level_file_pattern(value).filter(|pattern| Path::new(pattern).is_relative()) else {
+        return Ok(None);
+    };
+    let there = folder.to_str().map(|folder| format!("{}/{pattern}", level_files_mode(folder)));
+    if let Some(there) = there.filter(|there| find_levels(there).is_ok()) {
+        return Ok(Some(there));
+    }
+    match find_levels(value) {
+        Err(SplitError::Files(LevelFileError::NoFiles { pattern, folder: here })) => Err(format!(
+            "files:{pattern} matches no file, neither seen from {}, the folder of this file, nor from {here}: name level \
+             files, as in files:levels/**/*.json",
+            folder.display()
+        )),
+        // Other mistakes are reported when the value is parsed.
+        _ => Ok(None),
+    }
+}
+
+/// Finds the files of `files:PATTERN`, with or without a range.
+fn find_levels(levels: &str) -> Result<(), SplitError> {
+    let split: LevelSplit = levels.parse()?;
+    find_level_files(level_file_pattern(&split.mode).unwrap_or_default())?;
+    Ok(())
+}
+
+impl Keys {
+    /// Puts `folder` in front of the paths of recordings and level files that lie there.
+    ///
+    /// # Errors
+    ///
+    /// Level files that are neither there nor in the current folder.
+    fn start_in(&mut self, folder: &Path) -> Result<(), ConfigError> {
+        for key in PATHS {
+            // Values of other types are refused when they are parsed.
+            let Some(value) = self.0.get_mut(key) else { continue };
+            let Ok(Some(path)) = reader().from_str::<Option<String>>(&value.text) else { continue };
+            let refuse = |message: String| value.origin.error((1, 1), message);
+            if let Some(found) = beside(folder, key, &path).map_err(refuse)? {
+                value.text = ron::to_string(&found).map_err(|error| refuse(error.to_string()))?;
+            }
+        }
+        let Some(value) = self.0.get_mut("variants") else { return Ok(()) };
+        let Ok(mut variants) = reader().from_str::<Vec<Variant>>(&value.text) else { return Ok(()) };
+        let refuse = |message: String| value.origin.error((1, 1), message);
+        let mut is_changed = false;
+        for set in variants.iter_mut().flat_map(|variant| &mut variant.set) {
+            let Some((key, text)) = set.split_once('=').map(|(key, text)| (key.trim(), text.trim())) else { continue };
+            if !PATHS.contains(&key) {
+                continue;
+            }
+            let path = ron::from_str::<String>(text).unwrap_or_else(|_| text.to_owned());
+            if let Some(found) = beside(folder, key, &path).map_err(refuse)? {
+                *set = format!("{key}={found}");
+                is_changed = true;
+            }
+        }
+        if is_changed {
+            value.text = ron::to_string(&variants).map_err(|error| refuse(error.to_string()))?;
+        }
+        Ok(())
+    }
 }
 
 impl Experiment {

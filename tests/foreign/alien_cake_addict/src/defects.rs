@@ -72,9 +72,7 @@ fn add<M>(app: &mut App, system: impl IntoScheduleConfigs<bevy::ecs::system::Sch
 mod tests {
     use std::sync::Arc;
 
-    use playbot::harness::{foreign::Restart, game::Game as PlayedGame, worlds::build_world};
-    use playbot::mutation::bugs::Mutant;
-    use playbot::prelude::{Control, LevelQueue, PlaybotAppExt, Reward, StateHash};
+    use playbot::harness::foreign::Restart;
 
     use super::*;
     use crate::{game, refresh};
@@ -95,30 +93,5 @@ mod tests {
         Arc::new(played)
     }
 
-    /// Returns the values that a replay compares, and the rewards, after each tick of the bot.
-    fn trace(played: &dyn PlayedGame, level: u64) -> Vec<(u64, f32)> {
-        let (mut world, agents) = build_world(played, "default", 0, 0, 1);
-        world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::list([level])));
-        played.tools().bots.attach_demonstrator(&mut world, agents[0], 0.0);
-        let mut ticks = Vec::new();
-        for _ in 0..600 {
-            world.tick().expect("sound");
-            let hash = world.get::<StateHash>(agents[0]).expect("an agent").0;
-            ticks.push((hash, world.get::<Reward>(agents[0]).expect("an agent").get()));
-        }
-        ticks
-    }
-
-    #[test]
-    fn every_defect_changes_some_game_and_without_one_nothing_changes() {
-        let sound: Vec<_> = (0..6).map(|level| trace(&*played(), level)).collect();
-        assert_eq!(trace(&Mutant::sound(played()), 0), sound[0]);
-        for kind in kinds() {
-            for variant in 0..3 {
-                let mutant = Mutant::new(played(), &kind, variant);
-                let differs = |level: usize| trace(&mutant, level as u64) != sound[level];
-                assert!((0..sound.len()).any(differs), "{} {variant}", kind.class);
-            }
-        }
-    }
+    playbot_shell::planted_defects!(game: played(), kinds: kinds(), levels: 6, ticks: 600);
 }

@@ -70,11 +70,7 @@ fn kinds() -> [DefectKind; 4] {
 mod tests {
     use std::sync::Arc;
 
-    use playbot::harness::{
-        foreign::{LevelSeed, Restart},
-        worlds::build_world,
-    };
-    use playbot::mutation::bugs::Mutant;
+    use playbot::harness::foreign::{LevelSeed, Restart};
     use playbot::prelude::*;
 
     use super::*;
@@ -101,29 +97,5 @@ mod tests {
         Arc::new(game)
     }
 
-    /// Returns the values that a replay compares, after each tick of the bot.
-    fn trace(game: &dyn Game, level: u64) -> Vec<u64> {
-        let (mut world, agents) = build_world(game, "default", 0, 0, 1);
-        world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::list([level])));
-        game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.0);
-        let mut hashes = Vec::new();
-        for _ in 0..900 {
-            world.tick().expect("sound");
-            hashes.push(world.get::<StateHash>(agents[0]).expect("an agent").0);
-        }
-        hashes
-    }
-
-    #[test]
-    fn every_defect_changes_some_run_and_without_one_nothing_changes() {
-        let sound: Vec<_> = (0..4).map(|level| trace(&*game(), level)).collect();
-        assert_eq!(trace(&Mutant::sound(game()), 0), sound[0]);
-        for kind in kinds() {
-            for variant in 0..3 {
-                let mutant = Mutant::new(game(), &kind, variant);
-                let differs = |level: usize| trace(&mutant, level as u64) != sound[level];
-                assert!((0..sound.len()).any(differs), "{} {variant}", kind.class);
-            }
-        }
-    }
+    playbot_shell::planted_defects!(game: game(), kinds: kinds(), levels: 4, ticks: 900);
 }

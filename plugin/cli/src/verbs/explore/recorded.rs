@@ -7,6 +7,7 @@ use crate::{
 use bevy_playbot::demo::file::DemoWriter;
 use playbot_harness::{demo::verify_file, floor_plan::FloorPlan, game::Game, trails::cells::CellChart};
 use playbot_learner::disk;
+use playbot_report::counted;
 use playbot_test::explore::{Exploration, ExploredCell, Route, follow_route, record_route};
 use std::path::{Path, PathBuf};
 
@@ -59,8 +60,8 @@ impl RecordingFile {
         let report = verify_file(game, fresh, |_| {})?;
         if report.episodes != 1 || report.ticks != route.len() as u64 {
             return Err(CliError::Io(format!(
-                "{path}: the path that was found has {} ticks, and only {} of them could be played again",
-                route.len(),
+                "{path}: the path that was found has {}, and only {} of them could be played again",
+                counted(route.len() as u64, "tick"),
                 report.ticks
             )));
         }

@@ -8,7 +8,7 @@ use crate::{
     verbs::runs::{UNKNOWN, age_s, duration, to_json, write_plot},
 };
 use playbot_harness::games::Games;
-use playbot_report::{Chart, Curve, PlainTable, readable, sparkline, to_svg, whole};
+use playbot_report::{Chart, Curve, PlainTable, counted, readable, sparkline, to_svg, whole};
 use playbot_train::{
     Experiment,
     checkpoint::{Checkpoint, CheckpointSummary},
@@ -108,8 +108,11 @@ fn print_head(run: &RunRecord, games: &Games) -> Result<(), CliError> {
     };
     print_line(format!("{done} of {planned} steps{logged}, {state}{speed}{age}"))?;
     print_line(format!(
-        "trained on {}, held out {}, {} arenas in {} Worlds",
-        experiment.train, experiment.test, experiment.arenas, experiment.worlds
+        "trained on {}, held out {}, {} in {}",
+        experiment.train,
+        experiment.test,
+        counted(u64::from(experiment.arenas), "arena"),
+        counted(u64::from(experiment.worlds), "World")
     ))?;
     print_line(describe_settings(experiment, games))?;
     for Checkpoint { path, summary } in &run.checkpoints {

@@ -1,6 +1,6 @@
 //! Tests of levels, as a game's own tests write them, and of what physics keeps from one episode to the next.
 
-use bevy::prelude::*;
+use bevy::{log::LogPlugin, prelude::*};
 use foreign_orchard::{Body, FEET, Hero, Level, Map, Screen, game};
 use playbot::harness::{
     foreign::{ForeignGame, LevelSeed},
@@ -8,6 +8,7 @@ use playbot::harness::{
     worlds::build_world,
 };
 use playbot::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Returns the game with the picker, as in `src/main.rs`, and with smaller observations.
 fn orchard() -> ForeignGame {
@@ -62,6 +63,20 @@ fn an_episode_is_the_same_after_another_level_and_in_a_new_world() {
 }
 
 #[test]
+fn no_world_sets_up_a_log_that_is_there() {
+    static LOGS: AtomicU32 = AtomicU32::new(0);
+    let counted = ForeignGame::new("counted", 1, |app: &mut App| {
+        LOGS.fetch_add(u32::from(app.is_plugin_added::<LogPlugin>()), Ordering::Relaxed);
+        game(app);
+    });
+    let counted = counted.keys([vec![], vec![KeyCode::Space]]).observe(["x"], || [0.0]);
+    for _ in 0..3 {
+        drop(build_world(&counted, "default", 0, 0, 1));
+    }
+    assert!(LOGS.load(Ordering::Relaxed) <= 1, "a program has one log");
+}
+
+#[test]
 fn every_level_can_be_finished() {
-    assert_levels_solvable(&orchard(), "default:0..7");
+    playbot::test(&orchard()).levels("default:0..7").assert_levels_solvable();
 }
