@@ -168,6 +168,9 @@ mod tests {
         "Stamp",
         "TappedKeys",
         "Tick",
+        // Stand-ins for Bevy's own, which its plugins would insert.
+        "GlobalVolume",
+        "TonemappingLuts",
         // Carried over by the code that inserts them.
         "Renewal",
         "SharedBatch",

@@ -13,7 +13,7 @@
 //! - A World has one keyboard and one mouse: two agents that claim the same key or motion are a fault. Every agent has
 //!   a gamepad of its own.
 //! - The route is a setting: see [`InputRoute`].
-//! - In a window on a screen an agent's cursor is seen by the game only: the real pointer stays where the person has it.
+//! - In a window on a screen only the game sees an agent's cursor: the real pointer stays where the person has it.
 //! - With the features `leafwing-input-manager` and `bevy_enhanced_input`, actions of these input managers can also be
 //!   driven without any key. Keys drive them without these features.
 //!

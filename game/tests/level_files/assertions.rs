@@ -6,7 +6,6 @@ use std::{
     path::Path,
 };
 
-use playbot::prelude::*;
 use playbot_games::coinrun::CoinRun;
 use playbot_harness::level_files::level_files_mode;
 

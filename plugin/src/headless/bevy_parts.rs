@@ -150,7 +150,8 @@ mod core_pipeline {
         pub(crate) use super::super::Nothing as TonemappingPlugin;
         use bevy::prelude::*;
 
-        #[derive(Resource)]
+        #[derive(Resource, Reflect)]
+        #[reflect(Resource)]
         pub(crate) struct TonemappingLuts {
             pub(crate) blender_filmic: Handle<Image>,
             pub(crate) agx: Handle<Image>,
@@ -203,7 +204,8 @@ mod audio {
         fn build(&self, _: &mut App) {}
     }
 
-    #[derive(Resource, Default)]
+    #[derive(Resource, Default, Reflect)]
+    #[reflect(Resource)]
     pub(crate) struct GlobalVolume;
 
     #[derive(Asset, TypePath)]

@@ -202,8 +202,8 @@ impl InputMessages<'_, '_> {
 
 // The pointer of a window on a screen, which stays the person's.
 //
-// A game asks its window where the cursor is, and the event loop moves the real pointer to a position that was set there.
-// So the window has the agent's cursor while the game's systems run, and the person's when the event loop looks.
+// A game asks its window where the cursor is, and the event loop moves the real pointer to a position that was set
+// there. So the window has the agent's cursor while the game's systems run, and the person's when the event loop looks.
 
 /// After `First`: the window gets the agent's cursor.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -26,9 +26,9 @@ macro_rules! tests {
     };
 }
 
-/// Makes a test of the planted defects of a game, an `Arc` of it. Each kind changes the play of the game's demonstrator on
-/// one of the first levels, in each of the three variants. Without a defect nothing changes. Names of `playbot` are those
-/// of the crate that is tested.
+/// Makes a test of the planted defects of a game, an `Arc` of it. Each kind changes the play of the game's demonstrator
+/// on one of the first levels, in each of the three variants. Without a defect nothing changes. Names of `playbot` are
+/// those of the crate that is tested.
 #[macro_export]
 macro_rules! planted_defects {
     (game: $game:expr, kinds: $kinds:expr, levels: $levels:expr, ticks: $ticks:expr) => {

@@ -161,8 +161,8 @@ impl From<TextFileError> for io::Error {
     }
 }
 
-/// Returns the text of a regular file of at most `most` bytes, or that of standard input for the path `-`. Takes no more
-/// memory, whatever the path is, and waits for nothing but standard input.
+/// Returns the text of a regular file of at most `most` bytes, or that of standard input for the path `-`. Takes no
+/// more memory, whatever the path is, and waits for nothing but standard input.
 ///
 /// # Errors
 ///
