@@ -327,6 +327,11 @@ pub trait LevelTools: Send + Sync {
         None
     }
 
+    /// Returns the number of levels if higher numbers play the same levels again; `None` if that is not known.
+    fn level_count(&self) -> Option<u64> {
+        None
+    }
+
     /// Returns a hash of the layout of a level that the game draws itself: of all that play meets, without pictures and
     /// without random numbers that only break ties. Returns `None`, by default, if the game does not compare its levels,
     /// or if all levels of the mode have the same layout. [`LevelDesign::with_layout`] is the same for level files.

@@ -81,8 +81,9 @@ impl GameCopy {
     }
 
     /// Plays another episode first, with other actions, to its end or for at most `limit` ticks.
-    pub fn play_prelude(&mut self, limit: u32) {
+    pub fn play_prelude(&mut self, plan: &Plan, limit: u32) {
         self.in_prelude = true;
+        self.set_level(plan.before.unwrap_or(plan.level));
         for _ in 0..limit {
             self.tick();
             let ended = |agent: &Entity| self.world.get::<Episode>(*agent).is_some_and(|episode| !episode.is_running());
@@ -95,7 +96,15 @@ impl GameCopy {
                 episode.abandon();
             }
         }
+        self.set_level(plan.level);
         self.in_prelude = false;
+    }
+
+    /// Lets all further episodes be of this level.
+    fn set_level(&mut self, level: u64) {
+        for &agent in &self.agents {
+            self.world.entity_mut(agent).insert(LevelQueue::Always(level));
+        }
     }
 
     /// Saves the first agent's episode, plays on with other actions for at most `limit` ticks or to the end, and returns
@@ -152,6 +161,8 @@ impl GameCopy {
 pub(super) struct Plan<'a> {
     pub mode: &'a str,
     pub level: u64,
+    /// Another level, which a copy plays before this one.
+    pub before: Option<u64>,
     /// Random seed of the World and of the actions.
     pub seed: u64,
 }

@@ -582,6 +582,10 @@ impl ForeignGame {
 }
 
 impl LevelTools for ForeignGame {
+    fn level_count(&self) -> Option<u64> {
+        self.description.levels
+    }
+
     fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
         self.description.level_parts.parser.as_ref().map(|parser| match &parser.parse {
             ParseFile::Text(parse) => parse(text),
