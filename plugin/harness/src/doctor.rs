@@ -65,7 +65,7 @@ pub fn examine(
     let mut known_types = KnownTypes::new(&bare_world(), options.default_ignores);
     let mut comparisons: Vec<ComparisonReport> = Vec::new();
     let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
-    let (mut suspicions, mut unequal_steps) = (Vec::new(), None);
+    let (mut suspicions, mut unequal_steps, mut holds_keys) = (Vec::new(), None, false);
     for planned in options.planned() {
         if let Some(why) = reason_to_skip(planned.comparison, game, &comparisons) {
             comparisons.push(ComparisonReport { skipped: Some(why), ..planned });
@@ -85,6 +85,7 @@ pub fn examine(
             types = known_types.report(&trial.copies[0], &result.incomparable);
             suspicions = known_types.suspicions(&trial.copies[0]);
             unequal_steps = UnequalSteps::of(&trial.copies[0].world);
+            holds_keys = trial.copies[0].holds_keys();
         }
         comparisons.push(result.report);
     }
@@ -104,6 +105,7 @@ pub fn examine(
         observation,
         types,
         unequal_steps,
+        holds_keys,
         ticks_per_second: None,
     })
 }
@@ -194,6 +196,8 @@ pub struct DoctorReport {
     pub types: TypesReport,
     /// Lengths of frames and of fixed steps, if they differ and the game may notice it.
     pub unequal_steps: Option<UnequalSteps>,
+    /// True if actions hold keys or buttons. Reflection cannot show whether the game reads `pressed` or `just_pressed`.
+    pub holds_keys: bool,
     /// The uses that the game is safe for.
     pub safety: Safety,
     /// The findings, worst first.

@@ -11,7 +11,7 @@ use bevy::{
     time::{Real, TimeSystems},
 };
 use bevy_playbot::{
-    action::{Action, ActionSpace},
+    action::{Action, ActionSpace, ActionValue},
     agent::{Agent, Control},
     bot::uniform,
     engine::{Renewal, into_world, tick_world},
@@ -22,6 +22,7 @@ use bevy_playbot::{
     reward::Reward,
     state_hash::StateHash,
     streams::AgentStreams,
+    virtual_input::VirtualInput,
 };
 use serde::Serialize;
 use std::{
@@ -147,6 +148,14 @@ impl GameCopy {
     pub fn observed_names(&self) -> Vec<String> {
         let sensor = self.agents.first().and_then(|&agent| self.world.get::<VectorSensor>(agent));
         sensor.map(|sensor| sensor.space().names.clone()).unwrap_or_default()
+    }
+
+    /// Returns whether actions of the first agent hold keys or buttons.
+    pub fn holds_keys(&self) -> bool {
+        let input = self.agents.first().and_then(|&agent| self.world.get::<VirtualInput>(agent));
+        let (Some(input), ActionSpace::Discrete(actions)) = (input, &self.space) else { return false };
+        let mut held = (0..*actions as u32).map(|action| input.held(&ActionValue::Discrete(action)));
+        held.any(|held| !held.buttons.is_empty() && !held.clicks)
     }
 
     /// Returns the types of all components and resources in this World.

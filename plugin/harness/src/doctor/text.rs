@@ -28,6 +28,16 @@ impl Display for DoctorReport {
         if let Some(steps) = &self.unequal_steps {
             write!(f, "{steps}")?;
         }
+        if self.holds_keys {
+            writeln!(
+                f,
+                "Keys: an action that is chosen again holds its keys. `just_pressed` is true in its first tick only,"
+            )?;
+            writeln!(
+                f,
+                "  so a game that reads it acts once, however long `chaos` or `explore --sticky` repeat the action."
+            )?;
+        }
         if let Some(speed) = self.ticks_per_second {
             writeln!(f, "Speed: {speed:.0} ticks per second of one arena in one World")?;
         }
