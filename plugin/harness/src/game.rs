@@ -54,7 +54,7 @@ use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     bot::BlindBot,
     demo::file::DemoHeader,
-    engine::{demo_actions, has_no_actions},
+    engine::{GameCall, demo_actions, has_no_actions},
     headless::HeadlessPlugins,
     key_bindings::KeyBindings,
     observation::{Observation, ObservationSpace},
@@ -305,6 +305,12 @@ pub trait HostTools: Send + Sync {
     fn unplayable(&self) -> Option<String> {
         None
     }
+}
+
+/// Asks a game for [`LevelTools::prove`]. The call is noted, so that a proof that does not return is named with its level.
+pub fn prove_level(game: &dyn Game, mode: &str, level: u64) -> LevelProof {
+    let _call = GameCall::begin("proving", [level]);
+    game.tools().levels.prove(mode, level)
 }
 
 /// Levels without agents in them.
