@@ -34,6 +34,21 @@ fn the_report_is_one_line_of_json_for_programs() {
 }
 
 #[test]
+fn two_levels_are_examined_unless_levels_are_named() {
+    for (levels, first, further) in [
+        (&[][..], 0, &[1][..]),
+        (&["--level", "3"], 3, &[]),
+        (&["--level", "3", "--level", "9", "--level", "3", "--level", "4"], 3, &[9, 4]),
+    ] {
+        let (text, words) = doctor(&[&["coinrun", "--ticks", "2", "--json"], levels].concat(), 0);
+        let report: Value = serde_json::from_str(text.trim_end()).expect("one line of JSON");
+        assert_eq!((&report["level"], &report["further_levels"]), (&first.into(), &further.into()), "{text}");
+        let is_after = further.first().map(|level| format!("comparing: level {level} after level {first}\n"));
+        assert!(is_after.is_none_or(|line| words.contains(&line)), "{words}");
+    }
+}
+
+#[test]
 fn a_seed_alone_is_the_level_too_for_one_more_version() {
     let (text, warning) = doctor(&["coinrun", "--ticks", "2", "--seed", "7", "--json"], 0);
     let report: Value = serde_json::from_str(text.trim_end()).expect("one line of JSON");

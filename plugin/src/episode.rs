@@ -34,6 +34,7 @@
 
 use crate::{
     agent::{Agent, AgentOrder, Control},
+    calls::GameCall,
     carry_over::ReflectCarryComponent,
     fault::Faults,
     level::LevelQueue,
@@ -255,6 +256,7 @@ pub(crate) fn begin_episodes(
             ));
         }
         *episode = Episode { level, state: EpisodeState::Running, ..default() };
+        GameCall::add_level(level);
         commands.trigger(StartEpisode { entity, level });
     }
 }

@@ -37,7 +37,8 @@
 mod bevy_parts;
 
 use crate::{
-    agent::{Agent, Control},
+    agent::{Agent, AgentOrder, Control},
+    calls::GameCall,
     episode::{Episode, Tick},
     fault::{Fault, Faults},
     loading::{deliver_between_frames, wait_for_assets},
@@ -156,12 +157,24 @@ pub fn tick_world(world: &mut World) -> Result<(), Fault> {
     if let Some(mut faults) = world.get_resource_mut::<Faults>() {
         faults.set_caller(true);
     }
+    let call = GameCall::begin("playing", levels_in_play(world));
     let ticked = panics::guard(world, run_frames);
+    drop(call);
     // A World that has panicked may have lost the note.
     if let Some(mut faults) = world.get_resource_mut::<Faults>() {
         faults.set_caller(false);
     }
     ticked
+}
+
+/// Returns the levels of all running episodes.
+fn levels_in_play(world: &World) -> impl Iterator<Item = u64> {
+    let agents = world.get_resource::<AgentOrder>().map_or(&[][..], AgentOrder::entities);
+    agents.iter().filter_map(|&agent| {
+        let (control, episode) = (world.get::<Control>(agent)?, world.get::<Episode>(agent)?);
+        let is_played = control.is_active() && (episode.is_running() || episode.is_loading());
+        is_played.then_some(episode.level)
+    })
 }
 
 /// Frames of a level under construction that do not wait for the clock.
@@ -353,7 +366,7 @@ fn not_drawing(plugins: PluginGroupBuilder, shows_sub_app: bool) -> PluginGroupB
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::level::LevelQueue;
+    use crate::{calls::SlowCalls, level::LevelQueue};
     use playbot_learner::ActionSpace;
 
     /// Returns an app of fixed ticks, in which an agent plays level 7 and `system` runs in each of them.
@@ -371,6 +384,29 @@ mod tests {
         set_frame_rate(&mut app, 2.0);
         app.ticks(20).expect("there is no agent");
         assert_eq!(app.world().resource::<Time<Virtual>>().elapsed(), Duration::from_secs(10));
+    }
+
+    /// The calls that a system sees in its own tick.
+    #[derive(Resource, Default)]
+    struct Seen(Vec<String>);
+
+    #[test]
+    fn a_tick_is_a_call_for_the_levels_that_are_played_and_begin() {
+        let mut app = app_with(|mut seen: ResMut<Seen>| {
+            let mut slow = SlowCalls::default();
+            slow.look();
+            seen.0 = slow.look().iter().map(ToString::to_string).collect();
+        });
+        app.init_resource::<Seen>();
+        app.world_mut().spawn((Agent::new(1, ActionSpace::Discrete(2)), Control::Human, LevelQueue::Always(70_002)));
+        for _tick in 0..2 {
+            app.tick().expect("nothing is wrong");
+            let seen = &app.world().resource::<Seen>().0;
+            assert!(seen.iter().any(|call| call == "playing levels 7 and 70002"), "{seen:?}");
+        }
+        let mut slow = SlowCalls::default();
+        slow.look();
+        assert!(slow.look().iter().all(|call| !call.to_string().contains("70002")), "it has returned");
     }
 
     #[test]

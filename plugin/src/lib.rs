@@ -90,6 +90,7 @@
 pub mod action;
 pub mod agent;
 pub mod bot;
+mod calls;
 #[cfg(feature = "camera")]
 pub mod camera;
 mod carry_over;

@@ -28,6 +28,10 @@ pub enum Fault {
     SharedScore,
     /// The [`Soil`] dries from episode to episode.
     Survivor,
+    /// Level 0 floods the [`Soil`], and no other level dries it.
+    Flood,
+    /// The [`Wind`] comes from an unseeded generator in level 1.
+    Storm,
     /// The plants of an episode stay when it is over.
     LeftOvers,
     /// An unread [`Record`] lasts for ever.
@@ -142,11 +146,15 @@ fn start(
     mut gardeners: Query<(&mut Gardener, &mut Smells)>,
     plants: Query<(Entity, &Plant)>,
     mut score: ResMut<Score>,
+    mut soil: ResMut<Soil>,
     mut commands: Commands,
 ) {
     let Ok((mut gardener, mut smells)) = gardeners.get_mut(event.entity) else { return };
     (*gardener, *smells) = (Gardener::default(), Smells::default());
     score.0 = 0;
+    if planted.0 == Fault::Flood && event.level == 0 {
+        soil.wet = 2.0;
+    }
     if planted.0 != Fault::LeftOvers {
         let own = plants.iter().filter(|(_, plant)| plant.gardener == event.entity);
         own.for_each(|(plant, _)| commands.entity(plant).despawn());
@@ -165,6 +173,7 @@ fn random() -> u64 {
 fn weather(
     planted: Res<Planted>,
     real: Res<Time<Real>>,
+    episodes: Query<&Episode>,
     mut wind: ResMut<Wind>,
     mut sun: ResMut<Sun>,
     mut soil: ResMut<Soil>,
@@ -175,6 +184,10 @@ fn weather(
     *tick += 1;
     match planted.0 {
         Fault::UnseededRandomness => wind.force = (random() >> 40) as f32,
+        Fault::Storm => {
+            let is_stormy = episodes.iter().any(|episode| episode.level == 1);
+            wind.force = if is_stormy { (random() >> 40) as f32 } else { 0.0 };
+        }
         Fault::WallClock => sun.pace = real.delta_secs(),
         Fault::WallTime => sun.pace = real.elapsed_secs(),
         Fault::Survivor => soil.wet *= 0.99,

@@ -11,6 +11,10 @@ use crate::program::{done, ended, lines, playbot};
 #[path = "../fixtures/init_adapter.rs"]
 mod adapter;
 
+/// The adapter that is written for [`FILES`].
+#[path = "../fixtures/init_adapter_of_files.rs"]
+mod adapter_of_files;
+
 /// The component that the adapter observes.
 #[derive(Component)]
 pub struct Player;
@@ -34,6 +38,22 @@ fn walk(keys: Res<ButtonInput<KeyCode>>) {
     let _ = [KeyCode::ArrowLeft, KeyCode::ArrowRight, KeyCode::Escape].map(|key| keys.pressed(key));
     let _ = rand::rng();
 }
+";
+
+/// A game with files, assets in a folder of its own, and keys that leave and skip levels.
+const FILES: &str = "\
+#[derive(Component)]
+pub struct Player;
+pub fn plugin(app: &mut App) { app.add_systems(Update, (play, skip_level.run_if(input_just_pressed(KeyCode::KeyN)))); }
+fn play(keys: Res<ButtonInput<KeyCode>>, assets: Res<AssetServer>) {
+    if keys.just_pressed(KeyCode::ArrowLeft) { let _ = assets.load(\"a.png\"); }
+    if keys.just_pressed(KeyCode::Escape) { exit.write(AppExit::Success); }
+    if keys.just_pressed(KeyCode::Enter) && won { level.0 += 1; }
+    if keys.pressed(KeyCode::Enter) { dash(); }
+    if keys.pressed(KeyCode::F3) { show(); }
+    for file in std::fs::read_dir(\"levels\") {}
+}
+pub fn defaults() -> AssetPlugin { AssetPlugin { file_path: \"art\".into(), ..default() } }
 ";
 
 const MAIN: &str = "\
@@ -92,6 +112,25 @@ fn the_adapter_of_a_game_with_a_library_is_one_that_compiles() {
     assert!(read(folder, "bots/tests/levels.rs").contains("playbot::test(&adapter())"));
     assert!(reported.contains("written: bots/tests/levels.rs") && reported.contains("--edit-workspace"), "{reported}");
     assert_eq!((read(folder, "Cargo.toml"), read(folder, "src/lib.rs")), (MANIFEST.to_owned(), LIBRARY.to_owned()));
+}
+
+#[test]
+fn the_adapter_of_a_game_with_files_says_what_follows_from_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let shared = "[workspace]\nmembers = [\"game\"]\n";
+    write(folder, &[("Cargo.toml", shared), ("game/Cargo.toml", MANIFEST), ("game/src/lib.rs", FILES)]);
+    let (found, _) = done(folder, &["init"]);
+    assert_eq!(read(folder, "bots/src/lib.rs"), include_str!("../fixtures/init_adapter_of_files.rs"));
+    assert_eq!(adapter_of_files::adapter().problem(), None);
+    for line in [
+        "keys that leave or skip levels: KeyN (src/lib.rs:3), Escape (src/lib.rs:6), Enter (src/lib.rs:7)",
+        "folder of assets: art (src/lib.rs:12)",
+        "reads of files: read_dir( (src/lib.rs:10)",
+        "to do: build the paths of files from env!(\"CARGO_MANIFEST_DIR\"), and sort the names of a folder",
+    ] {
+        assert!(found.lines().any(|found| found == line), "{line}: {found}");
+    }
 }
 
 #[test]

@@ -4,7 +4,8 @@ mod help;
 
 use crate::{
     error::{CliError, Outcome},
-    output::{log, program},
+    output::{GamesPrintElsewhere, log, program},
+    progress,
     progress::interrupt,
     verbs::{
         bench, bugs, completions, config, demo, doctor, eval, explore, eyes, init, learn_skills, level, levels, play,
@@ -154,6 +155,8 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
         }
     };
     let repeats = log::init(cli.verbose, !matches!(cli.verb, Some(Verb::Bugs(_))));
+    progress::start();
+    let _elsewhere = GamesPrintElsewhere::begin();
     let games = match Games::new(games) {
         Ok(games) => games,
         Err(error) => {

@@ -17,12 +17,17 @@ use playbot_learner::{disk, disk::DiskFile};
 use playbot_report::PlainTable;
 use playbot_test::verdict::TestError;
 use std::{
+    fs::File,
     io::{self, Write},
     path::{Path, PathBuf},
+    sync::{Mutex, PoisonError},
 };
 
 /// Advice where nothing can be written.
 const ELSEWHERE: &str = "make room or rights there, or name a file in another folder";
+
+/// The standard output that the program was started with, while that of the process leads to standard error.
+static DATA: Mutex<Option<File>> = Mutex::new(None);
 
 /// Prints one line of data.
 ///
@@ -30,8 +35,13 @@ const ELSEWHERE: &str = "make room or rights there, or name a file in another fo
 ///
 /// [`CliError::BrokenPipe`] if the reader is gone.
 pub(crate) fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
-    let line = line.to_string();
-    writeln!(io::stdout().lock(), "{}", for_programs(&line)).map_err(|error| match error.kind() {
+    let line = format!("{}\n", for_programs(&line.to_string()));
+    let mut data = DATA.lock().unwrap_or_else(PoisonError::into_inner);
+    let written = match data.as_mut() {
+        Some(data) => data.write_all(line.as_bytes()),
+        None => io::stdout().lock().write_all(line.as_bytes()),
+    };
+    written.map_err(|error| match error.kind() {
         io::ErrorKind::BrokenPipe => CliError::BrokenPipe,
         _ => CliError::Io(format!("cannot write to standard output: {error}")),
     })
@@ -43,9 +53,51 @@ pub(crate) fn print_line(line: impl std::fmt::Display) -> Result<(), CliError> {
 ///
 /// [`CliError::BrokenPipe`] if the reader is gone.
 pub(crate) fn print_table(table: &PlainTable) -> Result<(), CliError> {
-    let terminal = terminal_size::terminal_size_of(io::stdout());
+    let terminal = match DATA.lock().unwrap_or_else(PoisonError::into_inner).as_ref() {
+        Some(data) => terminal_size::terminal_size_of(data),
+        None => terminal_size::terminal_size_of(io::stdout()),
+    };
     let width = terminal.map_or(usize::MAX, |(width, _)| width.0.into());
     print_line(table.to_text_within(width).trim_end())
+}
+
+/// While this lives, what games print by `println!` goes to standard error, so that standard output holds the data of the
+/// verb alone. On Unix only: elsewhere it has no effect.
+pub(crate) struct GamesPrintElsewhere(());
+
+impl GamesPrintElsewhere {
+    /// Redirects standard output of the process. If the system refuses, all is printed as before.
+    pub fn begin() -> Self {
+        #[cfg(unix)]
+        {
+            let own = redirect().ok();
+            *DATA.lock().unwrap_or_else(PoisonError::into_inner) = own;
+        }
+        Self(())
+    }
+}
+
+/// Lets the file of standard output be that of standard error, and returns the former.
+#[cfg(unix)]
+fn redirect() -> io::Result<File> {
+    use std::os::fd::AsFd;
+    let own = io::stdout().as_fd().try_clone_to_owned()?;
+    rustix::stdio::dup2_stdout(io::stderr().as_fd())?;
+    Ok(own.into())
+}
+
+impl Drop for GamesPrintElsewhere {
+    fn drop(&mut self) {
+        let own = DATA.lock().unwrap_or_else(PoisonError::into_inner).take();
+        #[cfg(unix)]
+        if let Some(own) = own {
+            // A game may have begun a line. The words are lost only if nobody can read them.
+            let _ = io::stdout().flush();
+            let _ = rustix::stdio::dup2_stdout(&own);
+        }
+        #[cfg(not(unix))]
+        drop(own);
+    }
 }
 
 /// Makes the folder of a file, and tests whether the file can be written.

@@ -9,6 +9,7 @@
 pub(crate) mod console;
 pub(crate) mod interrupt;
 
+use bevy_playbot::engine::SlowCalls;
 use indicatif::{
     HumanDuration, MultiProgress, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar,
 };
@@ -57,8 +58,7 @@ pub(crate) fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
             bar: bar.downgrade(),
             pace: Pace::default(),
         });
-        // Without a thread for it, nothing is reported.
-        REPORTER.call_once(|| drop(thread::Builder::new().spawn(report)));
+        start();
     }
     bar
 }
@@ -112,8 +112,15 @@ fn text_progress() -> MutexGuard<'static, Vec<TextProgress>> {
     TEXT_PROGRESS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Reports running work from now on, and calls of games that take long.
+pub(crate) fn start() {
+    // Without a thread for it, nothing is reported.
+    REPORTER.call_once(|| drop(thread::Builder::new().spawn(report)));
+}
+
 /// Reports all running work, in a loop.
 fn report() {
+    let mut slow = SlowCalls::default();
     loop {
         thread::park_timeout(PAUSE);
         let mut lines = String::new();
@@ -122,9 +129,19 @@ fn report() {
             line.iter().for_each(|line| lines.extend([line, "\n"]));
             line.is_some()
         });
-        // Standard error may be closed.
-        let _ = stderr().write_all(lines.as_bytes());
+        lines.push_str(&slow_lines(&mut slow));
+        if !lines.is_empty() {
+            // Standard error may be closed.
+            BARS.suspend(|| drop(stderr().write_all(lines.as_bytes())));
+        }
     }
+}
+
+/// Returns a line for each call of a game that has not returned since the last look. A call is named again when it has
+/// taken twice as long.
+fn slow_lines(slow: &mut SlowCalls) -> String {
+    let named = slow.look().into_iter().filter(|call| call.looks.is_power_of_two());
+    named.map(|call| format!("still {call} after {} s\n", PAUSE.as_secs() * u64::from(call.looks))).collect()
 }
 
 // Estimate of the time that is left, by the recent speed of the work.
@@ -163,6 +180,7 @@ impl Pace {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bevy_playbot::engine::GameCall;
 
     fn words(bar: &ProgressBar) -> Option<String> {
         let (title, unit) = ("record".to_owned(), "steps".to_owned());
@@ -188,6 +206,16 @@ mod tests {
         assert_eq!(words(&bar).as_deref(), Some("record: 1200 steps"), "the length is not known");
         bar.finish_and_clear();
         assert_eq!(words(&bar), None, "it is over");
+    }
+
+    #[test]
+    fn a_call_that_does_not_return_is_named_ever_less_often() {
+        let _call = GameCall::begin("proving", [70_003]);
+        let mut slow = SlowCalls::default();
+        let mut line = || slow_lines(&mut slow).lines().find(|line| line.contains("70003")).map(str::to_owned);
+        let lines = [line(), line(), line(), line(), line()].map(Option::unwrap_or_default);
+        let after = |seconds: u32| format!("still proving level 70003 after {seconds} s");
+        assert_eq!(lines, [String::new(), after(10), after(20), String::new(), after(40)]);
     }
 
     #[test]

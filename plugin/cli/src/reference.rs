@@ -25,8 +25,8 @@ playbot --help
 playbot test --help
 ```
 
-Data goes to standard output, as JSON with `--json`. Everything else goes to standard error. [Exit codes](exit-codes.md)
-are the same for all verbs.
+Data goes to standard output, as JSON with `--json`. Everything else goes to standard error. On Linux and macOS that is also
+what games print. [Exit codes](exit-codes.md) are the same for all verbs.
 
 In every verb that has them, `--level` names a level and `--seed` the random seed. In `level`, `trace`, `view`, `play` and
 `doctor`, `--seed` alone named the level before: for one version it still does, with a warning.

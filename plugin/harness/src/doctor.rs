@@ -3,8 +3,9 @@
 //!
 //! Recording, replay, resume and training in many arenas need games that are a function of their level and their
 //! actions. [`examine`] plays copies of a game with the same random actions and compares them after every tick, by
-//! reflection: see [`DoctorComparison`] for the pairs. No finding in some ticks of one level is no proof: more ticks
-//! and other levels show more.
+//! reflection: see [`DoctorComparison`] for the pairs. One level is examined in full. Further levels are played twice, and
+//! each level is played after another one, to find state that a level leaves to the next. No finding in some ticks of
+//! some levels is no proof: more ticks and other levels show more.
 //!
 //! A difference in state is a finding if agents notice it before the episode ends: in observations, rewards, ends of
 //! episodes or the state hash. Otherwise it is a note. Components and resources that are `Reflect` and have
@@ -50,7 +51,7 @@ pub use crate::doctor::{
 };
 
 /// Plays copies of a game with the same random actions, compares them after every tick, and reports the differences.
-/// `progress` receives the next comparison.
+/// `progress` receives the next comparison, in words.
 ///
 /// # Errors
 ///
@@ -58,22 +59,22 @@ pub use crate::doctor::{
 pub fn examine(
     game: &dyn Game,
     options: &DoctorOptions,
-    mut progress: impl FnMut(DoctorComparison),
+    mut progress: impl FnMut(&str),
 ) -> Result<DoctorReport, ModeError> {
     game.check_mode(&options.mode)?;
-    let plan = Plan { mode: &options.mode, level: options.level, seed: options.seed };
     let mut known_types = KnownTypes::new(&bare_world(), options.default_ignores);
     let mut comparisons: Vec<ComparisonReport> = Vec::new();
     let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
-    let (mut suspicions, mut unequal_steps) = (Vec::new(), None);
-    for comparison in DoctorComparison::ALL {
-        if let Some(why) = reason_to_skip(comparison, game, &comparisons) {
-            comparisons.push(skipped(comparison, why));
+    let (mut suspicions, mut unequal_steps, mut holds_keys) = (Vec::new(), None, false);
+    for planned in options.planned() {
+        if let Some(why) = reason_to_skip(planned.comparison, game, &comparisons) {
+            comparisons.push(ComparisonReport { skipped: Some(why), ..planned });
             continue;
         }
-        progress(comparison);
-        let mut trial = Trial::new(comparison, game, &plan, options.ticks);
-        let is_first = comparison == DoctorComparison::Repeat;
+        progress(&planned.describe(options.level));
+        let plan = Plan { mode: &options.mode, level: planned.level, before: planned.before, seed: options.seed };
+        let is_first = comparisons.is_empty();
+        let mut trial = Trial::new(planned, game, &plan, options.ticks);
         let mut monitor = is_first.then(|| ObservationMonitor::new(trial.copies[0].observed_names()));
         let noted = comparisons.iter().filter(|of| of.comparison == DoctorComparison::Repeat && of.is_note());
         let noted = noted.flat_map(ComparisonReport::names).map(str::to_owned).collect();
@@ -84,24 +85,27 @@ pub fn examine(
             types = known_types.report(&trial.copies[0], &result.incomparable);
             suspicions = known_types.suspicions(&trial.copies[0]);
             unequal_steps = UnequalSteps::of(&trial.copies[0].world);
+            holds_keys = trial.copies[0].holds_keys();
         }
         comparisons.push(result.report);
     }
-    let (findings, notes) = findings(&comparisons, &observation, &suspicions);
+    let (findings, notes) = findings(options.level, &comparisons, &observation, &suspicions);
     Ok(DoctorReport {
         game: game.name().to_owned(),
         version: game.version(),
         mode: options.mode.clone(),
         level: options.level,
+        further_levels: options.levels().split_off(1),
         seed: options.seed,
         ticks: options.ticks,
-        safety: assess_safety(&comparisons, &observation),
+        safety: assess_safety(options.level, &comparisons, &observation),
         findings,
         notes,
         comparisons,
         observation,
         types,
         unequal_steps,
+        holds_keys,
         ticks_per_second: None,
     })
 }
@@ -113,8 +117,10 @@ pub struct DoctorOptions {
     pub mode: String,
     /// Ticks that each comparison plays.
     pub ticks: u32,
-    /// The level.
+    /// The level that is examined in full.
     pub level: u64,
+    /// Further levels. Each is played twice, and after the level before it; the first one is played after the last.
+    pub further_levels: Vec<u64>,
     /// Random seed of the World and of the actions.
     pub seed: u64,
     /// Components and resources whose path contains one of these are ignored, such as a high score that should last.
@@ -124,9 +130,44 @@ pub struct DoctorOptions {
 }
 
 impl DoctorOptions {
-    /// Creates options for 300 ticks of a mode.
+    /// Creates options for 300 ticks of level 0 of a mode.
     pub fn new(mode: impl Into<String>) -> Self {
-        Self { mode: mode.into(), ticks: 300, level: 0, seed: 0, ignored: Vec::new(), default_ignores: true }
+        Self {
+            mode: mode.into(),
+            ticks: 300,
+            level: 0,
+            further_levels: Vec::new(),
+            seed: 0,
+            ignored: Vec::new(),
+            default_ignores: true,
+        }
+    }
+
+    /// Returns all levels, each once.
+    fn levels(&self) -> Vec<u64> {
+        let mut levels = vec![self.level];
+        for level in &self.further_levels {
+            if !levels.contains(level) {
+                levels.push(*level);
+            }
+        }
+        levels
+    }
+
+    /// Returns the comparisons to make, in order. Further levels get the two that find most, so that each of them takes
+    /// a fourth of the time of the first one.
+    fn planned(&self) -> Vec<ComparisonReport> {
+        let of_first = |comparison| ComparisonReport::new(comparison, self.level, None);
+        let mut planned: Vec<_> = DoctorComparison::OF_ONE_LEVEL.map(of_first).into();
+        let levels = self.levels();
+        let befores = levels.iter().cycle().skip(levels.len() - 1);
+        for (place, (&level, &before)) in levels.iter().zip(befores).enumerate().filter(|_| levels.len() > 1) {
+            if place > 0 {
+                planned.push(ComparisonReport::new(DoctorComparison::Repeat, level, None));
+            }
+            planned.push(ComparisonReport::new(DoctorComparison::OtherLevel, level, Some(before)));
+        }
+        planned
     }
 }
 
@@ -139,8 +180,10 @@ pub struct DoctorReport {
     pub version: u32,
     /// Its mode.
     pub mode: String,
-    /// The level.
+    /// The level that was examined in full.
     pub level: u64,
+    /// Further levels, which were played twice and after another level.
+    pub further_levels: Vec<u64>,
     /// Random seed of the World and of the actions.
     pub seed: u64,
     /// Ticks that each comparison was to play.
@@ -153,6 +196,8 @@ pub struct DoctorReport {
     pub types: TypesReport,
     /// Lengths of frames and of fixed steps, if they differ and the game may notice it.
     pub unequal_steps: Option<UnequalSteps>,
+    /// True if actions hold keys or buttons. Reflection cannot show whether the game reads `pressed` or `just_pressed`.
+    pub holds_keys: bool,
     /// The uses that the game is safe for.
     pub safety: Safety,
     /// The findings, worst first.
@@ -169,7 +214,7 @@ impl DoctorReport {
         self.findings.is_empty()
     }
 
-    /// Returns the report of a comparison.
+    /// Returns the report of a comparison, on the first level that it was made on.
     pub fn of(&self, comparison: DoctorComparison) -> Option<&ComparisonReport> {
         self.comparisons.iter().find(|report| report.comparison == comparison)
     }
@@ -180,6 +225,10 @@ impl DoctorReport {
 pub struct ComparisonReport {
     /// The comparison.
     pub comparison: DoctorComparison,
+    /// The level.
+    pub level: u64,
+    /// The other level that one copy has played before, in [`DoctorComparison::OtherLevel`].
+    pub before: Option<u64>,
     /// The reason that it was skipped, if it was.
     pub skipped: Option<String>,
     /// Ticks compared. If state differs and no agent has noticed it, an episode is played on to its end.
@@ -201,9 +250,11 @@ pub struct ComparisonReport {
 
 impl ComparisonReport {
     /// Makes the report of a comparison that has not begun.
-    pub(crate) fn new(comparison: DoctorComparison) -> Self {
+    pub(crate) fn new(comparison: DoctorComparison, level: u64, before: Option<u64>) -> Self {
         Self {
             comparison,
+            level,
+            before,
             skipped: None,
             ticks: 0,
             episodes: 0,
@@ -223,6 +274,15 @@ impl ComparisonReport {
     /// Returns whether state differs, and no agent noticed it.
     pub fn is_note(&self) -> bool {
         self.first.is_some() && self.same() == Some(true)
+    }
+
+    /// Returns the comparison in words. They name the level, unless it is the `first` one by itself.
+    pub(crate) fn describe(&self, first: u64) -> String {
+        match self.before {
+            Some(before) => format!("level {} after level {before}", self.level),
+            None if self.level == first => self.comparison.describe().to_owned(),
+            None => format!("level {}, {}", self.level, self.comparison.describe()),
+        }
     }
 
     /// Returns the types that differ, and kinds of entities.
@@ -255,11 +315,13 @@ pub enum DoctorComparison {
     Restart,
     /// A World that plays on, and one that returns to the same tick by a snapshot of the game, as explorers do.
     Snapshots,
+    /// The first episode of a World, and an episode of the same level in a World that has played another level before.
+    OtherLevel,
 }
 
 impl DoctorComparison {
-    /// All comparisons, in the order in which they are made.
-    pub const ALL: [Self; 7] =
+    /// The comparisons that need no other level, in the order in which they are made.
+    pub const OF_ONE_LEVEL: [Self; 7] =
         [Self::Repeat, Self::Archetypes, Self::Clock, Self::Threads, Self::Arenas, Self::Restart, Self::Snapshots];
 
     /// Returns the comparison in words.
@@ -272,7 +334,13 @@ impl DoctorComparison {
             Self::Arenas => "two arenas in one World",
             Self::Restart => "again after a restart",
             Self::Snapshots => "after loading a snapshot",
+            Self::OtherLevel => "after another level",
         }
+    }
+
+    /// Returns whether the copy on the right has played something else before the ticks that are compared.
+    pub(crate) fn returns(self) -> bool {
+        matches!(self, Self::Restart | Self::Snapshots | Self::OtherLevel)
     }
 
     /// Returns the names of the left and the right copy.
@@ -285,6 +353,7 @@ impl DoctorComparison {
             Self::Arenas => ("alone", "with another arena"),
             Self::Restart => ("first episode", "second episode"),
             Self::Snapshots => ("played on", "snapshot loaded"),
+            Self::OtherLevel => ("first level", "after another level"),
         }
     }
 }
@@ -339,6 +408,8 @@ pub struct DoctorFinding {
     pub what: String,
     /// The comparison that showed it.
     pub comparison: Option<DoctorComparison>,
+    /// The level of the comparison.
+    pub level: Option<u64>,
     /// The first difference.
     pub difference: Option<DoctorDifference>,
     /// Causes that fit, likeliest first.
@@ -371,21 +442,22 @@ fn reason_to_skip(comparison: DoctorComparison, game: &dyn Game, done: &[Compari
     if comparison == DoctorComparison::Snapshots && game.built_anew().is_some() {
         return Some("a game that is built anew for each episode is explored by replays".to_owned());
     }
-    let broken = done.iter().find(|of| of.comparison == DoctorComparison::Repeat && of.same() == Some(false))?;
+    let differing = |wanted| done.iter().find(|of| of.comparison == wanted && of.same() == Some(false));
+    if comparison == DoctorComparison::OtherLevel && differing(DoctorComparison::Restart).is_some() {
+        return Some("the game already differs after a restart of one level, which must be repaired first".to_owned());
+    }
+    let broken = differing(DoctorComparison::Repeat)?;
     Some(match broken.fault.is_some() {
         true => "the game has a fault, which must be repaired first".to_owned(),
         false => "the game already differs from itself without this, which must be repaired first".to_owned(),
     })
 }
 
-fn skipped(comparison: DoctorComparison, why: String) -> ComparisonReport {
-    ComparisonReport { skipped: Some(why), ..ComparisonReport::new(comparison) }
-}
-
 // Findings of an examination.
 
 /// Returns all findings, worst first, and all notes.
 fn findings(
+    first_level: u64,
     comparisons: &[ComparisonReport],
     observation: &ObservationReport,
     suspicions: &[(CauseKind, String)],
@@ -404,8 +476,9 @@ fn findings(
                 report.comparison != DoctorComparison::Clock && of_clock.contains(difference.name.as_str());
             DoctorFinding {
                 kind,
-                what: sentence(report.comparison, difference),
+                what: sentence(&report.describe(first_level), difference),
                 comparison: Some(report.comparison),
+                level: Some(report.level),
                 difference: Some(difference.clone()),
                 causes: causes(report.comparison, Some(difference), suspicions, follows_clock),
             }
@@ -415,14 +488,25 @@ fn findings(
             let new: Vec<_> = all.filter(|difference| noted.insert(difference.name.as_str())).collect();
             notes.extend(new.into_iter().map(|difference| differs(FindingKind::Unnoticed, difference)));
         } else if let Some(difference) = report.difference() {
-            findings.push(differs(FindingKind::Differs, difference));
+            // What one level leaves to the next shows after each level.
+            let is_known = |finding: &DoctorFinding| {
+                let known = finding.difference.as_ref().filter(|_| finding.comparison == Some(report.comparison));
+                report.before.is_some() && known.is_some_and(|known| known.has_field_of(difference))
+            };
+            if !findings.iter().any(is_known) {
+                findings.push(differs(FindingKind::Differs, difference));
+            }
         }
         let Some(fault) = &report.fault else { continue };
         // One fault shows in every comparison.
         if findings.iter().any(|finding| finding.kind == FindingKind::Fault && finding.what == *fault) {
             continue;
         }
-        let finding = plain(FindingKind::Fault, fault.clone(), Some(report.comparison));
+        let finding = DoctorFinding {
+            comparison: Some(report.comparison),
+            level: Some(report.level),
+            ..plain(FindingKind::Fault, fault.clone())
+        };
         match fault.contains("panicked: ") {
             // Everything else may follow from a panic.
             true => findings.insert(0, finding),
@@ -434,34 +518,34 @@ fn findings(
     (findings, notes)
 }
 
-fn plain(kind: FindingKind, what: String, comparison: Option<DoctorComparison>) -> DoctorFinding {
-    DoctorFinding { kind, what, comparison, difference: None, causes: Vec::new() }
+fn plain(kind: FindingKind, what: String) -> DoctorFinding {
+    DoctorFinding { kind, what, comparison: None, level: None, difference: None, causes: Vec::new() }
 }
 
 fn of_observation(seen: &ObservationReport) -> Vec<DoctorFinding> {
     let mut findings = Vec::new();
     if let Some(NonFiniteValue { tick, name, value }) = &seen.not_finite {
         let what = format!("observation `{name}` is {value} at tick {tick}: no policy can read that");
-        findings.push(plain(FindingKind::NotFinite, what, None));
+        findings.push(plain(FindingKind::NotFinite, what));
     }
     if let Some((tick, got)) = seen.length {
         let what = format!(
             "the observation has {got} values at tick {tick}, its sensor names {}: every value must be there in every tick",
             seen.values
         );
-        findings.push(plain(FindingKind::LengthChanges, what, None));
+        findings.push(plain(FindingKind::LengthChanges, what));
     }
     if seen.is_blind() {
         let what = format!(
             "none of the {} observed values changed in {} ticks: the agent sees nothing",
             seen.values, seen.ticks
         );
-        findings.push(plain(FindingKind::Blind, what, None));
+        findings.push(plain(FindingKind::Blind, what));
     }
     findings
 }
 
-fn sentence(comparison: DoctorComparison, difference: &DoctorDifference) -> String {
+fn sentence(comparison: &str, difference: &DoctorDifference) -> String {
     use self::DifferenceKind::{Component, End, Entities, Observation, Resource, Reward, StateHash};
     let DoctorDifference { kind, name, entity, field, tick, .. } = difference;
     let thing = match kind {
@@ -471,7 +555,7 @@ fn sentence(comparison: DoctorComparison, difference: &DoctorDifference) -> Stri
         Observation => format!("observation `{name}` of {}", entity.as_deref().unwrap_or("the agent")),
         Reward | End | StateHash => format!("the {name} of {}", entity.as_deref().unwrap_or("the agent")),
     };
-    format!("{}: {thing} differs at tick {tick}", comparison.describe())
+    format!("{comparison}: {thing} differs at tick {tick}")
 }
 
 // Scope of comparisons: the game's state, without the engine's housekeeping.
@@ -537,8 +621,7 @@ fn is_compared(path: &str) -> bool {
 
 /// Returns whether they are part of this comparison.
 fn is_compared_in(comparison: DoctorComparison, path: &str) -> bool {
-    let continues = matches!(comparison, DoctorComparison::Restart | DoctorComparison::Snapshots);
-    !continues || !GOES_ON.iter().any(|prefix| path.starts_with(prefix))
+    !comparison.returns() || !GOES_ON.iter().any(|prefix| path.starts_with(prefix))
 }
 
 #[cfg(test)]

@@ -54,7 +54,7 @@ use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     bot::BlindBot,
     demo::file::DemoHeader,
-    engine::{demo_actions, has_no_actions},
+    engine::{GameCall, demo_actions, has_no_actions},
     headless::HeadlessPlugins,
     key_bindings::KeyBindings,
     observation::{Observation, ObservationSpace},
@@ -307,6 +307,12 @@ pub trait HostTools: Send + Sync {
     }
 }
 
+/// Asks a game for [`LevelTools::prove`]. The call is noted, so that a proof that does not return is named with its level.
+pub fn prove_level(game: &dyn Game, mode: &str, level: u64) -> LevelProof {
+    let _call = GameCall::begin("proving", [level]);
+    game.tools().levels.prove(mode, level)
+}
+
 /// Levels without agents in them.
 pub trait LevelTools: Send + Sync {
     /// Checks a mode with options behind its name. Returns `None`, by default, for a game whose modes are
@@ -324,6 +330,11 @@ pub trait LevelTools: Send + Sync {
 
     /// Returns the largest number of a level that the game draws itself, in any mode; `None` if every number is valid.
     fn last_level(&self) -> Option<u64> {
+        None
+    }
+
+    /// Returns the number of levels if higher numbers play the same levels again; `None` if that is not known.
+    fn level_count(&self) -> Option<u64> {
         None
     }
 

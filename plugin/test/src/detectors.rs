@@ -43,11 +43,11 @@ use crate::detectors::{
     soft_lock::SoftLock,
 };
 use bevy::{math::Vec2, prelude::*};
-use bevy_playbot::{action::ActionValue, episode::EpisodeResult, vision::ObservationConfig};
+use bevy_playbot::{action::ActionValue, engine::GameCall, episode::EpisodeResult, vision::ObservationConfig};
 use playbot_harness::{
     detector::{Detector, DetectorSetting, LevelProof, Proofs},
     eval::Player,
-    game::Game,
+    game::{Game, prove_level},
 };
 use std::collections::BTreeMap;
 
@@ -351,10 +351,11 @@ pub(crate) struct GameProofs<'a> {
 
 impl Proofs for GameProofs<'_> {
     fn of_level(&self) -> LevelProof {
-        self.game.tools().levels.prove(self.mode, self.level)
+        prove_level(self.game, self.mode, self.level)
     }
 
     fn of_state(&self) -> LevelProof {
+        let _call = GameCall::begin("proving whether the goal can still be reached in", [self.level]);
         self.game.tools().state.prove_from(self.world, self.agent)
     }
 }

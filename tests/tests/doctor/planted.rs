@@ -65,7 +65,7 @@ fn constant(report: &DoctorReport) -> Vec<&str> {
 fn a_healthy_game_has_no_findings() {
     let report = examined(&Fault::None, 60, &[]);
     assert!(report.is_healthy() && report.notes.is_empty(), "{report}");
-    assert_eq!(report.comparisons.len(), DoctorComparison::ALL.len());
+    assert_eq!(report.comparisons.len(), DoctorComparison::OF_ONE_LEVEL.len());
     for comparison in report.comparisons.iter().filter(|of| of.comparison != DoctorComparison::Snapshots) {
         assert_eq!((comparison.same(), comparison.ticks, comparison.unmatched), (Some(true), 60, 0), "{report}");
     }
@@ -184,7 +184,7 @@ fn a_measurement_that_no_agent_notices_is_noted_once_as_a_clock() {
     assert_eq!((note.comparison, likeliest(&note)), (Some(DoctorComparison::Repeat), CauseKind::WallClock), "{report}");
     assert!(note.causes[0].evidence[0].starts_with("`Labour.took` is a `"), "{:?}", note.causes[0]);
     let compared = report.comparisons.iter().filter(|comparison| comparison.skipped.is_none());
-    let all_but_snapshots = DoctorComparison::ALL.len() - 1;
+    let all_but_snapshots = DoctorComparison::OF_ONE_LEVEL.len() - 1;
     assert_eq!(compared.count(), all_but_snapshots, "a note hides no other comparison");
 }
 
@@ -279,6 +279,77 @@ fn the_report_says_how_much_was_compared_and_how_to_compare_more() {
     ] {
         assert!(text.contains(words), "`{words}` is missing in:\n{text}");
     }
+}
+
+/// Returns the report on levels 0 and 1 of a copy with this fault.
+fn examined_on_two_levels(fault: Fault) -> DoctorReport {
+    let options = DoctorOptions { ticks: 60, further_levels: vec![1], ..DoctorOptions::new("bed") };
+    examine(&fault, &options, |_| {}).expect("the game has this mode")
+}
+
+#[test]
+fn further_levels_are_played_twice_and_each_level_after_another() {
+    let report = examined_on_two_levels(Fault::None);
+    assert!(report.is_healthy() && report.notes.is_empty(), "{report}");
+    let further = &report.comparisons[DoctorComparison::OF_ONE_LEVEL.len()..];
+    let made: Vec<_> = further.iter().map(|of| (of.comparison, of.level, of.before, of.ticks)).collect();
+    let other = DoctorComparison::OtherLevel;
+    assert_eq!(
+        made,
+        [(other, 0, Some(1), 60), (DoctorComparison::Repeat, 1, None, 60), (other, 1, Some(0), 60)],
+        "{report}"
+    );
+    assert_eq!((report.level, report.further_levels.as_slice()), (0, &[1][..]));
+    let text = report.to_string();
+    for words in [
+        "mode bed, levels 0 and 1\n",
+        "Copies of the game played level 0 for 60 ticks",
+        "\nThen level 1, in fewer ways: `--level 1` alone makes all comparisons on it.\n  twice in one thread ",
+        "\n  after level 1 ",
+        "\n  after level 0 ",
+        "(compared: twice in one thread, again after a restart, after another level)",
+        "no difference was found in 60 ticks of levels 0 and 1, not that there",
+        "`--level 2` another level",
+    ] {
+        assert!(text.contains(words), "`{words}` is missing in:\n{text}");
+    }
+}
+
+#[test]
+fn state_of_one_level_that_survives_into_the_next_is_found() {
+    assert!(examined(&Fault::Flood, 60, &[]).is_healthy(), "one level alone does not show it");
+    let report = examined_on_two_levels(Fault::Flood);
+    assert_eq!(report.findings.len(), 1, "{report}");
+    let finding = &report.findings[0];
+    assert_eq!((finding.comparison, finding.level), (Some(DoctorComparison::OtherLevel), Some(1)), "{report}");
+    let difference = finding.difference.as_ref().expect("a difference");
+    assert!(difference.name.ends_with("::Soil") && difference.field == ".wet", "{report}");
+    assert_eq!((difference.left.as_str(), difference.right.as_str()), ("0.5", "2.0"), "{report}");
+    assert_eq!(likeliest(finding), CauseKind::SurvivesRestart);
+    assert!(finding.what.starts_with("level 1 after level 0: resource `"), "{}", finding.what);
+    assert_eq!(report.safety.resume.why, "differs on level 1 after level 0", "{report}");
+    assert_eq!(report.safety.threads.safe, Some(true), "{report}");
+}
+
+#[test]
+fn a_fault_of_the_second_level_alone_is_found_there() {
+    let report = examined_on_two_levels(Fault::Storm);
+    assert_eq!(report.findings.len(), 1, "{report}");
+    let finding = &report.findings[0];
+    assert_eq!((finding.comparison, finding.level), (Some(DoctorComparison::Repeat), Some(1)), "{report}");
+    assert!(finding.what.starts_with("level 1, twice in one thread: resource `"), "{}", finding.what);
+    assert_eq!(report.safety.recording.why, "differs on level 1, twice in one thread", "{report}");
+    let last = report.comparisons.last().and_then(|of| of.skipped.clone()).expect("it would only repeat the finding");
+    assert!(last.contains("differs from itself"), "{last}");
+}
+
+#[test]
+fn what_a_restart_leaves_is_not_sought_after_another_level_again() {
+    let report = examined_on_two_levels(Fault::Survivor);
+    assert_eq!(report.findings.len(), 1, "{report}");
+    assert_eq!(report.findings[0].comparison, Some(DoctorComparison::Restart), "{report}");
+    let skipped = report.of(DoctorComparison::OtherLevel).and_then(|of| of.skipped.clone()).expect("it is skipped");
+    assert!(skipped.contains("differs after a restart of one level"), "{skipped}");
 }
 
 #[test]

@@ -11,6 +11,8 @@ mod lines;
 mod loading;
 mod namesakes;
 mod play;
+#[cfg(unix)]
+mod prints;
 mod rebuild;
 mod restarts;
 mod snapshots;

@@ -63,6 +63,24 @@ fn other_frames_show_a_press_in_each_of_their_steps() {
     assert_eq!(seen(&counting(game).hz(128.0)), 0);
 }
 
+#[test]
+fn an_action_that_is_repeated_is_one_press_and_the_doctor_says_so() {
+    let game = counting(game).hz(64.0);
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    world.entity_mut(agents[0]).insert((Control::Replay, LevelQueue::Always(3)));
+    // Held for 5 ticks, let go for one, and held for 4.
+    for action in [1, 1, 1, 1, 1, 0, 1, 1, 1, 1] {
+        world.entity_mut(agents[0]).insert(Action(ActionValue::Discrete(action)));
+        world.tick().expect("sound");
+    }
+    assert_eq!(world.resource::<Presses>().0, 2);
+    let words = "Keys: an action that is chosen again holds its keys. `just_pressed` is true in its first tick only,";
+    assert!(examined(&game).contains(words));
+    let without = ForeignGame::new("still", 1, |app: &mut App| _ = app.init_resource::<Presses>());
+    let without = without.actions(ActionSpace::Discrete(2), || {}).observe(["presses"], || [0.0]);
+    assert!(!examined(&without).contains("Keys:"), "its actions press nothing");
+}
+
 /// Returns the doctor's report as text.
 fn examined(game: &ForeignGame) -> String {
     let options = DoctorOptions { ticks: 30, ..DoctorOptions::new("default") };

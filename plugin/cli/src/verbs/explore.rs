@@ -20,7 +20,7 @@ use crate::{
     progress::interrupt,
     verbs::explore::recorded::{RecordingFile, chart},
 };
-use bevy_playbot::{policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
+use bevy_playbot::{placement::TickPlacement, policy::ActionDraw, skill_prior::SkillPrior, vision::ObservationConfig};
 use playbot_harness::{
     eval::Player,
     game::Game,
@@ -78,7 +78,8 @@ pub struct Args {
     /// Ticks without anything new after which a visit ends.
     #[arg(long, default_value_t = 100, value_parser = clap::value_parser!(u32).range(1..))]
     explore_ticks: u32,
-    /// Probability that a random action is repeated in the next tick.
+    /// Probability that a random action is repeated in the next tick. Its keys stay held, so a game that reads
+    /// `just_pressed` acts once: 0 chooses anew in each tick.
     #[arg(long, default_value_t = 0.95)]
     sticky: f64,
     /// Side of a cell in units of the level (default: one tile). For cells of observations, the step to which values
@@ -150,6 +151,13 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         report!("warning: {fault}");
     }
     report!("{}", pace(&exploration, begin.elapsed()));
+    if exploration.has_goal && exploration.solution_ticks().is_none() && repeats_keys(game, &plan) {
+        report!(
+            "tip: --sticky {} repeats an action with its keys held, and a game that reads `just_pressed` acts once: \
+             --sticky 0 chooses anew in each tick",
+            plan.sticky
+        );
+    }
     let to_cell = args.cell.as_ref().map(|cell| (cell, exploration.route_to(cell)));
     print(&exploration.summary(game), to_cell.as_ref(), args.json)?;
     let is_missed = matches!(to_cell, Some((_, None)));
@@ -264,6 +272,12 @@ fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> 
     Ok(explored?)
 }
 
+/// Returns whether random actions hold keys for many ticks.
+fn repeats_keys(game: &dyn Game, plan: &ExplorePlan) -> bool {
+    let presses = game.tools().host.placement() == TickPlacement::Frame;
+    presses && matches!(plan.explorer, Explorer::Random) && plan.sticky >= 0.5
+}
+
 /// Returns how fast the exploration was, and what snapshots have saved. The speed differs from run to run, so it is no
 /// part of the result.
 fn pace(exploration: &Exploration, time: Duration) -> String {
@@ -358,6 +372,8 @@ impl ExplorerSetup {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bevy::prelude::App;
+    use playbot_harness::foreign::ForeignGame;
 
     #[test]
     fn levels_are_read_and_others_are_refused_with_an_example() {
@@ -376,5 +392,12 @@ mod tests {
             assert!(error.contains(&format!("`{text}` names no level")) && error.ends_with(example), "{error}");
         }
         assert!(one_level("plain:9..3").is_err_and(|error| error.contains("write plain:3..9")));
+    }
+
+    #[test]
+    fn keys_are_held_by_random_actions_that_are_mostly_repeated() {
+        let game = ForeignGame::new("walk", 1, |_: &mut App| {});
+        let plan = |sticky| ExplorePlan { sticky, ..ExplorePlan::new("default", 0) };
+        assert_eq!([0.95, 0.0].map(|sticky| repeats_keys(&game, &plan(sticky))), [true, false]);
     }
 }

@@ -226,7 +226,7 @@ impl GameFolder {
             files.push((format!("{folder}{}", self.library_file()), LIBRARY.to_owned()));
         }
         files.push(("bots/Cargo.toml".to_owned(), self.bots_manifest(facts, playbot)));
-        files.push(("bots/src/lib.rs".to_owned(), adapter(self.name(), &self.library(), facts)));
+        files.push(("bots/src/lib.rs".to_owned(), adapter(self.name(), &self.library(), &self.package, facts)));
         files.push(("bots/src/main.rs".to_owned(), PROGRAM.to_owned()));
         files.push(("bots/tests/levels.rs".to_owned(), TESTS.to_owned()));
         files
@@ -256,6 +256,9 @@ impl GameFolder {
         let states = facts.states.iter().map(|state| {
             format!("{} ({}:{}): {}", state.at.name, state.at.file, state.at.line, state.variants.join(" | "))
         });
+        let folder = facts.asset_folder.as_ref().map(|folder| {
+            format!("{} ({}:{})", folder.path.as_deref().unwrap_or("computed"), folder.at.file, folder.at.line)
+        });
         let version = self.bevy.version.as_deref().unwrap_or("without a number");
         let library = if facts.has_library { self.library_file() } else { "none".to_owned() };
         let mut rows = vec![
@@ -267,18 +270,26 @@ impl GameFolder {
             ("states", or_none(states.collect())),
             ("input", names(&facts.inputs)),
             ("keys", or_none(facts.keys.clone())),
+            ("keys that leave or skip levels", at(&facts.leaving_keys)),
+            ("presses that count once", at(&facts.presses)),
             ("mouse buttons", or_none(facts.mouse_buttons.clone())),
             ("buttons", or_none(facts.buttons.clone())),
             ("player", items(facts.player.as_slice())),
             ("physics", names(&facts.physics)),
             ("loading", names(&facts.loaders)),
             ("loads of assets", at(&facts.loads)),
+            ("folder of assets", folder.unwrap_or_else(|| "assets".to_owned())),
+            ("reads of files", at(&facts.files)),
             ("random numbers with a seed", at(&facts.seeded)),
             ("random numbers without a seed", at(&facts.unseeded)),
             ("clocks of the machine", at(&facts.clocks)),
         ];
         if !facts.unseeded.is_empty() || !facts.clocks.is_empty() {
             rows.push(("to do", "make it the same every time: docs/how-to/make-it-deterministic.md".to_owned()));
+        }
+        if !facts.files.is_empty() {
+            let advice = "build the paths of files from env!(\"CARGO_MANIFEST_DIR\"), and sort the names of a folder";
+            rows.push(("to do", advice.to_owned()));
         }
         rows.into_iter().map(|(what, found)| format!("{what}: {found}")).collect()
     }
@@ -363,8 +374,8 @@ fn has_clicks(facts: &GameFacts) -> bool {
     !facts.buttons.is_empty()
 }
 
-/// Returns the source of an adapter.
-fn adapter(name: &str, library: &str, facts: &GameFacts) -> String {
+/// Returns the source of an adapter. `package` is the folder of the game within the workspace, empty if it is the same.
+fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> String {
     let path = |items: &[NamedItem]| items.first().and_then(|item| item.path.clone());
     let mut own = String::new();
     let game = match (path(&facts.functions), path(&facts.plugins)) {
@@ -387,6 +398,7 @@ fn adapter(name: &str, library: &str, facts: &GameFacts) -> String {
          /// Returns the game for testers and bots.\npub fn adapter() -> ForeignGame {{\n    \
          ForeignGame::new(\"{name}\", 1, {game})\n"
     );
+    add_assets(&mut text, package, facts);
     add_input(&mut text, facts);
     add_sight(&mut text, library, facts);
     text.push_str(
@@ -407,6 +419,15 @@ fn adapter(name: &str, library: &str, facts: &GameFacts) -> String {
     if !facts.loads.is_empty() || !facts.loaders.is_empty() {
         text.push_str("        // TODO: if a level loads while the game runs, when it is ready: .ready(condition)\n");
     }
+    if let Some(SourceLine { file, line, .. }) = facts.files.first() {
+        let _ = write!(
+            text,
+            "        // TODO: the game reads files while it runs ({file}:{line}). Build their paths in the game from\n        \
+             // `env!(\"CARGO_MANIFEST_DIR\")`, because programs and tests of `bots` start in other folders. Sort the\n        \
+             // names of a folder, which have no order. If each file is a level, `.levels` takes their number, and\n        \
+             // `.level` begins the file of that number.\n"
+        );
+    }
     text.push_str(
         "        // TODO: the number of levels, and a system that begins level `level.0` or seeds its generator.\n        \
          .levels(1)\n        .level(|_level: Res<LevelSeed>| {})\n}\n",
@@ -414,10 +435,53 @@ fn adapter(name: &str, library: &str, facts: &GameFacts) -> String {
     text + &own
 }
 
+/// Adds the folder of assets. Bevy looks for `assets` in the package of the program, which is that of the bots.
+fn add_assets(text: &mut String, package: &str, facts: &GameFacts) {
+    let own = facts.asset_folder.as_ref();
+    if own.is_none() && facts.loads.is_empty() && facts.loaders.is_empty() {
+        return;
+    }
+    let _ = match own.map(|folder| (folder.path.is_some(), &folder.at)) {
+        None => writeln!(text, "        // The assets of the game, as the bots find them."),
+        Some((true, SourceLine { file, line, .. })) => {
+            writeln!(text, "        // The folder of assets that the game sets ({file}:{line}), as the bots find it.")
+        }
+        Some((false, SourceLine { file, line, .. })) => {
+            writeln!(
+                text,
+                "        // TODO: the folder of assets that the game sets ({file}:{line}), as the bots find it."
+            )
+        }
+    };
+    let inner = own.and_then(|folder| folder.path.as_deref()).unwrap_or("assets");
+    let path = match Path::new(inner).is_absolute() {
+        true => format!("{inner:?}"),
+        false => {
+            let folders: Vec<&str> = ["..", package, inner].into_iter().filter(|part| !part.is_empty()).collect();
+            format!("concat!(env!(\"CARGO_MANIFEST_DIR\"), {:?})", format!("/{}", folders.join("/")))
+        }
+    };
+    let _ = write!(
+        text,
+        "        .default_plugins(|plugins| {{\n            let file_path = {path}.to_owned();\n            \
+         plugins.set(bevy::asset::AssetPlugin {{ file_path, ..default() }})\n        }})\n"
+    );
+}
+
 /// Adds the actions.
 fn add_input(text: &mut String, facts: &GameFacts) {
-    let (tools, keys): (Vec<&str>, Vec<&str>) =
-        facts.keys.iter().map(String::as_str).partition(|key| TOOL_KEYS.contains(key));
+    let (leaving, playing): (Vec<&str>, Vec<&str>) =
+        facts.keys.iter().map(String::as_str).partition(|key| facts.only_leaves(key));
+    let (tools, keys): (Vec<&str>, Vec<&str>) = playing.into_iter().partition(|key| TOOL_KEYS.contains(key));
+    let place = |key: &str| facts.leaving_keys.iter().find(|at| at.name == key);
+    let at = |key: &str| place(key).map_or(String::new(), |at| format!("{key} ({}:{})", at.file, at.line));
+    if !leaving.is_empty() {
+        let places: Vec<String> = leaving.into_iter().map(at).collect();
+        let _ = writeln!(text, "        // Left out, because they leave or skip levels: {}.", places.join(", "));
+    }
+    for key in keys.iter().filter(|key| place(key).is_some()) {
+        let _ = writeln!(text, "        // TODO: {} also leaves or skips levels: leave it out if it can.", at(key));
+    }
     if !tools.is_empty() {
         let _ = writeln!(text, "        // Left out, because they seldom play: {}.", tools.join(", "));
     }
@@ -439,6 +503,11 @@ fn add_input(text: &mut String, facts: &GameFacts) {
              .keys([vec![], vec![KeyCode::Space]])\n",
         );
     } else {
+        if !facts.presses.is_empty() {
+            text.push_str(
+                "        // The game reads `just_pressed`: an action that is chosen again holds its keys, and counts once.\n",
+            );
+        }
         text.push_str(
             "        .keys([\n            // One action for each set of keys. TODO: add sets that are held together.\n            \
              vec![],\n",

@@ -130,7 +130,7 @@ fn kinds(comparison: DoctorComparison) -> &'static [CauseKind] {
         DoctorComparison::Archetypes => &[CauseKind::ArchetypeOrder],
         DoctorComparison::Threads => &[CauseKind::ThreadState],
         DoctorComparison::Arenas => &[CauseKind::SharedByArenas],
-        DoctorComparison::Restart => &[CauseKind::SurvivesRestart],
+        DoctorComparison::Restart | DoctorComparison::OtherLevel => &[CauseKind::SurvivesRestart],
         DoctorComparison::Snapshots => &[CauseKind::IncompleteSnapshot],
     }
 }
@@ -277,6 +277,7 @@ mod tests {
         assert_eq!(kinds(DoctorComparison::Archetypes, &[]), [CauseKind::ArchetypeOrder]);
         assert_eq!(kinds(DoctorComparison::Arenas, &[]), [CauseKind::SharedByArenas]);
         assert_eq!(kinds(DoctorComparison::Restart, &[]), [CauseKind::SurvivesRestart]);
+        assert_eq!(kinds(DoctorComparison::OtherLevel, &[]), [CauseKind::SurvivesRestart]);
         assert_eq!(kinds(DoctorComparison::Snapshots, &[]), [CauseKind::IncompleteSnapshot]);
         assert_eq!(kinds(DoctorComparison::Repeat, &[])[0], CauseKind::Randomness);
     }

@@ -101,7 +101,7 @@ impl Comparer<'_> {
         match self.comparison {
             DoctorComparison::Repeat | DoctorComparison::Clock | DoctorComparison::Threads => false,
             DoctorComparison::Archetypes | DoctorComparison::Arenas => true,
-            DoctorComparison::Restart | DoctorComparison::Snapshots => true,
+            DoctorComparison::Restart | DoctorComparison::Snapshots | DoctorComparison::OtherLevel => true,
         }
     }
 
@@ -241,7 +241,7 @@ fn presence(left: bool, right: bool) -> Option<FieldDifference> {
 pub(super) fn rank(comparison: DoctorComparison, difference: &DoctorDifference) -> (bool, u8) {
     // After a restart or a snapshot, a surplus of entities is itself the cause, so it comes early. In other comparisons
     // it is the effect of another difference, and comes last.
-    let is_cause = matches!(comparison, DoctorComparison::Restart | DoctorComparison::Snapshots);
+    let is_cause = comparison.returns();
     match difference.kind {
         DifferenceKind::Entities => (false, if is_cause { 1 } else { 3 }),
         DifferenceKind::Resource => (doctor::is_engine(&difference.name), 0),

@@ -11,7 +11,7 @@ use bevy::{
     time::{Real, TimeSystems},
 };
 use bevy_playbot::{
-    action::{Action, ActionSpace},
+    action::{Action, ActionSpace, ActionValue},
     agent::{Agent, Control},
     bot::uniform,
     engine::{Renewal, into_world, tick_world},
@@ -22,6 +22,7 @@ use bevy_playbot::{
     reward::Reward,
     state_hash::StateHash,
     streams::AgentStreams,
+    virtual_input::VirtualInput,
 };
 use serde::Serialize;
 use std::{
@@ -81,8 +82,9 @@ impl GameCopy {
     }
 
     /// Plays another episode first, with other actions, to its end or for at most `limit` ticks.
-    pub fn play_prelude(&mut self, limit: u32) {
+    pub fn play_prelude(&mut self, plan: &Plan, limit: u32) {
         self.in_prelude = true;
+        self.set_level(plan.before.unwrap_or(plan.level));
         for _ in 0..limit {
             self.tick();
             let ended = |agent: &Entity| self.world.get::<Episode>(*agent).is_some_and(|episode| !episode.is_running());
@@ -95,7 +97,15 @@ impl GameCopy {
                 episode.abandon();
             }
         }
+        self.set_level(plan.level);
         self.in_prelude = false;
+    }
+
+    /// Lets all further episodes be of this level.
+    fn set_level(&mut self, level: u64) {
+        for &agent in &self.agents {
+            self.world.entity_mut(agent).insert(LevelQueue::Always(level));
+        }
     }
 
     /// Saves the first agent's episode, plays on with other actions for at most `limit` ticks or to the end, and returns
@@ -140,6 +150,14 @@ impl GameCopy {
         sensor.map(|sensor| sensor.space().names.clone()).unwrap_or_default()
     }
 
+    /// Returns whether actions of the first agent hold keys or buttons.
+    pub fn holds_keys(&self) -> bool {
+        let input = self.agents.first().and_then(|&agent| self.world.get::<VirtualInput>(agent));
+        let (Some(input), ActionSpace::Discrete(actions)) = (input, &self.space) else { return false };
+        let mut held = (0..*actions as u32).map(|action| input.held(&ActionValue::Discrete(action)));
+        held.any(|held| !held.buttons.is_empty() && !held.clicks)
+    }
+
     /// Returns the types of all components and resources in this World.
     pub fn present_types(&self) -> BTreeSet<TypeId> {
         let archetypes = self.world.archetypes().iter().filter(|archetype| !archetype.is_empty());
@@ -152,6 +170,8 @@ impl GameCopy {
 pub(super) struct Plan<'a> {
     pub mode: &'a str,
     pub level: u64,
+    /// Another level, which a copy plays before this one.
+    pub before: Option<u64>,
     /// Random seed of the World and of the actions.
     pub seed: u64,
 }

@@ -144,10 +144,18 @@ impl Safety {
 }
 
 /// Judges the uses by the results of the comparisons.
-pub(super) fn assess_safety(comparisons: &[ComparisonReport], observation: &ObservationReport) -> Safety {
-    let verdict = |needed: &[DoctorComparison]| verdict(comparisons, needed);
-    let mut resume = verdict(&[DoctorComparison::Repeat, DoctorComparison::Restart]);
-    let mut recording = verdict(&[DoctorComparison::Repeat, DoctorComparison::Archetypes, DoctorComparison::Restart]);
+pub(super) fn assess_safety(
+    first_level: u64,
+    comparisons: &[ComparisonReport],
+    observation: &ObservationReport,
+) -> Safety {
+    let verdict = |needed: &[DoctorComparison]| verdict(first_level, comparisons, needed);
+    let has_other = comparisons.iter().any(|report| report.comparison == DoctorComparison::OtherLevel);
+    let other = has_other.then_some(DoctorComparison::OtherLevel);
+    let with_other = |needed: &[DoctorComparison]| needed.iter().copied().chain(other).collect::<Vec<_>>();
+    let mut resume = verdict(&with_other(&[DoctorComparison::Repeat, DoctorComparison::Restart]));
+    let mut recording =
+        verdict(&with_other(&[DoctorComparison::Repeat, DoctorComparison::Archetypes, DoctorComparison::Restart]));
     for verdict in [&mut recording, &mut resume] {
         if verdict.safe == Some(true) && !observation.state_hash {
             verdict.why = "but the game writes no StateHash, so that a replay compares little".to_owned();
@@ -164,11 +172,12 @@ pub(super) fn assess_safety(comparisons: &[ComparisonReport], observation: &Obse
 }
 
 /// Returns safe if all these comparisons found nothing, unsafe if one of them did.
-fn verdict(reports: &[ComparisonReport], needed: &[DoctorComparison]) -> Verdict {
+fn verdict(first_level: u64, reports: &[ComparisonReport], needed: &[DoctorComparison]) -> Verdict {
     let comparisons = needed.to_vec();
     let mut of_needed = reports.iter().filter(|report| needed.contains(&report.comparison));
     if let Some(bad) = of_needed.clone().find(|report| report.same() == Some(false)) {
-        let why = format!("differs {}", bad.comparison.describe());
+        let is_of_first = bad.before.is_none() && bad.level == first_level;
+        let why = format!("differs {}{}", if is_of_first { "" } else { "on " }, bad.describe(first_level));
         let why =
             if bad.fault.is_some() && bad.difference().is_none() { "the game has a fault".to_owned() } else { why };
         return Verdict { safe: Some(false), why, comparisons };

@@ -14,13 +14,12 @@ use std::{
 impl Display for DoctorReport {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self { game, version, mode, level, ticks, .. } = self;
-        writeln!(f, "{game} (version {version}), mode {mode}, level {level}\n")?;
+        writeln!(f, "{game} (version {version}), mode {mode}, {}\n", self.levels())?;
+        let played = if self.further_levels.is_empty() { "this level".to_owned() } else { format!("level {level}") };
         let ticks = counted(u64::from(*ticks), "tick");
-        writeln!(f, "Copies of the game played this level for {ticks} with the same random actions, and were")?;
+        writeln!(f, "Copies of the game played {played} for {ticks} with the same random actions, and were")?;
         writeln!(f, "compared after each tick. When an episode ended, the same level began again.")?;
-        for report in &self.comparisons {
-            writeln!(f, "  {:<26}{}", report.comparison.describe(), outcome(report))?;
-        }
+        self.write_comparisons(f)?;
         writeln!(f)?;
         for (number, finding) in self.findings.iter().enumerate() {
             self.write_finding(f, number + 1, finding)?;
@@ -30,6 +29,16 @@ impl Display for DoctorReport {
         write!(f, "{}{}", self.observation, self.types)?;
         if let Some(steps) = &self.unequal_steps {
             write!(f, "{steps}")?;
+        }
+        if self.holds_keys {
+            writeln!(
+                f,
+                "Keys: an action that is chosen again holds its keys. `just_pressed` is true in its first tick only,"
+            )?;
+            writeln!(
+                f,
+                "  so a game that reads it acts once, however long `chaos` or `explore --sticky` repeat the action."
+            )?;
         }
         if let Some(speed) = self.ticks_per_second {
             writeln!(f, "Speed: {speed:.0} ticks per second of one arena in one World")?;
@@ -47,6 +56,29 @@ impl Display for DoctorReport {
 }
 
 impl DoctorReport {
+    /// Returns the levels, such as `level 0`, or `levels 0, 3 and 7`.
+    fn levels(&self) -> String {
+        let Some((last, others)) = self.further_levels.split_last() else { return format!("level {}", self.level) };
+        let others: Vec<String> = std::iter::once(&self.level).chain(others).map(u64::to_string).collect();
+        format!("levels {} and {last}", others.join(", "))
+    }
+
+    fn write_comparisons(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let mut level = self.level;
+        for report in &self.comparisons {
+            if report.level != level {
+                level = report.level;
+                writeln!(f, "Then level {level}, in fewer ways: `--level {level}` alone makes all comparisons on it.")?;
+            }
+            let title = match report.before {
+                Some(before) => format!("after level {before}"),
+                None => report.comparison.describe().to_owned(),
+            };
+            writeln!(f, "  {title:<26}{}", outcome(report))?;
+        }
+        Ok(())
+    }
+
     fn write_notes(&self, f: &mut Formatter<'_>) -> fmt::Result {
         if self.notes.is_empty() {
             return Ok(());
@@ -66,19 +98,18 @@ impl DoctorReport {
     }
 
     fn write_safety(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { level, seed, ticks, .. } = self;
+        let Self { level, further_levels, seed, ticks, .. } = self;
         writeln!(f, "Safe for")?;
         let verdicts = self.safety.all();
         for (what, verdict) in verdicts {
             writeln!(f, "  {what:<26}{}", in_words(verdict))?;
         }
         if verdicts.iter().any(|(_, verdict)| verdict.safe == Some(true)) {
-            let (longer, level, seed) = (ticks.saturating_mul(10), level.wrapping_add(1), seed.wrapping_add(1));
-            writeln!(
-                f,
-                "  \"yes\" means that no difference was found in {} of this one level, not that there",
-                counted(u64::from(*ticks), "tick")
-            )?;
+            let last = further_levels.iter().fold(*level, |last, level| last.max(*level));
+            let (longer, level, seed) = (ticks.saturating_mul(10), last.wrapping_add(1), seed.wrapping_add(1));
+            let played = if further_levels.is_empty() { "this one level".to_owned() } else { self.levels() };
+            let ticks = counted(u64::from(*ticks), "tick");
+            writeln!(f, "  \"yes\" means that no difference was found in {ticks} of {played}, not that there")?;
             writeln!(
                 f,
                 "  is none: `--ticks {longer}` plays longer, `--level {level}` another level, `--seed {seed}` other actions."
@@ -89,7 +120,8 @@ impl DoctorReport {
 
     fn write_finding(&self, f: &mut Formatter<'_>, number: usize, finding: &DoctorFinding) -> fmt::Result {
         writeln!(f, "{number}. {}", finding.what)?;
-        let report = finding.comparison.and_then(|comparison| self.of(comparison));
+        let made = (finding.comparison, finding.level);
+        let report = self.comparisons.iter().find(|report| (Some(report.comparison), Some(report.level)) == made);
         if let (Some(difference), Some(report)) = (&finding.difference, report) {
             let (left, right) = report.comparison.sides();
             writeln!(f, "     {left}: {}\n     {right}: {}", difference.left, difference.right)?;

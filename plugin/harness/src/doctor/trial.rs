@@ -29,7 +29,8 @@ const WITHOUT_SNAPSHOT: u32 = 64;
 
 /// Copies of a game that are compared.
 pub(super) struct Trial<'a> {
-    comparison: DoctorComparison,
+    /// The report without results.
+    planned: ComparisonReport,
     game: &'a dyn Game,
     /// The copies. The observations of the first one are monitored.
     pub copies: Vec<GameCopy>,
@@ -45,13 +46,15 @@ pub(super) struct Trial<'a> {
 
 impl<'a> Trial<'a> {
     /// Builds the copies.
-    pub fn new(comparison: DoctorComparison, game: &'a dyn Game, plan: &Plan, ticks: u32) -> Self {
+    pub fn new(planned: ComparisonReport, game: &'a dyn Game, plan: &Plan, ticks: u32) -> Self {
+        let comparison = planned.comparison;
         let one = |number: u32| GameCopy::new(game, plan, number, 1);
         let (mut copies, pairs) = match comparison {
             DoctorComparison::Repeat
             | DoctorComparison::Clock
             | DoctorComparison::Restart
-            | DoctorComparison::Snapshots => (vec![one(0), one(0)], vec![(0, 1)]),
+            | DoctorComparison::Snapshots
+            | DoctorComparison::OtherLevel => (vec![one(0), one(0)], vec![(0, 1)]),
             DoctorComparison::Archetypes => {
                 ((0..=VARIANTS).map(|_| one(0)).collect(), (1..=VARIANTS as usize).map(|right| (0, right)).collect())
             }
@@ -66,11 +69,11 @@ impl<'a> Trial<'a> {
             DoctorComparison::Archetypes => {
                 copies.iter_mut().zip(0..).for_each(|(copy, count)| add_archetypes(&mut copy.world, count));
             }
-            DoctorComparison::Restart => copies[1].play_prelude(ticks),
+            DoctorComparison::Restart | DoctorComparison::OtherLevel => copies[1].play_prelude(plan, ticks),
             _ => {}
         }
         let on_threads = if comparison == DoctorComparison::Threads { 2 } else { 0 };
-        Self { comparison, game, copies, pairs, on_threads, returns: 0, not_loaded: None }
+        Self { planned, game, copies, pairs, on_threads, returns: 0, not_loaded: None }
     }
 
     /// Plays, and compares after every tick. State is compared until an agent notices a difference, and if none does,
@@ -82,7 +85,7 @@ impl<'a> Trial<'a> {
         left_out: &LeftOut,
         mut monitor: Option<&mut ObservationMonitor>,
     ) -> TrialResult {
-        let mut report = ComparisonReport::new(self.comparison);
+        let mut report = self.planned.clone();
         let mut incomparable = Default::default();
         if self.on_threads > 0 && is_bound_to_its_thread(&self.copies[0].world) {
             let why = "the game has data for one thread alone (Bevy's non-send data), so its Worlds are not shared out";
@@ -96,7 +99,7 @@ impl<'a> Trial<'a> {
             if tick >= ticks && !is_undecided {
                 break;
             }
-            if self.comparison == DoctorComparison::Snapshots && !self.return_by_snapshot(tick) {
+            if self.planned.comparison == DoctorComparison::Snapshots && !self.return_by_snapshot(tick) {
                 break;
             }
             self.tick();
@@ -115,7 +118,7 @@ impl<'a> Trial<'a> {
             is_over = self.copies[0].end(0).is_some();
             self.copies.iter().for_each(|copy| known_types.learn(&copy.world));
             if report.effect.is_none() && all.len() < MOST_DIFFERENCES {
-                let (comparison, ignored) = (self.comparison, left_out.ignored);
+                let (comparison, ignored) = (self.planned.comparison, left_out.ignored);
                 let mut comparer = Comparer { known_types, comparison, ignored, incomparable };
                 self.compare(tick, &mut comparer, left_out, &mut report, &mut all);
                 incomparable = comparer.incomparable;
@@ -125,17 +128,17 @@ impl<'a> Trial<'a> {
                 report.effect = pairs.find_map(|&(left, right)| effect(&self.copies[left], &self.copies[right], tick));
             }
         }
-        if self.comparison == DoctorComparison::Archetypes && report.effect.is_none() {
+        if self.planned.comparison == DoctorComparison::Archetypes && report.effect.is_none() {
             all.clear();
         }
-        if self.comparison == DoctorComparison::Snapshots && report.same() == Some(true) {
+        if self.planned.comparison == DoctorComparison::Snapshots && report.same() == Some(true) {
             report.skipped = self.reason_without_snapshots(report.ticks);
             if report.skipped.is_some() {
                 all.clear();
             }
         }
         // A later difference is not the cause of an earlier one.
-        all.sort_by_key(|of| (of.tick, likelihood(self.comparison, of), rank(self.comparison, of)));
+        all.sort_by_key(|of| (of.tick, likelihood(self.planned.comparison, of), rank(self.planned.comparison, of)));
         let mut all = all.into_iter();
         (report.first, report.others) = (all.next(), all.collect());
         TrialResult { report, incomparable }
@@ -203,7 +206,7 @@ pub(super) struct LeftOut<'a> {
 
 impl DoctorDifference {
     /// Returns whether both are in the same field of the same type.
-    fn has_field_of(&self, other: &Self) -> bool {
+    pub(super) fn has_field_of(&self, other: &Self) -> bool {
         (self.kind, &self.name, &self.field) == (other.kind, &other.name, &other.field)
     }
 }

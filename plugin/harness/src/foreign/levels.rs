@@ -10,7 +10,7 @@ use crate::{
     level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
 };
 use bevy::prelude::*;
-use bevy_playbot::state_hash::StateHash;
+use bevy_playbot::{engine::GameCall, state_hash::StateHash};
 use std::{
     any::{Any, TypeId, type_name},
     fmt::Display,
@@ -582,6 +582,10 @@ impl ForeignGame {
 }
 
 impl LevelTools for ForeignGame {
+    fn level_count(&self) -> Option<u64> {
+        self.description.levels
+    }
+
     fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
         self.description.level_parts.parser.as_ref().map(|parser| match &parser.parse {
             ParseFile::Text(parse) => parse(text),
@@ -597,6 +601,7 @@ impl LevelTools for ForeignGame {
     }
 
     fn layout_hash(&self, mode: &str, level: u64) -> Option<u64> {
+        let _call = GameCall::begin("hashing the layout of", [level]);
         let declared = self.of_level((mode, level), self.description.level_parts.layout.as_ref(), None);
         declared.or_else(|| self.editor_level(mode, level).map(|drawn| drawn.layout))
     }
@@ -611,6 +616,7 @@ impl LevelTools for ForeignGame {
     }
 
     fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
+        let _call = GameCall::begin("drawing the floor plan of", [level]);
         let LevelParts { plan, plan_of_file, .. } = &self.description.level_parts;
         let declared = self.of_level((mode, level), plan.as_ref(), plan_of_file.as_ref());
         declared.or_else(|| self.editor_level(mode, level).map(|drawn| drawn.plan.clone()))

@@ -5,7 +5,7 @@ use bevy_playbot::{action::ActionValue, bot::BlindBot, state_hash::StateHash};
 use playbot_harness::{
     detector::LevelProof,
     eval::{EvalError, Player},
-    game::idle_action,
+    game::{idle_action, prove_level},
     split::LevelSplit,
 };
 use playbot_test::{
@@ -171,8 +171,7 @@ pub(super) fn search(trial: &Trial, explorer: &Explorer) -> Result<Option<JobRes
         return Ok(None);
     }
     let ticks = found.solution_ticks();
-    let proof =
-        if ticks.is_some() { LevelProof::Solvable } else { trial.game.tools().levels.prove(trial.mode, trial.level) };
+    let proof = if ticks.is_some() { LevelProof::Solvable } else { prove_level(trial.game, trial.mode, trial.level) };
     let unsolvable = proof.why_unsolvable().map(str::to_owned);
     let seconds = trial.clock.seconds();
     let shortened = shortened_exploration(trial, &sightings);

@@ -17,7 +17,7 @@ use bevy_playbot::{
 use playbot_harness::{
     detector,
     detector::{Detector, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher},
-    game::Game,
+    game::{Game, prove_level},
 };
 use playbot_report::counted;
 use std::{cell::RefCell, rc::Rc, sync::Arc};
@@ -103,7 +103,7 @@ fn is_broken(head: &FindingHead, replayed: &Replayed) -> Option<u32> {
 
 /// Checks that the goal is still proved to be out of reach.
 fn is_unreachable(game: &dyn Game, mode: &str, level: u64) -> bool {
-    game.tools().levels.prove(mode, level).why_unsolvable().is_some()
+    prove_level(game, mode, level).why_unsolvable().is_some()
 }
 
 /// Checks that the game ends the episode before the goal. Returns the tick of the end.

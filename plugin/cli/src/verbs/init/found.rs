@@ -22,6 +22,33 @@ const RANDOM: [&str; 9] = [
 /// Clocks of the machine.
 const CLOCKS: [&str; 5] = ["Instant::now", "SystemTime", "Time<Real>", "Utc::now", "Local::now"];
 
+/// Files that are read while the game runs, besides assets.
+const FILES: [&str; 5] = ["read_dir(", "fs::read", "read_to_string(", "File::open", "WalkDir::new"];
+
+/// Code that leaves a level, or goes on to another one.
+const LEAVES: [&str; 20] = [
+    "AppExit",
+    "process::exit",
+    "next_level",
+    "NextLevel",
+    "skip_level",
+    "SkipLevel",
+    "previous_level",
+    "PreviousLevel",
+    "prev_level",
+    "change_level",
+    "level += 1",
+    "level -= 1",
+    "level.0 += 1",
+    "level.0 -= 1",
+    "level + 1",
+    "level.0 + 1",
+    "level_index += 1",
+    "::Menu)",
+    "::MainMenu)",
+    "::LevelSelect)",
+];
+
 /// Crates that load levels or assets while the game runs.
 const LOADERS: [&str; 3] = ["bevy_ecs_ldtk", "bevy_ecs_tiled", "bevy_asset_loader"];
 
@@ -317,6 +344,16 @@ pub(super) struct StateEnum {
     pub variants: Vec<String>,
 }
 
+/// The folder of assets that a game sets.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct AssetFolder {
+    /// Where it is set.
+    #[serde(flatten)]
+    pub at: SourceLine,
+    /// Its path from the folder of the package, if it is written there.
+    pub path: Option<String>,
+}
+
 /// All that the sources show.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(super) struct GameFacts {
@@ -330,6 +367,12 @@ pub(super) struct GameFacts {
     pub states: Vec<StateEnum>,
     /// Keys that are read.
     pub keys: Vec<String>,
+    /// Keys behind which the code leaves a level or goes on to another one.
+    pub leaving_keys: Vec<SourceLine>,
+    /// Those of them that are also read elsewhere.
+    pub also_playing: Vec<String>,
+    /// Lines that ask whether a key was just pressed.
+    pub presses: Vec<SourceLine>,
     /// Mouse buttons that are read.
     pub mouse_buttons: Vec<String>,
     /// Devices and managers of input.
@@ -350,6 +393,10 @@ pub(super) struct GameFacts {
     pub loaders: Vec<&'static str>,
     /// Lines that load assets.
     pub loads: Vec<SourceLine>,
+    /// The folder of assets, if it is another one than `assets`.
+    pub asset_folder: Option<AssetFolder>,
+    /// Lines that read other files.
+    pub files: Vec<SourceLine>,
     /// The component that looks like the player.
     pub player: Option<NamedItem>,
 }
@@ -364,6 +411,7 @@ impl GameFacts {
             let prefix = door.and_then(|door| prefix(door, source));
             facts.read_source(source, prefix.as_deref());
         }
+        facts.also_playing.retain(|key| facts.leaving_keys.iter().any(|leaving| leaving.name == *key));
         let rank = |item: &NamedItem| match item.at.name.as_str() {
             "plugin" => 0,
             "game" => 1,
@@ -392,6 +440,14 @@ impl GameFacts {
             self.states.push(StateEnum { at: source.at(item.name, item.offset), variants: variants(item.rest) });
         }
         add_new(&mut self.keys, names_behind(code, "KeyCode::"));
+        for (key, offset) in keys_in(code) {
+            if LEAVES.iter().any(|word| reaction(code, offset).contains(word)) {
+                self.leaving_keys.push(source.at(key, offset));
+            } else {
+                add_new(&mut self.also_playing, vec![key.to_owned()]);
+            }
+        }
+        self.presses.extend(source.lines_with(&["just_pressed"]));
         add_new(&mut self.mouse_buttons, names_behind(code, "MouseButton::"));
         if code.contains("Interaction") || code.contains("Pointer<") {
             add_new(&mut self.buttons, button_texts(code));
@@ -407,6 +463,10 @@ impl GameFacts {
         if code.contains("AssetServer") {
             self.loads.extend(source.lines_with(&[".load(", ".load_folder("]));
         }
+        self.files.extend(source.lines_with(&FILES));
+        if let Some((offset, path)) = asset_folder(code) {
+            self.asset_folder = Some(AssetFolder { at: source.at("AssetPlugin", offset), path });
+        }
         for item in deriving(code, "Component", "struct ") {
             let Some(rank) = PLAYERS.iter().position(|name| *name == item.name) else { continue };
             let earlier =
@@ -416,6 +476,11 @@ impl GameFacts {
                 self.player = Some(NamedItem { at: source.at(item.name, item.offset), path });
             }
         }
+    }
+
+    /// Returns whether a key leaves or skips levels wherever it is read.
+    pub fn only_leaves(&self, key: &str) -> bool {
+        self.leaving_keys.iter().any(|leaving| leaving.name == key) && !self.also_playing.iter().any(|also| also == key)
     }
 
     fn add_inputs(&mut self, sources: &[SourceText]) {
@@ -473,6 +538,60 @@ fn names_behind(code: &str, path: &str) -> Vec<String> {
         add_new(&mut found, names.into_iter().filter(is_variant).map(str::to_owned).collect());
     }
     found
+}
+
+/// Returns the keys that code names one by one, with their offsets, but for imports.
+fn keys_in(code: &str) -> Vec<(&str, usize)> {
+    let found = code.match_indices("KeyCode::").filter_map(|(at, path)| {
+        let line = code[..at].rsplit('\n').next().unwrap_or_default().trim_start();
+        let key = name(&code[at + path.len()..]);
+        let is_key = key.starts_with(|c: char| c.is_uppercase()) && !code[..at].ends_with(is_of_name);
+        (is_key && !line.trim_start_matches("pub ").starts_with("use ")).then_some((key, at))
+    });
+    found.collect()
+}
+
+/// Returns the code that depends on the key that stands there: the block behind it, the arm of a match, or the line of a
+/// condition of a system. Behind a guard that returns without the key it is the rest of the function.
+fn reaction(code: &str, at: usize) -> &str {
+    let begin = code[..at].rfind('\n').map_or(0, |end| end + 1);
+    let line = code[begin..].lines().next().unwrap_or_default();
+    if ["input_just_pressed(", "input_pressed(", "run_if("].iter().any(|condition| line.contains(condition)) {
+        return line;
+    }
+    let rest = &code[at..];
+    let is_guard = |text: &str| text.split_once('{').is_some_and(|(_, block)| block.trim_start().starts_with("return"));
+    let (mut depth, mut is_arm, mut before) = (0_i32, false, ' ');
+    for (length, c) in rest.char_indices() {
+        let behind = &rest[..length];
+        match c {
+            '{' => depth += 1,
+            '}' => depth -= 1,
+            '>' if before == '=' => is_arm = true,
+            _ => {}
+        }
+        let is_over = match c {
+            '}' => depth < 0 || depth == 0 && !is_guard(behind),
+            ';' => depth == 0 && !is_guard(behind),
+            ',' => depth == 0 && is_arm,
+            _ => false,
+        };
+        if is_over {
+            return behind;
+        }
+        before = c;
+    }
+    rest
+}
+
+/// Returns the offset where the code sets the folder of its assets, and the path, if it is a text.
+fn asset_folder(code: &str) -> Option<(usize, Option<String>)> {
+    code.match_indices("AssetPlugin {").find_map(|(at, words)| {
+        let fields = code[at + words.len()..].split('}').next()?;
+        let (_, value) = fields.split_once("file_path")?;
+        let text = value.trim_start().strip_prefix(':').and_then(|value| value.trim_start().strip_prefix('"'));
+        Some((at, text.and_then(|text| text.split('"').next()).map(str::to_owned)))
+    })
 }
 
 /// Returns the public functions that take `&mut App` alone, with their offsets.
@@ -682,6 +801,41 @@ mod tests {
         assert_eq!(lines(&found.unseeded), [3, 5, 9], "{:?}", found.unseeded);
         assert_eq!(lines(&found.seeded), [4, 6]);
         assert_eq!((lines(&found.clocks), lines(&found.loads)), (vec![7], vec![8]));
+    }
+
+    #[test]
+    fn keys_that_leave_or_skip_levels_are_told_from_those_that_play() {
+        let code = "use bevy::prelude::KeyCode::KeyQ;\n\
+            fn play(keys: Res<ButtonInput<KeyCode>>) {\n    if keys.just_pressed(KeyCode::ArrowLeft) { step(-1); }\n    \
+            if keys.just_pressed(KeyCode::Escape) {\n        exit.write(AppExit::Success);\n    }\n    \
+            if keys.just_pressed(KeyCode::Space) && won.0 {\n        level.0 += 1;\n    }\n    \
+            if keys.pressed(KeyCode::Space) { jump(); }\n}\n\
+            fn cheat(keys: Res<ButtonInput<KeyCode>>) {\n    if !keys.just_pressed(KeyCode::KeyN) {\n        return;\n    }\n    \
+            level.0 = (level.0 + 1) % 3;\n}\n\
+            fn menu(key: KeyCode) { match key { KeyCode::KeyM => next.set(Screen::Menu), KeyCode::KeyX => fire(), _ => {} } }\n\
+            fn add(app: &mut App) {\n    app.add_systems(Update, (\n        walk,\n        \
+            skip_level.run_if(input_just_pressed(KeyCode::PageDown)),\n        shoot.run_if(input_just_pressed(KeyCode::KeyZ)),\n    ));\n}";
+        let found = facts(&[("src/lib.rs", code)]);
+        let leaving: Vec<_> = found.leaving_keys.iter().map(|at| (at.name.as_str(), at.line)).collect();
+        assert_eq!(leaving, [("Escape", 4), ("Space", 7), ("KeyN", 13), ("KeyM", 18), ("PageDown", 22)]);
+        assert_eq!(found.also_playing, ["Space"]);
+        let only = |key: &str| found.only_leaves(key);
+        assert_eq!(["KeyN", "Space", "KeyX", "KeyZ", "ArrowLeft"].map(only), [true, false, false, false, false]);
+    }
+
+    #[test]
+    fn files_and_the_folder_of_assets_have_their_lines() {
+        let code = "use std::fs;\nfn levels() { fs::read_dir(\"levels\"); }\nfn level() { fs::read_to_string(\"a\"); }\n\
+            fn main() { App::new().add_plugins(DefaultPlugins.set(AssetPlugin {\n    file_path: \"data/art\".into(),\n    ..default()\n})); }";
+        let found = facts(&[("src/main.rs", code)]);
+        let lines: Vec<_> = found.files.iter().map(|at| (at.name.as_str(), at.line)).collect();
+        assert_eq!(lines, [("read_dir(", 2), ("fs::read", 3)]);
+        let folder = found.asset_folder.expect("it is set");
+        assert_eq!((folder.at.line, folder.path.as_deref()), (4, Some("data/art")));
+        let computed = code.replace("file_path: \"data/art\".into()", "file_path");
+        assert_eq!(facts(&[("src/main.rs", &computed)]).asset_folder.expect("it is set").path, None);
+        let plain = code.replace("file_path: \"data/art\".into(),", "");
+        assert_eq!(facts(&[("src/main.rs", &plain)]).asset_folder, None);
     }
 
     #[test]
