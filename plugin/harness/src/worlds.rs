@@ -2,12 +2,13 @@
 
 use crate::{
     benchmark::{StageClock, add_readings},
-    game::{Game, level_designs},
+    game::{Game, idle_action, level_designs},
     level_files::is_level_files,
     sensors::GameSensors,
 };
 use bevy::prelude::*;
 use bevy_playbot::{
+    action::ActionValue,
     agent::Agent,
     engine::{
         AgentLimit, Renewal, headless_frame_app, into_world,
@@ -17,6 +18,7 @@ use bevy_playbot::{
     episode::{EpisodeEnded, EpisodeResult},
     fault::{Fault, Faults},
     headless::{HeadlessPlugins, headless_app},
+    legal::IdleAction,
     observation::VectorSensor,
     placement::TickPlacement,
     streams::PlaybotSeed,
@@ -195,6 +197,9 @@ pub fn add_game(
     seed: u64,
 ) -> Result<(), VisionError> {
     app.insert_resource(PlaybotSeed(seed));
+    if let ActionValue::Discrete(idle) = idle_action(game) {
+        app.insert_resource(IdleAction(idle));
+    }
     let host = game.tools().host;
     if let Some(arenas) = host.arenas_per_world() {
         let most = arenas.saturating_mul(host.agents_per_arena().max(1));
