@@ -11,7 +11,7 @@ use playbot_test::{
     findings::{FINDINGS, list_findings},
     verdict::{
         AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, ResultLines, SUMMARY, TesterTotal,
-        Trials, wilson, write_reports,
+        Trials, action_search, wilson, write_reports,
     },
     verdict_report::{HtmlReport, REPORT, write_html},
 };
@@ -83,6 +83,7 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     report!("{}", counts(&overview));
     overview.first_tick().iter().for_each(|levels| report!("{levels}"));
     stops(&overview).iter().for_each(|line| report!("{line}"));
+    search(&overview).iter().for_each(|line| report!("{line}"));
     replays(results.folder, &overview).iter().for_each(|line| report!("{line}"));
     if let Some(comparison) = &comparison {
         report_comparison(comparison);
@@ -97,6 +98,13 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
 fn stops(overview: &Overview) -> Vec<String> {
     let stop = |level: &LevelVerdict| level.stop.as_ref().map(|stop| format!("{}: {stop}", level.level));
     overview.worst.iter().filter_map(stop).take(MOST_STOPS).collect()
+}
+
+/// Returns the command that looks for actions without an effect, for the worst level that no tester solved.
+fn search(overview: &Overview) -> Option<String> {
+    let command = |level| action_search(program::name(), &overview.record, level);
+    let (level, command) = overview.worst.iter().find_map(|level| Some((&level.level, command(level)?)))?;
+    Some(format!("{level}: to learn which actions do nothing there, or stop working: {command}"))
 }
 
 /// Returns the commands that show findings of the worst levels, and the list of other files.
