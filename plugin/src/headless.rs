@@ -38,7 +38,7 @@ mod bevy_parts;
 
 use crate::{
     agent::{Agent, Control},
-    episode::{Episode, Tick},
+    episode::{Episode, Tick, with_moments},
     fault::{Fault, Faults},
     loading::{deliver_between_frames, wait_for_assets},
     panics,
@@ -156,7 +156,7 @@ pub fn tick_world(world: &mut World) -> Result<(), Fault> {
     if let Some(mut faults) = world.get_resource_mut::<Faults>() {
         faults.set_caller(true);
     }
-    let ticked = panics::guard(world, run_frames);
+    let ticked = with_moments(|| panics::guard(world, run_frames));
     // A World that has panicked may have lost the note.
     if let Some(mut faults) = world.get_resource_mut::<Faults>() {
         faults.set_caller(false);

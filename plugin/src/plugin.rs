@@ -101,6 +101,7 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
                 reward::clear_rewards,
                 episode::begin_episodes,
                 skill_prior::end_skills,
+                episode::note_moment,
             )
                 .chain()
                 .in_set(PlaybotSystems::Begin),
