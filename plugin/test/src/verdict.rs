@@ -51,7 +51,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 pub use crate::verdict::{
-    compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange, UnreachedSquares},
+    compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange, RecordedFurther, UnreachedSquares},
     error::TestError,
     folder::{Earlier, TestFolder},
     maps::{FailurePath, LevelMaps, LevelPars, MapScope, SkillTicks, hash_of_files, level_name},

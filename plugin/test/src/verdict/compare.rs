@@ -3,17 +3,21 @@
 #[cfg(test)]
 mod tests;
 
-use crate::verdict::{
-    LevelVerdict, Shard, TesterVerdict,
-    error::TestError,
-    maps::LevelMaps,
-    plan::TestRecord,
-    results::ResultLines,
-    statistics::{Trials, benjamini_hochberg, fisher_exact},
-    track::ReachedCells,
+use crate::{
+    findings::{RecordedCourse, course_of_recording},
+    verdict::{
+        LevelOutcome, LevelVerdict, Shard, TesterVerdict,
+        error::TestError,
+        maps::LevelMaps,
+        plan::TestRecord,
+        results::ResultLines,
+        statistics::{Trials, benjamini_hochberg, fisher_exact},
+        track::ReachedCells,
+    },
 };
 use bevy::math::Vec2;
-use playbot_harness::level_files::is_level_files;
+use bevy_playbot::demo::file::{DemoEpisode, DemoReader};
+use playbot_harness::{game::Game, level_files::is_level_files, split::LevelSplit};
 use playbot_report::counted;
 use serde::Serialize;
 use std::{
@@ -393,6 +397,87 @@ impl Known {
     fn repeats(&self, other: &Self) -> bool {
         self.draws == other.draws || self.testers.iter().chain(&other.testers).all(|tester| tester.exact)
     }
+}
+
+// Comparison with the recordings of an earlier build.
+
+/// A level that a recorded episode has solved and that no tester solves now, with the course of the recorded actions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedFurther {
+    /// The level.
+    pub level: String,
+    /// Ticks of the recorded episode.
+    pub ticks: u64,
+    /// The course of its actions in the present game.
+    pub course: RecordedCourse,
+}
+
+impl RecordedFurther {
+    /// Plays a recording's solved episodes on those levels that the results in a folder have as unsolved: the first one
+    /// of each level.
+    ///
+    /// # Errors
+    ///
+    /// The results or the recording cannot be read, or the recording is of other levels.
+    pub fn read(game: &dyn Game, folder: &Path, recording: &Path) -> Result<Vec<Self>, TestError> {
+        let mut lines = ResultLines::open_whole(folder)?;
+        let range = lines.record().range.clone();
+        let mut recorded = recorded_levels(game, &range, recording)?;
+        let mut found = Vec::new();
+        while let Some(level) = lines.next_level()? {
+            let is_unsolved = level.outcome != LevelOutcome::Solved;
+            let Some(episode) = recorded.remove(&(range.first + level.index)).filter(|_| is_unsolved) else { continue };
+            let course = course_of_recording(game, &range.mode, &episode);
+            found.push(Self { level: level.level, ticks: episode.len() as u64, course });
+        }
+        Ok(found)
+    }
+
+    /// Checks before a test that a recording can be compared with it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read`](Self::read), as far as known in advance.
+    pub fn check(game: &dyn Game, range: &LevelSplit, recording: &Path) -> Result<(), TestError> {
+        recorded_levels(game, range, recording).map(drop)
+    }
+}
+
+impl fmt::Display for RecordedFurther {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { level, ticks, course: RecordedCourse { differs, position, furthest, is_solved } } = self;
+        let at = |place: &Vec2| format!("({:.1}, {:.1})", place.x, place.y);
+        write!(f, "{level}: the recording solves it in {}; its actions ", counted(*ticks, "tick"))?;
+        match differs {
+            None => return f.write_str("still do, so the testers are too weak"),
+            Some(tick) => write!(f, "lead elsewhere from tick {tick} on")?,
+        }
+        position.iter().try_for_each(|position| write!(f, ", at {}", at(position)))?;
+        if *is_solved {
+            return f.write_str(", and still reach the goal");
+        }
+        f.write_str(", and do not reach the goal")?;
+        furthest.iter().try_for_each(|furthest| write!(f, ": they come no further than {}", at(furthest)))
+    }
+}
+
+/// Returns the first solved episode of each level of a range.
+fn recorded_levels(
+    game: &dyn Game,
+    range: &LevelSplit,
+    recording: &Path,
+) -> Result<BTreeMap<u64, DemoEpisode>, TestError> {
+    let mut levels = BTreeMap::new();
+    for episode in DemoReader::open_for_game(recording, game.name(), game.version(), Some(&range.mode))? {
+        let episode = episode?;
+        if episode.is_success() && range.contains(&range.mode, episode.level_seed) {
+            levels.entry(episode.level_seed).or_insert(episode);
+        }
+    }
+    if levels.is_empty() {
+        return Err(TestError::NothingRecorded { path: recording.into(), range: range.to_string() });
+    }
+    Ok(levels)
 }
 
 /// A level whose difference may be chance.
