@@ -96,7 +96,7 @@ impl LegalActions {
 pub struct IdleAction(pub u32);
 
 /// Replaces an illegal action by a drawn one instead of the idle one, for random actions that are drawn before the tick,
-/// when its mask is not known yet. Has no effect without [`LegalActions`].
+/// when its mask is not known yet. It works under [`Control::Replay`] too. Has no effect without [`LegalActions`].
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Component, CarryComponent, Clone, Debug, PartialEq)]
 pub struct RedrawsIllegal {
@@ -128,7 +128,8 @@ pub(crate) fn keep_legal(
 ) {
     for (control, episode, legal, redraw, mut action) in &mut agents {
         let is_outside = action.discrete().is_some_and(|index| index as usize >= legal.0.len());
-        if *control != Control::Bot || !episode.is_running() || is_outside || legal.allows(&action.0) {
+        let is_bot = *control == Control::Bot || (*control == Control::Replay && redraw.is_some());
+        if !is_bot || !episode.is_running() || is_outside || legal.allows(&action.0) {
             continue;
         }
         let instead = match redraw {
