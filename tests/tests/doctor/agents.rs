@@ -117,3 +117,15 @@ fn the_random_actions_of_an_examination_are_legal() {
     assert!(legal >= 120, "{legal}");
     assert_eq!(illegal, 0);
 }
+
+#[test]
+fn a_game_in_which_no_action_holds_nothing_has_a_note_with_the_remedy() {
+    let report = examined(&masked(&Arc::default()));
+    let words =
+        "no action of turns holds nothing: while you hold no key, it gets action 0 (KeyA); add `vec![]` to its keys";
+    assert_eq!(report.without_idle.as_deref(), Some(words));
+    let text = report.to_string();
+    assert!(text.contains("Actions: no action of turns holds nothing") && text.ends_with(" 1 note."), "{text}");
+    let idle = ForeignGame::new("idle", 1, |_: &mut App| {}).keys([vec![], vec![KeyCode::KeyA]]);
+    assert_eq!(examined(&idle.observe(["x"], || [0.0]).time_limit(20)).without_idle, None);
+}

@@ -25,6 +25,7 @@ impl Display for DoctorReport {
         }
         self.write_notes(f)?;
         self.write_safety(f)?;
+        self.without_idle.iter().try_for_each(|problem| writeln!(f, "Actions: {problem}"))?;
         write!(f, "{}{}", self.observation, self.types)?;
         if let Some(steps) = &self.unequal_steps {
             write!(f, "{steps}")?;
@@ -37,7 +38,7 @@ impl Display for DoctorReport {
             1 => "1 finding.".to_owned(),
             count => format!("{count} findings."),
         };
-        let notes = match self.notes.len() {
+        let notes = match self.notes.len() + usize::from(self.without_idle.is_some()) {
             0 => String::new(),
             1 => " 1 note.".to_owned(),
             count => format!(" {count} notes."),
