@@ -288,10 +288,16 @@ fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec
 const OF_ACTIONS: [&str; 2] = ["dead-action", "fading-action"];
 
 /// Returns the command that looks for actions without an effect on a level that no tester solved, for the program of this
-/// name. `None` for other levels, or if the test looked for them.
+/// name. `None` for other levels, or if the test looked for them there.
 pub fn action_search(program: &str, record: &TestRecord, level: &LevelVerdict) -> Option<String> {
-    let has_looked =
-        |name: &str| record.detectors.iter().any(|detector| detector.split(' ').next().is_some_and(|it| it == name));
+    let has_looked = |name: &str| {
+        record.detectors.iter().any(|detector| {
+            let mut words = detector.split(' ');
+            let is_it = words.next() == Some(name);
+            let every = words.find_map(|setting| setting.strip_prefix("every=")?.parse::<f64>().ok());
+            is_it && level.index.is_multiple_of((every.unwrap_or(1.0) as u64).max(1))
+        })
+    };
     let missing: Vec<&str> = OF_ACTIONS.into_iter().filter(|name| !has_looked(name)).collect();
     if level.outcome != LevelOutcome::BotFailed || missing.is_empty() {
         return None;
@@ -435,10 +441,11 @@ mod tests {
         };
         assert_eq!(search(&record, &failed), command("dead-action,fading-action"));
         let mut looked = record.clone();
-        looked.detectors = vec!["stuck ticks=300".to_owned(), "dead-action every=10".to_owned()];
+        looked.detectors = vec!["stuck ticks=300".to_owned(), "dead-action every=1 moments=6".to_owned()];
         assert_eq!(search(&looked, &failed), command("fading-action"));
-        looked.detectors.push("fading-action every=10".to_owned());
-        assert_eq!(search(&looked, &failed), None);
+        looked.detectors.push("fading-action every=10 tries=40".to_owned());
+        assert_eq!(search(&looked, &failed), command("fading-action"), "it looked at every tenth level");
+        assert_eq!(search(&looked, &LevelVerdict { index: 20, ..failed.clone() }), None);
         assert_eq!(search(&record, &verdict(1, 4, 4)), None, "it was solved");
     }
 
