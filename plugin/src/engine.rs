@@ -11,6 +11,7 @@
 //! | begin an episode in a World as new | [`Renewal`], [`NextEpisode`], [`EpisodeSeeds`], [`LevelFiles`] |
 //! | find the tick of a game, whatever its frames | [`TickSchedules`], [`is_tick`], [`set_tick_rate`] |
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
+//! | name the tick in which a game logs a message | [`moment_of_thread`], [`EpisodeMoment`] |
 //! | name the assets that a game waits for | [`UnloadedAssets`] |
 //! | name the level of a call that does not return | [`GameCall`], [`SlowCalls`], [`SlowCall`] |
 //! | decide for many agents at once | [`PolicyBatch`], [`PolicyRows`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
@@ -47,6 +48,7 @@ pub use crate::{
         recorder::{demo_actions, flush_unfinished, record_ticks},
         replay::recorded_action,
     },
+    episode::{EpisodeMoment, moment_of_thread},
     fault::FaultSystems,
     headless::{headless_frame_app, into_world, run_on_one_thread, set_tick_rate, tick_world},
     key_bindings::TappedKeys,

@@ -43,6 +43,7 @@ use crate::{
 };
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::{cell::Cell, fmt};
 
 /// The end of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Reflect)]
@@ -236,6 +237,7 @@ pub(crate) fn begin_episodes(
     mut faults: ResMut<Faults>,
     mut commands: Commands,
 ) {
+    let mut begun = Vec::new();
     for ((entity, agent, mut control, mut episode), (mut queue, mut streams, seeds), mut reward) in &mut agents {
         if episode.is_running() || episode.is_loading() || !control.is_active() {
             continue;
@@ -244,8 +246,8 @@ pub(crate) fn begin_episodes(
             *control = Control::Idle;
             continue;
         };
-        if let Some(begun) = seeds.and_then(|mut seeds| seeds.next_streams()) {
-            *streams = begun;
+        if let Some(seeded) = seeds.and_then(|mut seeds| seeds.next_streams()) {
+            *streams = seeded;
         }
         let late = reward.start_episode();
         if late != 0.0 {
@@ -258,6 +260,11 @@ pub(crate) fn begin_episodes(
         *episode = Episode { level, state: EpisodeState::Running, ..default() };
         GameCall::add_level(level);
         commands.trigger(StartEpisode { entity, level });
+        begun.push(EpisodeMoment { level, tick: 0 });
+    }
+    // The observers that build these levels run next.
+    if !begun.is_empty() {
+        set_moment(begun.into_iter());
     }
 }
 
@@ -305,6 +312,60 @@ pub(crate) fn end_episodes(
     }
 }
 
+// The moment that a thread is at, for the messages of games in the log.
+
+/// A tick of an episode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct EpisodeMoment {
+    /// The level.
+    pub level: u64,
+    /// The tick, from 0.
+    pub tick: u32,
+}
+
+impl fmt::Display for EpisodeMoment {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "level {}, tick {}", self.level, self.tick)
+    }
+}
+
+thread_local! {
+    /// True while this thread ticks a World without a window, whose systems all run on it.
+    static TICKS: Cell<bool> = const { Cell::new(false) };
+    static MOMENT: Cell<Option<EpisodeMoment>> = const { Cell::new(None) };
+}
+
+/// Returns the tick that this thread runs. `None` outside of [`tick_world`](crate::headless::tick_world), or if the agents
+/// of the World are at several moments.
+pub fn moment_of_thread() -> Option<EpisodeMoment> {
+    MOMENT.get()
+}
+
+/// Runs a tick of a World on this thread, with [`moment_of_thread`].
+pub(crate) fn with_moments<T>(tick: impl FnOnce() -> T) -> T {
+    TICKS.set(true);
+    let ticked = tick();
+    TICKS.set(false);
+    MOMENT.set(None);
+    ticked
+}
+
+/// Notes the moment of this thread, if all agents are at the same one.
+fn set_moment(mut agents: impl Iterator<Item = EpisodeMoment>) {
+    if TICKS.get() {
+        let first = agents.next();
+        MOMENT.set(first.filter(|first| agents.all(|other| other == *first)));
+    }
+}
+
+/// Notes the moment of this tick.
+pub(crate) fn note_moment(agents: Query<(&Control, &Episode)>) {
+    let playing = agents
+        .iter()
+        .filter(|(control, episode)| control.is_active() && (episode.is_running() || episode.is_loading()));
+    set_moment(playing.map(|(_, episode)| EpisodeMoment { level: episode.level, tick: episode.tick }));
+}
+
 /// Number of fixed ticks since the World began.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Resource)]
@@ -312,4 +373,53 @@ pub struct Tick(pub u64);
 
 pub(crate) fn count_tick(mut tick: ResMut<Tick>) {
     tick.0 += 1;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{headless::run_on_one_thread, prelude::*};
+    use std::sync::{Arc, Mutex};
+
+    /// Returns the moments that a system and the observer that builds levels see, with so many agents.
+    fn seen(levels: &[u64]) -> Vec<Option<(u64, u32)>> {
+        let seen = Arc::<Mutex<Vec<_>>>::default();
+        let note = |seen: &Arc<Mutex<Vec<_>>>| {
+            let moment = moment_of_thread().map(|moment| (moment.level, moment.tick));
+            seen.lock().expect("no thread panics").push(moment);
+        };
+        let mut app = headless_app();
+        let (in_game, in_start) = (seen.clone(), seen.clone());
+        app.add_systems(FixedUpdate, move |mut episodes: Query<&mut Episode>| {
+            note(&in_game);
+            episodes.iter_mut().filter(|episode| episode.tick == 1).for_each(|mut episode| episode.truncate());
+        });
+        app.add_observer(move |_: On<StartEpisode>| note(&in_start));
+        for (index, level) in (0..).zip(levels) {
+            let queue = LevelQueue::list([*level, *level + 1]);
+            app.world_mut().spawn((
+                Agent::new(index, ActionSpace::Discrete(2)),
+                Control::Bot,
+                BlindBot::Uniform,
+                queue,
+            ));
+        }
+        run_on_one_thread(app.world_mut());
+        app.ticks(3).expect("no agent broke its contract");
+        assert_eq!(moment_of_thread(), None, "the tick is over");
+        let seen = seen.lock().expect("no thread panics");
+        seen.clone()
+    }
+
+    #[test]
+    fn a_thread_knows_level_and_tick_of_the_world_that_it_ticks() {
+        let alone = [(7, 0), (7, 0), (7, 1), (8, 0), (8, 0)].map(Some);
+        assert_eq!(seen(&[7]), alone, "the start, two ticks, the next start and its first tick");
+    }
+
+    #[test]
+    fn agents_on_one_level_share_their_moment_and_others_have_none() {
+        assert!(seen(&[7, 7]).iter().all(Option::is_some));
+        assert!(seen(&[7, 9]).iter().all(Option::is_none));
+    }
 }

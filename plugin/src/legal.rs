@@ -2,7 +2,9 @@
 //!
 //! A game keeps the [`LegalActions`] of its agents up to date in [`ObserveSchedule`](crate::systems::ObserveSchedule).
 //! Random bots, the noise of demonstrators and explorers then draw among legal actions. Policies give illegal actions
-//! probability 0, in play and in training. A person may press anything, so the game has to ignore illegal actions.
+//! probability 0, in play and in training. Whatever else acts under [`Control::Bot`] and wants an illegal action plays
+//! the game's [`IdleAction`], or the lowest legal action if that is illegal too. A person may press anything, so the game
+//! has to ignore illegal actions. A replay plays what was recorded.
 //!
 //! ```
 //! use bevy::prelude::*;
@@ -56,6 +58,13 @@ impl LegalActions {
         self.0.iter().filter(|&&is_legal| is_legal).count()
     }
 
+    /// Returns the action to play instead of an illegal one: the idle action, or the lowest legal one if that is illegal
+    /// too; `None` if no action is legal.
+    pub fn instead(&self, idle: Option<&IdleAction>) -> Option<ActionValue> {
+        let idle = idle.map(|IdleAction(choice)| ActionValue::Discrete(*choice));
+        idle.filter(|idle| self.allows(idle)).or_else(|| self.pick(0))
+    }
+
     /// Returns the legal action that `number` falls on, counted round and round; `None` if no action is legal.
     pub(crate) fn pick(&self, number: u32) -> Option<ActionValue> {
         let legal: Vec<u32> = (0..).zip(&self.0).filter_map(|(index, &is_legal)| is_legal.then_some(index)).collect();
@@ -81,8 +90,13 @@ impl LegalActions {
     }
 }
 
-/// Replaces an illegal action of this tick by a legal one, for random actions that are drawn before the tick, when its
-/// mask is not known yet. Has no effect without [`LegalActions`].
+/// The discrete action of a game that does nothing: bots without another choice play it instead of an illegal one.
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[reflect(Resource, Clone, Debug, PartialEq)]
+pub struct IdleAction(pub u32);
+
+/// Replaces an illegal action by a drawn one instead of the idle one, for random actions that are drawn before the tick,
+/// when its mask is not known yet. It works under [`Control::Replay`] too. Has no effect without [`LegalActions`].
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Component, CarryComponent, Clone, Debug, PartialEq)]
 pub struct RedrawsIllegal {
@@ -106,14 +120,24 @@ pub(crate) fn check_legal_actions(
     }
 }
 
-/// Draws again for agents with [`RedrawsIllegal`].
-pub(crate) fn redraw_illegal(mut agents: Query<(&Control, &Episode, &LegalActions, &RedrawsIllegal, &mut Action)>) {
+/// Replaces the illegal actions of bots, whichever system has chosen them. An action outside the space stays, and is a
+/// fault.
+pub(crate) fn keep_legal(
+    mut agents: Query<(&Control, &Episode, &LegalActions, Option<&RedrawsIllegal>, &mut Action)>,
+    idle: Option<Res<IdleAction>>,
+) {
     for (control, episode, legal, redraw, mut action) in &mut agents {
-        if *control != Control::Bot || !episode.is_running() || legal.allows(&action.0) {
+        let is_outside = action.discrete().is_some_and(|index| index as usize >= legal.0.len());
+        let is_bot = *control == Control::Bot || (*control == Control::Replay && redraw.is_some());
+        if !is_bot || !episode.is_running() || is_outside || legal.allows(&action.0) {
             continue;
         }
-        if let Some(drawn) = legal.pick(redraw.random) {
-            action.0 = drawn;
+        let instead = match redraw {
+            Some(RedrawsIllegal { random }) => legal.pick(*random),
+            None => legal.instead(idle.as_deref()),
+        };
+        if let Some(instead) = instead {
+            action.0 = instead;
         }
     }
 }
@@ -176,6 +200,44 @@ mod tests {
         let (mut app, _) = masked(BlindBot::Uniform, &[true; 3]);
         let text = app.tick().expect_err("too short").to_string();
         assert!(text.contains("3 entries") && text.contains("give each action one"), "{text}");
+    }
+
+    #[test]
+    fn a_bot_that_wants_an_illegal_action_plays_the_idle_one_or_else_the_lowest_legal_one() {
+        let played = |wanted: u32, idle: Option<u32>| {
+            let (mut app, agent) =
+                masked(BlindBot::Constant(ActionValue::Discrete(wanted)), &[false, true, true, false]);
+            if let Some(idle) = idle {
+                app.insert_resource(IdleAction(idle));
+            }
+            app.tick().expect("some action is legal");
+            app.world().get::<Action>(agent).and_then(Action::discrete)
+        };
+        assert_eq!(played(2, Some(1)), Some(2), "it is legal");
+        assert_eq!(played(3, Some(2)), Some(2));
+        assert_eq!(played(0, Some(3)), Some(1), "the idle action is illegal too");
+        assert_eq!(played(3, None), Some(1));
+        assert_eq!(played(0, Some(9)), Some(1), "there is no such action");
+    }
+
+    #[test]
+    fn an_action_outside_the_space_is_a_fault_under_a_mask_too() {
+        let (mut app, _) = masked(BlindBot::Constant(ActionValue::Discrete(4)), &[true; 4]);
+        let text = app.tick().expect_err("there are four").to_string();
+        assert!(text.contains("discrete action 4 is outside 0..4"), "{text}");
+    }
+
+    #[test]
+    fn people_and_replays_keep_illegal_actions() {
+        for control in [Control::Human, Control::Replay] {
+            let mut app = headless_app();
+            let action = Action(ActionValue::Discrete(2));
+            let agent =
+                (Agent::new(0, ActionSpace::Discrete(3)), LegalActions::new([true, true, false]), control, action);
+            let agent = app.world_mut().spawn(agent).id();
+            app.tick().expect("the game ignores it");
+            assert_eq!(app.world().get::<Action>(agent).and_then(Action::discrete), Some(2), "{control:?}");
+        }
     }
 
     #[test]

@@ -101,6 +101,7 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
                 reward::clear_rewards,
                 episode::begin_episodes,
                 skill_prior::end_skills,
+                episode::note_moment,
             )
                 .chain()
                 .in_set(PlaybotSystems::Begin),
@@ -109,13 +110,18 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
                 .in_set(PlaybotSystems::Observe),
             (
                 bot::run_blind_bots,
-                legal::redraw_illegal,
                 crate::demo::replay::run_replays,
                 skill_prior::draw_skills.run_if(resource_exists::<skill_prior::SkillPrior>),
                 policy::run_policy.run_if(resource_exists::<policy::ActivePolicy>),
             )
                 .chain()
                 .in_set(PlaybotSystems::Decide),
+            // After the controllers of games, each of which acts for its own agents.
+            legal::keep_legal
+                .after(PlaybotSystems::Decide)
+                .before(PlaybotSystems::Act)
+                .run_if(placement::is_tick)
+                .ambiguous_with_all(),
             action::check_actions.in_set(PlaybotSystems::Act),
         ),
     );

@@ -57,12 +57,7 @@ use playbot_harness::{
 };
 use std::time::Duration;
 
-pub use crate::window::{
-    deciders::Autopilot,
-    error::WindowError,
-    playlist::Playlist,
-    unbound::{UnboundKeys, idle_warning},
-};
+pub use crate::window::{deciders::Autopilot, error::WindowError, playlist::Playlist, unbound::UnboundKeys};
 
 /// Width and height of the window at first: eleven pixels for each of the bots' 64.
 const SIDE: u32 = 704;

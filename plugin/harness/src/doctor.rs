@@ -37,7 +37,7 @@ use crate::{
         observed::{ObservationMonitor, assess_safety},
         trial::{LeftOut, Trial},
     },
-    game::Game,
+    game::{Game, without_idle_action},
     mode::ModeError,
 };
 use serde::Serialize;
@@ -103,6 +103,7 @@ pub fn examine(
         notes,
         comparisons,
         observation,
+        without_idle: without_idle_action(game),
         types,
         unequal_steps,
         holds_keys,
@@ -192,6 +193,8 @@ pub struct DoctorReport {
     pub comparisons: Vec<ComparisonReport>,
     /// The observations of agents.
     pub observation: ObservationReport,
+    /// What is wrong and what to add if no action holds nothing, so that a person who holds no key plays action 0.
+    pub without_idle: Option<String>,
     /// The types that could be compared.
     pub types: TypesReport,
     /// Lengths of frames and of fixed steps, if they differ and the game may notice it.

@@ -635,6 +635,20 @@ pub fn idle_action(game: &dyn Game) -> ActionValue {
     }
 }
 
+/// Returns what is wrong and what to add if a person who holds no key gets an action that holds one.
+pub fn without_idle_action(game: &dyn Game) -> Option<String> {
+    let input = game.tools().input;
+    if input.has_idle_action() {
+        return None;
+    }
+    let (held, remedy) = match input.key_bindings() {
+        Some(_) => ("hold no key", "`vec![]` to its keys"),
+        None => ("do nothing", "one, such as `vec![]` in its keys"),
+    };
+    let first = input.action_names().into_iter().next().map_or_else(String::new, |name| format!(" ({name})"));
+    Some(format!("no action of {} holds nothing: while you {held}, it gets action 0{first}; add {remedy}", game.name()))
+}
+
 /// Returns whether a discrete choice does nothing, by its name.
 pub fn is_named_idle(names: &[String], choice: u32) -> bool {
     let name = names.get(choice as usize).and_then(|name| name.split_whitespace().next()).unwrap_or("");
@@ -643,7 +657,7 @@ pub fn is_named_idle(names: &[String], choice: u32) -> bool {
 
 #[cfg(test)]
 mod tests {
-    use bevy::prelude::App;
+    use bevy::prelude::{App, KeyCode, MouseButton};
 
     use super::*;
     use crate::foreign::ForeignGame;
@@ -656,5 +670,18 @@ mod tests {
         let unnamed = keys.keys_by_name([vec!["ArrowUp"], vec!["ArrowLeft"]]);
         assert_eq!(idle_action(&unnamed), ActionValue::Discrete(0));
         assert!(is_named_idle(&["None (D)".to_owned()], 0) && !is_named_idle(&[], 3));
+    }
+
+    #[test]
+    fn a_game_in_which_no_action_holds_nothing_is_known_with_the_remedy() {
+        let game = ForeignGame::new("hop", 1, |_: &mut App| {});
+        let keys = without_idle_action(&game.clone().keys([vec![KeyCode::ArrowLeft], vec![KeyCode::Space]]));
+        let words = "no action of hop holds nothing: while you hold no key, it gets action 0 (ArrowLeft); add `vec![]` to its \
+                     keys";
+        assert_eq!(keys.as_deref(), Some(words));
+        assert_eq!(without_idle_action(&game.clone().keys([vec![], vec![KeyCode::Space]])), None);
+        let mouse =
+            without_idle_action(&game.mouse_buttons([[MouseButton::Left]])).expect("its only action is a button");
+        assert!(mouse.contains("while you do nothing, it gets action 0; add one, such as `vec![]`"), "{mouse}");
     }
 }

@@ -111,7 +111,8 @@ pub struct PlainLevels {
 
 impl PlainLevels {
     /// Plays each level once with each action, held for the whole episode. Continuous actions are rest, and each axis at
-    /// both its ends. `progress` receives finished episodes, from several threads.
+    /// both its ends. Where the action is illegal, the idle action is held, or the lowest legal one: see
+    /// [`legal`](bevy_playbot::legal). `progress` receives finished episodes, from several threads.
     ///
     /// # Errors
     ///

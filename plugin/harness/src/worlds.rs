@@ -2,21 +2,23 @@
 
 use crate::{
     benchmark::{StageClock, add_readings},
-    game::{Game, level_designs},
+    game::{Game, idle_action, level_designs},
     level_files::is_level_files,
     sensors::GameSensors,
 };
 use bevy::prelude::*;
 use bevy_playbot::{
-    agent::Agent,
+    action::ActionValue,
+    agent::{Agent, AgentOrder},
     engine::{
         AgentLimit, Renewal, headless_frame_app, into_world,
         panics::{self, EpisodeTrace, PanicReports},
         set_tick_rate,
     },
-    episode::{EpisodeEnded, EpisodeResult},
+    episode::{EpisodeEnded, EpisodeResult, Tick},
     fault::{Fault, Faults},
     headless::{HeadlessPlugins, headless_app},
+    legal::IdleAction,
     observation::VectorSensor,
     placement::TickPlacement,
     streams::PlaybotSeed,
@@ -195,6 +197,9 @@ pub fn add_game(
     seed: u64,
 ) -> Result<(), VisionError> {
     app.insert_resource(PlaybotSeed(seed));
+    if let ActionValue::Discrete(idle) = idle_action(game) {
+        app.insert_resource(IdleAction(idle));
+    }
     let host = game.tools().host;
     if let Some(arenas) = host.arenas_per_world() {
         let most = arenas.saturating_mul(host.agents_per_arena().max(1));
@@ -233,6 +238,24 @@ pub fn spawn_agents(
         observation_config.equip(game, world, agent);
     }
     agents
+}
+
+/// Returns a fault if the agents of a World are no longer these, whose numbers begin with `first`: the game has despawned
+/// or spawned one.
+pub fn other_agents(world: &World, agents: &[Entity], first: u32) -> Option<String> {
+    let tick = world.get_resource::<Tick>().map_or(0, |tick| tick.0);
+    let why = |index: u32, what: &str| {
+        format!(
+            "agent {index}: the game {what} it in tick {tick} of its World, and a training has the same agents in every \
+             tick: end the episode of an agent that dies (`Episode::terminate`), and use the agent again in the next one"
+        )
+    };
+    if let Some(row) = agents.iter().position(|&agent| world.get::<Agent>(agent).is_none()) {
+        return Some(why(first + row as u32, "despawned"));
+    }
+    let order = world.get_resource::<AgentOrder>().filter(|order| order.entities().len() > agents.len())?;
+    let other = order.entities().iter().find(|entity| !agents.contains(entity))?;
+    world.get::<Agent>(*other).map(|agent| why(agent.index, "spawned"))
 }
 
 /// Returns whether only the thread that built this World may tick it: it holds Bevy's non-send data, such as the

@@ -22,8 +22,15 @@ pub(super) type Pads<'w, 's> = Query<'w, 's, (Entity, &'static VirtualGamepad)>;
 pub(super) type Players<'w, 's> =
     Query<'w, 's, (&'static VirtualInput, &'static Action, &'static Control, &'static Episode, Has<PressesForPeople>)>;
 
-/// Returns the inputs that all agents hold and push in this tick. Inputs of a gamepad wait until it is plugged in.
-pub(super) fn wanted(order: &AgentOrder, players: &Players, pads: &Pads, state: &InputState) -> Wanted {
+/// Returns the inputs that all agents hold and push in this tick. Inputs of a gamepad wait until it is plugged in. In a
+/// minimised window nothing is clicked, because the cursor would still be at an old position.
+pub(super) fn wanted(
+    order: &AgentOrder,
+    players: &Players,
+    pads: &Pads,
+    state: &InputState,
+    is_minimised: bool,
+) -> Wanted {
     let mut wanted = Wanted::default();
     for &agent in order.entities() {
         let Ok((input, action, control, episode, for_people)) = players.get(agent) else { continue };
@@ -37,12 +44,14 @@ pub(super) fn wanted(order: &AgentOrder, players: &Players, pads: &Pads, state: 
         wanted.cursor = held.cursor.map(|position| (agent, position)).or(wanted.cursor);
         wanted.tap = held.tap.map(|position| (agent, position)).or(wanted.tap);
         wanted.text.push_str(&held.text);
-        for button in held.buttons {
+        let misses = is_minimised && held.cursor.is_some();
+        let is_mouse = |button: &VirtualButton| matches!(button, VirtualButton::Mouse(_));
+        for button in held.buttons.into_iter().filter(|button| !(misses && is_mouse(button))) {
             let is_pad = matches!(button, VirtualButton::Gamepad(_));
             if !is_pad || pad.is_some() {
                 let switch = Switch { button, pad: pad.filter(|_| is_pad) };
                 wanted.switches.push((agent, switch));
-                if held.clicks && matches!(button, VirtualButton::Mouse(_)) {
+                if held.clicks && is_mouse(&button) {
                     wanted.anew.push((agent, switch));
                 }
             }
@@ -70,7 +79,7 @@ pub(super) fn send_messages(
     mut devices: ResMut<VirtualDevices>,
     mut messages: InputMessages,
 ) {
-    let wanted = wanted(&order, &players, &pads, &state);
+    let wanted = wanted(&order, &players, &pads, &state, messages.is_minimised());
     let changes = devices.change(&wanted, |switch| switch.pad.is_some() || state.is_down(switch));
     let (released, others) = releases_first(changes);
     released.into_iter().for_each(|change| messages.send(change));
@@ -206,7 +215,7 @@ pub(super) fn write_directly(
     for &switch in past.down.iter().chain(&past.up) {
         state.touch(switch, Touch::Settle);
     }
-    let wanted = wanted(&order, &players, &pads, &state);
+    let wanted = wanted(&order, &players, &pads, &state, messages.is_minimised());
     let (released, others) = releases_first(devices.change(&wanted, |switch| state.is_down(switch)));
     for change in released {
         write_change(change, &mut state, &mut direct, &mut messages);

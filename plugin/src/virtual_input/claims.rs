@@ -114,7 +114,8 @@ fn outside(agent: &Agent, input: &VirtualInput, window: Option<Vec2>) -> Option<
                  window: add Bevy's `WindowPlugin`, which is part of `DefaultPlugins`"
             ));
         };
-        if position.within(size).is_none() {
+        // A minimised window may have no size, until it is restored.
+        if size.min_element() > 0.0 && position.within(size).is_none() {
             return Some(format!(
                 "agent {index}: action {action} of its `VirtualInput` points at {position}, outside of the window of {} \
                  by {}: give a position inside, or a fraction of the window, `PointerPosition::fraction`",

@@ -135,6 +135,11 @@ impl InputMessages<'_, '_> {
         }
     }
 
+    /// Returns whether the window has no size, as a minimised one on some systems: no position is in it.
+    pub fn is_minimised(&self) -> bool {
+        self.windows.single().is_ok_and(|(_, window)| window.size().min_element() <= 0.0)
+    }
+
     /// Moves the mouse cursor and the finger as the agents of this tick want it, in the window and by messages. Those
     /// of agents that do not play any more leave.
     pub fn point(&mut self, devices: &mut VirtualDevices, wanted: &Wanted) {

@@ -51,7 +51,7 @@ use thiserror::Error;
 pub(crate) use crate::findings::play::detector_of;
 pub use crate::findings::{
     checks::{Check, Checks},
-    course::{course_of, keeps_course},
+    course::{RecordedCourse, course_of, course_of_recording, keeps_course},
     folder::{Date, DateError, FINDINGS, clear_findings, gather_findings, has_findings, list_findings},
     keep::{FindingFiles, Played, Recheck, SeenFinding, SeenLevel, Sighting, recheck},
     minimise::{Budget, Lengths, Minimised, actions_of, lengths, minimise},
@@ -121,9 +121,12 @@ impl StoredFinding {
         let mut state_hashes = replayed.state_hashes;
         let last = state_hashes.last().copied().unwrap_or(0);
         state_hashes.resize(ticks, last);
+        // The tick in which a game breaks is not among the played ones.
+        let played = replayed.actions.iter().chain(actions.iter().skip(replayed.actions.len()));
+        let played: Vec<ActionValue> = played.take(ticks).cloned().collect();
         let mut episode = DemoEpisode::new(level, header.actions);
         episode.level_file = replayed.level_file;
-        episode.actions = recorded(&actions[..ticks], &game.actions());
+        episode.actions = recorded(&played, &game.actions());
         episode.deciders = vec![Decider::Bot; ticks];
         (episode.rewards, episode.state_hashes) = (rewards, state_hashes);
         episode.end = match end {

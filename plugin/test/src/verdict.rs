@@ -41,7 +41,7 @@ mod walked;
 use crate::verdict::{
     played::{Played, PlayedEnd},
     run::{inspect, seen},
-    track::common_stop,
+    track::{common_stop, reached},
     walked::LevelVisits,
 };
 use bevy::math::{Rect, Vec2};
@@ -54,18 +54,18 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 pub use crate::verdict::{
-    compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange, UnreachedSquares},
+    compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange, RecordedFurther, UnreachedSquares},
     error::TestError,
     folder::{Earlier, TestFolder},
     maps::{FailurePath, LevelMaps, LevelPars, MapScope, SkillTicks, hash_of_files, level_name},
     merge::merge,
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
-    reports::{AGAINST, JUNIT, SUMMARY, rerun_commands, write_reports},
+    reports::{AGAINST, JUNIT, SUMMARY, action_search, rerun_commands, write_reports},
     results::{FinishTime, MOST_WORST, Overview, RESULTS, ResultLines, TesterTotal, results_folder},
     run::{TestEnd, TestObserver, run_tests, run_tests_keeping, test_in_turn},
     shard::{Shard, ShardError},
     statistics::{Trials, benjamini_hochberg, fisher_exact, wilson},
-    track::{CommonStop, StopKind},
+    track::{CommonStop, ReachedCells, StopKind},
 };
 
 /// Squares along the longer side of a floor plan to which [`SquareEnds`]s are rounded.
@@ -105,6 +105,10 @@ pub struct LevelVerdict {
     /// Maps of where agents went, for levels with maps: see [`MapScope`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub maps: Option<LevelMaps>,
+    /// Cells that agents reached, for a level that could have maps and has none: without a floor plan, or without
+    /// declared positions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reached: Option<ReachedCells>,
     /// Each tester, in the order of the plan.
     pub testers: Vec<TesterVerdict>,
     /// Findings.
@@ -314,24 +318,27 @@ fn judge(
         solved_at_start: is_solved_at_start(all()),
         places: None,
         maps: None,
+        reached: None,
         testers: testers.collect(),
         findings,
     };
     let has_maps = plan.maps().wants(verdict.is_perfect());
     let has_positions = failed.iter().any(|end| end.position.is_some());
-    let Some(floor) = (has_maps || has_positions).then(|| game.tools().levels.floor_plan(mode, level)).flatten() else {
-        return verdict;
-    };
-    verdict.ends = end_places(floor.bounds, &failed);
-    if has_maps {
+    let floor = (has_maps || has_positions).then(|| game.tools().levels.floor_plan(mode, level)).flatten();
+    if let Some(floor) = floor {
+        verdict.ends = end_places(floor.bounds, &failed);
         let names: Vec<&str> = plan.testers.iter().map(|tester| tester.record.name.as_str()).collect();
-        if let Some(walked) = LevelVisits::of(&floor, &names, played, &verdict.findings) {
+        let walked = has_maps.then(|| LevelVisits::of(&floor, &names, played, &verdict.findings)).flatten();
+        if let Some(walked) = walked {
             verdict.places = walked.places;
             verdict.maps = Some(walked.maps);
             for (tester, places) in verdict.testers.iter_mut().zip(walked.testers) {
                 tester.places = places;
             }
         }
+    }
+    if has_maps && verdict.maps.is_none() {
+        verdict.reached = reached(all().map(|episode| &episode.track));
     }
     verdict
 }
@@ -464,7 +471,7 @@ mod tests {
     #[test]
     fn older_results_are_read_and_newer_ones_read_back() {
         let old = serde_json::to_string(&verdict(3, 1, 2)).expect("serialises");
-        for name in ["maps", "places", "causes", "seconds", "stop", "solved_at_start"] {
+        for name in ["maps", "places", "causes", "seconds", "stop", "solved_at_start", "reached"] {
             assert!(!old.contains(name), "{old}");
         }
         assert_eq!(serde_json::from_str::<LevelVerdict>(&old).expect("whole"), verdict(3, 1, 2));
@@ -473,7 +480,8 @@ mod tests {
         let causes = [("saw".to_owned(), 1)].into();
         let stop = CommonStop { kind: StopKind::End, x: 0.1, y: 0.7, within: 0.3, episodes: 2, of: 3, entity: None };
         let new = LevelVerdict { places, maps, causes, stop: Some(stop), solved_at_start: true, ..verdict(3, 1, 2) };
-        let new = LevelVerdict { seconds: Some(0.1 + 0.2), ..new };
+        let reached = ReachedCells { side: 0.25, cells: [[-3, 0], [7, 4]].into(), entity: Some("the one".to_owned()) };
+        let new = LevelVerdict { seconds: Some(0.1 + 0.2), reached: Some(reached), ..new };
         let text = serde_json::to_string(&new).expect("serialises");
         assert_eq!(serde_json::from_str::<LevelVerdict>(&text).expect("whole"), new);
     }
@@ -527,7 +535,7 @@ mod tests {
             exact: true,
             found: Vec::new(),
             walk: None,
-            track: Track { is_solved_at_start, route: None },
+            track: Track { is_solved_at_start, ..Track::default() },
         };
         let end = PlayedEnd::Broken { detector: "panic", tick: Some(5), message: String::new() };
         let broken = Played { end, ..episode(false) };

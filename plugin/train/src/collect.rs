@@ -6,7 +6,7 @@ use bevy_playbot::{
     agent::{Agent, AgentOrder, Control},
     demo::recorder,
     engine::{PolicyBatch, Renewal, SharedBatch, TickSchedules, draw_skills, tick_world},
-    episode::{Episode, EpisodeEnd, EpisodeEnded, Tick},
+    episode::{Episode, EpisodeEnd, EpisodeEnded},
     fault::{Fault, Faults},
     legal::LegalActions,
     level::LevelQueue,
@@ -19,7 +19,12 @@ use bevy_playbot::{
     systems::{ObserveSchedule, PlaybotSystems},
     vision::{ObservationConfig, VisionError},
 };
-use playbot_harness::{game::Game, sensors::GameSensors, split::LevelSplit, worlds::build_observing_world};
+use playbot_harness::{
+    game::Game,
+    sensors::GameSensors,
+    split::LevelSplit,
+    worlds::{build_observing_world, other_agents},
+};
 use playbot_learner::{
     Actions, LearnError, ObsColumns, ObsKind, Observations, Policy, RngState, Rollout, RolloutStep, rng::normal,
 };
@@ -206,23 +211,6 @@ impl Collector {
     pub fn agents(&self) -> &[Entity] {
         &self.agents
     }
-}
-
-/// Returns why the agents are no longer those that the rollout has rows for, if the game has despawned or spawned one.
-fn other_agents(world: &World, agents: &[Entity], first: u32) -> Option<String> {
-    let tick = world.get_resource::<Tick>().map_or(0, |tick| tick.0);
-    let why = |index: u32, what: &str| {
-        format!(
-            "agent {index}: the game {what} it in tick {tick} of its World, and a training has the same agents in every \
-             tick: end the episode of an agent that dies (`Episode::terminate`), and use the agent again in the next one"
-        )
-    };
-    if let Some(row) = agents.iter().position(|&agent| world.get::<Agent>(agent).is_none()) {
-        return Some(why(first + row as u32, "despawned"));
-    }
-    let order = world.get_resource::<AgentOrder>().filter(|order| order.entities().len() > agents.len())?;
-    let other = order.entities().iter().find(|entity| !agents.contains(entity))?;
-    world.get::<Agent>(*other).map(|agent| why(agent.index, "spawned"))
 }
 
 /// Adds the states in which the rollout stopped, with the skills active there, and their values.

@@ -3,6 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use bevy::prelude::*;
+use bevy_playbot::demo::file::{Decider, DemoEnd, DemoEpisode, DemoHeader, DemoWriter, EpisodeActions};
 use playbot::prelude::*;
 use playbot_harness::{
     eval::Player,
@@ -13,8 +14,10 @@ use playbot_harness::{
 use playbot_learner::{DeviceKind, Learner as _, PolicySpec, PpoConfig, PpoLearner, Prior, SkillDraw};
 use playbot_test::{
     detectors::Detectors,
+    findings::course_of,
     verdict::{
-        FailurePath, LevelMaps, LevelVerdict, Places, SquareEnds, TestError, TestObserver, TestPlan, Tester, run_tests,
+        Earlier, FailurePath, LevelMaps, LevelVerdict, Places, RecordedFurther, SquareEnds, TestError, TestFolder,
+        TestObserver, TestPlan, Tester, run_tests,
     },
 };
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
@@ -159,14 +162,79 @@ fn an_invisible_wall_shows_in_a_game_without_position_and_plan() {
         .observe(["x"], |at: Single<&Transform, With<Player>>| [at.translation.x])
         .end(|at: Single<&Transform, With<Player>>| (at.translation.x >= 6.0).then_some(EpisodeEnd::WON))
         .time_limit(20);
-    let stopped = |game: &ForeignGame| {
+    let entity = "the entity with `Player`";
+    let stopped = |game: &ForeignGame, entity: Option<&str>| {
         let found = verdicts_of(game, &plan("default:0..0", vec![constant("right", 1)], 3, 1));
+        let reached = found[0].reached.as_ref().expect("its positions are known, and it has no plan");
+        // From 1 to 3 there are 17 cells of an eighth, and 33 of a sixteenth.
+        assert_eq!((reached.side, reached.cells.last(), reached.entity.as_deref()), (0.125, Some(&[24, 0]), entity));
         found[0].stop.as_ref().map(ToString::to_string).unwrap_or_default()
     };
     let words = "all 3 episodes got no further than (3.0, 0.0), within 0.0";
-    assert_eq!(stopped(&walled), format!("{words}, by the position of the entity with `Player`"));
+    assert_eq!(stopped(&walled, Some(entity)), format!("{words}, by the position of {entity}"));
     let declared = walled.position(|at: Single<&Transform, With<Player>>| at.translation.truncate());
-    assert_eq!(stopped(&declared), words, "a declared position needs no guess");
+    assert_eq!(stopped(&declared, None), words, "a declared position needs no guess");
+}
+
+#[test]
+fn a_recording_of_an_earlier_build_says_where_its_actions_lead_elsewhere() {
+    #[derive(Component)]
+    struct Player;
+
+    // The track ends at `end`, and the goal is at 6.
+    let track = |end: f32| {
+        let game = move |app: &mut App| {
+            app.add_systems(Startup, |mut commands: Commands| {
+                commands.spawn((Player, Transform::default()));
+            })
+            .add_systems(
+                Update,
+                move |keys: Res<ButtonInput<KeyCode>>, mut at: Single<&mut Transform, With<Player>>| {
+                    let step = f32::from(u8::from(keys.pressed(KeyCode::ArrowRight)));
+                    at.translation.x = (at.translation.x + step).min(end);
+                },
+            );
+        };
+        ForeignGame::new("track", 1, game)
+            .keys([vec![], vec![KeyCode::ArrowRight]])
+            .observe(["x"], |at: Single<&Transform, With<Player>>| [at.translation.x])
+            .reward(|at: Single<&Transform, With<Player>>| at.translation.x)
+            .end(|at: Single<&Transform, With<Player>>| (at.translation.x >= 6.0).then_some(EpisodeEnd::WON))
+            .time_limit(20)
+    };
+    let (before, now) = (track(9.0), track(3.0));
+    let folder = tempfile::tempdir().expect("a folder");
+    let recording = folder.path().join("before.demo");
+    let right = constant("right", 1);
+    let course = course_of(&before, ("default", 0), 0, &right.player);
+    let header = DemoHeader { demonstrator: "right".to_owned(), ..before.demo_header("default") };
+    let mut episode = DemoEpisode::new(0, header.actions);
+    let ticks = course.rewards.len();
+    episode.actions = EpisodeActions::Discrete(vec![1; ticks]);
+    (episode.rewards, episode.state_hashes) = (course.rewards, course.state_hashes);
+    (episode.deciders, episode.end) = (vec![Decider::Bot; ticks], DemoEnd::Terminated { success: true });
+    DemoWriter::replace(&recording, header).and_then(|mut writer| writer.push(&episode)).expect("writable");
+
+    let compared = |game: &ForeignGame, name: &str, tester: Tester| {
+        let plan = plan("default:0..1", vec![tester], 1, 1);
+        let results = folder.path().join(name);
+        let (mut open, _) = TestFolder::open(&results, &plan.record(game), Earlier::Keep).expect("new");
+        verdicts_of(game, &plan).iter().for_each(|level| open.keep(level).expect("writable"));
+        open.finish().expect("writable");
+        let found = RecordedFurther::read(game, &results, &recording).expect("comparable");
+        found.iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let words = format!("default:0: the recording solves it in {ticks} ticks; its actions ");
+    // After tick 3 the agent was at 4.
+    let elsewhere =
+        "lead elsewhere from tick 3 on, at (3.0, 0.0), and do not reach the goal: they come no further than";
+    assert_eq!(compared(&now, "walled", right.clone()), [format!("{words}{elsewhere} (3.0, 0.0)")]);
+    let weak = format!("{words}still do, so the testers are too weak");
+    assert_eq!(compared(&before, "weak", constant("rest", 0)), [weak]);
+    assert!(compared(&before, "solved", right).is_empty());
+    let others = RecordedFurther::check(&now, &"default:5..6".parse().expect("levels"), &recording);
+    let others = others.expect_err("it has level 0").to_string();
+    assert!(others.contains("before.demo has no solved episode on a level of default:5..6: name a rec"), "{others}");
 }
 
 #[test]
@@ -189,7 +257,7 @@ fn visits_lost_time_causes_and_places_are_counted() {
         failure: Some(failure),
         ..LevelMaps::default()
     };
-    assert_eq!(level.maps, Some(expected));
+    assert_eq!((&level.maps, &level.reached), (&Some(expected), &None), "a map has more than cells");
     let abyss = BTreeMap::from([("abyss".to_owned(), 1)]);
     assert_eq!(level.causes, abyss);
     let ended: Vec<(u64, u64, &BTreeMap<String, u64>)> =

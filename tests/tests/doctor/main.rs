@@ -1,5 +1,6 @@
 //! Tests of the doctor on games with planted faults.
 
+mod agents;
 mod foreign;
 mod planted;
 mod replays;

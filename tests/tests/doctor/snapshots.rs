@@ -121,6 +121,62 @@ fn a_snapshot_that_forgets_a_resource_is_a_finding_that_names_it() {
     }
 }
 
+/// Steps so far, on the walker itself.
+#[derive(Component, Clone, Copy, Default, Reflect)]
+#[reflect(Component)]
+struct Stride(u32);
+
+/// Returns a game whose walker steps further each time, with snapshots that leave its stride out unless `has_stride`.
+fn pacer(has_stride: bool) -> ForeignGame {
+    let game = |app: &mut App| {
+        app.add_systems(Startup, |mut commands: Commands| {
+            commands.spawn((Walker, Stride::default(), Transform::default()));
+        })
+        .add_systems(
+            Update,
+            |keys: Res<ButtonInput<KeyCode>>, walker: Single<(&mut Transform, &mut Stride)>| {
+                let (mut at, mut stride) = walker.into_inner();
+                if keys.pressed(KeyCode::ArrowRight) {
+                    stride.0 += 1;
+                    at.translation.x += 1.0 + 0.125 * stride.0 as f32;
+                }
+            },
+        );
+    };
+    ForeignGame::new("pacer", 1, game)
+        .keys([vec![], vec![KeyCode::ArrowRight]])
+        .observe(["x"], |walker: Single<&Transform, With<Walker>>| [walker.translation.x])
+        .time_limit(60)
+        .restart(Restart::Startup)
+        .snapshot(
+            |walker: Single<(&Transform, &Stride)>| {
+                let (at, stride) = *walker;
+                (*at, *stride)
+            },
+            move |world: &mut World, (at, stride): &(Transform, Stride)| {
+                place(world, *at);
+                let mut strides = world.query::<&mut Stride>();
+                for mut kept in strides.iter_mut(world).filter(|_| has_stride) {
+                    *kept = *stride;
+                }
+            },
+        )
+}
+
+#[test]
+fn a_snapshot_that_forgets_a_component_is_a_finding_that_names_it() {
+    let whole = examined(&pacer(true));
+    assert!(whole.is_healthy() && whole.notes.is_empty(), "{whole}");
+    let report = examined(&pacer(false));
+    let [found] = report.findings.as_slice() else { panic!("one finding: {report}") };
+    assert_eq!((found.kind, found.comparison), (FindingKind::Differs, Some(DoctorComparison::Snapshots)), "{report}");
+    let difference = found.difference.as_ref().expect("a difference");
+    assert_eq!((difference.kind, difference.tick), (DifferenceKind::Component, 1), "{report}");
+    assert!(difference.name.ends_with("::Stride") && difference.field == ".0", "{report}");
+    assert_eq!(found.causes[0].kind, CauseKind::IncompleteSnapshot, "{report}");
+    assert!(report.to_string().contains("after loading a snapshot: component `"), "{report}");
+}
+
 #[test]
 fn forgotten_state_that_no_agent_notices_is_a_note() {
     let report = examined(&saving(true, false));

@@ -13,6 +13,8 @@ use bevy_playbot::vision::ObservationConfig;
 use playbot::prelude::*;
 use playbot_harness::{
     foreign::{ForeignGame, Restart},
+    level_audit::PlainLevels,
+    split::LevelSplit,
     worlds::build_world,
 };
 use playbot_learner::{DeviceKind, PpoConfig};
@@ -61,6 +63,17 @@ fn random_bots_take_legal_actions_only() {
 }
 
 #[test]
+fn bots_and_demonstrators_without_noise_take_legal_actions_only() {
+    for wanted in 0..3 {
+        check(&masked(), |world, agent| {
+            world.entity_mut(agent).insert(BlindBot::Constant(ActionValue::Discrete(wanted)));
+        });
+    }
+    let game = masked().demonstrator("lazy", || 0_u32);
+    check(&game, |world, agent| game.tools().bots.attach_demonstrator(world, agent, 0.0));
+}
+
+#[test]
 fn the_noise_of_a_demonstrator_draws_legal_actions_only() {
     let game = masked().demonstrator("lazy", || 0_u32);
     check(&game, |world, agent| game.tools().bots.attach_demonstrator(world, agent, 1.0));
@@ -78,13 +91,12 @@ fn a_policy_takes_legal_actions_only() {
     }
 }
 
-/// Returns the ticks of a training with a legal action, and those with an illegal one. The first two actions take
-/// turns in being illegal.
-fn trained(algorithm: Algorithm) -> [u64; 2] {
-    let counts: Arc<[AtomicU64; 2]> = Arc::default();
-    let counted = counts.clone();
+/// Returns a game whose first two actions take turns in being illegal. It counts ticks with a legal action, and ticks
+/// with an illegal one.
+fn counting(counted: &Arc<[AtomicU64; 2]>) -> ForeignGame {
+    let counts = counted.clone();
     let game = move |app: &mut App| {
-        let counted = counted.clone();
+        let counted = counts.clone();
         app.insert_resource(Turn(0)).add_systems(Startup, |mut turn: ResMut<Turn>| turn.0 = 0).add_systems(
             Update,
             move |keys: Res<ButtonInput<KeyCode>>, mut turn: ResMut<Turn>| {
@@ -97,13 +109,30 @@ fn trained(algorithm: Algorithm) -> [u64; 2] {
             },
         );
     };
-    let game = ForeignGame::new("turns", 1, game)
+    ForeignGame::new("turns", 1, game)
         .keys([vec![KeyCode::KeyA], vec![KeyCode::KeyB], vec![KeyCode::KeyC]])
         .legal(|turn: Res<Turn>| [turn.0.is_multiple_of(2), !turn.0.is_multiple_of(2), true])
         .observe(["turn"], |turn: Res<Turn>| [turn.0 as f32])
         .reward(|keys: Res<ButtonInput<KeyCode>>| f32::from(u8::from(keys.pressed(KeyCode::KeyA))))
         .time_limit(20)
-        .restart(Restart::Startup);
+        .restart(Restart::Startup)
+}
+
+#[test]
+fn an_audit_that_holds_actions_holds_legal_ones_only() {
+    let counts: Arc<[AtomicU64; 2]> = Arc::default();
+    let levels: LevelSplit = "default:0..3".parse().expect("levels");
+    PlainLevels::of(&counting(&counts), &levels, 2, |_| {}).expect("no action is illegal");
+    let [legal, illegal] = [0, 1].map(|at: usize| counts[at].load(Ordering::Relaxed));
+    // Three actions are held on four levels for 20 ticks.
+    assert!(legal > 200, "{legal}");
+    assert_eq!(illegal, 0);
+}
+
+/// Returns the ticks of a training with a legal action, and those with an illegal one.
+fn trained(algorithm: Algorithm) -> [u64; 2] {
+    let counts: Arc<[AtomicU64; 2]> = Arc::default();
+    let game = counting(&counts);
     let text = r#"(
         game: "turns", train: "default:0..7", test: "default:8..15", steps: 4096, arenas: 2, worlds: 2,
         ppo: (num_steps: 64, minibatches: 2, hidden: [8], lr: 0.003),

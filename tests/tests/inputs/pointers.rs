@@ -87,6 +87,20 @@ fn the_cursor_moves_before_its_button_is_pressed_and_each_tick_is_a_click() {
 }
 
 #[test]
+fn a_minimised_window_without_size_gets_no_click_and_the_next_one_when_it_is_restored() {
+    let (mut world, agent) = played(&clicking(), &[1]);
+    let mut windows = world.query_filtered::<&mut Window, With<PrimaryWindow>>();
+    let mut seen = |size: Vec2| {
+        windows.single_mut(&mut world).expect("one window").resolution.set(size.x, size.y);
+        world.entity_mut(agent).insert(Action(ActionValue::Discrete(2)));
+        world.tick().expect("a position in a window without size is no fault");
+        world.resource::<Seen>().mouse.last().copied()
+    };
+    assert_eq!(seen(Vec2::ZERO), Some((None, false, false)));
+    assert_eq!(seen(Vec2::new(1280.0, 720.0)), Some((Some(RIGHT_PIXELS), true, true)));
+}
+
+#[test]
 fn an_episode_begins_with_the_cursor_outside_of_the_window() {
     let (world, _) = played(&clicking().time_limit(1), &[1, 0]);
     let seen = &world.resource::<Seen>().mouse;

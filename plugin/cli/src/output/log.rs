@@ -1,6 +1,7 @@
 //! The log on standard error, and libraries that write there by themselves.
 
 use crate::output::messages::for_people;
+use bevy_playbot::engine::{EpisodeMoment, moment_of_thread};
 use playbot_report::counted;
 use std::{
     cmp::Reverse,
@@ -90,6 +91,11 @@ where
         let krate = event.metadata().target().split("::").next().unwrap_or_default();
         let is_ours = krate == "playbot" || krate == "bevy_playbot" || krate.starts_with("playbot_");
         if !(self.is_plain && is_ours) {
+            if let Some(moment) = moment_of_thread().filter(|_| !is_of_program(event.metadata().target())) {
+                // Shorter names of levels are padded on the left.
+                let space = if matches!(*event.metadata().level(), Level::INFO | Level::WARN) { "" } else { " " };
+                write!(writer, "{moment}:{space}")?;
+            }
             return self.full.format_event(context, writer, event);
         }
         writer.write_str(if *event.metadata().level() == Level::ERROR { "error: " } else { "warning: " })?;
@@ -113,13 +119,41 @@ impl<'writer> FormatFields<'writer> for HarmlessFields {
 ///
 /// Errors about assets and warnings of a training are repeated by nature: every World loads the files of its game and
 /// reports the same missing ones, and a damaged checkpoint is found again at each look. Warnings and errors of a game
-/// come in every episode and would drown the progress. The log does not know levels and ticks: findings have them.
+/// come in every episode and would drown the progress.
 #[derive(Clone, Default)]
 pub(crate) struct Repeats {
     /// True if messages of games are let through once too.
     counts_games: bool,
-    /// Messages that were let through, and how often each of a game came again.
-    kept: Arc<Mutex<BTreeMap<String, u64>>>,
+    /// Messages that were let through.
+    kept: Arc<Mutex<BTreeMap<String, Kept>>>,
+}
+
+/// A message that was let through.
+#[derive(Clone, Copy, Default)]
+struct Kept {
+    /// How often it came again, if it is a game's.
+    again: u64,
+    /// Its first and its last moment by level and tick, which do not depend on the order of threads. `None` without a
+    /// known one.
+    moments: Option<[EpisodeMoment; 2]>,
+}
+
+impl Kept {
+    fn note(&mut self, moment: Option<EpisodeMoment>) {
+        let Some(moment) = moment else { return };
+        let [first, last] = self.moments.get_or_insert([moment; 2]);
+        *first = moment.min(*first);
+        *last = moment.max(*last);
+    }
+
+    /// Returns its moments in parentheses, after a space; empty without one.
+    fn moments(&self) -> String {
+        match self.moments {
+            None => String::new(),
+            Some([first, last]) if first == last => format!(" (in {first})"),
+            Some([first, last]) => format!(" (first in {first}, last in {last})"),
+        }
+    }
 }
 
 impl Repeats {
@@ -131,16 +165,17 @@ impl Repeats {
     /// Returns the lines of the report, the most frequent message first.
     fn lines(&self) -> Vec<String> {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        let mut again: Vec<(&str, u64)> = kept.iter().map(|(text, count)| (text.as_str(), *count)).collect();
-        again.retain(|(_, count)| *count > 0);
+        let mut again: Vec<(&str, &Kept)> = kept.iter().map(|(text, kept)| (text.as_str(), kept)).collect();
+        again.retain(|(_, kept)| kept.again > 0);
         if again.is_empty() {
             return Vec::new();
         }
-        again.sort_by_key(|(_, count)| Reverse(*count));
+        again.sort_by_key(|(_, kept)| Reverse(kept.again));
         let title = "messages of the game that came again (-v shows them each time):".to_owned();
         // A message may have a stack trace below it.
-        let line = |(text, count): &(&str, u64)| {
-            format!("  {} more: {}", counted(*count, "time"), text.lines().next().unwrap_or_default())
+        let line = |(text, kept): &(&str, &Kept)| {
+            let (again, text) = (counted(kept.again, "time"), text.lines().next().unwrap_or_default());
+            format!("  {again} more: {text}{}", kept.moments())
         };
         let more = again.len().saturating_sub(MOST_LISTED);
         let more = (more > 0).then(|| format!("  and {}", counted(more as u64, "other message")));
@@ -165,13 +200,15 @@ impl<S: Subscriber> Layer<S> for Repeats {
         }
         let mut message = Message(format!("{level} {target}:"));
         event.record(&mut message);
+        let moment = moment_of_thread().filter(|_| !is_of_files);
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(again) = kept.get_mut(&message.0) {
-            *again += u64::from(!is_of_files);
+        if let Some(known) = kept.get_mut(&message.0) {
+            known.again += u64::from(!is_of_files);
+            known.note(moment);
             return false;
         }
         if kept.len() < MOST_KEPT {
-            kept.insert(message.0, 0);
+            kept.entry(message.0).or_default().note(moment);
         }
         true
     }
@@ -219,6 +256,9 @@ pub(crate) fn silence_mesa() {
 #[cfg(test)]
 mod tests {
     use std::{io, sync::Arc};
+
+    use bevy::prelude::{FixedUpdate, Query};
+    use bevy_playbot::{engine::run_on_one_thread, prelude::*};
 
     use super::*;
 
@@ -311,6 +351,32 @@ mod tests {
         let counts =
             ["  57 times more: ERROR my_game::doors: door 3 has no key", "  1 time more: WARN my_game: it is late"];
         assert_eq!(lines, [TITLE, counts[0], counts[1]]);
+    }
+
+    #[test]
+    fn a_message_of_an_episode_has_its_level_and_tick_and_the_first_and_last_of_all_at_the_end() {
+        let mut app = headless_app();
+        app.add_systems(FixedUpdate, |mut episodes: Query<&mut Episode>| {
+            for mut episode in &mut episodes {
+                if episode.tick == 2 {
+                    tracing::warn!(target: "my_game", "it is late");
+                }
+                if episode.level == 4 && episode.tick == 1 {
+                    (0..2).for_each(|_| tracing::warn!(target: "my_game", "a door is stuck"));
+                }
+                if episode.tick == 3 {
+                    episode.truncate();
+                }
+            }
+        });
+        let agent = (Agent::new(0, ActionSpace::Discrete(2)), Control::Bot, BlindBot::Uniform);
+        app.world_mut().spawn((agent, LevelQueue::list([9, 4, 5])));
+        run_on_one_thread(app.world_mut());
+        let (text, lines) = heard(true, || app.ticks(12).expect("no agent broke its contract"));
+        assert!(text.contains("level 9, tick 2: WARN my_game: it is late"), "{text}");
+        let late = "  2 times more: WARN my_game: it is late (first in level 4, tick 2, last in level 9, tick 2)";
+        let stuck = "  1 time more: WARN my_game: a door is stuck (in level 4, tick 1)";
+        assert_eq!(lines, [TITLE, late, stuck]);
     }
 
     #[test]

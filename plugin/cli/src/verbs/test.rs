@@ -26,8 +26,8 @@ use playbot_test::{
     detectors::Detectors,
     findings::{Budget, Checks, FINDINGS, FindingFiles, list_findings},
     verdict::{
-        Comparison, Earlier, LevelVerdict, Shard, TestEnd, TestFolder, TestObserver, TestPlan, results_folder,
-        run_tests_keeping,
+        Comparison, Earlier, LevelVerdict, RecordedFurther, Shard, TestEnd, TestFolder, TestObserver, TestPlan,
+        results_folder, run_tests_keeping,
     },
 };
 use std::path::{Path, PathBuf};
@@ -74,8 +74,9 @@ pub struct Args {
     /// Test only one part of the levels, as index/count, counted from 0. `playbot report merge` joins the results.
     #[arg(long, value_name = "INDEX/COUNT")]
     shard: Option<Shard>,
-    /// Folder of earlier results of the same version of the game, to report changes.
-    #[arg(long, value_name = "DIR")]
+    /// Folder of earlier results of the same version of the game, to report changes. Or a .demo recording of an earlier
+    /// build, to report levels that it solves and no tester does, and where its actions lead elsewhere now.
+    #[arg(long, value_name = "PATH")]
     against: Option<PathBuf>,
     /// Folder for the results (not with --regress).
     #[arg(long, value_name = "DIR")]
@@ -122,9 +123,15 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     warn_of_idle_agents(game);
     let plan = plan(args, game)?;
     let record = plan.record(game);
-    let against = args.against.as_deref().map(results_folder);
-    let results = Results { folder: out, against, game: Some(game), json: args.json };
+    let (recording, against) = match args.against.as_deref() {
+        Some(path) if path.extension().is_some_and(|ending| ending == "demo") => (Some(path), None),
+        path => (None, path.map(results_folder)),
+    };
+    let results = Results { folder: out, against, recording, game: Some(game), json: args.json };
     results.check_folders()?;
+    if let Some(recording) = recording {
+        RecordedFurther::check(game, &plan.split, recording)?;
+    }
     if let Some(before) = results.against {
         Comparison::check(before, &record)?;
     }

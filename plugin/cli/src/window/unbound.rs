@@ -67,31 +67,11 @@ impl UnboundKeys {
 }
 
 impl Tally {
-    /// Names an action.
+    /// Returns the number of an action with its name, if it has one.
     fn action(&self, action: u32) -> String {
-        name_action(&self.action_names, action)
+        let name = self.action_names.get(action as usize);
+        name.map_or(format!("action {action}"), |name| format!("action {action} ({name})"))
     }
-}
-
-/// Returns the number of an action with its name, if it has one.
-fn name_action(names: &[String], action: u32) -> String {
-    names.get(action as usize).map_or(format!("action {action}"), |name| format!("action {action} ({name})"))
-}
-
-/// Returns a warning if a person who holds no key gets an action that holds one.
-pub fn idle_warning(game: &dyn Game) -> Option<String> {
-    let input = game.tools().input;
-    let (held, remedy) = match input.key_bindings() {
-        Some(_) => ("hold no key", "`vec![]` to its keys"),
-        None => ("do nothing", "one, such as `vec![]` in its keys"),
-    };
-    (!input.has_idle_action()).then(|| {
-        format!(
-            "warning: no action of {} holds nothing: while you {held}, it gets {}; add {remedy}",
-            game.name(),
-            name_action(&input.action_names(), 0)
-        )
-    })
 }
 
 fn in_words(keys: &[VirtualButton]) -> String {
@@ -199,21 +179,6 @@ mod tests {
             "{whole}"
         );
         assert!(single.ends_with(": add `vec![MouseButton::Right]` to its mouse buttons"), "{single}");
-    }
-
-    #[test]
-    fn a_game_for_the_mouse_in_which_no_action_holds_nothing_is_warned_of() {
-        let game = ForeignGame::new("hop", 1, |_: &mut App| {}).mouse_buttons([[MouseButton::Left]]);
-        let warning = idle_warning(&game).expect("its only action is a button");
-        assert!(warning.contains("while you do nothing, it gets action 0; add one, such as `vec![]`"), "{warning}");
-    }
-
-    #[test]
-    fn a_game_in_which_no_action_holds_nothing_is_warned_of() {
-        let warning = idle_warning(&game(&SETS)).expect("both actions hold a key");
-        let words = "no action of hop holds nothing: while you hold no key, it gets action 0 (ArrowLeft); add `vec![]`";
-        assert!(warning.contains(words), "{warning}");
-        assert_eq!(idle_warning(&game(&[&[], &[KeyCode::Space]])), None);
     }
 
     #[test]

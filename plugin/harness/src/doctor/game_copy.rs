@@ -1,6 +1,12 @@
 //! A running copy of a game, whose agents play a script of random actions.
 
-use crate::{doctor, doctor::cause::CauseKind, game::Game, saved_episode::SavedEpisode, worlds::build_world};
+use crate::{
+    doctor,
+    doctor::cause::CauseKind,
+    game::Game,
+    saved_episode::SavedEpisode,
+    worlds::{build_world, other_agents},
+};
 use bevy::{
     ecs::{
         component::ComponentInfo, entity::EntityHashMap, observer::Observer, reflect::AppTypeRegistry,
@@ -17,6 +23,7 @@ use bevy_playbot::{
     engine::{Renewal, into_world, tick_world},
     episode::{Episode, EpisodeEnd, EpisodeEnded},
     headless::headless_app,
+    legal::RedrawsIllegal,
     level::LevelQueue,
     observation::{Observation, VectorSensor},
     reward::Reward,
@@ -40,6 +47,8 @@ pub(super) struct GameCopy {
     first: u32,
     space: ActionSpace,
     scripts: Vec<AgentStreams>,
+    /// Ticks of the script.
+    played: u32,
     in_prelude: bool,
 }
 
@@ -54,7 +63,7 @@ impl GameCopy {
         }
         let scripts = (first..first + count).map(|number| AgentStreams::new(plan.seed, number)).collect();
         let (census, fault, space) = (Census::default(), None, game.actions());
-        Self { world, agents, census, fault, first, space, scripts, in_prelude: false }
+        Self { world, agents, census, fault, first, space, scripts, played: 0, in_prelude: false }
     }
 
     /// Returns the number of an agent.
@@ -62,18 +71,23 @@ impl GameCopy {
         self.first + agent as u32
     }
 
-    /// Draws the actions of all agents and runs one tick. A fault or a panic ends this copy.
+    /// Draws the actions of all agents and runs one tick. A fault or a panic ends this copy, as does a game that despawns
+    /// or spawns an agent.
     pub fn tick(&mut self) {
         if self.fault.is_some() {
             return;
         }
         for (&agent, script) in self.agents.iter().zip(&mut self.scripts) {
             let draws = if self.in_prelude { &mut script.skill } else { &mut script.action };
-            self.world.entity_mut(agent).insert(Action(uniform(&self.space, draws)));
+            // The mask of the tick is not known yet. Further draws would change the script of games without one.
+            let redraw = RedrawsIllegal { random: self.played };
+            self.world.entity_mut(agent).insert((Action(uniform(&self.space, draws)), redraw));
         }
+        self.played = self.played.wrapping_add(u32::from(!self.in_prelude));
         self.world.resource_mut::<Ends>().0.clear();
         let before = self.world.id();
-        self.fault = tick_world(&mut self.world).err().map(|fault| fault.to_string());
+        let fault = tick_world(&mut self.world).err().map(|fault| fault.to_string());
+        self.fault = fault.or_else(|| other_agents(&self.world, &self.agents, self.first));
         if self.world.id() != before {
             // Another World has replaced it, with other entities.
             self.census = Census::default();

@@ -26,6 +26,7 @@ impl Display for DoctorReport {
         }
         self.write_notes(f)?;
         self.write_safety(f)?;
+        self.without_idle.iter().try_for_each(|problem| writeln!(f, "Actions: {problem}"))?;
         write!(f, "{}{}", self.observation, self.types)?;
         if let Some(steps) = &self.unequal_steps {
             write!(f, "{steps}")?;
@@ -47,7 +48,7 @@ impl Display for DoctorReport {
             0 => format!("No findings: the same actions played the same game for {ticks}."),
             count => format!("{}.", counted(count as u64, "finding")),
         };
-        let notes = match self.notes.len() {
+        let notes = match self.notes.len() + usize::from(self.without_idle.is_some()) {
             0 => String::new(),
             count => format!(" {}.", counted(count as u64, "note")),
         };

@@ -21,6 +21,8 @@ use playbot_harness::{
 /// Actions are tried at a few moments of the episode, each held for some ticks. An episode that is too short for that
 /// is skipped. An effect must show in the state hash, the observation or the reward.
 ///
+/// A moment in which the action is illegal does not count, and there must be two in which it is legal.
+///
 /// A stuck agent says nothing about actions. So the episode is one that was solved or, on an unsolved level, the one
 /// with the best reward. Its agent must be at different positions at these moments. It is opt-in, because games may
 /// have actions without an effect in some levels or in all.
@@ -29,6 +31,9 @@ pub struct DeadAction {
     moments: f64,
     ticks: f64,
 }
+
+/// Fewest moments in which a dead action must have been legal, unless there are fewer moments.
+const LEAST_MOMENTS: usize = 2;
 
 impl Default for DeadAction {
     fn default() -> Self {
@@ -97,18 +102,25 @@ impl DeadAction {
         if !is_same || !(has_solved || gets_around(script, &course, &moments)) {
             return Ok(Vec::new());
         }
-        let mut left = tried(script.game);
+        let enough = moments.len().min(LEAST_MOMENTS);
+        let mut left: Vec<_> = tried(script.game).into_iter().map(|(name, ways)| (name, ways, 0)).collect();
         for moment in moments {
             let before = &course.actions[..moment];
             let nothing = script.play(before, &idle, ticks)?;
             let mut still = Vec::new();
-            for (name, ways) in left {
-                let mut is_dead = true;
+            for (name, ways, mut times) in left {
+                let (mut has_effect, mut is_tried) = (false, false);
                 for way in &ways {
-                    is_dead = is_dead && script.play(before, way, ticks)? == nothing;
+                    if !has_effect {
+                        let held = script.play(before, way, ticks)?;
+                        has_effect = held.hashes != nothing.hashes;
+                        // Instead of an illegal action, the idle one was played.
+                        is_tried |= held.actions != nothing.actions;
+                    }
                 }
-                if is_dead {
-                    still.push((name, ways));
+                times += usize::from(is_tried);
+                if !has_effect {
+                    still.push((name, ways, times));
                 }
             }
             left = still;
@@ -116,7 +128,7 @@ impl DeadAction {
                 break;
             }
         }
-        Ok(left.into_iter().map(|(name, _)| name).collect())
+        Ok(left.into_iter().filter(|(_, _, times)| *times >= enough).map(|(name, ..)| name).collect())
     }
 }
 

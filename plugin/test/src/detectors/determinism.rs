@@ -183,6 +183,16 @@ pub struct SeenState {
     pub observation: Vec<f32>,
     /// The agent's position, if the game reports it.
     pub position: Option<Vec2>,
+    /// The action that led to it: another one than was asked for, if that was illegal.
+    pub action: ActionValue,
+}
+
+/// An action that was held, tick by tick.
+pub struct HeldOn {
+    /// The hashes of the known states: see [`hash_of_state`].
+    pub hashes: Vec<u64>,
+    /// The actions that were played: other ones than were asked for, where those were illegal.
+    pub actions: Vec<ActionValue>,
 }
 
 /// Most ticks and frames to wait.
@@ -242,21 +252,22 @@ impl<'a> Script<'a> {
                     hash: hash_of_state(&probe.world, probe.agent),
                     observation: seen.map_or_else(Vec::new, |seen| seen.vector.clone()),
                     position: self.game.tools().state.position(&probe.world, probe.agent),
+                    action: played_action(&probe),
                 });
             }
         }
         Ok(states)
     }
 
-    /// Plays these actions, then another one for this many ticks. Returns the hashes of the states of the latter.
+    /// Plays these actions, then another one for this many ticks. Returns the states and actions of the latter.
     ///
     /// # Errors
     ///
     /// The game broke its contract, or the test was stopped.
-    pub fn play(&self, before: &[ActionValue], then: &ActionValue, ticks_then: usize) -> Result<Vec<u64>, Fault> {
+    pub fn play(&self, before: &[ActionValue], then: &ActionValue, ticks_then: usize) -> Result<HeldOn, Fault> {
         let probe = Probe::led(self.game, self.mode, self.level, self.seed);
         let mut probe = probe.map_err(broken)?.until(self.stop);
-        let mut hashes = Vec::new();
+        let mut held = HeldOn { hashes: Vec::new(), actions: Vec::new() };
         for _ in 0..MOST_RUNS {
             let played = ticks(&probe);
             let action = before.get(played).unwrap_or(then).clone();
@@ -264,18 +275,24 @@ impl<'a> Script<'a> {
             let is_active = probe.tick()?;
             let now = ticks(&probe);
             if now > played && now > before.len() {
-                hashes.push(hash_of_state(&probe.world, probe.agent));
+                held.hashes.push(hash_of_state(&probe.world, probe.agent));
+                held.actions.push(played_action(&probe));
             }
             if !is_active || probe.is_over() || now >= before.len() + ticks_then {
                 break;
             }
         }
-        Ok(hashes)
+        Ok(held)
     }
 }
 
 fn broken(error: VisionError) -> Fault {
     Fault(error.to_string())
+}
+
+/// Returns the action of the last tick.
+fn played_action(probe: &Probe<'_>) -> ActionValue {
+    probe.world.get::<Action>(probe.agent).cloned().unwrap_or_default().0
 }
 
 /// Returns the ticks of the episode.

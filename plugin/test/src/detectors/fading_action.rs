@@ -24,6 +24,8 @@ const TOLERANCE: f32 = 0.01;
 /// one, with the same observation. Numbers that change while nothing is done, such as a clock, may differ. Another action
 /// must still have an effect there, because no action works after a pause.
 ///
+/// An action that is illegal in one of its last tries has not faded.
+///
 /// It is opt-in: ammunition that is not observed is a finding too.
 pub struct FadingAction {
     every: f64,
@@ -97,7 +99,13 @@ impl Tried<'_> {
     fn has_effect(&self, from: usize, to: usize) -> Result<bool, Fault> {
         let (begin, end) = (self.begin(from), self.begin(to));
         let nothing = self.script.play(&self.actions[..begin], self.idle, end - begin)?;
-        Ok(nothing.iter().ne(self.states[begin..end].iter().map(|state| &state.hash)))
+        Ok(nothing.hashes.iter().ne(self.states[begin..end].iter().map(|state| &state.hash)))
+    }
+
+    /// Returns whether the action was played in each try from this one on: it is not where it is illegal.
+    fn is_played_from(&self, number: usize, way: &ActionValue) -> bool {
+        let states = |number| &self.states[self.begin(number)..self.begin(number + 1)];
+        (number..self.count()).all(|number| states(number).iter().any(|state| state.action == *way))
     }
 
     /// Returns the number of tries after which no further one has an effect, of `count` in all, of which the last
@@ -138,7 +146,11 @@ impl FadingAction {
                 }
                 let (first, end) = (rest - 1, tried.begin(count - 1) - 1);
                 let is_same = is_same(&tried.states[first], &tried.states[end], &resting);
-                if !is_same || !tried.has_effect(0, 1)? || tried.has_effect(count - last, count)? {
+                if !is_same
+                    || !tried.is_played_from(count - last, way)
+                    || !tried.has_effect(0, 1)?
+                    || tried.has_effect(count - last, count)?
+                {
                     continue;
                 }
                 let works = tried.works_for(count, last)?;
@@ -170,7 +182,7 @@ impl FadingAction {
             tried.states[begin..].iter().map(|state| state.hash).take(self.ticks as usize).collect();
         for (name, ways) in others {
             for way in ways {
-                if tried.script.play(&tried.actions[..begin], way, nothing.len())? != nothing {
+                if tried.script.play(&tried.actions[..begin], way, nothing.len())?.hashes != nothing {
                     return Ok(Some(name.clone()));
                 }
             }
@@ -275,6 +287,12 @@ mod tests {
     }
 
     #[test]
+    fn an_action_that_becomes_illegal_has_not_faded() {
+        let masked = game(3, false).legal(|jumper: Single<&Jumper>| [true, true, jumper.jumps > 0]);
+        assert!(faded(&masked).is_empty());
+    }
+
+    #[test]
     fn a_shown_number_of_jumps_is_no_surprise() {
         assert!(faded(&game(3, true)).is_empty());
     }
@@ -287,7 +305,10 @@ mod tests {
 
     #[test]
     fn numbers_that_change_by_themselves_may_differ() {
-        let state = |observation: [f32; 2]| SeenState { hash: 0, observation: observation.to_vec(), position: None };
+        let state = |observation: [f32; 2]| {
+            let (observation, action) = (observation.to_vec(), ActionValue::Discrete(0));
+            SeenState { hash: 0, observation, position: None, action }
+        };
         let ticking = [state([0.0, 1.0]), state([1.0, 1.0])];
         assert!(is_same(&state([0.0, 1.0]), &state([9.0, 1.0]), &ticking));
         assert!(!is_same(&state([0.0, 1.0]), &state([0.0, 2.0]), &ticking));

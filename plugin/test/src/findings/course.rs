@@ -5,17 +5,25 @@ use crate::{
     findings::{
         FindingHead, StoredFinding,
         checks::{Check, message_of, watcher as detector_watcher},
-        play::{Replayed, Setting, Solo, play_actions, play_player},
+        play::{CheckTick, Replayed, Setting, Solo, Watcher, listed, play_actions, play_player},
     },
 };
-use bevy_playbot::{action::ActionValue, vision::ObservationConfig};
+use bevy::math::Vec2;
+use bevy_playbot::{
+    action::ActionValue,
+    demo::file::{DemoEnd, DemoEpisode},
+    episode::EpisodeEnd,
+    vision::ObservationConfig,
+};
 use playbot_harness::{
     eval::Player,
     game::{Game, level_designs, read_level_designs},
     level_files::{is_level_files, level_files_mode},
 };
 use std::{
+    cell::RefCell,
     path::{Path, PathBuf},
+    rc::Rc,
     sync::Arc,
 };
 
@@ -53,6 +61,60 @@ pub fn keeps_course(game: &dyn Game, (mode, level): (&str, u64), seed: u64, bot:
             None => {}
         }
     }
+}
+
+/// The course of a recorded episode's actions in the present game.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RecordedCourse {
+    /// The first tick, from 0, whose reward, state or end is not the recorded one; `None` if the course is the same.
+    pub differs: Option<u32>,
+    /// Position of the agent in that tick, if it is known.
+    pub position: Option<Vec2>,
+    /// Position with the largest distance from the first one, if positions are known.
+    pub furthest: Option<Vec2>,
+    /// Whether the actions reach the goal.
+    pub is_solved: bool,
+}
+
+/// Plays the actions of a recorded episode. Positions are those that the game declares, or else guessed ones.
+pub fn course_of_recording(game: &dyn Game, mode: &str, recorded: &DemoEpisode) -> RecordedCourse {
+    let noted = Rc::new(RefCell::new(Vec::new()));
+    let positions = Rc::clone(&noted);
+    let watcher: Watcher = Box::new(move |moment: &CheckTick| {
+        let (state, world, agent) = (moment.game.tools().state, moment.world, moment.agent);
+        let guessed = || state.guessed_position(world, agent).map(|guess| guess.position);
+        positions.borrow_mut().push(state.position(world, agent).or_else(guessed));
+        None
+    });
+    let setting = Setting { game, mode, level: recorded.level_seed, seed: 0 };
+    let replayed = play_actions(setting, &listed(&recorded.actions), Some(watcher));
+    let differs = first_difference(recorded, &replayed);
+    let positions = noted.borrow();
+    let position = differs.and_then(|tick| positions.get(tick as usize).copied().flatten());
+    let mut known = positions.iter().flatten().copied();
+    let start = known.next();
+    let furthest = start.map(|start| {
+        known.fold(start, |far, next| if start.distance(next) > start.distance(far) { next } else { far })
+    });
+    RecordedCourse { differs, position, furthest, is_solved: replayed.end.is_some_and(|end| end.success) }
+}
+
+/// Returns the first tick whose reward, state or end is not the recorded one.
+fn first_difference(recorded: &DemoEpisode, replayed: &Replayed) -> Option<u32> {
+    let (before, now) = (recorded.len(), replayed.rewards.len());
+    let is_same = |tick: &usize| {
+        let (paid, pays) = (recorded.rewards[*tick], replayed.rewards[*tick]);
+        paid.to_bits() == pays.to_bits() && recorded.state_hashes[*tick] == replayed.state_hashes[*tick]
+    };
+    let shared = before.min(now);
+    let end = replayed.end.map(|end| match end.end {
+        EpisodeEnd::Terminated { success } => DemoEnd::Terminated { success },
+        EpisodeEnd::Truncated => DemoEnd::Truncated,
+    });
+    let ends_differently = now < before || end.unwrap_or(DemoEnd::Aborted) != recorded.end;
+    let last = || ends_differently.then_some(shared.saturating_sub(1));
+    let first = (0..shared).find(|tick| !is_same(tick)).or_else(last);
+    first.map(|tick| u32::try_from(tick).unwrap_or(u32::MAX))
 }
 
 impl StoredFinding {

@@ -271,7 +271,10 @@ pub fn actions_of(
 mod tests {
     use super::*;
     use crate::findings::checks::LOST;
+    use bevy::prelude::*;
+    use bevy_playbot::{bot::BlindBot, episode::EpisodeEnd};
     use playbot_corridor::Corridor;
+    use playbot_harness::foreign::{ForeignGame, Restart};
     use std::cell::Cell;
 
     /// A finding of this detector on a level of the corridor, where action 0 is idling, and goes to the end that loses.
@@ -316,6 +319,43 @@ mod tests {
         let Minimised { finding, replays, is_minimal, .. } = shorter(&late);
         assert!(is_minimal && replays < 80, "{replays}");
         assert_eq!(finding.episode.len(), 30);
+    }
+
+    /// A game that is lost after six turns. Its actions 0 and 1 are legal in even turns, and 2 in odd ones.
+    fn turns() -> ForeignGame {
+        let game = |app: &mut App| {
+            app.insert_resource(Turn(0)).add_systems(Startup, |mut turn: ResMut<Turn>| turn.0 = 0);
+            app.add_systems(Update, |mut turn: ResMut<Turn>| turn.0 += 1);
+        };
+        ForeignGame::new("turns", 1, game)
+            .keys([vec![], vec![KeyCode::KeyA], vec![KeyCode::KeyB]])
+            .legal(|turn: Res<Turn>| {
+                let is_even = turn.0.is_multiple_of(2);
+                [is_even, is_even, !is_even]
+            })
+            .observe(["turn"], |turn: Res<Turn>| [turn.0 as f32])
+            .end(|turn: Res<Turn>| (turn.0 >= 6).then_some(EpisodeEnd::LOST))
+            .restart(Restart::Startup)
+    }
+
+    #[derive(Resource)]
+    struct Turn(u32);
+
+    #[test]
+    fn a_shorter_finding_names_the_legal_actions_that_were_played() {
+        let (game, checks, stop) = (turns(), Checks::default(), || false);
+        let bot = Player::Blind(BlindBot::Constant(ActionValue::Discrete(1)));
+        let played = actions_of(&game, ("default", 0), 0, &bot, &ObservationConfig::default()).expect("a vector");
+        let head = FindingHead::new("default:0", LOST, "after 6 ticks");
+        let found = StoredFinding::of_actions(&game, "default", 0, head, &played, &checks).expect("it is lost");
+        assert_eq!(found.actions(), played);
+        let minimised = minimise(&game, &found, &checks, Budget::default(), &|_| {}, &stop).expect("it is there");
+        // In place of 1 nothing is done, and 2 is still the only legal action of the other turns.
+        let one = ActionValue::Discrete(1);
+        let expected =
+            played.iter().map(|action| if *action == one { ActionValue::Discrete(0) } else { action.clone() });
+        assert!(played.contains(&one) && played.contains(&ActionValue::Discrete(2)), "{played:?}");
+        assert_eq!(minimised.finding.actions(), expected.collect::<Vec<_>>());
     }
 
     const NEVER: &dyn Fn() -> bool = &|| false;

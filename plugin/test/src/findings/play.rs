@@ -38,6 +38,10 @@ const BLANK: &str = "each picture of an episode of ";
 /// The result of a replayed episode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Replayed {
+    /// Action of each tick, as it was played: an illegal one is replaced, see [`LegalActions`].
+    ///
+    /// [`LegalActions`]: bevy_playbot::legal::LegalActions
+    pub actions: Vec<ActionValue>,
     /// Reward of each tick.
     pub rewards: Vec<f32>,
     /// Hash of the game's state after each tick.
@@ -61,6 +65,7 @@ impl Replayed {
     /// Adds a tick. Returns whether the episode goes on.
     fn note(&mut self, solo: &Solo, watcher: Option<&mut Watcher>) -> bool {
         let (reward, hash) = solo.outcome();
+        self.actions.extend(solo.action());
         self.rewards.push(reward);
         self.state_hashes.push(hash);
         self.end = solo.end();

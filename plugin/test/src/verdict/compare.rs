@@ -3,16 +3,21 @@
 #[cfg(test)]
 mod tests;
 
-use crate::verdict::{
-    LevelVerdict, Shard, TesterVerdict,
-    error::TestError,
-    maps::LevelMaps,
-    plan::TestRecord,
-    results::ResultLines,
-    statistics::{Trials, benjamini_hochberg, fisher_exact},
+use crate::{
+    findings::{RecordedCourse, course_of_recording},
+    verdict::{
+        LevelOutcome, LevelVerdict, Shard, TesterVerdict,
+        error::TestError,
+        maps::LevelMaps,
+        plan::TestRecord,
+        results::ResultLines,
+        statistics::{Trials, benjamini_hochberg, fisher_exact},
+        track::ReachedCells,
+    },
 };
 use bevy::math::Vec2;
-use playbot_harness::level_files::is_level_files;
+use bevy_playbot::demo::file::{DemoEpisode, DemoReader};
+use playbot_harness::{game::Game, level_files::is_level_files, split::LevelSplit};
 use playbot_report::counted;
 use serde::Serialize;
 use std::{
@@ -52,7 +57,7 @@ pub struct Comparison {
     pub new_findings: Vec<FindingChange>,
     /// Findings that are gone.
     pub gone_findings: Vec<FindingChange>,
-    /// Squares of levels that are no longer solved, where no tester comes any more.
+    /// Squares of levels that are not solved now, where no tester comes any more.
     pub unreached: Vec<UnreachedSquares>,
 }
 
@@ -66,16 +71,19 @@ impl Comparison {
     pub fn read(before: &Path, now: &Path) -> Result<Self, TestError> {
         let mut lines = ResultLines::open_whole(now)?;
         let Comparable { mut earlier, common, other_detectors, left_out } = comparable(before, lines.record())?;
+        let draws = |record: &TestRecord| (record.seed, record.episodes);
+        let (drawn, draws) = (draws(earlier.record()), draws(lines.record()));
         let mut known = BTreeMap::new();
         while let Some(level) = earlier.next_level()? {
-            known.insert(level.level.clone(), Known::of(level, &common, &other_detectors));
+            known.insert(level.level.clone(), Known::of(level, &common, &other_detectors, drawn));
         }
         let (mut comparison, mut doubtful) = (Self { left_out, ..Self::default() }, Vec::new());
         while let Some(level) = lines.next_level()? {
             match known.remove(&level.level) {
                 Some(known) => {
                     let name = level.level.clone();
-                    comparison.compare(&known, &name, &Known::of(level, &common, &other_detectors), &mut doubtful)
+                    let level = Known::of(level, &common, &other_detectors, draws);
+                    comparison.compare(&known, &name, &level, &mut doubtful)
                 }
                 None => comparison.only_now += 1,
             }
@@ -229,10 +237,12 @@ impl fmt::Display for FindingChange {
     }
 }
 
-/// Squares of a level that was solved before and no longer is: testers visited them before, and none does now.
+/// Squares of a level that is not solved now: testers visited them before, and none does now.
 ///
-/// It needs maps of both results, of the same squares and the same testers. It explains a change and is no alarm of its
-/// own.
+/// It needs maps or reached cells of both results, of the same squares and the same testers. On a level that was not
+/// solved before either, the episodes must be those that an unchanged level repeats: with the same seed, or without
+/// draws. A large part of the squares must be missing then, because the path of a random tester changes with everything.
+/// It explains a change and is no alarm of its own.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct UnreachedSquares {
     /// The level.
@@ -245,15 +255,21 @@ pub struct UnreachedSquares {
     pub nearest: [f32; 2],
 }
 
+/// Part of the squares that must be missing on a level that is unsolved in both results: one of so many.
+const LARGE_PART: usize = 4;
+
 impl UnreachedSquares {
     fn between(level: &str, before: &Known, now: &Known) -> Option<Self> {
-        let (was, is) = (before.visited.as_ref()?, now.visited.as_ref()?);
-        let is_lost = before.total.successes > 0 && now.total.successes == 0;
-        if !is_lost || !was.has_squares_of(is) {
+        if now.total.successes > 0 {
             return None;
         }
-        let lost: Vec<u64> = was.squares.difference(&is.squares).copied().collect();
-        let mut closest: Option<(f32, [u64; 2])> = None;
+        let (was, is) = before.visited.as_ref()?.alike(now.visited.as_ref()?)?;
+        let lost: Vec<Square> = was.squares.difference(&is.squares).copied().collect();
+        let is_chance = !before.repeats(now) || lost.len() * LARGE_PART < was.squares.len();
+        if before.total.successes == 0 && is_chance {
+            return None;
+        }
+        let mut closest: Option<(f32, [Square; 2])> = None;
         for square in &lost {
             for reached in &is.squares {
                 let distance = was.middle(*square).distance_squared(was.middle(*reached));
@@ -278,35 +294,74 @@ impl fmt::Display for UnreachedSquares {
     }
 }
 
+/// Row and column of a square, whose order is that of maps.
+type Square = [i32; 2];
+
 /// Squares that testers visited.
+#[derive(Clone, Debug)]
 struct VisitedSquares {
     corner: Vec2,
     side: f32,
-    columns: u64,
-    squares: BTreeSet<u64>,
+    /// Where they come from: squares of different origins are not comparable.
+    origin: SquareOrigin,
+    squares: BTreeSet<Square>,
+}
+
+/// Origin of visited squares.
+#[derive(Clone, Debug, PartialEq)]
+enum SquareOrigin {
+    /// Maps with so many columns.
+    Maps(u64),
+    /// Positions, of this entity if the game does not declare them.
+    Cells(Option<String>),
 }
 
 impl VisitedSquares {
-    fn of(maps: &LevelMaps) -> Self {
-        let squares = maps.visits.iter().map(|[square, _]| *square).collect();
-        Self { corner: Vec2::new(maps.x, maps.y), side: maps.side, columns: maps.columns.max(1), squares }
+    fn of(level: &LevelVerdict) -> Option<Self> {
+        level.maps.as_ref().map(Self::of_maps).or_else(|| level.reached.as_ref().map(Self::of_cells))
     }
 
-    fn has_squares_of(&self, other: &Self) -> bool {
-        self.corner == other.corner && self.side == other.side && self.columns == other.columns
+    fn of_maps(maps: &LevelMaps) -> Self {
+        let columns = maps.columns.max(1);
+        let place = |square: &[u64; 2]| [square[0] / columns, square[0] % columns].map(|number| number as i32);
+        let squares = maps.visits.iter().map(place).collect();
+        Self { corner: Vec2::new(maps.x, maps.y), side: maps.side, origin: SquareOrigin::Maps(columns), squares }
+    }
+
+    fn of_cells(cells: &ReachedCells) -> Self {
+        let origin = SquareOrigin::Cells(cells.entity.clone());
+        let squares = cells.cells.iter().map(|[column, row]| [*row, *column]).collect();
+        Self { corner: Vec2::ZERO, side: cells.side, origin, squares }
+    }
+
+    /// Returns both in squares of one size; `None` if that is impossible.
+    fn alike(&self, other: &Self) -> Option<(Self, Self)> {
+        let side = match self.origin {
+            _ if self.corner != other.corner || self.origin != other.origin => return None,
+            SquareOrigin::Maps(_) if self.side != other.side => return None,
+            SquareOrigin::Maps(_) => return Some((self.clone(), other.clone())),
+            SquareOrigin::Cells(_) => self.side.max(other.side),
+        };
+        let enlarged = |it: &Self| {
+            let cells = ReachedCells { side: it.side, cells: it.squares.clone(), entity: None }.of_side(side);
+            Self { side: cells.side, squares: cells.cells, ..it.clone() }
+        };
+        let (one, another) = (enlarged(self), enlarged(other));
+        (one.side == another.side).then_some((one, another))
     }
 
     /// Returns the middle of a square.
-    fn middle(&self, square: u64) -> Vec2 {
-        let place = Vec2::new((square % self.columns) as f32, (square / self.columns) as f32);
-        self.corner + (place + 0.5) * self.side
+    fn middle(&self, [row, column]: Square) -> Vec2 {
+        self.corner + (Vec2::new(column as f32, row as f32) + 0.5) * self.side
     }
 }
 
 /// Results of an earlier level that are kept in memory.
 struct Known {
-    /// Squares that the testers visited, if the level has maps of these testers alone.
+    /// Squares that the testers visited, if the level was played by these testers alone.
     visited: Option<VisitedSquares>,
+    /// Random seed of the test, and episodes of each tester.
+    draws: (u64, u32),
     testers: Vec<TesterVerdict>,
     total: Trials,
     is_unsolvable: bool,
@@ -315,16 +370,16 @@ struct Known {
 
 impl Known {
     /// Keeps the results of the testers with these names, and of all detectors except these.
-    fn of(level: LevelVerdict, testers: &[String], other_detectors: &[String]) -> Self {
+    fn of(level: LevelVerdict, testers: &[String], other_detectors: &[String], draws: (u64, u32)) -> Self {
         let is_unsolvable = level.proof.why_unsolvable().is_some();
         let is_common = |name: &Option<String>| name.as_ref().is_none_or(|name| testers.contains(name));
+        let is_theirs = level.testers.len() == testers.len();
+        let visited = if is_theirs { VisitedSquares::of(&level) } else { None };
         let findings = level
             .findings
             .into_iter()
             .filter(|finding| is_common(&finding.tester) && !other_detectors.contains(&finding.detector));
         let findings = findings.map(|finding| (finding.detector, finding.tester)).collect();
-        let is_theirs = level.testers.len() == testers.len();
-        let visited = level.maps.as_ref().filter(|_| is_theirs).map(VisitedSquares::of);
         let mut verdicts = level.testers;
         let own: Vec<TesterVerdict> = testers
             .iter()
@@ -335,8 +390,94 @@ impl Known {
             .collect();
         let mut total = Trials::default();
         own.iter().for_each(|tester| add(&mut total, tester.score.trials()));
-        Self { visited, testers: own, total, is_unsolvable, findings }
+        Self { visited, draws, testers: own, total, is_unsolvable, findings }
     }
+
+    /// Returns whether the other episodes are these once more if the level is the same.
+    fn repeats(&self, other: &Self) -> bool {
+        self.draws == other.draws || self.testers.iter().chain(&other.testers).all(|tester| tester.exact)
+    }
+}
+
+// Comparison with the recordings of an earlier build.
+
+/// A level that a recorded episode has solved and that no tester solves now, with the course of the recorded actions.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordedFurther {
+    /// The level.
+    pub level: String,
+    /// Ticks of the recorded episode.
+    pub ticks: u64,
+    /// The course of its actions in the present game.
+    pub course: RecordedCourse,
+}
+
+impl RecordedFurther {
+    /// Plays a recording's solved episodes on those levels that the results in a folder have as unsolved: the first one
+    /// of each level.
+    ///
+    /// # Errors
+    ///
+    /// The results or the recording cannot be read, or the recording is of other levels.
+    pub fn read(game: &dyn Game, folder: &Path, recording: &Path) -> Result<Vec<Self>, TestError> {
+        let mut lines = ResultLines::open_whole(folder)?;
+        let range = lines.record().range.clone();
+        let mut recorded = recorded_levels(game, &range, recording)?;
+        let mut found = Vec::new();
+        while let Some(level) = lines.next_level()? {
+            let is_unsolved = level.outcome != LevelOutcome::Solved;
+            let Some(episode) = recorded.remove(&(range.first + level.index)).filter(|_| is_unsolved) else { continue };
+            let course = course_of_recording(game, &range.mode, &episode);
+            found.push(Self { level: level.level, ticks: episode.len() as u64, course });
+        }
+        Ok(found)
+    }
+
+    /// Checks before a test that a recording can be compared with it.
+    ///
+    /// # Errors
+    ///
+    /// As for [`read`](Self::read), as far as known in advance.
+    pub fn check(game: &dyn Game, range: &LevelSplit, recording: &Path) -> Result<(), TestError> {
+        recorded_levels(game, range, recording).map(drop)
+    }
+}
+
+impl fmt::Display for RecordedFurther {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { level, ticks, course: RecordedCourse { differs, position, furthest, is_solved } } = self;
+        let at = |place: &Vec2| format!("({:.1}, {:.1})", place.x, place.y);
+        write!(f, "{level}: the recording solves it in {}; its actions ", counted(*ticks, "tick"))?;
+        match differs {
+            None => return f.write_str("still do, so the testers are too weak"),
+            Some(tick) => write!(f, "lead elsewhere from tick {tick} on")?,
+        }
+        position.iter().try_for_each(|position| write!(f, ", at {}", at(position)))?;
+        if *is_solved {
+            return f.write_str(", and still reach the goal");
+        }
+        f.write_str(", and do not reach the goal")?;
+        furthest.iter().try_for_each(|furthest| write!(f, ": they come no further than {}", at(furthest)))
+    }
+}
+
+/// Returns the first solved episode of each level of a range.
+fn recorded_levels(
+    game: &dyn Game,
+    range: &LevelSplit,
+    recording: &Path,
+) -> Result<BTreeMap<u64, DemoEpisode>, TestError> {
+    let mut levels = BTreeMap::new();
+    for episode in DemoReader::open_for_game(recording, game.name(), game.version(), Some(&range.mode))? {
+        let episode = episode?;
+        if episode.is_success() && range.contains(&range.mode, episode.level_seed) {
+            levels.entry(episode.level_seed).or_insert(episode);
+        }
+    }
+    if levels.is_empty() {
+        return Err(TestError::NothingRecorded { path: recording.into(), range: range.to_string() });
+    }
+    Ok(levels)
 }
 
 /// A level whose difference may be chance.

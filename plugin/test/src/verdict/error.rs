@@ -1,6 +1,7 @@
 //! Errors of tests and their results.
 
 use crate::{findings::FindingError, verdict::shard::Shard};
+use bevy_playbot::demo::file::DemoFileError;
 use playbot_harness::eval::EvalError;
 use playbot_learner::HasExitCode;
 use playbot_report::counted;
@@ -112,6 +113,20 @@ pub enum TestError {
         folder: PathBuf,
         /// The differences, described.
         differences: Vec<String>,
+    },
+    /// A recording cannot be read, or is of another game, version or mode.
+    #[error(transparent)]
+    Recording(#[from] DemoFileError),
+    /// A recording without a solved episode on the levels of the test.
+    #[error(
+        "{} has no solved episode on a level of {range}: name a recording of these levels that reaches their goals, or leave \
+         --against out", path.display()
+    )]
+    NothingRecorded {
+        /// The recording.
+        path: PathBuf,
+        /// The range of levels.
+        range: String,
     },
     /// JUnit XML could not be written.
     #[error("the results cannot be written as JUnit XML: {0}")]

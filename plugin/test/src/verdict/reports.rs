@@ -137,6 +137,11 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
             lines.extend(shown);
             lines.push("```".to_owned());
         }
+        if let Some(search) = overview.worst.iter().find_map(|level| action_search(program, record, level)) {
+            let why = "No tester solved a level: to learn which actions do nothing there, or stop working:";
+            lines.extend(["", why, "", "```sh"].map(str::to_owned));
+            lines.extend([search, "```".to_owned()]);
+        }
     }
     lines.push(String::new());
     lines.join("\n")
@@ -279,6 +284,33 @@ fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec
     [again].into_iter().chain(exact.then_some(picture)).collect()
 }
 
+/// Detectors of actions that do nothing, or no longer do what they did. They are opt-in, since they take long.
+const OF_ACTIONS: [&str; 2] = ["dead-action", "fading-action"];
+
+/// Returns the command that looks for actions without an effect on a level that no tester solved, for the program of this
+/// name. `None` for other levels, or if the test looked for them there.
+pub fn action_search(program: &str, record: &TestRecord, level: &LevelVerdict) -> Option<String> {
+    let has_looked = |name: &str| {
+        record.detectors.iter().any(|detector| {
+            let mut words = detector.split(' ');
+            let is_it = words.next() == Some(name);
+            let every = words.find_map(|setting| setting.strip_prefix("every=")?.parse::<f64>().ok());
+            is_it && level.index.is_multiple_of((every.unwrap_or(1.0) as u64).max(1))
+        })
+    };
+    let missing: Vec<&str> = OF_ACTIONS.into_iter().filter(|name| !has_looked(name)).collect();
+    if level.outcome != LevelOutcome::BotFailed || missing.is_empty() {
+        return None;
+    }
+    let (game, seed, episodes, played) = (&record.game, record.seed, record.episodes, testers(&record.testers));
+    let levels = level_argument(&record.range, &level.level);
+    let missing = missing.join(",");
+    Some(format!(
+        "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed} --detect {missing} --out \
+         runs/actions"
+    ))
+}
+
 /// Returns the testers as arguments of `playbot test`. The draws of a policy depend on its name, so the name is
 /// included.
 fn testers(testers: &[TesterRecord]) -> String {
@@ -388,6 +420,33 @@ mod tests {
         assert_eq!(seen(&first), "--run 'my runs/a' --checkpoint 4096");
         let all = [TesterRecord::bot("random"), TesterRecord { greedy: true, ..first }, second];
         assert_eq!(testers(&all), "--bot random --run 'my runs/a' --run runs/b --greedy", "no checkpoint is theirs");
+    }
+
+    #[test]
+    fn a_level_that_no_tester_solved_names_the_search_for_dead_actions_unless_it_was_made() {
+        let policy = TesterRecord { checksum: Some("0f".to_owned()), ..TesterRecord::bot("ppo.policy") };
+        let record = TestRecord {
+            seed: 3,
+            testers: vec![TesterRecord::bot("random"), policy],
+            episodes: 2,
+            ..testing::record("bed:5..9")
+        };
+        let failed = LevelVerdict { level: "bed:6".to_owned(), ..verdict(1, 0, 4) };
+        let search = |record: &TestRecord, level: &LevelVerdict| action_search("jump", record, level);
+        let command = |detectors: &str| {
+            Some(format!(
+                "jump test garden --levels bed:6 --bot random --policy ppo.policy --episodes 2 --seed 3 --detect \
+                 {detectors} --out runs/actions"
+            ))
+        };
+        assert_eq!(search(&record, &failed), command("dead-action,fading-action"));
+        let mut looked = record.clone();
+        looked.detectors = vec!["stuck ticks=300".to_owned(), "dead-action every=1 moments=6".to_owned()];
+        assert_eq!(search(&looked, &failed), command("fading-action"));
+        looked.detectors.push("fading-action every=10 tries=40".to_owned());
+        assert_eq!(search(&looked, &failed), command("fading-action"), "it looked at every tenth level");
+        assert_eq!(search(&looked, &LevelVerdict { index: 20, ..failed.clone() }), None);
+        assert_eq!(search(&record, &verdict(1, 4, 4)), None, "it was solved");
     }
 
     #[test]

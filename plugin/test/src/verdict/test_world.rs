@@ -229,7 +229,11 @@ impl TestWorld {
         for (agent, result) in ended {
             let Some(seat) = self.seats.iter().position(|seat| seat.agent == agent) else { continue };
             let walk = self.take_walk(seat);
-            let track = self.seats[seat].track.take();
+            let mut track = self.seats[seat].track.take();
+            if walk.is_some() {
+                // A map has more than these.
+                track.cells = None;
+            }
             let Some((task, seed)) = self.seats[seat].current() else { continue };
             let position = game.tools().state.position(&self.world, agent);
             let cause = if result.success { None } else { game.tools().state.end_cause(&self.world, agent) };

@@ -53,6 +53,7 @@ pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
         solved_at_start: false,
         places: None,
         maps: None,
+        reached: None,
         testers: vec![tester("random", solved, episodes, false)],
         findings: Vec::new(),
     }

@@ -1,11 +1,11 @@
-//! Progress of agents without a floor plan: success in the first tick, and the position at which the episodes of an
-//! unsolved level stop.
+//! Progress of agents without a floor plan: success in the first tick, the cells that they reach, and the position at
+//! which the episodes of an unsolved level stop.
 
 use bevy::{math::Vec2, prelude::*};
 use bevy_playbot::episode::{Episode, EpisodeResult};
 use playbot_harness::game::Game;
 use serde::{Deserialize, Serialize};
-use std::fmt;
+use std::{collections::BTreeSet, fmt};
 
 /// Radius of a common stop, as a share of the distance that the best episode came from its start.
 const RADIUS: f32 = 0.1;
@@ -20,6 +20,8 @@ pub(super) struct Track {
     pub is_solved_at_start: bool,
     /// Its positions, if they are known.
     pub route: Option<Route>,
+    /// The cells of its positions, if they are known.
+    pub cells: Option<ReachedCells>,
 }
 
 /// Positions of an agent in an episode.
@@ -62,7 +64,7 @@ impl TrackCounter {
         }
         if episode.tick == 1 {
             let is_solved_at_start = result.map_or_else(|| episode.is_success(), |result| result.success);
-            self.now = Track { is_solved_at_start, route: None };
+            self.now = Track { is_solved_at_start, ..Track::default() };
         }
         let state = game.tools().state;
         let declared = state.position(world, self.agent).map(|position| (position, None));
@@ -73,6 +75,10 @@ impl TrackCounter {
     }
 
     fn note(&mut self, position: Vec2, entity: Option<String>) {
+        match &mut self.now.cells {
+            Some(cells) if cells.entity == entity => cells.insert(position),
+            cells => cells.insert(ReachedCells::new(entity.clone())).insert(position),
+        }
         match &mut self.now.route {
             // Distances from another entity's start mean nothing.
             Some(route) if route.entity == entity => {
@@ -89,6 +95,95 @@ impl TrackCounter {
     pub fn take(&mut self) -> Track {
         std::mem::take(&mut self.now)
     }
+}
+
+/// Most cells along a side of the area that was reached.
+const MOST_CELLS: i32 = 32;
+
+/// Side of the smallest cells.
+const SMALLEST: f32 = 1.0 / 256.0;
+
+/// Most cells between the origin and a position, so that numbers of cells are exact.
+const FARTHEST: f32 = 1_048_576.0;
+
+/// Cells of the positions that agents reached on a level without [maps](crate::verdict::LevelMaps). They are coarse: at
+/// most 32 along each side of the area.
+///
+/// The side of a cell is a power of two, and the corner of one is the origin. So larger cells consist of whole smaller
+/// ones, and results with cells of different sizes are comparable.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ReachedCells {
+    /// Side of a cell, in the units of the game's positions.
+    pub side: f32,
+    /// Column and row of each cell: its corner is at these times the side.
+    pub cells: BTreeSet<[i32; 2]>,
+    /// The entity whose positions they are, if the game does not declare positions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub entity: Option<String>,
+}
+
+impl ReachedCells {
+    fn new(entity: Option<String>) -> Self {
+        Self { side: SMALLEST, cells: BTreeSet::new(), entity }
+    }
+
+    /// Adds the cell of a finite position. The result does not depend on the order of positions.
+    fn insert(&mut self, position: Vec2) {
+        while position.abs().max_element() > FARTHEST * self.side {
+            *self = self.doubled();
+        }
+        if self.cells.insert((position / self.side).floor().as_ivec2().to_array()) {
+            self.shorten();
+        }
+    }
+
+    /// Adds the cells of another episode.
+    fn add(&mut self, other: &Self) {
+        let side = self.side.max(other.side);
+        *self = self.of_side(side);
+        self.cells.extend(other.of_side(side).cells);
+        self.shorten();
+    }
+
+    /// Makes cells of at least this side. Cells from a file may have any.
+    pub(super) fn of_side(&self, side: f32) -> Self {
+        let mut cells = self.clone();
+        while cells.side > 0.0 && cells.side < side {
+            cells = cells.doubled();
+        }
+        cells
+    }
+
+    /// Makes larger cells, until there are few of them.
+    fn shorten(&mut self) {
+        while (0..2).any(|axis| self.length(axis) > i64::from(MOST_CELLS)) {
+            *self = self.doubled();
+        }
+    }
+
+    /// Returns the number of cells from the first to the last one along an axis.
+    fn length(&self, axis: usize) -> i64 {
+        let numbers = || self.cells.iter().map(|cell| i64::from(cell[axis]));
+        numbers().max().zip(numbers().min()).map_or(0, |(last, first)| last - first + 1)
+    }
+
+    fn doubled(&self) -> Self {
+        let cells = self.cells.iter().map(|cell| cell.map(|number| number.div_euclid(2))).collect();
+        Self { side: 2.0 * self.side, cells, entity: self.entity.clone() }
+    }
+}
+
+/// Returns the cells of all these episodes together. `None` without positions, or with those of different entities.
+pub(super) fn reached<'a>(tracks: impl Iterator<Item = &'a Track>) -> Option<ReachedCells> {
+    let mut all: Option<ReachedCells> = None;
+    for cells in tracks.filter_map(|track| track.cells.as_ref()) {
+        match &mut all {
+            None => all = Some(cells.clone()),
+            Some(all) if all.entity == cells.entity => all.add(cells),
+            Some(_) => return None,
+        }
+    }
+    all
 }
 
 /// The position at which the episodes of an unsolved level stop.
@@ -209,7 +304,8 @@ mod tests {
     /// Makes the track of an episode that goes from 0, 0 to `furthest` and ends at `end`.
     fn track(furthest: [f32; 2], end: [f32; 2]) -> Track {
         let [furthest, end] = [furthest, end].map(Vec2::from_array);
-        Track { is_solved_at_start: false, route: Some(Route { start: Vec2::ZERO, furthest, end, entity: None }) }
+        let route = Some(Route { start: Vec2::ZERO, furthest, end, entity: None });
+        Track { route, ..Track::default() }
     }
 
     fn words(tracks: &[Track]) -> Option<String> {
@@ -264,6 +360,44 @@ mod tests {
         let mixed: Vec<Track> =
             moved.iter().zip(["a", "b", "b"]).map(|(one, name)| guessed(one.clone(), name)).collect();
         assert_eq!(words(&mixed), None, "these are positions of two entities");
+    }
+
+    /// Returns the side and the cells of these positions, in one episode.
+    fn cells(positions: &[[f32; 2]]) -> (f32, Vec<[i32; 2]>) {
+        let mut counter = TrackCounter::new(Entity::PLACEHOLDER);
+        positions.iter().for_each(|position| counter.note(Vec2::from_array(*position), None));
+        let reached = counter.take().cells.expect("positions are known");
+        (reached.side, reached.cells.into_iter().collect())
+    }
+
+    #[test]
+    fn cells_grow_until_there_are_few_whatever_the_order_of_positions() {
+        // 33 cells of side 1 would be too many: from -1 to 31.
+        let all = [[-0.5, 0.0], [31.5, 3.0], [8.0, 2.0]];
+        let expected = (2.0, vec![[-1, 0], [4, 1], [15, 1]]);
+        assert_eq!(cells(&all), expected);
+        assert_eq!(cells(&[all[2], all[0], all[1]]), expected);
+        assert_eq!(cells(&[all[1], all[2], all[0]]), expected);
+        assert_eq!(cells(&[[0.0, 0.0], [31.5, 0.0]]), (1.0, vec![[0, 0], [31, 0]]));
+        assert_eq!(cells(&[[0.25, 0.5]]), (SMALLEST, vec![[64, 128]]));
+        // The farthest position is at 2 to the power of 30, and 2 to the power of 20 cells away.
+        assert_eq!(cells(&[[1_073_741_824.0, 0.0]]), (1024.0, vec![[1_048_576, 0]]));
+    }
+
+    #[test]
+    fn cells_of_all_episodes_are_added_in_the_larger_size() {
+        let track = |positions: &[[f32; 2]], entity: Option<&str>| {
+            let mut counter = TrackCounter::new(Entity::PLACEHOLDER);
+            let entity = entity.map(str::to_owned);
+            positions.iter().for_each(|position| counter.note(Vec2::from_array(*position), entity.clone()));
+            counter.take()
+        };
+        let far = track(&[[0.0, 0.0], [63.0, 0.0]], None);
+        let near = track(&[[1.0, 1.0], [3.0, 5.0]], None);
+        let all = reached([&near, &far].into_iter()).expect("positions are known");
+        assert_eq!((all.side, all.cells.into_iter().collect::<Vec<_>>()), (2.0, vec![[0, 0], [1, 2], [31, 0]]));
+        assert_eq!(reached([&near, &track(&[[0.0, 0.0]], Some("the one"))].into_iter()), None);
+        assert_eq!(reached([&Track::default()].into_iter()), None);
     }
 
     #[test]

@@ -113,6 +113,7 @@ pub(crate) fn level(index: u64, solved: u64, episodes: u64, ticks: u32) -> Level
         solved_at_start: false,
         places: None,
         maps: None,
+        reached: None,
         testers: vec![TesterVerdict { tester: "random".to_owned(), score, exact: false, places: None }],
         findings: Vec::new(),
     }

@@ -8,8 +8,8 @@ use playbot_harness::detector::LevelProof;
 use playbot_test::{
     verdict::{
         CommonStop, Comparison, Earlier, EpisodeScore, FailurePath, Finding, FinishTime, LevelMaps, LevelOutcome,
-        LevelVerdict, MapScope, Overview, Places, RESULTS, ResultLines, Shard, SkillTicks, SquareEnds, StopKind,
-        TestFolder, TestRecord, TesterRecord, TesterVerdict, merge, wilson, write_reports,
+        LevelVerdict, MapScope, Overview, Places, RESULTS, ReachedCells, ResultLines, Shard, SkillTicks, SquareEnds,
+        StopKind, TestFolder, TestRecord, TesterRecord, TesterVerdict, merge, wilson, write_reports,
     },
     verdict_report::{HtmlReport, html},
 };
@@ -113,6 +113,7 @@ fn verdict(index: u64) -> LevelVerdict {
         solved_at_start: true,
         places,
         maps: Some(maps()),
+        reached: Some(ReachedCells { side: 0.5, cells: [[-1, 2], [3, 0]].into(), entity: Some("the one".to_owned()) }),
         testers: ["random", "chaos"].map(tester).to_vec(),
         findings: vec![finding],
     }

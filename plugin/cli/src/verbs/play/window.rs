@@ -6,14 +6,19 @@ use crate::{
     output::program,
     progress::interrupt,
     verbs::{demo::deciders, play::Args},
-    window::{Autopilot, GameWindow, Playlist, UnboundKeys, WindowSetup, idle_warning},
+    window::{Autopilot, GameWindow, Playlist, UnboundKeys, WindowSetup},
 };
 use bevy_playbot::{
     demo::file::{DemoHeader, DemoSummary},
     placement::TickPlacement,
     vision::ObservationConfig,
 };
-use playbot_harness::{game::Game, games::Games, level_files::is_level_files, split::LevelSplit};
+use playbot_harness::{
+    game::{Game, without_idle_action},
+    games::Games,
+    level_files::is_level_files,
+    split::LevelSplit,
+};
 use playbot_report::counted;
 use std::path::Path;
 
@@ -90,8 +95,8 @@ fn announce(game: &dyn Game, args: &Args) {
         report!("the game's own keys and mouse; R again, N next level, P pause, Escape ends");
     }
     let is_by_actions = game.tools().input.key_bindings().is_some() || args.record.is_some();
-    if let Some(warning) = idle_warning(game).filter(|_| is_by_actions) {
-        report!("{warning}");
+    if let Some(problem) = without_idle_action(game).filter(|_| is_by_actions) {
+        report!("warning: {problem}");
     }
     if args.autopilot.is_named() {
         report!("Tab hands over and takes over again");

@@ -10,8 +10,8 @@ use playbot_report::{PlainTable, counted, ticks, whole};
 use playbot_test::{
     findings::{FINDINGS, list_findings},
     verdict::{
-        AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, ResultLines, SUMMARY, TesterTotal,
-        Trials, wilson, write_reports,
+        AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, RecordedFurther, ResultLines, SUMMARY,
+        TesterTotal, Trials, action_search, wilson, write_reports,
     },
     verdict_report::{HtmlReport, REPORT, write_html},
 };
@@ -29,6 +29,8 @@ pub struct Results<'a> {
     pub folder: &'a Path,
     /// Folder of earlier ones.
     pub against: Option<&'a Path>,
+    /// A recording of an earlier build.
+    pub recording: Option<&'a Path>,
     /// The game that was tested, if the program has it: it draws the levels of the report.
     pub game: Option<&'a dyn Game>,
     /// The levels are printed as JSON instead of tables.
@@ -84,9 +86,13 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     report!("{}", counts(&overview));
     overview.first_tick().iter().for_each(|levels| report!("{levels}"));
     stops(&overview).iter().for_each(|line| report!("{line}"));
+    search(&overview).iter().for_each(|line| report!("{line}"));
     replays(results.folder, &overview).iter().for_each(|line| report!("{line}"));
     if let Some(comparison) = &comparison {
         report_comparison(comparison);
+    }
+    if let (Some(recording), Some(game)) = (results.recording, results.game) {
+        report_recording(&RecordedFurther::read(game, results.folder, recording)?);
     }
     let names = [RESULTS, REPORT, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
     report!("{folder}: {}", names.collect::<Vec<_>>().join(", "));
@@ -98,6 +104,13 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
 fn stops(overview: &Overview) -> Vec<String> {
     let stop = |level: &LevelVerdict| level.stop.as_ref().map(|stop| format!("{}: {stop}", level.level));
     overview.worst.iter().filter_map(stop).take(MOST_STOPS).collect()
+}
+
+/// Returns the command that looks for actions without an effect, for the worst level that no tester solved.
+fn search(overview: &Overview) -> Option<String> {
+    let command = |level| action_search(program::name(), &overview.record, level);
+    let (level, command) = overview.worst.iter().find_map(|level| Some((&level.level, command(level)?)))?;
+    Some(format!("{level}: to learn which actions do nothing there, or stop working: {command}"))
 }
 
 /// Returns the commands that show findings of the worst levels, and the list of other files.
@@ -192,6 +205,13 @@ fn report_comparison(comparison: &Comparison) {
     }
     if lists.iter().all(|(_, changes)| changes.is_empty()) {
         report!("nothing has changed by more than chance in {}", counted(comparison.levels, "level"));
+    }
+}
+
+fn report_recording(further: &[RecordedFurther]) {
+    further.iter().for_each(|level| report!("recorded: {level}"));
+    if further.is_empty() {
+        report!("the recording solves no level that the testers do not solve");
     }
 }
 

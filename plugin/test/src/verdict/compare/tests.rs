@@ -125,6 +125,31 @@ fn squares_of_a_level_that_is_no_longer_solved_are_reported_where_no_tester_come
 }
 
 #[test]
+fn without_maps_the_cells_of_positions_are_compared_in_the_larger_size() {
+    let went = |solved: u64, side: f32, columns: i32, entity: Option<&str>| {
+        let cells = (0..columns).map(|column| [column, 0]).collect();
+        let reached = Some(ReachedCells { side, cells, entity: entity.map(str::to_owned) });
+        LevelVerdict { reached, ..exact(0, solved) }
+    };
+    let unreached = |before: LevelVerdict, now: LevelVerdict| compared(&[before], &[now], &["plan"]).unreached;
+    // Six cells of side 1 are three of side 2.
+    let found = unreached(went(1, 1.0, 6, None), went(0, 2.0, 2, None));
+    let expected = UnreachedSquares { level: "hard:0".to_owned(), squares: 1, at: [5.0, 1.0], nearest: [3.0, 1.0] };
+    assert_eq!(found, std::slice::from_ref(&expected));
+    let unsolved = unreached(went(0, 1.0, 6, None), went(0, 2.0, 2, None));
+    assert_eq!(unsolved, [expected], "a third is missing on a level that was not solved before either");
+    assert!(unreached(went(0, 1.0, 6, None), went(0, 1.0, 5, None)).is_empty(), "a sixth may be chance");
+    let drawn = |level: LevelVerdict| LevelVerdict { testers: vec![tester("plan", 0, 1, false)], ..level };
+    let others = unreached(drawn(went(0, 1.0, 6, None)), drawn(went(0, 2.0, 2, None)));
+    assert!(others.is_empty(), "another seed leads to other cells");
+    assert_eq!(unreached(went(1, 1.0, 6, None), went(0, 1.0, 5, None)).len(), 1);
+    assert!(unreached(went(1, 1.0, 6, None), went(1, 1.0, 5, None)).is_empty(), "it is solved");
+    assert!(unreached(went(1, 1.0, 6, None), went(0, 1.0, 5, Some("the one"))).is_empty(), "another entity");
+    assert!(unreached(went(1, 0.0, 6, None), went(0, 1.0, 5, None)).is_empty(), "no side of a cell");
+    assert!(unreached(went(1, 0.75, 6, None), went(0, 1.0, 5, None)).is_empty(), "no power of two");
+}
+
+#[test]
 fn what_cannot_be_compared_is_refused_by_name() {
     let parent = tempfile::tempdir().expect("a folder");
     let (one, other) = (parent.path().join("before"), parent.path().join("now"));
