@@ -11,7 +11,8 @@
 //! - `levels`: modes, level files, levels of an editor, plans and proofs.
 //! - `ldtk`, `tiled`: levels of these two editors, with the features of the same names.
 //! - `restart`, `clocks`: the start of an episode, and the game's clocks at that time.
-//! - `input`: the path from an action into the game, the mask of actions, and the ticks that a decision holds.
+//! - `input`: the path from an action into the game, the mask of actions, and the ticks that a decision and its keys
+//!   hold.
 //! - `agents`: several agents in one World, and their inputs.
 //! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `snapshot`: the state of an episode, saved and loaded.

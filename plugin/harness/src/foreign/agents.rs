@@ -106,7 +106,8 @@ impl SharingAgents {
             match own {
                 OwnInput::Keys(keys) => (input.keys, input.unknown_key) = (keys.clone(), None),
                 OwnInput::Whole(whole) => {
-                    input = Input { whole: Some(whole.clone()), names: input.names, ..Input::default() };
+                    let Input { names, every, hold, .. } = input;
+                    input = Input { whole: Some(whole.clone()), names, every, hold, ..Input::default() };
                 }
             }
         }

@@ -197,6 +197,7 @@ impl Plugin for ForeignPlugin {
                     .ambiguous_with(PlaybotSystems::Act),
             );
         }
+        input::add_rest(app, &description.input);
         #[cfg(feature = "ui")]
         clicks::add_clicks(app, &description.input);
         if description.has_state() {
