@@ -64,7 +64,7 @@ pub fn examine(
     let plan = Plan { mode: &options.mode, level: options.level, seed: options.seed };
     let mut known_types = KnownTypes::new(&bare_world(), options.default_ignores);
     let mut comparisons: Vec<ComparisonReport> = Vec::new();
-    let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
+    let (mut observations, mut types) = (Vec::new(), TypesReport::default());
     let (mut suspicions, mut unequal_steps) = (Vec::new(), None);
     for comparison in DoctorComparison::ALL {
         if let Some(why) = reason_to_skip(comparison, game, &comparisons) {
@@ -74,20 +74,25 @@ pub fn examine(
         progress(comparison);
         let mut trial = Trial::new(comparison, game, &plan, options.ticks);
         let is_first = comparison == DoctorComparison::Repeat;
-        let mut monitor = is_first.then(|| ObservationMonitor::new(trial.copies[0].observed_names()));
+        let monitored = if is_first { trial.copies[0].agents.len() } else { 0 };
+        let monitor = |_| ObservationMonitor::new(trial.copies[0].observed_names());
+        let mut monitors: Vec<ObservationMonitor> = (0..monitored).map(monitor).collect();
         let noted = comparisons.iter().filter(|of| of.comparison == DoctorComparison::Repeat && of.is_note());
         let noted = noted.flat_map(ComparisonReport::names).map(str::to_owned).collect();
         let left_out = LeftOut { ignored: &options.ignored, noted };
-        let result = trial.run(options.ticks, &mut known_types, &left_out, monitor.as_mut());
-        if let Some(monitor) = monitor {
-            observation = monitor.report();
+        let result = trial.run(options.ticks, &mut known_types, &left_out, &mut monitors);
+        if is_first {
+            observations = monitors.into_iter().map(ObservationMonitor::report).collect();
             types = known_types.report(&trial.copies[0], &result.incomparable);
             suspicions = known_types.suspicions(&trial.copies[0]);
             unequal_steps = UnequalSteps::of(&trial.copies[0].world);
         }
         comparisons.push(result.report);
     }
-    let (findings, notes) = findings(&comparisons, &observation, &suspicions);
+    let mut observations = observations.into_iter();
+    let observation: ObservationReport = observations.next().unwrap_or_default();
+    let other_observations: Vec<ObservationReport> = observations.collect();
+    let (findings, notes) = findings(&comparisons, (&observation, &other_observations), &suspicions);
     Ok(DoctorReport {
         game: game.name().to_owned(),
         version: game.version(),
@@ -100,6 +105,7 @@ pub fn examine(
         notes,
         comparisons,
         observation,
+        other_observations,
         types,
         unequal_steps,
         ticks_per_second: None,
@@ -147,8 +153,11 @@ pub struct DoctorReport {
     pub ticks: u32,
     /// The comparisons.
     pub comparisons: Vec<ComparisonReport>,
-    /// The observations of agents.
+    /// The observations of the first agent.
     pub observation: ObservationReport,
+    /// Those of the agents that share its arena.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub other_observations: Vec<ObservationReport>,
     /// The types that could be compared.
     pub types: TypesReport,
     /// Lengths of frames and of fixed steps, if they differ and the game may notice it.
@@ -387,11 +396,15 @@ fn skipped(comparison: DoctorComparison, why: String) -> ComparisonReport {
 /// Returns all findings, worst first, and all notes.
 fn findings(
     comparisons: &[ComparisonReport],
-    observation: &ObservationReport,
+    (observation, others): (&ObservationReport, &[ObservationReport]),
     suspicions: &[(CauseKind, String)],
 ) -> (Vec<DoctorFinding>, Vec<DoctorFinding>) {
     let has_fault = comparisons.iter().any(|report| report.fault.is_some());
     let (mut findings, mut notes) = (of_observation(observation), Vec::new());
+    for (number, seen) in (1..).zip(others) {
+        let named = |of: DoctorFinding| DoctorFinding { what: format!("agent {number}: {}", of.what), ..of };
+        findings.extend(of_observation(seen).into_iter().map(named));
+    }
     // A game that stops early has not shown all that it does.
     findings.retain(|finding| finding.kind != FindingKind::Blind || !has_fault);
     let clock = comparisons.iter().filter(|of| of.comparison == DoctorComparison::Clock);

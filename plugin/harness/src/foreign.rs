@@ -13,7 +13,7 @@
 //! - `restart`, `clocks`: the start of an episode, and the game's clocks at that time.
 //! - `input`: the path from an action into the game, the mask of actions, and the ticks that a decision and its keys
 //!   hold.
-//! - `agents`: several agents in one World, and their inputs.
+//! - `agents`: several agents in one World, their inputs, and those that play along.
 //! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `snapshot`: the state of an episode, saved and loaded.
 //! - `observe`, `paths`, `guess`: observation, position, reward and end after a tick, observations by the paths of
@@ -78,7 +78,7 @@ use crate::{
     defect::DefectKind,
     detector::Detector,
     foreign::{
-        agents::SharingAgents,
+        agents::{SharingAgents, add_companions},
         description::{Description, ForeignPlugin, nothing_seen},
         input::{ForeignBot, Input},
         levels::LevelParts,
@@ -552,6 +552,10 @@ impl HostTools for ForeignGame {
 
     fn agents_per_arena(&self) -> u32 {
         u32::try_from(self.description.agents.count()).unwrap_or(u32::MAX)
+    }
+
+    fn add_companions(&self, world: &mut World) {
+        add_companions(self, world);
     }
 
     fn unplayable(&self) -> Option<String> {

@@ -1,8 +1,20 @@
 //! Several agents that share one World of a foreign game, and one episode.
 
-use crate::foreign::{ForeignGame, input::Input};
+use crate::{
+    foreign::{
+        ForeignGame,
+        input::{ForeignBot, Input},
+        runtime::{AgentPlace, with_foreign},
+    },
+    game::Game,
+};
 use bevy::prelude::*;
 use bevy_playbot::{
+    agent::{Agent, Control},
+    bot::BlindBot,
+    engine::{LevelFiles, PlaysAlong, begin_beside},
+    episode::EpisodeEnded,
+    streams::AgentStreams,
     unknown_name::nearest,
     virtual_input::{VirtualButton, VirtualInput},
 };
@@ -20,7 +32,10 @@ impl ForeignGame {
     /// has a gamepad of its own. Keys that two agents hold are a [`problem`](crate::game::Game::problem).
     ///
     /// Trainings and evaluations play all agents by one policy, each with its own observation. Everything that records,
-    /// replays or tests plays the first agent alone, while the others do nothing.
+    /// replays, tests or explores plays the first agent, and the others play along: by the
+    /// [`demonstrator`](Self::demonstrator) without noise, or at random (`chaos`) in a game without one. What they do
+    /// depends on the level, and on what happens in it. So a recording holds the actions of the first agent alone, and
+    /// replays.
     ///
     /// ```
     /// use bevy::prelude::*;
@@ -183,10 +198,54 @@ impl SharingAgents {
     }
 }
 
+// Agents that play along, where one agent is recorded, tested or replayed.
+
+/// Adds the agents that are missing in a World, as ones that play along.
+pub(super) fn add_companions(game: &ForeignGame, world: &mut World) {
+    let present: Vec<u32> = world.query::<&Agent>().iter(world).map(|agent| agent.index).collect();
+    let Some(last) = present.iter().copied().max() else { return };
+    let missing = game.description.agents.count().saturating_sub(present.len());
+    for number in (1..=missing as u32).map(|number| last.saturating_add(number)) {
+        let companion = game.spawn_agent(world, number);
+        let mut companion = world.entity_mut(companion);
+        companion.insert(PlaysAlong);
+        match &game.description.demonstrator {
+            Some(_) => companion.insert(ForeignBot { noise: 0.0 }),
+            None => companion.insert(BlindBot::Chaos),
+        };
+    }
+}
+
+/// Begins the episode of the agents that play along, on the level of the first one. Nothing of an earlier episode counts
+/// for them, so a replay of the first agent finds them as they were.
+pub(super) fn begin_companions(world: &mut World, level: u64) {
+    let mut companions = world.query_filtered::<(&AgentPlace, Entity), With<PlaysAlong>>();
+    let mut companions: Vec<(usize, Entity)> = companions.iter(world).map(|(place, it)| (place.0, it)).collect();
+    companions.sort_unstable();
+    // A file has another number as soon as there are other files.
+    let file = world.get_resource::<LevelFiles>().and_then(|files| files.of(level));
+    let seed = file.map_or(level, |file| file.hash);
+    for (place, companion) in companions {
+        begin_beside(world, companion, level);
+        world.entity_mut(companion).insert(AgentStreams::new(seed, place as u32));
+        with_foreign(world, companion, |_, foreign| {
+            foreign.renew_bot();
+            Ok(())
+        });
+    }
+}
+
+/// Makes agents that play along wait for the next episode.
+pub(super) fn end_companions(event: On<EpisodeEnded>, mut companions: Query<&mut Control, With<PlaysAlong>>) {
+    if let Ok(mut control) = companions.get_mut(event.entity) {
+        *control = Control::Idle;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{game::Game, worlds::Arrangement};
+    use crate::worlds::Arrangement;
 
     /// A game of two agents without observations of their own; `right` has these keys.
     fn pair(right: &[KeyCode]) -> ForeignGame {

@@ -6,7 +6,7 @@ use crate::{
     defect::DefectKind,
     detector::{Detector, LevelProof},
     foreign::{
-        ForeignGame, Restart,
+        ForeignGame, Restart, agents,
         agents::SharingAgents,
         clocks::ClockSettings,
         input,
@@ -165,6 +165,7 @@ impl Plugin for ForeignPlugin {
             .init_resource::<LevelFromFile>()
             .add_observer(restart::start)
             .add_observer(restart::announce)
+            .add_observer(agents::end_companions)
             .init_schedule(BeforeGame)
             .add_systems(BeforeGame, note_baseline);
         let TickSchedules { decide, judge, .. } = TickSchedules::of(app);
