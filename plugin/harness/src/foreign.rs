@@ -482,7 +482,7 @@ impl Game for ForeignGame {
     }
 
     fn actions(&self) -> ActionSpace {
-        self.description.input_of(0).space()
+        self.description.first_input().space()
     }
 
     fn observation(&self) -> ObservationSpace {
@@ -495,7 +495,7 @@ impl Game for ForeignGame {
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         let sensor = VectorSensor::new(self.description.observation().names);
-        let place = world.query::<&Agent>().iter(world).count();
+        let place = self.description.agents.place_after(world.query::<&Agent>().iter(world).count());
         let mut agent = world.spawn((Agent::new(index, self.actions()), sensor, AgentPlace(place)));
         if let Some(input) = self.description.input_of(place).pressed() {
             agent.insert(input);

@@ -165,6 +165,27 @@ fn a_recording_of_one_agent_replays_with_the_other_one() {
 }
 
 #[test]
+fn the_other_agent_is_played_where_it_is_called_the_first_one() {
+    let game = pong_game().first_agent("right");
+    assert_eq!(game.problem(), None);
+    let played = along(&game, 0, &[0, 1]);
+    for level in &played {
+        assert!(level[..3].iter().map(|[_, right]| *right).eq([0.5, 1.0, 1.5]), "{level:?}");
+    }
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    EndedEpisodes::note_in(&mut world);
+    let still = BlindBot::Constant(ActionValue::Discrete(0));
+    world.entity_mut(agents[0]).insert((Control::Bot, still, LevelQueue::list([1])));
+    while Control::of(&world, agents[0]).is_active() {
+        world.tick().expect("sound");
+    }
+    let ended: Vec<_> = EndedEpisodes::take(&mut world).iter().map(|(_, it)| (it.end, it.ticks)).collect();
+    assert_eq!(ended, [(EpisodeEnd::LOST, 15)], "the ball comes to the right first, two above the middle");
+    let text = pong_game().first_agent("rihgt").problem().expect("no such agent");
+    assert!(text.contains("`.first_agent` for an agent `rihgt` (did you mean `right`?)"), "{text}");
+}
+
+#[test]
 fn a_panic_that_the_other_agent_brings_about_is_found_and_happens_again() {
     let game = pong_game().end(|loser: Res<Loser>, agent: Res<PlayedAgent>, paddles: Query<(&Paddle, &Transform)>| {
         let is_high = |(paddle, at): (&Paddle, &Transform)| paddle.side == 1 && at.translation.y >= 2.0;

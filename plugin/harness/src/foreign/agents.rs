@@ -62,6 +62,31 @@ impl ForeignGame {
         self.with(|description| description.agents.names = Some(names.into_iter().map(Into::into).collect()))
     }
 
+    /// Chooses the agent that is recorded, tested or explored, while the others play along. Default: the first of
+    /// [`agents`](Self::agents). To test another one as well, add the game twice, under two names.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::{ForeignGame, PlayedAgent}, prelude::*};
+    ///
+    /// fn duel(name: &'static str, first: &str) -> ForeignGame {
+    ///     ForeignGame::new(name, 1, |_: &mut App| {})
+    ///         .agents(["hunter", "prey"])
+    ///         .keys([vec![], vec![KeyCode::KeyW]])
+    ///         .keys_of("prey", [vec![], vec![KeyCode::ArrowUp]])
+    ///         .observe(["side"], |agent: Res<PlayedAgent>| [agent.0 as f32])
+    ///         .first_agent(first)
+    /// }
+    /// let (hunt, flight) = (duel("hunt", "hunter"), duel("flight", "prey"));
+    /// assert_eq!(hunt.tools().input.action_names(), ["nothing", "KeyW"]);
+    /// assert_eq!(flight.tools().input.action_names(), ["nothing", "ArrowUp"]);
+    /// let problem = duel("flight", "pray").problem().expect("there is no such agent");
+    /// assert!(problem.contains("did you mean `prey`?"), "{problem}");
+    /// ```
+    pub fn first_agent(self, name: impl Into<String>) -> Self {
+        self.with(|description| description.agents.first = Some(name.into()))
+    }
+
     /// Replaces the sets of [`keys`](Self::keys) for one of the [`agents`](Self::agents): as many, in the same order.
     pub fn keys_of(
         self,
@@ -100,6 +125,8 @@ impl OwnInput {
 #[derive(Clone, Default)]
 pub(super) struct SharingAgents {
     names: Option<Vec<String>>,
+    /// The agent that is spawned first, if it is not the first of the names.
+    first: Option<String>,
     own: Vec<(String, OwnInput)>,
 }
 
@@ -111,6 +138,12 @@ impl SharingAgents {
     /// Returns the number of agents in a World.
     pub(super) fn count(&self) -> usize {
         self.names().len().max(1)
+    }
+
+    /// Returns the place of the agent that is spawned after so many others.
+    pub(super) fn place_after(&self, others: usize) -> usize {
+        let first = self.first.iter().find_map(|first| self.names().iter().position(|name| name == first));
+        (others + first.unwrap_or_default()) % self.count()
     }
 
     /// Returns the input of the agent at this place, with its own parts in place of those of `common`.
@@ -161,8 +194,9 @@ impl SharingAgents {
         if let Some((_, name)) = twice {
             return Some(format!("names the agent `{name}` twice in `.agents`: give each a name of its own"));
         }
-        let (agent, own) = self.own.iter().find(|(agent, _)| !names.contains(agent))?;
-        let method = own.method();
+        let first = self.first.iter().map(|agent| ("`.first_agent`", agent));
+        let own = self.own.iter().map(|(agent, own)| (own.method(), agent));
+        let (method, agent) = own.chain(first).find(|(_, agent)| !names.contains(agent))?;
         if names.is_empty() {
             return Some(format!("has {method} for the agent `{agent}`, and names no agents: add `.agents`"));
         }

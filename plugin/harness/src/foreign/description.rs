@@ -100,6 +100,11 @@ impl Description {
         self.agents.input_of(place % self.agents.count(), &self.input)
     }
 
+    /// Returns the input of the agent that is played where one agent is played.
+    pub(super) fn first_input(&self) -> Input {
+        self.input_of(self.agents.place_after(0))
+    }
+
     /// Returns whether the agent's state is read for explorers, detectors, proofs or snapshots.
     pub(super) fn has_state(&self) -> bool {
         self.position.is_some() || self.cell.is_some() || self.proof.is_some() || self.snapshot.is_some()

@@ -526,20 +526,20 @@ impl Input {
 
 impl InputTools for ForeignGame {
     fn action_names(&self) -> Vec<String> {
-        self.description.input_of(0).names()
+        self.description.first_input().names()
     }
 
     fn key_bindings(&self) -> Option<KeyBindings> {
-        self.description.input_of(0).bindings()
+        self.description.first_input().bindings()
     }
 
     fn records_people(&self) -> bool {
-        let input = self.description.input_of(0);
+        let input = self.description.first_input();
         input.space.is_none() && input.pressed().is_some()
     }
 
     fn has_idle_action(&self) -> bool {
-        let input = self.description.input_of(0);
+        let input = self.description.first_input();
         let pressed = input.pressed().filter(|_| input.space.is_none());
         pressed.is_none_or(|pressed| match pressed.space() {
             ActionSpace::Discrete(actions) => pressed.has_idle_action(actions - input.clicks.len()),
