@@ -64,6 +64,13 @@ impl Agent {
     }
 }
 
+/// Marks an agent that plays along with another one, which is played by a person, a tester or a replay. It has no levels
+/// of its own: the game begins its episodes with [`begin_beside`](crate::engine::begin_beside), and nothing counts their
+/// results.
+#[derive(Component, Clone, Copy, Debug, Default, Reflect)]
+#[reflect(Component)]
+pub struct PlaysAlong;
+
 /// All agents of the World in the order of their numbers: the row order of every batch.
 #[derive(Resource, Default, Debug, Reflect)]
 #[reflect(Resource, CarryResource)]

@@ -129,6 +129,7 @@ mod tests {
         "LevelFiles",
         "NoRenderer",
         "NoScreen",
+        "PlaysAlong",
         "PressesForPeople",
         "RasterSensor",
         "ReadbackDelay",

@@ -9,6 +9,7 @@
 //! |---|---|
 //! | drive a World without an app | [`headless_frame_app`], [`into_world`], [`run_on_one_thread`], [`tick_world`] |
 //! | begin an episode in a World as new | [`Renewal`], [`NextEpisode`], [`EpisodeSeeds`], [`LevelFiles`] |
+//! | let other agents play along | [`PlaysAlong`], [`begin_beside`] |
 //! | find the tick of a game, whatever its frames | [`TickSchedules`], [`is_tick`], [`set_tick_rate`] |
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
 //! | name the tick in which a game logs a message | [`moment_of_thread`], [`EpisodeMoment`] |
@@ -42,13 +43,13 @@
 #[doc(no_inline)]
 pub use crate::{
     action::{check_actions, misfit},
-    agent::{AgentLimit, has_no_actions},
+    agent::{AgentLimit, PlaysAlong, has_no_actions},
     demo::{
         file::{find_demos, merge_demos, relabel_demo, repair::repair, select_demos},
         recorder::{demo_actions, flush_unfinished, record_ticks},
         replay::recorded_action,
     },
-    episode::{EpisodeMoment, moment_of_thread},
+    episode::{EpisodeMoment, begin_beside, moment_of_thread},
     fault::FaultSystems,
     headless::{headless_frame_app, into_world, run_on_one_thread, set_tick_rate, tick_world},
     key_bindings::TappedKeys,

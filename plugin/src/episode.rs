@@ -33,7 +33,7 @@
 //! ```
 
 use crate::{
-    agent::{Agent, AgentOrder, Control},
+    agent::{Agent, AgentOrder, Control, PlaysAlong},
     calls::GameCall,
     carry_over::ReflectCarryComponent,
     fault::Faults,
@@ -229,11 +229,14 @@ pub(crate) fn plugin(app: &mut App) {
 
 /// Starts an episode for every agent that has none and is not idle.
 pub(crate) fn begin_episodes(
-    mut agents: Query<(
-        (Entity, &Agent, &mut Control, &mut Episode),
-        (&mut LevelQueue, &mut AgentStreams, Option<&mut EpisodeSeeds>),
-        &mut Reward,
-    )>,
+    mut agents: Query<
+        (
+            (Entity, &Agent, &mut Control, &mut Episode),
+            (&mut LevelQueue, &mut AgentStreams, Option<&mut EpisodeSeeds>),
+            &mut Reward,
+        ),
+        Without<PlaysAlong>,
+    >,
     mut faults: ResMut<Faults>,
     mut commands: Commands,
 ) {
@@ -266,6 +269,19 @@ pub(crate) fn begin_episodes(
     if !begun.is_empty() {
         set_moment(begun.into_iter());
     }
+}
+
+/// Begins an episode of an agent that [plays along](PlaysAlong), as a bot, on the level of the agent whose episode begins
+/// now. Call it where the game hears of the other one's [`StartEpisode`]. An episode that still runs is left.
+pub fn begin_beside(world: &mut World, agent: Entity, level: u64) {
+    let Ok(mut agent) = world.get_entity_mut(agent) else { return };
+    if let Some(mut reward) = agent.get_mut::<Reward>() {
+        // Late reward of the episode before counts nowhere.
+        let _ = reward.start_episode();
+    }
+    agent.insert((Control::Bot, Episode { level, state: EpisodeState::Running, ..default() }));
+    let entity = agent.id();
+    world.trigger(StartEpisode { entity, level });
 }
 
 /// Counts the tick and its reward.

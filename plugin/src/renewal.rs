@@ -28,7 +28,7 @@
 //! ```
 
 use crate::{
-    agent::{Agent, Control},
+    agent::{Agent, Control, PlaysAlong},
     carry_over::CarryOver,
     episode::Episode,
     fault::Fault,
@@ -127,7 +127,8 @@ pub(crate) fn renew_if_due(world: &mut World) -> Result<bool, Fault> {
 /// Returns the episodes that begin in the next tick; empty while another one is being played.
 fn episodes_ahead(world: &mut World) -> Vec<NextEpisode> {
     let seed = world.get_resource::<PlaybotSeed>().copied().unwrap_or_default();
-    let mut agents = world.query::<(Entity, &Agent, &Control, &Episode, &LevelQueue, &AgentStreams)>();
+    let mut agents =
+        world.query_filtered::<(Entity, &Agent, &Control, &Episode, &LevelQueue, &AgentStreams), Without<PlaysAlong>>();
     let mut ahead = Vec::new();
     for (entity, agent, control, episode, queue, streams) in agents.iter(world) {
         if episode.is_running() || episode.is_loading() {

@@ -125,9 +125,15 @@ pub struct VirtualInput {
     mapping: Mapping,
     /// True if sets of buttons were added to continuous actions, where they have no meaning.
     is_mixed: bool,
+    /// True while actions hold nothing.
+    is_resting: bool,
 }
 
 impl VirtualInput {
+    fn new(mapping: Mapping) -> Self {
+        Self { mapping, is_mixed: false, is_resting: false }
+    }
+
     /// Creates a mapping with a set of keys for each discrete action; an empty set presses nothing.
     pub fn keys(sets: impl IntoIterator<Item = impl IntoIterator<Item = KeyCode>>) -> Self {
         Self::discrete(sets.into_iter().map(HeldInput::new))
@@ -135,12 +141,12 @@ impl VirtualInput {
 
     /// Creates a mapping with inputs of any device for each discrete action.
     pub fn discrete(actions: impl IntoIterator<Item = HeldInput>) -> Self {
-        Self { mapping: Mapping::Discrete(actions.into_iter().collect()), is_mixed: false }
+        Self::new(Mapping::Discrete(actions.into_iter().collect()))
     }
 
     /// Creates a mapping with an axis for each value of a continuous action.
     pub fn axes(axes: impl IntoIterator<Item = ActionAxis>) -> Self {
-        Self { mapping: Mapping::Continuous(axes.into_iter().collect()), is_mixed: false }
+        Self::new(Mapping::Continuous(axes.into_iter().collect()))
     }
 
     /// Adds a set of mouse buttons to each discrete action, in order. For continuous actions use
@@ -230,6 +236,12 @@ impl VirtualInput {
         }
     }
 
+    /// Lets go of everything while true, whatever the action: between two presses of one decision. The mouse cursor stays
+    /// where it is.
+    pub fn rest(&mut self, is_resting: bool) {
+        self.is_resting = is_resting;
+    }
+
     /// Returns the first action that points at a position outside of any window, and that position.
     pub fn impossible_position(&self) -> Option<(usize, PointerPosition)> {
         self.positions().find(|(_, position)| !position.is_possible())
@@ -263,8 +275,12 @@ impl VirtualInput {
         }
     }
 
-    /// Returns the inputs that this action holds down; empty for an action outside [`space`](Self::space).
+    /// Returns the inputs that this action holds down; empty for an action outside [`space`](Self::space), and while it
+    /// [rests](Self::rest).
     pub fn held(&self, action: &ActionValue) -> HeldInput {
+        if self.is_resting {
+            return HeldInput::default();
+        }
         match (&self.mapping, action) {
             (Mapping::Discrete(actions), ActionValue::Discrete(index)) => {
                 actions.get(*index as usize).cloned().unwrap_or_default()
@@ -409,7 +425,8 @@ fn add_what_is_written(app: &mut App) {
 }
 
 /// The systems that press the inputs of this tick's actions. A system that changes a [`VirtualInput`] for this tick, as
-/// [`set_action`](VirtualInput::set_action) does, runs before them, in [`PlaybotSystems::Act`].
+/// [`set_action`](VirtualInput::set_action) and [`rest`](VirtualInput::rest) do, runs before them, in
+/// [`PlaybotSystems::Act`].
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct PressSystems;
 

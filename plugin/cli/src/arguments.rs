@@ -313,13 +313,16 @@ pub(crate) fn first_levels(game: &dyn Game, last: u64) -> LevelSplit {
     LevelSplit { mode: default_mode(game).to_owned(), first: 0, last }
 }
 
-/// Warns that a verb plays one agent of a game in which several play together.
-pub(crate) fn warn_of_idle_agents(game: &dyn Game) {
-    let agents = game.tools().host.agents_per_arena();
+/// Says who plays the other agents, where a verb plays one agent of a game in which several play together.
+pub(crate) fn report_companions(game: &dyn Game) {
+    let (agents, name) = (game.tools().host.agents_per_arena(), game.name());
     if agents > 1 {
-        tracing::warn!(
-            "`{}` has {agents} agents that play together; here the first one plays alone, and the others do nothing",
-            game.name()
+        let along = match game.tools().bots.demonstrator() {
+            Some(demonstrator) => format!("by the demonstrator `{demonstrator}`"),
+            None => "at random, as `chaos` does".to_owned(),
+        };
+        report!(
+            "`{name}` has {agents} agents that play together: this is about the first one, and the others play along {along}"
         );
     }
 }

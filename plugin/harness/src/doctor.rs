@@ -64,7 +64,7 @@ pub fn examine(
     game.check_mode(&options.mode)?;
     let mut known_types = KnownTypes::new(&bare_world(), options.default_ignores);
     let mut comparisons: Vec<ComparisonReport> = Vec::new();
-    let (mut observation, mut types) = (ObservationReport::default(), TypesReport::default());
+    let (mut observations, mut types) = (Vec::new(), TypesReport::default());
     let (mut suspicions, mut unequal_steps, mut holds_keys) = (Vec::new(), None, false);
     for planned in options.planned() {
         if let Some(why) = reason_to_skip(planned.comparison, game, &comparisons) {
@@ -75,13 +75,15 @@ pub fn examine(
         let plan = Plan { mode: &options.mode, level: planned.level, before: planned.before, seed: options.seed };
         let is_first = comparisons.is_empty();
         let mut trial = Trial::new(planned, game, &plan, options.ticks);
-        let mut monitor = is_first.then(|| ObservationMonitor::new(trial.copies[0].observed_names()));
+        let monitored = if is_first { trial.copies[0].agents.len() } else { 0 };
+        let monitor = |_| ObservationMonitor::new(trial.copies[0].observed_names());
+        let mut monitors: Vec<ObservationMonitor> = (0..monitored).map(monitor).collect();
         let noted = comparisons.iter().filter(|of| of.comparison == DoctorComparison::Repeat && of.is_note());
         let noted = noted.flat_map(ComparisonReport::names).map(str::to_owned).collect();
         let left_out = LeftOut { ignored: &options.ignored, noted };
-        let result = trial.run(options.ticks, &mut known_types, &left_out, monitor.as_mut());
-        if let Some(monitor) = monitor {
-            observation = monitor.report();
+        let result = trial.run(options.ticks, &mut known_types, &left_out, &mut monitors);
+        if is_first {
+            observations = monitors.into_iter().map(ObservationMonitor::report).collect();
             types = known_types.report(&trial.copies[0], &result.incomparable);
             suspicions = known_types.suspicions(&trial.copies[0]);
             unequal_steps = UnequalSteps::of(&trial.copies[0].world);
@@ -89,7 +91,10 @@ pub fn examine(
         }
         comparisons.push(result.report);
     }
-    let (findings, notes) = findings(options.level, &comparisons, &observation, &suspicions);
+    let mut observations = observations.into_iter();
+    let observation: ObservationReport = observations.next().unwrap_or_default();
+    let other_observations: Vec<ObservationReport> = observations.collect();
+    let (findings, notes) = findings(options.level, &comparisons, (&observation, &other_observations), &suspicions);
     Ok(DoctorReport {
         game: game.name().to_owned(),
         version: game.version(),
@@ -103,6 +108,7 @@ pub fn examine(
         notes,
         comparisons,
         observation,
+        other_observations,
         without_idle: without_idle_action(game),
         types,
         unequal_steps,
@@ -191,8 +197,11 @@ pub struct DoctorReport {
     pub ticks: u32,
     /// The comparisons.
     pub comparisons: Vec<ComparisonReport>,
-    /// The observations of agents.
+    /// The observations of the first agent.
     pub observation: ObservationReport,
+    /// Those of the agents that share its arena.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub other_observations: Vec<ObservationReport>,
     /// What is wrong and what to add if no action holds nothing, so that a person who holds no key plays action 0.
     pub without_idle: Option<String>,
     /// The types that could be compared.
@@ -462,11 +471,15 @@ fn reason_to_skip(comparison: DoctorComparison, game: &dyn Game, done: &[Compari
 fn findings(
     first_level: u64,
     comparisons: &[ComparisonReport],
-    observation: &ObservationReport,
+    (observation, others): (&ObservationReport, &[ObservationReport]),
     suspicions: &[(CauseKind, String)],
 ) -> (Vec<DoctorFinding>, Vec<DoctorFinding>) {
     let has_fault = comparisons.iter().any(|report| report.fault.is_some());
     let (mut findings, mut notes) = (of_observation(observation), Vec::new());
+    for (number, seen) in (1..).zip(others) {
+        let named = |of: DoctorFinding| DoctorFinding { what: format!("agent {number}: {}", of.what), ..of };
+        findings.extend(of_observation(seen).into_iter().map(named));
+    }
     // A game that stops early has not shown all that it does.
     findings.retain(|finding| finding.kind != FindingKind::Blind || !has_fault);
     let clock = comparisons.iter().filter(|of| of.comparison == DoctorComparison::Clock);

@@ -11,8 +11,9 @@
 //! - `levels`: modes, level files, levels of an editor, plans and proofs.
 //! - `ldtk`, `tiled`: levels of these two editors, with the features of the same names.
 //! - `restart`, `clocks`: the start of an episode, and the game's clocks at that time.
-//! - `input`: the path from an action into the game, the mask of actions, and the ticks that a decision holds.
-//! - `agents`: several agents in one World, and their inputs.
+//! - `input`: the path from an action into the game, the mask of actions, and the ticks that a decision and its keys
+//!   hold.
+//! - `agents`: several agents in one World, their inputs, and those that play along.
 //! - `clicks`: clicks on buttons of Bevy's UI.
 //! - `snapshot`: the state of an episode, saved and loaded.
 //! - `observe`, `paths`, `guess`: observation, position, reward and end after a tick, observations by the paths of
@@ -77,7 +78,7 @@ use crate::{
     defect::DefectKind,
     detector::Detector,
     foreign::{
-        agents::SharingAgents,
+        agents::{SharingAgents, add_companions},
         description::{Description, ForeignPlugin, nothing_seen},
         input::{ForeignBot, Input},
         levels::LevelParts,
@@ -481,7 +482,7 @@ impl Game for ForeignGame {
     }
 
     fn actions(&self) -> ActionSpace {
-        self.description.input_of(0).space()
+        self.description.first_input().space()
     }
 
     fn observation(&self) -> ObservationSpace {
@@ -494,7 +495,7 @@ impl Game for ForeignGame {
 
     fn spawn_agent(&self, world: &mut World, index: u32) -> Entity {
         let sensor = VectorSensor::new(self.description.observation().names);
-        let place = world.query::<&Agent>().iter(world).count();
+        let place = self.description.agents.place_after(world.query::<&Agent>().iter(world).count());
         let mut agent = world.spawn((Agent::new(index, self.actions()), sensor, AgentPlace(place)));
         if let Some(input) = self.description.input_of(place).pressed() {
             agent.insert(input);
@@ -551,6 +552,10 @@ impl HostTools for ForeignGame {
 
     fn agents_per_arena(&self) -> u32 {
         u32::try_from(self.description.agents.count()).unwrap_or(u32::MAX)
+    }
+
+    fn add_companions(&self, world: &mut World) {
+        add_companions(self, world);
     }
 
     fn unplayable(&self) -> Option<String> {

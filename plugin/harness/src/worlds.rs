@@ -11,7 +11,7 @@ use bevy_playbot::{
     action::ActionValue,
     agent::{Agent, AgentOrder},
     engine::{
-        AgentLimit, Renewal, headless_frame_app, into_world,
+        AgentLimit, PlaysAlong, Renewal, headless_frame_app, into_world,
         panics::{self, EpisodeTrace, PanicReports},
         set_tick_rate,
     },
@@ -225,7 +225,8 @@ pub fn add_game(
     observation_config.build(game, app)
 }
 
-/// Adds agents `first..first + count` with their sensors, all idle, and returns them in the order of their numbers.
+/// Adds agents `first..first + count` with their sensors, all idle, and returns them in the order of their numbers. If
+/// more agents share an arena, the others [play along](PlaysAlong).
 pub fn spawn_agents(
     game: &dyn Game,
     world: &mut World,
@@ -237,6 +238,7 @@ pub fn spawn_agents(
     for &agent in &agents {
         observation_config.equip(game, world, agent);
     }
+    game.tools().host.add_companions(world);
     agents
 }
 
@@ -350,8 +352,10 @@ impl EndedEpisodes {
     }
 }
 
-fn note(event: On<EpisodeEnded>, mut ended: ResMut<EndedEpisodes>) {
-    ended.0.push((event.entity, event.result));
+fn note(event: On<EpisodeEnded>, companions: Query<(), With<PlaysAlong>>, mut ended: ResMut<EndedEpisodes>) {
+    if !companions.contains(event.entity) {
+        ended.0.push((event.entity, event.result));
+    }
 }
 
 #[cfg(test)]

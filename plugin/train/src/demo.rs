@@ -2,7 +2,7 @@
 //!
 //! The folder, in reading order:
 //!
-//! - `observe`: the replay of recordings whose files lack observations.
+//! - `observe`: the replay of recordings whose files lack observations, or masks.
 //! - `chosen`: the selection of recorded episodes to learn from.
 
 mod chosen;
@@ -23,6 +23,7 @@ use playbot_harness::{
 use playbot_learner::{ActionSpace, Actions, Dataset, DatasetEpisode, LearnError, ObsKind, Observations, Rollout};
 use std::{
     collections::{BTreeMap, BTreeSet},
+    ops::Range,
     path::Path,
     sync::Arc,
 };
@@ -153,7 +154,8 @@ impl Demonstrations {
 
     /// Pairs each action with the observation before it, in the order of the recordings. Each distinct demonstration
     /// that needs a replay is replayed once, on at most `threads` threads. Idle starts are left out: they are replayed,
-    /// and demonstrate nothing. `progress` receives numbers of finished steps, from several threads.
+    /// and demonstrate nothing. Masks of actions are restored by a replay, too, of files with observations as well. Where
+    /// such a file does not replay, every action counts as legal ([`Dataset::unmasked`]). `progress` receives numbers of finished steps, from several threads.
     ///
     /// # Errors
     ///
@@ -178,26 +180,38 @@ impl Demonstrations {
         self.check_room(self.bytes(game), free_memory())?;
         let originals = self.originals();
         let mut observed = self.observe(game, threads, &originals, Replay::new, progress)?;
-        let mut episodes = Vec::new();
+        let mut masks_of_seen = self.masks_of_seen(game, threads, &originals)?;
+        let (mut episodes, mut masks) = (Vec::new(), Vec::<Option<Vec<bool>>>::new());
         for (i, demo) in self.episodes.iter().enumerate() {
+            let mut mask = match masks_of_seen.remove(&i) {
+                // An earlier episode is equal.
+                None if originals[i] < i => masks[originals[i]].clone(),
+                None => Some(Vec::new()),
+                Some(mask) => mask,
+            };
             let observations = if demo.is_seen {
                 progress(demo.episode.len() as u64);
                 Observations::Vector(demo.episode.observations.clone())
-            } else if let Some(ObservedEpisode { observations, .. }) = observed.remove(&i) {
+            } else if let Some(ObservedEpisode { observations, legal, .. }) = observed.remove(&i) {
+                mask = Some(legal);
                 observations
             } else {
-                // An earlier episode is equal.
                 progress(demo.episode.len() as u64);
                 let earlier: &DatasetEpisode = &episodes[originals[i]];
                 earlier.observations.clone()
             };
             episodes.push(DatasetEpisode { observations, actions: learner_actions(&demo.episode) });
+            masks.push(mask);
         }
         let (kind, space) = (self.observation_config.obs_kind(game), game.actions());
-        for (demo, episode) in self.episodes.iter().zip(&mut episodes) {
-            leave_out(demo.episode.idle_start(), episode, &kind, &space)?;
+        for ((demo, episode), mask) in self.episodes.iter().zip(&mut episodes).zip(masks.iter_mut()) {
+            let start = demo.episode.idle_start();
+            leave_out(start, episode, &kind, &space)?;
+            if let Some(mask) = mask {
+                mask.drain(..mask.len().min(start * space.dim()));
+            }
         }
-        let dataset = Dataset::new(kind, space, episodes)?;
+        let dataset = Dataset::new(kind, space, episodes)?.with_legal(masks)?;
         Ok(dataset.with_levels(self.levels())?)
     }
 
@@ -278,7 +292,7 @@ fn leave_out(
 /// Returns the steps of an episode with a known outcome, if there are any.
 fn rollout(
     episode: &DemoEpisode,
-    ObservedEpisode { observations, rewards, .. }: &ObservedEpisode,
+    ObservedEpisode { observations, rewards, legal, .. }: &ObservedEpisode,
     kind: &ObsKind,
     space: &ActionSpace,
 ) -> Result<Option<Rollout>, LearnError> {
@@ -297,6 +311,11 @@ fn rollout(
     rollout.terminated[steps - 1] = is_terminated;
     rollout.next_values = vec![0.0];
     rollout.ends.next_obs.push(observations.row(episode.len() - 1, width))?;
+    if !legal.is_empty() {
+        let mask_of = |rows: Range<usize>| legal[rows.start * space.dim()..rows.end * space.dim()].to_vec();
+        rollout.legal = mask_of(0..steps);
+        rollout.ends.next_legal = mask_of(episode.len() - 1..episode.len());
+    }
     Ok(Some(rollout))
 }
 

@@ -84,6 +84,9 @@ pub fn read_dataset(
     let counter = observer.counter(CountedWork::Replay { steps: summary.steps });
     let dataset = demos.dataset(game, threads, counter)?;
     observer.observe(RunEvent::RecordingsRead);
+    if dataset.unmasked() > 0 {
+        observer.observe(RunEvent::MasksUnknown { episodes: dataset.unmasked(), of: dataset.episodes() });
+    }
     Ok(dataset)
 }
 

@@ -75,6 +75,13 @@ pub enum RunEvent<'a> {
     },
     /// Recordings were read.
     RecordingsRead,
+    /// Recorded episodes of a game with masks do not replay: every action counts as legal in them.
+    MasksUnknown {
+        /// Number of these episodes.
+        episodes: usize,
+        /// Number of all recorded episodes.
+        of: usize,
+    },
     /// The learning of skills begins.
     SkillsBegun {
         /// Batches done, in a resumed learning.

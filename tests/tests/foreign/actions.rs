@@ -1,9 +1,15 @@
 //! Tests of actions that reach a game without keys, and of decisions that hold for several ticks.
 
 use bevy::{input::mouse::AccumulatedMouseMotion, prelude::*};
-use bevy_playbot::{policy::Decision, virtual_input::ActionAxis, vision::ObservationConfig};
+use bevy_playbot::{
+    demo::file::{Decider, DemoEpisode, DemoReader, DemoWriter},
+    engine::PressesForPeople,
+    policy::Decision,
+    virtual_input::ActionAxis,
+    vision::ObservationConfig,
+};
 use playbot::prelude::*;
-use playbot_harness::{foreign::ForeignGame, worlds::build_world};
+use playbot_harness::{demo::verify_file, foreign::ForeignGame, worlds::build_world};
 use playbot_learner::PpoConfig;
 use playbot_tests::{
     foreign::catch::{Paddle, game},
@@ -172,4 +178,77 @@ fn decisions_that_cannot_hold_are_problems_that_say_what_to_type() {
     let problem = continuous.problem().expect("it cannot be held");
     assert!(problem.contains("continuous actions") && problem.contains("lower `.hz`"), "{problem}");
     assert_eq!(slow(1).problem(), None);
+}
+
+#[test]
+fn keys_are_held_for_the_first_ticks_of_each_decision_and_then_pressed_anew() {
+    let game = slow(4).hold(2).legal(|| [false, false, true]);
+    assert_eq!(game.problem(), None);
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::Always(3)));
+    let mut held = Vec::new();
+    for _ in 0..8 {
+        world.tick().expect("sound");
+        held.push(world.resource::<Presses>().held);
+        assert_eq!(world.get::<Action>(agents[0]).and_then(Action::discrete), Some(2), "the decision stays");
+    }
+    assert_eq!(held, [1, 2, 2, 2, 3, 4, 4, 4]);
+    assert_eq!(world.resource::<Presses>().new, 2);
+}
+
+/// Records an episode of twelve ticks that holds the right arrow, in a game whose decisions hold keys for two of four
+/// ticks. Returns the number of ticks in which it was held, and the divergences of replays of the changed recording.
+fn replayed(control: Control, change: impl Fn(&mut DemoEpisode)) -> (u32, Vec<(u64, String)>) {
+    let game = slow(4).hold(2).time_limit(12).level(|mut presses: ResMut<Presses>| *presses = Presses::default());
+    let folder = tempfile::tempdir().expect("a folder");
+    let [whole, path] = ["whole.demo", "changed.demo"].map(|name| folder.path().join(name));
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    world.insert_resource(Recorder::new(DemoWriter::create(&whole, game.demo_header("default")).expect("fresh")));
+    let right = ActionValue::Discrete(2);
+    let bot = (BlindBot::Constant(right.clone()), LevelQueue::Always(0));
+    world.entity_mut(agents[0]).insert((control, PressesForPeople, Recording::default(), bot));
+    for _ in 0..12 {
+        world.entity_mut(agents[0]).insert(Action(right.clone()));
+        world.tick().expect("sound");
+    }
+    let held = world.resource::<Presses>().held;
+    drop(world);
+    let mut writer = DemoWriter::create(&path, game.demo_header("default")).expect("fresh");
+    for mut episode in DemoReader::open(&whole).and_then(DemoReader::read_all).expect("whole") {
+        assert_eq!(episode.len(), 12);
+        change(&mut episode);
+        writer.push(&episode).expect("writable");
+    }
+    let report = verify_file(&game, &path, |_| {}).expect("readable");
+    assert_eq!(report.episodes, 1);
+    (held, report.divergences)
+}
+
+#[test]
+fn recordings_of_keys_that_are_let_go_replay() {
+    assert_eq!(replayed(Control::Bot, |_| {}), (6, Vec::new()));
+}
+
+#[test]
+fn people_hold_keys_as_long_as_they_please_and_so_do_replays_of_their_recordings() {
+    let (held, divergences) = replayed(Control::Human, |_| {});
+    assert!(held > 10, "{held}");
+    assert!(divergences.is_empty(), "{divergences:?}");
+    let (_, divergences) = replayed(Control::Human, |episode| episode.deciders.fill(Decider::Bot));
+    assert_eq!(divergences.len(), 1, "a bot would have let them go");
+}
+
+#[test]
+fn keys_that_cannot_be_held_so_long_are_problems_that_say_what_to_type() {
+    let problem = |game: ForeignGame| game.problem().expect("it cannot be held");
+    assert!(problem(slow(4).hold(0)).contains("the game `slow` has `.hold(0)`"));
+    assert!(problem(slow(4).hold(0)).contains("type `.hold(1)`"));
+    let text = problem(slow(4).hold(5));
+    assert!(text.contains("a decision of `.every(4)` ends before: type `.hold(4)` or less"), "{text}");
+    let short = ForeignGame::new("short", 1, |_: &mut App| {}).observe(["x"], || [0.0]);
+    let text = problem(short.clone().keys([[KeyCode::KeyA]]).hold(2));
+    assert!(text.contains("a decision is one tick: add `.every`") && text.contains("`.every(4)`"), "{text}");
+    let text = problem(short.actions(ActionSpace::Discrete(2), || {}).every(4).hold(2));
+    assert!(text.contains("`.hold` and `.actions`") && text.contains("leave `.hold` out"), "{text}");
+    assert_eq!(slow(4).hold(4).problem(), None);
 }

@@ -97,9 +97,13 @@ impl EpisodeWorld {
     ) -> Result<Self, CliError> {
         let (mut world, agents) = build_observing_world(game, mode, observation_config, seed, 0, 1)?;
         let agent = agents[0];
-        Renewal::set_up(&mut world, |world| {
+        Renewal::set_up(&mut world, move |world| {
             world.init_resource::<End>();
-            world.add_observer(|ended: On<EpisodeEnded>, mut end: ResMut<End>| end.0 = Some(*ended));
+            world.add_observer(move |ended: On<EpisodeEnded>, mut end: ResMut<End>| {
+                if ended.entity == agent {
+                    end.0 = Some(*ended);
+                }
+            });
         });
         Renewal::carry_resource::<End>(&mut world);
         // The sensor for pictures has replaced the vector, which a player may read.

@@ -130,6 +130,10 @@ impl RunObserver for Console<'_> {
                 self.end_shared_bar();
                 self.reading = None;
             }
+            RunEvent::MasksUnknown { episodes, of } => report!(
+                "{episodes} of {of} recorded episodes do not replay, and a replay is what restores their masks: every action \
+                 counts as legal in them"
+            ),
             RunEvent::SkillsResumed { epoch, epochs } => report!("going on in epoch {epoch} of {epochs}"),
             RunEvent::SkillsBegun { done, batches } => {
                 let bar = progress::bar("learn skills", batches, "batches");

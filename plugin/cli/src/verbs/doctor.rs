@@ -1,7 +1,7 @@
 //! `playbot doctor`.
 
 use crate::{
-    arguments::{default_mode, level_number, warn_of_idle_agents},
+    arguments::{default_mode, level_number},
     error::{CliError, Outcome},
     output::print_line,
     progress::{interrupt, interrupt::NothingToSave},
@@ -68,7 +68,6 @@ const SPEED_SECONDS: f64 = 0.5;
 
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    warn_of_idle_agents(game);
     let mode = args.mode.unwrap_or_else(|| default_mode(game).to_owned());
     let named = level_number(args.level.first().copied(), args.seed);
     game.check_mode(&mode)?;

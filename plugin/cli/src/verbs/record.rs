@@ -4,7 +4,7 @@ use crate::{
     arguments::{
         OverwriteArgs, default_held_out, first_levels, number_of_steps,
         player::{LoadedPlayer, PlayerArgs},
-        warn_of_idle_agents,
+        report_companions,
     },
     error::{CliError, Outcome},
     progress,
@@ -84,7 +84,7 @@ fn warn_of_pupils(player: &LoadedPlayer) {
 
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    warn_of_idle_agents(game);
+    report_companions(game);
     let levels = args.levels.clone().unwrap_or_else(|| first_levels(game, LAST_LEVEL));
     levels.check(game)?;
     let chosen_player = args.player.load(game)?;

@@ -70,6 +70,9 @@ fn note_end(
     deciders: Res<Deciders>,
     mut queues: Query<&mut LevelQueue>,
 ) {
+    if event.entity != deciders.agent {
+        return;
+    }
     last.0 = Some(event.result);
     if event.success {
         playlist.advance();

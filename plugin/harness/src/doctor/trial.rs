@@ -48,7 +48,9 @@ impl<'a> Trial<'a> {
     /// Builds the copies.
     pub fn new(planned: ComparisonReport, game: &'a dyn Game, plan: &Plan, ticks: u32) -> Self {
         let comparison = planned.comparison;
-        let one = |number: u32| GameCopy::new(game, plan, number, 1);
+        // Agents that share an arena play together.
+        let together = game.tools().host.agents_per_arena().max(1);
+        let one = |number: u32| GameCopy::new(game, plan, number, together);
         let (mut copies, pairs) = match comparison {
             DoctorComparison::Repeat
             | DoctorComparison::Clock
@@ -83,7 +85,7 @@ impl<'a> Trial<'a> {
         ticks: u32,
         known_types: &mut KnownTypes,
         left_out: &LeftOut,
-        mut monitor: Option<&mut ObservationMonitor>,
+        monitors: &mut [ObservationMonitor],
     ) -> TrialResult {
         let mut report = self.planned.clone();
         let mut incomparable = Default::default();
@@ -103,11 +105,12 @@ impl<'a> Trial<'a> {
                 break;
             }
             self.tick();
-            let seen = self.copies[0].outcome(0);
-            // A copy with a fault may have ended before it observed anything in this tick.
-            let is_seen = self.copies[0].fault.is_none() || !seen.observation.is_empty();
-            if let Some(monitor) = monitor.as_mut().filter(|_| tick < ticks && is_seen) {
-                monitor.note(tick, &seen);
+            for (agent, monitor) in monitors.iter_mut().enumerate().filter(|_| tick < ticks) {
+                let seen = self.copies[0].outcome(agent);
+                // A copy with a fault may have ended before it observed anything in this tick.
+                if self.copies[0].fault.is_none() || !seen.observation.is_empty() {
+                    monitor.note(tick, &seen);
+                }
             }
             report.fault = self.copies.iter().find_map(|copy| copy.fault.clone());
             if report.fault.is_some() {
@@ -218,15 +221,20 @@ pub(super) struct TrialResult {
     pub incomparable: BTreeSet<String>,
 }
 
-/// Returns the first difference in the observation, reward or end of the left copy's agent and its double on the right.
+/// Returns the first difference in the observation, reward or end of one of the left copy's agents and its double on the
+/// right.
 fn effect(left: &GameCopy, right: &GameCopy, tick: u32) -> Option<DoctorDifference> {
-    let number = left.number(0);
+    (0..left.agents.len()).find_map(|agent| effect_on(agent, left, right, tick))
+}
+
+fn effect_on(agent: usize, left: &GameCopy, right: &GameCopy, tick: u32) -> Option<DoctorDifference> {
+    let number = left.number(agent);
     let double = (0..right.agents.len()).find(|&agent| right.number(agent) == number)?;
     let differs = |kind, name: &str, left: String, right: String| {
         let (name, entity, field) = (name.to_owned(), Some(format!("agent {number}")), String::new());
         DoctorDifference { tick, kind, name, entity, field, left, right, value_type: String::new() }
     };
-    first_of_outcomes(&left.outcome(0), &right.outcome(double), &left.observed_names(), differs)
+    first_of_outcomes(&left.outcome(agent), &right.outcome(double), &left.observed_names(), differs)
 }
 
 /// Returns the first difference of two outcomes, made with `differs`.

@@ -1,8 +1,20 @@
 //! Several agents that share one World of a foreign game, and one episode.
 
-use crate::foreign::{ForeignGame, input::Input};
+use crate::{
+    foreign::{
+        ForeignGame,
+        input::{ForeignBot, Input},
+        runtime::{AgentPlace, with_foreign},
+    },
+    game::Game,
+};
 use bevy::prelude::*;
 use bevy_playbot::{
+    agent::{Agent, Control},
+    bot::BlindBot,
+    engine::{LevelFiles, PlaysAlong, begin_beside},
+    episode::EpisodeEnded,
+    streams::AgentStreams,
     unknown_name::nearest,
     virtual_input::{VirtualButton, VirtualInput},
 };
@@ -20,7 +32,10 @@ impl ForeignGame {
     /// has a gamepad of its own. Keys that two agents hold are a [`problem`](crate::game::Game::problem).
     ///
     /// Trainings and evaluations play all agents by one policy, each with its own observation. Everything that records,
-    /// replays or tests plays the first agent alone, while the others do nothing.
+    /// replays, tests or explores plays the first agent, and the others play along: by the
+    /// [`demonstrator`](Self::demonstrator) without noise, or at random (`chaos`) in a game without one. What they do
+    /// depends on the level, and on what happens in it. So a recording holds the actions of the first agent alone, and
+    /// replays.
     ///
     /// ```
     /// use bevy::prelude::*;
@@ -45,6 +60,31 @@ impl ForeignGame {
     /// ```
     pub fn agents(self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.with(|description| description.agents.names = Some(names.into_iter().map(Into::into).collect()))
+    }
+
+    /// Chooses the agent that is recorded, tested or explored, while the others play along. Default: the first of
+    /// [`agents`](Self::agents). To test another one as well, add the game twice, under two names.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::{ForeignGame, PlayedAgent}, prelude::*};
+    ///
+    /// fn duel(name: &'static str, first: &str) -> ForeignGame {
+    ///     ForeignGame::new(name, 1, |_: &mut App| {})
+    ///         .agents(["hunter", "prey"])
+    ///         .keys([vec![], vec![KeyCode::KeyW]])
+    ///         .keys_of("prey", [vec![], vec![KeyCode::ArrowUp]])
+    ///         .observe(["side"], |agent: Res<PlayedAgent>| [agent.0 as f32])
+    ///         .first_agent(first)
+    /// }
+    /// let (hunt, flight) = (duel("hunt", "hunter"), duel("flight", "prey"));
+    /// assert_eq!(hunt.tools().input.action_names(), ["nothing", "KeyW"]);
+    /// assert_eq!(flight.tools().input.action_names(), ["nothing", "ArrowUp"]);
+    /// let problem = duel("flight", "pray").problem().expect("there is no such agent");
+    /// assert!(problem.contains("did you mean `prey`?"), "{problem}");
+    /// ```
+    pub fn first_agent(self, name: impl Into<String>) -> Self {
+        self.with(|description| description.agents.first = Some(name.into()))
     }
 
     /// Replaces the sets of [`keys`](Self::keys) for one of the [`agents`](Self::agents): as many, in the same order.
@@ -85,6 +125,8 @@ impl OwnInput {
 #[derive(Clone, Default)]
 pub(super) struct SharingAgents {
     names: Option<Vec<String>>,
+    /// The agent that is spawned first, if it is not the first of the names.
+    first: Option<String>,
     own: Vec<(String, OwnInput)>,
 }
 
@@ -98,6 +140,12 @@ impl SharingAgents {
         self.names().len().max(1)
     }
 
+    /// Returns the place of the agent that is spawned after so many others.
+    pub(super) fn place_after(&self, others: usize) -> usize {
+        let first = self.first.iter().find_map(|first| self.names().iter().position(|name| name == first));
+        (others + first.unwrap_or_default()) % self.count()
+    }
+
     /// Returns the input of the agent at this place, with its own parts in place of those of `common`.
     pub(super) fn input_of(&self, place: usize, common: &Input) -> Input {
         let mut input = common.clone();
@@ -106,7 +154,8 @@ impl SharingAgents {
             match own {
                 OwnInput::Keys(keys) => (input.keys, input.unknown_key) = (keys.clone(), None),
                 OwnInput::Whole(whole) => {
-                    input = Input { whole: Some(whole.clone()), names: input.names, ..Input::default() };
+                    let Input { names, every, hold, .. } = input;
+                    input = Input { whole: Some(whole.clone()), names, every, hold, ..Input::default() };
                 }
             }
         }
@@ -145,8 +194,9 @@ impl SharingAgents {
         if let Some((_, name)) = twice {
             return Some(format!("names the agent `{name}` twice in `.agents`: give each a name of its own"));
         }
-        let (agent, own) = self.own.iter().find(|(agent, _)| !names.contains(agent))?;
-        let method = own.method();
+        let first = self.first.iter().map(|agent| ("`.first_agent`", agent));
+        let own = self.own.iter().map(|(agent, own)| (own.method(), agent));
+        let (method, agent) = own.chain(first).find(|(_, agent)| !names.contains(agent))?;
         if names.is_empty() {
             return Some(format!("has {method} for the agent `{agent}`, and names no agents: add `.agents`"));
         }
@@ -182,10 +232,54 @@ impl SharingAgents {
     }
 }
 
+// Agents that play along, where one agent is recorded, tested or replayed.
+
+/// Adds the agents that are missing in a World, as ones that play along.
+pub(super) fn add_companions(game: &ForeignGame, world: &mut World) {
+    let present: Vec<u32> = world.query::<&Agent>().iter(world).map(|agent| agent.index).collect();
+    let Some(last) = present.iter().copied().max() else { return };
+    let missing = game.description.agents.count().saturating_sub(present.len());
+    for number in (1..=missing as u32).map(|number| last.saturating_add(number)) {
+        let companion = game.spawn_agent(world, number);
+        let mut companion = world.entity_mut(companion);
+        companion.insert(PlaysAlong);
+        match &game.description.demonstrator {
+            Some(_) => companion.insert(ForeignBot { noise: 0.0 }),
+            None => companion.insert(BlindBot::Chaos),
+        };
+    }
+}
+
+/// Begins the episode of the agents that play along, on the level of the first one. Nothing of an earlier episode counts
+/// for them, so a replay of the first agent finds them as they were.
+pub(super) fn begin_companions(world: &mut World, level: u64) {
+    let mut companions = world.query_filtered::<(&AgentPlace, Entity), With<PlaysAlong>>();
+    let mut companions: Vec<(usize, Entity)> = companions.iter(world).map(|(place, it)| (place.0, it)).collect();
+    companions.sort_unstable();
+    // A file has another number as soon as there are other files.
+    let file = world.get_resource::<LevelFiles>().and_then(|files| files.of(level));
+    let seed = file.map_or(level, |file| file.hash);
+    for (place, companion) in companions {
+        begin_beside(world, companion, level);
+        world.entity_mut(companion).insert(AgentStreams::new(seed, place as u32));
+        with_foreign(world, companion, |_, foreign| {
+            foreign.renew_bot();
+            Ok(())
+        });
+    }
+}
+
+/// Makes agents that play along wait for the next episode.
+pub(super) fn end_companions(event: On<EpisodeEnded>, mut companions: Query<&mut Control, With<PlaysAlong>>) {
+    if let Ok(mut control) = companions.get_mut(event.entity) {
+        *control = Control::Idle;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{game::Game, worlds::Arrangement};
+    use crate::worlds::Arrangement;
 
     /// A game of two agents without observations of their own; `right` has these keys.
     fn pair(right: &[KeyCode]) -> ForeignGame {

@@ -2,7 +2,7 @@
 
 use crate::foreign::{
     ForeignGame,
-    input::{Input, mask},
+    input::{Input, mask, rests_now},
     runtime::{ForeignCell, playing_agents},
 };
 use bevy::{
@@ -165,7 +165,8 @@ fn aim(world: &mut World) {
     Renewal::carry_component::<ButtonClicks>(world);
     let Some(game) = world.get_resource::<ForeignCell>().map(|cell| cell.lock().game.clone()) else { return };
     let (first, names) = game.description.input.clicked();
-    let action = world.get::<Action>(agent).and_then(Action::discrete);
+    let is_resting = rests_now(world, agent, &game.description.input);
+    let action = world.get::<Action>(agent).and_then(Action::discrete).filter(|_| !is_resting);
     let chosen = action.and_then(|action| (action as usize).checked_sub(first)).filter(|&number| number < names.len());
     let mut held = HeldInput::default();
     if let Some(number) = chosen {

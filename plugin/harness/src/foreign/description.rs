@@ -6,7 +6,7 @@ use crate::{
     defect::DefectKind,
     detector::{Detector, LevelProof},
     foreign::{
-        ForeignGame, Restart,
+        ForeignGame, Restart, agents,
         agents::SharingAgents,
         clocks::ClockSettings,
         input,
@@ -100,6 +100,11 @@ impl Description {
         self.agents.input_of(place % self.agents.count(), &self.input)
     }
 
+    /// Returns the input of the agent that is played where one agent is played.
+    pub(super) fn first_input(&self) -> Input {
+        self.input_of(self.agents.place_after(0))
+    }
+
     /// Returns whether the agent's state is read for explorers, detectors, proofs or snapshots.
     pub(super) fn has_state(&self) -> bool {
         self.position.is_some() || self.cell.is_some() || self.proof.is_some() || self.snapshot.is_some()
@@ -165,6 +170,7 @@ impl Plugin for ForeignPlugin {
             .init_resource::<LevelFromFile>()
             .add_observer(restart::start)
             .add_observer(restart::announce)
+            .add_observer(agents::end_companions)
             .init_schedule(BeforeGame)
             .add_systems(BeforeGame, note_baseline);
         let TickSchedules { decide, judge, .. } = TickSchedules::of(app);
@@ -197,6 +203,7 @@ impl Plugin for ForeignPlugin {
                     .ambiguous_with(PlaybotSystems::Act),
             );
         }
+        input::add_rest(app, &description.input);
         #[cfg(feature = "ui")]
         clicks::add_clicks(app, &description.input);
         if description.has_state() {

@@ -3,7 +3,7 @@
 use crate::{
     foreign::{
         ForeignGame,
-        runtime::{SystemFactory, playing_agents, with_foreign},
+        runtime::{ForeignCell, SystemFactory, playing_agents, with_foreign},
     },
     game::InputTools,
 };
@@ -12,12 +12,14 @@ use bevy_playbot::{
     action::{Action, ActionSpace, ActionValue},
     agent::{Agent, Control},
     bot::with_noise,
+    demo::{file::Decider, replay::Replay},
+    engine::{TickSchedules, check_actions},
     episode::Episode,
     key_bindings::KeyBindings,
     legal::LegalActions,
     streams::AgentStreams,
-    systems::ObserveSchedule,
-    virtual_input::{ActionAxis, HeldInput, PointerPosition, UnknownInput, VirtualButton, VirtualInput},
+    systems::{ObserveSchedule, PlaybotSystems},
+    virtual_input::{ActionAxis, HeldInput, PointerPosition, PressSystems, UnknownInput, VirtualButton, VirtualInput},
 };
 
 /// Most discrete actions that `.choices` may bring.
@@ -174,6 +176,31 @@ impl ForeignGame {
     pub fn every(self, ticks: u32) -> Self {
         self.with(|description| description.input.every = Some(ticks))
     }
+
+    /// Holds the keys of a decision for the first so many of the ticks of [`every`](Self::every), and lets them go for
+    /// the rest: so the next decision presses them anew. Clicks, taps, the wheel and texts come in those first ticks
+    /// only. The action itself stays that of the decision, also in recordings. People hold what they please, and
+    /// replays of their recordings do as they did.
+    ///
+    /// More ticks than a decision has are a [`problem`](crate::game::Game::problem), and so are
+    /// [`actions`](Self::actions) that a system passes on.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// let jump = || {
+    ///     let game = ForeignGame::new("hop", 1, |_: &mut App| {}).observe(["y"], || [0.0]);
+    ///     game.keys([vec![], vec![KeyCode::Space]])
+    /// };
+    /// // Ten decisions a second, which hold the key for two frames and let it go for four.
+    /// assert_eq!(jump().every(6).hold(2).problem(), None);
+    /// let problem = jump().every(6).hold(7).problem().expect("too long");
+    /// assert!(problem.contains("type `.hold(6)` or less"), "{problem}");
+    /// ```
+    pub fn hold(self, ticks: u32) -> Self {
+        self.with(|description| description.input.hold = Some(ticks))
+    }
 }
 
 /// The parts of the path from an action into the game, set in any order.
@@ -209,6 +236,8 @@ pub(super) struct Input {
     pub(super) names: Vec<String>,
     /// Ticks that a decision holds; 1 if not set.
     pub(super) every: Option<u32>,
+    /// The first ticks of them in which its keys are held; all if not set.
+    pub(super) hold: Option<u32>,
 }
 
 impl Input {
@@ -301,8 +330,9 @@ impl Input {
         if said.len() > 1 {
             return Some(format!("has {}, and each of them declares every action: keep one", said.join(" and ")));
         }
-        if let Some(problem) = self.problem_of_clicks().or_else(|| self.problem_of_period()) {
-            return Some(problem);
+        let problem = self.problem_of_clicks().or_else(|| self.problem_of_period()).or_else(|| self.problem_of_hold());
+        if problem.is_some() {
+            return problem;
         }
         let pressed = self.pressed()?;
         if let Some((action, position)) = pressed.impossible_position() {
@@ -405,6 +435,41 @@ impl Input {
         }
     }
 
+    /// Returns the problem of the ticks in which a decision holds its keys.
+    fn problem_of_hold(&self) -> Option<String> {
+        let (hold, every) = (self.hold?, self.every.unwrap_or(1));
+        if hold == 0 {
+            return Some(
+                "has `.hold(0)`, but keys are held for at least one tick: type `.hold(1)`, or leave it out".to_owned(),
+            );
+        }
+        if self.space.is_some() {
+            return Some(
+                "has `.hold` and `.actions`, whose system passes the action on in each tick: leave `.hold` out"
+                    .to_owned(),
+            );
+        }
+        (hold > every).then(|| match self.every {
+            Some(_) => format!(
+                "has `.hold({hold})`, but a decision of `.every({every})` ends before: type `.hold({every})` or less"
+            ),
+            None => format!(
+                "has `.hold({hold})`, but a decision is one tick: add `.every` with more ticks, such as `.every({})`",
+                hold.saturating_mul(2)
+            ),
+        })
+    }
+
+    /// Returns whether decisions let their keys go before they end.
+    pub(super) fn rests(&self) -> bool {
+        self.hold.is_some_and(|hold| hold < self.every.unwrap_or(1))
+    }
+
+    /// Returns whether a decision has let its keys go by this tick of an episode.
+    fn is_resting(&self, tick: u32) -> bool {
+        self.rests() && self.hold.is_some_and(|hold| tick % self.every.unwrap_or(1) >= hold)
+    }
+
     /// Returns whether decisions hold for more than one tick.
     pub(super) fn holds(&self) -> bool {
         self.every.is_some_and(|ticks| ticks > 1)
@@ -461,20 +526,20 @@ impl Input {
 
 impl InputTools for ForeignGame {
     fn action_names(&self) -> Vec<String> {
-        self.description.input_of(0).names()
+        self.description.first_input().names()
     }
 
     fn key_bindings(&self) -> Option<KeyBindings> {
-        self.description.input_of(0).bindings()
+        self.description.first_input().bindings()
     }
 
     fn records_people(&self) -> bool {
-        let input = self.description.input_of(0);
+        let input = self.description.first_input();
         input.space.is_none() && input.pressed().is_some()
     }
 
     fn has_idle_action(&self) -> bool {
-        let input = self.description.input_of(0);
+        let input = self.description.first_input();
         let pressed = input.pressed().filter(|_| input.space.is_none());
         pressed.is_none_or(|pressed| match pressed.space() {
             ActionSpace::Discrete(actions) => pressed.has_idle_action(actions - input.clicks.len()),
@@ -544,6 +609,44 @@ pub(super) fn hold(world: &mut World) {
             Ok(())
         });
     }
+}
+
+/// Adds the system that lets keys go before the next decision, if the game wants that.
+pub(super) fn add_rest(app: &mut App, input: &Input) {
+    if !input.rests() {
+        return;
+    }
+    let decide = TickSchedules::of(app).decide;
+    app.add_systems(
+        decide,
+        // No other system lets the inputs of an agent go.
+        rest.in_set(PlaybotSystems::Act).after(check_actions).before(PressSystems).ambiguous_with(PlaybotSystems::Act),
+    );
+}
+
+fn rest(world: &mut World) {
+    let Some(game) = world.get_resource::<ForeignCell>().map(|cell| cell.lock().game.clone()) else { return };
+    for agent in playing_agents(world) {
+        let is_resting = rests_now(world, agent, &game.description.input);
+        if let Some(mut input) = world.get_mut::<VirtualInput>(agent) {
+            input.rest(is_resting);
+        }
+    }
+}
+
+/// Returns whether the agent's decision has let its keys go. People hold theirs as long as they please. A replay does
+/// what they did.
+pub(super) fn rests_now(world: &World, agent: Entity, input: &Input) -> bool {
+    let Some(tick) = world.get::<Episode>(agent).map(|episode| episode.tick) else { return false };
+    let is_person = match world.get::<Control>(agent) {
+        Some(Control::Human) => true,
+        Some(Control::Replay) => {
+            let deciders = world.get::<Replay>(agent).map(|replay| &replay.episode().deciders);
+            deciders.and_then(|deciders| deciders.get(tick as usize)) == Some(&Decider::Human)
+        }
+        _ => false,
+    };
+    !is_person && input.is_resting(tick)
 }
 
 /// Adds the system that keeps the mask of the agent's actions up to date.

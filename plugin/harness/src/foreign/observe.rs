@@ -343,12 +343,17 @@ fn note<C: Component>(world: &mut World, agent: Entity, component: Option<C>) {
 /// Reads rewards and ends, after the game's frame. The end of one agent's episode ends those of all others.
 pub(super) fn read_outcome(world: &mut World) {
     let mut outcomes = Vec::new();
-    for agent in playing_agents(world) {
+    let agents = playing_agents(world);
+    for &agent in &agents {
         outcomes.extend(outcome_of(world, agent).map(|(reward, end)| (agent, reward, end)));
     }
     let is_over = outcomes.iter().any(|(_, _, end)| end.is_some());
     for (agent, reward, end) in outcomes {
         judge(world, agent, reward, end.or(is_over.then_some(EpisodeEnd::Truncated)));
+    }
+    // Proofs and snapshots are about the first agent, and read the World as it is now.
+    if let [first, _, ..] = agents[..] {
+        with_foreign(world, first, |_, _| Ok(()));
     }
 }
 

@@ -184,6 +184,12 @@ impl Foreign {
         &mut self.agents[self.asked]
     }
 
+    /// Replaces the demonstrator of the agent that is asked about by a new one, which remembers no episode.
+    pub(super) fn renew_bot(&mut self) {
+        let bot = self.game.description.demonstrator.as_ref().map(|(_, system)| system.make());
+        self.asked().bot = bot;
+    }
+
     /// Returns the parts of the rewards of all agents.
     pub(super) fn rewards(&mut self) -> impl Iterator<Item = &mut RewardPart> {
         self.agents.iter_mut().flat_map(|parts| &mut parts.rewards)

@@ -17,7 +17,18 @@ use bevy::{
     prelude::*,
     window::WindowEvent,
 };
-use bevy_playbot::{engine::panics, virtual_input::VirtualDevices};
+use bevy_playbot::{
+    action::Action,
+    agent::{AgentOrder, Control},
+    bot::HeldAction,
+    engine::panics,
+    episode::Episode,
+    observation::Observation,
+    reward::Reward,
+    state_hash::StateHash,
+    streams::AgentStreams,
+    virtual_input::VirtualDevices,
+};
 use std::sync::Arc;
 
 /// The function that puts a saved state into a World. Returns false if the state is of another type.
@@ -83,12 +94,31 @@ impl ForeignGame {
     }
 }
 
+/// What the plugin keeps of an agent.
+type KeptAgent = ((Control, Episode, AgentStreams, Action), (Observation, Reward, StateHash), HeldAction);
+
+/// Returns what the plugin keeps of the other agents of a World. The caller knows the one that it plays.
+fn others(world: &World, agent: Entity) -> Vec<(Entity, KeptAgent)> {
+    let all = world.get_resource::<AgentOrder>().map_or(&[][..], |order| order.entities());
+    let kept = |other: Entity| -> Option<(Entity, KeptAgent)> {
+        let entity = world.get_entity(other).ok()?;
+        let (control, episode, streams) = (entity.get().copied()?, entity.get().cloned()?, entity.get().cloned()?);
+        let (action, seen) = (entity.get().cloned()?, entity.get().cloned()?);
+        let (reward, hash) = (entity.get().copied()?, entity.get().copied()?);
+        let held = entity.get().cloned().unwrap_or_default();
+        Some((other, ((control, episode, streams, action), (seen, reward, hash), held)))
+    };
+    all.iter().filter(|other| **other != agent).filter_map(|&other| kept(other)).collect()
+}
+
 /// The state of a game, and that of the plugin about it.
 struct SavedGame {
     game: Snapshot,
     agent: Entity,
     /// Position and cell of the agent.
     state: KeptState,
+    /// The other agents of the World.
+    others: Vec<(Entity, KeptAgent)>,
     /// The last value of each part of the reward.
     rewards: Vec<Option<f32>>,
     /// The last decision, if decisions hold for several ticks.
@@ -115,6 +145,7 @@ impl SnapshotTools for ForeignGame {
             game,
             agent,
             state: kept_state(world, agent),
+            others: others(world, agent),
             rewards: foreign.rewards().map(|part| part.last).collect(),
             held: foreign.held().map(|held| *held).collect(),
             devices: world.get_resource().cloned(),
@@ -148,6 +179,11 @@ impl SnapshotTools for ForeignGame {
             *held = *last;
         }
         put_state(world, agent, &saved.state);
+        for (other, kept) in &saved.others {
+            if let Ok(mut other) = world.get_entity_mut(*other) {
+                other.insert(kept.clone());
+            }
+        }
         put(world, saved.devices.clone());
         put(world, saved.keys.clone());
         put(world, saved.letters.clone());

@@ -149,8 +149,11 @@ impl ReplayBuffer {
     /// [`LearnError::Action`] if the two act in different kinds of spaces.
     pub(super) fn picked(&self, slots: &[usize], more: Option<(&Self, &[usize])>) -> Result<Self, LearnError> {
         let n = slots.len() + more.map_or(0, |(_, slots)| slots.len());
-        let mut all = Self { seen: n as u64, ..Self::empty(n, self.widths, self.actions.gather(slots)) };
-        let Widths { obs, latent, clock, weight, legal } = self.widths;
+        // One of the two may have masks alone.
+        let legal = more.map_or(0, |(from, _)| from.widths.legal).max(self.widths.legal);
+        let widths = Widths { legal, ..self.widths };
+        let mut all = Self { seen: n as u64, ..Self::empty(n, widths, self.actions.gather(slots)) };
+        let Widths { obs, latent, clock, weight, legal } = widths;
         let all_legal = vec![true; legal];
         let parts = [Some((self, slots)), more];
         for (from, slots) in parts.iter().flatten() {
@@ -491,6 +494,10 @@ mod tests {
         assert_eq!(forbidden(&buffer.next_legal), [6 * 3 + 1, (6 + 2) * 3]);
         let picked = buffer.picked(&[10, 0], None).expect("the same actions");
         assert_eq!(picked.legal, [false, true, true, true, true, true]);
+        let mut plain = new(6, PLAIN);
+        plain.push(&rollout(), &[]).expect("it fits");
+        let joined = plain.picked(&[1], Some((&buffer, &[10]))).expect("the same actions");
+        assert_eq!((joined.legal, joined.widths.legal), (vec![true, true, true, false, true, true], 3));
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Demonstrations for a skill model.
 
 use crate::{
-    ActionSpace, Actions, LearnError, ObsKind, Observations, SeenLevels, legacy,
+    ActionSpace, Actions, LearnError, ObsKind, Observations, SeenLevels, legacy, legal,
     norm::ObsStats,
     rng::{Streams, below, fnv1a, shuffle},
 };
@@ -30,6 +30,10 @@ pub struct Dataset {
     pub(super) states: Option<Arc<Self>>,
     /// The levels that they show, if known.
     pub(super) seen: Option<Arc<SeenLevels>>,
+    /// The masks of each episode; empty if every action was always legal.
+    pub(super) legal: Arc<[Arc<[bool]>]>,
+    /// Episodes whose masks are not known.
+    pub(super) unmasked: usize,
 }
 
 impl Dataset {
@@ -55,7 +59,8 @@ impl Dataset {
         }
         let levels = (0..episodes.len()).collect();
         let episodes = episodes.into_iter().map(Arc::new).collect();
-        Ok(Self { observation, space, episodes, levels, states: None, seen: None })
+        let (states, seen, legal, unmasked) = (None, None, Arc::default(), 0);
+        Ok(Self { observation, space, episodes, levels, states, seen, legal, unmasked })
     }
 
     /// Assigns a level to each episode, by any number that is equal for episodes on the same level.
@@ -67,6 +72,34 @@ impl Dataset {
     pub fn with_levels(self, levels: Vec<usize>) -> Result<Self, LearnError> {
         LearnError::check("levels of episodes", self.episodes.len(), levels.len())?;
         Ok(Self { levels: levels.into(), ..self })
+    }
+
+    /// Adds the masks of the actions, episode by episode: an entry for each discrete action of each step, true if it was
+    /// legal. In an episode with an empty mask everything was legal, and it counts as legal where the mask is not known,
+    /// `None`. Masks that forbid nothing are dropped.
+    ///
+    /// # Errors
+    /// [`LearnError::Shape`] unless there is a mask of the right length for each episode, [`LearnError::Action`] if one
+    /// forbids an action that was taken, or if the actions are continuous.
+    pub fn with_legal(self, masks: Vec<Option<Vec<bool>>>) -> Result<Self, LearnError> {
+        LearnError::check("masks of episodes", self.episodes.len(), masks.len())?;
+        for (episode, mask) in self.episodes.iter().zip(&masks) {
+            legal::check(mask.as_deref().unwrap_or_default(), &self.space, &episode.actions)?;
+        }
+        let unmasked = masks.iter().filter(|mask| mask.is_none()).count();
+        let forbids = masks.iter().flatten().any(|mask| mask.contains(&false));
+        let masks = masks.into_iter().filter(|_| forbids);
+        Ok(Self { legal: masks.map(|mask| mask.unwrap_or_default().into()).collect(), unmasked, ..self })
+    }
+
+    /// Returns whether an action was illegal in some step.
+    pub fn has_masks(&self) -> bool {
+        !self.legal.is_empty()
+    }
+
+    /// Returns the number of episodes whose masks are not known.
+    pub fn unmasked(&self) -> usize {
+        self.unmasked
     }
 
     /// Notes the levels that they show: skill models that are learned from them [keep
@@ -109,6 +142,8 @@ impl Dataset {
             levels: numbers.iter().map(|&i| self.levels[i]).collect(),
             states: self.states.as_ref().map(|states| Arc::new(states.subset(numbers))),
             seen: self.seen.clone(),
+            legal: numbers.iter().filter_map(|&i| self.legal.get(i)).cloned().collect(),
+            unmasked: self.unmasked,
         }
     }
 
@@ -122,7 +157,7 @@ impl Dataset {
         Some(ObsStats::of(rows, width))
     }
 
-    /// Returns a hash of all observations, actions and states, the same on any number of threads.
+    /// Returns a hash of all observations, actions, states and masks, the same on any number of threads.
     pub(super) fn fingerprint(&self) -> u64 {
         let mut hashes: Vec<[u64; 2]> = self
             .episodes
@@ -140,6 +175,7 @@ impl Dataset {
             })
             .collect();
         hashes.extend(self.states.as_ref().map(|states| [states.fingerprint(), 0]));
+        hashes.extend(self.legal.iter().map(|mask| [fnv1a(bytemuck::cast_slice(mask)), 0]));
         fnv1a(bytemuck::cast_slice(&hashes))
     }
 
@@ -157,6 +193,25 @@ impl Dataset {
             }
         }
         Ok((observations, actions))
+    }
+
+    /// Returns the masks of `windows`, time-major as [`Self::gather`]; nothing without masks.
+    pub(super) fn legal_of(&self, windows: &[Window], steps: usize) -> Vec<bool> {
+        if self.legal.is_empty() {
+            return Vec::new();
+        }
+        let choices = self.space.dim();
+        let mut legal = Vec::with_capacity(windows.len() * steps * choices);
+        for t in 0..steps {
+            for window in windows {
+                let (episode, row) = self.step_of(window, t);
+                match self.legal[episode].get(row * choices..(row + 1) * choices) {
+                    Some(mask) => legal.extend_from_slice(mask),
+                    None => legal.resize(legal.len() + choices, true),
+                }
+            }
+        }
+        legal
     }
 }
 
@@ -280,6 +335,35 @@ pub(super) mod tests {
         let some = all.subset(&[2, 0]);
         assert_eq!((some.steps(), some.levels.to_vec()), (8, vec![2, 0]));
         assert!(Arc::ptr_eq(&some.episodes[0], &all.episodes[2]));
+    }
+
+    #[test]
+    fn masks_are_gathered_as_the_actions_they_belong_to() {
+        let mask = vec![true, false, true, true, true, false];
+        let all = dataset(&[3, 1, 2]).with_legal(vec![Some(mask), Some(Vec::new()), None]).expect("action 0 is legal");
+        assert_eq!((all.has_masks(), all.unmasked()), (true, 1));
+        let windows = [Window { episode: 0, start: 1 }, Window { episode: 2, start: 0 }];
+        assert_eq!(all.legal_of(&windows, 2), [true, true, true, true, true, false, true, true]);
+        let some = all.subset(&[2, 0]);
+        assert_eq!(some.legal_of(&[Window { episode: 1, start: 0 }], 1), [true, false]);
+    }
+
+    #[test]
+    fn masks_that_forbid_nothing_change_nothing() {
+        let plain = dataset(&[2, 1]);
+        let masked = plain.clone().with_legal(vec![Some(vec![true; 4]), Some(Vec::new())]).expect("all is legal");
+        assert_eq!((&masked, masked.fingerprint(), masked.has_masks()), (&plain, plain.fingerprint(), false));
+        let forbids = plain.clone().with_legal(vec![Some(vec![true, false, true, true]), Some(Vec::new())]);
+        assert_ne!(forbids.expect("action 0 is legal").fingerprint(), plain.fingerprint(), "other demonstrations");
+    }
+
+    #[test]
+    fn masks_of_another_size_and_illegal_actions_are_refused() {
+        let masked = |masks| dataset(&[2]).with_legal(masks).expect_err("refused").to_string();
+        assert!(masked(Vec::new()).contains("masks of episodes"));
+        assert!(masked(vec![Some(vec![true; 3])]).contains("legal"));
+        let text = masked(vec![Some(vec![true, true, false, true])]);
+        assert!(text.contains("row 1 is 0, which its mask forbids"), "{text}");
     }
 
     #[test]

@@ -37,16 +37,59 @@ pub fn skill_loss(forward: &SkillForward, config: &SkillConfig) -> SkillLoss {
 }
 
 /// Returns the negative log-likelihood of each recorded action if a share ε of discrete actions was replaced by
-/// uniformly random ones. It is −ln((1 − ε) π(a) + ε / K) for K actions. The decoder then learns the intended action,
-/// not the noise. Continuous actions are not corrected.
+/// uniformly random ones. It is −ln((1 − ε) π(a) + ε / K) for K legal actions. The decoder then learns the intended
+/// action, not the noise. Continuous actions are not corrected.
 fn nll_under_noise(forward: &SkillForward, noise: f64) -> Tensor<1> {
     let nll = forward.nll_per_step.clone();
     match &forward.decoded {
         Dist::Categorical { log_probs } if noise > 0.0 => {
             let [_, actions] = log_probs.dims();
             let meant = nll.neg().exp() * (1.0 - noise);
-            (meant + noise / actions as f64).log().neg()
+            match &forward.legal_count {
+                None => (meant + noise / actions as f64).log().neg(),
+                Some(legal) => (meant + legal.clone().recip() * noise).log().neg(),
+            }
         }
         _ => nll,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        Actions, DeviceKind,
+        nn::{ActionBatch, host, matrix, vector},
+    };
+
+    /// Returns the loss of three steps of one window whose decoder holds four actions equally likely.
+    fn nll(noise: f64, legal: &[bool]) -> Vec<f32> {
+        let device = DeviceKind::Flex.plain();
+        let actions = ActionBatch::new(&Actions::Discrete(vec![1, 2, 3]), &device);
+        let decoded = Dist::categorical(matrix(vec![0.5; 12], 3, 4, &device));
+        let zeros = |columns| matrix(vec![0.0; columns], 1, columns, &device);
+        let forward = SkillForward {
+            nll_per_step: decoded.log_prob(&actions).expect("choices").neg(),
+            kl_per_sequence: vector(vec![0.0], &device),
+            decoder_latent: zeros(2),
+            decoded,
+            decoder_features: zeros(2),
+            prior_features: zeros(2),
+            legal_count: None,
+        };
+        let forward = forward.restricted(legal, &actions, &device).expect("choices");
+        host(nll_under_noise(&forward, noise)).expect("readable")
+    }
+
+    #[test]
+    fn only_legal_actions_count_in_the_likelihood_with_noise_and_without() {
+        let mask = [[true; 4], [false, true, true, false], [false, false, false, true]].concat();
+        for noise in [0.0, 0.5] {
+            // Equal chances of 4, 2 and 1 actions, which uniform noise leaves as they are.
+            for (got, chances) in nll(noise, &mask).into_iter().zip([4.0f32, 2.0, 1.0]) {
+                assert!((got - chances.ln()).abs() < 1e-5, "{got} of {chances}");
+            }
+            assert!(nll(noise, &[]).into_iter().all(|got| (got - 4.0f32.ln()).abs() < 1e-5));
+        }
     }
 }

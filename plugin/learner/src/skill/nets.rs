@@ -3,9 +3,10 @@
 use crate::{
     ActionSpace, FileError, LearnError, ObsKind,
     file::TensorFile,
+    legal::logit_offsets,
     nn::{
         ActionBatch, Dist, Gru, ImageNet, Linear, Mlp, ObsBatch, ParamSource, ParamVisitor, Parameters, RandomInit,
-        path,
+        path, vector,
     },
     policy::Actor,
     rng::Streams,
@@ -47,6 +48,30 @@ pub struct SkillForward {
     pub decoder_features: Tensor<2>,
     /// Features of the prior's trunk for each window's first step, `[B, features]`.
     pub prior_features: Tensor<2>,
+    /// The number of legal actions of each step, `[steps * B]`, if some are illegal.
+    pub legal_count: Option<Tensor<1>>,
+}
+
+impl SkillForward {
+    /// Gives illegal actions probability 0. `legal` has an entry for each action of each step, time-major, or is empty
+    /// without masks. `actions` are those that were taken.
+    ///
+    /// # Errors
+    /// [`LearnError::Action`] if `actions` do not fit the decoder.
+    pub(super) fn restricted(self, legal: &[bool], actions: &ActionBatch, device: &Device) -> Result<Self, LearnError> {
+        let Dist::Categorical { log_probs } = &self.decoded else { return Ok(self) };
+        let [rows, choices] = log_probs.dims();
+        let rows: Vec<usize> = (0..rows).collect();
+        let Some(offsets) = logit_offsets(legal, &rows, choices, device) else { return Ok(self) };
+        let decoded = Dist::categorical(log_probs.clone() + offsets);
+        let count = |mask: &[bool]| match mask.iter().filter(|&&is_legal| is_legal).count() {
+            0 => choices as f32,
+            count => count as f32,
+        };
+        let counts = legal.chunks_exact(choices).map(count).collect();
+        let nll_per_step = decoded.log_prob(actions)?.neg();
+        Ok(Self { nll_per_step, decoded, legal_count: Some(vector(counts, device)), ..self })
+    }
 }
 
 impl SkillNets {
@@ -115,7 +140,15 @@ impl SkillNets {
         let decoder_features = self.decoder.observe(states)?;
         let decoded = self.decoder.forward_held(decoder_latent.clone(), decoder_features.clone(), steps);
         let nll_per_step = decoded.log_prob(actions)?.neg();
-        Ok(SkillForward { nll_per_step, kl_per_sequence, decoder_latent, decoded, decoder_features, prior_features })
+        Ok(SkillForward {
+            nll_per_step,
+            kl_per_sequence,
+            decoder_latent,
+            decoded,
+            decoder_features,
+            prior_features,
+            legal_count: None,
+        })
     }
 }
 

@@ -292,7 +292,7 @@ impl SkillTrainer {
         let noise = matrix(noise, batch, self.config.latent, &device);
         let rows = ActionBatch::new(&actions, &device);
         let forward = self.nets.forward(&states, &rows, encoded, noise, steps)?;
-        Ok((forward, actions))
+        Ok((forward.restricted(&dataset.legal_of(windows, steps), &rows, &device)?, actions))
     }
 
     /// Returns the squared error of the predicted state of `windows` of `dataset`, `[1]`, if it is predicted.

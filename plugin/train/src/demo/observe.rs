@@ -1,15 +1,17 @@
-//! The replay of recordings whose files lack observations.
+//! The replay of recordings whose files lack observations, or masks.
 
 use crate::demo::{Demonstration, Demonstrations};
 use bevy::prelude::*;
 use bevy_playbot::{
-    agent::Control,
+    action::{ActionSpace, ActionValue},
+    agent::{Agent, Control},
     demo::{
         file::DemoEpisode,
         replay::{Divergence, Replay},
     },
-    engine::tick_world,
+    engine::{recorded_action, tick_world},
     fault::Fault,
+    legal::LegalActions,
     observation::Observation,
     reward::Reward,
     vision::{ObservationConfig, VisionError},
@@ -22,7 +24,10 @@ use playbot_harness::{
     worlds::{at_most, build_observing_world},
 };
 use playbot_learner::{ObsKind, Observations};
-use std::{collections::BTreeMap, sync::Arc};
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    sync::Arc,
+};
 
 impl Demonstrations {
     /// Replays the episodes whose observations are not in a file, mode by mode, each distinct demonstration once.
@@ -39,25 +44,68 @@ impl Demonstrations {
         replay: impl Fn(Arc<DemoEpisode>) -> Replay,
         progress: &(impl Fn(u64) + Sync),
     ) -> Result<BTreeMap<usize, ObservedEpisode>, VerifyError> {
+        let is_wanted = |i: usize| !self.episodes[i].is_seen && originals[i] == i;
+        let mut all = self.nothing_to_see(game);
+        for observed in self.replayed(game, threads, is_wanted, replay, progress)? {
+            if let Some(divergence) = observed.divergence {
+                let Demonstration { file, index, .. } = &self.episodes[observed.id];
+                return Err(VerifyError::Diverged { path: file.to_path_buf(), episode: *index, divergence });
+            }
+            all.insert(observed.id, observed);
+        }
+        Ok(all)
+    }
+
+    /// Returns the masks of the distinct episodes whose observations are in a file, by the index of the episode.
+    /// Recordings hold no masks, so a replay restores them. It is `None` for an episode that does not replay. Without
+    /// masks in the first such episode of each mode the game has none, and nothing is returned.
+    ///
+    /// # Errors
+    ///
+    /// [`VerifyError::Fault`] if a game with masks breaks its contract.
+    pub fn masks_of_seen(
+        &self,
+        game: &dyn Game,
+        threads: usize,
+        originals: &[usize],
+    ) -> Result<BTreeMap<usize, Option<Vec<bool>>>, VerifyError> {
+        let is_seen = |i: usize| self.episodes[i].is_seen && originals[i] == i && !self.episodes[i].episode.is_empty();
+        let mut modes = BTreeSet::new();
+        let seen = (0..self.episodes.len()).filter(|&i| is_seen(i));
+        let firsts: Vec<usize> = seen.filter(|&i| modes.insert(&self.episodes[i].mode)).collect();
+        // Recordings of a game without masks need not replay here.
+        let probe = self.replayed(game, 1, |i| firsts.contains(&i), Replay::new, &|_| {});
+        if !probe.is_ok_and(|probe| probe.iter().any(|observed| !observed.legal.is_empty())) {
+            return Ok(BTreeMap::new());
+        }
+        let replayed = self.replayed(game, threads, is_seen, Replay::new, &|_| {})?;
+        let known = |observed: &ObservedEpisode| observed.divergence.is_none();
+        Ok(replayed.into_iter().map(|observed| (observed.id, known(&observed).then_some(observed.legal))).collect())
+    }
+
+    /// Replays the episodes whose index is wanted, mode by mode: first beside others, and where that diverges, alone.
+    fn replayed(
+        &self,
+        game: &dyn Game,
+        threads: usize,
+        is_wanted: impl Fn(usize) -> bool,
+        replay: impl Fn(Arc<DemoEpisode>) -> Replay,
+        progress: &(impl Fn(u64) + Sync),
+    ) -> Result<Vec<ObservedEpisode>, VerifyError> {
         let mut by_mode: BTreeMap<&str, Vec<Job>> = BTreeMap::new();
         for (i, demo) in self.episodes.iter().enumerate() {
-            if !demo.is_seen && originals[i] == i && !demo.episode.is_empty() {
+            if is_wanted(i) && !demo.episode.is_empty() {
                 by_mode.entry(&demo.mode).or_default().push((i, replay(demo.episode.clone())));
             }
         }
-        let mut all = self.nothing_to_see(game);
+        let mut all = Vec::new();
         for (mode, jobs) in by_mode {
             let observed = observe_replays(game, &self.observation_config, mode, jobs, threads, progress);
             for observed in observed.map_err(|error| self.explained(error))? {
-                let observed = match observed.divergence {
+                all.push(match observed.divergence {
                     None => observed,
                     Some(_) => self.observe_alone(game, mode, observed, &replay)?,
-                };
-                if let Some(divergence) = observed.divergence {
-                    let Demonstration { file, index, .. } = &self.episodes[observed.id];
-                    return Err(VerifyError::Diverged { path: file.to_path_buf(), episode: *index, divergence });
-                }
-                all.insert(observed.id, observed);
+                });
             }
         }
         Ok(all)
@@ -97,6 +145,7 @@ impl Demonstrations {
             id,
             observations: Observations::empty(&kind),
             rewards: Vec::new(),
+            legal: Vec::new(),
             divergence: None,
         };
         empty.map(|(id, _)| (id, nothing(id))).collect()
@@ -119,6 +168,8 @@ pub struct ObservedEpisode {
     pub observations: Observations,
     /// The reward of each action.
     pub rewards: Vec<f32>,
+    /// An entry for each discrete action of each step: true if it was legal, or the recorded one. Empty without masks.
+    pub legal: Vec<bool>,
     /// The first divergence from the recorded episode, if there is one.
     pub divergence: Option<Divergence>,
 }
@@ -224,18 +275,38 @@ impl ReplayWorld {
         };
         let observations = Observations::with_capacity(&self.kind, replay.episode().len());
         replay.start(&mut entity);
-        self.replaying[agent] = Some(ObservedEpisode { id, observations, rewards: Vec::new(), divergence: None });
+        let (rewards, legal) = (Vec::new(), Vec::new());
+        self.replaying[agent] = Some(ObservedEpisode { id, observations, rewards, legal, divergence: None });
     }
 
-    /// Stores an agent's observation and reward of this tick. Returns the episode after its last tick.
+    /// Stores an agent's observation, mask and reward of this tick. Returns the episode after its last tick.
     fn note(&mut self, agent: usize) -> Option<ObservedEpisode> {
         let observed = self.replaying[agent].as_mut()?;
         let entity = self.world.entity(self.agents[agent]);
         // After a tick the agent still has the observation that it acted on.
         entity.get::<Observation>()?.push_to(&mut observed.observations);
+        let replay = entity.get::<Replay>()?;
+        let (mask, agent_actions) = (entity.get::<LegalActions>(), &entity.get::<Agent>()?.actions);
+        push_mask(&mut observed.legal, observed.rewards.len(), mask, agent_actions, replay);
         observed.rewards.push(entity.get::<Reward>()?.get());
-        let replay = entity.get::<Replay>().filter(|replay| replay.is_finished())?;
+        if !replay.is_finished() {
+            return None;
+        }
         observed.divergence = replay.divergence().cloned();
         self.replaying[agent].take()
+    }
+}
+
+/// Adds the mask of a tick to those of the ticks before it. Without a mask every action is legal. People may press what
+/// is illegal, and the recorded action has to be a possible one for a learner.
+fn push_mask(legal: &mut Vec<bool>, tick: usize, mask: Option<&LegalActions>, space: &ActionSpace, replay: &Replay) {
+    let (ActionSpace::Discrete(actions), false) = (space, mask.is_none() && legal.is_empty()) else { return };
+    legal.resize(tick * actions, true);
+    legal.extend(mask.iter().flat_map(|mask| mask.mask()));
+    legal.resize((tick + 1) * actions, true);
+    if let Some(ActionValue::Discrete(action)) = recorded_action(&replay.episode().actions, tick)
+        && let Some(is_legal) = legal.get_mut(tick * actions + action as usize)
+    {
+        *is_legal = true;
     }
 }
