@@ -340,6 +340,12 @@ pub trait LevelTools: Send + Sync {
         None
     }
 
+    /// Returns the [names](Self::level_name) of all levels of a mode, in the order of their numbers from 0, for command
+    /// lines that name a level. By default there is none.
+    fn level_names(&self, _mode: &str) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Reads a level in the game's own format, or says what is wrong with it and on which line. Returns `None`, by
     /// default: the game has no level files.
     ///

@@ -518,6 +518,7 @@ impl ForeignGame {
     /// );
     /// assert_eq!(game.level_count(), Some(2));
     /// assert_eq!(game.tools().levels.level_name("default", 3).as_deref(), Some("stairs"));
+    /// assert_eq!(game.tools().levels.level_names("default"), ["pantry", "stairs"]);
     /// ```
     pub fn editor_levels(self, levels: Result<Vec<EditorLevel>, String>) -> Self {
         let levels = levels.and_then(|levels| {
@@ -603,6 +604,12 @@ impl LevelTools for ForeignGame {
 
     fn level_name(&self, mode: &str, level: u64) -> Option<String> {
         self.editor_level(mode, level).map(|drawn| drawn.name.clone())
+    }
+
+    fn level_names(&self, mode: &str) -> Vec<String> {
+        let levels = self.description.level_parts.editor.as_ref().filter(|_| !is_level_files(mode));
+        let levels = levels.and_then(|levels| levels.as_ref().ok()).map_or(&[][..], |levels| levels);
+        levels.iter().map(|level| level.name.clone()).collect()
     }
 
     fn show(&self, request: &LevelRequest) -> Option<Result<LevelView, InspectError>> {
