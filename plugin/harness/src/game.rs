@@ -60,6 +60,7 @@ use bevy_playbot::{
     observation::{Observation, ObservationSpace},
     placement::TickPlacement,
     policy_file::GameMetadata,
+    state_hash::StateHash,
     unknown_name::UnknownName,
     vision::Picture,
 };
@@ -414,6 +415,19 @@ pub trait StateTools: Send + Sync {
     /// [`position`](Self::position), or, if that is not known, for the downscaled observation.
     fn explore_cell(&self, _world: &World, _agent: Entity) -> Option<Vec<i32>> {
         None
+    }
+
+    /// Returns a hash of all that is known of the state that decides how the agent's episode goes on; `None` if nothing but
+    /// its observation is known. Levels are compared by it: see [`AlikeLevels`](crate::held_out::AlikeLevels). By default
+    /// it is the [`StateHash`] that the game keeps.
+    fn known_state(&self, world: &World, agent: Entity) -> Option<u64> {
+        world.get::<StateHash>(agent).map(|hash| hash.0).filter(|hash| *hash != 0)
+    }
+
+    /// Returns whether held-out levels without a [layout hash](LevelTools::layout_hash) are compared with seen ones by
+    /// [`known_state`](Self::known_state), which takes some ticks of each level. By default they are not.
+    fn compares_levels(&self) -> bool {
+        false
     }
 
     /// Returns what is certain about the state of an agent that plays: whether its goal can still be reached. Called
