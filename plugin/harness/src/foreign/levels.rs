@@ -537,7 +537,8 @@ impl ForeignGame {
     /// Shows what is known of a level without playing it: its name, its cells or its plan, and the content of its file.
     fn show_known(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
         let name = self.name();
-        if let Some(why) = self.problem() {
+        // Levels are shown before the rest of the game is described.
+        if let Some(why) = self.description.level_parts.problem(name) {
             return Err(InspectError::Usage(why));
         }
         if request.map.is_some() {
@@ -546,7 +547,10 @@ impl ForeignGame {
         }
         let (mode, level) = match request.file {
             Some(path) => (level_files_mode(&path.to_string_lossy()), 0),
-            None => (request.mode.unwrap_or_else(|| Game::modes(self)[0]).to_owned(), request.level.unwrap_or(0)),
+            None => {
+                let first = Game::modes(self).first().copied().unwrap_or_default();
+                (request.mode.unwrap_or(first).to_owned(), request.level.unwrap_or(0))
+            }
         };
         self.check_mode(&mode)?;
         check_level(self, &mode, level)?;
