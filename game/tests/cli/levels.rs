@@ -45,7 +45,11 @@ fn levels_that_one_held_action_solves_are_those_of_the_bot_that_holds_it() {
     // Start and goal of these are in one cell, so that no action is needed.
     let (mazes, _) = ended(folder, &["levels", "maze2d", "--levels", "medium:0..49"], 1);
     assert!(mazes.contains("solved without an action: 3: 17, 35, 39\n"), "{mazes}");
-    assert!(mazes.contains("equal levels: unknown"), "{mazes}");
+    // Each of them has a start and a goal of its own, to the last bit.
+    let words = "layouts: 50, by the state of the game in up to 600 ticks; 0 of the levels share theirs with another";
+    assert!(mazes.contains(words), "{mazes}");
+    let (unplayed, _) = ended(folder, &["levels", "maze2d", "--levels", "medium:0..49", "--layouts-only"], 0);
+    assert!(unplayed.contains("equal levels: unknown"), "{unplayed}");
 }
 
 #[test]
@@ -59,6 +63,10 @@ fn copies_of_a_file_and_of_a_numbered_level_are_found() {
     let args = ["coinrun", "--levels", "files:*.json", "--layouts-only", "--among", "hard:140..145"];
     let found = audit(folder, &args, 1);
     assert_eq!((&found["layouts"], &found["equal"]), (&json!(1), &json!([[0, 1]])));
+    assert_eq!((&found["names"], &found["compared_by"]), (&json!({ "0": "a.json", "1": "b.json" }), &json!("layout")));
+    let (text, _) = ended(folder, &args, 1);
+    assert!(text.contains("\n  equal: a.json, b.json\n"), "{text}");
+    assert!(text.ends_with("among hard:140..145: 2: a.json, b.json\n"), "{text}");
     assert_eq!(found["among"][0]["levels"], json!([0, 1]), "level 142 has the same layout");
     let clean = audit(folder, &["coinrun", "--levels", "files:a.json", "--layouts-only"], 0);
     assert_eq!(clean["equal"], json!([]));

@@ -3,6 +3,7 @@
 mod help;
 
 use crate::{
+    arguments::default_mode,
     error::{CliError, Outcome},
     output::{GamesPrintElsewhere, log, program},
     progress,
@@ -12,11 +13,17 @@ use crate::{
         policy, quickstart, record, replay, report, runs, study, test, trace, train, view,
     },
 };
+use bevy_playbot::unknown_name::nearest;
 use clap::{
     Command, CommandFactory, FromArgMatches, Parser, Subcommand,
     error::{ContextKind, ContextValue, ErrorKind},
 };
-use playbot_harness::{game::Game, games::Games, level_files::LevelFileError, split::SplitError};
+use playbot_harness::{
+    game::Game,
+    games::Games,
+    level_files::{LevelFileError, is_level_files},
+    split::{LevelSplit, SplitError},
+};
 use playbot_learner::UnknownDevice;
 use std::{
     error::Error,
@@ -187,11 +194,13 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
 /// Parses the arguments of the process.
 fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
     let mut command = with_only_game(with_own_name(Cli::command()), games);
-    let matches = match command.try_get_matches_from_mut(std::env::args_os()) {
+    let args = with_level_numbers(std::env::args_os().collect(), games);
+    let args = args.map_err(|words| command.error(ErrorKind::InvalidValue, words))?;
+    let matches = match command.try_get_matches_from_mut(&args) {
         Err(error) if is_help(&error) => {
             // Not before: to know which examples work, games are asked for a level, which takes them some work.
             let helpful = with_only_game(with_own_name(help::named(Cli::command(), program::name(), games)), games);
-            helpful.try_get_matches_from(std::env::args_os())?
+            helpful.try_get_matches_from(&args)?
         }
         matches => matches?,
     };
@@ -260,6 +269,94 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
     }
 }
 
+// Levels that are named as in their level editor.
+
+/// Options whose values are levels.
+const OF_LEVELS: [&str; 4] = ["--level", "--levels", "--among", "--hold-out"];
+
+/// Verbs whose option `--level` takes a mode in front of the number.
+const WITH_MODE: [&str; 2] = ["explore", "demo"];
+
+/// Replaces the names of levels by their modes and numbers, so that each option takes them: `--levels Cave`,
+/// `--levels default:Cave..Tower`, `--level Cave`. The game is the first one that a word names, or the program's first.
+///
+/// # Errors
+///
+/// The game has names for its levels, but no such one.
+fn with_level_numbers(mut args: Vec<OsString>, games: &[&dyn Game]) -> Result<Vec<OsString>, String> {
+    let words: Vec<String> = args.iter().map(|word| word.to_string_lossy().into_owned()).collect();
+    let named =
+        |word: &String| games.iter().find(|game| game.name() == word || game.aliases().contains(&word.as_str()));
+    let Some(&game) = words.iter().skip(1).find_map(named).or(games.first()) else { return Ok(args) };
+    let value_of = |option: &str, place: usize| -> Option<&str> {
+        let rest = words[place].strip_prefix(option)?;
+        if rest.is_empty() { words.get(place + 1).map(String::as_str) } else { rest.strip_prefix('=') }
+    };
+    let mode = (1..words.len()).find_map(|place| value_of("--mode", place));
+    let verb = words.iter().skip(1).find(|word| !word.starts_with('-'));
+    let takes_mode = verb.is_some_and(|verb| WITH_MODE.contains(&verb.as_str()));
+    for place in 1..words.len() {
+        let found = OF_LEVELS.into_iter().find_map(|option| Some((option, value_of(option, place)?)));
+        let Some((option, value)) = found else { continue };
+        let Some(level) = NumberedLevels::of(game, mode, value)? else { continue };
+        let text = level.in_words(option != "--level" || takes_mode);
+        if words[place].contains('=') {
+            args[place] = format!("{option}={text}").into();
+        } else {
+            args[place + 1] = text.into();
+        }
+    }
+    Ok(args)
+}
+
+/// Levels whose names have been replaced by their numbers.
+struct NumberedLevels {
+    mode: String,
+    /// True if the mode was named in front of the level.
+    is_mode_named: bool,
+    numbers: String,
+}
+
+impl NumberedLevels {
+    /// Finds the levels with these names. `mode` is that of levels without one. Returns `None` for numbers and files, and
+    /// for games whose levels have no names.
+    fn of(game: &dyn Game, mode: Option<&str>, value: &str) -> Result<Option<Self>, String> {
+        let is_range = |text: &str| text.parse::<LevelSplit>().is_ok();
+        // Some options take numbers without a mode.
+        if value.starts_with('-') || is_level_files(value) || is_range(value) || is_range(&format!("any:{value}")) {
+            return Ok(None);
+        }
+        let own = value.split_once(':').filter(|(mode, _)| game.check_mode(mode).is_ok());
+        let (mode, name) = own.unwrap_or_else(|| (mode.unwrap_or_else(|| default_mode(game)), value));
+        let names = game.tools().levels.level_names(mode);
+        let number = |name: &str| names.iter().position(|known| known == name);
+        let numbers = number(name).map(|number| number.to_string()).or_else(|| {
+            let (first, last) = name.split_once("..")?;
+            Some(format!("{}..{}", number(first)?, number(last)?))
+        });
+        match (numbers, names.as_slice()) {
+            (Some(numbers), _) => Ok(Some(Self { mode: mode.to_owned(), is_mode_named: own.is_some(), numbers })),
+            (None, []) => Ok(None),
+            (None, [first, ..]) => {
+                let known: Vec<&str> = names.iter().map(String::as_str).collect();
+                let near = nearest(name, &known).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
+                Err(format!(
+                    "`{}` has no level `{name}`{near}: name one as in its level editor, such as `{first}`, or by its number, \
+                     as in {mode}:0",
+                    game.name()
+                ))
+            }
+        }
+    }
+
+    /// Returns them as an option takes them. One that takes no mode gets it only if it was named, for the error that says
+    /// where to name it.
+    fn in_words(&self, takes_mode: bool) -> String {
+        let Self { mode, is_mode_named, numbers } = self;
+        if takes_mode || *is_mode_named { format!("{mode}:{numbers}") } else { numbers.clone() }
+    }
+}
+
 // Plain wording of errors of the command line's parser.
 
 /// Lets options take numbers below 0, so that the error is about the number, and not about an unknown option.
@@ -312,7 +409,9 @@ fn number_wanted(error: &(dyn Error + 'static)) -> Option<String> {
 
 #[cfg(test)]
 mod tests {
+    use bevy::{app::App, math::Vec2};
     use clap::{Arg, value_parser};
+    use playbot_harness::foreign::{EditorLevel, ForeignGame};
 
     use super::*;
 
@@ -338,6 +437,57 @@ mod tests {
         assert!(first.len() > 4 && first.iter().all(|line| line.len() <= 40), "{narrow}");
         assert_eq!(first.join(" ").split_whitespace().collect::<Vec<_>>().join(" "), about);
         assert!(help(with_width(Command::new("outer"), false)).starts_with(&format!("{about}\n")));
+    }
+
+    /// A game whose levels are drawn in an editor, and one whose levels have numbers only.
+    fn rooms() -> [ForeignGame; 2] {
+        let level = |name: &str| EditorLevel::of_rows(name, vec!["S.G".to_owned()], Vec2::ONE);
+        let game = |name| ForeignGame::new(name, 1, |_: &mut App| {}).modes(&["easy", "hard"]);
+        [game("rooms").editor_levels(Ok(vec![level("Hall"), level("Cave"), level("Tower")])), game("plain")]
+    }
+
+    fn numbered(args: &str) -> Result<String, String> {
+        let [rooms, plain] = rooms();
+        let args = format!("playbot {args}").split(' ').map(OsString::from).collect();
+        let words = with_level_numbers(args, &[&rooms, &plain])?;
+        Ok(words.iter().skip(1).map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" "))
+    }
+
+    #[test]
+    fn names_of_levels_become_their_numbers() {
+        for (args, wanted) in [
+            ("level rooms --level Cave", "level rooms --level 1"),
+            ("level rooms --mode hard --level=Tower --json", "level rooms --mode hard --level=2 --json"),
+            ("level rooms --level hard:Cave", "level rooms --level hard:1"),
+            ("test rooms --levels Cave --out a", "test rooms --levels easy:1 --out a"),
+            ("test --levels hard:Hall..Cave", "test --levels hard:0..1"),
+            ("record rooms --levels=hard:Tower --hold-out Hall", "record rooms --levels=hard:2 --hold-out easy:0"),
+            ("explore rooms --level Cave", "explore rooms --level easy:1"),
+        ] {
+            assert_eq!(numbered(args).as_deref(), Ok(wanted));
+        }
+        for same in [
+            "level rooms --level 7",
+            "test rooms --levels easy:0..9 --out Cave",
+            "play rooms --levels 0..9",
+            "test rooms --levels files:Cave",
+            "test plain --levels Cave",
+            "level rooms --level",
+            "level rooms --level --json",
+        ] {
+            assert_eq!(numbered(same).as_deref(), Ok(same), "there is nothing to replace");
+        }
+    }
+
+    #[test]
+    fn an_unknown_name_of_a_level_is_reported_with_the_nearest() {
+        let words = numbered("test rooms --levels easy:Cvae").expect_err("no such level");
+        assert_eq!(
+            words,
+            "`rooms` has no level `Cvae` (did you mean `Cave`?): name one as in its level editor, such as `Hall`, or by its \
+             number, as in easy:0"
+        );
+        assert!(numbered("level rooms --level Attic").is_err_and(|words| words.contains("`Attic`: name one")));
     }
 
     #[test]

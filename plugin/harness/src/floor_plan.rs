@@ -1,6 +1,13 @@
 //! The floor plan of a level, for pictures of paths and for detectors.
 
+use crate::drawing::{Drawing, MarkForm, Rgb, Shape};
 use bevy::math::{Rect, Vec2};
+
+/// The most letters along the longer side of a plan.
+const LETTERS: f32 = 72.0;
+
+/// Length of the longer side of a picture, pixels.
+const PIXELS: f32 = 640.0;
 
 /// The shape of a level from above, or from the side, in any units: x to the right, y up.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -32,6 +39,76 @@ impl FloorPlan {
         let bounds = square(0, 0).union(square(rows - 1, columns - 1));
         Self { bounds, walls, start, goal, ..Self::default() }
     }
+
+    /// Returns the plan as rows of letters from the top: `S` the start, `G` the goal, `#` walls, `^` what kills, `=`
+    /// platforms. A letter is one unit wide, or more in a plan that is longer than 72 units.
+    ///
+    /// ```
+    /// use bevy::math::{Rect, Vec2};
+    /// use playbot_harness::floor_plan::FloorPlan;
+    ///
+    /// let plan = FloorPlan {
+    ///     bounds: Rect::new(0.0, 0.0, 4.0, 2.0),
+    ///     walls: vec![Rect::new(0.0, 0.0, 2.0, 1.0), Rect::new(3.0, 0.0, 4.0, 1.0)],
+    ///     start: Vec2::new(0.5, 1.5),
+    ///     goal: Vec2::new(3.5, 1.5),
+    ///     ..FloorPlan::default()
+    /// };
+    /// assert_eq!(plan.rows(), ["S..G", "##.#"]);
+    /// ```
+    pub fn rows(&self) -> Vec<String> {
+        let (min, size) = (self.bounds.min, self.bounds.size());
+        let side = (size.max_element() / LETTERS).max(1.0);
+        // A plan may be smaller than a letter, or have no bounds.
+        let count = |length: f32| (length / side).ceil().clamp(1.0, LETTERS) as usize;
+        let (columns, rows) = (count(size.x), count(size.y));
+        let mut letters = vec![vec!['.'; columns]; rows];
+        for (areas, letter) in [(&self.platforms, '='), (&self.hazards, '^'), (&self.walls, '#')] {
+            for area in areas {
+                // Areas that only touch a cell are not in it.
+                let first = ((area.min - min) / side + 0.01).floor().max(Vec2::ZERO);
+                let last = ((area.max - min) / side - 0.01).ceil().max(Vec2::ZERO);
+                for row in letters.iter_mut().take(last.y as usize).skip(first.y as usize) {
+                    row.iter_mut().take(last.x as usize).skip(first.x as usize).for_each(|free| *free = letter);
+                }
+            }
+        }
+        for (at, letter) in [(self.start, 'S'), (self.goal, 'G')] {
+            let cell = ((at - min) / side).floor();
+            if cell.cmpge(Vec2::ZERO).all()
+                && let Some(row) = letters.get_mut(cell.y as usize)
+                && let Some(free) = row.get_mut(cell.x as usize)
+            {
+                *free = letter;
+            }
+        }
+        letters.iter().rev().map(String::from_iter).collect()
+    }
+
+    /// Draws the plan. `label` describes it for readers that do not see it.
+    pub fn picture(&self, label: &str) -> Drawing {
+        let bounds = self.bounds;
+        let scale = PIXELS / bounds.size().max_element().max(f32::MIN_POSITIVE);
+        let at = |point: Vec2| Vec2::new(point.x - bounds.min.x, bounds.max.y - point.y) * scale;
+        let blocks = |areas: &[Rect], fill: Rgb| -> Vec<Shape> {
+            let block = |area: &Rect| Shape::Block { area: Rect::from_corners(at(area.min), at(area.max)), fill };
+            areas.iter().map(block).collect()
+        };
+        let mark = |form, centre: Vec2, fill: Rgb| Shape::Mark {
+            form,
+            centre: at(centre),
+            radius: PIXELS / 80.0,
+            fill,
+            outline: [255; 3],
+        };
+        let mut shapes = blocks(&[bounds], [238, 238, 238]);
+        shapes.extend(blocks(&self.platforms, [170, 136, 102]));
+        shapes.extend(blocks(&self.walls, [96, 96, 96]));
+        shapes.extend(blocks(&self.hazards, [213, 94, 0]));
+        shapes.push(mark(MarkForm::Disc, self.start, [0, 114, 178]));
+        shapes.push(mark(MarkForm::Diamond, self.goal, [0, 158, 115]));
+        Drawing { label: label.to_owned(), size: bounds.size() * scale, shapes }
+    }
 }
 
 /// Returns the areas of the tiles of one kind. Adjacent tiles in a row become one rectangle.
@@ -59,6 +136,21 @@ pub fn joined_tiles(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_long_plan_has_72_letters_in_a_row_and_what_stands_outside_is_left_out() {
+        let plan = FloorPlan {
+            bounds: Rect::new(-720.0, 0.0, 720.0, 60.0),
+            walls: vec![Rect::new(-800.0, 0.0, 900.0, 20.0), Rect::new(0.0, -50.0, 20.0, -10.0)],
+            hazards: vec![Rect::new(-720.0, 40.0, -700.0, 60.0)],
+            start: Vec2::new(-705.0, 30.0),
+            goal: Vec2::new(5_000.0, 30.0),
+            ..FloorPlan::default()
+        };
+        let rows = plan.rows();
+        assert_eq!(rows, [format!("^{}", ".".repeat(71)), format!("S{}", ".".repeat(71)), "#".repeat(72)]);
+        assert_eq!(FloorPlan::default().rows(), ["G"], "start and goal share its only letter");
+    }
 
     #[test]
     fn walls_side_by_side_become_one() {

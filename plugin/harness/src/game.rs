@@ -60,6 +60,7 @@ use bevy_playbot::{
     observation::{Observation, ObservationSpace},
     placement::TickPlacement,
     policy_file::GameMetadata,
+    state_hash::StateHash,
     unknown_name::UnknownName,
     vision::Picture,
 };
@@ -357,6 +358,12 @@ pub trait LevelTools: Send + Sync {
         None
     }
 
+    /// Returns the [names](Self::level_name) of all levels of a mode, in the order of their numbers from 0, for command
+    /// lines that name a level. By default there is none.
+    fn level_names(&self, _mode: &str) -> Vec<String> {
+        Vec::new()
+    }
+
     /// Reads a level in the game's own format, or says what is wrong with it and on which line. Returns `None`, by
     /// default: the game has no level files.
     ///
@@ -425,6 +432,19 @@ pub trait StateTools: Send + Sync {
     /// [`position`](Self::position), or, if that is not known, for the downscaled observation.
     fn explore_cell(&self, _world: &World, _agent: Entity) -> Option<Vec<i32>> {
         None
+    }
+
+    /// Returns a hash of all that is known of the state that decides how the agent's episode goes on; `None` if nothing but
+    /// its observation is known. Levels are compared by it: see [`AlikeLevels`](crate::held_out::AlikeLevels). By default
+    /// it is the [`StateHash`] that the game keeps.
+    fn known_state(&self, world: &World, agent: Entity) -> Option<u64> {
+        world.get::<StateHash>(agent).map(|hash| hash.0).filter(|hash| *hash != 0)
+    }
+
+    /// Returns whether held-out levels without a [layout hash](LevelTools::layout_hash) are compared with seen ones by
+    /// [`known_state`](Self::known_state), which takes some ticks of each level. By default they are not.
+    fn compares_levels(&self) -> bool {
+        false
     }
 
     /// Returns what is certain about the state of an agent that plays: whether its goal can still be reached. Called

@@ -3,13 +3,28 @@
 //! Different seeds can draw the same level. A held-out level that is drawn again is no unseen level, whatever its number
 //! is. [`HeldOut::contains`] is for levels that a training or a recording must not show: those of the range, by number
 //! or as a file of the same content. [`HeldOut::seen_in`] is for levels that a result must leave out.
+//!
+//! A game that does not hash the layouts of its levels has them compared by their play: [`AlikeLevels`].
 
 use crate::{
     game::{Game, level_designs},
     level_files::is_level_files,
+    machine::usable_threads,
+    parallel::{default_threads, on_threads},
     split::LevelSplit,
+    worlds::{EndedEpisodes, build_world},
 };
-use bevy_playbot::level::LevelFile;
+use bevy::prelude::*;
+use bevy_playbot::{
+    agent::Control,
+    bot::BlindBot,
+    engine::{EpisodeSeeds, panics::PanicReports, tick_world},
+    episode::{Episode, EpisodeEnd, EpisodeResult},
+    level::{LevelFile, LevelQueue},
+    observation::Observation,
+    reward::Reward,
+    state_hash::StateHash,
+};
 use playbot_learner::SeenLevels;
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -106,15 +121,18 @@ impl<'a> HeldOut<'a> {
     /// Returns the held-out levels that are seen: by number, as a file, or by their layout.
     ///
     /// All levels of all ranges are compared by their numbers, and those of the first ranges by their layouts, up to
-    /// 262,144 levels.
+    /// 262,144 levels. If the game has no layouts and [compares states](crate::game::StateTools::compares_levels), the
+    /// first ranges are compared by their play, up to 2,048 levels with the held-out ones. In a game whose World is built
+    /// anew for each episode these are 128. If all held-out levels play like seen ones, none is left out for that: the
+    /// game has no others.
     pub fn seen_in(&self, seen: &SeenLevels) -> BTreeSet<u64> {
         let mut found = BTreeSet::new();
         if seen.game != self.game.name() {
             return found;
         }
-        let mut left = MOST_COMPARED;
-        for range in self.known_ranges(seen) {
-            if let Some((first, last)) = self.common(&range) {
+        let (ranges, mut left) = (self.known_ranges(seen), MOST_COMPARED);
+        for range in &ranges {
+            if let Some((first, last)) = self.common(range) {
                 found.extend(first..=last);
             }
             if range.len() <= left && !self.layouts().is_empty() {
@@ -131,7 +149,49 @@ impl<'a> HeldOut<'a> {
             found.extend(self.split.levels().filter(is_file));
         }
         self.add_layouts(seen.layouts.iter().copied(), &mut found);
+        let is_unknown = self.layouts().is_empty() && !is_level_files(&self.split.mode);
+        if is_unknown && self.game.tools().state.compares_levels() {
+            self.add_alike(&ranges, &mut found);
+        }
         found
+    }
+
+    /// Adds the levels that play like seen ones to those that are found already.
+    fn add_alike(&self, seen: &[LevelSplit], found: &mut BTreeSet<u64>) {
+        let mut left = if self.game.built_anew().is_some() { MOST_BUILT } else { MOST_PLAYED };
+        if self.split.len() > left {
+            return;
+        }
+        left -= self.split.len();
+        let mut by_mode = BTreeMap::<&str, BTreeSet<u64>>::new();
+        for range in seen {
+            if range.len() <= left {
+                left -= range.len();
+                by_mode.entry(&range.mode).or_default().extend(range.levels());
+            }
+        }
+        let own: Vec<u64> = self.split.levels().filter(|level| !found.contains(level)).collect();
+        if own.is_empty() || by_mode.is_empty() {
+            return;
+        }
+        let others = by_mode.into_iter().map(|(mode, levels)| (mode, levels.into_iter().collect()));
+        let ranges: Vec<(&str, Vec<u64>)> = [(self.split.mode.as_str(), own)].into_iter().chain(others).collect();
+        let is_wanted = |group: &[PlacedLevel]| group.iter().any(is_own) && !group.iter().all(is_own);
+        let alike = AlikeLevels::of(self.game, &ranges, is_wanted, usable_threads(default_threads()), |_| {});
+        if !alike.by_state {
+            return;
+        }
+        let known: BTreeSet<u64> = (1..ranges.len()).flat_map(|range| alike.among(range)).collect();
+        if known.len() == ranges[0].1.len() {
+            tracing::warn!(
+                "each of the levels {} plays like one that was seen, as far as the state of `{}` shows: none is left out for \
+                 that, and they are no unseen levels",
+                self.split,
+                self.game.name()
+            );
+            return;
+        }
+        found.extend(known);
     }
 
     /// Returns true if every held-out level has the layout of one of these levels. More than 4,096 are not compared: this
@@ -172,6 +232,222 @@ impl<'a> HeldOut<'a> {
     }
 }
 
+// Levels that play alike.
+
+/// Ticks after which levels that have played alike so far are compared again, ascending.
+const STAGES: [u32; 3] = [1, 60, 600];
+
+/// Levels for each World that plays them, if there are enough.
+const LEVELS_PER_WORLD: usize = 32;
+
+/// Largest number of Worlds that play levels. It is the same on any number of threads, and so are results.
+const MOST_WORLDS: usize = 8;
+
+/// Worlds that break in their first level, after which the other levels of a thread are not played.
+const MOST_BARREN: u32 = 3;
+
+/// Largest number of levels that are played to compare held-out levels with seen ones.
+const MOST_PLAYED: u64 = 2_048;
+
+/// The same for a game whose World is built for each of them.
+const MOST_BUILT: u64 = 128;
+
+/// A level of one of several ranges: the index of the range, and the number of the level.
+pub type PlacedLevel = (usize, u64);
+
+/// Returns whether a level is of the first range.
+fn is_own((range, _): &PlacedLevel) -> bool {
+    *range == 0
+}
+
+/// Levels by how they play, for games that do not hash their layouts.
+///
+/// Levels are alike if their episodes are the same for the same actions, drawn at random, for 600 ticks or to their end:
+/// in observations, rewards, ends, and in all that is known of the state
+/// ([`known_state`](crate::game::StateTools::known_state)). Their first tick tells most levels apart, and only those
+/// that are alike in it are played on. Levels that differ in anything which neither is seen nor shows within these ticks
+/// count as alike.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct AlikeLevels {
+    /// All levels that could be played, in groups that are alike, in the order of their first levels.
+    classes: Vec<Vec<PlacedLevel>>,
+    /// True if the state of the game was compared in all ticks. Otherwise levels are alike by what agents observe, and
+    /// may differ in the rest.
+    pub by_state: bool,
+}
+
+impl AlikeLevels {
+    /// The most ticks of a level that are played.
+    pub const TICKS: u32 = STAGES[STAGES.len() - 1];
+
+    /// Plays levels of some modes, all of which the game has. Groups that are not wanted are not told apart any further.
+    /// `progress` receives levels that have been played, from several threads.
+    pub fn of(
+        game: &dyn Game,
+        ranges: &[(&str, Vec<u64>)],
+        is_wanted: impl Fn(&[PlacedLevel]) -> bool,
+        threads: usize,
+        progress: impl Fn(u64) + Sync,
+    ) -> Self {
+        let placed = |(range, (_, levels)): (usize, &(&str, Vec<u64>))| -> Vec<PlacedLevel> {
+            levels.iter().map(|&level| (range, level)).collect()
+        };
+        let all: BTreeSet<PlacedLevel> = ranges.iter().enumerate().flat_map(placed).collect();
+        if game.problem().is_some() || all.is_empty() {
+            return Self::default();
+        }
+        let mut open = vec![all.into_iter().collect::<Vec<_>>()];
+        let (mut classes, mut by_state) = (Vec::new(), true);
+        for ticks in STAGES {
+            let mut played = BTreeMap::new();
+            for (range, (mode, _)) in ranges.iter().enumerate() {
+                let waiting = open.iter().flatten().filter(|(of, _)| *of == range).map(|(_, level)| *level);
+                let waiting: Vec<u64> = waiting.collect();
+                let results = play(game, mode, &waiting, ticks, threads, &progress);
+                played.extend(results.into_iter().map(|result| ((range, result.level), result)));
+            }
+            let mut left = Vec::new();
+            for group in open {
+                let mut alike = BTreeMap::<u64, Vec<PlacedLevel>>::new();
+                let mut over = BTreeSet::new();
+                // A level that breaks the game is like no other.
+                for level in group {
+                    let Some(PlayedLevel { hash, is_over, is_state, .. }) = played.get(&level) else { continue };
+                    alike.entry(*hash).or_default().push(level);
+                    by_state &= is_state;
+                    over.extend(is_over.then_some(*hash));
+                }
+                for (hash, group) in alike {
+                    let goes_on = group.len() > 1 && is_wanted(&group) && !over.contains(&hash);
+                    if goes_on { left.push(group) } else { classes.push(group) }
+                }
+            }
+            open = left;
+            if open.is_empty() {
+                break;
+            }
+        }
+        classes.extend(open);
+        classes.sort_unstable();
+        Self { by_state: by_state && !classes.is_empty(), classes }
+    }
+
+    /// Returns the groups of levels of the first range that are alike; the number of each group's level counts up. Levels
+    /// that are like no other are groups of one.
+    pub fn groups(&self) -> Vec<Vec<u64>> {
+        let own =
+            |class: &Vec<PlacedLevel>| class.iter().filter(|level| is_own(level)).map(|(_, level)| *level).collect();
+        self.classes.iter().map(own).filter(|group: &Vec<u64>| !group.is_empty()).collect()
+    }
+
+    /// Returns the levels of the first range that are like one of another range.
+    pub fn among(&self, range: usize) -> BTreeSet<u64> {
+        let has = |class: &&Vec<PlacedLevel>| class.iter().any(|(of, _)| *of == range);
+        let own = self.classes.iter().filter(has).flatten().filter(|level| is_own(level));
+        own.map(|(_, level)| *level).collect()
+    }
+}
+
+/// The play of a level.
+struct PlayedLevel {
+    level: u64,
+    /// Hash of all that was seen of it.
+    hash: u64,
+    /// True if the state was known in every tick.
+    is_state: bool,
+    /// True if the episode has ended.
+    is_over: bool,
+}
+
+/// Plays so many ticks of each level with the same random actions. Levels that break the game are missing.
+fn play(
+    game: &dyn Game,
+    mode: &str,
+    levels: &[u64],
+    ticks: u32,
+    threads: usize,
+    progress: &(impl Fn(u64) + Sync),
+) -> Vec<PlayedLevel> {
+    let worlds = levels.len().div_ceil(LEVELS_PER_WORLD).clamp(1, MOST_WORLDS);
+    let mut shares: Vec<&[u64]> = levels.chunks(levels.len().div_ceil(worlds).max(1)).collect();
+    let parts = on_threads(&mut shares, threads, |share| -> Vec<PlayedLevel> {
+        let (mut played, mut left, mut barren) = (Vec::new(), *share, 0);
+        // A broken World is built again for the levels behind the one that broke it, unless it breaks each time.
+        while !left.is_empty() && barren < MOST_BARREN {
+            let part = play_world(game, mode, left, ticks, progress);
+            left = left.get(part.len() + 1..).unwrap_or_default();
+            barren += u32::from(part.is_empty());
+            played.extend(part);
+        }
+        played
+    });
+    parts.into_iter().flatten().collect()
+}
+
+/// Plays levels in one World, until one of them breaks it.
+fn play_world(
+    game: &dyn Game,
+    mode: &str,
+    levels: &[u64],
+    ticks: u32,
+    progress: &(impl Fn(u64) + Sync),
+) -> Vec<PlayedLevel> {
+    let (mut world, agents) = build_world(game, mode, 0, 0, 1);
+    let Some(&agent) = agents.first() else { return Vec::new() };
+    if let Some(mut reports) = world.get_resource_mut::<PanicReports>() {
+        reports.keep_no_files();
+    }
+    EndedEpisodes::note_in(&mut world);
+    // Some games begin their first episode in a World otherwise than the next ones.
+    let queue: Vec<u64> = levels.first().into_iter().chain(levels).copied().collect();
+    let seeds = EpisodeSeeds::new(vec![0; queue.len()]);
+    world.entity_mut(agent).insert((Control::Bot, BlindBot::Chaos, LevelQueue::list(queue), seeds));
+    let mut played = Vec::with_capacity(levels.len() + 1);
+    let begun = |level| PlayedLevel { level, hash: 0, is_state: true, is_over: false };
+    let mut now: Option<PlayedLevel> = None;
+    while Control::of(&world, agent).is_active() {
+        if tick_world(&mut world).is_err() {
+            break;
+        }
+        let end = EndedEpisodes::take(&mut world).into_iter().find(|(ended, _)| *ended == agent);
+        let end: Option<EpisodeResult> = end.map(|(_, result)| result);
+        let Some(episode) = world.get::<Episode>(agent) else { break };
+        if end.is_none() && !episode.is_running() {
+            continue;
+        }
+        let (level, tick) = end.map_or((episode.level, episode.tick), |result| (result.level, result.ticks));
+        let level = now.get_or_insert_with(|| begun(level));
+        let state = game.tools().state.known_state(&world, agent);
+        level.hash = StateHash::of([level.hash, seen(&world, agent), state.unwrap_or(0), code(end)]).0;
+        level.is_state &= state.is_some();
+        level.is_over = end.is_some();
+        if end.is_some() || tick >= ticks {
+            played.extend(now.take());
+            progress(1);
+            if let (None, Some(mut episode)) = (end, world.get_mut::<Episode>(agent)) {
+                episode.abandon();
+            }
+        }
+    }
+    played.into_iter().skip(1).collect()
+}
+
+/// Returns a hash of an agent's observation and of its reward.
+fn seen(world: &World, agent: Entity) -> u64 {
+    let reward = world.get::<Reward>(agent).map_or(0.0, Reward::get);
+    let vector = world.get::<Observation>(agent).map_or(&[][..], |seen| &seen.vector);
+    StateHash::of([reward].iter().chain(vector).map(|value| u64::from(value.to_bits()))).0
+}
+
+/// Returns a number for the end of an episode in a tick.
+fn code(end: Option<EpisodeResult>) -> u64 {
+    match end {
+        None => 0,
+        Some(EpisodeResult { end: EpisodeEnd::Truncated, success, .. }) => 1 + u64::from(success),
+        Some(EpisodeResult { success, .. }) => 3 + u64::from(success),
+    }
+}
+
 /// Returns the hash of a level file's content; `None` for levels that the game draws itself.
 fn file_hash(game: &dyn Game, mode: &str, level: u64) -> Option<u64> {
     if is_level_files(mode) { level_designs(game, mode).ok()?.hash(level) } else { None }
@@ -186,4 +462,121 @@ pub fn seen_by_training(game: &dyn Game, train: &LevelSplit) -> SeenLevels {
         return SeenLevels { game: game_name, levels: Vec::new(), level_files, layouts };
     }
     SeenLevels { game: game_name, levels: vec![train.to_string()], ..SeenLevels::default() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::foreign::{ForeignGame, LevelSeed, Restart};
+
+    #[derive(Component)]
+    struct Dot;
+
+    /// The speed of the dot from its 30th frame on. It is not reflected, and no agent observes it.
+    #[derive(Resource, Default)]
+    struct Drift {
+        speed: f32,
+        frames: u32,
+    }
+
+    /// A game with a dot at a place, which later drifts away.
+    fn dots(place: fn(u64) -> f32, speed: fn(u64) -> f32) -> ForeignGame {
+        let add = |app: &mut App| {
+            app.init_resource::<Drift>()
+                .add_systems(Startup, |mut commands: Commands| {
+                    commands.spawn((Dot, Transform::default()));
+                })
+                .add_systems(Update, |mut drift: ResMut<Drift>, mut dot: Single<&mut Transform, With<Dot>>| {
+                    drift.frames += 1;
+                    if drift.frames > 30 {
+                        dot.translation.x += drift.speed;
+                    }
+                });
+        };
+        ForeignGame::new("dots", 1, add)
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["nothing"], || [0.0])
+            .time_limit(40)
+            .restart(Restart::Startup)
+            .level(
+                move |level: Res<LevelSeed>, mut dot: Single<&mut Transform, With<Dot>>, mut drift: ResMut<Drift>| {
+                    dot.translation.x = place(level.0);
+                    *drift = Drift { speed: speed(level.0), frames: 0 };
+                },
+            )
+    }
+
+    fn modulo(level: u64, count: u64) -> f32 {
+        (level % count) as f32
+    }
+
+    fn alike(game: &ForeignGame, levels: u64, is_wanted: bool, threads: usize) -> AlikeLevels {
+        AlikeLevels::of(game, &[("default", (0..levels).collect())], |_| is_wanted, threads, |_| {})
+    }
+
+    #[test]
+    fn levels_with_the_same_entities_are_alike_on_any_number_of_threads() {
+        let game = dots(|level| modulo(level, 3), |_| 0.0);
+        let found = alike(&game, 40, true, 1);
+        let group = |first: u64| (first..40).step_by(3).collect::<Vec<_>>();
+        assert_eq!((found.groups(), found.by_state), ([0, 1, 2].map(group).to_vec(), true));
+        assert_eq!(alike(&game, 40, true, 2), found);
+    }
+
+    #[test]
+    fn levels_that_differ_later_only_are_told_apart_by_their_play() {
+        let game = dots(|_| 0.0, |level| modulo(level, 2));
+        assert_eq!(alike(&game, 6, false, 1).groups(), [[0, 1, 2, 3, 4, 5]], "their first ticks are equal");
+        assert_eq!(alike(&game, 6, true, 1).groups(), [[0, 2, 4], [1, 3, 5]]);
+    }
+
+    #[test]
+    fn a_game_without_places_is_compared_by_what_agents_observe() {
+        let game = |seen: f32| {
+            ForeignGame::new("cards", 1, |_: &mut App| {})
+                .keys([vec![], vec![KeyCode::Space]])
+                .observe(["card"], move |level: Res<LevelSeed>| [seen * modulo(level.0, 2)])
+                .time_limit(3)
+        };
+        let (blind, seeing) = (alike(&game(0.0), 4, true, 1), alike(&game(1.0), 4, true, 1));
+        assert_eq!((blind.groups(), blind.by_state), (vec![vec![0, 1, 2, 3]], false));
+        assert_eq!((seeing.groups(), seeing.by_state), (vec![vec![0, 2], vec![1, 3]], false));
+        let hashed = alike(&game(0.0).state_hash(|level: Res<LevelSeed>| 1 + level.0 / 2), 4, true, 1);
+        assert_eq!((hashed.groups(), hashed.by_state), (vec![vec![0, 1], vec![2, 3]], true));
+    }
+
+    /// Returns the levels 100 to 105 that are known to a player that has seen these levels.
+    fn known(game: &ForeignGame, levels: &str) -> Vec<u64> {
+        let split = "default:100..105".parse().expect("levels");
+        let seen = SeenLevels { game: "dots".to_owned(), levels: vec![levels.to_owned()], ..SeenLevels::default() };
+        HeldOut::new(game, &split).seen_in(&seen).into_iter().collect()
+    }
+
+    #[test]
+    fn held_out_levels_that_play_like_seen_ones_are_known_unless_all_do() {
+        let game = dots(|level| modulo(level, 3), |_| 0.0);
+        // 100 is like 1, and 102 like 0.
+        assert_eq!(known(&game, "default:0..1"), [100, 102, 103, 105]);
+        assert_eq!(known(&game, "default:0..2"), Vec::<u64>::new(), "the game has no other levels");
+        assert_eq!(known(&game, "default:105..105"), [102, 105], "one of them by its number");
+        assert_eq!(known(&game, "default:0..5000"), Vec::<u64>::new(), "that would take long");
+        let layouts = game.layout(|_, level| level);
+        assert_eq!(known(&layouts, "default:0..1"), Vec::<u64>::new(), "its layouts say more");
+    }
+
+    #[test]
+    fn what_is_observed_alone_leaves_no_level_out() {
+        let blind = ForeignGame::new("dots", 1, |_: &mut App| {})
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["card"], |level: Res<LevelSeed>| [modulo(level.0, 3)])
+            .time_limit(3);
+        assert_eq!(known(&blind, "default:0..1"), Vec::<u64>::new());
+    }
+
+    #[test]
+    fn a_level_that_breaks_the_game_is_like_no_other() {
+        let game = dots(|level| modulo(level, 2), |_| 0.0)
+            .reward(|level: Res<LevelSeed>| if level.0 == 2 { f32::NAN } else { 0.0 });
+        assert_eq!(alike(&game, 6, true, 1).groups(), [vec![0, 4], vec![1, 3, 5]]);
+    }
 }

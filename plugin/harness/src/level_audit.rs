@@ -5,7 +5,7 @@ use crate::{
     eval::{EpisodeResult, EvalError, EvalPlan, Player, evaluate},
     floor_plan::FloorPlan,
     game::{Game, idle_action, is_named_idle},
-    held_out::{HeldOut, by_layout},
+    held_out::{AlikeLevels, HeldOut, by_layout},
     split::LevelSplit,
 };
 use bevy::math::{Rect, Vec2};
@@ -32,9 +32,17 @@ impl EqualLevels {
         if layouts.is_empty() {
             return None;
         }
-        let count = layouts.len() as u64;
-        let groups = largest_first(layouts.into_values().filter(|levels| levels.len() > 1));
-        Some(Self { layouts: count, groups })
+        Some(Self::of_groups(layouts.into_values()))
+    }
+
+    /// Takes levels that were compared by their play: as many layouts as there are groups.
+    pub fn of_alike(alike: &AlikeLevels) -> Self {
+        Self::of_groups(alike.groups().into_iter())
+    }
+
+    fn of_groups(groups: impl ExactSizeIterator<Item = Vec<u64>>) -> Self {
+        let count = groups.len() as u64;
+        Self { layouts: count, groups: largest_first(groups.filter(|levels| levels.len() > 1)) }
     }
 
     /// Returns the number of levels that share their layout with another.

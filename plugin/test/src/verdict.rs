@@ -74,8 +74,11 @@ pub const END_SQUARES: f32 = 32.0;
 /// All results of one level.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LevelVerdict {
-    /// Its name, such as `hard:7`.
+    /// Its mode and number, such as `hard:7`, or the path of its file.
     pub level: String,
+    /// Its name in a level editor, if it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
     /// Its index in the range, from 0.
     pub index: u64,
     /// Its outcome.
@@ -116,6 +119,11 @@ pub struct LevelVerdict {
 }
 
 impl LevelVerdict {
+    /// Returns the level as reports name it: `hard:7`, with its name behind that if it has one.
+    pub fn title(&self) -> String {
+        self.name.as_ref().map_or_else(|| self.level.clone(), |name| format!("{} {name}", self.level))
+    }
+
     /// Returns whether it was solved and has no finding.
     pub fn is_sound(&self) -> bool {
         self.outcome == LevelOutcome::Solved && self.findings.is_empty()
@@ -307,6 +315,7 @@ fn judge(
     let stops = (outcome == LevelOutcome::BotFailed).then(|| common_stop(all().map(|episode| &episode.track)));
     let mut verdict = LevelVerdict {
         level: name,
+        name: game.tools().levels.level_name(mode, level),
         index,
         outcome,
         proof,

@@ -18,9 +18,10 @@ fn train(shell: &Shell, run: &str) {
     shell.done(&[&TRAIN[..], &["--run", run]].concat());
 }
 
-/// Returns the JSON of `eval --json` for one player on these levels, two of them.
+/// Returns the JSON of `eval --json` for one player on these levels, two of them. They are named, so that levels which play
+/// like trained ones are measured as well.
 fn measured(shell: &Shell, who: &[&str], levels: &str) -> Value {
-    let row = shell.answer(&[&["eval", "--json"], who].concat());
+    let row = shell.answer(&[&["eval", "--json", "--levels", levels], who].concat());
     assert_eq!((&row["split"], &row["episodes"]), (&levels.into(), &2.into()), "{row}");
     for key in ["return_mean", "return_se", "success", "length_mean", "clipped"] {
         assert!(row[key].as_f64().is_some_and(f64::is_finite), "{key}: {row}");

@@ -5,7 +5,10 @@ use std::collections::BTreeSet;
 use bevy::prelude::*;
 use bevy_playbot::vision::ObservationConfig;
 use playbot::prelude::*;
-use playbot_harness::{eval::Player, foreign::Restart};
+use playbot_harness::{
+    eval::Player,
+    foreign::{EditorLevel, Restart},
+};
 use playbot_test::{
     detectors::Detectors,
     verdict::{
@@ -45,6 +48,25 @@ fn verdicts(game: &dyn Game, plan: &TestPlan) -> Vec<LevelVerdict> {
     assert_eq!(end, TestEnd::Done);
     found.sort_by_key(|verdict| verdict.index);
     found
+}
+
+#[test]
+fn levels_of_an_editor_have_their_names_in_results() {
+    let level = |name: &str| EditorLevel::of_rows(name, vec!["S.G".to_owned()], Vec2::ONE);
+    let game = ForeignGame::new("rooms", 1, |_: &mut App| {})
+        .keys([vec![], vec![KeyCode::Space]])
+        .observe(["x"], || [0.0])
+        .end(|| Some(EpisodeEnd::WON))
+        .editor_levels(Ok(vec![level("Pantry"), level("Cave")]));
+    let found = verdicts(&game, &plan("default:0..2", vec![tester("random", BlindBot::Uniform)], 1));
+    let titles: Vec<String> = found.iter().map(LevelVerdict::title).collect();
+    assert_eq!(titles, ["default:0 Pantry", "default:1 Cave", "default:2 Pantry"], "there are two levels");
+    let line = serde_json::to_value(&found[1]).expect("JSON");
+    assert_eq!((&line["level"], &line["name"]), (&"default:1".into(), &"Cave".into()));
+    let mut older = line.clone();
+    older.as_object_mut().expect("an object").remove("name");
+    let older: LevelVerdict = serde_json::from_value(older).expect("results of an older version");
+    assert_eq!(older, LevelVerdict { name: None, ..found[1].clone() });
 }
 
 /// The corridor, which panics on level 3 when the agent stands at its last cell but one, and breaks its contract on

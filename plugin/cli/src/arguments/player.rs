@@ -388,13 +388,15 @@ pub struct MeasuredLevels<'a> {
     splits: Vec<(HeldOut<'a>, BTreeSet<u64>)>,
     /// The levels were named; else they are the held-out ones of the experiment.
     are_named: bool,
+    /// Levels without layouts are compared by their play.
+    compares_play: bool,
 }
 
 impl<'a> MeasuredLevels<'a> {
     /// Takes ranges of levels that the game [has](LevelSplit::check).
     pub fn new(game: &'a dyn Game, splits: &'a [LevelSplit], are_named: bool) -> Self {
         let splits = splits.iter().map(|split| (HeldOut::new(game, split), BTreeSet::new())).collect();
-        Self { splits, are_named }
+        Self { splits, are_named, compares_play: game.tools().state.compares_levels() }
     }
 
     /// Checks that the policy in `path` has not learned from these levels. Levels that were named are only reported, and
@@ -421,9 +423,9 @@ impl<'a> MeasuredLevels<'a> {
             let Some(seen) = seen else { continue };
             let own = levels.seen_in(seen);
             if !own.is_empty() {
+                let by = if self.compares_play { "number, layout or play" } else { "number or layout" };
                 report!(
-                    "{path} knows {} of the {} levels {split}: by number or layout they are among {seen}, from which it has \
-                     learned",
+                    "{path} knows {} of the {} levels {split}: by {by} they are among {seen}, from which it has learned",
                     whole(own.len() as f64),
                     whole(split.len() as f64)
                 );

@@ -13,7 +13,10 @@ use playbot_harness::{
 };
 use std::path::PathBuf;
 
-/// Show the layout of a level.
+/// Show a level: its layout, or what is known of it without playing it.
+///
+/// A game that is adapted with `ForeignGame` shows names and cells of its level editor, the plan that it declares, and the
+/// content of level files.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot level GAME --mode MODE --level 7
@@ -40,7 +43,8 @@ pub struct Args {
     /// standard input). --mode also takes the start and goal of the level.
     #[arg(long, value_name = "MAP", conflicts_with_all = ["mode", "levels"])]
     map: Option<String>,
-    /// Level file to show, in the form that --json prints, or - for standard input.
+    /// Level file to show, in the game's own format, or - for standard input. Games that draw levels themselves take what
+    /// --json prints.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["mode", "levels", "map", "level", "seed"])]
     file: Option<PathBuf>,
     #[command(flatten)]

@@ -59,8 +59,8 @@ pub use crate::verbs::test::results::{Results, report_results};
 pub struct Args {
     /// Name of the game (not with --regress).
     game: Option<String>,
-    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json" (default: the
-    /// held-out levels of the game's experiment).
+    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json", or the name of a
+    /// level in its editor (default: the held-out levels of the game's experiment).
     #[arg(long)]
     levels: Option<LevelSplit>,
     #[command(flatten)]

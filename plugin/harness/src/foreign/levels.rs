@@ -2,18 +2,20 @@
 
 use crate::{
     detector::LevelProof,
-    drawing::{Drawing, MarkForm, Rgb, Shape},
     floor_plan::{FloorPlan, joined_tiles},
     foreign::{ForeignGame, runtime::LevelSeed},
     game::{Game, LevelTools, level_designs},
-    inspect::{InspectError, LevelPicture, LevelRequest, LevelView},
-    level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files},
+    inspect::{InspectError, LevelPicture, LevelRequest, LevelView, read_text},
+    level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files, level_files_mode},
+    mode::ModeError,
+    split::check_level,
 };
 use bevy::prelude::*;
 use bevy_playbot::{engine::GameCall, state_hash::StateHash};
 use std::{
     any::{Any, TypeId, type_name},
     fmt::Display,
+    path::Path,
     sync::Arc,
 };
 
@@ -97,30 +99,6 @@ impl EditorLevel {
         };
         let layout = StateHash::of(rows.join("\n").bytes().map(u64::from)).0;
         Self { name: name.into(), rows, plan, layout, ..Self::default() }
-    }
-
-    /// Draws the plan.
-    fn picture(&self) -> Drawing {
-        let (longest, bounds) = (640.0, self.plan.bounds);
-        let scale = longest / bounds.size().max_element().max(f32::MIN_POSITIVE);
-        let at = |point: Vec2| Vec2::new(point.x - bounds.min.x, bounds.max.y - point.y) * scale;
-        let blocks = |areas: &[Rect], fill: Rgb| -> Vec<Shape> {
-            let block = |area: &Rect| Shape::Block { area: Rect::from_corners(at(area.min), at(area.max)), fill };
-            areas.iter().map(block).collect()
-        };
-        let mark = |form, centre: Vec2, fill: Rgb| Shape::Mark {
-            form,
-            centre: at(centre),
-            radius: longest / 80.0,
-            fill,
-            outline: [255; 3],
-        };
-        let mut shapes = blocks(&[bounds], [238, 238, 238]);
-        shapes.extend(blocks(&self.plan.walls, [96, 96, 96]));
-        shapes.extend(blocks(&self.plan.hazards, [213, 94, 0]));
-        shapes.push(mark(MarkForm::Disc, self.plan.start, [0, 114, 178]));
-        shapes.push(mark(MarkForm::Diamond, self.plan.goal, [0, 158, 115]));
-        Drawing { label: format!("the level {}", self.name), size: bounds.size() * scale, shapes }
     }
 }
 
@@ -518,6 +496,7 @@ impl ForeignGame {
     /// );
     /// assert_eq!(game.level_count(), Some(2));
     /// assert_eq!(game.tools().levels.level_name("default", 3).as_deref(), Some("stairs"));
+    /// assert_eq!(game.tools().levels.level_names("default"), ["pantry", "stairs"]);
     /// ```
     pub fn editor_levels(self, levels: Result<Vec<EditorLevel>, String>) -> Self {
         let levels = levels.and_then(|levels| {
@@ -555,29 +534,96 @@ impl ForeignGame {
 }
 
 impl ForeignGame {
-    /// Shows a level of an editor: its name and its rows.
-    fn show_drawn(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
+    /// Shows what is known of a level without playing it: its name, its cells or its plan, and the content of its file.
+    fn show_known(&self, request: &LevelRequest) -> Result<LevelView, InspectError> {
         let name = self.name();
-        if let Some(why) = self.problem() {
+        // Levels are shown before the rest of the game is described.
+        if let Some(why) = self.description.level_parts.problem(name) {
             return Err(InspectError::Usage(why));
         }
-        if request.map.is_some() || request.file.is_some() {
-            let why = format!("`{name}` shows levels by their numbers: name one with --level");
+        if request.map.is_some() {
+            let why = format!("the levels of `{name}` are no maps: name one with --level, or a level file with --file");
             return Err(InspectError::Usage(why));
         }
-        let mode = request.mode.unwrap_or_else(|| Game::modes(self)[0]);
-        self.check_mode(mode)?;
-        let level = request.level.unwrap_or(0);
-        let Some(drawn) = self.editor_level(mode, level) else {
-            return Err(InspectError::Usage(format!("`{name}` shows no level files: name one of its modes")));
+        let (mode, level) = match request.file {
+            Some(path) => (level_files_mode(&path.to_string_lossy()), 0),
+            None => {
+                let first = Game::modes(self).first().copied().unwrap_or_default();
+                (request.mode.unwrap_or(first).to_owned(), request.level.unwrap_or(0))
+            }
         };
-        let EditorLevel { name: title, file, rows, .. } = drawn;
-        let json = serde_json::json!({ "mode": mode, "level": level, "name": title, "file": file, "rows": rows });
-        Ok(LevelView {
-            text: format!("{mode}:{level} is `{title}` of {file}\n{}", rows.join("\n")),
-            json: json.to_string(),
-            picture: request.picture.then(|| LevelPicture::Drawing(drawn.picture())),
-        })
+        self.check_mode(&mode)?;
+        check_level(self, &mode, level)?;
+        let plan = self.floor_plan(&mode, level);
+        let known = match self.editor_level(&mode, level) {
+            Some(drawn) => of_editor((&mode, level), drawn),
+            None if is_level_files(&mode) => self.of_file((&mode, level), plan.as_ref())?,
+            None => self.of_number((&mode, level), plan.as_ref()),
+        };
+        let picture = match (&plan, request.picture) {
+            (_, false) => None,
+            (Some(plan), true) => Some(LevelPicture::Drawing(plan.picture(&known.title))),
+            (None, true) => {
+                let why =
+                    format!("`{name}` has no plan of this level to draw: give one with `.plan` or `.plan_of_file`");
+                return Err(InspectError::Usage(why));
+            }
+        };
+        Ok(LevelView { text: known.text, json: known.json.to_string(), picture })
+    }
+
+    /// Describes a level by its number and its plan.
+    fn of_number(&self, (mode, level): (&str, u64), plan: Option<&FloorPlan>) -> KnownLevel {
+        let (title, played) = (format!("{mode}:{level}"), self.level_of(level));
+        let mut head = format!("{title} of `{}`", self.name());
+        if let Some(count) = self.level_count() {
+            head += &format!(", which has {count} levels");
+        }
+        if played != level {
+            head += &format!(": the same as {mode}:{played}");
+        }
+        let text = format!("{head}\n{}", in_words(plan));
+        let json =
+            serde_json::json!({ "mode": mode, "level": level, "played": played, "rows": plan.map(FloorPlan::rows) });
+        KnownLevel { title, text, json }
+    }
+
+    /// Describes a level file by its plan and its content.
+    fn of_file(&self, (mode, level): (&str, u64), plan: Option<&FloorPlan>) -> Result<KnownLevel, InspectError> {
+        let designs = level_designs(self, mode).map_err(ModeError::from)?;
+        let path = designs.path(level).unwrap_or_default().to_owned();
+        // A file that is no text is read as one by nobody.
+        let content = if self.parse_bytes(&[]).is_some() { None } else { Some(read_text(Path::new(&path))?) };
+        let shown = content.as_ref().map_or("its content is no text", |text| text.trim_end());
+        let text = format!("{path}, a level of `{}`\n{}\n{shown}", self.name(), in_words(plan));
+        let rows = plan.map(FloorPlan::rows);
+        let json = serde_json::json!({ "mode": mode, "level": level, "file": path, "rows": rows, "content": content });
+        Ok(KnownLevel { title: path, text, json })
+    }
+}
+
+/// A level as far as it is known without playing it.
+struct KnownLevel {
+    title: String,
+    text: String,
+    json: serde_json::Value,
+}
+
+/// Describes a level of an editor: its name and its cells.
+fn of_editor((mode, level): (&str, u64), drawn: &EditorLevel) -> KnownLevel {
+    let EditorLevel { name, file, rows, .. } = drawn;
+    KnownLevel {
+        title: format!("the level {name}"),
+        text: format!("{mode}:{level} is `{name}` of {file}\n{}", rows.join("\n")),
+        json: serde_json::json!({ "mode": mode, "level": level, "name": name, "file": file, "rows": rows }),
+    }
+}
+
+/// Returns a plan as letters, with their meanings.
+fn in_words(plan: Option<&FloorPlan>) -> String {
+    match plan {
+        Some(plan) => format!("{}\nS start  G goal  # wall  ^ kills  = platform", plan.rows().join("\n")),
+        None => "the game declares no plan of it: see `.plan` and `.plan_of_file`".to_owned(),
     }
 }
 
@@ -610,9 +656,14 @@ impl LevelTools for ForeignGame {
         self.editor_level(mode, level).map(|drawn| drawn.name.clone())
     }
 
+    fn level_names(&self, mode: &str) -> Vec<String> {
+        let levels = self.description.level_parts.editor.as_ref().filter(|_| !is_level_files(mode));
+        let levels = levels.and_then(|levels| levels.as_ref().ok()).map_or(&[][..], |levels| levels);
+        levels.iter().map(|level| level.name.clone()).collect()
+    }
+
     fn show(&self, request: &LevelRequest) -> Option<Result<LevelView, InspectError>> {
-        self.description.level_parts.editor.as_ref()?;
-        Some(self.show_drawn(request))
+        Some(self.show_known(request))
     }
 
     fn floor_plan(&self, mode: &str, level: u64) -> Option<FloorPlan> {
@@ -631,12 +682,7 @@ impl LevelTools for ForeignGame {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        foreign::Restart,
-        level_files::{level_file_pattern, level_files_mode},
-        prelude::*,
-        worlds::build_world,
-    };
+    use crate::{foreign::Restart, level_files::level_file_pattern, prelude::*, worlds::build_world};
     use std::fs;
 
     /// The level of the game: the cell of its goal.
@@ -811,6 +857,82 @@ mod tests {
         assert_eq!(levels.prove(&mode, 0).why_unsolvable(), Some("4 is far"));
         assert_eq!(levels.prove("easy", 0), LevelProof::Solvable);
         assert_eq!(game.problem(), None);
+    }
+
+    /// Returns a level of a game as it is shown.
+    fn shown(game: &ForeignGame, request: LevelRequest) -> Result<LevelView, String> {
+        game.show_level(&request).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_level_of_a_number_is_shown_as_its_plan() {
+        let plan = |level: u64| FloorPlan {
+            bounds: Rect::new(0.0, 0.0, 4.0, 2.0),
+            walls: vec![Rect::new(0.0, 0.0, 4.0, 1.0)],
+            start: Vec2::new(0.5, 1.5),
+            goal: Vec2::new(1.5 + level as f32, 1.5),
+            ..FloorPlan::default()
+        };
+        let request = LevelRequest { mode: Some("hard"), level: Some(4), ..LevelRequest::default() };
+        let bare = shown(&game(), request).expect("a level");
+        let head = "hard:4 of `finder`, which has 3 levels: the same as hard:1\n";
+        assert_eq!(bare.text, format!("{head}the game declares no plan of it: see `.plan` and `.plan_of_file`"));
+        let json: serde_json::Value = serde_json::from_str(&bare.json).expect("JSON");
+        assert_eq!(json, serde_json::json!({ "mode": "hard", "level": 4, "played": 1, "rows": null }));
+        let error = shown(&game(), LevelRequest { picture: true, ..request }).expect_err("nothing to draw");
+        assert!(error.contains("`finder` has no plan of this level to draw: give one with `.plan`"), "{error}");
+        let view = shown(&game().plan(plan), LevelRequest { picture: true, ..request }).expect("a level");
+        assert_eq!(view.text, format!("{head}S.G.\n####\nS start  G goal  # wall  ^ kills  = platform"));
+        assert!(view.picture.is_some());
+        let error = shown(&game(), LevelRequest { map: Some("big"), ..LevelRequest::default() }).expect_err("no map");
+        assert!(error.starts_with("the levels of `finder` are no maps: name one with --level"), "{error}");
+    }
+
+    #[test]
+    fn a_level_file_is_shown_with_its_content_and_its_plan() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let mode = drawn(&folder, &["goal\n4", "goal\n5\n"]);
+        let path = folder.path().join("1.txt");
+        let view = shown(&game(), LevelRequest { file: Some(&path), ..LevelRequest::default() }).expect("a level");
+        assert!(
+            view.text.ends_with(
+                "1.txt, a level of `finder`\nthe game declares no plan of it: see `.plan` and \
+             `.plan_of_file`\ngoal\n5"
+            ),
+            "{}",
+            view.text
+        );
+        let json: serde_json::Value = serde_json::from_str(&view.json).expect("JSON");
+        assert_eq!((&json["content"], &json["level"]), (&"goal\n5\n".into(), &0.into()));
+        let planned = game().plan_of_file(|goal: &Goal| FloorPlan {
+            bounds: Rect::new(0.0, 0.0, 6.0, 1.0),
+            goal: Vec2::new(goal.0 as f32 + 0.5, 0.5),
+            start: Vec2::splat(0.5),
+            ..FloorPlan::default()
+        });
+        let second = LevelRequest { mode: Some(&mode), level: Some(1), ..LevelRequest::default() };
+        let text = shown(&planned, second).expect("a level").text;
+        assert!(text.contains("\nS....G\n") && text.ends_with("\ngoal\n5"), "{text}");
+        let error = shown(&planned, LevelRequest { level: Some(2), ..second }).expect_err("no such file");
+        assert!(error.contains("there is no level 2 in "), "{error}");
+        fs::write(&path, "goal\nfar").expect("writable");
+        let error =
+            shown(&game(), LevelRequest { file: Some(&path), ..LevelRequest::default() }).expect_err("no level");
+        assert!(error.ends_with("1.txt, line 2: `far` is not a cell: write a number"), "{error}");
+        let bare =
+            ForeignGame::new("bare", 1, |_: &mut App| {}).keys([vec![], vec![KeyCode::Space]]).observe(["x"], || [0.0]);
+        let error = shown(&bare, LevelRequest { file: Some(&path), ..LevelRequest::default() }).expect_err("no files");
+        assert!(error.contains("`bare` has no level files: name one of its modes"), "{error}");
+    }
+
+    #[test]
+    fn a_binary_level_file_is_shown_by_its_plan_alone() {
+        let folder = tempfile::tempdir().expect("a folder");
+        binary(&folder, &[b"\xfe\x04"]);
+        let path = folder.path().join("0.bin");
+        let view = shown(&game_of_bytes(), LevelRequest { file: Some(&path), ..LevelRequest::default() });
+        let text = view.expect("a level").text;
+        assert!(text.ends_with("\nits content is no text"), "{text}");
     }
 
     #[test]

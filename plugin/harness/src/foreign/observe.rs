@@ -5,13 +5,17 @@ use crate::{
     detector::LevelProof,
     foreign::{
         ForeignGame,
+        paths::component_of,
         runtime::{
             Baseline, ForeignCell, OwnedSystem, ReaderFactory, Sensor, SystemFactory, playing_agents, with_foreign,
         },
     },
     game::{GuessedPosition, StateTools},
 };
-use bevy::{ecs::system::ReadOnlySystem, prelude::*};
+use bevy::{
+    ecs::{component::ComponentInfo, system::ReadOnlySystem},
+    prelude::*,
+};
 use bevy_playbot::{
     engine::{TickSchedules, is_tick},
     episode::{Episode, EpisodeEnd},
@@ -22,6 +26,7 @@ use bevy_playbot::{
     vision::VisionSystems,
 };
 use playbot_report::counted;
+use std::hash::{DefaultHasher, Hash, Hasher};
 
 /// Adds the system that reads the observation.
 pub(super) fn add_observation(app: &mut App) {
@@ -276,6 +281,20 @@ impl StateTools for ForeignGame {
         world.get::<ForeignExploreCell>(agent).map(|cell| cell.0.clone())
     }
 
+    fn known_state(&self, world: &World, agent: Entity) -> Option<u64> {
+        let declared = world.get::<StateHash>(agent)?.0;
+        if self.description.hash.is_some() {
+            return Some(declared);
+        }
+        let cell = world.get_resource::<ForeignCell>()?;
+        let of_entities = of_entities(world, cell.lock().baseline.as_ref()?)?;
+        Some(StateHash::of([declared, of_entities]).0)
+    }
+
+    fn compares_levels(&self) -> bool {
+        true
+    }
+
     fn prove_from(&self, world: &World, agent: Entity) -> LevelProof {
         let is_playing = world.get::<Episode>(agent).is_some_and(Episode::is_running);
         let Some(cell) = world.get_resource::<ForeignCell>().filter(|_| is_playing) else {
@@ -415,11 +434,43 @@ pub(super) fn of_transforms(world: &World, baseline: &Baseline) -> u64 {
         if !baseline.is_placed(world, entity) {
             continue;
         }
-        let Transform { translation, rotation, scale } = transform;
-        let numbers = [translation.to_array(), scale.to_array()].into_iter().flatten().chain(rotation.to_array());
-        sum = sum.wrapping_add(StateHash::of(numbers.map(|number| u64::from(number.to_bits()))).0);
+        sum = sum.wrapping_add(StateHash::of(bits(transform)).0);
     }
     sum
+}
+
+/// Returns a hash of all entities of the game, by the types of their components and their transforms. It is the same in
+/// all Worlds of a process, and differs between processes. Returns `None` if nothing but cameras has a transform: then it
+/// says nothing about the level.
+fn of_entities(world: &World, baseline: &Baseline) -> Option<u64> {
+    let camera = component_of(world, "Camera");
+    let (mut sum, mut has_places) = (0_u64, false);
+    for entity in baseline.spawned(world) {
+        if !baseline.is_placed(world, entity) {
+            continue;
+        }
+        let entity = world.entity(entity);
+        // The order of components depends on which system has run first.
+        let mut types = 0_u64;
+        for id in entity.archetype().components() {
+            let Some(id) = world.components().get_info(*id).and_then(ComponentInfo::type_id) else { continue };
+            let mut hasher = DefaultHasher::new();
+            id.hash(&mut hasher);
+            types = types.wrapping_add(hasher.finish());
+        }
+        let transform = entity.get::<Transform>();
+        has_places |= transform.is_some() && camera.is_none_or(|camera| !entity.contains_id(camera));
+        let words = transform.into_iter().flat_map(bits).chain([types]);
+        sum = sum.wrapping_add(StateHash::of(words).0);
+    }
+    has_places.then_some(sum)
+}
+
+/// Returns the numbers of a transform.
+fn bits(Transform { translation, rotation, scale }: &Transform) -> [u64; 10] {
+    let ([x, y, z], [width, height, depth]) = (translation.to_array(), scale.to_array());
+    let [i, j, k, w] = rotation.to_array();
+    [x, y, z, width, height, depth, i, j, k, w].map(|number| u64::from(number.to_bits()))
 }
 
 /// Returns the hash of the state, with the agent's observation and reward.

@@ -228,7 +228,7 @@ impl Failure<'_> {
         }
         let rest = self.broken.get(self.episodes.len()..).unwrap_or_default();
         if !rest.is_empty() {
-            let names: Vec<&str> = rest.iter().take(MOST_NAMED).map(|level| level.level.as_str()).collect();
+            let names: Vec<String> = rest.iter().take(MOST_NAMED).map(LevelVerdict::title).collect();
             let more = rest.len().saturating_sub(MOST_NAMED);
             let more = if more > 0 { format!(" and {more} more") } else { String::new() };
             lines.push(format!("and {}{more}", names.join(", ")));
@@ -259,7 +259,7 @@ impl Failure<'_> {
     }
 
     fn level(&self, level: &LevelVerdict, episode: Option<&str>) -> Vec<String> {
-        let mut lines = vec![format!("{}: {}", level.level, level.outcome.name())];
+        let mut lines = vec![format!("{}: {}", level.title(), level.outcome.name())];
         lines.extend(level.testers.iter().map(|tester| format!("  {}", of_tester(tester))));
         lines.extend(level.stop.iter().map(|stop| format!("  {stop}")));
         for finding in level.findings.iter().take(MOST_FINDINGS) {

@@ -129,7 +129,7 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
         );
         for level in &overview.worst {
             let what = markdown_cell(&message(level));
-            lines.push(format!("| {} | {} | {what} |", markdown_cell(&level.level), level.outcome.name()));
+            lines.push(format!("| {} | {} | {what} |", markdown_cell(&level.title()), level.outcome.name()));
         }
         let shown = overview.worst.first().map(|level| rerun_commands(program, record, level)).unwrap_or_default();
         if !shown.is_empty() {
@@ -367,6 +367,8 @@ mod tests {
         assert!(!plain.contains("open squares") && !plain.contains("first tick"), "{plain}");
         let at_start = said(&LevelVerdict { solved_at_start: true, ..verdict(0, 2, 2) });
         assert!(at_start.contains("\n1 level is solved in its first tick: hard:0.\n"), "{at_start}");
+        let named = said(&LevelVerdict { name: Some("Cave".to_owned()), ..verdict(0, 0, 2) });
+        assert!(named.contains("\n| hard:0 Cave | bot-failed |"), "{named}");
         let mut level = LevelVerdict { places: Some(Places { visited: 3, open: 4 }), ..verdict(0, 2, 2) };
         level.testers[0].places = Some(Places { visited: 1, open: 4 });
         let mapped = said(&level);

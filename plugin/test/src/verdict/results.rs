@@ -322,7 +322,7 @@ impl Overview {
         if level.solved_at_start {
             self.solved_at_start += 1;
             if self.first_solved_at_start.len() < MOST_NAMES {
-                self.first_solved_at_start.push(level.level.clone());
+                self.first_solved_at_start.push(level.title());
             }
         }
         *match level.outcome {

@@ -42,6 +42,7 @@ pub(super) fn record(range: &str) -> TestRecord {
 pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
     LevelVerdict {
         level: format!("hard:{index}"),
+        name: None,
         index,
         outcome: if solved > 0 { LevelOutcome::Solved } else { LevelOutcome::BotFailed },
         proof: if solved > 0 { LevelProof::Solvable } else { LevelProof::Unknown },

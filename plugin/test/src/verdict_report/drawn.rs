@@ -29,8 +29,6 @@ pub struct Drawn {
     pub picture: String,
     /// Its failure as an animated PNG, in base64.
     pub clip: Option<String>,
-    /// Its name in a level editor, if it has one.
-    pub name: Option<String>,
 }
 
 /// Drawer of levels, within the size limits of the page.
@@ -65,7 +63,7 @@ impl<'a> Drawer<'a> {
         // The first clip without room is the last one that is tried.
         let clip = text.filter(|_| self.letters <= MOST_LETTERS);
         self.clips += usize::from(clip.is_some());
-        Some(Drawn { picture, clip, name: self.plans.name(level) })
+        Some(Drawn { picture, clip })
     }
 }
 
@@ -97,21 +95,9 @@ impl<'a> Plans<'a> {
 
     /// Returns the plan of a level of the test.
     pub fn get(&self, level: &LevelVerdict) -> Option<FloorPlan> {
-        let (game, range, number) = self.find(level)?;
-        game.tools().levels.floor_plan(&range.mode, number)
-    }
-
-    /// Returns the name of a level of the test in a level editor, if it has one.
-    fn name(&self, level: &LevelVerdict) -> Option<String> {
-        let (game, range, number) = self.find(level)?;
-        game.tools().levels.level_name(&range.mode, number)
-    }
-
-    /// Returns the game and the number of a level of the test.
-    fn find(&self, level: &LevelVerdict) -> Option<(&dyn Game, &LevelSplit, u64)> {
         let Self::Known { game, range } = self else { return None };
         let number = range.first.checked_add(level.index).filter(|number| *number <= range.last)?;
-        Some((*game, range, number))
+        game.tools().levels.floor_plan(&range.mode, number)
     }
 
     /// Returns the game's ticks per second; `None` without plans.

@@ -123,14 +123,12 @@ pub(crate) fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str
     let share = score.solved as f64 / score.episodes.max(1) as f64;
     let median = score.ticks.map(|ticks| ticks.median);
     let places = level.places.unwrap_or_default();
-    let name =
-        drawn.and_then(|drawn| drawn.name.as_deref()).map_or_else(String::new, |name| format!(" {}", text(name)));
     let mut out = format!(
-        "<tbody data-k=\"{kinds}\"><tr><th scope=\"row\" data-v=\"{}\">{}{name}</th><td data-v=\"{}\" class=\"{outcome}\">\
+        "<tbody data-k=\"{kinds}\"><tr><th scope=\"row\" data-v=\"{}\">{}</th><td data-v=\"{}\" class=\"{outcome}\">\
          {outcome}</td><td data-v=\"{share:.4}\">{} of {}</td><td data-v=\"{:.4}\">{}</td><td data-v=\"{}\">{}</td>\
          <td data-v=\"{:.1}\">{}</td><td data-v=\"{}\">{}</td></tr>\n",
         level.index,
-        text(&level.level),
+        text(&level.title()),
         level.outcome as u8,
         score.solved,
         score.episodes,

@@ -28,7 +28,7 @@ pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<String> 
     let extent = extent(plan.bounds, side, &level.ends);
     let grid = Grid::new(extent)?;
     let [width, height] = grid.size();
-    let label = format!("{}: solved {}, {}", level.level, level.score.solved, ends(&level.score));
+    let label = format!("{}: solved {}, {}", level.title(), level.score.solved, ends(&level.score));
     let mut svg = format!(
         "<svg class=\"level\" viewBox=\"0 0 {width} {height}\" role=\"img\" aria-label=\"{}\">",
         escape(&label)

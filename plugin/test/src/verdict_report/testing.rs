@@ -51,9 +51,6 @@ impl LevelTools for Garden {
     fn floor_plan(&self, _mode: &str, _level: u64) -> Option<FloorPlan> {
         Some(garden())
     }
-    fn level_name(&self, _mode: &str, level: u64) -> Option<String> {
-        (level == 64).then(|| "Thicket".to_owned())
-    }
 }
 
 /// Makes a floor with a pit of thorns and many bushes.
@@ -102,6 +99,7 @@ pub(crate) fn level(index: u64, solved: u64, episodes: u64, ticks: u32) -> Level
     };
     LevelVerdict {
         level: format!("hard:{index}"),
+        name: None,
         index,
         outcome: if solved > 0 { LevelOutcome::Solved } else { LevelOutcome::BotFailed },
         proof: if solved > 0 { LevelProof::Solvable } else { LevelProof::Unknown },

@@ -102,6 +102,7 @@ fn verdict(index: u64) -> LevelVerdict {
     let causes: BTreeMap<String, u64> = [("saw".to_owned(), 2)].into();
     LevelVerdict {
         level: format!("hard:{index}"),
+        name: Some("Thicket".to_owned()),
         index,
         outcome: if solved > 0 { LevelOutcome::Solved } else { LevelOutcome::BotFailed },
         proof: if solved > 0 { LevelProof::Solvable } else { LevelProof::Unknown },

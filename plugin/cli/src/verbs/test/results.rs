@@ -102,7 +102,7 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
 
 /// Returns the positions at which the episodes of the worst levels stopped.
 fn stops(overview: &Overview) -> Vec<String> {
-    let stop = |level: &LevelVerdict| level.stop.as_ref().map(|stop| format!("{}: {stop}", level.level));
+    let stop = |level: &LevelVerdict| level.stop.as_ref().map(|stop| format!("{}: {stop}", level.title()));
     overview.worst.iter().filter_map(stop).take(MOST_STOPS).collect()
 }
 
@@ -168,7 +168,7 @@ fn worst(overview: &Overview) -> PlainTable {
         let median = score.ticks.map_or(f64::NAN, |ticks| ticks.median);
         let finding = level.findings.first().map_or_else(String::new, |finding| finding.detector.clone());
         vec![
-            level.level.clone(),
+            level.title(),
             level.outcome.name().to_owned(),
             format!("{} of {}", score.solved, score.episodes),
             ticks(median),

@@ -77,7 +77,7 @@ fn test_case(record: &TestRecord, level: &LevelVerdict, program: &str, class: &s
         status.set_description(description(record, level, program));
         status
     };
-    let mut case = TestCase::new(level.level.as_str(), status);
+    let mut case = TestCase::new(level.title(), status);
     case.set_classname(class);
     // Results of older versions have no time, and a file may hold any number.
     case.time = level.seconds.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
@@ -118,7 +118,7 @@ fn kind(level: &LevelVerdict) -> &str {
 
 /// Describes a failure in several lines. Begins with its message, because some readers show the text alone.
 fn description(record: &TestRecord, level: &LevelVerdict, program: &str) -> String {
-    let mut lines = vec![format!("{}: {}", level.level, level.outcome.name()), message(level)];
+    let mut lines = vec![format!("{}: {}", level.title(), level.outcome.name()), message(level)];
     for tester in &level.testers {
         let score = &tester.score;
         lines.push(format!(
@@ -283,6 +283,17 @@ mod tests {
         assert_eq!(values(&text, "testcase", "name"), paths.map(|path| Some(path.to_owned())));
         assert_eq!(values(&text, "testsuite", "name"), paths.map(|path| Some(format!("garden {path}"))));
         assert_eq!(values(&written(&record("hard"), &levels), "testsuite", "file"), [None]);
+    }
+
+    #[test]
+    fn a_level_of_an_editor_is_named_in_its_case() {
+        let named =
+            |index, solved, name: &str| LevelVerdict { name: Some(name.to_owned()), ..verdict(index, solved, 2) };
+        let text = written(&record("hard"), &[named(0, 0, "Cave"), named(1, 2, "a & b"), verdict(2, 2, 2)]);
+        let names = ["hard:0 Cave", "hard:1 a & b", "hard:2"].map(|name| Some(name.to_owned()));
+        assert_eq!(values(&text, "testcase", "name"), names);
+        assert!(text.contains(">hard:0 Cave: bot-failed\n"), "{text}");
+        assert!(text.contains("--levels hard:0 ") && !text.contains("--levels hard:0 Cave"), "{text}");
     }
 
     #[test]

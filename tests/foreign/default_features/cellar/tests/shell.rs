@@ -1,6 +1,8 @@
 //! Tests of the verbs through the command line.
 
-use playbot_shell::GameProgram;
+use std::fs;
+
+use playbot_shell::{GameProgram, Shell};
 
 const GAME: GameProgram = GameProgram {
     program: env!("CARGO_BIN_EXE_foreign_cellar"),
@@ -13,3 +15,14 @@ const GAME: GameProgram = GameProgram {
 };
 
 playbot_shell::tests!(GAME: recordings_replay, a_killed_training_goes_on_bit_for_bit, a_policy_file_plays_as_its_run, the_doctor_finds_nothing);
+
+/// The first rooms of the project are Pantry, Stairs and Larder.
+#[test]
+fn rooms_are_named_as_in_their_editor() {
+    let shell = Shell::new(GAME.program);
+    let shown = shell.done(&["level", "cellar", "--level", "Larder"]);
+    assert!(shown.starts_with("default:2 is `Larder` of "), "{shown}");
+    shell.done(&["test", "cellar", "--levels", "Pantry", "--bot", "guide", "--out", "tested"]);
+    let line = fs::read_to_string(shell.path("tested/results.json")).expect("results");
+    assert!(line.contains("\"level\":\"default:0\"") && line.contains("\"name\":\"Pantry\""), "{line}");
+}
