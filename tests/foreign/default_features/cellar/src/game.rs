@@ -63,7 +63,8 @@ impl Room {
         std::array::from_fn(|cell| self.cell(self.at + IVec2::new(cell as i32 % 5 - 2, cell as i32 / 5 - 2)) as u8)
     }
 
-    fn put(&mut self, at: IVec2, cell: Cell) {
+    /// Changes the content of a cell.
+    pub fn put(&mut self, at: IVec2, cell: Cell) {
         let [column, row] = [at.x, at.y].map(|at| at.max(0) as usize);
         self.cells.resize(self.cells.len().max(row + 1), Vec::new());
         let cells = &mut self.cells[row];
@@ -114,7 +115,7 @@ impl Room {
 
 /// The walker, with the seconds until the next step.
 #[derive(Component, Default)]
-struct Walker(f32);
+pub struct Walker(f32);
 
 /// A thing that can be taken, opened or reached.
 #[derive(Component, Clone, Copy, Default)]
