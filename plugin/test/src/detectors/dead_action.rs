@@ -22,8 +22,9 @@ use playbot_harness::{
 /// is skipped. An effect must show in the state hash, the observation or the reward.
 ///
 /// A stuck agent says nothing about actions. So the episode is one that was solved or, on an unsolved level, the one
-/// with the best reward. Its agent must be at different positions at these moments. It is opt-in, because games may
-/// have actions without an effect in some levels or in all.
+/// with the best reward. Its agent must be at different positions at these moments. An action that the agent took itself,
+/// such as a click on a menu's button, must have no effect where it was taken first, either. It is opt-in, because games
+/// may have actions without an effect in some levels or in all.
 pub struct DeadAction {
     every: f64,
     moments: f64,
@@ -86,7 +87,7 @@ fn teller<'a, 'b>(level: &'b TestedLevel<'a>) -> Option<&'b TestedBy<'a>> {
 impl DeadAction {
     /// Returns the names of the dead actions. `has_solved`: whether the episode was solved in the test.
     fn dead(&self, script: &Script<'_>, has_solved: bool) -> Result<Vec<String>, Fault> {
-        let (course, idle) = (script.course()?, idle_action(script.game));
+        let (course, idle, led) = (script.course()?, idle_action(script.game), script.led_episodes());
         let (moments, ticks) = (self.moments as usize, self.ticks as usize);
         let length = course.actions.len();
         if length < moments.saturating_add(1).saturating_mul(ticks) {
@@ -100,12 +101,12 @@ impl DeadAction {
         let mut left = tried(script.game);
         for moment in moments {
             let before = &course.actions[..moment];
-            let nothing = script.play(before, &idle, ticks)?;
+            let nothing = led.play(before, &idle, ticks)?;
             let mut still = Vec::new();
             for (name, ways) in left {
                 let mut is_dead = true;
                 for way in &ways {
-                    is_dead = is_dead && script.play(before, way, ticks)? == nothing;
+                    is_dead = is_dead && led.play(before, way, ticks)? == nothing;
                 }
                 if is_dead {
                     still.push((name, ways));
@@ -116,7 +117,18 @@ impl DeadAction {
                 break;
             }
         }
-        Ok(left.into_iter().map(|(name, _)| name).collect())
+        let mut dead = Vec::new();
+        for (name, ways) in left {
+            let first = course.actions.iter().position(|action| ways.contains(action));
+            let has_effect = match first.map(|moment| course.actions.split_at(moment)) {
+                Some((before, after)) => led.play(before, &after[0], ticks)? != led.play(before, &idle, ticks)?,
+                None => false,
+            };
+            if !has_effect {
+                dead.push(name);
+            }
+        }
+        Ok(dead)
     }
 }
 
@@ -213,6 +225,30 @@ mod tests {
         assert_eq!(dead(false, 5.0), ["`Space`"]);
         assert!(dead(true, 5.0).is_empty());
         assert!(dead(false, 20.0).is_empty(), "the episode has 40 ticks, which is too short");
+    }
+
+    #[test]
+    fn an_action_that_has_an_effect_where_the_agent_takes_it_is_not_dead() {
+        let begins_by_enter = |app: &mut App| {
+            app.add_systems(Startup, |mut commands: Commands| {
+                commands.spawn((Runner, Transform::default()));
+            })
+            .add_systems(
+                Update,
+                |keys: Res<ButtonInput<KeyCode>>, mut at: Single<&mut Transform, With<Runner>>| {
+                    let x = &mut at.translation.x;
+                    let moves = if *x < 1.0 { KeyCode::Enter } else { KeyCode::ArrowRight };
+                    *x += f32::from(u8::from(keys.pressed(moves)));
+                },
+            );
+        };
+        let game = ForeignGame::new("runner", 1, begins_by_enter)
+            .keys([vec![], vec![KeyCode::ArrowRight], vec![KeyCode::Enter]])
+            .observe(["x"], |at: Single<&Transform, With<Runner>>| [at.translation.x])
+            .end(|at: Single<&Transform, With<Runner>>| (at.translation.x >= 40.0).then_some(EpisodeEnd::WON))
+            .time_limit(100)
+            .demonstrator("runs", |at: Single<&Transform, With<Runner>>| 1 + u32::from(at.translation.x < 1.0));
+        assert!(dead(&game, &Player::Demonstrator, 5.0).is_empty());
     }
 
     #[test]
