@@ -73,7 +73,7 @@ impl Room {
     }
 
     /// Takes a step, if nothing is in the way. Returns the content of the cell.
-    fn step(&mut self, way: IVec2) -> Option<Cell> {
+    pub fn step(&mut self, way: IVec2) -> Option<Cell> {
         let to = self.at + way;
         let cell = self.cell(to);
         match cell {
