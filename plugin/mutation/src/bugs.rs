@@ -31,7 +31,7 @@ use thiserror::Error;
 
 pub use crate::bugs::{
     general::general_defects,
-    make::{Made, MakePlan, MissingMutants, Source, make_bugs},
+    make::{Made, MakePlan, MissingMutants, Source, make_bugs, without_effect},
     mutant::{Mutant, PlantedRules},
     set::{BugGame, BugSet, PlantedBug, PlantedPart, UnmutatedLevels},
 };

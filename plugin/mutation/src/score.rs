@@ -8,7 +8,7 @@
 //! The folder, in reading order:
 //!
 //! - `record`: the record of a score: set, games, testers and settings.
-//! - `contestant`: the testers that are scored, and the clocks for their jobs.
+//! - `contestant`: the testers that are scored, the clocks for their jobs, and the detectors that they share.
 //! - `playing`: the jobs: testers that play, and testers that explore.
 //! - `found`: the rules that decide which defects were found.
 //! - `journal`: the journal of finished jobs, beside the file of their score.
@@ -31,7 +31,7 @@ pub(crate) mod testing;
 use crate::{
     bugs::{BugSet, Mutant, PlantedPart, defect_kinds},
     score::{
-        contestant::JobClock,
+        contestant::{JobClock, SubjectDetectors},
         error::io_error,
         found::Trial,
         playing::{play, search},
@@ -351,6 +351,13 @@ struct Shared<'a> {
     is_stopped: bool,
 }
 
+impl Shared<'_> {
+    /// Returns whether no further job is run.
+    fn is_over(&self) -> bool {
+        self.failure.is_some() || self.is_stopped
+    }
+}
+
 impl<'a> ScoreRun<'a> {
     /// Checks the plan, and reads all levels.
     ///
@@ -369,18 +376,24 @@ impl<'a> ScoreRun<'a> {
 
     /// Runs all jobs that the journal does not have, and judges all of them; `None` if `stop` returned true.
     ///
-    /// Each job runs on one thread. Its results, apart from the times, depend on the plan's budget, the tester and the
-    /// subject alone. A mutant that makes a tester panic is a finding.
+    /// The jobs of a subject run one after the other on one thread. Their results, apart from the times, depend on the
+    /// plan's budget, the tester and the subject alone. A mutant that makes a tester panic is a finding.
     ///
     /// # Errors
     ///
     /// A tester cannot play at all, or the journal cannot be written.
     pub fn run(&self, journal: &mut ScoreJournal, watch: &ScoreCallbacks) -> Result<Option<Score>, ScoreError> {
-        let is_open = |(case, contestant): &(&Case, &Contestant)| {
-            let key = (case.subject.id.clone(), contestant.record.name.clone());
-            !journal.finished().contains_key(&key)
-        };
-        let open: Vec<(&Case, &Contestant)> = self.all().filter(is_open).collect();
+        let mut open: Vec<(&Case, Vec<&Contestant>)> = Vec::new();
+        for case in &self.cases {
+            let is_open = |contestant: &&Contestant| {
+                let key = (case.subject.id.clone(), contestant.record.name.clone());
+                !journal.finished().contains_key(&key)
+            };
+            let testers: Vec<_> = self.plan.games[case.game].contestants.iter().filter(is_open).collect();
+            if !testers.is_empty() {
+                open.push((case, testers));
+            }
+        }
         let threads = self.plan.threads.clamp(1, open.len().max(1));
         let shared = Mutex::new(Shared { next: 0, journal: &mut *journal, failure: None, is_stopped: false });
         thread::scope(|scope| {
@@ -412,31 +425,31 @@ impl<'a> ScoreRun<'a> {
         })
     }
 
-    /// Runs job after job on one thread.
-    fn work(&self, open: &[(&Case, &Contestant)], shared: &Mutex<Shared>, watch: &ScoreCallbacks) {
+    /// Runs the open jobs of subject after subject on one thread.
+    fn work(&self, open: &[(&Case, Vec<&Contestant>)], shared: &Mutex<Shared>, watch: &ScoreCallbacks) {
         loop {
-            let (case, contestant) = {
+            let next = {
                 let mut shared = lock(shared);
-                if shared.failure.is_some() || shared.is_stopped {
+                shared.next += 1;
+                shared.next - 1
+            };
+            let Some((case, contestants)) = open.get(next) else { return };
+            let detectors = SubjectDetectors::new(&self.plan.games[case.game].detectors, self.plan.clock);
+            for contestant in contestants {
+                if lock(shared).is_over() {
                     return;
                 }
-                shared.next += 1;
-                match open.get(shared.next - 1) {
-                    Some(job) => *job,
-                    None => return,
-                }
-            };
-            let done = self.job(case, contestant, watch);
-            let mut shared = lock(shared);
-            match done {
-                Ok(Some(result)) => match shared.journal.push(result) {
-                    Ok(()) => (watch.progress)(1),
-                    Err(error) => {
-                        shared.failure.get_or_insert(error);
+                let done = self.job(case, contestant, &detectors, watch);
+                let mut shared = lock(shared);
+                let kept = match done {
+                    Ok(Some(result)) => shared.journal.push(result).map(|()| (watch.progress)(1)),
+                    Ok(None) => {
+                        shared.is_stopped = true;
+                        Ok(())
                     }
-                },
-                Ok(None) => shared.is_stopped = true,
-                Err(error) => {
+                    Err(error) => Err(error),
+                };
+                if let Err(error) = kept {
                     shared.failure.get_or_insert(error);
                 }
             }
@@ -447,6 +460,7 @@ impl<'a> ScoreRun<'a> {
         &self,
         case: &Case,
         contestant: &Contestant,
+        detectors: &SubjectDetectors,
         watch: &ScoreCallbacks,
     ) -> Result<Option<JobResult>, ScoreError> {
         if (watch.stop)() {
@@ -454,14 +468,14 @@ impl<'a> ScoreRun<'a> {
         }
         let tested = &self.plan.games[case.game];
         let mutant = case.mutant(tested.game);
-        let clock = JobClock::start(self.plan.clock);
+        let clock = JobClock::start(self.plan.clock, &detectors.charges);
         let trial = Trial {
             game: &mutant,
             mode: &case.mode,
             level: case.level,
             name: &case.name,
             contestant,
-            detectors: &tested.detectors,
+            detectors: &detectors.detectors,
             budget: self.plan.budget,
             shortens: case.subject.class().is_some(),
             clock,

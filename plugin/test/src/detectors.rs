@@ -94,6 +94,12 @@ pub trait LevelDetector: Send + Sync {
         false
     }
 
+    /// Returns whether its findings depend on the testers and their episodes. Those of the others are computed once for all
+    /// testers of a level.
+    fn depends_on_testers(&self) -> bool {
+        true
+    }
+
     /// Returns the defects of a level.
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect>;
 

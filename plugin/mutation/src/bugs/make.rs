@@ -262,6 +262,26 @@ pub(super) fn bases_with_effect(
     found.into_iter().flatten().collect()
 }
 
+/// Returns the variants of a game's own defects of rules that change no bot's episode on any of these levels, by their
+/// class and number. A test of own defects expects that there are no such variants. The bots are those of [`make_bugs`].
+pub fn without_effect(game: &dyn Game, levels: &LevelSplit, threads: usize) -> Vec<(&'static str, u32)> {
+    let sound = SoundCourses::of(game, &levels.mode);
+    let mut jobs: Vec<(DefectKind, u32)> = Vec::new();
+    for kind in game.tools().tests.defects() {
+        if let Plant::Rules { variants, .. } = kind.plant {
+            jobs.extend((0..variants).map(|variant| (kind.clone(), variant)));
+        }
+    }
+    let are_silent = on_threads(&mut jobs, threads, |(kind, variant)| {
+        let mutant = Mutant::new(game, kind, *variant);
+        // The most sensitive bot plays all levels before the next one does.
+        let mut bots = 0..sound.bots.len();
+        !bots.any(|bot| levels.levels().any(|level| sound.is_left(&mutant, bot, level)))
+    });
+    let silent = jobs.into_iter().zip(are_silent).filter(|(_, is_silent)| *is_silent);
+    silent.map(|((kind, variant), _)| (kind.class, variant)).collect()
+}
+
 /// Returns the random numbers of a mutant.
 pub(super) fn stream(seed: u64, game: &dyn Game, kind: &DefectKind, number: u32) -> ChaCha8Rng {
     Streams::new(seed).stream(&format!("{}/{}", game.name(), kind.class), u64::from(number))
@@ -293,9 +313,13 @@ impl<'a> SoundCourses<'a> {
     /// Returns whether some bot's episode differs with the defect.
     fn are_left(&self, kind: &DefectKind, variant: u32, level: u64) -> bool {
         let mutant = Mutant::new(self.game, kind, variant);
-        self.bots.iter().enumerate().any(|(number, (bot, seed))| {
-            !keeps_course(&mutant, (self.mode, level), *seed, bot, &self.course(number, level))
-        })
+        (0..self.bots.len()).any(|bot| self.is_left(&mutant, bot, level))
+    }
+
+    /// Returns whether the episode of this bot differs in the mutant.
+    fn is_left(&self, mutant: &Mutant<&dyn Game>, bot: usize, level: u64) -> bool {
+        let (player, seed) = &self.bots[bot];
+        !keeps_course(mutant, (self.mode, level), *seed, player, &self.course(bot, level))
     }
 
     fn course(&self, number: usize, level: u64) -> Arc<Replayed> {

@@ -1,17 +1,27 @@
-//! The testers that are scored.
+//! The testers that are scored, the clocks of their jobs, and the detectors that they share.
 
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     bot::BlindBot,
+    episode::EpisodeResult,
     vision::ObservationConfig,
 };
 use playbot_harness::{
     eval::{CHAOS, Player, blind_bots},
     game::Game,
 };
-use playbot_test::explore::Explorer;
+use playbot_test::{
+    detectors::{Detectors, LevelDefect, LevelDetector, ShownBy, TestedLevel},
+    explore::Explorer,
+};
 use serde::{Deserialize, Serialize};
-use std::time::Instant;
+use std::{
+    sync::{
+        Arc, Mutex, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
+    time::Instant,
+};
 
 /// Name of the bot with random actions.
 pub const RANDOM: &str = "random";
@@ -137,21 +147,101 @@ pub(super) struct JobClock {
     kind: ClockKind,
     cpu: f64,
     begun: Instant,
+    charges: Charges,
+    /// The charges at the start.
+    charged: u64,
 }
 
 impl JobClock {
-    pub fn start(kind: ClockKind) -> Self {
-        Self { kind, cpu: thread_cpu_seconds().unwrap_or(0.0), begun: Instant::now() }
+    pub fn start(kind: ClockKind, charges: &Charges) -> Self {
+        let (charges, charged) = (Arc::clone(charges), charges.load(Ordering::Relaxed));
+        Self { kind, cpu: thread_cpu_seconds().unwrap_or(0.0), begun: Instant::now(), charges, charged }
     }
 
-    /// Returns the seconds since the start, to the microsecond.
+    /// Returns the seconds since the start, to the microsecond, with those of work that was taken over.
     pub fn seconds(&self) -> f64 {
+        self.own_seconds() + (self.charges.load(Ordering::Relaxed) - self.charged) as f64 / 1e6
+    }
+
+    fn own_seconds(&self) -> f64 {
         let wall = || self.begun.elapsed().as_secs_f64();
         let seconds = match self.kind {
             ClockKind::ThreadCpu => thread_cpu_seconds().map_or_else(wall, |cpu| cpu - self.cpu),
             ClockKind::Wall => wall(),
         };
         (seconds * 1e6).round() / 1e6
+    }
+}
+
+// Work that the testers of a subject share.
+
+/// Microseconds of work that jobs on a subject have taken over from another job.
+pub(super) type Charges = Arc<AtomicU64>;
+
+/// The detectors of a subject. Findings that do not depend on the tester are computed in the first job. Each further job
+/// takes them over, and is charged with the time that they took, as if it had computed them.
+pub(super) struct SubjectDetectors {
+    /// The detectors.
+    pub detectors: Detectors,
+    /// The charges for work that was taken over.
+    pub charges: Charges,
+}
+
+impl SubjectDetectors {
+    pub fn new(detectors: &Detectors, clock: ClockKind) -> Self {
+        let (mut detectors, charges) = (detectors.clone(), Charges::default());
+        for detector in detectors.levels.iter_mut().filter(|detector| !detector.depends_on_testers()) {
+            let (own, charges) = (Arc::clone(detector), Arc::clone(&charges));
+            *detector = Arc::new(SharedDetector { own, clock, charges, known: Mutex::default() });
+        }
+        Self { detectors, charges }
+    }
+}
+
+/// A detector that inspects a subject once.
+struct SharedDetector {
+    own: Arc<dyn LevelDetector>,
+    clock: ClockKind,
+    charges: Charges,
+    /// Its findings, and the microseconds that they took.
+    known: Mutex<Option<(Vec<LevelDefect>, u64)>>,
+}
+
+impl LevelDetector for SharedDetector {
+    fn name(&self) -> &'static str {
+        self.own.name()
+    }
+
+    fn describe(&self) -> &'static str {
+        self.own.describe()
+    }
+
+    fn depends_on_testers(&self) -> bool {
+        false
+    }
+
+    fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((defects, microseconds)) = &*known {
+            self.charges.fetch_add(*microseconds, Ordering::Relaxed);
+            return defects.clone();
+        }
+        let clock = JobClock::start(self.clock, &Charges::default());
+        let defects = self.own.inspect(level);
+        *known = Some((defects.clone(), (clock.seconds() * 1e6).round() as u64));
+        defects
+    }
+
+    fn shown_by(&self) -> ShownBy {
+        self.own.shown_by()
+    }
+
+    fn is_in_level(&self, game: &dyn Game, mode: &str, level: u64) -> bool {
+        self.own.is_in_level(game, mode, level)
+    }
+
+    fn is_in_episode(&self, result: &EpisodeResult, tick: Option<u32>) -> bool {
+        self.own.is_in_episode(result, tick)
     }
 }
 
@@ -188,7 +278,7 @@ mod tests {
     #[test]
     fn work_takes_time_by_either_clock() {
         for kind in [ClockKind::here(), ClockKind::Wall] {
-            let clock = JobClock::start(kind);
+            let clock = JobClock::start(kind, &Charges::default());
             let mut number = 1_u64;
             // Longer than the system takes to update its count.
             while clock.begun.elapsed().as_millis() < 50 {

@@ -7,13 +7,18 @@ use crate::{
 use playbot_corridor::Corridor;
 use playbot_harness::game::Game;
 use playbot_test::{
-    detectors::{DetectorChoice, Detectors},
+    detectors::{DetectorChoice, Detectors, LevelDefect, LevelDetector, TestedLevel},
     verdict::Earlier,
 };
 use std::{
     fs,
     path::Path,
-    sync::atomic::{AtomicU64, Ordering},
+    sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    },
+    thread,
+    time::Duration,
 };
 
 /// Three mutants and three unmutated levels, as a file has them.
@@ -109,6 +114,50 @@ fn a_score_is_the_same_on_any_number_of_threads_and_after_a_stop() {
     assert_eq!(without_times(&resumed), without_times(&whole));
     resumed.write(&file).expect("writable");
     assert_eq!(Score::read(&file).expect("readable"), resumed);
+}
+
+/// A slow detector that finds something in each level, and counts the levels that it has inspected.
+#[derive(Default)]
+struct Slow(AtomicU64);
+
+/// The milliseconds that it takes.
+const SLOW: u64 = 20;
+
+impl LevelDetector for Slow {
+    fn name(&self) -> &'static str {
+        "slow"
+    }
+
+    fn describe(&self) -> &'static str {
+        "a level was inspected"
+    }
+
+    fn depends_on_testers(&self) -> bool {
+        false
+    }
+
+    #[allow(clippy::disallowed_methods, reason = "it takes time, which the score reports")]
+    fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
+        self.0.fetch_add(1, Ordering::SeqCst);
+        thread::sleep(Duration::from_millis(SLOW));
+        vec![LevelDefect { message: format!("level {}", level.level), ..LevelDefect::default() }]
+    }
+}
+
+#[test]
+fn findings_that_do_not_depend_on_the_tester_are_computed_once_and_charged_to_each() {
+    let (folder, game, slow) = (tempfile::tempdir().expect("a folder"), Corridor::default(), Arc::<Slow>::default());
+    let set = made(folder.path());
+    let mut plan = ScorePlan { clock: ClockKind::Wall, ..plan(&set, folder.path(), &game, 2) };
+    plan.games[0].detectors.levels = vec![Arc::<Slow>::clone(&slow)];
+    plan.games[0].contestants.retain(|contestant| contestant.record.name != "explore");
+    let (score, _) = scored(&plan, &folder.path().join("score.json"), Earlier::Keep, u64::MAX);
+    let score = score.expect("not stopped");
+    assert_eq!((slow.0.load(Ordering::SeqCst), score.jobs.len()), (7, 28));
+    for ScoredJob { result, .. } in score.jobs {
+        assert!(result.findings.iter().any(|finding| finding.detector == "slow"), "{result:?}");
+        assert!(result.seconds >= SLOW as f64 / 1e3, "{result:?}");
+    }
 }
 
 /// A game that panics in the second episode of a World, after ten ticks.

@@ -24,8 +24,9 @@ use playbot_harness::{
 /// A moment in which the action is illegal does not count, and there must be two in which it is legal.
 ///
 /// A stuck agent says nothing about actions. So the episode is one that was solved or, on an unsolved level, the one
-/// with the best reward. Its agent must be at different positions at these moments. It is opt-in, because games may
-/// have actions without an effect in some levels or in all.
+/// with the best reward. Its agent must be at different positions at these moments. An action that the agent took itself,
+/// such as a click on a menu's button, must have no effect where it was taken first, either. It is opt-in, because games
+/// may have actions without an effect in some levels or in all.
 pub struct DeadAction {
     every: f64,
     moments: f64,
@@ -91,7 +92,7 @@ fn teller<'a, 'b>(level: &'b TestedLevel<'a>) -> Option<&'b TestedBy<'a>> {
 impl DeadAction {
     /// Returns the names of the dead actions. `has_solved`: whether the episode was solved in the test.
     fn dead(&self, script: &Script<'_>, has_solved: bool) -> Result<Vec<String>, Fault> {
-        let (course, idle) = (script.course()?, idle_action(script.game));
+        let (course, idle, led) = (script.course()?, idle_action(script.game), script.led_episodes());
         let (moments, ticks) = (self.moments as usize, self.ticks as usize);
         let length = course.actions.len();
         if length < moments.saturating_add(1).saturating_mul(ticks) {
@@ -106,13 +107,13 @@ impl DeadAction {
         let mut left: Vec<_> = tried(script.game).into_iter().map(|(name, ways)| (name, ways, 0)).collect();
         for moment in moments {
             let before = &course.actions[..moment];
-            let nothing = script.play(before, &idle, ticks)?;
+            let nothing = led.play(before, &idle, ticks)?;
             let mut still = Vec::new();
             for (name, ways, mut times) in left {
                 let (mut has_effect, mut is_tried) = (false, false);
                 for way in &ways {
                     if !has_effect {
-                        let held = script.play(before, way, ticks)?;
+                        let held = led.play(before, way, ticks)?;
                         has_effect = held.hashes != nothing.hashes;
                         // Instead of an illegal action, the idle one was played.
                         is_tried |= held.actions != nothing.actions;
@@ -128,7 +129,21 @@ impl DeadAction {
                 break;
             }
         }
-        Ok(left.into_iter().filter(|(_, _, times)| *times >= enough).map(|(name, ..)| name).collect())
+        let mut dead = Vec::new();
+        for (name, ways, _) in left.into_iter().filter(|(_, _, times)| *times >= enough) {
+            let first = course.actions.iter().position(|action| ways.contains(action));
+            let has_effect = match first.map(|moment| course.actions.split_at(moment)) {
+                Some((before, after)) => {
+                    let held = |action| led.play(before, action, ticks).map(|held| held.hashes);
+                    held(&after[0])? != held(&idle)?
+                }
+                None => false,
+            };
+            if !has_effect {
+                dead.push(name);
+            }
+        }
+        Ok(dead)
     }
 }
 
@@ -225,6 +240,30 @@ mod tests {
         assert_eq!(dead(false, 5.0), ["`Space`"]);
         assert!(dead(true, 5.0).is_empty());
         assert!(dead(false, 20.0).is_empty(), "the episode has 40 ticks, which is too short");
+    }
+
+    #[test]
+    fn an_action_that_has_an_effect_where_the_agent_takes_it_is_not_dead() {
+        let begins_by_enter = |app: &mut App| {
+            app.add_systems(Startup, |mut commands: Commands| {
+                commands.spawn((Runner, Transform::default()));
+            })
+            .add_systems(
+                Update,
+                |keys: Res<ButtonInput<KeyCode>>, mut at: Single<&mut Transform, With<Runner>>| {
+                    let x = &mut at.translation.x;
+                    let moves = if *x < 1.0 { KeyCode::Enter } else { KeyCode::ArrowRight };
+                    *x += f32::from(u8::from(keys.pressed(moves)));
+                },
+            );
+        };
+        let game = ForeignGame::new("runner", 1, begins_by_enter)
+            .keys([vec![], vec![KeyCode::ArrowRight], vec![KeyCode::Enter]])
+            .observe(["x"], |at: Single<&Transform, With<Runner>>| [at.translation.x])
+            .end(|at: Single<&Transform, With<Runner>>| (at.translation.x >= 40.0).then_some(EpisodeEnd::WON))
+            .time_limit(100)
+            .demonstrator("runs", |at: Single<&Transform, With<Runner>>| 1 + u32::from(at.translation.x < 1.0));
+        assert!(dead(&game, &Player::Demonstrator, 5.0).is_empty());
     }
 
     #[test]

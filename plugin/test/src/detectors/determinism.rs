@@ -4,14 +4,15 @@ use crate::detectors::{LevelDefect, LevelDetector, TestedBy, TestedLevel, entity
 use bevy::{math::Vec2, prelude::*};
 use bevy_playbot::{
     action::{Action, ActionValue},
-    episode::{Episode, EpisodeCount},
+    episode::{Episode, EpisodeCount, EpisodeEnd, EpisodeResult},
     fault::Fault,
     observation::Observation,
     reward::Reward,
     state_hash::StateHash,
     vision::{ObservationConfig, VisionError},
 };
-use playbot_harness::{detector::DetectorSetting, eval::Player, game::Game};
+use playbot_harness::{detector::DetectorSetting, eval::Player, game::Game, worlds::EndedEpisodes};
+use std::cell::RefCell;
 
 /// A finding for testers whose episode differs between two Worlds, or within one World that plays it again and again.
 /// It is opt-in, because it plays a tester's first episode on some of the levels several more times.
@@ -28,29 +29,32 @@ impl Default for Determinism {
 }
 
 impl Determinism {
-    /// Plays the episode `episodes` times in a row in one World.
+    /// Plays the episode `episodes` times in a row in one World, each time at most up to the last tick that is compared.
     fn play(&self, level: &TestedLevel<'_>, tester: &TestedBy<'_>, episodes: usize) -> Result<Vec<Played>, Fault> {
         let (player, config) = (tester.player, &tester.observation_config);
         let probe = Probe::new(level.game, level.mode, level.level, player, config, vec![tester.seed; episodes]);
         let mut probe = probe.map_err(|error| Fault(error.to_string()))?.until(level.stop);
+        EndedEpisodes::note_in(&mut probe.world);
         let most = self.ticks as usize;
         let (mut played, mut now) = (Vec::new(), Played::default());
         for _ in 0..episodes * most {
             let is_active = probe.tick()?;
-            let finished = probe.world.get::<EpisodeCount>(probe.agent).map_or(0, |count| count.finished as usize);
-            let is_last = finished == episodes;
-            if finished > played.len() {
-                // The state after the last tick of an episode is that of the next one, if there is one.
-                if is_last && now.hashes.len() < most {
-                    now.hashes.push(hash(&probe.world, probe.agent));
-                }
-                now.is_over = true;
-                played.push(std::mem::take(&mut now));
-            } else if now.hashes.len() < most && !is_loading(&probe) {
-                now.hashes.push(hash(&probe.world, probe.agent));
+            let ended = EndedEpisodes::take(&mut probe.world).pop();
+            if now.hashes.len() < most && !is_loading(&probe) {
+                // The state after the last tick may be that of the next episode, if there is one.
+                let state = || hash(&probe.world, probe.agent);
+                now.hashes.push(ended.map_or_else(state, |(_, result)| hash_of_result(&result)));
             }
-            if !is_active || is_last {
-                break;
+            let is_cut = ended.is_none() && now.hashes.len() == most;
+            if is_cut && let Some(mut episode) = probe.world.get_mut::<Episode>(probe.agent) {
+                episode.abandon();
+            }
+            if ended.is_some() || is_cut {
+                now.is_over = ended.is_some();
+                played.push(std::mem::take(&mut now));
+            }
+            if !is_active || played.len() == episodes {
+                return Ok(played);
             }
         }
         played.push(now);
@@ -60,14 +64,13 @@ impl Determinism {
     /// Returns a difference between repetitions of a tester's first episode, with its tick.
     fn difference(&self, level: &TestedLevel<'_>, tester: &TestedBy<'_>) -> Option<(u32, String)> {
         // Other detectors report a panic.
-        let (one, other) = (self.play(level, tester, 1).ok()?, self.play(level, tester, 1).ok()?);
-        if let Some(tick) = one.first()?.difference(other.first()?) {
+        let (alone, row) = (self.play(level, tester, 1).ok()?, self.play(level, tester, self.episodes as usize).ok()?);
+        let first = row.first()?;
+        if let Some(tick) = alone.first()?.difference(first) {
             let message = "the episode differed when it was played again; `playbot doctor` names what differs";
             return Some((tick, message.to_owned()));
         }
-        // One more, since the end of the last one is not comparable.
-        let row = self.play(level, tester, self.episodes as usize + 1).ok()?;
-        let (first, later) = (row.first()?, row.iter().enumerate().take(self.episodes as usize).skip(1));
+        let later = row.iter().enumerate().skip(1);
         let (number, tick) = later.filter_map(|(number, played)| Some((number, first.difference(played)?))).next()?;
         let message = format!(
             "episode {} of a World differed from the first, though it began from the same seed: something is left \
@@ -110,6 +113,13 @@ fn hash(world: &World, agent: Entity) -> u64 {
     let choice = action.and_then(Action::discrete).unwrap_or(0);
     let done = done.iter().map(|number| u64::from(number.to_bits()));
     StateHash::of([hash_of_state(world, agent), u64::from(choice)].into_iter().chain(done)).0
+}
+
+/// Returns a hash of the result of an episode.
+fn hash_of_result(result: &EpisodeResult) -> u64 {
+    let EpisodeResult { end, success, ticks, total_reward, .. } = *result;
+    let is_truncated = end == EpisodeEnd::Truncated;
+    StateHash::of([u64::from(is_truncated), u64::from(success), u64::from(ticks), total_reward.to_bits()]).0
 }
 
 /// Returns a hash of the known state.
@@ -230,31 +240,50 @@ impl<'a> Script<'a> {
         Ok(course)
     }
 
-    /// Plays these actions. Returns the state after each of them; fewer if the episode ends before.
+    /// Returns the player of episodes whose actions the caller gives.
+    pub fn led_episodes(&self) -> LedEpisodes<'_> {
+        LedEpisodes { script: self, worlds: RefCell::new(Reuse { probe: None, is_clean: true, first: None }) }
+    }
+}
+
+/// The Worlds in which episodes of given actions are played from the start of a level.
+///
+/// Building a World can take longer than many episodes. So a World is used again while its restarts are clean: equal first
+/// actions must lead to the same states as in the first episode. Otherwise each episode is played in a World of its own.
+pub struct LedEpisodes<'a> {
+    script: &'a Script<'a>,
+    worlds: RefCell<Reuse<'a>>,
+}
+
+struct Reuse<'a> {
+    /// The World of the last episode.
+    probe: Option<Probe<'a>>,
+    /// Whether no restart has left anything so far.
+    is_clean: bool,
+    /// The first episode, in a new World: the actions, and the states after them.
+    first: Option<(Vec<ActionValue>, Vec<u64>)>,
+}
+
+impl Reuse<'_> {
+    /// Returns whether an episode is the same as the first one, as long as its actions are.
+    fn is_as_first(&self, actions: &[ActionValue], states: &[SeenState]) -> bool {
+        let Some((first_actions, first_states)) = &self.first else { return true };
+        let same = first_actions.iter().zip(actions).take_while(|(one, other)| one == other).count();
+        let states = states.iter().map(|state| &state.hash).take(same);
+        states.eq(first_states.iter().take(same))
+    }
+}
+
+impl LedEpisodes<'_> {
+    /// Plays these actions. Returns the state after each of them, without that after the end of the episode.
     ///
     /// # Errors
     ///
     /// The game broke its contract, or the test was stopped.
     pub fn states(&self, actions: &[ActionValue]) -> Result<Vec<SeenState>, Fault> {
-        let probe = Probe::led(self.game, self.mode, self.level, self.seed);
-        let mut probe = probe.map_err(broken)?.until(self.stop);
-        let mut states = Vec::new();
-        for _ in 0..MOST_RUNS {
-            let Some(action) = actions.get(states.len()) else { break };
-            probe.world.entity_mut(probe.agent).insert(Action(action.clone()));
-            let is_active = probe.tick()?;
-            if !is_active || probe.is_over() {
-                break;
-            }
-            if ticks(&probe) > states.len() {
-                let seen = probe.world.get::<Observation>(probe.agent);
-                states.push(SeenState {
-                    hash: hash_of_state(&probe.world, probe.agent),
-                    observation: seen.map_or_else(Vec::new, |seen| seen.vector.clone()),
-                    position: self.game.tools().state.position(&probe.world, probe.agent),
-                    action: played_action(&probe),
-                });
-            }
+        let (mut states, has_ended) = self.play_all(actions)?;
+        if has_ended {
+            states.pop();
         }
         Ok(states)
     }
@@ -265,25 +294,61 @@ impl<'a> Script<'a> {
     ///
     /// The game broke its contract, or the test was stopped.
     pub fn play(&self, before: &[ActionValue], then: &ActionValue, ticks_then: usize) -> Result<HeldOn, Fault> {
-        let probe = Probe::led(self.game, self.mode, self.level, self.seed);
-        let mut probe = probe.map_err(broken)?.until(self.stop);
-        let mut held = HeldOn { hashes: Vec::new(), actions: Vec::new() };
-        for _ in 0..MOST_RUNS {
-            let played = ticks(&probe);
-            let action = before.get(played).unwrap_or(then).clone();
-            probe.world.entity_mut(probe.agent).insert(Action(action));
-            let is_active = probe.tick()?;
-            let now = ticks(&probe);
-            if now > played && now > before.len() {
-                held.hashes.push(hash_of_state(&probe.world, probe.agent));
-                held.actions.push(played_action(&probe));
-            }
-            if !is_active || probe.is_over() || now >= before.len() + ticks_then {
-                break;
-            }
-        }
-        Ok(held)
+        let actions: Vec<ActionValue> = before.iter().chain(std::iter::repeat_n(then, ticks_then)).cloned().collect();
+        let (states, _) = self.play_all(&actions)?;
+        let (hashes, actions) = states.into_iter().skip(before.len()).map(|state| (state.hash, state.action)).unzip();
+        Ok(HeldOn { hashes, actions })
     }
+
+    /// Plays an episode of these actions. Returns the state after each tick, and whether the last tick has ended it.
+    fn play_all(&self, actions: &[ActionValue]) -> Result<(Vec<SeenState>, bool), Fault> {
+        let Script { game, mode, level, seed, stop, .. } = *self.script;
+        let mut worlds = self.worlds.borrow_mut();
+        if let Some(mut probe) = worlds.probe.take() {
+            probe.begin_again(level, seed);
+            let played = led(game, &mut probe, actions);
+            if let Ok((states, has_ended)) = played
+                && worlds.is_as_first(actions, &states)
+            {
+                worlds.probe = Some(probe);
+                return Ok((states, has_ended));
+            }
+            worlds.is_clean = false;
+        }
+        let mut probe = Probe::led(game, mode, level, seed).map_err(broken)?.until(stop);
+        let (states, has_ended) = led(game, &mut probe, actions)?;
+        if worlds.is_clean {
+            let hashes = states.iter().map(|state| state.hash).collect();
+            worlds.first = Some((actions.to_vec(), hashes));
+            worlds.probe = Some(probe);
+        }
+        Ok((states, has_ended))
+    }
+}
+
+/// Leads an agent through these actions. Returns the state after each tick, and whether the last tick has ended the
+/// episode.
+fn led(game: &dyn Game, probe: &mut Probe<'_>, actions: &[ActionValue]) -> Result<(Vec<SeenState>, bool), Fault> {
+    let mut states = Vec::new();
+    for _ in 0..MOST_RUNS {
+        let Some(action) = actions.get(states.len()) else { break };
+        probe.world.entity_mut(probe.agent).insert(Action(action.clone()));
+        let is_active = probe.tick()?;
+        let is_tick = ticks(probe) > states.len();
+        if is_tick {
+            let seen = probe.world.get::<Observation>(probe.agent);
+            states.push(SeenState {
+                hash: hash_of_state(&probe.world, probe.agent),
+                observation: seen.map_or_else(Vec::new, |seen| seen.vector.clone()),
+                position: game.tools().state.position(&probe.world, probe.agent),
+                action: played_action(probe),
+            });
+        }
+        if !is_active || probe.is_over() {
+            return Ok((states, is_tick));
+        }
+    }
+    Ok((states, false))
 }
 
 fn broken(error: VisionError) -> Fault {
@@ -303,6 +368,62 @@ fn ticks(probe: &Probe<'_>) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use playbot_harness::foreign::{ForeignGame, Restart};
+    use std::sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering},
+    };
+
+    #[derive(Component)]
+    struct Runner;
+
+    /// Left over from earlier ticks; a restart does not reset it.
+    #[derive(Resource)]
+    struct Push(f32);
+
+    /// A run to the right, faster and faster if the game keeps its push. Counts how often it is built.
+    fn run(keeps: bool, built: &Arc<AtomicU32>) -> ForeignGame {
+        let built = Arc::clone(built);
+        let game = move |app: &mut App| {
+            built.fetch_add(1, Ordering::SeqCst);
+            app.insert_resource(Push(0.0))
+                .add_systems(Startup, |mut commands: Commands| {
+                    commands.spawn((Runner, Transform::default()));
+                })
+                .add_systems(Update, move |mut at: Single<&mut Transform, With<Runner>>, mut push: ResMut<Push>| {
+                    at.translation.x += 1.0 + push.0;
+                    push.0 += if keeps { 0.5 } else { 0.0 };
+                });
+        };
+        ForeignGame::new("runner", 1, game)
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["x"], |at: Single<&Transform, With<Runner>>| [at.translation.x])
+            .time_limit(50)
+            .restart(Restart::Startup)
+    }
+
+    #[test]
+    fn a_world_is_used_again_if_its_restarts_are_clean() {
+        for keeps in [false, true] {
+            let built = Arc::default();
+            let (game, observation_config) = (run(keeps, &built), ObservationConfig::default());
+            let (mode, player, stop) = ("default", &Player::Demonstrator, &|| false);
+            let script = Script { game: &game, mode, level: 0, player, observation_config, seed: 3, stop };
+            let led = script.led_episodes();
+            let seen = |actions: &[u32]| {
+                let actions: Vec<ActionValue> = actions.iter().map(|&action| ActionValue::Discrete(action)).collect();
+                let states = led.states(&actions).expect("sound");
+                states.iter().map(|state| state.observation[0]).collect::<Vec<_>>()
+            };
+            let first = seen(&[0, 0, 0]);
+            assert_eq!(first.len(), 3);
+            let once = built.load(Ordering::SeqCst);
+            assert_eq!(seen(&[0, 0, 1]), first, "Space does nothing");
+            assert_eq!(built.load(Ordering::SeqCst) > once, keeps);
+            assert_eq!(seen(&[0, 0, 0, 0])[..3], first);
+            assert_eq!(seen(&[0; 60]).len(), 49, "the last tick is not among them");
+        }
+    }
 
     #[test]
     fn the_first_tick_that_differs_is_named() {

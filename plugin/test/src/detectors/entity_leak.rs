@@ -98,6 +98,10 @@ impl LevelDetector for EntityLeak {
         ]
     }
 
+    fn depends_on_testers(&self) -> bool {
+        false
+    }
+
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         if !level.is_sample(self.every) {
             return Vec::new();
@@ -132,6 +136,8 @@ pub struct Probe<'a> {
     /// The agent.
     pub agent: Entity,
     stop: &'a dyn Fn() -> bool,
+    /// Episodes that were over before the present ones.
+    finished: u64,
 }
 
 impl<'a> Probe<'a> {
@@ -181,7 +187,18 @@ impl<'a> Probe<'a> {
         let agent = agents.into_iter().next().expect("one agent was asked for");
         let queue = LevelQueue::list(vec![level; seeds.len()]);
         world.entity_mut(agent).insert((queue, EpisodeSeeds::new(seeds)));
-        Ok(Self { world, agent, stop: &|| false })
+        Ok(Self { world, agent, stop: &|| false, finished: 0 })
+    }
+
+    /// Makes the agent begin a level anew with the next tick, wherever it is, for one episode that the caller leads.
+    pub fn begin_again(&mut self, level: u64, seed: u64) {
+        let mut agent = self.world.entity_mut(self.agent);
+        agent.insert((Control::Bot, LevelQueue::list([level]), EpisodeSeeds::new([seed])));
+        self.finished = agent.get::<EpisodeCount>().map_or(0, |count| count.finished);
+        if let Some(mut episode) = agent.get_mut::<Episode>() {
+            episode.abandon();
+            episode.tick = 0;
+        }
     }
 
     /// Makes the probe stop when `stop` returns true.
@@ -192,7 +209,7 @@ impl<'a> Probe<'a> {
 
     /// Returns whether an episode is over.
     pub fn is_over(&self) -> bool {
-        self.world.get::<EpisodeCount>(self.agent).is_some_and(|count| count.finished > 0)
+        self.world.get::<EpisodeCount>(self.agent).is_some_and(|count| count.finished > self.finished)
     }
 
     /// Plays a tick. Returns whether the agent is still playing.

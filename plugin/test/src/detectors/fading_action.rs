@@ -3,7 +3,7 @@
 use crate::detectors::{
     LevelDefect, LevelDetector, TestedLevel,
     dead_action::tried,
-    determinism::{Script, SeenState},
+    determinism::{LedEpisodes, Script, SeenState},
 };
 use bevy_playbot::{action::ActionValue, fault::Fault};
 use playbot_harness::{detector::DetectorSetting, game::idle_action};
@@ -63,17 +63,23 @@ impl LevelDetector for FadingAction {
         ]
     }
 
+    fn depends_on_testers(&self) -> bool {
+        false
+    }
+
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         let Some(tester) = level.testers.first().filter(|_| level.is_sample(self.every)) else { return Vec::new() };
+        // The actions are given, so the player decides nothing, and its seed is without effect.
+        let script = Script { seed: 0, ..Script::new(level, tester) };
         // Other detectors report a panic.
-        let faded = self.faded(&Script::new(level, tester)).unwrap_or_default();
+        let faded = self.faded(&script).unwrap_or_default();
         faded.into_iter().map(|message| LevelDefect { message, ..LevelDefect::default() }).collect()
     }
 }
 
 /// An action that is tried again and again.
-struct Tried<'a> {
-    script: &'a Script<'a>,
+struct Tried<'a, 'b> {
+    led: &'a LedEpisodes<'b>,
     idle: &'a ActionValue,
     /// All ticks: a rest, then the tries.
     actions: Vec<ActionValue>,
@@ -84,7 +90,7 @@ struct Tried<'a> {
     length: usize,
 }
 
-impl Tried<'_> {
+impl Tried<'_, '_> {
     /// Returns the number of tries that are played to their end.
     fn count(&self) -> usize {
         self.states.len().saturating_sub(self.rest) / self.length
@@ -98,7 +104,7 @@ impl Tried<'_> {
     /// Returns whether doing nothing from the begin of a try to the end of another one changes anything.
     fn has_effect(&self, from: usize, to: usize) -> Result<bool, Fault> {
         let (begin, end) = (self.begin(from), self.begin(to));
-        let nothing = self.script.play(&self.actions[..begin], self.idle, end - begin)?;
+        let nothing = self.led.play(&self.actions[..begin], self.idle, end - begin)?;
         Ok(nothing.hashes.iter().ne(self.states[begin..end].iter().map(|state| &state.hash)))
     }
 
@@ -131,15 +137,16 @@ impl FadingAction {
         let [tries, last, ticks, rest] = [self.tries, self.last, self.ticks, self.rest].map(|number| number as usize);
         let (length, idle, actions) = (ticks.saturating_add(rest), idle_action(script.game), tried(script.game));
         let most = rest.saturating_add(tries.saturating_mul(length)).min(MOST_TICKS);
-        let resting = script.states(&vec![idle.clone(); most])?;
+        let led = script.led_episodes();
+        let resting = led.states(&vec![idle.clone(); most])?;
         let mut found = Vec::new();
         for (name, ways) in &actions {
             for way in ways {
                 let one = std::iter::repeat_n(way, ticks).chain(std::iter::repeat_n(&idle, rest));
                 let all = std::iter::repeat_n(&idle, rest).chain(one.cycle()).take(most);
                 let actions: Vec<ActionValue> = all.cloned().collect();
-                let states = script.states(&actions)?;
-                let tried = Tried { script, idle: &idle, actions, states, rest, length };
+                let states = led.states(&actions)?;
+                let tried = Tried { led: &led, idle: &idle, actions, states, rest, length };
                 let count = tried.count();
                 if count <= last {
                     continue;
@@ -173,7 +180,7 @@ impl FadingAction {
     /// Returns the name of an action that still has an effect at the begin of this try.
     fn working(
         &self,
-        tried: &Tried<'_>,
+        tried: &Tried<'_, '_>,
         others: &[(String, Vec<ActionValue>)],
         number: usize,
     ) -> Result<Option<String>, Fault> {
@@ -182,7 +189,7 @@ impl FadingAction {
             tried.states[begin..].iter().map(|state| state.hash).take(self.ticks as usize).collect();
         for (name, ways) in others {
             for way in ways {
-                if tried.script.play(&tried.actions[..begin], way, nothing.len())?.hashes != nothing {
+                if tried.led.play(&tried.actions[..begin], way, nothing.len())?.hashes != nothing {
                     return Ok(Some(name.clone()));
                 }
             }

@@ -200,6 +200,10 @@ impl LevelDetector for UnreachableRegion {
         ]
     }
 
+    fn depends_on_testers(&self) -> bool {
+        false
+    }
+
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         if !level.is_sample(self.every) {
             return Vec::new();

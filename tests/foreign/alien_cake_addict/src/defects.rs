@@ -70,28 +70,26 @@ fn add<M>(app: &mut App, system: impl IntoScheduleConfigs<bevy::ecs::system::Sch
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use playbot::harness::foreign::Restart;
 
     use super::*;
     use crate::{game, refresh};
 
     /// Returns the game with a bot that walks to the cake.
-    fn played() -> Arc<ForeignGame> {
-        let played = ForeignGame::new("alien_cake_addict", 1, game)
+    fn played() -> ForeignGame {
+        ForeignGame::new("alien_cake_addict", 1, game)
             .hz(20.0)
             .keys([KeyCode::ArrowUp, KeyCode::ArrowDown, KeyCode::ArrowRight, KeyCode::ArrowLeft].map(|key| vec![key]))
             .observe(["cakes"], |game: Res<Game>| [game.cake_eaten as f32])
             .reward_delta(|game: Res<Game>| game.cake_eaten as f32)
+            .time_limit(600)
             .restart(Restart::state(GameState::Playing))
             .level(refresh)
             .demonstrator("glutton", |game: Res<Game>| {
                 let (at, cake) = (&game.player, &game.bonus);
                 [at.i < cake.i, at.i > cake.i, at.j < cake.j].iter().position(|go| *go).unwrap_or(3) as u32
-            });
-        Arc::new(played)
+            })
     }
 
-    playbot_shell::planted_defects!(game: played(), kinds: kinds(), levels: 6, ticks: 600);
+    playbot_shell::planted_defects!(game: played(), levels: "default:0..5");
 }

@@ -68,20 +68,19 @@ fn kinds() -> [DefectKind; 4] {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use playbot::harness::foreign::{LevelSeed, Restart};
-    use playbot::prelude::*;
+    use playbot::prelude::EpisodeEnd;
 
     use super::*;
     use crate::game::{self, Level, Map};
 
     /// Returns the game with a bot that runs and hops where the ground ahead is another.
-    fn game() -> Arc<ForeignGame> {
-        let game = ForeignGame::new("gem_hop", 1, game::game)
+    fn game() -> ForeignGame {
+        ForeignGame::new("gem_hop", 1, game::game)
             .keys([vec![], vec![KeyCode::ArrowRight], vec![KeyCode::ArrowRight, KeyCode::Space]])
             .observe(["x"], |at: Single<&Transform, With<Hero>>| [at.translation.x])
             .end(|on: Res<State<Screen>>| matches!(**on, Screen::Won | Screen::Lost).then_some(EpisodeEnd::LOST))
+            .time_limit(900)
             .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>, mut next: ResMut<NextState<Screen>>| {
                 level.0 = seed.0;
                 next.set(Screen::Loading);
@@ -93,9 +92,8 @@ mod tests {
                 // A player that no goal stops runs past the end.
                 let next = map.columns[((at.x + 0.8) as usize).min(map.columns.len() - 1)];
                 1 + u32::from(next.spikes || f32::from(next.ground) != at.y.floor() || hero.1.velocity.y > 0.0)
-            });
-        Arc::new(game)
+            })
     }
 
-    playbot_shell::planted_defects!(game: game(), kinds: kinds(), levels: 4, ticks: 900);
+    playbot_shell::planted_defects!(game: game(), levels: "default:0..3");
 }

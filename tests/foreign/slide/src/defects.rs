@@ -175,19 +175,17 @@ fn kinds() -> [DefectKind; 10] {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use playbot::harness::foreign::{LevelSeed, Restart};
-    use playbot::prelude::*;
+    use playbot::prelude::{EpisodeEnd, PointerPosition};
 
     use super::*;
     use crate::game;
 
     /// Returns the game with clicks on Start and on cells, and a bot that solves it.
-    fn game() -> Arc<ForeignGame> {
+    fn game() -> ForeignGame {
         let middle = |at: usize| (at as f32 + 0.5) / SIDE as f32;
         let cells = (0..CELLS).map(|cell| Some(PointerPosition::fraction(middle(cell % SIDE), middle(cell / SIDE))));
-        let game = ForeignGame::new("slide", 1, game::game)
+        ForeignGame::new("slide", 1, game::game)
             .cursor([None].into_iter().chain(cells))
             .mouse_buttons([vec![]].into_iter().chain((0..CELLS).map(|_| vec![MouseButton::Left])))
             .clicks(["Start"])
@@ -204,9 +202,8 @@ mod tests {
             .demonstrator("solver", |board: Res<Board>, screen: Res<State<Screen>>| match **screen {
                 Screen::Menu => 1 + CELLS as u32,
                 _ => board.hint(8).map_or(0, |cell| 1 + cell as u32),
-            });
-        Arc::new(game)
+            })
     }
 
-    playbot_shell::planted_defects!(game: game(), kinds: kinds(), levels: 12, ticks: 60);
+    playbot_shell::planted_defects!(game: game(), levels: "default:0..11");
 }

@@ -2,6 +2,7 @@
 
 mod defects;
 mod game;
+mod rules;
 
 use std::process::ExitCode;
 
@@ -16,7 +17,7 @@ const START: u32 = 1 + CELLS as u32;
 fn main() -> ExitCode {
     let middle = |at: usize| (at as f32 + 0.5) / SIDE as f32;
     let cells = (0..CELLS).map(|cell| Some(PointerPosition::fraction(middle(cell % SIDE), middle(cell / SIDE))));
-    playbot::main(&[&defects::add_to(ForeignGame::new("slide", 1, game::game))
+    playbot::main(&[&rules::add_to(ForeignGame::new("slide", 1, game::game))
         .cursor([None].into_iter().chain(cells))
         .mouse_buttons([vec![]].into_iter().chain((0..CELLS).map(|_| vec![MouseButton::Left])))
         .clicks(["Start"])

@@ -202,6 +202,16 @@ fn every_kind_is_planted_into_levels_that_the_bot_solves() {
 }
 
 #[test]
+fn variants_that_no_bot_notices_are_named() {
+    let levels = |text: &str| text.parse::<LevelSplit>().expect("a split");
+    // Level 1001 is one after a multiple of 4, and level 1002 two.
+    for threads in [1, 3] {
+        assert_eq!(without_effect(&Dash, &levels("default:1001..1002"), threads), [("seldom", 0)]);
+    }
+    assert_eq!(without_effect(&Dash, &levels("default:1002..1002"), 1), [("seldom", 0), ("seldom", 1)]);
+}
+
+#[test]
 fn the_same_seed_makes_the_same_files_and_another_one_others() {
     let write = |plan: &MakePlan| {
         let folder = tempfile::tempdir().expect("a folder");

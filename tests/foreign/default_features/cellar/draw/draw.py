@@ -2,7 +2,7 @@
 
 import collections, json, pathlib, random, struct, uuid, zlib
 
-WIDTH, HEIGHT, SIDE, ROOMS = 11, 9, 16, 120
+WIDTH, HEIGHT, SIDE, ROOMS = 11, 9, 16, 240
 THINGS = {"P": "Walker", "k": "Key", "d": "Door", "E": "Exit"}
 UIDS = {letter: 10 + number for number, letter in enumerate(THINGS)}
 HERE = pathlib.Path(__file__).parent

@@ -63,7 +63,8 @@ impl Room {
         std::array::from_fn(|cell| self.cell(self.at + IVec2::new(cell as i32 % 5 - 2, cell as i32 / 5 - 2)) as u8)
     }
 
-    fn put(&mut self, at: IVec2, cell: Cell) {
+    /// Changes the content of a cell.
+    pub fn put(&mut self, at: IVec2, cell: Cell) {
         let [column, row] = [at.x, at.y].map(|at| at.max(0) as usize);
         self.cells.resize(self.cells.len().max(row + 1), Vec::new());
         let cells = &mut self.cells[row];
@@ -72,7 +73,7 @@ impl Room {
     }
 
     /// Takes a step, if nothing is in the way. Returns the content of the cell.
-    fn step(&mut self, way: IVec2) -> Option<Cell> {
+    pub fn step(&mut self, way: IVec2) -> Option<Cell> {
         let to = self.at + way;
         let cell = self.cell(to);
         match cell {
@@ -114,7 +115,7 @@ impl Room {
 
 /// The walker, with the seconds until the next step.
 #[derive(Component, Default)]
-struct Walker(f32);
+pub struct Walker(f32);
 
 /// A thing that can be taken, opened or reached.
 #[derive(Component, Clone, Copy, Default)]

@@ -1,6 +1,8 @@
 //! Cellar, a walk through rooms that are drawn in LDtk, without any code for playbot, with every verb of it.
 
+mod defects;
 mod game;
+mod rules;
 
 use std::process::ExitCode;
 
@@ -16,7 +18,7 @@ const ASSETS: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/assets");
 fn main() -> ExitCode {
     let legend = MapLegend::default().walls(["wall"]).hazards(["pit"]).start("Walker").goal("Exit").in_cells();
     let views = (0..25).map(|cell| format!("cell {cell}"));
-    playbot::main(&[&ForeignGame::new("cellar", 1, game::game)
+    playbot::main(&[&rules::add_to(ForeignGame::new("cellar", 1, game::game))
         .default_plugins(|plugins| plugins.set(AssetPlugin { file_path: ASSETS.to_owned(), ..default() }))
         .ldtk(format!("{ASSETS}/cellar.ldtk"), legend)
         .level(|level: Res<EditorLevel>, mut chosen: ResMut<LevelSelection>, mut next: ResMut<NextState<Screen>>| {

@@ -73,9 +73,12 @@ pub type Body = (&'static Transform, &'static LinearVelocity, &'static Hero);
 
 /// An object that the hero can touch.
 #[derive(Component, Clone, Copy, PartialEq, Eq)]
-enum Thing {
+pub enum Thing {
+    /// Counts once it is picked.
     Fruit,
+    /// Ends the run.
     Thorns,
+    /// Wins.
     Gate,
 }
 

@@ -1,6 +1,7 @@
 //! Orchard, a platformer without any code for playbot, with every verb of it.
 
 mod defects;
+mod rules;
 
 use std::process::ExitCode;
 
@@ -13,7 +14,7 @@ use playbot::harness::foreign::{ForeignGame, LevelSeed};
 use playbot::prelude::EpisodeEnd;
 
 fn main() -> ExitCode {
-    playbot::main(&[&defects::add_to(ForeignGame::new("orchard", 1, game))
+    playbot::main(&[&rules::add_to(ForeignGame::new("orchard", 1, game))
         .hz(64.0)
         .default_plugins(|plugins| plugins.set(AssetPlugin { file_path: ASSETS.into(), ..default() }))
         .keys([vec![], vec![ArrowLeft], vec![ArrowRight], vec![ArrowRight, Space], vec![Space]])
