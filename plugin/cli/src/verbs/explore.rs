@@ -149,6 +149,9 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if let Some(fault) = &exploration.snapshot_fault {
         report!("warning: {fault}");
     }
+    if let Some(obstacle) = &exploration.snapshot_obstacle {
+        report!("warning: `{}` was explored by replays, since snapshots are not possible: {obstacle}", game.name());
+    }
     report!("{}", pace(&exploration, begin.elapsed()));
     let to_cell = args.cell.as_ref().map(|cell| (cell, exploration.route_to(cell)));
     print(&exploration.summary(game), to_cell.as_ref(), args.json)?;
