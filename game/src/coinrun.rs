@@ -13,7 +13,6 @@
 //! - [`planner`] and `demonstrator_bot`: plans to the coin, and the bot that follows them; `proof`: proofs about
 //!   levels.
 //! - [`picture`]: what sensors and people see.
-//! - `snapshot`: episodes that are saved in the middle.
 //! - [`text`], `level_text` and `show_level`: levels as text, as files, and on the command line.
 //! - `detectors` and `defects`: the game's own detectors, and the defects that can be planted.
 
@@ -34,13 +33,14 @@ mod proof;
 pub mod rules;
 mod show_level;
 pub mod sim;
-mod snapshot;
 pub mod text;
 pub mod tile;
 pub mod view;
 
 use crate::coinrun::{
-    components::{CoinRunMode, LastOutcome, PlayerBody, PlaysIn, Tiles, level_of},
+    components::{
+        ArenaBody, ArenaEntities, CoinRunMode, LastOutcome, PlayerBody, PlayerMemory, PlaysIn, Tiles, level_of,
+    },
     physics::CoinRunPhysicsPlugin,
     picture::{CoinRunPicturePlugin, VIEW},
     proof::{prove, prove_from},
@@ -54,7 +54,8 @@ use playbot_harness::{
     detector::{Detector, LevelProof},
     floor_plan::FloorPlan,
     game::{
-        BenchmarkTools, BotTools, InputTools, LevelTools, PictureTools, StateTools, TestTools, TraceTools, TrainTools,
+        BenchmarkTools, BotTools, InputTools, LevelTools, PictureTools, Snapshot, SnapshotTools, StateTools, TestTools,
+        TraceTools, TrainTools,
     },
     inspect::{ExperimentText, InspectError, LevelRequest, LevelView},
     level_files::{LevelDesign, LevelTextError, is_level_files},
@@ -190,6 +191,49 @@ impl StateTools for CoinRun {
 
     fn prove_from(&self, world: &World, agent: Entity) -> LevelProof {
         prove_from(world, agent)
+    }
+}
+
+/// The state of an arena and its player between two ticks. Colliders follow the bodies, and are no part of it.
+struct SavedArena {
+    player: (PlayerBody, PlayerMemory, LastOutcome),
+    tiles: Tiles,
+    /// In creation order, which is the same for all arenas of a level.
+    bodies: Vec<ArenaBody>,
+}
+
+impl SnapshotTools for CoinRun {
+    fn save(&self, world: &World, agent: Entity) -> Option<Snapshot> {
+        let arena = world.get::<PlaysIn>(agent)?.0;
+        let entities = world.get::<ArenaEntities>(arena)?;
+        let bodies = entities.iter().map(|entity| world.get::<ArenaBody>(entity).copied());
+        Some(Snapshot::new(SavedArena {
+            player: (*world.get(agent)?, *world.get(agent)?, *world.get(agent)?),
+            tiles: world.get::<Tiles>(arena)?.clone(),
+            bodies: bodies.collect::<Option<_>>()?,
+        }))
+    }
+
+    fn load(&self, world: &mut World, agent: Entity, snapshot: &Snapshot) -> bool {
+        let Some(saved) = snapshot.get::<SavedArena>() else { return false };
+        let Some(arena) = world.get::<PlaysIn>(agent).map(|plays_in| plays_in.0) else { return false };
+        let entities: Vec<Entity> =
+            world.get::<ArenaEntities>(arena).map_or_else(Vec::new, |entities| entities.iter().collect());
+        // No level is built yet, or a game on top has added bodies.
+        if entities.len() != saved.bodies.len() {
+            return false;
+        }
+        for (entity, body) in entities.into_iter().zip(&saved.bodies) {
+            world.entity_mut(entity).insert(*body);
+        }
+        // Pictures draw tiles again if they are changed.
+        if let Some(mut tiles) = world.get_mut::<Tiles>(arena)
+            && *tiles != saved.tiles
+        {
+            tiles.clone_from(&saved.tiles);
+        }
+        world.entity_mut(agent).insert(saved.player);
+        true
     }
 }
 

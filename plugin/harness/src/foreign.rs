@@ -148,6 +148,7 @@ impl ForeignGame {
             cell: None,
             proof: None,
             snapshot: None,
+            snapshot_parts: Vec::new(),
             rewards: Vec::new(),
             end: None,
             end_cause: None,

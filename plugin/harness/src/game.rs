@@ -490,6 +490,11 @@ pub trait SnapshotTools: Send + Sync {
     fn load(&self, _world: &mut World, _agent: Entity, _snapshot: &Snapshot) -> bool {
         false
     }
+
+    /// Returns why nothing was saved or loaded in this World, in words; `None`, by default, if there is no reason to name.
+    fn obstacle(&self, _world: &World) -> Option<String> {
+        None
+    }
 }
 
 /// Steps of an agent as lines of numbers: see [`trace_actions`](crate::trace::trace_actions).

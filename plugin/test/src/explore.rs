@@ -272,6 +272,8 @@ pub struct Exploration {
     pub restored_steps: u64,
     /// The difference that made the exploration do without snapshots, if there was one.
     pub snapshot_fault: Option<SnapshotFault>,
+    /// Why the game has saved or loaded no snapshot, if there is a reason to name.
+    pub snapshot_obstacle: Option<String>,
     /// Visits.
     pub visits: u64,
     /// Ends of their episodes.

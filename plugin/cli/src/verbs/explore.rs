@@ -150,6 +150,9 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if let Some(fault) = &exploration.snapshot_fault {
         report!("warning: {fault}");
     }
+    if let Some(obstacle) = &exploration.snapshot_obstacle {
+        report!("warning: `{}` was explored by replays, since snapshots are not possible: {obstacle}", game.name());
+    }
     report!("{}", pace(&exploration, begin.elapsed()));
     if exploration.has_goal && exploration.solution_ticks().is_none() && repeats_keys(game, &plan) {
         report!(

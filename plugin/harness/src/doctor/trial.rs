@@ -167,6 +167,8 @@ impl<'a> Trial<'a> {
             Some(tick) => format!("the snapshot before tick {tick} could not be loaded"),
             None => format!("no snapshot was saved in {ticks} ticks"),
         };
+        let obstacle = self.game.tools().snapshots.obstacle(&self.copies[1].world);
+        let why = obstacle.map_or_else(|| why.clone(), |obstacle| format!("{why} ({obstacle})"));
         (self.returns == 0).then(|| format!("{why}, so explorers return by replays"))
     }
 

@@ -16,7 +16,7 @@ use crate::{
         paths::ObservedPath,
         restart,
         runtime::{Baseline, Foreign, ForeignCell, LevelSeed, PlayedAgent, ReaderFactory, Sensor, SystemFactory},
-        snapshot::SnapshotParts,
+        snapshot::{Part, SnapshotParts, add_whole},
     },
 };
 use bevy::{
@@ -67,6 +67,8 @@ pub(super) struct Description {
     pub(super) proof: Option<ReaderFactory<LevelProof>>,
     /// How the state of an episode is saved and loaded.
     pub(super) snapshot: Option<SnapshotParts>,
+    /// How single types are saved and loaded, if the plugin saves all state.
+    pub(super) snapshot_parts: Vec<Part>,
     /// Reward systems; the flag says whether the growth of the value is paid.
     pub(super) rewards: Vec<(SystemFactory<f32>, bool)>,
     pub(super) end: Option<SystemFactory<Option<EpisodeEnd>>>,
@@ -209,6 +211,9 @@ impl Plugin for ForeignPlugin {
         if description.has_state() {
             observe::add_state(app);
         }
+        if let Some(SnapshotParts::Whole) = description.snapshot {
+            add_whole(app, &description.snapshot_parts);
+        }
     }
 
     fn finish(&self, app: &mut App) {
@@ -226,7 +231,7 @@ fn note_baseline(world: &mut World) {
     let (baseline, clocks) = (Baseline::of(world), ClockSettings::of(world));
     if let Some(cell) = world.get_resource::<ForeignCell>().cloned() {
         let mut foreign = cell.lock();
-        (foreign.baseline, foreign.clocks) = (Some(baseline), Some(clocks));
+        (foreign.baseline, foreign.clocks) = (Some(Arc::new(baseline)), Some(clocks));
     }
 }
 

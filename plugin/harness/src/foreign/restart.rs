@@ -7,6 +7,7 @@ use crate::{
         levels::{EditorLevel, LevelFromFile, editor_level_ahead, level_ahead},
         observe::forget_state,
         runtime::{AgentParts, Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agents, with_foreign},
+        snapshot::{note_frame, note_start},
     },
     level_files::LevelDesigns,
 };
@@ -162,6 +163,7 @@ fn forget_messages(world: &mut World, foreign: &Foreign) {
 
 /// Checks whether the level is ready. Each restart gets one frame to settle: commands, states and transforms.
 pub(super) fn check(world: &mut World) {
+    note_frame(world);
     let mut agents = active_agents(world);
     agents.retain(|&agent| world.get::<Episode>(agent).is_some_and(Episode::is_loading));
     let Some(&first) = agents.first() else { return };
@@ -189,6 +191,9 @@ pub(super) fn check(world: &mut World) {
         }
         if let Some(system) = &mut foreign.loaded {
             system.demand(world)?;
+        }
+        if let Some(baseline) = &foreign.baseline {
+            note_start(world, baseline);
         }
         Ok(true)
     });

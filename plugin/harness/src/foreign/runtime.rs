@@ -134,7 +134,7 @@ pub(super) struct Foreign {
     pub(super) restart: Option<OwnedSystem<()>>,
     pub(super) hash: Option<OwnedSystem<u64>>,
     /// The World before the game started.
-    pub(super) baseline: Option<Baseline>,
+    pub(super) baseline: Option<Arc<Baseline>>,
     /// The clocks before the game started.
     pub(super) clocks: Option<ClockSettings>,
     /// The clocks when the first episode was about to begin.
@@ -162,7 +162,7 @@ impl Foreign {
             asked: 0,
             guess: Guess::default(),
             proof: description.proof.as_ref().map(|system| system.make()),
-            save: description.snapshot.as_ref().map(|parts| parts.save.make()),
+            save: description.snapshot.as_ref().and_then(|parts| parts.reader()),
             failed_proof: None,
             ready: description.ready.as_ref().map(|system| system.make()),
             level: description.level.as_ref().map(|system| system.make()),

@@ -478,12 +478,15 @@ impl Visit {
         }
     }
 
-    /// Keeps a snapshot if a cell of this tick is news, and the last one is some ticks old.
+    /// Keeps a snapshot if a cell of this tick is news, and the last one is some ticks old. A game that saves nothing in
+    /// this tick is asked again in the next one.
     fn save_news(&mut self, end: Option<EpisodeResult>, save: impl FnOnce() -> Option<SavedEpisode>) {
         let has_news = std::mem::take(&mut self.has_news) && end.is_none();
         let last = self.visited.saved.last().map(SavedEpisode::tick);
         if has_news && last.is_none_or(|last| self.ticks - last >= SPACING) {
-            self.visited.saved.extend(save());
+            let saved = save();
+            self.has_news = saved.is_none();
+            self.visited.saved.extend(saved);
         }
     }
 

@@ -131,6 +131,8 @@ fn search(
         }
     };
     let grid = has_positions(&crews).then_some(grid);
+    let obstacle = |crew: &Crew<'_>| game.tools().snapshots.obstacle(&crew.world.world);
+    let snapshot_obstacle = if has_snapshots { crews.iter().find_map(obstacle) } else { None };
     let rests_on = crews.iter().find_map(|crew| crew.world.lookout.describe());
     // They borrow the open cells, which are part of the result.
     drop(crews);
@@ -144,6 +146,7 @@ fn search(
         steps,
         restored_steps,
         snapshot_fault: None,
+        snapshot_obstacle,
         visits,
         ends,
         curve,

@@ -25,6 +25,8 @@ fn main() -> ExitCode {
             next.set(Loading);
         })
         .ready(in_state(Playing))
+        .snapshots()
+        .snapshot_of(|map: &Map| map.columns.clone(), |map, columns| map.columns.clone_from(columns))
         .demonstrator("runner", |hero: Single<(&Transform, &Hero)>, map: Res<Map>| {
             let (at, next) = (hero.0.translation, map.columns[(hero.0.translation.x + 0.8) as usize]);
             2 + u32::from(next.spikes || f32::from(next.ground) != at.y.floor() || hero.1.velocity.y > 0.0)

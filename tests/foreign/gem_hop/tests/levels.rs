@@ -4,10 +4,13 @@
 #[allow(dead_code, reason = "what the adapter reads")]
 mod game;
 
+use std::ops::ControlFlow;
+
 use bevy::prelude::*;
 use game::{Hero, Level, Map, Screen, game};
 use playbot::harness::foreign::{ForeignGame, LevelSeed, Restart};
 use playbot::prelude::EpisodeEnd;
+use playbot::test::explore::{ExplorePlan, Until, explore};
 use playbot::test::verdict::LevelOutcome;
 
 /// Returns the game with a bot that runs and hops, as in `src/main.rs`, and with smaller observations.
@@ -45,4 +48,21 @@ fn the_runner_solves_most_levels() {
 #[test]
 fn the_game_plays_the_same_again() {
     playbot::test(&gem_hop()).levels("default:0..1").assert_deterministic();
+}
+
+#[test]
+fn explorers_find_the_same_from_snapshots_as_by_replays() {
+    let game = gem_hop()
+        .position(|hero: Single<&Transform, With<Hero>>| hero.translation.truncate())
+        .snapshots()
+        .snapshot_of(|map: &Map| map.columns.clone(), |map, columns| map.columns.clone_from(columns));
+    let explored = |snapshots: bool| {
+        let plan = ExplorePlan { steps: 20_000, until: Until::Spent, snapshots, ..ExplorePlan::new("default", 3) };
+        let found = explore(&game, &plan, |_| {}, |_| ControlFlow::Continue(()));
+        found.unwrap_or_else(|error| panic!("{error}"))
+    };
+    let (restored, replayed) = (explored(true), explored(false));
+    assert_eq!((&restored.snapshot_fault, &restored.snapshot_obstacle), (&None, &None));
+    assert!(restored.restored_steps > 0, "of {}", restored.steps);
+    assert_eq!(format!("{:?}", restored.summary(&game)), format!("{:?}", replayed.summary(&game)));
 }
