@@ -118,7 +118,10 @@ impl GameCopy {
     /// Lets all further episodes be of this level.
     fn set_level(&mut self, level: u64) {
         for &agent in &self.agents {
-            self.world.entity_mut(agent).insert(LevelQueue::Always(level));
+            // An agent may be gone: that is a fault of the copy.
+            if let Ok(mut agent) = self.world.get_entity_mut(agent) {
+                agent.insert(LevelQueue::Always(level));
+            }
         }
     }
 
