@@ -11,7 +11,7 @@
 //! | begin an episode in a World as new | [`Renewal`], [`NextEpisode`], [`EpisodeSeeds`], [`LevelFiles`] |
 //! | find the tick of a game, whatever its frames | [`TickSchedules`], [`is_tick`], [`set_tick_rate`] |
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
-//! | name the assets that a game waits for | [`UnloadedAssets`] |
+//! | let frames wait for the assets of a game, and name them | [`deliver_between_frames`], [`wait_for_assets`], [`UnloadedAssets`] |
 //! | decide for many agents at once | [`PolicyBatch`], [`PolicyRows`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
 //! | keep systems in one order | [`put_in_order`], [`leave_open`], [`FaultSystems`], [`run_observe_schedule`] |
 //! | check what agents see and do | [`check_actions`], [`check_observations`], [`misfit`], [`has_no_actions`], [`AgentLimit`] |
@@ -61,7 +61,7 @@ pub use crate::{
 };
 // Documented here: games do not need their modules, which are private.
 pub use crate::{
-    loading::UnloadedAssets,
+    loading::{UnloadedAssets, deliver_between_frames, wait_for_assets},
     policy_batch::{Playing, PolicyBatch, PolicyRows, SharedBatch},
     renewal::{NextEpisode, Renewal},
 };
