@@ -69,7 +69,7 @@ pub use crate::{
 /// Panics of a game: turned into faults, with a file that replays to the panic.
 pub mod panics {
     pub use crate::panics::{
-        EpisodeTrace, PanicReports, hear, lacks_render_app, note_actions, place_of_panic, refusal, refuse,
+        EpisodeTrace, PanicReports, hear, lacks_render_app, note_actions, place_of_panic, refusal, refuse, tell_at_once,
     };
 }
 

@@ -14,3 +14,4 @@ mod play;
 mod rebuild;
 mod restarts;
 mod snapshots;
+mod starts;

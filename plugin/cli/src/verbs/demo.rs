@@ -7,7 +7,7 @@ mod filter;
 mod show;
 
 use crate::{
-    arguments::open,
+    arguments::{check_start, open},
     error::{CliError, Outcome},
     output::{prepare, print_line, program},
     progress,
@@ -225,6 +225,7 @@ fn replay(file: &Path, games: &Games) -> Result<VerifyReport, CliError> {
     // The whole file is read before any of it is played, so that damage shows at once.
     let summary = DemoSummary::read(file)?;
     let game = games.of_file(Artifact::Recording, file, &summary.header.game)?;
+    check_start(game, &summary.header.mode, 0)?;
     let bar = progress::bar("replay", summary.episodes as u64, "episodes");
     let report = verify_file(game, file, |done| bar.set_position(done));
     bar.finish_and_clear();

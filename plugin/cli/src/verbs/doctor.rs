@@ -1,7 +1,7 @@
 //! `playbot doctor`.
 
 use crate::{
-    arguments::{default_mode, level_number, warn_of_idle_agents},
+    arguments::{check_start, default_mode, level_number, warn_of_idle_agents},
     error::{CliError, Outcome},
     output::print_line,
     progress::{interrupt, interrupt::NothingToSave},
@@ -12,7 +12,7 @@ use playbot_harness::{
     games::Games,
     prelude::*,
     split::check_level,
-    worlds::{build_world, check_build},
+    worlds::build_world,
 };
 use std::time::Instant;
 
@@ -69,7 +69,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let level = level_number(args.level, args.seed).unwrap_or(0);
     game.check_mode(&mode)?;
     check_level(game, &mode, level)?;
-    check_build(game, &mode)?;
+    check_start(game, &mode, level)?;
     let options = DoctorOptions {
         ticks: args.ticks,
         level,
