@@ -74,7 +74,8 @@ enum Verb {
     /// Replay recordings. Exit code 1 if one diverges, is damaged or cannot be replayed.
     ///
     /// Each episode is replayed in a new World, and in a World that has played another episode. The message says which
-    /// of the two differs. `learn-skills` and `train` accept every recording that this accepts.
+    /// of the two differs. `learn-skills` and `train` accept every recording that this accepts. For `learn-skills`, an
+    /// episode must have at least the steps of `skills.window`.
     Verify {
         /// Files or folders.
         #[arg(default_value = "demos")]

@@ -18,6 +18,7 @@ playbot_shell::tests!(
     a_killed_training_goes_on_bit_for_bit,
     a_policy_file_plays_as_its_run,
     the_doctor_finds_nothing,
+    what_verifies_is_learned_from,
     levels_are_looked_at,
     levels_are_tested,
     methods_are_compared,
