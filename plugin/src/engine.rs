@@ -13,7 +13,7 @@
 //! | find the tick of a game, whatever its frames | [`TickSchedules`], [`is_tick`], [`set_tick_rate`] |
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
 //! | name the tick in which a game logs a message | [`moment_of_thread`], [`EpisodeMoment`] |
-//! | name the assets that a game waits for | [`UnloadedAssets`] |
+//! | let frames wait for the assets of a game, and name them | [`deliver_between_frames`], [`wait_for_assets`], [`UnloadedAssets`] |
 //! | name the level of a call that does not return | [`GameCall`], [`SlowCalls`], [`SlowCall`] |
 //! | decide for many agents at once | [`PolicyBatch`], [`PolicyRows`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
 //! | keep systems in one order | [`put_in_order`], [`leave_open`], [`FaultSystems`], [`run_observe_schedule`] |
@@ -66,7 +66,7 @@ pub use crate::{
 // Documented here: games do not need their modules, which are private.
 pub use crate::{
     calls::{GameCall, SlowCall, SlowCalls},
-    loading::UnloadedAssets,
+    loading::{UnloadedAssets, deliver_between_frames, wait_for_assets},
     policy_batch::{Playing, PolicyBatch, PolicyRows, SharedBatch},
     renewal::{NextEpisode, Renewal},
 };
@@ -74,7 +74,7 @@ pub use crate::{
 /// Panics of a game: turned into faults, with a file that replays to the panic.
 pub mod panics {
     pub use crate::panics::{
-        EpisodeTrace, PanicReports, hear, lacks_render_app, note_actions, place_of_panic, refusal, refuse,
+        EpisodeTrace, PanicReports, hear, lacks_render_app, note_actions, place_of_panic, refusal, refuse, tell_at_once,
     };
 }
 

@@ -1,4 +1,4 @@
-//! Assets that Bevy's asset server is still loading, and headless frames that wait for them.
+//! Assets that Bevy's asset server is still loading, and frames that wait for them.
 
 use crate::carry_over::ReflectCarryResource;
 use bevy::{
@@ -117,7 +117,7 @@ struct OverdueAssets(Vec<String>);
 
 /// Keeps Bevy from delivering loaded assets in the middle of a frame, where some machines are fast enough for the assets
 /// of `Startup`, and others are not. [`wait_for_assets`] delivers them after it. Call it before the schedules run.
-pub(crate) fn deliver_between_frames(world: &mut World) {
+pub fn deliver_between_frames(world: &mut World) {
     let Some(mut schedules) = world.get_resource_mut::<Schedules>() else { return };
     let Some(schedule) = schedules.get_mut(PreUpdate) else { return };
     let delivery = set_of(handle_internal_asset_events);
@@ -143,7 +143,7 @@ fn set_of<M>(system: impl IntoSystemSet<M>) -> InternedSystemSet {
 /// every machine. No game time passes.
 ///
 /// A World without new loads is left at once. An asset that does not arrive for ten seconds is left behind.
-pub(crate) fn wait_for_assets(world: &mut World) {
+pub fn wait_for_assets(world: &mut World) {
     if !world.contains_resource::<AssetServer>() {
         return;
     }

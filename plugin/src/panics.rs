@@ -118,6 +118,8 @@ thread_local! {
     /// True if this thread runs a World with reported panics.
     static GUARDED: Cell<bool> = const { Cell::new(false) };
     static WORDS: RefCell<String> = const { RefCell::new(String::new()) };
+    /// Gets the message of the first panic at once.
+    static TELL: Cell<Option<fn(&str)>> = const { Cell::new(None) };
 }
 
 /// Captures panics of guarded Worlds instead of printing them.
@@ -134,7 +136,11 @@ fn hear_panics() {
                 let words = panic.payload_as_str().unwrap_or("no reason given");
                 let words = words.split_whitespace().collect::<Vec<_>>().join(" ");
                 let place = place_of_panic(panic);
-                WORDS.set(format!("{words}{place}"));
+                let words = format!("{words}{place}");
+                if let Some(tell) = TELL.get() {
+                    tell(&words);
+                }
+                WORDS.set(words);
             }
         }));
     });
@@ -179,6 +185,15 @@ pub fn hear<T>(work: impl FnOnce() -> T) -> Result<T, String> {
     let result = catch_unwind(AssertUnwindSafe(work));
     GUARDED.set(outer);
     result.map_err(|_| WORDS.take())
+}
+
+/// Runs work, and passes the message of a captured panic in it on at once. Bevy prints the name of a system that has
+/// panicked while the panic leaves the schedule, which is later.
+pub fn tell_at_once<T>(tell: fn(&str), work: impl FnOnce() -> T) -> T {
+    let outer = TELL.replace(Some(tell));
+    let done = work();
+    TELL.set(outer);
+    done
 }
 
 /// Returns whether the message of a panic says that Bevy's `RenderApp` does not exist.

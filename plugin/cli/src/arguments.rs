@@ -19,6 +19,7 @@ use playbot_harness::{
     machine::usable_threads,
     parallel::default_threads,
     split::{LevelSplit, check_level},
+    worlds,
 };
 use playbot_learner::DeviceKind;
 use playbot_train::{
@@ -26,6 +27,16 @@ use playbot_train::{
     experiment::{experiment_of, file::parse_experiment},
 };
 use std::{num::IntErrorKind, path::Path};
+
+/// Checks that a game starts in this mode, before a verb prints or writes anything. A panic is the first thing that is
+/// printed.
+///
+/// # Errors
+///
+/// The game panicked while it was added to the app, or in a startup system.
+pub(crate) fn check_start(game: &dyn Game, mode: &str, level: u64) -> Result<(), CliError> {
+    Ok(worlds::check_start(game, mode, level, |panic: &str| report!("the game panicked: {panic}"))?)
+}
 
 /// More threads than any machine has cores.
 pub(crate) const MOST_THREADS: usize = 1024;

@@ -181,6 +181,12 @@ impl GameWindow {
         self.unbound.clone()
     }
 
+    /// Prints these lines once the game has started: its first panic comes before them.
+    pub fn announce(&mut self, lines: Vec<String>) {
+        let mut lines = Some(lines);
+        self.app.add_systems(PostStartup, move || lines.take().iter().flatten().for_each(|line| report!("{line}")));
+    }
+
     /// Records every episode from now on, of any decider. What a person does then reaches the game as its actions only.
     pub fn record(&mut self, writer: DemoWriter) {
         self.app.insert_resource(Recorder::new(writer));

@@ -11,13 +11,13 @@ use bevy_playbot::{
     action::ActionValue,
     agent::{Agent, AgentOrder},
     engine::{
-        AgentLimit, PlaysAlong, Renewal, headless_frame_app, into_world,
+        AgentLimit, NextEpisode, PlaysAlong, Renewal, headless_frame_app, into_world,
         panics::{self, EpisodeTrace, PanicReports},
         set_tick_rate,
     },
     episode::{EpisodeEnded, EpisodeResult, Tick},
     fault::{Fault, Faults},
-    headless::{HeadlessPlugins, headless_app},
+    headless::{HeadlessPlugins, PlaybotAppExt, headless_app},
     legal::IdleAction,
     observation::VectorSensor,
     placement::TickPlacement,
@@ -94,14 +94,28 @@ pub fn build_observing_world(
     Ok((world, agents))
 }
 
-/// Checks that a World of the game can be built, and drops it.
+/// Checks that a World of the game can be built and that its startup systems run, and drops it. Verbs call it before they
+/// print or write anything, so that a game that cannot start is reported by its first panic, and not by a consequence.
+///
+/// `tell` gets the panic of a startup system at once, before Bevy prints the system's name. A mode that the game does not
+/// have is not checked.
 ///
 /// # Errors
 ///
 /// The game panicked: the panic's message, with its file, its line and, if they are known, its plugin or system.
-pub fn check_build(game: &dyn Game, mode: &str) -> Result<(), Fault> {
-    let (world, _) = build_world(game, mode, 0, 0, 1);
-    panics::refusal(&world).map_or(Ok(()), Err)
+pub fn check_start(game: &dyn Game, mode: &str, level: u64, tell: fn(&str)) -> Result<(), Fault> {
+    if game.check_mode(mode).is_err() {
+        return Ok(());
+    }
+    let (mut world, agents) = build_world(game, mode, 0, 0, 1);
+    if let Some(fault) = panics::refusal(&world) {
+        return Err(fault);
+    }
+    // Startup systems may read the level, but without an agent that plays it does not begin: a panic belongs to no level.
+    world.trigger(NextEpisode { entity: agents[0], level });
+    let started = panics::tell_at_once(tell, || world.tick());
+    // Other faults are those of a level, too.
+    if panics::refusal(&world).is_some() { started } else { Ok(()) }
 }
 
 /// Builds a World. If the game panics meanwhile, the World has no game, and each of its ticks is this fault.

@@ -54,7 +54,10 @@ pub enum LearnError {
     #[error("action does not fit the action space: {0}")]
     Action(String),
     /// No window of the requested length fits into the demonstrations.
-    #[error("no window of {window} steps fits into the demonstrations: the longest stretch to cut from has {longest}")]
+    #[error(
+        "no window of {window} steps fits into the demonstrations: the longest stretch to cut from has {longest}; record \
+         longer episodes, or set `skills.window` lower"
+    )]
     NoWindow {
         /// Window length in steps.
         window: usize,

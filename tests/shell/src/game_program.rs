@@ -42,6 +42,25 @@ const SMALL: [&str; 11] = [
     "checkpoints.every=2",
 ];
 
+/// Settings that shorten an experiment to a second. Nothing is learned.
+const TINY: [&str; 14] = [
+    "demos=few.demo",
+    "demo_steps=200",
+    "arenas=2",
+    "worlds=2",
+    "steps=64",
+    "skills.epochs=1",
+    // Short recordings are learned from, too.
+    "skills.window=2",
+    "skills.hidden=[8]",
+    "skills.encoder_hidden=4",
+    "skills.gru_hidden=4",
+    "skills.latent=2",
+    "ppo.num_steps=16",
+    "ppo.epochs=1",
+    "ppo.minibatches=1",
+];
+
 impl GameProgram {
     /// Returns a shell in whose folder lies `few.demo`, of three levels.
     pub(crate) fn with_recording(&self) -> Shell {
@@ -56,15 +75,28 @@ impl GameProgram {
     /// both, `skills.safetensors`, in its folder.
     pub(crate) fn with_skills(&self) -> Shell {
         let shell = self.with_recording();
-        let own = format!("{}/experiment.ron", self.folder);
         let (steps, test) = (format!("steps={}", UPDATES * 2 * 64), format!("test={}", self.held_out));
-        let sets = SMALL.iter().copied().chain([steps.as_str(), &test]).flat_map(|set| ["--set", set]);
-        let show: Vec<&str> = ["config", "show", "--experiment", &own].into_iter().chain(sets).collect();
-        fs::write(shell.path("small.ron"), shell.done(&show)).expect("writable");
+        self.write_experiment(&shell, "small.ron", &[&SMALL[..], &[&steps, &test]].concat());
         let learn = ["learn-skills", "--experiment", "small.ron", "--out", "skills.safetensors", "--json"];
         let epochs = shell.answers(&learn);
         assert_eq!(epochs.len(), 2, "one line for each epoch: {epochs:?}");
         assert!(epochs.iter().all(|epoch| epoch["loss"].as_f64().is_some_and(f64::is_finite)), "{epochs:?}");
         shell
+    }
+
+    /// Returns a shell with `few.demo` and `tiny.ron`, the game's own experiment made tiny, in its folder.
+    pub(crate) fn with_tiny_experiment(&self) -> Shell {
+        let shell = self.with_recording();
+        let first = self.held_out.split("..").next().unwrap_or(self.held_out);
+        self.write_experiment(&shell, "tiny.ron", &[&TINY[..], &[&format!("test={first}")]].concat());
+        shell
+    }
+
+    /// Writes the game's own experiment, with other settings.
+    fn write_experiment(&self, shell: &Shell, name: &str, sets: &[&str]) {
+        let own = format!("{}/experiment.ron", self.folder);
+        let sets = sets.iter().flat_map(|set| ["--set", *set]);
+        let show: Vec<&str> = ["config", "show", "--experiment", &own].into_iter().chain(sets).collect();
+        fs::write(shell.path(name), shell.done(&show)).expect("writable");
     }
 }

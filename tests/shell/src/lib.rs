@@ -3,6 +3,7 @@
 
 mod at_work;
 mod desk;
+mod every_verb;
 mod examined;
 mod game_program;
 mod output;
@@ -18,7 +19,7 @@ mod waiting;
 pub use at_work::{at_work, kill};
 pub use desk::{Desk, Seat};
 pub use game_program::GameProgram;
-pub use output::{code, ended, errors, json_lines, lines, said};
+pub use output::{code, ended, ended_in, errors, json_lines, lines, said};
 pub use run_folder::{logged, results, steps};
 pub use shell::Shell;
 pub use unsealed::unsealed;

@@ -1,6 +1,12 @@
 //! Tests of the verbs around recordings.
 
-use crate::{game_program::GameProgram, shell::Shell};
+use std::fs;
+
+use crate::{
+    game_program::GameProgram,
+    output::{ended, ended_in},
+    shell::Shell,
+};
 
 /// Returns width and height of a PNG, and the number of colours of its first frame, at most 100.
 fn looked_at(shell: &Shell, name: &str) -> (u64, u64, usize) {
@@ -39,18 +45,68 @@ impl GameProgram {
         assert!(shell.read("few.demo") == self.with_recording().read("few.demo"), "the same seed, the same file");
     }
 
+    /// `demo filter`, `demo label`, `demo repair`, `demo merge`, `learn-skills` and `train`: whatever `demo verify`
+    /// accepts is learned from, and what it refuses is not.
+    pub fn what_verifies_is_learned_from(&self) {
+        let shell = self.with_tiny_experiment();
+        let one = format!("default:{0}..{0}", self.recorded + 1);
+        let change = |args: &[&str]| _ = shell.answer(&[args, &["--json"]].concat());
+        change(&["demo", "filter", "few.demo", "--levels", &one, "--without-idle-start", "--out", "one.demo"]);
+        change(&["demo", "label", "few.demo", "--player", "alice", "--out", "alice.demo"]);
+        let short = ["record", self.game, "--bot", "random", "--noise", "0.1", "--levels", &one, "--steps", "3"];
+        shell.done(&[&short[..], &["--out", "short.demo"]].concat());
+        // A recording that was cut off, one with a bit of its last episode turned over, and the whole rest of each.
+        let whole = shell.read("few.demo");
+        let mut bent = whole.clone();
+        bent[whole.len() - 60] ^= 1;
+        for (name, bytes) in [("torn.demo", &whole[..whole.len() - 40]), ("bent.demo", &bent)] {
+            fs::write(shell.path(name), bytes).expect("writable");
+            let mended = format!("mended-{name}");
+            change(&["demo", "repair", name, "--out", &mended]);
+        }
+        change(&["demo", "merge", "mended-torn.demo", "short.demo", "--out", "merged.demo"]);
+
+        let mut refused = Vec::new();
+        for name in [
+            "few.demo",
+            "one.demo",
+            "alice.demo",
+            "short.demo",
+            "torn.demo",
+            "bent.demo",
+            "mended-torn.demo",
+            "mended-bent.demo",
+            "merged.demo",
+        ] {
+            let (verified, out, err) = ended_in(shell.command(&["demo", "verify", name]), &[0, 1]);
+            let (demos, skills, run) = (format!("demos={name}"), format!("{name}.safetensors"), format!("run-{name}"));
+            let tiny = ["--experiment", "tiny.ron", "--set", &demos];
+            let learn = [&["learn-skills"][..], &tiny, &["--out", &skills]].concat();
+            if verified == 0 {
+                ended(shell.command(&learn), 0);
+                let train = [&["train"][..], &tiny, &["--skills", &skills, "--run", &run]].concat();
+                ended(shell.command(&train), 0);
+            } else {
+                refused.push(name);
+                let words = ended(shell.command(&learn), 3).1;
+                assert!(words.contains(name) && words.contains("demo repair"), "{out}{err}: {words}");
+            }
+        }
+        assert_eq!(refused, ["torn.demo", "bent.demo"], "only damaged files are refused");
+    }
+
     /// `view`: a tick of the demonstrator's play, and one of a recording, as pictures.
     pub fn moments_are_drawn(&self) {
         let shell = self.with_recording();
-        let bot = ["view", self.game, "--level", "3", "--tick", "20", "--out", "bot.png", "--json"];
-        let recording = ["view", self.game, "--demo", "few.demo", "--episode-number", "1", "--tick", "20"];
+        let bot = ["view", self.game, "--level", "3", "--tick", "3", "--out", "bot.png", "--json"];
+        let recording = ["view", self.game, "--demo", "few.demo", "--episode-number", "1", "--tick", "3"];
         let recording = [&recording[..], &["--out", "demo.png", "--json"]].concat();
         for (args, name, player, level) in
             [(&bot[..], "bot.png", self.demonstrator, 3), (&recording, "demo.png", "recording", self.recorded + 1)]
         {
             let said = shell.answer(args);
             assert_eq!((&said["player"], &said["level"]), (&player.into(), &level.into()), "{said}");
-            assert_eq!((&said["frames"], &said["ticks"], &said["divergence"]), (&1.into(), &21.into(), &().into()));
+            assert_eq!((&said["frames"], &said["ticks"], &said["divergence"]), (&1.into(), &4.into(), &().into()));
             let (width, height, colours) = looked_at(&shell, name);
             assert_eq!((&said["width"], &said["height"]), (&width.into(), &height.into()), "{said}");
             assert!(colours > 2, "{name} has no more than {colours} colours");

@@ -12,6 +12,9 @@ macro_rules! tests {
             a_killed_training_goes_on_bit_for_bit,
             a_policy_file_plays_as_its_run,
             the_doctor_finds_nothing,
+            levels_are_looked_at,
+            levels_are_tested,
+            methods_are_compared,
         }
         #[cfg(feature = "screen")]
         $crate::tests! { $game: what_a_window_records_replays }

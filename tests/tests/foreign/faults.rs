@@ -10,7 +10,7 @@ use playbot_harness::{
     demo::verify_file,
     eval::{Player, evaluate},
     foreign::{ForeignGame, Restart},
-    worlds::{build_world, check_build},
+    worlds::{build_world, check_start},
 };
 use playbot_learner::DeviceKind;
 use playbot_tests::{
@@ -107,12 +107,26 @@ fn a_panic_in_a_plugin_is_the_fault_of_each_tick_with_the_name_of_the_plugin() {
 #[test]
 fn a_game_that_panics_when_it_is_added_is_refused_before_any_level() {
     let broken = catch_game_with(|app| _ = app.add_plugins(Fragile("finish")));
-    let words = check_build(&broken, "default").expect_err("it panics").to_string();
+    let words = check_start(&broken, "default", 0, |_| {}).expect_err("it panics").to_string();
     assert!(words.contains("it breaks in finish"), "{words}");
     let error =
         evaluate(&broken, &Player::Blind(BlindBot::Uniform), &plan("default:0..3"), |_| {}).expect_err("it panics");
     assert_eq!(error.to_string(), words);
-    assert_eq!(check_build(&catch_game(), "default"), Ok(()));
+    assert_eq!(check_start(&catch_game(), "default", 0, |_| {}), Ok(()));
+}
+
+#[test]
+fn a_panic_of_the_start_is_none_of_a_level() {
+    fn enter() {
+        panic!("no door");
+    }
+    let closed = catch_game_with(|app| _ = app.add_systems(Startup, enter));
+    let words = check_start(&closed, "default", 3, |_| {}).expect_err("it panics").to_string();
+    assert!(words.starts_with("before any level was played: the game panicked: no door ("), "{words}");
+    // In the first tick of a level.
+    let bomb = catch_game().reward(|_score: Res<Score>| -> f32 { panic!("the reward is gone") });
+    assert!(fault(&bomb, 1).contains("the reward is gone"));
+    assert_eq!(check_start(&bomb, "default", 3, |_| {}), Ok(()));
 }
 
 #[test]

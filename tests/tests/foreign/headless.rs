@@ -18,7 +18,7 @@ use playbot::prelude::*;
 use playbot_harness::{
     eval::{EvalPlan, Player, evaluate},
     foreign::{ForeignGame, Restart},
-    worlds::{build_world, check_build},
+    worlds::{build_world, check_start},
 };
 use playbot_tests::measuring::plan;
 
@@ -162,7 +162,7 @@ fn a_plugin_that_needs_the_render_app_when_it_is_finished_gets_advice() {
     }
     let late = ForeignGame::new("late", 1, |app: &mut App| _ = app.add_plugins(Late));
     let late = late.keys([vec![], vec![KeyCode::ArrowRight]]).observe(["x"], || [0.0]);
-    let words = check_build(&late, "default").expect_err("there is no renderer").to_string();
+    let words = check_start(&late, "default", 0, |_| {}).expect_err("there is no renderer").to_string();
     for part in ["in `finish` of the plugin `", "::Late`)", "`get_sub_app_mut(RenderApp)`"] {
         assert!(words.contains(part), "`{part}` is missing in: {words}");
     }

@@ -16,3 +16,4 @@ mod prints;
 mod rebuild;
 mod restarts;
 mod snapshots;
+mod starts;

@@ -1,9 +1,13 @@
 //! Tests of actions that click on buttons of Bevy's UI.
 
+use std::fmt::Debug;
+
 use bevy::{
+    camera::{ImageRenderTarget, RenderTarget},
     input::{ButtonState, mouse::MouseButtonInput},
     prelude::*,
-    ui::InteractionDisabled,
+    render::render_resource::TextureFormat,
+    ui::{InteractionDisabled, IsDefaultUiCamera},
     window::{PrimaryWindow, WindowEvent},
 };
 use bevy_playbot::virtual_input::ActionAxis;
@@ -19,6 +23,10 @@ struct Presses(Vec<String>);
 /// The events of the mouse that Bevy's picking reads.
 #[derive(Resource, Default)]
 struct MouseEvents(Vec<&'static str>);
+
+/// The events that Bevy's picking has triggered at entities with a name, such as `Click StartButton`.
+#[derive(Resource, Default)]
+struct PointerEvents(Vec<String>);
 
 fn button(name: &'static str, text: &'static str) -> impl Bundle {
     let node = Node { width: Val::Px(200.0), height: Val::Px(50.0), ..default() };
@@ -36,6 +44,8 @@ fn build_menu(mut commands: Commands) {
             (Node::default(), Name::new("Credits"), children![button("CreditsBack", "Back")]),
             (Node::default(), Visibility::Hidden, children![button("HiddenButton", "Secret")]),
             (button("OffButton", "Off"), InteractionDisabled),
+            // Without `Interaction`, for observers alone.
+            (Node { width: Val::Px(200.0), height: Val::Px(50.0), ..default() }, Name::new("Plain")),
         ],
     ));
 }
@@ -54,10 +64,24 @@ fn note_events(mut events: MessageReader<WindowEvent>, mut seen: ResMut<MouseEve
     }));
 }
 
+fn note_pointer<E: Clone + Debug + Reflect>(
+    event: On<Pointer<E>>,
+    names: Query<&Name, With<Node>>,
+    mut seen: ResMut<PointerEvents>,
+) {
+    let kind = std::any::type_name::<E>().rsplit("::").next().unwrap_or_default();
+    seen.0.extend(names.get(event.entity).map(|name| format!("{kind} {name}")));
+}
+
 /// The menu, without a camera, so that nothing lays it out.
 fn bare_menu(app: &mut App) {
     app.init_resource::<Presses>()
         .init_resource::<MouseEvents>()
+        .init_resource::<PointerEvents>()
+        .add_observer(note_pointer::<Press>)
+        .add_observer(note_pointer::<Click>)
+        .add_observer(note_pointer::<Release>)
+        .add_observer(note_pointer::<Cancel>)
         .add_systems(Startup, build_menu)
         .add_systems(Update, (note_presses, note_events));
 }
@@ -66,6 +90,16 @@ fn menu(app: &mut App) {
     bare_menu(app);
     app.add_systems(Startup, |mut commands: Commands| {
         commands.spawn(Camera2d);
+    });
+}
+
+/// The menu, drawn into an image, where no window has a cursor.
+fn painted_menu(app: &mut App) {
+    bare_menu(app);
+    app.add_systems(Startup, |mut images: ResMut<Assets<Image>>, mut commands: Commands| {
+        let handle = images.add(Image::new_target_texture(1280, 720, TextureFormat::Rgba8UnormSrgb, None));
+        let target = RenderTarget::Image(ImageRenderTarget { handle, scale_factor: 1.0 });
+        commands.spawn((Camera2d, target, IsDefaultUiCamera));
     });
 }
 
@@ -129,6 +163,58 @@ fn the_mouse_does_what_a_persons_does() {
     let mut windows = world.query_filtered::<&Window, With<PrimaryWindow>>();
     let window = windows.single(&world).expect("one window");
     assert_eq!(window.cursor_position(), Some(Vec2::new(100.0, 25.0)), "the middle of the button");
+}
+
+#[test]
+fn observers_of_picking_see_a_click_with_the_mouse_and_without_it() {
+    for (menu, place) in [(menu as fn(&mut App), "window"), (bare_menu, "nothing"), (painted_menu, "image")] {
+        let game = game(menu).keys([Vec::<KeyCode>::new()]).clicks(["Start", "Plain"]);
+        let (world, agent) = played(&game, &[1, 0, 0, 2, 0, 0]);
+        let of = |name: &str| ["Press", "Click", "Release"].map(|kind| format!("{kind} {name}"));
+        assert_eq!(world.resource::<PointerEvents>().0, [of("StartButton"), of("Plain")].concat(), "in {place}");
+        assert_eq!(counts(&world, agent), (2, 0), "in {place}");
+        assert_eq!(pressed(&world), ["StartButton"], "in {place}: by `Interaction`, which the other has not");
+    }
+}
+
+#[test]
+fn each_tick_is_a_click_for_observers_too() {
+    for menu in [menu as fn(&mut App), bare_menu, painted_menu] {
+        let game = game(menu).keys([Vec::<KeyCode>::new()]).clicks(["Start"]);
+        let (world, _) = played(&game, &[1, 1, 1, 0, 0]);
+        let clicks = world.resource::<PointerEvents>().0.iter().filter(|event| *event == "Click StartButton").count();
+        assert_eq!(clicks, 3);
+    }
+}
+
+#[test]
+fn a_press_that_the_end_of_an_episode_interrupts_is_no_click() {
+    let game = game(bare_menu).keys([Vec::<KeyCode>::new()]).clicks(["Start"]).time_limit(1);
+    let (world, _) = played(&game, &[1, 0]);
+    assert_eq!(world.resource::<PointerEvents>().0, ["Press StartButton", "Cancel StartButton"]);
+}
+
+/// Agents that see pictures through the camera that shows the menu.
+#[cfg(feature = "screen")]
+#[test]
+fn agents_that_see_pictures_click_as_others_do() {
+    use bevy_playbot::vision::{ImageOptions, ObservationConfig, ObservationKind};
+    use playbot_harness::worlds::build_observing_world;
+
+    let game = game(menu).keys([Vec::<KeyCode>::new()]).clicks(["Start"]).camera();
+    let image = ImageOptions { width: 16, height: 16, ..default() };
+    let config = ObservationConfig { kind: ObservationKind::Camera, image };
+    let (mut world, agents) = build_observing_world(&game, "default", &config, 0, 0, 1)
+        .expect("these tests need a Vulkan driver: apt-get install mesa-vulkan-drivers");
+    world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(0)));
+    for action in [1, 0, 0] {
+        world.entity_mut(agents[0]).insert(Action(ActionValue::Discrete(action)));
+        world.tick().expect("sound");
+    }
+    assert_eq!(pressed(&world), ["StartButton"]);
+    assert_eq!(world.resource::<MouseEvents>().0, ["moved", "down", "up"]);
+    let seen = &world.resource::<PointerEvents>().0;
+    assert_eq!(*seen, ["Press", "Click", "Release"].map(|kind| format!("{kind} StartButton")));
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `playbot bench`: steps per second of the whole and microseconds of its parts.
 
 use crate::{
-    arguments::{Device, MOST_THREADS, experiment::ExperimentArgs},
+    arguments::{Device, MOST_THREADS, check_start, experiment::ExperimentArgs},
     error::{CliError, Outcome},
     output::print_line,
 };
@@ -93,6 +93,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         return wanted.iter().try_for_each(|case| print_line(line(&case))).map(|()| Outcome::Pass);
     }
     for (number, Case { name, game, benchmark }) in wanted.iter().enumerate() {
+        check_start(*game, benchmark.mode, 0)?;
         report!("{name}: case {} of {}, {} s at least", number + 1, wanted.len(), args.seconds);
         let measure = if benchmark.train { train } else { simulate };
         let measured = match measure(*game, benchmark.mode, benchmark.observation, &args, games) {

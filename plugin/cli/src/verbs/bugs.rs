@@ -9,7 +9,7 @@ mod score;
 pub(crate) mod testers;
 
 use crate::{
-    arguments::{Threads, default_experiment_of, default_mode},
+    arguments::{Threads, check_start, default_experiment_of, default_mode},
     error::{CliError, Outcome},
     output,
     output::{print_line, program},
@@ -231,6 +231,7 @@ fn source<'a>(args: &MakeArgs, game: &'a dyn Game) -> Result<Source<'a>, CliErro
         }
     };
     levels.check(game)?;
+    check_start(game, &levels.mode, levels.first)?;
     Ok(Source { game, levels, trained: default.map(|default| default.train).filter(is_mode) })
 }
 

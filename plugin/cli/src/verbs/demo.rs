@@ -7,7 +7,7 @@ mod filter;
 mod show;
 
 use crate::{
-    arguments::open,
+    arguments::{check_start, open},
     error::{CliError, Outcome},
     output::{prepare, print_line, program},
     progress,
@@ -74,7 +74,8 @@ enum Verb {
     /// Replay recordings. Exit code 1 if one diverges, is damaged or cannot be replayed.
     ///
     /// Each episode is replayed in a new World, and in a World that has played another episode. The message says which
-    /// of the two differs. `learn-skills` and `train` accept every recording that this accepts.
+    /// of the two differs. `learn-skills` and `train` accept every recording that this accepts. For `learn-skills`, an
+    /// episode must have at least the steps of `skills.window`.
     Verify {
         /// Files or folders.
         #[arg(default_value = "demos")]
@@ -225,6 +226,7 @@ fn replay(file: &Path, games: &Games) -> Result<VerifyReport, CliError> {
     // The whole file is read before any of it is played, so that damage shows at once.
     let summary = DemoSummary::read(file)?;
     let game = games.of_file(Artifact::Recording, file, &summary.header.game)?;
+    check_start(game, &summary.header.mode, 0)?;
     let bar = progress::bar("replay", summary.episodes as u64, "episodes");
     let report = verify_file(game, file, |done| bar.set_position(done));
     bar.finish_and_clear();

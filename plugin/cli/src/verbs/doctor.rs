@@ -1,7 +1,7 @@
 //! `playbot doctor`.
 
 use crate::{
-    arguments::{default_mode, level_number},
+    arguments::{check_start, default_mode, level_number},
     error::{CliError, Outcome},
     output::print_line,
     progress::{interrupt, interrupt::NothingToSave},
@@ -13,7 +13,7 @@ use playbot_harness::{
     level_files::is_level_files,
     prelude::*,
     split::check_level,
-    worlds::{build_world, check_build},
+    worlds::build_world,
 };
 use std::time::Instant;
 
@@ -76,7 +76,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         None => (0, has_second_level(game, &mode).then_some(1).into_iter().collect()),
     };
     further_levels.iter().chain([&level]).try_for_each(|level| check_level(game, &mode, *level))?;
-    check_build(game, &mode)?;
+    check_start(game, &mode, level)?;
     let options = DoctorOptions {
         ticks: args.ticks,
         level,

@@ -2,7 +2,7 @@
 
 use crate::{
     arguments::{
-        Compute, default_held_out,
+        Compute, check_start, default_held_out,
         experiment::{ExperimentArgs, option},
         first_levels, name_in_list, open, player,
         player::{LoadedPlayer, MeasuredLevels, action_draw, check_run_of, check_skills},
@@ -122,6 +122,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     // Checked before anything is measured.
     let plan_of = |split| experiment.eval_plan(split, args.compute.threads());
     splits.iter().try_for_each(|split| plan_of(split).check_memory())?;
+    check_start(game, &splits[0].mode, splits[0].first)?;
     let (players, known) = players(game, &experiment, &splits, &args, games)?;
     let left_out = left_out(&splits, known, &args)?;
     let kept = if args.json { KEPT_LINES } else { KEPT_NOTHING };

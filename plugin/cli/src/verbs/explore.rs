@@ -6,7 +6,7 @@ mod recorded;
 
 use crate::{
     arguments::{
-        Compute, at_least_one_step, default_experiment_of,
+        Compute, at_least_one_step, check_start, default_experiment_of,
         experiment::ExperimentArgs,
         first_levels,
         player::{LoadedPlayer, check_skills},
@@ -145,6 +145,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             Some((PlotFile::new(path)?, floor_plan))
         }
     };
+    check_start(game, &split.mode, split.first)?;
     let begin = Instant::now();
     let exploration = search(game, &plan)?;
     if let Some(fault) = &exploration.snapshot_fault {

@@ -1,7 +1,7 @@
 //! `playbot eyes`: the camera's and the raster's pictures, compared side by side.
 
 use crate::{
-    arguments::{first_levels, player::LoadedPlayer},
+    arguments::{check_start, first_levels, player::LoadedPlayer},
     error::{CliError, Outcome},
     output,
     output::{print_line, program},
@@ -97,6 +97,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     if args.frames == 0 {
         return Err(CliError::Usage("--frames is 0: compare at least one frame a level".to_owned()));
     }
+    check_start(game, &levels.mode, levels.first)?;
     let compared = compare(game, &levels, &args)?;
     let summary = sum_up(game, &levels, &compared)?;
     if let Some(folder) = &args.out {

@@ -2,7 +2,7 @@
 
 use crate::{
     arguments::{
-        Compute, at_least_one_step,
+        Compute, at_least_one_step, check_start,
         experiment::{ExperimentArgs, Options, in_words, option, quoted},
     },
     error::{CliError, Outcome},
@@ -65,6 +65,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         None => args.from.recordings(&experiment, games)?,
     };
     experiment.check_skill_memory(game).map_err(|error| args.from.locate(games, [], error))?;
+    check_start(game, &experiment.train.mode, experiment.train.first)?;
     prepare(&args.out)?;
     let go_on = format!("the same command and {}", if args.force { "--resume instead of --force" } else { "--resume" });
     note_unlearned(Some(checkpoint.as_path()).filter(|checkpoint| !args.force && checkpoint.exists()), &go_on);

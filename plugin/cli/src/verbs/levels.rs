@@ -1,7 +1,7 @@
 //! `playbot levels`.
 
 use crate::{
-    arguments::{Threads, default_held_out, first_levels},
+    arguments::{Threads, check_start, default_held_out, first_levels},
     error::{CliError, Outcome},
     output::print_line,
     progress,
@@ -69,6 +69,7 @@ pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     });
     levels.check(game)?;
     args.among.iter().try_for_each(|others| others.check(game))?;
+    check_start(game, &levels.mode, levels.first)?;
     interrupt::leave("nothing is kept: call it again".to_owned());
     let _nothing = NothingToSave::listen();
     let threads = args.threads.count();

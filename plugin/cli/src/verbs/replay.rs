@@ -7,6 +7,7 @@
 mod picture;
 
 use crate::{
+    arguments::check_start,
     error::{CliError, Outcome},
     output,
     output::{print_line, program},
@@ -94,6 +95,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let pictures = Pictures { still: args.png.as_deref(), animated: args.apng.as_deref(), scale: args.scale };
     pictures.prepare()?;
     check_out(args)?;
+    check_start(game, &finding.header.mode, finding.episode.level_seed)?;
     let again = play_again(game, &finding)?;
     let status = again.status(&finding);
     let shorter = match &args.out {

@@ -2,7 +2,7 @@
 
 use crate::{
     arguments::{
-        Compute,
+        Compute, check_start,
         experiment::{ExperimentArgs, Options, in_words, quoted, report_unread, sets_key},
         revision,
     },
@@ -15,7 +15,7 @@ use crate::{
 };
 use bevy_playbot::unknown_name::UnknownName;
 use indicatif::ProgressBar;
-use playbot_harness::{games::Games, sealed_file::read_sealed};
+use playbot_harness::{games::Games, sealed_file::read_sealed, split::LevelSplit};
 use playbot_learner::DeviceKind;
 use playbot_train::{
     Experiment,
@@ -232,11 +232,16 @@ fn keep(experiment: &mut Experiment, named: &[String]) -> Result<(), CliError> {
 }
 
 fn check_games(runs: &[StudyRun], from: &ExperimentArgs, games: &Games) -> Result<(), CliError> {
+    let mut started = BTreeSet::new();
     for StudyRun { variant, experiment } in runs {
         let game = from.find_game(games, experiment)?;
         let of_variant = |source| StudyError::Values { variant: variant.clone(), source };
         experiment.check_game(game).map_err(of_variant)?;
         experiment.check_memory(game).map_err(of_variant)?;
+        let LevelSplit { mode, first, .. } = &experiment.train;
+        if started.insert((game.name(), mode)) {
+            check_start(game, mode, *first)?;
+        }
     }
     Ok(())
 }

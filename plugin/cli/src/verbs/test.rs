@@ -11,7 +11,7 @@ mod results;
 mod testers;
 
 use crate::{
-    arguments::{Compute, default_held_out, experiment::quoted, first_levels, report_companions},
+    arguments::{Compute, check_start, default_held_out, experiment::quoted, first_levels, report_companions},
     error::{CliError, Outcome},
     progress,
     progress::interrupt,
@@ -176,6 +176,7 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
         }
     };
     split.check(game)?;
+    check_start(game, &split.mode, split.first)?;
     report_equal_levels(game, &split);
     let detectors = args.detectors.choose(game, &split)?;
     let testers = args.testers.load(game, &split, args.compute.device())?;

@@ -2,6 +2,7 @@
 
 use crate::{
     arguments::LevelsArg,
+    arguments::check_start,
     error::{CliError, Outcome},
     output::print_line,
 };
@@ -65,6 +66,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         file: args.actions_file.as_deref(),
         json: args.json,
     };
+    check_start(game, mode.or(game.modes().last().copied()).unwrap_or_default(), level)?;
     let mut failed = None;
     let mut print = |line: String| {
         print_line(line).map_err(|error| {

@@ -6,7 +6,7 @@ mod written_picture;
 
 use crate::{
     arguments::{
-        LevelsArg, default_mode, open,
+        LevelsArg, check_start, default_mode, open,
         player::{LoadedPlayer, PlayerArgs},
     },
     error::{CliError, Outcome},
@@ -168,6 +168,7 @@ fn open_episode(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, C
         game.check_mode(&mode).map_err(|error| CliError::Usage(format!("{}: {error}", path.display())))?;
         let observation_config = observation_config(game, args, None)?;
         let episode = episode(reader, path, args.episode_number)?;
+        check_start(game, &mode, episode.level_seed)?;
         let episode_world = EpisodeWorld::replaying(game, &mode, &observation_config, episode)?;
         return Ok(Opened { episode_world, observation_config, mode, player: "recording".to_owned() });
     }
@@ -179,6 +180,7 @@ fn open_episode(game: &dyn Game, args: &Args, games: &Games) -> Result<Opened, C
         None => LoadedPlayer::default_of(game)?,
     };
     let observation_config = observation_config(game, args, Some(&chosen))?;
+    check_start(game, mode, level)?;
     let seed = args.levels.random_seed(args.seed);
     let episode_world = EpisodeWorld::playing(game, mode, &observation_config, level, &chosen.player, seed)?;
     Ok(Opened { episode_world, observation_config, mode: mode.to_owned(), player: chosen.name })

@@ -20,7 +20,9 @@ use bevy_playbot::{
     action::Action,
     agent::Control,
     demo::file::DemoEpisode,
-    engine::{PressesForPeople, TickSchedules, run_on_one_thread, system_errors},
+    engine::{
+        PressesForPeople, TickSchedules, deliver_between_frames, run_on_one_thread, system_errors, wait_for_assets,
+    },
     episode::Episode,
     fault::Faults,
     key_bindings::{KeyBindings, MissingSet},
@@ -83,8 +85,9 @@ fn rest(_: On<EpisodeEnded>, rate: Res<FrameRate>, mut pace: ResMut<Pace>) {
 fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
     if !*has_begun {
         *has_begun = true;
-        // In the order that systems have headless.
+        // In the order that systems have headless, and with assets in the frames in which they arrive there.
         run_on_one_thread(world);
+        deliver_between_frames(world);
     }
     choose_devices(world);
     devices::take(world);
@@ -100,6 +103,7 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
         world.run_schedule(StandStill);
     } else {
         world.run_schedule(Main);
+        wait_for_assets(world);
         if let Some(failure) = system_errors::take() {
             world.resource_mut::<Faults>().report(failure);
             world.run_schedule(StandStill);

@@ -6,8 +6,13 @@ use crate::foreign::{
     runtime::{ForeignCell, playing_agents},
 };
 use bevy::{
-    camera::RenderTarget,
+    camera::{NormalizedRenderTarget, RenderTarget},
     input::InputSystems,
+    picking::{
+        backend::HitData,
+        events::{Cancel, Click, Pointer, Press, Release},
+        pointer::{Location, PointerButton, PointerId},
+    },
     prelude::*,
     ui::{
         ComputedNode, ComputedStackIndex, ComputedUiRenderTargetInfo, ComputedUiTargetCamera, InteractionDisabled,
@@ -24,6 +29,7 @@ use bevy_playbot::{
     unknown_name::nearest,
     virtual_input::{ClickAreas, HeldInput, PointerPosition, PressSystems, PressesForPeople, VirtualInput},
 };
+use std::{fmt::Debug, time::Duration};
 
 /// The clicks of an agent's actions on buttons of Bevy's UI, counted from its first episode on.
 #[derive(Component, Clone, Debug, Default, PartialEq, Reflect)]
@@ -39,9 +45,9 @@ pub struct ButtonClicks {
     present: Vec<String>,
     /// Names of the buttons that existed at the last click that missed.
     others: Vec<String>,
-    /// The button whose `Interaction` is set in this frame, for want of a layout.
+    /// The button that is pressed in this frame without the mouse.
     next: Option<Entity>,
-    /// The button whose `Interaction` was set in the last frame.
+    /// The button that was pressed so in the last frame.
     down: Option<Entity>,
 }
 
@@ -140,17 +146,17 @@ pub(super) fn add_clicks(app: &mut App, input: &Input) {
         // No other system changes the inputs of the agent's actions.
         aim.in_set(PlaybotSystems::Act).after(check_actions).before(PressSystems).ambiguous_with(PlaybotSystems::Act),
     )
-    .add_systems(PreUpdate, set_interactions.after(InputSystems).after(UiSystems::Focus))
+    .add_systems(PreUpdate, press_without_mouse.after(InputSystems).after(UiSystems::Focus))
     .add_systems(ObserveSchedule, note_areas.after(mask))
     .add_observer(end_episode);
 }
 
-fn end_episode(event: On<EpisodeEnded>, mut agents: Query<&mut ButtonClicks>, mut buttons: Query<&mut Interaction>) {
+fn end_episode(event: On<EpisodeEnded>, mut agents: Query<&mut ButtonClicks>, mut commands: Commands) {
     let Ok(mut clicks) = agents.get_mut(event.entity) else { return };
     clicks.end_episode();
     // In the next episode it may be another entity, in a World that is built anew.
-    if let Some(mut interaction) = clicks.down.take().and_then(|button| buttons.get_mut(button).ok()) {
-        *interaction = Interaction::None;
+    if let Some(button) = clicks.down.take() {
+        commands.queue(move |world: &mut World| end_press(world, button, PressEnd::Cancelled));
     }
 }
 
@@ -175,7 +181,7 @@ fn aim(world: &mut World) {
             clicks.note(&names[number], &found);
             match found {
                 Found::One(_, Target::At(position)) => held = held.click(position, MouseButton::Left),
-                Found::One(_, Target::Interaction(button)) => clicks.next = Some(button),
+                Found::One(button, Target::WithoutMouse) => clicks.next = Some(button),
                 Found::Unreachable | Found::Missing(_) | Found::Several(_) => {}
             }
         }
@@ -211,24 +217,78 @@ fn note_areas(world: &mut World) {
     world.entity_mut(agent).insert(ClickAreas { first: first as u32, areas });
 }
 
-/// Sets `Interaction` for a frame where there is no layout. Bevy's own system sets it otherwise.
-fn set_interactions(mut agents: Query<&mut ButtonClicks>, mut buttons: Query<&mut Interaction>) {
-    for mut clicks in &mut agents {
-        if clicks.down.is_none() && clicks.next.is_none() {
-            continue;
-        }
-        if let Some(button) = clicks.down.take()
-            && let Ok(mut interaction) = buttons.get_mut(button)
-        {
-            *interaction = Interaction::None;
-        }
-        if let Some(button) = clicks.next.take()
-            && let Ok(mut interaction) = buttons.get_mut(button)
-        {
-            *interaction = Interaction::Pressed;
-            clicks.down = Some(button);
+/// Presses the button of this frame, and lets go of that of the last one, where no mouse reaches them: by
+/// `Interaction` and by the events of Bevy's picking. With a mouse, Bevy's own systems do both.
+fn press_without_mouse(world: &mut World) {
+    let mut agents = world.query::<&mut ButtonClicks>();
+    let mut pressed = Vec::new();
+    for mut clicks in agents.iter_mut(world) {
+        if clicks.down.is_some() || clicks.next.is_some() {
+            let (last, next) = (clicks.down.take(), clicks.next.take());
+            clicks.down = next;
+            pressed.push((last, next));
         }
     }
+    for (last, next) in pressed {
+        if let Some(button) = last {
+            end_press(world, button, PressEnd::Released);
+        }
+        if let Some(button) = next {
+            set_interaction(world, button, Interaction::Pressed);
+            let press = |hit| Press { button: PointerButton::Primary, hit, count: 1 };
+            trigger(world, button, press);
+        }
+    }
+}
+
+/// The end of a press without the mouse.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum PressEnd {
+    /// The button was let go of, and is clicked on.
+    Released,
+    /// The episode is over.
+    Cancelled,
+}
+
+fn end_press(world: &mut World, button: Entity, end: PressEnd) {
+    set_interaction(world, button, Interaction::None);
+    match end {
+        PressEnd::Released => {
+            // A duration by the clock would differ from run to run.
+            let duration = Duration::ZERO;
+            trigger(world, button, |hit| Click { button: PointerButton::Primary, hit, duration, count: 1 });
+            trigger(world, button, |hit| Release { button: PointerButton::Primary, hit });
+        }
+        PressEnd::Cancelled => trigger(world, button, |hit| Cancel { hit }),
+    }
+}
+
+fn set_interaction(world: &mut World, button: Entity, wanted: Interaction) {
+    if let Some(mut interaction) = world.get_mut::<Interaction>(button) {
+        *interaction = wanted;
+    }
+}
+
+/// Triggers an event of the mouse at a button, and sends its message, as Bevy's picking does.
+fn trigger<E: Clone + Debug + Reflect>(world: &mut World, button: Entity, event: impl FnOnce(HitData) -> E) {
+    // An observer of the event before may have despawned it.
+    if world.get_entity(button).is_err() {
+        return;
+    }
+    let camera = world.get::<ComputedUiTargetCamera>(button).and_then(ComputedUiTargetCamera::get);
+    let mut windows = world.query_filtered::<Entity, With<PrimaryWindow>>();
+    let window = windows.single(world).ok();
+    let target = camera.and_then(|camera| world.get::<RenderTarget>(camera)?.normalize(window));
+    let target = target.or_else(|| RenderTarget::default().normalize(window));
+    let target = target.unwrap_or(NormalizedRenderTarget::None { width: 0, height: 0 });
+    let scale = camera.and_then(|camera| world.get::<Camera>(camera)?.target_scaling_factor()).unwrap_or(1.0);
+    let position = camera.and_then(|camera| middle(world, button, camera)).unwrap_or(Vec2::ZERO) / scale;
+    let hit = HitData::new(camera.unwrap_or(Entity::PLACEHOLDER), 0.0, None, None);
+    let event = Pointer::new(PointerId::Mouse, Location { target, position }, event(hit), button);
+    if let Some(mut messages) = world.get_resource_mut::<Messages<Pointer<E>>>() {
+        messages.write(event.clone());
+    }
+    world.trigger(event);
 }
 
 /// The result of a search for a button.
@@ -248,8 +308,8 @@ enum Found {
 enum Target {
     /// The mouse, at this position.
     At(PointerPosition),
-    /// Its `Interaction` alone, for want of a layout.
-    Interaction(Entity),
+    /// `Interaction` and events of Bevy's picking, where there is no layout, or no window that shows it.
+    WithoutMouse,
 }
 
 /// Finds the button of this name. Buttons that cannot be clicked on do not make a name ambiguous.
@@ -352,14 +412,14 @@ fn target(world: &World, button: Entity, window: Option<(Entity, Vec2, f32)>) ->
     let info = world.get::<ComputedUiRenderTargetInfo>(button).copied().unwrap_or_default();
     let camera = world.get::<ComputedUiTargetCamera>(button).and_then(ComputedUiTargetCamera::get);
     let (true, Some(camera)) = (info.physical_size().min_element() > 0, camera) else {
-        return world.get::<Interaction>(button).map(|_| Target::Interaction(button));
+        return Some(Target::WithoutMouse);
     };
     let (entity, size, scale) = window?;
     let is_shown = match world.get::<RenderTarget>(camera) {
         Some(RenderTarget::Window(WindowRef::Primary)) => true,
         Some(RenderTarget::Window(WindowRef::Entity(other))) => *other == entity,
-        // Pictures for agents are drawn into images, and Bevy finds no cursor there.
-        _ => return world.get::<Interaction>(button).map(|_| Target::Interaction(button)),
+        // Bevy finds no cursor on what is drawn into an image.
+        _ => return Some(Target::WithoutMouse),
     };
     let is_empty = world.get::<ComputedNode>(button).is_none_or(ComputedNode::is_empty);
     if !is_shown || is_empty {

@@ -112,8 +112,9 @@ impl ForeignGame {
     /// crate.
     ///
     /// The mouse cursor moves to the middle of the button, and the left mouse button goes down, and up before the next
-    /// tick. So `Interaction`, `ButtonInput<MouseButton>` and Bevy's picking see a person's click. Without a renderer
-    /// there is no layout, and only `Interaction` is set.
+    /// tick. So `Interaction`, `ButtonInput<MouseButton>` and Bevy's picking see a person's click. Where no camera of a
+    /// window lays the button out, the mouse stands still. Then `Interaction` is set, and the events of Bevy's picking
+    /// are triggered at the button: `Pointer<Press>` in this tick, `Pointer<Click>` and `Pointer<Release>` in the next.
     ///
     /// A click has no effect if its button does not exist in this tick, is hidden, is disabled, or shares its name with
     /// another one. `ButtonClicks` on the agent counts them. The log has a warning that names the buttons if two share

@@ -16,7 +16,7 @@ use crate::{
 };
 use bevy::math::Vec2;
 use bevy_playbot::{episode::EpisodeResult, fault::Fault};
-use playbot_harness::{eval::EvalError, game::Game, worlds::check_build};
+use playbot_harness::{eval::EvalError, game::Game, worlds::check_start};
 use std::{
     collections::{BTreeMap, BTreeSet},
     sync::{Mutex, MutexGuard, PoisonError},
@@ -102,7 +102,7 @@ pub fn run_tests_keeping(
         return Err(EvalError::from(Fault(problem)).into());
     }
     // Otherwise it would be a finding of each level.
-    check_build(game, &plan.split.mode).map_err(EvalError::from)?;
+    check_start(game, &plan.split.mode, plan.split.first, |_| {}).map_err(EvalError::from)?;
     let places: Vec<u64> = plan.places().into_iter().filter(|place| !finished.contains(place)).collect();
     let most = (MOST_EPISODES / plan.episodes.max(1) as usize).max(1);
     let size = places.len().div_ceil(PORTIONS).clamp(1, most);

@@ -13,3 +13,4 @@ const GAME: GameProgram = GameProgram {
 };
 
 playbot_shell::tests!(GAME);
+playbot_shell::tests!(GAME: defects_need_levels);

@@ -13,6 +13,7 @@ const GAME: GameProgram = GameProgram {
 };
 
 playbot_shell::tests!(GAME);
+playbot_shell::tests!(GAME: defects_need_levels);
 
 /// The sound has a stand-in, so its file is not looked for.
 #[test]

@@ -12,7 +12,18 @@ const GAME: GameProgram = GameProgram {
     held_out: "default:100000..100001",
 };
 
-playbot_shell::tests!(GAME: recordings_replay, a_killed_training_goes_on_bit_for_bit, a_policy_file_plays_as_its_run, the_doctor_finds_nothing);
+playbot_shell::tests!(
+    GAME: recordings_replay,
+    moments_are_drawn,
+    a_killed_training_goes_on_bit_for_bit,
+    a_policy_file_plays_as_its_run,
+    the_doctor_finds_nothing,
+    what_verifies_is_learned_from,
+    levels_are_looked_at,
+    levels_are_tested,
+    methods_are_compared,
+    defects_are_planted_and_looked_for,
+);
 
 /// Plays with the mouse in a window of this scale, and returns the first and the last recorded action. Positions are in
 /// pixels.

@@ -1,7 +1,7 @@
 //! `playbot bugs score`.
 
 use crate::{
-    arguments::{Compute, at_least_one_step, experiment::quoted},
+    arguments::{Compute, at_least_one_step, check_start, default_mode, experiment::quoted},
     error::{CliError, Outcome},
     output,
     output::{print_line, print_table, program},
@@ -170,6 +170,8 @@ fn tested<'a>(args: &Args, set: &BugSet, games: &Games<'a>) -> Result<Vec<Tested
         settings: args.detector.clone(),
     };
     let mut tested = Vec::new();
+    // The game itself: that a mutant does not start is what is looked for.
+    chosen.iter().try_for_each(|game| check_start(*game, default_mode(*game), 0))?;
     for (game, contestants) in chosen.into_iter().zip(contestants) {
         if contestants.is_empty() {
             report!("left out, since it has none of the testers: {}", game.name());

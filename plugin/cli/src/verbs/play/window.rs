@@ -39,7 +39,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         window.record(args.overwrite.open(path, header)?);
     }
     interrupt::listen();
-    announce(game, &args);
+    window.announce(announcement(game, &args));
     let unbound = window.unbound_keys();
     window.run()?;
     args.record.as_deref().map_or(Ok(Outcome::Pass), |path| conclude(path, &unbound))
@@ -82,27 +82,31 @@ fn header(game: &dyn Game, mode: &str, args: &Args) -> DemoHeader {
     DemoHeader { demonstrator: args.name.clone(), ..header }
 }
 
-fn announce(game: &dyn Game, args: &Args) {
+/// Returns the lines about keys and players that are printed once the game has started.
+fn announcement(game: &dyn Game, args: &Args) -> Vec<String> {
+    let mut lines = Vec::new();
     if let Some(keys) = game.tools().input.key_bindings() {
         let zoom = if game.tools().host.placement() == TickPlacement::Fixed { ", - and = zoom" } else { "" };
-        report!("{}; R again, N next level, P pause{zoom}, Escape ends", keys.help());
+        lines.push(format!("{}; R again, N next level, P pause{zoom}, Escape ends", keys.help()));
     } else if args.record.is_some() {
-        report!(
+        lines.push(
             "the game gets the actions that your keys, mouse and gamepad mean, and nothing else; R again, N next level, P \
              pause, Escape ends"
+                .to_owned(),
         );
     } else {
-        report!("the game's own keys and mouse; R again, N next level, P pause, Escape ends");
+        lines.push("the game's own keys and mouse; R again, N next level, P pause, Escape ends".to_owned());
     }
     let is_by_actions = game.tools().input.key_bindings().is_some() || args.record.is_some();
     if let Some(problem) = without_idle_action(game).filter(|_| is_by_actions) {
-        report!("warning: {problem}");
+        lines.push(format!("warning: {problem}"));
     }
     if args.autopilot.is_named() {
-        report!("Tab hands over and takes over again");
+        lines.push("Tab hands over and takes over again".to_owned());
     } else {
-        report!("there is no autopilot to hand over to: name a --policy, a --run or a --bot");
+        lines.push("there is no autopilot to hand over to: name a --policy, a --run or a --bot".to_owned());
     }
+    lines
 }
 
 /// Prints the path of the recording, its contents, the keys that are not in it, and the next commands.

@@ -1,6 +1,7 @@
 //! Replay of stored findings, and detectors on the command line.
 
 use crate::{
+    arguments::check_start,
     error::{CliError, Outcome},
     output::{print_line, print_table},
     progress,
@@ -10,10 +11,15 @@ use playbot_harness::{game::Game, games::Games, split::LevelSplit};
 use playbot_report::{PlainTable, counted};
 use playbot_test::{
     detectors::{ALWAYS, DetectorChoice, DetectorError, DetectorInfo, Detectors, Pars, TIMING, forget_timing, list},
-    findings::{Checks, Date, FindingStatus, Regress, RegressRow, Regression, list_findings, regress_until},
+    findings::{
+        Checks, Date, FindingStatus, Regress, RegressRow, Regression, StoredFinding, list_findings, regress_until,
+    },
     verdict::{LevelPars, maps::level_name},
 };
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 /// Options for stored findings.
 #[derive(clap::Args, Clone, Debug)]
@@ -60,7 +66,9 @@ fn play(
     json: bool,
 ) -> Result<Outcome, CliError> {
     detectors.check_settings(games)?;
-    let total = list_findings(folder)?.len() as u64;
+    let found = list_findings(folder)?;
+    check_starts(&found, games)?;
+    let total = found.len() as u64;
     interrupt::listen();
     let bar = progress::bar("replay findings", total, "findings");
     let checks = |game: &dyn Game| detectors.checks(game);
@@ -86,6 +94,21 @@ fn play(
         return Ok(Outcome::Stopped);
     }
     Ok(if regression.has_alarms() { Outcome::Findings } else { Outcome::Pass })
+}
+
+/// Checks that the games of the findings start. Otherwise each of them would be gone.
+fn check_starts(findings: &[(String, PathBuf)], games: &Games) -> Result<(), CliError> {
+    let mut started = BTreeSet::new();
+    // Those that cannot be read or played are reported with the others.
+    for finding in findings.iter().filter_map(|(_, path)| StoredFinding::read(path).ok()) {
+        let (mode, level) = (&finding.header.mode, finding.episode.level_seed);
+        if let Ok(game) = games.get(&finding.header.game)
+            && started.insert((game.name(), mode.clone()))
+        {
+            check_start(game, mode, level)?;
+        }
+    }
+    Ok(())
 }
 
 fn table(folder: &Path, regression: &Regression) -> PlainTable {

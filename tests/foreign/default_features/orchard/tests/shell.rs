@@ -12,4 +12,5 @@ const GAME: GameProgram = GameProgram {
     held_out: "default:100000..100001",
 };
 
-playbot_shell::tests!(GAME: recordings_replay, a_killed_training_goes_on_bit_for_bit, a_policy_file_plays_as_its_run, the_doctor_finds_nothing);
+playbot_shell::tests!(GAME);
+playbot_shell::tests!(GAME: what_verifies_is_learned_from, defects_need_levels);
