@@ -277,6 +277,20 @@ mod tests {
     }
 
     #[test]
+    fn a_panic_is_told_at_once_and_only_where_it_is_asked_for() {
+        thread_local!(static TOLD: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) });
+        fn open() {
+            panic!("the door\n is locked");
+        }
+        let heard = tell_at_once(|words| TOLD.with_borrow_mut(|told| told.push(words.to_owned())), || hear(open));
+        let told = TOLD.take();
+        assert!(told.len() == 1 && told[0].starts_with("the door is locked ("), "{told:?}");
+        assert_eq!(heard, Err(told[0].clone()));
+        assert!(hear(open).is_err());
+        assert!(TOLD.take().is_empty());
+    }
+
+    #[test]
     fn only_a_missing_render_app_is_taken_for_one() {
         assert!(lacks_render_app("No sub-app with label 'RenderApp' exists. (bevy_app-0.19.1/src/app.rs:1235:13)"));
         assert!(!lacks_render_app("No sub-app with label 'Physics' exists."));
