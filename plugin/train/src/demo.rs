@@ -154,8 +154,9 @@ impl Demonstrations {
 
     /// Pairs each action with the observation before it, in the order of the recordings. Each distinct demonstration
     /// that needs a replay is replayed once, on at most `threads` threads. Idle starts are left out: they are replayed,
-    /// and demonstrate nothing. Masks of actions are restored by a replay, too, of files with observations as well. Where
-    /// such a file does not replay, every action counts as legal ([`Dataset::unmasked`]). `progress` receives numbers of finished steps, from several threads.
+    /// and demonstrate nothing. Masks of actions are restored by a replay, too, of files with observations as well. In an
+    /// episode with stored observations that does not replay, every action counts as legal ([`Dataset::unmasked`]).
+    /// `progress` receives numbers of finished steps, from several threads.
     ///
     /// # Errors
     ///

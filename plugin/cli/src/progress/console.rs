@@ -131,8 +131,8 @@ impl RunObserver for Console<'_> {
                 self.reading = None;
             }
             RunEvent::MasksUnknown { episodes, of } => report!(
-                "{episodes} of {of} recorded episodes do not replay, and a replay is what restores their masks: every action \
-                 counts as legal in them"
+                "masks are unknown in {episodes} of {}, because no replay restores them: every action counts as legal there",
+                counted(of as u64, "recorded episode")
             ),
             RunEvent::SkillsResumed { epoch, epochs } => report!("going on in epoch {epoch} of {epochs}"),
             RunEvent::SkillsBegun { done, batches } => {

@@ -25,8 +25,9 @@ use std::time::Instant;
 /// saves snapshots, one copy plays on, and another one returns to the same tick by a snapshot. All of this is done on
 /// level 0. Level 1 is played twice, too, if the game has one, and each of the two levels after the other: nothing of a
 /// level may survive into the next. The first difference is printed with its tick and with advice. A clean result holds
-/// for the ticks and the levels that were played, so try more ticks and other levels too. State that differs is only a note if agents never notice it: not in observations, rewards,
-/// ends of episodes or the state hash. Exit code 1 if something was found; notes are no findings.
+/// for the ticks and the levels that were played, so try more ticks and other levels too. State that differs is only a
+/// note if agents never notice it: not in observations, rewards, ends of episodes or the state hash. Exit code 1 if
+/// something was found; notes are no findings.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot doctor GAME

@@ -43,8 +43,8 @@ pub struct Args {
     /// held-out levels of the game's experiment).
     #[arg(long)]
     levels: Option<LevelSplit>,
-    /// Other levels, such as those of a training: name the audited levels that are among them, by number, as a file or
-    /// by their layout (repeatable).
+    /// Other levels, such as those of a training: name the audited levels that are among them, by number, as a file,
+    /// by their layout or by their play (repeatable).
     #[arg(long, value_name = "LEVELS")]
     among: Vec<LevelSplit>,
     /// Compare hashes of layouts only: do not play.

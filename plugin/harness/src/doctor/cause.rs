@@ -100,9 +100,9 @@ impl CauseKind {
                  this comparison does not see, but agents may: a Local, a static, an asset, a queue of messages, a type that does not derive Reflect, and a field with #[reflect(ignore)]"
             }
             Self::IncompleteSnapshot => {
-                "return it in `save`, and put it back in `load` (`.snapshot` of a `ForeignGame`, or `SnapshotTools`); keep a \
-                 Local in a resource, and despawn in `load` what was spawned since. Explorers that notice it return by \
-                 replays, and --no-snapshots always does"
+                "return it in `save`, and put it back in `load` (`.snapshot` of a `ForeignGame`, or `SnapshotTools`), and \
+                 despawn in `load` what was spawned since; with `.snapshots()`, declare its type with `.snapshot_of`. Keep a \
+                 Local in a resource. Explorers that notice it return by replays, and --no-snapshots always does"
             }
             Self::Loading => {
                 "wait for the files before an episode starts, with a `ready` that says when they are there"
