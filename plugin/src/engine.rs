@@ -12,7 +12,7 @@
 //! | let other agents play along | [`PlaysAlong`], [`begin_beside`] |
 //! | find the tick of a game, whatever its frames | [`TickSchedules`], [`is_tick`], [`set_tick_rate`] |
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
-//! | name the tick in which a game logs a message | [`moment_of_thread`], [`EpisodeMoment`] |
+//! | name the tick in which a game logs a message | [`tick_of_thread`], [`LevelTick`] |
 //! | let frames wait for the assets of a game, and name them | [`deliver_between_frames`], [`wait_for_assets`], [`UnloadedAssets`] |
 //! | name the level of a call that does not return | [`GameCall`], [`SlowCalls`], [`SlowCall`] |
 //! | decide for many agents at once | [`PolicyBatch`], [`PolicyRows`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
@@ -49,7 +49,7 @@ pub use crate::{
         recorder::{demo_actions, flush_unfinished, record_ticks},
         replay::recorded_action,
     },
-    episode::{EpisodeMoment, begin_beside, moment_of_thread},
+    episode::{LevelTick, begin_beside, tick_of_thread},
     fault::FaultSystems,
     headless::{headless_frame_app, into_world, run_on_one_thread, set_tick_rate, tick_world},
     key_bindings::TappedKeys,
@@ -74,7 +74,8 @@ pub use crate::{
 /// Panics of a game: turned into faults, with a file that replays to the panic.
 pub mod panics {
     pub use crate::panics::{
-        EpisodeTrace, PanicReports, hear, lacks_render_app, note_actions, place_of_panic, refusal, refuse, tell_at_once,
+        EpisodeTrace, PanicReports, hear, lacks_render_app, note_actions, place_of_panic, refusal, refuse,
+        report_at_once,
     };
 }
 

@@ -263,11 +263,11 @@ pub(crate) fn begin_episodes(
         *episode = Episode { level, state: EpisodeState::Running, ..default() };
         GameCall::add_level(level);
         commands.trigger(StartEpisode { entity, level });
-        begun.push(EpisodeMoment { level, tick: 0 });
+        begun.push(LevelTick { level, tick: 0 });
     }
     // The observers that build these levels run next.
     if !begun.is_empty() {
-        set_moment(begun.into_iter());
+        set_level_tick(begun.into_iter());
     }
 }
 
@@ -328,18 +328,18 @@ pub(crate) fn end_episodes(
     }
 }
 
-// The moment that a thread is at, for the messages of games in the log.
+// The tick that a thread runs, for the messages of games in the log.
 
 /// A tick of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub struct EpisodeMoment {
+pub struct LevelTick {
     /// The level.
     pub level: u64,
     /// The tick, from 0.
     pub tick: u32,
 }
 
-impl fmt::Display for EpisodeMoment {
+impl fmt::Display for LevelTick {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "level {}, tick {}", self.level, self.tick)
     }
@@ -348,38 +348,38 @@ impl fmt::Display for EpisodeMoment {
 thread_local! {
     /// True while this thread ticks a World without a window, whose systems all run on it.
     static TICKS: Cell<bool> = const { Cell::new(false) };
-    static MOMENT: Cell<Option<EpisodeMoment>> = const { Cell::new(None) };
+    static LEVEL_TICK: Cell<Option<LevelTick>> = const { Cell::new(None) };
 }
 
 /// Returns the tick that this thread runs. `None` outside of [`tick_world`](crate::headless::tick_world), or if the agents
-/// of the World are at several moments.
-pub fn moment_of_thread() -> Option<EpisodeMoment> {
-    MOMENT.get()
+/// of the World are in several ticks.
+pub fn tick_of_thread() -> Option<LevelTick> {
+    LEVEL_TICK.get()
 }
 
-/// Runs a tick of a World on this thread, with [`moment_of_thread`].
-pub(crate) fn with_moments<T>(tick: impl FnOnce() -> T) -> T {
+/// Runs a tick of a World on this thread, with [`tick_of_thread`].
+pub(crate) fn with_tick<T>(tick: impl FnOnce() -> T) -> T {
     TICKS.set(true);
     let ticked = tick();
     TICKS.set(false);
-    MOMENT.set(None);
+    LEVEL_TICK.set(None);
     ticked
 }
 
-/// Notes the moment of this thread, if all agents are at the same one.
-fn set_moment(mut agents: impl Iterator<Item = EpisodeMoment>) {
+/// Notes the tick that this thread runs, if all agents are in the same one.
+fn set_level_tick(mut agents: impl Iterator<Item = LevelTick>) {
     if TICKS.get() {
         let first = agents.next();
-        MOMENT.set(first.filter(|first| agents.all(|other| other == *first)));
+        LEVEL_TICK.set(first.filter(|first| agents.all(|other| other == *first)));
     }
 }
 
-/// Notes the moment of this tick.
-pub(crate) fn note_moment(agents: Query<(&Control, &Episode)>) {
+/// Notes the tick that the agents of a World play now.
+pub(crate) fn note_level_tick(agents: Query<(&Control, &Episode)>) {
     let playing = agents
         .iter()
         .filter(|(control, episode)| control.is_active() && (episode.is_running() || episode.is_loading()));
-    set_moment(playing.map(|(_, episode)| EpisodeMoment { level: episode.level, tick: episode.tick }));
+    set_level_tick(playing.map(|(_, episode)| LevelTick { level: episode.level, tick: episode.tick }));
 }
 
 /// Number of fixed ticks since the World began.
@@ -397,12 +397,12 @@ mod tests {
     use crate::{headless::run_on_one_thread, prelude::*};
     use std::sync::{Arc, Mutex};
 
-    /// Returns the moments that a system and the observer that builds levels see, with so many agents.
+    /// Returns the ticks that a system and the observer that builds levels see, with so many agents.
     fn seen(levels: &[u64]) -> Vec<Option<(u64, u32)>> {
         let seen = Arc::<Mutex<Vec<_>>>::default();
         let note = |seen: &Arc<Mutex<Vec<_>>>| {
-            let moment = moment_of_thread().map(|moment| (moment.level, moment.tick));
-            seen.lock().expect("no thread panics").push(moment);
+            let tick = tick_of_thread().map(|tick| (tick.level, tick.tick));
+            seen.lock().expect("no thread panics").push(tick);
         };
         let mut app = headless_app();
         let (in_game, in_start) = (seen.clone(), seen.clone());
@@ -422,7 +422,7 @@ mod tests {
         }
         run_on_one_thread(app.world_mut());
         app.ticks(3).expect("no agent broke its contract");
-        assert_eq!(moment_of_thread(), None, "the tick is over");
+        assert_eq!(tick_of_thread(), None, "the tick is over");
         let seen = seen.lock().expect("no thread panics");
         seen.clone()
     }
@@ -434,7 +434,7 @@ mod tests {
     }
 
     #[test]
-    fn agents_on_one_level_share_their_moment_and_others_have_none() {
+    fn agents_on_one_level_share_their_tick_and_others_have_none() {
         assert!(seen(&[7, 7]).iter().all(Option::is_some));
         assert!(seen(&[7, 9]).iter().all(Option::is_none));
     }

@@ -39,7 +39,7 @@ mod bevy_parts;
 use crate::{
     agent::{Agent, AgentOrder, Control},
     calls::GameCall,
-    episode::{Episode, Tick, with_moments},
+    episode::{Episode, Tick, with_tick},
     fault::{Fault, Faults},
     loading::{deliver_between_frames, wait_for_assets},
     panics,
@@ -158,7 +158,7 @@ pub fn tick_world(world: &mut World) -> Result<(), Fault> {
         faults.set_caller(true);
     }
     let call = GameCall::begin("playing", levels_in_play(world));
-    let ticked = with_moments(|| panics::guard(world, run_frames));
+    let ticked = with_tick(|| panics::guard(world, run_frames));
     drop(call);
     // A World that has panicked may have lost the note.
     if let Some(mut faults) = world.get_resource_mut::<Faults>() {

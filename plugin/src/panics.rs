@@ -119,7 +119,7 @@ thread_local! {
     static GUARDED: Cell<bool> = const { Cell::new(false) };
     static WORDS: RefCell<String> = const { RefCell::new(String::new()) };
     /// Gets the message of the first panic at once.
-    static TELL: Cell<Option<fn(&str)>> = const { Cell::new(None) };
+    static REPORT: Cell<Option<fn(&str)>> = const { Cell::new(None) };
 }
 
 /// Captures panics of guarded Worlds instead of printing them.
@@ -137,8 +137,8 @@ fn hear_panics() {
                 let words = words.split_whitespace().collect::<Vec<_>>().join(" ");
                 let place = place_of_panic(panic);
                 let words = format!("{words}{place}");
-                if let Some(tell) = TELL.get() {
-                    tell(&words);
+                if let Some(report) = REPORT.get() {
+                    report(&words);
                 }
                 WORDS.set(words);
             }
@@ -189,10 +189,10 @@ pub fn hear<T>(work: impl FnOnce() -> T) -> Result<T, String> {
 
 /// Runs work, and passes the message of a captured panic in it on at once. Bevy prints the name of a system that has
 /// panicked while the panic leaves the schedule, which is later.
-pub fn tell_at_once<T>(tell: fn(&str), work: impl FnOnce() -> T) -> T {
-    let outer = TELL.replace(Some(tell));
+pub fn report_at_once<T>(report: fn(&str), work: impl FnOnce() -> T) -> T {
+    let outer = REPORT.replace(Some(report));
     let done = work();
-    TELL.set(outer);
+    REPORT.set(outer);
     done
 }
 
@@ -277,17 +277,18 @@ mod tests {
     }
 
     #[test]
-    fn a_panic_is_told_at_once_and_only_where_it_is_asked_for() {
-        thread_local!(static TOLD: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) });
+    fn a_panic_is_reported_at_once_and_only_where_it_is_asked_for() {
+        thread_local!(static REPORTED: RefCell<Vec<String>> = const { RefCell::new(Vec::new()) });
         fn open() {
             panic!("the door\n is locked");
         }
-        let heard = tell_at_once(|words| TOLD.with_borrow_mut(|told| told.push(words.to_owned())), || hear(open));
-        let told = TOLD.take();
-        assert!(told.len() == 1 && told[0].starts_with("the door is locked ("), "{told:?}");
-        assert_eq!(heard, Err(told[0].clone()));
+        let heard =
+            report_at_once(|words| REPORTED.with_borrow_mut(|reported| reported.push(words.to_owned())), || hear(open));
+        let reported = REPORTED.take();
+        assert!(reported.len() == 1 && reported[0].starts_with("the door is locked ("), "{reported:?}");
+        assert_eq!(heard, Err(reported[0].clone()));
         assert!(hear(open).is_err());
-        assert!(TOLD.take().is_empty());
+        assert!(REPORTED.take().is_empty());
     }
 
     #[test]

@@ -101,7 +101,7 @@ fn add_decision_systems(app: &mut App, schedule: impl ScheduleLabel) {
                 reward::clear_rewards,
                 episode::begin_episodes,
                 skill_prior::end_skills,
-                episode::note_moment,
+                episode::note_level_tick,
             )
                 .chain()
                 .in_set(PlaybotSystems::Begin),

@@ -324,8 +324,8 @@ pub(crate) fn first_levels(game: &dyn Game, last: u64) -> LevelSplit {
     LevelSplit { mode: default_mode(game).to_owned(), first: 0, last }
 }
 
-/// Says who plays the other agents, where a verb plays one agent of a game in which several play together.
-pub(crate) fn report_companions(game: &dyn Game) {
+/// Reports how the other agents play, where a verb is about one of several agents that play together.
+pub(crate) fn report_agents_along(game: &dyn Game) {
     let (agents, name) = (game.tools().host.agents_per_arena(), game.name());
     if agents > 1 {
         let along = match game.tools().bots.demonstrator() {

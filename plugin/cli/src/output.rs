@@ -91,7 +91,7 @@ impl Drop for GamesPrintElsewhere {
         let own = DATA.lock().unwrap_or_else(PoisonError::into_inner).take();
         #[cfg(unix)]
         if let Some(own) = own {
-            // A game may have begun a line. The words are lost only if nobody can read them.
+            // A game may have begun a line. If standard error is closed, its words are lost.
             let _ = io::stdout().flush();
             let _ = rustix::stdio::dup2_stdout(&own);
         }

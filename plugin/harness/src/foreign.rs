@@ -78,7 +78,7 @@ use crate::{
     defect::DefectKind,
     detector::Detector,
     foreign::{
-        agents::{SharingAgents, add_companions},
+        agents::{SharingAgents, add_agents_along},
         description::{Description, ForeignPlugin, nothing_seen},
         input::{ForeignBot, Input},
         levels::LevelParts,
@@ -555,8 +555,8 @@ impl HostTools for ForeignGame {
         u32::try_from(self.description.agents.count()).unwrap_or(u32::MAX)
     }
 
-    fn add_companions(&self, world: &mut World) {
-        add_companions(self, world);
+    fn add_agents_along(&self, world: &mut World) {
+        add_agents_along(self, world);
     }
 
     fn unplayable(&self) -> Option<String> {

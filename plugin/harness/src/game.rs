@@ -297,7 +297,7 @@ pub trait HostTools: Send + Sync {
 
     /// Returns the number of agents that share each arena: its level, its episode and its ticks. In a World of trainings
     /// and evaluations all of them play. Everything else plays the first one, and the others
-    /// [play along](Self::add_companions).
+    /// [play along](Self::add_agents_along).
     fn agents_per_arena(&self) -> u32 {
         1
     }
@@ -305,7 +305,7 @@ pub trait HostTools: Send + Sync {
     /// Adds the agents that are missing in a World of fewer agents than share an arena. They play along, as
     /// [`PlaysAlong`](bevy_playbot::engine::PlaysAlong) says, in a way that depends on nothing but the level and what the
     /// others do. So a recording of the first agent replays.
-    fn add_companions(&self, _world: &mut World) {}
+    fn add_agents_along(&self, _world: &mut World) {}
 
     /// Returns the reason that the game cannot be played at all, if there is one. That it has no actions is checked for
     /// every game.

@@ -332,8 +332,8 @@ impl AlikeLevels {
         Self { by_state: by_state && !classes.is_empty(), classes }
     }
 
-    /// Returns the groups of levels of the first range that are alike; the number of each group's level counts up. Levels
-    /// that are like no other are groups of one.
+    /// Returns the groups of levels of the first range that are alike, each in ascending order. Levels that are like no
+    /// other are groups of one.
     pub fn groups(&self) -> Vec<Vec<u64>> {
         let own =
             |class: &Vec<PlacedLevel>| class.iter().filter(|level| is_own(level)).map(|(_, level)| *level).collect();

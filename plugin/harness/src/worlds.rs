@@ -97,13 +97,13 @@ pub fn build_observing_world(
 /// Checks that a World of the game can be built and that its startup systems run, and drops it. Verbs call it before they
 /// print or write anything, so that a game that cannot start is reported by its first panic, and not by a consequence.
 ///
-/// `tell` gets the panic of a startup system at once, before Bevy prints the system's name. A mode that the game does not
-/// have is not checked.
+/// `report` gets the panic of a startup system at once, before Bevy prints the system's name. A mode that the game does
+/// not have is not checked.
 ///
 /// # Errors
 ///
 /// The game panicked: the panic's message, with its file, its line and, if they are known, its plugin or system.
-pub fn check_start(game: &dyn Game, mode: &str, level: u64, tell: fn(&str)) -> Result<(), Fault> {
+pub fn check_start(game: &dyn Game, mode: &str, level: u64, report: fn(&str)) -> Result<(), Fault> {
     if game.check_mode(mode).is_err() {
         return Ok(());
     }
@@ -113,7 +113,7 @@ pub fn check_start(game: &dyn Game, mode: &str, level: u64, tell: fn(&str)) -> R
     }
     // Startup systems may read the level, but without an agent that plays it does not begin: a panic belongs to no level.
     world.trigger(NextEpisode { entity: agents[0], level });
-    let started = panics::tell_at_once(tell, || world.tick());
+    let started = panics::report_at_once(report, || world.tick());
     // Other faults are those of a level, too.
     if panics::refusal(&world).is_some() { started } else { Ok(()) }
 }
@@ -252,7 +252,7 @@ pub fn spawn_agents(
     for &agent in &agents {
         observation_config.equip(game, world, agent);
     }
-    game.tools().host.add_companions(world);
+    game.tools().host.add_agents_along(world);
     agents
 }
 
@@ -366,8 +366,8 @@ impl EndedEpisodes {
     }
 }
 
-fn note(event: On<EpisodeEnded>, companions: Query<(), With<PlaysAlong>>, mut ended: ResMut<EndedEpisodes>) {
-    if !companions.contains(event.entity) {
+fn note(event: On<EpisodeEnded>, others: Query<(), With<PlaysAlong>>, mut ended: ResMut<EndedEpisodes>) {
+    if !others.contains(event.entity) {
         ended.0.push((event.entity, event.result));
     }
 }

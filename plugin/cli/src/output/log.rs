@@ -1,7 +1,7 @@
 //! The log on standard error, and libraries that write there by themselves.
 
 use crate::output::messages::for_people;
-use bevy_playbot::engine::{EpisodeMoment, moment_of_thread};
+use bevy_playbot::engine::{LevelTick, tick_of_thread};
 use playbot_report::counted;
 use std::{
     cmp::Reverse,
@@ -91,10 +91,10 @@ where
         let krate = event.metadata().target().split("::").next().unwrap_or_default();
         let is_ours = krate == "playbot" || krate == "bevy_playbot" || krate.starts_with("playbot_");
         if !(self.is_plain && is_ours) {
-            if let Some(moment) = moment_of_thread().filter(|_| !is_of_program(event.metadata().target())) {
-                // Shorter names of levels are padded on the left.
+            if let Some(tick) = tick_of_thread().filter(|_| !is_of_program(event.metadata().target())) {
+                // `INFO` and `WARN` come with a space before them.
                 let space = if matches!(*event.metadata().level(), Level::INFO | Level::WARN) { "" } else { " " };
-                write!(writer, "{moment}:{space}")?;
+                write!(writer, "{tick}:{space}")?;
             }
             return self.full.format_event(context, writer, event);
         }
@@ -133,22 +133,22 @@ pub(crate) struct Repeats {
 struct Kept {
     /// How often it came again, if it is a game's.
     again: u64,
-    /// Its first and its last moment by level and tick, which do not depend on the order of threads. `None` without a
+    /// Its first and its last tick, by level and tick, which do not depend on the order of threads. `None` without a
     /// known one.
-    moments: Option<[EpisodeMoment; 2]>,
+    ticks: Option<[LevelTick; 2]>,
 }
 
 impl Kept {
-    fn note(&mut self, moment: Option<EpisodeMoment>) {
-        let Some(moment) = moment else { return };
-        let [first, last] = self.moments.get_or_insert([moment; 2]);
-        *first = moment.min(*first);
-        *last = moment.max(*last);
+    fn note(&mut self, tick: Option<LevelTick>) {
+        let Some(tick) = tick else { return };
+        let [first, last] = self.ticks.get_or_insert([tick; 2]);
+        *first = tick.min(*first);
+        *last = tick.max(*last);
     }
 
-    /// Returns its moments in parentheses, after a space; empty without one.
-    fn moments(&self) -> String {
-        match self.moments {
+    /// Returns its ticks in parentheses, after a space; empty without one.
+    fn ticks(&self) -> String {
+        match self.ticks {
             None => String::new(),
             Some([first, last]) if first == last => format!(" (in {first})"),
             Some([first, last]) => format!(" (first in {first}, last in {last})"),
@@ -175,7 +175,7 @@ impl Repeats {
         // A message may have a stack trace below it.
         let line = |(text, kept): &(&str, &Kept)| {
             let (again, text) = (counted(kept.again, "time"), text.lines().next().unwrap_or_default());
-            format!("  {again} more: {text}{}", kept.moments())
+            format!("  {again} more: {text}{}", kept.ticks())
         };
         let more = again.len().saturating_sub(MOST_LISTED);
         let more = (more > 0).then(|| format!("  and {}", counted(more as u64, "other message")));
@@ -200,15 +200,15 @@ impl<S: Subscriber> Layer<S> for Repeats {
         }
         let mut message = Message(format!("{level} {target}:"));
         event.record(&mut message);
-        let moment = moment_of_thread().filter(|_| !is_of_files);
+        let tick = tick_of_thread().filter(|_| !is_of_files);
         let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some(known) = kept.get_mut(&message.0) {
             known.again += u64::from(!is_of_files);
-            known.note(moment);
+            known.note(tick);
             return false;
         }
         if kept.len() < MOST_KEPT {
-            kept.entry(message.0).or_default().note(moment);
+            kept.entry(message.0).or_default().note(tick);
         }
         true
     }

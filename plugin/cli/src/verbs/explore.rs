@@ -10,7 +10,7 @@ use crate::{
         experiment::ExperimentArgs,
         first_levels,
         player::{LoadedPlayer, check_skills},
-        report_companions,
+        report_agents_along,
     },
     error::{CliError, Outcome},
     output,
@@ -116,7 +116,7 @@ pub struct Args {
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    report_companions(game);
+    report_agents_along(game);
     let split = level(game, args.level.as_ref())?;
     split.check(game)?;
     let device = args.compute.device();

@@ -4,7 +4,7 @@ use crate::{
     arguments::{
         OverwriteArgs, check_start, default_held_out, first_levels, number_of_steps,
         player::{LoadedPlayer, PlayerArgs},
-        report_companions,
+        report_agents_along,
     },
     error::{CliError, Outcome},
     progress,
@@ -84,7 +84,7 @@ fn warn_of_pupils(player: &LoadedPlayer) {
 
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
-    report_companions(game);
+    report_agents_along(game);
     let levels = args.levels.clone().unwrap_or_else(|| first_levels(game, LAST_LEVEL));
     levels.check(game)?;
     let chosen_player = args.player.load(game)?;

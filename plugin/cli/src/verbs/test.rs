@@ -11,7 +11,7 @@ mod results;
 mod testers;
 
 use crate::{
-    arguments::{Compute, check_start, default_held_out, experiment::quoted, first_levels, report_companions},
+    arguments::{Compute, check_start, default_held_out, experiment::quoted, first_levels, report_agents_along},
     error::{CliError, Outcome},
     progress,
     progress::interrupt,
@@ -120,7 +120,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         return Err(CliError::Usage(format!("name a folder for the results with --out, such as --out runs/{name}")));
     };
     let game = games.get(name)?;
-    report_companions(game);
+    report_agents_along(game);
     let plan = plan(args, game)?;
     let record = plan.record(game);
     let (recording, against) = match args.against.as_deref() {

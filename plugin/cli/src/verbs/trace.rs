@@ -1,8 +1,7 @@
 //! `playbot trace`.
 
 use crate::{
-    arguments::LevelsArg,
-    arguments::check_start,
+    arguments::{LevelsArg, check_start},
     error::{CliError, Outcome},
     output::print_line,
 };

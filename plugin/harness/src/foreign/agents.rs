@@ -235,34 +235,34 @@ impl SharingAgents {
 // Agents that play along, where one agent is recorded, tested or replayed.
 
 /// Adds the agents that are missing in a World, as ones that play along.
-pub(super) fn add_companions(game: &ForeignGame, world: &mut World) {
+pub(super) fn add_agents_along(game: &ForeignGame, world: &mut World) {
     let present: Vec<u32> = world.query::<&Agent>().iter(world).map(|agent| agent.index).collect();
     let Some(last) = present.iter().copied().max() else { return };
     let missing = game.description.agents.count().saturating_sub(present.len());
     for number in (1..=missing as u32).map(|number| last.saturating_add(number)) {
-        let companion = game.spawn_agent(world, number);
-        let mut companion = world.entity_mut(companion);
-        companion.insert(PlaysAlong);
+        let other = game.spawn_agent(world, number);
+        let mut other = world.entity_mut(other);
+        other.insert(PlaysAlong);
         match &game.description.demonstrator {
-            Some(_) => companion.insert(ForeignBot { noise: 0.0 }),
-            None => companion.insert(BlindBot::Chaos),
+            Some(_) => other.insert(ForeignBot { noise: 0.0 }),
+            None => other.insert(BlindBot::Chaos),
         };
     }
 }
 
 /// Begins the episode of the agents that play along, on the level of the first one. Nothing of an earlier episode counts
 /// for them, so a replay of the first agent finds them as they were.
-pub(super) fn begin_companions(world: &mut World, level: u64) {
-    let mut companions = world.query_filtered::<(&AgentPlace, Entity), With<PlaysAlong>>();
-    let mut companions: Vec<(usize, Entity)> = companions.iter(world).map(|(place, it)| (place.0, it)).collect();
-    companions.sort_unstable();
+pub(super) fn begin_agents_along(world: &mut World, level: u64) {
+    let mut others = world.query_filtered::<(&AgentPlace, Entity), With<PlaysAlong>>();
+    let mut others: Vec<(usize, Entity)> = others.iter(world).map(|(place, it)| (place.0, it)).collect();
+    others.sort_unstable();
     // A file has another number as soon as there are other files.
     let file = world.get_resource::<LevelFiles>().and_then(|files| files.of(level));
     let seed = file.map_or(level, |file| file.hash);
-    for (place, companion) in companions {
-        begin_beside(world, companion, level);
-        world.entity_mut(companion).insert(AgentStreams::new(seed, place as u32));
-        with_foreign(world, companion, |_, foreign| {
+    for (place, other) in others {
+        begin_beside(world, other, level);
+        world.entity_mut(other).insert(AgentStreams::new(seed, place as u32));
+        with_foreign(world, other, |_, foreign| {
             foreign.renew_bot();
             Ok(())
         });
@@ -270,8 +270,8 @@ pub(super) fn begin_companions(world: &mut World, level: u64) {
 }
 
 /// Makes agents that play along wait for the next episode.
-pub(super) fn end_companions(event: On<EpisodeEnded>, mut companions: Query<&mut Control, With<PlaysAlong>>) {
-    if let Ok(mut control) = companions.get_mut(event.entity) {
+pub(super) fn end_agents_along(event: On<EpisodeEnded>, mut others: Query<&mut Control, With<PlaysAlong>>) {
+    if let Ok(mut control) = others.get_mut(event.entity) {
         *control = Control::Idle;
     }
 }

@@ -172,7 +172,7 @@ impl Plugin for ForeignPlugin {
             .init_resource::<LevelFromFile>()
             .add_observer(restart::start)
             .add_observer(restart::announce)
-            .add_observer(agents::end_companions)
+            .add_observer(agents::end_agents_along)
             .init_schedule(BeforeGame)
             .add_systems(BeforeGame, note_baseline);
         let TickSchedules { decide, judge, .. } = TickSchedules::of(app);

@@ -592,7 +592,7 @@ impl ForeignGame {
     fn of_file(&self, (mode, level): (&str, u64), plan: Option<&FloorPlan>) -> Result<KnownLevel, InspectError> {
         let designs = level_designs(self, mode).map_err(ModeError::from)?;
         let path = designs.path(level).unwrap_or_default().to_owned();
-        // A file that is no text is read as one by nobody.
+        // Level files of bytes have no text to show.
         let content = if self.parse_bytes(&[]).is_some() { None } else { Some(read_text(Path::new(&path))?) };
         let shown = content.as_ref().map_or("its content is no text", |text| text.trim_end());
         let text = format!("{path}, a level of `{}`\n{}\n{shown}", self.name(), in_words(plan));

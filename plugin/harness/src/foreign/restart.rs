@@ -2,7 +2,7 @@
 
 use crate::{
     foreign::{
-        agents::begin_companions,
+        agents::begin_agents_along,
         clocks::{ClockSettings, leave_loading_out, stand_still},
         levels::{EditorLevel, LevelFromFile, editor_level_ahead, level_ahead},
         observe::forget_state,
@@ -39,7 +39,7 @@ fn begin(world: &mut World, agent: Entity, level: u64) {
             episode.level = level;
         }
     }
-    begin_companions(world, level);
+    begin_agents_along(world, level);
     with_foreign(world, agent, |world, foreign| {
         let designs = world.get_resource::<LevelDesigns>();
         let (seed, file) = level_ahead(&foreign.game, designs, level)?;

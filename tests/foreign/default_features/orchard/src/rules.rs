@@ -45,9 +45,9 @@ struct Watched(Option<Seen>);
 #[derive(Clone, Copy)]
 struct Seen {
     /// Fruit and distance, as they are paid: see the adapter.
-    success: f32,
+    paid: f32,
     fruit: u32,
-    /// Fruit that nobody has picked.
+    /// Fruit that is not picked yet.
     left: u32,
 }
 
@@ -58,9 +58,9 @@ impl EpisodeWatcher for Watched {
             .world
             .try_query::<&Thing>()
             .map_or(0, |mut things| things.iter(moment.world).filter(|thing| **thing == Thing::Fruit).count() as u32);
-        let now = Seen { success: run.fruit as f32 + run.distance / 10.0, fruit: run.fruit, left };
+        let now = Seen { paid: run.fruit as f32 + run.distance / 10.0, fruit: run.fruit, left };
         let before = self.0.replace(now)?;
-        let (earned, reward) = (now.success - before.success, moment.reward);
+        let (earned, reward) = (now.paid - before.paid, moment.reward);
         if (reward - earned).abs() > ROUNDING {
             return Some(format!("a reward of {reward} for fruit and distance of {earned}"));
         }
@@ -113,14 +113,14 @@ mod tests {
 
     #[test]
     fn rewards_are_for_fruit_and_distance() {
-        let is_wrong = |success, reward| said(Some(Seen { success, fruit: 2, left: 0 }), reward).is_some();
+        let is_wrong = |paid, reward| said(Some(Seen { paid, fruit: 2, left: 0 }), reward).is_some();
         assert!(!is_wrong(3.4, 0.1) && !is_wrong(3.5, 0.0) && said(None, 0.7).is_none());
         assert!(is_wrong(3.5, 0.1) && is_wrong(3.4, 0.0));
     }
 
     #[test]
     fn picked_fruit_counts() {
-        let before = |fruit, left| Some(Seen { success: 2.5, fruit, left });
+        let before = |fruit, left| Some(Seen { paid: 2.5, fruit, left });
         assert_eq!(said(before(1, 1), 1.0), None);
         assert_eq!(said(before(2, 1), 1.0).as_deref(), Some("1 fruit picked, and 0 counted"));
         assert_eq!(said(before(1, 0), 1.0).as_deref(), Some("0 fruit picked, and 1 counted"));
