@@ -140,7 +140,33 @@ pub struct DetectorTick<'a> {
     pub proofs: &'a dyn Proofs,
 }
 
-impl DetectorTick<'_> {
+impl<'a> DetectorTick<'a> {
+    /// Creates tick 0 of level 0, without an observation, a reward and a position: for tests of detectors.
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{detector::DetectorTick, prelude::*};
+    ///
+    /// let (world, action) = (World::new(), ActionValue::Discrete(1));
+    /// let paid = DetectorTick { reward: 1.0, ..DetectorTick::of(&world, &action) };
+    /// assert_eq!((paid.reward, paid.tick, paid.level), (1.0, 0, 0));
+    /// ```
+    pub fn of(world: &'a World, action: &'a ActionValue) -> Self {
+        Self {
+            world,
+            agent: Entity::PLACEHOLDER,
+            level: 0,
+            tick: 0,
+            action,
+            observation: &[],
+            state_hash: 0,
+            reward: 0.0,
+            position: None,
+            is_success: false,
+            proofs: &NoProofs,
+        }
+    }
+
     /// Returns a hash of the known state: the game's own hash, the observation and the position.
     pub fn fingerprint(&self) -> u64 {
         let position = self.position.map_or([0.0; 2], |position| position.to_array());

@@ -65,6 +65,32 @@ use crate::{
 use bevy::prelude::*;
 use bevy_playbot::{engine::panics::EpisodeTrace, streams::AgentStreams};
 
+/// What the plugin keeps of an agent that plays.
+#[derive(Bundle, Clone)]
+pub(crate) struct AgentState {
+    episode: Episode,
+    streams: AgentStreams,
+    hash: StateHash,
+    observation: Observation,
+    action: Action,
+    reward: Reward,
+}
+
+impl AgentState {
+    /// Returns a copy of what the plugin keeps of an agent; `None` if this is none.
+    pub(crate) fn of(world: &World, agent: Entity) -> Option<Self> {
+        let agent = world.get_entity(agent).ok()?;
+        Some(Self {
+            episode: agent.get::<Episode>()?.clone(),
+            streams: agent.get::<AgentStreams>()?.clone(),
+            hash: *agent.get::<StateHash>()?,
+            observation: agent.get::<Observation>()?.clone(),
+            action: agent.get::<Action>()?.clone(),
+            reward: *agent.get::<Reward>()?,
+        })
+    }
+}
+
 /// An agent's running episode at the end of a tick. Other agents of the game may go on from it, also in other Worlds.
 ///
 /// It has the state of the game, by [`SnapshotTools`](crate::game::SnapshotTools), and what the plugin keeps of an
@@ -72,12 +98,7 @@ use bevy_playbot::{engine::panics::EpisodeTrace, streams::AgentStreams};
 /// and the states of bots are no part of it.
 pub struct SavedEpisode {
     game: Snapshot,
-    episode: Episode,
-    streams: AgentStreams,
-    hash: StateHash,
-    observation: Observation,
-    action: Action,
-    reward: Reward,
+    state: AgentState,
     /// The actions so far, for the report of a panic.
     trace: Option<EpisodeTrace>,
 }
@@ -86,22 +107,17 @@ impl SavedEpisode {
     /// Saves the episode of an agent. Call it between two ticks. Returns `None` if the agent plays no level, or if the
     /// game saves nothing.
     pub fn of(game: &dyn Game, world: &World, agent: Entity) -> Option<Self> {
-        let episode = world.get::<Episode>(agent).filter(|episode| episode.is_running() && episode.end().is_none())?;
+        world.get::<Episode>(agent).filter(|episode| episode.is_running() && episode.end().is_none())?;
         Some(Self {
             game: game.tools().snapshots.save(world, agent)?,
-            episode: episode.clone(),
-            streams: world.get::<AgentStreams>(agent)?.clone(),
-            hash: *world.get::<StateHash>(agent)?,
-            observation: world.get::<Observation>(agent)?.clone(),
-            action: world.get::<Action>(agent)?.clone(),
-            reward: *world.get::<Reward>(agent)?,
+            state: AgentState::of(world, agent)?,
             trace: world.get::<EpisodeTrace>(agent).cloned(),
         })
     }
 
     /// Returns the ticks of the episode so far.
     pub fn tick(&self) -> u32 {
-        self.episode.tick
+        self.state.episode.tick
     }
 
     /// Puts an agent into the episode, whatever it plays now. Its control and its next levels stay as they
@@ -109,13 +125,12 @@ impl SavedEpisode {
     /// game cannot load its state.
     pub fn restore(&self, game: &dyn Game, world: &mut World, agent: Entity) -> bool {
         let played = world.get::<Episode>(agent);
-        let is_same = played.is_some_and(|played| played.level == self.episode.level && !played.is_loading());
+        let is_same = played.is_some_and(|played| played.level == self.state.episode.level && !played.is_loading());
         if !is_same || !game.tools().snapshots.load(world, agent, &self.game) {
             return false;
         }
         let Ok(mut agent) = world.get_entity_mut(agent) else { return false };
-        agent.insert((self.episode.clone(), self.streams.clone(), self.hash, self.reward));
-        agent.insert((self.observation.clone(), self.action.clone()));
+        agent.insert(self.state.clone());
         if let Some(trace) = &self.trace {
             agent.insert(trace.clone());
         }

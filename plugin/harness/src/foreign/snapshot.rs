@@ -14,6 +14,7 @@ use crate::{
         snapshot::value::{EntityMap, Made, Owner, Value, Way, Ways},
     },
     game::{Snapshot, SnapshotTools},
+    saved_episode::AgentState,
 };
 use bevy::{
     ecs::{
@@ -31,15 +32,9 @@ use bevy::{
     window::WindowEvent,
 };
 use bevy_playbot::{
-    action::Action,
     agent::{AgentOrder, Control},
     bot::HeldAction,
     engine::panics,
-    episode::Episode,
-    observation::Observation,
-    reward::Reward,
-    state_hash::StateHash,
-    streams::AgentStreams,
     virtual_input::VirtualDevices,
 };
 use std::{
@@ -172,19 +167,16 @@ impl ForeignGame {
     }
 }
 
-/// What the plugin keeps of an agent.
-type KeptAgent = ((Control, Episode, AgentStreams, Action), (Observation, Reward, StateHash), HeldAction);
+/// What the plugin keeps of an agent that plays along: its control and held action besides.
+type KeptAgent = (AgentState, Control, HeldAction);
 
 /// Returns what the plugin keeps of the other agents of a World. The caller knows the one that it plays.
 fn others(world: &World, agent: Entity) -> Vec<(Entity, KeptAgent)> {
     let all = world.get_resource::<AgentOrder>().map_or(&[][..], |order| order.entities());
     let kept = |other: Entity| -> Option<(Entity, KeptAgent)> {
-        let entity = world.get_entity(other).ok()?;
-        let (control, episode, streams) = (entity.get().copied()?, entity.get().cloned()?, entity.get().cloned()?);
-        let (action, seen) = (entity.get().cloned()?, entity.get().cloned()?);
-        let (reward, hash) = (entity.get().copied()?, entity.get().copied()?);
-        let held = entity.get().cloned().unwrap_or_default();
-        Some((other, ((control, episode, streams, action), (seen, reward, hash), held)))
+        let control = *world.get::<Control>(other)?;
+        let held = world.get::<HeldAction>(other).cloned().unwrap_or_default();
+        Some((other, (AgentState::of(world, other)?, control, held)))
     };
     all.iter().filter(|other| **other != agent).filter_map(|&other| kept(other)).collect()
 }

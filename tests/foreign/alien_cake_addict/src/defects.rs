@@ -70,26 +70,8 @@ fn add<M>(app: &mut App, system: impl IntoScheduleConfigs<bevy::ecs::system::Sch
 
 #[cfg(test)]
 mod tests {
-    use playbot::harness::foreign::Restart;
-
     use super::*;
-    use crate::{game, refresh};
+    use crate::adapter;
 
-    /// Returns the game with a bot that walks to the cake.
-    fn played() -> ForeignGame {
-        ForeignGame::new("alien_cake_addict", 1, game)
-            .hz(20.0)
-            .keys([KeyCode::ArrowUp, KeyCode::ArrowDown, KeyCode::ArrowRight, KeyCode::ArrowLeft].map(|key| vec![key]))
-            .observe(["cakes"], |game: Res<Game>| [game.cake_eaten as f32])
-            .reward_delta(|game: Res<Game>| game.cake_eaten as f32)
-            .time_limit(600)
-            .restart(Restart::state(GameState::Playing))
-            .level(refresh)
-            .demonstrator("glutton", |game: Res<Game>| {
-                let (at, cake) = (&game.player, &game.bonus);
-                [at.i < cake.i, at.i > cake.i, at.j < cake.j].iter().position(|go| *go).unwrap_or(3) as u32
-            })
-    }
-
-    playbot_shell::planted_defects!(game: played(), levels: "default:0..5");
+    playbot_shell::planted_defects!(game: adapter(), levels: "default:0..5");
 }

@@ -14,7 +14,12 @@ use playbot::harness::foreign::{ForeignGame, LevelSeed, Restart};
 use playbot::prelude::EpisodeEnd;
 
 fn main() -> ExitCode {
-    playbot::main(&[&rules::add_to(ForeignGame::new("alien_cake_addict", 1, game))
+    playbot::main(&[&rules::add_to(adapter())])
+}
+
+/// The game with all that its testers need.
+fn adapter() -> ForeignGame {
+    ForeignGame::new("alien_cake_addict", 1, game)
         .hz(20.0)
         .keys([vec![ArrowUp], vec![ArrowDown], vec![ArrowRight], vec![ArrowLeft], vec![]])
         .observe(["i", "j", "cake_i", "cake_j", "cake"], |g: Res<Game>| {
@@ -29,7 +34,7 @@ fn main() -> ExitCode {
         .demonstrator("glutton", |game: Res<Game>| {
             let (at, cake) = (&game.player, &game.bonus);
             [at.i < cake.i, at.i > cake.i, at.j < cake.j, at.j > cake.j].iter().position(|go| *go).unwrap_or(4) as u32
-        })])
+        })
 }
 
 /// Resets state that the game's own setup leaves: the timer, an old cake, and the camera's target.

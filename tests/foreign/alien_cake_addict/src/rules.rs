@@ -36,7 +36,6 @@ fn broken_rule(moment: &DetectorTick<'_>) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use bevy::prelude::*;
-    use playbot::harness::detector::NoProofs;
     use playbot::prelude::ActionValue;
 
     use super::*;
@@ -47,19 +46,8 @@ mod tests {
         let (world, action) = (World::new(), ActionValue::Discrete(0));
         let ([i, j], [cake_i, cake_j]) = (before, cake.unwrap_or([0.0; 2]));
         let seen = [i, j, cake_i, cake_j, f32::from(u8::from(cake.is_some()))].map(|number| number / 10.0);
-        broken_rule(&DetectorTick {
-            world: &world,
-            agent: Entity::PLACEHOLDER,
-            level: 0,
-            tick: 3,
-            action: &action,
-            observation: &seen,
-            state_hash: 0,
-            reward,
-            position: Some(Vec2::from_array(now)),
-            is_success: false,
-            proofs: &NoProofs,
-        })
+        let position = Some(Vec2::from_array(now));
+        broken_rule(&DetectorTick { observation: &seen, reward, position, ..DetectorTick::of(&world, &action) })
     }
 
     #[test]

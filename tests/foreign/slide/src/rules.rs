@@ -80,8 +80,6 @@ fn clicked(action: &ActionValue) -> Option<usize> {
 
 #[cfg(test)]
 mod tests {
-    use playbot::harness::detector::NoProofs;
-
     use super::*;
 
     const SOLVED: [u8; CELLS] = [1, 2, 3, 4, 5, 6, 7, 8, 0];
@@ -95,19 +93,9 @@ mod tests {
         let mut world = World::new();
         world.insert_resource(State::new(Screen::Playing));
         world.insert_resource(Board(tiles[1]));
-        Watched(Some((Screen::Playing, Board(tiles[0])))).tick(&DetectorTick {
-            world: &world,
-            agent: Entity::PLACEHOLDER,
-            level: 0,
-            tick: 3,
-            action: &ActionValue::Discrete(action),
-            observation: &[],
-            state_hash: 0,
-            reward,
-            position: None,
-            is_success,
-            proofs: &NoProofs,
-        })
+        let action = ActionValue::Discrete(action);
+        let moment = DetectorTick { reward, is_success, ..DetectorTick::of(&world, &action) };
+        Watched(Some((Screen::Playing, Board(tiles[0])))).tick(&moment)
     }
 
     #[test]
@@ -134,19 +122,8 @@ mod tests {
         let said = |end: EpisodeEnd, ticks: u32| {
             let (world, success) = (World::new(), end.is_success());
             let result = EpisodeResult { level: 0, end, success, ticks, clipped: 0, total_reward: 0.0 };
-            let moment = DetectorTick {
-                world: &world,
-                agent: Entity::PLACEHOLDER,
-                level: 0,
-                tick: ticks - 1,
-                action: &ActionValue::Discrete(0),
-                observation: &[],
-                state_hash: 0,
-                reward: 0.0,
-                position: None,
-                is_success: success,
-                proofs: &NoProofs,
-            };
+            let action = ActionValue::Discrete(0);
+            let moment = DetectorTick { tick: ticks - 1, is_success: success, ..DetectorTick::of(&world, &action) };
             Watched::default().end(&moment, &result)
         };
         assert!(said(EpisodeEnd::WON, 9).is_none() && said(EpisodeEnd::Truncated, TIME).is_none());

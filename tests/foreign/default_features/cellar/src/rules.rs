@@ -94,8 +94,6 @@ fn way(action: &ActionValue) -> Option<IVec2> {
 
 #[cfg(test)]
 mod tests {
-    use playbot::harness::detector::NoProofs;
-
     use super::*;
 
     /// The action without a key, and the one with that to the right.
@@ -125,19 +123,7 @@ mod tests {
         let mut world = World::new();
         world.insert_resource(State::new(Screen::Walking));
         world.insert_resource(room);
-        ask(&DetectorTick {
-            world: &world,
-            agent: Entity::PLACEHOLDER,
-            level: 0,
-            tick: 3,
-            action: &ActionValue::Discrete(action),
-            observation: &[],
-            state_hash: 0,
-            reward,
-            position: None,
-            is_success,
-            proofs: &NoProofs,
-        })
+        ask(&DetectorTick { reward, is_success, ..DetectorTick::of(&world, &ActionValue::Discrete(action)) })
     }
 
     /// Returns whether a tick after so many ticks of rest breaks a rule.

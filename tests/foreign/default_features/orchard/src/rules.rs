@@ -80,7 +80,6 @@ impl EpisodeWatcher for Watched {
 
 #[cfg(test)]
 mod tests {
-    use playbot::harness::detector::NoProofs;
     use playbot::prelude::ActionValue;
 
     use super::*;
@@ -90,19 +89,7 @@ mod tests {
         let mut world = World::new();
         world.insert_resource(State::new(screen));
         world.insert_resource(run);
-        ask(&DetectorTick {
-            world: &world,
-            agent: Entity::PLACEHOLDER,
-            level: 0,
-            tick: 3,
-            action: &ActionValue::Discrete(0),
-            observation: &[],
-            state_hash: 0,
-            reward,
-            position: None,
-            is_success: false,
-            proofs: &NoProofs,
-        })
+        ask(&DetectorTick { reward, ..DetectorTick::of(&world, &ActionValue::Discrete(0)) })
     }
 
     /// Returns the message about a tick after which two fruit are counted, none is left, and the hero is at 15.
