@@ -243,7 +243,7 @@ const LEVELS_PER_WORLD: usize = 32;
 /// Largest number of Worlds that play levels. It is the same on any number of threads, and so are results.
 const MOST_WORLDS: usize = 8;
 
-/// Worlds that break in their first level, after which the other levels of a thread are not played.
+/// Worlds in a row that break in their first level, after which the other levels of a thread are not played.
 const MOST_BARREN: u32 = 3;
 
 /// Largest number of levels that are played to compare held-out levels with seen ones.
@@ -302,7 +302,10 @@ impl AlikeLevels {
             let mut played = BTreeMap::new();
             for (range, (mode, _)) in ranges.iter().enumerate() {
                 let waiting = open.iter().flatten().filter(|(of, _)| *of == range).map(|(_, level)| *level);
-                let waiting: Vec<u64> = waiting.collect();
+                let mut waiting: Vec<u64> = waiting.collect();
+                // Groups stand in the order of their hashes, which can differ from build to build. Levels are dealt to
+                // Worlds in their own order.
+                waiting.sort_unstable();
                 let results = play(game, mode, &waiting, ticks, threads, &progress);
                 played.extend(results.into_iter().map(|result| ((range, result.level), result)));
             }
@@ -376,7 +379,7 @@ fn play(
         while !left.is_empty() && barren < MOST_BARREN {
             let part = play_world(game, mode, left, ticks, progress);
             left = left.get(part.len() + 1..).unwrap_or_default();
-            barren += u32::from(part.is_empty());
+            barren = if part.is_empty() { barren + 1 } else { 0 };
             played.extend(part);
         }
         played
@@ -578,5 +581,12 @@ mod tests {
         let game = dots(|level| modulo(level, 2), |_| 0.0)
             .reward(|level: Res<LevelSeed>| if level.0 == 2 { f32::NAN } else { 0.0 });
         assert_eq!(alike(&game, 6, true, 1).groups(), [vec![0, 4], vec![1, 3, 5]]);
+    }
+
+    #[test]
+    fn levels_behind_many_that_break_the_game_are_played() {
+        // Each World breaks in the first of two such levels, and the next World in the second.
+        let game = dots(|_| 0.0, |_| 0.0).reward(|level: Res<LevelSeed>| if level.0 % 4 >= 2 { f32::NAN } else { 0.0 });
+        assert_eq!(alike(&game, 18, true, 1).groups(), [[0, 1, 4, 5, 8, 9, 12, 13, 16, 17]]);
     }
 }
