@@ -134,6 +134,32 @@ fn the_adapter_of_a_game_with_files_says_what_follows_from_them() {
 }
 
 #[test]
+fn the_adapter_of_a_game_in_fixed_steps_has_a_frame_for_each() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let game = LIBRARY.replace("app.add_systems(Update, walk);", "app.add_systems(FixedUpdate, walk)CLOCK;");
+    for (clock, line, words) in [
+        ("", "        .hz(64.0)", "64 a second, which is Bevy's default"),
+        (".insert_resource(Time::<Fixed>::from_hz(50.0))", "        .hz(50.0)", "50 a second (src/lib.rs:5)"),
+        (
+            ".insert_resource(Time::<Fixed>::from_hz(RATE))",
+            "        // sees a press twice: .hz(steps of a second), as set in src/lib.rs:5",
+            "a number of them a second that is computed (src/lib.rs:5)",
+        ),
+    ] {
+        write(folder, &[("Cargo.toml", MANIFEST), ("src/lib.rs", &game.replace("CLOCK", clock))]);
+        let (printed, _) = done(folder, &["init", "--dry-run"]);
+        let found = format!("fixed steps: FixedUpdate (src/lib.rs:5), {words}");
+        for line in [line, &found] {
+            assert!(printed.lines().any(|printed| printed == line), "{line}: {printed}");
+        }
+    }
+    write(folder, &[("src/lib.rs", LIBRARY)]);
+    let (printed, _) = done(folder, &["init", "--dry-run"]);
+    assert!(printed.contains("fixed steps: none found\n") && !printed.contains(".hz("), "{printed}");
+}
+
+#[test]
 fn a_second_run_leaves_all_files_alone() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

@@ -81,11 +81,11 @@ fn what_a_file_says_that_it_has_seen_is_not_believed_beyond_reason() {
     };
     let (few, millions) = (mazes(1000, 1999), mazes(1 << 20, (1 << 24) - 1));
     assert_eq!(hidden.shown_by(Some(&seen(std::slice::from_ref(&few)))), None, "the numbers differ");
-    let alike = hidden.seen_in(&seen(std::slice::from_ref(&few)));
+    let alike = hidden.seen_in(&seen(std::slice::from_ref(&few)), &|_, _| {});
     assert!(alike.len() > 32 && alike.iter().all(|level| test.contains(&test.mode, *level)), "{alike:?}");
     assert!(alike.iter().all(|level| hidden.resembles(&test.mode, *level)));
-    assert!(hidden.seen_in(&seen(std::slice::from_ref(&millions))).is_empty(), "that would take long");
-    assert_eq!(hidden.seen_in(&seen(&[millions.clone(), few])), alike, "later ranges are compared");
+    assert!(hidden.seen_in(&seen(std::slice::from_ref(&millions)), &|_, _| {}).is_empty(), "that would take long");
+    assert_eq!(hidden.seen_in(&seen(&[millions.clone(), few]), &|_, _| {}), alike, "later ranges are compared");
     let numbers = seen(&[millions, mazes(63, 64)]);
     assert_eq!(hidden.shown_by(Some(&numbers)).as_deref(), Some("random+size=5x5:63..64, among others"));
 }
@@ -99,7 +99,8 @@ fn levels_of_a_seen_layout_are_found_under_another_number_and_as_a_file() {
     let hidden = HeldOut::new(&game, &test);
     let seen = |ranges: &[&str]| {
         let levels = ranges.iter().map(|&range| range.to_owned()).collect();
-        hidden.seen_in(&SeenLevels { game: "coinrun".to_owned(), levels, ..SeenLevels::default() }).len()
+        let seen = SeenLevels { game: "coinrun".to_owned(), levels, ..SeenLevels::default() };
+        hidden.seen_in(&seen, &|_, _| {}).len()
     };
     assert_eq!([seen(&["hard:0..63"]), seen(&["easy:0..499"]), seen(&["easy:0..499", "hard:0..63"])], [46, 222, 224]);
     assert!(!hidden.contains("hard", 0) && hidden.contains("hard", 64));
@@ -114,7 +115,7 @@ fn levels_of_a_seen_layout_are_found_under_another_number_and_as_a_file() {
     let drawn = seen_by_training(&game, &files);
     let test = hard(80, 142);
     let hidden = HeldOut::new(&game, &test);
-    let known = hidden.seen_in(&drawn);
+    let known = hidden.seen_in(&drawn, &|_, _| {});
     assert!(known.contains(&81) && known.contains(&142) && !known.contains(&80), "{known:?}");
     assert_eq!((hidden.shown_by(Some(&drawn)), hidden.first_of(&files)), (None, None));
     let twin = hard(142, 142);

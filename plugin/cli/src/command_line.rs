@@ -15,7 +15,7 @@ use crate::{
 };
 use bevy_playbot::unknown_name::nearest;
 use clap::{
-    Command, CommandFactory, FromArgMatches, Parser, Subcommand,
+    Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand,
     error::{ContextKind, ContextValue, ErrorKind},
 };
 use playbot_harness::{
@@ -194,7 +194,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
 /// Parses the arguments of the process.
 fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
     let mut command = with_only_game(with_own_name(Cli::command()), games);
-    let args = with_level_numbers(std::env::args_os().collect(), games);
+    let args = with_level_numbers(std::env::args_os().collect(), games, &command);
     let args = args.map_err(|words| command.error(ErrorKind::InvalidValue, words))?;
     let matches = match command.try_get_matches_from_mut(&args) {
         Err(error) if is_help(&error) => {
@@ -278,23 +278,38 @@ const OF_LEVELS: [&str; 4] = ["--level", "--levels", "--among", "--hold-out"];
 const WITH_MODE: [&str; 2] = ["explore", "demo"];
 
 /// Replaces the names of levels by their modes and numbers, so that each option takes them: `--levels Cave`,
-/// `--levels default:Cave..Tower`, `--level Cave`. The game is the first one that a word names, or the program's first.
+/// `--levels default:Cave..Tower`, `--level Cave`. The game is the one that is named behind the verb, or the program's
+/// first. Names stay as they are if only a file says which of several games is meant.
 ///
 /// # Errors
 ///
 /// The game has names for its levels, but no such one.
-fn with_level_numbers(mut args: Vec<OsString>, games: &[&dyn Game]) -> Result<Vec<OsString>, String> {
+fn with_level_numbers(
+    mut args: Vec<OsString>,
+    games: &[&dyn Game],
+    command: &Command,
+) -> Result<Vec<OsString>, String> {
     let words: Vec<String> = args.iter().map(|word| word.to_string_lossy().into_owned()).collect();
-    let named =
-        |word: &String| games.iter().find(|game| game.name() == word || game.aliases().contains(&word.as_str()));
-    let Some(&game) = words.iter().skip(1).find_map(named).or(games.first()) else { return Ok(args) };
     let value_of = |option: &str, place: usize| -> Option<&str> {
         let rest = words[place].strip_prefix(option)?;
         if rest.is_empty() { words.get(place + 1).map(String::as_str) } else { rest.strip_prefix('=') }
     };
+    let verb = words.iter().skip(1).map(String::as_str).find(|word| !word.starts_with('-'));
+    let has = |option: &str| (1..words.len()).any(|place| value_of(option, place).is_some());
+    let is_of_file = match verb {
+        Some("demo") => true,
+        Some("eval") => ["--experiment", "--run", "--policy"].into_iter().any(has),
+        _ => has("--experiment"),
+    };
+    let first = first_positional(&words, command);
+    let named = first.and_then(|word| games.iter().find(|game| game.name() == word || game.aliases().contains(&word)));
+    let game = match (named, games) {
+        (Some(game), _) | (None, [game]) => *game,
+        (None, [game, ..]) if !is_of_file => *game,
+        _ => return Ok(args),
+    };
     let mode = (1..words.len()).find_map(|place| value_of("--mode", place));
-    let verb = words.iter().skip(1).find(|word| !word.starts_with('-'));
-    let takes_mode = verb.is_some_and(|verb| WITH_MODE.contains(&verb.as_str()));
+    let takes_mode = verb.is_some_and(|verb| WITH_MODE.contains(&verb));
     for place in 1..words.len() {
         let found = OF_LEVELS.into_iter().find_map(|option| Some((option, value_of(option, place)?)));
         let Some((option, value)) = found else { continue };
@@ -307,6 +322,26 @@ fn with_level_numbers(mut args: Vec<OsString>, games: &[&dyn Game]) -> Result<Ve
         }
     }
     Ok(args)
+}
+
+/// Returns the first word behind the verb that is neither an option nor the value of one.
+fn first_positional<'a>(words: &'a [String], command: &Command) -> Option<&'a str> {
+    let (mut command, mut words) = (command, words.iter().skip(1));
+    while let Some(word) = words.next() {
+        if let Some(option) = word.strip_prefix("--") {
+            let is_it = |arg: &&Arg| arg.get_long_and_visible_aliases().is_some_and(|names| names.contains(&option));
+            if command.get_arguments().find(is_it).is_some_and(|arg| arg.get_action().takes_values()) {
+                words.next();
+            }
+        } else if word.starts_with('-') && word.len() > 1 {
+            // The options with one letter have no values.
+        } else if let Some(verb) = command.find_subcommand(word) {
+            command = verb;
+        } else {
+            return Some(word);
+        }
+    }
+    None
 }
 
 /// Levels whose names have been replaced by their numbers.
@@ -410,7 +445,7 @@ fn number_wanted(error: &(dyn Error + 'static)) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use bevy::{app::App, math::Vec2};
-    use clap::{Arg, value_parser};
+    use clap::value_parser;
     use playbot_harness::foreign::{EditorLevel, ForeignGame};
 
     use super::*;
@@ -449,7 +484,7 @@ mod tests {
     fn numbered(args: &str) -> Result<String, String> {
         let [rooms, plain] = rooms();
         let args = format!("playbot {args}").split(' ').map(OsString::from).collect();
-        let words = with_level_numbers(args, &[&rooms, &plain])?;
+        let words = with_level_numbers(args, &[&rooms, &plain], &Cli::command())?;
         Ok(words.iter().skip(1).map(|word| word.to_string_lossy()).collect::<Vec<_>>().join(" "))
     }
 
@@ -463,6 +498,11 @@ mod tests {
             ("test --levels hard:Hall..Cave", "test --levels hard:0..1"),
             ("record rooms --levels=hard:Tower --hold-out Hall", "record rooms --levels=hard:2 --hold-out easy:0"),
             ("explore rooms --level Cave", "explore rooms --level easy:1"),
+            // Values of options name no game.
+            ("test --out plain --levels Cave", "test --out plain --levels easy:1"),
+            ("test --out plain rooms --levels Cave", "test --out plain rooms --levels easy:1"),
+            ("eval rooms --run runs/a --levels Cave", "eval rooms --run runs/a --levels easy:1"),
+            ("train --run runs/a --hold-out Cave", "train --run runs/a --hold-out easy:1"),
         ] {
             assert_eq!(numbered(args).as_deref(), Ok(wanted));
         }
@@ -474,9 +514,23 @@ mod tests {
             "test plain --levels Cave",
             "level rooms --level",
             "level rooms --level --json",
+            // A file says which game it is.
+            "eval --experiment a.ron --levels Cave",
+            "eval --run=runs/a --levels Cave",
+            "eval --policy a.policy --levels Cave",
+            "demo filter a.demo --levels Cave --out b.demo",
+            "test --out rooms plain --levels Cave",
         ] {
             assert_eq!(numbered(same).as_deref(), Ok(same), "there is nothing to replace");
         }
+    }
+
+    #[test]
+    fn a_program_of_one_game_knows_its_levels_beside_any_file() {
+        let [rooms, _] = rooms();
+        let args = ["playbot", "demo", "filter", "a.demo", "--levels", "Cave"].map(OsString::from).to_vec();
+        let numbered = with_level_numbers(args, &[&rooms], &Cli::command()).expect("a level");
+        assert_eq!(numbered.last(), Some(&OsString::from("easy:1")));
     }
 
     #[test]

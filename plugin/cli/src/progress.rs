@@ -17,7 +17,7 @@ use std::{
     collections::VecDeque,
     fmt::Write as _,
     io::{IsTerminal, Write as _, stderr},
-    sync::{Arc, LazyLock, Mutex, MutexGuard, Once, PoisonError},
+    sync::{Arc, LazyLock, Mutex, MutexGuard, Once, OnceLock, PoisonError},
     thread,
     time::{Duration, Instant},
 };
@@ -61,6 +61,21 @@ pub(crate) fn bar(title: &str, length: u64, unit: &str) -> ProgressBar {
         start();
     }
     bar
+}
+
+/// Compares levels by their play, with a bar from the first one on: many games compare none so. The bar grows with the
+/// episodes that are known to be needed.
+pub(crate) fn comparing<T>(play: impl FnOnce(&(dyn Fn(u64, u64) + Sync)) -> T) -> T {
+    let shown = OnceLock::new();
+    let compared = play(&|played, more| {
+        let shown = shown.get_or_init(|| bar("compare levels", 0, "episodes"));
+        shown.inc_length(more);
+        shown.inc(played);
+    });
+    if let Some(bar) = shown.get() {
+        bar.finish_and_clear();
+    }
+    compared
 }
 
 /// Returns whether standard error is a terminal that can move its cursor, as bars need.

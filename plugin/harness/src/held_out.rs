@@ -124,8 +124,8 @@ impl<'a> HeldOut<'a> {
     /// 262,144 levels. If the game has no layouts and [compares states](crate::game::StateTools::compares_levels), the
     /// first ranges are compared by their play, up to 2,048 levels with the held-out ones. In a game whose World is built
     /// anew for each episode these are 128. If all held-out levels play like seen ones, none is left out for that: the
-    /// game has no others.
-    pub fn seen_in(&self, seen: &SeenLevels) -> BTreeSet<u64> {
+    /// game has no others. `progress` is that of [`AlikeLevels::of`], and is called only if levels are played.
+    pub fn seen_in(&self, seen: &SeenLevels, progress: &(dyn Fn(u64, u64) + Sync)) -> BTreeSet<u64> {
         let mut found = BTreeSet::new();
         if seen.game != self.game.name() {
             return found;
@@ -151,13 +151,13 @@ impl<'a> HeldOut<'a> {
         self.add_layouts(seen.layouts.iter().copied(), &mut found);
         let is_unknown = self.layouts().is_empty() && !is_level_files(&self.split.mode);
         if is_unknown && self.game.tools().state.compares_levels() {
-            self.add_alike(&ranges, &mut found);
+            self.add_alike(&ranges, &mut found, progress);
         }
         found
     }
 
     /// Adds the levels that play like seen ones to those that are found already.
-    fn add_alike(&self, seen: &[LevelSplit], found: &mut BTreeSet<u64>) {
+    fn add_alike(&self, seen: &[LevelSplit], found: &mut BTreeSet<u64>, progress: &(dyn Fn(u64, u64) + Sync)) {
         let mut left = if self.game.built_anew().is_some() { MOST_BUILT } else { MOST_PLAYED };
         if self.split.len() > left {
             return;
@@ -177,7 +177,8 @@ impl<'a> HeldOut<'a> {
         let others = by_mode.into_iter().map(|(mode, levels)| (mode, levels.into_iter().collect()));
         let ranges: Vec<(&str, Vec<u64>)> = [(self.split.mode.as_str(), own)].into_iter().chain(others).collect();
         let is_wanted = |group: &[PlacedLevel]| group.iter().any(is_own) && !group.iter().all(is_own);
-        let alike = AlikeLevels::of(self.game, &ranges, is_wanted, usable_threads(default_threads()), |_| {});
+        let threads = usable_threads(default_threads());
+        let alike = AlikeLevels::of(self.game, &ranges, is_wanted, threads, progress);
         if !alike.by_state {
             return;
         }
@@ -243,7 +244,7 @@ const LEVELS_PER_WORLD: usize = 32;
 /// Largest number of Worlds that play levels. It is the same on any number of threads, and so are results.
 const MOST_WORLDS: usize = 8;
 
-/// Worlds that break in their first level, after which the other levels of a thread are not played.
+/// Worlds in a row that break in their first level, after which the other levels of a thread are not played.
 const MOST_BARREN: u32 = 3;
 
 /// Largest number of levels that are played to compare held-out levels with seen ones.
@@ -281,13 +282,14 @@ impl AlikeLevels {
     pub const TICKS: u32 = STAGES[STAGES.len() - 1];
 
     /// Plays levels of some modes, all of which the game has. Groups that are not wanted are not told apart any further.
-    /// `progress` receives levels that have been played, from several threads.
+    /// `progress` receives episodes that have been played, and those that are to be played besides the ones that it has
+    /// received before, from several threads. A level that is played on has a second and a third episode.
     pub fn of(
         game: &dyn Game,
         ranges: &[(&str, Vec<u64>)],
         is_wanted: impl Fn(&[PlacedLevel]) -> bool,
         threads: usize,
-        progress: impl Fn(u64) + Sync,
+        progress: impl Fn(u64, u64) + Sync,
     ) -> Self {
         let placed = |(range, (_, levels)): (usize, &(&str, Vec<u64>))| -> Vec<PlacedLevel> {
             levels.iter().map(|&level| (range, level)).collect()
@@ -299,11 +301,15 @@ impl AlikeLevels {
         let mut open = vec![all.into_iter().collect::<Vec<_>>()];
         let (mut classes, mut by_state) = (Vec::new(), true);
         for ticks in STAGES {
+            progress(0, open.iter().map(|group| group.len() as u64).sum());
             let mut played = BTreeMap::new();
             for (range, (mode, _)) in ranges.iter().enumerate() {
                 let waiting = open.iter().flatten().filter(|(of, _)| *of == range).map(|(_, level)| *level);
-                let waiting: Vec<u64> = waiting.collect();
-                let results = play(game, mode, &waiting, ticks, threads, &progress);
+                let mut waiting: Vec<u64> = waiting.collect();
+                // Groups stand in the order of their hashes, which can differ from build to build. Levels are dealt to
+                // Worlds in their own order.
+                waiting.sort_unstable();
+                let results = play(game, mode, &waiting, ticks, threads, &|played| progress(played, 0));
                 played.extend(results.into_iter().map(|result| ((range, result.level), result)));
             }
             let mut left = Vec::new();
@@ -376,7 +382,7 @@ fn play(
         while !left.is_empty() && barren < MOST_BARREN {
             let part = play_world(game, mode, left, ticks, progress);
             left = left.get(part.len() + 1..).unwrap_or_default();
-            barren += u32::from(part.is_empty());
+            barren = if part.is_empty() { barren + 1 } else { 0 };
             played.extend(part);
         }
         played
@@ -422,8 +428,11 @@ fn play_world(
         level.is_state &= state.is_some();
         level.is_over = end.is_some();
         if end.is_some() || tick >= ticks {
+            // The first episode of a World is left out below.
+            if !played.is_empty() {
+                progress(1);
+            }
             played.extend(now.take());
-            progress(1);
             if let (None, Some(mut episode)) = (end, world.get_mut::<Episode>(agent)) {
                 episode.abandon();
             }
@@ -468,6 +477,7 @@ pub fn seen_by_training(game: &dyn Game, train: &LevelSplit) -> SeenLevels {
 mod tests {
     use super::*;
     use crate::foreign::{ForeignGame, LevelSeed, Restart};
+    use std::sync::atomic::{AtomicU64, Ordering};
 
     #[derive(Component)]
     struct Dot;
@@ -511,7 +521,7 @@ mod tests {
     }
 
     fn alike(game: &ForeignGame, levels: u64, is_wanted: bool, threads: usize) -> AlikeLevels {
-        AlikeLevels::of(game, &[("default", (0..levels).collect())], |_| is_wanted, threads, |_| {})
+        AlikeLevels::of(game, &[("default", (0..levels).collect())], |_| is_wanted, threads, |_, _| {})
     }
 
     #[test]
@@ -549,7 +559,7 @@ mod tests {
     fn known(game: &ForeignGame, levels: &str) -> Vec<u64> {
         let split = "default:100..105".parse().expect("levels");
         let seen = SeenLevels { game: "dots".to_owned(), levels: vec![levels.to_owned()], ..SeenLevels::default() };
-        HeldOut::new(game, &split).seen_in(&seen).into_iter().collect()
+        HeldOut::new(game, &split).seen_in(&seen, &|_, _| {}).into_iter().collect()
     }
 
     #[test]
@@ -578,5 +588,26 @@ mod tests {
         let game = dots(|level| modulo(level, 2), |_| 0.0)
             .reward(|level: Res<LevelSeed>| if level.0 == 2 { f32::NAN } else { 0.0 });
         assert_eq!(alike(&game, 6, true, 1).groups(), [vec![0, 4], vec![1, 3, 5]]);
+    }
+
+    #[test]
+    fn levels_behind_many_that_break_the_game_are_played() {
+        // Each World breaks in the first of two such levels, and the next World in the second.
+        let game = dots(|_| 0.0, |_| 0.0).reward(|level: Res<LevelSeed>| if level.0 % 4 >= 2 { f32::NAN } else { 0.0 });
+        assert_eq!(alike(&game, 18, true, 1).groups(), [[0, 1, 4, 5, 8, 9, 12, 13, 16, 17]]);
+    }
+
+    #[test]
+    fn progress_counts_each_episode_that_is_played_once() {
+        let game = dots(|level| modulo(level, 3), |_| 0.0);
+        let (done, all) = (AtomicU64::new(0), AtomicU64::new(0));
+        let progress = |played, more| {
+            done.fetch_add(played, Ordering::Relaxed);
+            all.fetch_add(more, Ordering::Relaxed);
+            assert!(done.load(Ordering::Relaxed) <= all.load(Ordering::Relaxed), "no more than there are");
+        };
+        // All but level 2 have their like after the first tick. Episodes end after 40 ticks, and are not played on then.
+        AlikeLevels::of(&game, &[("default", (0..5).collect())], |_| true, 1, progress);
+        assert_eq!((done.into_inner(), all.into_inner()), (5 + 4, 5 + 4));
     }
 }

@@ -385,17 +385,41 @@ pub(crate) fn print_json(summary: &EvalSummary) -> Result<(), CliError> {
 
 /// The levels that players are measured on, and those of them that the players know.
 pub struct MeasuredLevels<'a> {
-    splits: Vec<(HeldOut<'a>, BTreeSet<u64>)>,
+    splits: Vec<MeasuredSplit<'a>>,
     /// The levels were named; else they are the held-out ones of the experiment.
     are_named: bool,
     /// Levels without layouts are compared by their play.
     compares_play: bool,
 }
 
+/// A range of levels that players are measured on.
+struct MeasuredSplit<'a> {
+    levels: HeldOut<'a>,
+    /// Those that some player knows.
+    known: BTreeSet<u64>,
+    /// Those that players with these levels know. The policies of a study have often learned from the same ones, and the
+    /// comparison can take minutes.
+    compared: Vec<(SeenLevels, BTreeSet<u64>)>,
+}
+
+impl MeasuredSplit<'_> {
+    /// Returns the levels that a player knows who has seen these levels.
+    fn known_to(&mut self, seen: &SeenLevels) -> BTreeSet<u64> {
+        if let Some((_, known)) = self.compared.iter().find(|(compared, _)| compared == seen) {
+            return known.clone();
+        }
+        let known = progress::comparing(|progress| self.levels.seen_in(seen, progress));
+        self.compared.push((seen.clone(), known.clone()));
+        known
+    }
+}
+
 impl<'a> MeasuredLevels<'a> {
     /// Takes ranges of levels that the game [has](LevelSplit::check).
     pub fn new(game: &'a dyn Game, splits: &'a [LevelSplit], are_named: bool) -> Self {
-        let splits = splits.iter().map(|split| (HeldOut::new(game, split), BTreeSet::new())).collect();
+        let measured =
+            |split| MeasuredSplit { levels: HeldOut::new(game, split), known: BTreeSet::new(), compared: Vec::new() };
+        let splits = splits.iter().map(measured).collect();
         Self { splits, are_named, compares_play: game.tools().state.compares_levels() }
     }
 
@@ -407,9 +431,9 @@ impl<'a> MeasuredLevels<'a> {
     /// It has seen held-out levels.
     pub fn check(&mut self, path: &Path, seen: Option<&SeenLevels>) -> Result<(), CliError> {
         let path = path.display();
-        for (levels, known) in &mut self.splits {
-            let split = levels.split();
-            if let Some(own) = levels.shown_by(seen) {
+        for measured in &mut self.splits {
+            let split = measured.levels.split();
+            if let Some(own) = measured.levels.shown_by(seen) {
                 if !self.are_named {
                     return Err(CliError::Usage(format!(
                         "{path} has learned from {own}, and the held-out levels {split} have some of these: choose \
@@ -421,27 +445,59 @@ impl<'a> MeasuredLevels<'a> {
                 );
             }
             let Some(seen) = seen else { continue };
-            let own = levels.seen_in(seen);
+            let own = measured.known_to(seen);
             if !own.is_empty() {
                 let by = if self.compares_play { "number, layout or play" } else { "number or layout" };
                 report!(
-                    "{path} knows {} of the {} levels {split}: by {by} they are among {seen}, from which it has learned",
+                    "{path} knows {} of the {} levels {}: by {by} they are among {seen}, from which it has learned",
                     whole(own.len() as f64),
-                    whole(split.len() as f64)
+                    whole(measured.levels.split().len() as f64),
+                    measured.levels.split()
                 );
             }
-            known.extend(own);
+            measured.known.extend(own);
         }
         Ok(())
     }
 
     /// Returns the levels of each range that some player knows.
     pub fn known(self) -> Vec<BTreeSet<u64>> {
-        self.splits.into_iter().map(|(_, known)| known).collect()
+        self.splits.into_iter().map(|measured| measured.known).collect()
     }
 }
 
 /// Returns the levels that a run has seen; for runs without a note, its training levels.
 pub(crate) fn seen_by_run(game: &dyn Game, experiment: &Experiment, info: &RunInfo) -> SeenLevels {
     info.seen.clone().unwrap_or_else(|| seen_by_training(game, &experiment.train))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::prelude::*;
+    use playbot_harness::foreign::{ForeignGame, LevelSeed};
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    #[test]
+    fn levels_are_compared_once_for_all_policies_that_have_seen_the_same() {
+        static BUILT: AtomicUsize = AtomicUsize::new(0);
+        let game = ForeignGame::new("dots", 1, |_: &mut App| {
+            BUILT.fetch_add(1, Ordering::Relaxed);
+        })
+        .keys([vec![], vec![KeyCode::Space]])
+        .observe(["nothing"], || [0.0])
+        .time_limit(3)
+        .level(|_: Res<LevelSeed>| {});
+        let splits: [LevelSplit; 1] = ["default:100..101".parse().expect("levels")];
+        let mut measured = MeasuredLevels::new(&game, &splits, true);
+        let mut built_for = |levels: &str| {
+            let seen = SeenLevels { game: "dots".to_owned(), levels: vec![levels.to_owned()], ..SeenLevels::default() };
+            measured.check(Path::new("a.policy"), Some(&seen)).expect("levels that are named are only reported");
+            BUILT.load(Ordering::Relaxed)
+        };
+        let first = built_for("default:0..1");
+        assert!(first > 0, "they are played");
+        assert_eq!(built_for("default:0..1"), first);
+        assert!(built_for("default:0..2") > first, "others");
+    }
 }

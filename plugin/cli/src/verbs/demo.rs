@@ -27,7 +27,10 @@ use playbot_harness::{
 };
 use playbot_report::counted;
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeSet,
+    path::{Path, PathBuf},
+};
 
 pub use crate::verbs::demo::show::deciders;
 
@@ -204,9 +207,10 @@ fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, Cl
     let files = all_demos(paths)?;
     let mut outcome = Outcome::Pass;
     let _replaying = NothingToSave::listen();
+    let mut started = BTreeSet::new();
     for (done, file) in files.iter().enumerate() {
         interrupt::leave(format!("{done} of {} checked: name the others", counted(files.len() as u64, "recording")));
-        let checked = replay(file, games);
+        let checked = replay(file, games, &mut started);
         // A verdict is never vacuous: without a replay nothing is proved.
         if !checked.as_ref().is_ok_and(|report| report.divergences.is_empty() && report.episodes > 0) {
             outcome = Outcome::Findings;
@@ -221,12 +225,16 @@ fn verify(paths: &[PathBuf], as_json: bool, games: &Games) -> Result<Outcome, Cl
     Ok(outcome)
 }
 
-/// Replays a file with a progress bar.
-fn replay(file: &Path, games: &Games) -> Result<VerifyReport, CliError> {
+/// Replays a file with a progress bar. `started` are the games and modes of earlier files, which start.
+fn replay(file: &Path, games: &Games, started: &mut BTreeSet<(String, String)>) -> Result<VerifyReport, CliError> {
     // The whole file is read before any of it is played, so that damage shows at once.
     let summary = DemoSummary::read(file)?;
     let game = games.of_file(Artifact::Recording, file, &summary.header.game)?;
-    check_start(game, &summary.header.mode, 0)?;
+    let mode = (game.name().to_owned(), summary.header.mode);
+    if !started.contains(&mode) {
+        check_start(game, &mode.1, 0)?;
+        started.insert(mode);
+    }
     let bar = progress::bar("replay", summary.episodes as u64, "episodes");
     let report = verify_file(game, file, |done| bar.set_position(done));
     bar.finish_and_clear();

@@ -9,7 +9,7 @@ mod found;
 use crate::{
     error::{CliError, Outcome},
     output::{print_line, write},
-    verbs::init::found::{GameFacts, GameManifest, NamedItem, SourceLine, SourceText, major_minor},
+    verbs::init::found::{GameFacts, GameManifest, NamedItem, SourceLine, SourceText, StepRate, major_minor},
 };
 use serde_json::json;
 use std::{
@@ -272,6 +272,7 @@ impl GameFolder {
             ("keys", or_none(facts.keys.clone())),
             ("keys that leave or skip levels", at(&facts.leaving_keys)),
             ("presses that count once", at(&facts.presses)),
+            ("fixed steps", or_none(fixed_steps(facts).into_iter().collect())),
             ("mouse buttons", or_none(facts.mouse_buttons.clone())),
             ("buttons", or_none(facts.buttons.clone())),
             ("player", items(facts.player.as_slice())),
@@ -398,6 +399,7 @@ fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> Strin
          /// Returns the game for testers and bots.\npub fn adapter() -> ForeignGame {{\n    \
          ForeignGame::new(\"{name}\", 1, {game})\n"
     );
+    add_frames(&mut text, facts);
     add_assets(&mut text, package, facts);
     add_input(&mut text, facts);
     add_sight(&mut text, library, facts);
@@ -433,6 +435,41 @@ fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> Strin
          .levels(1)\n        .level(|_level: Res<LevelSeed>| {})\n}\n",
     );
     text + &own
+}
+
+/// Steps of a second in Bevy, if a game sets none.
+const DEFAULT_STEPS: f64 = 64.0;
+
+/// Returns the schedule of fixed steps that a game uses, and how many of them are a second, in words.
+fn fixed_steps(facts: &GameFacts) -> Option<String> {
+    let SourceLine { name, file, line } = facts.fixed.as_ref()?;
+    let of_second = |hz: f64| format!("{hz} a second");
+    let rate = facts.step_rate.as_ref().map_or_else(
+        || format!("{}, which is Bevy's default", of_second(DEFAULT_STEPS)),
+        |StepRate { at, hz }| {
+            let count = hz.map_or("a number of them a second that is computed".to_owned(), of_second);
+            format!("{count} ({}:{})", at.file, at.line)
+        },
+    );
+    Some(format!("{name} ({file}:{line}), {rate}"))
+}
+
+/// Adds the frames of a second, for a game that plays in fixed steps. Where a frame has two steps, a press counts twice.
+fn add_frames(text: &mut String, facts: &GameFacts) {
+    let Some(SourceLine { name, file, line }) = &facts.fixed else { return };
+    let _ = match facts.step_rate.as_ref().map_or(Ok(DEFAULT_STEPS), |rate| rate.hz.ok_or(&rate.at)) {
+        Ok(hz) => write!(
+            text,
+            "        // A frame for each fixed step of the game ({file}:{line}): in a frame of two steps, `{name}` would see a\n        \
+             // press twice.\n        .hz({hz:?})\n"
+        ),
+        Err(rate) => write!(
+            text,
+            "        // TODO: a frame for each fixed step of the game ({file}:{line}), because in a frame of two steps `{name}`\n        \
+             // sees a press twice: .hz(steps of a second), as set in {}:{}\n",
+            rate.file, rate.line
+        ),
+    };
 }
 
 /// Adds the folder of assets. Bevy looks for `assets` in the package of the program, which is that of the bots.

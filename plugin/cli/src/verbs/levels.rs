@@ -105,11 +105,9 @@ fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args, threads: usize) ->
         .chain(&args.among)
         .map(|levels| (levels.mode.as_str(), levels.levels().collect()))
         .collect();
-    let bar = progress::bar("compare", ranges.iter().map(|(_, levels)| levels.len() as u64).sum(), "levels");
     // Groups of the other sets alone do not count.
     let is_wanted = |group: &[PlacedLevel]| group.iter().any(|(range, _)| *range == 0);
-    let alike = AlikeLevels::of(game, &ranges, is_wanted, threads, |levels| bar.inc(levels));
-    bar.finish_and_clear();
+    let alike = progress::comparing(|progress| AlikeLevels::of(game, &ranges, is_wanted, threads, progress));
     let equal = EqualLevels::of_alike(&alike);
     let equality = match (equal.layouts, alike.by_state) {
         (0, _) => Equality::Unknown,

@@ -12,6 +12,7 @@ use crate::{
     },
     error::{CliError, Outcome},
     output::{print_line, program},
+    progress,
     progress::{console::Console, interrupt},
     verbs::{learn_skills, quickstart::report::write_report, train::report_length},
 };
@@ -173,7 +174,8 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
 fn known_levels(game: &dyn Game, experiment: &Experiment, skills: &SkillModel) -> BTreeSet<u64> {
     let mut seen = seen_by_training(game, &experiment.train);
     seen.extend(skills.demos().unwrap_or(&SeenLevels::default()));
-    let known = HeldOut::new(game, &experiment.test).seen_in(&seen);
+    let held_out = HeldOut::new(game, &experiment.test);
+    let known = progress::comparing(|progress| held_out.seen_in(&seen, progress));
     // Without a new level the known ones are better than none.
     if known.is_empty() || known.len() as u64 == experiment.test.len() {
         return BTreeSet::new();

@@ -81,10 +81,16 @@ pub fn run_tests(
     keep: &mut (dyn FnMut(LevelVerdict) -> Result<(), TestError> + Send),
     watch: &TestObserver,
 ) -> Result<TestEnd, TestError> {
+    plan.check()?;
+    // Otherwise it would be a finding of each level.
+    if game.problem().is_none() {
+        check_start(game, &plan.split.mode, plan.split.first, |_| {}).map_err(EvalError::from)?;
+    }
     run_tests_keeping(game, plan, finished, keep, watch, None)
 }
 
-/// Runs tests as [`run_tests`] does, with a file for each finding.
+/// Runs tests as [`run_tests`] does, with a file for each finding. A game that does not start is a finding of each level:
+/// [`check_start`] tells before.
 ///
 /// # Errors
 ///
@@ -101,8 +107,6 @@ pub fn run_tests_keeping(
     if let Some(problem) = game.problem() {
         return Err(EvalError::from(Fault(problem)).into());
     }
-    // Otherwise it would be a finding of each level.
-    check_start(game, &plan.split.mode, plan.split.first, |_| {}).map_err(EvalError::from)?;
     let places: Vec<u64> = plan.places().into_iter().filter(|place| !finished.contains(place)).collect();
     let most = (MOST_EPISODES / plan.episodes.max(1) as usize).max(1);
     let size = places.len().div_ceil(PORTIONS).clamp(1, most);

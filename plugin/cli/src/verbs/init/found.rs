@@ -49,6 +49,21 @@ const LEAVES: [&str; 20] = [
     "::LevelSelect)",
 ];
 
+/// Schedules that run in fixed steps.
+const FIXED: [&str; 5] = ["FixedUpdate", "FixedPreUpdate", "FixedPostUpdate", "FixedFirst", "FixedLast"];
+
+/// Code that sets the fixed steps, and whether a number behind it counts the steps of a second; else it is the seconds of
+/// a step.
+const STEPS: [(&str, bool); 7] = [
+    ("Time::<Fixed>::from_hz(", true),
+    ("Time::from_hz(", true),
+    ("set_timestep_hz(", true),
+    ("Time::<Fixed>::from_seconds(", false),
+    ("set_timestep_seconds(", false),
+    ("Time::<Fixed>::from_duration(", false),
+    ("set_timestep(", false),
+];
+
 /// Crates that load levels or assets while the game runs.
 const LOADERS: [&str; 3] = ["bevy_ecs_ldtk", "bevy_ecs_tiled", "bevy_asset_loader"];
 
@@ -354,6 +369,16 @@ pub(super) struct AssetFolder {
     pub path: Option<String>,
 }
 
+/// The fixed steps of a game that sets them.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct StepRate {
+    /// Where they are set.
+    #[serde(flatten)]
+    pub at: SourceLine,
+    /// Steps of a second, if the number is written there.
+    pub hz: Option<f64>,
+}
+
 /// All that the sources show.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(super) struct GameFacts {
@@ -397,6 +422,10 @@ pub(super) struct GameFacts {
     pub asset_folder: Option<AssetFolder>,
     /// Lines that read other files.
     pub files: Vec<SourceLine>,
+    /// The first line with a schedule of fixed steps.
+    pub fixed: Option<SourceLine>,
+    /// The fixed steps, if the game sets them.
+    pub step_rate: Option<StepRate>,
     /// The component that looks like the player.
     pub player: Option<NamedItem>,
 }
@@ -464,6 +493,10 @@ impl GameFacts {
             self.loads.extend(source.lines_with(&[".load(", ".load_folder("]));
         }
         self.files.extend(source.lines_with(&FILES));
+        self.fixed = self.fixed.take().or_else(|| source.lines_with(&FIXED).into_iter().next());
+        if let (None, Some((offset, hz))) = (&self.step_rate, step_rate(code)) {
+            self.step_rate = Some(StepRate { at: source.at("Time<Fixed>", offset), hz });
+        }
         if let Some((offset, path)) = asset_folder(code) {
             self.asset_folder = Some(AssetFolder { at: source.at("AssetPlugin", offset), path });
         }
@@ -591,6 +624,20 @@ fn asset_folder(code: &str) -> Option<(usize, Option<String>)> {
         let (_, value) = fields.split_once("file_path")?;
         let text = value.trim_start().strip_prefix(':').and_then(|value| value.trim_start().strip_prefix('"'));
         Some((at, text.and_then(|text| text.split('"').next()).map(str::to_owned)))
+    })
+}
+
+/// Returns the offset where the code sets the fixed steps, and the steps of a second, if a number is written there.
+fn step_rate(code: &str) -> Option<(usize, Option<f64>)> {
+    let number = |text: &str| text.replace('_', "").trim().parse::<f64>().ok();
+    STEPS.iter().find_map(|(words, counts_steps)| {
+        let at = code.find(words)?;
+        let text = code[at + words.len()..].split(')').next()?;
+        let (over, under) = text.split_once('/').unwrap_or((text, "1"));
+        let value = number(over).zip(number(under)).map(|(over, under)| over / under);
+        // A step of 1.0 / 60.0 seconds is one of 60 in a second, in spite of rounding.
+        let hz = value.map(|value| if *counts_steps { value } else { (1e6 / value).round() / 1e6 });
+        Some((at, hz.filter(|hz| hz.is_finite() && *hz > 0.0)))
     })
 }
 
@@ -836,6 +883,28 @@ mod tests {
         assert_eq!(facts(&[("src/main.rs", &computed)]).asset_folder.expect("it is set").path, None);
         let plain = code.replace("file_path: \"data/art\".into(),", "");
         assert_eq!(facts(&[("src/main.rs", &plain)]).asset_folder, None);
+    }
+
+    #[test]
+    fn fixed_steps_are_those_of_the_schedules_and_of_the_clock() {
+        let code = "use bevy::app::FixedUpdate;\nfn add(app: &mut App) {\n    app.add_systems(FixedUpdate, walk);\n    CLOCK;\n}";
+        let found = facts(&[("src/lib.rs", code)]);
+        assert_eq!(found.fixed.map(|at| (at.name, at.line)), Some(("FixedUpdate".to_owned(), 3)));
+        assert_eq!(found.step_rate, None);
+        for (clock, hz) in [
+            ("app.insert_resource(Time::<Fixed>::from_hz(50.0))", Some(50.0)),
+            ("time.set_timestep_hz(1_00.5)", Some(100.5)),
+            ("app.insert_resource(Time::<Fixed>::from_seconds(0.02))", Some(50.0)),
+            ("app.insert_resource(Time::<Fixed>::from_seconds(1.0 / 60.0))", Some(60.0)),
+            ("app.insert_resource(Time::<Fixed>::from_hz(RATE))", None),
+            ("app.insert_resource(Time::<Fixed>::from_seconds(0.0))", None),
+            ("app.insert_resource(Time::<Fixed>::from_duration(Duration::from_millis(20)))", None),
+        ] {
+            let rate = facts(&[("src/lib.rs", &code.replace("CLOCK", clock))]).step_rate.expect("it is set");
+            assert_eq!((rate.at.line, rate.hz), (4, hz), "{clock}");
+        }
+        let without = code.replace("app.add_systems(FixedUpdate", "app.add_systems(Update");
+        assert_eq!(facts(&[("src/lib.rs", &without)]).fixed, None, "an import alone");
     }
 
     #[test]
