@@ -485,6 +485,10 @@ pub trait SnapshotTools: Send + Sync {
         None
     }
 
+    /// Notes that episodes of this World will be saved: see
+    /// [`SavedEpisode::prepare`](crate::saved_episode::SavedEpisode::prepare). By default this does nothing.
+    fn prepare(&self, _world: &mut World) {}
+
     /// Puts an agent into a saved state. The agent has played the same level before, to its end or not. Returns false if
     /// that is impossible, for instance because no level was built yet; the level is then started again.
     fn load(&self, _world: &mut World, _agent: Entity, _snapshot: &Snapshot) -> bool {

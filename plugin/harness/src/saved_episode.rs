@@ -49,6 +49,7 @@
 //! }
 //!
 //! let (mut world, agents) = build_world(&Count, "default", 0, 0, 1);
+//! SavedEpisode::prepare(&Count, &mut world);
 //! world.entity_mut(agents[0]).insert((Control::Human, LevelQueue::Always(7)));
 //! world.ticks(3).expect("no agent broke its contract");
 //! let saved = SavedEpisode::of(&Count, &world, agents[0]).expect("the game saves its state");
@@ -104,8 +105,14 @@ pub struct SavedEpisode {
 }
 
 impl SavedEpisode {
-    /// Saves the episode of an agent. Call it between two ticks. Returns `None` if the agent plays no level, or if the
-    /// game saves nothing.
+    /// Lets episodes of a World be saved. Call it before the first of them: some games note their state at the start of
+    /// each episode, and save nothing without it.
+    pub fn prepare(game: &dyn Game, world: &mut World) {
+        game.tools().snapshots.prepare(world);
+    }
+
+    /// Saves the episode of an agent. Call it between two ticks, in a World that was [prepared](Self::prepare). Returns
+    /// `None` if the agent plays no level, or if the game saves nothing.
     pub fn of(game: &dyn Game, world: &World, agent: Entity) -> Option<Self> {
         world.get::<Episode>(agent).filter(|episode| episode.is_running() && episode.end().is_none())?;
         Some(Self {

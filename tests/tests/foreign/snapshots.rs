@@ -1,6 +1,12 @@
 //! Tests of snapshots of foreign games: explorers that load them find the same as by replays.
 
-use std::ops::ControlFlow;
+use std::{
+    ops::ControlFlow,
+    sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering},
+    },
+};
 
 use bevy::prelude::*;
 use playbot::prelude::*;
@@ -272,6 +278,7 @@ fn lane(plugin: impl Fn(&mut App) + Send + Sync + 'static) -> ForeignGame {
 /// Builds the game, and plays these actions in level 3.
 fn played(game: &ForeignGame, actions: &[u32]) -> (World, Entity) {
     let (mut world, agents) = build_world(game, "default", 0, 0, 1);
+    SavedEpisode::prepare(game, &mut world);
     world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(3)));
     hashes(&mut world, agents[0], actions);
     (world, agents[0])
@@ -377,4 +384,55 @@ fn a_type_that_the_game_declares_is_copied_by_it() {
     assert_eq!(world.resource::<Diary>().0.len(), pages.len() + 2);
     assert!(saved.restore(&game, &mut world, agent));
     assert_eq!(world.resource::<Diary>().0, pages);
+}
+
+/// Counts its copies, and panics at the third one.
+#[derive(Resource, Default)]
+struct Guarded {
+    touched: u32,
+    copies: Arc<AtomicU32>,
+}
+
+impl Clone for Guarded {
+    fn clone(&self) -> Self {
+        assert!(self.copies.fetch_add(1, Ordering::Relaxed) < 2, "the third copy breaks");
+        Self { touched: self.touched, copies: self.copies.clone() }
+    }
+}
+
+fn lane_with_guarded(app: &mut App) {
+    lane_game(app);
+    app.init_resource::<Guarded>().add_systems(Update, |mut guarded: ResMut<Guarded>| guarded.touched += 1);
+}
+
+/// Returns how often the resource was copied.
+fn copies(world: &World) -> u32 {
+    world.resource::<Guarded>().copies.load(Ordering::Relaxed)
+}
+
+#[test]
+fn nothing_is_copied_in_a_world_that_saves_nothing() {
+    let game = lane(lane_with_guarded);
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(3)));
+    hashes(&mut world, agents[0], &[2, 1]);
+    assert!(SavedEpisode::of(&game, &world, agents[0]).is_none());
+    assert_eq!(copies(&world), 0);
+    // The start of an episode is copied in a World that is prepared for it.
+    let (world, _) = played(&game, &[2, 1]);
+    assert_eq!(copies(&world), 1);
+}
+
+#[test]
+fn a_panic_while_saving_is_named_and_nothing_is_saved_from_then_on() {
+    let game = lane(lane_with_guarded);
+    let (mut world, agent) = played(&game, &[2]);
+    assert!(SavedEpisode::of(&game, &world, agent).is_some());
+    for _ in 0..2 {
+        assert!(SavedEpisode::of(&game, &world, agent).is_none());
+        let obstacle = game.tools().snapshots.obstacle(&world).expect("its `Clone` panics");
+        assert!(obstacle.contains("the third copy breaks"), "{obstacle}");
+        assert_eq!(copies(&world), 3, "once it has panicked, it is not copied again");
+        hashes(&mut world, agent, &[1]);
+    }
 }

@@ -10,6 +10,7 @@ use crate::{
     },
     game::Game,
     parallel::on_threads,
+    saved_episode::SavedEpisode,
     worlds::is_bound_to_its_thread,
 };
 use std::collections::BTreeSet;
@@ -70,6 +71,9 @@ impl<'a> Trial<'a> {
             }
             DoctorComparison::Archetypes => {
                 copies.iter_mut().zip(0..).for_each(|(copy, count)| add_archetypes(&mut copy.world, count));
+            }
+            DoctorComparison::Snapshots => {
+                copies.iter_mut().for_each(|copy| SavedEpisode::prepare(game, &mut copy.world));
             }
             DoctorComparison::Restart | DoctorComparison::OtherLevel => copies[1].play_prelude(plan, ticks),
             _ => {}

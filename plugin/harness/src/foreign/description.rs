@@ -211,7 +211,10 @@ impl Plugin for ForeignPlugin {
         if description.has_state() {
             observe::add_state(app);
         }
-        if let Some(SnapshotParts::Whole) = description.snapshot {
+        // A World for a single episode has no use for snapshots.
+        if matches!(description.snapshot, Some(SnapshotParts::Whole))
+            && !matches!(description.restart, Restart::Rebuild)
+        {
             add_whole(app, &description.snapshot_parts);
         }
     }

@@ -124,8 +124,9 @@ impl ForeignGame {
     ///
     /// Saved is each component of an entity that the game has spawned, and each resource of the game, as soon as it has
     /// changed in the episode. A type is copied by the first of these that it has: [`snapshot_of`](Self::snapshot_of),
-    /// `Reflect`, `Clone`, or its bytes if it needs no drop, like numbers. Entities that are gone are spawned again, and
-    /// others are despawned. With the features `bevy_rapier2d` and `bevy_rapier3d` the worlds of that engine are saved.
+    /// `Reflect`, `Clone`, or its bytes if it needs no drop, has no hooks and is aligned to less than a pointer, like
+    /// numbers of 32 bits. Entities that are gone are spawned again, and others are despawned. With the features
+    /// `bevy_rapier2d` and `bevy_rapier3d` the worlds of that engine are saved.
     ///
     /// Once a value of another type has changed, nothing is saved, and explorers name the type. While messages of the
     /// game, or removed components, wait to be read, a tick is not saved. Neither are the game's [`Local`]s, values that
@@ -211,7 +212,7 @@ impl SnapshotTools for ForeignGame {
         let mut foreign = cell.lock();
         let foreign = &mut *foreign;
         let game = match (world.get_resource::<WholeCell>(), &foreign.baseline) {
-            (Some(whole), Some(baseline)) => Snapshot::new(whole.lock().save(world, baseline)?),
+            (Some(whole), Some(baseline)) => Snapshot::new(save_whole(world, whole, baseline)?),
             // An error of the system is not one of the game: it is played without snapshots.
             _ => foreign.save.as_mut()?.read(world).ok()??,
         };
@@ -277,9 +278,25 @@ impl SnapshotTools for ForeignGame {
         true
     }
 
+    fn prepare(&self, world: &mut World) {
+        if let Some(whole) = world.get_resource::<WholeCell>() {
+            whole.lock().is_prepared = true;
+        }
+    }
+
     fn obstacle(&self, world: &World) -> Option<String> {
         world.get_resource::<WholeCell>()?.lock().obstacle()
     }
+}
+
+/// Saves the whole state. After a panic of a game's own function that copies a type, nothing is saved any more.
+fn save_whole(world: &World, whole: &WholeCell, baseline: &Baseline) -> Option<SavedWhole> {
+    let mut whole = whole.lock();
+    let saved = panics::hear(|| whole.save(world, baseline));
+    saved.unwrap_or_else(|words| {
+        whole.obstacle.get_or_insert(words);
+        None
+    })
 }
 
 /// Loads the whole state.
@@ -337,13 +354,17 @@ pub(super) fn note_frame(world: &mut World) {
 /// Notes that an episode begins.
 pub(super) fn note_start(world: &mut World, baseline: &Baseline) {
     if let Some(whole) = world.get_resource::<WholeCell>().cloned() {
-        whole.lock().begin(world, baseline);
+        let mut whole = whole.lock();
+        let begun = panics::hear(|| whole.begin(world, baseline));
+        whole.obstacle = whole.obstacle.take().or(begun.err());
     }
 }
 
 /// What the plugin knows of a game in one World to save it as a whole.
 struct WholeGame {
     ways: Ways,
+    /// Whether episodes are saved in this World. Most verbs save none, and then nothing is copied.
+    is_prepared: bool,
     /// The change tick at which this frame began.
     frame: Tick,
     start: Option<Start>,
@@ -409,11 +430,16 @@ impl WholeGame {
     /// Prepares for a game with these parts.
     fn new(parts: &[Part]) -> Self {
         let (frame, obstacle) = (Tick::new(0), None);
-        Self { ways: Ways::new(parts), frame, start: None, has_saved: false, obstacle, waited_for: None }
+        let (ways, is_prepared) = (Ways::new(parts), false);
+        Self { ways, is_prepared, frame, start: None, has_saved: false, obstacle, waited_for: None }
     }
 
     /// Notes the start of an episode.
     fn begin(&mut self, world: &mut World, baseline: &Baseline) {
+        self.start = None;
+        if !self.is_prepared || self.obstacle.is_some() {
+            return;
+        }
         let tick = world.increment_change_tick();
         let ways = &mut self.ways;
         let spawned = baseline.spawned(world).into_iter();
@@ -432,6 +458,9 @@ impl WholeGame {
 
     /// Returns the state after a tick; `None` if it cannot be saved, or not in this tick.
     fn save(&mut self, world: &World, baseline: &Baseline) -> Option<SavedWhole> {
+        if self.obstacle.is_some() {
+            return None;
+        }
         let Self { ways, start, .. } = self;
         let start = start.as_ref()?;
         self.waited_for = pending(ways, world, self.frame);

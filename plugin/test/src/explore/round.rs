@@ -178,6 +178,9 @@ fn build_crews<'a>(
     for first in arrangement.first_agents() {
         let mut world = ExploreWorld::new(game, plan, lookout, first, arrangement.arenas)?;
         world.has_snapshots = has_snapshots;
+        if has_snapshots {
+            SavedEpisode::prepare(game, &mut world.world);
+        }
         crews.push(Crew { world, jobs: Vec::new() });
     }
     Ok(crews)

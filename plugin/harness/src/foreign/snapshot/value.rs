@@ -2,14 +2,14 @@
 //!
 //! A game's types are often private to it, so the plugin sees no more of them than Bevy does: a layout, a function that
 //! drops a value, the function that clones an entity's component, and what is registered for reflection. Bytes alone are
-//! a copy if a value needs no drop. Each block of unsafe code in this file moves or copies a value of a type that Bevy
-//! knows by its [`ComponentId`].
+//! a copy of small numbers only: see [`is_plain`]. Each block of unsafe code in this file moves or copies a value of a
+//! type that Bevy knows by its [`ComponentId`].
 #![expect(unsafe_code, reason = "types that are private to a game are copied through pointers, as Bevy does")]
 
 use bevy::{
     ecs::{
         change_detection::{MaybeLocation, Tick},
-        component::{ComponentCloneBehavior, ComponentId, Mutable},
+        component::{ComponentCloneBehavior, ComponentId, ComponentInfo, Mutable},
         entity::{EntityCloner, EntityHashMap, EntityMapper},
         reflect::ReflectComponent,
     },
@@ -22,6 +22,7 @@ use std::{
     any::{Any, TypeId},
     collections::BTreeMap,
     mem::{ManuallyDrop, MaybeUninit},
+    panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
     ptr::{self, NonNull},
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
@@ -177,12 +178,17 @@ pub(super) struct Way {
     reflect: Option<(ReflectFromPtr, Option<ReflectComponent>)>,
     has_clone: bool,
     is_plain: bool,
+    /// Whether a resource of this type existed when this was found out.
+    is_resource: bool,
 }
 
 /// The ways of a World.
 pub(super) struct Ways {
     parts: Vec<Part>,
-    cloner: SharedCloner,
+    /// Made for the first clone.
+    cloner: Option<SharedCloner>,
+    /// Returns what the type of a name is. It also gets whether there is such a resource.
+    owner: fn(&str, bool) -> Owner,
     by_id: Vec<Option<Arc<Way>>>,
 }
 
@@ -190,7 +196,7 @@ impl Ways {
     /// Creates the ways of a game with these parts.
     pub(super) fn new(parts: &[Part]) -> Self {
         let parts = [parts, &Part::of_engines()[..]].concat();
-        Self { parts, cloner: SharedCloner::new(), by_id: Vec::new() }
+        Self { parts, cloner: None, owner, by_id: Vec::new() }
     }
 
     /// Returns the way of a type; `None` for one that is left alone.
@@ -199,8 +205,10 @@ impl Ways {
             self.by_id.resize(id.index() + 1, None);
         }
         let way = &mut self.by_id[id.index()];
-        if way.is_none() {
-            *way = Way::of(world, id, &self.parts).map(Arc::new);
+        // Another World may name a resource before there is one here.
+        let is_resource = world.resource_entities().get(id).is_some();
+        if way.as_ref().is_none_or(|way| is_resource && !way.is_resource) {
+            *way = Way::of(world, id, &self.parts, self.owner).map(Arc::new);
         }
         way.clone().filter(|way| way.owner != Owner::Skipped)
     }
@@ -212,8 +220,8 @@ impl Ways {
     }
 
     /// Copies the value of an entity; `None` if it has none, or if its type cannot be copied.
-    pub(super) fn copy(&self, way: &Way, world: &World, entity: Entity) -> Option<Value> {
-        way.copy(world, entity, &self.cloner)
+    pub(super) fn copy(&mut self, way: &Way, world: &World, entity: Entity) -> Option<Value> {
+        way.copy(world, entity, &mut self.cloner)
     }
 }
 
@@ -242,19 +250,37 @@ unsafe fn blocks(from: *const u8, size: usize) -> Box<[Block]> {
     blocks
 }
 
+/// Returns whether the bytes of a value are a copy of it, although its type has no `Clone`.
+///
+/// A value that needs no drop may still be the only one of its kind, like a mutable reference or a box that is never
+/// dropped. Only pointers are aligned like pointers, so a type of smaller alignment has none. Hooks could free what a
+/// number stands for. What remains are packed structs with such a reference, and numbers that unsafe code trusts to be
+/// the only ones.
+fn is_plain(info: &ComponentInfo) -> bool {
+    let (mut hooks, is_small) = (info.hooks().clone(), info.layout().align() < align_of::<*const ()>());
+    let has_none = hooks.try_on_add(|_, _| {}).is_some()
+        && hooks.try_on_insert(|_, _| {}).is_some()
+        && hooks.try_on_discard(|_, _| {}).is_some()
+        && hooks.try_on_remove(|_, _| {}).is_some()
+        && hooks.try_on_despawn(|_, _| {}).is_some();
+    info.drop().is_none() && info.is_send_and_sync() && is_small && has_none
+}
+
 impl Way {
     /// Returns the way for a type; `None` for one without a Rust type, and for one that is not registered.
-    fn of(world: &World, id: ComponentId, parts: &[Part]) -> Option<Self> {
+    fn of(world: &World, id: ComponentId, parts: &[Part], owner: fn(&str, bool) -> Owner) -> Option<Self> {
         let info = world.components().get_info(id)?;
         let type_id = info.type_id()?;
         let name = info.name().to_string();
         let registry = world.get_resource::<AppTypeRegistry>().map(|registry| registry.read());
         let registration = registry.as_ref().and_then(|registry| registry.get(type_id));
         let from_ptr = registration.and_then(|of| of.data::<ReflectFromPtr>().cloned());
+        let from_ptr = from_ptr.filter(|from_ptr| from_ptr.type_id() == type_id);
         let component = registration.and_then(|of| of.data::<ReflectComponent>().cloned());
         let is_rapiers = name.starts_with("bevy_rapier2d::") || name.starts_with("bevy_rapier3d::");
         let ends = ["Handle", "ContextSimulation", "ContextColliders", "ContextJoints", "RigidBodySet"];
-        let owner = owner(&name, world.resource_entities().get(id).is_some());
+        let is_resource = world.resource_entities().get(id).is_some();
+        let owner = owner(&name, is_resource);
         Some(Self {
             id,
             type_id,
@@ -267,13 +293,14 @@ impl Way {
             has_clone: matches!(info.clone_behavior(), ComponentCloneBehavior::Custom(_))
                 && owner == Owner::Game
                 && info.relationship_accessor().is_none(),
-            is_plain: info.drop().is_none() && info.layout().align() <= align_of::<Block>(),
+            is_plain: is_plain(info),
+            is_resource,
             name,
         })
     }
 
     /// Copies the value of an entity; `None` if it has none, or if its type cannot be copied.
-    fn copy(&self, world: &World, entity: Entity, cloner: &SharedCloner) -> Option<Value> {
+    fn copy(&self, world: &World, entity: Entity, cloner: &mut Option<SharedCloner>) -> Option<Value> {
         if let Some(part) = &self.part {
             return (part.save)(world, entity).map(Value::Part);
         }
@@ -286,6 +313,7 @@ impl Way {
             }
         }
         if self.has_clone {
+            let cloner = cloner.get_or_insert_with(SharedCloner::new);
             // SAFETY: the value is one of this component, and stays where it is meanwhile.
             if let Some(cloned) = unsafe { cloner.copy(world, self, value) } {
                 return Some(Value::Cloned(cloned));
@@ -333,8 +361,14 @@ impl Way {
         let bytes = match value {
             Value::Part(_) => return None,
             Value::Reflected(copy) => {
-                let (copy, size) = (Box::into_raw(self.mapped(&**copy, map)?).cast::<u8>(), self.layout.size());
-                // SAFETY: the box holds a value of this layout. It is moved out, and only its memory is freed.
+                let copy = self.mapped(&**copy, map)?;
+                // A game's own reflection may return a copy of any type.
+                let any: &dyn Any = &*copy;
+                if any.type_id() != self.type_id {
+                    return None;
+                }
+                let (copy, size) = (Box::into_raw(copy).cast::<u8>(), self.layout.size());
+                // SAFETY: the box holds a value of this type. It is moved out, and only its memory is freed.
                 unsafe {
                     let bytes = blocks(copy, size);
                     if size > 0 {
@@ -394,11 +428,12 @@ impl Made {
 
 /// A World of its own in which Bevy's cloner of entities clones single values. It has no hooks and no observers.
 ///
-/// Each type has one entity whose bits are borrowed from the value that is cloned. Therefore the World is never dropped,
-/// which keeps a little memory for each World of the game. Clones are dropped with [`Cloned`].
+/// Each type has one entity to which a value of the game moves while it is cloned. Its bits are left behind there, so
+/// the World is never dropped, which keeps a little memory for each World of the game. Clones are dropped with
+/// [`Cloned`].
 struct Cloner {
     world: ManuallyDrop<World>,
-    /// Id of each type here, and the entity with the borrowed bits.
+    /// Id of each type here, and the entity for values of the game.
     types: BTreeMap<TypeId, (ComponentId, Entity)>,
 }
 
@@ -411,7 +446,6 @@ pub(super) struct Cloned {
     cloner: SharedCloner,
     entity: Entity,
     id: ComponentId,
-    type_id: TypeId,
 }
 
 /// Gives the cloner of entities its target first, and then other entities in place of those of the value.
@@ -443,7 +477,7 @@ impl SharedCloner {
     ///
     /// # Safety
     ///
-    /// The pointer is to a value of the component in this World, which stays there meanwhile.
+    /// The pointer is to a value of the component in this World, which stays there, and which nothing else uses meanwhile.
     unsafe fn copy(&self, world: &World, way: &Way, value: Ptr) -> Option<Cloned> {
         let mut cloner = self.lock();
         let is_known = cloner.types.contains_key(&way.type_id);
@@ -451,33 +485,41 @@ impl SharedCloner {
             let descriptor = world.components().get_descriptor(way.id)?.into_owned();
             let id = cloner.world.register_component_with_descriptor(descriptor);
             let mut source = cloner.world.spawn_empty();
-            // SAFETY: the value has this type. Its bits are borrowed, and never dropped here.
+            // SAFETY: the value has this type. Its bits are never dropped here.
             unsafe { source.insert_by_id(id, OwningPtr::new(NonNull::new(value.as_ptr())?)) };
             let source = source.id();
             cloner.types.insert(way.type_id, (id, source));
         }
         // SAFETY: the value has this type.
-        let (id, entity) = unsafe { cloner.clone_at(way.type_id, value.as_ptr(), &mut EntityMap::default())? };
+        let (id, entity) = unsafe { cloner.clone_guest(way.type_id, value.as_ptr())? };
         drop(cloner);
-        Some(Cloned { cloner: self.clone(), entity, id, type_id: way.type_id })
+        Some(Cloned { cloner: self.clone(), entity, id })
     }
 }
 
 impl Cloner {
-    /// Clones the value at this place into a new entity.
+    /// Clones the value at this place into a new entity. Meanwhile the value itself is here, and moves back then: a
+    /// `Clone` that changes its source, for instance behind a lock, changes the only one that there is.
     ///
     /// # Safety
     ///
-    /// The place holds a value of this type.
-    unsafe fn clone_at(&mut self, of: TypeId, value: *const u8, map: &mut EntityMap) -> Option<(ComponentId, Entity)> {
-        let (id, source) = *self.types.get(&of)?;
+    /// The place holds a value of this type, which nothing else uses.
+    unsafe fn clone_guest(&mut self, of: TypeId, value: *mut u8) -> Option<(ComponentId, Entity)> {
+        let (id, guest) = *self.types.get(&of)?;
         let size = self.world.components().get_info(id)?.layout().size();
-        // SAFETY: the entity's bits are borrowed, so the old ones need no drop. Both places have the layout of the type.
-        unsafe {
-            let mut source = self.world.get_entity_mut(source).ok()?;
-            let mut slot = source.get_mut_assume_mutable_by_id(id).ok()?;
-            ptr::copy(value, slot.bypass_change_detection().as_ptr(), size);
-        }
+        let place = self.place(guest, id)?;
+        // SAFETY: both places have the layout of the type, and the bits that were here need no drop.
+        unsafe { ptr::copy_nonoverlapping(value, place, size) };
+        let cloned = catch_unwind(AssertUnwindSafe(|| self.clone_entity(guest, id, &mut EntityMap::default())));
+        // The new entity may have moved this one.
+        let place = self.place(guest, id)?;
+        // SAFETY: as above. The bits that are left here are not used as a value.
+        unsafe { ptr::copy_nonoverlapping(place, value, size) };
+        Some((id, cloned.unwrap_or_else(|panic| resume_unwind(panic))?))
+    }
+
+    /// Clones the value of an entity into a new one.
+    fn clone_entity(&mut self, source: Entity, id: ComponentId, map: &mut EntityMap) -> Option<Entity> {
         let target = self.world.spawn_empty().id();
         let mut mapper = TargetFirst { target: Some(target), map };
         EntityCloner::build_opt_out(&mut self.world).finish().clone_entity_mapped(&mut self.world, source, &mut mapper);
@@ -485,7 +527,7 @@ impl Cloner {
             self.world.despawn(target);
             return None;
         }
-        Some((id, target))
+        Some(target)
     }
 
     /// Returns the place of a value.
@@ -505,10 +547,8 @@ impl Cloner {
 impl Cloned {
     /// Clones the value once more, and returns the new one with its place.
     fn again(&self, cloner: &mut Cloner, map: &mut EntityMap) -> Option<(Entity, *mut u8)> {
-        let value = cloner.place(self.entity, self.id)?;
-        // SAFETY: the entity holds a value of this type.
-        let (id, entity) = unsafe { cloner.clone_at(self.type_id, value, map)? };
-        let place = cloner.place(entity, id)?;
+        let entity = cloner.clone_entity(self.entity, self.id, map)?;
+        let place = cloner.place(entity, self.id)?;
         Some((entity, place))
     }
 
@@ -595,6 +635,8 @@ fn owner(name: &str, is_resource: bool) -> Owner {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bevy::ecs::{lifecycle::HookContext, world::DeferredWorld};
+    use bevy_playbot::engine::panics;
 
     #[test]
     fn types_belong_to_bevy_to_the_game_or_to_the_plugin() {
@@ -633,6 +675,11 @@ mod tests {
         steps: u32,
     }
 
+    /// Returns the ways of a game whose types are those of these tests.
+    fn ways() -> Ways {
+        Ways { owner: |_, _| Owner::Game, ..Ways::new(&[]) }
+    }
+
     /// Returns the way of the only component of an entity.
     fn way(ways: &mut Ways, world: &World, entity: Entity) -> Arc<Way> {
         let id = world.entity(entity).archetype().components()[0];
@@ -641,7 +688,7 @@ mod tests {
 
     #[test]
     fn clones_are_dropped_once() {
-        let (mut world, mut ways, mut map) = (World::new(), Ways::new(&[]), EntityMap::default());
+        let (mut world, mut ways, mut map) = (World::new(), ways(), EntityMap::default());
         let count = Arc::new(());
         let first = world.spawn(Held(count.clone())).id();
         let second = world.spawn(Held(Arc::new(()))).id();
@@ -667,7 +714,7 @@ mod tests {
 
     #[test]
     fn clones_name_the_entities_that_take_the_place_of_others() {
-        let (mut world, mut ways) = (World::new(), Ways::new(&[]));
+        let (mut world, mut ways) = (World::new(), ways());
         let (old, new) = (world.spawn_empty().id(), world.spawn_empty().id());
         let aiming = world.spawn(Aims(old, vec![1, 2])).id();
         let way = way(&mut ways, &world, aiming);
@@ -680,9 +727,114 @@ mod tests {
         assert_eq!(aims(&world), Some((new, vec![1, 2])));
     }
 
+    /// Its `Clone` lets the value itself grow, behind a lock.
+    #[derive(Component)]
+    struct Growing(Mutex<Vec<u8>>);
+
+    impl Clone for Growing {
+        fn clone(&self) -> Self {
+            let mut grown = self.0.lock().expect("nothing panics");
+            grown.extend([0; 100]);
+            Self(Mutex::new(grown.clone()))
+        }
+    }
+
+    #[test]
+    fn a_clone_that_changes_its_source_changes_the_value_itself() {
+        let (mut world, mut ways, mut map) = (World::new(), ways(), EntityMap::default());
+        let entity = world.spawn(Growing(Mutex::new(vec![7]))).id();
+        let way = way(&mut ways, &world, entity);
+        let len = |world: &World| world.get::<Growing>(entity).map(|all| all.0.lock().expect("nothing panics").len());
+        let values = [101, 201, 301].map(|grown| {
+            let value = ways.copy(&way, &world, entity).expect("it has `Clone`");
+            assert_eq!(len(&world), Some(grown));
+            value
+        });
+        way.write(&mut world, entity, &values[0], &mut map, Tick::new(1));
+        // Cloned once more.
+        assert_eq!(len(&world), Some(201));
+    }
+
+    /// Its `Clone` panics.
+    #[derive(Component)]
+    struct Fragile(Arc<()>);
+
+    impl Clone for Fragile {
+        fn clone(&self) -> Self {
+            panic!("{} of it break", Arc::strong_count(&self.0))
+        }
+    }
+
+    #[test]
+    fn a_value_whose_clone_panics_stays_where_it_is() {
+        let (mut world, mut ways) = (World::new(), ways());
+        let count = Arc::new(());
+        let entity = world.spawn(Fragile(count.clone())).id();
+        let way = way(&mut ways, &world, entity);
+        let copied = panics::hear(|| ways.copy(&way, &world, entity).is_some());
+        assert!(copied.is_err_and(|words| words.contains("2 of it break")));
+        world.despawn(entity);
+        drop((world, ways));
+        assert_eq!(Arc::strong_count(&count), 1);
+    }
+
+    #[test]
+    fn a_world_for_clones_is_made_for_the_first_one() {
+        let (mut world, mut ways) = (World::new(), ways());
+        let (number, held) = (world.spawn(Legs { steps: 7 }).id(), world.spawn(Held(Arc::new(()))).id());
+        let (of_number, of_held) = (way(&mut ways, &world, number), way(&mut ways, &world, held));
+        assert!(ways.copy(&of_number, &world, number).is_some() && ways.cloner.is_none());
+        assert!(ways.copy(&of_held, &world, held).is_some() && ways.cloner.is_some());
+    }
+
+    /// May be the only one of its kind, although it needs no drop.
+    #[derive(Component)]
+    struct Borrows(&'static mut u32);
+
+    #[derive(Component)]
+    struct Kept(ManuallyDrop<Box<u32>>);
+
+    /// A number that a hook gives back.
+    #[derive(Component)]
+    #[component(on_remove = give_back)]
+    struct Ticket(u32);
+
+    fn give_back(_: DeferredWorld, _: HookContext) {}
+
+    #[test]
+    fn bytes_that_may_be_more_than_numbers_are_not_copied() {
+        let (mut world, mut ways) = (World::new(), ways());
+        let borrows = world.spawn(Borrows(Box::leak(Box::new(1)))).id();
+        let kept = world.spawn(Kept(ManuallyDrop::new(Box::new(2)))).id();
+        let ticket = world.spawn(Ticket(3)).id();
+        for entity in [borrows, kept, ticket] {
+            let way = way(&mut ways, &world, entity);
+            assert!(ways.copy(&way, &world, entity).is_none(), "{}", way.name);
+        }
+        let sum = |world: &World| -> Option<u32> {
+            let (borrowed, kept) = (world.get::<Borrows>(borrows)?, world.get::<Kept>(kept)?);
+            Some(*borrowed.0 + **kept.0 + world.get::<Ticket>(ticket)?.0)
+        };
+        assert_eq!(sum(&world), Some(6));
+    }
+
+    #[derive(Resource, Clone)]
+    struct Late;
+
+    #[test]
+    fn a_type_that_was_no_resource_at_first_may_become_one() {
+        let (mut world, mut ways) = (World::new(), ways());
+        let id = world.register_component::<Late>();
+        assert!(!ways.of(&world, id).expect("a type of the game").is_resource);
+        world.insert_resource(Late);
+        assert!(ways.of(&world, id).expect("a type of the game").is_resource);
+        world.remove_resource::<Late>();
+        assert!(ways.of(&world, id).expect("a type of the game").is_resource);
+    }
+
     #[test]
     fn numbers_are_copied_without_clone() {
-        let (mut world, mut ways, mut map) = (World::new(), Ways::new(&[]), EntityMap::default());
+        let (mut world, mut ways, mut map) = (World::new(), ways(), EntityMap::default());
         let (first, other) = (world.spawn(Legs { steps: 7 }).id(), world.spawn_empty().id());
         let way = way(&mut ways, &world, first);
         let value = ways.copy(&way, &world, first).expect("it needs no drop");
