@@ -13,7 +13,7 @@
 //! | find the tick of a game, whatever its frames | [`TickSchedules`], [`is_tick`], [`set_tick_rate`] |
 //! | survive a game that panics or logs errors | [`panics`], [`system_errors`] |
 //! | name the tick in which a game logs a message | [`tick_of_thread`], [`LevelTick`] |
-//! | let frames wait for the assets of a game, and name them | [`deliver_between_frames`], [`wait_for_assets`], [`UnloadedAssets`] |
+//! | let frames wait for the assets of a game, and name them | [`deliver_between_frames`], [`wait_for_assets`], [`deliver_assets`], [`UnloadedAssets`] |
 //! | name the level of a call that does not return | [`GameCall`], [`SlowCalls`], [`SlowCall`] |
 //! | decide for many agents at once | [`PolicyBatch`], [`PolicyRows`], [`SharedBatch`], [`Playing`], [`draw_skills`] |
 //! | keep systems in one order | [`put_in_order`], [`leave_open`], [`FaultSystems`], [`run_observe_schedule`] |
@@ -66,7 +66,7 @@ pub use crate::{
 // Documented here: games do not need their modules, which are private.
 pub use crate::{
     calls::{GameCall, SlowCall, SlowCalls},
-    loading::{UnloadedAssets, deliver_between_frames, wait_for_assets},
+    loading::{UnloadedAssets, deliver_assets, deliver_between_frames, wait_for_assets},
     policy_batch::{Playing, PolicyBatch, PolicyRows, SharedBatch},
     renewal::{NextEpisode, Renewal},
 };

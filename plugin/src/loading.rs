@@ -116,7 +116,8 @@ struct AwaitedLoads {
 struct OverdueAssets(Vec<String>);
 
 /// Keeps Bevy from delivering loaded assets in the middle of a frame, where some machines are fast enough for the assets
-/// of `Startup`, and others are not. [`wait_for_assets`] delivers them after it. Call it before the schedules run.
+/// of `Startup`, and others are not. [`wait_for_assets`] or [`deliver_assets`] delivers them after it. Call it before the
+/// schedules run.
 pub fn deliver_between_frames(world: &mut World) {
     let Some(mut schedules) = world.get_resource_mut::<Schedules>() else { return };
     let Some(schedule) = schedules.get_mut(PreUpdate) else { return };
@@ -158,6 +159,15 @@ pub fn wait_for_assets(world: &mut World) {
             awaited.begun = count_loads(&mut awaited, world);
         }
     });
+}
+
+/// Delivers the assets that have arrived, and waits for no other. It is for a person who plays without a recording: the
+/// assets arrive there as they do in the game itself.
+pub fn deliver_assets(world: &mut World) {
+    if world.contains_resource::<AssetServer>() {
+        run_tasks();
+        handle_internal_asset_events(world);
+    }
 }
 
 /// Returns the number of loads that have begun; `None` if the game has switched off Bevy's diagnostic of it.

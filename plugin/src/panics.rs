@@ -4,7 +4,7 @@ mod origin;
 
 use crate::{
     action::{Action, check_actions},
-    agent::{Agent, AgentOrder, Control},
+    agent::{Agent, AgentOrder, Control, PlaysAlong},
     carry_over::{ReflectCarryComponent, ReflectCarryResource},
     demo::{
         file::{DemoEpisode, DemoHeader, DemoWriter},
@@ -212,7 +212,9 @@ fn report(world: &mut World, words: &str) -> String {
         else {
             continue;
         };
-        if !control.is_active() || !(episode.is_running() || episode.is_loading()) {
+        // What plays along is no part of recordings: the game lets it act again.
+        let is_beside = world.get::<PlaysAlong>(entity).is_some();
+        if is_beside || !control.is_active() || !(episode.is_running() || episode.is_loading()) {
             continue;
         }
         at.push(episode.moment(agent));
@@ -268,6 +270,12 @@ fn keep(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        episode::begin_beside,
+        headless::{PlaybotAppExt, headless_app},
+        level::LevelQueue,
+    };
+    use playbot_learner::ActionSpace;
 
     #[test]
     fn a_path_in_the_registry_begins_with_its_package() {
@@ -296,6 +304,18 @@ mod tests {
         assert!(lacks_render_app("No sub-app with label 'RenderApp' exists. (bevy_app-0.19.1/src/app.rs:1235:13)"));
         assert!(!lacks_render_app("No sub-app with label 'Physics' exists."));
         assert!(!lacks_render_app("the RenderApp burns"));
+    }
+
+    #[test]
+    fn the_report_of_a_panic_leaves_out_what_plays_along() {
+        let (mut app, space) = (headless_app(), ActionSpace::Discrete(2));
+        app.world_mut().spawn((Agent::new(0, space), Control::Human, LevelQueue::Always(7)));
+        let beside = app.world_mut().spawn((Agent::new(1, space), PlaysAlong)).id();
+        app.tick().expect("no agent broke its contract");
+        begin_beside(app.world_mut(), beside, 7);
+        app.tick().expect("no agent broke its contract");
+        let said = report(app.world_mut(), "it burns");
+        assert!(said.starts_with("agent 0, level 7, tick 2: the game panicked: it burns"), "{said}");
     }
 
     #[test]

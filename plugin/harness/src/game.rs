@@ -646,6 +646,15 @@ pub fn read_level_designs(game: &(impl Game + ?Sized), mode: &str) -> Result<Lev
     with_parser(game, |parse| LevelDesigns::read_with(game.name(), mode, parse))
 }
 
+/// Returns the level of one file as level 0, or that of standard input for the path `-`.
+///
+/// # Errors
+///
+/// As for [`level_designs`].
+pub(crate) fn design_of_file(game: &(impl Game + ?Sized), path: &str) -> Result<LevelDesigns, LevelFileError> {
+    with_parser(game, |parse| LevelDesigns::of_file_with(path, parse))
+}
+
 /// Calls a function with the game's parser of level files: of bytes if it has one, else of texts.
 fn with_parser<Out>(game: &(impl Game + ?Sized), read: impl FnOnce(Parse) -> Out) -> Out {
     let levels = game.tools().levels;

@@ -122,8 +122,7 @@ impl<'a> HeldOut<'a> {
     ///
     /// All levels of all ranges are compared by their numbers, and those of the first ranges by their layouts, up to
     /// 262,144 levels. If the game has no layouts and [compares states](crate::game::StateTools::compares_levels), the
-    /// first ranges are compared by their play, up to 2,048 levels with the held-out ones. In a game whose World is built
-    /// anew for each episode these are 128. If all held-out levels play like seen ones, none is left out for that: the
+    /// first ranges are compared by their play, up to 128 levels with the held-out ones. If all held-out levels play like seen ones, none is left out for that: the
     /// game has no others. `progress` is that of [`AlikeLevels::of`], and is called only if levels are played.
     pub fn seen_in(&self, seen: &SeenLevels, progress: &(dyn Fn(u64, u64) + Sync)) -> BTreeSet<u64> {
         let mut found = BTreeSet::new();
@@ -158,7 +157,7 @@ impl<'a> HeldOut<'a> {
 
     /// Adds the levels that play like seen ones to those that are found already.
     fn add_alike(&self, seen: &[LevelSplit], found: &mut BTreeSet<u64>, progress: &(dyn Fn(u64, u64) + Sync)) {
-        let mut left = if self.game.built_anew().is_some() { MOST_BUILT } else { MOST_PLAYED };
+        let mut left = MOST_PLAYED;
         if self.split.len() > left {
             return;
         }
@@ -247,11 +246,9 @@ const MOST_WORLDS: usize = 8;
 /// Worlds in a row that break in their first level, after which the other levels of a thread are not played.
 const MOST_BARREN: u32 = 3;
 
-/// Largest number of levels that are played to compare held-out levels with seen ones.
-const MOST_PLAYED: u64 = 2_048;
-
-/// The same for a game whose World is built for each of them.
-const MOST_BUILT: u64 = 128;
+/// Largest number of levels that are played to compare held-out levels with seen ones. A slow game plays a few in a
+/// second, and `eval` may not wait for minutes; `playbot levels` compares as many as are asked for.
+const MOST_PLAYED: u64 = 128;
 
 /// A level of one of several ranges: the index of the range, and the number of the level.
 pub type PlacedLevel = (usize, u64);

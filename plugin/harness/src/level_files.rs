@@ -80,7 +80,12 @@ impl LevelDesigns {
         path: &str,
         parse: &dyn Fn(&str) -> Result<LevelDesign, LevelTextError>,
     ) -> Result<Self, LevelFileError> {
-        Ok(Self(Arc::new(vec![read::read_one(path, Parse::Text(parse))?])))
+        Self::of_file_with(path, Parse::Text(parse))
+    }
+
+    /// Reads the level of one file as [`of_file`](Self::of_file) does, with a parser of texts or of bytes.
+    pub(crate) fn of_file_with(path: &str, parse: Parse) -> Result<Self, LevelFileError> {
+        Ok(Self(Arc::new(vec![read::read_one(path, parse)?])))
     }
 
     /// Wraps a single level as level 0, under a name instead of a path.

@@ -31,7 +31,7 @@ pub(crate) mod testing;
 use crate::{
     bugs::{BugSet, Mutant, PlantedPart, defect_kinds},
     score::{
-        contestant::{JobClock, SubjectDetectors},
+        contestant::{JobClock, JobDetectors, KnownSubject},
         error::io_error,
         found::Trial,
         playing::{play, search},
@@ -53,7 +53,7 @@ use std::{
     collections::BTreeSet,
     fs, io,
     path::Path,
-    sync::{Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     thread,
     thread::Builder,
 };
@@ -343,6 +343,14 @@ pub struct ScoreRun<'a> {
     cases: Vec<Case>,
 }
 
+/// A job that the journal does not have.
+struct OpenJob<'a> {
+    case: &'a Case,
+    contestant: &'a Contestant,
+    /// What its subject's jobs share.
+    known: Arc<KnownSubject>,
+}
+
 /// The state that the threads share.
 struct Shared<'a> {
     next: usize,
@@ -376,23 +384,23 @@ impl<'a> ScoreRun<'a> {
 
     /// Runs all jobs that the journal does not have, and judges all of them; `None` if `stop` returned true.
     ///
-    /// The jobs of a subject run one after the other on one thread. Their results, apart from the times, depend on the
-    /// plan's budget, the tester and the subject alone. A mutant that makes a tester panic is a finding.
+    /// The results, apart from the times, depend on the plan's budget, the tester and the subject alone. A mutant that
+    /// makes a tester panic is a finding.
     ///
     /// # Errors
     ///
     /// A tester cannot play at all, or the journal cannot be written.
     pub fn run(&self, journal: &mut ScoreJournal, watch: &ScoreCallbacks) -> Result<Option<Score>, ScoreError> {
-        let mut open: Vec<(&Case, Vec<&Contestant>)> = Vec::new();
+        let mut open: Vec<OpenJob> = Vec::new();
         for case in &self.cases {
+            let tested = &self.plan.games[case.game];
+            let known = Arc::new(KnownSubject::new(&tested.detectors));
             let is_open = |contestant: &&Contestant| {
                 let key = (case.subject.id.clone(), contestant.record.name.clone());
                 !journal.finished().contains_key(&key)
             };
-            let testers: Vec<_> = self.plan.games[case.game].contestants.iter().filter(is_open).collect();
-            if !testers.is_empty() {
-                open.push((case, testers));
-            }
+            let jobs = tested.contestants.iter().filter(is_open);
+            open.extend(jobs.map(|contestant| OpenJob { case, contestant, known: Arc::clone(&known) }));
         }
         let threads = self.plan.threads.clamp(1, open.len().max(1));
         let shared = Mutex::new(Shared { next: 0, journal: &mut *journal, failure: None, is_stopped: false });
@@ -425,48 +433,41 @@ impl<'a> ScoreRun<'a> {
         })
     }
 
-    /// Runs the open jobs of subject after subject on one thread.
-    fn work(&self, open: &[(&Case, Vec<&Contestant>)], shared: &Mutex<Shared>, watch: &ScoreCallbacks) {
+    /// Runs open jobs, one after the other, on one thread.
+    fn work(&self, open: &[OpenJob], shared: &Mutex<Shared>, watch: &ScoreCallbacks) {
         loop {
             let next = {
                 let mut shared = lock(shared);
+                if shared.is_over() {
+                    return;
+                }
                 shared.next += 1;
                 shared.next - 1
             };
-            let Some((case, contestants)) = open.get(next) else { return };
-            let detectors = SubjectDetectors::new(&self.plan.games[case.game].detectors, self.plan.clock);
-            for contestant in contestants {
-                if lock(shared).is_over() {
-                    return;
+            let Some(open) = open.get(next) else { return };
+            let done = self.job(open, watch);
+            let mut shared = lock(shared);
+            let kept = match done {
+                Ok(Some(result)) => shared.journal.push(result).map(|()| (watch.progress)(1)),
+                Ok(None) => {
+                    shared.is_stopped = true;
+                    Ok(())
                 }
-                let done = self.job(case, contestant, &detectors, watch);
-                let mut shared = lock(shared);
-                let kept = match done {
-                    Ok(Some(result)) => shared.journal.push(result).map(|()| (watch.progress)(1)),
-                    Ok(None) => {
-                        shared.is_stopped = true;
-                        Ok(())
-                    }
-                    Err(error) => Err(error),
-                };
-                if let Err(error) = kept {
-                    shared.failure.get_or_insert(error);
-                }
+                Err(error) => Err(error),
+            };
+            if let Err(error) = kept {
+                shared.failure.get_or_insert(error);
             }
         }
     }
 
-    fn job(
-        &self,
-        case: &Case,
-        contestant: &Contestant,
-        detectors: &SubjectDetectors,
-        watch: &ScoreCallbacks,
-    ) -> Result<Option<JobResult>, ScoreError> {
+    fn job(&self, open: &OpenJob, watch: &ScoreCallbacks) -> Result<Option<JobResult>, ScoreError> {
         if (watch.stop)() {
             return Ok(None);
         }
+        let OpenJob { case, contestant, known } = open;
         let tested = &self.plan.games[case.game];
+        let detectors = JobDetectors::new(&tested.detectors, self.plan.clock, known);
         let mutant = case.mutant(tested.game);
         let clock = JobClock::start(self.plan.clock, &detectors.charges);
         let trial = Trial {

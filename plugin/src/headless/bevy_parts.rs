@@ -254,32 +254,19 @@ pub(super) fn without_devices(plugins: PluginGroupBuilder) -> PluginGroupBuilder
     }
 }
 
-/// Leaves the log to the first World of a program that has none.
+/// Leaves the log to the first World of a program that has none: Bevy's plugin logs an error in each further World.
 pub(super) fn with_one_log(plugins: PluginGroupBuilder) -> PluginGroupBuilder {
     #[allow(unused_imports, reason = "Bevy may lack these modules")]
     use bevy::*;
-    if plugins.contains::<log::LogPlugin>() {
-        plugins.add_after::<log::LogPlugin>(FirstLog).disable::<log::LogPlugin>()
-    } else {
+
+    /// Whether a World has looked after the log.
+    static SEEN: AtomicBool = AtomicBool::new(false);
+
+    let is_first = !SEEN.swap(true, Ordering::Relaxed);
+    if is_first && dispatcher::get_default(|log| log.is::<NoSubscriber>()) {
         plugins
-    }
-}
-
-/// Sets up Bevy's log once. A program has one log, and Bevy's plugin logs an error in each further World.
-struct FirstLog;
-
-impl Plugin for FirstLog {
-    fn build(&self, app: &mut App) {
-        #[allow(unused_imports, reason = "Bevy may lack these modules")]
-        use bevy::*;
-
-        /// Whether a World has looked after the log.
-        static SEEN: AtomicBool = AtomicBool::new(false);
-
-        let is_first = !SEEN.swap(true, Ordering::Relaxed);
-        if is_first && dispatcher::get_default(|log| log.is::<NoSubscriber>()) {
-            app.add_plugins(log::LogPlugin::default());
-        }
+    } else {
+        without::<log::LogPlugin>(plugins)
     }
 }
 

@@ -19,9 +19,10 @@ use bevy::{
 use bevy_playbot::{
     action::Action,
     agent::Control,
-    demo::file::DemoEpisode,
+    demo::{file::DemoEpisode, recorder::Recorder},
     engine::{
-        PressesForPeople, TickSchedules, deliver_between_frames, run_on_one_thread, system_errors, wait_for_assets,
+        PressesForPeople, TickSchedules, deliver_assets, deliver_between_frames, run_on_one_thread, system_errors,
+        wait_for_assets,
     },
     episode::Episode,
     fault::Faults,
@@ -103,7 +104,12 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
         world.run_schedule(StandStill);
     } else {
         world.run_schedule(Main);
-        wait_for_assets(world);
+        if is_repeatable(world) {
+            wait_for_assets(world);
+        } else {
+            // A person sees the game's own loading screen, and may leave it.
+            deliver_assets(world);
+        }
         if let Some(failure) = system_errors::take() {
             world.resource_mut::<Faults>().report(failure);
             world.run_schedule(StandStill);
@@ -111,6 +117,13 @@ fn run_frame(world: &mut World, mut has_begun: Local<bool>) {
         world.run_schedule(WindowEnd);
     }
     devices::give_back(world);
+}
+
+/// Returns whether each asset has to arrive in the frame in which it arrives headless: for a recording, or because the
+/// agent is not played by a person.
+fn is_repeatable(world: &World) -> bool {
+    let agent = world.resource::<Deciders>().agent;
+    world.contains_resource::<Recorder>() || world.get::<Control>(agent) != Some(&Control::Human)
 }
 
 /// Opens the devices to the game where what a person does is no action, and keeps them otherwise.

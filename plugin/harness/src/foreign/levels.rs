@@ -4,9 +4,9 @@ use crate::{
     detector::LevelProof,
     floor_plan::{FloorPlan, joined_tiles},
     foreign::{ForeignGame, runtime::LevelSeed},
-    game::{Game, LevelTools, level_designs},
+    game::{Game, LevelTools, design_of_file, level_designs},
     inspect::{InspectError, LevelPicture, LevelRequest, LevelView, read_text},
-    level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files, level_files_mode},
+    level_files::{LevelDesign, LevelDesigns, LevelTextError, is_level_files, level_files_mode, read::shown_path},
     mode::ModeError,
     split::check_level,
 };
@@ -545,20 +545,32 @@ impl ForeignGame {
             let why = format!("the levels of `{name}` are no maps: name one with --level, or a level file with --file");
             return Err(InspectError::Usage(why));
         }
-        let (mode, level) = match request.file {
-            Some(path) => (level_files_mode(&path.to_string_lossy()), 0),
+        let (plan, known) = match request.file {
+            Some(path) => {
+                let designs = design_of_file(self, &path.to_string_lossy()).map_err(ModeError::from)?;
+                let plan = self.plan_of(&designs, 0);
+                // Standard input is no mode that could be played.
+                let mode = (path != Path::new("-")).then(|| level_files_mode(&path.to_string_lossy()));
+                let known = self.of_file((mode.as_deref(), 0), path, plan.as_ref())?;
+                (plan, known)
+            }
             None => {
                 let first = Game::modes(self).first().copied().unwrap_or_default();
-                (request.mode.unwrap_or(first).to_owned(), request.level.unwrap_or(0))
+                let (mode, level) = (request.mode.unwrap_or(first), request.level.unwrap_or(0));
+                self.check_mode(mode)?;
+                check_level(self, mode, level)?;
+                let plan = self.floor_plan(mode, level);
+                let known = match self.editor_level(mode, level) {
+                    Some(drawn) => of_editor((mode, level), drawn),
+                    None if is_level_files(mode) => {
+                        let designs = level_designs(self, mode).map_err(ModeError::from)?;
+                        let path = Path::new(designs.path(level).unwrap_or_default());
+                        self.of_file((Some(mode), level), path, plan.as_ref())?
+                    }
+                    None => self.of_number((mode, level), plan.as_ref()),
+                };
+                (plan, known)
             }
-        };
-        self.check_mode(&mode)?;
-        check_level(self, &mode, level)?;
-        let plan = self.floor_plan(&mode, level);
-        let known = match self.editor_level(&mode, level) {
-            Some(drawn) => of_editor((&mode, level), drawn),
-            None if is_level_files(&mode) => self.of_file((&mode, level), plan.as_ref())?,
-            None => self.of_number((&mode, level), plan.as_ref()),
         };
         let picture = match (&plan, request.picture) {
             (_, false) => None,
@@ -588,12 +600,22 @@ impl ForeignGame {
         KnownLevel { title, text, json }
     }
 
-    /// Describes a level file by its plan and its content.
-    fn of_file(&self, (mode, level): (&str, u64), plan: Option<&FloorPlan>) -> Result<KnownLevel, InspectError> {
-        let designs = level_designs(self, mode).map_err(ModeError::from)?;
-        let path = designs.path(level).unwrap_or_default().to_owned();
+    /// Returns the plan of a level file.
+    fn plan_of(&self, designs: &LevelDesigns, level: u64) -> Option<FloorPlan> {
+        let _call = GameCall::begin("drawing the floor plan of", [level]);
+        (self.description.level_parts.plan_of_file.as_ref()?.read)(designs.design(level).ok()?)
+    }
+
+    /// Describes a level file, or standard input, by its plan and its content.
+    fn of_file(
+        &self,
+        (mode, level): (Option<&str>, u64),
+        path: &Path,
+        plan: Option<&FloorPlan>,
+    ) -> Result<KnownLevel, InspectError> {
         // Level files of bytes have no text to show.
-        let content = if self.parse_bytes(&[]).is_some() { None } else { Some(read_text(Path::new(&path))?) };
+        let content = if self.parse_bytes(&[]).is_some() { None } else { Some(read_text(path)?) };
+        let path = shown_path(path);
         let shown = content.as_ref().map_or("its content is no text", |text| text.trim_end());
         let text = format!("{path}, a level of `{}`\n{}\n{shown}", self.name(), in_words(plan));
         let rows = plan.map(FloorPlan::rows);
@@ -923,6 +945,38 @@ mod tests {
             ForeignGame::new("bare", 1, |_: &mut App| {}).keys([vec![], vec![KeyCode::Space]]).observe(["x"], || [0.0]);
         let error = shown(&bare, LevelRequest { file: Some(&path), ..LevelRequest::default() }).expect_err("no files");
         assert!(error.contains("`bare` has no level files: name one of its modes"), "{error}");
+    }
+
+    #[test]
+    fn standard_input_is_shown_as_a_level_file_is() {
+        use std::{
+            io::Write,
+            process::{Command, Stdio},
+        };
+
+        /// Set in the process whose standard input is the level.
+        const PIPED: &str = "PLAYBOT_LEVEL_IS_PIPED";
+        if std::env::var_os(PIPED).is_some() {
+            let planned = game().plan_of_file(|goal: &Goal| FloorPlan {
+                bounds: Rect::new(0.0, 0.0, 6.0, 1.0),
+                goal: Vec2::new(goal.0 as f32 + 0.5, 0.5),
+                start: Vec2::splat(0.5),
+                ..FloorPlan::default()
+            });
+            let request = LevelRequest { file: Some(Path::new("-")), ..LevelRequest::default() };
+            let view = shown(&planned, request).expect("a level");
+            assert!(view.text.starts_with("standard input, a level of `finder`\nS....G\n"), "{}", view.text);
+            let json: serde_json::Value = serde_json::from_str(&view.json).expect("JSON");
+            assert_eq!((&json["content"], &json["mode"]), (&"goal\n5\n".into(), &serde_json::Value::Null));
+            return;
+        }
+        let mut test = Command::new(std::env::current_exe().expect("a program"));
+        test.args(["--exact", "foreign::levels::tests::standard_input_is_shown_as_a_level_file_is"]).env(PIPED, "1");
+        let mut test = test.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().expect("it starts");
+        test.stdin.take().expect("a pipe").write_all(b"goal\n5\n").expect("writable");
+        let done = test.wait_with_output().expect("it ends");
+        let said = String::from_utf8_lossy(&done.stdout);
+        assert!(done.status.success() && said.contains("1 passed"), "{said}");
     }
 
     #[test]

@@ -148,19 +148,17 @@ pub(super) struct JobClock {
     cpu: f64,
     begun: Instant,
     charges: Charges,
-    /// The charges at the start.
-    charged: u64,
 }
 
 impl JobClock {
     pub fn start(kind: ClockKind, charges: &Charges) -> Self {
-        let (charges, charged) = (Arc::clone(charges), charges.load(Ordering::Relaxed));
-        Self { kind, cpu: thread_cpu_seconds().unwrap_or(0.0), begun: Instant::now(), charges, charged }
+        let charges = Arc::clone(charges);
+        Self { kind, cpu: thread_cpu_seconds().unwrap_or(0.0), begun: Instant::now(), charges }
     }
 
     /// Returns the seconds since the start, to the microsecond, with those of work that was taken over.
     pub fn seconds(&self) -> f64 {
-        self.own_seconds() + (self.charges.load(Ordering::Relaxed) - self.charged) as f64 / 1e6
+        self.own_seconds() + self.charges.load(Ordering::Relaxed) as f64 / 1e6
     }
 
     fn own_seconds(&self) -> f64 {
@@ -175,24 +173,39 @@ impl JobClock {
 
 // Work that the testers of a subject share.
 
-/// Microseconds of work that jobs on a subject have taken over from another job.
+/// Microseconds of work that a job has taken over from another job.
 pub(super) type Charges = Arc<AtomicU64>;
 
-/// The detectors of a subject. Findings that do not depend on the tester are computed in the first job. Each further job
-/// takes them over, and is charged with the time that they took, as if it had computed them.
-pub(super) struct SubjectDetectors {
+/// The findings of a detector in a subject, once they are known, and the microseconds that they took.
+type KnownDefects = Arc<Mutex<Option<(Vec<LevelDefect>, u64)>>>;
+
+/// What is known of a subject, for all of its jobs: an entry for each detector of levels. Findings that do not depend on
+/// the tester are computed in the job that needs them first. Each further job takes them over, and is charged with the
+/// time that they took, as if it had computed them.
+pub(super) struct KnownSubject(Vec<KnownDefects>);
+
+impl KnownSubject {
+    pub fn new(detectors: &Detectors) -> Self {
+        Self(detectors.levels.iter().map(|_| KnownDefects::default()).collect())
+    }
+}
+
+/// The detectors of a job.
+pub(super) struct JobDetectors {
     /// The detectors.
     pub detectors: Detectors,
     /// The charges for work that was taken over.
     pub charges: Charges,
 }
 
-impl SubjectDetectors {
-    pub fn new(detectors: &Detectors, clock: ClockKind) -> Self {
+impl JobDetectors {
+    pub fn new(detectors: &Detectors, clock: ClockKind, KnownSubject(known): &KnownSubject) -> Self {
         let (mut detectors, charges) = (detectors.clone(), Charges::default());
-        for detector in detectors.levels.iter_mut().filter(|detector| !detector.depends_on_testers()) {
-            let (own, charges) = (Arc::clone(detector), Arc::clone(&charges));
-            *detector = Arc::new(SharedDetector { own, clock, charges, known: Mutex::default() });
+        for (detector, known) in detectors.levels.iter_mut().zip(known) {
+            if !detector.depends_on_testers() {
+                let (own, charges, known) = (Arc::clone(detector), Arc::clone(&charges), Arc::clone(known));
+                *detector = Arc::new(SharedDetector { own, clock, charges, known });
+            }
         }
         Self { detectors, charges }
     }
@@ -203,8 +216,7 @@ struct SharedDetector {
     own: Arc<dyn LevelDetector>,
     clock: ClockKind,
     charges: Charges,
-    /// Its findings, and the microseconds that they took.
-    known: Mutex<Option<(Vec<LevelDefect>, u64)>>,
+    known: KnownDefects,
 }
 
 impl LevelDetector for SharedDetector {
@@ -221,14 +233,17 @@ impl LevelDetector for SharedDetector {
     }
 
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
+        let waiting = JobClock::start(self.clock, &Charges::default());
         let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
         if let Some((defects, microseconds)) = &*known {
-            self.charges.fetch_add(*microseconds, Ordering::Relaxed);
+            // The job's clock has counted the time for which another job computed them.
+            let waited = microseconds_of(&waiting);
+            self.charges.fetch_add(microseconds.saturating_sub(waited), Ordering::Relaxed);
             return defects.clone();
         }
         let clock = JobClock::start(self.clock, &Charges::default());
         let defects = self.own.inspect(level);
-        *known = Some((defects.clone(), (clock.seconds() * 1e6).round() as u64));
+        *known = Some((defects.clone(), microseconds_of(&clock)));
         defects
     }
 
@@ -243,6 +258,10 @@ impl LevelDetector for SharedDetector {
     fn is_in_episode(&self, result: &EpisodeResult, tick: Option<u32>) -> bool {
         self.own.is_in_episode(result, tick)
     }
+}
+
+fn microseconds_of(clock: &JobClock) -> u64 {
+    (clock.seconds() * 1e6).round() as u64
 }
 
 /// Returns the CPU time of this thread since it started. The first number of the file is in nanoseconds.

@@ -5,7 +5,7 @@ use crate::detectors::{
     dead_action::tried,
     determinism::{LedEpisodes, Script, SeenState},
 };
-use bevy_playbot::{action::ActionValue, fault::Fault};
+use bevy_playbot::{action::ActionValue, fault::Fault, vision::ObservationConfig};
 use playbot_harness::{detector::DetectorSetting, game::idle_action};
 
 /// Most ticks for which an action is tried.
@@ -69,8 +69,10 @@ impl LevelDetector for FadingAction {
 
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         let Some(tester) = level.testers.first().filter(|_| level.is_sample(self.every)) else { return Vec::new() };
-        // The actions are given, so the player decides nothing, and its seed is without effect.
-        let script = Script { seed: 0, ..Script::new(level, tester) };
+        // The actions are given, so the player decides nothing, and neither its seed nor what it sees may matter: the
+        // finding is that of every tester.
+        let observation_config = ObservationConfig::default();
+        let script = Script { observation_config, seed: 0, ..Script::new(level, tester) };
         // Other detectors report a panic.
         let faded = self.faded(&script).unwrap_or_default();
         faded.into_iter().map(|message| LevelDefect { message, ..LevelDefect::default() }).collect()
@@ -229,7 +231,6 @@ fn is_same(one: &SeenState, other: &SeenState, resting: &[SeenState]) -> bool {
 #[cfg(test)]
 mod tests {
     use bevy::prelude::*;
-    use bevy_playbot::vision::ObservationConfig;
     use playbot_harness::{eval::Player, foreign::ForeignGame};
 
     use super::*;

@@ -5,7 +5,7 @@ use crate::{
     findings::{
         FindingHead, StoredFinding,
         checks::{Check, message_of, watcher as detector_watcher},
-        play::{CheckTick, Replayed, Setting, Solo, Watcher, listed, play_actions, play_player},
+        play::{CheckTick, Replayed, Setting, Solo, Watcher, play_actions, play_player, play_recording},
     },
 };
 use bevy::math::Vec2;
@@ -87,7 +87,7 @@ pub fn course_of_recording(game: &dyn Game, mode: &str, recorded: &DemoEpisode) 
         None
     });
     let setting = Setting { game, mode, level: recorded.level_seed, seed: 0 };
-    let replayed = play_actions(setting, &listed(&recorded.actions), Some(watcher));
+    let replayed = play_recording(setting, recorded, Some(watcher));
     let differs = first_difference(recorded, &replayed);
     let positions = noted.borrow();
     let position = differs.and_then(|tick| positions.get(tick as usize).copied().flatten());
@@ -223,9 +223,15 @@ fn in_episode(setting: Setting, actions: &[ActionValue], tick: impl Fn(&Replayed
 mod tests {
     use super::*;
     use crate::findings::{Checks, FindingHead, keep::recheck};
-    use bevy_playbot::{action::ActionValue, bot::BlindBot, demo::file::DemoEpisode, level::LevelFile};
+    use bevy::prelude::*;
+    use bevy_playbot::{
+        action::ActionValue,
+        bot::BlindBot,
+        demo::file::{Decider, DemoActions, DemoEpisode, EpisodeActions},
+        level::LevelFile,
+    };
     use playbot_corridor::{Corridor, Rule, to_the_goal};
-    use playbot_harness::level_files::LevelDesign;
+    use playbot_harness::{foreign::ForeignGame, level_files::LevelDesign};
     use std::fs;
 
     #[test]
@@ -243,6 +249,36 @@ mod tests {
         assert!(!keeps_course(&Corridor::default(), level, 0, &idle, &guided), "another player goes another way");
         let broken = course_of(&burning, level, 0, &Player::Demonstrator);
         assert!(broken.broken.is_some() && keeps_course(&burning, level, 0, &Player::Demonstrator, &broken));
+    }
+
+    /// A recording of a person that walks for two ticks between the decisions of bots.
+    #[test]
+    fn what_a_person_has_pressed_between_decisions_is_played_again() {
+        #[derive(Component)]
+        struct Walker;
+        let walk = |app: &mut App| {
+            app.add_systems(Startup, |mut commands: Commands| {
+                commands.spawn((Walker, Transform::default()));
+            })
+            .add_systems(
+                Update,
+                |keys: Res<ButtonInput<KeyCode>>, mut walker: Single<&mut Transform, With<Walker>>| {
+                    walker.translation.x += f32::from(u8::from(keys.pressed(KeyCode::ArrowRight)));
+                },
+            );
+        };
+        let game = ForeignGame::new("walk", 1, walk)
+            .keys([vec![], vec![KeyCode::ArrowRight]])
+            .observe(["x"], |walker: Single<&Transform, With<Walker>>| [walker.translation.x])
+            .position(|walker: Single<&Transform, With<Walker>>| walker.translation.truncate())
+            .every(4)
+            .time_limit(100);
+        let mut recorded = DemoEpisode::new(0, DemoActions::Discrete(2));
+        recorded.actions = EpisodeActions::Discrete(vec![0, 1, 1, 0]);
+        (recorded.rewards, recorded.state_hashes) = (vec![0.0; 4], vec![0; 4]);
+        recorded.deciders = vec![Decider::Human; 4];
+        let course = course_of_recording(&game, "default", &recorded);
+        assert_eq!(course.furthest, Some(Vec2::new(2.0, 0.0)));
     }
 
     /// A path without a file, relative to the folder of this test.

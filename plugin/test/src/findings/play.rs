@@ -5,7 +5,10 @@ use bevy::prelude::*;
 use bevy_playbot::{
     action::{Action, ActionSpace, ActionValue},
     agent::Control,
-    demo::file::EpisodeActions,
+    demo::{
+        file::{DemoEpisode, EpisodeActions},
+        replay::Replay,
+    },
     engine::{EpisodeSeeds, LevelFiles, demo_actions, misfit, panics::PanicReports, recorded_action, tick_world},
     episode::{Episode, EpisodeResult},
     fault::Fault,
@@ -21,6 +24,7 @@ use playbot_harness::{
     worlds::{EndedEpisodes, build_observing_world},
 };
 use playbot_learner::HasExitCode;
+use std::sync::Arc;
 use thiserror::Error;
 
 /// Ticks after which an episode counts as endless, as in tests of levels.
@@ -75,7 +79,31 @@ impl Replayed {
 }
 
 /// Plays actions up to their end, to that of the episode, or to the tick in which the watcher saw the finding.
-pub(super) fn play_actions(setting: Setting, actions: &[ActionValue], mut watcher: Option<Watcher>) -> Replayed {
+pub(super) fn play_actions(setting: Setting, actions: &[ActionValue], watcher: Option<Watcher>) -> Replayed {
+    play_on(setting, watcher, |solo| {
+        let action = actions.get(solo.ticks() as usize);
+        action.is_some_and(|action| {
+            solo.act(action.clone());
+            true
+        })
+    })
+}
+
+/// Plays a recorded episode as `demo verify` does: what people pressed stays, legal or not, on the recorded file if the
+/// levels are files.
+pub(super) fn play_recording(setting: Setting, recorded: &DemoEpisode, watcher: Option<Watcher>) -> Replayed {
+    let mut has_begun = false;
+    play_on(setting, watcher, |solo| {
+        if !std::mem::replace(&mut has_begun, true) {
+            solo.replay(recorded);
+        }
+        (solo.ticks() as usize) < recorded.len()
+    })
+}
+
+/// Plays while `prepare`, which is called before each tick, returns true; at most to the end of the episode, or to the
+/// tick in which the watcher saw the finding.
+fn play_on(setting: Setting, mut watcher: Option<Watcher>, mut prepare: impl FnMut(&mut Solo) -> bool) -> Replayed {
     // The watcher examines the World, not the observations.
     let built = Solo::new(setting, &ObservationConfig::default());
     let mut solo = built.expect("nothing can be wrong with a vector");
@@ -83,8 +111,7 @@ pub(super) fn play_actions(setting: Setting, actions: &[ActionValue], mut watche
         solo.listen();
     }
     let mut replayed = Replayed { level_file: solo.level_file(), ..Replayed::default() };
-    while let Some(action) = actions.get(solo.ticks() as usize) {
-        solo.act(action.clone());
+    while prepare(&mut solo) {
         match solo.tick() {
             Err(broken) => {
                 replayed.broken = Some(broken);
@@ -199,6 +226,13 @@ impl<'a> Solo<'a> {
         let control = player.seat(self.game, &mut self.world, self.agent);
         self.world.entity_mut(self.agent).insert(control);
         player.install(&mut self.world);
+    }
+
+    /// Hands the agent over to a recorded episode.
+    pub fn replay(&mut self, recorded: &DemoEpisode) {
+        let mut agent = self.world.entity_mut(self.agent);
+        agent.remove::<EpisodeSeeds>();
+        Replay::begin(Arc::new(recorded.clone()), &mut agent);
     }
 
     /// Sets the agent's next action.

@@ -17,7 +17,11 @@ use crate::{
 };
 use bevy::math::Vec2;
 use bevy_playbot::demo::file::{DemoEpisode, DemoReader};
-use playbot_harness::{game::Game, level_files::is_level_files, split::LevelSplit};
+use playbot_harness::{
+    game::{Game, level_designs},
+    level_files::is_level_files,
+    split::LevelSplit,
+};
 use playbot_report::counted;
 use serde::Serialize;
 use std::{
@@ -468,10 +472,17 @@ fn recorded_levels(
     recording: &Path,
 ) -> Result<BTreeMap<u64, DemoEpisode>, TestError> {
     let mut levels = BTreeMap::new();
+    // The numbers of level files change with the files that a pattern matches.
+    let designs = is_level_files(&range.mode).then(|| level_designs(game, &range.mode).ok()).flatten();
+    let files = designs.map(|designs| designs.files());
     for episode in DemoReader::open_for_game(recording, game.name(), game.version(), Some(&range.mode))? {
         let episode = episode?;
-        if episode.is_success() && range.contains(&range.mode, episode.level_seed) {
-            levels.entry(episode.level_seed).or_insert(episode);
+        let level = match (&episode.level_file, &files) {
+            (Some(file), Some(files)) => files.number_of(file),
+            _ => Some(episode.level_seed),
+        };
+        if let Some(level) = level.filter(|&level| episode.is_success() && range.contains(&range.mode, level)) {
+            levels.entry(level).or_insert(episode);
         }
     }
     if levels.is_empty() {

@@ -77,6 +77,20 @@ fn no_world_sets_up_a_log_that_is_there() {
 }
 
 #[test]
+fn a_game_may_leave_out_the_log_and_set_up_its_own() {
+    #[derive(Resource)]
+    struct Added;
+
+    let own = ForeignGame::new("own", 1, |app: &mut App| {
+        app.add_plugins(LogPlugin::default()).insert_resource(Added);
+    });
+    let own = own.keys([vec![], vec![KeyCode::Space]]).observe(["x"], || [0.0]);
+    let own = own.headless(|plugins| plugins.build().disable::<LogPlugin>());
+    let (world, _) = build_world(&own, "default", 0, 0, 1);
+    assert!(world.contains_resource::<Added>());
+}
+
+#[test]
 fn every_level_can_be_finished() {
     playbot::test(&orchard()).levels("default:0..7").assert_levels_solvable();
 }
