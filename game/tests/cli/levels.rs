@@ -64,7 +64,7 @@ fn copies_of_a_file_and_of_a_numbered_level_are_found() {
     let found = audit(folder, &args, 1);
     assert_eq!((&found["layouts"], &found["equal"]), (&json!(1), &json!([[0, 1]])));
     assert_eq!((&found["names"], &found["compared_by"]), (&json!({ "0": "a.json", "1": "b.json" }), &json!("layout")));
-    let (text, _) = ended(folder, &args, 1);
+    let (text, _) = ended(folder, &[&["levels"][..], &args].concat(), 1);
     assert!(text.contains("\n  equal: a.json, b.json\n"), "{text}");
     assert!(text.ends_with("among hard:140..145: 2: a.json, b.json\n"), "{text}");
     assert_eq!(found["among"][0]["levels"], json!([0, 1]), "level 142 has the same layout");

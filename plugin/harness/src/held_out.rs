@@ -566,7 +566,7 @@ mod tests {
         assert_eq!(known(&game, "default:0..1"), [100, 102, 103, 105]);
         assert_eq!(known(&game, "default:0..2"), Vec::<u64>::new(), "the game has no other levels");
         assert_eq!(known(&game, "default:105..105"), [102, 105], "one of them by its number");
-        assert_eq!(known(&game, "default:0..5000"), Vec::<u64>::new(), "that would take long");
+        assert_eq!(known(&game, "default:1000..6000"), Vec::<u64>::new(), "that would take long");
         let layouts = game.layout(|_, level| level);
         assert_eq!(known(&layouts, "default:0..1"), Vec::<u64>::new(), "its layouts say more");
     }

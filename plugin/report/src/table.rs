@@ -26,7 +26,7 @@ impl PlainTable {
     }
 
     /// Returns the table for a console of this width. If it is too wide, long words lose their middle, but keep at least
-    /// [`FEWEST_LETTERS`]. Numbers are never shortened.
+    /// twelve letters. Numbers are never shortened.
     pub fn to_text_within(&self, most: usize) -> String {
         let numbers = number_columns(self);
         let mut rows: Vec<Vec<String>> = std::iter::once(&self.columns)
