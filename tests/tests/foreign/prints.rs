@@ -5,7 +5,8 @@ use serde_json::Value;
 
 /// Returns the data and the messages of a verb of a game that prints.
 fn printed(args: &[&str]) -> (String, String) {
-    let mut command = Shell::new(env!("CARGO_BIN_EXE_namesakes")).command(args);
+    let shell = Shell::new(env!("CARGO_BIN_EXE_namesakes"));
+    let mut command = shell.command(args);
     command.env("PRINTS", "1");
     ended(command, 0)
 }

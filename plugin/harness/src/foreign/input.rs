@@ -37,7 +37,7 @@ impl ForeignGame {
     /// let walk = vec![vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]];
     /// let jump = vec![vec![], vec![KeyCode::Space]];
     /// let game = ForeignGame::new("hop", 1, |_: &mut App| {}).choices([walk, jump]).observe(["x"], || [0.0]);
-    /// assert_eq!(game.actions(), ActionSpace::Discrete(6));
+    /// assert_eq!(Game::actions(&game), ActionSpace::Discrete(6));
     /// let names = game.tools().input.action_names();
     /// assert_eq!(names[..4], ["nothing", "Space", "ArrowLeft", "ArrowLeft+Space"]);
     /// ```
