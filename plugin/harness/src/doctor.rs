@@ -167,8 +167,8 @@ impl DoctorOptions {
         let of_first = |comparison| ComparisonReport::new(comparison, self.level, None);
         let mut planned: Vec<_> = DoctorComparison::OF_ONE_LEVEL.map(of_first).into();
         let levels = self.levels();
-        let befores = levels.iter().cycle().skip(levels.len() - 1);
-        for (place, (&level, &before)) in levels.iter().zip(befores).enumerate().filter(|_| levels.len() > 1) {
+        let earlier = levels.iter().cycle().skip(levels.len() - 1);
+        for (place, (&level, &before)) in levels.iter().zip(earlier).enumerate().filter(|_| levels.len() > 1) {
             if place > 0 {
                 planned.push(ComparisonReport::new(DoctorComparison::Repeat, level, None));
             }
