@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use bevy_playbot::test_app::test_app;
 use playbot_harness::{
     defect::{ChangeRules, Plant},
-    detector::{Detector, DetectorTick, LevelAhead, NoProofs},
+    detector::{Detector, DetectorTick, LevelAhead},
     prelude::*,
 };
 use std::sync::Arc;
@@ -46,17 +46,12 @@ pub(crate) fn first_finding(
         let world = app.world();
         let is_over = world.get::<EpisodeCount>(agent)?.finished > 0;
         let moment = DetectorTick {
-            world,
             agent,
             level,
             tick,
-            action: &world.get::<Action>(agent)?.0,
-            observation: &[],
-            state_hash: 0,
             reward: world.get::<Reward>(agent)?.get(),
             position: game.tools().state.position(world, agent),
-            is_success: false,
-            proofs: &NoProofs,
+            ..DetectorTick::of(world, &world.get::<Action>(agent)?.0)
         };
         if let Some(words) = watch.tick(&moment) {
             return Some((tick, words));

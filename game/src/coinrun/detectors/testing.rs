@@ -8,7 +8,7 @@ use bevy::prelude::*;
 use bevy_playbot::episode::EpisodeResult;
 use playbot_harness::{
     defect::ChangeRules,
-    detector::{DetectorTick, EpisodeWatcher, LevelAhead, NoProofs},
+    detector::{DetectorTick, EpisodeWatcher, LevelAhead},
     prelude::*,
 };
 use std::{
@@ -59,24 +59,12 @@ pub(super) fn findings(rules: &Rules, level: u64, bot: Bot, ticks: u32) -> Vec<(
     let all = detectors();
     let mut watches: Vec<(&'static str, Box<dyn EpisodeWatcher>)> =
         all.iter().filter_map(|detector| detector.watch(&ahead).map(|watch| (detector.name(), watch))).collect();
-    let mut found = Vec::new();
+    let (mut found, idle) = (Vec::new(), ActionValue::Discrete(0));
     for tick in 0..ticks {
         app.tick().expect("sound");
         let world = app.world();
         let result = *ended.lock().expect("no thread panics");
-        let moment = DetectorTick {
-            world,
-            agent,
-            level,
-            tick,
-            action: &ActionValue::Discrete(0),
-            observation: &[],
-            state_hash: 0,
-            reward: 0.0,
-            position: None,
-            is_success: false,
-            proofs: &NoProofs,
-        };
+        let moment = DetectorTick { agent, level, tick, ..DetectorTick::of(world, &idle) };
         for (name, watch) in &mut watches {
             let message = watch.tick(&moment).or_else(|| result.and_then(|result| watch.end(&moment, &result)));
             found.extend(message.map(|_| (*name, tick)));

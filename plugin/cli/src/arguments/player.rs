@@ -397,13 +397,13 @@ struct MeasuredSplit<'a> {
     levels: HeldOut<'a>,
     /// Those that some player knows.
     known: BTreeSet<u64>,
-    /// Those that players with these levels know. The policies of a study have often learned from the same ones, and the
+    /// Those that players know by the levels that they have seen. The policies of a study have often learned from the same ones, and the
     /// comparison can take minutes.
     compared: Vec<(SeenLevels, BTreeSet<u64>)>,
 }
 
 impl MeasuredSplit<'_> {
-    /// Returns the levels that a player knows who has seen these levels.
+    /// Returns the levels that are known to a player that has seen these.
     fn known_to(&mut self, seen: &SeenLevels) -> BTreeSet<u64> {
         if let Some((_, known)) = self.compared.iter().find(|(compared, _)| compared == seen) {
             return known.clone();
