@@ -1,6 +1,7 @@
 //! A game small enough to know every number of it by heart, for tests of the plugin.
 
 mod as_corridor;
+pub mod come_and_go;
 mod corridor;
 mod documentation;
 pub mod faulty;

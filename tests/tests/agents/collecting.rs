@@ -6,7 +6,12 @@ use bevy::prelude::*;
 use bevy_playbot::vision::ObservationConfig;
 use playbot::prelude::*;
 use playbot_learner::{DeviceKind, PpoConfig};
-use playbot_tests::{as_corridor, corridor_plugin, training::untrained};
+use playbot_tests::{
+    as_corridor,
+    come_and_go::{Crowded, Deadly},
+    corridor_plugin,
+    training::untrained,
+};
 use playbot_train::{collect::Collector, experiment::file::parse_experiment, trainer::Trainer};
 
 /// A corridor that once replaces a decided action by one of another kind.
@@ -40,44 +45,6 @@ fn a_collector_that_met_a_fault_goes_on() {
     assert_eq!((rollout.steps, rollout.rewards.len()), (10, 20));
 }
 
-/// A corridor that despawns agent 2 in its hundredth tick.
-struct Deadly;
-
-impl Game for Deadly {
-    as_corridor!(but build);
-
-    fn build(&self, app: &mut App, _mode: &str) {
-        corridor_plugin(app);
-        app.add_systems(FixedUpdate, kill);
-    }
-}
-
-fn kill(mut ticks: Local<u32>, agents: Query<(Entity, &Agent)>, mut commands: Commands) {
-    *ticks += 1;
-    for (entity, _) in agents.iter().filter(|(_, agent)| *ticks == 100 && agent.index == 2) {
-        commands.entity(entity).despawn();
-    }
-}
-
-/// A corridor that spawns agent 9 in its fifth tick.
-struct Crowded;
-
-impl Game for Crowded {
-    as_corridor!(but build);
-
-    fn build(&self, app: &mut App, _mode: &str) {
-        corridor_plugin(app);
-        app.add_systems(FixedUpdate, join);
-    }
-}
-
-fn join(mut ticks: Local<u32>, mut commands: Commands) {
-    *ticks += 1;
-    if *ticks == 5 {
-        commands.spawn(Agent::new(9, ActionSpace::Discrete(2)));
-    }
-}
-
 /// Returns the fault of a rollout with four agents.
 fn fault_of(game: &dyn Game) -> String {
     let observation_config = ObservationConfig::default();
@@ -89,7 +56,7 @@ fn fault_of(game: &dyn Game) -> String {
 
 #[test]
 fn an_agent_that_is_despawned_in_a_rollout_is_a_fault_with_its_number_and_the_tick() {
-    let fault = fault_of(&Deadly);
+    let fault = fault_of(&Deadly { agent: 2, tick: 100 });
     assert!(fault.starts_with("agent 2: the game despawned it in tick 100 of its World, "), "{fault}");
     assert!(fault.contains("`Episode::terminate`"), "{fault}");
 }

@@ -11,7 +11,7 @@ use playbot_harness::{
     doctor::{DoctorOptions, DoctorReport, FindingKind, examine},
     foreign::{ForeignGame, Restart},
 };
-use playbot_tests::{as_corridor, corridor_plugin};
+use playbot_tests::come_and_go::{Crowded, Deadly};
 
 fn examined(game: &dyn Game) -> DoctorReport {
     let options = DoctorOptions { ticks: 60, ..DoctorOptions::new(game.modes()[0]) };
@@ -26,47 +26,9 @@ fn fault(game: &dyn Game) -> String {
     finding.what.clone()
 }
 
-/// A corridor that despawns its agent in its twentieth tick.
-struct Deadly;
-
-impl Game for Deadly {
-    as_corridor!(but build);
-
-    fn build(&self, app: &mut App, _mode: &str) {
-        corridor_plugin(app);
-        app.add_systems(FixedUpdate, kill);
-    }
-}
-
-fn kill(mut ticks: Local<u32>, agents: Query<Entity, With<Agent>>, mut commands: Commands) {
-    *ticks += 1;
-    if *ticks == 20 {
-        agents.iter().for_each(|agent| commands.entity(agent).despawn());
-    }
-}
-
-/// A corridor that spawns agent 9 in its fifth tick.
-struct Crowded;
-
-impl Game for Crowded {
-    as_corridor!(but build);
-
-    fn build(&self, app: &mut App, _mode: &str) {
-        corridor_plugin(app);
-        app.add_systems(FixedUpdate, join);
-    }
-}
-
-fn join(mut ticks: Local<u32>, mut commands: Commands) {
-    *ticks += 1;
-    if *ticks == 5 {
-        commands.spawn(Agent::new(9, ActionSpace::Discrete(2)));
-    }
-}
-
 #[test]
 fn an_agent_that_dies_is_a_finding_with_its_number_and_the_remedy() {
-    let fault = fault(&Deadly);
+    let fault = fault(&Deadly { agent: 0, tick: 20 });
     assert!(fault.starts_with("agent 0: the game despawned it in tick 20 of its World, "), "{fault}");
     assert!(fault.contains("`Episode::terminate`"), "{fault}");
 }
