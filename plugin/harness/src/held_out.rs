@@ -12,7 +12,7 @@ use crate::{
     machine::usable_threads,
     parallel::{default_threads, on_threads},
     split::LevelSplit,
-    worlds::{EndedEpisodes, build_world},
+    worlds::{EndedEpisodes, build_world, hash_with_agent},
 };
 use bevy::prelude::*;
 use bevy_playbot::{
@@ -421,7 +421,8 @@ fn play_world(
         let (level, tick) = end.map_or((episode.level, episode.tick), |result| (result.level, result.ticks));
         let level = now.get_or_insert_with(|| begun(level));
         let state = game.tools().state.known_state(&world, agent);
-        level.hash = StateHash::of([level.hash, seen(&world, agent), state.unwrap_or(0), code(end)]).0;
+        let seen = hash_with_agent(state.unwrap_or(0), world.get::<Observation>(agent), world.get::<Reward>(agent));
+        level.hash = StateHash::of([level.hash, seen, code(end)]).0;
         level.is_state &= state.is_some();
         level.is_over = end.is_some();
         if end.is_some() || tick >= ticks {
@@ -436,13 +437,6 @@ fn play_world(
         }
     }
     played.into_iter().skip(1).collect()
-}
-
-/// Returns a hash of an agent's observation and of its reward.
-fn seen(world: &World, agent: Entity) -> u64 {
-    let reward = world.get::<Reward>(agent).map_or(0.0, Reward::get);
-    let vector = world.get::<Observation>(agent).map_or(&[][..], |seen| &seen.vector);
-    StateHash::of([reward].iter().chain(vector).map(|value| u64::from(value.to_bits()))).0
 }
 
 /// Returns a number for the end of an episode in a tick.

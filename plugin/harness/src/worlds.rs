@@ -19,8 +19,10 @@ use bevy_playbot::{
     fault::{Fault, Faults},
     headless::{HeadlessPlugins, PlaybotAppExt, headless_app},
     legal::IdleAction,
-    observation::VectorSensor,
+    observation::{Observation, VectorSensor},
     placement::TickPlacement,
+    reward::Reward,
+    state_hash::StateHash,
     streams::PlaybotSeed,
     vision::{ObservationConfig, VisionError},
 };
@@ -272,6 +274,13 @@ pub fn other_agents(world: &World, agents: &[Entity], first: u32) -> Option<Stri
     let order = world.get_resource::<AgentOrder>().filter(|order| order.entities().len() > agents.len())?;
     let other = order.entities().iter().find(|entity| !agents.contains(entity))?;
     world.get::<Agent>(*other).map(|agent| why(agent.index, "spawned"))
+}
+
+/// Returns the hash of a state, with the observation and the reward of an agent. Recordings of foreign games hold it.
+pub fn hash_with_agent(state: u64, observation: Option<&Observation>, reward: Option<&Reward>) -> u64 {
+    let reward = reward.map_or(0, |reward| u64::from(reward.get().to_bits()));
+    let seen = observation.into_iter().flat_map(|seen| seen.vector.iter().map(|value| u64::from(value.to_bits())));
+    StateHash::of([state, reward].into_iter().chain(seen)).0
 }
 
 /// Returns whether only the thread that built this World may tick it: it holds Bevy's non-send data, such as the

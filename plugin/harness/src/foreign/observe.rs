@@ -11,6 +11,7 @@ use crate::{
         },
     },
     game::{GuessedPosition, StateTools},
+    worlds::hash_with_agent,
 };
 use bevy::{
     ecs::{component::ComponentInfo, system::ReadOnlySystem},
@@ -414,7 +415,7 @@ fn judge(world: &mut World, agent: Entity, reward: f32, end: Option<EpisodeEnd>)
     if let Some(mut paid) = agent.get_mut::<Reward>() {
         paid.add(reward);
     }
-    let hash = with_agent(state, agent.get(), agent.get());
+    let hash = hash_with_agent(state, agent.get(), agent.get());
     agent.insert(StateHash(hash));
     if let Some(mut episode) = agent.get_mut::<Episode>() {
         match end {
@@ -471,13 +472,6 @@ fn bits(Transform { translation, rotation, scale }: &Transform) -> [u64; 10] {
     let ([x, y, z], [width, height, depth]) = (translation.to_array(), scale.to_array());
     let [i, j, k, w] = rotation.to_array();
     [x, y, z, width, height, depth, i, j, k, w].map(|number| u64::from(number.to_bits()))
-}
-
-/// Returns the hash of the state, with the agent's observation and reward.
-pub(super) fn with_agent(state: u64, observation: Option<&Observation>, reward: Option<&Reward>) -> u64 {
-    let reward = reward.map_or(0, |reward| u64::from(reward.get().to_bits()));
-    let seen = observation.into_iter().flat_map(|seen| seen.vector.iter().map(|value| u64::from(value.to_bits())));
-    StateHash::of([state, reward].into_iter().chain(seen)).0
 }
 
 #[cfg(test)]

@@ -11,7 +11,12 @@ use bevy_playbot::{
     state_hash::StateHash,
     vision::{ObservationConfig, VisionError},
 };
-use playbot_harness::{detector::DetectorSetting, eval::Player, game::Game, worlds::EndedEpisodes};
+use playbot_harness::{
+    detector::DetectorSetting,
+    eval::Player,
+    game::Game,
+    worlds::{EndedEpisodes, hash_with_agent},
+};
 use std::cell::RefCell;
 
 /// A finding for testers whose episode differs between two Worlds, or within one World that plays it again and again.
@@ -125,10 +130,7 @@ fn hash_of_result(result: &EpisodeResult) -> u64 {
 /// Returns a hash of the known state.
 pub(super) fn hash_of_state(world: &World, agent: Entity) -> u64 {
     let state = world.get::<StateHash>(agent).map_or(0, |hash| hash.0);
-    let reward = world.get::<Reward>(agent).map_or(0.0, Reward::get);
-    let seen = world.get::<Observation>(agent).map_or(&[][..], |observation| observation.vector.as_slice());
-    let numbers = seen.iter().chain([&reward]).map(|number| u64::from(number.to_bits()));
-    StateHash::of([state].into_iter().chain(numbers)).0
+    hash_with_agent(state, world.get::<Observation>(agent), world.get::<Reward>(agent))
 }
 
 impl LevelDetector for Determinism {
