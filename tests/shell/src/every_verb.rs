@@ -160,7 +160,7 @@ impl GameProgram {
     /// `bugs make` on too few levels, for games whose episodes take too long to plant defects in a test.
     pub fn defects_need_levels(&self) {
         let shell = Shell::new(self.program);
-        let levels = format!("{}=default:{}..{}", self.game, self.recorded, self.recorded);
+        let levels = format!("{}={}", self.game, self.held_out);
         let make = ["bugs", "make", self.game, "--per-kind", "1", "--sound", "1", "--levels", &levels, "--out", "bugs"];
         let (out, err) = ended(shell.command(&make), 3);
         let is_explained = err.contains("are needed") && err.contains(self.game);
