@@ -1,8 +1,8 @@
 //! The position of an agent in a game that declares none, guessed from the game's entities.
 //!
 //! The entity is the one whose `Transform` the game's `.observe_paths` read, or else the only one with a component
-//! `Player`, with a component whose name contains `Player`, or with the `Name` `Player`. Where several entities match,
-//! the guess is not certain, and there is none.
+//! `Player`, with a component whose name contains `Player`, with the `Name` `Player`, or with another component of
+//! [`PLAYER_NAMES`]. Where several entities match, the guess is not certain, and there is none.
 
 use crate::{
     foreign::paths::{component_of, is_ours},
@@ -14,7 +14,10 @@ use bevy::{
 };
 use std::collections::BTreeSet;
 
-/// The word by which games call what a person plays.
+/// Names of components by which games call what a person plays, the likeliest first.
+pub const PLAYER_NAMES: [&str; 10] =
+    [WORD, "Hero", "Paddle", "Character", "Avatar", "Ship", "PlayerShip", "Snake", "Bird", "Car"];
+
 const WORD: &str = "Player";
 
 /// Crates of Bevy, whose components such as `AudioPlayer` mark no agent.
@@ -45,7 +48,7 @@ impl Guess {
     pub(super) fn position(&mut self, world: &World, paths: &[String]) -> Option<GuessedPosition> {
         let components = world.components().num_registered();
         if self.known != components {
-            *self = Self { known: components, signs: signs(world, paths), camera: component_of(world, "Camera3d") };
+            *self = Self { known: components, signs: signs(world, paths, &named(world)), camera: component_of(world, "Camera3d") };
         }
         for sign in &self.signs {
             let found = sign.entities(world);
@@ -93,8 +96,8 @@ impl Sign {
     }
 }
 
-/// Returns the signs, the most certain first.
-fn signs(world: &World, paths: &[String]) -> Vec<Sign> {
+/// Returns the signs, the most certain first. `named` are components that look like the player.
+fn signs(world: &World, paths: &[String], named: &[(String, ComponentId)]) -> Vec<Sign> {
     let read = paths.iter().filter_map(|path| {
         let mut parts = path.split('.');
         let (marker, component) = (parts.next()?, parts.next()?);
@@ -109,13 +112,15 @@ fn signs(world: &World, paths: &[String]) -> Vec<Sign> {
             None => Sign::Name(name),
         });
     }
-    let all = named(world);
-    let exact = all.iter().filter(|(name, _)| name == WORD).cloned().collect();
-    signs.extend([Sign::Components(exact), Sign::Components(all), Sign::Name(WORD.to_owned())]);
+    let with = |is_meant: &dyn Fn(&str) -> bool| {
+        Sign::Components(named.iter().filter(|(name, _)| is_meant(name)).cloned().collect())
+    };
+    signs.extend([with(&|name| name == WORD), with(&|name| name.contains(WORD)), Sign::Name(WORD.to_owned())]);
+    signs.extend(PLAYER_NAMES[1..].iter().map(|word| with(&|name| name == *word)));
     signs
 }
 
-/// Returns the game's components whose short names contain the word, in the order of their names.
+/// Returns the game's components whose short names look like the player, in the order of their names.
 fn named(world: &World) -> Vec<(String, ComponentId)> {
     let components = world.components();
     let mut found = BTreeSet::new();
@@ -123,7 +128,7 @@ fn named(world: &World) -> Vec<(String, ComponentId)> {
         let plain = path.split('<').next().unwrap_or_default();
         let short = plain.rsplit("::").next().unwrap_or_default();
         let is_engine = is_ours(path) || ENGINE.iter().any(|of| path.starts_with(of));
-        if short.contains(WORD) && !is_engine {
+        if (short.contains(WORD) || PLAYER_NAMES.contains(&short)) && !is_engine {
             found.insert((short.to_owned(), component));
         }
     };
@@ -166,20 +171,19 @@ mod tests {
     fn guessed(world: &World, paths: &[&str]) -> Option<(f32, String)> {
         let paths: Vec<String> = paths.iter().map(|path| (*path).to_owned()).collect();
         // The tests' own components are those of this crate, which a guess leaves out.
-        let mut guess = Guess {
-            known: world.components().num_registered(),
-            signs: signs(world, &paths),
-            camera: component_of(world, "Camera3d"),
-        };
+        let components = world.components();
         let mine = [
-            ("Player", world.components().component_id::<Player>()),
-            ("PlayerHat", world.components().component_id::<PlayerHat>()),
+            ("Player", components.component_id::<Player>()),
+            ("PlayerHat", components.component_id::<PlayerHat>()),
+            ("Hero", components.component_id::<Hero>()),
         ];
         let mine = mine.into_iter().filter_map(|(name, component)| Some((name.to_owned(), component?)));
         let mine: Vec<_> = mine.collect();
-        let exact = mine.iter().filter(|(name, _)| name == WORD).cloned().collect();
-        let at = guess.signs.len() - 3;
-        guess.signs.splice(at..at + 2, [Sign::Components(exact), Sign::Components(mine)]);
+        let mut guess = Guess {
+            known: components.num_registered(),
+            signs: signs(world, &paths, &mine),
+            camera: component_of(world, "Camera3d"),
+        };
         guess.position(world, &paths).map(|found| (found.position.x, found.entity))
     }
 
@@ -197,6 +201,15 @@ mod tests {
         );
         world.spawn((Player, Transform::from_xyz(3.0, 0.0, 0.0)));
         assert_eq!(guessed(&world, &[]), None, "which of the two is meant is not certain");
+    }
+
+    #[test]
+    fn a_hero_is_the_agent_of_a_game_without_a_player() {
+        let mut world = World::new();
+        world.spawn((Hero, Transform::from_xyz(4.0, 0.0, 0.0)));
+        assert_eq!(guessed(&world, &[]), Some((4.0, "the entity with `Hero`".to_owned())));
+        world.spawn((Player, Transform::from_xyz(2.0, 0.0, 0.0)));
+        assert_eq!(guessed(&world, &[]), Some((2.0, "the entity with `Player`".to_owned())));
     }
 
     #[test]

@@ -75,7 +75,8 @@ impl ForeignGame {
     /// Declares the position of the agent, from above or from the side, in any units, for detectors of progress, for
     /// explorers and for pictures. The system may run more than once in a tick, so it must change nothing. While it is
     /// skipped, because an entity that it asks for does not exist, the position is unknown. Without it, reports of
-    /// unsolved levels use the only entity with a component `Player`, if there is one.
+    /// unsolved levels use the only entity with a component `Player`, or another of
+    /// [`PLAYER_NAMES`](crate::foreign::PLAYER_NAMES), if there is one.
     ///
     /// The system returns a `Vec2`, or in three dimensions a `Vec3`: see [`IntoPlanPosition`].
     ///

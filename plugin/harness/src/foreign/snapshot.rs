@@ -491,6 +491,9 @@ impl WholeGame {
     ///
     /// Why that is impossible. The World is then in no state at all, and the level must be started again.
     fn load(&mut self, world: &mut World, baseline: &Baseline, saved: &SavedWhole) -> Result<(), String> {
+        // Hooks and observers make the clock go on below, and no system of the game runs meanwhile: what has changed a
+        // frame ago must not seem newer to it.
+        let now = world.read_change_tick();
         let Self { ways, start, .. } = self;
         let start = start.as_mut().filter(|start| start.kinds == saved.kinds);
         let start = start.ok_or("the level does not begin with the same entities each time")?;
@@ -524,7 +527,7 @@ impl WholeGame {
         world.flush();
         // Observers of the game may have spawned some.
         despawn_others(world, baseline, &all.iter().map(|(now, ..)| *now).collect());
-        let clock = (start.tick, world.increment_change_tick());
+        let clock = (start.tick, now);
         for (now, values, saved) in &all {
             write(ways, world, |_, _| Some(*now), values, saved, &mut maps, clock)?;
         }
@@ -737,7 +740,7 @@ fn complete_resources(
 }
 
 /// Writes the values of a state, and those of the start over values that have changed since. `place` returns the entity
-/// of a component or resource, and the clock is the start of the episode and the present.
+/// of a component or resource, and the clock is the start of the episode and the end of the last frame.
 fn write(
     ways: &mut Ways,
     world: &mut World,
@@ -757,7 +760,8 @@ fn write(
     }
     for (way, value) in start.iter().filter(|(way, _)| !saved.gone.contains(&way.type_id) && !saved.has(way.type_id)) {
         let Some(entity) = place(world, way.id) else { continue };
-        if ticks(world, entity, way.id).is_some_and(|ticks| ticks.changed.is_newer_than(begun, now)) {
+        let present = world.read_change_tick();
+        if ticks(world, entity, way.id).is_some_and(|ticks| ticks.changed.is_newer_than(begun, present)) {
             match value {
                 Some(value) => way.write(world, entity, value, own, begun),
                 None => demand(way, false)?,

@@ -33,6 +33,9 @@ use std::{
 /// Longest visit, as a multiple of its patience, if it goes on finding cells.
 const LONGEST: u32 = 10;
 
+/// Of so many visits that may use snapshots one is checked by a replay.
+const CHECKED: u64 = 32;
+
 /// The state of an exploration after a round of visits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Round {
@@ -53,9 +56,9 @@ struct Crew<'a> {
 /// Explores a level. `progress` receives the ticks of each visit, from several threads. `after_round` may end the
 /// exploration, whose result is then that of the last finished round.
 ///
-/// The same plan has the same result for any number of threads, arenas and Worlds, with and without snapshots. In the
-/// first round that uses snapshots, and in the second, fourth, eighth and so on, all visits are made by replays, too. If
-/// one of them differs, the exploration begins anew without snapshots.
+/// The same plan has the same result for any number of threads, arenas and Worlds, with and without snapshots. All
+/// visits of the first round that uses snapshots are made by replays, too, and later each 32nd one. If one of them
+/// differs, the exploration begins anew without snapshots.
 ///
 /// # Errors
 ///
@@ -101,7 +104,7 @@ fn search(
     let mut archive = Archive::new(game.actions());
     let (mut steps, mut restored_steps, mut visits, mut ends) = (0, 0, 0, EndCounts::default());
     let mut curve = Vec::new();
-    let mut restoring_rounds = 0;
+    let mut has_restored = false;
     let stop = loop {
         let jobs = choose_jobs(plan, &archive, &mut chance, steps, visits);
         if jobs.is_empty() {
@@ -109,7 +112,7 @@ fn search(
         }
         visits += jobs.len() as u64;
         let round = Jobs { game, plan, archive: &archive, jobs };
-        let visited = match round.play(&mut crews, &mut restoring_rounds, progress)? {
+        let visited = match round.play(&mut crews, &mut has_restored, progress)? {
             Ok(visited) => visited,
             Err(fault) => return Ok(Attempt::Distrusted(fault)),
         };
@@ -218,7 +221,7 @@ struct Jobs<'a> {
 }
 
 impl Jobs<'_> {
-    /// Makes the visits. Some of the rounds that use snapshots are played by replays, too, and compared.
+    /// Makes the visits. Some of those that use snapshots are made by replays, too, and compared.
     ///
     /// # Errors
     ///
@@ -226,7 +229,7 @@ impl Jobs<'_> {
     fn play(
         self,
         crews: &mut [Crew<'_>],
-        restoring_rounds: &mut u32,
+        has_restored: &mut bool,
         progress: &(impl Fn(u64) + Sync),
     ) -> Result<Result<Vec<Visited>, SnapshotFault>, ExploreError> {
         let Self { game, plan, archive, jobs } = self;
@@ -234,9 +237,10 @@ impl Jobs<'_> {
         if jobs.iter().all(|job| job.saved.is_none()) {
             return play_round(crews, jobs, threads, archive, progress).map(Ok);
         }
-        *restoring_rounds += 1;
-        let is_checked = restoring_rounds.is_power_of_two();
-        let replays = jobs.iter().filter(|_| is_checked).map(|job| Job { saved: None, ..job.clone() }).collect();
+        let is_first = !std::mem::replace(has_restored, true);
+        let is_checked = |job: &Job| is_first || (job.saved.is_some() && job.number.is_multiple_of(CHECKED));
+        let checked: Vec<bool> = jobs.iter().map(is_checked).collect();
+        let replays = jobs.iter().filter(|job| is_checked(job)).map(|job| Job { saved: None, ..job.clone() }).collect();
         let fault = |tick| Ok(Err(SnapshotFault { game: game.name(), level: plan.level, tick }));
         let restored = match play_round(crews, jobs, threads, archive, progress) {
             Ok(restored) => restored,
@@ -245,7 +249,8 @@ impl Jobs<'_> {
             Err(_) => return fault(None),
         };
         let replayed = play_round(crews, replays, threads, archive, &|_| {})?;
-        let difference = restored.iter().zip(&replayed).find_map(|(one, other)| one.first_difference(other));
+        let pairs = restored.iter().zip(checked).filter(|(_, is_checked)| *is_checked).zip(&replayed);
+        let difference = pairs.into_iter().find_map(|((one, _), other)| one.first_difference(other));
         if difference.is_some() { fault(difference) } else { Ok(Ok(restored)) }
     }
 }

@@ -83,8 +83,9 @@ pub(super) struct Trial {
 
 /// Notes the actions of a visit from cell to cell.
 ///
-/// An action counts as tried from a cell if it leads to another cell, ends the game or changes nothing, or if it is
-/// repeated in the cell for a while.
+/// An action counts as tried from a cell if it leads to another cell or ends the game, if it is repeated in the cell for
+/// a while, or if nothing has changed for as long, whatever the actions were. In a single tick it may change nothing for
+/// the only reason that the agent still rests from its last step.
 #[derive(Default)]
 pub(super) struct TrialNotes {
     /// The actions so far.
@@ -95,6 +96,8 @@ pub(super) struct TrialNotes {
     action: Option<u32>,
     /// Ticks in a row in which it was taken in this cell.
     held: u32,
+    /// Ticks in a row in which nothing has changed.
+    still: u32,
 }
 
 impl TrialNotes {
@@ -113,7 +116,8 @@ impl TrialNotes {
                 (true, false) => 1,
             };
             self.action = Some(trial.action);
-            if !stays || trial.is_over || !trial.has_changed || self.held >= HOLD {
+            self.still = if trial.has_changed { 0 } else { self.still + 1 };
+            if !stays || trial.is_over || self.held.max(self.still) >= HOLD {
                 self.tried.add(Some(from), trial.action);
             }
         }
@@ -185,15 +189,30 @@ mod tests {
     }
 
     #[test]
-    fn an_action_that_changes_nothing_or_ends_the_game_was_tried() {
+    fn an_action_that_ends_the_game_was_tried() {
         let mut notes = TrialNotes::default();
-        notes.arrive(3, &cell(1), None);
-        notes.arrive(4, &cell(1), Some(Trial { action: 0, has_changed: false, is_over: false }));
+        notes.arrive(4, &cell(1), None);
         notes.arrive(5, &cell(1), Some(Trial { action: 1, has_changed: true, is_over: true }));
-        assert_eq!(tried(&notes, 1), [0, 1]);
+        assert_eq!(tried(&notes, 1), [1]);
         notes.end(6, 2);
         notes.end(9, 3);
-        assert_eq!(tried(&notes, 1), [0, 1, 2], "in tick 9 the cell before is unknown");
+        assert_eq!(tried(&notes, 1), [1, 2], "in tick 9 the cell before is unknown");
+    }
+
+    #[test]
+    fn actions_that_change_nothing_were_tried_once_nothing_has_changed_for_long_enough() {
+        let still = |action| Some(Trial { action, has_changed: false, is_over: false });
+        let mut notes = TrialNotes::default();
+        notes.arrive(0, &cell(1), None);
+        for ticks in 1..HOLD {
+            notes.arrive(ticks, &cell(1), still(ticks % 2));
+        }
+        assert_eq!(tried(&notes, 1), Vec::<u32>::new(), "the agent may rest from its last step");
+        notes.arrive(HOLD, &cell(1), still(2));
+        assert_eq!(tried(&notes, 1), [2]);
+        notes.arrive(HOLD + 1, &cell(1), trial(0));
+        notes.arrive(HOLD + 2, &cell(1), still(1));
+        assert_eq!(tried(&notes, 1), [2], "a change begins a new rest");
     }
 
     #[test]

@@ -1,10 +1,7 @@
 //! Facts about a game that its `Cargo.toml` and its sources show, read as text.
 
+use playbot_harness::foreign::PLAYER_NAMES;
 use serde::Serialize;
-
-/// Names of components that look like the player, the likeliest first.
-const PLAYERS: [&str; 10] =
-    ["Player", "Hero", "Paddle", "Character", "Avatar", "Ship", "PlayerShip", "Snake", "Bird", "Car"];
 
 /// Random numbers that differ from run to run.
 const RANDOM: [&str; 9] = [
@@ -501,9 +498,9 @@ impl GameFacts {
             self.asset_folder = Some(AssetFolder { at: source.at("AssetPlugin", offset), path });
         }
         for item in deriving(code, "Component", "struct ") {
-            let Some(rank) = PLAYERS.iter().position(|name| *name == item.name) else { continue };
+            let Some(rank) = PLAYER_NAMES.iter().position(|name| *name == item.name) else { continue };
             let earlier =
-                self.player.as_ref().and_then(|player| PLAYERS.iter().position(|name| *name == player.at.name));
+                self.player.as_ref().and_then(|player| PLAYER_NAMES.iter().position(|name| *name == player.at.name));
             if earlier.is_none_or(|earlier| rank < earlier) {
                 let path = prefix.filter(|_| item.is_public).map(|prefix| format!("{prefix}{}", item.name));
                 self.player = Some(NamedItem { at: source.at(item.name, item.offset), path });

@@ -100,6 +100,11 @@ fn kinds() -> [DefectKind; 10] {
         }),
         DefectKind::rules("endless-loading", "a level is loaded and never begins", 3, |app, variant| {
             forbid(app, Screen::Playing, variant);
+            // The game builds the level in each frame then, and would fill the memory.
+            let clear = |mut commands: Commands, built: Query<Entity, Or<(With<Sprite>, With<Collider>)>>| {
+                built.iter().for_each(|entity| commands.entity(entity).despawn());
+            };
+            app.add_systems(First, clear.run_if(in_state(Screen::Loading)));
         }),
     ]
 }
