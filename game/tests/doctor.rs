@@ -84,7 +84,7 @@ fn wrong_names_and_numbers_are_usage_errors() {
         (&["coinrunn"][..], "did you mean `coinrun`?"),
         (&["coinrun", "--mode", "hrad"], "did you mean `hard`?"),
         (&["coinrun", "--ticks", "0"], "it must be a whole number from 1 to 4294967295"),
-        (&["coinrun", "--level", "4294967296"], "does not exist: choose one up to 4294967295"),
+        (&["coinrun", "--level", "4294967296"], "does not exist: `coinrun` has levels 0 to 4294967295"),
     ] {
         let (_, errors) = doctor(args, 3);
         assert!(errors.contains(words), "{errors}");

@@ -226,7 +226,11 @@ fn bad_wishes_are_refused_in_words() {
     let large = ["--image", "width=1024", "--image", "height=1024", "--image", "stack=16"];
     for (args, code, words) in [
         (&["--mode", "hrad"][..], 3, "did you mean `hard`?"),
-        (&["--level", "5000000000"], 3, "level 5000000000 of `hard` does not exist: choose one up to 4294967295"),
+        (
+            &["--level", "5000000000"],
+            3,
+            "level 5000000000 of `hard` does not exist: `coinrun` has levels 0 to 4294967295",
+        ),
         (&["--run", "none"], 3, "none: there is no such folder"),
         (&["--bot", "serch"], 3, "did you mean `search`?"),
         (&["--policy", "none.policy"], 3, "policy export --run RUN --out none.policy"),

@@ -50,6 +50,10 @@ impl UnknownName {
 /// comparing them is slow.
 const LONGEST: usize = 256;
 
+/// Least Jaro-Winkler similarity of a name to one that was probably meant. A letter too many, too few, wrong or swapped
+/// leaves more than this in names of three letters and more. Words that share a few letters by chance have less.
+const SIMILAR: f64 = 0.8;
+
 /// Returns the candidate nearest to `name`, if one is similar at all.
 pub fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
     if let Some(same) = candidates.iter().find(|candidate| candidate.eq_ignore_ascii_case(name)) {
@@ -61,7 +65,32 @@ pub fn nearest<'a>(name: &str, candidates: &[&'a str]) -> Option<&'a str> {
     candidates
         .iter()
         .map(|candidate| (strsim::jaro_winkler(name, candidate), *candidate))
-        .filter(|(likeness, _)| *likeness > 0.7)
+        .filter(|(likeness, _)| *likeness > SIMILAR)
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, candidate)| candidate)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_typing_error_is_near_and_another_word_is_not() {
+        let rooms = ["Pantry", "Stairs", "Larder", "Well", "Room_39"];
+        for (wrong, near) in [
+            ("Pantyr", "Pantry"),
+            ("Stiars", "Stairs"),
+            ("Ladder", "Larder"),
+            ("Wel", "Well"),
+            ("Wall", "Well"),
+            ("room_39", "Room_39"),
+            ("WELL", "Well"),
+        ] {
+            assert_eq!(nearest(wrong, &rooms), Some(near), "{wrong}");
+        }
+        // `Sellar` has three letters of `Well`, and no more than chance leaves.
+        for other in ["Sellar", "Attic", "300..200", "", "Pantry Stairs Larder Well".repeat(11).as_str()] {
+            assert_eq!(nearest(other, &rooms), None, "{other}");
+        }
+    }
 }

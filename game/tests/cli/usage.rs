@@ -96,11 +96,14 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         ),
         (
             &["eval", "--bot", "random", "--levels", "hard:4294967295..4294967296"],
-            "level 4294967296 of `hard` does not exist: choose one up to 4294967295",
+            "level 4294967296 of `hard` does not exist: `coinrun` has levels 0 to 4294967295",
         ),
-        (&["test", "coinrun", "--levels", "hard:4294967296", "--out", "t"], "choose one up to 4294967295"),
+        (&["test", "coinrun", "--levels", "hard:4294967296", "--out", "t"], "`coinrun` has levels 0 to 4294967295"),
         (&["record", "coinrun", "--levels", "hard:0..4294967296", "--out", "q.demo"], "has too many levels"),
-        (&["record", "coinrun", "--levels", "hard:4294967290..4294967296", "--out", "q.demo"], "choose one up to"),
+        (
+            &["record", "coinrun", "--levels", "hard:4294967290..4294967296", "--out", "q.demo"],
+            "`coinrun` has levels 0 to",
+        ),
         (&["eval", "--bot", "random,serch"], "did you mean `search`?"),
         (&["eval", "--bot", "random", "--levels", "easy:9..3"], "first level 9 is after last level 3; write easy:3..9"),
         (&["config", "show", "--set", "ppo.minibatches=7"], "64 × 128 = 8192; 8 does"),

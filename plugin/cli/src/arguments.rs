@@ -16,9 +16,10 @@ use crate::{error::CliError, output::prepare};
 use bevy_playbot::demo::file::{DemoFault, DemoFileError, DemoHeader, DemoWriter};
 use playbot_harness::{
     game::Game,
+    held_out::is_only_level,
     machine::usable_threads,
     parallel::default_threads,
-    split::{LevelSplit, check_level},
+    split::{LevelSplit, check_level, last_level},
     worlds,
 };
 use playbot_learner::DeviceKind;
@@ -313,15 +314,28 @@ pub(crate) fn default_mode(game: &dyn Game) -> &'static str {
     known(&trained).or_else(|| known(name)).or(modes.first().copied()).unwrap_or_default()
 }
 
-/// Returns the default held-out levels, those of the game's experiment; `None` if the game brings none that it has.
+/// Returns the default held-out levels, those of the game's experiment; `None` if the game brings none that it has, or
+/// has a [single level](is_only_level).
 pub(crate) fn default_held_out(game: &dyn Game) -> Option<LevelSplit> {
     let test = default_experiment_of(game)?.experiment.test;
-    game.check_mode(&test.mode).is_ok().then_some(test)
+    (test.check(game).is_ok() && !is_only_level(game, &test.mode)).then_some(test)
 }
 
-/// Returns levels 0 to `last` of the [`default_mode`].
+/// Returns the levels 0 to `last` of the [`default_mode`], as far as the game has them.
 pub(crate) fn first_levels(game: &dyn Game, last: u64) -> LevelSplit {
-    LevelSplit { mode: default_mode(game).to_owned(), first: 0, last }
+    LevelSplit { mode: default_mode(game).to_owned(), first: 0, last }.within(game)
+}
+
+/// The most levels that are tested and audited by default.
+const MOST_TESTED: u64 = 64;
+
+/// Returns the default levels of tests and audits: the default held-out ones, or all levels of a game that brings no
+/// experiment and has at most 64.
+pub(crate) fn default_tested(game: &dyn Game) -> LevelSplit {
+    let mode = default_mode(game);
+    let has_few = last_level(game, mode).is_some_and(|last| last < MOST_TESTED);
+    let held_out = if has_few && game.tools().training.experiment().is_none() { None } else { default_held_out(game) };
+    held_out.unwrap_or_else(|| first_levels(game, MOST_TESTED - 1))
 }
 
 /// Reports how the other agents play, where a verb is about one of several agents that play together.
@@ -429,5 +443,23 @@ mod tests {
         assert_eq!(held_out, default.experiment.test);
         assert!(!held_out.overlaps(&default.experiment.train));
         assert_eq!(first_levels(&game, 9).to_string(), "default:0..9");
+        assert_eq!(default_tested(&game), held_out);
+    }
+
+    #[test]
+    fn default_levels_are_levels_of_the_game() {
+        let game = |count| ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {}).levels(count);
+        for (count, first, tested, held_out) in [
+            (1, "default:0..0", "default:0..0", None),
+            (8, "default:0..7", "default:0..7", Some("default:4..7")),
+            (64, "default:0..63", "default:0..63", Some("default:32..63")),
+            (100, "default:0..99", "default:50..99", Some("default:50..99")),
+            (240, "default:0..239", "default:64..127", Some("default:64..127")),
+        ] {
+            let game = game(count);
+            assert_eq!(first_levels(&game, 499).to_string(), first);
+            assert_eq!(default_tested(&game).to_string(), tested);
+            assert_eq!(default_held_out(&game).map(|split| split.to_string()).as_deref(), held_out);
+        }
     }
 }

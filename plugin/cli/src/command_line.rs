@@ -3,7 +3,7 @@
 mod help;
 
 use crate::{
-    arguments::default_mode,
+    arguments::{default_mode, first_levels},
     error::{CliError, Outcome},
     output::{GamesPrintElsewhere, log, program},
     progress,
@@ -15,7 +15,7 @@ use crate::{
 };
 use bevy_playbot::unknown_name::nearest;
 use clap::{
-    Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand,
+    Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, Subcommand,
     error::{ContextKind, ContextValue, ErrorKind},
 };
 use playbot_harness::{
@@ -146,7 +146,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
         Err(error) => {
             // A request for help is no mistake; anything else is a wrong usage, which is 3 here.
             let code = if error.use_stderr() { 3 } else { 0 };
-            match in_plain_words(&error) {
+            match in_plain_words(&error).or_else(|| with_own_mode(&error, games)) {
                 Some(words) => begin_report!("{words}"),
                 None => {
                     if let Err(refused) = error.print()
@@ -194,8 +194,11 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
 /// Parses the arguments of the process.
 fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
     let mut command = with_only_game(with_own_name(Cli::command()), games);
-    let args = with_level_numbers(std::env::args_os().collect(), games, &command);
-    let args = args.map_err(|words| command.error(ErrorKind::InvalidValue, words))?;
+    let args: Vec<OsString> = std::env::args_os().collect();
+    let args = match with_level_numbers(args.clone(), games, &command) {
+        Ok(args) => args,
+        Err(words) => return Err(error_of_verb(&mut command, &args, words)),
+    };
     let matches = match command.try_get_matches_from_mut(&args) {
         Err(error) if is_help(&error) => {
             // Not before: to know which examples work, games are asked for a level, which takes them some work.
@@ -205,6 +208,19 @@ fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
         matches => matches?,
     };
     Cli::from_arg_matches(&matches).map_err(|error| error.format(&mut command))
+}
+
+/// Returns an error with the usage of the verb that was called.
+fn error_of_verb(command: &mut Command, args: &[OsString], error: String) -> clap::Error {
+    // The usage of a verb begins with the name of the program only then.
+    command.build();
+    let words: Vec<String> = args.iter().map(|word| word.to_string_lossy().into_owned()).collect();
+    let verbs: Vec<String> = CalledVerb::find(&words, command).verbs.into_iter().map(str::to_owned).collect();
+    let mut called = command;
+    for verb in &verbs {
+        called = called.find_subcommand_mut(verb).expect("it was found in this command");
+    }
+    called.error(ErrorKind::InvalidValue, error)
 }
 
 fn is_help(error: &clap::Error) -> bool {
@@ -269,127 +285,226 @@ fn run(verb: Verb, games: &Games) -> Result<Outcome, CliError> {
     }
 }
 
-// Levels that are named as in their level editor.
+// Levels that are named as in their level editor, or by their number alone.
 
 /// Options whose values are levels.
 const OF_LEVELS: [&str; 4] = ["--level", "--levels", "--among", "--hold-out"];
 
-/// Verbs whose option `--level` takes a mode in front of the number.
-const WITH_MODE: [&str; 2] = ["explore", "demo"];
-
 /// Replaces the names of levels by their modes and numbers, so that each option takes them: `--levels Cave`,
-/// `--levels default:Cave..Tower`, `--level Cave`. The game is the one that is named behind the verb, or the program's
-/// first. Names stay as they are if only a file says which of several games is meant.
+/// `--levels default:Cave..Tower`, `--level Cave`, `--levels Cave,Tower`. Numbers alone get the mode where an option needs
+/// one. Names and numbers stay as they are if only a file says which of several games is meant.
 ///
 /// # Errors
 ///
-/// The game has names for its levels, but no such one.
-fn with_level_numbers(
-    mut args: Vec<OsString>,
-    games: &[&dyn Game],
-    command: &Command,
-) -> Result<Vec<OsString>, String> {
+/// The game has names for its levels, but no such one. Or the levels do not follow one another, and the option takes
+/// one range.
+fn with_level_numbers(args: Vec<OsString>, games: &[&dyn Game], command: &Command) -> Result<Vec<OsString>, String> {
     let words: Vec<String> = args.iter().map(|word| word.to_string_lossy().into_owned()).collect();
-    let value_of = |option: &str, place: usize| -> Option<&str> {
-        let rest = words[place].strip_prefix(option)?;
-        if rest.is_empty() { words.get(place + 1).map(String::as_str) } else { rest.strip_prefix('=') }
-    };
-    let verb = words.iter().skip(1).map(String::as_str).find(|word| !word.starts_with('-'));
-    let has = |option: &str| (1..words.len()).any(|place| value_of(option, place).is_some());
-    let is_of_file = match verb {
-        Some("demo") => true,
-        Some("eval") => ["--experiment", "--run", "--policy"].into_iter().any(has),
-        _ => has("--experiment"),
-    };
-    let first = first_positional(&words, command);
-    let named = first.and_then(|word| games.iter().find(|game| game.name() == word || game.aliases().contains(&word)));
-    let game = match (named, games) {
-        (Some(game), _) | (None, [game]) => *game,
-        (None, [game, ..]) if !is_of_file => *game,
-        _ => return Ok(args),
-    };
-    let mode = (1..words.len()).find_map(|place| value_of("--mode", place));
-    let takes_mode = verb.is_some_and(|verb| WITH_MODE.contains(&verb));
-    for place in 1..words.len() {
-        let found = OF_LEVELS.into_iter().find_map(|option| Some((option, value_of(option, place)?)));
-        let Some((option, value)) = found else { continue };
-        let Some(level) = NumberedLevels::of(game, mode, value)? else { continue };
-        let text = level.in_words(option != "--level" || takes_mode);
-        if words[place].contains('=') {
-            args[place] = format!("{option}={text}").into();
-        } else {
-            args[place + 1] = text.into();
+    let called = CalledVerb::find(&words, command);
+    let Some(game) = called.game(&words, games) else { return Ok(args) };
+    let mode = (1..words.len()).find_map(|place| value_of(&words, "--mode", place));
+    let mut numbered = Vec::new();
+    let mut replaced = None;
+    for (place, arg) in args.into_iter().enumerate() {
+        if replaced == Some(place) {
+            continue;
         }
-    }
-    Ok(args)
-}
-
-/// Returns the first word behind the verb that is neither an option nor the value of one.
-fn first_positional<'a>(words: &'a [String], command: &Command) -> Option<&'a str> {
-    let (mut command, mut words) = (command, words.iter().skip(1));
-    while let Some(word) = words.next() {
-        if let Some(option) = word.strip_prefix("--") {
-            let is_it = |arg: &&Arg| arg.get_long_and_visible_aliases().is_some_and(|names| names.contains(&option));
-            if command.get_arguments().find(is_it).is_some_and(|arg| arg.get_action().takes_values()) {
-                words.next();
+        let found = OF_LEVELS.into_iter().find_map(|name| Some((name, value_of(&words, name, place)?)));
+        let levels = found.and_then(|(name, value)| Some((name, called.levels_option(name)?, value)));
+        let Some((name, option, value)) = levels else {
+            numbered.push(arg);
+            continue;
+        };
+        match NumberedLevels::of(game, mode, value, option)? {
+            None => numbered.push(arg),
+            Some(texts) => {
+                numbered.extend(texts.iter().map(|text| OsString::from(format!("{name}={text}"))));
+                replaced = (!words[place].contains('=')).then_some(place + 1);
             }
-        } else if word.starts_with('-') && word.len() > 1 {
-            // The options with one letter have no values.
-        } else if let Some(verb) = command.find_subcommand(word) {
-            command = verb;
-        } else {
-            return Some(word);
         }
     }
-    None
+    Ok(numbered)
 }
 
-/// Levels whose names have been replaced by their numbers.
+/// Returns the value of an option if it stands at this place: in the same word, or in the next one.
+fn value_of<'a>(words: &'a [String], option: &str, place: usize) -> Option<&'a str> {
+    let rest = words.get(place)?.strip_prefix(option)?;
+    if rest.is_empty() { words.get(place + 1).map(String::as_str) } else { rest.strip_prefix('=') }
+}
+
+/// The verb of a command line.
+struct CalledVerb<'a> {
+    /// The verb, and those below it, such as `demo` and `filter`.
+    verbs: Vec<&'a str>,
+    command: &'a Command,
+    /// The first word behind the verb that is neither an option nor the value of one.
+    positional: Option<&'a str>,
+}
+
+impl<'a> CalledVerb<'a> {
+    fn find(words: &'a [String], command: &'a Command) -> Self {
+        let mut called = Self { verbs: Vec::new(), command, positional: None };
+        let mut words = words.iter().skip(1);
+        while let Some(word) = words.next() {
+            if let Some(option) = word.strip_prefix("--") {
+                if called.option(option).is_some_and(|arg| arg.get_action().takes_values()) {
+                    words.next();
+                }
+            } else if word.starts_with('-') && word.len() > 1 {
+                // The options with one letter have no values.
+            } else if let Some(verb) = called.command.find_subcommand(word) {
+                called.verbs.push(word);
+                called.command = verb;
+            } else {
+                called.positional = Some(word);
+                break;
+            }
+        }
+        called
+    }
+
+    fn option(&self, name: &str) -> Option<&'a Arg> {
+        let is_it = |arg: &&Arg| arg.get_long_and_visible_aliases().is_some_and(|names| names.contains(&name));
+        self.command.get_arguments().find(is_it)
+    }
+
+    /// Returns the game: the one that is named behind the verb, or the program's first. `None` if only a file says which
+    /// of several games is meant.
+    fn game<'g>(&self, words: &[String], games: &[&'g dyn Game]) -> Option<&'g dyn Game> {
+        let has = |option: &str| (1..words.len()).any(|place| value_of(words, option, place).is_some());
+        let is_of_file = match self.verbs.first() {
+            Some(&"demo") => true,
+            Some(&"eval") => ["--experiment", "--run", "--policy"].into_iter().any(has),
+            _ => has("--experiment"),
+        };
+        let is_named = |game: &&&dyn Game, word| game.name() == word || game.aliases().contains(&word);
+        let named = self.positional.and_then(|word| games.iter().find(|game| is_named(game, word)));
+        match (named, games) {
+            (Some(game), _) | (None, [game]) => Some(*game),
+            (None, [game, ..]) if !is_of_file => Some(*game),
+            _ => None,
+        }
+    }
+
+    /// Returns what an option takes; `None` if the verb has no such option, or one that names a game before the levels.
+    fn levels_option(&self, name: &str) -> Option<LevelsOption<'a>> {
+        let arg = self.option(name.trim_start_matches('-')).filter(|_| self.verbs.first() != Some(&"bugs"))?;
+        // `--level` is the number of a level beside `--mode`, or else an alias of `--levels`.
+        let takes_mode = arg.get_id() != "level" || self.verbs.first() == Some(&"explore");
+        let is_repeatable = matches!(arg.get_action(), ArgAction::Append);
+        Some(LevelsOption { verb: self.verbs.last().copied()?, takes_mode, is_repeatable })
+    }
+}
+
+/// An option whose value are levels.
+#[derive(Clone, Copy)]
+struct LevelsOption<'a> {
+    verb: &'a str,
+    /// True for a range of levels with their mode, false for the number of a level.
+    takes_mode: bool,
+    is_repeatable: bool,
+}
+
+/// Levels by their numbers, which follow one another.
 struct NumberedLevels {
     mode: String,
     /// True if the mode was named in front of the level.
     is_mode_named: bool,
-    numbers: String,
+    first: u64,
+    last: u64,
 }
 
 impl NumberedLevels {
-    /// Finds the levels with these names. `mode` is that of levels without one. Returns `None` for numbers and files, and
-    /// for games whose levels have no names.
-    fn of(game: &dyn Game, mode: Option<&str>, value: &str) -> Result<Option<Self>, String> {
+    /// Finds the levels of a value, and returns them as an option takes them. `mode` is that of levels without one. Returns
+    /// `None` for a value that needs no change, and for one that names no levels of the game, which has no names for them.
+    fn of(
+        game: &dyn Game,
+        mode: Option<&str>,
+        value: &str,
+        option: LevelsOption,
+    ) -> Result<Option<Vec<String>>, String> {
         let is_range = |text: &str| text.parse::<LevelSplit>().is_ok();
-        // Some options take numbers without a mode.
-        if value.starts_with('-') || is_level_files(value) || is_range(value) || is_range(&format!("any:{value}")) {
+        if value.starts_with('-') || is_level_files(value) || is_range(value) {
             return Ok(None);
         }
-        let own = value.split_once(':').filter(|(mode, _)| game.check_mode(mode).is_ok());
-        let (mode, name) = own.unwrap_or_else(|| (mode.unwrap_or_else(|| default_mode(game)), value));
-        let names = game.tools().levels.level_names(mode);
-        let number = |name: &str| names.iter().position(|known| known == name);
-        let numbers = number(name).map(|number| number.to_string()).or_else(|| {
-            let (first, last) = name.split_once("..")?;
-            Some(format!("{}..{}", number(first)?, number(last)?))
-        });
-        match (numbers, names.as_slice()) {
-            (Some(numbers), _) => Ok(Some(Self { mode: mode.to_owned(), is_mode_named: own.is_some(), numbers })),
-            (None, []) => Ok(None),
-            (None, [first, ..]) => {
-                let known: Vec<&str> = names.iter().map(String::as_str).collect();
-                let near = nearest(name, &known).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
-                Err(format!(
-                    "`{}` has no level `{name}`{near}: name one as in its level editor, such as `{first}`, or by its number, \
-                     as in {mode}:0",
-                    game.name()
-                ))
+        let default = mode.unwrap_or_else(|| default_mode(game));
+        if is_range(&format!("any:{value}")) {
+            return Ok(option.takes_mode.then(|| vec![format!("{default}:{value}")]));
+        }
+        let mut levels: Vec<Self> = Vec::new();
+        // A name may have a comma in it.
+        let whole = Self::one(game, (default, false), value);
+        let parts = if whole.is_some() { vec![value] } else { value.split(',').map(str::trim).collect() };
+        for part in parts {
+            let before = levels.last().filter(|before| before.is_mode_named);
+            let inherited = before.map_or((default, false), |before| (before.mode.as_str(), true));
+            let Some(level) = Self::one(game, inherited, part) else {
+                return unknown_level(game, inherited.0, part, option).map_or(Ok(None), Err);
+            };
+            match levels.last_mut().filter(|before| option.takes_mode && before.is_followed_by(&level)) {
+                Some(before) => before.last = level.last,
+                None => levels.push(level),
             }
         }
+        if levels.len() > 1 && !option.is_repeatable {
+            let LevelsOption { verb, takes_mode, .. } = option;
+            let (found, wanted) = match takes_mode {
+                true => ("ranges of levels", "levels that follow one another"),
+                false => ("levels", "one level"),
+            };
+            let (count, first) = (levels.len(), levels[0].in_words(takes_mode));
+            return Err(format!("`{value}` names {count} {found}: `{verb}` takes {wanted}, such as {first}"));
+        }
+        Ok(Some(levels.iter().map(|levels| levels.in_words(option.takes_mode)).collect()))
+    }
+
+    /// Finds a level, or a range of levels, by names or numbers. A mode may stand in front.
+    fn one(game: &dyn Game, (mode, is_mode_named): (&str, bool), text: &str) -> Option<Self> {
+        let own = text.split_once(':').filter(|(mode, _)| game.check_mode(mode).is_ok());
+        let (mode, name) = own.unwrap_or((mode, text));
+        let names = game.tools().levels.level_names(mode);
+        let number = |name: &str| -> Option<u64> {
+            let by_name = || names.iter().position(|known| known == name).map(|number| number as u64);
+            name.parse().ok().or_else(by_name)
+        };
+        let range = || name.split_once("..").and_then(|(first, last)| Some((number(first)?, number(last)?)));
+        let (first, last) = number(name).map(|level| (level, level)).or_else(range)?;
+        Some(Self { mode: mode.to_owned(), is_mode_named: is_mode_named || own.is_some(), first, last })
+    }
+
+    fn is_followed_by(&self, next: &Self) -> bool {
+        self.mode == next.mode && self.first <= self.last && self.last.checked_add(1) == Some(next.first)
     }
 
     /// Returns them as an option takes them. One that takes no mode gets it only if it was named, for the error that says
     /// where to name it.
     fn in_words(&self, takes_mode: bool) -> String {
-        let Self { mode, is_mode_named, numbers } = self;
-        if takes_mode || *is_mode_named { format!("{mode}:{numbers}") } else { numbers.clone() }
+        let Self { mode, is_mode_named, first, last } = self;
+        let numbers = if first == last { first.to_string() } else { format!("{first}..{last}") };
+        if takes_mode || *is_mode_named { format!("{mode}:{numbers}") } else { numbers }
     }
+}
+
+/// Names that are listed for a name that does not exist.
+const LISTED: usize = 3;
+
+/// Returns the error of a name that no level has; `None` for a game whose levels have no names.
+fn unknown_level(game: &dyn Game, mode: &str, text: &str, option: LevelsOption) -> Option<String> {
+    let own = text.split_once(':').filter(|(mode, _)| game.check_mode(mode).is_ok());
+    let (mode, name) = own.unwrap_or((mode, text));
+    let names = game.tools().levels.level_names(mode);
+    let known: Vec<&str> = names.iter().map(String::as_str).collect();
+    let near = nearest(name, &known).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
+    let listed = match known.as_slice() {
+        [] => return None,
+        [only] => format!("its level is {only}"),
+        _ if known.len() > LISTED + 1 => {
+            format!("its levels are {} and {} more", known[..LISTED].join(", "), known.len() - LISTED)
+        }
+        [others @ .., last] => format!("its levels are {} and {last}", others.join(", ")),
+    };
+    let number = if option.takes_mode { format!("{mode}:0") } else { "0".to_owned() };
+    Some(format!("`{}` has no level `{name}`{near}: {listed}, which have numbers too, such as {number}", game.name()))
 }
 
 // Plain wording of errors of the command line's parser.
@@ -412,6 +527,25 @@ pub(crate) fn in_plain_words(error: &clap::Error) -> Option<String> {
         plain += &format!("; write --mode {mode} --level {level}");
     }
     Some(error.render().to_string().replacen(&format!(": {source}"), &format!(": {plain}"), 1))
+}
+
+/// Returns the whole text of an error about levels with a mode of the game in its example; `None` for other errors.
+fn with_own_mode(error: &clap::Error, games: &[&dyn Game]) -> Option<String> {
+    error.source()?;
+    let words: Vec<String> = std::env::args_os().map(|word| word.to_string_lossy().into_owned()).collect();
+    let command = Cli::command();
+    let game = CalledVerb::find(&words, &command).game(&words, games)?;
+    own_example(&error.render().to_string(), game)
+}
+
+/// Replaces the mode of examples that are written for any game.
+fn own_example(text: &str, game: &dyn Game) -> Option<String> {
+    let (range, level) = (first_levels(game, 9), first_levels(game, 7));
+    let mut own = text.replace("such as MODE:7", &format!("such as {}:{}", level.mode, level.last));
+    if !game.modes().contains(&"hard") {
+        own = own.replace("such as hard:64..127", &format!("such as {range}"));
+    }
+    (own != text).then_some(own)
 }
 
 /// Returns mode and level where both were given as the number of a level, as in `--level hard:7`.
@@ -491,25 +625,39 @@ mod tests {
     #[test]
     fn names_of_levels_become_their_numbers() {
         for (args, wanted) in [
-            ("level rooms --level Cave", "level rooms --level 1"),
+            ("level rooms --level Cave", "level rooms --level=1"),
             ("level rooms --mode hard --level=Tower --json", "level rooms --mode hard --level=2 --json"),
-            ("level rooms --level hard:Cave", "level rooms --level hard:1"),
-            ("test rooms --levels Cave --out a", "test rooms --levels easy:1 --out a"),
-            ("test --levels hard:Hall..Cave", "test --levels hard:0..1"),
-            ("record rooms --levels=hard:Tower --hold-out Hall", "record rooms --levels=hard:2 --hold-out easy:0"),
-            ("explore rooms --level Cave", "explore rooms --level easy:1"),
+            ("level rooms --level hard:Cave", "level rooms --level=hard:1"),
+            ("test rooms --levels Cave --out a", "test rooms --levels=easy:1 --out a"),
+            ("test --levels hard:Hall..Cave", "test --levels=hard:0..1"),
+            ("record rooms --levels=hard:Tower --hold-out Hall", "record rooms --levels=hard:2 --hold-out=easy:0"),
+            ("explore rooms --level Cave", "explore rooms --level=easy:1"),
             // Values of options name no game.
-            ("test --out plain --levels Cave", "test --out plain --levels easy:1"),
-            ("test --out plain rooms --levels Cave", "test --out plain rooms --levels easy:1"),
-            ("eval rooms --run runs/a --levels Cave", "eval rooms --run runs/a --levels easy:1"),
-            ("train --run runs/a --hold-out Cave", "train --run runs/a --hold-out easy:1"),
+            ("test --out plain --levels Cave", "test --out plain --levels=easy:1"),
+            ("test --out plain rooms --levels Cave", "test --out plain rooms --levels=easy:1"),
+            ("eval rooms --run runs/a --levels Cave", "eval rooms --run runs/a --levels=easy:1"),
+            ("record rooms --out a --hold-out Cave", "record rooms --out a --hold-out=easy:1"),
+            // Each verb takes `--level`.
+            ("test rooms --level Cave", "test rooms --level=easy:1"),
+            ("eval rooms --level Cave --bot random", "eval rooms --level=easy:1 --bot random"),
+            ("record rooms --level Cave", "record rooms --level=easy:1"),
+            ("levels rooms --level Cave", "levels rooms --level=easy:1"),
+            // Lists, of levels that follow one another unless the option is repeatable.
+            ("test rooms --levels Hall,Cave,Tower", "test rooms --levels=easy:0..2"),
+            ("test rooms --levels hard:Hall,Cave", "test rooms --levels=hard:0..1"),
+            ("test rooms --levels Hall,1", "test rooms --levels=easy:0..1"),
+            ("eval rooms --levels Hall,Tower", "eval rooms --levels=easy:0 --levels=easy:2"),
+            ("eval plain --levels 3,5..6,7", "eval plain --levels=easy:3 --levels=easy:5..7"),
+            ("doctor rooms --level Hall,Cave", "doctor rooms --level=0 --level=1"),
         ] {
             assert_eq!(numbered(args).as_deref(), Ok(wanted));
         }
         for same in [
             "level rooms --level 7",
             "test rooms --levels easy:0..9 --out Cave",
-            "play rooms --levels 0..9",
+            "level rooms --level 0..9",
+            "test rooms --level",
+            "bugs make rooms --levels rooms=easy:0..9",
             "test rooms --levels files:Cave",
             "test plain --levels Cave",
             "level rooms --level",
@@ -526,11 +674,62 @@ mod tests {
     }
 
     #[test]
+    fn numbers_alone_get_the_mode_where_one_is_needed() {
+        for (args, wanted) in [
+            ("explore rooms --level 1", "explore rooms --level=easy:1"),
+            ("explore plain --level 7", "explore plain --level=easy:7"),
+            ("test plain --levels 0..9 --out a", "test plain --levels=easy:0..9 --out a"),
+            ("test plain --level=3", "test plain --level=easy:3"),
+            ("levels plain --levels 0..9 --among 10..19", "levels plain --levels=easy:0..9 --among=easy:10..19"),
+            ("play rooms --mode hard --levels 0..9", "play rooms --mode hard --levels=hard:0..9"),
+        ] {
+            assert_eq!(numbered(args).as_deref(), Ok(wanted));
+        }
+    }
+
+    #[test]
+    fn levels_that_do_not_follow_one_another_need_an_option_that_is_repeatable() {
+        assert_eq!(
+            numbered("test rooms --levels Hall,Tower").expect_err("two ranges"),
+            "`Hall,Tower` names 2 ranges of levels: `test` takes levels that follow one another, such as easy:0"
+        );
+        assert_eq!(
+            numbered("level rooms --level Hall,Cave").expect_err("two levels"),
+            "`Hall,Cave` names 2 levels: `level` takes one level, such as 0"
+        );
+    }
+
+    #[test]
+    fn an_error_about_levels_has_the_usage_of_its_verb() {
+        let usage = |args: &str| {
+            let args: Vec<OsString> = format!("playbot {args}").split(' ').map(OsString::from).collect();
+            error_of_verb(&mut with_own_name(Cli::command()), &args, "no such level".to_owned()).to_string()
+        };
+        let text = usage("level rooms --level Attic");
+        assert!(text.starts_with("error: no such level\n") && text.contains(" level [OPTIONS] <GAME>"), "{text}");
+        let text = usage("demo filter a.demo --levels Attic");
+        assert!(text.contains(" demo filter [OPTIONS]"), "{text}");
+    }
+
+    #[test]
+    fn examples_in_errors_have_a_mode_of_the_game() {
+        let game = ForeignGame::new("plain", 1, |_: &mut App| {}).modes(&["calm"]);
+        let own = |text: &str, game: &ForeignGame| own_example(text, game);
+        let range = "write mode:first..last, both ends included, such as hard:64..127, or";
+        let wanted = "write mode:first..last, both ends included, such as calm:0..9, or";
+        assert_eq!(own(range, &game).as_deref(), Some(wanted));
+        assert_eq!(own("such as MODE:7", &game).as_deref(), Some("such as calm:7"));
+        let few = ForeignGame::new("plain", 1, |_: &mut App| {}).levels(3);
+        assert_eq!(own("such as MODE:7", &few).as_deref(), Some("such as default:2"));
+        assert_eq!(own(range, &rooms()[0]), None, "it has a mode `hard`");
+    }
+
+    #[test]
     fn a_program_of_one_game_knows_its_levels_beside_any_file() {
         let [rooms, _] = rooms();
         let args = ["playbot", "demo", "filter", "a.demo", "--levels", "Cave"].map(OsString::from).to_vec();
         let numbered = with_level_numbers(args, &[&rooms], &Cli::command()).expect("a level");
-        assert_eq!(numbered.last(), Some(&OsString::from("easy:1")));
+        assert_eq!(numbered.last(), Some(&OsString::from("--levels=easy:1")));
     }
 
     #[test]
@@ -538,10 +737,25 @@ mod tests {
         let words = numbered("test rooms --levels easy:Cvae").expect_err("no such level");
         assert_eq!(
             words,
-            "`rooms` has no level `Cvae` (did you mean `Cave`?): name one as in its level editor, such as `Hall`, or by its \
-             number, as in easy:0"
+            "`rooms` has no level `Cvae` (did you mean `Cave`?): its levels are Hall, Cave and Tower, which have numbers too, \
+             such as easy:0"
         );
-        assert!(numbered("level rooms --level Attic").is_err_and(|words| words.contains("`Attic`: name one")));
+        let words = numbered("level rooms --level Attic").expect_err("no such level");
+        assert!(
+            words.ends_with("`Attic`: its levels are Hall, Cave and Tower, which have numbers too, such as 0"),
+            "{words}"
+        );
+        assert!(numbered("test rooms --levels Hall,Attic").is_err_and(|words| words.contains("no level `Attic`: ")));
+        let level = |number: u32| EditorLevel::of_rows(format!("Room_{number}"), vec!["S.G".to_owned()], Vec2::ONE);
+        let many = |count: u32| {
+            let levels = (0..count).map(level).collect();
+            let game = ForeignGame::new("rooms", 1, |_: &mut App| {}).editor_levels(Ok(levels));
+            let args = ["playbot", "level", "rooms", "--level", "Attic"].map(OsString::from).to_vec();
+            with_level_numbers(args, &[&game], &Cli::command()).expect_err("no such level")
+        };
+        assert!(many(1).contains("its level is Room_0, "), "{}", many(1));
+        assert!(many(4).contains("Room_0, Room_1, Room_2 and Room_3, "), "{}", many(4));
+        assert!(many(240).contains("Room_0, Room_1, Room_2 and 237 more, "), "{}", many(240));
     }
 
     #[test]

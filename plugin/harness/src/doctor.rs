@@ -39,6 +39,7 @@ use crate::{
     },
     game::{Game, without_idle_action},
     mode::ModeError,
+    split::check_level,
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
@@ -101,6 +102,7 @@ pub fn examine(
         mode: options.mode.clone(),
         level: options.level,
         further_levels: options.levels().split_off(1),
+        another_level: options.another_level(game),
         seed: options.seed,
         ticks: options.ticks,
         safety: assess_safety(options.level, &comparisons, &observation),
@@ -161,6 +163,15 @@ impl DoctorOptions {
         levels
     }
 
+    /// Returns the level after those that are played, or else the first one that is not played; `None` if all are.
+    fn another_level(&self, game: &dyn Game) -> Option<u64> {
+        let levels = self.levels();
+        let next = levels.iter().max().and_then(|last| last.checked_add(1));
+        // One of so many is not among the levels.
+        let all = next.into_iter().chain(0..=levels.len() as u64);
+        all.filter(|level| !levels.contains(level)).find(|level| check_level(game, &self.mode, *level).is_ok())
+    }
+
     /// Returns the comparisons to make, in order. Further levels get the two that find most, so that each of them takes
     /// a fourth of the time of the first one.
     fn planned(&self) -> Vec<ComparisonReport> {
@@ -191,6 +202,9 @@ pub struct DoctorReport {
     pub level: u64,
     /// Further levels, which were played twice and after another level.
     pub further_levels: Vec<u64>,
+    /// A level that was not played, if the game has any.
+    #[serde(skip)]
+    pub another_level: Option<u64>,
     /// Random seed of the World and of the actions.
     pub seed: u64,
     /// Ticks that each comparison was to play.
@@ -643,6 +657,24 @@ fn is_compared_in(comparison: DoctorComparison, path: &str) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::foreign::ForeignGame;
+    use bevy::prelude::App;
+
+    #[test]
+    fn another_level_is_one_that_the_game_has_and_that_was_not_played() {
+        let another = |game: &ForeignGame, level, further_levels: &[u64]| {
+            let further_levels = further_levels.to_vec();
+            DoctorOptions { level, further_levels, ..DoctorOptions::new("default".to_owned()) }.another_level(game)
+        };
+        let endless = || ForeignGame::new("walk", 1, |_: &mut App| {});
+        assert_eq!(another(&endless(), 7, &[3]), Some(8));
+        assert_eq!(another(&endless(), u64::MAX, &[0]), Some(1));
+        let three = endless().levels(3);
+        assert_eq!(another(&three, 0, &[1]), Some(2));
+        assert_eq!(another(&three, 2, &[0]), Some(1), "level 3 does not exist");
+        assert_eq!(another(&three, 2, &[1, 0]), None);
+        assert_eq!(another(&endless().levels(1), 0, &[]), None);
+    }
 
     #[test]
     fn the_games_state_is_compared_and_the_engines_housekeeping_is_not() {

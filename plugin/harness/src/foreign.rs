@@ -400,7 +400,7 @@ impl ForeignGame {
         self.with(|description| description.loaded = Some(SystemFactory::new(system, |()| ())))
     }
 
-    /// Sets the number of levels: level n is the same as level 0, and so on. Default: endless.
+    /// Sets the number of levels, which are numbered from 0. Default: endless.
     pub fn levels(self, number: u64) -> Self {
         self.with(|description| description.levels = Some(number))
     }
@@ -456,7 +456,9 @@ impl ForeignGame {
         self.description.levels
     }
 
-    /// Returns the level that is played for this number.
+    /// Returns the level that is played for this number. Higher ones are refused where levels are named
+    /// ([`check_level`](crate::split::check_level)). Recordings of earlier builds of a game may show them, and so may
+    /// Worlds that a program builds: levels begin again there.
     fn level_of(&self, level: u64) -> u64 {
         self.level_count().map_or(level, |levels| level % levels.max(1))
     }

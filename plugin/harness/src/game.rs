@@ -335,13 +335,9 @@ pub trait LevelTools: Send + Sync {
         mode.to_owned()
     }
 
-    /// Returns the largest number of a level that the game draws itself, in any mode; `None` if every number is valid.
+    /// Returns the largest number of a level of the game's own, in any mode; `None` if every number is valid. Level files
+    /// are numbered apart. Verbs refuse higher numbers, and their default levels end here.
     fn last_level(&self) -> Option<u64> {
-        None
-    }
-
-    /// Returns the number of levels if higher numbers play the same levels again; `None` if that is not known.
-    fn level_count(&self) -> Option<u64> {
         None
     }
 

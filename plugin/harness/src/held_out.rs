@@ -11,7 +11,7 @@ use crate::{
     level_files::is_level_files,
     machine::usable_threads,
     parallel::{default_threads, on_threads},
-    split::LevelSplit,
+    split::{LevelSplit, last_level},
     worlds::{EndedEpisodes, build_world, hash_with_agent},
 };
 use bevy::prelude::*;
@@ -51,6 +51,11 @@ pub fn by_layout(game: &dyn Game, split: &LevelSplit) -> LevelsByLayout {
     layouts
 }
 
+/// Returns true if a game has one level of its own, which it is trained and measured on.
+pub fn is_only_level(game: &dyn Game, mode: &str) -> bool {
+    last_level(game, mode) == Some(0)
+}
+
 /// Held-out levels, kept unseen before the test, also under another mode's rules.
 pub struct HeldOut<'a> {
     game: &'a dyn Game,
@@ -59,14 +64,22 @@ pub struct HeldOut<'a> {
     /// Hashes of the files' contents, if the levels are files.
     files: BTreeSet<u64>,
     layouts: OnceLock<LevelsByLayout>,
+    /// False if the game has a single level: it is trained and measured on that one, so nothing is held out.
+    holds: bool,
 }
 
 impl<'a> HeldOut<'a> {
     /// Holds out a split of a game whose mode has been checked with [`Game::check_mode`].
+    /// A game with a [single level](is_only_level) holds nothing out.
     pub fn new(game: &'a dyn Game, split: &'a LevelSplit) -> Self {
+        Self { holds: !is_only_level(game, &split.mode), ..Self::levels_of(game, split) }
+    }
+
+    /// Takes a split to look levels up in, whether or not they can be held out.
+    pub(crate) fn levels_of(game: &'a dyn Game, split: &'a LevelSplit) -> Self {
         let family = game.tools().levels.family(&split.mode);
         let files = split.levels().map_while(|level| file_hash(game, &split.mode, level)).collect();
-        Self { game, split, family, files, layouts: OnceLock::new() }
+        Self { game, split, family, files, layouts: OnceLock::new(), holds: true }
     }
 
     /// Returns the levels as they were named.
@@ -78,12 +91,12 @@ impl<'a> HeldOut<'a> {
     pub fn contains(&self, mode: &str, level: u64) -> bool {
         let is_named =
             self.split.contains(&self.split.mode, level) && self.game.tools().levels.family(mode) == self.family;
-        is_named || file_hash(self.game, mode, level).is_some_and(|hash| self.files.contains(&hash))
+        self.holds && is_named || file_hash(self.game, mode, level).is_some_and(|hash| self.files.contains(&hash))
     }
 
     /// Returns whether this level has the layout of a held-out one.
     pub fn resembles(&self, mode: &str, level: u64) -> bool {
-        self.game.layout(mode, level).is_some_and(|layout| self.layouts().contains_key(&layout))
+        self.holds && self.game.layout(mode, level).is_some_and(|layout| self.layouts().contains_key(&layout))
     }
 
     /// Returns whether the level in this file is held out, under any number.
@@ -104,7 +117,8 @@ impl<'a> HeldOut<'a> {
     /// Returns the first and the last number of both.
     fn common(&self, levels: &LevelSplit) -> Option<(u64, u64)> {
         let (first, last) = (levels.first.max(self.split.first), levels.last.min(self.split.last));
-        (first <= last && self.game.tools().levels.family(&levels.mode) == self.family).then_some((first, last))
+        let is_same_family = || self.game.tools().levels.family(&levels.mode) == self.family;
+        (self.holds && first <= last && is_same_family()).then_some((first, last))
     }
 
     /// Describes the levels of `seen` that are held out; `None` if there are no such levels, or if the seen levels
@@ -126,7 +140,7 @@ impl<'a> HeldOut<'a> {
     /// game has no others. `progress` is that of [`AlikeLevels::of`], and is called only if levels are played.
     pub fn seen_in(&self, seen: &SeenLevels, progress: &(dyn Fn(u64, u64) + Sync)) -> BTreeSet<u64> {
         let mut found = BTreeSet::new();
-        if seen.game != self.game.name() {
+        if seen.game != self.game.name() || !self.holds {
             return found;
         }
         let (ranges, mut left) = (self.known_ranges(seen), MOST_COMPARED);
@@ -197,7 +211,7 @@ impl<'a> HeldOut<'a> {
     /// Returns true if every held-out level has the layout of one of these levels. More than 4,096 are not compared: this
     /// is for the check of an experiment, which takes no time.
     pub fn are_all_in(&self, levels: &LevelSplit) -> bool {
-        if levels.len() > MOST_CHECKED {
+        if levels.len() > MOST_CHECKED || !self.holds {
             return false;
         }
         let layouts = by_layout(self.game, levels);
@@ -563,6 +577,24 @@ mod tests {
         assert_eq!(known(&game, "default:1000..6000"), Vec::<u64>::new(), "that would take long");
         let layouts = game.layout(|_, level| level);
         assert_eq!(known(&layouts, "default:0..1"), Vec::<u64>::new(), "its layouts say more");
+    }
+
+    #[test]
+    fn a_game_holds_out_levels_unless_it_has_only_one() {
+        let split: LevelSplit = "default:0".parse().expect("a level");
+        let seen =
+            SeenLevels { game: "dots".to_owned(), levels: vec!["default:0..0".to_owned()], ..SeenLevels::default() };
+        for (count, is_held_out) in [(1, false), (2, true)] {
+            let game = dots(|_| 0.0, |_| 0.0).levels(count).layout(|_, _| 7);
+            let held_out = HeldOut::new(&game, &split);
+            assert_eq!(held_out.contains("default", 0), is_held_out);
+            assert_eq!(held_out.resembles("default", 0), is_held_out);
+            assert_eq!(held_out.first_of(&split).is_some(), is_held_out);
+            assert_eq!(held_out.shown_by(Some(&seen)).is_some(), is_held_out);
+            assert_eq!(!held_out.seen_in(&seen, &|_, _| {}).is_empty(), is_held_out);
+            assert_eq!(held_out.are_all_in(&split), is_held_out);
+            assert!(HeldOut::levels_of(&game, &split).contains("default", 0), "an audit looks levels up");
+        }
     }
 
     #[test]

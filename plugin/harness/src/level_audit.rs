@@ -103,7 +103,7 @@ fn plan_hash(plan: &FloorPlan) -> u64 {
 
 /// Returns the levels of a split that are among others: by number, as a file, or by their layout.
 pub fn levels_in(game: &dyn Game, split: &LevelSplit, others: &LevelSplit) -> BTreeSet<u64> {
-    let others = HeldOut::new(game, others);
+    let others = HeldOut::levels_of(game, others);
     let is_in = |level: &u64| others.contains(&split.mode, *level) || others.resembles(&split.mode, *level);
     split.levels().filter(is_in).collect()
 }

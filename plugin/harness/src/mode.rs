@@ -15,13 +15,15 @@ pub enum ModeError {
     #[error(transparent)]
     Files(#[from] LevelFileError),
     /// The mode has no level of this number.
-    #[error("level {level} of `{mode}` does not exist: choose one up to {last}")]
+    #[error("level {level} of `{mode}` does not exist: `{game}` has {}", levels_to(*.last))]
     NoLevel {
+        /// Name of the game.
+        game: String,
         /// The mode.
         mode: String,
         /// The requested number.
         level: u64,
-        /// Largest number of the mode.
+        /// Largest number of a level.
         last: u64,
     },
     /// Invalid value of an option.
@@ -35,3 +37,7 @@ pub enum ModeError {
 }
 
 impl HasExitCode for ModeError {}
+
+fn levels_to(last: u64) -> String {
+    if last == 0 { "only one, level 0".to_owned() } else { format!("levels 0 to {last}") }
+}

@@ -59,6 +59,17 @@ impl LevelSplit {
         check_level(game, &self.mode, self.last)
     }
 
+    /// Returns the levels of a default range that the game has. If it has none of them, they are all of its levels, or as
+    /// many of the first as the range has.
+    #[must_use]
+    pub fn within(self, game: &dyn Game) -> Self {
+        let last = last_level(game, &self.mode).unwrap_or(u64::MAX);
+        if self.first <= last {
+            return Self { last: self.last.min(last), ..self };
+        }
+        Self { first: 0, last: last.min(self.len() - 1), ..self }
+    }
+
     /// Returns the fewest ranges that hold exactly these levels of a mode, which ascend.
     pub fn ranges(mode: &str, levels: &[u64]) -> Vec<Self> {
         let runs = levels.chunk_by(|one, next| one + 1 == *next);
@@ -89,10 +100,15 @@ pub fn check_level(game: &dyn Game, mode: &str, level: u64) -> Result<(), ModeEr
         let count = level_designs(game, &mode)?.count();
         return if level < count { Ok(()) } else { Err(LevelFileError::NoLevel { mode, level, count }.into()) };
     }
-    match game.tools().levels.last_level() {
-        Some(last) if level > last => Err(ModeError::NoLevel { mode, level, last }),
+    match last_level(game, &mode) {
+        Some(last) if level > last => Err(ModeError::NoLevel { game: game.name().to_owned(), mode, level, last }),
         _ => Ok(()),
     }
+}
+
+/// Returns the number of the last level of the game's own; `None` for level files, and if every number is valid.
+pub fn last_level(game: &dyn Game, mode: &str) -> Option<u64> {
+    game.tools().levels.last_level().filter(|_| !is_level_files(mode))
 }
 
 /// Returns the level files that a text probably means.
@@ -194,6 +210,8 @@ impl From<LevelSplit> for String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::foreign::ForeignGame;
+    use bevy::prelude::App;
 
     #[test]
     fn text_form_reads_back() {
@@ -231,6 +249,39 @@ mod tests {
         let words = "files:no/such/*.json".parse::<LevelSplit>().expect_err("no files").to_string();
         assert!(words.contains("files:no/such/*.json matches no file"), "{words}");
         assert!("files:a.json:9..3".parse::<LevelSplit>().is_err());
+    }
+
+    #[test]
+    fn default_ranges_end_with_the_last_level_of_the_game() {
+        let game = |count| ForeignGame::new("rooms", 1, |_: &mut App| {}).levels(count);
+        let within =
+            |text: &str, game: &ForeignGame| text.parse::<LevelSplit>().expect("a split").within(game).to_string();
+        for (text, count, wanted) in [
+            ("default:0..63", 240, "default:0..63"),
+            ("default:0..499", 240, "default:0..239"),
+            ("default:64..127", 100, "default:64..99"),
+            ("default:64..127", 8, "default:0..7"),
+            ("default:1000..1003", 8, "default:0..3"),
+            ("default:0..63", 1, "default:0..0"),
+        ] {
+            assert_eq!(within(text, &game(count)), wanted);
+        }
+        let endless = ForeignGame::new("rooms", 1, |_: &mut App| {});
+        assert_eq!(within("default:1000..1003", &endless), "default:1000..1003");
+        assert_eq!(within("files:a/*.json:3..9", &game(2)), "files:a/*.json:3..9");
+    }
+
+    #[test]
+    fn levels_past_the_last_one_are_refused_with_the_levels_that_there_are() {
+        let game = |count| ForeignGame::new("rooms", 1, |_: &mut App| {}).levels(count);
+        let check = |text: &str, count| {
+            text.parse::<LevelSplit>().expect("a split").check(&game(count)).map_err(|error| error.to_string())
+        };
+        assert_eq!(check("default:0..7", 8), Ok(()));
+        let words = "level 8 of `default` does not exist: `rooms` has levels 0 to 7";
+        assert_eq!(check("default:5..8", 8), Err(words.to_owned()));
+        let words = "level 1 of `default` does not exist: `rooms` has only one, level 0";
+        assert_eq!(check("default:1", 1), Err(words.to_owned()));
     }
 
     #[test]

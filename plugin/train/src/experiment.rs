@@ -378,7 +378,7 @@ impl From<Algorithm> for String {
 
 // The default experiment, and presets.
 
-/// Number of training levels, and of test levels after them, for a game without its own experiment.
+/// Largest number of training levels, and of test levels after them, for a game without its own experiment.
 const LEVELS: u64 = 64;
 
 /// Returns the experiment of a program's first game, see [`experiment_of`].
@@ -387,7 +387,8 @@ pub fn default_experiment(games: &Games) -> ExperimentText {
 }
 
 /// Returns the default experiment of a game. A game without its own experiment gets the simplest: SCORE-PPO in its
-/// first mode, from the recording in `demos/` with the game's name.
+/// first mode, from the recording in `demos/` with the game's name. It trains on the first half of the levels and holds
+/// out the second, up to 64 each. A single level is in both.
 pub fn experiment_of(game: &dyn Game) -> ExperimentText {
     game.tools().training.experiment().unwrap_or_else(|| ExperimentText {
         origin: format!("the experiment of {}", game.name()).into(),
@@ -397,11 +398,12 @@ pub fn experiment_of(game: &dyn Game) -> ExperimentText {
 
 fn plainest(game: &dyn Game) -> String {
     let (name, mode) = (game.name(), game.modes().first().copied().unwrap_or_default());
-    let last = LEVELS - 1;
+    let last = game.tools().levels.last_level().unwrap_or(u64::MAX).min(2 * LEVELS - 1);
+    let held_out = last.div_ceil(2);
+    let trained = held_out.saturating_sub(1);
     format!(
-        "(game: \"{name}\", train: \"{mode}:0..{last}\", test: \"{mode}:{LEVELS}..{}\", demos: \"demos/{name}\", \
-         steps: 500000)",
-        2 * LEVELS - 1
+        "(game: \"{name}\", train: \"{mode}:0..{trained}\", test: \"{mode}:{held_out}..{last}\", demos: \
+         \"demos/{name}\", steps: 500000)"
     )
 }
 
@@ -418,6 +420,49 @@ pub fn find_preset(name: &str) -> Result<ExperimentFile, UnknownName> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::file::parse_experiment;
+    use bevy::prelude::App;
+    use playbot_harness::foreign::ForeignGame;
+    use std::path::Path;
+
+    #[test]
+    fn the_default_experiment_has_no_level_past_the_last_one() {
+        let game = |count| ForeignGame::new("rooms", 1, |_: &mut App| {}).levels(count);
+        let of = |game: &ForeignGame| {
+            let experiment = parse_experiment(&experiment_of(game).text, Path::new("x.ron")).expect("valid");
+            experiment.check_levels(game).expect("levels of the game");
+            (experiment.train.to_string(), experiment.test.to_string())
+        };
+        for (count, train, test) in [
+            (1, "default:0..0", "default:0..0"),
+            (2, "default:0..0", "default:1..1"),
+            (7, "default:0..2", "default:3..6"),
+            (8, "default:0..3", "default:4..7"),
+            (127, "default:0..62", "default:63..126"),
+            (128, "default:0..63", "default:64..127"),
+            (500, "default:0..63", "default:64..127"),
+        ] {
+            assert_eq!(of(&game(count)), (train.to_owned(), test.to_owned()), "{count} levels");
+        }
+        let endless = ForeignGame::new("rooms", 1, |_: &mut App| {});
+        assert_eq!(of(&endless), ("default:0..63".to_owned(), "default:64..127".to_owned()));
+    }
+
+    #[test]
+    fn a_single_level_is_trained_and_tested_only_if_there_is_no_other() {
+        let text = r#"(game: "rooms", train: "default:0", test: "default:0", demos: "d", steps: 10)"#;
+        let experiment = parse_experiment(text, Path::new("x.ron")).expect("valid");
+        let game = |count| ForeignGame::new("rooms", 1, |_: &mut App| {}).levels(count);
+        assert_eq!(experiment.check_levels(&game(1)), Ok(()));
+        let words = experiment.check_levels(&game(2)).expect_err("level 1 can be held out").to_string();
+        assert_eq!(
+            words,
+            "level 0 of the training levels default:0..0 is one of the held-out levels default:0..0: choose others"
+        );
+        let text = text.replace("default:0", "default:3");
+        let words = parse_experiment(&text, Path::new("x.ron")).expect_err("they overlap").to_string();
+        assert!(words.contains("choose ranges that share no level"), "{words}");
+    }
 
     #[test]
     fn those_that_are_trained_are_all_but_cloning() {

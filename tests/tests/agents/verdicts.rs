@@ -58,9 +58,9 @@ fn levels_of_an_editor_have_their_names_in_results() {
         .observe(["x"], || [0.0])
         .end(|| Some(EpisodeEnd::WON))
         .editor_levels(Ok(vec![level("Pantry"), level("Cave")]));
-    let found = verdicts(&game, &plan("default:0..2", vec![tester("random", BlindBot::Uniform)], 1));
+    let found = verdicts(&game, &plan("default:0..1", vec![tester("random", BlindBot::Uniform)], 1));
     let titles: Vec<String> = found.iter().map(LevelVerdict::title).collect();
-    assert_eq!(titles, ["default:0 Pantry", "default:1 Cave", "default:2 Pantry"], "there are two levels");
+    assert_eq!(titles, ["default:0 Pantry", "default:1 Cave"]);
     let line = serde_json::to_value(&found[1]).expect("JSON");
     assert_eq!((&line["level"], &line["name"]), (&"default:1".into(), &"Cave".into()));
     let mut older = line.clone();

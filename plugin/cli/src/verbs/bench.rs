@@ -13,6 +13,7 @@ use playbot_harness::{
     games::Games,
     parallel::{default_threads, on_threads},
     prelude::*,
+    split::last_level,
     worlds::{Arrangement, build_observing_world, is_bound_to_its_thread},
 };
 use playbot_learner::waited;
@@ -171,15 +172,16 @@ impl Measure {
     }
 }
 
-/// Measures random actions on 64 levels, with observations filled every tick.
+/// Measures random actions on up to 64 levels, with observations filled every tick.
 fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
     let observation_config = ObservationConfig { kind, ..ObservationConfig::default() };
     let arrangement = Arrangement::new(game, args.arenas, args.threads as u32);
+    let last = last_level(game, mode).unwrap_or(u64::MAX).min(63);
     let mut worlds = Vec::new();
     for first in arrangement.first_agents() {
         let (mut world, agents) = build_observing_world(game, mode, &observation_config, 1, first, arrangement.arenas)?;
         for agent in agents {
-            let queue = LevelQueue::Uniform { first: 0, last: 63 };
+            let queue = LevelQueue::Uniform { first: 0, last };
             world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
         }
         worlds.push(world);

@@ -129,7 +129,7 @@ pub struct MakeArgs {
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u64).range(..=1_000_000))]
     sound: u64,
     /// Levels of a game to plant defects into and to list as unmutated (once for each game). Default: numbers from
-    /// 1000000 on, in the mode of the game's held-out levels.
+    /// 1000000 on, in the mode of the game's held-out levels, or all levels of a game that has no such numbers.
     #[arg(long, value_name = "GAME=MODE:FIRST..LAST")]
     levels: Vec<LevelsOf>,
     #[command(flatten)]
@@ -227,7 +227,7 @@ fn source<'a>(args: &MakeArgs, game: &'a dyn Game) -> Result<Source<'a>, CliErro
         None => {
             let held_out = default.as_ref().map(|default| &default.test).filter(|split| is_mode(split));
             let mode = held_out.map_or_else(|| default_mode(game).to_owned(), |split| split.mode.clone());
-            LevelSplit { mode, first: FIRST, last: LAST }
+            LevelSplit { mode, first: FIRST, last: LAST }.within(game)
         }
     };
     levels.check(game)?;

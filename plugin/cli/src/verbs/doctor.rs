@@ -10,7 +10,6 @@ use playbot_harness::{
     doctor::{DoctorOptions, examine},
     game::Game,
     games::Games,
-    level_files::is_level_files,
     prelude::*,
     split::check_level,
     worlds::build_world,
@@ -44,8 +43,8 @@ pub struct Args {
     /// Ticks of each comparison. More of them find rare and late differences.
     #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
     ticks: u32,
-    /// Number of the level to examine (repeatable; default: 0 and 1). Further ones are played twice, and after the level
-    /// before them.
+    /// Number of the level to examine, or its name in a level editor (repeatable; default: 0 and 1). Further ones are played
+    /// twice, and after the level before them.
     #[arg(long, value_name = "N")]
     level: Vec<u64>,
     /// Random seed of the actions (default: 0).
@@ -110,10 +109,9 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     Ok(if report.is_healthy() { Outcome::Pass } else { Outcome::Findings })
 }
 
-/// Returns whether level 1 of a mode is another level than level 0.
+/// Returns whether a mode has a level 1.
 fn has_second_level(game: &dyn Game, mode: &str) -> bool {
-    let is_only_one = !is_level_files(mode) && game.tools().levels.level_count().is_some_and(|count| count < 2);
-    !is_only_one && check_level(game, mode, 1).is_ok()
+    check_level(game, mode, 1).is_ok()
 }
 
 /// Returns the ticks per second of one arena under random actions, by the clock.

@@ -62,10 +62,10 @@ pub struct Args {
     /// Sensor for policies that read pictures: camera or raster (default: the one that the policy was trained with).
     #[arg(long)]
     observation: Option<ObservationKind>,
-    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/**/*.json". Default: the
-    /// experiment's held-out levels, or those of the game's own experiment if a policy file is of another game than the
-    /// experiment.
-    #[arg(long)]
+    /// Levels, as mode:first..last, both included, as files:pattern, such as "files:levels/**/*.json", or by their names in
+    /// a level editor (repeatable). Default: the experiment's held-out levels, or those of the game's own experiment if a
+    /// policy file is of another game than the experiment.
+    #[arg(long, visible_alias = "level")]
     levels: Vec<LevelSplit>,
     /// Leave out levels of a layout that some player has learned from, under any number. Held-out levels are always
     /// measured so.

@@ -58,7 +58,8 @@ use std::{
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Level, as mode:number (default: level 0 of the mode that `train` trains in).
+    /// Level, as mode:number, as a number of the mode that `train` trains in, or by its name in a level editor (default:
+    /// level 0 of that mode).
     #[arg(long, value_name = "MODE:N", value_parser = one_level)]
     level: Option<LevelSplit>,
     /// Environment steps to use, including returns to known cells. The last visits may take some more.

@@ -33,7 +33,7 @@ pub struct Args {
     game: String,
     /// Levels, as mode:first..last, both included (default: levels 0 to 49 of the mode that `train` trains in). The
     /// game's demonstrator, or else the first of its bots, plays each once.
-    #[arg(long)]
+    #[arg(long, visible_alias = "level")]
     levels: Option<LevelSplit>,
     /// Frames to compare on each level, spread over the episode.
     #[arg(long, default_value_t = 10)]

@@ -1,7 +1,7 @@
 //! `playbot levels`.
 
 use crate::{
-    arguments::{Threads, check_start, default_held_out, first_levels},
+    arguments::{Threads, check_start, default_tested},
     error::{CliError, Outcome},
     output::print_line,
     progress,
@@ -39,9 +39,10 @@ use std::collections::{BTreeMap, BTreeSet};
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json" (default: the
-    /// held-out levels of the game's experiment).
-    #[arg(long)]
+    /// Levels, as mode:first..last, both included, as files:pattern, such as "files:levels/*.json", or by their names in a
+    /// level editor (default: the held-out levels of the game's experiment, or all of a game that has no experiment and at
+    /// most 64 levels).
+    #[arg(long, visible_alias = "level")]
     levels: Option<LevelSplit>,
     /// Other levels, such as those of a training: name the audited levels that are among them, by number, as a file,
     /// by their layout or by their play (repeatable).
@@ -63,7 +64,7 @@ const SHOWN: usize = 10;
 pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let levels = args.levels.clone().unwrap_or_else(|| {
-        let default = default_held_out(game).unwrap_or_else(|| first_levels(game, 63));
+        let default = default_tested(game);
         report!("no --levels are named: {default}");
         default
     });

@@ -41,14 +41,14 @@ pub struct Args {
     /// Mode of the game (default: that of the levels, or else the one that `train` trains in).
     #[arg(long)]
     mode: Option<String>,
-    /// Number of the level to begin with (default: the first of the levels).
+    /// Number of the level to begin with, or its name in a level editor (default: the first of the levels).
     #[arg(long, value_name = "N")]
     level: Option<u64>,
     /// Random seed of the autopilot's draws (default: 0).
     #[arg(long)]
     seed: Option<u64>,
-    /// Levels, as first..last or mode:first..last, both included, or files:pattern, such as "files:levels/*.json"
-    /// (default: all).
+    /// Levels, as first..last or mode:first..last, both included, as files:pattern, such as "files:levels/*.json", or by
+    /// their names in a level editor (default: all).
     #[arg(long)]
     levels: Option<String>,
     /// Recording to write.

@@ -40,10 +40,10 @@ use std::{
 pub struct Args {
     /// Name of the game.
     game: String,
-    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json". They are played in
-    /// order, again and again until --steps is reached. Default: levels 0 to 499 of the mode that `train` trains in,
-    /// but for the held-out ones of the game's own experiment.
-    #[arg(long)]
+    /// Levels, as mode:first..last, both included, as files:pattern, such as "files:levels/*.json", or by their names in a
+    /// level editor. They are played in order, again and again until --steps is reached. Default: levels 0 to 499 of the
+    /// mode that `train` trains in, but for the held-out ones of the game's own experiment.
+    #[arg(long, visible_alias = "level")]
     levels: Option<LevelSplit>,
     /// Leave out these levels, and any of the same layout as one of them (repeatable).
     #[arg(long, value_name = "LEVELS")]

@@ -11,7 +11,7 @@ mod results;
 mod testers;
 
 use crate::{
-    arguments::{Compute, check_start, default_held_out, experiment::quoted, first_levels, report_agents_along},
+    arguments::{Compute, check_start, default_tested, experiment::quoted, report_agents_along},
     error::{CliError, Outcome},
     progress,
     progress::interrupt,
@@ -59,9 +59,10 @@ pub use crate::verbs::test::results::{Results, report_results};
 pub struct Args {
     /// Name of the game (not with --regress).
     game: Option<String>,
-    /// Levels, as mode:first..last, both included, or files:pattern, such as "files:levels/*.json", or the name of a
-    /// level in its editor (default: the held-out levels of the game's experiment).
-    #[arg(long)]
+    /// Levels, as mode:first..last, both included, as files:pattern, such as "files:levels/*.json", or by their names in a
+    /// level editor (default: the held-out levels of the game's experiment, or all of a game that has no experiment and at
+    /// most 64 levels).
+    #[arg(long, visible_alias = "level")]
     levels: Option<LevelSplit>,
     #[command(flatten)]
     testers: TesterArgs,
@@ -170,7 +171,7 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
     let split = match &args.levels {
         Some(split) => split.clone(),
         None => {
-            let default = default_held_out(game).unwrap_or_else(|| first_levels(game, 63));
+            let default = default_tested(game);
             report!("no --levels are named: {default}");
             default
         }

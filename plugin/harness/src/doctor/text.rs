@@ -99,22 +99,20 @@ impl DoctorReport {
     }
 
     fn write_safety(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { level, further_levels, seed, ticks, .. } = self;
+        let Self { further_levels, seed, ticks, .. } = self;
         writeln!(f, "Safe for")?;
         let verdicts = self.safety.all();
         for (what, verdict) in verdicts {
             writeln!(f, "  {what:<26}{}", in_words(verdict))?;
         }
         if verdicts.iter().any(|(_, verdict)| verdict.safe == Some(true)) {
-            let last = further_levels.iter().fold(*level, |last, level| last.max(*level));
-            let (longer, level, seed) = (ticks.saturating_mul(10), last.wrapping_add(1), seed.wrapping_add(1));
+            let (longer, seed) = (ticks.saturating_mul(10), seed.wrapping_add(1));
+            let level =
+                self.another_level.map_or_else(String::new, |level| format!("`--level {level}` another level, "));
             let played = if further_levels.is_empty() { "this one level".to_owned() } else { self.levels() };
             let ticks = counted(u64::from(*ticks), "tick");
             writeln!(f, "  \"yes\" means that no difference was found in {ticks} of {played}, not that there")?;
-            writeln!(
-                f,
-                "  is none: `--ticks {longer}` plays longer, `--level {level}` another level, `--seed {seed}` other actions."
-            )?;
+            writeln!(f, "  is none: `--ticks {longer}` plays longer, {level}`--seed {seed}` other actions.")?;
         }
         Ok(())
     }

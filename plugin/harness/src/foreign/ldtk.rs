@@ -531,7 +531,11 @@ mod tests {
         assert_eq!((&json["name"], &json["rows"][1]), (&json!("Two"), &json!("S^G")));
         assert!(view.picture.is_some());
         let levels = game.tools().levels;
-        assert_eq!(levels.level_name("default", 3).as_deref(), Some("Two"));
+        assert_eq!(levels.level_name("default", 1).as_deref(), Some("Two"));
+        assert_eq!(levels.last_level(), Some(1));
+        let beyond = game.show_level(&crate::inspect::LevelRequest { level: Some(2), ..request });
+        let words = beyond.map(drop).expect_err("there are two levels").to_string();
+        assert_eq!(words, "level 2 of `default` does not exist: `cellar` has levels 0 to 1");
         assert!(levels.floor_plan("default", 1).is_some_and(|plan| plan.goal.x == 40.0));
         assert_eq!(Game::layout(&game, "default", 0), Game::layout(&game, "default", 1), "they are copies");
     }

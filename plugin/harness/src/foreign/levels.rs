@@ -495,7 +495,7 @@ impl ForeignGame {
     ///     |level: Res<EditorLevel>| info!("the game loads {}", level.name),
     /// );
     /// assert_eq!(game.level_count(), Some(2));
-    /// assert_eq!(game.tools().levels.level_name("default", 3).as_deref(), Some("stairs"));
+    /// assert_eq!(game.tools().levels.level_name("default", 1).as_deref(), Some("stairs"));
     /// assert_eq!(game.tools().levels.level_names("default"), ["pantry", "stairs"]);
     /// ```
     pub fn editor_levels(self, levels: Result<Vec<EditorLevel>, String>) -> Self {
@@ -586,17 +586,13 @@ impl ForeignGame {
 
     /// Describes a level by its number and its plan.
     fn of_number(&self, (mode, level): (&str, u64), plan: Option<&FloorPlan>) -> KnownLevel {
-        let (title, played) = (format!("{mode}:{level}"), self.level_of(level));
+        let title = format!("{mode}:{level}");
         let mut head = format!("{title} of `{}`", self.name());
         if let Some(count) = self.level_count() {
-            head += &format!(", which has {count} levels");
-        }
-        if played != level {
-            head += &format!(": the same as {mode}:{played}");
+            head += &if count == 1 { ", its only one".to_owned() } else { format!(", which has {count} levels") };
         }
         let text = format!("{head}\n{}", in_words(plan));
-        let json =
-            serde_json::json!({ "mode": mode, "level": level, "played": played, "rows": plan.map(FloorPlan::rows) });
+        let json = serde_json::json!({ "mode": mode, "level": level, "rows": plan.map(FloorPlan::rows) });
         KnownLevel { title, text, json }
     }
 
@@ -650,8 +646,8 @@ fn in_words(plan: Option<&FloorPlan>) -> String {
 }
 
 impl LevelTools for ForeignGame {
-    fn level_count(&self) -> Option<u64> {
-        self.description.levels
+    fn last_level(&self) -> Option<u64> {
+        self.description.levels.map(|levels| levels.saturating_sub(1))
     }
 
     fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
@@ -895,17 +891,19 @@ mod tests {
             goal: Vec2::new(1.5 + level as f32, 1.5),
             ..FloorPlan::default()
         };
-        let request = LevelRequest { mode: Some("hard"), level: Some(4), ..LevelRequest::default() };
+        let request = LevelRequest { mode: Some("hard"), level: Some(1), ..LevelRequest::default() };
         let bare = shown(&game(), request).expect("a level");
-        let head = "hard:4 of `finder`, which has 3 levels: the same as hard:1\n";
+        let head = "hard:1 of `finder`, which has 3 levels\n";
         assert_eq!(bare.text, format!("{head}the game declares no plan of it: see `.plan` and `.plan_of_file`"));
         let json: serde_json::Value = serde_json::from_str(&bare.json).expect("JSON");
-        assert_eq!(json, serde_json::json!({ "mode": "hard", "level": 4, "played": 1, "rows": null }));
+        assert_eq!(json, serde_json::json!({ "mode": "hard", "level": 1, "rows": null }));
         let error = shown(&game(), LevelRequest { picture: true, ..request }).expect_err("nothing to draw");
         assert!(error.contains("`finder` has no plan of this level to draw: give one with `.plan`"), "{error}");
         let view = shown(&game().plan(plan), LevelRequest { picture: true, ..request }).expect("a level");
         assert_eq!(view.text, format!("{head}S.G.\n####\nS start  G goal  # wall  ^ kills  = platform"));
         assert!(view.picture.is_some());
+        let error = shown(&game(), LevelRequest { level: Some(3), ..request }).expect_err("no such level");
+        assert_eq!(error, "level 3 of `hard` does not exist: `finder` has levels 0 to 2");
         let error = shown(&game(), LevelRequest { map: Some("big"), ..LevelRequest::default() }).expect_err("no map");
         assert!(error.starts_with("the levels of `finder` are no maps: name one with --level"), "{error}");
     }

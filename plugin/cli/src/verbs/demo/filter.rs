@@ -40,7 +40,7 @@ pub(super) struct FilterArgs {
     /// Keep the recordings of this player, by the name in their header.
     #[arg(long, value_name = "NAME")]
     player: Option<String>,
-    /// Keep episodes on these levels, as mode:first..last or mode:number (repeatable).
+    /// Keep episodes on these levels, as mode:first..last or mode:number, or by their names in a level editor (repeatable).
     #[arg(long, visible_alias = "level")]
     levels: Vec<LevelSplit>,
     /// Mark the leading ticks with the game's idle action. Replays play them, and `learn-skills` leaves them out.

@@ -52,7 +52,7 @@ fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
         Some(text) if text.contains(':') => text.parse()?,
         Some(text) => format!("{mode}:{text}").parse()?,
         None if is_level_files(mode) => mode.parse()?,
-        None => LevelSplit { mode: mode.to_owned(), first: 0, last: LAST_LEVEL },
+        None => LevelSplit { mode: mode.to_owned(), first: 0, last: LAST_LEVEL }.within(game),
     };
     levels.check(game)?;
     if named.is_some_and(|mode| mode != levels.mode) {

@@ -26,4 +26,46 @@ fn rooms_are_named_as_in_their_editor() {
     shell.done(&["test", "cellar", "--levels", "Pantry", "--bot", "guide", "--out", "tested"]);
     let line = fs::read_to_string(shell.path("tested/results.json")).expect("results");
     assert!(line.contains("\"level\":\"default:0\"") && line.contains("\"name\":\"Pantry\""), "{line}");
+    shell.done(&["test", "cellar", "--level", "Pantry,Stairs", "--bot", "guide", "--out", "both"]);
+    let lines = fs::read_to_string(shell.path("both/results.json")).expect("results");
+    assert!(lines.contains("\"name\":\"Pantry\"") && lines.contains("\"name\":\"Stairs\""), "{lines}");
+}
+
+/// Returns what a refused command prints.
+fn refused(shell: &Shell, args: &[&str]) -> String {
+    let output = shell.command(args).output().expect("the program starts");
+    let printed = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert_eq!(output.status.code(), Some(3), "{args:?}: {printed}");
+    printed
+}
+
+#[test]
+fn no_verb_goes_past_the_last_room() {
+    let shell = Shell::new(GAME.program);
+    let beyond = "of `default` does not exist: `cellar` has levels 0 to 239";
+    for args in [
+        &["level", "cellar", "--level", "240"][..],
+        &["test", "cellar", "--levels", "default:238..242", "--bot", "guide", "--out", "none"],
+        &["record", "cellar", "--levels", "240", "--out", "none.demo"],
+        &["eval", "--bot", "guide", "--levels", "default:999"],
+        &["levels", "cellar", "--levels", "0..240"],
+        &["view", "cellar", "--level", "240"],
+        &["trace", "cellar", "--level", "240", "--actions", "0"],
+        &["explore", "cellar", "--level", "240"],
+        &["doctor", "cellar", "--level", "240"],
+        &["bugs", "make", "cellar", "--levels", "cellar=default:0..240", "--out", "none"],
+    ] {
+        let printed = refused(&shell, args);
+        assert!(printed.contains(beyond), "{args:?}: {printed}");
+    }
+    let another = shell.done(&["doctor", "cellar", "--level", "239", "--ticks", "20"]);
+    assert!(another.contains("`--level 0` another level"), "{another}");
+}
+
+#[test]
+fn a_room_that_does_not_exist_is_refused_with_the_first_rooms_and_the_usage_of_the_verb() {
+    let shell = Shell::new(GAME.program);
+    let printed = refused(&shell, &["level", "cellar", "--level", "Sellar"]);
+    assert!(printed.contains("no level `Sellar`: its levels are Pantry, Stairs, Larder and 237 more"), "{printed}");
+    assert!(printed.contains(" level [OPTIONS]"), "{printed}");
 }
