@@ -29,6 +29,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let playlist = playlist(game, &args)?;
     let (autopilot, observation_config) = autopilot(game, &args)?;
+    check_time_limit(game, &args)?;
     let header = header(game, playlist.mode(), &args);
     let seed = args.seed.unwrap_or(0);
     let mut window =
@@ -38,11 +39,26 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         window.check_recording()?;
         window.record(args.overwrite.open(path, header)?);
     }
+    if args.no_time_limit {
+        window.lift_time_limit();
+    }
     interrupt::listen();
     window.announce(announcement(game, &args));
     let unbound = window.unbound_keys();
     window.run()?;
     args.record.as_deref().map_or(Ok(Outcome::Pass), |path| conclude(path, &unbound))
+}
+
+/// Checks that there is a time limit to lift.
+fn check_time_limit(game: &dyn Game, args: &Args) -> Result<(), CliError> {
+    if !args.no_time_limit || game.tools().host.time_limit().is_some() {
+        return Ok(());
+    }
+    Err(CliError::Usage(format!(
+        "`{}` has no time limit that could be lifted: no adapter sets one with `.time_limit`, and a limit that is a rule \
+         of the game stays; leave out --no-time-limit",
+        game.name()
+    )))
 }
 
 fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
@@ -100,6 +116,13 @@ fn announcement(game: &dyn Game, args: &Args) -> Vec<String> {
     let is_by_actions = game.tools().input.key_bindings().is_some() || args.record.is_some();
     if let Some(problem) = without_idle_action(game).filter(|_| is_by_actions) {
         lines.push(format!("warning: {problem}"));
+    }
+    if let Some(limit) = game.tools().host.time_limit() {
+        let limit = counted(u64::from(limit), "tick");
+        lines.push(match args.no_time_limit {
+            true => format!("there is no time limit; bots have {limit} for a level"),
+            false => format!("time limit, as for bots: {limit} for a level; --no-time-limit lifts it"),
+        });
     }
     if args.autopilot.is_named() {
         lines.push("Tab hands over and takes over again".to_owned());
