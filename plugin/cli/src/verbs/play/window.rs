@@ -46,7 +46,11 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     window.announce(announcement(game, &args));
     let unbound = window.unbound_keys();
     window.run()?;
-    args.record.as_deref().map_or(Ok(Outcome::Pass), |path| conclude(path, &unbound))
+    if let Some(path) = &args.record {
+        conclude(path, &unbound)?;
+    }
+    // A signal ends the program as it ends any other verb. A person who is done presses Escape.
+    Ok(if interrupt::asked() { Outcome::Stopped } else { Outcome::Pass })
 }
 
 /// Checks that there is a time limit to lift.
@@ -133,7 +137,7 @@ fn announcement(game: &dyn Game, args: &Args) -> Vec<String> {
 }
 
 /// Prints the path of the recording, its contents, the keys that are not in it, and the next commands.
-fn conclude(path: &Path, unbound: &UnboundKeys) -> Result<Outcome, CliError> {
+fn conclude(path: &Path, unbound: &UnboundKeys) -> Result<(), CliError> {
     let summary = DemoSummary::read(path)?;
     let file = path.display();
     report!(
@@ -146,5 +150,5 @@ fn conclude(path: &Path, unbound: &UnboundKeys) -> Result<Outcome, CliError> {
     let program = program::name();
     report!("  {program} demo verify {file}   proves that it replays");
     report!("  {program} learn-skills --set demos={file} --out skills.safetensors   learns from it");
-    Ok(Outcome::Pass)
+    Ok(())
 }
