@@ -143,6 +143,14 @@ fn a_crash_costs_the_running_episode_only() {
 }
 
 #[test]
+fn a_limit_that_is_a_rule_of_the_game_is_not_lifted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = command(folder.path(), &["play", "coinrun", "--no-time-limit"]).output().expect("the program starts");
+    assert_eq!(code(&output), 3, "{}", errors(&output));
+    assert!(errors(&output).contains("`coinrun` has no time limit that could be lifted"), "{}", errors(&output));
+}
+
+#[test]
 fn a_signal_ends_a_window_with_its_own_exit_code() {
     let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
     for (signal, expected, args) in
