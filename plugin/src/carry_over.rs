@@ -237,6 +237,7 @@ mod tests {
                 "EpisodeTrace",
                 "LegalActions",
                 "LevelQueue",
+                "NoTimeLimit",
                 "Recording",
                 "RedrawsIllegal",
                 "Replay",

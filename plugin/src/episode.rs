@@ -45,6 +45,12 @@ use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::{cell::Cell, fmt};
 
+/// Lifts the time limit of an agent's episodes, as for a person, who is slower than a bot. Games that end episodes by
+/// rules of their own ignore it.
+#[derive(Component, Clone, Copy, Debug, Default, Reflect)]
+#[reflect(Component, CarryComponent, Clone, Debug, Default)]
+pub struct NoTimeLimit;
+
 /// The end of an episode.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, Reflect)]
 pub enum EpisodeEnd {

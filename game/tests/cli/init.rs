@@ -156,7 +156,13 @@ fn the_adapter_of_a_game_in_fixed_steps_has_a_frame_for_each() {
     }
     write(folder, &[("src/lib.rs", LIBRARY)]);
     let (printed, _) = done(folder, &["init", "--dry-run"]);
-    assert!(printed.contains("fixed steps: none found\n") && !printed.contains(".hz("), "{printed}");
+    let missing = printed.lines().find_map(|line| line.strip_prefix("none found: ")).expect("a line of all of them");
+    assert!(missing.split(", ").any(|what| what == "fixed steps") && !printed.contains(".hz("), "{printed}");
+    assert!(missing.split(", ").any(|what| what == "folder of assets"), "{printed}");
+    assert_eq!(printed.matches("none found").count(), 1, "{printed}");
+    fs::create_dir(folder.join("assets")).expect("writable");
+    let (printed, _) = done(folder, &["init", "--dry-run"]);
+    assert!(printed.contains("\nfolder of assets: assets\n"), "{printed}");
 }
 
 #[test]
@@ -187,14 +193,35 @@ fn a_game_in_its_main_alone_gets_a_library_and_the_lines_to_move() {
     assert!(found.contains("library: none\n"), "{found}");
     assert!(read(folder, "src/lib.rs").contains("pub fn plugin(app: &mut App) {"));
     assert!(read(folder, "bots/src/lib.rs").contains("ForeignGame::new(\"my-game\", 1, my_game::plugin)\n"));
-    for line in [
+    let moves = [
         "to do: move the game from src/main.rs to src/lib.rs:",
         "  lines 4 to 6, all but `DefaultPlugins` and `run`, into `plugin`",
         "  line 2, `mod rules;`, as `pub mod rules;`",
-    ] {
-        assert!(reported.lines().any(|reported| reported == line), "{line}: {reported}");
-    }
+    ];
+    let names_all = |reported: &str| {
+        for line in moves {
+            assert!(reported.lines().any(|reported| reported == line), "{line}: {reported}");
+        }
+    };
+    names_all(&reported);
     assert_eq!(read(folder, "src/main.rs"), MAIN);
+
+    // Nothing has been moved yet: the library is still the one that was written.
+    let (found, reported) = done(folder, &["init", "--edit-workspace"]);
+    assert!(
+        found.contains("library: src/lib.rs, which is still empty\n") && !found.contains("App`: plugin"),
+        "{found}"
+    );
+    assert!(reported.contains("left alone: src/lib.rs exists already"), "{reported}");
+    names_all(&reported);
+    // A comment is no game.
+    let stub = read(folder, "src/lib.rs");
+    write(folder, &[("src/lib.rs", &stub.replace("// TODO: move", "// I shall move"))]);
+    names_all(&done(folder, &["init"]).1);
+    write(folder, &[("src/lib.rs", &stub.replace("let _ = app;", "app.add_systems(Update, walk);"))]);
+    let (found, reported) = done(folder, &["init"]);
+    assert!(found.contains("library: src/lib.rs\n") && found.contains("App`: plugin (src/lib.rs:6)\n"), "{found}");
+    assert!(!reported.contains("to do: move"), "{reported}");
 }
 
 #[test]
@@ -215,6 +242,16 @@ fn the_game_of_a_workspace_gets_the_bots_beside_it() {
     assert!(reported.contains("add \"bots\" to `members` of [workspace] in "), "{reported}");
     let (_, refused) = ended(&folder.join("crates/game"), &["init"], 3);
     assert!(refused.contains("is a member of the workspace in ") && refused.contains("--package NAME"), "{refused}");
+}
+
+#[test]
+fn the_path_of_a_manifest_names_its_folder() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write(folder, &[("game/Cargo.toml", MANIFEST), ("game/src/lib.rs", LIBRARY)]);
+    let by_folder = done(folder, &["init", "game", "--dry-run"]).0;
+    assert_eq!(done(folder, &["init", "game/Cargo.toml", "--dry-run"]).0, by_folder);
+    assert_eq!(done(&folder.join("game"), &["init", "Cargo.toml", "--dry-run"]).0, by_folder);
 }
 
 #[test]
@@ -245,7 +282,8 @@ fn a_folder_without_a_game_for_this_bevy_is_refused() {
     write(folder, &[("two/Cargo.toml", "[workspace]\nmembers = [\"a\", \"b\"]\n")]);
     write(folder, &[("two/a/Cargo.toml", MANIFEST), ("two/b/Cargo.toml", &MANIFEST.replace("my-game", "other"))]);
     for (args, words) in [
-        (&["init", "none"][..], "none/Cargo.toml does not exist: call `playbot init` in the folder of a Bevy game"),
+        (&["init", "none/Cargo.toml"][..], "none/Cargo.toml does not exist: call"),
+        (&["init", "none"], "none/Cargo.toml does not exist: call `playbot init` in the folder of a Bevy game"),
         (&["init", "plain"], "plain/Cargo.toml does not depend on `bevy`: playbot tests games"),
         (
             &["init", "older"],

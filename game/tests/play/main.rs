@@ -143,6 +143,31 @@ fn a_crash_costs_the_running_episode_only() {
 }
 
 #[test]
+fn a_limit_that_is_a_rule_of_the_game_is_not_lifted() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let output = command(folder.path(), &["play", "coinrun", "--no-time-limit"]).output().expect("the program starts");
+    assert_eq!(code(&output), 3, "{}", errors(&output));
+    assert!(errors(&output).contains("`coinrun` has no time limit that could be lifted"), "{}", errors(&output));
+}
+
+#[test]
+fn a_signal_ends_a_window_with_its_own_exit_code() {
+    let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
+    for (signal, expected, args) in
+        [("-TERM", 143, &["--record", "a.demo"][..]), ("-INT", 130, &["--record", "b.demo"]), ("-TERM", 143, &[])]
+    {
+        let mut seat = desk.open(folder.path(), &[&["play", "coinrun", "--level", "0"][..], args].concat());
+        seat.pass_ticks(3);
+        seat.send(signal);
+        let (status, said) = seat.leave();
+        assert_eq!(status.code(), Some(expected), "{signal} {args:?}: {said}");
+        if let [_, file] = args {
+            verified(folder.path(), file);
+        }
+    }
+}
+
+#[test]
 fn a_missing_server_and_a_missing_driver_are_named() {
     let (desk, folder) = (Desk::new(PLAYBOT), tempfile::tempdir().expect("a folder"));
     let refuse = |vars: &[(&str, &str)], words: &str| {

@@ -115,14 +115,29 @@ fn recordings_of_many_testers_become_one_that_replays() {
 }
 
 #[test]
+fn a_copy_with_another_name_is_reported_by_a_merge() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    record(folder, "ada.demo", &["--levels", "easy:0..1"]);
+    let labelled = playbot(folder, &["demo", "label", "ada.demo", "--player", "bob", "--out", "bob.demo"]);
+    assert_eq!(code(&labelled), 0, "{}", errors(&labelled));
+    let merged = playbot(folder, &["demo", "merge", "--out", "all.demo", "ada.demo", "bob.demo", "--json"]);
+    assert_eq!(code(&merged), 0, "{}", errors(&merged));
+    assert!(errors(&merged).contains("warning: 2 episodes are equal to ones of other files"), "{}", errors(&merged));
+    assert_eq!(lines(&merged)[0]["equal_episodes"], 2);
+}
+
+#[test]
 fn recordings_that_do_not_belong_together_are_not_merged() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();
     record(folder, "easy.demo", &["--levels", "easy:0..0"]);
     record(folder, "hard.demo", &["--levels", "hard:0..0"]);
+    record(folder, "noisy.demo", &["--levels", "easy:0..0", "--noise", "0.5"]);
     let merge = |files: &[&str]| playbot(folder, &[&["demo", "merge", "--out", "all.demo"], files].concat());
     for (files, words) in [
         (&["easy.demo", "hard.demo"][..], "mode `hard`"),
+        (&["easy.demo", "noisy.demo"], "`noise` is 0.5, but 0.0 in easy.demo: put both into one folder"),
         (&["easy.demo", "./easy.demo"], "easy.demo"),
         (&["easy.demo", "nothing.demo"], "nothing.demo"),
         (&[], "<FILE>"),
@@ -152,6 +167,23 @@ fn recordings_are_shown_in_plain_words() {
     }
     let ticks = said(&show(&["--episode", "0"]));
     assert!(ticks.contains("  bot\n") && !(shown + &ticks).contains(['{', '"']), "{ticks}");
+    assert!(
+        ticks.lines().any(|line| line.contains("  action 7 right ") || line.contains("  action 8 right+jump ")),
+        "actions have names: {ticks}"
+    );
+    let some = show(&["--episode", "0", "--ticks", "3..5", "--json"]);
+    let some: Vec<_> =
+        lines(&some).iter().map(|tick| (tick["tick"].as_u64(), tick["action_name"].is_string())).collect();
+    assert_eq!(some, [3, 4, 5].map(|tick| (Some(tick), true)));
+    for (more, words) in [
+        (&["--episode", "0", "--ticks", "90000"][..], "--ticks begins with 90000, but episode 0 of a.demo has "),
+        (&["--episode", "0", "--ticks", "9..3"], "the first tick is behind the last one"),
+        (&["--ticks", "3..5"], "--episode"),
+    ] {
+        let refused = show(more);
+        assert_eq!(code(&refused), 3, "{more:?}: {}", errors(&refused));
+        assert!(errors(&refused).contains(words), "{more:?}: {}", errors(&refused));
+    }
     let none = show(&["--episode", "7"]);
     assert!(errors(&none).contains("has no episode 7; it has 1 episode, counted from 0"), "{}", errors(&none));
 }

@@ -45,6 +45,7 @@ use bevy_playbot::{
         recorder::Recorder,
     },
     engine::{PressesForPeople, panics},
+    episode::NoTimeLimit,
     headless::{set_fixed_step, set_frame_rate},
     key_bindings::{KeyBindings, KeyboardPlugin, MissingSet},
     placement::TickPlacement,
@@ -119,7 +120,7 @@ impl GameWindow {
             keys::excuse_view(&mut app);
         }
         title::build_pace(&mut app);
-        playlist::build(&mut app);
+        playlist::build(&mut app, game.tools().host.time_limit());
         title::build(&mut app, game.name(), Update);
         let unbound = UnboundKeys::new(game);
         unbound::build(&mut app, unbound.clone());
@@ -161,7 +162,7 @@ impl GameWindow {
         }
         ending::build(&mut app, stop);
         frames::build(&mut app, game.name(), hz);
-        playlist::build(&mut app);
+        playlist::build(&mut app, game.tools().host.time_limit());
         let unbound = UnboundKeys::new(game);
         unbound::build(&mut app, unbound.clone());
         Ok(Self { app, agent, unrecorded, unbound })
@@ -185,6 +186,11 @@ impl GameWindow {
     pub fn announce(&mut self, lines: Vec<String>) {
         let mut lines = Some(lines);
         self.app.add_systems(PostStartup, move || lines.take().iter().flatten().for_each(|line| report!("{line}")));
+    }
+
+    /// Lifts the time limit of the game's adapter.
+    pub fn lift_time_limit(&mut self) {
+        self.app.world_mut().entity_mut(self.agent).insert(NoTimeLimit);
     }
 
     /// Records every episode from now on, of any decider. What a person does then reaches the game as its actions only.

@@ -314,7 +314,8 @@ impl ForeignGame {
         self.with(|description| description.has_camera = true)
     }
 
-    /// Ends episodes after this many ticks, as [`Truncated`](bevy_playbot::episode::EpisodeEnd::Truncated).
+    /// Ends episodes after this many ticks, as [`Truncated`](bevy_playbot::episode::EpisodeEnd::Truncated). A person
+    /// may play without it (`playbot play --no-time-limit`), and such recordings replay to their end.
     pub fn time_limit(self, ticks: u32) -> Self {
         self.with(|description| description.limit = Some(ticks))
     }
@@ -560,6 +561,10 @@ impl HostTools for ForeignGame {
 
     fn add_agents_along(&self, world: &mut World) {
         add_agents_along(self, world);
+    }
+
+    fn time_limit(&self) -> Option<u32> {
+        self.description.limit
     }
 
     fn unplayable(&self) -> Option<String> {

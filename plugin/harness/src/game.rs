@@ -307,6 +307,12 @@ pub trait HostTools: Send + Sync {
     /// others do. So a recording of the first agent replays.
     fn add_agents_along(&self, _world: &mut World) {}
 
+    /// Returns the ticks after which episodes end, if they end then for agents without
+    /// [`NoTimeLimit`](bevy_playbot::episode::NoTimeLimit) only. Limits that are rules of the game are none of these.
+    fn time_limit(&self) -> Option<u32> {
+        None
+    }
+
     /// Returns the reason that the game cannot be played at all, if there is one. That it has no actions is checked for
     /// every game.
     fn unplayable(&self) -> Option<String> {

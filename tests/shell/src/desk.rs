@@ -209,6 +209,13 @@ impl Seat<'_> {
         panic!("the program does not end; {}", self.state());
     }
 
+    /// Sends the program this signal, such as `-TERM`.
+    pub fn send(&self, signal: &str) {
+        let sent =
+            Command::new("kill").args([signal, &self.program.id().to_string()]).status().expect("a shell's kill");
+        assert!(sent.success(), "it runs");
+    }
+
     /// Ends the program as a crash would.
     pub fn kill(mut self) {
         self.program.kill().expect("it runs");

@@ -14,7 +14,7 @@ use crate::{
     progress::{interrupt, interrupt::NothingToSave},
     verbs::demo::{
         filter::{FilterArgs, filter, label},
-        show::show,
+        show::{TickRange, show},
     },
 };
 use bevy_playbot::{
@@ -39,6 +39,7 @@ pub use crate::verbs::demo::show::deciders;
 #[command(after_help = "Examples:
   playbot demo ls
   playbot demo show my.demo --episode 0
+  playbot demo show my.demo --episode 0 --ticks 100..150
   playbot demo verify demos/GAME
   playbot demo verify a.demo b.demo --json
   playbot demo repair torn.demo --out whole.demo
@@ -63,13 +64,18 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
-    /// Show the header and the episodes of a recording.
+    /// Show the header and the episodes of a recording, or the ticks of one of them.
+    ///
+    /// Actions of the program's own games are shown with their names.
     Show {
         /// The file.
         file: PathBuf,
         /// Show every tick of this episode, counted from 0.
         #[arg(long)]
         episode: Option<usize>,
+        /// Show these ticks of the episode only, as first..last, both included, or one number.
+        #[arg(long, requires = "episode", value_name = "TICKS")]
+        ticks: Option<TickRange>,
         /// One line of JSON per episode, or per tick.
         #[arg(long)]
         json: bool,
@@ -102,7 +108,11 @@ enum Verb {
         #[arg(long)]
         json: bool,
     },
-    /// Join recordings of one game, one version of its rules and one mode into a new one.
+    /// Join recordings of one game, version of its rules, mode and noise into a new one.
+    ///
+    /// The noise is that of `record --noise`, which `demo show` prints. Recordings also have to agree in the
+    /// observations that they keep, if any. `learn-skills` and `train` learn from a folder of recordings that differ in
+    /// noise, without a merge: put them there, and name it with `--set demos=FOLDER`.
     Merge {
         /// The recordings, in the order of their episodes in the new one.
         #[arg(required = true, value_name = "FILE")]
@@ -135,7 +145,7 @@ enum Verb {
 pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     match args.verb {
         Verb::Ls { paths, json } => ls(&paths, json),
-        Verb::Show { file, episode, json } => show(&file, episode, json),
+        Verb::Show { file, episode, ticks, json } => show(&file, episode, ticks, json, games),
         Verb::Verify { paths, json } => verify(&paths, json, games),
         Verb::Repair { file, out, header_from, json } => {
             mend(&file, out.as_deref().unwrap_or(&file), header_from.as_deref(), json)
@@ -309,6 +319,7 @@ pub(crate) fn merge(files: &[PathBuf], out: &Path, as_json: bool) -> Result<Outc
             report.files.iter().map(|(file, episodes)| json!({ "file": file, "episodes": episodes })).collect();
         print_line(json!({
             "file": out, "header": report.header, "episodes": report.episodes(), "steps": report.steps, "files": parts,
+            "equal_episodes": report.equal_episodes,
         }))?;
     } else {
         for (file, episodes) in &report.files {
@@ -324,6 +335,16 @@ pub(crate) fn merge(files: &[PathBuf], out: &Path, as_json: bool) -> Result<Outc
             counted(report.files.len() as u64, "recording"),
             report.header.demonstrator,
         ))?;
+    }
+    if report.equal_episodes > 0 {
+        report!(
+            "warning: {} equal to ones of other files, as in a copy with another name, and would count twice: leave the copy \
+             out",
+            match report.equal_episodes {
+                1 => "1 episode is".to_owned(),
+                n => format!("{n} episodes are"),
+            }
+        );
     }
     Ok(if report.episodes() == 0 { Outcome::Findings } else { Outcome::Pass })
 }

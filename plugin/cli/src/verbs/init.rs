@@ -37,7 +37,7 @@ const TOOL_KEYS: [&str; 14] =
   playbot init --edit-workspace   also append `bots` to Cargo.toml as a member
   playbot init my_workspace --package my_game")]
 pub struct Args {
-    /// Folder of the game, or of its workspace.
+    /// Folder of the game, or of its workspace, or the Cargo.toml there.
     #[arg(value_name = "FOLDER", default_value = ".")]
     folder: PathBuf,
     /// Package of the game, if several of a workspace use Bevy.
@@ -60,8 +60,12 @@ pub struct Args {
 
 /// Writes the files that are missing, and reports what was found.
 pub(crate) fn run(args: &Args) -> Result<Outcome, CliError> {
-    let game = GameFolder::find(&args.folder, args.package.as_deref())?;
-    let sources = read_sources(&game.root.join(&game.package))?;
+    let game = GameFolder::find(folder_of(&args.folder), args.package.as_deref())?;
+    let mut sources = read_sources(&game.root.join(&game.package))?;
+    // The library of an earlier call, in which nothing has been written since, is none yet.
+    let (library, all) = (game.library_file(), sources.len());
+    sources.retain(|source| source.path != library || !is_stub(source));
+    let has_stub = sources.len() < all;
     let facts = GameFacts::read(&game.manifest, &game.library_file(), &sources);
     let files = game.files(&facts, &playbot_source(args.playbot.as_deref())?);
     let (missing, kept): (Vec<_>, Vec<_>) = files.into_iter().partition(|(path, _)| !game.root.join(path).exists());
@@ -81,7 +85,7 @@ pub(crate) fn run(args: &Args) -> Result<Outcome, CliError> {
             "edits_workspace": should_edit,
         }))?;
     } else {
-        for line in game.description(&facts) {
+        for line in game.description(&facts, has_stub) {
             print_line(line)?;
         }
     }
@@ -246,13 +250,14 @@ impl GameFolder {
     }
 
     /// Returns lines for people about all that was found.
-    fn description(&self, facts: &GameFacts) -> Vec<String> {
-        let or_none = |names: Vec<String>| if names.is_empty() { "none found".to_owned() } else { names.join(", ") };
+    fn description(&self, facts: &GameFacts, has_stub: bool) -> Vec<String> {
+        // Empty where nothing was found.
+        let joined = |names: Vec<String>| names.join(", ");
         let at = |lines: &[SourceLine]| {
-            or_none(lines.iter().map(|found| format!("{} ({}:{})", found.name, found.file, found.line)).collect())
+            joined(lines.iter().map(|found| format!("{} ({}:{})", found.name, found.file, found.line)).collect())
         };
         let items = |items: &[NamedItem]| at(&items.iter().map(|item| item.at.clone()).collect::<Vec<_>>());
-        let names = |names: &[&str]| or_none(names.iter().map(|name| (*name).to_owned()).collect());
+        let names = |names: &[&str]| joined(names.iter().map(|name| (*name).to_owned()).collect());
         let states = facts.states.iter().map(|state| {
             format!("{} ({}:{}): {}", state.at.name, state.at.file, state.at.line, state.variants.join(" | "))
         });
@@ -260,31 +265,43 @@ impl GameFolder {
             format!("{} ({}:{})", folder.path.as_deref().unwrap_or("computed"), folder.at.file, folder.at.line)
         });
         let version = self.bevy.version.as_deref().unwrap_or("without a number");
-        let library = if facts.has_library { self.library_file() } else { "none".to_owned() };
+        let library = match (facts.has_library, has_stub) {
+            (true, _) => self.library_file(),
+            (false, true) => format!("{}, which is still empty", self.library_file()),
+            (false, false) => "none".to_owned(),
+        };
+        let has_assets = self.root.join(&self.package).join("assets").is_dir();
+        let assets = if has_assets { "assets".to_owned() } else { String::new() };
         let mut rows = vec![
             ("game", format!("{}, Bevy {version}", self.name())),
-            ("features of Bevy", or_none(self.bevy.features.clone())),
+            ("features of Bevy", joined(self.bevy.features.clone())),
             ("library", library),
             ("functions of `&mut App`", items(&facts.functions)),
             ("plugins", items(&facts.plugins)),
-            ("states", or_none(states.collect())),
+            ("states", joined(states.collect())),
             ("input", names(&facts.inputs)),
-            ("keys", or_none(facts.keys.clone())),
+            ("keys", joined(facts.keys.clone())),
             ("keys that leave or skip levels", at(&facts.leaving_keys)),
             ("presses that count once", at(&facts.presses)),
-            ("fixed steps", or_none(fixed_steps(facts).into_iter().collect())),
-            ("mouse buttons", or_none(facts.mouse_buttons.clone())),
-            ("buttons", or_none(facts.buttons.clone())),
+            ("fixed steps", joined(fixed_steps(facts).into_iter().collect())),
+            ("mouse buttons", joined(facts.mouse_buttons.clone())),
+            ("buttons", joined(facts.buttons.clone())),
             ("player", items(facts.player.as_slice())),
             ("physics", names(&facts.physics)),
             ("loading", names(&facts.loaders)),
             ("loads of assets", at(&facts.loads)),
-            ("folder of assets", folder.unwrap_or_else(|| "assets".to_owned())),
+            ("folder of assets", folder.unwrap_or(assets)),
             ("reads of files", at(&facts.files)),
             ("random numbers with a seed", at(&facts.seeded)),
             ("random numbers without a seed", at(&facts.unseeded)),
             ("clocks of the machine", at(&facts.clocks)),
         ];
+        let missing: Vec<&str> = rows.iter().filter(|(_, found)| found.is_empty()).map(|(what, _)| *what).collect();
+        let missing = missing.join(", ");
+        rows.retain(|(_, found)| !found.is_empty());
+        if !missing.is_empty() {
+            rows.push(("none found", missing));
+        }
         if !facts.unseeded.is_empty() || !facts.clocks.is_empty() {
             rows.push(("to do", "make it the same every time: docs/how-to/make-it-deterministic.md".to_owned()));
         }
@@ -632,6 +649,22 @@ fn playbot_source(wanted: Option<&str>) -> Result<String, CliError> {
     let folder = std::path::absolute(&folder).unwrap_or(folder);
     // The form of a text in Rust is one of TOML for all paths that a keyboard writes.
     Ok(format!("path = {:?}", folder.display().to_string()))
+}
+
+/// Returns the folder of a path, which may be that of the `Cargo.toml` in it.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if path.file_name().is_some_and(|name| name == "Cargo.toml") && !path.is_dir() => {
+            if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
+        }
+        _ => path,
+    }
+}
+
+/// Returns true for the library that this verb writes, as long as no code has been added to it.
+fn is_stub(source: &SourceText) -> bool {
+    let stub = SourceText::new(&source.path, LIBRARY);
+    source.code.split_whitespace().eq(stub.code.split_whitespace())
 }
 
 fn unreadable(path: &Path, error: &io::Error) -> CliError {

@@ -28,9 +28,13 @@ pub use crate::verbs::play::window::run;
 
 A won level is followed by the next one, a lost one is played again. Every finished episode is on disk at once.
 
+The time limit of a game's adapter suits bots. Without it (--no-time-limit) a person has all the time that a level takes,
+and such a recording replays, verifies and is learned from like any other.
+
 Examples:
   playbot play GAME --level 7
   playbot play GAME --levels 0..63 --record my.demo
+  playbot play GAME --no-time-limit --record slow.demo
   playbot play GAME --levels 'files:levels/*.json'
   playbot play GAME --run runs/first --record mixed.demo
   playbot play GAME --mode MODE --bot BOT")]
@@ -51,6 +55,10 @@ pub struct Args {
     /// their names in a level editor (default: all).
     #[arg(long)]
     levels: Option<String>,
+    /// Play without the time limit of the game's adapter (`.time_limit`), which also cuts off the autopilot. A limit that
+    /// is a rule of the game itself stays.
+    #[arg(long)]
+    no_time_limit: bool,
     /// Recording to write.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,

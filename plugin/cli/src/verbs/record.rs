@@ -141,12 +141,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         }
     })?;
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
-    let wins = match ended.successes {
-        // Not every game has a goal.
-        0 => String::new(),
-        n => format!(", {:.1} % reached the goal", 100.0 * n as f64 / ended.finished as f64),
-    };
-    report!("{}: {counts}{wins}", args.out.display());
+    report!("{}: {counts}{}", args.out.display(), wins(episodes, ended));
     if finished {
         return Ok(Outcome::Pass);
     }
@@ -154,6 +149,19 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let stopped = StoppedRecording { level, steps, left_out };
     report!("stopped, so the recording is incomplete: {}", stopped.how_to_go_on(&args, &levels));
     Ok(Outcome::Stopped)
+}
+
+/// Describes how many of the recorded episodes reached the goal. An episode that was cut off at the end of the recording
+/// shows nothing about that.
+fn wins(recorded: u64, ended: EpisodeCount) -> String {
+    let cut_off = recorded.saturating_sub(ended.finished);
+    match (ended.successes, cut_off) {
+        // Not every game has a goal.
+        (0, 0) => String::new(),
+        (0, _) => format!(", {cut_off} cut off"),
+        (n, 0) => format!(", {:.1} % reached the goal", 100.0 * n as f64 / ended.finished as f64),
+        (n, _) => format!(", {n} of {} that ended reached the goal; {cut_off} cut off", ended.finished),
+    }
 }
 
 /// Removes a new recording without an episode, which would be in the way of the next attempt. Devices and links stay.
@@ -309,6 +317,14 @@ mod tests {
         let args = Record::try_parse_from(words).unwrap_or_else(|error| panic!("{error}")).args;
         let games = [game as &dyn Game];
         run(args, &Games::new(&games).expect("one game")).map(drop)
+    }
+
+    #[test]
+    fn an_episode_that_was_cut_off_does_not_count_as_ended() {
+        let words = |recorded, finished, successes| wins(recorded, EpisodeCount { finished, successes });
+        assert_eq!(words(5, 4, 4), ", 4 of 4 that ended reached the goal; 1 cut off");
+        assert_eq!(words(4, 4, 3), ", 75.0 % reached the goal");
+        assert_eq!((words(4, 4, 0), words(1, 0, 0)), (String::new(), ", 1 cut off".to_owned()));
     }
 
     #[test]

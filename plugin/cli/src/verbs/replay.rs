@@ -115,6 +115,9 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     pictures.write(game, shown)?;
     if args.window {
         show(game, shown)?;
+        if interrupt::asked() {
+            return Ok(Outcome::Stopped);
+        }
     }
     Ok(if status == FindingStatus::StillThere { Outcome::Pass } else { Outcome::Findings })
 }

@@ -39,26 +39,34 @@ impl Playlist {
     }
 }
 
-pub(super) fn build(app: &mut App) {
-    app.init_resource::<LastEpisode>().add_observer(note_end);
+/// `time_limit` is the limit of the game's adapter, in ticks.
+pub(super) fn build(app: &mut App, time_limit: Option<u32>) {
+    app.insert_resource(LastEpisode { result: None, time_limit }).add_observer(note_end);
 }
 
 /// The last finished episode.
-#[derive(Resource, Default, Reflect)]
+#[derive(Resource, Reflect)]
 #[reflect(Resource)]
-pub(super) struct LastEpisode(Option<EpisodeResult>);
+pub(super) struct LastEpisode {
+    result: Option<EpisodeResult>,
+    /// Ticks after which the game's adapter ends an episode.
+    time_limit: Option<u32>,
+}
 
 impl LastEpisode {
     /// Describes its end.
     pub fn words(&self) -> Option<String> {
-        let EpisodeResult { level, end, success, ticks, .. } = self.0?;
+        let EpisodeResult { level, end, success, ticks, .. } = self.result?;
         let how = match end {
             EpisodeEnd::Terminated { success: true } => "won",
             EpisodeEnd::Terminated { success: false } => "lost",
             EpisodeEnd::Truncated if success => "reached the goal, time was up",
             EpisodeEnd::Truncated => "out of time",
         };
-        Some(format!("level {level} {how} after {}", counted(u64::from(ticks), "tick")))
+        // The limit suits bots, so a person has to learn how to play without it.
+        let is_cut = end == EpisodeEnd::Truncated && self.time_limit.is_some_and(|limit| ticks == limit);
+        let advice = if is_cut { " (--no-time-limit lifts the limit)" } else { "" };
+        Some(format!("level {level} {how} after {}{advice}", counted(u64::from(ticks), "tick")))
     }
 }
 
@@ -73,7 +81,7 @@ fn note_end(
     if event.entity != deciders.agent {
         return;
     }
-    last.0 = Some(event.result);
+    last.result = Some(event.result);
     if event.success {
         playlist.advance();
     }
@@ -85,6 +93,22 @@ fn note_end(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn an_episode_that_the_time_limit_ended_names_the_option_that_lifts_it() {
+        let words = |end, ticks, time_limit| {
+            let result =
+                EpisodeResult { level: 1, end, success: end == EpisodeEnd::WON, ticks, clipped: 0, total_reward: 0.0 };
+            LastEpisode { result: Some(result), time_limit }.words().expect("an episode")
+        };
+        let late = words(EpisodeEnd::Truncated, 120, Some(120));
+        assert_eq!(late, "level 1 out of time after 120 ticks (--no-time-limit lifts the limit)");
+        // The game's own rules end these.
+        for time_limit in [None, Some(200)] {
+            assert_eq!(words(EpisodeEnd::Truncated, 120, time_limit), "level 1 out of time after 120 ticks");
+        }
+        assert_eq!(words(EpisodeEnd::WON, 120, Some(120)), "level 1 won after 120 ticks");
+    }
 
     #[test]
     fn after_the_last_level_comes_the_first() {

@@ -18,8 +18,10 @@ use bevy::{
     prelude::*,
 };
 use bevy_playbot::{
+    agent::Control,
+    demo::replay::Replay,
     engine::{TickSchedules, is_tick},
-    episode::{Episode, EpisodeEnd},
+    episode::{Episode, EpisodeEnd, NoTimeLimit},
     observation::{Observation, VectorSensor},
     reward::Reward,
     state_hash::StateHash,
@@ -365,8 +367,9 @@ fn note<C: Component>(world: &mut World, agent: Entity, component: Option<C>) {
 pub(super) fn read_outcome(world: &mut World) {
     let mut outcomes = Vec::new();
     let agents = playing_agents(world);
+    let lifted = LiftedLimit::of(world, &agents);
     for &agent in &agents {
-        outcomes.extend(outcome_of(world, agent).map(|(reward, end)| (agent, reward, end)));
+        outcomes.extend(outcome_of(world, agent, lifted).map(|(reward, end)| (agent, reward, end)));
     }
     let is_over = outcomes.iter().any(|(_, _, end)| end.is_some());
     for (agent, reward, end) in outcomes {
@@ -378,8 +381,40 @@ pub(super) fn read_outcome(world: &mut World) {
     }
 }
 
+/// The time up to which the game's time limit ends no episode.
+#[derive(Clone, Copy)]
+enum LiftedLimit {
+    /// There is no limit.
+    Always,
+    /// The limit is at least this many ticks.
+    Until(u32),
+}
+
+impl LiftedLimit {
+    /// Returns that of the agents of a level, whose episodes end together. A recording goes on to its end, because it
+    /// may have been made without the limit.
+    fn of(world: &World, agents: &[Entity]) -> Self {
+        if agents.iter().any(|&agent| world.entity(agent).contains::<NoTimeLimit>()) {
+            return Self::Always;
+        }
+        let recorded = |&agent: &Entity| {
+            let replay = world.get::<Replay>(agent).filter(|_| Control::of(world, agent) == Control::Replay)?;
+            Some(u32::try_from(replay.episode().len()).unwrap_or(u32::MAX))
+        };
+        Self::Until(agents.iter().filter_map(recorded).max().unwrap_or(0))
+    }
+
+    /// Returns whether time is up after this many ticks.
+    fn is_over(self, limit: u32, ticks: u32) -> bool {
+        match self {
+            Self::Always => false,
+            Self::Until(lifted) => ticks >= limit.max(lifted),
+        }
+    }
+}
+
 /// Returns the agent's reward of this tick, and the end of the game as the agent sees it.
-fn outcome_of(world: &mut World, agent: Entity) -> Option<(f32, Option<EpisodeEnd>)> {
+fn outcome_of(world: &mut World, agent: Entity, lifted: LiftedLimit) -> Option<(f32, Option<EpisodeEnd>)> {
     let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
     with_foreign(world, agent, |world, foreign| {
         let limit = foreign.game.description.limit;
@@ -392,7 +427,7 @@ fn outcome_of(world: &mut World, agent: Entity) -> Option<(f32, Option<EpisodeEn
             part.last = Some(value);
         }
         let end = run(&mut parts.end, world)?.flatten();
-        let time_is_up = limit.is_some_and(|limit| tick + 1 >= limit);
+        let time_is_up = limit.is_some_and(|limit| lifted.is_over(limit, tick + 1));
         Ok((reward, end.or(time_is_up.then_some(EpisodeEnd::Truncated))))
     })
 }
@@ -479,12 +514,14 @@ fn bits(Transform { translation, rotation, scale }: &Transform) -> [u64; 10] {
 mod tests {
     use super::*;
     use crate::{
+        demo::verify_file,
         floor_plan::FloorPlan,
         foreign::{ForeignGame, Restart},
         level_files::LevelDesigns,
         prelude::*,
         worlds::build_world,
     };
+    use bevy_playbot::demo::file::{DemoEnd, DemoReader, DemoWriter};
 
     #[derive(Component)]
     struct Snail;
@@ -545,6 +582,43 @@ mod tests {
                 look(&world, agents[0]);
             }
         }
+    }
+
+    #[test]
+    fn a_recording_without_the_time_limit_replays_to_its_end() {
+        let game = |limit| {
+            let home = |at: Single<&Transform, With<Snail>>| (at.translation.x >= 9.0).then_some(EpisodeEnd::WON);
+            snail().end(home).time_limit(limit)
+        };
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("long.demo");
+        let (limited, (mut world, agents)) = (game(2), build_world(&game(2), "default", 0, 0, 1));
+        assert_eq!(limited.tools().host.time_limit(), Some(2));
+        let writer = DemoWriter::create(&path, limited.demo_header("default")).expect("a new file");
+        world.insert_resource(Recorder::new(writer));
+        let bot = BlindBot::Constant(ActionValue::Discrete(0));
+        world.entity_mut(agents[0]).insert((Control::Bot, bot, LevelQueue::list([7]), Recording::default()));
+        world.entity_mut(agents[0]).insert(NoTimeLimit);
+        while Control::of(&world, agents[0]).is_active() {
+            world.tick().expect("sound");
+        }
+        drop(world);
+        let episodes = DemoReader::open(&path).and_then(DemoReader::read_all).expect("sound");
+        let ends: Vec<_> = episodes.iter().map(|episode| (episode.len(), episode.end)).collect();
+        // The snail begins at 2, and moves in the two frames before the first tick.
+        assert_eq!(ends, [(6, DemoEnd::Terminated { success: true })]);
+        let report = verify_file(&limited, &path, |_| {}).expect("readable");
+        assert_eq!((report.ticks, report.divergences), (6, Vec::new()));
+
+        // A bot has the limit.
+        let mut seen = Vec::new();
+        play(&limited, |world, agent| seen.extend(limited.tools().state.position(world, agent).map(|at| at.x)));
+        assert_eq!(seen, [4.0, 5.0]);
+        // A game that no longer ends where the recording does differs in its end, as without any limit.
+        let further = snail().time_limit(2);
+        let report = verify_file(&further, &path, |_| {}).expect("readable");
+        assert!(report.divergences.iter().all(|(_, words)| words.contains("the episode's end is")), "{report:?}");
+        assert_eq!(report.divergences.len(), 1);
     }
 
     #[test]

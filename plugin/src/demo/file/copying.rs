@@ -1,14 +1,16 @@
 //! New recordings of the episodes of others: joined, selected, or with another player's name.
 
 use crate::demo::file::{
-    episode::DemoEpisode,
+    episode::{DemoEpisode, EpisodeActions},
     error::{DemoFault, DemoFileError},
     header::DemoHeader,
     reader::DemoReader,
     writer::DemoWriter,
 };
 use std::{
+    collections::HashMap,
     fs,
+    hash::{DefaultHasher, Hash, Hasher},
     path::{Path, PathBuf},
 };
 
@@ -83,12 +85,16 @@ fn copy(
     choose: &mut impl FnMut(&Path, DemoEpisode) -> Option<DemoEpisode>,
 ) -> Result<MergeReport, DemoFileError> {
     let mut writer = DemoWriter::create(out, header.clone())?;
-    let mut report = MergeReport { header, files: Vec::new(), steps: 0 };
-    let copied = readers.into_iter().try_for_each(|reader| {
+    let mut report = MergeReport { header, files: Vec::new(), steps: 0, equal_episodes: 0 };
+    // The file in which each episode came first, by its play.
+    let mut first_files: HashMap<u64, usize> = HashMap::new();
+    let copied = readers.into_iter().enumerate().try_for_each(|(file, reader)| {
         let (path, mut kept) = (reader.path().to_owned(), 0);
         for episode in reader {
             let Some(episode) = choose(&path, episode?) else { continue };
             report.steps += episode.len();
+            let is_known = *first_files.entry(hash_of_play(&episode)).or_insert(file) != file;
+            report.equal_episodes += usize::from(is_known);
             kept += 1;
             writer.push(&episode)?;
         }
@@ -113,6 +119,8 @@ pub struct MergeReport {
     pub files: Vec<(PathBuf, usize)>,
     /// Ticks over all episodes.
     pub steps: usize,
+    /// Episodes that play as one of an earlier file does, tick by tick, as those of a copy with another player's name do.
+    pub equal_episodes: usize,
 }
 
 impl MergeReport {
@@ -120,6 +128,24 @@ impl MergeReport {
     pub fn episodes(&self) -> usize {
         self.files.iter().map(|(_, episodes)| episodes).sum()
     }
+}
+
+/// Returns a hash of what was played: the level, and each tick without its decider.
+fn hash_of_play(episode: &DemoEpisode) -> u64 {
+    let DemoEpisode { level_seed, level_file, actions, rewards, state_hashes, deciders: _, end, observations: _ } =
+        episode;
+    let mut hasher = DefaultHasher::new();
+    (level_seed, level_file.as_ref().map(|file| file.hash), state_hashes).hash(&mut hasher);
+    rewards.iter().for_each(|reward| reward.to_bits().hash(&mut hasher));
+    match actions {
+        EpisodeActions::Discrete(list) => list.hash(&mut hasher),
+        EpisodeActions::Continuous { dim, values } => {
+            dim.hash(&mut hasher);
+            values.iter().for_each(|value| value.to_bits().hash(&mut hasher));
+        }
+    }
+    std::mem::discriminant(end).hash(&mut hasher);
+    hasher.finish()
 }
 
 /// Returns whether two paths lead to one file.

@@ -49,6 +49,17 @@ fn advised(fault: &DemoFault, path: &Path) -> String {
     fault.to_string().replace("`playbot demo repair FILE", &format!("`playbot demo repair {word}"))
 }
 
+/// Returns what to do with two recordings that differ in this field. Learners take recordings of different noise, and of
+/// observations that are kept or not.
+fn instead_of_merge(field: &str) -> &'static str {
+    match field {
+        "noise" | "observation_names" => {
+            "put both into one folder, from which `learn-skills` and `train` learn without a merge (--set demos=FOLDER)"
+        }
+        _ => "leave one of them out",
+    }
+}
+
 /// The fault of a recording.
 ///
 /// `offset` is a byte offset from the start of the file, `episode` counts from 0.
@@ -223,7 +234,7 @@ pub enum DemoFault {
         wanted: String,
     },
     /// The file cannot be merged with another one because it was recorded under other conditions.
-    #[error("cannot be merged: `{field}` is {found}, but {expected} in {}", first.display())]
+    #[error("cannot be merged: `{field}` is {found}, but {expected} in {}: {}", first.display(), instead_of_merge(field))]
     MergeDiffers {
         /// The first header field that differs.
         field: &'static str,

@@ -164,7 +164,7 @@ impl DemoHeader {
         same("actions", &self.actions, &wanted.actions)?;
         same("observation_names", &self.observation_names, &wanted.observation_names)?;
         same("demonstrator", &self.demonstrator, &wanted.demonstrator)?;
-        same("action_noise", &self.action_noise, &wanted.action_noise)
+        same("noise", &self.action_noise, &wanted.action_noise)
     }
 }
 

@@ -375,6 +375,26 @@ fn all_episodes_of_all_testers_are_in_the_merged_file() {
 }
 
 #[test]
+fn episodes_that_another_file_has_too_are_counted() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (a, b) = (episode(1, 5), episode(2, 3));
+    // The same episode again in one file is what its player did.
+    let one = write(folder.path(), "one.demo", &[a.clone(), b.clone(), b]);
+    let named = DemoHeader { demonstrator: "zoë".into(), ..header() };
+    let other = DemoEpisode { level_seed: 3, ..a.clone() };
+    let two = write_as(folder.path(), "two.demo", named, &[a.clone(), other]);
+    let report = merge_demos(&[&one, &two], folder.path().join("all.demo")).expect("merges");
+    assert_eq!((report.episodes(), report.equal_episodes), (5, 1));
+    let alone = merge_demos(&[&one], folder.path().join("alone.demo")).expect("merges");
+    assert_eq!(alone.equal_episodes, 0);
+    let mut turned = a;
+    let EpisodeActions::Discrete(list) = &mut turned.actions else { panic!("they are numbers") };
+    list[0] ^= 1;
+    let three = write(folder.path(), "three.demo", &[turned]);
+    assert_eq!(merge_demos(&[&one, &three], folder.path().join("more.demo")).expect("merges").equal_episodes, 0);
+}
+
+#[test]
 fn files_that_do_not_belong_together_are_refused_by_name_and_nothing_is_written() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let one = write(folder.path(), "one.demo", &[episode(1, 5)]);
@@ -385,6 +405,12 @@ fn files_that_do_not_belong_together_are_refused_by_name_and_nothing_is_written(
         ("mode", DemoHeader { mode: "hard".into(), ..header() }, "mode `hard`"),
         ("rate", DemoHeader { tick_hz: 30.0, ..header() }, "`tick_hz` is 30.0, but 60.0 in"),
         ("actions", DemoHeader { actions: DemoActions::Discrete(5), ..header() }, "`actions` is Discrete(5)"),
+        (
+            "noise",
+            DemoHeader { action_noise: 0.5, ..header() },
+            "one.demo: put both into one folder, from which `learn-skills` and `train` learn without a merge \
+             (--set demos=FOLDER)",
+        ),
     ] {
         let path = write_as(folder.path(), name, other, &[]);
         let error = merge_demos(&[&one, &path], &out).expect_err(name);

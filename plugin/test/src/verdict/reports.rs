@@ -207,23 +207,25 @@ fn lost(level: &LevelVerdict) -> String {
     if kinds.is_empty() {
         return String::new();
     }
+    if level.causes.is_empty() {
+        return format!("; {kinds}{}", squares(level));
+    }
     let mut reasons = reasons(level);
     // A stable sort: equally frequent ones keep the order of the results.
     reasons.sort_by_key(|(count, _)| Reverse(*count));
     let more = reasons.len().saturating_sub(MOST_CAUSES);
     let more = (more > 0).then(|| format!("{more} more"));
     let words: Vec<String> = reasons.into_iter().take(MOST_CAUSES).map(|(_, words)| words).chain(more).collect();
-    if words.is_empty() { format!("; {kinds}") } else { format!("; {kinds}: {}", words.join(", ")) }
+    format!("; {kinds}: {}", words.join(", "))
 }
 
-/// Returns how often each cause ended an episode, and the square where it did most often. Without causes, returns the
-/// squares.
+/// Describes a square of ends.
+fn near(end: &SquareEnds) -> String {
+    format!("near {:.1}, {:.1}", end.x, end.y)
+}
+
+/// Returns how often each cause ended an episode, and the square where it did most often.
 fn reasons(level: &LevelVerdict) -> Vec<(u64, String)> {
-    let near = |end: &SquareEnds| format!("near {:.1}, {:.1}", end.x, end.y);
-    if level.causes.is_empty() {
-        let count = |end: &SquareEnds| end.lost.saturating_add(end.timed_out);
-        return level.ends.iter().map(|end| (count(end), format!("{} ({})", count(end), near(end)))).collect();
-    }
     let reason = |(cause, count): (&String, &u64)| {
         let ends = level.ends.iter().filter(|end| end.causes.contains_key(cause));
         // Of equal squares `max_by_key` takes the last one, which is the first of the results.
@@ -232,6 +234,26 @@ fn reasons(level: &LevelVerdict) -> Vec<(u64, String)> {
         (*count, format!("{cause} {count}{place}"))
     };
     level.causes.iter().map(reason).collect()
+}
+
+/// Returns the squares where episodes ended, in brackets, for a game that reports no causes. A square where all of them
+/// ended has no number. Empty without positions.
+fn squares(level: &LevelVerdict) -> String {
+    let count = |end: &SquareEnds| end.lost.saturating_add(end.timed_out);
+    let mut ends: Vec<&SquareEnds> = level.ends.iter().collect();
+    // A stable sort, as for causes.
+    ends.sort_by_key(|end| Reverse(count(end)));
+    let words = match ends[..] {
+        [] => return String::new(),
+        [end] if count(end) == level.score.lost.saturating_add(level.score.timed_out) => near(end),
+        _ => {
+            let more = ends.len().saturating_sub(MOST_CAUSES);
+            let more = (more > 0).then(|| format!("{more} more"));
+            let named = ends.iter().take(MOST_CAUSES).map(|end| format!("{} {}", count(end), near(end)));
+            named.chain(more).collect::<Vec<_>>().join("; ")
+        }
+    };
+    format!(" ({words})")
 }
 
 // Commands that show a level of results again.
@@ -399,8 +421,15 @@ mod tests {
         level.causes.insert("toad".to_owned(), 1);
         assert_eq!(message(&level), format!("{start}: {causes}, 1 more"));
         level.causes.clear();
-        let squares = "2 (near 4.0, 1.0), 1 (near 12.5, 3.0), 1 (near 20.0, 2.5)";
-        assert_eq!(message(&level), format!("{start}: {squares}"), "the game reports no causes");
+        let squares = "2 near 4.0, 1.0; 1 near 12.5, 3.0; 1 near 20.0, 2.5";
+        assert_eq!(message(&level), format!("{start} ({squares})"), "the game reports no causes");
+        level.ends.push(end(30.0, 2.5, [0, 1], &[]));
+        assert_eq!(message(&level), format!("{start} ({squares}; 1 more)"));
+        level.ends.truncate(1);
+        assert_eq!(message(&level), format!("{start} (1 near 12.5, 3.0)"), "the other positions are not known");
+        level.ends[0].lost = 3;
+        level.ends[0].timed_out = 1;
+        assert_eq!(message(&level), format!("{start} (near 12.5, 3.0)"), "all of them in one square");
         level.ends.clear();
         assert_eq!(message(&level), start, "nor positions");
         assert_eq!(message(&verdict(0, 4, 4)), "solved 4 of 4 episodes");

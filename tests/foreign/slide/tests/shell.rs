@@ -58,6 +58,36 @@ fn recorded_by_mouse(scale: Option<&str>, start: [u32; 2], cell: [u32; 2]) -> [O
     [actions.first().copied(), actions.last().copied()]
 }
 
+/// Plays without a key, and returns the lengths of the episodes that are recorded. An episode of a bot has 120 ticks.
+#[cfg(feature = "screen")]
+fn lengths_of_a_slow_person(more: &[&str]) -> Vec<u64> {
+    use playbot_shell::{Desk, Shell};
+
+    let (desk, shell) = (Desk::new(GAME.program), Shell::new(GAME.program));
+    let args = ["play", "slide", "--levels", "1..1", "--record", "slow.demo"];
+    let mut seat = desk.open(shell.folder(), &[&args[..], more].concat());
+    if more.is_empty() {
+        seat.read("level 1 out of time after 120 ticks (--no-time-limit lifts the limit)");
+    } else {
+        seat.pass_ticks(140);
+    }
+    seat.tap("Escape");
+    let (status, said) = seat.leave();
+    assert!(status.success(), "{said}");
+    let verified = shell.answer(&["demo", "verify", "slow.demo", "--json"]);
+    assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
+    let episodes = shell.answers(&["demo", "show", "slow.demo", "--json"]);
+    episodes.iter().filter_map(|episode| episode["steps"].as_u64()).collect()
+}
+
+#[cfg(feature = "screen")]
+#[test]
+fn a_person_may_play_without_the_time_limit_of_bots() {
+    assert_eq!(lengths_of_a_slow_person(&[])[0], 120);
+    let slow = lengths_of_a_slow_person(&["--no-time-limit"]);
+    assert!(slow.len() == 1 && slow[0] >= 140, "{slow:?}");
+}
+
 /// The action that clicks on Start, behind nothing and nine cells.
 #[cfg(feature = "screen")]
 const START: u64 = 10;

@@ -10,17 +10,45 @@ use bevy_playbot::{
     demo::file::{Decider, DemoActions, DemoEnd, DemoEpisode, DemoHeader, DemoReader, EpisodeActions},
     level::LevelFile,
 };
+use playbot_harness::{game::Game, games::Games};
 use playbot_report::counted;
 use serde_json::{Value, json};
-use std::{collections::BTreeMap, path::Path};
+use std::{collections::BTreeMap, path::Path, str::FromStr};
+
+/// Ticks of an episode, both included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct TickRange {
+    first: usize,
+    last: usize,
+}
+
+impl FromStr for TickRange {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let (first, last) = text.split_once("..").unwrap_or((text, text));
+        match (first.parse(), last.parse()) {
+            (Ok(first), Ok(last)) if first <= last => Ok(Self { first, last }),
+            (Ok(_), Ok(_)) => Err("the first tick is behind the last one".to_owned()),
+            _ => Err("write first..last, such as 100..150, or one number".to_owned()),
+        }
+    }
+}
 
 /// Shows the header and the episodes of a recording, or the ticks of one of them.
 ///
 /// # Errors
 ///
-/// It cannot be read, or has no such episode.
-pub(crate) fn show(file: &Path, wanted: Option<usize>, as_json: bool) -> Result<Outcome, CliError> {
+/// It cannot be read, or has no such episode, or the episode has no such ticks.
+pub(super) fn show(
+    file: &Path,
+    wanted: Option<usize>,
+    ticks: Option<TickRange>,
+    as_json: bool,
+    games: &Games,
+) -> Result<Outcome, CliError> {
     let reader = DemoReader::open(file).map_err(open::missing_recording)?;
+    let names = action_names(reader.header(), games);
     if !as_json {
         show_header(reader.header())?;
     }
@@ -30,7 +58,16 @@ pub(crate) fn show(file: &Path, wanted: Option<usize>, as_json: bool) -> Result<
         match wanted {
             None => show_episode(episodes, &episode, as_json)?,
             Some(wanted) if wanted == episodes => {
-                show_ticks(&episode, as_json)?;
+                let ticks = ticks.unwrap_or(TickRange { first: 0, last: usize::MAX });
+                if ticks.first >= episode.len() && !episode.is_empty() {
+                    return Err(CliError::Usage(format!(
+                        "--ticks begins with {}, but episode {wanted} of {} has {}, counted from 0",
+                        ticks.first,
+                        file.display(),
+                        counted(episode.len() as u64, "tick")
+                    )));
+                }
+                show_ticks(&episode, ticks, &names, as_json)?;
                 return Ok(Outcome::Pass);
             }
             Some(_) => {}
@@ -45,6 +82,13 @@ pub(crate) fn show(file: &Path, wanted: Option<usize>, as_json: bool) -> Result<
         ))),
         None => Ok(Outcome::Pass),
     }
+}
+
+/// Returns the names of the actions, if the program has the recorded game in the same version; empty otherwise.
+fn action_names(header: &DemoHeader, games: &Games) -> Vec<String> {
+    let is_same = |game: &&dyn Game| game.version() == header.game_version;
+    let Some(game) = games.get(&header.game).ok().filter(is_same) else { return Vec::new() };
+    game.tools().input.action_names()
 }
 
 fn show_header(header: &DemoHeader) -> Result<(), CliError> {
@@ -124,27 +168,73 @@ pub fn deciders(words: &str, steps_by_decider: &BTreeMap<Decider, usize>) -> Str
     format!("{words} {}", steps_by_decider.iter().map(share).collect::<Vec<_>>().join(", "))
 }
 
-fn show_ticks(episode: &DemoEpisode, as_json: bool) -> Result<(), CliError> {
-    for tick in 0..episode.len() {
-        let action = match &episode.actions {
-            EpisodeActions::Discrete(list) => json!(list[tick]),
-            EpisodeActions::Continuous { dim, values } => json!(values[tick * dim..(tick + 1) * dim]),
-        };
+fn show_ticks(episode: &DemoEpisode, ticks: TickRange, names: &[String], as_json: bool) -> Result<(), CliError> {
+    let shown = ticks.first..episode.len().min(ticks.last.saturating_add(1));
+    let words: Vec<String> = shown.clone().map(|tick| action_in_words(&episode.actions, tick, names)).collect();
+    let width = words.iter().map(|words| words.chars().count()).max().unwrap_or(0).max(4);
+    for (tick, words) in shown.zip(words) {
         let (reward, hash, decider) = (episode.rewards[tick], episode.state_hashes[tick], episode.deciders[tick]);
         if as_json {
-            print_line(json!({
+            let (action, name) = match &episode.actions {
+                EpisodeActions::Discrete(list) => (json!(list[tick]), names.get(list[tick] as usize)),
+                EpisodeActions::Continuous { dim, values } => (json!(values[tick * dim..(tick + 1) * dim]), None),
+            };
+            let mut row = json!({
                 "tick": tick, "action": action, "reward": reward, "state_hash": hash, "decider": decider,
-            }))?;
+            });
+            if let Some(name) = name {
+                row["action_name"] = json!(name);
+            }
+            print_line(row)?;
         } else {
-            print_line(format!("{tick:>5}  action {action:<4}  reward {reward:<5}  hash {hash:08x}  {decider}"))?;
+            print_line(format!("{tick:>5}  action {words:<width$}  reward {reward:<5}  hash {hash:08x}  {decider}"))?;
         }
     }
     Ok(())
 }
 
+/// Describes the action of a tick by its number or numbers, with their names where they are known.
+fn action_in_words(actions: &EpisodeActions, tick: usize, names: &[String]) -> String {
+    let named = |name: Option<&String>| name.filter(|name| !name.is_empty());
+    match actions {
+        EpisodeActions::Discrete(list) => {
+            let number = list[tick];
+            named(names.get(number as usize)).map_or_else(|| number.to_string(), |name| format!("{number} {name}"))
+        }
+        EpisodeActions::Continuous { dim, values } => {
+            let row = values[tick * dim..(tick + 1) * dim].iter().enumerate();
+            let words = row.map(|(at, value)| {
+                named(names.get(at)).map_or_else(|| value.to_string(), |name| format!("{name} {value}"))
+            });
+            format!("[{}]", words.collect::<Vec<_>>().join(", "))
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ranges_of_ticks_include_both_ends() {
+        for (text, first, last) in [("100..150", 100, 150), ("7", 7, 7), ("0..0", 0, 0)] {
+            assert_eq!(text.parse::<TickRange>(), Ok(TickRange { first, last }), "{text}");
+        }
+        assert!("5..4".parse::<TickRange>().is_err_and(|error| error.contains("behind the last")));
+        for wrong in ["", "..", "5..", "a..9", "1...2", "-1..3"] {
+            assert!(wrong.parse::<TickRange>().is_err_and(|error| error.contains("first..last")), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn actions_have_the_names_that_are_known() {
+        let names = ["left", "", "jump"].map(str::to_owned);
+        let discrete = EpisodeActions::Discrete(vec![0, 1, 2, 3]);
+        let words = [0, 1, 2, 3].map(|tick| action_in_words(&discrete, tick, &names));
+        assert_eq!(words, ["0 left", "1", "2 jump", "3"]);
+        let values = EpisodeActions::Continuous { dim: 2, values: vec![0.5, -1.0, 0.0, 1.0] };
+        assert_eq!(action_in_words(&values, 1, &names[..1]), "[left 0, 1]");
+    }
 
     #[test]
     fn noise_and_observations_are_plain_words() {

@@ -29,6 +29,7 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
     let playlist = playlist(game, &args)?;
     let (autopilot, observation_config) = autopilot(game, &args)?;
+    check_time_limit(game, &args)?;
     let header = header(game, playlist.mode(), &args);
     let seed = args.seed.unwrap_or(0);
     let mut window =
@@ -38,11 +39,30 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         window.check_recording()?;
         window.record(args.overwrite.open(path, header)?);
     }
+    if args.no_time_limit {
+        window.lift_time_limit();
+    }
     interrupt::listen();
     window.announce(announcement(game, &args));
     let unbound = window.unbound_keys();
     window.run()?;
-    args.record.as_deref().map_or(Ok(Outcome::Pass), |path| conclude(path, &unbound))
+    if let Some(path) = &args.record {
+        conclude(path, &unbound)?;
+    }
+    // A signal ends the program as it ends any other verb. A person who is done presses Escape.
+    Ok(if interrupt::asked() { Outcome::Stopped } else { Outcome::Pass })
+}
+
+/// Checks that there is a time limit to lift.
+fn check_time_limit(game: &dyn Game, args: &Args) -> Result<(), CliError> {
+    if !args.no_time_limit || game.tools().host.time_limit().is_some() {
+        return Ok(());
+    }
+    Err(CliError::Usage(format!(
+        "`{}` has no time limit that could be lifted: no adapter sets one with `.time_limit`, and a limit that is a rule \
+         of the game stays; leave out --no-time-limit",
+        game.name()
+    )))
 }
 
 fn playlist(game: &dyn Game, args: &Args) -> Result<Playlist, CliError> {
@@ -101,6 +121,13 @@ fn announcement(game: &dyn Game, args: &Args) -> Vec<String> {
     if let Some(problem) = without_idle_action(game).filter(|_| is_by_actions) {
         lines.push(format!("warning: {problem}"));
     }
+    if let Some(limit) = game.tools().host.time_limit() {
+        let limit = counted(u64::from(limit), "tick");
+        lines.push(match args.no_time_limit {
+            true => format!("there is no time limit; bots have {limit} for a level"),
+            false => format!("time limit, as for bots: {limit} for a level; --no-time-limit lifts it"),
+        });
+    }
     if args.autopilot.is_named() {
         lines.push("Tab hands over and takes over again".to_owned());
     } else {
@@ -110,7 +137,7 @@ fn announcement(game: &dyn Game, args: &Args) -> Vec<String> {
 }
 
 /// Prints the path of the recording, its contents, the keys that are not in it, and the next commands.
-fn conclude(path: &Path, unbound: &UnboundKeys) -> Result<Outcome, CliError> {
+fn conclude(path: &Path, unbound: &UnboundKeys) -> Result<(), CliError> {
     let summary = DemoSummary::read(path)?;
     let file = path.display();
     report!(
@@ -123,5 +150,5 @@ fn conclude(path: &Path, unbound: &UnboundKeys) -> Result<Outcome, CliError> {
     let program = program::name();
     report!("  {program} demo verify {file}   proves that it replays");
     report!("  {program} learn-skills --set demos={file} --out skills.safetensors   learns from it");
-    Ok(Outcome::Pass)
+    Ok(())
 }
