@@ -195,16 +195,16 @@ fn show_ticks(episode: &DemoEpisode, ticks: TickRange, names: &[String], as_json
 
 /// Describes the action of a tick by its number or numbers, with their names where they are known.
 fn action_in_words(actions: &EpisodeActions, tick: usize, names: &[String]) -> String {
-    let named = |name: Option<&String>| name.filter(|name| !name.is_empty());
+    let named = |index: usize| names.get(index).filter(|name| !name.is_empty());
     match actions {
         EpisodeActions::Discrete(list) => {
             let number = list[tick];
-            named(names.get(number as usize)).map_or_else(|| number.to_string(), |name| format!("{number} {name}"))
+            named(number as usize).map_or_else(|| number.to_string(), |name| format!("{number} {name}"))
         }
         EpisodeActions::Continuous { dim, values } => {
             let row = values[tick * dim..(tick + 1) * dim].iter().enumerate();
             let words = row.map(|(at, value)| {
-                named(names.get(at)).map_or_else(|| value.to_string(), |name| format!("{name} {value}"))
+                named(at).map_or_else(|| value.to_string(), |name| format!("{name} {value}"))
             });
             format!("[{}]", words.collect::<Vec<_>>().join(", "))
         }
