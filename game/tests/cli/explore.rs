@@ -89,7 +89,7 @@ fn mistakes_are_reported_before_anything_is_explored() {
         (&["coinrun", "--skills", "s", "--policy", "p"], "cannot be used with"),
         (&["coinrun", "--policy", "none.policy"], "`playbot policy export --run RUN --out none.policy`"),
         (&["coinrun", "--png", "x.svg"], "written as .png"),
-        (&["ant", "--level", "chase:0", "--png", "x.png"], "has no floor plan of level chase:0"),
+        (&["ant", "--level", "chase:0", "--png", "x.png"], "leave --png out, or add one to its adapter with `.plan`"),
         (&["coinrun", "--force"], "--out <FILE>"),
         (&["coinrun", "--cell", "a", "--out", "a.demo"], "`a` is not a cell"),
         (&["coinrn"], "did you mean `coinrun`?"),

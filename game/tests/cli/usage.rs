@@ -36,7 +36,7 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["view", "coinrun", "--seed", "18446744073709551616"], "the number is too large"),
         (
             &["trace", "coinrun", "--actions", "a"],
-            "`a` is not an action of `coinrun`: write numbers from 0, or the names",
+            "`a` is not an action of `coinrun`: write numbers from 0 to 14, or the names",
         ),
         (&["runs", "compare", "r", "--threshold", "abc"], "it must be a number, such as 0.5"),
         (&["eval", "--bot", "robot"], "unknown bot `robot`"),

@@ -142,7 +142,7 @@ fn eval_draws_where_players_went() {
         (&["eval", "--bot", "random", "--plot", "where.gif"][..], ".png or .svg"),
         (
             &["eval", "--bot", "random", "--set", "game=\"ant\"", "--levels", "chase:0..0", "--plot", "a.png"],
-            "no floor plan",
+            "no floor plan of level chase:0: leave --plot out, or add one to its adapter with `.plan`",
         ),
     ] {
         let (_, errors) = ended(folder.path(), args, 3);

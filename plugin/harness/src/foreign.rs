@@ -281,7 +281,7 @@ impl ForeignGame {
         self.with(|description| description.defects.push(kind))
     }
 
-    /// Sets the names of the actions, for people. Actions of keys have names by default.
+    /// Sets the names of the actions, for people. Actions of keys, of the mouse and of clicks have names by default.
     pub fn action_names(self, names: impl IntoIterator<Item = impl Into<String>>) -> Self {
         self.with(|description| description.input.names = names.into_iter().map(Into::into).collect())
     }

@@ -96,5 +96,9 @@ pub fn action_number(game: &dyn Game, word: &str) -> Result<u32, String> {
         return Ok(number as u32);
     }
     let known = if names.is_empty() { String::new() } else { format!(", or the names {}", names.join(", ")) };
-    Err(format!("`{word}` is not an action of `{}`: write numbers from 0{known}", game.name()))
+    let last = match game.actions() {
+        ActionSpace::Discrete(actions) if actions > 0 => format!(" to {}", actions - 1),
+        _ => String::new(),
+    };
+    Err(format!("`{word}` is not an action of `{}`: write numbers from 0{last}{known}", game.name()))
 }

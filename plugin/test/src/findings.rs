@@ -52,7 +52,7 @@ pub(crate) use crate::findings::play::detector_of;
 pub use crate::findings::{
     checks::{Check, Checks},
     course::{RecordedCourse, course_of, course_of_recording, keeps_course},
-    folder::{Date, DateError, FINDINGS, clear_findings, gather_findings, has_findings, list_findings},
+    folder::{Date, DateError, FINDINGS, clear_findings, first_finding, gather_findings, list_findings},
     keep::{FindingFiles, Played, Recheck, SeenFinding, SeenLevel, Sighting, recheck},
     minimise::{Budget, Lengths, Minimised, actions_of, lengths, minimise},
     play::{Breakage, CheckTick, Replayed, Unplayable, Watcher},

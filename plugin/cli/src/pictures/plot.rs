@@ -103,7 +103,8 @@ impl Footprints {
         let file = PlotFile::new(path)?;
         match splits.iter().find(|split| game.tools().levels.floor_plan(&split.mode, split.first).is_none()) {
             Some(split) => Err(CliError::Usage(format!(
-                "`{}` has no floor plan of level {}:{}: leave --plot out",
+                "`{}` has no floor plan of level {}:{}: leave --plot out, or add one to its adapter with `.plan` or \
+                 `.plan_of_file`",
                 game.name(),
                 split.mode,
                 split.first

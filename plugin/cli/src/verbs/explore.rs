@@ -137,7 +137,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         Some(path) => {
             let missing = || {
                 CliError::Usage(format!(
-                    "`{}` has no floor plan of level {}: leave --png out",
+                    "`{}` has no floor plan of level {}: leave --png out, or add one to its adapter with `.plan` or \
+                     `.plan_of_file`",
                     game.name(),
                     shown(&split)
                 ))

@@ -71,7 +71,8 @@ pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     levels.check(game)?;
     args.among.iter().try_for_each(|others| others.check(game))?;
     check_start(game, &levels.mode, levels.first)?;
-    interrupt::leave("nothing is kept: call it again".to_owned());
+    let quicker = if args.layouts_only { "" } else { ", or with --layouts-only, which plays nothing" };
+    interrupt::leave(format!("nothing is kept: call it again{quicker}"));
     let _nothing = NothingToSave::listen();
     let threads = args.threads.count();
     let (equal, alike) = compare(game, &levels, args, threads);

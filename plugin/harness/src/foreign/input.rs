@@ -491,22 +491,45 @@ impl Input {
         (others, &self.clicks)
     }
 
-    /// Returns the names that were set, or those of the keys.
+    /// Returns the names that were set, or those of what the actions hold.
     pub(super) fn names(&self) -> Vec<String> {
-        let of_keys = |keys: &Vec<VirtualButton>| match keys.as_slice() {
-            [] => "nothing".to_owned(),
-            keys => keys.iter().map(VirtualButton::to_string).collect::<Vec<_>>().join("+"),
-        };
+        if !self.names.is_empty() {
+            return self.names.clone();
+        }
         let of_texts = self.texts.iter().map(|text| format!("type {text:?}"));
         let of_clicks = self.clicks.iter().map(|name| format!("click {name}"));
         let sets = self.sets();
-        let named = sets.len() + self.texts.len() + self.clicks.len();
-        let is_of_keys = self.names.is_empty() && self.space() == ActionSpace::Discrete(named);
-        if is_of_keys {
-            sets.iter().map(of_keys).chain(of_texts).chain(of_clicks).collect()
-        } else {
-            self.names.clone()
+        let others = self.texts.len() + self.clicks.len();
+        let ActionSpace::Discrete(actions) = self.space() else { return Vec::new() };
+        if actions == sets.len() + others {
+            return sets.iter().map(|set| name_of_keys(set)).chain(of_texts).chain(of_clicks).collect();
         }
+        if self.space.is_some() || self.whole.is_some() || actions < others {
+            return Vec::new();
+        }
+        let of_held = (0..actions - others).map(|action| self.name_of_held(&sets, action));
+        of_held.chain(of_texts).chain(of_clicks).collect()
+    }
+
+    /// Returns the name of an action by its keys, its buttons and what it does with the mouse and the touch screen. It
+    /// has no comma, since commas separate actions on the command line.
+    fn name_of_held(&self, sets: &[Vec<VirtualButton>], action: usize) -> String {
+        let mouse = self.mouse.get(action).into_iter().flatten().copied().map(VirtualButton::Mouse);
+        let pads = self.pads.get(action).into_iter().flatten().copied().map(VirtualButton::Gamepad);
+        let held: Vec<VirtualButton> =
+            sets.get(action).into_iter().flatten().copied().chain(mouse).chain(pads).collect();
+        let cursor = self.cursor.get(action).copied().flatten().map(name_of_position);
+        let mut parts = match cursor {
+            Some(at) if held == [VirtualButton::Mouse(MouseButton::Left)] => vec![format!("click {at}")],
+            Some(at) if held.is_empty() => vec![format!("cursor {at}")],
+            Some(at) => vec![format!("{} at {at}", name_of_keys(&held))],
+            None if held.is_empty() => Vec::new(),
+            None => vec![name_of_keys(&held)],
+        };
+        parts.extend(self.taps.get(action).copied().flatten().map(|at| format!("tap {}", name_of_position(at))));
+        let turned = self.wheel.get(action).filter(|lines| **lines != 0.0);
+        parts.extend(turned.map(|lines| format!("wheel {lines:+}")));
+        if parts.is_empty() { name_of_keys(&[]) } else { parts.join(" and ") }
     }
 
     /// Returns the keys of a person: for games that are played with keys alone.
@@ -522,6 +545,23 @@ impl Input {
             && !sets.is_empty()
             && self.pressed() == Some(VirtualInput::keys(sets.iter().cloned()));
         is_keys.then(|| KeyBindings::of_sets(&sets))
+    }
+}
+
+/// Returns the name of keys and buttons that are held together.
+fn name_of_keys(held: &[VirtualButton]) -> String {
+    match held {
+        [] => "nothing".to_owned(),
+        held => held.iter().map(VirtualButton::to_string).collect::<Vec<_>>().join("+"),
+    }
+}
+
+/// Returns a position in pixels, or in hundredths of the window's width and height.
+fn name_of_position(position: PointerPosition) -> String {
+    let percent = |fraction: f32| (fraction * 1000.0).round() / 10.0;
+    match position {
+        PointerPosition::Pixels(at) => format!("{} {}", at.x, at.y),
+        PointerPosition::Fraction(at) => format!("{}% {}%", percent(at.x), percent(at.y)),
     }
 }
 
@@ -669,5 +709,39 @@ pub(super) fn mask(world: &mut World) {
         if let Some(legal) = legal {
             world.entity_mut(agent).insert(LegalActions::new(legal));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(add: impl Fn(ForeignGame) -> ForeignGame) -> Vec<String> {
+        add(ForeignGame::new("board", 1, |_: &mut App| {}).observe(["x"], || [0.0])).action_names()
+    }
+
+    #[test]
+    fn actions_of_the_mouse_are_named_by_where_they_point() {
+        let cells = [None, Some(PointerPosition::fraction(1.0 / 6.0, 0.5)), Some(PointerPosition::pixels(160.0, 80.0))];
+        let clicked =
+            names(|game| game.cursor(cells).mouse_buttons([vec![], vec![MouseButton::Left]]).clicks(["Start"]));
+        assert_eq!(clicked, ["nothing", "click 16.7% 50%", "cursor 160 80", "click Start"]);
+        let turned = names(|game| {
+            let held = [vec![], vec![MouseButton::Right]];
+            game.cursor(cells).mouse_buttons(held).taps([None, None, cells[1]]).wheel([-1.0, 0.0, 0.5])
+        });
+        let right = format!("{} at 16.7% 50%", VirtualButton::Mouse(MouseButton::Right));
+        assert_eq!(turned, ["wheel -1", &right, "cursor 160 80 and tap 16.7% 50% and wheel +0.5"]);
+    }
+
+    #[test]
+    fn names_that_policies_may_have_stored_stay_those_of_keys() {
+        let held = [vec![], vec![MouseButton::Left]];
+        assert_eq!(
+            names(|game| game.keys([vec![], vec![KeyCode::KeyW]]).mouse_buttons(held.clone())),
+            ["nothing", "KeyW"]
+        );
+        let named = names(|game| game.mouse_buttons(held.clone()).action_names(["wait", "go"]));
+        assert_eq!(named, ["wait", "go"]);
     }
 }

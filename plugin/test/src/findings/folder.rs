@@ -38,9 +38,9 @@ pub fn list_findings(folder: &Path) -> Result<Vec<(String, PathBuf)>, FindingErr
     Ok(found)
 }
 
-/// Returns true if files of findings are in the folder itself, as in the `findings` of a test.
-pub fn has_findings(folder: &Path) -> bool {
-    files_in(folder).is_ok_and(|found| !found.is_empty())
+/// Returns the first file of a finding in the folder itself, as in the `findings` of a test; `None` without one.
+pub fn first_finding(folder: &Path) -> Option<PathBuf> {
+    files_in(folder).ok()?.into_iter().min().map(|(_, path)| path)
 }
 
 /// Removes the findings of an earlier test from its folder.

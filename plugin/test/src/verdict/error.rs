@@ -44,8 +44,8 @@ pub enum TestError {
     /// A file is at the path of the folder.
     #[error("{} is a file, and results need a folder: name another --out", .0.display())]
     NotAFolder(PathBuf),
-    /// The folder is that of another test's findings, which would count as those of this one.
-    #[error("{} has the findings of another test: name another --out", .0.display())]
+    /// The folder has a finding from elsewhere, which would count as one of this test.
+    #[error("{} is a finding that is not of this test: name another --out, or move the file", .0.display())]
     HasFindings(PathBuf),
     /// Another process tests into the folder.
     #[error("{} is in use by another test: wait for it or stop it, or choose another --out", .0.display())]

@@ -7,7 +7,7 @@
 //! ```
 
 use crate::{
-    findings::{FINDINGS, clear_findings, has_findings},
+    findings::{FINDINGS, clear_findings, first_finding},
     verdict::{
         LevelVerdict,
         error::{JOURNAL, TestError, io_error, json_fault},
@@ -59,8 +59,8 @@ impl TestFolder {
         if path.is_file() {
             return Err(TestError::NotAFolder(path.into()));
         }
-        if has_findings(path) {
-            return Err(TestError::HasFindings(path.into()));
+        if let Some(finding) = first_finding(path) {
+            return Err(TestError::HasFindings(finding));
         }
         disk::create_dir_all(path).map_err(io_error("create", path))?;
         let (record_file, results) = (path.join(RECORD), path.join(RESULTS));
@@ -299,7 +299,7 @@ mod tests {
         fs::create_dir_all(&findings).expect("writable");
         fs::write(findings.join("a.finding"), "").expect("writable");
         let error = TestFolder::open(&findings, &record(), Earlier::Replace).map(drop).expect_err("another test's");
-        assert!(error.is_usage() && error.to_string().contains("has the findings of another test"), "{error}");
+        assert!(error.is_usage() && error.to_string().contains("a.finding is a finding"), "{error}");
 
         let journal = path.join(JOURNAL);
         let torn = [fs::read(&journal).expect("written"), b"{\"ind".to_vec()].concat();

@@ -75,7 +75,10 @@ impl ResultLines {
                         "the line breaks are not those of `playbot test`, whose results are read line by line: keep the file \
                          as it was written, and format a copy"
                     }
-                    _ => "this is not the head of results",
+                    _ => {
+                        "the file is torn, or holds no results: `test --resume` writes it anew from the levels that are \
+                         done, and `test --force` plays all of them again"
+                    }
                 };
                 let message = message.to_owned();
                 return Err(TestError::Damaged { path, line: 1, message });

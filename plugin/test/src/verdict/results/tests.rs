@@ -63,6 +63,9 @@ fn what_is_no_result_is_named_with_its_line() {
         let found = all.expect_err(text).to_string();
         assert!(found.contains(&format!("{RESULTS}, line {line}: ")), "{found}");
     }
+    fs::write(folder.path().join(RESULTS), &head[..head.len() / 2]).expect("writable");
+    let found = open().map(drop).expect_err("half a head").to_string();
+    assert!(found.contains("the file is torn") && found.contains("`test --resume`"), "{found}");
     fs::write(folder.path().join(RESULTS), written(&[r#"{"index":0}"#, r#"{"index":1,]"#])).expect("writable");
     let mut lines = open().expect("a head");
     lines.next_line().expect("a level");
