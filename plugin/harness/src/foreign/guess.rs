@@ -48,7 +48,11 @@ impl Guess {
     pub(super) fn position(&mut self, world: &World, paths: &[String]) -> Option<GuessedPosition> {
         let components = world.components().num_registered();
         if self.known != components {
-            *self = Self { known: components, signs: signs(world, paths, &named(world)), camera: component_of(world, "Camera3d") };
+            *self = Self {
+                known: components,
+                signs: signs(world, paths, &named(world)),
+                camera: component_of(world, "Camera3d"),
+            };
         }
         for sign in &self.signs {
             let found = sign.entities(world);

@@ -11,6 +11,10 @@ use std::{
 /// larger than one step of most of them.
 const HOLD: u32 = 30;
 
+/// Times that an action has changed nothing in a cell before it counts as tried there. In a single tick it may change
+/// nothing for the only reason that the agent still rests from its last step.
+const IDLE: u32 = 100;
+
 /// The statement that an exploration has tried every action from every cell that it knows, and that no other cell came
 /// up. It is no proof.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -39,6 +43,8 @@ impl fmt::Display for Exhaustion {
 pub(super) struct TriedActions {
     start: BTreeSet<u32>,
     cells: BTreeMap<ExploredCell, BTreeSet<u32>>,
+    /// Times that actions have changed nothing in a cell.
+    idle: BTreeMap<ExploredCell, BTreeMap<u32, u32>>,
 }
 
 impl TriedActions {
@@ -56,8 +62,26 @@ impl TriedActions {
         }
     }
 
+    /// Notes that an action has changed nothing in a cell so many times more.
+    fn add_idle(&mut self, cell: &ExploredCell, action: u32, times: u32) {
+        if !self.idle.contains_key(cell) {
+            self.idle.insert(cell.clone(), BTreeMap::new());
+        }
+        let count = self.idle.get_mut(cell).map_or(0, |actions| {
+            let count = actions.entry(action).or_default();
+            *count = (*count + times).min(IDLE);
+            *count
+        });
+        if count >= IDLE {
+            self.add(Some(cell), action);
+        }
+    }
+
     /// Adds the actions of a visit.
     pub fn merge(&mut self, other: Self) {
+        for (cell, actions) in &other.idle {
+            actions.iter().for_each(|(action, times)| self.add_idle(cell, *action, *times));
+        }
         self.start.extend(other.start);
         for (cell, actions) in other.cells {
             self.cells.entry(cell).or_default().extend(actions);
@@ -84,8 +108,7 @@ pub(super) struct Trial {
 /// Notes the actions of a visit from cell to cell.
 ///
 /// An action counts as tried from a cell if it leads to another cell or ends the game, if it is repeated in the cell for
-/// a while, or if nothing has changed for as long, whatever the actions were. In a single tick it may change nothing for
-/// the only reason that the agent still rests from its last step.
+/// a while, or if it has changed nothing there many times.
 #[derive(Default)]
 pub(super) struct TrialNotes {
     /// The actions so far.
@@ -96,8 +119,6 @@ pub(super) struct TrialNotes {
     action: Option<u32>,
     /// Ticks in a row in which it was taken in this cell.
     held: u32,
-    /// Ticks in a row in which nothing has changed.
-    still: u32,
 }
 
 impl TrialNotes {
@@ -116,9 +137,10 @@ impl TrialNotes {
                 (true, false) => 1,
             };
             self.action = Some(trial.action);
-            self.still = if trial.has_changed { 0 } else { self.still + 1 };
-            if !stays || trial.is_over || self.held.max(self.still) >= HOLD {
+            if !stays || trial.is_over || self.held >= HOLD {
                 self.tried.add(Some(from), trial.action);
+            } else if !trial.has_changed {
+                self.tried.add_idle(from, trial.action, 1);
             }
         }
         let here = before.filter(|_| stays).map_or_else(|| cell.clone(), |(_, from)| from);
@@ -200,19 +222,17 @@ mod tests {
     }
 
     #[test]
-    fn actions_that_change_nothing_were_tried_once_nothing_has_changed_for_long_enough() {
-        let still = |action| Some(Trial { action, has_changed: false, is_over: false });
-        let mut notes = TrialNotes::default();
-        notes.arrive(0, &cell(1), None);
-        for ticks in 1..HOLD {
-            notes.arrive(ticks, &cell(1), still(ticks % 2));
+    fn an_action_that_changes_nothing_was_tried_after_many_times_in_all_visits_together() {
+        let mut all = TriedActions::default();
+        for times in 1..=IDLE {
+            let mut notes = TrialNotes::default();
+            notes.arrive(3, &cell(1), None);
+            notes.arrive(4, &cell(1), Some(Trial { action: 0, has_changed: false, is_over: false }));
+            notes.arrive(5, &cell(1), trial(1));
+            all.merge(notes.tried);
+            assert_eq!(all.has_all(Some(&cell(1)), 1), times == IDLE, "{times}");
         }
-        assert_eq!(tried(&notes, 1), Vec::<u32>::new(), "the agent may rest from its last step");
-        notes.arrive(HOLD, &cell(1), still(2));
-        assert_eq!(tried(&notes, 1), [2]);
-        notes.arrive(HOLD + 1, &cell(1), trial(0));
-        notes.arrive(HOLD + 2, &cell(1), still(1));
-        assert_eq!(tried(&notes, 1), [2], "a change begins a new rest");
+        assert!(!all.has_all(Some(&cell(1)), 2), "action 1 has changed something and led nowhere yet");
     }
 
     #[test]

@@ -203,9 +203,8 @@ fn action_in_words(actions: &EpisodeActions, tick: usize, names: &[String]) -> S
         }
         EpisodeActions::Continuous { dim, values } => {
             let row = values[tick * dim..(tick + 1) * dim].iter().enumerate();
-            let words = row.map(|(at, value)| {
-                named(at).map_or_else(|| value.to_string(), |name| format!("{name} {value}"))
-            });
+            let words =
+                row.map(|(at, value)| named(at).map_or_else(|| value.to_string(), |name| format!("{name} {value}")));
             format!("[{}]", words.collect::<Vec<_>>().join(", "))
         }
     }
