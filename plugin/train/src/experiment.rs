@@ -460,7 +460,8 @@ mod tests {
             "level 0 of the training levels default:0..0 is one of the held-out levels default:0..0: choose others"
         );
         let text = text.replace("default:0", "default:3");
-        let words = parse_experiment(&text, Path::new("x.ron")).expect_err("they overlap").to_string();
+        let third = parse_experiment(&text, Path::new("x.ron")).expect("readable");
+        let words = third.check().expect_err("they overlap").to_string();
         assert!(words.contains("choose ranges that share no level"), "{words}");
     }
 

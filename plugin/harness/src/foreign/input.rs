@@ -717,7 +717,8 @@ mod tests {
     use super::*;
 
     fn names(add: impl Fn(ForeignGame) -> ForeignGame) -> Vec<String> {
-        add(ForeignGame::new("board", 1, |_: &mut App| {}).observe(["x"], || [0.0])).action_names()
+        let game = add(ForeignGame::new("board", 1, |_: &mut App| {}).observe(["x"], || [0.0]));
+        InputTools::action_names(&game)
     }
 
     #[test]
