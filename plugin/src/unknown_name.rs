@@ -81,7 +81,6 @@ mod tests {
             ("Pantyr", "Pantry"),
             ("Stiars", "Stairs"),
             ("Ladder", "Larder"),
-            ("Wel", "Well"),
             ("Wall", "Well"),
             ("room_39", "Room_39"),
             ("WELL", "Well"),
