@@ -460,7 +460,7 @@ impl NumberedLevels {
 
     /// Finds a level, or a range of levels, by names or numbers. A mode may stand in front.
     fn one(game: &dyn Game, (mode, is_mode_named): (&str, bool), text: &str) -> Option<Self> {
-        let own = text.split_once(':').filter(|(mode, _)| game.check_mode(mode).is_ok());
+        let own = own_mode(game, text);
         let (mode, name) = own.unwrap_or((mode, text));
         let names = game.tools().levels.level_names(mode);
         let number = |name: &str| -> Option<u64> {
@@ -485,13 +485,17 @@ impl NumberedLevels {
     }
 }
 
+/// Returns the mode in front of a level, and the level, if it is a mode of the game. A name may have a colon in it.
+fn own_mode<'a>(game: &dyn Game, text: &'a str) -> Option<(&'a str, &'a str)> {
+    text.split_once(':').filter(|(mode, _)| game.check_mode(mode).is_ok())
+}
+
 /// Names that are listed for a name that does not exist.
 const LISTED: usize = 3;
 
 /// Returns the error of a name that no level has; `None` for a game whose levels have no names.
 fn unknown_level(game: &dyn Game, mode: &str, text: &str, option: LevelsOption) -> Option<String> {
-    let own = text.split_once(':').filter(|(mode, _)| game.check_mode(mode).is_ok());
-    let (mode, name) = own.unwrap_or((mode, text));
+    let (mode, name) = own_mode(game, text).unwrap_or((mode, text));
     let names = game.tools().levels.level_names(mode);
     let known: Vec<&str> = names.iter().map(String::as_str).collect();
     let near = nearest(name, &known).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));

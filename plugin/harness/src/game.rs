@@ -728,6 +728,9 @@ mod tests {
         assert_eq!(without_idle_action(&game.clone().keys([vec![], vec![KeyCode::Space]])), None);
         let mouse =
             without_idle_action(&game.mouse_buttons([[MouseButton::Left]])).expect("its only action is a button");
-        assert!(mouse.contains("while you do nothing, it gets action 0; add one, such as `vec![]`"), "{mouse}");
+        assert!(
+            mouse.contains("while you do nothing, it gets action 0 (MouseLeft); add one, such as `vec![]`"),
+            "{mouse}"
+        );
     }
 }

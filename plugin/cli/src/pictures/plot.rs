@@ -93,6 +93,15 @@ struct TestedGround {
     floor: Floor,
 }
 
+/// Returns the error of an option that draws on the floor plan of a level, for a game that has none.
+pub(crate) fn without_plan(game: &dyn Game, level: &str, option: &str) -> CliError {
+    CliError::Usage(format!(
+        "`{}` has no floor plan of level {level}: leave {option} out, or add one to its adapter with `.plan` or \
+         `.plan_of_file`",
+        game.name()
+    ))
+}
+
 impl Footprints {
     /// Prepares the trails of a game, to be drawn into a file.
     ///
@@ -102,13 +111,7 @@ impl Footprints {
     pub fn new(path: &Path, game: &dyn Game, splits: &[LevelSplit]) -> Result<Self, CliError> {
         let file = PlotFile::new(path)?;
         match splits.iter().find(|split| game.tools().levels.floor_plan(&split.mode, split.first).is_none()) {
-            Some(split) => Err(CliError::Usage(format!(
-                "`{}` has no floor plan of level {}:{}: leave --plot out, or add one to its adapter with `.plan` or \
-                 `.plan_of_file`",
-                game.name(),
-                split.mode,
-                split.first
-            ))),
+            Some(LevelSplit { mode, first, .. }) => Err(without_plan(game, &format!("{mode}:{first}"), "--plot")),
             None => Ok(Self { file, grounds: Vec::new() }),
         }
     }

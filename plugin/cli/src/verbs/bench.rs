@@ -13,7 +13,7 @@ use playbot_harness::{
     games::Games,
     parallel::{default_threads, on_threads},
     prelude::*,
-    split::last_level,
+    split::LevelSplit,
     worlds::{Arrangement, build_observing_world, is_bound_to_its_thread},
 };
 use playbot_learner::waited;
@@ -176,12 +176,12 @@ impl Measure {
 fn simulate(game: &dyn Game, mode: &str, kind: ObservationKind, args: &Args, _: &Games) -> Result<Measure, CliError> {
     let observation_config = ObservationConfig { kind, ..ObservationConfig::default() };
     let arrangement = Arrangement::new(game, args.arenas, args.threads as u32);
-    let last = last_level(game, mode).unwrap_or(u64::MAX).min(63);
+    let levels = LevelSplit { mode: mode.to_owned(), first: 0, last: 63 }.within(game);
     let mut worlds = Vec::new();
     for first in arrangement.first_agents() {
         let (mut world, agents) = build_observing_world(game, mode, &observation_config, 1, first, arrangement.arenas)?;
         for agent in agents {
-            let queue = LevelQueue::Uniform { first: 0, last };
+            let queue = LevelQueue::Uniform { first: levels.first, last: levels.last };
             world.entity_mut(agent).insert((Control::Bot, BlindBot::Uniform, queue));
         }
         worlds.push(world);

@@ -337,13 +337,11 @@ pub(crate) fn merge(files: &[PathBuf], out: &Path, as_json: bool) -> Result<Outc
         ))?;
     }
     if report.equal_episodes > 0 {
+        let are = if report.equal_episodes == 1 { "is" } else { "are" };
         report!(
-            "warning: {} equal to ones of other files, as in a copy with another name, and would count twice: leave the copy \
-             out",
-            match report.equal_episodes {
-                1 => "1 episode is".to_owned(),
-                n => format!("{n} episodes are"),
-            }
+            "warning: {} {are} equal to ones of other files, as in a copy with another name, and would count twice: leave the \
+             copy out",
+            counted(report.equal_episodes as u64, "episode")
         );
     }
     Ok(if report.episodes() == 0 { Outcome::Findings } else { Outcome::Pass })

@@ -15,7 +15,7 @@ use crate::{
     error::{CliError, Outcome},
     output,
     output::print_line,
-    pictures::plot::PlotFile,
+    pictures::plot::{PlotFile, without_plan},
     progress,
     progress::interrupt,
     verbs::explore::recorded::{RecordingFile, chart},
@@ -135,15 +135,8 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let floor = match &args.png {
         None => None,
         Some(path) => {
-            let missing = || {
-                CliError::Usage(format!(
-                    "`{}` has no floor plan of level {}: leave --png out, or add one to its adapter with `.plan` or \
-                     `.plan_of_file`",
-                    game.name(),
-                    shown(&split)
-                ))
-            };
-            let floor_plan = game.tools().levels.floor_plan(&split.mode, split.first).ok_or_else(missing)?;
+            let floor_plan = game.tools().levels.floor_plan(&split.mode, split.first);
+            let floor_plan = floor_plan.ok_or_else(|| without_plan(game, &shown(&split), "--png"))?;
             Some((PlotFile::new(path)?, floor_plan))
         }
     };

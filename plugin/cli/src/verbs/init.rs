@@ -252,12 +252,11 @@ impl GameFolder {
     /// Returns lines for people about all that was found.
     fn description(&self, facts: &GameFacts, has_stub: bool) -> Vec<String> {
         // Empty where nothing was found.
-        let joined = |names: Vec<String>| names.join(", ");
         let at = |lines: &[SourceLine]| {
-            joined(lines.iter().map(|found| format!("{} ({}:{})", found.name, found.file, found.line)).collect())
+            let found = lines.iter().map(|found| format!("{} ({}:{})", found.name, found.file, found.line));
+            found.collect::<Vec<_>>().join(", ")
         };
         let items = |items: &[NamedItem]| at(&items.iter().map(|item| item.at.clone()).collect::<Vec<_>>());
-        let names = |names: &[&str]| joined(names.iter().map(|name| (*name).to_owned()).collect());
         let states = facts.states.iter().map(|state| {
             format!("{} ({}:{}): {}", state.at.name, state.at.file, state.at.line, state.variants.join(" | "))
         });
@@ -274,21 +273,21 @@ impl GameFolder {
         let assets = if has_assets { "assets".to_owned() } else { String::new() };
         let mut rows = vec![
             ("game", format!("{}, Bevy {version}", self.name())),
-            ("features of Bevy", joined(self.bevy.features.clone())),
+            ("features of Bevy", self.bevy.features.join(", ")),
             ("library", library),
             ("functions of `&mut App`", items(&facts.functions)),
             ("plugins", items(&facts.plugins)),
-            ("states", joined(states.collect())),
-            ("input", names(&facts.inputs)),
-            ("keys", joined(facts.keys.clone())),
+            ("states", states.collect::<Vec<_>>().join(", ")),
+            ("input", facts.inputs.join(", ")),
+            ("keys", facts.keys.join(", ")),
             ("keys that leave or skip levels", at(&facts.leaving_keys)),
             ("presses that count once", at(&facts.presses)),
-            ("fixed steps", joined(fixed_steps(facts).into_iter().collect())),
-            ("mouse buttons", joined(facts.mouse_buttons.clone())),
-            ("buttons", joined(facts.buttons.clone())),
+            ("fixed steps", fixed_steps(facts).unwrap_or_default()),
+            ("mouse buttons", facts.mouse_buttons.join(", ")),
+            ("buttons", facts.buttons.join(", ")),
             ("player", items(facts.player.as_slice())),
-            ("physics", names(&facts.physics)),
-            ("loading", names(&facts.loaders)),
+            ("physics", facts.physics.join(", ")),
+            ("loading", facts.loaders.join(", ")),
             ("loads of assets", at(&facts.loads)),
             ("folder of assets", folder.unwrap_or(assets)),
             ("reads of files", at(&facts.files)),

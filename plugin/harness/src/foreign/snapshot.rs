@@ -758,9 +758,10 @@ fn write(
         let age = value.age.min(since_begun.saturating_sub(1));
         way.write(world, entity, &value.value, map, Tick::new(now.get().wrapping_sub(age)));
     }
+    // Values that hooks and observers have changed during the load are later than the last frame.
+    let present = world.read_change_tick();
     for (way, value) in start.iter().filter(|(way, _)| !saved.gone.contains(&way.type_id) && !saved.has(way.type_id)) {
         let Some(entity) = place(world, way.id) else { continue };
-        let present = world.read_change_tick();
         if ticks(world, entity, way.id).is_some_and(|ticks| ticks.changed.is_newer_than(begun, present)) {
             match value {
                 Some(value) => way.write(world, entity, value, own, begun),

@@ -239,8 +239,9 @@ impl Jobs<'_> {
         }
         let is_first = !std::mem::replace(has_restored, true);
         let is_checked = |job: &Job| is_first || (job.saved.is_some() && job.number.is_multiple_of(CHECKED));
-        let checked: Vec<bool> = jobs.iter().map(is_checked).collect();
-        let replays = jobs.iter().filter(|job| is_checked(job)).map(|job| Job { saved: None, ..job.clone() }).collect();
+        let checked = jobs.iter().enumerate().filter(|(_, job)| is_checked(job));
+        let (places, replays): (Vec<usize>, Vec<Job>) =
+            checked.map(|(place, job)| (place, Job { saved: None, ..job.clone() })).unzip();
         let fault = |tick| Ok(Err(SnapshotFault { game: game.name(), level: plan.level, tick }));
         let restored = match play_round(crews, jobs, threads, archive, progress) {
             Ok(restored) => restored,
@@ -249,8 +250,8 @@ impl Jobs<'_> {
             Err(_) => return fault(None),
         };
         let replayed = play_round(crews, replays, threads, archive, &|_| {})?;
-        let pairs = restored.iter().zip(checked).filter(|(_, is_checked)| *is_checked).zip(&replayed);
-        let difference = pairs.into_iter().find_map(|((one, _), other)| one.first_difference(other));
+        let mut pairs = places.into_iter().zip(&replayed);
+        let difference = pairs.find_map(|(place, replayed)| restored[place].first_difference(replayed));
         if difference.is_some() { fault(difference) } else { Ok(Ok(restored)) }
     }
 }

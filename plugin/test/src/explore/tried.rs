@@ -50,29 +50,15 @@ pub(super) struct TriedActions {
 impl TriedActions {
     /// Adds an action from a cell; `None` is the start.
     fn add(&mut self, cell: Option<&ExploredCell>, action: u32) {
-        let Some(cell) = cell else {
-            self.start.insert(action);
-            return;
-        };
-        // A cell is copied once, and not in each tick.
-        if let Some(tried) = self.cells.get_mut(cell) {
-            tried.insert(action);
-        } else {
-            self.cells.insert(cell.clone(), BTreeSet::from([action]));
-        }
+        let tried = cell.map_or(&mut self.start, |cell| of_cell(&mut self.cells, cell));
+        tried.insert(action);
     }
 
     /// Notes that an action has changed nothing in a cell so many times more.
     fn add_idle(&mut self, cell: &ExploredCell, action: u32, times: u32) {
-        if !self.idle.contains_key(cell) {
-            self.idle.insert(cell.clone(), BTreeMap::new());
-        }
-        let count = self.idle.get_mut(cell).map_or(0, |actions| {
-            let count = actions.entry(action).or_default();
-            *count = (*count + times).min(IDLE);
-            *count
-        });
-        if count >= IDLE {
+        let count = of_cell(&mut self.idle, cell).entry(action).or_default();
+        *count = (*count + times).min(IDLE);
+        if *count == IDLE {
             self.add(Some(cell), action);
         }
     }
@@ -93,6 +79,14 @@ impl TriedActions {
         let tried = cell.map_or(Some(&self.start), |cell| self.cells.get(cell));
         tried.is_some_and(|tried| tried.len() >= actions as usize)
     }
+}
+
+/// Returns the value of a cell. The cell is copied once, and not in each tick.
+fn of_cell<'a, V: Default>(all: &'a mut BTreeMap<ExploredCell, V>, cell: &ExploredCell) -> &'a mut V {
+    if !all.contains_key(cell) {
+        all.insert(cell.clone(), V::default());
+    }
+    all.get_mut(cell).expect("it was added")
 }
 
 /// The action of a tick, and its effect.

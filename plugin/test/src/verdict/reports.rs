@@ -213,10 +213,17 @@ fn lost(level: &LevelVerdict) -> String {
     let mut reasons = reasons(level);
     // A stable sort: equally frequent ones keep the order of the results.
     reasons.sort_by_key(|(count, _)| Reverse(*count));
-    let more = reasons.len().saturating_sub(MOST_CAUSES);
-    let more = (more > 0).then(|| format!("{more} more"));
-    let words: Vec<String> = reasons.into_iter().take(MOST_CAUSES).map(|(_, words)| words).chain(more).collect();
+    let words = first_few(reasons.into_iter().map(|(_, words)| words));
     format!("; {kinds}: {}", words.join(", "))
+}
+
+/// Returns the first causes or squares, and how many more there are.
+fn first_few(mut all: impl ExactSizeIterator<Item = String>) -> Vec<String> {
+    let mut words: Vec<String> = all.by_ref().take(MOST_CAUSES).collect();
+    if all.len() > 0 {
+        words.push(format!("{} more", all.len()));
+    }
+    words
 }
 
 /// Describes a square of ends.
@@ -246,12 +253,7 @@ fn squares(level: &LevelVerdict) -> String {
     let words = match ends[..] {
         [] => return String::new(),
         [end] if count(end) == level.score.lost.saturating_add(level.score.timed_out) => near(end),
-        _ => {
-            let more = ends.len().saturating_sub(MOST_CAUSES);
-            let more = (more > 0).then(|| format!("{more} more"));
-            let named = ends.iter().take(MOST_CAUSES).map(|end| format!("{} {}", count(end), near(end)));
-            named.chain(more).collect::<Vec<_>>().join("; ")
-        }
+        _ => first_few(ends.iter().map(|end| format!("{} {}", count(end), near(end)))).join("; "),
     };
     format!(" ({words})")
 }

@@ -45,17 +45,23 @@ fn recorded_by_mouse(scale: Option<&str>, start: [u32; 2], cell: [u32; 2]) -> [O
     seat.click(cell[0], cell[1]);
     // A busy computer draws few frames a second.
     seat.sit_out(12);
-    seat.tap("Escape");
-    let (status, said) = seat.leave();
-    assert!(status.success(), "{said}");
-    let verified = shell.answer(&["demo", "verify", "mine.demo", "--json"]);
-    assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
+    leave_with(&shell, seat, "mine.demo");
     let episodes = shell.answers(&["demo", "show", "mine.demo", "--json"]).len();
     let ticks = (0..episodes)
         .flat_map(|episode| shell.answers(&["demo", "show", "mine.demo", "--episode", &episode.to_string(), "--json"]));
     // A button that is held for two frames is an action more, in between.
     let actions: Vec<u64> = ticks.filter_map(|tick| tick["action"].as_u64()).filter(|action| *action != 0).collect();
     [actions.first().copied(), actions.last().copied()]
+}
+
+/// Closes a window. Its recording replays.
+#[cfg(feature = "screen")]
+fn leave_with(shell: &playbot_shell::Shell, seat: playbot_shell::Seat, file: &str) {
+    seat.tap("Escape");
+    let (status, said) = seat.leave();
+    assert!(status.success(), "{said}");
+    let verified = shell.answer(&["demo", "verify", file, "--json"]);
+    assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
 }
 
 /// Plays without a key, and returns the lengths of the episodes that are recorded. An episode of a bot has 120 ticks.
@@ -71,11 +77,7 @@ fn lengths_of_a_slow_person(more: &[&str]) -> Vec<u64> {
     } else {
         seat.pass_ticks(140);
     }
-    seat.tap("Escape");
-    let (status, said) = seat.leave();
-    assert!(status.success(), "{said}");
-    let verified = shell.answer(&["demo", "verify", "slow.demo", "--json"]);
-    assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
+    leave_with(&shell, seat, "slow.demo");
     let episodes = shell.answers(&["demo", "show", "slow.demo", "--json"]);
     episodes.iter().filter_map(|episode| episode["steps"].as_u64()).collect()
 }
