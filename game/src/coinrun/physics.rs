@@ -5,7 +5,7 @@
 
 use crate::coinrun::{
     SIZE, Tile,
-    components::{Arena, ArenaBody, Crate, Enemy, InArena, PlayerBody, PlaysIn, Saw, Tiles},
+    components::{ArenaBody, Crate, Enemy, InArena, PlayerBody, PlaysIn, Saw, Tiles},
     play::CoinRunSystems,
     rules::Body,
 };
@@ -45,13 +45,14 @@ impl Plugin for CoinRunPhysicsPlugin {
     }
 }
 
-/// Adds a context without gravity to each new arena: only the rules move bodies.
+/// Adds a context without gravity to the arena of each new player: only the rules move bodies. A player has a collider
+/// before its first level.
 fn add_contexts(
-    arenas: Query<Entity, Added<Arena>>,
+    players: Query<&PlaysIn, Added<PlaysIn>>,
     known: Query<(), With<RapierContextSimulation>>,
     mut commands: Commands,
 ) {
-    for arena in &arenas {
+    for &PlaysIn(arena) in &players {
         if !known.contains(arena) {
             let configuration = RapierConfiguration { gravity: Vec2::ZERO, ..RapierConfiguration::new(1.0) };
             commands.entity(arena).insert((RapierContextSimulation::default(), configuration));
