@@ -143,8 +143,28 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
             lines.extend([search, "```".to_owned()]);
         }
     }
+    lines.extend(hardest(overview));
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// Lists levels that are solved less often than others. They have no problem.
+fn hardest(overview: &Overview) -> Vec<String> {
+    if overview.hardest.is_empty() {
+        return Vec::new();
+    }
+    let head = [
+        "",
+        "## Hardest levels",
+        "",
+        "Solved and without findings, but in fewer episodes than half of the solved levels:",
+        "",
+        "| level | episodes |",
+        "|---|---|",
+    ];
+    let row =
+        |level: &LevelVerdict| format!("| {} | {} |", markdown_cell(&level.title()), markdown_cell(&message(level)));
+    head.map(str::to_owned).into_iter().chain(overview.hardest.iter().map(row)).collect()
 }
 
 /// Formats the 95 % interval of a share, in percent.
@@ -395,6 +415,30 @@ mod tests {
         level.testers[0].places = Some(Places { visited: 1, open: 4 });
         let mapped = said(&level);
         assert!(mapped.contains("75.0 % of the open squares") && mapped.contains(" | 25.0 % |"), "{mapped}");
+    }
+
+    #[test]
+    fn solved_levels_are_no_problem() {
+        let testers = ["search", "random"].map(TesterRecord::bot).to_vec();
+        let record = TestRecord { testers, ..testing::record("hard:0..3") };
+        let said = |solved: &[u64]| {
+            let parent = tempfile::tempdir().expect("a folder");
+            let (mut folder, _) = TestFolder::open(parent.path(), &record, Earlier::Keep).expect("new");
+            for (index, solved) in (0..).zip(solved) {
+                let testers = vec![tester("search", 1, 1, true), tester("random", solved - 1, 1, false)];
+                folder.keep(&LevelVerdict { testers, ..verdict(index, *solved, 2) }).expect("writable");
+            }
+            folder.finish().expect("writable");
+            summary(&Overview::read(parent.path()).expect("results"), None, "playbot")
+        };
+        let sound = said(&[1, 1, 1, 1]);
+        for words in ["look at", "problem", "Hardest", "--bot random"] {
+            assert!(!sound.contains(words), "{words}: {sound}");
+        }
+        let hard = said(&[2, 2, 1, 2]);
+        let row = "## Hardest levels\n\nSolved and without findings, but in fewer episodes than half of the solved levels:\n\n\
+                   | level | episodes |\n|---|---|\n| hard:2 | solved 1 of 2 episodes; lost 1 |\n";
+        assert!(hard.contains(row) && !hard.contains("problem") && !hard.contains("--bot random"), "{hard}");
     }
 
     #[test]

@@ -18,6 +18,7 @@ use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::{
+    collections::BTreeMap,
     fs::File,
     io,
     io::{BufRead, BufReader, Write},
@@ -35,6 +36,9 @@ const END: &str = "]}";
 
 /// Largest number of worst levels that are reported.
 pub const MOST_WORST: usize = 20;
+
+/// Largest number of hardest levels that are reported.
+const MOST_HARDEST: usize = 5;
 
 /// The levels of a `results.json`, in their order, as lines of JSON.
 pub struct ResultLines {
@@ -275,8 +279,11 @@ pub struct Overview {
     pub places: Places,
     /// The testers, in the order of the test.
     pub testers: Vec<TesterTotal>,
-    /// At most 20 levels that were not solved each time, or that have a finding, the worst ones first.
+    /// At most 20 levels that are not [sound](LevelVerdict::is_sound), the worst ones first.
     pub worst: Vec<LevelVerdict>,
+    /// At most 5 sound levels that were solved in a smaller share of their episodes than at least half of the solved
+    /// levels, the hardest ones first.
+    pub hardest: Vec<LevelVerdict>,
 }
 
 impl Overview {
@@ -288,9 +295,14 @@ impl Overview {
     pub fn read(folder: &Path) -> Result<Self, TestError> {
         let mut lines = ResultLines::open(folder)?;
         let mut overview = Self::empty(lines.record().clone());
+        let mut shares = BTreeMap::<u64, u64>::new();
         while let Some(level) = lines.next_level()? {
+            if level.outcome == LevelOutcome::Solved {
+                *shares.entry(solved_share(&level)).or_default() += 1;
+            }
             overview.add(level);
         }
+        overview.keep_hardest(&shares);
         Ok(overview)
     }
 
@@ -315,6 +327,7 @@ impl Overview {
             places,
             testers,
             worst: Vec::new(),
+            hardest: Vec::new(),
         }
     }
 
@@ -341,13 +354,29 @@ impl Overview {
             *successes = successes.saturating_add(tester.score.solved);
             total.places.add(tester.places);
         }
-        if !level.is_perfect() {
-            let place = self.worst.partition_point(|other| is_worse(other, &level));
-            if place < MOST_WORST {
-                self.worst.insert(place, level);
-                self.worst.truncate(MOST_WORST);
-            }
+        if level.is_perfect() {
+            return;
         }
+        let (list, most) = match level.is_sound() {
+            true => (&mut self.hardest, MOST_HARDEST),
+            false => (&mut self.worst, MOST_WORST),
+        };
+        let place = list.partition_point(|other| is_worse(other, &level));
+        if place < most {
+            list.insert(place, level);
+            list.truncate(most);
+        }
+    }
+
+    /// Keeps those of the hardest levels that are harder than at least half of the solved levels, given the numbers of
+    /// solved levels by their share of solved episodes. A tester that never wins makes no level harder than the others.
+    fn keep_hardest(&mut self, shares: &BTreeMap<u64, u64>) {
+        let mut half = shares.values().sum::<u64>().div_ceil(2);
+        let median = shares.iter().find_map(|(share, levels)| {
+            half = half.saturating_sub(*levels);
+            (half == 0).then_some(*share)
+        });
+        self.hardest.retain(|level| median.is_some_and(|median| solved_share(level) < median));
     }
 
     /// Returns a sentence about the levels that are solved in their first tick, without a full stop; `None` without such
@@ -365,6 +394,12 @@ impl Overview {
     pub fn is_sound(&self) -> bool {
         self.findings == 0 && self.solved == self.levels
     }
+}
+
+/// Returns the share of solved episodes, in millionths.
+fn solved_share(level: &LevelVerdict) -> u64 {
+    let Trials { successes, trials } = level.score.trials();
+    u64::try_from(u128::from(successes) * 1_000_000 / u128::from(trials.max(1))).unwrap_or(u64::MAX)
 }
 
 /// Returns whether a level is at least as bad as a later one of the range.

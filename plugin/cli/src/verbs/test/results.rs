@@ -82,6 +82,10 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
             print_line("")?;
             print_table(&worst(&overview))?;
         }
+        if !overview.hardest.is_empty() {
+            print_line("")?;
+            print_table(&hardest(&overview))?;
+        }
     }
     report!("{}", counts(&overview));
     overview.first_tick().iter().for_each(|levels| report!("{levels}"));
@@ -187,6 +191,26 @@ fn worst(overview: &Overview) -> PlainTable {
             .map(str::to_owned)
             .to_vec(),
         rows: overview.worst.iter().map(row).collect(),
+    }
+}
+
+/// Returns the levels that are solved less often than others.
+fn hardest(overview: &Overview) -> PlainTable {
+    let row = |level: &LevelVerdict| {
+        let score = &level.score;
+        let median = score.ticks.map_or(f64::NAN, |ticks| ticks.median);
+        vec![
+            level.title(),
+            format!("{} of {}", score.solved, score.episodes),
+            ticks(median),
+            whole(score.lost as f64),
+            whole(score.timed_out as f64),
+        ]
+    };
+    PlainTable {
+        caption: "hardest levels, all solved".to_owned(),
+        columns: ["level", "solved", "ticks", "lost", "timed out"].map(str::to_owned).to_vec(),
+        rows: overview.hardest.iter().map(row).collect(),
     }
 }
 
