@@ -256,6 +256,38 @@ pub struct TesterTotal {
     pub places: Places,
 }
 
+/// Levels that a recording of an earlier build solves, in the order of the range.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RecordedTotal {
+    /// Number of these levels.
+    pub levels: u64,
+    /// Those whose recorded actions no longer end as they were recorded to, described.
+    pub regressions: Vec<String>,
+    /// Those whose actions end so after another course, or where no tester reaches the goal, described.
+    pub others: Vec<String>,
+}
+
+impl RecordedTotal {
+    fn add(&mut self, level: &LevelVerdict) {
+        self.levels += u64::from(level.recorded.is_some());
+        let Some(news) = level.recorded_news() else { return };
+        let list = if level.is_regression() { &mut self.regressions } else { &mut self.others };
+        list.push(format!("{}: {news}", level.title()));
+    }
+
+    /// Returns a sentence about all of these levels, without a full stop; `None` without such levels.
+    pub fn summary(&self) -> Option<String> {
+        let levels = counted(self.levels, "recorded level");
+        match (self.levels, self.regressions.len()) {
+            (0, _) => None,
+            (_, 0) => Some(format!("{levels}: all end as recorded")),
+            (_, count) => {
+                Some(format!("{levels}: {count} no longer {} as recorded", if count == 1 { "ends" } else { "end" }))
+            }
+        }
+    }
+}
+
 /// Totals of all results, and the worst levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overview {
@@ -284,6 +316,8 @@ pub struct Overview {
     /// At most 5 sound levels that were solved in a smaller share of their episodes than at least half of the solved
     /// levels, the hardest ones first.
     pub hardest: Vec<LevelVerdict>,
+    /// Levels of a recording of an earlier build, in a test against one.
+    pub recorded: RecordedTotal,
 }
 
 impl Overview {
@@ -328,6 +362,7 @@ impl Overview {
             testers,
             worst: Vec::new(),
             hardest: Vec::new(),
+            recorded: RecordedTotal::default(),
         }
     }
 
@@ -354,6 +389,7 @@ impl Overview {
             *successes = successes.saturating_add(tester.score.solved);
             total.places.add(tester.places);
         }
+        self.recorded.add(&level);
         if level.is_perfect() {
             return;
         }
@@ -390,9 +426,9 @@ impl Overview {
         (count > 0).then(|| format!("{} {are} solved in {their} first tick: {names}{more}", counted(count, "level")))
     }
 
-    /// Returns whether every level was solved and has no finding.
+    /// Returns whether every level was solved, has no finding, and ends as recorded.
     pub fn is_sound(&self) -> bool {
-        self.findings == 0 && self.solved == self.levels
+        self.findings == 0 && self.solved == self.levels && self.recorded.regressions.is_empty()
     }
 }
 

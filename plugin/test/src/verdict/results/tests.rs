@@ -1,6 +1,9 @@
 //! Tests of results as files.
 
-use crate::verdict::{Finding, MapScope, TesterRecord, results::*, testing::verdict};
+use crate::{
+    findings::testing::course,
+    verdict::{Finding, MapScope, TesterRecord, results::*, testing::verdict},
+};
 use playbot_harness::detector::LevelProof;
 use std::fs;
 
@@ -197,6 +200,26 @@ fn the_hardest_levels_are_those_that_are_solved_less_often_than_half_of_the_solv
     assert!(hardest(&[2, 3]).is_empty() && hardest(&[0]).is_empty() && hardest(&[]).is_empty());
     assert_eq!(hardest(&[4, 4, 4, 4, 4, 4, 3, 3, 3, 3, 3, 3]), Vec::<u64>::new(), "half of them are no exception");
     assert_eq!(hardest(&[4, 4, 4, 4, 4, 4, 4, 3, 3, 3, 3, 3, 3]), [7, 8, 9, 10, 11], "the first five");
+}
+
+#[test]
+fn recordings_that_end_otherwise_are_among_the_worst_levels() {
+    let mut overview = Overview::empty(record());
+    let recorded = |index, solved, ticks| LevelVerdict { recorded: Some(course(ticks)), ..verdict(index, solved, 2) };
+    assert_eq!(overview.recorded.summary(), None);
+    overview.add(recorded(0, 2, 120));
+    overview.add(recorded(1, 1, 120));
+    assert_eq!(overview.recorded.summary().as_deref(), Some("2 recorded levels: all end as recorded"));
+    assert!(overview.is_sound() && overview.worst.is_empty() && overview.recorded.others.is_empty());
+    overview.add(recorded(2, 2, 80));
+    let words = "hard:2: the recording solves it in 120 ticks; its actions lead elsewhere from tick 79 on, and reach the goal \
+                 after 80 ticks";
+    assert_eq!(overview.recorded.regressions, [words]);
+    assert_eq!(overview.recorded.summary().as_deref(), Some("3 recorded levels: 1 no longer ends as recorded"));
+    assert!(!overview.is_sound() && overview.worst[0].index == 2);
+    overview.add(recorded(3, 0, 120));
+    let weak = "hard:3: the recording solves it in 120 ticks; its actions still do, so the testers are too weak";
+    assert_eq!(overview.recorded.others, [weak]);
 }
 
 #[test]
