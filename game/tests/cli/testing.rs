@@ -2,6 +2,7 @@
 
 use std::{fs, path::Path, process::Output};
 
+use bevy_playbot::demo::file::{Decider, DemoReader, DemoWriter, EpisodeActions};
 use serde_json::Value;
 
 use crate::program::{code, done, ended, errors, lines, playbot, unsealed};
@@ -235,6 +236,79 @@ fn a_level_that_no_longer_exists_as_it_was_is_named_and_the_same_code_raises_no_
     for before in ["before", "before/results.json"] {
         assert!(run("before", &["--against", before, "--force"], 3).contains("cannot be compared with themselves"));
     }
+}
+
+/// Writes a recording in which the episodes of a level are longer by one tick, as if the present game ended them too
+/// early.
+fn delay(from: &Path, to: &Path, level: u64) {
+    let reader = DemoReader::open(from).expect("a recording");
+    let mut writer = DemoWriter::create(to, reader.header().clone()).expect("a fresh file");
+    for episode in reader {
+        let mut episode = episode.expect("whole");
+        if episode.level_seed == level {
+            let seen = episode.observations.len() / episode.len();
+            episode.observations.extend_from_within(episode.observations.len() - seen..);
+            episode.rewards.push(0.0);
+            episode.state_hashes.push(0);
+            episode.deciders.push(Decider::Bot);
+            let EpisodeActions::Discrete(actions) = &mut episode.actions else { panic!("numbers of actions") };
+            actions.push(0);
+        }
+        writer.push(&episode).expect("writable");
+    }
+}
+
+#[test]
+fn levels_that_no_longer_end_as_they_were_recorded_are_in_all_reports_and_raise_an_alarm() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    done(folder, &["record", "coinrun", "--levels", "easy:0..2", "--out", "same.demo"]);
+    delay(&folder.join("same.demo"), &folder.join("late.demo"), 1);
+    let plan = ["--levels", "easy:0..2", "--bot", "search,random"];
+    let run = |out: &str, rest: &[&str], wanted: i32| {
+        let output = test(folder, out, &[&plan[..], rest].concat());
+        assert_eq!(code(&output), wanted, "{}", errors(&output));
+        errors(&output)
+    };
+    let words = run("same", &["--against", "same.demo"], 0);
+    assert!(words.contains("3 recorded levels: all end as recorded") && !words.contains("recorded: "), "{words}");
+    let rows = |out: &str| results(folder, out)["levels"].as_array().cloned().expect("levels");
+    assert!(rows("same").iter().all(|row| row["recorded"]["end"] == "solved" && row["recorded"]["differs"].is_null()));
+    assert!(read(folder, "same/junit.xml").contains("failures=\"0\""));
+    assert!(!read(folder, "same/summary.md").contains("Levels to look at"), "`random` need not win");
+
+    let words = run("late", &["--against", "late.demo", "--threads", "1"], 1);
+    assert!(words.contains("3 recorded levels: 1 no longer ends as recorded"), "{words}");
+    let row = rows("late").remove(1);
+    let recorded = &row["recorded"];
+    let [before, now] = ["recorded_ticks", "ticks"].map(|name| recorded[name].as_u64().expect("a number"));
+    assert_eq!(
+        (row["outcome"].as_str(), before, recorded["differs"].as_u64()),
+        (Some("solved"), now + 1, Some(now - 1))
+    );
+    let news =
+        format!("the recording solves it in {before} ticks; its actions lead elsewhere from tick {} on", now - 1);
+    let end = format!(", and reach the goal after {now} ticks");
+    assert!(words.contains(&format!("recorded: easy:1: {news}")) && words.contains(&end), "{words}");
+    for file in &FILES[1..] {
+        let text = read(folder, &format!("late/{file}"));
+        assert!(text.contains(&news) && text.contains(&end), "{file}: {text}");
+    }
+    assert!(read(folder, "late/junit.xml").contains("failures=\"1\""));
+
+    run("two", &["--against", "late.demo", "--threads", "2"], 1);
+    assert_same(folder, "late", "two");
+    run("zero", &["--against", "late.demo", "--shard", "0/2"], 0);
+    run("one", &["--against", "late.demo", "--shard", "1/2"], 1);
+    ended(folder, &["report", "merge", "one", "zero", "--out", "joined"], 1);
+    assert_same(folder, "late", "joined");
+    // Earlier results may have courses of a recording or not.
+    run("after", &["--against", "late"], 0);
+    // What was played is kept without a recording, and compared with another one.
+    run("two", &["--resume", "--against", "same.demo"], 0);
+    assert_same(folder, "same", "two");
+    run("two", &["--resume"], 0);
+    assert_eq!(read(folder, "two/results.json"), read(folder, "after/results.json"));
 }
 
 /// Returns a line of results in which `search` failed on one level, and another level was proved unsolvable.

@@ -28,7 +28,7 @@ pub mod scan;
 #[cfg(test)]
 mod stored_tests;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 
 use crate::findings::{
     course::{Look, look},
@@ -51,7 +51,7 @@ use thiserror::Error;
 pub(crate) use crate::findings::play::detector_of;
 pub use crate::findings::{
     checks::{Check, Checks},
-    course::{RecordedCourse, course_of, course_of_recording, keeps_course},
+    course::{CourseEnd, RecordedCourse, course_of, course_of_recording, keeps_course},
     folder::{Date, DateError, FINDINGS, clear_findings, first_finding, gather_findings, list_findings},
     keep::{FindingFiles, Played, Recheck, SeenFinding, SeenLevel, Sighting, recheck},
     minimise::{Budget, Lengths, Minimised, actions_of, lengths, minimise},

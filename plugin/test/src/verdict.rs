@@ -38,11 +38,14 @@ mod track;
 mod walk;
 mod walked;
 
-use crate::verdict::{
-    played::{Played, PlayedEnd},
-    run::{inspect, seen},
-    track::{common_stop, reached},
-    walked::LevelVisits,
+use crate::{
+    findings::RecordedCourse,
+    verdict::{
+        played::{Played, PlayedEnd},
+        run::{inspect, seen},
+        track::{common_stop, reached},
+        walked::LevelVisits,
+    },
 };
 use bevy::math::{Rect, Vec2};
 use bevy_playbot::episode::EpisodeEnd;
@@ -54,14 +57,14 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 pub use crate::verdict::{
-    compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange, RecordedFurther, UnreachedSquares},
+    compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange, RecordedWins, UnreachedSquares},
     error::TestError,
     folder::{Earlier, TestFolder},
     maps::{FailurePath, LevelMaps, LevelPars, MapScope, SkillTicks, hash_of_files, level_name},
     merge::merge,
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
     reports::{AGAINST, JUNIT, SUMMARY, action_search, rerun_commands, write_reports},
-    results::{FinishTime, MOST_WORST, Overview, RESULTS, ResultLines, TesterTotal, results_folder},
+    results::{FinishTime, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, TesterTotal, results_folder},
     run::{TestEnd, TestObserver, run_tests, run_tests_keeping, test_in_turn},
     shard::{Shard, ShardError},
     statistics::{Trials, benjamini_hochberg, fisher_exact, wilson},
@@ -116,6 +119,10 @@ pub struct LevelVerdict {
     pub testers: Vec<TesterVerdict>,
     /// Findings.
     pub findings: Vec<Finding>,
+    /// Course of the actions that a recording of an earlier build solves it with, in a test against a recording that
+    /// does. It is the last field: [`TestFolder::finish_against`] adds it to a line.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recorded: Option<RecordedCourse>,
 }
 
 impl LevelVerdict {
@@ -124,12 +131,29 @@ impl LevelVerdict {
         self.name.as_ref().map_or_else(|| self.level.clone(), |name| format!("{} {name}", self.level))
     }
 
-    /// Returns whether it was solved and has no finding.
+    /// Returns whether it was solved, has no finding, and ends as recorded if it was recorded.
     pub fn is_sound(&self) -> bool {
-        self.outcome == LevelOutcome::Solved && self.findings.is_empty()
+        self.outcome == LevelOutcome::Solved && self.findings.is_empty() && !self.is_regression()
     }
 
-    /// Returns whether it was solved in every episode and has no finding.
+    /// Returns whether the actions of a recording no longer end as they were recorded to.
+    pub fn is_regression(&self) -> bool {
+        self.recorded.as_ref().is_some_and(|course| !course.ends_as_recorded())
+    }
+
+    /// Describes what the actions of a recording do otherwise, or better than all testers. `None` if there is nothing to
+    /// say.
+    pub fn recorded_news(&self) -> Option<String> {
+        let course = self.recorded.as_ref()?;
+        match (course.differs, self.outcome) {
+            (None, LevelOutcome::Solved) => None,
+            (None, LevelOutcome::BotFailed) => Some(format!("{course}, so the testers are too weak")),
+            (None, LevelOutcome::ProvedUnsolvable) => Some(format!("{course}, so the proof is wrong")),
+            (Some(_), _) => Some(course.to_string()),
+        }
+    }
+
+    /// Returns whether it is [sound](Self::is_sound) and was solved in every episode.
     pub fn is_perfect(&self) -> bool {
         self.is_sound() && self.score.solved == self.score.episodes
     }
@@ -330,6 +354,7 @@ fn judge(
         reached: None,
         testers: testers.collect(),
         findings,
+        recorded: None,
     };
     let has_maps = plan.maps().wants(verdict.is_perfect());
     let has_positions = failed.iter().any(|end| end.position.is_some());
@@ -474,13 +499,16 @@ fn add_cause(causes: &mut BTreeMap<String, u64>, cause: Option<&'static str>) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict::{maps::LevelMaps, testing::verdict, track::Track};
+    use crate::{
+        findings::CourseEnd,
+        verdict::{maps::LevelMaps, testing::verdict, track::Track},
+    };
     use bevy_playbot::episode::EpisodeResult;
 
     #[test]
     fn older_results_are_read_and_newer_ones_read_back() {
         let old = serde_json::to_string(&verdict(3, 1, 2)).expect("serialises");
-        for name in ["maps", "places", "causes", "seconds", "stop", "solved_at_start", "reached"] {
+        for name in ["maps", "places", "causes", "seconds", "stop", "solved_at_start", "reached", "recorded"] {
             assert!(!old.contains(name), "{old}");
         }
         assert_eq!(serde_json::from_str::<LevelVerdict>(&old).expect("whole"), verdict(3, 1, 2));
@@ -490,7 +518,16 @@ mod tests {
         let stop = CommonStop { kind: StopKind::End, x: 0.1, y: 0.7, within: 0.3, episodes: 2, of: 3, entity: None };
         let new = LevelVerdict { places, maps, causes, stop: Some(stop), solved_at_start: true, ..verdict(3, 1, 2) };
         let reached = ReachedCells { side: 0.25, cells: [[-3, 0], [7, 4]].into(), entity: Some("the one".to_owned()) };
-        let new = LevelVerdict { seconds: Some(0.1 + 0.2), reached: Some(reached), ..new };
+        let recorded = RecordedCourse {
+            recorded_ticks: 120,
+            ticks: 46,
+            end: CourseEnd::TimedOut,
+            differs: Some(45),
+            position: Some([0.1, -0.7]),
+            furthest: None,
+        };
+        let recorded = Some(recorded);
+        let new = LevelVerdict { seconds: Some(0.1 + 0.2), reached: Some(reached), recorded, ..new };
         let text = serde_json::to_string(&new).expect("serialises");
         assert_eq!(serde_json::from_str::<LevelVerdict>(&text).expect("whole"), new);
     }

@@ -24,7 +24,10 @@ mod testing;
 mod tests;
 
 use crate::{
-    verdict::{Comparison, EpisodeScore, LevelVerdict, Overview, TestError, TestRecord, Trials, wilson},
+    verdict::{
+        AGAINST, Comparison, EpisodeScore, LevelVerdict, Overview, RESULTS, RecordedTotal, TestError, TestRecord,
+        Trials, wilson,
+    },
     verdict_report::{
         drawn::Plans,
         level_table::{Selection, level_table},
@@ -54,7 +57,7 @@ const MOST_LETTERS: usize = 400;
 /// Largest number of causes that are named.
 const MOST_CAUSES: usize = 8;
 
-/// Largest number of changes of a kind that are listed; all are in `against.json`.
+/// Largest number of changes of a kind that are listed.
 const MOST_CHANGES: usize = 100;
 
 /// Makes the report of the results in a folder, and writes it to a file.
@@ -131,6 +134,7 @@ impl Page<'_> {
         );
         let body = numbers(self.overview)
             + &self.comparison.map_or_else(String::new, compared)
+            + &recorded(&self.overview.recorded)
             + &level_table(record, self.selection, self.plans, self.program);
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
@@ -198,12 +202,12 @@ pub(crate) fn compared(comparison: &Comparison) -> String {
         let _ = writeln!(out, "<p>Left out: {}.</p>", text(why));
     }
     let lists = [
-        list("Unsolvable", &comparison.unsolvable),
-        list("Harder", &comparison.harder),
-        list("New findings", &comparison.new_findings),
-        list("Easier", &comparison.easier),
-        list("Gone findings", &comparison.gone_findings),
-        list("No longer reached", &comparison.unreached),
+        list("Unsolvable", &comparison.unsolvable, AGAINST),
+        list("Harder", &comparison.harder, AGAINST),
+        list("New findings", &comparison.new_findings, AGAINST),
+        list("Easier", &comparison.easier, AGAINST),
+        list("Gone findings", &comparison.gone_findings, AGAINST),
+        list("No longer reached", &comparison.unreached, AGAINST),
     ];
     if lists.iter().all(String::is_empty) {
         out += "<p>Nothing has changed by more than chance.</p>\n";
@@ -211,7 +215,18 @@ pub(crate) fn compared(comparison: &Comparison) -> String {
     out + &lists.concat() + "</section>\n"
 }
 
-fn list(title: &str, changes: &[impl Display]) -> String {
+/// Writes the section about a recording; empty without one.
+pub(crate) fn recorded(total: &RecordedTotal) -> String {
+    let Some(words) = total.summary() else { return String::new() };
+    let lists = [
+        list("No longer end as recorded", &total.regressions, RESULTS),
+        list("End as recorded", &total.others, RESULTS),
+    ];
+    format!("<section>\n<h2>Since the recording</h2>\n<p>{}.</p>\n{}</section>\n", text(&words), lists.concat())
+}
+
+/// Writes a list of changes, the first ones of many; all are in the file.
+fn list(title: &str, changes: &[impl Display], file: &str) -> String {
     if changes.is_empty() {
         return String::new();
     }
@@ -221,7 +236,7 @@ fn list(title: &str, changes: &[impl Display]) -> String {
     }
     let more = changes.len().saturating_sub(MOST_CHANGES);
     if more > 0 {
-        let _ = writeln!(out, "<li>and {more} more in against.json</li>");
+        let _ = writeln!(out, "<li>and {more} more in {file}</li>");
     }
     out + "</ul>\n"
 }
@@ -246,17 +261,18 @@ pub(crate) fn interval_of(share: Trials) -> String {
     interval(wilson(share.successes, share.trials))
 }
 
-/// Describes the failure of a level in one line of escaped text.
+/// Describes the failure of a level in one line of escaped text, with what a recording does in it.
 pub(crate) fn what(level: &LevelVerdict) -> String {
+    let news = level.recorded_news().map_or_else(String::new, |news| format!("; {}", text(&news)));
     let Some(finding) = level.findings.first() else {
         let causes = causes(level);
         let causes = if causes.is_empty() { String::new() } else { format!(" ({causes})") };
         let stop = level.stop.as_ref().map_or_else(String::new, |stop| format!("; {}", text(&stop.to_string())));
-        return format!("{}{causes}{stop}", ends(&level.score));
+        return format!("{}{causes}{stop}{news}", ends(&level.score));
     };
     let more = level.findings.len() - 1;
     let more = if more > 0 { format!(" (and {more} more)") } else { String::new() };
-    format!("{}: {}{more}", escape(&finding.detector), text(&finding.message))
+    format!("{}: {}{more}{news}", escape(&finding.detector), text(&finding.message))
 }
 
 /// Describes the ends of the episodes that were not solved.

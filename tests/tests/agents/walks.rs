@@ -16,8 +16,8 @@ use playbot_test::{
     detectors::Detectors,
     findings::course_of,
     verdict::{
-        Earlier, FailurePath, LevelMaps, LevelVerdict, Places, RecordedFurther, SquareEnds, TestError, TestFolder,
-        TestObserver, TestPlan, Tester, run_tests,
+        Earlier, FailurePath, LevelMaps, LevelVerdict, Overview, Places, RecordedWins, SquareEnds, TestError,
+        TestFolder, TestObserver, TestPlan, Tester, run_tests,
     },
 };
 use playbot_tests::{Cell, as_corridor, corridor_plugin};
@@ -181,8 +181,8 @@ fn a_recording_of_an_earlier_build_says_where_its_actions_lead_elsewhere() {
     #[derive(Component)]
     struct Player;
 
-    // The track ends at `end`, and the goal is at 6.
-    let track = |end: f32| {
+    // The track ends at `end`, and each position pays its distance from the start this often.
+    let track = |end: f32, goal: f32, pay: f32| {
         let game = move |app: &mut App| {
             app.add_systems(Startup, |mut commands: Commands| {
                 commands.spawn((Player, Transform::default()));
@@ -198,11 +198,11 @@ fn a_recording_of_an_earlier_build_says_where_its_actions_lead_elsewhere() {
         ForeignGame::new("track", 1, game)
             .keys([vec![], vec![KeyCode::ArrowRight]])
             .observe(["x"], |at: Single<&Transform, With<Player>>| [at.translation.x])
-            .reward(|at: Single<&Transform, With<Player>>| at.translation.x)
-            .end(|at: Single<&Transform, With<Player>>| (at.translation.x >= 6.0).then_some(EpisodeEnd::WON))
+            .reward(move |at: Single<&Transform, With<Player>>| pay * at.translation.x)
+            .end(move |at: Single<&Transform, With<Player>>| (at.translation.x >= goal).then_some(EpisodeEnd::WON))
             .time_limit(20)
     };
-    let (before, now) = (track(9.0), track(3.0));
+    let before = track(9.0, 6.0, 1.0);
     let folder = tempfile::tempdir().expect("a folder");
     let recording = folder.path().join("before.demo");
     let right = constant("right", 1);
@@ -215,24 +215,44 @@ fn a_recording_of_an_earlier_build_says_where_its_actions_lead_elsewhere() {
     (episode.deciders, episode.end) = (vec![Decider::Bot; ticks], DemoEnd::Terminated { success: true });
     DemoWriter::replace(&recording, header).and_then(|mut writer| writer.push(&episode)).expect("writable");
 
-    let compared = |game: &ForeignGame, name: &str, tester: Tester| {
-        let plan = plan("default:0..1", vec![tester], 1, 1);
+    let compared = |game: &ForeignGame, name: &str, tester: &Tester| {
+        let plan = plan("default:0..1", vec![tester.clone()], 1, 1);
         let results = folder.path().join(name);
         let (mut open, _) = TestFolder::open(&results, &plan.record(game), Earlier::Keep).expect("new");
         verdicts_of(game, &plan).iter().for_each(|level| open.keep(level).expect("writable"));
-        open.finish().expect("writable");
-        let found = RecordedFurther::read(game, &results, &recording).expect("comparable");
-        found.iter().map(ToString::to_string).collect::<Vec<_>>()
+        let wins = |threads| {
+            let wins = RecordedWins::read(game, &plan, &recording).expect("comparable");
+            wins.courses(game, threads, &|_| {}, &|| false).expect("nothing stops it")
+        };
+        let courses = wins(1);
+        assert_eq!(wins(2), courses, "threads change nothing");
+        open.finish_against(&courses).expect("writable");
+        let overview = Overview::read(&results).expect("results");
+        assert_eq!(overview.recorded.levels, 1, "the second level is not in the recording");
+        (overview.recorded.regressions, overview.recorded.others)
     };
-    let words = format!("default:0: the recording solves it in {ticks} ticks; its actions ");
+    let words = |end: &str| vec![format!("default:0: the recording solves it in {ticks} ticks; its actions {end}")];
+    let rest = constant("rest", 0);
     // After tick 3 the agent was at 4.
     let elsewhere =
-        "lead elsewhere from tick 3 on, at (3.0, 0.0), and do not reach the goal: they come no further than";
-    assert_eq!(compared(&now, "walled", right.clone()), [format!("{words}{elsewhere} (3.0, 0.0)")]);
-    let weak = format!("{words}still do, so the testers are too weak");
-    assert_eq!(compared(&before, "weak", constant("rest", 0)), [weak]);
-    assert!(compared(&before, "solved", right).is_empty());
-    let others = RecordedFurther::check(&now, &"default:5..6".parse().expect("levels"), &recording);
+        "lead elsewhere from tick 3 on, at (3.0, 0.0), and do not reach the goal: they come no further than (3.0, 0.0)";
+    assert_eq!(compared(&track(3.0, 6.0, 1.0), "walled", &right), (words(elsewhere), Vec::new()));
+    let weak = words("still do, so the testers are too weak");
+    assert_eq!(compared(&before, "weak", &rest), (Vec::new(), weak));
+    assert_eq!(compared(&before, "unchanged", &right), (Vec::new(), Vec::new()));
+    // Of levels that the tester solves.
+    let early = "lead elsewhere from tick 3 on, at (4.0, 0.0), and reach the goal after 4 ticks";
+    assert_eq!(compared(&track(9.0, 4.0, 1.0), "early", &right), (words(early), Vec::new()));
+    let far =
+        "lead elsewhere from tick 5 on, at (6.0, 0.0), and do not reach the goal: they come no further than (6.0, 0.0)";
+    assert_eq!(compared(&track(9.0, 8.0, 1.0), "far", &right), (words(far), Vec::new()));
+    let paid = "lead elsewhere from tick 0 on, at (1.0, 0.0), and still reach the goal";
+    assert_eq!(compared(&track(9.0, 6.0, 2.0), "paid", &right), (Vec::new(), words(paid)));
+
+    let of_others = |range| plan(range, vec![rest.clone()], 1, 1);
+    let wins = RecordedWins::read(&before, &of_others("default:0..1"), &recording).expect("comparable");
+    assert!(wins.courses(&before, 1, &|_| {}, &|| true).is_none(), "it was stopped");
+    let others = RecordedWins::read(&before, &of_others("default:5..6"), &recording).map(drop);
     let others = others.expect_err("it has level 0").to_string();
     assert!(others.contains("before.demo has no solved episode on a level of default:5..6: name a rec"), "{others}");
 }

@@ -24,13 +24,16 @@ use playbot_harness::{game::Game, games::Games, level_audit::EqualLevels, split:
 use playbot_report::counted;
 use playbot_test::{
     detectors::Detectors,
-    findings::{Budget, Checks, FINDINGS, FindingFiles, list_findings},
+    findings::{Budget, Checks, FINDINGS, FindingFiles, RecordedCourse, list_findings},
     verdict::{
-        Comparison, Earlier, LevelVerdict, RecordedFurther, Shard, TestEnd, TestFolder, TestObserver, TestPlan,
+        Comparison, Earlier, LevelVerdict, RecordedWins, Shard, TestEnd, TestFolder, TestObserver, TestPlan,
         results_folder, run_tests_keeping,
     },
 };
-use std::path::{Path, PathBuf};
+use std::{
+    collections::BTreeMap,
+    path::{Path, PathBuf},
+};
 
 pub use crate::verbs::test::results::{Results, report_results};
 
@@ -44,8 +47,9 @@ pub use crate::verbs::test::results::{Results, report_results};
 /// Each finding of an episode is a file in DIR/findings, which `playbot replay` shows. With --regress, such files are
 /// played again instead.
 ///
-/// Exit code 1 if a level was not solved or something was found. With --against, exit code 1 if a level is solved less
-/// often than before, can no longer be solved, or has a new finding.
+/// Exit code 1 if a level was not solved or something was found. With --against DIR, exit code 1 if a level is solved less
+/// often than before, can no longer be solved, or has a new finding. With --against FILE.demo, also if the actions of the
+/// recording no longer end as they were recorded to.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot test GAME --levels MODE:0..99 --out runs/test
@@ -76,7 +80,7 @@ pub struct Args {
     #[arg(long, value_name = "INDEX/COUNT")]
     shard: Option<Shard>,
     /// Folder of earlier results of the same version of the game, to report changes. Or a .demo recording of an earlier
-    /// build, to report levels that it solves and no tester does, and where its actions lead elsewhere now.
+    /// build, to report on which of the levels that it solves its actions lead elsewhere or end otherwise now.
     #[arg(long, value_name = "PATH")]
     against: Option<PathBuf>,
     /// Folder for the results (not with --regress).
@@ -128,11 +132,9 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         Some(path) if path.extension().is_some_and(|ending| ending == "demo") => (Some(path), None),
         path => (None, path.map(results_folder)),
     };
-    let results = Results { folder: out, against, recording, game: Some(game), json: args.json };
+    let results = Results { folder: out, against, game: Some(game), json: args.json };
     results.check_folders()?;
-    if let Some(recording) = recording {
-        RecordedFurther::check(game, &plan.split, recording)?;
-    }
+    let recorded = recording.map(|recording| RecordedWins::read(game, &plan, recording)).transpose()?;
     if let Some(before) = results.against {
         Comparison::check(before, &record)?;
     }
@@ -149,22 +151,32 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     }
     let end = test(game, &plan, &mut folder, &args.findings.files(out, &plan.detectors))?;
     report_slow_ticks(&plan.detectors, out)?;
-    match end {
-        TestEnd::Stopped => {
-            report!(
-                "stopped; {} of {} levels are finished: go on with the same command and --resume",
-                folder.finished().len(),
-                plan.places().len()
-            );
-            Ok(Outcome::Stopped)
-        }
+    let courses = match end {
+        TestEnd::Stopped => None,
         TestEnd::Done => {
-            folder.finish()?;
-            let outcome = report_results(&results)?;
-            args.findings.report_missing(out);
-            Ok(outcome)
+            recorded.map_or_else(|| Some(BTreeMap::new()), |recorded| play_recorded(game, &plan, recorded))
         }
-    }
+    };
+    let Some(courses) = courses else {
+        report!(
+            "stopped; {} of {} levels are finished: go on with the same command and --resume",
+            folder.finished().len(),
+            plan.places().len()
+        );
+        return Ok(Outcome::Stopped);
+    };
+    folder.finish_against(&courses)?;
+    let outcome = report_results(&results)?;
+    args.findings.report_missing(out);
+    Ok(outcome)
+}
+
+/// Plays recorded actions again, with a progress bar. Returns `None` if it was stopped.
+fn play_recorded(game: &dyn Game, plan: &TestPlan, recorded: RecordedWins) -> Option<BTreeMap<u64, RecordedCourse>> {
+    let bar = progress::bar(&format!("replay {}", game.name()), recorded.len() as u64, "episodes");
+    let courses = recorded.courses(game, plan.threads, &|episodes| bar.inc(episodes), &interrupt::asked);
+    bar.finish_and_clear();
+    courses
 }
 
 fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {

@@ -20,8 +20,11 @@ use playbot_harness::{
     game::{Game, level_designs, read_level_designs},
     level_files::{is_level_files, level_files_mode},
 };
+use playbot_report::counted;
+use serde::{Deserialize, Serialize};
 use std::{
     cell::RefCell,
+    fmt,
     path::{Path, PathBuf},
     rc::Rc,
     sync::Arc,
@@ -63,27 +66,82 @@ pub fn keeps_course(game: &dyn Game, (mode, level): (&str, u64), seed: u64, bot:
     }
 }
 
-/// The course of a recorded episode's actions in the present game.
-#[derive(Clone, Debug, Default, PartialEq)]
+/// The course of the actions of a recorded episode that was won, in the present game.
+///
+/// Its text says what has changed, for a level with the name before it: `the recording solves it in 120 ticks; its
+/// actions lead elsewhere from tick 45 on, and do not reach the goal`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RecordedCourse {
+    /// Ticks of the recorded episode, which reached the goal in the last one.
+    pub recorded_ticks: u64,
+    /// Ticks until the actions end now.
+    pub ticks: u64,
+    /// The end of the actions now.
+    pub end: CourseEnd,
     /// The first tick, from 0, whose reward, state or end is not the recorded one; `None` if the course is the same.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differs: Option<u32>,
     /// Position of the agent in that tick, if it is known.
-    pub position: Option<Vec2>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub position: Option<[f32; 2]>,
     /// Position with the largest distance from the first one, if positions are known.
-    pub furthest: Option<Vec2>,
-    /// Whether the actions reach the goal.
-    pub is_solved: bool,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub furthest: Option<[f32; 2]>,
 }
 
-/// Plays the actions of a recorded episode. Positions are those that the game declares, or else guessed ones.
+impl RecordedCourse {
+    /// Returns whether the actions reach the goal in the tick in which they were recorded to do so.
+    pub fn ends_as_recorded(&self) -> bool {
+        self.end == CourseEnd::Solved && self.ticks == self.recorded_ticks
+    }
+}
+
+impl fmt::Display for RecordedCourse {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { recorded_ticks, ticks, end, differs, position, furthest } = self;
+        let at = |[x, y]: &[f32; 2]| format!("({x:.1}, {y:.1})");
+        write!(f, "the recording solves it in {}; its actions ", counted(*recorded_ticks, "tick"))?;
+        let Some(tick) = differs else { return f.write_str("still do") };
+        write!(f, "lead elsewhere from tick {tick} on")?;
+        position.iter().try_for_each(|position| write!(f, ", at {}", at(position)))?;
+        if self.ends_as_recorded() {
+            return f.write_str(", and still reach the goal");
+        }
+        if *end == CourseEnd::Solved {
+            return write!(f, ", and reach the goal after {}", counted(*ticks, "tick"));
+        }
+        f.write_str(", and do not reach the goal")?;
+        furthest.iter().try_for_each(|furthest| write!(f, ": they come no further than {}", at(furthest)))
+    }
+}
+
+/// The end of the actions of a recorded episode.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CourseEnd {
+    /// They reach the goal.
+    Solved,
+    /// The game ends the episode without the goal.
+    Lost,
+    /// Time is up.
+    TimedOut,
+    /// The episode goes on after the last action.
+    Unfinished,
+    /// The game panics or breaks its contract.
+    Broken,
+}
+
+/// Plays the actions of a recorded episode that was won. Positions are those that the game declares, or else guessed
+/// ones.
 pub fn course_of_recording(game: &dyn Game, mode: &str, recorded: &DemoEpisode) -> RecordedCourse {
     let noted = Rc::new(RefCell::new(Vec::new()));
     let positions = Rc::clone(&noted);
     let watcher: Watcher = Box::new(move |moment: &CheckTick| {
         let (state, world, agent) = (moment.game.tools().state, moment.world, moment.agent);
         let guessed = || state.guessed_position(world, agent).map(|guess| guess.position);
-        positions.borrow_mut().push(state.position(world, agent).or_else(guessed));
+        let position = state.position(world, agent).or_else(guessed);
+        // JSON has no other numbers.
+        positions.borrow_mut().push(position.filter(|position| position.is_finite()));
         None
     });
     let setting = Setting { game, mode, level: recorded.level_seed, seed: 0 };
@@ -96,7 +154,16 @@ pub fn course_of_recording(game: &dyn Game, mode: &str, recorded: &DemoEpisode) 
     let furthest = start.map(|start| {
         known.fold(start, |far, next| if start.distance(next) > start.distance(far) { next } else { far })
     });
-    RecordedCourse { differs, position, furthest, is_solved: replayed.end.is_some_and(|end| end.success) }
+    let [position, furthest] = [position, furthest].map(|place| place.map(|place: Vec2| place.to_array()));
+    let end = match (&replayed.broken, replayed.end) {
+        (Some(_), _) => CourseEnd::Broken,
+        (None, None) => CourseEnd::Unfinished,
+        (None, Some(end)) if end.success => CourseEnd::Solved,
+        (None, Some(end)) if end.end == EpisodeEnd::Truncated => CourseEnd::TimedOut,
+        (None, Some(_)) => CourseEnd::Lost,
+    };
+    let (recorded_ticks, ticks) = (recorded.len() as u64, replayed.rewards.len() as u64);
+    RecordedCourse { recorded_ticks, ticks, end, differs, position, furthest }
 }
 
 /// Returns the first tick whose reward, state or end is not the recorded one.
@@ -278,7 +345,8 @@ mod tests {
         (recorded.rewards, recorded.state_hashes) = (vec![0.0; 4], vec![0; 4]);
         recorded.deciders = vec![Decider::Human; 4];
         let course = course_of_recording(&game, "default", &recorded);
-        assert_eq!(course.furthest, Some(Vec2::new(2.0, 0.0)));
+        assert_eq!(course.furthest, Some([2.0, 0.0]));
+        assert_eq!((course.end, course.ticks), (CourseEnd::Unfinished, 4), "four actions reach no goal");
     }
 
     /// A path without a file, relative to the folder of this test.

@@ -1,6 +1,6 @@
 //! Findings for tests.
 
-use crate::findings::{FindingHead, StoredFinding};
+use crate::findings::{CourseEnd, FindingHead, RecordedCourse, StoredFinding};
 use bevy_playbot::demo::file::{Decider, DemoActions, DemoEpisode, DemoHeader, EpisodeActions};
 
 /// A finding of this detector in `hard:7`, at tick 2.
@@ -19,4 +19,10 @@ pub(super) fn stored() -> StoredFinding {
     episode.state_hashes = vec![3, 0x1f, 0x1f];
     episode.deciders = vec![Decider::Bot; 3];
     StoredFinding { header, head: head("panic"), episode }
+}
+
+/// Makes the course of a recording that was won in 120 ticks, and is won in so many now.
+pub(crate) fn course(ticks: u64) -> RecordedCourse {
+    let differs = (ticks != 120).then(|| ticks as u32 - 1);
+    RecordedCourse { recorded_ticks: 120, ticks, end: CourseEnd::Solved, differs, position: None, furthest: None }
 }

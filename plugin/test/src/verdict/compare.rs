@@ -6,10 +6,10 @@ mod tests;
 use crate::{
     findings::{RecordedCourse, course_of_recording},
     verdict::{
-        LevelOutcome, LevelVerdict, Shard, TesterVerdict,
+        LevelVerdict, Shard, TesterVerdict,
         error::TestError,
         maps::LevelMaps,
-        plan::TestRecord,
+        plan::{TestPlan, TestRecord},
         results::ResultLines,
         statistics::{Trials, benjamini_hochberg, fisher_exact},
         track::ReachedCells,
@@ -20,7 +20,7 @@ use bevy_playbot::demo::file::{DemoEpisode, DemoReader};
 use playbot_harness::{
     game::{Game, level_designs},
     level_files::is_level_files,
-    split::LevelSplit,
+    parallel::on_threads,
 };
 use playbot_report::counted;
 use serde::Serialize;
@@ -405,90 +405,76 @@ impl Known {
 
 // Comparison with the recordings of an earlier build.
 
-/// A level that a recorded episode has solved and that no tester solves now, with the course of the recorded actions.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RecordedFurther {
-    /// The level.
-    pub level: String,
-    /// Ticks of the recorded episode.
-    pub ticks: u64,
-    /// The course of its actions in the present game.
-    pub course: RecordedCourse,
+/// Episodes of a recording that were won on the levels of a test: the first one of each level.
+pub struct RecordedWins {
+    mode: String,
+    /// By the level's index in the range.
+    episodes: BTreeMap<u64, DemoEpisode>,
 }
 
-impl RecordedFurther {
-    /// Plays a recording's solved episodes on those levels that the results in a folder have as unsolved: the first one
-    /// of each level.
+impl RecordedWins {
+    /// Reads the episodes on the levels of a test, or on those of its shard.
     ///
     /// # Errors
     ///
-    /// The results or the recording cannot be read, or the recording is of other levels.
-    pub fn read(game: &dyn Game, folder: &Path, recording: &Path) -> Result<Vec<Self>, TestError> {
-        let mut lines = ResultLines::open_whole(folder)?;
-        let range = lines.record().range.clone();
-        let mut recorded = recorded_levels(game, &range, recording)?;
-        let mut found = Vec::new();
-        while let Some(level) = lines.next_level()? {
-            let is_unsolved = level.outcome != LevelOutcome::Solved;
-            let Some(episode) = recorded.remove(&(range.first + level.index)).filter(|_| is_unsolved) else { continue };
-            let course = course_of_recording(game, &range.mode, &episode);
-            found.push(Self { level: level.level, ticks: episode.len() as u64, course });
+    /// The recording cannot be read, or has no such episode on the whole range.
+    pub fn read(game: &dyn Game, plan: &TestPlan, recording: &Path) -> Result<Self, TestError> {
+        let range = &plan.split;
+        let mut episodes = BTreeMap::new();
+        // The numbers of level files change with the files that a pattern matches.
+        let designs = is_level_files(&range.mode).then(|| level_designs(game, &range.mode).ok()).flatten();
+        let files = designs.map(|designs| designs.files());
+        for episode in DemoReader::open_for_game(recording, game.name(), game.version(), Some(&range.mode))? {
+            let episode = episode?;
+            let level = match (&episode.level_file, &files) {
+                (Some(file), Some(files)) => files.number_of(file),
+                _ => Some(episode.level_seed),
+            };
+            if let Some(level) = level.filter(|&level| episode.is_success() && range.contains(&range.mode, level)) {
+                episodes.entry(level - range.first).or_insert(episode);
+            }
         }
-        Ok(found)
+        if episodes.is_empty() {
+            return Err(TestError::NothingRecorded { path: recording.into(), range: range.to_string() });
+        }
+        if plan.shard.is_some() {
+            let places: BTreeSet<u64> = plan.places().into_iter().collect();
+            episodes.retain(|index, _| places.contains(index));
+        }
+        Ok(Self { mode: range.mode.clone(), episodes })
     }
 
-    /// Checks before a test that a recording can be compared with it.
-    ///
-    /// # Errors
-    ///
-    /// As for [`read`](Self::read), as far as known in advance.
-    pub fn check(game: &dyn Game, range: &LevelSplit, recording: &Path) -> Result<(), TestError> {
-        recorded_levels(game, range, recording).map(drop)
+    /// Returns the number of levels.
+    pub fn len(&self) -> usize {
+        self.episodes.len()
     }
-}
 
-impl fmt::Display for RecordedFurther {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { level, ticks, course: RecordedCourse { differs, position, furthest, is_solved } } = self;
-        let at = |place: &Vec2| format!("({:.1}, {:.1})", place.x, place.y);
-        write!(f, "{level}: the recording solves it in {}; its actions ", counted(*ticks, "tick"))?;
-        match differs {
-            None => return f.write_str("still do, so the testers are too weak"),
-            Some(tick) => write!(f, "lead elsewhere from tick {tick} on")?,
-        }
-        position.iter().try_for_each(|position| write!(f, ", at {}", at(position)))?;
-        if *is_solved {
-            return f.write_str(", and still reach the goal");
-        }
-        f.write_str(", and do not reach the goal")?;
-        furthest.iter().try_for_each(|furthest| write!(f, ": they come no further than {}", at(furthest)))
+    /// Returns whether no level of the shard has been won.
+    pub fn is_empty(&self) -> bool {
+        self.episodes.is_empty()
     }
-}
 
-/// Returns the first solved episode of each level of a range.
-fn recorded_levels(
-    game: &dyn Game,
-    range: &LevelSplit,
-    recording: &Path,
-) -> Result<BTreeMap<u64, DemoEpisode>, TestError> {
-    let mut levels = BTreeMap::new();
-    // The numbers of level files change with the files that a pattern matches.
-    let designs = is_level_files(&range.mode).then(|| level_designs(game, &range.mode).ok()).flatten();
-    let files = designs.map(|designs| designs.files());
-    for episode in DemoReader::open_for_game(recording, game.name(), game.version(), Some(&range.mode))? {
-        let episode = episode?;
-        let level = match (&episode.level_file, &files) {
-            (Some(file), Some(files)) => files.number_of(file),
-            _ => Some(episode.level_seed),
-        };
-        if let Some(level) = level.filter(|&level| episode.is_success() && range.contains(&range.mode, level)) {
-            levels.entry(level).or_insert(episode);
-        }
+    /// Plays the recorded actions in the present game, and returns their courses by the index of the level in the range.
+    /// `progress` receives each one that is done. Returns `None` if `stop` returned true. Threads change no result.
+    pub fn courses(
+        self,
+        game: &dyn Game,
+        threads: usize,
+        progress: &(dyn Fn(u64) + Sync),
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Option<BTreeMap<u64, RecordedCourse>> {
+        let Self { mode, episodes } = self;
+        let mut episodes: Vec<(u64, DemoEpisode)> = episodes.into_iter().collect();
+        let played = on_threads(&mut episodes, threads, |(index, episode)| {
+            if stop() {
+                return None;
+            }
+            let course = course_of_recording(game, &mode, episode);
+            progress(1);
+            Some((*index, course))
+        });
+        played.into_iter().collect()
     }
-    if levels.is_empty() {
-        return Err(TestError::NothingRecorded { path: recording.into(), range: range.to_string() });
-    }
-    Ok(levels)
 }
 
 /// A level whose difference may be chance.

@@ -7,7 +7,7 @@
 //! ```
 
 use crate::{
-    findings::{FINDINGS, clear_findings, first_finding},
+    findings::{FINDINGS, RecordedCourse, clear_findings, first_finding},
     verdict::{
         LevelVerdict,
         error::{JOURNAL, TestError, io_error, json_fault},
@@ -114,10 +114,27 @@ impl TestFolder {
     ///
     /// It cannot be written; the levels are still kept.
     pub fn finish(&mut self) -> Result<(), TestError> {
+        self.finish_against(&BTreeMap::new())
+    }
+
+    /// Writes `results.json` as [`finish`](Self::finish) does, with the courses of recorded actions by the index of the
+    /// level. The journal has none, so that `--resume` may compare with another recording.
+    ///
+    /// # Errors
+    ///
+    /// As for [`finish`](Self::finish).
+    pub fn finish_against(&mut self, courses: &BTreeMap<u64, RecordedCourse>) -> Result<(), TestError> {
         let path = self.path.join(RESULTS);
         let written = write_atomically_with(&path, |file| {
             let mut results = ResultWriter::begin(file, &self.record)?;
-            self.journal.in_order(|line| results.push(line))?;
+            self.journal.in_order(|line| match courses.get(&serde_json::from_str::<LevelIndex>(line)?.index) {
+                Some(course) => {
+                    let course = serde_json::to_string(course)?;
+                    // The level is an object that is not empty, and goes on.
+                    results.push(&format!("{},\"recorded\":{course}}}", line.strip_suffix('}').unwrap_or(line)))
+                }
+                None => results.push(line),
+            })?;
             results.end()
         });
         written.map_err(io_error("write", &path))

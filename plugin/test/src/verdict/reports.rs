@@ -15,7 +15,7 @@ use crate::{
         maps::level_argument,
         plan::{TestPlan, TestRecord, Tester, TesterRecord},
         reports::junit::junit,
-        results::Overview,
+        results::{Overview, RecordedTotal},
         statistics::{Trials, wilson},
     },
 };
@@ -123,15 +123,19 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
     if let Some(comparison) = comparison {
         lines.extend(compared(comparison));
     }
+    lines.extend(recorded(&overview.recorded));
     if !overview.worst.is_empty() {
         lines.extend(
             ["", "## Levels to look at", "", "| level | outcome | problem |", "|---|---|---|"].map(str::to_owned),
         );
         for level in &overview.worst {
-            let what = markdown_cell(&message(level));
+            let what = markdown_cell(&failure(level));
             lines.push(format!("| {} | {} | {what} |", markdown_cell(&level.title()), level.outcome.name()));
         }
-        let shown = overview.worst.first().map(|level| rerun_commands(program, record, level)).unwrap_or_default();
+        // Testers show nothing of a level that only the recording no longer solves.
+        let has_failed = |level: &&LevelVerdict| level.outcome != LevelOutcome::Solved || !level.findings.is_empty();
+        let first = overview.worst.first().filter(has_failed);
+        let shown = first.map(|level| rerun_commands(program, record, level)).unwrap_or_default();
         if !shown.is_empty() {
             lines.extend(["", "To play the first one again:", "", "```sh"].map(str::to_owned));
             lines.extend(shown);
@@ -143,8 +147,28 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
             lines.extend([search, "```".to_owned()]);
         }
     }
+    lines.extend(hardest(overview));
     lines.push(String::new());
     lines.join("\n")
+}
+
+/// Lists levels that are solved less often than others. They have no problem.
+fn hardest(overview: &Overview) -> Vec<String> {
+    if overview.hardest.is_empty() {
+        return Vec::new();
+    }
+    let head = [
+        "",
+        "## Hardest levels",
+        "",
+        "Solved and without findings, but in fewer episodes than half of the solved levels:",
+        "",
+        "| level | episodes |",
+        "|---|---|",
+    ];
+    let row =
+        |level: &LevelVerdict| format!("| {} | {} |", markdown_cell(&level.title()), markdown_cell(&message(level)));
+    head.map(str::to_owned).into_iter().chain(overview.hardest.iter().map(row)).collect()
 }
 
 /// Formats the 95 % interval of a share, in percent.
@@ -158,25 +182,41 @@ fn compared(comparison: &Comparison) -> Vec<String> {
     let Comparison { levels, only_now, only_before, .. } = comparison;
     lines.push(format!("{} in both, {only_now} only now, {only_before} only before.", counted(*levels, "level")));
     lines.extend(comparison.left_out.iter().map(|why| format!("Left out: {}.", markdown_cell(why))));
-    let mut list = |title: &str, changes: Vec<String>| {
-        if changes.is_empty() {
-            return;
-        }
-        lines.extend([String::new(), format!("{title} ({}):", changes.len()), String::new()]);
-        let more = changes.len().saturating_sub(MOST_CHANGES);
-        lines.extend(changes.into_iter().take(MOST_CHANGES).map(|change| format!("- {}", markdown_cell(&change))));
-        lines.extend((more > 0).then(|| format!("- and {more} more")));
-    };
-    list("Unsolvable", texts(&comparison.unsolvable));
-    list("Harder", texts(&comparison.harder));
-    list("Easier", texts(&comparison.easier));
-    list("New findings", texts(&comparison.new_findings));
-    list("Gone findings", texts(&comparison.gone_findings));
-    list("No longer reached", texts(&comparison.unreached));
+    for (title, changes) in [
+        ("Unsolvable", texts(&comparison.unsolvable)),
+        ("Harder", texts(&comparison.harder)),
+        ("Easier", texts(&comparison.easier)),
+        ("New findings", texts(&comparison.new_findings)),
+        ("Gone findings", texts(&comparison.gone_findings)),
+        ("No longer reached", texts(&comparison.unreached)),
+    ] {
+        lines.extend(list(title, changes));
+    }
     let is_better = !(comparison.easier.is_empty() && comparison.gone_findings.is_empty());
     if !comparison.has_alarms() && !is_better && comparison.unreached.is_empty() {
         lines.extend([String::new(), "Nothing has changed by more than chance.".to_owned()]);
     }
+    lines
+}
+
+fn recorded(total: &RecordedTotal) -> Vec<String> {
+    let Some(words) = total.summary() else { return Vec::new() };
+    let mut lines = ["", "## Since the recording", ""].map(str::to_owned).to_vec();
+    lines.push(format!("{words}."));
+    lines.extend(list("No longer end as recorded", total.regressions.clone()));
+    lines.extend(list("End as recorded", total.others.clone()));
+    lines
+}
+
+/// Writes a list of changes, the first ones of many; empty without changes.
+fn list(title: &str, changes: Vec<String>) -> Vec<String> {
+    if changes.is_empty() {
+        return Vec::new();
+    }
+    let mut lines = vec![String::new(), format!("{title} ({}):", changes.len()), String::new()];
+    let more = changes.len().saturating_sub(MOST_CHANGES);
+    lines.extend(changes.into_iter().take(MOST_CHANGES).map(|change| format!("- {}", markdown_cell(&change))));
+    lines.extend((more > 0).then(|| format!("- and {more} more")));
     lines
 }
 
@@ -189,8 +229,14 @@ fn texts(changes: &[impl Display]) -> Vec<String> {
 /// Most causes or squares that are named in one line.
 const MOST_CAUSES: usize = 3;
 
-/// Describes the failure of a level in one line.
-pub(super) fn message(level: &LevelVerdict) -> String {
+/// Describes the failure of a level in one line, with what a recording does in it.
+fn failure(level: &LevelVerdict) -> String {
+    let news = level.recorded_news().map_or_else(String::new, |news| format!("; {news}"));
+    message(level) + &news
+}
+
+/// Describes the ends of a level's episodes and its findings in one line.
+fn message(level: &LevelVerdict) -> String {
     let solved = format!("solved {} of {}", level.score.solved, counted(level.score.episodes, "episode"));
     let finding = level.findings.first().map(|finding| format!("; {}: {}", finding.detector, finding.message));
     let more = level.findings.len().saturating_sub(1);
@@ -369,11 +415,14 @@ fn seen(tester: &TesterRecord) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict::{
-        CommonStop, Finding, LevelVerdict, Places, StopKind, TestRecord, TestedRun, TesterRecord,
-        folder::{Earlier, TestFolder},
-        testing,
-        testing::{tester, verdict},
+    use crate::{
+        findings::testing::course,
+        verdict::{
+            CommonStop, Finding, LevelVerdict, Places, StopKind, TestRecord, TestedRun, TesterRecord,
+            folder::{Earlier, TestFolder},
+            testing,
+            testing::{tester, verdict},
+        },
     };
 
     #[test]
@@ -397,6 +446,38 @@ mod tests {
         level.testers[0].places = Some(Places { visited: 1, open: 4 });
         let mapped = said(&level);
         assert!(mapped.contains("75.0 % of the open squares") && mapped.contains(" | 25.0 % |"), "{mapped}");
+    }
+
+    #[test]
+    fn solved_levels_are_no_problem_and_those_that_end_otherwise_than_recorded_are() {
+        let testers = ["search", "random"].map(TesterRecord::bot).to_vec();
+        let record = TestRecord { testers, ..testing::record("hard:0..3") };
+        let said = |solved: &[u64], recorded: &[u64]| {
+            let parent = tempfile::tempdir().expect("a folder");
+            let (mut folder, _) = TestFolder::open(parent.path(), &record, Earlier::Keep).expect("new");
+            for (index, solved) in (0..).zip(solved) {
+                let testers = vec![tester("search", 1, 1, true), tester("random", solved - 1, 1, false)];
+                folder.keep(&LevelVerdict { testers, ..verdict(index, *solved, 2) }).expect("writable");
+            }
+            let courses = (0..).zip(recorded).map(|(index, ticks)| (index, course(*ticks))).collect();
+            folder.finish_against(&courses).expect("writable");
+            summary(&Overview::read(parent.path()).expect("results"), None, "playbot")
+        };
+        let sound = said(&[1, 1, 1, 1], &[]);
+        for words in ["look at", "problem", "Hardest", "--bot random", "recording"] {
+            assert!(!sound.contains(words), "{words}: {sound}");
+        }
+        let hard = said(&[2, 2, 1, 2], &[120; 4]);
+        let row = "## Hardest levels\n\nSolved and without findings, but in fewer episodes than half of the solved levels:\n\n\
+                   | level | episodes |\n|---|---|\n| hard:2 | solved 1 of 2 episodes; lost 1 |\n";
+        assert!(hard.contains(row) && !hard.contains("problem") && !hard.contains("--bot random"), "{hard}");
+        assert!(hard.contains("## Since the recording\n\n4 recorded levels: all end as recorded.\n"), "{hard}");
+        let early = said(&[1, 1, 1, 1], &[120, 80]);
+        let words = "the recording solves it in 120 ticks; its actions lead elsewhere from tick 79 on, and reach the goal after \
+                     80 ticks";
+        let list = format!("No longer end as recorded (1):\n\n- hard:1: {words}\n");
+        let row = format!("| hard:1 | solved | solved 1 of 2 episodes; lost 1; {words} |\n");
+        assert!(early.contains(&list) && early.contains(&row) && !early.contains("--bot random"), "{early}");
     }
 
     #[test]

@@ -18,6 +18,7 @@ use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::{
+    collections::BTreeMap,
     fs::File,
     io,
     io::{BufRead, BufReader, Write},
@@ -35,6 +36,9 @@ const END: &str = "]}";
 
 /// Largest number of worst levels that are reported.
 pub const MOST_WORST: usize = 20;
+
+/// Largest number of hardest levels that are reported.
+const MOST_HARDEST: usize = 5;
 
 /// The levels of a `results.json`, in their order, as lines of JSON.
 pub struct ResultLines {
@@ -252,6 +256,38 @@ pub struct TesterTotal {
     pub places: Places,
 }
 
+/// Levels that a recording of an earlier build solves, in the order of the range.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RecordedTotal {
+    /// Number of these levels.
+    pub levels: u64,
+    /// Those whose recorded actions no longer end as they were recorded to, described.
+    pub regressions: Vec<String>,
+    /// Those whose actions end so after another course, or where no tester reaches the goal, described.
+    pub others: Vec<String>,
+}
+
+impl RecordedTotal {
+    fn add(&mut self, level: &LevelVerdict) {
+        self.levels += u64::from(level.recorded.is_some());
+        let Some(news) = level.recorded_news() else { return };
+        let list = if level.is_regression() { &mut self.regressions } else { &mut self.others };
+        list.push(format!("{}: {news}", level.title()));
+    }
+
+    /// Returns a sentence about all of these levels, without a full stop; `None` without such levels.
+    pub fn summary(&self) -> Option<String> {
+        let levels = counted(self.levels, "recorded level");
+        match (self.levels, self.regressions.len()) {
+            (0, _) => None,
+            (_, 0) => Some(format!("{levels}: all end as recorded")),
+            (_, count) => {
+                Some(format!("{levels}: {count} no longer {} as recorded", if count == 1 { "ends" } else { "end" }))
+            }
+        }
+    }
+}
+
 /// Totals of all results, and the worst levels.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Overview {
@@ -275,8 +311,13 @@ pub struct Overview {
     pub places: Places,
     /// The testers, in the order of the test.
     pub testers: Vec<TesterTotal>,
-    /// At most 20 levels that were not solved each time, or that have a finding, the worst ones first.
+    /// At most 20 levels that are not [sound](LevelVerdict::is_sound), the worst ones first.
     pub worst: Vec<LevelVerdict>,
+    /// At most 5 sound levels that were solved in a smaller share of their episodes than at least half of the solved
+    /// levels, the hardest ones first.
+    pub hardest: Vec<LevelVerdict>,
+    /// Levels of a recording of an earlier build, in a test against one.
+    pub recorded: RecordedTotal,
 }
 
 impl Overview {
@@ -288,9 +329,14 @@ impl Overview {
     pub fn read(folder: &Path) -> Result<Self, TestError> {
         let mut lines = ResultLines::open(folder)?;
         let mut overview = Self::empty(lines.record().clone());
+        let mut shares = BTreeMap::<u64, u64>::new();
         while let Some(level) = lines.next_level()? {
+            if level.outcome == LevelOutcome::Solved {
+                *shares.entry(solved_share(&level)).or_default() += 1;
+            }
             overview.add(level);
         }
+        overview.keep_hardest(&shares);
         Ok(overview)
     }
 
@@ -315,6 +361,8 @@ impl Overview {
             places,
             testers,
             worst: Vec::new(),
+            hardest: Vec::new(),
+            recorded: RecordedTotal::default(),
         }
     }
 
@@ -341,13 +389,30 @@ impl Overview {
             *successes = successes.saturating_add(tester.score.solved);
             total.places.add(tester.places);
         }
-        if !level.is_perfect() {
-            let place = self.worst.partition_point(|other| is_worse(other, &level));
-            if place < MOST_WORST {
-                self.worst.insert(place, level);
-                self.worst.truncate(MOST_WORST);
-            }
+        self.recorded.add(&level);
+        if level.is_perfect() {
+            return;
         }
+        let (list, most) = match level.is_sound() {
+            true => (&mut self.hardest, MOST_HARDEST),
+            false => (&mut self.worst, MOST_WORST),
+        };
+        let place = list.partition_point(|other| is_worse(other, &level));
+        if place < most {
+            list.insert(place, level);
+            list.truncate(most);
+        }
+    }
+
+    /// Keeps those of the hardest levels that are harder than at least half of the solved levels, given the numbers of
+    /// solved levels by their share of solved episodes. A tester that never wins makes no level harder than the others.
+    fn keep_hardest(&mut self, shares: &BTreeMap<u64, u64>) {
+        let mut half = shares.values().sum::<u64>().div_ceil(2);
+        let median = shares.iter().find_map(|(share, levels)| {
+            half = half.saturating_sub(*levels);
+            (half == 0).then_some(*share)
+        });
+        self.hardest.retain(|level| median.is_some_and(|median| solved_share(level) < median));
     }
 
     /// Returns a sentence about the levels that are solved in their first tick, without a full stop; `None` without such
@@ -361,10 +426,16 @@ impl Overview {
         (count > 0).then(|| format!("{} {are} solved in {their} first tick: {names}{more}", counted(count, "level")))
     }
 
-    /// Returns whether every level was solved and has no finding.
+    /// Returns whether every level was solved, has no finding, and ends as recorded.
     pub fn is_sound(&self) -> bool {
-        self.findings == 0 && self.solved == self.levels
+        self.findings == 0 && self.solved == self.levels && self.recorded.regressions.is_empty()
     }
+}
+
+/// Returns the share of solved episodes, in millionths.
+fn solved_share(level: &LevelVerdict) -> u64 {
+    let Trials { successes, trials } = level.score.trials();
+    u64::try_from(u128::from(successes) * 1_000_000 / u128::from(trials.max(1))).unwrap_or(u64::MAX)
 }
 
 /// Returns whether a level is at least as bad as a later one of the range.

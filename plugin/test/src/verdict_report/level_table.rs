@@ -17,7 +17,8 @@ const FILTER: &str = "\
 <form id=\"filter\" class=\"filter\" hidden>
 <label>Find <input type=\"search\" name=\"words\" placeholder=\"level, detector, tester\"></label>
 <label>Show <select name=\"kind\"><option value=\"\">all levels</option><option value=\"findings\">with findings</option>\
-<option>proved-unsolvable</option><option>bot-failed</option><option>solved</option></select></label>
+<option value=\"recording\">not as recorded</option><option>proved-unsolvable</option><option>bot-failed</option>\
+<option>solved</option></select></label>
 <output id=\"count\" aria-live=\"polite\"></output>
 </form>
 ";
@@ -106,7 +107,7 @@ fn keep_worst(levels: &mut Vec<LevelVerdict>) {
 fn worst_first(one: &LevelVerdict, other: &LevelVerdict) -> Ordering {
     let share = |a: &LevelVerdict, b: &LevelVerdict| u128::from(a.score.solved) * u128::from(b.score.episodes);
     let ticks = |level: &LevelVerdict| level.score.ticks.map_or(0.0, |ticks| ticks.median);
-    let findings = other.findings.len().cmp(&one.findings.len());
+    let findings = problems(other).cmp(&problems(one));
     findings
         .then_with(|| one.outcome.cmp(&other.outcome))
         .then_with(|| share(one, other).cmp(&share(other, one)))
@@ -119,13 +120,14 @@ fn worst_first(one: &LevelVerdict, other: &LevelVerdict) -> Ordering {
 pub(crate) fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str, drawn: Option<&Drawn>) -> String {
     let LevelVerdict { score, findings, .. } = level;
     let outcome = level.outcome.name();
-    let kinds = if findings.is_empty() { outcome.to_owned() } else { format!("{outcome} findings") };
+    let found = if findings.is_empty() { "" } else { " findings" };
+    let recorded = if level.is_regression() { " recording" } else { "" };
     let share = score.solved as f64 / score.episodes.max(1) as f64;
     let median = score.ticks.map(|ticks| ticks.median);
     let places = level.places.unwrap_or_default();
     let mut out = format!(
-        "<tbody data-k=\"{kinds}\"><tr><th scope=\"row\" data-v=\"{}\">{}</th><td data-v=\"{}\" class=\"{outcome}\">\
-         {outcome}</td><td data-v=\"{share:.4}\">{} of {}</td><td data-v=\"{:.4}\">{}</td><td data-v=\"{}\">{}</td>\
+        "<tbody data-k=\"{outcome}{found}{recorded}\"><tr><th scope=\"row\" data-v=\"{}\">{}</th>\
+         <td data-v=\"{}\" class=\"{outcome}\">{outcome}</td><td data-v=\"{share:.4}\">{} of {}</td><td data-v=\"{:.4}\">{}</td><td data-v=\"{}\">{}</td>\
          <td data-v=\"{:.1}\">{}</td><td data-v=\"{}\">{}</td></tr>\n",
         level.index,
         text(&level.title()),
@@ -138,10 +140,10 @@ pub(crate) fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str
         median.map_or_else(|| "–".to_owned(), ticks),
         places.percent().unwrap_or(UNKNOWN),
         places.describe(),
-        findings.len(),
+        problems(level),
         detectors(level),
     );
-    if !level.is_perfect() || drawn.is_some() {
+    if !level.is_perfect() || drawn.is_some() || level.recorded_news().is_some() {
         let _ = writeln!(
             out,
             "<tr><td colspan=\"7\"><details><summary>{}</summary>\n<div class=\"card\">\n{}</div></details></td></tr>",
@@ -152,9 +154,15 @@ pub(crate) fn level_row(record: &TestRecord, level: &LevelVerdict, program: &str
     out + "</tbody>\n"
 }
 
-/// Returns the names of the detectors with findings, each once.
+/// Returns the number of findings, with one for a recording that no longer ends as it did.
+fn problems(level: &LevelVerdict) -> usize {
+    level.findings.len() + usize::from(level.is_regression())
+}
+
+/// Returns the names of the detectors with findings, each once, and `recording` for one that no longer ends as it did.
 fn detectors(level: &LevelVerdict) -> String {
     let mut names: Vec<&str> = level.findings.iter().map(|finding| finding.detector.as_str()).collect();
+    names.extend(level.is_regression().then_some("recording"));
     names.sort_unstable();
     names.dedup();
     if names.is_empty() { "–".to_owned() } else { escape(&names.join(", ")) }
@@ -176,6 +184,9 @@ pub(crate) fn details(record: &TestRecord, level: &LevelVerdict, program: &str, 
             format!("<button type=\"button\" class=\"clip\" data-clip=\"{clip}\" hidden>Play the failure</button>")
         });
         let _ = writeln!(out, "<figure>{picture}{clip}</figure>");
+    }
+    if let Some(news) = level.recorded_news() {
+        let _ = writeln!(out, "<p>{}.</p>", text(&news));
     }
     out += &walks(level);
     out += &testers(&level.testers);

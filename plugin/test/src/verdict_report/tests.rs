@@ -1,6 +1,7 @@
 //! Tests of the whole page.
 
 use crate::{
+    findings::{RecordedCourse, testing::course},
     verdict::{
         CommonStop, Comparison, FailurePath, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard,
         SkillTicks, SquareEnds, StopKind, TestError, TestRecord, TesterVerdict, merge,
@@ -80,6 +81,28 @@ fn common_stops_and_levels_that_are_solved_in_their_first_tick_are_on_the_page()
                  `Player&lt;T&gt;`";
     assert!(html.contains(words), "{html}");
     assert!(html.contains("<p>1 level is solved in its first tick: hard:1.</p>"), "{html}");
+}
+
+#[test]
+fn what_a_recording_does_otherwise_is_in_the_row_of_its_level() {
+    let recorded = |index, course| LevelVerdict { recorded: Some(course), ..level(index, 1, 1, 9) };
+    let other = RecordedCourse { differs: Some(3), position: Some([2.0, 0.5]), ..course(120) };
+    let html = page(&[recorded(0, course(120)), recorded(1, other), recorded(2, course(80))], &PLAIN);
+    let start = "the recording solves it in 120 ticks; its actions lead elsewhere from tick";
+    let early = format!("{start} 79 on, and reach the goal after 80 ticks");
+    let late = format!("{start} 3 on, at (2.0, 0.5), and still reach the goal");
+    for words in [&early, &late] {
+        let summary = format!("<summary>solved each time; {words}</summary>");
+        assert!(html.contains(&summary) && html.contains(&format!("<p>{words}.</p>")), "{html}");
+    }
+    assert!(html.contains("<p>3 recorded levels: 1 no longer ends as recorded.</p>"), "{html}");
+    let list = |title: &str, line: &str| format!("<h3>{title} (1)</h3>\n<ul>\n<li>{line}</li>\n</ul>");
+    assert!(html.contains(&list("No longer end as recorded", &format!("hard:2: {early}"))), "{html}");
+    assert!(html.contains(&list("End as recorded", &format!("hard:1: {late}"))), "{html}");
+    assert_eq!(html.matches("data-k=\"solved recording\"").count(), 1, "{html}");
+    assert!(html.contains("<td data-v=\"1\">recording</td>"), "{html}");
+    let place = |name: &str| html.find(&format!(">{name}</th>")).unwrap_or_else(|| panic!("{name} in {html}"));
+    assert!(place("hard:2") < place("hard:0"), "it is worse");
 }
 
 #[test]

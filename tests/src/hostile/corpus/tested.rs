@@ -6,6 +6,7 @@ use playbot::prelude::*;
 use playbot_games::coinrun::CoinRun;
 use playbot_harness::detector::LevelProof;
 use playbot_test::{
+    findings::{CourseEnd, RecordedCourse},
     verdict::{
         CommonStop, Comparison, Earlier, EpisodeScore, FailurePath, Finding, FinishTime, LevelMaps, LevelOutcome,
         LevelVerdict, MapScope, Overview, Places, RESULTS, ReachedCells, ResultLines, Shard, SkillTicks, SquareEnds,
@@ -117,7 +118,13 @@ fn verdict(index: u64) -> LevelVerdict {
         reached: Some(ReachedCells { side: 0.5, cells: [[-1, 2], [3, 0]].into(), entity: Some("the one".to_owned()) }),
         testers: ["random", "chaos"].map(tester).to_vec(),
         findings: vec![finding],
+        recorded: Some(recorded()),
     }
+}
+
+fn recorded() -> RecordedCourse {
+    let (position, furthest) = (Some([12.5, 3.0]), Some([13.5, 3.0]));
+    RecordedCourse { recorded_ticks: 120, ticks: 46, end: CourseEnd::Lost, differs: Some(45), position, furthest }
 }
 
 fn stop() -> CommonStop {

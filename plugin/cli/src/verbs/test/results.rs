@@ -10,7 +10,7 @@ use playbot_report::{PlainTable, counted, ticks, whole};
 use playbot_test::{
     findings::{FINDINGS, list_findings},
     verdict::{
-        AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, RecordedFurther, ResultLines, SUMMARY,
+        AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, SUMMARY,
         TesterTotal, Trials, action_search, wilson, write_reports,
     },
     verdict_report::{HtmlReport, REPORT, write_html},
@@ -29,8 +29,6 @@ pub struct Results<'a> {
     pub folder: &'a Path,
     /// Folder of earlier ones.
     pub against: Option<&'a Path>,
-    /// A recording of an earlier build.
-    pub recording: Option<&'a Path>,
     /// The game that was tested, if the program has it: it draws the levels of the report.
     pub game: Option<&'a dyn Game>,
     /// The levels are printed as JSON instead of tables.
@@ -82,6 +80,10 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
             print_line("")?;
             print_table(&worst(&overview))?;
         }
+        if !overview.hardest.is_empty() {
+            print_line("")?;
+            print_table(&hardest(&overview))?;
+        }
     }
     report!("{}", counts(&overview));
     overview.first_tick().iter().for_each(|levels| report!("{levels}"));
@@ -91,12 +93,13 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     if let Some(comparison) = &comparison {
         report_comparison(comparison);
     }
-    if let (Some(recording), Some(game)) = (results.recording, results.game) {
-        report_recording(&RecordedFurther::read(game, results.folder, recording)?);
-    }
+    report_recording(&overview.recorded);
     let names = [RESULTS, REPORT, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
     report!("{folder}: {}", names.collect::<Vec<_>>().join(", "));
-    let is_sound = comparison.as_ref().map_or(overview.is_sound(), |comparison| !comparison.has_alarms());
+    let is_sound = match &comparison {
+        Some(comparison) => !comparison.has_alarms() && overview.recorded.regressions.is_empty(),
+        None => overview.is_sound(),
+    };
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
 }
 
@@ -166,7 +169,8 @@ fn worst(overview: &Overview) -> PlainTable {
     let row = |level: &LevelVerdict| {
         let score = &level.score;
         let median = score.ticks.map_or(f64::NAN, |ticks| ticks.median);
-        let finding = level.findings.first().map_or_else(String::new, |finding| finding.detector.clone());
+        let recording = if level.is_regression() { "recording" } else { "" };
+        let finding = level.findings.first().map_or(recording, |finding| finding.detector.as_str()).to_owned();
         vec![
             level.title(),
             level.outcome.name().to_owned(),
@@ -190,6 +194,26 @@ fn worst(overview: &Overview) -> PlainTable {
     }
 }
 
+/// Returns the levels that are solved less often than others.
+fn hardest(overview: &Overview) -> PlainTable {
+    let row = |level: &LevelVerdict| {
+        let score = &level.score;
+        let median = score.ticks.map_or(f64::NAN, |ticks| ticks.median);
+        vec![
+            level.title(),
+            format!("{} of {}", score.solved, score.episodes),
+            ticks(median),
+            whole(score.lost as f64),
+            whole(score.timed_out as f64),
+        ]
+    };
+    PlainTable {
+        caption: "hardest levels, all solved".to_owned(),
+        columns: ["level", "solved", "ticks", "lost", "timed out"].map(str::to_owned).to_vec(),
+        rows: overview.hardest.iter().map(row).collect(),
+    }
+}
+
 fn report_comparison(comparison: &Comparison) {
     comparison.left_out.iter().for_each(|why| report!("left out of the comparison: {why}"));
     let lists = [
@@ -208,11 +232,10 @@ fn report_comparison(comparison: &Comparison) {
     }
 }
 
-fn report_recording(further: &[RecordedFurther]) {
-    further.iter().for_each(|level| report!("recorded: {level}"));
-    if further.is_empty() {
-        report!("the recording solves no level that the testers do not solve");
-    }
+fn report_recording(recorded: &RecordedTotal) {
+    let levels = recorded.regressions.iter().chain(&recorded.others);
+    levels.for_each(|level| report!("recorded: {level}"));
+    recorded.summary().iter().for_each(|words| report!("{words}"));
 }
 
 fn texts(changes: &[impl ToString]) -> Vec<String> {

@@ -7,7 +7,7 @@ use crate::verdict::{
     LevelOutcome, LevelVerdict,
     error::TestError,
     plan::{TestRecord, TesterRecord},
-    reports::{message, rerun_commands},
+    reports::{failure, rerun_commands},
     results::ResultLines,
 };
 use playbot_harness::level_files::is_level_files;
@@ -20,7 +20,8 @@ const HOST: &str = "localhost";
 /// The attribute that [`quick_junit`] writes on `testsuites`, and the schema of Jenkins lacks.
 const REFUSED: &str = " skipped=\"0\"";
 
-/// Converts the results in a folder. A level that was not solved, or that has a finding, has failed.
+/// Converts the results in a folder. A level that was not solved, that has a finding, or that no longer ends as recorded,
+/// has failed.
 pub(super) fn junit(folder: &Path, program: &str) -> Result<String, TestError> {
     let mut lines = ResultLines::open(folder)?;
     let record = lines.record().clone();
@@ -73,7 +74,7 @@ fn test_case(record: &TestRecord, level: &LevelVerdict, program: &str, class: &s
         TestCaseStatus::success()
     } else {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
-        status.set_type(kind(level)).set_message(message(level));
+        status.set_type(kind(level)).set_message(failure(level));
         status.set_description(description(record, level, program));
         status
     };
@@ -111,14 +112,14 @@ fn tester(record: &TesterRecord) -> String {
 /// Returns the kind of a failure, in a word.
 fn kind(level: &LevelVerdict) -> &str {
     match level.outcome {
-        LevelOutcome::Solved => level.findings.first().map_or("finding", |finding| finding.detector.as_str()),
+        LevelOutcome::Solved => level.findings.first().map_or("recording", |finding| finding.detector.as_str()),
         outcome => outcome.name(),
     }
 }
 
 /// Describes a failure in several lines. Begins with its message, because some readers show the text alone.
 fn description(record: &TestRecord, level: &LevelVerdict, program: &str) -> String {
-    let mut lines = vec![format!("{}: {}", level.title(), level.outcome.name()), message(level)];
+    let mut lines = vec![format!("{}: {}", level.title(), level.outcome.name()), failure(level)];
     for tester in &level.testers {
         let score = &tester.score;
         lines.push(format!(
@@ -138,11 +139,14 @@ fn description(record: &TestRecord, level: &LevelVerdict, program: &str) -> Stri
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict::{
-        Finding, TestedRun,
-        folder::{Earlier, TestFolder},
-        testing,
-        testing::verdict,
+    use crate::{
+        findings::{RecordedCourse, testing::course},
+        verdict::{
+            Finding, TestedRun,
+            folder::{Earlier, TestFolder},
+            testing,
+            testing::verdict,
+        },
     };
     use playbot_harness::split::LevelSplit;
     use quick_xml::{Reader, XmlVersion, events::Event};
@@ -302,6 +306,19 @@ mod tests {
         let message = Some("solved 0 of 2 episodes; lost 2".to_owned());
         assert_eq!(values(&text, "failure", "message"), [message]);
         assert!(text.contains(">hard:0: bot-failed\nsolved 0 of 2 episodes; lost 2\nrandom: solved 0 of 2"), "{text}");
+    }
+
+    #[test]
+    fn a_level_that_no_longer_ends_as_recorded_has_failed() {
+        let recorded = |index, ticks| LevelVerdict { recorded: Some(course(ticks)), ..verdict(index, 2, 2) };
+        let other_course = RecordedCourse { differs: Some(3), ..course(120) };
+        let other = LevelVerdict { recorded: Some(other_course), ..verdict(2, 2, 2) };
+        let text = written(&record("hard"), &[recorded(0, 120), recorded(1, 80), other]);
+        let message = "solved 2 of 2 episodes; the recording solves it in 120 ticks; its actions lead elsewhere from tick 79 \
+                       on, and reach the goal after 80 ticks";
+        assert_eq!(values(&text, "failure", "message"), [Some(message.to_owned())]);
+        assert_eq!(values(&text, "failure", "type"), [Some("recording".to_owned())]);
+        assert!(text.contains(&format!(">hard:1: solved\n{message}\n")), "{text}");
     }
 
     #[test]

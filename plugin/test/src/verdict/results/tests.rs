@@ -1,6 +1,9 @@
 //! Tests of results as files.
 
-use crate::verdict::{Finding, MapScope, TesterRecord, results::*, testing::verdict};
+use crate::{
+    findings::testing::course,
+    verdict::{Finding, MapScope, TesterRecord, results::*, testing::verdict},
+};
 use playbot_harness::detector::LevelProof;
 use std::fs;
 
@@ -125,7 +128,7 @@ fn nothing_may_follow_the_last_level_or_the_end() {
 }
 
 #[test]
-fn the_worst_come_first_and_perfect_ones_not_at_all() {
+fn the_worst_come_first_and_solved_ones_not_at_all() {
     let record = TestRecord {
         game: "garden".to_owned(),
         game_version: 1,
@@ -164,7 +167,9 @@ fn the_worst_come_first_and_perfect_ones_not_at_all() {
     };
     overview.add(proved);
     let worst: Vec<u64> = overview.worst.iter().map(|level| level.index).collect();
-    assert_eq!(worst, [5, 2, 4, 3, 1]);
+    assert_eq!(worst, [5, 2, 4], "the others are solved");
+    let hardest: Vec<u64> = overview.hardest.iter().map(|level| level.index).collect();
+    assert_eq!(hardest, [3, 1], "of all levels that are not solved each time");
     assert_eq!((overview.solved, overview.bot_failed, overview.proved_unsolvable), (3, 2, 1));
     assert_eq!(overview.testers[0].levels, Trials { successes: 3, trials: 6 });
     assert_eq!(overview.testers[0].episodes, Trials { successes: 8, trials: 24 });
@@ -175,6 +180,46 @@ fn the_worst_come_first_and_perfect_ones_not_at_all() {
         overview.add(verdict(index, 0, 4));
     }
     assert_eq!((overview.worst.len(), overview.worst[0].index), (20, 5));
+}
+
+/// Reads levels of which four testers solved so many episodes, and returns the indices of the hardest ones.
+fn hardest(solved: &[u64]) -> Vec<u64> {
+    let folder = tempfile::tempdir().expect("a folder");
+    let line = |(index, solved): (usize, &u64)| serde_json::to_string(&verdict(index as u64, *solved, 4));
+    let lines: Vec<String> = solved.iter().enumerate().map(|level| line(level).expect("JSON")).collect();
+    let lines: Vec<&str> = lines.iter().map(String::as_str).collect();
+    fs::write(folder.path().join(RESULTS), written(&lines)).expect("writable");
+    Overview::read(folder.path()).expect("results").hardest.iter().map(|level| level.index).collect()
+}
+
+#[test]
+fn the_hardest_levels_are_those_that_are_solved_less_often_than_half_of_the_solved_ones() {
+    assert!(hardest(&[1, 1, 1, 1]).is_empty(), "some testers never win");
+    assert_eq!(hardest(&[3, 1, 3, 2, 3]), [1, 3]);
+    assert_eq!(hardest(&[3, 0, 0, 0, 4, 4]), [0], "levels that are not solved do not count");
+    assert!(hardest(&[2, 3]).is_empty() && hardest(&[0]).is_empty() && hardest(&[]).is_empty());
+    assert_eq!(hardest(&[4, 4, 4, 4, 4, 4, 3, 3, 3, 3, 3, 3]), Vec::<u64>::new(), "half of them are no exception");
+    assert_eq!(hardest(&[4, 4, 4, 4, 4, 4, 4, 3, 3, 3, 3, 3, 3]), [7, 8, 9, 10, 11], "the first five");
+}
+
+#[test]
+fn recordings_that_end_otherwise_are_among_the_worst_levels() {
+    let mut overview = Overview::empty(record());
+    let recorded = |index, solved, ticks| LevelVerdict { recorded: Some(course(ticks)), ..verdict(index, solved, 2) };
+    assert_eq!(overview.recorded.summary(), None);
+    overview.add(recorded(0, 2, 120));
+    overview.add(recorded(1, 1, 120));
+    assert_eq!(overview.recorded.summary().as_deref(), Some("2 recorded levels: all end as recorded"));
+    assert!(overview.is_sound() && overview.worst.is_empty() && overview.recorded.others.is_empty());
+    overview.add(recorded(2, 2, 80));
+    let words = "hard:2: the recording solves it in 120 ticks; its actions lead elsewhere from tick 79 on, and reach the goal \
+                 after 80 ticks";
+    assert_eq!(overview.recorded.regressions, [words]);
+    assert_eq!(overview.recorded.summary().as_deref(), Some("3 recorded levels: 1 no longer ends as recorded"));
+    assert!(!overview.is_sound() && overview.worst[0].index == 2);
+    overview.add(recorded(3, 0, 120));
+    let weak = "hard:3: the recording solves it in 120 ticks; its actions still do, so the testers are too weak";
+    assert_eq!(overview.recorded.others, [weak]);
 }
 
 #[test]
