@@ -9,6 +9,7 @@ mod value;
 use crate::{
     foreign::{
         ForeignGame,
+        clocks::LastFrame,
         observe::{KeptState, kept_state, put_state},
         runtime::{Baseline, ForeignCell, OwnedReader, ReaderFactory},
         snapshot::value::{EntityMap, Made, Owner, Value, Way, Ways},
@@ -397,6 +398,8 @@ struct StartEntity {
 
 /// The state of an episode.
 struct SavedWhole {
+    /// The frame at whose end it was saved.
+    frame: LastFrame,
     kinds: Vec<u64>,
     /// The entities of the start that still exist.
     entities: Vec<Option<SavedEntity>>,
@@ -461,13 +464,13 @@ impl WholeGame {
         if self.obstacle.is_some() {
             return None;
         }
-        let Self { ways, start, .. } = self;
+        let Self { ways, start, frame, .. } = self;
         let start = start.as_ref()?;
-        self.waited_for = pending(ways, world, self.frame);
+        self.waited_for = pending(ways, world, *frame);
         if self.waited_for.is_some() {
             return None;
         }
-        match saved(ways, start, world, baseline) {
+        match saved(ways, start, world, baseline, LastFrame::since(*frame, world)) {
             Ok(saved) => {
                 self.has_saved = true;
                 Some(saved)
@@ -494,6 +497,7 @@ impl WholeGame {
         // Hooks and observers make the clock go on below, and no system of the game runs meanwhile: what has changed a
         // frame ago must not seem newer to it.
         let now = world.read_change_tick();
+        let ages = saved.frame.ages_in(LastFrame::since(self.frame, world));
         let Self { ways, start, .. } = self;
         let start = start.as_mut().filter(|start| start.kinds == saved.kinds);
         let start = start.ok_or("the level does not begin with the same entities each time")?;
@@ -527,7 +531,7 @@ impl WholeGame {
         world.flush();
         // Observers of the game may have spawned some.
         despawn_others(world, baseline, &all.iter().map(|(now, ..)| *now).collect());
-        let clock = (start.tick, now);
+        let clock = (start.tick, now, &ages as Ages<'_>);
         for (now, values, saved) in &all {
             write(ways, world, |_, _| Some(*now), values, saved, &mut maps, clock)?;
         }
@@ -586,7 +590,13 @@ fn pending(ways: &mut Ways, world: &World, frame: Tick) -> Option<String> {
     removed.find_map(|(id, _)| ways.of(world, *id).filter(|way| way.owner == Owner::Game).map(|way| way.name.clone()))
 }
 
-fn saved(ways: &mut Ways, start: &Start, world: &World, baseline: &Baseline) -> Result<SavedWhole, String> {
+fn saved(
+    ways: &mut Ways,
+    start: &Start,
+    world: &World,
+    baseline: &Baseline,
+    frame: LastFrame,
+) -> Result<SavedWhole, String> {
     let mut entities = Vec::with_capacity(start.entities.len());
     for live in &start.entities {
         let exists = world.get_entity(live.now).is_ok();
@@ -602,7 +612,7 @@ fn saved(ways: &mut Ways, start: &Start, world: &World, baseline: &Baseline) -> 
     }
     let all = resources(world);
     let resources = saved_entity(ways, world, Entity::PLACEHOLDER, all, &start.resources, Some(start.tick))?;
-    Ok(SavedWhole { kinds: start.kinds.clone(), entities, others, resources })
+    Ok(SavedWhole { frame, kinds: start.kinds.clone(), entities, others, resources })
 }
 
 /// Returns the values that have changed since a tick, or all.
@@ -739,8 +749,12 @@ fn complete_resources(
     Ok(())
 }
 
+/// The age that a saved change has in this World.
+type Ages<'a> = &'a dyn Fn(u32) -> u32;
+
 /// Writes the values of a state, and those of the start over values that have changed since. `place` returns the entity
-/// of a component or resource, and the clock is the start of the episode and the end of the last frame.
+/// of a component or resource, and the clock is the start of the episode, the end of the last frame, and ages
+/// of changes by it.
 fn write(
     ways: &mut Ways,
     world: &mut World,
@@ -748,14 +762,14 @@ fn write(
     start: &[(Arc<Way>, Option<Value>)],
     saved: &SavedEntity,
     (map, own): &mut (&mut EntityMap, &mut EntityMap),
-    (begun, now): (Tick, Tick),
+    (begun, now, ages): (Tick, Tick, Ages<'_>),
 ) -> Result<(), String> {
     let since_begun = now.get().wrapping_sub(begun.get());
     for value in &saved.values {
         let Some(way) = ways.of_type(world, value.of) else { continue };
         let Some(entity) = place(world, way.id) else { continue };
         // What has changed in the episode stays newer than its start.
-        let age = value.age.min(since_begun.saturating_sub(1));
+        let age = ages(value.age).min(since_begun.saturating_sub(1));
         way.write(world, entity, &value.value, map, Tick::new(now.get().wrapping_sub(age)));
     }
     // Values that hooks and observers have changed during the load are later than the last frame.
