@@ -12,7 +12,7 @@ use crate::{
         clocks::LastFrame,
         observe::{KeptState, kept_state, put_state},
         runtime::{Baseline, ForeignCell, OwnedReader, ReaderFactory},
-        snapshot::value::{EntityMap, Made, Owner, Value, Way, Ways},
+        snapshot::value::{EntityMap, Made, Owner, Value, Way, Ways, forget_engines},
     },
     game::{Snapshot, SnapshotTools},
     saved_episode::AgentState,
@@ -753,8 +753,7 @@ fn complete_resources(
 type Ages<'a> = &'a dyn Fn(u32) -> u32;
 
 /// Writes the values of a state, and those of the start over values that have changed since. `place` returns the entity
-/// of a component or resource, and the clock is the start of the episode, the end of the last frame, and ages
-/// of changes by it.
+/// of a component or resource. The clock is the episode's start, the end of the last frame, and ages of changes by it.
 fn write(
     ways: &mut Ways,
     world: &mut World,
@@ -795,6 +794,7 @@ fn forget_what_waits(world: &mut World, begun: Tick) {
             registry.run_updates(world, begun);
         });
     }
+    forget_engines(world);
     world.clear_trackers();
     world.clear_trackers();
 }

@@ -6,6 +6,8 @@
 //! type that Bevy knows by its [`ComponentId`].
 #![expect(unsafe_code, reason = "types that are private to a game are copied through pointers, as Bevy does")]
 
+#[cfg(any(feature = "bevy_rapier2d", feature = "bevy_rapier3d"))]
+use super::forget;
 use bevy::{
     ecs::{
         change_detection::{MaybeLocation, Tick},
@@ -107,6 +109,24 @@ fn put_others<T, V>(owner: &mut T, show: impl FnOnce(&T) -> &HashMap<Entity, V>,
     // SAFETY: the map lies within the value, at this offset, and the value is borrowed mutably.
     let entities = unsafe { &mut *ptr::from_mut(owner).byte_add(offset).cast::<HashMap<Entity, V>>() };
     *entities = mem::take(entities).into_iter().map(|(entity, value)| (map.get_mapped(entity), value)).collect();
+}
+
+/// Drops the messages of physics engines, which they keep out of Bevy's registry.
+#[cfg_attr(not(any(feature = "bevy_rapier2d", feature = "bevy_rapier3d")), expect(unused_variables))]
+pub(super) fn forget_engines(world: &mut World) {
+    #[cfg(any(feature = "bevy_rapier2d", feature = "bevy_rapier3d"))]
+    macro_rules! forget_all {
+        ($engine:ident) => {{
+            use $engine::prelude::{CollisionEvent, ContactForceEvent, MassModifiedEvent};
+            forget::<CollisionEvent>(world);
+            forget::<ContactForceEvent>(world);
+            forget::<MassModifiedEvent>(world);
+        }};
+    }
+    #[cfg(feature = "bevy_rapier2d")]
+    forget_all!(bevy_rapier2d);
+    #[cfg(feature = "bevy_rapier3d")]
+    forget_all!(bevy_rapier3d);
 }
 
 /// The state of a part.
