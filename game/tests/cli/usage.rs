@@ -62,7 +62,11 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
         (&["bench", "--threads", "4096", "--arenas", "4096"], "--threads must be at most 1024"),
         (&["view", "coinrun", "--out", "x.svg"], "written as .png"),
         (&["report", "html", "r", "--out", "x.txt"], "written as .html"),
-        (&["view", "coinrun", "--level", "hard:7"], "0 or more; write --mode hard --level 7"),
+        (&["view", "coinrun", "--level", "hrad:7"], "did you mean `hard`?"),
+        (
+            &["view", "coinrun", "--mode", "easy", "--level", "hard:7"],
+            "`--level hard:7` is of the mode hard, and --mode names",
+        ),
         (&["view", "coinrun", "--level", "5", "--episode-number", "3"], "cannot be used with"),
         (&["view", "coinrun", "--greedy"], "--greedy is for policies"),
         (&["test", "coinrun", "--greedy", "--out", "o"], "--greedy is for policies"),
