@@ -143,7 +143,8 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
         Err(error) => {
             // A request for help is no mistake; anything else is a wrong usage, which is 3 here.
             let code = if error.use_stderr() { 3 } else { 0 };
-            match in_plain_words(&error).or_else(|| with_own_mode(&error, games)) {
+            let words = in_plain_words(&error).or_else(|| with_own_mode(&error, games));
+            match words.or_else(|| with_games(&error, games)) {
                 Some(words) => begin_report!("{words}"),
                 None => {
                     if let Err(refused) = error.print()
@@ -199,7 +200,8 @@ fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
     let matches = match command.try_get_matches_from_mut(&args) {
         Err(error) if is_help(&error) => {
             // Not before: to know which examples work, games are asked for a level, which takes them some work.
-            let helpful = with_only_game(with_own_name(help::named(Cli::command(), program::name(), games)), games);
+            let named = help::with_games(help::named(Cli::command(), program::name(), games), games);
+            let helpful = with_only_game(with_own_name(named), games);
             helpful.try_get_matches_from(&args)?
         }
         matches => matches?,
@@ -584,6 +586,15 @@ fn with_own_mode(error: &clap::Error, games: &[&dyn Game]) -> Option<String> {
     own_example(&error.render().to_string(), game)
 }
 
+/// Returns the whole text of an error about a missing name of a game, with the games; `None` for other errors.
+fn with_games(error: &clap::Error, games: &[&dyn Game]) -> Option<String> {
+    const MISSING: &str = "\n  <GAME>\n";
+    let text = error.render().to_string();
+    let is_missing = error.kind() == ErrorKind::MissingRequiredArgument && text.contains(MISSING);
+    let names: Vec<&str> = games.iter().map(|game| game.name()).collect();
+    is_missing.then(|| text.replacen(MISSING, &format!("\n  <GAME>, one of {}\n", names.join(", ")), 1))
+}
+
 /// Replaces the mode of examples that are written for any game.
 fn own_example(text: &str, game: &dyn Game) -> Option<String> {
     let (range, level) = (first_levels(game, 9), first_levels(game, 7));
@@ -775,6 +786,15 @@ mod tests {
         assert!(text.starts_with("error: no such level\n") && text.contains(" level [OPTIONS] <GAME>"), "{text}");
         let text = usage("demo filter a.demo --levels Attic");
         assert!(text.contains(" demo filter [OPTIONS]"), "{text}");
+    }
+
+    #[test]
+    fn the_error_of_a_missing_game_lists_those_of_the_program() {
+        let [rooms, plain] = rooms();
+        let error = |args: &[&str]| Cli::command().try_get_matches_from(args).expect_err("no game is named");
+        let words = with_games(&error(&["playbot", "level"]), &[&rooms, &plain]).expect("a game is missing");
+        assert!(words.contains("\n  <GAME>, one of rooms, plain\n"), "{words}");
+        assert_eq!(with_games(&error(&["playbot", "trace", "rooms"]), &[&rooms, &plain]), None, "actions are missing");
     }
 
     #[test]
