@@ -153,6 +153,32 @@ fn a_dash_stands_for_standard_input() {
 }
 
 #[test]
+fn utf_16_without_its_mark_is_named_wherever_a_text_is_read() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let bytes = "(steps: 1234)\n".encode_utf16().flat_map(u16::to_le_bytes).collect::<Vec<u8>>();
+    for name in ["a.json", "a.ron", "a.txt"] {
+        fs::write(folder.join(name), &bytes).expect("writable");
+    }
+    for args in [
+        &["level", "coinrun", "--file", "a.json"][..],
+        &["levels", "coinrun", "--levels", "files:a.json"],
+        &["level", "maze2d", "--map", "a.txt"],
+        &["config", "show", "--experiment", "a.ron"],
+        &["trace", "coinrun", "--actions-file", "a.txt"],
+        &["trace", "maze2d", "--map", "medium", "--actions-file", "a.txt"],
+        &["test", "coinrun", "--levels", "easy:0", "--par", "a.json", "--out", "o"],
+    ] {
+        let (_, words) = ended(folder, args, 3);
+        let next =
+            "it is text in UTF-16 without a byte order mark: save it as UTF-8 in an editor, or with `iconv -f UTF-16LE";
+        let file = args.iter().find_map(|arg| arg.trim_start_matches("files:").strip_prefix("a."));
+        let file = format!("a.{}", file.expect("each names one"));
+        assert!(words.contains(next) && words.contains(&file), "{args:?}: {words}");
+    }
+}
+
+#[test]
 fn an_empty_folder_becomes_a_run_and_a_file_does_not() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

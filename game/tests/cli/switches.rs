@@ -239,6 +239,8 @@ fn bench_measures_the_requested_case_for_the_requested_time() {
     }
     let (listed, _) = done(temporary.path(), &["bench", "--case", "sim/maze2d", "--list"]);
     assert_eq!(listed.lines().collect::<Vec<_>>(), names, "--list");
+    let (of_game, _) = done(temporary.path(), &["bench", "maze2d", "--case", "sim/", "--list"]);
+    assert_eq!(of_game, listed);
     let (listed, _) = done(temporary.path(), &["bench", "--case", "sim/maze2d", "--list", "--json"]);
     assert_eq!(listed.lines().next(), Some(&*json!({ "case": names[0] }).to_string()));
     let (_, took) = bench(&["--seconds", "0.5"]);

@@ -4,6 +4,7 @@ use std::{
     fs,
     path::Path,
     process::{Command, Output, Stdio},
+    time::{Duration, Instant},
 };
 
 use playbot_shell::at_work;
@@ -44,6 +45,35 @@ fn a_stopped_recording_says_how_the_rest_is_added() {
     let output = playbot(folder, &base.into_iter().chain(advice.split(' ')).collect::<Vec<_>>());
     assert_eq!(code(&output), 0, "{}", errors(&output));
     assert_eq!(listed("steps"), Some(recorded + 100), "the steps that were there are not counted again");
+}
+
+#[test]
+fn a_stopped_audit_of_levels_prints_what_it_has_compared() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    // Layouts are hashed, and levels are played if the game does not hash them.
+    for (args, basis) in [
+        (&["levels", "coinrun", "--levels", "hard:0..100000000", "--layouts-only", "--json"][..], "layout"),
+        (&["levels", "maze2d", "--levels", "medium:0..300000", "--json"], "state"),
+    ] {
+        let begun = Instant::now();
+        let mut audit = command(temporary.path(), args);
+        audit.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let child = at_work(&mut audit, || begun.elapsed() > Duration::from_secs(5));
+        let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("a shell's kill");
+        assert!(sent.success());
+        let output = child.wait_with_output().expect("a child");
+        assert_eq!(code(&output), 130, "{args:?}: {}", errors(&output));
+        let found = &lines(&output)[0];
+        let number = |what: &str| found[what].as_u64().unwrap_or_default();
+        assert_eq!(found["stopped"], true, "{found}");
+        if basis == "layout" {
+            assert_eq!(found["compared_by"], basis, "{found}");
+            assert!(number("compared") > 0 && number("compared") < number("count"), "{found}");
+            assert!(number("layouts") <= number("compared"), "{found}");
+        }
+        let words = "the same command does all of it again";
+        assert!(errors(&output).contains(words), "{}", errors(&output));
+    }
 }
 
 /// `nohup` has SIGHUP ignored, and a shell without job control SIGINT of what it starts in the background.

@@ -183,7 +183,7 @@ pub struct LevelsArg {
     /// one of --level.
     #[arg(long, conflicts_with = "mode")]
     levels: Option<LevelSplit>,
-    /// Number of the level, or its name in a level editor (default: 0, or the first of the levels).
+    /// Number of the level, also as mode:number, or its name in a level editor (default: 0, or the first of the levels).
     #[arg(long, value_name = "N")]
     level: Option<u64>,
 }

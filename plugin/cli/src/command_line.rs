@@ -14,10 +14,7 @@ use crate::{
     },
 };
 use bevy_playbot::unknown_name::nearest;
-use clap::{
-    Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, Subcommand,
-    error::{ContextKind, ContextValue, ErrorKind},
-};
+use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind};
 use playbot_harness::{
     game::Game,
     games::Games,
@@ -146,7 +143,8 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
         Err(error) => {
             // A request for help is no mistake; anything else is a wrong usage, which is 3 here.
             let code = if error.use_stderr() { 3 } else { 0 };
-            match in_plain_words(&error).or_else(|| with_own_mode(&error, games)) {
+            let words = in_plain_words(&error).or_else(|| with_own_mode(&error, games));
+            match words.or_else(|| with_games(&error, games)) {
                 Some(words) => begin_report!("{words}"),
                 None => {
                     if let Err(refused) = error.print()
@@ -202,7 +200,8 @@ fn read(games: &[&dyn Game]) -> Result<Cli, clap::Error> {
     let matches = match command.try_get_matches_from_mut(&args) {
         Err(error) if is_help(&error) => {
             // Not before: to know which examples work, games are asked for a level, which takes them some work.
-            let helpful = with_only_game(with_own_name(help::named(Cli::command(), program::name(), games)), games);
+            let named = help::with_games(help::named(Cli::command(), program::name(), games), games);
+            let helpful = with_only_game(with_own_name(named), games);
             helpful.try_get_matches_from(&args)?
         }
         matches => matches?,
@@ -292,17 +291,26 @@ const OF_LEVELS: [&str; 4] = ["--level", "--levels", "--among", "--hold-out"];
 
 /// Replaces the names of levels by their modes and numbers, so that each option takes them: `--levels Cave`,
 /// `--levels default:Cave..Tower`, `--level Cave`, `--levels Cave,Tower`. Numbers alone get the mode where an option needs
-/// one. Names and numbers stay as they are if only a file says which of several games is meant.
+/// one. A mode in front of a number moves to `--mode` where an option takes the number alone: `--level hard:7`. Names and
+/// numbers stay as they are if only a file says which of several games is meant.
 ///
 /// # Errors
 ///
 /// The game has names for its levels, but no such one. Or the levels do not follow one another, and the option takes
-/// one range.
+/// one range. Or a mode in front of a number is not the game's, or is not that of `--mode`.
 fn with_level_numbers(args: Vec<OsString>, games: &[&dyn Game], command: &Command) -> Result<Vec<OsString>, String> {
     let words: Vec<String> = args.iter().map(|word| word.to_string_lossy().into_owned()).collect();
     let called = CalledVerb::find(&words, command);
     let Some(game) = called.game(&words, games) else { return Ok(args) };
-    let mode = (1..words.len()).find_map(|place| value_of(&words, "--mode", place));
+    let mode_options = called.names_of("mode");
+    let of_option = |names: &[String]| {
+        let mut places = (1..words.len()).flat_map(|place| names.iter().map(move |name| (name, place)));
+        places.find_map(|(name, place)| Some((name.clone(), value_of(&words, name, place)?)))
+    };
+    let mode = of_option(&mode_options).map(|(_, mode)| mode);
+    let of_levels = |(option, levels): (String, &str)| Some((option, levels.parse::<LevelSplit>().ok()?.mode));
+    let named = of_option(&mode_options).map(|(option, mode)| (option, mode.to_owned()));
+    let mut named = named.or_else(|| of_option(&called.names_of("levels")).and_then(of_levels));
     let mut numbered = Vec::new();
     let mut replaced = None;
     for (place, arg) in args.into_iter().enumerate() {
@@ -315,13 +323,33 @@ fn with_level_numbers(args: Vec<OsString>, games: &[&dyn Game], command: &Comman
             numbered.push(arg);
             continue;
         };
-        match NumberedLevels::of(game, mode, value, option)? {
-            None => numbered.push(arg),
-            Some(texts) => {
-                numbered.extend(texts.iter().map(|text| OsString::from(format!("{name}={text}"))));
-                replaced = (!words[place].contains('=')).then_some(place + 1);
-            }
+        let texts = NumberedLevels::of(game, mode, value, option)?;
+        let is_changed = texts.is_some();
+        let texts = texts.unwrap_or_else(|| vec![value.to_owned()]);
+        let modes = texts.iter().map(|text| if option.takes_mode { Ok(None) } else { mode_and_number(game, text) });
+        let modes = modes.collect::<Result<Vec<_>, _>>()?;
+        if !is_changed && modes.iter().all(Option::is_none) {
+            numbered.push(arg);
+            continue;
         }
+        for (text, of_mode) in texts.iter().zip(modes) {
+            let (own, number) = of_mode.map_or((None, text.as_str()), |(own, number)| (Some(own), number));
+            match (own, &named) {
+                (Some(own), Some((option, known))) if own != known => {
+                    return Err(format!(
+                        "`{name} {text}` is of the mode {own}, and {option} names {known}: name one mode, such as `{name} {text}` \
+                         alone"
+                    ));
+                }
+                (Some(own), None) => {
+                    numbered.push(OsString::from(format!("--mode={own}")));
+                    named = Some((name.to_owned(), own.to_owned()));
+                }
+                (Some(_), Some(_)) | (None, _) => {}
+            }
+            numbered.push(OsString::from(format!("{name}={number}")));
+        }
+        replaced = (!words[place].contains('=')).then_some(place + 1);
     }
     Ok(numbered)
 }
@@ -366,6 +394,12 @@ impl<'a> CalledVerb<'a> {
     fn option(&self, name: &str) -> Option<&'a Arg> {
         let is_it = |arg: &&Arg| arg.get_long_and_visible_aliases().is_some_and(|names| names.contains(&name));
         self.command.get_arguments().find(is_it)
+    }
+
+    /// Returns all names of an option, as they are written; none if the verb has no such option.
+    fn names_of(&self, option: &str) -> Vec<String> {
+        let names = self.option(option).and_then(Arg::get_long_and_visible_aliases).unwrap_or_default();
+        names.into_iter().map(|name| format!("--{name}")).collect()
     }
 
     /// Returns the game: the one that is named behind the verb, or the program's first. `None` if only a file says which
@@ -476,8 +510,7 @@ impl NumberedLevels {
         self.mode == next.mode && self.first <= self.last && self.last.checked_add(1) == Some(next.first)
     }
 
-    /// Returns them as an option takes them. One that takes no mode gets it only if it was named, for the error that says
-    /// where to name it.
+    /// Returns them as an option takes them. One that takes no mode gets it only if it was named, and it moves to `--mode`.
     fn in_words(&self, takes_mode: bool) -> String {
         let Self { mode, is_mode_named, first, last } = self;
         let numbers = if first == last { first.to_string() } else { format!("{first}..{last}") };
@@ -488,6 +521,20 @@ impl NumberedLevels {
 /// Returns the mode in front of a level, and the level, if it is a mode of the game. A name may have a colon in it.
 fn own_mode<'a>(game: &dyn Game, text: &'a str) -> Option<(&'a str, &'a str)> {
     text.split_once(':').filter(|(mode, _)| game.check_mode(mode).is_ok())
+}
+
+/// Returns the mode in front of the number of a level, and the number; `None` if no mode is there.
+///
+/// # Errors
+///
+/// The game does not have the mode.
+fn mode_and_number<'a>(game: &dyn Game, text: &'a str) -> Result<Option<(&'a str, &'a str)>, String> {
+    let is_number = |(mode, number): &(&str, &str)| !mode.is_empty() && number.parse::<u64>().is_ok();
+    let Some((mode, number)) = text.rsplit_once(':').filter(is_number).filter(|_| !is_level_files(text)) else {
+        return Ok(None);
+    };
+    game.check_mode(mode).map_err(|error| error.to_string())?;
+    Ok(Some((mode, number)))
 }
 
 /// Names that are listed for a name that does not exist.
@@ -526,10 +573,7 @@ pub(crate) fn with_negative_numbers(command: Command) -> Command {
 /// Returns the whole text of an error about a number in plain words; `None` for other errors.
 pub(crate) fn in_plain_words(error: &clap::Error) -> Option<String> {
     let source = error.source()?;
-    let mut plain = number_wanted(source)?;
-    if let Some((mode, level)) = mode_and_level(error) {
-        plain += &format!("; write --mode {mode} --level {level}");
-    }
+    let plain = number_wanted(source)?;
     Some(error.render().to_string().replacen(&format!(": {source}"), &format!(": {plain}"), 1))
 }
 
@@ -542,6 +586,15 @@ fn with_own_mode(error: &clap::Error, games: &[&dyn Game]) -> Option<String> {
     own_example(&error.render().to_string(), game)
 }
 
+/// Returns the whole text of an error about a missing name of a game, with the games; `None` for other errors.
+fn with_games(error: &clap::Error, games: &[&dyn Game]) -> Option<String> {
+    const MISSING: &str = "\n  <GAME>\n";
+    let text = error.render().to_string();
+    let is_missing = error.kind() == ErrorKind::MissingRequiredArgument && text.contains(MISSING);
+    let names: Vec<&str> = games.iter().map(|game| game.name()).collect();
+    is_missing.then(|| text.replacen(MISSING, &format!("\n  <GAME>, one of {}\n", names.join(", ")), 1))
+}
+
 /// Replaces the mode of examples that are written for any game.
 fn own_example(text: &str, game: &dyn Game) -> Option<String> {
     let (range, level) = (first_levels(game, 9), first_levels(game, 7));
@@ -550,16 +603,6 @@ fn own_example(text: &str, game: &dyn Game) -> Option<String> {
         own = own.replace("such as hard:64..127", &format!("such as {range}"));
     }
     (own != text).then_some(own)
-}
-
-/// Returns mode and level where both were given as the number of a level, as in `--level hard:7`.
-fn mode_and_level(error: &clap::Error) -> Option<(&str, &str)> {
-    let text = |kind| match error.get(kind) {
-        Some(ContextValue::String(text)) => Some(text.as_str()),
-        _ => None,
-    };
-    text(ContextKind::InvalidArg).filter(|option| option.starts_with("--level "))?;
-    text(ContextKind::InvalidValue)?.split_once(':')
 }
 
 /// Describes the wanted number.
@@ -631,7 +674,7 @@ mod tests {
         for (args, wanted) in [
             ("level rooms --level Cave", "level rooms --level=1"),
             ("level rooms --mode hard --level=Tower --json", "level rooms --mode hard --level=2 --json"),
-            ("level rooms --level hard:Cave", "level rooms --level=hard:1"),
+            ("level rooms --level hard:Cave", "level rooms --mode=hard --level=1"),
             ("test rooms --levels Cave --out a", "test rooms --levels=easy:1 --out a"),
             ("test --levels hard:Hall..Cave", "test --levels=hard:0..1"),
             ("record rooms --levels=hard:Tower --hold-out Hall", "record rooms --levels=hard:2 --hold-out=easy:0"),
@@ -692,6 +735,36 @@ mod tests {
     }
 
     #[test]
+    fn a_mode_in_front_of_a_number_is_taken_wherever_a_level_is_named() {
+        for (args, wanted) in [
+            ("level plain --level hard:7", "level plain --mode=hard --level=7"),
+            ("trace plain --level=hard:7 --actions 0", "trace plain --mode=hard --level=7 --actions 0"),
+            ("view rooms --level hard:Cave", "view rooms --mode=hard --level=1"),
+            ("play plain --level hard:7 --name me", "play plain --mode=hard --level=7 --name me"),
+            ("doctor plain --level hard:3 --level hard:4", "doctor plain --mode=hard --level=3 --level=4"),
+            ("doctor rooms --level hard:Hall,Cave", "doctor rooms --mode=hard --level=0 --level=1"),
+            // The mode is named already.
+            ("level plain --mode hard --level hard:7", "level plain --mode hard --level=7"),
+            ("trace plain --level hard:7 --map hard", "trace plain --level=7 --map hard"),
+            ("view plain --levels hard:0..9 --level hard:7", "view plain --levels hard:0..9 --level=7"),
+            // These take the mode themselves.
+            ("explore plain --level hard:7", "explore plain --level hard:7"),
+            ("test plain --level hard:7", "test plain --level hard:7"),
+        ] {
+            assert_eq!(numbered(args).as_deref(), Ok(wanted));
+        }
+        for (args, words) in [
+            ("level plain --mode easy --level hard:7", "`--level hard:7` is of the mode hard, and --mode names easy: "),
+            ("view plain --levels easy:0..9 --level hard:7", "and --levels names easy: "),
+            ("doctor plain --level easy:0 --level hard:7", "and --level names easy: "),
+            ("trace plain --level hrad:7", "did you mean `hard`?"),
+        ] {
+            let error = numbered(args).expect_err(args);
+            assert!(error.contains(words), "{error}");
+        }
+    }
+
+    #[test]
     fn levels_that_do_not_follow_one_another_need_an_option_that_is_repeatable() {
         assert_eq!(
             numbered("test rooms --levels Hall,Tower").expect_err("two ranges"),
@@ -713,6 +786,15 @@ mod tests {
         assert!(text.starts_with("error: no such level\n") && text.contains(" level [OPTIONS] <GAME>"), "{text}");
         let text = usage("demo filter a.demo --levels Attic");
         assert!(text.contains(" demo filter [OPTIONS]"), "{text}");
+    }
+
+    #[test]
+    fn the_error_of_a_missing_game_lists_those_of_the_program() {
+        let [rooms, plain] = rooms();
+        let error = |args: &[&str]| Cli::command().try_get_matches_from(args).expect_err("no game is named");
+        let words = with_games(&error(&["playbot", "level"]), &[&rooms, &plain]).expect("a game is missing");
+        assert!(words.contains("\n  <GAME>, one of rooms, plain\n"), "{words}");
+        assert_eq!(with_games(&error(&["playbot", "trace", "rooms"]), &[&rooms, &plain]), None, "actions are missing");
     }
 
     #[test]
@@ -768,7 +850,6 @@ mod tests {
             ("--seed", "x", "error: invalid value 'x' for '--seed <seed>': it must be a whole number, 0 or more"),
             ("--seed", "-1", "it must be a whole number, 0 or more"),
             ("--seed", "18446744073709551616", "the number is too large"),
-            ("--level", "hard:7", "0 or more; write --mode hard --level 7"),
             ("--seed", "hard:7", "it must be a whole number, 0 or more\n"),
             ("--noise", "abc", "it must be a number, such as 0.5"),
             ("--scale", "0", "it must be a whole number from 1 to 32"),

@@ -210,7 +210,22 @@ pub fn evaluate(
     plan: &EvalPlan,
     progress: impl Fn(u64) + Sync,
 ) -> Result<Vec<EpisodeResult>, EvalError> {
-    let trails = play(game, player, plan, false, progress)?;
+    evaluate_until(game, player, plan, progress, &|| false)
+}
+
+/// Evaluates as [`evaluate`] does until the caller stops, and returns the episodes that ended by then.
+///
+/// # Errors
+///
+/// As for [`evaluate`].
+pub fn evaluate_until(
+    game: &dyn Game,
+    player: &Player,
+    plan: &EvalPlan,
+    progress: impl Fn(u64) + Sync,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> Result<Vec<EpisodeResult>, EvalError> {
+    let trails = play(game, player, plan, false, progress, stop)?;
     Ok(trails.into_iter().map(|trail| trail.result).collect())
 }
 
@@ -225,7 +240,7 @@ pub fn evaluate_with_trails(
     plan: &EvalPlan,
     progress: impl Fn(u64) + Sync,
 ) -> Result<Vec<Trail>, EvalError> {
-    play(game, player, plan, true, progress)
+    play(game, player, plan, true, progress, &|| false)
 }
 
 fn play(
@@ -234,6 +249,7 @@ fn play(
     plan: &EvalPlan,
     follow: bool,
     progress: impl Fn(u64) + Sync,
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Trail>, EvalError> {
     if let Some(problem) = game.problem() {
         return Err(Fault(problem).into());
@@ -252,8 +268,8 @@ fn play(
     let mut shares = shares.collect::<Result<Vec<_>, VisionError>>()?;
     let parts = on_threads(&mut shares, plan.threads, |(first, built)| -> Result<Vec<Trail>, EvalError> {
         match built {
-            Some(world) => Ok(play_out(world, followed, &progress)?),
-            None => Ok(play_out(&mut build(*first)?, followed, &progress)?),
+            Some(world) => Ok(play_out(world, followed, &progress, stop)?),
+            None => Ok(play_out(&mut build(*first)?, followed, &progress, stop)?),
         }
     });
     tracing::info!("{costs} for `{}`", game.name());
@@ -297,16 +313,17 @@ fn build_eval_world(
     Ok(world)
 }
 
-/// Ticks until every agent has played its list. With a game, stores the position of each agent after each tick.
+/// Ticks until every agent has played its list, or the caller stops. With a game, stores the position of each agent after each tick.
 fn play_out(
     world: &mut World,
     followed: Option<&dyn Game>,
     progress: &(impl Fn(u64) + Sync),
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Vec<Trail>, Fault> {
     let everybody = world.query_filtered::<Entity, With<Agent>>().iter(world).collect::<Vec<_>>();
     let mut positions: HashMap<Entity, Vec<Vec2>> = HashMap::new();
     let mut trails = Vec::new();
-    while everybody.iter().any(|&agent| Control::of(world, agent).is_active()) {
+    while everybody.iter().any(|&agent| Control::of(world, agent).is_active()) && !stop() {
         tick_world(world)?;
         let ended = EndedEpisodes::take(world);
         for (game, &agent) in followed.iter().flat_map(|game| everybody.iter().map(move |agent| (game, agent))) {

@@ -42,13 +42,28 @@ pub type LevelsByLayout = BTreeMap<u64, Vec<u64>>;
 
 /// Returns the levels of a split by their layout. Levels without a [layout](Game::layout) are not among them.
 pub fn by_layout(game: &dyn Game, split: &LevelSplit) -> LevelsByLayout {
-    let mut layouts = LevelsByLayout::new();
+    by_layout_until(game, split, &|| false).0
+}
+
+/// Returns the levels of a split by their layout until the caller stops, and the number of levels that were looked at, the
+/// first ones.
+pub(crate) fn by_layout_until(
+    game: &dyn Game,
+    split: &LevelSplit,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> (LevelsByLayout, u64) {
+    let (mut layouts, mut count) = (LevelsByLayout::new(), 0);
     for level in split.levels() {
+        // Whether the game has layouts is known from one on.
+        if count > 0 && stop() {
+            break;
+        }
+        count += 1;
         if let Some(layout) = game.layout(&split.mode, level) {
             layouts.entry(layout).or_default().push(level);
         }
     }
-    layouts
+    (layouts, count)
 }
 
 /// Returns true if a game has one level of its own, which it is trained and measured on.
@@ -191,7 +206,7 @@ impl<'a> HeldOut<'a> {
         let ranges: Vec<(&str, Vec<u64>)> = [(self.split.mode.as_str(), own)].into_iter().chain(others).collect();
         let is_wanted = |group: &[PlacedLevel]| group.iter().any(is_own) && !group.iter().all(is_own);
         let threads = usable_threads(default_threads());
-        let alike = AlikeLevels::of(self.game, &ranges, is_wanted, threads, progress);
+        let alike = AlikeLevels::of(self.game, &ranges, is_wanted, threads, progress, &|| false);
         if !alike.by_state {
             return;
         }
@@ -286,6 +301,8 @@ pub struct AlikeLevels {
     /// True if the state of the game was compared in all ticks. Otherwise levels are alike by what agents observe, and
     /// may differ in the rest.
     pub by_state: bool,
+    /// Levels of the first range that are in no group, since the caller stopped before they were told apart.
+    pub unfinished: u64,
 }
 
 impl AlikeLevels {
@@ -294,13 +311,15 @@ impl AlikeLevels {
 
     /// Plays levels of some modes, all of which the game has. Groups that are not wanted are not told apart any further.
     /// `progress` receives episodes that have been played, and those that are to be played besides the ones that it has
-    /// received before, from several threads. A level that is played on has a second and a third episode.
+    /// received before, from several threads. A level that is played on has a second and a third episode. If the caller
+    /// stops, groups are those of the levels whose comparison was over by then.
     pub fn of(
         game: &dyn Game,
         ranges: &[(&str, Vec<u64>)],
         is_wanted: impl Fn(&[PlacedLevel]) -> bool,
         threads: usize,
         progress: impl Fn(u64, u64) + Sync,
+        stop: &(dyn Fn() -> bool + Sync),
     ) -> Self {
         let placed = |(range, (_, levels)): (usize, &(&str, Vec<u64>))| -> Vec<PlacedLevel> {
             levels.iter().map(|&level| (range, level)).collect()
@@ -310,7 +329,7 @@ impl AlikeLevels {
             return Self::default();
         }
         let mut open = vec![all.into_iter().collect::<Vec<_>>()];
-        let (mut classes, mut by_state) = (Vec::new(), true);
+        let (mut classes, mut by_state, mut unfinished) = (Vec::new(), true, 0);
         for ticks in STAGES {
             progress(0, open.iter().map(|group| group.len() as u64).sum());
             let mut played = BTreeMap::new();
@@ -320,33 +339,42 @@ impl AlikeLevels {
                 // Groups stand in the order of their hashes, which can differ from build to build. Levels are dealt to
                 // Worlds in their own order.
                 waiting.sort_unstable();
-                let results = play(game, mode, &waiting, ticks, threads, &|played| progress(played, 0));
+                let results = play(game, mode, &waiting, ticks, threads, &|played| progress(played, 0), stop);
                 played.extend(results.into_iter().map(|result| ((range, result.level), result)));
             }
-            let mut left = Vec::new();
+            let (mut left, is_stopped) = (Vec::new(), stop());
             for group in open {
                 let mut alike = BTreeMap::<u64, Vec<PlacedLevel>>::new();
                 let mut over = BTreeSet::new();
-                // A level that breaks the game is like no other.
                 for level in group {
-                    let Some(PlayedLevel { hash, is_over, is_state, .. }) = played.get(&level) else { continue };
+                    let Some(PlayedLevel { hash, is_over, is_state, .. }) = played.get(&level) else {
+                        // A level that breaks the game is like no other.
+                        unfinished += u64::from(is_stopped && is_own(&level));
+                        continue;
+                    };
                     alike.entry(*hash).or_default().push(level);
                     by_state &= is_state;
                     over.extend(is_over.then_some(*hash));
                 }
                 for (hash, group) in alike {
                     let goes_on = group.len() > 1 && is_wanted(&group) && !over.contains(&hash);
-                    if goes_on { left.push(group) } else { classes.push(group) }
+                    if !goes_on {
+                        classes.push(group);
+                    } else if is_stopped && ticks < Self::TICKS {
+                        unfinished += group.iter().filter(|level| is_own(level)).count() as u64;
+                    } else {
+                        left.push(group);
+                    }
                 }
             }
             open = left;
-            if open.is_empty() {
+            if open.is_empty() || is_stopped {
                 break;
             }
         }
         classes.extend(open);
         classes.sort_unstable();
-        Self { by_state: by_state && !classes.is_empty(), classes }
+        Self { by_state: by_state && !classes.is_empty(), classes, unfinished }
     }
 
     /// Returns the groups of levels of the first range that are alike, each in ascending order. Levels that are like no
@@ -376,7 +404,8 @@ struct PlayedLevel {
     is_over: bool,
 }
 
-/// Plays so many ticks of each level with the same random actions. Levels that break the game are missing.
+/// Plays so many ticks of each level with the same random actions. Levels that break the game are missing, and so are those
+/// that were not played to the end when the caller stopped.
 fn play(
     game: &dyn Game,
     mode: &str,
@@ -384,14 +413,15 @@ fn play(
     ticks: u32,
     threads: usize,
     progress: &(impl Fn(u64) + Sync),
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Vec<PlayedLevel> {
     let worlds = levels.len().div_ceil(LEVELS_PER_WORLD).clamp(1, MOST_WORLDS);
     let mut shares: Vec<&[u64]> = levels.chunks(levels.len().div_ceil(worlds).max(1)).collect();
     let parts = on_threads(&mut shares, threads, |share| -> Vec<PlayedLevel> {
         let (mut played, mut left, mut barren) = (Vec::new(), *share, 0);
         // A broken World is built again for the levels behind the one that broke it, unless it breaks each time.
-        while !left.is_empty() && barren < MOST_BARREN {
-            let part = play_world(game, mode, left, ticks, progress);
+        while !left.is_empty() && barren < MOST_BARREN && !stop() {
+            let part = play_world(game, mode, left, ticks, progress, stop);
             left = left.get(part.len() + 1..).unwrap_or_default();
             barren = if part.is_empty() { barren + 1 } else { 0 };
             played.extend(part);
@@ -401,13 +431,14 @@ fn play(
     parts.into_iter().flatten().collect()
 }
 
-/// Plays levels in one World, until one of them breaks it.
+/// Plays levels in one World, until one of them breaks it or the caller stops.
 fn play_world(
     game: &dyn Game,
     mode: &str,
     levels: &[u64],
     ticks: u32,
     progress: &(impl Fn(u64) + Sync),
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Vec<PlayedLevel> {
     let (mut world, agents) = build_world(game, mode, 0, 0, 1);
     let Some(&agent) = agents.first() else { return Vec::new() };
@@ -422,7 +453,7 @@ fn play_world(
     let mut played = Vec::with_capacity(levels.len() + 1);
     let begun = |level| PlayedLevel { level, hash: 0, is_state: true, is_over: false };
     let mut now: Option<PlayedLevel> = None;
-    while Control::of(&world, agent).is_active() {
+    while Control::of(&world, agent).is_active() && !stop() {
         if tick_world(&mut world).is_err() {
             break;
         }
@@ -526,7 +557,7 @@ mod tests {
     }
 
     fn alike(game: &ForeignGame, levels: u64, is_wanted: bool, threads: usize) -> AlikeLevels {
-        AlikeLevels::of(game, &[("default", (0..levels).collect())], |_| is_wanted, threads, |_, _| {})
+        AlikeLevels::of(game, &[("default", (0..levels).collect())], |_| is_wanted, threads, |_, _| {}, &|| false)
     }
 
     #[test]
@@ -630,7 +661,26 @@ mod tests {
             assert!(done.load(Ordering::Relaxed) <= all.load(Ordering::Relaxed), "no more than there are");
         };
         // All but level 2 have their like after the first tick. Episodes end after 40 ticks, and are not played on then.
-        AlikeLevels::of(&game, &[("default", (0..5).collect())], |_| true, 1, progress);
+        AlikeLevels::of(&game, &[("default", (0..5).collect())], |_| true, 1, progress, &|| false);
         assert_eq!((done.into_inner(), all.into_inner()), (5 + 4, 5 + 4));
+    }
+
+    #[test]
+    fn a_stopped_comparison_has_the_groups_of_the_levels_that_were_played_to_the_end() {
+        let game = dots(|level| modulo(level, 3), |_| 0.0);
+        let stopped_after = |episodes: u64| {
+            let done = AtomicU64::new(0);
+            let progress = |played, _| {
+                done.fetch_add(played, Ordering::Relaxed);
+            };
+            let stop = || done.load(Ordering::Relaxed) >= episodes;
+            AlikeLevels::of(&game, &[("default", (0..40).collect())], |_| true, 1, progress, &stop)
+        };
+        // All levels have their like after one tick, and end within the 60 ticks of the second stage.
+        let second = stopped_after(40 + 10);
+        assert_eq!(second.groups(), [vec![0, 3, 6, 9], vec![1, 4, 7], vec![2, 5, 8]]);
+        assert_eq!((second.unfinished, second.by_state), (30, true));
+        let first = stopped_after(10);
+        assert_eq!((first.groups(), first.unfinished), (Vec::<Vec<u64>>::new(), 40), "they may differ later");
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     drawing::Drawing,
-    level_files::read::{read_text_file, shown_path},
+    level_files::read::{TextFileError, read_text_file, shown_path},
     mode::ModeError,
 };
 use bevy::prelude::*;
@@ -118,10 +118,12 @@ const MOST_BYTES: u64 = 32 << 20;
 /// The file cannot be read.
 pub fn read_text(path: &Path) -> Result<String, InspectError> {
     read_text_file(path, MOST_BYTES).map_err(|error| {
-        InspectError::Usage(format!(
-            "cannot read {}: {error}; name an existing file that you may read",
-            shown_path(path)
-        ))
+        let next = match error {
+            TextFileError::Unreadable(_) | TextFileError::NotAFile => "; name an existing file that you may read",
+            // They say what to do.
+            TextFileError::TooLarge { .. } | TextFileError::Utf16(_) | TextFileError::NoText { .. } => "",
+        };
+        InspectError::Usage(format!("cannot read {}: {error}{next}", shown_path(path)))
     })
 }
 

@@ -2,10 +2,10 @@
 //! action solves.
 
 use crate::{
-    eval::{EpisodeResult, EvalError, EvalPlan, Player, evaluate},
+    eval::{EpisodeResult, EvalError, EvalPlan, Player, evaluate_until},
     floor_plan::FloorPlan,
     game::{Game, idle_action, is_named_idle},
-    held_out::{AlikeLevels, HeldOut, by_layout},
+    held_out::{AlikeLevels, HeldOut, by_layout_until},
     split::LevelSplit,
 };
 use bevy::math::{Rect, Vec2};
@@ -28,11 +28,14 @@ pub struct EqualLevels {
 impl EqualLevels {
     /// Compares levels of a game; `None` if the game does not compare its [layouts](Game::layout).
     pub fn of(game: &dyn Game, split: &LevelSplit) -> Option<Self> {
-        let layouts = by_layout(game, split);
-        if layouts.is_empty() {
-            return None;
-        }
-        Some(Self::of_groups(layouts.into_values()))
+        Self::of_until(game, split, &|| false).map(|(equal, _)| equal)
+    }
+
+    /// Compares levels as [`of`](Self::of) does until the caller stops, and returns the number of compared levels, the first
+    /// ones.
+    pub fn of_until(game: &dyn Game, split: &LevelSplit, stop: &(dyn Fn() -> bool + Sync)) -> Option<(Self, u64)> {
+        let (layouts, count) = by_layout_until(game, split, stop);
+        (!layouts.is_empty()).then(|| (Self::of_groups(layouts.into_values()), count))
     }
 
     /// Takes levels that were compared by their play: as many layouts as there are groups.
@@ -60,10 +63,14 @@ pub struct EqualPlans {
 }
 
 impl EqualPlans {
-    /// Compares levels of a game; `None` if the game has no [floor plans](crate::game::LevelTools::floor_plan).
-    pub fn of(game: &dyn Game, split: &LevelSplit) -> Option<Self> {
+    /// Compares levels of a game; `None` if the game has no [floor plans](crate::game::LevelTools::floor_plan), or if the
+    /// caller stopped.
+    pub fn of_until(game: &dyn Game, split: &LevelSplit, stop: &(dyn Fn() -> bool + Sync)) -> Option<Self> {
         let mut by_plan = BTreeMap::<u64, Vec<u64>>::new();
         for level in split.levels() {
+            if stop() {
+                return None;
+            }
             if let Some(plan) = game.tools().levels.floor_plan(&split.mode, level) {
                 by_plan.entry(plan_hash(&plan)).or_default().push(level);
             }
@@ -101,11 +108,19 @@ fn plan_hash(plan: &FloorPlan) -> u64 {
     StateHash::of(areas.chain(corners(bounds)).chain(point(start)).chain(point(goal))).0
 }
 
-/// Returns the levels of a split that are among others: by number, as a file, or by their layout.
-pub fn levels_in(game: &dyn Game, split: &LevelSplit, others: &LevelSplit) -> BTreeSet<u64> {
+/// Returns the levels of a split that are among others: by number, as a file, or by their layout. If the caller stops, these
+/// are the ones that were found by then.
+pub fn levels_in_until(
+    game: &dyn Game,
+    split: &LevelSplit,
+    others: &LevelSplit,
+    stop: &(dyn Fn() -> bool + Sync),
+) -> BTreeSet<u64> {
+    let (layouts, _) = by_layout_until(game, others, stop);
     let others = HeldOut::levels_of(game, others);
-    let is_in = |level: &u64| others.contains(&split.mode, *level) || others.resembles(&split.mode, *level);
-    split.levels().filter(is_in).collect()
+    let is_equal = |level| game.layout(&split.mode, level).is_some_and(|layout| layouts.contains_key(&layout));
+    let is_in = |level: &u64| others.contains(&split.mode, *level) || is_equal(*level);
+    split.levels().take_while(|_| !stop()).filter(is_in).collect()
 }
 
 /// Levels that need no player.
@@ -120,17 +135,19 @@ pub struct PlainLevels {
 impl PlainLevels {
     /// Plays each level once with each action, held for the whole episode. Continuous actions are rest, and each axis at
     /// both its ends. Where the action is illegal, the idle action is held, or the lowest legal one: see
-    /// [`legal`](bevy_playbot::legal). `progress` receives finished episodes, from several threads.
+    /// [`legal`](bevy_playbot::legal). `progress` receives finished episodes, from several threads. Returns `None` if the
+    /// caller stopped.
     ///
     /// # Errors
     ///
     /// The game broke its contract.
-    pub fn of(
+    pub fn of_until(
         game: &dyn Game,
         split: &LevelSplit,
         threads: usize,
         progress: impl Fn(u64) + Sync,
-    ) -> Result<Self, EvalError> {
+        stop: &(dyn Fn() -> bool + Sync),
+    ) -> Result<Option<Self>, EvalError> {
         let plan = EvalPlan::of_bot(split.clone(), ARENAS, threads);
         let mut solved = Vec::new();
         let mut first_ticks = BTreeMap::<u64, u64>::new();
@@ -138,7 +155,10 @@ impl PlainLevels {
         let (actions, idle) = (held_actions(game), known_idle_action(game));
         for (name, action) in &actions {
             let player = Player::Blind(BlindBot::Constant(action.clone()));
-            let results = evaluate(game, &player, &plan, &progress)?;
+            let results = evaluate_until(game, &player, &plan, &progress, stop)?;
+            if stop() {
+                return Ok(None);
+            }
             let wins = || results.iter().filter(|result| result.success);
             for result in wins().filter(|result: &&EpisodeResult| result.ticks <= 1) {
                 *first_ticks.entry(result.level).or_default() += 1;
@@ -153,7 +173,7 @@ impl PlainLevels {
         let others = |levels: BTreeSet<u64>| levels.difference(&without_action).copied().collect::<BTreeSet<_>>();
         let by_one_action = solved.into_iter().map(|(name, levels)| (name, others(levels)));
         let by_one_action = by_one_action.filter(|(_, levels)| !levels.is_empty()).collect();
-        Ok(Self { without_action, by_one_action })
+        Ok(Some(Self { without_action, by_one_action }))
     }
 
     /// Returns the levels that some held action solves.
@@ -162,7 +182,7 @@ impl PlainLevels {
     }
 }
 
-/// Returns the number of episodes that [`PlainLevels::of`] plays.
+/// Returns the number of episodes that [`PlainLevels::of_until`] plays.
 pub fn plain_episodes(game: &dyn Game, split: &LevelSplit) -> u64 {
     split.len().saturating_mul(held_actions(game).len() as u64)
 }
@@ -202,22 +222,39 @@ fn held_actions(game: &dyn Game) -> Vec<(String, ActionValue)> {
 mod tests {
     use super::*;
     use crate::foreign::ForeignGame;
-    use bevy::app::App;
+    use bevy::{app::App, input::keyboard::KeyCode};
+    use std::sync::atomic::{AtomicU64, Ordering};
 
     #[test]
     fn levels_of_one_plan_are_named_unless_their_layouts_are_equal() {
         let plan = |level: u64| FloorPlan { goal: Vec2::new((level % 3) as f32, 0.0), ..FloorPlan::default() };
         let bare = ForeignGame::new("rooms", 1, |_: &mut App| {});
         let levels: LevelSplit = "default:0..7".parse().expect("levels");
-        assert_eq!(EqualPlans::of(&bare, &levels), None, "the game has no plans");
+        assert_eq!(EqualPlans::of_until(&bare, &levels, &|| false), None, "the game has no plans");
         let drawn = bare.plan(plan);
         let all = vec![vec![0, 3, 6], vec![1, 4, 7], vec![2, 5]];
-        let unknown = EqualPlans::of(&drawn, &levels).expect("plans");
+        let unknown = EqualPlans::of_until(&drawn, &levels, &|| false).expect("plans");
         assert_eq!((&unknown.groups, unknown.shared()), (&all, 8));
         // 0 and 6 are equal, and so are 1 and 7.
-        let other = EqualPlans::of(&drawn.clone().layout(|_, level| level % 6), &levels).expect("plans");
+        let other =
+            EqualPlans::of_until(&drawn.clone().layout(|_, level| level % 6), &levels, &|| false).expect("plans");
         assert_eq!(other.groups, all);
-        let equal = EqualPlans::of(&drawn.layout(|_, level| level % 3), &levels).expect("plans");
+        let equal = EqualPlans::of_until(&drawn.layout(|_, level| level % 3), &levels, &|| false).expect("plans");
         assert_eq!(equal.groups, Vec::<Vec<u64>>::new());
+    }
+
+    #[test]
+    fn a_stopped_audit_is_about_the_first_levels() {
+        let game = ForeignGame::new("rooms", 1, |_: &mut App| {}).layout(|_, level| level % 3);
+        let levels: LevelSplit = "default:0..99".parse().expect("levels");
+        let looks = AtomicU64::new(0);
+        let stop = || looks.fetch_add(1, Ordering::Relaxed) >= 4;
+        let (equal, count) = EqualLevels::of_until(&game, &levels, &stop).expect("layouts");
+        assert_eq!((equal.groups, equal.layouts, count), (vec![vec![0, 3], vec![1, 4]], 3, 5));
+        assert_eq!(EqualPlans::of_until(&game.clone().plan(|_| FloorPlan::default()), &levels, &stop), None);
+        assert_eq!(levels_in_until(&game, &levels, &levels, &stop), BTreeSet::new());
+        let game = game.keys([vec![], vec![KeyCode::Space]]).observe(["nothing"], || [0.0]).time_limit(3);
+        let plain = PlainLevels::of_until(&game, &levels, 1, |_| {}, &stop);
+        assert_eq!(plain.expect("it plays"), None);
     }
 }

@@ -17,7 +17,7 @@ use bevy::prelude::*;
 use bevy_playbot::{engine::LevelFiles, level::LevelFile, state_hash::StateHash};
 use std::{any::Any, path::Path, sync::Arc};
 
-pub use crate::level_files::error::{JsonStep, LevelFileError, LevelTextError, read_json, read_json_object};
+pub use crate::level_files::error::{JsonStep, LevelFileError, LevelTextError, Utf16, read_json, read_json_object};
 
 /// Largest number of files: a range cannot have more levels.
 const MOST: usize = 1 << 24;

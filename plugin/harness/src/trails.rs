@@ -88,6 +88,9 @@ const LINE: f32 = 19.0;
 /// Ratio of the widths of letters in pixel images and in drawings.
 const WIDEST: f32 = 1.4;
 
+/// Space between a drawing and the words below it.
+pub(crate) const BELOW: f32 = 2.0;
+
 /// Room for the words above a drawing.
 const HEAD: f32 = 3.0 * LINE + 2.0;
 
@@ -187,7 +190,9 @@ impl Paper {
         self.text(area.min.x - GAP, TEXT, SOFT, &content.caption(player));
         content.draw(floor, player, frame, &mut self.shapes);
         self.width = self.width.max(area.max.x);
-        self.y = area.max.y + GAP;
+        self.y = area.max.y + BELOW;
+        self.text(area.min.x - GAP, TEXT, SOFT, &scales(frame.bounds()));
+        self.y += GAP / 2.0;
     }
 }
 
@@ -240,6 +245,22 @@ impl FloorFrame {
     /// Returns the pixels of the whole floor.
     pub fn whole(&self) -> Rect {
         self.area(self.bounds)
+    }
+}
+
+/// Describes the ends of both axes of a drawing, from left to right and from below, in the units of positions.
+pub fn scales(bounds: Rect) -> String {
+    let Rect { min, max } = bounds;
+    let [left, right, below, above] = [min.x, max.x, min.y, max.y].map(short);
+    format!("x {left} to {right}, y {below} to {above}")
+}
+
+/// Returns a number with at most two decimals.
+fn short(number: f32) -> String {
+    let text = format!("{number:.2}");
+    match text.trim_end_matches('0').trim_end_matches('.') {
+        "-0" => "0".to_owned(),
+        short => short.to_owned(),
     }
 }
 
@@ -364,6 +385,32 @@ pub(crate) fn goal_mark(centre: Vec2, radius: f32) -> Shape {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_ends_of_both_axes_are_written_below_each_floor() {
+        let plan = FloorPlan { bounds: Rect::new(-2.5, -0.001, 20.0, 6.25), ..FloorPlan::default() };
+        let player = PlayerTrails { name: "a".to_owned(), trails: Vec::new() };
+        let floor = |players: usize| Floor {
+            name: "floor".to_owned(),
+            plan: plan.clone(),
+            starts: Vec::new(),
+            goals: Vec::new(),
+            players: vec![player.clone(); players],
+        };
+        let drawing = TrailChart { title: "walk".to_owned(), floors: vec![floor(1), floor(2)] }.draw();
+        let written = drawing.shapes.iter().filter_map(|shape| match shape {
+            Shape::Text { at, words, .. } if words.starts_with("x ") => Some((at, words.as_str())),
+            _ => None,
+        });
+        let written: Vec<_> = written.collect();
+        // Trajectories and visits, of each player.
+        assert_eq!(written.len(), 2 + 4);
+        for (at, words) in written {
+            assert_eq!(words, "x -2.5 to 20, y 0 to 6.25");
+            assert!(at.min_element() >= 0.0 && at.cmple(drawing.size).all(), "{at} on {}", drawing.size);
+        }
+        assert_eq!([100.0, 0.5, -30.0].map(short), ["100", "0.5", "-30"]);
+    }
 
     #[test]
     fn long_names_keep_their_ends() {

@@ -6,7 +6,10 @@ use crate::{
     results::{Rank, ResultRow, ResultTable, rank_key, ranks},
     text_table::{NO_SUCCESS, has_no_success},
 };
-use std::fmt::Write;
+use std::{
+    collections::{BTreeMap, BTreeSet},
+    fmt::Write,
+};
 
 /// A table of text.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,29 +28,42 @@ impl PlainTable {
         self.to_text_within(usize::MAX)
     }
 
-    /// Returns the table for a console of this width. If it is too wide, long words lose their middle, but keep at least
-    /// twelve letters. Numbers are never shortened.
+    /// Returns the table for a console of this width. If it is too wide, sentences in the last columns move below their
+    /// rows. Then long words lose a part, but keep at least twelve letters, and different ones stay different. Numbers are
+    /// never shortened.
     pub fn to_text_within(&self, most: usize) -> String {
         let numbers = number_columns(self);
-        let mut rows: Vec<Vec<String>> = std::iter::once(&self.columns)
+        let rows: Vec<Vec<String>> = std::iter::once(&self.columns)
             .chain(&self.rows)
             .map(|row| (0..numbers.len()).map(|c| row.get(c).map_or(String::new(), |cell| one_line(cell))).collect())
             .collect();
         let width = |c: usize| rows.iter().map(|row| row[c].chars().count()).max().unwrap_or(0);
         let mut widths: Vec<usize> = (0..numbers.len()).map(width).collect();
+        while total(&widths) > most && widths.len() > 1 && has_sentences(&rows[1..], widths.len() - 1) {
+            widths.pop();
+        }
         fit(&mut widths, &numbers, most);
-        rows.iter_mut().for_each(|row| row.iter_mut().zip(&widths).for_each(|(cell, width)| shorten(cell, *width)));
-        let line = |row: &[String]| {
-            let cells = row.iter().zip(&widths).zip(&numbers).map(|((cell, &width), number)| {
+        let columns: Vec<Vec<String>> = widths
+            .iter()
+            .enumerate()
+            .map(|(c, width)| shortened(&rows.iter().map(|row| row[c].as_str()).collect::<Vec<_>>(), *width))
+            .collect();
+        let line = |index: usize| {
+            let cells = columns.iter().zip(&widths).zip(&numbers).map(|((column, &width), number)| {
+                let cell = &column[index];
                 if *number { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
             });
             cells.collect::<Vec<_>>().join("  ").trim_end().to_owned() + "\n"
         };
         let ruler: Vec<String> = widths.iter().map(|width| "-".repeat(*width)).collect();
         let mut out = if self.caption.is_empty() { String::new() } else { one_line(&self.caption) + "\n" };
-        out += &line(&rows[0]);
-        out += &line(&ruler);
-        rows[1..].iter().for_each(|row| out += &line(row));
+        out += &line(0);
+        out += &(ruler.join("  ") + "\n");
+        for (index, row) in rows.iter().enumerate().skip(1) {
+            out += &line(index);
+            let below = row.iter().zip(&rows[0]).skip(widths.len()).filter(|(cell, _)| !cell.is_empty());
+            below.for_each(|(cell, heading)| out += &indented(&format!("{heading}: {cell}"), most));
+        }
         out
     }
 }
@@ -58,9 +74,38 @@ pub const FEWEST_LETTERS: usize = 12;
 /// Space between two columns.
 const GAP: usize = 2;
 
+/// Space in front of sentences below a row.
+const INDENT: usize = 4;
+
+/// Most words of a cell that is no sentence.
+const FEW_WORDS: usize = 3;
+
+/// Returns the width of a table with columns of these widths.
+fn total(widths: &[usize]) -> usize {
+    widths.iter().map(|width| width + GAP).sum::<usize>().saturating_sub(GAP)
+}
+
+/// Returns true if a cell of this column is a sentence.
+fn has_sentences(rows: &[Vec<String>], column: usize) -> bool {
+    rows.iter().any(|row| row[column].split_whitespace().nth(FEW_WORDS).is_some())
+}
+
+/// Breaks a text into indented lines of at most `most` letters. A longer word gets a line of its own, whole, so that it can
+/// be copied.
+fn indented(text: &str, most: usize) -> String {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        let fits = |line: &String| INDENT + line.chars().count() + 1 + word.chars().count() <= most;
+        match lines.last_mut().filter(|line| fits(line)) {
+            Some(line) => *line = format!("{line} {word}"),
+            None => lines.push(word.to_owned()),
+        }
+    }
+    lines.iter().map(|line| format!("{:INDENT$}{line}\n", "")).collect()
+}
+
 /// Takes letters from the widest column of words, again and again, until the table is no wider than `most`.
 fn fit(widths: &mut [usize], numbers: &[bool], most: usize) {
-    let total = |widths: &[usize]| widths.iter().map(|width| width + GAP).sum::<usize>().saturating_sub(GAP);
     while total(widths) > most {
         let words = widths.iter_mut().zip(numbers).filter(|(_, number)| !**number).map(|(width, _)| width);
         match words.max() {
@@ -70,14 +115,77 @@ fn fit(widths: &mut [usize], numbers: &[bool], most: usize) {
     }
 }
 
-/// Replaces the middle of a text that is longer than `width`. More is kept of its end: paths differ there.
-fn shorten(text: &mut String, width: usize) {
+/// Shortens the texts of a column. Different texts stay different: those that would be the same are cut around their first
+/// difference, or numbered where even that does not tell them apart.
+fn shortened(texts: &[&str], width: usize) -> Vec<String> {
+    let mut cut: BTreeMap<&str, String> = texts.iter().map(|text| (*text, shorten(text, width))).collect();
+    // A group that is told apart in part becomes smaller each time.
+    for _ in 0..MOST_CUTS {
+        let groups = same(&cut);
+        for group in &groups {
+            let first = first_difference(group);
+            cut.extend(group.iter().map(|text| (*text, around(text, first, width))));
+        }
+        if groups.is_empty() {
+            break;
+        }
+    }
+    let mut used: BTreeSet<String> = cut.values().cloned().collect();
+    for text in same(&cut).iter().flat_map(|group| group.iter().skip(1)) {
+        let numbered = |number: usize| {
+            let ending = format!("…{number}");
+            let begin = text.chars().take(width.saturating_sub(ending.chars().count()));
+            begin.chain(ending.chars()).collect::<String>()
+        };
+        if let Some(own) = (2..=used.len() + 2).map(numbered).find(|own| !used.contains(own)) {
+            used.insert(own.clone());
+            cut.insert(*text, own);
+        }
+    }
+    texts.iter().map(|text| cut[text].clone()).collect()
+}
+
+/// Times that texts are cut around their first difference.
+const MOST_CUTS: usize = 4;
+
+/// Returns the groups of texts that are cut to the same.
+fn same<'a>(cut: &BTreeMap<&'a str, String>) -> Vec<Vec<&'a str>> {
+    let mut groups = BTreeMap::<&str, Vec<&'a str>>::new();
+    cut.iter().for_each(|(text, short)| groups.entry(short).or_default().push(*text));
+    groups.into_values().filter(|group| group.len() > 1).collect()
+}
+
+/// Returns the number of letters with which all texts begin.
+fn first_difference(texts: &[&str]) -> usize {
+    let [first, others @ ..] = texts else { return 0 };
+    let common = |other: &&str| first.chars().zip(other.chars()).take_while(|(a, b)| a == b).count();
+    others.iter().map(common).min().unwrap_or(0)
+}
+
+/// Returns a text, or one without its middle if it is longer than `width`. More is kept of its end: paths differ there.
+fn shorten(text: &str, width: usize) -> String {
     let length = text.chars().count();
-    if length > width {
-        let begin = width.saturating_sub(1) / 3;
-        let end = width.saturating_sub(1) - begin;
-        let kept = text.chars().take(begin).chain(['…']).chain(text.chars().skip(length - end));
-        *text = kept.collect();
+    if length <= width {
+        return text.to_owned();
+    }
+    let begin = width.saturating_sub(1) / 3;
+    let end = width.saturating_sub(1) - begin;
+    text.chars().take(begin).chain(['…']).chain(text.chars().skip(length - end)).collect()
+}
+
+/// Returns the part of a text around a letter, or the whole text if it is no longer than `width`.
+fn around(text: &str, at: usize, width: usize) -> String {
+    let length = text.chars().count();
+    let room = width.saturating_sub(2);
+    let start = at.saturating_sub(room / 3);
+    if length <= width {
+        text.to_owned()
+    } else if start <= 1 {
+        text.chars().take(width.saturating_sub(1)).chain(['…']).collect()
+    } else if start + room + 1 >= length {
+        std::iter::once('…').chain(text.chars().skip(length + 1 - width)).collect()
+    } else {
+        std::iter::once('…').chain(text.chars().skip(start).take(room)).chain(['…']).collect()
     }
 }
 
@@ -348,5 +456,70 @@ mod tests {
         assert_eq!(table.to_text_within(usize::MAX), table.to_text());
         let least = table.to_text_within(1);
         assert!(least.contains("bro…-00.json  123,456  finished"), "{least}");
+    }
+
+    fn levels(names: &[&str]) -> PlainTable {
+        let row = |name: &&str| vec![(*name).to_owned(), "7".to_owned()];
+        PlainTable {
+            caption: String::new(),
+            columns: vec!["level".into(), "steps".into()],
+            rows: names.iter().map(row).collect(),
+        }
+    }
+
+    #[test]
+    fn different_names_stay_different_in_a_narrow_table() {
+        let names = |names: &[&str], most: usize| -> Vec<String> {
+            let text = levels(names).to_text_within(most);
+            assert!(text.lines().all(|line| line.chars().count() <= most), "{text}");
+            text.lines().skip(2).map(|line| line.trim_end_matches('7').trim_end().to_owned()).collect()
+        };
+        let (first, second) =
+            ("levels/a very long folder/east/level.json", "levels/a very long folder/west/level.json");
+        let other = "levels/a very long folder/west/other.json";
+        assert_eq!(names(&[first, second, other], 23), ["…der/east/level…", "…der/west/level…", "level…other.json"]);
+        // Equal names stay equal.
+        assert_eq!(names(&[first, first], 23), ["level…level.json"; 2]);
+        // They differ beyond what can be shown of both.
+        let far = ["x".repeat(40) + "a" + &"y".repeat(40) + "c", "x".repeat(40) + "b" + &"y".repeat(40) + "c"];
+        let shown = names(&[far[0].as_str(), far[1].as_str()], 23);
+        assert!(shown[0].contains("xa") && shown[1].contains("xb"), "{shown:?}");
+        // Three differences in pairs, which no part of the text shows at once.
+        let many: Vec<String> = (0..8_usize)
+            .map(|bits| (0..3).map(|bit| format!("{}{}", "z".repeat(20), bits >> bit & 1)).collect::<String>() + "end")
+            .collect();
+        let many: Vec<&str> = many.iter().map(String::as_str).collect();
+        let shown: BTreeSet<String> = names(&many, 23).into_iter().collect();
+        assert_eq!(shown.len(), 8, "{shown:?}");
+    }
+
+    #[test]
+    fn sentences_at_the_end_of_a_narrow_table_move_below_their_rows() {
+        let cells = |cells: [&str; 4]| cells.map(str::to_owned).to_vec();
+        let table = PlainTable {
+            caption: "findings in runs/old".into(),
+            columns: cells(["finding", "now", "pinned", "message"]),
+            rows: vec![
+                cells(["stuck-default-7", "still there", "", "the agent did not move for 300 ticks at 12.5, 3.25"]),
+                cells(["panic-default-9", "gone", "until 2031-01-01: known since May", "it does not happen any more"]),
+            ],
+        };
+        let expected = [
+            "findings in runs/old",
+            "finding          now",
+            "---------------  -----------",
+            "stuck-default-7  still there",
+            "    message: the agent did not move for",
+            "    300 ticks at 12.5, 3.25",
+            "panic-default-9  gone",
+            "    pinned: until 2031-01-01: known since",
+            "    May",
+            "    message: it does not happen any more",
+            "",
+        ];
+        assert_eq!(table.to_text_within(41), expected.join("\n"));
+        let wide = table.to_text();
+        assert!(wide.lines().nth(3).is_some_and(|row| row.ends_with("at 12.5, 3.25")), "{wide}");
+        assert_eq!(table.to_text_within(200), wide);
     }
 }

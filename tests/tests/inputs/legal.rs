@@ -131,7 +131,7 @@ fn counting(counted: &Arc<[AtomicU64; 2]>) -> ForeignGame {
 fn an_audit_that_holds_actions_holds_legal_ones_only() {
     let counts: Arc<[AtomicU64; 2]> = Arc::default();
     let levels: LevelSplit = "default:0..3".parse().expect("levels");
-    PlainLevels::of(&counting(&counts), &levels, 2, |_| {}).expect("no action is illegal");
+    PlainLevels::of_until(&counting(&counts), &levels, 2, |_| {}, &|| false).expect("no action is illegal");
     let [legal, illegal] = [0, 1].map(|at: usize| counts[at].load(Ordering::Relaxed));
     // Three actions are held on four levels for 20 ticks.
     assert!(legal > 200, "{legal}");

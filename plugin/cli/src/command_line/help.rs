@@ -34,6 +34,29 @@ pub(crate) fn named(command: Command, program: &'static str, games: &[&dyn Game]
     }
 }
 
+/// Puts the games of a program in front of the text below the options: a line for each, with its modes.
+pub(crate) fn with_games(command: Command, games: &[&dyn Game]) -> Command {
+    let below = command.get_after_help().map_or_else(String::new, ToString::to_string);
+    command.after_help(format!("{}\n\n{below}", list(games)))
+}
+
+/// Most modes of a game that are listed.
+const MOST_MODES: usize = 8;
+
+/// Lists games with their modes.
+fn list(games: &[&dyn Game]) -> String {
+    let width = games.iter().map(|game| game.name().chars().count()).max().unwrap_or(0);
+    let line = |game: &&dyn Game| {
+        let modes = game.modes();
+        let more = modes.len().saturating_sub(MOST_MODES);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let what = if modes.len() == 1 { "mode" } else { "modes" };
+        format!("  {:width$}   {what} {}{more}", game.name(), modes[..modes.len().min(MOST_MODES)].join(", "))
+    };
+    let head = if games.len() == 1 { "Game:" } else { "Games:" };
+    std::iter::once(head.to_owned()).chain(games.iter().map(line)).collect::<Vec<_>>().join("\n")
+}
+
 fn of_argument(argument: Arg, program: &str) -> Arg {
     let own = |text: String| with_name(&text, program);
     let (short, long) =
@@ -164,6 +187,24 @@ mod tests {
         for example in ["doctor runner ", "train runner --skills", "train --run runs/first --resume", "eval --skills"] {
             assert!(all.iter().any(|text| text.contains(&format!("  jump {example}"))), "{example}: {all:?}");
         }
+    }
+
+    #[test]
+    fn the_help_of_a_program_lists_its_games_with_their_modes() {
+        let game = |name, modes| ForeignGame::new(name, 1, |_: &mut bevy::prelude::App| {}).modes(modes);
+        let (chess, go) = (game("chess", &["default"]), game("go", &["9", "13", "19"]));
+        let below = |games: &[&dyn Game]| {
+            let command = with_games(named(Cli::command(), "jump", games), games);
+            command.get_after_help().map(ToString::to_string).unwrap_or_default()
+        };
+        let several = below(&[&chess, &go]);
+        let wanted = "Games:\n  chess   mode default\n  go      modes 9, 13, 19\n\nExamples:\n  jump ";
+        assert!(several.starts_with(wanted), "{several}");
+        assert!(below(&[&chess]).starts_with("Game:\n  chess   mode default\n\nExamples:\n"), "{}", below(&[&chess]));
+        let many = game("many", &["1", "2", "3", "4", "5", "6", "7", "8", "9", "10"]);
+        assert_eq!(list(&[&many]), "Game:\n  many   modes 1, 2, 3, 4, 5, 6, 7, 8 and 2 more");
+        let without = Cli::command().get_after_help().map(ToString::to_string).unwrap_or_default();
+        assert!(without.starts_with("Examples:"), "the reference is that of any program: {without}");
     }
 
     #[test]

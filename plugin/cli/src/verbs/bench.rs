@@ -30,10 +30,13 @@ use std::time::Instant;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot bench --list
+  playbot bench GAME
   playbot bench --json
   playbot bench --case sim/GAME --threads 1
   playbot bench --case train/GAME/raster --seconds 20 --set 'ppo.cnn=Impala()' --set ppo.num_steps=256")]
 pub struct Args {
+    /// Name of the game whose cases are measured (default: all games of the program).
+    game: Option<String>,
     /// Measure only cases whose name contains this.
     #[arg(long, default_value = "")]
     case: String,
@@ -83,11 +86,14 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
             (arenas as usize).next_multiple_of(threads)
         )));
     }
-    let all: Vec<_> = games.iter().flat_map(cases).collect();
+    let all = cases_of(&args, games)?;
     let wanted: Vec<_> = all.iter().filter(|case| case.name.contains(&args.case)).collect();
     if wanted.is_empty() {
         let names: Vec<_> = all.iter().map(|case| case.name.as_str()).collect();
-        return Err(CliError::Usage(format!("no case has `{}` in its name; cases: {}", args.case, names.join(", "))));
+        return Err(CliError::Usage(match &args.game {
+            Some(game) if names.is_empty() => format!("`{game}` has no cases: name another game"),
+            _ => format!("no case has `{}` in its name; cases: {}", args.case, names.join(", ")),
+        }));
     }
     if args.list {
         let line = |case: &&&Case| if args.json { json!({ "case": case.name }).to_string() } else { case.name.clone() };
@@ -128,6 +134,19 @@ struct Case<'a> {
     game: &'a dyn Game,
     /// Mode and observation to play it with.
     benchmark: Benchmark,
+}
+
+/// Returns the measurements of the named game, or of all.
+fn cases_of<'a>(args: &Args, games: &'a Games) -> Result<Vec<Case<'a>>, CliError> {
+    let all = || games.iter().flat_map(cases);
+    let Some(name) = &args.game else { return Ok(all().collect()) };
+    games.get(name).map(cases).map_err(|error| {
+        let is_case = all().any(|case| case.name.contains(name.as_str()));
+        let advice =
+            if is_case { format!("`playbot bench --case {name}`") } else { "`playbot bench --list`".to_owned() };
+        let what = if is_case { "measures the cases with it in their names" } else { "lists the cases of all games" };
+        CliError::Usage(format!("{error}; {advice} {what}"))
+    })
 }
 
 /// Returns the measurements of a game.

@@ -43,8 +43,8 @@ pub struct Args {
     /// Ticks of each comparison. More of them find rare and late differences.
     #[arg(long, default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..))]
     ticks: u32,
-    /// Number of the level to examine, or its name in a level editor (repeatable; default: 0 and 1). Further ones are played
-    /// twice, and after the level before them.
+    /// Number of the level to examine, also as mode:number, or its name in a level editor (repeatable; default: 0 and 1).
+    /// Further ones are played twice, and after the level before them.
     #[arg(long, value_name = "N")]
     level: Vec<u64>,
     /// Random seed of the actions (default: 0).

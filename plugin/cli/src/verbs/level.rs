@@ -1,16 +1,19 @@
 //! `playbot level`.
 
 use crate::{
-    arguments::{LevelsArg, default_mode},
+    arguments::{LevelsArg, default_mode, experiment::quoted},
     error::{CliError, Outcome},
-    output::print_or_write,
+    output::{print_or_write, program},
     pictures::{plot, plot::PlotFile},
 };
 use playbot_harness::{
     game::Game,
     games::Games,
     inspect::{InspectError, LevelRequest, LevelView},
+    level_files::is_level_files,
 };
+use playbot_learner::ActionSpace;
+use serde_json::Value;
 use std::path::PathBuf;
 
 /// Show a level: its layout, or what is known of it without playing it.
@@ -72,7 +75,39 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         report!("picture: {}", file.path().display());
     }
     print_or_write(if args.json { &level.json } else { &level.text }, args.out.as_deref())?;
+    if lacks_plan(&level) {
+        instead(game, &args).iter().for_each(|advice| report!("{advice}"));
+    }
     Ok(Outcome::Pass)
+}
+
+/// Returns true if a level could have been drawn, and its plan is not known.
+fn lacks_plan(level: &LevelView) -> bool {
+    let json: Option<Value> = serde_json::from_str(&level.json).ok();
+    json.is_some_and(|json| json.get("rows").is_some_and(Value::is_null))
+}
+
+/// Returns the commands that show a level without a plan. A level from standard input cannot be named in them.
+fn instead(game: &dyn Game, args: &Args) -> Option<String> {
+    let level = match (&args.file, &args.mode) {
+        (Some(file), _) if file.as_os_str() == "-" => return None,
+        (Some(file), _) => format!("--levels {}", quoted(&format!("files:{}", file.display()))),
+        (None, mode) => {
+            let (named, level) = args.levels.choose(game, mode.as_deref(), args.seed).ok()?;
+            match named {
+                Some(mode) if is_level_files(mode) => format!("--levels {} --level {level}", quoted(mode)),
+                Some(mode) => format!("--mode {mode} --level {level}"),
+                None => format!("--level {level}"),
+            }
+        }
+    };
+    let command = |verb: &str| format!("`{} {verb} {} {level}", program::name(), game.name());
+    let trace = match game.actions() {
+        ActionSpace::Discrete(_) => format!(", {} --actions 0` prints its state in each tick", command("trace")),
+        ActionSpace::Continuous(_) => String::new(),
+    };
+    let (view, play) = (command("view"), command("play"));
+    Some(format!("without a plan: {view}` shows what bots observe there{trace}, and {play}` plays it in a window"))
 }
 
 /// Shows the requested level. Without a mode and a map it is one of the default mode.
@@ -103,5 +138,47 @@ fn explain(game: &dyn Game, error: InspectError) -> CliError {
             CliError::Usage(format!("{why}; `playbot view {} --level N` shows the observation in a level", game.name()))
         }
         error => error.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::{
+        app::App,
+        input::keyboard::KeyCode,
+        math::{Rect, Vec2},
+    };
+    use clap::Parser;
+    use playbot_harness::{floor_plan::FloorPlan, foreign::ForeignGame};
+
+    #[derive(Parser)]
+    struct Called {
+        #[command(flatten)]
+        args: Args,
+    }
+
+    #[test]
+    fn a_level_without_a_plan_is_followed_by_commands_that_show_it() {
+        let bare = ForeignGame::new("cards", 1, |_: &mut App| {}).keys([vec![], vec![KeyCode::Space]]).modes(&["calm"]);
+        let args = |more: &[&str]| Called::parse_from([&["level", "cards"], more].concat()).args;
+        let shown = |game: &ForeignGame, level| {
+            let request = LevelRequest { mode: Some("calm"), level: Some(level), ..LevelRequest::default() };
+            game.show_level(&request).expect("a level")
+        };
+        assert!(lacks_plan(&shown(&bare, 3)));
+        let plan = FloorPlan { bounds: Rect::new(0.0, 0.0, 2.0, 1.0), goal: Vec2::X, ..FloorPlan::default() };
+        assert!(!lacks_plan(&shown(&bare.clone().plan(move |_| plan.clone()), 3)));
+        let words = instead(&bare, &args(&["--level", "3"])).expect("commands");
+        for part in
+            ["view cards --level 3` shows", "trace cards --level 3 --actions 0` prints", "play cards --level 3` plays"]
+        {
+            assert!(words.contains(part), "{words}");
+        }
+        let words = instead(&bare, &args(&["--level", "3", "--mode", "calm"])).expect("commands");
+        assert!(words.contains("view cards --mode calm --level 3`"), "{words}");
+        let words = instead(&bare, &args(&["--file", "a b.txt"])).expect("commands");
+        assert!(words.contains("view cards --levels 'files:a b.txt'`"), "{words}");
+        assert_eq!(instead(&bare, &args(&["--file", "-"])), None);
     }
 }

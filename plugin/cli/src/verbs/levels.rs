@@ -5,13 +5,13 @@ use crate::{
     error::{CliError, Outcome},
     output::print_line,
     progress,
-    progress::{interrupt, interrupt::NothingToSave},
+    progress::interrupt,
 };
 use playbot_harness::{
     game::Game,
     games::Games,
     held_out::{AlikeLevels, PlacedLevel},
-    level_audit::{EqualLevels, EqualPlans, PlainLevels, levels_in, plain_episodes},
+    level_audit::{EqualLevels, EqualPlans, PlainLevels, levels_in_until, plain_episodes},
     level_files::is_level_files,
     split::LevelSplit,
 };
@@ -29,7 +29,8 @@ use std::collections::{BTreeMap, BTreeSet};
 /// drawn, which is no finding. Then each level is played once with each action, held from the start to the end. That
 /// shows the levels that are solved without an action, and those that one held action solves.
 ///
-/// Exit code 1 if levels are equal, among those of another set, or solved without an action.
+/// Exit code 1 if levels are equal, among those of another set, or solved without an action. Ctrl-C ends it with the results
+/// so far.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot levels GAME --levels MODE:0..99
@@ -73,35 +74,35 @@ pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     check_start(game, &levels.mode, levels.first)?;
     let quicker = if args.layouts_only { "" } else { ", or with --layouts-only, which plays nothing" };
     interrupt::leave(format!("nothing is kept: call it again{quicker}"));
-    let _nothing = NothingToSave::listen();
+    interrupt::listen();
     let threads = args.threads.count();
-    let (equal, alike) = compare(game, &levels, args, threads);
+    let (equal, compared, alike) = compare(game, &levels, args, threads);
     let of_play = alike.filter(|alike| alike.by_state);
     let among = args.among.iter().enumerate().map(|(index, others)| {
-        let mut known = levels_in(game, &levels, others);
+        let mut known = levels_in_until(game, &levels, others, &interrupt::asked);
         known.extend(of_play.iter().flat_map(|alike| alike.among(index + 1)));
         (others.clone(), known)
     });
-    let audit = Audit {
-        among: among.collect(),
-        equal,
-        plans: EqualPlans::of(game, &levels),
-        plain: (!args.layouts_only).then(|| play(game, &levels, threads)).transpose()?,
-        names: names(game, &levels),
-        levels,
-    };
+    let (among, plans) = (among.collect(), EqualPlans::of_until(game, &levels, &interrupt::asked));
+    let plain = if args.layouts_only { None } else { play(game, &levels, threads)? };
+    let names = names(game, &levels);
+    let audit = Audit { among, equal, compared, plans, plain, names, levels, is_stopped: interrupt::asked() };
     print_line(if args.json { audit.to_json(game) } else { audit.to_text(game) })?;
+    if audit.is_stopped {
+        report!("{}: the same command does all of it again{quicker}", audit.progress());
+        return Ok(Outcome::Stopped);
+    }
     Ok(if audit.is_clean() { Outcome::Pass } else { Outcome::Findings })
 }
 
-/// Compares levels by their layouts, or by their play if the game does not hash them. The play is also that of the other
-/// sets.
-fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args, threads: usize) -> (Equality, Option<AlikeLevels>) {
-    if let Some(equal) = EqualLevels::of(game, levels) {
-        return (Equality::Layouts(equal), None);
+/// Compares levels by their layouts, or by their play if the game does not hash them, until Ctrl-C is pressed. Returns the
+/// number of compared levels as well. The play is also that of the other sets.
+fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args, threads: usize) -> (Equality, u64, Option<AlikeLevels>) {
+    if let Some((equal, compared)) = EqualLevels::of_until(game, levels, &interrupt::asked) {
+        return (Equality::Layouts(equal), compared, None);
     }
     if args.layouts_only {
-        return (Equality::Unknown, None);
+        return (Equality::Unknown, 0, None);
     }
     let ranges: Vec<(&str, Vec<u64>)> = std::iter::once(levels)
         .chain(&args.among)
@@ -109,14 +110,15 @@ fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args, threads: usize) ->
         .collect();
     // Groups of the other sets alone do not count.
     let is_wanted = |group: &[PlacedLevel]| group.iter().any(|(range, _)| *range == 0);
-    let alike = progress::comparing(|progress| AlikeLevels::of(game, &ranges, is_wanted, threads, progress));
+    let alike =
+        progress::comparing(|progress| AlikeLevels::of(game, &ranges, is_wanted, threads, progress, &interrupt::asked));
     let equal = EqualLevels::of_alike(&alike);
     let equality = match (equal.layouts, alike.by_state) {
         (0, _) => Equality::Unknown,
         (_, true) => Equality::States(equal),
         (_, false) => Equality::Observations(equal),
     };
-    (equality, Some(alike))
+    (equality, levels.len() - alike.unfinished, Some(alike))
 }
 
 /// Returns the names of levels that have any: the path of a file, or the name in a level editor.
@@ -126,14 +128,19 @@ fn names(game: &dyn Game, levels: &LevelSplit) -> BTreeMap<u64, String> {
         let of_file = || is_level_files(mode).then(|| level_name(game, levels, level));
         tools.level_name(mode, level).or_else(of_file)
     };
-    let has_names = is_level_files(mode) || !tools.level_names(mode).is_empty();
-    let all = levels.levels().filter(|_| has_names);
-    all.filter_map(|level| Some((level, name(level)?))).collect()
+    if !is_level_files(mode) && tools.level_names(mode).is_empty() {
+        return BTreeMap::new();
+    }
+    levels.levels().filter_map(|level| Some((level, name(level)?))).collect()
 }
 
-fn play(game: &dyn Game, levels: &LevelSplit, threads: usize) -> Result<PlainLevels, CliError> {
+/// Holds each action in each level; `None` if Ctrl-C was pressed.
+fn play(game: &dyn Game, levels: &LevelSplit, threads: usize) -> Result<Option<PlainLevels>, CliError> {
+    if interrupt::asked() {
+        return Ok(None);
+    }
     let bar = progress::bar("hold each action", plain_episodes(game, levels), "episodes");
-    let plain = PlainLevels::of(game, levels, threads, |episodes| bar.inc(episodes));
+    let plain = PlainLevels::of_until(game, levels, threads, |episodes| bar.inc(episodes), &interrupt::asked);
     bar.finish_and_clear();
     Ok(plain?)
 }
@@ -201,6 +208,8 @@ impl Equality {
 struct Audit {
     levels: LevelSplit,
     equal: Equality,
+    /// Levels that were compared; fewer than all if the audit was stopped.
+    compared: u64,
     /// `None` if the game has no floor plans.
     plans: Option<EqualPlans>,
     among: Vec<(LevelSplit, BTreeSet<u64>)>,
@@ -208,9 +217,22 @@ struct Audit {
     plain: Option<PlainLevels>,
     /// Names of levels that have any.
     names: BTreeMap<u64, String>,
+    /// True if Ctrl-C was pressed before all was done.
+    is_stopped: bool,
 }
 
 impl Audit {
+    /// Describes how far a stopped audit has come.
+    fn progress(&self) -> String {
+        let all = whole(self.levels.len() as f64);
+        match self.compared {
+            compared if compared < self.levels.len() => {
+                format!("stopped; {} of {all} levels were compared", whole(compared as f64))
+            }
+            _ => format!("stopped; all {all} levels were compared, and the rest of the audit is missing"),
+        }
+    }
+
     fn is_clean(&self) -> bool {
         let needs_none = self.plain.iter().any(|plain| !plain.without_action.is_empty());
         !needs_none && !self.equal.is_finding() && self.among.iter().all(|(_, known)| known.is_empty())
@@ -225,6 +247,8 @@ impl Audit {
             "game": game.name(),
             "levels": self.levels,
             "count": self.levels.len(),
+            "stopped": self.is_stopped,
+            "compared": self.compared,
             "names": self.names,
             "compared_by": self.equal.basis(),
             "layouts": self.equal.levels().map(|equal| equal.layouts),
@@ -243,6 +267,9 @@ impl Audit {
             count => format!("{} levels", whole(count as f64)),
         };
         let mut lines = vec![format!("{} {}: {count}", game.name(), self.levels)];
+        if self.is_stopped {
+            lines.push(self.progress());
+        }
         lines.push(self.equal.in_words(game.name()));
         if let Some(equal) = self.equal.levels() {
             let what = if matches!(self.equal, Equality::Observations(_)) { "alike" } else { "equal" };
@@ -320,6 +347,8 @@ mod tests {
             among: vec![(levels.clone(), [1].into())],
             plain: None,
             names: names(&game, &levels),
+            compared: 2,
+            is_stopped: false,
             levels,
         };
         let text = audit.to_text(&game);
@@ -339,6 +368,8 @@ mod tests {
             among: Vec::new(),
             plain: None,
             names: BTreeMap::new(),
+            compared: 2,
+            is_stopped: false,
         };
         let observed = audit(Equality::Observations(equal.clone()));
         assert!(observed.is_clean());
@@ -352,5 +383,29 @@ mod tests {
         assert!(
             unknown.is_clean() && unknown.to_text(&game).contains("equal levels: unknown, since cards does not hash")
         );
+    }
+
+    #[test]
+    fn a_stopped_audit_says_how_far_it_came_and_shows_what_it_has_found() {
+        let game = ForeignGame::new("cards", 1, |_: &mut App| {});
+        let mut audit = Audit {
+            levels: "default:0..1999".parse().expect("levels"),
+            equal: Equality::Layouts(EqualLevels { layouts: 1199, groups: vec![vec![3, 1000]] }),
+            compared: 1200,
+            plans: None,
+            among: Vec::new(),
+            plain: None,
+            names: BTreeMap::new(),
+            is_stopped: true,
+        };
+        let text = audit.to_text(&game);
+        let wanted = "cards default:0..1999: 2,000 levels\nstopped; 1,200 of 2,000 levels were compared\n\
+                      layouts: 1,199; 2 of the levels share theirs with another\n  equal: 3, 1000";
+        assert_eq!(text, wanted);
+        let json: serde_json::Value = serde_json::from_str(&audit.to_json(&game)).expect("JSON");
+        assert_eq!((&json["stopped"], &json["compared"], &json["count"]), (&true.into(), &1200.into(), &2000.into()));
+        audit.compared = 2000;
+        let words = "\nstopped; all 2,000 levels were compared, and the rest of the audit is missing\n";
+        assert!(audit.to_text(&game).contains(words), "{}", audit.to_text(&game));
     }
 }

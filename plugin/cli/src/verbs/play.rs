@@ -45,7 +45,8 @@ pub struct Args {
     /// Mode of the game (default: that of the levels, or else the one that `train` trains in).
     #[arg(long)]
     mode: Option<String>,
-    /// Number of the level to begin with, or its name in a level editor (default: the first of the levels).
+    /// Number of the level to begin with, also as mode:number, or its name in a level editor (default: the first of the
+    /// levels).
     #[arg(long, value_name = "N")]
     level: Option<u64>,
     /// Random seed of the autopilot's draws (default: 0).

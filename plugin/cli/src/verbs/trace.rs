@@ -41,8 +41,8 @@ pub struct Args {
     /// Discrete actions: their numbers, from 0, or their names, separated by commas.
     #[arg(long, value_delimiter = ',')]
     actions: Vec<String>,
-    /// File of actions, or - for standard input. Discrete ones are numbers, separated by commas, spaces or line ends.
-    /// Continuous ones, in games that can trace them, are one action per line, with values separated by spaces.
+    /// File of actions, or - for standard input. Discrete ones are numbers or names, separated by commas, spaces or line
+    /// ends. Continuous ones, in games that can trace them, are one action per line, with values separated by spaces.
     #[arg(long, value_name = "FILE")]
     actions_file: Option<PathBuf>,
     /// Position and velocity to start with instead of the level's, in games that can start anywhere.

@@ -16,8 +16,15 @@ use crate::{
     verbs::train::repeated::resumed,
 };
 use bevy_playbot::unknown_name::UnknownName;
-use playbot_harness::games::{Artifact, Games};
+use playbot_harness::{
+    game::Game,
+    games::{Artifact, Games},
+    held_out::is_only_level,
+    level_audit::{EqualLevels, levels_in_until},
+    split::LevelSplit,
+};
 use playbot_learner::SkillModel;
+use playbot_report::{counted, whole};
 use playbot_train::{
     Algorithm, Experiment, LearnerKind, TrainError,
     run_dir::{OpenedRun, RunDir},
@@ -179,7 +186,37 @@ fn start(
             experiment.test
         );
     }
+    equal_layouts(game, &experiment.train, &experiment.test).iter().for_each(|words| report!("{words}"));
     Ok(training)
+}
+
+/// Largest number of levels of a range whose layouts are compared before a training, so that it begins at once.
+const MOST_COMPARED: u64 = 10_000;
+
+/// Describes how many training levels are equal, and how many held-out levels are equal to training levels. `None` if
+/// neither is the case, or is not known at once: without layouts, levels would have to be played.
+fn equal_layouts(game: &dyn Game, train: &LevelSplit, test: &LevelSplit) -> Option<String> {
+    if train.len() > MOST_COMPARED {
+        return None;
+    }
+    let equal = EqualLevels::of(game, train)?;
+    let known = match test.len() <= MOST_COMPARED && !is_only_level(game, &test.mode) {
+        true => levels_in_until(game, test, train, &|| false).len(),
+        false => 0,
+    };
+    let layouts = counted(equal.layouts, "layout");
+    let of_training = format!("the {} {train} have {layouts}", counted(train.len(), "training level"));
+    let all = whole(test.len() as f64);
+    match (equal.groups.is_empty(), known) {
+        (true, 0) => None,
+        (false, 0) => Some(of_training),
+        (true, known) => {
+            Some(format!("{known} of the {all} held-out levels {test} have the layout of a training level"))
+        }
+        (false, known) => {
+            Some(format!("{of_training}, and {known} of the {all} held-out levels {test} have one of these"))
+        }
+    }
 }
 
 /// Refuses settings of skills that differ from the model's, which was learned before. Settings of a file are not
@@ -256,4 +293,49 @@ fn resume(args: &Args, games: &Games, setup: &TrainingSetup<'_>) -> Result<Train
         );
     }
     Ok(training)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bevy::app::App;
+    use playbot_harness::foreign::ForeignGame;
+
+    #[test]
+    fn a_training_reports_equal_levels_of_its_ranges_if_there_are_any() {
+        let game = |modulo: u64| ForeignGame::new("rooms", 1, |_: &mut App| {}).layout(move |_, level| level % modulo);
+        let words = |game: &ForeignGame, train: &str, test: &str| {
+            equal_layouts(game, &train.parse().expect("levels"), &test.parse().expect("levels"))
+        };
+        let (train, test) = ("default:0..7", "default:8..13");
+        assert_eq!(
+            words(&game(6), train, test).as_deref(),
+            Some(
+                "the 8 training levels default:0..7 have 6 layouts, and 6 of the 6 held-out levels default:8..13 have one of these"
+            )
+        );
+        assert_eq!(
+            words(&game(10), train, test).as_deref(),
+            Some("4 of the 6 held-out levels default:8..13 have the layout of a training level")
+        );
+        let twice = game(100);
+        assert_eq!(words(&twice, train, test), None);
+        let of_training = words(&twice, "default:0..100", "default:150..160");
+        // 100 is like 0, and all of 150 to 160 are like 50 to 60.
+        assert!(of_training.is_some_and(|words| {
+            words.starts_with("the 101 training levels default:0..100 have 100 layouts, and 11 of")
+        }));
+        let few = game(100).layout(|_, level| level.min(9));
+        assert_eq!(
+            words(&few, "default:8..10", "default:0..5").as_deref(),
+            Some("the 3 training levels default:8..10 have 2 layouts")
+        );
+        assert_eq!(words(&game(6), "default:0..10000", test), None, "that would take long");
+        assert_eq!(
+            words(&game(6).levels(1), "default:0", "default:0"),
+            None,
+            "it is measured on the level it trains on"
+        );
+        assert_eq!(words(&ForeignGame::new("rooms", 1, |_: &mut App| {}), train, test), None, "it has no layouts");
+    }
 }

@@ -637,11 +637,15 @@ fn of_editor((mode, level): (&str, u64), drawn: &EditorLevel) -> KnownLevel {
     }
 }
 
+/// The words for a level without a plan.
+const NO_PLAN: &str =
+    "the game declares no plan of it: add one to its adapter with `.plan`, or with `.plan_of_file` for level files";
+
 /// Returns a plan as letters, with their meanings.
 fn in_words(plan: Option<&FloorPlan>) -> String {
     match plan {
         Some(plan) => format!("{}\nS start  G goal  # wall  ^ kills  = platform", plan.rows().join("\n")),
-        None => "the game declares no plan of it: see `.plan` and `.plan_of_file`".to_owned(),
+        None => NO_PLAN.to_owned(),
     }
 }
 
@@ -894,7 +898,7 @@ mod tests {
         let request = LevelRequest { mode: Some("hard"), level: Some(1), ..LevelRequest::default() };
         let bare = shown(&game(), request).expect("a level");
         let head = "hard:1 of `finder`, which has 3 levels\n";
-        assert_eq!(bare.text, format!("{head}the game declares no plan of it: see `.plan` and `.plan_of_file`"));
+        assert_eq!(bare.text, format!("{head}{NO_PLAN}"));
         let json: serde_json::Value = serde_json::from_str(&bare.json).expect("JSON");
         assert_eq!(json, serde_json::json!({ "mode": "hard", "level": 1, "rows": null }));
         let error = shown(&game(), LevelRequest { picture: true, ..request }).expect_err("nothing to draw");
@@ -914,14 +918,7 @@ mod tests {
         let mode = drawn(&folder, &["goal\n4", "goal\n5\n"]);
         let path = folder.path().join("1.txt");
         let view = shown(&game(), LevelRequest { file: Some(&path), ..LevelRequest::default() }).expect("a level");
-        assert!(
-            view.text.ends_with(
-                "1.txt, a level of `finder`\nthe game declares no plan of it: see `.plan` and \
-             `.plan_of_file`\ngoal\n5"
-            ),
-            "{}",
-            view.text
-        );
+        assert!(view.text.ends_with(&format!("1.txt, a level of `finder`\n{NO_PLAN}\ngoal\n5")), "{}", view.text);
         let json: serde_json::Value = serde_json::from_str(&view.json).expect("JSON");
         assert_eq!((&json["content"], &json["level"]), (&"goal\n5\n".into(), &0.into()));
         let planned = game().plan_of_file(|goal: &Goal| FloorPlan {

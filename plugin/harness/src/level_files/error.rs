@@ -66,6 +66,14 @@ pub enum LevelFileError {
         /// Its path.
         path: String,
     },
+    /// The file is UTF-16, without the mark that says so.
+    #[error("{path}: {utf16}")]
+    Utf16 {
+        /// The file.
+        path: String,
+        /// Its byte order.
+        utf16: Utf16,
+    },
     /// The file is not UTF-8 text.
     #[error("{path}, line {line}: byte {byte} of the line is not UTF-8: save the level as UTF-8, or name another file")]
     NoText {
@@ -102,6 +110,28 @@ pub enum LevelFileError {
         /// Description of the fault.
         error: LevelTextError,
     },
+}
+
+/// Text in UTF-16 without a byte order mark, and its byte order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[error(
+    "it is text in UTF-16 without a byte order mark: save it as UTF-8 in an editor, or with `iconv -f {0} -t UTF-8`"
+)]
+pub struct Utf16(&'static str);
+
+impl Utf16 {
+    /// Recognises UTF-16 by zeros, the high bytes of Latin letters. They are every other byte of at least half of the
+    /// text, and at the same side of each pair.
+    pub(super) fn of(bytes: &[u8]) -> Option<Self> {
+        let (pairs, _) = bytes.as_chunks::<2>();
+        let zeros = |side: usize| pairs.iter().filter(|pair| pair[side] == 0).count();
+        let is_most = |count: usize| count > 0 && 2 * count >= pairs.len();
+        match [zeros(0), zeros(1)] {
+            [0, low] if is_most(low) => Some(Self("UTF-16LE")),
+            [high, 0] if is_most(high) => Some(Self("UTF-16BE")),
+            _ => None,
+        }
+    }
 }
 
 fn files(count: u64) -> String {

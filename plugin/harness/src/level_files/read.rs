@@ -2,7 +2,7 @@
 
 use crate::level_files::{
     DrawnLevel, LevelDesign,
-    error::{LevelFileError, LevelTextError},
+    error::{LevelFileError, LevelTextError, Utf16},
     find_level_files,
 };
 use std::{
@@ -121,6 +121,7 @@ fn named(path: &str, error: TextFileError) -> LevelFileError {
         TextFileError::Unreadable(error) => LevelFileError::Unreadable { path, why: error.to_string() },
         TextFileError::NotAFile => LevelFileError::NotAFile { path },
         TextFileError::TooLarge { bytes, most } => LevelFileError::TooLarge { path, bytes, most },
+        TextFileError::Utf16(utf16) => LevelFileError::Utf16 { path, utf16 },
         TextFileError::NoText { line, byte } => LevelFileError::NoText { path, line, byte },
     }
 }
@@ -142,6 +143,9 @@ pub enum TextFileError {
         /// Largest size of a file of its kind, bytes.
         most: u64,
     },
+    /// The file is UTF-16, without the mark that says so.
+    #[error("{0}")]
+    Utf16(Utf16),
     /// The file is not UTF-8.
     #[error("line {line}: byte {byte} of the line is not UTF-8: save it as UTF-8, or name another file")]
     NoText {
@@ -238,7 +242,10 @@ fn decode(bytes: &[u8]) -> Result<String, TextFileError> {
         [0xfe, 0xff, ..] => return utf16(u16::from_be_bytes),
         _ => {}
     }
-    // UTF-16 without a mark would pass for UTF-8.
+    if let Some(utf16) = Utf16::of(bytes) {
+        return Err(TextFileError::Utf16(utf16));
+    }
+    // Other UTF-16 without a mark would pass for UTF-8.
     if let Some(zero) = bytes.iter().position(|&byte| byte == 0) {
         return Err(no_text(bytes, zero));
     }
@@ -290,8 +297,21 @@ mod text_file_tests {
             assert_eq!(read(&bytes("\u{feff}ä\r\n(")), text);
             let torn = read(&bytes("\u{feff}ä\r\n(")[..7]).expect_err("half a letter");
             assert!(torn.starts_with("line 1: byte 1 of the line is not UTF-8"), "{torn}");
-            let bare = read(&bytes("(a: 1)")).expect_err("no mark");
-            assert!(bare.contains("of the line is not UTF-8: save it as UTF-8"), "{bare}");
+        }
+        for (of, order) in [(u16::to_le_bytes as fn(u16) -> [u8; 2], "UTF-16LE"), (u16::to_be_bytes, "UTF-16BE")] {
+            let bytes = |text: &str| text.encode_utf16().flat_map(of).collect::<Vec<u8>>();
+            // Some letters have a high byte, and the last one of a torn file has lost it.
+            for bare in [bytes("(a: 1)"), bytes("a: Ωж\n"), bytes("(a: 1)")[..11].to_vec()] {
+                let bare = read(&bare).expect_err("no mark");
+                let wanted =
+                    "it is text in UTF-16 without a byte order mark: save it as UTF-8 in an editor, or with `iconv -f ";
+                assert_eq!(bare, format!("{wanted}{order} -t UTF-8`"));
+            }
+        }
+        for other in [&b"\0\0a\0"[..], b"a\0", b"ab\0cdefg", b"\0"] {
+            let is_utf16 = other == b"a\0";
+            let error = read(other).expect_err("zeros");
+            assert_eq!(error.starts_with("it is text in UTF-16"), is_utf16, "{error}");
         }
         assert_eq!(read(b""), Ok(String::new()));
     }

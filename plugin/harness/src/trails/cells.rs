@@ -3,7 +3,7 @@
 use crate::{
     drawing::{Drawing, Rgb, Shape},
     floor_plan::FloorPlan,
-    trails::{FloorFrame, goal_mark, start_mark},
+    trails::{BELOW, FloorFrame, goal_mark, scales, start_mark},
 };
 use bevy::math::{Rect, Vec2};
 use playbot_report::text_table::{text_width, wrap};
@@ -66,7 +66,8 @@ impl CellChart {
         let frame = FloorFrame::new(extent, Vec2::new(GAP, GAP + y + GAP / 2.0), LENGTH * share);
         self.floor(&frame, &mut shapes);
         let corner = frame.whole().max;
-        Drawing { label: self.title.clone(), size: Vec2::new(right.max(corner.x), corner.y) + GAP, shapes }
+        let right = right.max(write(corner.y - GAP + BELOW, TEXT, SOFT, &scales(frame.bounds()), &mut shapes));
+        Drawing { label: self.title.clone(), size: Vec2::new(right.max(corner.x), corner.y + LINE) + GAP, shapes }
     }
 
     /// Explains the marks, and returns the lower end.
@@ -207,7 +208,7 @@ mod tests {
         let is_there = |wanted: &str| {
             drawing.shapes.iter().any(|shape| matches!(shape, Shape::Text { words, .. } if words == wanted))
         };
-        assert!(["start", "goal", "path"].into_iter().all(is_there));
+        assert!(["start", "goal", "path", "x 0 to 4, y 0 to 2"].into_iter().all(is_there));
     }
 
     #[test]

@@ -14,6 +14,9 @@ use thiserror::Error;
 /// Name of the journal in the folder of a test.
 pub(super) const JOURNAL: &str = "levels.jsonl";
 
+/// The remedy for damaged results.
+pub(super) const MAKE_AGAIN: &str = "make it again with `playbot test`";
+
 /// Failure to test levels, or to use results.
 #[derive(Debug, Error)]
 pub enum TestError {
@@ -65,7 +68,7 @@ pub enum TestError {
     #[error("{} has no results.json{}", .0.display(), no_results(.0))]
     NoResults(PathBuf),
     /// A file is damaged.
-    #[error("{}, line {line}: {message}; make it again with `playbot test`", path.display())]
+    #[error("{}, line {line}: {message}; {next}", path.display())]
     Damaged {
         /// The file.
         path: PathBuf,
@@ -73,6 +76,8 @@ pub enum TestError {
         line: usize,
         /// The damage.
         message: String,
+        /// The remedy.
+        next: &'static str,
     },
     /// Results that cannot be joined.
     #[error(

@@ -8,7 +8,7 @@ mod tests;
 
 use crate::verdict::{
     LevelOutcome, LevelVerdict, Places,
-    error::{TestError, io_error, json_fault},
+    error::{MAKE_AGAIN, TestError, io_error, json_fault},
     plan::TestRecord,
     statistics::Trials,
 };
@@ -70,25 +70,19 @@ impl ResultLines {
         let mut hasher = Hasher::new();
         hash_line(&mut hasher, &head);
         let record = head.strip_suffix(LEVELS).map(|record| serde_json::from_str(&format!("{record}}}")));
-        let record = match record {
-            Some(Ok(record)) => record,
-            Some(Err(error)) => return Err(TestError::Damaged { path, line: 1, message: json_fault(&error) }),
-            None => {
-                let message = match head.trim() {
-                    "{" => {
-                        "the line breaks are not those of `playbot test`, whose results are read line by line: keep the file \
-                         as it was written, and format a copy"
-                    }
-                    _ => {
-                        "the file is torn, or holds no results: `test --resume` writes it anew from the levels that are \
-                         done, and `test --force` plays all of them again"
-                    }
-                };
-                let message = message.to_owned();
-                return Err(TestError::Damaged { path, line: 1, message });
-            }
+        let (message, next) = match record {
+            Some(Ok(record)) => return Ok(Self { path, record, lines, number: 1, is_over: false, hasher }),
+            Some(Err(error)) => (json_fault(&error), MAKE_AGAIN),
+            None if head.trim() == "{" => (
+                "the line breaks are not those of `playbot test`, whose results are read line by line".to_owned(),
+                "keep the file as it was written, and format a copy",
+            ),
+            None => (
+                "the file is torn, or holds no results".to_owned(),
+                "`test --resume` writes it anew from the levels that are done, and `test --force` plays all of them again",
+            ),
         };
-        Ok(Self { path, record, lines, number: 1, is_over: false, hasher })
+        Err(TestError::Damaged { path, line: 1, message, next })
     }
 
     /// Opens the results as [`open`](Self::open) does, after a check of the checksum over the whole file.
@@ -176,7 +170,8 @@ impl ResultLines {
     }
 
     fn damaged(&self, message: &str) -> TestError {
-        TestError::Damaged { path: self.path.clone(), line: self.number, message: message.to_owned() }
+        let (path, message) = (self.path.clone(), message.to_owned());
+        TestError::Damaged { path, line: self.number, message, next: MAKE_AGAIN }
     }
 }
 

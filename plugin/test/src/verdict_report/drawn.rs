@@ -27,6 +27,8 @@ const MOST_LETTERS: usize = 1_200_000;
 pub struct Drawn {
     /// Its picture, as SVG.
     pub picture: String,
+    /// The ends of its axes, in words.
+    pub axes: String,
     /// Its failure as an animated PNG, in base64.
     pub clip: Option<String>,
 }
@@ -53,7 +55,7 @@ impl<'a> Drawer<'a> {
     pub fn draw(&mut self, level: &LevelVerdict) -> Option<Drawn> {
         self.levels += 1;
         let plan = if self.levels <= MOST_PICTURES { self.plans.get(level)? } else { return None };
-        let picture = picture(&plan, level)?;
+        let (picture, axes) = picture(&plan, level)?;
         self.pictures += 1;
         self.maps += usize::from(level.maps.is_some());
         let is_room = self.clips < MOST_CLIPS && self.letters < MOST_LETTERS;
@@ -63,7 +65,7 @@ impl<'a> Drawer<'a> {
         // The first clip without room is the last one that is tried.
         let clip = text.filter(|_| self.letters <= MOST_LETTERS);
         self.clips += usize::from(clip.is_some());
-        Some(Drawn { picture, clip })
+        Some(Drawn { picture, axes, clip })
     }
 }
 

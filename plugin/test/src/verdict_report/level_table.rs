@@ -179,11 +179,11 @@ pub(crate) fn details(record: &TestRecord, level: &LevelVerdict, program: &str, 
         let more = if more > 0 { format!("<li>and {more} more</li>\n") } else { String::new() };
         let _ = write!(out, "<ul class=\"findings\">\n{listed}{more}</ul>\n");
     }
-    if let Some(Drawn { picture, clip, .. }) = drawn {
+    if let Some(Drawn { picture, axes, clip }) = drawn {
         let clip = clip.as_ref().map_or_else(String::new, |clip| {
             format!("<button type=\"button\" class=\"clip\" data-clip=\"{clip}\" hidden>Play the failure</button>")
         });
-        let _ = writeln!(out, "<figure>{picture}{clip}</figure>");
+        let _ = writeln!(out, "<figure>{picture}{clip}<figcaption class=\"key\">{axes}</figcaption></figure>");
     }
     if let Some(news) = level.recorded_news() {
         let _ = writeln!(out, "<p>{}.</p>", text(&news));

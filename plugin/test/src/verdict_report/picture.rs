@@ -8,7 +8,7 @@ use crate::{
     },
 };
 use bevy::math::{Rect, Vec2};
-use playbot_harness::floor_plan::FloorPlan;
+use playbot_harness::{floor_plan::FloorPlan, trails::scales};
 use playbot_report::escape::escape;
 use std::{cmp::Reverse, fmt::Write};
 
@@ -21,9 +21,9 @@ const MOST_SQUARES: usize = 40;
 /// Opacities of squares, from few to many ends.
 const STRENGTHS: [&str; 4] = [".3", ".5", ".7", ".9"];
 
-/// Returns the drawing as an SVG element in the colours of the page. `None` for a plan without extent, or with too
+/// Returns the drawing as an SVG element in the colours of the page, and the ends of its axes in words. `None` for a plan without extent, or with too
 /// many parts for a page with many levels.
-pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<String> {
+pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<(String, String)> {
     let side = plan.bounds.size().max_element() / END_SQUARES;
     let extent = extent(plan.bounds, side, &level.ends);
     let grid = Grid::new(extent)?;
@@ -55,7 +55,7 @@ pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<String> 
         shape("goal", None, &format!("M{x} {}l9 9l-9 9l-9-9z", y - 9), &mut svg);
     }
     svg += "</svg>";
-    (svg.len() - maps.len() <= MOST_BYTES).then_some(svg)
+    (svg.len() - maps.len() <= MOST_BYTES).then(|| (svg, scales(extent)))
 }
 
 /// Returns the drawn area: the bounds of the plan, with room for agents that fell out of it.
@@ -179,7 +179,7 @@ mod tests {
             ..SquareEnds::default()
         };
         let level = LevelVerdict { ends: ends.iter().map(end).collect(), ..level(0, 0, 9, 0) };
-        picture(&garden(), &level).expect("small")
+        picture(&garden(), &level).expect("small").0
     }
 
     #[test]
@@ -205,7 +205,8 @@ mod tests {
         );
         let maps = LevelMaps { side: 1.0, columns: 64, rows: 16, visits: vec![[70, 9]], ..LevelMaps::default() };
         let level = LevelVerdict { maps: Some(maps), ..level(0, 0, 9, 0) };
-        let svg = picture(&garden(), &level).expect("small");
+        let (svg, axes) = picture(&garden(), &level).expect("small");
+        assert_eq!(axes, "x 0 to 64, y 0 to 16");
         for class in ["ends", "visits", "lost-time", "skills"] {
             assert_eq!(svg.matches(&format!("<g class=\"map {class}\">")).count(), 1, "{class} in {svg}");
         }

@@ -69,6 +69,7 @@ fn what_is_no_result_is_named_with_its_line() {
     fs::write(folder.path().join(RESULTS), &head[..head.len() / 2]).expect("writable");
     let found = open().map(drop).expect_err("half a head").to_string();
     assert!(found.contains("the file is torn") && found.contains("`test --resume`"), "{found}");
+    assert!(!found.contains("make it again"), "it has another next step: {found}");
     fs::write(folder.path().join(RESULTS), written(&[r#"{"index":0}"#, r#"{"index":1,]"#])).expect("writable");
     let mut lines = open().expect("a head");
     lines.next_line().expect("a level");
@@ -254,4 +255,5 @@ fn results_with_other_line_breaks_are_named() {
     fs::write(folder.path().join(RESULTS), serde_json::to_string_pretty(&value).expect("JSON")).expect("writable");
     let found = ResultLines::open(folder.path()).map(|_| ()).expect_err("other lines").to_string();
     assert!(found.contains(&format!("{RESULTS}, line 1: the line breaks are not those of `playbot test`")), "{found}");
+    assert!(found.ends_with("; keep the file as it was written, and format a copy"), "{found}");
 }
