@@ -41,6 +41,25 @@ fn slow_ticks_have_a_file_of_their_own_and_fail_nothing() {
 }
 
 #[test]
+fn a_test_names_the_detectors_that_have_not_looked_once() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let test = |rest: &[&str]| {
+        let call = ["test", "coinrun", "--levels", "easy:0", "--bot", "search", "--out", "t", "--force"];
+        let (_, messages) = done(temporary.path(), &[&call[..], rest].concat());
+        let lines: Vec<&str> = messages.lines().filter(|line| line.contains("opt-in detector")).collect();
+        assert_eq!(lines.len(), 1, "{messages}");
+        lines[0].to_owned()
+    };
+    let line = test(&[]);
+    for words in [" opt-in detectors are off: ", "dead-action, fading-action", "`--detect fading-action` adds one"] {
+        assert!(line.contains(words), "`{words}` is missing in: {line}");
+    }
+    assert!(line.contains("determinism"), "{line}");
+    let line = test(&["--detect", "determinism", "--no-detect", "stuck"]);
+    assert!(!line.contains("determinism") && !line.contains("stuck"), "{line}");
+}
+
+#[test]
 fn what_is_no_detector_is_reported_with_what_would_be_right() {
     let temporary = tempfile::tempdir().expect("a folder");
     for (option, value, words) in [

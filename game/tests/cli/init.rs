@@ -166,6 +166,51 @@ fn the_adapter_of_a_game_in_fixed_steps_has_a_frame_for_each() {
 }
 
 #[test]
+fn the_adapter_adds_what_the_program_adds_and_waits_for_a_state_that_loads() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let hero = "pub struct HeroPlugin;\nimpl Plugin for HeroPlugin { fn build(&self, _: &mut App) {} }\n";
+    let library = "pub mod actors;\npub mod menu;\n#[derive(States)]\npub enum Screen { Loading, Playing }\n";
+    let menu = "const ITEMS: [&str; 2] = [\"Play\", \"Quit\"];\npub fn plugin(app: &mut App) {}\n\
+        fn menu() {\n    for label in ITEMS { spawn(button(label)); }\n}\n\
+        fn button(label: &str) -> impl Bundle { (Button, children![Text::new(label)]) }\n\
+        fn press(query: Query<&Interaction>) {}\n";
+    let program = |added: &str| format!("fn main() {{ App::new().add_plugins((DefaultPlugins, {added})).run(); }}\n");
+    write(
+        folder,
+        &[
+            ("Cargo.toml", MANIFEST),
+            ("src/lib.rs", library),
+            ("src/actors.rs", "pub mod hero;\n"),
+            ("src/actors/hero.rs", hero),
+            ("src/menu.rs", menu),
+        ],
+    );
+    for (added, game) in [
+        ("my_game::menu::plugin", "ForeignGame::new(\"my-game\", 1, my_game::menu::plugin)"),
+        ("my_game::actors::hero::HeroPlugin", "        app.add_plugins(my_game::actors::hero::HeroPlugin);"),
+        (
+            "my_game::actors::hero::HeroPlugin, my_game::menu::plugin",
+            "        app.add_plugins((my_game::actors::hero::HeroPlugin, my_game::menu::plugin));",
+        ),
+    ] {
+        write(folder, &[("src/main.rs", &program(added))]);
+        let (printed, _) = done(folder, &["init", "--dry-run"]);
+        for line in [
+            game,
+            "        .clicks([\"Play\", \"Quit\"])",
+            "        // TODO: if a level is ready once the game has left `Screen::Loading` (src/lib.rs:4), set that state in",
+            "        // .ready(|state: Res<State<my_game::Screen>>| **state != my_game::Screen::Loading)",
+        ] {
+            assert!(printed.lines().any(|printed| printed.trim() == line.trim()), "{line}: {printed}");
+        }
+    }
+    let (printed, _) = done(folder, &["init", "--dry-run"]);
+    let row = "added by src/main.rs: HeroPlugin (src/actors/hero.rs:2), plugin (src/menu.rs:2)";
+    assert!(printed.lines().any(|printed| printed == row), "{printed}");
+}
+
+#[test]
 fn a_second_run_leaves_all_files_alone() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

@@ -37,6 +37,7 @@ use crate::{
         observed::{ObservationMonitor, assess_safety},
         trial::{LeftOut, Trial},
     },
+    foreign::LeftMessages,
     game::{Game, without_idle_action},
     mode::ModeError,
     split::check_level,
@@ -67,6 +68,7 @@ pub fn examine(
     let mut comparisons: Vec<ComparisonReport> = Vec::new();
     let (mut observations, mut types) = (Vec::new(), TypesReport::default());
     let (mut suspicions, mut unequal_steps, mut holds_keys) = (Vec::new(), None, false);
+    let mut left = LeftMessages::default();
     for planned in options.planned() {
         if let Some(why) = reason_to_skip(planned.comparison, game, &comparisons) {
             comparisons.push(ComparisonReport { skipped: Some(why), ..planned });
@@ -83,6 +85,7 @@ pub fn examine(
         let noted = noted.flat_map(ComparisonReport::names).map(str::to_owned).collect();
         let left_out = LeftOut { ignored: &options.ignored, noted };
         let result = trial.run(options.ticks, &mut known_types, &left_out, &mut monitors);
+        trial.copies.iter().filter_map(|copy| copy.world.get_resource()).for_each(|more| left.add(more));
         if is_first {
             observations = monitors.into_iter().map(ObservationMonitor::report).collect();
             types = known_types.report(&trial.copies[0], &result.incomparable);
@@ -92,6 +95,9 @@ pub fn examine(
         }
         comparisons.push(result.report);
     }
+    left.retain(|message| !is_of_library(message) && !options.ignored.iter().any(|part| message.contains(part)));
+    let of_messages = left.unread.union(&left.recent).map(|message| (CauseKind::SurvivesRestart, hint_of(message)));
+    suspicions.extend(of_messages);
     let mut observations = observations.into_iter();
     let observation: ObservationReport = observations.next().unwrap_or_default();
     let other_observations: Vec<ObservationReport> = observations.collect();
@@ -113,6 +119,7 @@ pub fn examine(
         other_observations,
         without_idle: without_idle_action(game),
         types,
+        left_messages: left.unread.into_iter().collect(),
         unequal_steps,
         holds_keys,
         ticks_per_second: None,
@@ -220,6 +227,10 @@ pub struct DoctorReport {
     pub without_idle: Option<String>,
     /// The types that could be compared.
     pub types: TypesReport,
+    /// Types of messages of a foreign game that are written while a restart takes an episode down, so that its systems
+    /// read them in the next one. This is a note. Messages of libraries are left out: they may be work still to be done.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub left_messages: Vec<String>,
     /// Lengths of frames and of fixed steps, if they differ and the game may notice it.
     pub unequal_steps: Option<UnequalSteps>,
     /// True if actions hold keys or buttons. Reflection cannot show whether the game reads `pressed` or `just_pressed`.
@@ -548,6 +559,17 @@ fn findings(
     (findings, notes)
 }
 
+/// Returns the hint at messages that wait in their queue at a restart.
+fn hint_of(message: &str) -> String {
+    let call = forget_call(message);
+    format!("messages `{message}` of the last episode wait in their queue at a restart, and {call} drops them")
+}
+
+/// Returns the call of a `ForeignGame` that drops messages of a type at a restart.
+fn forget_call(message: &str) -> String {
+    format!("`.forget_messages::<{message}>()`")
+}
+
 fn plain(kind: FindingKind, what: String) -> DoctorFinding {
     DoctorFinding { kind, what, comparison: None, level: None, difference: None, causes: Vec::new() }
 }
@@ -641,6 +663,14 @@ const WALL_CLOCK: &str = "bevy_time::time::Time<bevy_time::real::Real>";
 /// Returns whether a type is the engine's or the plugin's, so that it says little about the cause of a difference.
 fn is_engine(path: &str) -> bool {
     path.starts_with("bevy_") || HOUSEKEEPING.iter().any(|prefix| path.starts_with(prefix))
+}
+
+/// Beginnings of the types of engines and input managers beside Bevy.
+const LIBRARIES: [&str; 3] = ["avian2d::", "avian3d::", "leafwing_input_manager::"];
+
+/// Returns whether messages of this type are those of an engine or of the plugin.
+fn is_of_library(path: &str) -> bool {
+    is_engine(path) || LIBRARIES.iter().any(|library| path.starts_with(library))
 }
 
 /// Returns whether components and resources of this type are compared at all.

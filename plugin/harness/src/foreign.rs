@@ -97,7 +97,9 @@ use bevy_playbot::{
     placement::TickPlacement,
     virtual_input::{ActionAxis, VirtualInput},
 };
-use std::sync::Arc;
+use std::{any::TypeId, sync::Arc};
+
+pub(crate) use crate::foreign::restart::LeftMessages;
 
 #[cfg(feature = "ui")]
 pub use crate::foreign::clicks::ButtonClicks;
@@ -350,7 +352,7 @@ impl ForeignGame {
                 messages.clear();
             }
         };
-        self.with(|description| description.forgotten.push(Arc::new(forget)))
+        self.with(|description| description.forgotten.push((TypeId::of::<Messages<M>>(), Arc::new(forget))))
     }
 
     /// Declares whether a level can be played. The system runs in each frame from the second one after the restart, and

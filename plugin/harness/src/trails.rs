@@ -1,12 +1,11 @@
 //! Charts of where agents went: trajectories on the floor plan, and a map of visits.
 //!
-//! The files of the folder, in reading order:
+//! In the folder:
 //!
-//! - [`cells`]: chart of the cells of a floor that were reached, by number of visits, and the colours of all charts.
-//! - [`visits`](mod@visits): number of visits of each square.
+//! - [`cells`]: chart of the cells of a floor that were reached, number of visits of each square, and the colours of all
+//!   charts.
 
 pub mod cells;
-pub mod visits;
 
 use crate::{
     drawing::{Drawing, MarkForm, Rgb, Shape},
@@ -17,7 +16,7 @@ use crate::{
 use bevy::math::{Rect, Vec2};
 use playbot_report::{counted, text_table::text_width};
 
-pub use crate::trails::{cells::CellChart, visits::Visits};
+pub use crate::trails::cells::{CellChart, Visits};
 
 /// Trajectories and visits of one or more players on one or more floors.
 #[derive(Clone, Debug, PartialEq)]

@@ -80,12 +80,7 @@ impl Desk {
             seat.window = String::from_utf8_lossy(&found.stdout).trim().to_owned();
             !seat.window.is_empty()
         });
-        seat.wait("keyboard", |seat| {
-            // Refused until the window is on the screen; keys pressed before would be lost.
-            seat.desk.xdotool(&["windowfocus", &seat.window]);
-            let focus = seat.desk.xdotool(&["getwindowfocus", "-f"]);
-            String::from_utf8_lossy(&focus.stdout).trim() == seat.window
-        });
+        seat.take_keyboard();
         // Without a window manager the keyboard changes hands twice, and Bevy lets go of all keys in between.
         seat.pass_ticks(8);
         seat
@@ -132,6 +127,27 @@ impl Seat<'_> {
     fn xdotool(&self, args: &[&str]) {
         let output = self.desk.xdotool(args);
         assert!(output.status.success(), "xdotool {args:?}: {}", String::from_utf8_lossy(&output.stderr));
+    }
+
+    /// Gives the window the keyboard.
+    fn take_keyboard(&mut self) {
+        self.wait("keyboard", |seat| {
+            // Refused until the window is on the screen; keys pressed before would be lost.
+            seat.desk.xdotool(&["windowfocus", &seat.window]);
+            let focus = seat.desk.xdotool(&["getwindowfocus", "-f"]);
+            String::from_utf8_lossy(&focus.stdout).trim() == seat.window
+        });
+    }
+
+    /// Takes the window off the screen, as a window manager does that minimises it. It loses the keyboard.
+    pub fn hide(&self) {
+        self.xdotool(&["windowunmap", "--sync", &self.window]);
+    }
+
+    /// Puts a hidden window back on the screen, and gives it the keyboard.
+    pub fn show(&mut self) {
+        self.xdotool(&["windowmap", "--sync", &self.window]);
+        self.take_keyboard();
     }
 
     /// Presses and releases a key.

@@ -3,7 +3,7 @@
 
 use std::fs;
 
-use serde_json::Value;
+use serde_json::{Value, json};
 
 use crate::{
     game_program::GameProgram,
@@ -32,6 +32,17 @@ fn is_written(shell: &Shell, names: &[&str]) {
     for name in names {
         assert!(fs::metadata(shell.path(name)).is_ok_and(|file| file.len() > 0), "{name} is not written");
     }
+}
+
+/// Scores the set in the folder `bugs` with random actions, one episode of each level, and prints the table.
+#[track_caller]
+fn score(shell: &Shell) -> Value {
+    let score = ["bugs", "score", "bugs", "--tester", "random", "--episodes", "1", "--replays", "0"];
+    // Those that play each episode again and again.
+    let without = ["--no-detect", "determinism,dead-action,fading-action,entity-leak"];
+    let scored = shell.answer(&[&score[..], &without, &["--out", "score.json", "--json"]].concat());
+    assert!(shell.done(&["bugs", "table", "score.json"]).contains("random"));
+    scored
 }
 
 impl GameProgram {
@@ -149,15 +160,35 @@ impl GameProgram {
         let make = ["bugs", "make", self.game, "--per-kind", "1", "--sound", "1", "--levels", &levels, "--out", "bugs"];
         let made = shell.answer(&[&make[..], &["--json"]].concat());
         assert!(made["mutants"].as_u64().is_some_and(|count| count >= 5) && made["sound"] == 1, "{made}");
-        let score = ["bugs", "score", "bugs", "--tester", "random", "--episodes", "1", "--replays", "0"];
-        // Those that play each episode again and again.
-        let without = ["--no-detect", "determinism,dead-action,fading-action,entity-leak"];
-        let scored = shell.answer(&[&score[..], &without, &["--out", "score.json", "--json"]].concat());
-        assert_eq!(scored["mutants"], made["mutants"], "{scored}");
-        assert!(shell.done(&["bugs", "table", "score.json"]).contains("random"));
+        assert_eq!(score(&shell)["mutants"], made["mutants"]);
     }
 
-    /// `bugs make` on too few levels, for games whose episodes take too long to plant defects in a test.
+    /// `bugs score` and `bugs table` of a set written by hand: two defects that games of all kinds can have, and the level
+    /// without them.
+    pub fn planted_defects_are_scored(&self) {
+        let shell = Shell::new(self.program);
+        let (game, level) = (self.game, format!("default:{}", self.recorded));
+        let mutant = |class: &str| {
+            let id = format!("{game}-{class}-00");
+            json!({ "id": id, "game": game, "class": class, "about": "it breaks", "base": level, "variant": 0 })
+        };
+        let set = json!({
+            "format": 1,
+            "seed": 0,
+            "games": [{ "name": game, "version": 1 }],
+            "mutants": [mutant("panic"), mutant("error-log")],
+            "sound": [{ "game": game, "range": format!("{level}..{}", self.recorded) }],
+        });
+        fs::create_dir(shell.path("bugs")).expect("writable");
+        fs::write(shell.path("bugs/mutants.json"), set.to_string()).expect("writable");
+        let scored = score(&shell);
+        let tester = &scored["testers"][0];
+        let count = |what: &str| (tester[what]["count"].as_u64(), tester[what]["of"].as_u64());
+        assert_eq!((count("recall"), count("false_findings")), ((Some(2), Some(2)), (Some(0), Some(1))), "{scored}");
+    }
+
+    /// `bugs make` on too few levels, for games whose episodes take too long to plant defects in a test. Those of
+    /// [`planted_defects_are_scored`](Self::planted_defects_are_scored) take the place of such a set.
     pub fn defects_need_levels(&self) {
         let shell = Shell::new(self.program);
         let levels = format!("{}={}", self.game, self.held_out);

@@ -86,7 +86,24 @@ impl GameProgram {
 
     /// Returns a shell with `few.demo` and `tiny.ron`, the game's own experiment made tiny, in its folder.
     pub(crate) fn with_tiny_experiment(&self) -> Shell {
-        let shell = self.with_recording();
+        self.add_tiny_experiment(self.with_recording())
+    }
+
+    /// Returns the same, where `few.demo` has the first ticks of each level alone.
+    pub(crate) fn with_short_recording(&self) -> Shell {
+        let shell = Shell::new(self.program);
+        let parts = [0, 1, 2].map(|place| format!("part-{place}.demo"));
+        for (level, part) in (self.recorded..).zip(&parts) {
+            let levels = format!("default:{level}..{level}");
+            let record = ["record", self.game, "--levels", &levels, "--noise", "0.1", "--steps", "60", "--out", part];
+            shell.done(&record);
+        }
+        let [first, second, third] = &parts;
+        shell.done(&["demo", "merge", first, second, third, "--out", "few.demo"]);
+        self.add_tiny_experiment(shell)
+    }
+
+    fn add_tiny_experiment(&self, shell: Shell) -> Shell {
         let first = self.held_out.split("..").next().unwrap_or(self.held_out);
         self.write_experiment(&shell, "tiny.ron", &[&TINY[..], &[&format!("test={first}")]].concat());
         shell

@@ -49,4 +49,32 @@ impl GameProgram {
         assert_eq!(verified["report"]["episodes"], episodes.len(), "{verified}");
         assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
     }
+
+    /// `play --record` in a window that is minimised while a key is held: the key is let go of, time goes on, and the
+    /// recording replays.
+    pub fn a_hidden_window_holds_no_key_and_plays_on(&self) {
+        let (desk, shell) = (Desk::new(self.program), Shell::new(self.program));
+        let args = ["play", self.game, "--levels", "0..1", "--record", "hidden.demo"];
+        let mut seat = desk.open(shell.folder(), &args);
+        seat.hold(&[self.key]);
+        seat.pass_ticks(20);
+        seat.hide();
+        seat.pass_ticks(40);
+        seat.show();
+        seat.release(&[self.key]);
+        seat.pass_ticks(5);
+        seat.tap("Escape");
+        let (status, said) = seat.leave();
+        assert!(status.success(), "{said}");
+
+        let verified = shell.answer(&["demo", "verify", "hidden.demo", "--json"]);
+        assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
+        let ticks = shell.answers(&["demo", "show", "hidden.demo", "--episode", "0", "--json"]);
+        let actions: Vec<u64> = ticks.iter().filter_map(|tick| tick["action"].as_u64()).collect();
+        // Runs of ticks with the key, and without any.
+        let runs: Vec<&[u64]> = actions.chunk_by(|one, next| one == next).collect();
+        let held = runs.iter().position(|run| run[0] != 0 && run.len() >= 10);
+        let after = held.map(|held| &runs[held + 1..]).unwrap_or_default();
+        assert!(after.iter().any(|run| run[0] == 0 && run.len() >= 30), "held before, and not while hidden: {runs:?}");
+    }
 }

@@ -48,7 +48,15 @@ impl GameProgram {
     /// `demo filter`, `demo label`, `demo repair`, `demo merge`, `learn-skills` and `train`: whatever `demo verify`
     /// accepts is learned from, and what it refuses is not.
     pub fn what_verifies_is_learned_from(&self) {
-        let shell = self.with_tiny_experiment();
+        self.learn_what_verifies(&self.with_tiny_experiment());
+    }
+
+    /// The same, for games whose whole episodes take too long: each is recorded for a second.
+    pub fn what_verifies_of_short_recordings_is_learned_from(&self) {
+        self.learn_what_verifies(&self.with_short_recording());
+    }
+
+    fn learn_what_verifies(&self, shell: &Shell) {
         let one = format!("default:{0}..{0}", self.recorded + 1);
         let change = |args: &[&str]| _ = shell.answer(&[args, &["--json"]].concat());
         change(&["demo", "filter", "few.demo", "--levels", &one, "--without-idle-start", "--out", "one.demo"]);

@@ -11,7 +11,7 @@ use playbot_harness::{
     floor_plan::FloorPlan,
     game::Game,
     games::Games,
-    trails::{Floor, PlayerTrails, TrailChart, visits::Visits},
+    trails::{Floor, PlayerTrails, TrailChart, Visits},
 };
 use playbot_tests::measuring::plan;
 

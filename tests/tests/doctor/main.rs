@@ -2,6 +2,7 @@
 
 mod agents;
 mod foreign;
+mod messages;
 mod planted;
 mod replays;
 mod snapshots;

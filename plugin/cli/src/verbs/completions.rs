@@ -10,7 +10,8 @@ use std::path::PathBuf;
 
 /// Print a script that completes verbs and options in a shell.
 ///
-/// The script is for the name of this program. Load it at the start of the shell, and make it again after an update.
+/// The script is for the name of this program. Load it at the start of the shell, and make it again after an update. There
+/// are no man pages: --help of each verb has all that they would say.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   playbot completions bash --out complete.bash   then: source complete.bash

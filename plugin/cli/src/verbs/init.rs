@@ -2,14 +2,19 @@
 //!
 //! In the folder:
 //!
-//! - `found`: facts about a game that its `Cargo.toml` and its sources show.
+//! - `manifest`: the `Cargo.toml` of a game.
+//! - `found`: facts about a game that its sources show.
 
 mod found;
+mod manifest;
 
 use crate::{
     error::{CliError, Outcome},
     output::{print_line, write},
-    verbs::init::found::{GameFacts, GameManifest, NamedItem, SourceLine, SourceText, StepRate, major_minor},
+    verbs::init::{
+        found::{GameFacts, NamedItem, SourceLine, SourceText, StepRate},
+        manifest::{BevyDependency, GameManifest, major_minor},
+    },
 };
 use serde_json::json;
 use std::{
@@ -121,7 +126,7 @@ struct GameFolder {
     /// The `Cargo.toml` of the package.
     manifest: GameManifest,
     /// Its dependency on Bevy, with what the workspace says.
-    bevy: found::BevyDependency,
+    bevy: BevyDependency,
 }
 
 impl GameFolder {
@@ -277,6 +282,7 @@ impl GameFolder {
             ("library", library),
             ("functions of `&mut App`", items(&facts.functions)),
             ("plugins", items(&facts.plugins)),
+            ("added by src/main.rs", items(&facts.added)),
             ("states", states.collect::<Vec<_>>().join(", ")),
             ("input", facts.inputs.join(", ")),
             ("keys", facts.keys.join(", ")),
@@ -395,7 +401,14 @@ fn has_clicks(facts: &GameFacts) -> bool {
 fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> String {
     let path = |items: &[NamedItem]| items.first().and_then(|item| item.path.clone());
     let mut own = String::new();
+    let added: Vec<String> = facts.added.iter().filter_map(|item| item.path.clone()).collect();
     let game = match (path(&facts.functions), path(&facts.plugins)) {
+        _ if added.len() > 1 || added.len() == 1 && facts.plugins.contains(&facts.added[0]) => {
+            let added: Vec<String> = added.iter().map(|path| format!("{library}::{path}")).collect();
+            let list = if added.len() > 1 { format!("({})", added.join(", ")) } else { added.join(", ") };
+            format!("|app: &mut App| {{\n        app.add_plugins({list});\n    }}")
+        }
+        _ if added.len() == 1 => format!("{library}::{}", added[0]),
         (Some(path), _) => format!("{library}::{path}"),
         (None, Some(path)) => {
             format!("|app: &mut App| {{\n        app.add_plugins({library}::{path});\n    }}")
@@ -434,7 +447,16 @@ fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> Strin
         );
     }
     text.push_str("        .restart(Restart::Startup)\n");
-    if !facts.loads.is_empty() || !facts.loaders.is_empty() {
+    if let Some((state, variant)) = facts.loading_state() {
+        let SourceLine { name, file, line } = &state.at;
+        let path = state.path.as_ref().map_or_else(|| name.clone(), |path| format!("{library}::{path}"));
+        let _ = write!(
+            text,
+            "        // TODO: if a level is ready once the game has left `{name}::{variant}` ({file}:{line}), set that state in\n        \
+             // `.level`, and wait for its end:\n        \
+             // .ready(|state: Res<State<{path}>>| **state != {path}::{variant})\n"
+        );
+    } else if !facts.loads.is_empty() || !facts.loaders.is_empty() {
         text.push_str("        // TODO: if a level loads while the game runs, when it is ready: .ready(condition)\n");
     }
     if let Some(SourceLine { file, line, .. }) = facts.files.first() {

@@ -168,7 +168,17 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     folder.finish_against(&courses)?;
     let outcome = report_results(&results)?;
     args.findings.report_missing(out);
+    report_off(game, &plan.detectors);
     Ok(outcome)
+}
+
+/// Reports the opt-in detectors that have not looked.
+fn report_off(game: &dyn Game, detectors: &Detectors) {
+    let off = detectors.off(game);
+    if let Some(name) = off.iter().find(|name| **name == "fading-action").or(off.first()) {
+        let (are, count) = (if off.len() == 1 { "is" } else { "are" }, counted(off.len() as u64, "opt-in detector"));
+        report!("{count} {are} off: {}; `--detect {name}` adds one, and `--detectors` describes all", off.join(", "));
+    }
 }
 
 /// Plays recorded actions again, with a progress bar. Returns `None` if it was stopped.

@@ -3,6 +3,7 @@
 use crate::{
     doctor,
     doctor::cause::CauseKind,
+    foreign::LeftMessages,
     game::Game,
     saved_episode::SavedEpisode,
     worlds::{build_world, other_agents},
@@ -223,6 +224,7 @@ struct Ends(Vec<(Entity, EpisodeEnd)>);
 fn prepare(world: &mut World) {
     Renewal::set_up(world, |world| {
         world.init_resource::<Ends>();
+        world.init_resource::<LeftMessages>();
         world.add_observer(|event: On<EpisodeEnded>, mut ends: ResMut<Ends>| ends.0.push((event.entity, event.end)));
     });
 }

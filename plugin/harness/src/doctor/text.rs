@@ -1,7 +1,7 @@
 //! The report for people.
 
 use crate::doctor::{
-    ComparisonReport, DoctorComparison, DoctorDifference, DoctorFinding, DoctorReport,
+    ComparisonReport, DoctorComparison, DoctorDifference, DoctorFinding, DoctorReport, forget_call,
     game_copy::TypesReport,
     observed::{NonFiniteValue, ObservationReport, Verdict},
 };
@@ -28,6 +28,7 @@ impl Display for DoctorReport {
         self.write_safety(f)?;
         self.without_idle.iter().try_for_each(|problem| writeln!(f, "Actions: {problem}"))?;
         write!(f, "{}{}", self.observation, self.types)?;
+        self.write_left_messages(f)?;
         if let Some(steps) = &self.unequal_steps {
             write!(f, "{steps}")?;
         }
@@ -48,7 +49,8 @@ impl Display for DoctorReport {
             0 => format!("No findings: the same actions played the same game for {ticks}."),
             count => format!("{}.", counted(count as u64, "finding")),
         };
-        let notes = match self.notes.len() + usize::from(self.without_idle.is_some()) {
+        let further = usize::from(self.without_idle.is_some()) + usize::from(!self.left_messages.is_empty());
+        let notes = match self.notes.len() + further {
             0 => String::new(),
             count => format!(" {}.", counted(count as u64, "note")),
         };
@@ -96,6 +98,18 @@ impl DoctorReport {
             }
         }
         writeln!(f)
+    }
+
+    fn write_left_messages(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        if self.left_messages.is_empty() {
+            return Ok(());
+        }
+        writeln!(
+            f,
+            "Messages: written while a restart takes an episode down, so that systems read them in the next one."
+        )?;
+        writeln!(f, "  A call in the adapter drops them:")?;
+        write_list(f, "    ", self.left_messages.iter().map(|message| forget_call(message)))
     }
 
     fn write_safety(&self, f: &mut Formatter<'_>) -> fmt::Result {

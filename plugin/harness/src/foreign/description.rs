@@ -33,7 +33,7 @@ use bevy_playbot::{
     systems::PlaybotSystems,
     virtual_input::{InputRoute, VirtualInputPlugin},
 };
-use std::sync::Arc;
+use std::{any::TypeId, sync::Arc};
 
 /// The settings of the builder.
 #[derive(Clone)]
@@ -77,8 +77,8 @@ pub(super) struct Description {
     /// Ticks after which an episode is truncated.
     pub(super) limit: Option<u32>,
     pub(super) restart: Restart,
-    /// Functions that drop all messages of one type each.
-    pub(super) forgotten: Vec<Arc<dyn Fn(&mut World) + Send + Sync>>,
+    /// Functions that drop all messages of one type each, with the type of its queue.
+    pub(super) forgotten: Vec<(TypeId, Arc<dyn Fn(&mut World) + Send + Sync>)>,
     pub(super) ready: Option<SystemFactory<bool>>,
     /// Frames that a level may take to load.
     pub(super) patience: u32,

@@ -11,12 +11,13 @@ use crate::{
     },
     level_files::LevelDesigns,
 };
-use bevy::prelude::*;
+use bevy::{ecs::change_detection::Tick, prelude::*};
 use bevy_playbot::{
     agent::{Agent, Control},
     engine::{NextEpisode, Renewal, UnloadedAssets},
     episode::{Episode, StartEpisode},
 };
+use std::{any::TypeId, collections::BTreeSet};
 
 /// Restarts the game as soon as the schedule allows it.
 pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, mut commands: Commands) {
@@ -62,10 +63,11 @@ fn restart(world: &mut World, foreign: &mut Foreign) -> Result<(), String> {
     // Before the first episode the clocks are as the start of the program has left them. A game's own restart goes on
     // from there; `Restart::Startup` goes back to the time before it.
     let begun = *foreign.begun.get_or_insert_with(|| ClockSettings::of(world).running());
+    let before = world.increment_change_tick();
     if let Some(system) = &mut foreign.restart {
         begun.start(world);
         system.demand(world)?;
-        forget_messages(world, foreign);
+        forget_messages(world, foreign, before);
         return Ok(());
     }
     match foreign.game.description.restart.clone() {
@@ -74,11 +76,11 @@ fn restart(world: &mut World, foreign: &mut Foreign) -> Result<(), String> {
             if let OwnRestartKind::State(enter) = own.0 {
                 enter(world)?;
             }
-            forget_messages(world, foreign);
+            forget_messages(world, foreign, before);
             Ok(())
         }
         Restart::Startup => {
-            start_again(world, foreign);
+            start_again(world, foreign, before);
             Ok(())
         }
         Restart::Rebuild => demand_a_new_world(world, foreign),
@@ -134,7 +136,7 @@ pub(super) fn announce(
 }
 
 /// Despawns the game's entities, and runs the schedules of a program's start again.
-fn start_again(world: &mut World, foreign: &Foreign) {
+fn start_again(world: &mut World, foreign: &Foreign, before: Tick) {
     let Some(baseline) = &foreign.baseline else { return };
     for entity in baseline.spawned(world) {
         // Some are despawned with their parents.
@@ -143,7 +145,7 @@ fn start_again(world: &mut World, foreign: &Foreign) {
         }
     }
     world.flush();
-    forget_messages(world, foreign);
+    forget_messages(world, foreign, before);
     if let Some(clocks) = foreign.clocks {
         clocks.start(world);
     }
@@ -156,14 +158,83 @@ fn start_again(world: &mut World, foreign: &Foreign) {
 /// Drops the messages of the last episode, and those that its end has written while the game was taken down.
 ///
 /// Only types that the game names are dropped. Others may carry work that is still to be done: loaded files for Bevy,
-/// or removed bodies for a physics engine.
-fn forget_messages(world: &mut World, foreign: &Foreign) {
-    foreign.game.description.forgotten.iter().for_each(|forget| forget(world));
+/// or removed bodies for a physics engine. The restart has begun at the change tick `before`.
+fn forget_messages(world: &mut World, foreign: &Foreign, before: Tick) {
+    let forgotten = &foreign.game.description.forgotten;
+    forgotten.iter().for_each(|(_, forget)| forget(world));
+    LeftMessages::note(world, &forgotten.iter().map(|(queue, _)| *queue).collect(), before);
+}
+
+/// Types of messages that an episode leaves to the next one, in a World that has this resource.
+///
+/// Only Bevy's name of a queue and the tick of its last message are known. How many messages wait, and which systems have
+/// read them, is hidden behind the type.
+#[derive(Resource, Clone, Debug, Default)]
+pub(crate) struct LeftMessages {
+    /// Types that were written while an episode was taken down, so that no system has read them.
+    pub unread: BTreeSet<String>,
+    /// Types that were written in the last frames of an episode. Some systems may have read them.
+    pub recent: BTreeSet<String>,
+    /// The change ticks at which the last two frames began.
+    frames: [Option<Tick>; 2],
+    /// Whether an episode has begun. What the start of the program writes belongs to the first one.
+    has_begun: bool,
+}
+
+/// The beginning of the names of all queues.
+const QUEUE: &str = "bevy_ecs::message::messages::Messages<";
+
+impl LeftMessages {
+    /// Adds the types of another World.
+    pub fn add(&mut self, other: &Self) {
+        self.unread.extend(other.unread.iter().cloned());
+        self.recent.extend(other.recent.iter().cloned());
+    }
+
+    /// Keeps the types for which `keep` is true.
+    pub fn retain(&mut self, keep: impl Fn(&str) -> bool) {
+        self.unread.retain(|message| keep(message));
+        self.recent.retain(|message| keep(message));
+    }
+
+    /// Notes that a frame begins.
+    fn note_frame(world: &mut World) {
+        if world.contains_resource::<Self>() {
+            let now = world.increment_change_tick();
+            let mut left = world.resource_mut::<Self>();
+            left.frames = [left.frames[1], Some(now)];
+        }
+    }
+
+    /// Notes the types that wait, but for forgotten ones.
+    fn note(world: &mut World, forgotten: &BTreeSet<TypeId>, before: Tick) {
+        let Some(left) = world.get_resource::<Self>() else { return };
+        let now = world.read_change_tick();
+        let (mut unread, mut recent) = (Vec::new(), Vec::new());
+        for (id, entity) in world.resource_entities().iter().filter(|_| left.has_begun) {
+            let Some(info) = world.components().get_info(id) else { continue };
+            let name = info.name().to_string();
+            let Some(message) = name.strip_prefix(QUEUE).and_then(|rest| rest.strip_suffix('>')) else { continue };
+            let is_forgotten = info.type_id().is_some_and(|queue| forgotten.contains(&queue));
+            let ticks = world.get_entity(entity).ok().and_then(|entity| entity.get_change_ticks_by_id(id));
+            let Some(ticks) = ticks.filter(|_| !is_forgotten) else { continue };
+            if ticks.changed.is_newer_than(before, now) {
+                unread.push(message.to_owned());
+            } else if left.frames[0].is_some_and(|frame| ticks.changed.is_newer_than(frame, now)) {
+                recent.push(message.to_owned());
+            }
+        }
+        let mut left = world.resource_mut::<Self>();
+        left.has_begun = true;
+        left.unread.extend(unread);
+        left.recent.extend(recent);
+    }
 }
 
 /// Checks whether the level is ready. Each restart gets one frame to settle: commands, states and transforms.
 pub(super) fn check(world: &mut World) {
     note_frame(world);
+    LeftMessages::note_frame(world);
     let mut agents = active_agents(world);
     agents.retain(|&agent| world.get::<Episode>(agent).is_some_and(Episode::is_loading));
     let Some(&first) = agents.first() else { return };

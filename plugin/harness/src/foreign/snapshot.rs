@@ -275,7 +275,7 @@ impl SnapshotTools for ForeignGame {
         forget::<KeyboardInput>(world);
         forget::<MouseButtonInput>(world);
         forget::<WindowEvent>(world);
-        self.description.forgotten.iter().for_each(|forget| forget(world));
+        self.description.forgotten.iter().for_each(|(_, forget)| forget(world));
         true
     }
 

@@ -149,6 +149,17 @@ impl Detectors {
         &self.options
     }
 
+    /// Returns the names of a game's opt-in detectors that are not selected.
+    pub fn off(&self, game: &dyn Game) -> Vec<&'static str> {
+        let is_recorded = |name: &str| self.record.iter().any(|record| record.split(' ').next() == Some(name));
+        let is_on = |known: &Known| match known {
+            Known::Clock(_) => self.clock.is_some(),
+            known => is_recorded(known.name()),
+        };
+        let off = all(game).into_iter().filter(|known| !known.is_default() && !is_on(known));
+        off.map(|known| known.name()).collect()
+    }
+
     /// Returns the detector that measures time, if it is selected.
     pub fn clock(&self) -> Option<&TickTime> {
         self.clock.as_deref()
@@ -256,6 +267,25 @@ mod tests {
             words.starts_with("the detector `stuck` has no setting `tick` (did you mean `ticks`?); it has "),
             "{words}"
         );
+    }
+
+    #[test]
+    fn opt_in_detectors_are_off_until_they_are_named() {
+        let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {});
+        let off = |with: &[&str]| {
+            let with = with.iter().map(|name| (*name).to_owned()).collect();
+            let choice = DetectorChoice { with, ..DetectorChoice::default() };
+            Detectors::choose(&game, &choice).expect("there are such").off(&game)
+        };
+        let defaults = off(&[]);
+        for name in ["fading-action", "determinism", "tick-time"] {
+            assert!(defaults.contains(&name), "{name} is missing in {defaults:?}");
+        }
+        assert!(!defaults.contains(&"stuck"), "it is a default: {defaults:?}");
+        let fewer = off(&["determinism", "tick-time"]);
+        assert_eq!(fewer.len() + 2, defaults.len(), "{fewer:?}");
+        assert!(!fewer.contains(&"determinism") && !fewer.contains(&"tick-time"), "{fewer:?}");
+        assert!(off(&["all"]).is_empty());
     }
 
     #[test]

@@ -13,4 +13,8 @@ const GAME: GameProgram = GameProgram {
 };
 
 playbot_shell::tests!(GAME);
-playbot_shell::tests!(GAME: defects_need_levels);
+playbot_shell::tests!(
+    GAME: what_verifies_of_short_recordings_is_learned_from,
+    defects_need_levels,
+    planted_defects_are_scored,
+);

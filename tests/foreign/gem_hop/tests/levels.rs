@@ -1,4 +1,4 @@
-//! Tests of levels, as a game's own tests write them.
+//! Tests of levels, as a game's own tests write them, and of what physics keeps from one episode to the next.
 
 #[path = "../src/game.rs"]
 #[allow(dead_code, reason = "what the adapter reads")]
@@ -8,8 +8,12 @@ use std::ops::ControlFlow;
 
 use bevy::prelude::*;
 use game::{Hero, Level, Map, Screen, game};
-use playbot::harness::foreign::{ForeignGame, LevelSeed, Restart};
-use playbot::prelude::EpisodeEnd;
+use playbot::harness::{
+    foreign::{ForeignGame, LevelSeed, Restart},
+    game::Game,
+    worlds::build_world,
+};
+use playbot::prelude::*;
 use playbot::test::explore::{ExplorePlan, Until, explore};
 use playbot::test::verdict::LevelOutcome;
 
@@ -48,6 +52,37 @@ fn the_runner_solves_most_levels() {
 #[test]
 fn the_game_plays_the_same_again() {
     playbot::test(&gem_hop()).levels("default:0..1").assert_deterministic();
+}
+
+/// Plays these levels one after another in one World, and returns for each tick of each the state hash, and the bits of the
+/// hero's position and speed.
+fn played(levels: &[u64]) -> Vec<Vec<(u64, [u32; 4])>> {
+    let game = gem_hop();
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::list(levels)));
+    game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.0);
+    let mut heroes = world.query::<(&Transform, &Hero)>();
+    let mut episodes = vec![Vec::new(); levels.len()];
+    for _ in 0..2000 * levels.len() {
+        let finished = world.get::<EpisodeCount>(agents[0]).expect("an agent").finished as usize;
+        let Some(episode) = episodes.get_mut(finished) else { break };
+        world.tick().expect("sound");
+        let moves = heroes.iter(&world).next().map_or([0; 4], |(at, hero)| {
+            [at.translation.x, at.translation.y, hero.velocity.x, hero.velocity.y].map(f32::to_bits)
+        });
+        episode.push((world.get::<StateHash>(agents[0]).expect("an agent").0, moves));
+    }
+    episodes
+}
+
+/// Rapier keeps bodies, contacts and islands, which a restart takes away.
+#[test]
+fn an_episode_is_the_same_after_another_level_and_in_a_new_world() {
+    let episodes = played(&[3, 8, 3]);
+    assert!(episodes.iter().all(|episode| episode.len() > 300), "each level is played to its flag");
+    assert_eq!(episodes[0], episodes[2]);
+    assert_eq!(episodes[1], played(&[8])[0]);
+    assert_ne!(episodes[0], episodes[1]);
 }
 
 #[test]

@@ -13,4 +13,6 @@ const GAME: GameProgram = GameProgram {
 };
 
 playbot_shell::tests!(GAME);
-playbot_shell::tests!(GAME: what_verifies_is_learned_from, defects_need_levels);
+playbot_shell::tests!(GAME: what_verifies_is_learned_from, defects_need_levels, planted_defects_are_scored);
+#[cfg(feature = "screen")]
+playbot_shell::tests!(GAME: a_hidden_window_holds_no_key_and_plays_on);

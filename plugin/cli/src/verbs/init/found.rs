@@ -1,5 +1,6 @@
-//! Facts about a game that its `Cargo.toml` and its sources show, read as text.
+//! Facts about a game that its sources show, read as text.
 
+use crate::verbs::init::manifest::GameManifest;
 use playbot_harness::foreign::PLAYER_NAMES;
 use serde::Serialize;
 
@@ -46,6 +47,9 @@ const LEAVES: [&str; 20] = [
     "::LevelSelect)",
 ];
 
+/// Ways in which a game hears of pressed buttons.
+const PRESSED: [&str; 3] = ["Interaction", "Pointer<", "Activate>"];
+
 /// Schedules that run in fixed steps.
 const FIXED: [&str; 5] = ["FixedUpdate", "FixedPreUpdate", "FixedPostUpdate", "FixedFirst", "FixedLast"];
 
@@ -69,167 +73,6 @@ const MANAGERS: [&str; 2] = ["leafwing-input-manager", "bevy_enhanced_input"];
 
 /// Crates of physics.
 const PHYSICS: [&str; 4] = ["avian2d", "avian3d", "bevy_rapier2d", "bevy_rapier3d"];
-
-/// A dependency on Bevy.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct BevyDependency {
-    /// The version as it is written; `None` for a path or a revision of git.
-    pub version: Option<String>,
-    /// The features that are named.
-    pub features: Vec<String>,
-    /// Whether the workspace says the rest.
-    pub is_inherited: bool,
-}
-
-/// The parts of a `Cargo.toml` that matter here.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct GameManifest {
-    /// Name of the package, if there is one.
-    pub package: Option<String>,
-    /// Name of its library, if it is given.
-    pub library: Option<String>,
-    /// File of its library, if it is given.
-    pub library_path: Option<String>,
-    /// Whether there is a table `[workspace]`.
-    pub is_workspace: bool,
-    /// The members of the workspace, as they are written.
-    pub members: Vec<String>,
-    /// Names of the dependencies.
-    pub dependencies: Vec<String>,
-    /// The dependency on Bevy.
-    pub bevy: Option<BevyDependency>,
-    /// The dependency on Bevy that members inherit.
-    pub workspace_bevy: Option<BevyDependency>,
-}
-
-impl GameManifest {
-    /// Reads the text of a `Cargo.toml`. Lines that are no TOML are passed over, because cargo reports them better.
-    pub fn read(text: &str) -> Self {
-        let (tables, entries) = entries(text);
-        let value = |table: &str, key: &str| {
-            let entry = entries.iter().find(|entry| entry.table == table && entry.key == key)?;
-            Some(texts(&entry.value))
-        };
-        let one = |table: &str, key: &str| value(table, key).and_then(|texts| texts.into_iter().next());
-        let dependencies = entries.iter().filter_map(|entry| match entry.table.strip_prefix("dependencies") {
-            Some("") => entry.key.split('.').next(),
-            Some(rest) => rest.strip_prefix('.'),
-            None => None,
-        });
-        let mut dependencies: Vec<String> = dependencies.map(str::to_owned).collect();
-        dependencies.sort();
-        dependencies.dedup();
-        Self {
-            package: one("package", "name"),
-            library: one("lib", "name"),
-            library_path: one("lib", "path"),
-            is_workspace: tables.iter().any(|table| table == "workspace" || table.starts_with("workspace.")),
-            members: value("workspace", "members").unwrap_or_default(),
-            dependencies,
-            bevy: bevy(&entries, "dependencies"),
-            workspace_bevy: bevy(&entries, "workspace.dependencies"),
-        }
-    }
-
-    /// Returns true if the package needs this crate.
-    pub fn depends_on(&self, name: &str) -> bool {
-        self.dependencies.iter().any(|dependency| dependency == name)
-    }
-}
-
-/// A line `key = value` with its table. A value over several lines is one.
-struct Entry {
-    table: String,
-    key: String,
-    value: String,
-}
-
-/// Returns the tables and the entries of a text in TOML.
-fn entries(text: &str) -> (Vec<String>, Vec<Entry>) {
-    let (mut tables, mut found) = (vec![String::new()], Vec::<Entry>::new());
-    let mut is_open = false;
-    for line in text.lines().map(|line| without_comment(line).trim()) {
-        if let Some(last) = found.last_mut().filter(|_| is_open) {
-            last.value.push_str(&line.replace('\'', "\""));
-            is_open = is_unclosed(&last.value);
-        } else if line.starts_with('[') {
-            tables.push(line.trim_matches(['[', ']']).replace(['"', ' '], ""));
-        } else if let Some((key, value)) = line.split_once('=') {
-            let value = value.trim().replace('\'', "\"");
-            is_open = is_unclosed(&value);
-            let table = tables.last().cloned().unwrap_or_default();
-            found.push(Entry { table, key: key.trim().replace('"', ""), value });
-        }
-    }
-    (tables, found)
-}
-
-/// Returns a line of TOML up to its comment.
-fn without_comment(line: &str) -> &str {
-    let mut quote = None;
-    for (at, c) in line.char_indices() {
-        match (c, quote) {
-            ('#', None) => return &line[..at],
-            ('"' | '\'', None) => quote = Some(c),
-            (c, Some(open)) if c == open => quote = None,
-            _ => {}
-        }
-    }
-    line
-}
-
-/// Returns true if an array or a table goes on in the next line.
-fn is_unclosed(value: &str) -> bool {
-    let outside = value.split('"').step_by(2);
-    let count = |signs: [char; 2]| outside.clone().map(|text| text.matches(signs).count()).sum::<usize>();
-    count(['[', '{']) > count([']', '}'])
-}
-
-/// Returns the texts of a value: of an array, or of one text.
-fn texts(value: &str) -> Vec<String> {
-    let within = value.strip_prefix('[').map_or(value, |rest| rest.split(']').next().unwrap_or_default());
-    within.split('"').skip(1).step_by(2).map(str::to_owned).collect()
-}
-
-/// Returns the dependency on Bevy in a table, in any of the forms that TOML has for it.
-fn bevy(entries: &[Entry], table: &str) -> Option<BevyDependency> {
-    let own = format!("{table}.bevy");
-    let parts = entries.iter().filter_map(|entry| {
-        if entry.table == own {
-            return Some(format!("{} = {}", entry.key, entry.value));
-        }
-        match entry.key.strip_prefix("bevy").filter(|_| entry.table == table)? {
-            "" if entry.value.starts_with('{') => Some(entry.value.trim_matches(['{', '}']).to_owned()),
-            "" => Some(format!("version = {}", entry.value)),
-            rest => rest.strip_prefix('.').map(|key| format!("{key} = {}", entry.value)),
-        }
-    });
-    let parts: Vec<String> = parts.collect();
-    if parts.is_empty() {
-        return None;
-    }
-    let all = parts.join(", ");
-    Some(BevyDependency {
-        version: value_of(&all, "version").and_then(|value| texts(value).into_iter().next()),
-        features: value_of(&all, "features").map(texts).unwrap_or_default(),
-        is_inherited: value_of(&all, "workspace").is_some_and(|value| value.starts_with("true")),
-    })
-}
-
-/// Returns the text from the value of a key on.
-fn value_of<'a>(inline: &'a str, key: &str) -> Option<&'a str> {
-    inline.match_indices(key).find_map(|(at, _)| {
-        let goes_on = inline[..at].ends_with(|c: char| c.is_alphanumeric() || "_-\"".contains(c));
-        let rest = inline[at + key.len()..].trim_start().strip_prefix('=')?;
-        (!goes_on).then(|| rest.trim_start())
-    })
-}
-
-/// Returns major and minor number of a version such as `^0.19.1`.
-pub(super) fn major_minor(version: &str) -> Option<(u32, u32)> {
-    let mut numbers = version.trim_start_matches(|c: char| !c.is_ascii_digit()).split(['.', '-', ',', ' ']);
-    Some((numbers.next()?.parse().ok()?, numbers.next().unwrap_or("0").parse().ok()?))
-}
 
 /// A source file of a game.
 pub(super) struct SourceText {
@@ -352,6 +195,8 @@ pub(super) struct StateEnum {
     /// Where it is defined.
     #[serde(flatten)]
     pub at: SourceLine,
+    /// Its path behind the name of the crate, if it is public.
+    pub path: Option<String>,
     /// Its variants.
     pub variants: Vec<String>,
 }
@@ -385,6 +230,8 @@ pub(super) struct GameFacts {
     pub functions: Vec<NamedItem>,
     /// Public plugins of the library that are unit structs.
     pub plugins: Vec<NamedItem>,
+    /// Those of both that the game's program adds, in their order.
+    pub added: Vec<NamedItem>,
     /// The states.
     pub states: Vec<StateEnum>,
     /// Keys that are read.
@@ -434,7 +281,7 @@ impl GameFacts {
         let door = sources.iter().find(|source| source.path == library);
         facts.has_library = door.is_some();
         for source in sources {
-            let prefix = door.and_then(|door| prefix(door, source));
+            let prefix = door.and_then(|door| prefix(sources, door, source));
             facts.read_source(source, prefix.as_deref());
         }
         facts.also_playing.retain(|key| facts.leaving_keys.iter().any(|leaving| leaving.name == *key));
@@ -444,6 +291,11 @@ impl GameFacts {
             _ => 2,
         };
         facts.functions.sort_by_key(rank);
+        let program = sources.iter().find(|source| source.path == "src/main.rs");
+        facts.added = program.map(|program| facts.added_in(&program.code)).unwrap_or_default();
+        if sources.iter().any(|source| PRESSED.iter().any(|word| source.code.contains(word))) {
+            facts.buttons = button_texts(sources);
+        }
         facts.physics.extend(PHYSICS.into_iter().filter(|name| manifest.depends_on(name)));
         facts.loaders.extend(LOADERS.into_iter().filter(|name| manifest.depends_on(name)));
         facts.add_inputs(sources);
@@ -463,7 +315,8 @@ impl GameFacts {
             self.plugins.extend(unit_plugins(code).into_iter().map(item));
         }
         for item in ["States", "SubStates"].into_iter().flat_map(|derived| deriving(code, derived, "enum ")) {
-            self.states.push(StateEnum { at: source.at(item.name, item.offset), variants: variants(item.rest) });
+            let path = prefix.filter(|_| item.is_public).map(|prefix| format!("{prefix}{}", item.name));
+            self.states.push(StateEnum { at: source.at(item.name, item.offset), path, variants: variants(item.rest) });
         }
         add_new(&mut self.keys, names_behind(code, "KeyCode::"));
         for (key, offset) in keys_in(code) {
@@ -475,9 +328,6 @@ impl GameFacts {
         }
         self.presses.extend(source.lines_with(&["just_pressed"]));
         add_new(&mut self.mouse_buttons, names_behind(code, "MouseButton::"));
-        if code.contains("Interaction") || code.contains("Pointer<") {
-            add_new(&mut self.buttons, button_texts(code));
-        }
         self.is_in_space |= code.contains("Camera3d");
         let random = source.lines_with(&RANDOM).into_iter().filter(|found| {
             let line = code.lines().nth(found.line - 1).unwrap_or_default();
@@ -508,6 +358,26 @@ impl GameFacts {
         }
     }
 
+    /// Returns the first state in which the game loads, and its variant.
+    pub fn loading_state(&self) -> Option<(&StateEnum, &str)> {
+        self.states.iter().find_map(|state| {
+            let variant = state.variants.iter().find(|variant| variant.contains("Loading"))?;
+            Some((state, variant.as_str()))
+        })
+    }
+
+    /// Returns the functions and plugins that the code of a program adds to its app.
+    fn added_in(&self, code: &str) -> Vec<NamedItem> {
+        let calls = code.match_indices("add_plugins(").flat_map(|(at, words)| parts(&code[at + words.len() - 1..]));
+        let words = calls.flat_map(|part| part.split(|c| !is_of_name(c) && c != ':'));
+        let is_named = |item: &NamedItem, word: &str| {
+            let Some(path) = item.path.as_deref() else { return false };
+            word == path || word.ends_with(&format!("::{path}")) || path.ends_with(&format!("::{word}"))
+        };
+        let all = self.functions.iter().chain(&self.plugins);
+        words.filter_map(|word| all.clone().find(|item| is_named(item, word)).cloned()).collect()
+    }
+
     /// Returns whether a key leaves or skips levels wherever it is read.
     pub fn only_leaves(&self, key: &str) -> bool {
         self.leaving_keys.iter().any(|leaving| leaving.name == key) && !self.also_playing.iter().any(|also| also == key)
@@ -528,14 +398,22 @@ impl GameFacts {
 }
 
 /// Returns the path of a source's module behind the name of the crate, if a program beside it can name the module.
-fn prefix(door: &SourceText, source: &SourceText) -> Option<String> {
+fn prefix(sources: &[SourceText], door: &SourceText, source: &SourceText) -> Option<String> {
     if source.path == door.path {
         return Some(String::new());
     }
     let folder = door.path.rsplit_once('/').map_or("", |(folder, _)| folder);
     let inner = source.path.strip_prefix(folder)?.trim_start_matches('/');
     let module = inner.strip_suffix("/mod.rs").or_else(|| inner.strip_suffix(".rs"))?;
-    door.code.contains(&format!("pub mod {module};")).then(|| format!("{module}::"))
+    let (above, name) = match module.rsplit_once('/') {
+        None => (door, module),
+        Some((above, name)) => {
+            let paths = [".rs", "/mod.rs"].map(|end| format!("{folder}/{above}{end}"));
+            (sources.iter().find(|source| paths.contains(&source.path))?, name)
+        }
+    };
+    let is_public = above.code.contains(&format!("pub mod {name};"));
+    prefix(sources, door, above).filter(|_| is_public).map(|outer| format!("{outer}{name}::"))
 }
 
 fn is_of_name(c: char) -> bool {
@@ -702,22 +580,94 @@ fn variants(rest: &str) -> Vec<String> {
     names.filter(|name| !name.is_empty()).collect()
 }
 
-/// Returns the texts that stand within 20 lines behind a `Button`.
-fn button_texts(code: &str) -> Vec<String> {
+/// Returns the texts that stand within 20 lines behind a `Button`, or that the names there stand for.
+fn button_texts(sources: &[SourceText]) -> Vec<String> {
     const REACH: usize = 20;
-    let (mut found, mut near) = (Vec::new(), 0_usize);
-    for line in code.lines() {
-        let is_import = line.trim_start().starts_with("use ");
-        let is_button = line
-            .match_indices("Button")
-            .any(|(at, word)| !line[..at].ends_with(is_of_name) && !line[at + word.len()..].starts_with(is_of_name));
-        near = if is_button && !is_import { REACH } else { near.saturating_sub(1) };
-        if near == 0 {
-            continue;
+    let mut found = Vec::new();
+    for code in sources.iter().map(|source| source.code.as_str()) {
+        let (mut near, mut offset) = (0_usize, 0);
+        for line in code.split_inclusive('\n') {
+            let is_import = line.trim_start().starts_with("use ");
+            let is_button = line.match_indices("Button").any(|(at, word)| {
+                !line[..at].ends_with(is_of_name) && !line[at + word.len()..].starts_with(is_of_name)
+            });
+            near = if is_button && !is_import { REACH } else { near.saturating_sub(1) };
+            for (at, words) in line.match_indices("Text::new(").filter(|_| near > 0) {
+                add_new(&mut found, labels(sources, code, offset + at, &line[at + words.len()..]));
+            }
+            offset += line.len();
         }
-        let texts = line.split("Text::new(\"").skip(1).filter_map(|rest| rest.split('"').next());
-        let is_plain = |text: &&str| !text.is_empty() && text.len() <= 30 && !text.contains(['{', '\\']);
-        add_new(&mut found, texts.filter(is_plain).map(str::to_owned).collect());
+    }
+    found
+}
+
+/// Returns the texts that a value in code stands for: the arguments of all calls, if it is a parameter of the function
+/// around it, else those of [`texts_of`].
+fn labels(sources: &[SourceText], code: &str, at: usize, value: &str) -> Vec<String> {
+    let Some(start) = code[..at].rfind("fn ") else { return texts_of(code, value) };
+    let of = name(value.trim_start_matches(['*', '&']));
+    let is_it = |parameter: &&str| !of.is_empty() && name(parameter.trim_start_matches("mut ")) == of;
+    let Some(place) = parts(&code[start..]).iter().position(is_it) else { return texts_of(code, value) };
+    let (mut found, call) = (Vec::new(), format!("{}(", name(&code[start + 3..])));
+    for code in sources.iter().map(|source| source.code.as_str()) {
+        let calls = code.match_indices(&call).filter(|(at, _)| !code[..*at].ends_with(is_of_name));
+        for (at, _) in calls.filter(|(at, _)| !code[..*at].ends_with("fn ")) {
+            add_new(&mut found, parts(&code[at..]).get(place).map_or_else(Vec::new, |value| texts_of(code, value)));
+        }
+    }
+    found
+}
+
+/// Returns the text that a value in code is, or those of the lists that loops and `map` run through with its name.
+fn texts_of(code: &str, value: &str) -> Vec<String> {
+    let value = value.trim_start_matches(['*', '&']);
+    if value.starts_with('"') || value.is_empty() {
+        return first_text(value).into_iter().collect();
+    }
+    let has_it = |pattern: &str| pattern.split(|c| !is_of_name(c)).any(|word| word == name(value));
+    let loops = code.match_indices("for ").filter_map(|(at, words)| code[at + words.len()..].split_once(" in "));
+    let loops = loops.filter(|(pattern, _)| has_it(pattern) && !pattern.contains(['{', ';'])).map(|(_, list)| list);
+    let maps = code.match_indices(".map(").filter_map(|(at, words)| {
+        let closure = code[at + words.len()..].trim_start_matches("move ").strip_prefix('|')?;
+        closure.split('|').next().is_some_and(has_it).then_some(at)
+    });
+    let maps = maps.map(|at| {
+        let list = code[..at].trim_end().trim_end_matches(".into_iter()").trim_end().trim_end_matches(".iter()");
+        let of_constant = list.trim_end_matches(is_of_name).len();
+        &code[if list.ends_with(']') { list.rfind('[').unwrap_or(0) } else { of_constant }..]
+    });
+    let mut found = Vec::new();
+    for list in loops.chain(maps).map(|list| list.trim_start_matches('&')) {
+        let constant = || code.split_once(&format!("{}:", name(list))).and_then(|(_, rest)| rest.split_once('='));
+        let values = if list.starts_with('[') { list } else { constant().map_or("", |(_, values)| values) };
+        found.extend(parts(values).into_iter().filter_map(first_text));
+    }
+    found
+}
+
+/// Returns the first text in code, if it can be the label of a button.
+fn first_text(code: &str) -> Option<String> {
+    let text = code.split('"').nth(1)?;
+    (!text.is_empty() && text.len() <= 30 && !text.contains(['{', '\\'])).then(|| text.to_owned())
+}
+
+/// Returns the parts of the first list in parentheses or brackets, between its commas.
+fn parts(code: &str) -> Vec<&str> {
+    let (mut depth, mut begin, mut is_text, mut found) = (0_i32, 0, false, Vec::new());
+    for (at, c) in code.char_indices() {
+        is_text ^= c == '"';
+        let is_one_of = |signs: &str| !is_text && signs.contains(c);
+        depth += i32::from(is_one_of("([{")) - i32::from(is_one_of(")]}"));
+        let is_over = depth == 0 && is_one_of(")]}");
+        if is_over || depth == 1 && is_one_of(",") {
+            found.push(code[begin..at].trim());
+        }
+        if is_over {
+            break;
+        }
+        if depth == 1 && is_one_of("([{,") {
+            begin = at + 1;
+        }
     }
     found
 }
@@ -729,58 +679,6 @@ mod tests {
     fn facts(sources: &[(&str, &str)]) -> GameFacts {
         let sources: Vec<_> = sources.iter().map(|(path, text)| SourceText::new(path, text)).collect();
         GameFacts::read(&GameManifest::default(), "src/lib.rs", &sources)
-    }
-
-    #[test]
-    fn a_manifest_has_its_bevy_in_every_form_that_toml_has() {
-        for (text, version, features) in [
-            ("[dependencies]\nbevy = \"0.19\" # \"0.18\"", Some("0.19"), &[] as &[&str]),
-            ("[dependencies]\nbevy = { version = '0.19.1', features = [\"a\", \"b\"] }", Some("0.19.1"), &["a", "b"]),
-            (
-                "[dependencies]\nbevy = { default-features = false, features = [\n  \"a\", # why\n  \"b\",\n] }",
-                None,
-                &["a", "b"],
-            ),
-            ("[dependencies.bevy]\nversion = \"0.18\"\nfeatures = [\"a\"]", Some("0.18"), &["a"]),
-            ("[dependencies]\nbevy.version = \"0.19\"\nbevy.features = [\"a\"]", Some("0.19"), &["a"]),
-            ("[dependencies]\nbevy = { git = \"https://example.org/bevy#main\" }", None, &[]),
-        ] {
-            let found = GameManifest::read(text).bevy.unwrap_or_else(|| panic!("no bevy in {text}"));
-            assert_eq!((found.version.as_deref(), found.is_inherited), (version, false), "{text}");
-            assert_eq!(found.features, features, "{text}");
-        }
-        let other = GameManifest::read("[dependencies]\nbevy_rapier2d = \"0.36\"\n[dev-dependencies]\nbevy = \"0.19\"");
-        assert_eq!((other.bevy.clone(), other.depends_on("bevy_rapier2d")), (None, true));
-    }
-
-    #[test]
-    fn a_manifest_has_its_package_its_library_and_its_members() {
-        let text = "[package]\nname = \"my-game\"\n[lib]\nname = \"mine\"\npath = \"code/lib.rs\"\n[workspace]\nmembers = [\n  \"a\",\n  \"crates/*\",\n]\n\
-            [workspace.dependencies]\nbevy = \"0.19\"\n[dependencies]\nbevy.workspace = true\n";
-        let manifest = GameManifest::read(text);
-        assert_eq!(manifest.package.as_deref(), Some("my-game"));
-        assert_eq!(
-            (manifest.library.as_deref(), manifest.library_path.as_deref()),
-            (Some("mine"), Some("code/lib.rs"))
-        );
-        assert!(manifest.is_workspace && manifest.members == ["a", "crates/*"], "{manifest:?}");
-        assert!(manifest.bevy.is_some_and(|bevy| bevy.is_inherited));
-        assert_eq!(manifest.workspace_bevy.and_then(|bevy| bevy.version).as_deref(), Some("0.19"));
-        assert!(!GameManifest::read("[package]\nname = \"a\"").is_workspace);
-    }
-
-    #[test]
-    fn versions_have_two_numbers_that_count() {
-        for (text, numbers) in [
-            ("0.19", Some((0, 19))),
-            ("^0.19.1", Some((0, 19))),
-            ("=0.19.0-rc.1", Some((0, 19))),
-            (">=0.18, <0.20", Some((0, 18))),
-            ("1", Some((1, 0))),
-            ("*", None),
-        ] {
-            assert_eq!(major_minor(text), numbers, "{text}");
-        }
     }
 
     #[test]
@@ -902,6 +800,53 @@ mod tests {
         }
         let without = code.replace("app.add_systems(FixedUpdate", "app.add_systems(Update");
         assert_eq!(facts(&[("src/lib.rs", &without)]).fixed, None, "an import alone");
+    }
+
+    #[test]
+    fn modules_within_modules_are_found_and_what_the_program_adds() {
+        let plugin = |name: &str| format!("pub struct {name};\nimpl Plugin for {name} {{}}\n");
+        let (hero, ghost) = (plugin("HeroPlugin"), plugin("GhostPlugin"));
+        let program = "fn main() { App::new().add_plugins((DefaultPlugins.set(x()), game::ui::plugin, \
+            game::actors::hero::HeroPlugin)).run(); }";
+        let found = facts(&[
+            ("src/lib.rs", "pub mod actors;\npub mod ui;"),
+            ("src/actors/mod.rs", "pub mod hero;\nmod ghost;"),
+            ("src/actors/hero.rs", &hero),
+            ("src/actors/ghost.rs", &ghost),
+            ("src/ui.rs", "pub fn plugin(app: &mut App) {}\npub fn other(app: &mut App) {}"),
+            ("src/main.rs", program),
+        ]);
+        let paths = |items: &[NamedItem]| items.iter().filter_map(|item| item.path.clone()).collect::<Vec<_>>();
+        assert_eq!(paths(&found.plugins), ["actors::hero::HeroPlugin"], "the other module is not public");
+        assert_eq!(paths(&found.functions), ["ui::plugin", "ui::other"]);
+        assert_eq!(paths(&found.added), ["ui::plugin", "actors::hero::HeroPlugin"]);
+    }
+
+    #[test]
+    fn a_state_that_loads_is_found() {
+        let screen = "#[derive(States)]\npub enum Screen { Menu, Playing }\n";
+        let loading = "#[derive(Default, States)]\nenum Phase { #[default] AssetLoading, Ready }\n";
+        assert_eq!(facts(&[("src/lib.rs", screen)]).loading_state(), None);
+        let found = facts(&[("src/lib.rs", &format!("{screen}{loading}"))]);
+        let (state, variant) = found.loading_state().expect("the second one");
+        assert_eq!((state.at.name.as_str(), state.at.line, variant), ("Phase", 4, "AssetLoading"));
+        assert_eq!((state.path.as_deref(), found.states[0].path.as_deref()), (None, Some("Screen")));
+    }
+
+    #[test]
+    fn labels_of_buttons_come_from_lists_and_from_calls_of_helpers() {
+        let helper = "pub fn button<T: Component>(parent: &mut ChildSpawner, label: &str, mark: T) {\n    \
+            parent.spawn((Button, mark)).with_child(Text::new(label));\n}";
+        let menu = "const ITEMS: [(&str, Go); 2] = [(\"Play, now\", Go::Play), (\"Quit\", Go::Quit)];\n\
+            fn menu(parent: &mut ChildSpawner) {\n    button(parent, \"Resume\", Mark(\"a\"));\n    \
+            for (label, go) in ITEMS { button(parent, label, go); }\n    my_button(parent, \"None\");\n}";
+        let levels = "fn levels() {\n    for name in &[\"Cave\", \"Mill\"] {\n        \
+            spawn((Button, children![Text::new(*name)]));\n    }\n    \
+            [\"Easy\", \"Hard\"]\n        .into_iter()\n        .map(move |label| (Button, children![Text::new(label.to_owned())]));\n    \
+            (Button, children![Text::new(title())]);\n}\nfn press(on: On<Pointer<Click>>) {}";
+        let all = [("src/levels.rs", levels), ("src/menu.rs", menu), ("src/widgets.rs", helper)];
+        assert_eq!(facts(&all).buttons, ["Cave", "Mill", "Easy", "Hard", "Resume", "Play, now", "Quit"]);
+        assert_eq!(facts(&all[1..]).buttons, Vec::<String>::new(), "nothing hears of a click");
     }
 
     #[test]
