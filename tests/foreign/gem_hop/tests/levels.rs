@@ -7,10 +7,12 @@ mod game;
 use std::ops::ControlFlow;
 
 use bevy::prelude::*;
-use game::{Hero, Level, Map, Screen, game};
+use bevy_rapier2d::prelude::CollisionEvent;
+use game::{Hero, Level, Map, Run, Screen, game};
 use playbot::harness::{
     foreign::{ForeignGame, LevelSeed, Restart},
     game::Game,
+    saved_episode::SavedEpisode,
     worlds::build_world,
 };
 use playbot::prelude::*;
@@ -85,12 +87,17 @@ fn an_episode_is_the_same_after_another_level_and_in_a_new_world() {
     assert_ne!(episodes[0], episodes[1]);
 }
 
-#[test]
-fn explorers_find_the_same_from_snapshots_as_by_replays() {
-    let game = gem_hop()
+/// Returns the game with snapshots.
+fn saving() -> ForeignGame {
+    gem_hop()
         .position(|hero: Single<&Transform, With<Hero>>| hero.translation.truncate())
         .snapshots()
-        .snapshot_of(|map: &Map| map.columns.clone(), |map, columns| map.columns.clone_from(columns));
+        .snapshot_of(|map: &Map| map.columns.clone(), |map, columns| map.columns.clone_from(columns))
+}
+
+#[test]
+fn explorers_find_the_same_from_snapshots_as_by_replays() {
+    let game = saving();
     let explored = |snapshots: bool| {
         let plan = ExplorePlan { steps: 20_000, until: Until::Spent, snapshots, ..ExplorePlan::new("default", 3) };
         let found = explore(&game, &plan, |_| {}, |_| ControlFlow::Continue(()));
@@ -100,4 +107,31 @@ fn explorers_find_the_same_from_snapshots_as_by_replays() {
     assert_eq!((&restored.snapshot_fault, &restored.snapshot_obstacle), (&None, &None));
     assert!(restored.restored_steps > 0, "of {}", restored.steps);
     assert_eq!(format!("{:?}", restored.summary(&game)), format!("{:?}", replayed.summary(&game)));
+}
+
+/// Rapier's messages are not in Bevy's registry of messages.
+#[test]
+fn a_gem_that_was_touched_before_a_load_is_not_taken_after_it() {
+    let game = saving();
+    let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
+    SavedEpisode::prepare(&game, &mut world);
+    world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(3)));
+    game.tools().bots.attach_demonstrator(&mut world, agents[0], 0.0);
+    let (mut saved, mut touched) = (None, 0);
+    for _ in 0..1000 {
+        world.tick().expect("sound");
+        saved = saved.or_else(|| SavedEpisode::of(&game, &world, agents[0]));
+        touched = world.resource::<Messages<CollisionEvent>>().len();
+        if touched > 0 {
+            break;
+        }
+    }
+    let saved = saved.expect("no message waits before the first gem");
+    assert!(touched > 0 && world.resource::<Run>().gems == 0, "the game is told in the next tick");
+    assert!(saved.restore(&game, &mut world, agents[0]));
+    world.tick().expect("sound");
+    assert_eq!(
+        (world.resource::<Run>().gems, saved.tick() + 1),
+        (0, world.get::<Episode>(agents[0]).expect("one").tick)
+    );
 }
