@@ -6,14 +6,20 @@ use bevy::{
     prelude::*,
     reflect::{Reflect, TypeRegistry},
 };
-use bevy_playbot::{agent::AgentOrder, engine::BlankEpisodes};
+use bevy_playbot::{
+    action::{ActionSpace, ActionValue},
+    agent::{Agent, AgentOrder},
+    engine::BlankEpisodes,
+    legal::LegalActions,
+};
 use playbot_harness::detector::{
     Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher,
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A finding for games in which nothing changes for any action: not the state and not the observations. A menu that no
-/// action leaves is such a game, so the message names the game's states and buttons.
+/// action leaves is such a game, so the message names the game's states and buttons. Every action must have been taken
+/// meanwhile, or the action must have changed in a tenth of the ticks.
 pub struct FrozenWorld {
     ticks: f64,
 }
@@ -29,6 +35,27 @@ struct Still {
     state: Option<u64>,
     same: u32,
     efforts: Efforts,
+    /// The choices that were taken since the last change.
+    tried: BTreeSet<u32>,
+}
+
+impl Still {
+    fn note(&mut self, action: &ActionValue) {
+        self.efforts.note(action);
+        if let ActionValue::Discrete(choice) = action {
+            self.tried.insert(*choice);
+        }
+    }
+
+    /// Returns whether every action that is legal was taken. Bots that hold each action for a while seldom change it.
+    fn has_tried_all(&self, moment: &DetectorTick<'_>) -> bool {
+        let Some(&Agent { actions: ActionSpace::Discrete(count), .. }) = moment.world.get(moment.agent) else {
+            return false;
+        };
+        let legal = moment.world.get::<LegalActions>(moment.agent);
+        let is_legal = |choice: u32| legal.is_none_or(|legal| legal.allows(&ActionValue::Discrete(choice)));
+        (0..count as u32).all(|choice| self.tried.contains(&choice) || !is_legal(choice))
+    }
 }
 
 impl Detector for FrozenWorld {
@@ -45,21 +72,24 @@ impl Detector for FrozenWorld {
     }
 
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
-        Some(Box::new(Still { ticks: self.ticks as u32, state: None, same: 0, efforts: Efforts::default() }))
+        let ticks = self.ticks as u32;
+        Some(Box::new(Still { ticks, state: None, same: 0, efforts: Efforts::default(), tried: BTreeSet::new() }))
     }
 }
 
 impl EpisodeWatcher for Still {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let state = moment.fingerprint();
-        self.efforts.note(moment.action);
+        self.note(moment.action);
         if self.state == Some(state) {
             self.same += 1;
         } else {
             (self.state, self.same) = (Some(state), 0);
             self.efforts.restart();
+            self.tried.clear();
         }
-        (self.same >= self.ticks && self.efforts.are_many(self.same)).then(|| {
+        let has_tried = || self.efforts.are_many(self.same) || self.has_tried_all(moment);
+        (self.same >= self.ticks && has_tried()).then(|| {
             let since = if self.same == moment.tick { "since the start of the episode, " } else { "" };
             let screen = screen(moment.world).map_or_else(String::new, |screen| format!(": {screen}"));
             format!("nothing has changed {since}for {} ticks, whatever the agent did{screen}", self.same)
@@ -275,6 +305,25 @@ mod tests {
         let clock = |tick: usize| Step { seen: (tick / 200) as f32, ..Step::at(tick, 5.0, 5.0) };
         let steps: Vec<Step> = (0..600).map(clock).collect();
         assert_eq!(found(&FrozenWorld::default(), &room(), &steps), None);
+    }
+
+    #[test]
+    fn a_world_that_stands_still_for_every_action_is_found_and_one_in_which_one_is_left_is_not() {
+        let mut world = World::new();
+        let agent = world.spawn(Agent::new(0, ActionSpace::Discrete(4))).id();
+        let tick_of_finding = |world: &World, actions: [u32; 4]| {
+            let mut watch = FrozenWorld::default().watch(&room()).expect("it looks at each level");
+            (0..800u32).find(|tick| {
+                // Each action is held for 100 ticks.
+                let action = ActionValue::Discrete(actions[*tick as usize / 100 % 4]);
+                let moment = DetectorTick { agent, tick: *tick, ..DetectorTick::of(world, &action) };
+                watch.tick(&moment).is_some()
+            })
+        };
+        assert_eq!(tick_of_finding(&world, [0, 1, 2, 3]), Some(300));
+        assert_eq!(tick_of_finding(&world, [0, 1, 2, 1]), None, "the last one may have an effect");
+        world.entity_mut(agent).insert(LegalActions::new([true, true, true, false]));
+        assert_eq!(tick_of_finding(&world, [0, 1, 2, 1]), Some(300), "it is illegal");
     }
 
     #[test]

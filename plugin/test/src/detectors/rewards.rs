@@ -57,8 +57,8 @@ impl LevelDetector for RewardFarm {
 }
 
 /// A finding for agents that earn again and again for coming back to the same spot or staying there. A reward for
-/// getting nearer to something pays nothing on the path back. It is opt-in, because a game that pays for each tick does
-/// so everywhere.
+/// getting nearer to something pays nothing on the path back. Payments of less than a thousandth of the largest reward of
+/// a tick do not count. It is opt-in, because a game that pays for each tick does so everywhere.
 pub struct RewardLoop {
     times: f64,
     spot: f64,
@@ -73,6 +73,10 @@ impl Default for RewardLoop {
 /// Least sum of rewards that is more than rounding.
 const SOMETHING: f32 = 1e-4;
 
+/// Least payment, as a share of the largest reward of a tick so far: an agent that physics pushes on within the spot is
+/// paid a little for the way.
+const LITTLE: f32 = 1e-3;
+
 /// The earnings of an agent between its visits to a spot.
 #[derive(Default)]
 struct Visits {
@@ -86,6 +90,8 @@ struct Earning {
     times: u32,
     grid: CellGrid,
     sum: f32,
+    /// The largest reward of a tick.
+    largest: f32,
     spots: BTreeMap<(i32, i32), Visits>,
 }
 
@@ -112,7 +118,7 @@ impl Detector for RewardLoop {
     fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let tile = CellGrid::new(level.plan.as_ref(), None).size;
         let grid = CellGrid::new(level.plan.as_ref(), Some(self.spot as f32 * tile));
-        Some(Box::new(Earning { times: self.times as u32, grid, sum: 0.0, spots: BTreeMap::new() }))
+        Some(Box::new(Earning { times: self.times as u32, grid, sum: 0.0, largest: 0.0, spots: BTreeMap::new() }))
     }
 }
 
@@ -122,13 +128,14 @@ impl EpisodeWatcher for Earning {
             return None;
         }
         self.sum += moment.reward;
+        self.largest = self.largest.max(moment.reward.abs());
         let position = moment.position?;
         let cell = self.grid.cell_at(position)?;
         let &[column, row] = cell.0.as_slice() else { return None };
         let is_first = !self.spots.contains_key(&(column, row));
         let visits = self.spots.entry((column, row)).or_default();
         let earned = self.sum - std::mem::replace(&mut visits.last, self.sum);
-        visits.paid += u32::from(!is_first && earned > SOMETHING);
+        visits.paid += u32::from(!is_first && earned > SOMETHING.max(LITTLE * self.largest));
         (visits.paid >= self.times).then(|| {
             format!(
                 "the agent was paid {} times for coming back to {:.1}, {:.1} or staying there, {earned} the last time",
@@ -162,6 +169,18 @@ mod tests {
         assert_eq!(found(&RewardLoop::default(), &room(), &coins), None);
         let goal = steps(40, |tick| Step { reward: 1.0, is_success: true, ..Step::at(tick, 8.5, 8.5) });
         assert_eq!(found(&RewardLoop::default(), &room(), &goal), None);
+    }
+
+    #[test]
+    fn who_is_pushed_on_within_a_spot_is_paid_for_the_way() {
+        let creep = |fruit: f32| {
+            let reward = |tick: usize| if tick == 0 { fruit } else { 2e-4 };
+            let steps =
+                steps(40, |tick| Step { reward: reward(tick), ..Step::at(tick, 4.501 + tick as f32 * 2e-4, 4.5) });
+            found(&RewardLoop::default(), &room(), &steps)
+        };
+        assert_eq!(creep(1.0), None);
+        assert!(creep(0.0).is_some(), "there is no larger reward");
     }
 
     #[test]

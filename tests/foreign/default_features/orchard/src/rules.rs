@@ -1,7 +1,8 @@
-//! Detector of the game's rules for fruit, rewards and ends. Playing needs none of it.
+//! Detector of the game's rules for falls, fruit, rewards and ends. Playing needs none of it.
 
+use avian2d::prelude::LinearVelocity;
 use bevy::prelude::*;
-use foreign_orchard::{Run, Screen, Thing};
+use foreign_orchard::{Hero, Run, Screen, Thing};
 use playbot::harness::{
     detector::{Detector, DetectorTick, EpisodeWatcher, LevelAhead},
     eval::EpisodeResult,
@@ -17,6 +18,18 @@ const TIME: u32 = 1500;
 /// Largest difference of rewards from rounding.
 const ROUNDING: f32 = 1e-3;
 
+/// Gravity, tiles per second squared.
+const GRAVITY: f32 = 36.0;
+
+/// Steps of the game in a second.
+const HZ: f32 = 64.0;
+
+/// Ticks of a fall that are enough to tell how strong gravity is: what the hero touches changes its speed unevenly.
+const FALL: u32 = 6;
+
+/// Largest difference of changes of speed in a fall, in a tick.
+const UNEVEN: f32 = 0.02;
+
 /// Adds the detector and the possible defects to the game.
 pub fn add_to(game: ForeignGame) -> ForeignGame {
     defects::add_to(game).detector(|| Rules)
@@ -30,7 +43,7 @@ impl Detector for Rules {
     }
 
     fn describe(&self) -> &'static str {
-        "fruit that does not count, a reward for something else, or an end that the screen does not show"
+        "a fall that is not of the game's gravity, fruit that does not count, a reward for something else, or an end that the screen does not show"
     }
 
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -38,9 +51,33 @@ impl Detector for Rules {
     }
 }
 
-/// The run after the last tick.
+/// The run and the fall after the last tick.
 #[derive(Default)]
-struct Watched(Option<Seen>);
+struct Watched(Option<Seen>, Fall);
+
+/// A hero in the air.
+#[derive(Default)]
+struct Fall {
+    speed: Option<f32>,
+    /// The last change of speed, and the ticks for which it was the same.
+    change: f32,
+    ticks: u32,
+}
+
+impl Fall {
+    /// Notes the upward speed in the air; `None` on the ground.
+    fn tick(&mut self, speed: Option<f32>) -> Option<String> {
+        let (Some(before), Some(now)) = (self.speed, speed) else {
+            *self = Self { speed, ..Self::default() };
+            return None;
+        };
+        let change = now - before;
+        self.ticks = if (change - self.change).abs() < UNEVEN { self.ticks + 1 } else { 0 };
+        (self.speed, self.change) = (speed, change);
+        let is_wrong = (change + GRAVITY / HZ).abs() > 5.0 * UNEVEN;
+        (is_wrong && self.ticks >= FALL).then(|| format!("the hero falls by {:.1} in a second", -change * HZ))
+    }
+}
 
 #[derive(Clone, Copy)]
 struct Seen {
@@ -53,6 +90,11 @@ struct Seen {
 
 impl EpisodeWatcher for Watched {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
+        let heroes = moment.world.try_query::<(&Hero, &LinearVelocity)>();
+        let hero = heroes.and_then(|mut heroes| heroes.iter(moment.world).next().map(|(hero, pace)| (hero.coyote, pace.y)));
+        if let Some(fall) = self.1.tick(hero.filter(|(coyote, _)| *coyote < 0.0).map(|(_, speed)| speed)) {
+            return Some(fall);
+        }
         let run = moment.world.get_resource::<Run>()?;
         let left = moment
             .world
@@ -95,7 +137,7 @@ mod tests {
     /// Returns the message about a tick after which two fruit are counted, none is left, and the hero is at 15.
     fn said(before: Option<Seen>, reward: f32) -> Option<String> {
         let run = Run { fruit: 2, distance: 15.0 };
-        at(run, Screen::Playing, reward, |moment| Watched(before).tick(moment))
+        at(run, Screen::Playing, reward, |moment| Watched(before, Fall::default()).tick(moment))
     }
 
     #[test]
@@ -103,6 +145,19 @@ mod tests {
         let is_wrong = |paid, reward| said(Some(Seen { paid, fruit: 2, left: 0 }), reward).is_some();
         assert!(!is_wrong(3.4, 0.1) && !is_wrong(3.5, 0.0) && said(None, 0.7).is_none());
         assert!(is_wrong(3.5, 0.1) && is_wrong(3.4, 0.0));
+    }
+
+    #[test]
+    fn falls_are_of_the_games_gravity() {
+        let said = |change: f32| {
+            let mut fall = Fall::default();
+            (0..20).find_map(|tick| fall.tick((tick > 2).then_some(9.0 + tick as f32 * change)))
+        };
+        assert_eq!(said(-GRAVITY / HZ), None);
+        assert_eq!(said(-0.5 * GRAVITY / HZ).as_deref(), Some("the hero falls by 18.0 in a second"));
+        let mut rolling = Fall::default();
+        let uneven = (0..20).find_map(|tick| rolling.tick(Some(-0.05 * (tick * tick) as f32)));
+        assert_eq!(uneven, None, "something is in the way");
     }
 
     #[test]
