@@ -27,6 +27,9 @@ const HZ: f32 = 64.0;
 /// Ticks of a fall that are enough to tell how strong gravity is: what the hero touches changes its speed unevenly.
 const FALL: u32 = 6;
 
+/// Least speed of a fall: a hero may hang between two edges.
+const FALLS: f32 = 1.0;
+
 /// Largest difference of changes of speed in a fall, in a tick.
 const UNEVEN: f32 = 0.02;
 
@@ -43,7 +46,8 @@ impl Detector for Rules {
     }
 
     fn describe(&self) -> &'static str {
-        "a fall that is not of the game's gravity, fruit that does not count, a reward for something else, or an end that the screen does not show"
+        "a fall of another gravity, fruit that does not count, a reward for something else, or an end that the screen does \
+         not show"
     }
 
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -74,7 +78,7 @@ impl Fall {
         let change = now - before;
         self.ticks = if (change - self.change).abs() < UNEVEN { self.ticks + 1 } else { 0 };
         (self.speed, self.change) = (speed, change);
-        let is_wrong = (change + GRAVITY / HZ).abs() > 5.0 * UNEVEN;
+        let is_wrong = now.abs() > FALLS && (change + GRAVITY / HZ).abs() > 5.0 * UNEVEN;
         (is_wrong && self.ticks >= FALL).then(|| format!("the hero falls by {:.1} in a second", -change * HZ))
     }
 }
@@ -91,7 +95,8 @@ struct Seen {
 impl EpisodeWatcher for Watched {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let heroes = moment.world.try_query::<(&Hero, &LinearVelocity)>();
-        let hero = heroes.and_then(|mut heroes| heroes.iter(moment.world).next().map(|(hero, pace)| (hero.coyote, pace.y)));
+        let hero =
+            heroes.and_then(|mut heroes| heroes.iter(moment.world).next().map(|(hero, pace)| (hero.coyote, pace.y)));
         if let Some(fall) = self.1.tick(hero.filter(|(coyote, _)| *coyote < 0.0).map(|(_, speed)| speed)) {
             return Some(fall);
         }
