@@ -38,6 +38,9 @@ static FIRST: AtomicU8 = AtomicU8::new(INTERRUPT);
 /// Ctrl-C was pressed; a second one stops at once.
 static HEARD: AtomicBool = AtomicBool::new(false);
 
+/// True once stopped work only sums up what it has.
+static SUMS_UP: AtomicBool = AtomicBool::new(false);
+
 /// Work is to stop.
 static ASKED: AtomicBool = AtomicBool::new(false);
 
@@ -149,6 +152,9 @@ fn hear(signal: u8) {
 #[expect(clippy::disallowed_methods, reason = "people wait by the clock, and nothing is simulated here")]
 fn stop_in_time() {
     thread::sleep(PATIENCE);
+    if SUMS_UP.load(Ordering::SeqCst) {
+        return;
+    }
     stop("stopped within a step, which would have taken longer")
 }
 
@@ -176,6 +182,15 @@ pub(crate) fn exit_code() -> u8 {
 /// Returns true if Ctrl-C was pressed.
 pub(crate) fn asked() -> bool {
     ASKED.load(Ordering::SeqCst)
+}
+
+/// Returns true if Ctrl-C was pressed. From then on the work only sums up what it has, for as long as that takes.
+pub(crate) fn asked_to_sum_up() -> bool {
+    let is_asked = asked();
+    if is_asked {
+        SUMS_UP.store(true, Ordering::SeqCst);
+    }
+    is_asked
 }
 
 /// Notes the saved part, in words, for the message of a second Ctrl-C.

@@ -79,14 +79,14 @@ pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let (equal, compared, alike) = compare(game, &levels, args, threads);
     let of_play = alike.filter(|alike| alike.by_state);
     let among = args.among.iter().enumerate().map(|(index, others)| {
-        let mut known = levels_in_until(game, &levels, others, &interrupt::asked);
+        let mut known = levels_in_until(game, &levels, others, &interrupt::asked_to_sum_up);
         known.extend(of_play.iter().flat_map(|alike| alike.among(index + 1)));
         (others.clone(), known)
     });
-    let (among, plans) = (among.collect(), EqualPlans::of_until(game, &levels, &interrupt::asked));
+    let (among, plans) = (among.collect(), EqualPlans::of_until(game, &levels, &interrupt::asked_to_sum_up));
     let plain = if args.layouts_only { None } else { play(game, &levels, threads)? };
     let names = names(game, &levels);
-    let audit = Audit { among, equal, compared, plans, plain, names, levels, is_stopped: interrupt::asked() };
+    let audit = Audit { among, equal, compared, plans, plain, names, levels, is_stopped: interrupt::asked_to_sum_up() };
     print_line(if args.json { audit.to_json(game) } else { audit.to_text(game) })?;
     if audit.is_stopped {
         report!("{}: the same command does all of it again{quicker}", audit.progress());
@@ -98,7 +98,7 @@ pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
 /// Compares levels by their layouts, or by their play if the game does not hash them, until Ctrl-C is pressed. Returns the
 /// number of compared levels as well. The play is also that of the other sets.
 fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args, threads: usize) -> (Equality, u64, Option<AlikeLevels>) {
-    if let Some((equal, compared)) = EqualLevels::of_until(game, levels, &interrupt::asked) {
+    if let Some((equal, compared)) = EqualLevels::of_until(game, levels, &interrupt::asked_to_sum_up) {
         return (Equality::Layouts(equal), compared, None);
     }
     if args.layouts_only {
@@ -110,8 +110,9 @@ fn compare(game: &dyn Game, levels: &LevelSplit, args: &Args, threads: usize) ->
         .collect();
     // Groups of the other sets alone do not count.
     let is_wanted = |group: &[PlacedLevel]| group.iter().any(|(range, _)| *range == 0);
-    let alike =
-        progress::comparing(|progress| AlikeLevels::of(game, &ranges, is_wanted, threads, progress, &interrupt::asked));
+    let alike = progress::comparing(|progress| {
+        AlikeLevels::of(game, &ranges, is_wanted, threads, progress, &interrupt::asked_to_sum_up)
+    });
     let equal = EqualLevels::of_alike(&alike);
     let equality = match (equal.layouts, alike.by_state) {
         (0, _) => Equality::Unknown,
@@ -136,11 +137,11 @@ fn names(game: &dyn Game, levels: &LevelSplit) -> BTreeMap<u64, String> {
 
 /// Holds each action in each level; `None` if Ctrl-C was pressed.
 fn play(game: &dyn Game, levels: &LevelSplit, threads: usize) -> Result<Option<PlainLevels>, CliError> {
-    if interrupt::asked() {
+    if interrupt::asked_to_sum_up() {
         return Ok(None);
     }
     let bar = progress::bar("hold each action", plain_episodes(game, levels), "episodes");
-    let plain = PlainLevels::of_until(game, levels, threads, |episodes| bar.inc(episodes), &interrupt::asked);
+    let plain = PlainLevels::of_until(game, levels, threads, |episodes| bar.inc(episodes), &interrupt::asked_to_sum_up);
     bar.finish_and_clear();
     Ok(plain?)
 }

@@ -169,7 +169,9 @@ fn forget_messages(world: &mut World, foreign: &Foreign, before: Tick) {
 ///
 /// Only Bevy's name of a queue and the tick of its last message are known. How many messages wait, and which systems have
 /// read them, is hidden behind the type.
-#[derive(Resource, Clone, Debug, Default)]
+#[derive(Resource, Clone, Debug, Default, Reflect)]
+#[reflect(opaque)]
+#[reflect(Resource, Clone)]
 pub(crate) struct LeftMessages {
     /// Types that were written while an episode was taken down, so that no system has read them.
     pub unread: BTreeSet<String>,
