@@ -32,19 +32,17 @@ fn recorded_by_mouse(scale: Option<&str>, start: [u32; 2], cell: [u32; 2]) -> [O
     use playbot_shell::{Desk, Shell};
 
     let (desk, shell) = (Desk::new(GAME.program), Shell::new(GAME.program));
-    let args = ["play", "slide", "--levels", "0..0", "--record", "mine.demo"];
-    let seat = match scale {
+    let args = ["play", "slide", "--levels", "0..0", "--record", "mine.demo", "--no-time-limit"];
+    let mut seat = match scale {
         Some(scale) => desk.open_scaled(shell.folder(), &args, scale),
         None => desk.open(shell.folder(), &args),
     };
-    // An episode has 120 ticks, and this one begins anew.
     seat.tap("r");
-    seat.sit_out(6);
+    seat.pass_ticks(12);
     seat.click(start[0], start[1]);
-    seat.sit_out(6);
+    seat.pass_ticks(12);
     seat.click(cell[0], cell[1]);
-    // A busy computer draws few frames a second.
-    seat.sit_out(12);
+    seat.pass_ticks(12);
     leave_with(&shell, seat, "mine.demo");
     let episodes = shell.answers(&["demo", "show", "mine.demo", "--json"]).len();
     let ticks = (0..episodes)
