@@ -5,8 +5,9 @@
 //! gone, or be there in part.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, HashSet},
     fs,
+    hash::{DefaultHasher, Hash, Hasher},
     path::{Path, PathBuf},
 };
 
@@ -50,6 +51,16 @@ pub fn power_cuts(operations: &[DiskOperation]) -> Vec<PowerCut> {
         })
     });
     all.collect()
+}
+
+/// Returns those of the power cuts that leave this disk in different states: the last of equal ones, since most was finished
+/// by then.
+pub fn distinct_power_cuts(disk: &PaperDisk, operations: &[DiskOperation]) -> Vec<PowerCut> {
+    let (mut seen, mut cuts) = (HashSet::new(), power_cuts(operations));
+    cuts.reverse();
+    cuts.retain(|cut| seen.insert(disk.clone().after(operations, cut).hash()));
+    cuts.reverse();
+    cuts
 }
 
 #[derive(Clone, Debug, Default)]
@@ -147,6 +158,15 @@ impl PaperDisk {
         self.names.contains_key(path)
     }
 
+    /// Returns a hash of all names and bytes.
+    fn hash(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        for (path, kind) in &self.names {
+            (path, kind.map(|place| &self.contents[place].now)).hash(&mut hasher);
+        }
+        hasher.finish()
+    }
+
     /// Puts the files that lie below `from` below `to`.
     pub fn write(&self, from: &Path, to: &Path) {
         for (path, kind) in &self.names {
@@ -233,6 +253,8 @@ mod tests {
         };
         assert_eq!(log(Unsynced::Lost), b"first");
         assert_eq!(log(Unsynced::Halved), b"firstsecon");
-        assert!(power_cuts(&operations).len() > 3 * operations.len());
+        let (all, distinct) = (power_cuts(&operations), distinct_power_cuts(&PaperDisk::default(), &operations));
+        assert!(all.len() > 3 * operations.len() && distinct.len() > operations.len(), "{}", distinct.len());
+        assert!(distinct.len() < all.len() && distinct.last().map(|cut| cut.operations) == Some(operations.len()));
     }
 }

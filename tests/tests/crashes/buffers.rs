@@ -5,7 +5,7 @@ use std::path::Path;
 use playbot_learner::{DeviceKind, disk::DiskRecording};
 use playbot_tests::{
     Corridor,
-    power_cut::{PaperDisk, PowerCut, power_cuts},
+    power_cut::{PaperDisk, PowerCut, distinct_power_cuts},
     small,
     training::{run_info, written},
 };
@@ -61,7 +61,7 @@ fn a_training_with_a_replay_buffer_goes_on_to_the_same_bytes_wherever_the_power_
     train_on(&run, fresh());
     let (operations, undisturbed, files) = (recording.operations(), written(&run), tree(folder.path()));
     let (mut begun, mut gone_on) = (0, 0);
-    for cut in power_cuts(&operations) {
+    for cut in distinct_power_cuts(&PaperDisk::default(), &operations) {
         let left = tempfile::tempdir().expect("a folder");
         PaperDisk::default().after(&operations, &cut).write(folder.path(), left.path());
         let run = left.path().join("run");

@@ -9,7 +9,7 @@ use playbot_learner::{
 };
 use playbot_tests::{
     Corridor,
-    power_cut::{PaperDisk, power_cuts},
+    power_cut::{PaperDisk, distinct_power_cuts},
     small,
     training::{run_info, train, written},
 };
@@ -102,10 +102,9 @@ fn a_study_comes_to_the_same_result_wherever_the_power_failed() {
     let recording = DiskRecording::of(folder.path());
     study(folder.path());
     let (operations, undisturbed, files) = (recording.operations(), files_of(folder.path()), tree(folder.path()));
-    let cuts = power_cuts(&operations);
-    assert!(cuts.len() > 300, "{} places", cuts.len());
-    // Half of them, alternately: each takes a training of its own.
-    for cut in cuts.iter().step_by(2) {
+    let cuts = distinct_power_cuts(&PaperDisk::default(), &operations);
+    assert!(cuts.len() > 100, "{} states", cuts.len());
+    for cut in &cuts {
         let left = tempfile::tempdir().expect("a folder");
         PaperDisk::default().after(&operations, cut).write(folder.path(), left.path());
         study(left.path());
