@@ -19,7 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// A finding for games in which nothing changes for any action: not the state and not the observations. A menu that no
 /// action leaves is such a game, so the message names the game's states and buttons. Every action must have been taken
-/// meanwhile, or the action must have changed in a tenth of the ticks.
+/// a while ago, or the action must have changed in a tenth of the ticks.
 pub struct FrozenWorld {
     ticks: f64,
 }
@@ -30,6 +30,7 @@ impl Default for FrozenWorld {
     }
 }
 
+#[derive(Default)]
 struct Still {
     ticks: u32,
     state: Option<u64>,
@@ -37,14 +38,26 @@ struct Still {
     efforts: Efforts,
     /// The choices that were taken since the last change.
     tried: BTreeSet<u32>,
+    /// Ticks since every legal choice was taken.
+    since_all: u32,
 }
 
+/// Ticks in which an action shows its effect: a button is pressed when it is released.
+const LATE: u32 = 100;
+
 impl Still {
-    fn note(&mut self, action: &ActionValue) {
-        self.efforts.note(action);
-        if let ActionValue::Discrete(choice) = action {
+    fn note(&mut self, moment: &DetectorTick<'_>) {
+        self.efforts.note(moment.action);
+        if let ActionValue::Discrete(choice) = moment.action {
             self.tried.insert(*choice);
         }
+        self.since_all = if self.has_tried_all(moment) { self.since_all + 1 } else { 0 };
+    }
+
+    fn restart(&mut self) {
+        self.efforts.restart();
+        self.tried.clear();
+        self.since_all = 0;
     }
 
     /// Returns whether every action that is legal was taken. Bots that hold each action for a while seldom change it.
@@ -73,22 +86,21 @@ impl Detector for FrozenWorld {
 
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let ticks = self.ticks as u32;
-        Some(Box::new(Still { ticks, state: None, same: 0, efforts: Efforts::default(), tried: BTreeSet::new() }))
+        Some(Box::new(Still { ticks, ..Still::default() }))
     }
 }
 
 impl EpisodeWatcher for Still {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let state = moment.fingerprint();
-        self.note(moment.action);
+        self.note(moment);
         if self.state == Some(state) {
             self.same += 1;
         } else {
             (self.state, self.same) = (Some(state), 0);
-            self.efforts.restart();
-            self.tried.clear();
+            self.restart();
         }
-        let has_tried = || self.efforts.are_many(self.same) || self.has_tried_all(moment);
+        let has_tried = || self.efforts.are_many(self.same) || self.since_all > LATE;
         (self.same >= self.ticks && has_tried()).then(|| {
             let since = if self.same == moment.tick { "since the start of the episode, " } else { "" };
             let screen = screen(moment.world).map_or_else(String::new, |screen| format!(": {screen}"));
@@ -320,7 +332,7 @@ mod tests {
                 watch.tick(&moment).is_some()
             })
         };
-        assert_eq!(tick_of_finding(&world, [0, 1, 2, 3]), Some(300));
+        assert_eq!(tick_of_finding(&world, [0, 1, 2, 3]), Some(300 + LATE), "the last one needs its time");
         assert_eq!(tick_of_finding(&world, [0, 1, 2, 1]), None, "the last one may have an effect");
         world.entity_mut(agent).insert(LegalActions::new([true, true, true, false]));
         assert_eq!(tick_of_finding(&world, [0, 1, 2, 1]), Some(300), "it is illegal");
