@@ -170,7 +170,7 @@ mod tests {
         assert_eq!(actions_in(&game, text), Ok(vec![start, space, idle, start, 0, 1, 0]));
         for (text, wanted) in [
             ("click Stop", "`click Stop` is not an action of `menu` (did you mean `click Start`?)"),
-            ("0 nothing Spcae", "`Spcae` is not an action of `menu` (did you mean `Space`?)"),
+            ("0 nothing Spade", "`Spade` is not an action of `menu` (did you mean `Space`?)"),
         ] {
             let words = actions_in(&game, text).expect_err("no such action");
             assert!(words.starts_with(wanted), "{words}");
