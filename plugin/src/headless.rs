@@ -48,7 +48,7 @@ use crate::{
     renewal, system_errors, systems,
 };
 use bevy::{
-    app::{PanicHandlerPlugin, PluginGroupBuilder, TerminalCtrlCHandlerPlugin},
+    app::{PanicHandlerPlugin, PluginGroupBuilder, TaskPoolOptions, TaskPoolPlugin, TerminalCtrlCHandlerPlugin},
     ecs::schedule::{Schedules, SingleThreadedExecutor},
     prelude::*,
     time::{TimePlugin, TimeUpdateStrategy},
@@ -138,6 +138,7 @@ pub fn run_on_one_thread(world: &mut World) {
     for (_, schedule) in world.resource_mut::<Schedules>().iter_mut() {
         schedule.set_executor(SingleThreadedExecutor::new());
     }
+    systems::mark_trees_on_one_thread(world);
     if world.contains_resource::<FrameGate>() {
         systems::put_in_order(world);
     }
@@ -339,9 +340,17 @@ impl PluginGroup for HeadlessPlugins {
                     ..default()
                 },
             );
-        let plugins = bevy_parts::with_one_log(bevy_parts::without_devices(plugins));
+        let plugins = bevy_parts::with_one_log(bevy_parts::without_devices(plugins)).set(one_thread_for_each_world());
         if self.draws { drawing(plugins) } else { not_drawing(plugins, self.shows_sub_app) }
     }
+}
+
+/// Bevy's pools of threads, with one thread for work within a frame: its systems then loop on the thread of their World,
+/// and so in the same order on every machine.
+fn one_thread_for_each_world() -> TaskPoolPlugin {
+    let mut options = TaskPoolOptions::default();
+    (options.compute.min_threads, options.compute.max_threads) = (1, 1);
+    TaskPoolPlugin { task_pool_options: options }
 }
 
 #[cfg(feature = "camera")]

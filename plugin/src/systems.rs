@@ -17,12 +17,19 @@
 //! ```
 
 use bevy::{
-    ecs::schedule::{
-        FlattenedDependencies, NodeId, ScheduleBuildError, ScheduleBuildPass, ScheduleGraph, ScheduleLabel, Schedules,
-        SystemKey, SystemSetKey, graph::DiGraph,
+    ecs::{
+        entity::EntityHashSet,
+        schedule::{
+            FlattenedDependencies, NodeId, ScheduleBuildError, ScheduleBuildPass, ScheduleGraph, ScheduleLabel,
+            Schedules, SystemKey, SystemSetKey, SystemWithAccess, graph::DiGraph,
+        },
     },
     platform::{collections::HashMap, hash::FixedHasher},
     prelude::*,
+    transform::{
+        components::TransformTreeChanged,
+        systems::{StaticTransformOptimizations, mark_dirty_trees},
+    },
 };
 use std::{cmp::Reverse, collections::BinaryHeap};
 
@@ -136,6 +143,51 @@ fn order(dependencies: &DiGraph<SystemKey>) -> Vec<SystemKey> {
     order
 }
 
+// Bevy's systems that take the threads of a pool whatever executor runs them.
+
+/// Puts a system that runs on the calling thread into the place of each of Bevy's `mark_dirty_trees`, of which a game
+/// with UI and physics has several. Call it before the schedules run.
+///
+/// Bevy's own starts two tasks in a pool that all Worlds of a program share, however few entities have moved, and so
+/// Worlds that run side by side wait for each other several times in each tick.
+pub(crate) fn mark_trees_on_one_thread(world: &mut World) {
+    let bevys = IntoSystem::system_type_id(&mark_dirty_trees);
+    world.resource_scope::<Schedules, _>(|world, mut schedules| {
+        for (_, schedule) in schedules.iter_mut() {
+            let systems = &mut schedule.graph_mut().systems;
+            let found = systems.iter().find(|(_, system, _)| system.system_type() == bevys).map(|(key, ..)| key);
+            let Some(place) = found.and_then(|key| systems.get_mut(key)) else { continue };
+            let mut mark = IntoSystem::into_system(mark_changed_trees);
+            mark.initialize(world);
+            *place = SystemWithAccess::new(Box::new(mark));
+        }
+    });
+}
+
+/// Marks the trees that Bevy's system marks: all entities whose place or parent has changed, and everything above them.
+fn mark_changed_trees(
+    optimizations: Res<StaticTransformOptimizations>,
+    changed: Query<Entity, Or<(Changed<Transform>, Changed<ChildOf>, Added<GlobalTransform>)>>,
+    mut orphans: RemovedComponents<ChildOf>,
+    parents: Query<&ChildOf>,
+    mut trees: Query<&mut TransformTreeChanged>,
+    mut seen: Local<EntityHashSet>,
+) {
+    if !optimizations.is_enabled() {
+        return;
+    }
+    seen.clear();
+    for start in changed.iter().chain(orphans.read()) {
+        let mut next = Some(start);
+        while let Some(entity) = next.filter(|&entity| seen.insert(entity)) {
+            if let Ok(mut tree) = trees.get_mut(entity) {
+                tree.set_changed();
+            }
+            next = parents.get(entity).ok().map(ChildOf::parent);
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use bevy::ecs::schedule::SingleThreadedExecutor;
@@ -204,5 +256,60 @@ mod tests {
             );
         });
         assert_eq!(seen, ["made"]);
+    }
+
+    /// A tree of three, and an entity beside it.
+    fn family(world: &mut World) -> [Entity; 4] {
+        let root = world.spawn(Transform::default()).id();
+        let child = world.spawn((Transform::default(), ChildOf(root))).id();
+        let leaf = world.spawn((Transform::default(), ChildOf(child))).id();
+        [root, child, leaf, world.spawn(Transform::default()).id()]
+    }
+
+    /// Moves some of the entities in each frame, takes one out of its tree, and returns where all of them are drawn and
+    /// which were marked.
+    fn moved(alone: bool) -> Vec<Vec<(Vec3, bool)>> {
+        bevy::tasks::ComputeTaskPool::get_or_init(Default::default);
+        let mut app = App::new();
+        app.add_plugins(TransformPlugin);
+        let family = family(app.world_mut());
+        if alone {
+            mark_trees_on_one_thread(app.world_mut());
+            let schedules = app.world().resource::<Schedules>();
+            let schedule = schedules.get(PostUpdate).expect("it is there");
+            let bevys = IntoSystem::system_type_id(&mark_dirty_trees);
+            let mut left = schedule.graph().systems.iter();
+            assert!(left.all(|(_, system, _)| system.system_type() != bevys), "it was replaced");
+        }
+        let mut frames = Vec::new();
+        for (frame, moved) in [vec![], vec![2], vec![0], vec![1, 3], vec![]].into_iter().enumerate() {
+            let before = app.world_mut().change_tick();
+            if frame == 4 {
+                app.world_mut().entity_mut(family[2]).remove::<ChildOf>();
+            }
+            for at in moved {
+                app.world_mut().get_mut::<Transform>(family[at]).expect("a place").translation.x += 1.0;
+            }
+            app.update();
+            let world = app.world_mut();
+            let now = world.change_tick();
+            frames.push(Vec::from(family.map(|entity| {
+                let entity = world.entity(entity);
+                let marked = entity.get_ref::<TransformTreeChanged>().expect("a mark").last_changed();
+                let place = entity.get::<GlobalTransform>().expect("a place").translation();
+                (place, marked.is_newer_than(before, now))
+            })));
+        }
+        frames
+    }
+
+    #[test]
+    fn trees_are_marked_on_one_thread_as_bevy_marks_them() {
+        let ours = moved(true);
+        assert_eq!(ours, moved(false));
+        let marked = |frame: usize| ours[frame].iter().map(|(_, marked)| *marked).collect::<Vec<_>>();
+        assert_eq!(marked(1), [true, true, true, false]);
+        assert_eq!(marked(3), [true, true, false, true]);
+        assert_eq!(ours[4].iter().map(|(place, _)| place.x).collect::<Vec<_>>(), [1.0, 2.0, 1.0, 1.0]);
     }
 }

@@ -22,6 +22,8 @@ pub struct GameProgram {
     pub recorded: u64,
     /// Levels that policies are measured on.
     pub held_out: &'static str,
+    /// Ticks that are recorded of each level, where whole episodes take too long for most tests.
+    pub recorded_ticks: Option<&'static str>,
 }
 
 /// Updates of a training.
@@ -62,12 +64,26 @@ const TINY: [&str; 14] = [
 ];
 
 impl GameProgram {
-    /// Returns a shell in whose folder lies `few.demo`, of three levels.
-    pub(crate) fn with_recording(&self) -> Shell {
+    /// Returns a shell in whose folder lies `few.demo`, of whole episodes on three levels.
+    pub(crate) fn with_whole_recording(&self) -> Shell {
         let shell = Shell::new(self.program);
         let levels = format!("default:{}..{}", self.recorded, self.recorded + 2);
-        let record = ["record", self.game, "--levels", &levels, "--noise", "0.1", "--out", "few.demo"];
-        shell.done(&record);
+        shell.done(&["record", self.game, "--levels", &levels, "--noise", "0.1", "--out", "few.demo"]);
+        shell
+    }
+
+    /// Returns the same, with no more of each level than the game's `recorded_ticks`.
+    pub(crate) fn with_recording(&self) -> Shell {
+        let Some(ticks) = self.recorded_ticks else { return self.with_whole_recording() };
+        let shell = Shell::new(self.program);
+        let parts = [0, 1, 2].map(|place| format!("part-{place}.demo"));
+        for (level, part) in (self.recorded..).zip(&parts) {
+            let levels = format!("default:{level}..{level}");
+            let record = ["record", self.game, "--levels", &levels, "--noise", "0.1", "--steps", ticks, "--out", part];
+            shell.done(&record);
+        }
+        let [first, second, third] = &parts;
+        shell.done(&["demo", "merge", first, second, third, "--out", "few.demo"]);
         shell
     }
 
@@ -86,24 +102,7 @@ impl GameProgram {
 
     /// Returns a shell with `few.demo` and `tiny.ron`, the game's own experiment made tiny, in its folder.
     pub(crate) fn with_tiny_experiment(&self) -> Shell {
-        self.add_tiny_experiment(self.with_recording())
-    }
-
-    /// Returns the same, where `few.demo` has the first ticks of each level alone.
-    pub(crate) fn with_short_recording(&self) -> Shell {
-        let shell = Shell::new(self.program);
-        let parts = [0, 1, 2].map(|place| format!("part-{place}.demo"));
-        for (level, part) in (self.recorded..).zip(&parts) {
-            let levels = format!("default:{level}..{level}");
-            let record = ["record", self.game, "--levels", &levels, "--noise", "0.1", "--steps", "60", "--out", part];
-            shell.done(&record);
-        }
-        let [first, second, third] = &parts;
-        shell.done(&["demo", "merge", first, second, third, "--out", "few.demo"]);
-        self.add_tiny_experiment(shell)
-    }
-
-    fn add_tiny_experiment(&self, shell: Shell) -> Shell {
+        let shell = self.with_recording();
         let first = self.held_out.split("..").next().unwrap_or(self.held_out);
         self.write_experiment(&shell, "tiny.ron", &[&TINY[..], &[&format!("test={first}")]].concat());
         shell

@@ -29,7 +29,7 @@ impl GameProgram {
     /// `record`, `demo ls`, `demo show` and `demo verify`: episodes of the demonstrator, with noise, replay, and
     /// recording them again makes the same file.
     pub fn recordings_replay(&self) {
-        let shell = self.with_recording();
+        let shell = self.with_whole_recording();
         let summary = shell.answer(&["demo", "ls", "few.demo", "--json"]);
         assert_eq!((&summary["episodes"], &summary["levels"]), (&3.into(), &3.into()), "{summary}");
         assert_eq!(summary["header"]["demonstrator"], self.demonstrator);
@@ -42,21 +42,14 @@ impl GameProgram {
         let verified = shell.answer(&["demo", "verify", "few.demo", "--json"]);
         assert_eq!(verified["report"]["episodes"], 3, "{verified}");
         assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
-        assert!(shell.read("few.demo") == self.with_recording().read("few.demo"), "the same seed, the same file");
+        let [once, again] = [self.with_recording(), self.with_recording()].map(|shell| shell.read("few.demo"));
+        assert!(once == again, "the same seed, the same file");
     }
 
     /// `demo filter`, `demo label`, `demo repair`, `demo merge`, `learn-skills` and `train`: whatever `demo verify`
     /// accepts is learned from, and what it refuses is not.
     pub fn what_verifies_is_learned_from(&self) {
-        self.learn_what_verifies(&self.with_tiny_experiment());
-    }
-
-    /// The same, for games whose whole episodes take too long: each is recorded for a second.
-    pub fn what_verifies_of_short_recordings_is_learned_from(&self) {
-        self.learn_what_verifies(&self.with_short_recording());
-    }
-
-    fn learn_what_verifies(&self, shell: &Shell) {
+        let shell = self.with_tiny_experiment();
         let one = format!("default:{0}..{0}", self.recorded + 1);
         let change = |args: &[&str]| _ = shell.answer(&[args, &["--json"]].concat());
         change(&["demo", "filter", "few.demo", "--levels", &one, "--without-idle-start", "--out", "one.demo"]);

@@ -8,6 +8,7 @@ macro_rules! tests {
         $crate::tests! {
             $game:
             recordings_replay,
+            what_verifies_is_learned_from,
             moments_are_drawn,
             a_killed_training_goes_on_bit_for_bit,
             a_policy_file_plays_as_its_run,

@@ -13,11 +13,6 @@ use crate::{
 
 const TRAIN: [&str; 5] = ["train", "--experiment", "small.ron", "--skills", "skills.safetensors"];
 
-/// Trains into the folder `run`.
-fn train(shell: &Shell, run: &str) {
-    shell.done(&[&TRAIN[..], &["--run", run]].concat());
-}
-
 /// Returns the JSON of `eval --json` for one player on these levels, two of them. They are named, so that levels which play
 /// like trained ones are measured as well.
 fn measured(shell: &Shell, who: &[&str], levels: &str) -> Value {
@@ -35,7 +30,7 @@ impl GameProgram {
     /// undisturbed training.
     pub fn a_killed_training_goes_on_bit_for_bit(&self) {
         let shell = self.with_skills();
-        train(&shell, "whole");
+        shell.done(&[&TRAIN[..], &["--run", "whole"]].concat());
         let (whole, killed) = (shell.path("whole"), shell.path("killed"));
         assert_eq!(logged(&whole), UPDATES);
         let mut command = shell.command(&[&TRAIN[..], &["--run", "killed"]].concat());
@@ -53,7 +48,8 @@ impl GameProgram {
     /// same.
     pub fn a_policy_file_plays_as_its_run(&self) {
         let shell = self.with_skills();
-        train(&shell, "run");
+        // However little it has learned.
+        shell.done(&[&TRAIN[..], &["--set", "steps=256", "--run", "run"]].concat());
         let of_bot = measured(&shell, &["--bot", self.demonstrator, "--experiment", "small.ron"], self.held_out);
         assert_eq!(of_bot["method"], self.demonstrator);
         assert!(of_bot["return_mean"].as_f64().is_some_and(|sum| sum > 0.0), "the demonstrator earns: {of_bot}");

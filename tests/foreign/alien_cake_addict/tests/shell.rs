@@ -10,11 +10,12 @@ const GAME: GameProgram = GameProgram {
     key: "Up",
     recorded: 1000,
     held_out: "default:100000..100001",
+    recorded_ticks: Some("300"),
 };
 
 playbot_shell::tests!(GAME);
 playbot_shell::tests!(
-    GAME: what_verifies_of_short_recordings_is_learned_from,
+    GAME:
     defects_need_levels,
     planted_defects_are_scored,
 );
