@@ -523,6 +523,7 @@ mod tests {
             ticks: 46,
             end: CourseEnd::TimedOut,
             differs: Some(45),
+            action: Some("jump".to_owned()),
             position: Some([0.1, -0.7]),
             furthest: None,
         };

@@ -24,3 +24,8 @@ pub use run_folder::{logged, results, steps};
 pub use shell::Shell;
 pub use unsealed::unsealed;
 pub use waiting::output;
+
+/// Returns a folder that vanishes with the value.
+pub fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("a folder")
+}

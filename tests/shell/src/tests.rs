@@ -47,3 +47,57 @@ macro_rules! planted_defects {
         }
     };
 }
+
+/// Makes a test of what recordings of the sound game say of its own planted defects, without a detector: each leads
+/// elsewhere on these levels in some variant, and the tick in which it departs is told. All but the quiet classes also end
+/// otherwise, which is a regression. Names of `playbot` are those of the crate that is tested.
+#[macro_export]
+macro_rules! defects_by_recording {
+    (game: $game:expr, levels: $levels:literal, quiet: $quiet:expr) => {
+        #[test]
+        fn recordings_of_the_sound_game_tell_where_a_broken_one_departs() {
+            use playbot::{
+                Game,
+                harness::defect::Plant,
+                mutation::bugs::Mutant,
+                test::{
+                    detectors::Detectors,
+                    verdict::{RecordedWins, TestPlan},
+                },
+                train::pipeline::record,
+            };
+
+            let game = $game;
+            let folder = $crate::folder();
+            let file = folder.path().join("sound.demo");
+            let split: playbot::harness::split::LevelSplit = $levels.parse().expect("levels");
+            record(&game, &split, 0.0, &file).expect("it plays");
+            let plan = TestPlan {
+                split,
+                testers: Vec::new(),
+                episodes: 1,
+                seed: 0,
+                detectors: Detectors::default(),
+                shard: None,
+                threads: 2,
+            };
+            let courses = |game: &dyn Game| {
+                let wins = RecordedWins::read(game, &plan, &file).expect("the demonstrator wins");
+                wins.courses(game, plan.threads, &|_| {}, &|| false).expect("nothing stops it").into_values()
+            };
+            assert!(courses(&game).all(|course| course.differs.is_none()), "the sound game leads nowhere else");
+            let mut quiet = Vec::new();
+            for kind in game.tools().tests.defects() {
+                let Plant::Rules { variants, .. } = kind.plant else { continue };
+                let broken = |variant| courses(&Mutant::new(&game as &dyn Game, &kind, variant));
+                let mut told = (0..variants).flat_map(broken).filter(|course| course.differs.is_some()).peekable();
+                assert!(told.peek().is_some(), "{}: the recorded courses do not show it", kind.class);
+                if told.all(|course| course.ends_as_recorded()) {
+                    quiet.push(kind.class);
+                }
+            }
+            let expected: &[&str] = &$quiet;
+            assert_eq!(quiet, expected, "these change no end");
+        }
+    };
+}

@@ -234,19 +234,19 @@ fn a_recording_of_an_earlier_build_says_where_its_actions_lead_elsewhere() {
     let words = |end: &str| vec![format!("default:0: the recording solves it in {ticks} ticks; its actions {end}")];
     let rest = constant("rest", 0);
     // After tick 3 the agent was at 4.
-    let elsewhere =
-        "lead elsewhere from tick 3 on, at (3.0, 0.0), and do not reach the goal: they come no further than (3.0, 0.0)";
+    let elsewhere = "lead elsewhere from tick 3 on, after `ArrowRight`, at (3.0, 0.0), and do not reach the goal: they \
+                     come no further than (3.0, 0.0)";
     assert_eq!(compared(&track(3.0, 6.0, 1.0), "walled", &right), (words(elsewhere), Vec::new()));
     let weak = words("still do, so the testers are too weak");
     assert_eq!(compared(&before, "weak", &rest), (Vec::new(), weak));
     assert_eq!(compared(&before, "unchanged", &right), (Vec::new(), Vec::new()));
     // Of levels that the tester solves.
-    let early = "lead elsewhere from tick 3 on, at (4.0, 0.0), and reach the goal after 4 ticks";
+    let early = "lead elsewhere from tick 3 on, after `ArrowRight`, at (4.0, 0.0), and reach the goal after 4 ticks";
     assert_eq!(compared(&track(9.0, 4.0, 1.0), "early", &right), (words(early), Vec::new()));
-    let far =
-        "lead elsewhere from tick 5 on, at (6.0, 0.0), and do not reach the goal: they come no further than (6.0, 0.0)";
+    let far = "lead elsewhere from tick 5 on, after `ArrowRight`, at (6.0, 0.0), and do not reach the goal: they come no \
+               further than (6.0, 0.0)";
     assert_eq!(compared(&track(9.0, 8.0, 1.0), "far", &right), (words(far), Vec::new()));
-    let paid = "lead elsewhere from tick 0 on, at (1.0, 0.0), and still reach the goal";
+    let paid = "lead elsewhere from tick 0 on, after `ArrowRight`, at (1.0, 0.0), and still reach the goal";
     assert_eq!(compared(&track(9.0, 6.0, 2.0), "paid", &right), (Vec::new(), words(paid)));
 
     let of_others = |range| plan(range, vec![rest.clone()], 1, 1);

@@ -11,13 +11,13 @@ use crate::{
 use bevy::math::Vec2;
 use bevy_playbot::{
     action::ActionValue,
-    demo::file::{DemoEnd, DemoEpisode},
+    demo::file::{DemoEnd, DemoEpisode, EpisodeActions},
     episode::EpisodeEnd,
     vision::ObservationConfig,
 };
 use playbot_harness::{
     eval::Player,
-    game::{Game, level_designs, read_level_designs},
+    game::{Game, is_named_idle, level_designs, read_level_designs},
     level_files::{is_level_files, level_files_mode},
 };
 use playbot_report::counted;
@@ -81,6 +81,9 @@ pub struct RecordedCourse {
     /// The first tick, from 0, whose reward, state or end is not the recorded one; `None` if the course is the same.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub differs: Option<u32>,
+    /// The name of the last action up to that tick that does something.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub action: Option<String>,
     /// Position of the agent in that tick, if it is known.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub position: Option<[f32; 2]>,
@@ -98,11 +101,12 @@ impl RecordedCourse {
 
 impl fmt::Display for RecordedCourse {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { recorded_ticks, ticks, end, differs, position, furthest } = self;
+        let Self { recorded_ticks, ticks, end, differs, action, position, furthest } = self;
         let at = |[x, y]: &[f32; 2]| format!("({x:.1}, {y:.1})");
         write!(f, "the recording solves it in {}; its actions ", counted(*recorded_ticks, "tick"))?;
         let Some(tick) = differs else { return f.write_str("still do") };
         write!(f, "lead elsewhere from tick {tick} on")?;
+        action.iter().try_for_each(|action| write!(f, ", after `{action}`"))?;
         position.iter().try_for_each(|position| write!(f, ", at {}", at(position)))?;
         if self.ends_as_recorded() {
             return f.write_str(", and still reach the goal");
@@ -147,6 +151,7 @@ pub fn course_of_recording(game: &dyn Game, mode: &str, recorded: &DemoEpisode) 
     let setting = Setting { game, mode, level: recorded.level_seed, seed: 0 };
     let replayed = play_recording(setting, recorded, Some(watcher));
     let differs = first_difference(recorded, &replayed);
+    let action = differs.and_then(|tick| last_action(game, &recorded.actions, tick));
     let positions = noted.borrow();
     let position = differs.and_then(|tick| positions.get(tick as usize).copied().flatten());
     let mut known = positions.iter().flatten().copied();
@@ -163,7 +168,16 @@ pub fn course_of_recording(game: &dyn Game, mode: &str, recorded: &DemoEpisode) 
         (None, Some(_)) => CourseEnd::Lost,
     };
     let (recorded_ticks, ticks) = (recorded.len() as u64, replayed.rewards.len() as u64);
-    RecordedCourse { recorded_ticks, ticks, end, differs, position, furthest }
+    RecordedCourse { recorded_ticks, ticks, end, differs, action, position, furthest }
+}
+
+/// Returns the name of the last action up to a tick that does something by its name.
+fn last_action(game: &dyn Game, actions: &EpisodeActions, tick: u32) -> Option<String> {
+    let EpisodeActions::Discrete(actions) = actions else { return None };
+    let names = game.tools().input.action_names();
+    let until = actions.iter().take(tick as usize + 1);
+    let last = until.rev().find(|&&action| !is_named_idle(&names, action))?;
+    names.get(*last as usize).cloned()
 }
 
 /// Returns the first tick whose reward, state or end is not the recorded one.

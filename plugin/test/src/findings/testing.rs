@@ -24,5 +24,13 @@ pub(super) fn stored() -> StoredFinding {
 /// Makes the course of a recording that was won in 120 ticks, and is won in so many now.
 pub(crate) fn course(ticks: u64) -> RecordedCourse {
     let differs = (ticks != 120).then(|| ticks as u32 - 1);
-    RecordedCourse { recorded_ticks: 120, ticks, end: CourseEnd::Solved, differs, position: None, furthest: None }
+    RecordedCourse {
+        recorded_ticks: 120,
+        ticks,
+        end: CourseEnd::Solved,
+        differs,
+        action: None,
+        position: None,
+        furthest: None,
+    }
 }

@@ -206,4 +206,5 @@ mod tests {
     }
 
     playbot_shell::planted_defects!(game: game(), levels: "default:0..11");
+    playbot_shell::defects_by_recording!(game: add_to(game()), levels: "default:0..5", quiet: []);
 }

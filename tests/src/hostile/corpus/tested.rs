@@ -124,7 +124,15 @@ fn verdict(index: u64) -> LevelVerdict {
 
 fn recorded() -> RecordedCourse {
     let (position, furthest) = (Some([12.5, 3.0]), Some([13.5, 3.0]));
-    RecordedCourse { recorded_ticks: 120, ticks: 46, end: CourseEnd::Lost, differs: Some(45), position, furthest }
+    RecordedCourse {
+        recorded_ticks: 120,
+        ticks: 46,
+        end: CourseEnd::Lost,
+        differs: Some(45),
+        action: Some("right".to_owned()),
+        position,
+        furthest,
+    }
 }
 
 fn stop() -> CommonStop {

@@ -108,3 +108,39 @@ fn kinds() -> [DefectKind; 10] {
         }),
     ]
 }
+
+#[cfg(test)]
+mod tests {
+    use foreign_orchard::{ASSETS, Body, FEET, Map, game};
+    use playbot::{harness::foreign::LevelSeed, prelude::EpisodeEnd};
+
+    use super::*;
+
+    /// Returns the game with the actions of its bot, which reaches the gate.
+    fn orchard() -> ForeignGame {
+        ForeignGame::new("orchard", 1, game)
+            .hz(64.0)
+            .default_plugins(|plugins| plugins.set(AssetPlugin { file_path: ASSETS.into(), ..default() }))
+            .keys([vec![], vec![KeyCode::ArrowRight], vec![KeyCode::ArrowRight, KeyCode::Space]])
+            .clicks(["Play"])
+            .observe(["column"], |hero: Option<Single<Body>>| [hero.map_or(0.0, |hero| hero.0.translation.x)])
+            .position(|at: Single<&Transform, With<Hero>>| at.translation.truncate())
+            .reward_delta(|run: Res<Run>| run.fruit as f32)
+            .end(|on: Res<State<Screen>>| {
+                matches!(**on, Screen::Won | Screen::Lost)
+                    .then(|| EpisodeEnd::Terminated { success: **on == Screen::Won })
+            })
+            .time_limit(1500)
+            .level(|seed: Res<LevelSeed>, mut level: ResMut<Level>, mut next: ResMut<NextState<Screen>>| {
+                level.number = seed.0;
+                next.set(Screen::Menu);
+            })
+            .demonstrator("picker", |hero: Option<Single<Body>>, map: Res<Map>| {
+                let Some((at, speed, hero)) = hero.map(Single::into_inner) else { return 3 };
+                let (right, jump) = map.hint(at.translation.truncate() - Vec2::Y * FEET, speed.0, hero.coyote > 0.0);
+                u32::from(right) + u32::from(jump)
+            })
+    }
+
+    playbot_shell::defects_by_recording!(game: add_to(orchard()), levels: "default:0..2", quiet: ["lost-fruit"]);
+}
