@@ -27,8 +27,12 @@ use bevy_playbot::{
     vision::{ObservationConfig, VisionError},
 };
 use std::{
+    collections::BTreeSet,
     fmt,
-    sync::atomic::{AtomicU64, Ordering},
+    sync::{
+        Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU64, Ordering},
+    },
     time::Instant,
 };
 
@@ -138,8 +142,10 @@ fn build_once(
         })
     };
     let plugins = observation_config.headless_plugins();
-    let mut built = build(plugins);
-    if built.as_ref().is_err_and(|words| panics::lacks_render_app(words)) {
+    let is_known = asking_games().contains(game.name());
+    let mut built = build(if is_known { plugins.with_render_app() } else { plugins });
+    if !is_known && built.as_ref().is_err_and(|words| panics::lacks_render_app(words)) {
+        asking_games().insert(game.name());
         built = build(plugins.with_render_app());
     }
     let (mut world, agents) = match built {
@@ -150,6 +156,13 @@ fn build_once(
         world.entity_mut(agent).insert(EpisodeTrace::default());
     }
     Ok((world, agents))
+}
+
+/// Returns the games whose plugins have panicked for want of Bevy's `RenderApp`, so that only their first World is built
+/// twice. An app that panics while it is built has pictures to load and no loader, so Bevy never frees its assets.
+fn asking_games() -> MutexGuard<'static, BTreeSet<&'static str>> {
+    static ASKING: Mutex<BTreeSet<&str>> = Mutex::new(BTreeSet::new());
+    ASKING.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 fn build_game(
