@@ -2,29 +2,26 @@
 //!
 //! In the folder:
 //!
-//! - `manifest`: the `Cargo.toml` of a game.
+//! - `folder`: the folder of a game, with its `Cargo.toml` and its sources.
 //! - `found`: facts about a game that its sources show.
 
+mod folder;
 mod found;
-mod manifest;
 
 use crate::{
     error::{CliError, Outcome},
     output::{print_line, write},
     verbs::init::{
-        found::{GameFacts, NamedItem, SourceLine, SourceText, StepRate},
-        manifest::{BevyDependency, GameManifest, major_minor},
+        folder::{BEVY, GameFolder, SourceLine, SourceText, folder_of, has_member, read_sources, unreadable},
+        found::{GameFacts, NamedItem, StepRate},
     },
 };
 use serde_json::json;
 use std::{
     fmt::Write as _,
-    fs, io,
+    fs,
     path::{Path, PathBuf},
 };
-
-/// The version of Bevy that this program is for.
-const BEVY: (u32, u32) = (0, 19);
 
 /// Keys that leave games or open tools, more often than they play.
 const TOOL_KEYS: [&str; 14] =
@@ -115,118 +112,7 @@ pub(crate) fn run(args: &Args) -> Result<Outcome, CliError> {
     Ok(Outcome::Pass)
 }
 
-/// A game's package and the folder that gets the bots.
-struct GameFolder {
-    /// The folder that gets `bots`: of the workspace, or of the package.
-    root: PathBuf,
-    /// The `Cargo.toml` there.
-    root_manifest: GameManifest,
-    /// The folder of the package within it, with `/`; empty if it is the same.
-    package: String,
-    /// The `Cargo.toml` of the package.
-    manifest: GameManifest,
-    /// Its dependency on Bevy, with what the workspace says.
-    bevy: BevyDependency,
-}
-
 impl GameFolder {
-    /// Finds the package of the game in a folder.
-    fn find(folder: &Path, wanted: Option<&str>) -> Result<Self, CliError> {
-        let file = folder.join("Cargo.toml");
-        let Some(root_manifest) = read_manifest(folder)? else {
-            return Err(CliError::Usage(format!(
-                "{} does not exist: call `playbot init` in the folder of a Bevy game, or name the folder, as in \
-                 `playbot init my_game`",
-                file.display()
-            )));
-        };
-        let (package, manifest) = Self::choose(folder, &root_manifest, wanted)?;
-        if !root_manifest.is_workspace {
-            check_not_member(folder)?;
-        }
-        let Some(mut bevy) = manifest.bevy.clone() else {
-            return Err(CliError::Usage(format!(
-                "{} does not depend on `bevy`: playbot tests games that are made with Bevy {}.{}",
-                folder.join(&package).join("Cargo.toml").display(),
-                BEVY.0,
-                BEVY.1
-            )));
-        };
-        if let Some(shared) = root_manifest.workspace_bevy.as_ref().filter(|_| bevy.is_inherited) {
-            bevy.version.clone_from(&shared.version);
-            bevy.features.extend(shared.features.iter().cloned());
-        }
-        let numbers = bevy.version.as_deref().and_then(major_minor);
-        if let (Some(version), Some(numbers)) = (&bevy.version, numbers)
-            && numbers != BEVY
-        {
-            return Err(CliError::Usage(format!(
-                "{} has Bevy {version}, and this playbot is for Bevy {}.{}: update the game first",
-                folder.join(&package).join("Cargo.toml").display(),
-                BEVY.0,
-                BEVY.1
-            )));
-        }
-        Ok(Self { root: folder.to_owned(), root_manifest, package, manifest, bevy })
-    }
-
-    /// Chooses the package of the game: the one that is named, the root's own, or the only member with Bevy.
-    fn choose(folder: &Path, root: &GameManifest, wanted: Option<&str>) -> Result<(String, GameManifest), CliError> {
-        let mut all = Vec::new();
-        if root.package.is_some() {
-            all.push((String::new(), root.clone()));
-        }
-        for member in members(folder, root) {
-            if let Some(manifest) = read_manifest(&folder.join(&member))? {
-                all.push((member, manifest));
-            }
-        }
-        let names = |all: &[(String, GameManifest)]| {
-            let names: Vec<&str> = all.iter().filter_map(|(_, manifest)| manifest.package.as_deref()).collect();
-            names.join(", ")
-        };
-        let file = folder.join("Cargo.toml");
-        if let Some(wanted) = wanted {
-            let known = names(&all);
-            let found = all.into_iter().find(|(_, manifest)| manifest.package.as_deref() == Some(wanted));
-            return found.ok_or_else(|| {
-                CliError::Usage(format!("{} has no package `{wanted}`; valid: {known}", file.display()))
-            });
-        }
-        if root.package.is_some() && (root.bevy.is_some() || all.len() == 1) {
-            return Ok(all.swap_remove(0));
-        }
-        // The crate of the bots is no game.
-        all.retain(|(_, manifest)| manifest.bevy.is_some() && !manifest.depends_on("playbot"));
-        match all.len() {
-            1 => Ok(all.swap_remove(0)),
-            0 => Err(CliError::Usage(format!(
-                "no package of {} depends on `bevy`: playbot tests games that are made with Bevy {}.{}",
-                file.display(),
-                BEVY.0,
-                BEVY.1
-            ))),
-            _ => Err(CliError::Usage(format!(
-                "several packages of {} use Bevy: name the game with --package; valid: {}",
-                file.display(),
-                names(&all)
-            ))),
-        }
-    }
-
-    fn name(&self) -> &str {
-        self.manifest.package.as_deref().unwrap_or("my-game")
-    }
-
-    /// Returns the name of the library in Rust.
-    fn library(&self) -> String {
-        self.manifest.library.clone().unwrap_or_else(|| self.name().to_owned()).replace('-', "_")
-    }
-
-    fn library_file(&self) -> String {
-        self.manifest.library_path.clone().unwrap_or_else(|| "src/lib.rs".to_owned())
-    }
-
     /// Returns the files of the layout, with their paths below the root.
     fn files(&self, facts: &GameFacts, playbot: &str) -> Vec<(String, String)> {
         let mut files = Vec::new();
@@ -672,112 +558,8 @@ fn playbot_source(wanted: Option<&str>) -> Result<String, CliError> {
     Ok(format!("path = {:?}", folder.display().to_string()))
 }
 
-/// Returns the folder of a path, which may be that of the `Cargo.toml` in it.
-fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if path.file_name().is_some_and(|name| name == "Cargo.toml") && !path.is_dir() => {
-            if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
-        }
-        _ => path,
-    }
-}
-
 /// Returns true for the library that this verb writes, as long as no code has been added to it.
 fn is_stub(source: &SourceText) -> bool {
     let stub = SourceText::new(&source.path, LIBRARY);
     source.code.split_whitespace().eq(stub.code.split_whitespace())
-}
-
-fn unreadable(path: &Path, error: &io::Error) -> CliError {
-    CliError::Io(format!("cannot read {}: {error}", path.display()))
-}
-
-/// Reads the `Cargo.toml` of a folder, if there is one.
-fn read_manifest(folder: &Path) -> Result<Option<GameManifest>, CliError> {
-    let file = folder.join("Cargo.toml");
-    match fs::read_to_string(&file) {
-        Ok(text) => Ok(Some(GameManifest::read(&text))),
-        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
-        Err(error) => Err(unreadable(&file, &error)),
-    }
-}
-
-/// Returns the names in a folder, in their order, and whether each is a folder. Links and hidden names are left out.
-fn names_in(folder: &Path) -> Result<Vec<(String, bool)>, CliError> {
-    let refused = |error: io::Error| unreadable(folder, &error);
-    let mut names = Vec::new();
-    for entry in fs::read_dir(folder).map_err(refused)? {
-        let entry = entry.map_err(refused)?;
-        let (name, kind) = (entry.file_name().to_string_lossy().into_owned(), entry.file_type().map_err(refused)?);
-        if !name.starts_with('.') && !kind.is_symlink() {
-            names.push((name, kind.is_dir()));
-        }
-    }
-    names.sort();
-    Ok(names)
-}
-
-/// Returns the folders of a workspace's members. A star at the end of a path stands for each folder there.
-fn members(root: &Path, manifest: &GameManifest) -> Vec<String> {
-    let mut found = Vec::new();
-    for member in &manifest.members {
-        match member.strip_suffix('*') {
-            Some(folder) => {
-                // A folder that cannot be read has no game, as cargo says itself.
-                let names = names_in(&root.join(folder)).unwrap_or_default().into_iter();
-                found.extend(names.filter(|(_, is_folder)| *is_folder).map(|(name, _)| format!("{folder}{name}")));
-            }
-            None => found.push(member.clone()),
-        }
-    }
-    found
-}
-
-/// Returns true if a folder is among the members of a workspace.
-fn has_member(members: &[String], folder: &str) -> bool {
-    let is_it = |member: &String| match member.trim_start_matches("./").strip_suffix('*') {
-        Some(begin) => folder.strip_prefix(begin).is_some_and(|rest| !rest.contains('/')),
-        None => member.trim_start_matches("./").trim_end_matches('/') == folder,
-    };
-    members.iter().any(is_it)
-}
-
-/// Refuses a member of a workspace above it, because the bots belong beside all members.
-fn check_not_member(folder: &Path) -> Result<(), CliError> {
-    let whole = folder.canonicalize().map_err(|error| unreadable(folder, &error))?;
-    for above in whole.ancestors().skip(1) {
-        let Ok(Some(manifest)) = read_manifest(above) else { continue };
-        let inner = whole.strip_prefix(above).unwrap_or(&whole).display().to_string().replace('\\', "/");
-        if manifest.is_workspace && has_member(&manifest.members, &inner) {
-            let root = above.display();
-            return Err(CliError::Usage(format!(
-                "{} is a member of the workspace in {root}: write `playbot init {root} --package NAME`, with the name \
-                 of its package",
-                folder.display()
-            )));
-        }
-    }
-    Ok(())
-}
-
-/// Reads the sources of a package, in the order of their paths.
-fn read_sources(package: &Path) -> Result<Vec<SourceText>, CliError> {
-    let (mut sources, mut folders) = (Vec::new(), vec!["src".to_owned()]);
-    while let Some(folder) = folders.pop() {
-        if !package.join(&folder).is_dir() {
-            continue;
-        }
-        for (name, is_folder) in names_in(&package.join(&folder))? {
-            let path = format!("{folder}/{name}");
-            if is_folder {
-                folders.push(path);
-            } else if name.ends_with(".rs") {
-                let file = package.join(&path);
-                let bytes = fs::read(&file).map_err(|error| unreadable(&file, &error))?;
-                sources.push(SourceText::new(&path, &String::from_utf8_lossy(&bytes)));
-            }
-        }
-    }
-    sources.sort_by(|one, other| one.path.cmp(&other.path));
-    Ok(sources)
 }

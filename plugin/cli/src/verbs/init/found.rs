@@ -1,6 +1,6 @@
 //! Facts about a game that its sources show, read as text.
 
-use crate::verbs::init::manifest::GameManifest;
+use crate::verbs::init::folder::{GameManifest, SourceLine, SourceText, is_of_name, name};
 use playbot_harness::foreign::PLAYER_NAMES;
 use serde::Serialize;
 
@@ -73,111 +73,6 @@ const MANAGERS: [&str; 2] = ["leafwing-input-manager", "bevy_enhanced_input"];
 
 /// Crates of physics.
 const PHYSICS: [&str; 4] = ["avian2d", "avian3d", "bevy_rapier2d", "bevy_rapier3d"];
-
-/// A source file of a game.
-pub(super) struct SourceText {
-    /// Its path in the package, with `/`.
-    pub path: String,
-    /// Its text; comments are blank.
-    pub code: String,
-}
-
-impl SourceText {
-    /// Creates the source of a text.
-    pub fn new(path: &str, text: &str) -> Self {
-        Self { path: path.to_owned(), code: without_comments(text) }
-    }
-
-    fn at(&self, name: &str, offset: usize) -> SourceLine {
-        let line = self.code[..offset].matches('\n').count() + 1;
-        SourceLine { name: name.to_owned(), file: self.path.clone(), line }
-    }
-
-    /// Returns the lines that have one of these words, but for imports.
-    fn lines_with(&self, words: &[&str]) -> Vec<SourceLine> {
-        let lines = self.code.lines().enumerate();
-        let found = lines.filter_map(|(at, line)| {
-            let is_import = line.trim_start().trim_start_matches("pub ").starts_with("use ");
-            let word = words.iter().find(|word| line.contains(**word)).filter(|_| !is_import)?;
-            Some(SourceLine { name: word.trim().to_owned(), file: self.path.clone(), line: at + 1 })
-        });
-        found.collect()
-    }
-}
-
-/// Blanks the comments of a source. Lines keep their numbers.
-fn without_comments(text: &str) -> String {
-    let (mut code, mut rest) = (String::with_capacity(text.len()), text);
-    while let Some(first) = rest.chars().next() {
-        let (kept, skipped) = if rest.starts_with("//") {
-            (0, rest.find('\n').unwrap_or(rest.len()))
-        } else if rest.starts_with("/*") {
-            (0, length_of_comment(rest))
-        } else if first == '"' {
-            (length_of_text(rest), 0)
-        } else if first == 'r' && !code.ends_with(is_of_name) {
-            (length_of_raw_text(rest).unwrap_or(1), 0)
-        } else if rest.starts_with("'\"'") {
-            (3, 0)
-        } else {
-            (first.len_utf8(), 0)
-        };
-        code.push_str(&rest[..kept]);
-        code.extend(rest[kept..kept + skipped].chars().filter(|c| *c == '\n'));
-        rest = &rest[kept + skipped..];
-    }
-    code
-}
-
-/// Returns the length of a comment between signs, with those inside it.
-fn length_of_comment(text: &str) -> usize {
-    let (mut depth, mut at) = (0_u32, 0);
-    while at < text.len() {
-        let rest = &text.as_bytes()[at..];
-        if rest.starts_with(b"/*") {
-            (depth, at) = (depth + 1, at + 2);
-        } else if rest.starts_with(b"*/") {
-            (depth, at) = (depth.saturating_sub(1), at + 2);
-            if depth == 0 {
-                return at;
-            }
-        } else {
-            at += 1;
-        }
-    }
-    text.len()
-}
-
-/// Returns the length of a text with its quotes.
-fn length_of_text(text: &str) -> usize {
-    let mut is_escaped = false;
-    for (at, c) in text.char_indices().skip(1) {
-        match c {
-            '"' if !is_escaped => return at + 1,
-            _ => is_escaped = c == '\\' && !is_escaped,
-        }
-    }
-    text.len()
-}
-
-/// Returns the length of a raw text, if it is one.
-fn length_of_raw_text(text: &str) -> Option<usize> {
-    let hashes = text[1..].len() - text[1..].trim_start_matches('#').len();
-    let inner = text[1 + hashes..].strip_prefix('"')?;
-    let end = format!("\"{}", "#".repeat(hashes));
-    Some(inner.find(&end).map_or(text.len(), |at| 2 + hashes + at + end.len()))
-}
-
-/// A name with its line in the sources.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct SourceLine {
-    /// The name.
-    pub name: String,
-    /// The file, in the package.
-    pub file: String,
-    /// The line, counted from 1.
-    pub line: usize,
-}
 
 /// A name that a program beside the game can use.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -414,15 +309,6 @@ fn prefix(sources: &[SourceText], door: &SourceText, source: &SourceText) -> Opt
     };
     let is_public = above.code.contains(&format!("pub mod {name};"));
     prefix(sources, door, above).filter(|_| is_public).map(|outer| format!("{outer}{name}::"))
-}
-
-fn is_of_name(c: char) -> bool {
-    c.is_alphanumeric() || c == '_'
-}
-
-/// Returns the name at the start of a text.
-fn name(text: &str) -> &str {
-    &text[..text.find(|c| !is_of_name(c)).unwrap_or(text.len())]
 }
 
 fn add_new(all: &mut Vec<String>, more: Vec<String>) {
@@ -679,12 +565,6 @@ mod tests {
     fn facts(sources: &[(&str, &str)]) -> GameFacts {
         let sources: Vec<_> = sources.iter().map(|(path, text)| SourceText::new(path, text)).collect();
         GameFacts::read(&GameManifest::default(), "src/lib.rs", &sources)
-    }
-
-    #[test]
-    fn comments_are_blank_and_lines_keep_their_numbers() {
-        let text = "a // \"b\n/* c /* d */ \n e */ f\nlet g = \"// h\"; // i\nr#\"j // \"k\"# '\"' // l";
-        assert_eq!(without_comments(text), "a \n\n f\nlet g = \"// h\"; \nr#\"j // \"k\"# '\"' ");
     }
 
     #[test]
