@@ -143,7 +143,7 @@ fn the_adapter_of_a_game_in_fixed_steps_has_a_frame_for_each() {
         (".insert_resource(Time::<Fixed>::from_hz(50.0))", "        .hz(50.0)", "50 a second (src/lib.rs:5)"),
         (
             ".insert_resource(Time::<Fixed>::from_hz(RATE))",
-            "        // sees a press twice: .hz(steps of a second), as set in src/lib.rs:5",
+            "        // twice: .hz(steps of a second), as the game sets them in `plugin`.",
             "a number of them a second that is computed (src/lib.rs:5)",
         ),
     ] {
@@ -199,7 +199,7 @@ fn the_adapter_adds_what_the_program_adds_and_waits_for_a_state_that_loads() {
         for line in [
             game,
             "        .clicks([\"Play\", \"Quit\"])",
-            "        // TODO: if a level is ready once the game has left `Screen::Loading` (src/lib.rs:4), set that state in",
+            "        // TODO: if a level is ready once the game has left `Screen::Loading`, set that state in `.level`, and wait for",
             "        // .ready(|state: Res<State<my_game::Screen>>| **state != my_game::Screen::Loading)",
         ] {
             assert!(printed.lines().any(|printed| printed.trim() == line.trim()), "{line}: {printed}");

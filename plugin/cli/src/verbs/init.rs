@@ -13,7 +13,7 @@ use crate::{
     output::{print_line, write},
     verbs::init::{
         folder::{BEVY, GameFolder, SourceLine, SourceText, folder_of, has_member, read_sources, unreadable},
-        found::{GameFacts, NamedItem, StepRate},
+        found::{AssetFolder, GameFacts, NamedItem, StepRate},
     },
 };
 use serde_json::json;
@@ -334,21 +334,22 @@ fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> Strin
     }
     text.push_str("        .restart(Restart::Startup)\n");
     if let Some((state, variant)) = facts.loading_state() {
-        let SourceLine { name, file, line } = &state.at;
+        let name = &state.at.name;
         let path = state.path.as_ref().map_or_else(|| name.clone(), |path| format!("{library}::{path}"));
         let _ = write!(
             text,
-            "        // TODO: if a level is ready once the game has left `{name}::{variant}` ({file}:{line}), set that state in\n        \
-             // `.level`, and wait for its end:\n        \
+            "        // TODO: if a level is ready once the game has left `{name}::{variant}`, set that state in `.level`, and wait for\n        \
+             // its end:\n        \
              // .ready(|state: Res<State<{path}>>| **state != {path}::{variant})\n"
         );
     } else if !facts.loads.is_empty() || !facts.loaders.is_empty() {
         text.push_str("        // TODO: if a level loads while the game runs, when it is ready: .ready(condition)\n");
     }
-    if let Some(SourceLine { file, line, .. }) = facts.files.first() {
+    if let Some(at) = facts.files.first() {
+        let place = at.place(facts.has_library);
         let _ = write!(
             text,
-            "        // TODO: the game reads files while it runs ({file}:{line}). Build their paths in the game from\n        \
+            "        // TODO: the game reads files{place} while it runs. Build their paths in the game from\n        \
              // `env!(\"CARGO_MANIFEST_DIR\")`, because programs and tests of `bots` start in other folders. Sort the\n        \
              // names of a folder, which have no order. If each file is a level, `.levels` takes their number, and\n        \
              // `.level` begins the file of that number.\n"
@@ -366,7 +367,7 @@ const DEFAULT_STEPS: f64 = 64.0;
 
 /// Returns the schedule of fixed steps that a game uses, and how many of them are a second, in words.
 fn fixed_steps(facts: &GameFacts) -> Option<String> {
-    let SourceLine { name, file, line } = facts.fixed.as_ref()?;
+    let SourceLine { name, file, line, .. } = facts.fixed.as_ref()?;
     let of_second = |hz: f64| format!("{hz} a second");
     let rate = facts.step_rate.as_ref().map_or_else(
         || format!("{}, which is Bevy's default", of_second(DEFAULT_STEPS)),
@@ -380,18 +381,18 @@ fn fixed_steps(facts: &GameFacts) -> Option<String> {
 
 /// Adds the frames of a second, for a game that plays in fixed steps. Where a frame has two steps, a press counts twice.
 fn add_frames(text: &mut String, facts: &GameFacts) {
-    let Some(SourceLine { name, file, line }) = &facts.fixed else { return };
+    let Some(SourceLine { name, .. }) = &facts.fixed else { return };
     let _ = match facts.step_rate.as_ref().map_or(Ok(DEFAULT_STEPS), |rate| rate.hz.ok_or(&rate.at)) {
         Ok(hz) => write!(
             text,
-            "        // A frame for each fixed step of the game ({file}:{line}): in a frame of two steps, `{name}` would see a\n        \
-             // press twice.\n        .hz({hz:?})\n"
+            "        // A frame for each fixed step of the game: in a frame of two steps, `{name}` would see a press twice.\n        \
+             .hz({hz:?})\n"
         ),
         Err(rate) => write!(
             text,
-            "        // TODO: a frame for each fixed step of the game ({file}:{line}), because in a frame of two steps `{name}`\n        \
-             // sees a press twice: .hz(steps of a second), as set in {}:{}\n",
-            rate.file, rate.line
+            "        // TODO: a frame for each fixed step of the game, because in a frame of two steps `{name}` sees a press\n        \
+             // twice: .hz(steps of a second), as the game sets them{}.\n",
+            rate.place(facts.has_library)
         ),
     };
 }
@@ -402,16 +403,11 @@ fn add_assets(text: &mut String, package: &str, facts: &GameFacts) {
     if own.is_none() && facts.loads.is_empty() && facts.loaders.is_empty() {
         return;
     }
-    let _ = match own.map(|folder| (folder.path.is_some(), &folder.at)) {
+    let _ = match own {
         None => writeln!(text, "        // The assets of the game, as the bots find them."),
-        Some((true, SourceLine { file, line, .. })) => {
-            writeln!(text, "        // The folder of assets that the game sets ({file}:{line}), as the bots find it.")
-        }
-        Some((false, SourceLine { file, line, .. })) => {
-            writeln!(
-                text,
-                "        // TODO: the folder of assets that the game sets ({file}:{line}), as the bots find it."
-            )
+        Some(AssetFolder { at, path }) => {
+            let (todo, place) = (if path.is_some() { "The" } else { "TODO: the" }, at.place(facts.has_library));
+            writeln!(text, "        // {todo} folder of assets that the game sets{place}, as the bots find it.")
         }
     };
     let inner = own.and_then(|folder| folder.path.as_deref()).unwrap_or("assets");
@@ -435,7 +431,7 @@ fn add_input(text: &mut String, facts: &GameFacts) {
         facts.keys.iter().map(String::as_str).partition(|key| facts.only_leaves(key));
     let (tools, keys): (Vec<&str>, Vec<&str>) = playing.into_iter().partition(|key| TOOL_KEYS.contains(key));
     let place = |key: &str| facts.leaving_keys.iter().find(|at| at.name == key);
-    let at = |key: &str| place(key).map_or(String::new(), |at| format!("{key} ({}:{})", at.file, at.line));
+    let at = |key: &str| place(key).map_or(String::new(), |at| format!("{key}{}", at.place(facts.has_library)));
     if !leaving.is_empty() {
         let places: Vec<String> = leaving.into_iter().map(at).collect();
         let _ = writeln!(text, "        // Left out, because they leave or skip levels: {}.", places.join(", "));
@@ -498,10 +494,10 @@ fn add_sight(text: &mut String, library: &str, facts: &GameFacts) {
         return;
     };
     let Some(path) = &player.path else {
-        let SourceLine { name, file, line } = &player.at;
+        let name = &player.at.name;
         let _ = write!(
             text,
-            "        // TODO: make `{name}` ({file}:{line}) public in the game's library, for `.observe` and:\n        \
+            "        // TODO: make `{name}` public in the game's library, for `.observe` and:\n        \
              // .position(|player: Single<&Transform, With<{library}::{name}>>| player.translation.truncate())\n        \
              .observe([\"time\"], |time: Res<Time>| [time.elapsed_secs()])\n"
         );

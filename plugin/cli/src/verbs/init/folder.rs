@@ -246,19 +246,60 @@ impl SourceText {
     /// Returns the line of an offset.
     pub fn at(&self, name: &str, offset: usize) -> SourceLine {
         let line = self.code[..offset].matches('\n').count() + 1;
-        SourceLine { name: name.to_owned(), file: self.path.clone(), line }
+        let function = function_around(&self.code[..offset]);
+        SourceLine { name: name.to_owned(), file: self.path.clone(), line, function }
     }
 
     /// Returns the lines that have one of these words, but for imports.
     pub fn lines_with(&self, words: &[&str]) -> Vec<SourceLine> {
-        let lines = self.code.lines().enumerate();
-        let found = lines.filter_map(|(at, line)| {
+        let (mut found, mut begin) = (Vec::new(), 0);
+        for line in self.code.split_inclusive('\n') {
             let is_import = line.trim_start().trim_start_matches("pub ").starts_with("use ");
-            let word = words.iter().find(|word| line.contains(**word)).filter(|_| !is_import)?;
-            Some(SourceLine { name: word.trim().to_owned(), file: self.path.clone(), line: at + 1 })
-        });
-        found.collect()
+            let word = words.iter().find_map(|word| line.find(word).map(|at| (word.trim(), begin + at)));
+            found.extend(word.filter(|_| !is_import).map(|(word, offset)| self.at(word, offset)));
+            begin += line.len();
+        }
+        found
     }
+}
+
+/// Returns the name of the function that is open at the end of code, behind that of its type: `HeroPlugin::build`.
+fn function_around(code: &str) -> Option<String> {
+    let (mut depth, mut function) = (0_u32, None);
+    for (at, brace) in code.rmatch_indices(['{', '}']) {
+        if brace == "}" {
+            depth += 1;
+            continue;
+        }
+        if depth > 0 {
+            depth -= 1;
+            continue;
+        }
+        let head = code[..at].rsplit(['{', '}']).next().unwrap_or_default();
+        let head = head.rsplit(";\n").next().unwrap_or_default();
+        match &function {
+            None => {
+                let words = head.rmatch_indices("fn ").find(|(at, _)| !head[..*at].ends_with(is_of_name));
+                function = words.map(|(at, words)| name(&head[at + words.len()..]).to_owned());
+            }
+            Some(function) => return Some(type_of(head).map_or(function.clone(), |of| format!("{of}::{function}"))),
+        }
+    }
+    function
+}
+
+/// Returns the name of the type behind `impl`.
+fn type_of(head: &str) -> Option<&str> {
+    let is_impl = |at: &usize| !head[..*at].ends_with(is_of_name) && !head.contains("fn ");
+    let at = head.find("impl").filter(is_impl)?;
+    let behind = head[at + 4..].trim_start();
+    let behind = match behind.split_once(" for ") {
+        Some((_, of)) => of,
+        None if behind.starts_with('<') => behind.split_once("> ")?.1,
+        None => behind,
+    };
+    let path = behind.trim_start().split(|c| !is_of_name(c) && c != ':').next()?;
+    path.rsplit("::").next().filter(|name| !name.is_empty())
 }
 
 /// Blanks the comments of a source. Lines keep their numbers.
@@ -333,6 +374,21 @@ pub(super) struct SourceLine {
     pub file: String,
     /// The line, counted from 1.
     pub line: usize,
+    /// The function around it, with its type. It stays true when the code is moved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub function: Option<String>,
+}
+
+impl SourceLine {
+    /// Returns the place for a file that is written: the function, which keeps its name when lines are moved. What is in
+    /// `main` is moved into `plugin`, if there is no library yet.
+    pub fn place(&self, has_library: bool) -> String {
+        match self.function.as_deref() {
+            Some("main") if !has_library => " in `plugin`".to_owned(),
+            Some(function) => format!(" in `{function}`"),
+            None => String::new(),
+        }
+    }
 }
 
 /// Returns true if a name may go on with this.
@@ -514,6 +570,30 @@ mod tests {
     fn comments_are_blank_and_lines_keep_their_numbers() {
         let text = "a // \"b\n/* c /* d */ \n e */ f\nlet g = \"// h\"; // i\nr#\"j // \"k\"# '\"' // l";
         assert_eq!(without_comments(text), "a \n\n f\nlet g = \"// h\"; \nr#\"j // \"k\"# '\"' ");
+    }
+
+    #[test]
+    fn lines_have_the_function_around_them() {
+        let code = "use a::MARK;\nconst A: u32 = MARK;\npub fn plugin(app: &mut App) { app.add(MARK); }\n\
+            fn sized(all: [u8; 3]) -> u8 {\n    if all[0] > 0 { one(); }\n    all.iter().map(|x| {\n        MARK\n    })\n}\n\
+            impl Plugin for hero::HeroPlugin<T> {\n    fn build(&self) { MARK }\n}\n\
+            impl<T: A> Own<T> {\n    fn other() {}\n    pub fn own() { MARK }\n}\nmod inner { fn deep() { MARK } }\nstatic B: u32 = MARK;";
+        let source = SourceText::new("src/lib.rs", code);
+        let found: Vec<_> = source.lines_with(&["MARK"]).into_iter().map(|at| (at.line, at.function)).collect();
+        let names =
+            [None, Some("plugin"), Some("sized"), Some("HeroPlugin::build"), Some("Own::own"), Some("deep"), None];
+        let lines = [2, 3, 7, 11, 15, 17, 18];
+        let expected: Vec<_> = lines.into_iter().zip(names.map(|name| name.map(str::to_owned))).collect();
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn a_place_keeps_its_name_when_the_code_is_moved() {
+        let source = SourceText::new("src/main.rs", "const A: u32 = MARK;\nfn main() { MARK }\nfn play() { MARK }");
+        let places =
+            |has_library| source.lines_with(&["MARK"]).iter().map(|at| at.place(has_library)).collect::<Vec<_>>();
+        assert_eq!(places(true), ["", " in `main`", " in `play`"]);
+        assert_eq!(places(false), ["", " in `plugin`", " in `play`"]);
     }
 
     #[test]

@@ -383,6 +383,8 @@ fn asset_folder(code: &str) -> Option<(usize, Option<String>)> {
     code.match_indices("AssetPlugin {").find_map(|(at, words)| {
         let fields = code[at + words.len()..].split('}').next()?;
         let (_, value) = fields.split_once("file_path")?;
+        // The first one may be the type that a function returns.
+        let at = fields.rfind(words).map_or(at, |inner| at + words.len() + inner);
         let text = value.trim_start().strip_prefix(':').and_then(|value| value.trim_start().strip_prefix('"'));
         Some((at, text.and_then(|text| text.split('"').next()).map(str::to_owned)))
     })
@@ -587,10 +589,8 @@ mod tests {
         assert!(found.has_library);
         assert_eq!(paths(&found.functions), ["rules::plugin", "add"]);
         assert_eq!(paths(&found.plugins), ["All"]);
-        assert_eq!(
-            found.functions[1].at,
-            SourceLine { name: "add".to_owned(), file: "src/lib.rs".to_owned(), line: 4 }
-        );
+        let at = &found.functions[1].at;
+        assert_eq!((at.name.as_str(), at.file.as_str(), at.line), ("add", "src/lib.rs", 4));
     }
 
     #[test]
