@@ -172,6 +172,10 @@ impl GameFolder {
             ("states", states.collect::<Vec<_>>().join(", ")),
             ("input", facts.inputs.join(", ")),
             ("keys", facts.keys.join(", ")),
+            (
+                "keys that mean the same",
+                facts.aliases.iter().map(|same| same.join(" = ")).collect::<Vec<_>>().join(", "),
+            ),
             ("keys that leave or skip levels", at(&facts.leaving_keys)),
             ("presses that count once", at(&facts.presses)),
             ("fixed steps", fixed_steps(facts).unwrap_or_default()),
@@ -469,7 +473,14 @@ fn add_input(text: &mut String, facts: &GameFacts) {
             "        .keys([\n            // One action for each set of keys. TODO: add sets that are held together.\n            \
              vec![],\n",
         );
-        for key in keys {
+        for (at, key) in keys.iter().enumerate() {
+            let same: Vec<&str> = facts.aliases_of(key).filter(|other| keys.contains(other)).collect();
+            if same.iter().any(|other| keys[..at].contains(other)) {
+                continue;
+            }
+            if !same.is_empty() {
+                let _ = writeln!(text, "            // The same as {}.", same.join(" and "));
+            }
             let _ = writeln!(text, "            vec![KeyCode::{key}],");
         }
         text.push_str("        ])\n");

@@ -3,6 +3,7 @@
 use crate::verbs::init::folder::{GameManifest, SourceLine, SourceText, is_of_name, name};
 use playbot_harness::foreign::PLAYER_NAMES;
 use serde::Serialize;
+use std::ops::Range;
 
 /// Random numbers that differ from run to run.
 const RANDOM: [&str; 9] = [
@@ -131,6 +132,8 @@ pub(super) struct GameFacts {
     pub states: Vec<StateEnum>,
     /// Keys that are read.
     pub keys: Vec<String>,
+    /// Keys that mean the same, in lists of two or more.
+    pub aliases: Vec<Vec<String>>,
     /// Keys behind which the code leaves a level or goes on to another one.
     pub leaving_keys: Vec<SourceLine>,
     /// Those of them that are also read elsewhere.
@@ -179,6 +182,7 @@ impl GameFacts {
             let prefix = door.and_then(|door| prefix(sources, door, source));
             facts.read_source(source, prefix.as_deref());
         }
+        facts.aliases = aliases(&facts.keys, sources);
         facts.also_playing.retain(|key| facts.leaving_keys.iter().any(|leaving| leaving.name == *key));
         let rank = |item: &NamedItem| match item.at.name.as_str() {
             "plugin" => 0,
@@ -278,6 +282,12 @@ impl GameFacts {
         self.leaving_keys.iter().any(|leaving| leaving.name == key) && !self.also_playing.iter().any(|also| also == key)
     }
 
+    /// Returns the keys that mean the same as a key, without itself.
+    pub fn aliases_of<'a>(&'a self, key: &'a str) -> impl Iterator<Item = &'a str> {
+        let same = self.aliases.iter().filter(move |same| same.iter().any(|name| name == key)).flatten();
+        same.map(String::as_str).filter(move |name| *name != key)
+    }
+
     fn add_inputs(&mut self, sources: &[SourceText]) {
         let any = |words: &[&str]| sources.iter().any(|source| words.iter().any(|word| source.code.contains(word)));
         let rows: [(&'static str, bool); 6] = [
@@ -343,6 +353,70 @@ fn keys_in(code: &str) -> Vec<(&str, usize)> {
         (is_key && !line.trim_start_matches("pub ").starts_with("use ")).then_some((key, at))
     });
     found.collect()
+}
+
+/// Returns the keys that mean the same: the sources read one nowhere without the others.
+fn aliases(keys: &[String], sources: &[SourceText]) -> Vec<Vec<String>> {
+    let read: Vec<Vec<&str>> = sources.iter().flat_map(|source| alternatives(&source.code)).collect();
+    let places = |key: &str| -> Vec<usize> {
+        read.iter().enumerate().filter(|(_, together)| together.contains(&key)).map(|(at, _)| at).collect()
+    };
+    let mut found: Vec<(Vec<usize>, Vec<String>)> = Vec::new();
+    for key in keys {
+        let at = places(key);
+        match found.iter_mut().find(|(other, _)| !at.is_empty() && *other == at) {
+            Some((_, same)) => same.push(key.clone()),
+            None => found.push((at, vec![key.clone()])),
+        }
+    }
+    found.into_iter().map(|(_, same)| same).filter(|same| same.len() > 1).collect()
+}
+
+/// Returns the keys that code reads at each place: those of which one is enough are together, as in
+/// `any_pressed([A, B])`, `pressed(A) || pressed(B)` and the pattern `A | B`.
+fn alternatives(code: &str) -> Vec<Vec<&str>> {
+    let all: Vec<(&str, Range<usize>)> =
+        keys_in(code).into_iter().map(|(key, at)| (key, at..at + "KeyCode::".len() + key.len())).collect();
+    let (mut found, mut begin) = (Vec::new(), 0);
+    while begin < all.len() {
+        let before = code[..all[begin].1.start].trim_end();
+        let is_listed = ["any_pressed([", "any_just_pressed(["].iter().any(|call| before.ends_with(call));
+        // The call or comparison of the first key, which has to be that of the others.
+        let is_same = |call: &str| {
+            let is_whole = call.ends_with('(') || call.ends_with("==");
+            let head = before.strip_suffix(call).filter(|_| is_whole);
+            head.is_some_and(|head| !head.ends_with(is_of_call) && !binds(head))
+        };
+        let goes_on = |pair: &[(&str, Range<usize>)]| {
+            let between = code[pair[0].1.end..pair[1].1.start].trim();
+            let rest = between.strip_prefix(')').unwrap_or(between).trim_start();
+            let is_next = rest.strip_prefix("||").is_some_and(|call| is_same(call.trim_start()));
+            between == "|" || between == "," && is_listed || is_next
+        };
+        let more = all[begin..].windows(2).take_while(|pair| goes_on(pair)).count();
+        let end = begin + more + 1;
+        // `A || B && C` does not mean the same for both.
+        let behind = code[all[end - 1].1.end..].trim_start();
+        let behind = behind.strip_prefix(')').filter(|_| before.ends_with('(')).unwrap_or(behind).trim_start();
+        let keys = all[begin..end].iter().map(|(key, _)| *key);
+        if behind.starts_with("&&") && !is_listed {
+            found.extend(keys.map(|key| vec![key]));
+        } else {
+            found.push(keys.collect());
+        }
+        begin = end;
+    }
+    found
+}
+
+/// Returns true if the name of a call may begin before this.
+fn is_of_call(c: char) -> bool {
+    is_of_name(c) || c == '.'
+}
+
+/// Returns true if code ends with an operator that binds what follows more closely than `||`.
+fn binds(code: &str) -> bool {
+    ["&&", "!"].iter().any(|operator| code.trim_end().ends_with(operator))
 }
 
 /// Returns the code that depends on the key that stands there: the block behind it, the arm of a match, or the line of a
@@ -576,6 +650,55 @@ mod tests {
         let found = facts(&[("src/main.rs", code)]);
         assert_eq!(found.keys, ["Space", "ArrowLeft", "KeyA"]);
         assert_eq!(found.inputs, ["keyboard"]);
+    }
+
+    #[test]
+    fn keys_mean_the_same_if_one_is_never_read_without_the_other() {
+        let aliases = |code: &str| {
+            let same = facts(&[("src/main.rs", code)]).aliases;
+            same.iter().map(|same| same.join(" ")).collect::<Vec<_>>().join(", ")
+        };
+        for (code, same) in [
+            ("if keys.any_pressed([KeyCode::KeyW, KeyCode::ArrowUp]) { up(); }", "KeyW ArrowUp"),
+            ("keys.any_just_pressed([\n    KeyCode::KeyW,\n    KeyCode::ArrowUp,\n])", "KeyW ArrowUp"),
+            ("if keys.pressed(KeyCode::KeyW) || keys.pressed(KeyCode::ArrowUp) { up(); }", "KeyW ArrowUp"),
+            ("if on && (keys.pressed(KeyCode::KeyW)\n    || keys.pressed(KeyCode::ArrowUp)) { up(); }", "KeyW ArrowUp"),
+            ("if (k.pressed(KeyCode::KeyW) || k.pressed(KeyCode::ArrowUp)) && on { up(); }", "KeyW ArrowUp"),
+            ("if key == KeyCode::KeyW || key == KeyCode::ArrowUp { up(); }", "KeyW ArrowUp"),
+            ("match key { KeyCode::KeyW | KeyCode::ArrowUp => up(), KeyCode::KeyS => down() }", "KeyW ArrowUp"),
+            (
+                "k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::KeyB) || k.pressed(KeyCode::KeyC);\n\
+                 k.any_pressed([KeyCode::KeyX, KeyCode::KeyY]);",
+                "KeyA KeyB KeyC, KeyX KeyY",
+            ),
+            // The first line moves, the others animate: of four keys, two and two mean the same.
+            (
+                "k.any_pressed([KeyCode::KeyA, KeyCode::ArrowLeft, KeyCode::KeyD, KeyCode::ArrowRight]);\n\
+                 k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::ArrowLeft);\n\
+                 k.pressed(KeyCode::KeyD) || k.pressed(KeyCode::ArrowRight);",
+                "KeyA ArrowLeft, KeyD ArrowRight",
+            ),
+            // Read alone somewhere else, held together, by two functions, by two devices, or bound by another operator.
+            ("k.any_pressed([KeyCode::KeyA, KeyCode::KeyB]); k.pressed(KeyCode::KeyB);", ""),
+            ("k.all_pressed([KeyCode::KeyA, KeyCode::KeyB]);", ""),
+            ("k.pressed(KeyCode::KeyA) || k.just_pressed(KeyCode::KeyB)", ""),
+            ("a.pressed(KeyCode::KeyA) || aa.pressed(KeyCode::KeyB)", ""),
+            ("aa.pressed(KeyCode::KeyA) || a.pressed(KeyCode::KeyB)", ""),
+            ("k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::KeyB) && on", ""),
+            ("key == KeyCode::KeyA || key == KeyCode::KeyB && on", ""),
+            ("on && k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::KeyB)", ""),
+            ("!k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::KeyB)", ""),
+            ("k.pressed(KeyCode::KeyA) && k.pressed(KeyCode::KeyB)", ""),
+            ("[KeyCode::KeyA, KeyCode::KeyB].map(|key| k.pressed(key))", ""),
+        ] {
+            assert_eq!(aliases(code), same, "{code}");
+        }
+        let both = [
+            ("src/a.rs", "k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::KeyB)"),
+            ("src/b.rs", "k.pressed(KeyCode::KeyA)"),
+        ];
+        assert_eq!(facts(&both[..1]).aliases.len(), 1);
+        assert_eq!(facts(&both).aliases, Vec::<Vec<String>>::new(), "another file reads it alone");
     }
 
     #[test]
