@@ -15,9 +15,23 @@ mod adapter;
 #[path = "../fixtures/init_adapter_of_files.rs"]
 mod adapter_of_files;
 
+/// The adapter that is written for [`ROUNDS`].
+#[path = "../fixtures/init_adapter_of_rounds.rs"]
+mod adapter_of_rounds;
+
 /// The component that the adapter observes.
 #[derive(Component)]
 pub struct Player;
+
+/// The state that the adapter of rounds enters.
+#[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Screen {
+    /// Waits for a key.
+    #[default]
+    Menu,
+    /// Plays a round.
+    Playing,
+}
 
 /// The game of the adapter.
 pub fn plugin(app: &mut App) {
@@ -54,6 +68,28 @@ fn play(keys: Res<ButtonInput<KeyCode>>, assets: Res<AssetServer>) {
     for file in std::fs::read_dir(\"levels\") {}
 }
 pub fn defaults() -> AssetPlugin { AssetPlugin { file_path: \"art\".into(), ..default() } }
+";
+
+/// A game that spawns its player in a state, with two keys for each direction.
+const ROUNDS: &str = "\
+#[derive(Component)]
+pub struct Player;
+#[derive(States)]
+pub enum Screen { Menu, Playing }
+pub fn plugin(app: &mut App) {
+    app.init_state::<Screen>()
+        .add_systems(OnEnter(Screen::Playing), begin)
+        .add_systems(OnExit(Screen::Playing), |mut commands: Commands, player: Single<Entity, With<Player>>| {
+            commands.entity(*player).despawn();
+        })
+        .add_systems(Update, walk.run_if(in_state(Screen::Playing)));
+}
+fn begin(mut commands: Commands) { commands.spawn((Player, Transform::default())); }
+fn walk(keys: Res<ButtonInput<KeyCode>>) {
+    if keys.pressed(KeyCode::ArrowUp) || keys.pressed(KeyCode::KeyW) { up(); }
+    if keys.any_pressed([KeyCode::KeyS, KeyCode::ArrowDown]) { down(); }
+    if keys.pressed(KeyCode::Space) { jump(); }
+}
 ";
 
 const MAIN: &str = "\
@@ -130,6 +166,57 @@ fn the_adapter_of_a_game_with_files_says_what_follows_from_them() {
         "to do: build the paths of files from env!(\"CARGO_MANIFEST_DIR\"), and sort the names of a folder",
     ] {
         assert!(found.lines().any(|found| found == line), "{line}: {found}");
+    }
+}
+
+#[test]
+fn the_adapter_of_a_game_with_rounds_enters_their_state_and_presses_one_key_of_two() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write(folder, &[("Cargo.toml", MANIFEST), ("src/lib.rs", ROUNDS)]);
+    let (found, _) = done(folder, &["init"]);
+    assert_eq!(read(folder, "bots/src/lib.rs"), include_str!("../fixtures/init_adapter_of_rounds.rs"));
+    assert_eq!(adapter_of_rounds::adapter().problem(), None);
+    for line in [
+        "state of a round: Screen::Playing (src/lib.rs:7)",
+        "keys that mean the same: ArrowUp = KeyW, KeyS = ArrowDown",
+    ] {
+        assert!(found.lines().any(|found| found == line), "{line}: {found}");
+    }
+    // A state that the bots cannot name, and one that loads first.
+    for (game, line) in [
+        (ROUNDS.replace("pub enum", "enum"), "        // .restart(Restart::state(my_game::Screen::Playing))"),
+        (ROUNDS.replace("Menu,", "Loading,"), "        .restart(Restart::Startup)"),
+    ] {
+        write(folder, &[("src/lib.rs", &game)]);
+        let _ = fs::remove_dir_all(folder.join("bots"));
+        let (printed, _) = done(folder, &["init", "--dry-run"]);
+        let lines: Vec<_> = printed.lines().collect();
+        assert!(lines.contains(&line) && lines.contains(&"        .restart(Restart::Startup)"), "{line}: {printed}");
+    }
+}
+
+#[test]
+fn what_is_written_names_no_line_of_the_game() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let loading =
+        FILES.replace("pub struct Player;", "struct Player;\n#[derive(States)]\npub enum Screen { Loading, Playing }");
+    let fixed = FILES.replace("Update, ", "FixedUpdate, ").replace("\"art\".into()", "folder()");
+    for (name, game) in [
+        ("src/lib.rs", LIBRARY),
+        ("src/lib.rs", loading.as_str()),
+        ("src/main.rs", ROUNDS),
+        ("src/main.rs", fixed.as_str()),
+    ] {
+        let _ = fs::remove_dir_all(folder.join("src"));
+        let _ = fs::remove_dir_all(folder.join("bots"));
+        write(folder, &[("Cargo.toml", MANIFEST), (name, game)]);
+        done(folder, &["init"]);
+        for written in WRITTEN {
+            let text = read(folder, written);
+            assert!(!text.contains(".rs:"), "{written} of {game}: {text}");
+        }
     }
 }
 

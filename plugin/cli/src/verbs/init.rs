@@ -13,7 +13,7 @@ use crate::{
     output::{print_line, write},
     verbs::init::{
         folder::{BEVY, GameFolder, SourceLine, SourceText, folder_of, has_member, read_sources, unreadable},
-        found::{AssetFolder, GameFacts, NamedItem, StepRate},
+        found::{AssetFolder, GameFacts, NamedItem, RoundState, StepRate},
     },
 };
 use serde_json::json;
@@ -151,6 +151,10 @@ impl GameFolder {
         let states = facts.states.iter().map(|state| {
             format!("{} ({}:{}): {}", state.at.name, state.at.file, state.at.line, state.variants.join(" | "))
         });
+        let round = facts
+            .round
+            .as_ref()
+            .map(|RoundState { at, state, .. }| format!("{state}::{} ({}:{})", at.name, at.file, at.line));
         let folder = facts.asset_folder.as_ref().map(|folder| {
             format!("{} ({}:{})", folder.path.as_deref().unwrap_or("computed"), folder.at.file, folder.at.line)
         });
@@ -170,6 +174,7 @@ impl GameFolder {
             ("plugins", items(&facts.plugins)),
             ("added by src/main.rs", items(&facts.added)),
             ("states", states.collect::<Vec<_>>().join(", ")),
+            ("state of a round", round.unwrap_or_default()),
             ("input", facts.inputs.join(", ")),
             ("keys", facts.keys.join(", ")),
             (
@@ -329,14 +334,7 @@ fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> Strin
          // .end(|score: Res<Score>| (score.0 >= 10).then_some(EpisodeEnd::WON))\n        \
          .time_limit(600)\n",
     );
-    if let Some(state) = facts.states.first() {
-        let (name, variants) = (&state.at.name, state.variants.join(", "));
-        let _ = writeln!(
-            text,
-            "        // TODO: if a state begins the game, set it in `.level`, which runs last: one of {variants} of `{name}`."
-        );
-    }
-    text.push_str("        .restart(Restart::Startup)\n");
+    add_restart(&mut text, library, facts);
     if let Some((state, variant)) = facts.loading_state() {
         let name = &state.at.name;
         let path = state.path.as_ref().map_or_else(|| name.clone(), |path| format!("{library}::{path}"));
@@ -364,6 +362,44 @@ fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> Strin
          .levels(1)\n        .level(|_level: Res<LevelSeed>| {})\n}\n",
     );
     text + &own
+}
+
+/// Adds the restart: by the state that begins a round, or by the systems of the start. A game that loads in a state of its
+/// own may not be played before that, so its restart begins there.
+fn add_restart(text: &mut String, library: &str, facts: &GameFacts) {
+    let round = facts.round.as_ref().filter(|_| facts.loading_state().is_none());
+    if let Some(RoundState { at: SourceLine { name: variant, .. }, state, path }) = round {
+        let of = path.as_ref().unwrap_or(state);
+        let restart = format!(".restart(Restart::state({library}::{of}::{variant}))");
+        let _ = match path {
+            Some(_) => writeln!(
+                text,
+                "        // The game spawns a round whenever it enters `{state}::{variant}`, so each episode enters this state again."
+            ),
+            None => write!(
+                text,
+                "        // TODO: the game spawns a round whenever it enters `{state}::{variant}`. Make `{state}` public in the game's\n        \
+                 // library, so that each episode can enter this state again, and write instead of `Restart::Startup`:\n        \
+                 // {restart}\n"
+            ),
+        };
+        let restart = if path.is_some() { restart.as_str() } else { ".restart(Restart::Startup)" };
+        let _ = write!(
+            text,
+            "        // TODO: reset what stays in resources, such as a score, in `.level`, which runs after that. If the round depends\n        \
+             // on the level or on random numbers, `Restart::Startup` is right, and `.level` sets the state by `NextState`.\n        \
+             {restart}\n"
+        );
+        return;
+    }
+    if let Some(state) = facts.states.first() {
+        let (name, variants) = (&state.at.name, state.variants.join(", "));
+        let _ = writeln!(
+            text,
+            "        // TODO: if a state begins the game, set it in `.level`, which runs last: one of {variants} of `{name}`."
+        );
+    }
+    text.push_str("        .restart(Restart::Startup)\n");
 }
 
 /// Steps of a second in Bevy, if a game sets none.

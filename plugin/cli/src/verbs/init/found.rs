@@ -3,7 +3,7 @@
 use crate::verbs::init::folder::{GameManifest, SourceLine, SourceText, is_of_name, name};
 use playbot_harness::foreign::PLAYER_NAMES;
 use serde::Serialize;
-use std::ops::Range;
+use std::{cmp::Reverse, ops::Range};
 
 /// Random numbers that differ from run to run.
 const RANDOM: [&str; 9] = [
@@ -66,6 +66,54 @@ const STEPS: [(&str, bool); 7] = [
     ("set_timestep(", false),
 ];
 
+/// Words in the names of states in which a round is played.
+const PLAYS: [&str; 12] =
+    ["Play", "Playing", "Game", "Gameplay", "Running", "Run", "Round", "Level", "Match", "Battle", "Fight", "Race"];
+
+/// Words in the names of states in which none is played.
+const RESTS: [&str; 37] = [
+    "Menu",
+    "Title",
+    "Splash",
+    "Intro",
+    "Load",
+    "Loading",
+    "Lobby",
+    "Select",
+    "Selection",
+    "Pause",
+    "Paused",
+    "Over",
+    "End",
+    "Ended",
+    "Ending",
+    "Finish",
+    "Finished",
+    "Complete",
+    "Completed",
+    "Failed",
+    "Won",
+    "Win",
+    "Victory",
+    "Lost",
+    "Lose",
+    "Defeat",
+    "Dead",
+    "Death",
+    "Died",
+    "Score",
+    "Scores",
+    "Credits",
+    "Settings",
+    "Options",
+    "Editor",
+    "Quit",
+    "Exit",
+];
+
+/// Code that takes down what a state has spawned.
+const CLEARS: [&str; 4] = ["despawn", "cleanup", "clean_up", "teardown"];
+
 /// Crates that load levels or assets while the game runs.
 const LOADERS: [&str; 3] = ["bevy_ecs_ldtk", "bevy_ecs_tiled", "bevy_asset_loader"];
 
@@ -95,6 +143,20 @@ pub(super) struct StateEnum {
     pub path: Option<String>,
     /// Its variants.
     pub variants: Vec<String>,
+    /// Whether it exists in another state only.
+    pub is_sub: bool,
+}
+
+/// A state that spawns a round whenever it is entered, and takes it down.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct RoundState {
+    /// Where the systems of its start are added. The name is that of the variant.
+    #[serde(flatten)]
+    pub at: SourceLine,
+    /// Name of the enum.
+    pub state: String,
+    /// Path of the enum behind the name of the crate, if it is public.
+    pub path: Option<String>,
 }
 
 /// The folder of assets that a game sets.
@@ -130,6 +192,8 @@ pub(super) struct GameFacts {
     pub added: Vec<NamedItem>,
     /// The states.
     pub states: Vec<StateEnum>,
+    /// The state that begins a round.
+    pub round: Option<RoundState>,
     /// Keys that are read.
     pub keys: Vec<String>,
     /// Keys that mean the same, in lists of two or more.
@@ -182,6 +246,7 @@ impl GameFacts {
             let prefix = door.and_then(|door| prefix(sources, door, source));
             facts.read_source(source, prefix.as_deref());
         }
+        facts.round = round(&facts.states, sources);
         facts.aliases = aliases(&facts.keys, sources);
         facts.also_playing.retain(|key| facts.leaving_keys.iter().any(|leaving| leaving.name == *key));
         let rank = |item: &NamedItem| match item.at.name.as_str() {
@@ -213,9 +278,13 @@ impl GameFacts {
             self.functions.extend(functions_of_apps(code).into_iter().map(item));
             self.plugins.extend(unit_plugins(code).into_iter().map(item));
         }
-        for item in ["States", "SubStates"].into_iter().flat_map(|derived| deriving(code, derived, "enum ")) {
+        for (item, is_sub) in [("States", false), ("SubStates", true)]
+            .into_iter()
+            .flat_map(|(derived, is_sub)| deriving(code, derived, "enum ").into_iter().map(move |item| (item, is_sub)))
+        {
             let path = prefix.filter(|_| item.is_public).map(|prefix| format!("{prefix}{}", item.name));
-            self.states.push(StateEnum { at: source.at(item.name, item.offset), path, variants: variants(item.rest) });
+            let at = source.at(item.name, item.offset);
+            self.states.push(StateEnum { at, path, variants: variants(item.rest), is_sub });
         }
         add_new(&mut self.keys, names_behind(code, "KeyCode::"));
         for (key, offset) in keys_in(code) {
@@ -542,6 +611,93 @@ fn variants(rest: &str) -> Vec<String> {
     names.filter(|name| !name.is_empty()).collect()
 }
 
+/// Returns the state that spawns a round whenever it is entered, and takes it down: of several, the one with the likeliest
+/// name, and then the one in which most systems run. A state within another one cannot be entered from everywhere.
+fn round(states: &[StateEnum], sources: &[SourceText]) -> Option<RoundState> {
+    let mut found = Vec::new();
+    for source in sources {
+        for (state, variant, at) in named_in(&source.code, "OnEnter(") {
+            let known = states.iter().find(|known| known.at.name == state && !known.is_sub);
+            let Some(known) = known.filter(|known| known.variants.iter().any(|known| known == variant)) else {
+                continue;
+            };
+            let words = words_of(variant);
+            let start = code_of_systems(sources, &source.code, at);
+            let spawns =
+                start.iter().any(|code| code.match_indices("spawn").any(|(at, _)| !code[..at].ends_with("de")));
+            if !spawns || words.iter().any(|word| RESTS.contains(word)) {
+                continue;
+            }
+            let is_it = |(of, name, _): &(&str, &str, usize)| (*of, *name) == (state, variant);
+            let despawns = |code: &str| {
+                ["DespawnOnExit(", "StateScoped("].iter().any(|mark| named_in(code, mark).iter().any(is_it))
+            };
+            let leaves = sources.iter().flat_map(|source| {
+                let exits = named_in(&source.code, "OnExit(").into_iter().filter(is_it);
+                exits.flat_map(|(_, _, at)| code_of_systems(sources, &source.code, at)).collect::<Vec<_>>()
+            });
+            let clears = |code: &str| CLEARS.iter().any(|word| code.contains(word));
+            if !start.into_iter().chain(leaves).any(clears) && !sources.iter().any(|source| despawns(&source.code)) {
+                continue;
+            }
+            let running =
+                |source: &SourceText| named_in(&source.code, "in_state(").iter().filter(|at| is_it(at)).count();
+            let rank = (words.iter().any(|word| PLAYS.contains(word)), sources.iter().map(running).sum::<usize>());
+            let (state, path) = (state.to_owned(), known.path.clone());
+            found.push((Reverse(rank), RoundState { at: source.at(variant, at), state, path }));
+        }
+    }
+    found.sort_by_key(|(rank, _)| *rank);
+    found.into_iter().next().map(|(_, state)| state)
+}
+
+/// Returns the variants of states that stand behind this call, such as `OnEnter(Screen::Playing)`: enum, variant, and the
+/// offset of the call.
+fn named_in<'a>(code: &'a str, call: &str) -> Vec<(&'a str, &'a str, usize)> {
+    let found = code.match_indices(call).filter_map(|(at, words)| {
+        let (path, variant) = code[at + words.len()..].split(')').next()?.trim().rsplit_once("::")?;
+        let is_whole = !code[..at].ends_with(is_of_name) && variant.chars().all(is_of_name);
+        is_whole.then(|| (path.rsplit("::").next().unwrap_or(path), variant, at))
+    });
+    found.collect()
+}
+
+/// Returns the words of a name such as `GameOver`.
+fn words_of(name: &str) -> Vec<&str> {
+    let begins = name.char_indices().filter(|(at, c)| *at == 0 || c.is_uppercase()).map(|(at, _)| at);
+    let begins: Vec<usize> = begins.chain([name.len()]).collect();
+    begins.windows(2).map(|pair| &name[pair[0]..pair[1]]).collect()
+}
+
+/// Returns the code behind a schedule up to the end of the call that adds systems to it, and that of the functions that it
+/// names.
+fn code_of_systems<'a>(sources: &'a [SourceText], code: &'a str, schedule: usize) -> Vec<&'a str> {
+    let mut depth = 0_i32;
+    let end = code[schedule..].char_indices().find(|(_, c)| {
+        depth += i32::from("([{".contains(*c)) - i32::from(")]}".contains(*c));
+        depth < 0
+    });
+    let call = &code[schedule..end.map_or(code.len(), |(at, _)| schedule + at)];
+    let names = call.split(|c| !is_of_name(c)).filter(|name| name.starts_with(|c: char| c.is_lowercase() || c == '_'));
+    let bodies = names.flat_map(|name| sources.iter().filter_map(move |source| body_of(&source.code, name)));
+    std::iter::once(call).chain(bodies).collect()
+}
+
+/// Returns the body of a function.
+fn body_of<'a>(code: &'a str, function: &str) -> Option<&'a str> {
+    code.match_indices(function).find_map(|(at, _)| {
+        let behind = &code[at + function.len()..];
+        let is_defined = code[..at].ends_with("fn ") && behind.starts_with(['(', '<']);
+        let body = behind.find('{').filter(|_| is_defined)?;
+        let mut depth = 0_i32;
+        let end = behind[body..].char_indices().find(|(_, c)| {
+            depth += i32::from(*c == '{') - i32::from(*c == '}');
+            depth == 0
+        });
+        Some(&behind[body..end.map_or(behind.len(), |(at, _)| body + at)])
+    })
+}
+
 /// Returns the texts that stand within 20 lines behind a `Button`, or that the names there stand for.
 fn button_texts(sources: &[SourceText]) -> Vec<String> {
     const REACH: usize = 20;
@@ -823,6 +979,44 @@ mod tests {
         assert_eq!(paths(&found.plugins), ["actors::hero::HeroPlugin"], "the other module is not public");
         assert_eq!(paths(&found.functions), ["ui::plugin", "ui::other"]);
         assert_eq!(paths(&found.added), ["ui::plugin", "actors::hero::HeroPlugin"]);
+    }
+
+    #[test]
+    fn a_round_begins_in_the_state_that_spawns_it_and_takes_it_down() {
+        let states = "#[derive(States)]\npub enum Screen { Menu, Playing, GameOver, Shop }\n\
+            #[derive(SubStates)]\npub enum Phase { Running }\n";
+        let round = |code: &str| {
+            let found = facts(&[("src/lib.rs", &format!("pub mod play;\n{states}")), ("src/play.rs", code)]).round?;
+            assert_eq!(
+                (found.state.as_str(), found.path.as_deref(), found.at.file.as_str()),
+                ("Screen", Some("Screen"), "src/play.rs")
+            );
+            Some((found.at.name, found.at.line))
+        };
+        let found = |variant: &str, line| Some((variant.to_owned(), line));
+        let whole = "fn plugin(app: &mut App) {\n    app.add_systems(OnEnter(crate::Screen::Playing), (set_up, other).chain())\n        \
+            .add_systems(OnExit(Screen::Playing), take_down);\n}\n\
+            fn set_up(mut commands: Commands) {\n    commands.spawn(Ball);\n}\n\
+            fn take_down(mut commands: Commands) {\n    commands.entity(ball).despawn();\n}\n";
+        assert_eq!(round(whole), found("Playing", 2));
+        for (left_out, why) in [
+            ("commands.spawn(Ball)", "nothing is spawned"),
+            (".despawn()", "nothing is despawned"),
+            ("OnExit(Screen::Playing)", "it is despawned somewhere else"),
+            ("OnEnter(crate::Screen::Playing)", "no state is entered"),
+        ] {
+            assert_eq!(round(&whole.replace(left_out, "nothing()")), None, "{why}");
+        }
+        let scoped = whole.replace(".despawn()", "").replace("Ball", "(Ball, DespawnOnExit(Screen::Playing))");
+        assert_eq!(round(&scoped), found("Playing", 2), "Bevy despawns it");
+        for variant in ["Menu", "GameOver"] {
+            assert_eq!(round(&whole.replace("Playing", variant)), None, "{variant} is no round");
+        }
+        assert_eq!(round(&whole.replace("Screen::Playing", "Phase::Running")), None, "a state within a state");
+        let shop = whole.replace("Playing", "Shop");
+        assert_eq!(round(&shop), found("Shop", 2));
+        let both = format!("{shop}{whole}");
+        assert_eq!(round(&both), found("Playing", shop.lines().count() + 2), "its name says that it is played");
     }
 
     #[test]
