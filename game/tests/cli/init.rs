@@ -317,6 +317,27 @@ fn a_second_run_leaves_all_files_alone() {
 }
 
 #[test]
+fn a_workspace_without_a_profile_of_crates_gets_the_place_of_one_that_builds_faster() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write(folder, &[("Cargo.toml", MANIFEST), ("src/lib.rs", LIBRARY)]);
+    let (_, reported) = done(folder, &["init", "--dry-run"]);
+    let begin = "to build the bots faster, copy [profile.release] and [profile.release.package] from ";
+    let named = reported.lines().find_map(|line| line.strip_prefix(begin)?.split(" to ").next());
+    let named = named.unwrap_or_else(|| panic!("{reported}"));
+    let profile = fs::read_to_string(named).unwrap_or_else(|error| panic!("{named}: {error}"));
+    for table in ["\n[profile.release]\n", "\n[profile.release.package]\n"] {
+        assert!(profile.contains(table), "{named} has no {table}");
+    }
+    assert!(reported.contains("  add `my-game = { opt-level = 3 }` to the second table, "), "{reported}");
+    let (_, reported) = done(folder, &["init", "--dry-run", "--playbot", "https://example.org/playbot"]);
+    assert!(reported.contains(&format!("{begin}Cargo.toml in https://example.org/playbot to ")), "{reported}");
+    let tuned = format!("{MANIFEST}\n[profile.release.package]\nbevy_ecs = {{ opt-level = 3 }}\n");
+    write(folder, &[("Cargo.toml", &tuned)]);
+    assert!(!done(folder, &["init", "--dry-run"]).1.contains("to build the bots faster"));
+}
+
+#[test]
 fn a_game_in_its_main_alone_gets_a_library_and_the_lines_to_move() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();

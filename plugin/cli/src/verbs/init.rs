@@ -69,7 +69,8 @@ pub(crate) fn run(args: &Args) -> Result<Outcome, CliError> {
     sources.retain(|source| source.path != library || !is_stub(source));
     let has_stub = sources.len() < all;
     let facts = GameFacts::read(&game.manifest, &game.library_file(), &sources);
-    let files = game.files(&facts, &playbot_source(args.playbot.as_deref())?);
+    let source = PlaybotSource::of(args.playbot.as_deref())?;
+    let files = game.files(&facts, &source.dependency);
     let (missing, kept): (Vec<_>, Vec<_>) = files.into_iter().partition(|(path, _)| !game.root.join(path).exists());
     let moves = if facts.has_library { Vec::new() } else { moves(&sources) };
     let should_edit = args.edit_workspace && !game.root_manifest.is_workspace;
@@ -106,6 +107,7 @@ pub(crate) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     moves.iter().for_each(|line| report!("{line}"));
     game.report_workspace(should_edit, args.dry_run)?;
+    game.report_profile(&source);
     if !args.dry_run {
         report!("next: fill in what bots/src/lib.rs marks with TODO, then run `cargo test --release` in bots");
     }
@@ -233,6 +235,21 @@ impl GameFolder {
             report!("add \"bots\" to `members` of [workspace] in {}", file.display());
         }
         Ok(())
+    }
+
+    /// Reports which settings make builds of the bots faster, unless the workspace has some.
+    fn report_profile(&self, source: &PlaybotSource) {
+        if !self.root_manifest.tunes_crates {
+            report!(
+                "to build the bots faster, copy [profile.release] and [profile.release.package] from {} to {}:\n  \
+                 Cargo takes no profile from a dependency, and optimises all of Bevy and burn without one\n  \
+                 add `{} = {{ opt-level = 3 }}` to the second table, because both hold for the game that ships, too\n  \
+                 to leave that game as it is, give them another name: docs/how-to/adapt-your-game.md#build-times",
+                source.profile,
+                self.root.join("Cargo.toml").display(),
+                self.name()
+            );
+        }
     }
 }
 
@@ -583,22 +600,34 @@ fn moves(sources: &[SourceText]) -> Vec<String> {
     lines
 }
 
-/// Returns the text of the dependency `playbot`, up to its features.
-fn playbot_source(wanted: Option<&str>) -> Result<String, CliError> {
-    if let Some(url) = wanted.filter(|wanted| wanted.contains("://") || wanted.starts_with("git@")) {
-        return Ok(format!("git = {url:?}"));
+/// Where the crate `playbot` comes from.
+struct PlaybotSource {
+    /// The text of the dependency, up to its features.
+    dependency: String,
+    /// The `Cargo.toml` with its profile, for people.
+    profile: String,
+}
+
+impl PlaybotSource {
+    /// Finds the source: a URL of git, a clone, or the clone from which this program was built.
+    fn of(wanted: Option<&str>) -> Result<Self, CliError> {
+        if let Some(url) = wanted.filter(|wanted| wanted.contains("://") || wanted.starts_with("git@")) {
+            return Ok(Self { dependency: format!("git = {url:?}"), profile: format!("Cargo.toml in {url}") });
+        }
+        let built_from = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let clone = wanted.map_or(built_from, Path::new);
+        let inner = clone.join("plugin/cli");
+        let folder = if inner.join("Cargo.toml").is_file() { inner } else { clone.to_owned() };
+        if !folder.join("Cargo.toml").is_file() {
+            let advice = "name a clone of the repository of playbot, or its URL, with --playbot";
+            return Err(CliError::Usage(format!("{} has no Cargo.toml: {advice}", folder.display())));
+        }
+        let folder = std::path::absolute(&folder).unwrap_or(folder);
+        let root = folder.ancestors().nth(2).unwrap_or(&folder).join("Cargo.toml");
+        // The form of a text in Rust is one of TOML for all paths that a keyboard writes.
+        let dependency = format!("path = {:?}", folder.display().to_string());
+        Ok(Self { dependency, profile: root.display().to_string() })
     }
-    let built_from = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let clone = wanted.map_or(built_from, Path::new);
-    let inner = clone.join("plugin/cli");
-    let folder = if inner.join("Cargo.toml").is_file() { inner } else { clone.to_owned() };
-    if !folder.join("Cargo.toml").is_file() {
-        let advice = "name a clone of the repository of playbot, or its URL, with --playbot";
-        return Err(CliError::Usage(format!("{} has no Cargo.toml: {advice}", folder.display())));
-    }
-    let folder = std::path::absolute(&folder).unwrap_or(folder);
-    // The form of a text in Rust is one of TOML for all paths that a keyboard writes.
-    Ok(format!("path = {:?}", folder.display().to_string()))
 }
 
 /// Returns true for the library that this verb writes, as long as no code has been added to it.

@@ -423,6 +423,8 @@ pub(super) struct GameManifest {
     pub library_path: Option<String>,
     /// Whether there is a table `[workspace]`.
     pub is_workspace: bool,
+    /// Whether it sets how single crates are optimised in some profile.
+    pub tunes_crates: bool,
     /// The members of the workspace, as they are written.
     pub members: Vec<String>,
     /// Names of the dependencies.
@@ -455,6 +457,7 @@ impl GameManifest {
             library: one("lib", "name"),
             library_path: one("lib", "path"),
             is_workspace: tables.iter().any(|table| table == "workspace" || table.starts_with("workspace.")),
+            tunes_crates: tables.iter().any(|table| is_of_crates(table)),
             members: value("workspace", "members").unwrap_or_default(),
             dependencies,
             bevy: bevy(&entries, "dependencies"),
@@ -466,6 +469,13 @@ impl GameManifest {
     pub fn depends_on(&self, name: &str) -> bool {
         self.dependencies.iter().any(|dependency| dependency == name)
     }
+}
+
+/// Returns true for the tables of single crates in a profile. Those of `dev` and `test` do not count, because bots are too
+/// slow there.
+fn is_of_crates(table: &str) -> bool {
+    let profile = table.strip_prefix("profile.").and_then(|rest| rest.split_once(".package"));
+    profile.is_some_and(|(name, _)| name != "dev" && name != "test")
 }
 
 /// A line `key = value` with its table. A value over several lines is one.
@@ -632,6 +642,15 @@ mod tests {
         assert!(manifest.bevy.is_some_and(|bevy| bevy.is_inherited));
         assert_eq!(manifest.workspace_bevy.and_then(|bevy| bevy.version).as_deref(), Some("0.19"));
         assert!(!GameManifest::read("[package]\nname = \"a\"").is_workspace);
+        for (table, tunes_crates) in [
+            ("[profile.release.package]\nbevy_ecs = { opt-level = 3 }", true),
+            ("[profile.release.package.bevy_ecs]\nopt-level = 3", true),
+            ("[profile.bots.package]", true),
+            ("[profile.dev.package.\"*\"]\nopt-level = 3", false),
+            ("[profile.release]\nlto = true", false),
+        ] {
+            assert_eq!(GameManifest::read(table).tunes_crates, tunes_crates, "{table}");
+        }
     }
 
     #[test]
