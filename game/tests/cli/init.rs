@@ -15,9 +15,23 @@ mod adapter;
 #[path = "../fixtures/init_adapter_of_files.rs"]
 mod adapter_of_files;
 
+/// The adapter that is written for [`ROUNDS`].
+#[path = "../fixtures/init_adapter_of_rounds.rs"]
+mod adapter_of_rounds;
+
 /// The component that the adapter observes.
 #[derive(Component)]
 pub struct Player;
+
+/// The state that the adapter of rounds enters.
+#[derive(States, Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Screen {
+    /// Waits for a key.
+    #[default]
+    Menu,
+    /// Plays a round.
+    Playing,
+}
 
 /// The game of the adapter.
 pub fn plugin(app: &mut App) {
@@ -54,6 +68,28 @@ fn play(keys: Res<ButtonInput<KeyCode>>, assets: Res<AssetServer>) {
     for file in std::fs::read_dir(\"levels\") {}
 }
 pub fn defaults() -> AssetPlugin { AssetPlugin { file_path: \"art\".into(), ..default() } }
+";
+
+/// A game that spawns its player in a state, with two keys for each direction.
+const ROUNDS: &str = "\
+#[derive(Component)]
+pub struct Player;
+#[derive(States)]
+pub enum Screen { Menu, Playing }
+pub fn plugin(app: &mut App) {
+    app.init_state::<Screen>()
+        .add_systems(OnEnter(Screen::Playing), begin)
+        .add_systems(OnExit(Screen::Playing), |mut commands: Commands, player: Single<Entity, With<Player>>| {
+            commands.entity(*player).despawn();
+        })
+        .add_systems(Update, walk.run_if(in_state(Screen::Playing)));
+}
+fn begin(mut commands: Commands) { commands.spawn((Player, Transform::default())); }
+fn walk(keys: Res<ButtonInput<KeyCode>>) {
+    if keys.pressed(KeyCode::ArrowUp) || keys.pressed(KeyCode::KeyW) { up(); }
+    if keys.any_pressed([KeyCode::KeyS, KeyCode::ArrowDown]) { down(); }
+    if keys.pressed(KeyCode::Space) { jump(); }
+}
 ";
 
 const MAIN: &str = "\
@@ -134,6 +170,57 @@ fn the_adapter_of_a_game_with_files_says_what_follows_from_them() {
 }
 
 #[test]
+fn the_adapter_of_a_game_with_rounds_enters_their_state_and_presses_one_key_of_two() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write(folder, &[("Cargo.toml", MANIFEST), ("src/lib.rs", ROUNDS)]);
+    let (found, _) = done(folder, &["init"]);
+    assert_eq!(read(folder, "bots/src/lib.rs"), include_str!("../fixtures/init_adapter_of_rounds.rs"));
+    assert_eq!(adapter_of_rounds::adapter().problem(), None);
+    for line in [
+        "state of a round: Screen::Playing (src/lib.rs:7)",
+        "keys that mean the same: ArrowUp = KeyW, KeyS = ArrowDown",
+    ] {
+        assert!(found.lines().any(|found| found == line), "{line}: {found}");
+    }
+    // A state that the bots cannot name, and one that loads first.
+    for (game, line) in [
+        (ROUNDS.replace("pub enum", "enum"), "        // .restart(Restart::state(my_game::Screen::Playing))"),
+        (ROUNDS.replace("Menu,", "Loading,"), "        .restart(Restart::Startup)"),
+    ] {
+        write(folder, &[("src/lib.rs", &game)]);
+        let _ = fs::remove_dir_all(folder.join("bots"));
+        let (printed, _) = done(folder, &["init", "--dry-run"]);
+        let lines: Vec<_> = printed.lines().collect();
+        assert!(lines.contains(&line) && lines.contains(&"        .restart(Restart::Startup)"), "{line}: {printed}");
+    }
+}
+
+#[test]
+fn what_is_written_names_no_line_of_the_game() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    let loading =
+        FILES.replace("pub struct Player;", "struct Player;\n#[derive(States)]\npub enum Screen { Loading, Playing }");
+    let fixed = FILES.replace("Update, ", "FixedUpdate, ").replace("\"art\".into()", "folder()");
+    for (name, game) in [
+        ("src/lib.rs", LIBRARY),
+        ("src/lib.rs", loading.as_str()),
+        ("src/main.rs", ROUNDS),
+        ("src/main.rs", fixed.as_str()),
+    ] {
+        let _ = fs::remove_dir_all(folder.join("src"));
+        let _ = fs::remove_dir_all(folder.join("bots"));
+        write(folder, &[("Cargo.toml", MANIFEST), (name, game)]);
+        done(folder, &["init"]);
+        for written in WRITTEN {
+            let text = read(folder, written);
+            assert!(!text.contains(".rs:"), "{written} of {game}: {text}");
+        }
+    }
+}
+
+#[test]
 fn the_adapter_of_a_game_in_fixed_steps_has_a_frame_for_each() {
     let folder = tempfile::tempdir().expect("a folder");
     let folder = folder.path();
@@ -143,7 +230,7 @@ fn the_adapter_of_a_game_in_fixed_steps_has_a_frame_for_each() {
         (".insert_resource(Time::<Fixed>::from_hz(50.0))", "        .hz(50.0)", "50 a second (src/lib.rs:5)"),
         (
             ".insert_resource(Time::<Fixed>::from_hz(RATE))",
-            "        // sees a press twice: .hz(steps of a second), as set in src/lib.rs:5",
+            "        // twice: .hz(steps of a second), as the game sets them in `plugin`.",
             "a number of them a second that is computed (src/lib.rs:5)",
         ),
     ] {
@@ -199,7 +286,7 @@ fn the_adapter_adds_what_the_program_adds_and_waits_for_a_state_that_loads() {
         for line in [
             game,
             "        .clicks([\"Play\", \"Quit\"])",
-            "        // TODO: if a level is ready once the game has left `Screen::Loading` (src/lib.rs:4), set that state in",
+            "        // TODO: if a level is ready once the game has left `Screen::Loading`, set that state in `.level`, and wait for",
             "        // .ready(|state: Res<State<my_game::Screen>>| **state != my_game::Screen::Loading)",
         ] {
             assert!(printed.lines().any(|printed| printed.trim() == line.trim()), "{line}: {printed}");
@@ -227,6 +314,27 @@ fn a_second_run_leaves_all_files_alone() {
     for (name, text) in before {
         assert_eq!(read(folder, name), text, "{name}");
     }
+}
+
+#[test]
+fn a_workspace_without_a_profile_of_crates_gets_the_place_of_one_that_builds_faster() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let folder = folder.path();
+    write(folder, &[("Cargo.toml", MANIFEST), ("src/lib.rs", LIBRARY)]);
+    let (_, reported) = done(folder, &["init", "--dry-run"]);
+    let begin = "to build the bots faster, copy [profile.release] and [profile.release.package] from ";
+    let named = reported.lines().find_map(|line| line.strip_prefix(begin)?.split(" to ").next());
+    let named = named.unwrap_or_else(|| panic!("{reported}"));
+    let profile = fs::read_to_string(named).unwrap_or_else(|error| panic!("{named}: {error}"));
+    for table in ["\n[profile.release]\n", "\n[profile.release.package]\n"] {
+        assert!(profile.contains(table), "{named} has no {table}");
+    }
+    assert!(reported.contains("  add `my-game = { opt-level = 3 }` to the second table, "), "{reported}");
+    let (_, reported) = done(folder, &["init", "--dry-run", "--playbot", "https://example.org/playbot"]);
+    assert!(reported.contains(&format!("{begin}Cargo.toml in https://example.org/playbot to ")), "{reported}");
+    let tuned = format!("{MANIFEST}\n[profile.release.package]\nbevy_ecs = {{ opt-level = 3 }}\n");
+    write(folder, &[("Cargo.toml", &tuned)]);
+    assert!(!done(folder, &["init", "--dry-run"]).1.contains("to build the bots faster"));
 }
 
 #[test]

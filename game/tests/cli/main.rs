@@ -22,4 +22,4 @@ mod work;
 
 // The adapter that `playbot init` writes names the game's crate.
 extern crate self as my_game;
-pub use init::{Player, plugin};
+pub use init::{Player, Screen, plugin};

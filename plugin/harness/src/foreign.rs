@@ -446,7 +446,8 @@ impl ForeignGame {
     }
 
     /// Changes Bevy's plugins for headless Worlds, to leave out some default ones:
-    /// `|plugins| plugins.build().disable::<TextPlugin>()`. For the window as well, there is
+    /// `|plugins| plugins.build().disable::<TextPlugin>()`. Their window has 1280 by 720 pixels; a system in `PreStartup`
+    /// gives it another size. For the window as well, there is
     /// [`default_plugins`](Self::default_plugins).
     pub fn headless(self, plugins: impl Fn(HeadlessPlugins) -> PluginGroupBuilder + Send + Sync + 'static) -> Self {
         self.with(|description| description.headless_plugins = Some(Arc::new(plugins)))

@@ -11,6 +11,7 @@ use bevy::{
     diagnostic::{FrameCount, FrameCountPlugin},
     prelude::*,
     render::{Render, RenderApp, RenderPlugin},
+    window::PrimaryWindow,
     winit::WinitPlugin,
 };
 use bevy_playbot::headless::HeadlessPlugins;
@@ -122,6 +123,69 @@ fn the_event_loop_is_left_out_and_the_renderer_draws_nothing() {
     let mut app = App::new();
     app.add_plugins(plugins);
     assert!(app.get_sub_app(RenderApp).is_none());
+}
+
+/// The points of a game that ends by a score.
+#[derive(Resource, Default)]
+struct Points(u32);
+
+#[test]
+fn an_end_sees_the_last_schedule_of_its_tick_before_the_state_that_the_game_has_set_there() {
+    let game = |app: &mut App| {
+        app.init_state::<Stage>().init_resource::<Points>();
+        app.add_systems(
+            PostUpdate,
+            |keys: Res<ButtonInput<KeyCode>>, mut points: ResMut<Points>, mut next: ResMut<NextState<Stage>>| {
+                points.0 += u32::from(keys.pressed(KeyCode::Space));
+                if points.0 == 3 {
+                    next.set(Stage::Playing);
+                }
+            },
+        );
+        // The screen of the end takes the score back.
+        app.add_systems(OnEnter(Stage::Playing), |mut points: ResMut<Points>| points.0 = 0);
+    };
+    let game = ForeignGame::new("points", 1, game)
+        .keys([vec![], vec![KeyCode::Space]])
+        .observe(["points"], |points: Res<Points>| [points.0 as f32])
+        .reward_delta(|points: Res<Points>| points.0 as f32)
+        .end(|points: Res<Points>, stage: Res<State<Stage>>| {
+            (points.0 == 3 && *stage == Stage::Loading).then_some(EpisodeEnd::WON)
+        })
+        .time_limit(10)
+        .restart(Restart::state(Stage::Loading))
+        .level(|mut points: ResMut<Points>| points.0 = 0);
+    let (mut world, agents) = build_world(&game, "default", 1, 0, 1);
+    let press = BlindBot::Constant(ActionValue::Discrete(1));
+    world.entity_mut(agents[0]).insert((Control::Bot, press, LevelQueue::list([1])));
+    world.ticks(3).expect("sound");
+    let count = world.get::<EpisodeCount>(agents[0]).expect("an agent");
+    assert_eq!((count.finished, count.successes), (1, 1));
+}
+
+#[test]
+fn an_adapter_sets_the_size_of_the_window_before_the_game_starts() {
+    let game = |app: &mut App| {
+        app.init_resource::<Points>().add_systems(Startup, |window: Single<&Window>, mut points: ResMut<Points>| {
+            points.0 = window.width() as u32;
+        });
+    };
+    let small = move |app: &mut App| {
+        app.add_systems(PreStartup, |mut window: Single<&mut Window, With<PrimaryWindow>>| {
+            window.resolution.set(800.0, 600.0);
+        });
+        game(app);
+    };
+    let width = |game: ForeignGame| {
+        let game =
+            game.keys([vec![], vec![KeyCode::Space]]).observe(["width"], |points: Res<Points>| [points.0 as f32]);
+        let (mut world, agents) = build_world(&game, "default", 1, 0, 1);
+        world.entity_mut(agents[0]).insert((Control::Bot, BlindBot::Uniform, LevelQueue::list([1])));
+        world.tick().expect("sound");
+        world.get::<Observation>(agents[0]).expect("an agent").vector.clone()
+    };
+    assert_eq!(width(ForeignGame::new("large", 1, game)), [1280.0]);
+    assert_eq!(width(ForeignGame::new("small", 1, small)), [800.0]);
 }
 
 /// A plugin that does not ask whether there is a renderer.

@@ -2,29 +2,26 @@
 //!
 //! In the folder:
 //!
-//! - `manifest`: the `Cargo.toml` of a game.
+//! - `folder`: the folder of a game, with its `Cargo.toml` and its sources.
 //! - `found`: facts about a game that its sources show.
 
+mod folder;
 mod found;
-mod manifest;
 
 use crate::{
     error::{CliError, Outcome},
     output::{print_line, write},
     verbs::init::{
-        found::{GameFacts, NamedItem, SourceLine, SourceText, StepRate},
-        manifest::{BevyDependency, GameManifest, major_minor},
+        folder::{BEVY, GameFolder, SourceLine, SourceText, folder_of, has_member, read_sources, unreadable},
+        found::{AssetFolder, GameFacts, NamedItem, RoundState, StepRate},
     },
 };
 use serde_json::json;
 use std::{
     fmt::Write as _,
-    fs, io,
+    fs,
     path::{Path, PathBuf},
 };
-
-/// The version of Bevy that this program is for.
-const BEVY: (u32, u32) = (0, 19);
 
 /// Keys that leave games or open tools, more often than they play.
 const TOOL_KEYS: [&str; 14] =
@@ -72,7 +69,8 @@ pub(crate) fn run(args: &Args) -> Result<Outcome, CliError> {
     sources.retain(|source| source.path != library || !is_stub(source));
     let has_stub = sources.len() < all;
     let facts = GameFacts::read(&game.manifest, &game.library_file(), &sources);
-    let files = game.files(&facts, &playbot_source(args.playbot.as_deref())?);
+    let source = PlaybotSource::of(args.playbot.as_deref())?;
+    let files = game.files(&facts, &source.dependency);
     let (missing, kept): (Vec<_>, Vec<_>) = files.into_iter().partition(|(path, _)| !game.root.join(path).exists());
     let moves = if facts.has_library { Vec::new() } else { moves(&sources) };
     let should_edit = args.edit_workspace && !game.root_manifest.is_workspace;
@@ -109,124 +107,14 @@ pub(crate) fn run(args: &Args) -> Result<Outcome, CliError> {
     }
     moves.iter().for_each(|line| report!("{line}"));
     game.report_workspace(should_edit, args.dry_run)?;
+    game.report_profile(&source);
     if !args.dry_run {
         report!("next: fill in what bots/src/lib.rs marks with TODO, then run `cargo test --release` in bots");
     }
     Ok(Outcome::Pass)
 }
 
-/// A game's package and the folder that gets the bots.
-struct GameFolder {
-    /// The folder that gets `bots`: of the workspace, or of the package.
-    root: PathBuf,
-    /// The `Cargo.toml` there.
-    root_manifest: GameManifest,
-    /// The folder of the package within it, with `/`; empty if it is the same.
-    package: String,
-    /// The `Cargo.toml` of the package.
-    manifest: GameManifest,
-    /// Its dependency on Bevy, with what the workspace says.
-    bevy: BevyDependency,
-}
-
 impl GameFolder {
-    /// Finds the package of the game in a folder.
-    fn find(folder: &Path, wanted: Option<&str>) -> Result<Self, CliError> {
-        let file = folder.join("Cargo.toml");
-        let Some(root_manifest) = read_manifest(folder)? else {
-            return Err(CliError::Usage(format!(
-                "{} does not exist: call `playbot init` in the folder of a Bevy game, or name the folder, as in \
-                 `playbot init my_game`",
-                file.display()
-            )));
-        };
-        let (package, manifest) = Self::choose(folder, &root_manifest, wanted)?;
-        if !root_manifest.is_workspace {
-            check_not_member(folder)?;
-        }
-        let Some(mut bevy) = manifest.bevy.clone() else {
-            return Err(CliError::Usage(format!(
-                "{} does not depend on `bevy`: playbot tests games that are made with Bevy {}.{}",
-                folder.join(&package).join("Cargo.toml").display(),
-                BEVY.0,
-                BEVY.1
-            )));
-        };
-        if let Some(shared) = root_manifest.workspace_bevy.as_ref().filter(|_| bevy.is_inherited) {
-            bevy.version.clone_from(&shared.version);
-            bevy.features.extend(shared.features.iter().cloned());
-        }
-        let numbers = bevy.version.as_deref().and_then(major_minor);
-        if let (Some(version), Some(numbers)) = (&bevy.version, numbers)
-            && numbers != BEVY
-        {
-            return Err(CliError::Usage(format!(
-                "{} has Bevy {version}, and this playbot is for Bevy {}.{}: update the game first",
-                folder.join(&package).join("Cargo.toml").display(),
-                BEVY.0,
-                BEVY.1
-            )));
-        }
-        Ok(Self { root: folder.to_owned(), root_manifest, package, manifest, bevy })
-    }
-
-    /// Chooses the package of the game: the one that is named, the root's own, or the only member with Bevy.
-    fn choose(folder: &Path, root: &GameManifest, wanted: Option<&str>) -> Result<(String, GameManifest), CliError> {
-        let mut all = Vec::new();
-        if root.package.is_some() {
-            all.push((String::new(), root.clone()));
-        }
-        for member in members(folder, root) {
-            if let Some(manifest) = read_manifest(&folder.join(&member))? {
-                all.push((member, manifest));
-            }
-        }
-        let names = |all: &[(String, GameManifest)]| {
-            let names: Vec<&str> = all.iter().filter_map(|(_, manifest)| manifest.package.as_deref()).collect();
-            names.join(", ")
-        };
-        let file = folder.join("Cargo.toml");
-        if let Some(wanted) = wanted {
-            let known = names(&all);
-            let found = all.into_iter().find(|(_, manifest)| manifest.package.as_deref() == Some(wanted));
-            return found.ok_or_else(|| {
-                CliError::Usage(format!("{} has no package `{wanted}`; valid: {known}", file.display()))
-            });
-        }
-        if root.package.is_some() && (root.bevy.is_some() || all.len() == 1) {
-            return Ok(all.swap_remove(0));
-        }
-        // The crate of the bots is no game.
-        all.retain(|(_, manifest)| manifest.bevy.is_some() && !manifest.depends_on("playbot"));
-        match all.len() {
-            1 => Ok(all.swap_remove(0)),
-            0 => Err(CliError::Usage(format!(
-                "no package of {} depends on `bevy`: playbot tests games that are made with Bevy {}.{}",
-                file.display(),
-                BEVY.0,
-                BEVY.1
-            ))),
-            _ => Err(CliError::Usage(format!(
-                "several packages of {} use Bevy: name the game with --package; valid: {}",
-                file.display(),
-                names(&all)
-            ))),
-        }
-    }
-
-    fn name(&self) -> &str {
-        self.manifest.package.as_deref().unwrap_or("my-game")
-    }
-
-    /// Returns the name of the library in Rust.
-    fn library(&self) -> String {
-        self.manifest.library.clone().unwrap_or_else(|| self.name().to_owned()).replace('-', "_")
-    }
-
-    fn library_file(&self) -> String {
-        self.manifest.library_path.clone().unwrap_or_else(|| "src/lib.rs".to_owned())
-    }
-
     /// Returns the files of the layout, with their paths below the root.
     fn files(&self, facts: &GameFacts, playbot: &str) -> Vec<(String, String)> {
         let mut files = Vec::new();
@@ -265,6 +153,10 @@ impl GameFolder {
         let states = facts.states.iter().map(|state| {
             format!("{} ({}:{}): {}", state.at.name, state.at.file, state.at.line, state.variants.join(" | "))
         });
+        let round = facts
+            .round
+            .as_ref()
+            .map(|RoundState { at, state, .. }| format!("{state}::{} ({}:{})", at.name, at.file, at.line));
         let folder = facts.asset_folder.as_ref().map(|folder| {
             format!("{} ({}:{})", folder.path.as_deref().unwrap_or("computed"), folder.at.file, folder.at.line)
         });
@@ -284,8 +176,13 @@ impl GameFolder {
             ("plugins", items(&facts.plugins)),
             ("added by src/main.rs", items(&facts.added)),
             ("states", states.collect::<Vec<_>>().join(", ")),
+            ("state of a round", round.unwrap_or_default()),
             ("input", facts.inputs.join(", ")),
             ("keys", facts.keys.join(", ")),
+            (
+                "keys that mean the same",
+                facts.aliases.iter().map(|same| same.join(" = ")).collect::<Vec<_>>().join(", "),
+            ),
             ("keys that leave or skip levels", at(&facts.leaving_keys)),
             ("presses that count once", at(&facts.presses)),
             ("fixed steps", fixed_steps(facts).unwrap_or_default()),
@@ -338,6 +235,21 @@ impl GameFolder {
             report!("add \"bots\" to `members` of [workspace] in {}", file.display());
         }
         Ok(())
+    }
+
+    /// Reports which settings make builds of the bots faster, unless the workspace has some.
+    fn report_profile(&self, source: &PlaybotSource) {
+        if !self.root_manifest.tunes_crates {
+            report!(
+                "to build the bots faster, copy [profile.release] and [profile.release.package] from {} to {}:\n  \
+                 Cargo takes no profile from a dependency, and optimises all of Bevy and burn without one\n  \
+                 add `{} = {{ opt-level = 3 }}` to the second table, because both hold for the game that ships, too\n  \
+                 to leave that game as it is, give them another name: docs/how-to/adapt-your-game.md#build-times",
+                source.profile,
+                self.root.join("Cargo.toml").display(),
+                self.name()
+            );
+        }
     }
 }
 
@@ -439,30 +351,24 @@ fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> Strin
          // .end(|score: Res<Score>| (score.0 >= 10).then_some(EpisodeEnd::WON))\n        \
          .time_limit(600)\n",
     );
-    if let Some(state) = facts.states.first() {
-        let (name, variants) = (&state.at.name, state.variants.join(", "));
-        let _ = writeln!(
-            text,
-            "        // TODO: if a state begins the game, set it in `.level`, which runs last: one of {variants} of `{name}`."
-        );
-    }
-    text.push_str("        .restart(Restart::Startup)\n");
+    add_restart(&mut text, library, facts);
     if let Some((state, variant)) = facts.loading_state() {
-        let SourceLine { name, file, line } = &state.at;
+        let name = &state.at.name;
         let path = state.path.as_ref().map_or_else(|| name.clone(), |path| format!("{library}::{path}"));
         let _ = write!(
             text,
-            "        // TODO: if a level is ready once the game has left `{name}::{variant}` ({file}:{line}), set that state in\n        \
-             // `.level`, and wait for its end:\n        \
+            "        // TODO: if a level is ready once the game has left `{name}::{variant}`, set that state in `.level`, and wait for\n        \
+             // its end:\n        \
              // .ready(|state: Res<State<{path}>>| **state != {path}::{variant})\n"
         );
     } else if !facts.loads.is_empty() || !facts.loaders.is_empty() {
         text.push_str("        // TODO: if a level loads while the game runs, when it is ready: .ready(condition)\n");
     }
-    if let Some(SourceLine { file, line, .. }) = facts.files.first() {
+    if let Some(at) = facts.files.first() {
+        let place = at.place(facts.has_library);
         let _ = write!(
             text,
-            "        // TODO: the game reads files while it runs ({file}:{line}). Build their paths in the game from\n        \
+            "        // TODO: the game reads files{place} while it runs. Build their paths in the game from\n        \
              // `env!(\"CARGO_MANIFEST_DIR\")`, because programs and tests of `bots` start in other folders. Sort the\n        \
              // names of a folder, which have no order. If each file is a level, `.levels` takes their number, and\n        \
              // `.level` begins the file of that number.\n"
@@ -475,12 +381,50 @@ fn adapter(name: &str, library: &str, package: &str, facts: &GameFacts) -> Strin
     text + &own
 }
 
+/// Adds the restart: by the state that begins a round, or by the systems of the start. A game that loads in a state of its
+/// own may not be played before that, so its restart begins there.
+fn add_restart(text: &mut String, library: &str, facts: &GameFacts) {
+    let round = facts.round.as_ref().filter(|_| facts.loading_state().is_none());
+    if let Some(RoundState { at: SourceLine { name: variant, .. }, state, path }) = round {
+        let of = path.as_ref().unwrap_or(state);
+        let restart = format!(".restart(Restart::state({library}::{of}::{variant}))");
+        let _ = match path {
+            Some(_) => writeln!(
+                text,
+                "        // The game spawns a round whenever it enters `{state}::{variant}`, so each episode enters this state again."
+            ),
+            None => write!(
+                text,
+                "        // TODO: the game spawns a round whenever it enters `{state}::{variant}`. Make `{state}` public in the game's\n        \
+                 // library, so that each episode can enter this state again, and write instead of `Restart::Startup`:\n        \
+                 // {restart}\n"
+            ),
+        };
+        let restart = if path.is_some() { restart.as_str() } else { ".restart(Restart::Startup)" };
+        let _ = write!(
+            text,
+            "        // TODO: reset what stays in resources, such as a score, in `.level`, which runs after that. If the round depends\n        \
+             // on the level or on random numbers, `Restart::Startup` is right, and `.level` sets the state by `NextState`.\n        \
+             {restart}\n"
+        );
+        return;
+    }
+    if let Some(state) = facts.states.first() {
+        let (name, variants) = (&state.at.name, state.variants.join(", "));
+        let _ = writeln!(
+            text,
+            "        // TODO: if a state begins the game, set it in `.level`, which runs last: one of {variants} of `{name}`."
+        );
+    }
+    text.push_str("        .restart(Restart::Startup)\n");
+}
+
 /// Steps of a second in Bevy, if a game sets none.
 const DEFAULT_STEPS: f64 = 64.0;
 
 /// Returns the schedule of fixed steps that a game uses, and how many of them are a second, in words.
 fn fixed_steps(facts: &GameFacts) -> Option<String> {
-    let SourceLine { name, file, line } = facts.fixed.as_ref()?;
+    let SourceLine { name, file, line, .. } = facts.fixed.as_ref()?;
     let of_second = |hz: f64| format!("{hz} a second");
     let rate = facts.step_rate.as_ref().map_or_else(
         || format!("{}, which is Bevy's default", of_second(DEFAULT_STEPS)),
@@ -494,18 +438,18 @@ fn fixed_steps(facts: &GameFacts) -> Option<String> {
 
 /// Adds the frames of a second, for a game that plays in fixed steps. Where a frame has two steps, a press counts twice.
 fn add_frames(text: &mut String, facts: &GameFacts) {
-    let Some(SourceLine { name, file, line }) = &facts.fixed else { return };
+    let Some(SourceLine { name, .. }) = &facts.fixed else { return };
     let _ = match facts.step_rate.as_ref().map_or(Ok(DEFAULT_STEPS), |rate| rate.hz.ok_or(&rate.at)) {
         Ok(hz) => write!(
             text,
-            "        // A frame for each fixed step of the game ({file}:{line}): in a frame of two steps, `{name}` would see a\n        \
-             // press twice.\n        .hz({hz:?})\n"
+            "        // A frame for each fixed step of the game: in a frame of two steps, `{name}` would see a press twice.\n        \
+             .hz({hz:?})\n"
         ),
         Err(rate) => write!(
             text,
-            "        // TODO: a frame for each fixed step of the game ({file}:{line}), because in a frame of two steps `{name}`\n        \
-             // sees a press twice: .hz(steps of a second), as set in {}:{}\n",
-            rate.file, rate.line
+            "        // TODO: a frame for each fixed step of the game, because in a frame of two steps `{name}` sees a press\n        \
+             // twice: .hz(steps of a second), as the game sets them{}.\n",
+            rate.place(facts.has_library)
         ),
     };
 }
@@ -516,16 +460,11 @@ fn add_assets(text: &mut String, package: &str, facts: &GameFacts) {
     if own.is_none() && facts.loads.is_empty() && facts.loaders.is_empty() {
         return;
     }
-    let _ = match own.map(|folder| (folder.path.is_some(), &folder.at)) {
+    let _ = match own {
         None => writeln!(text, "        // The assets of the game, as the bots find them."),
-        Some((true, SourceLine { file, line, .. })) => {
-            writeln!(text, "        // The folder of assets that the game sets ({file}:{line}), as the bots find it.")
-        }
-        Some((false, SourceLine { file, line, .. })) => {
-            writeln!(
-                text,
-                "        // TODO: the folder of assets that the game sets ({file}:{line}), as the bots find it."
-            )
+        Some(AssetFolder { at, path }) => {
+            let (todo, place) = (if path.is_some() { "The" } else { "TODO: the" }, at.place(facts.has_library));
+            writeln!(text, "        // {todo} folder of assets that the game sets{place}, as the bots find it.")
         }
     };
     let inner = own.and_then(|folder| folder.path.as_deref()).unwrap_or("assets");
@@ -549,7 +488,7 @@ fn add_input(text: &mut String, facts: &GameFacts) {
         facts.keys.iter().map(String::as_str).partition(|key| facts.only_leaves(key));
     let (tools, keys): (Vec<&str>, Vec<&str>) = playing.into_iter().partition(|key| TOOL_KEYS.contains(key));
     let place = |key: &str| facts.leaving_keys.iter().find(|at| at.name == key);
-    let at = |key: &str| place(key).map_or(String::new(), |at| format!("{key} ({}:{})", at.file, at.line));
+    let at = |key: &str| place(key).map_or(String::new(), |at| format!("{key}{}", at.place(facts.has_library)));
     if !leaving.is_empty() {
         let places: Vec<String> = leaving.into_iter().map(at).collect();
         let _ = writeln!(text, "        // Left out, because they leave or skip levels: {}.", places.join(", "));
@@ -587,7 +526,14 @@ fn add_input(text: &mut String, facts: &GameFacts) {
             "        .keys([\n            // One action for each set of keys. TODO: add sets that are held together.\n            \
              vec![],\n",
         );
-        for key in keys {
+        for (at, key) in keys.iter().enumerate() {
+            let same: Vec<&str> = facts.aliases_of(key).filter(|other| keys.contains(other)).collect();
+            if same.iter().any(|other| keys[..at].contains(other)) {
+                continue;
+            }
+            if !same.is_empty() {
+                let _ = writeln!(text, "            // The same as {}.", same.join(" and "));
+            }
             let _ = writeln!(text, "            vec![KeyCode::{key}],");
         }
         text.push_str("        ])\n");
@@ -612,10 +558,10 @@ fn add_sight(text: &mut String, library: &str, facts: &GameFacts) {
         return;
     };
     let Some(path) = &player.path else {
-        let SourceLine { name, file, line } = &player.at;
+        let name = &player.at.name;
         let _ = write!(
             text,
-            "        // TODO: make `{name}` ({file}:{line}) public in the game's library, for `.observe` and:\n        \
+            "        // TODO: make `{name}` public in the game's library, for `.observe` and:\n        \
              // .position(|player: Single<&Transform, With<{library}::{name}>>| player.translation.truncate())\n        \
              .observe([\"time\"], |time: Res<Time>| [time.elapsed_secs()])\n"
         );
@@ -654,31 +600,33 @@ fn moves(sources: &[SourceText]) -> Vec<String> {
     lines
 }
 
-/// Returns the text of the dependency `playbot`, up to its features.
-fn playbot_source(wanted: Option<&str>) -> Result<String, CliError> {
-    if let Some(url) = wanted.filter(|wanted| wanted.contains("://") || wanted.starts_with("git@")) {
-        return Ok(format!("git = {url:?}"));
-    }
-    let built_from = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let clone = wanted.map_or(built_from, Path::new);
-    let inner = clone.join("plugin/cli");
-    let folder = if inner.join("Cargo.toml").is_file() { inner } else { clone.to_owned() };
-    if !folder.join("Cargo.toml").is_file() {
-        let advice = "name a clone of the repository of playbot, or its URL, with --playbot";
-        return Err(CliError::Usage(format!("{} has no Cargo.toml: {advice}", folder.display())));
-    }
-    let folder = std::path::absolute(&folder).unwrap_or(folder);
-    // The form of a text in Rust is one of TOML for all paths that a keyboard writes.
-    Ok(format!("path = {:?}", folder.display().to_string()))
+/// Where the crate `playbot` comes from.
+struct PlaybotSource {
+    /// The text of the dependency, up to its features.
+    dependency: String,
+    /// The `Cargo.toml` with its profile, for people.
+    profile: String,
 }
 
-/// Returns the folder of a path, which may be that of the `Cargo.toml` in it.
-fn folder_of(path: &Path) -> &Path {
-    match path.parent() {
-        Some(folder) if path.file_name().is_some_and(|name| name == "Cargo.toml") && !path.is_dir() => {
-            if folder.as_os_str().is_empty() { Path::new(".") } else { folder }
+impl PlaybotSource {
+    /// Finds the source: a URL of git, a clone, or the clone from which this program was built.
+    fn of(wanted: Option<&str>) -> Result<Self, CliError> {
+        if let Some(url) = wanted.filter(|wanted| wanted.contains("://") || wanted.starts_with("git@")) {
+            return Ok(Self { dependency: format!("git = {url:?}"), profile: format!("Cargo.toml in {url}") });
         }
-        _ => path,
+        let built_from = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let clone = wanted.map_or(built_from, Path::new);
+        let inner = clone.join("plugin/cli");
+        let folder = if inner.join("Cargo.toml").is_file() { inner } else { clone.to_owned() };
+        if !folder.join("Cargo.toml").is_file() {
+            let advice = "name a clone of the repository of playbot, or its URL, with --playbot";
+            return Err(CliError::Usage(format!("{} has no Cargo.toml: {advice}", folder.display())));
+        }
+        let folder = std::path::absolute(&folder).unwrap_or(folder);
+        let root = folder.ancestors().nth(2).unwrap_or(&folder).join("Cargo.toml");
+        // The form of a text in Rust is one of TOML for all paths that a keyboard writes.
+        let dependency = format!("path = {:?}", folder.display().to_string());
+        Ok(Self { dependency, profile: root.display().to_string() })
     }
 }
 
@@ -686,98 +634,4 @@ fn folder_of(path: &Path) -> &Path {
 fn is_stub(source: &SourceText) -> bool {
     let stub = SourceText::new(&source.path, LIBRARY);
     source.code.split_whitespace().eq(stub.code.split_whitespace())
-}
-
-fn unreadable(path: &Path, error: &io::Error) -> CliError {
-    CliError::Io(format!("cannot read {}: {error}", path.display()))
-}
-
-/// Reads the `Cargo.toml` of a folder, if there is one.
-fn read_manifest(folder: &Path) -> Result<Option<GameManifest>, CliError> {
-    let file = folder.join("Cargo.toml");
-    match fs::read_to_string(&file) {
-        Ok(text) => Ok(Some(GameManifest::read(&text))),
-        Err(error) if matches!(error.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
-        Err(error) => Err(unreadable(&file, &error)),
-    }
-}
-
-/// Returns the names in a folder, in their order, and whether each is a folder. Links and hidden names are left out.
-fn names_in(folder: &Path) -> Result<Vec<(String, bool)>, CliError> {
-    let refused = |error: io::Error| unreadable(folder, &error);
-    let mut names = Vec::new();
-    for entry in fs::read_dir(folder).map_err(refused)? {
-        let entry = entry.map_err(refused)?;
-        let (name, kind) = (entry.file_name().to_string_lossy().into_owned(), entry.file_type().map_err(refused)?);
-        if !name.starts_with('.') && !kind.is_symlink() {
-            names.push((name, kind.is_dir()));
-        }
-    }
-    names.sort();
-    Ok(names)
-}
-
-/// Returns the folders of a workspace's members. A star at the end of a path stands for each folder there.
-fn members(root: &Path, manifest: &GameManifest) -> Vec<String> {
-    let mut found = Vec::new();
-    for member in &manifest.members {
-        match member.strip_suffix('*') {
-            Some(folder) => {
-                // A folder that cannot be read has no game, as cargo says itself.
-                let names = names_in(&root.join(folder)).unwrap_or_default().into_iter();
-                found.extend(names.filter(|(_, is_folder)| *is_folder).map(|(name, _)| format!("{folder}{name}")));
-            }
-            None => found.push(member.clone()),
-        }
-    }
-    found
-}
-
-/// Returns true if a folder is among the members of a workspace.
-fn has_member(members: &[String], folder: &str) -> bool {
-    let is_it = |member: &String| match member.trim_start_matches("./").strip_suffix('*') {
-        Some(begin) => folder.strip_prefix(begin).is_some_and(|rest| !rest.contains('/')),
-        None => member.trim_start_matches("./").trim_end_matches('/') == folder,
-    };
-    members.iter().any(is_it)
-}
-
-/// Refuses a member of a workspace above it, because the bots belong beside all members.
-fn check_not_member(folder: &Path) -> Result<(), CliError> {
-    let whole = folder.canonicalize().map_err(|error| unreadable(folder, &error))?;
-    for above in whole.ancestors().skip(1) {
-        let Ok(Some(manifest)) = read_manifest(above) else { continue };
-        let inner = whole.strip_prefix(above).unwrap_or(&whole).display().to_string().replace('\\', "/");
-        if manifest.is_workspace && has_member(&manifest.members, &inner) {
-            let root = above.display();
-            return Err(CliError::Usage(format!(
-                "{} is a member of the workspace in {root}: write `playbot init {root} --package NAME`, with the name \
-                 of its package",
-                folder.display()
-            )));
-        }
-    }
-    Ok(())
-}
-
-/// Reads the sources of a package, in the order of their paths.
-fn read_sources(package: &Path) -> Result<Vec<SourceText>, CliError> {
-    let (mut sources, mut folders) = (Vec::new(), vec!["src".to_owned()]);
-    while let Some(folder) = folders.pop() {
-        if !package.join(&folder).is_dir() {
-            continue;
-        }
-        for (name, is_folder) in names_in(&package.join(&folder))? {
-            let path = format!("{folder}/{name}");
-            if is_folder {
-                folders.push(path);
-            } else if name.ends_with(".rs") {
-                let file = package.join(&path);
-                let bytes = fs::read(&file).map_err(|error| unreadable(&file, &error))?;
-                sources.push(SourceText::new(&path, &String::from_utf8_lossy(&bytes)));
-            }
-        }
-    }
-    sources.sort_by(|one, other| one.path.cmp(&other.path));
-    Ok(sources)
 }

@@ -80,6 +80,9 @@ impl ForeignGame {
     /// unsolved levels use the only entity with a component `Player`, or another of
     /// [`PLAYER_NAMES`](crate::foreign::PLAYER_NAMES), if there is one.
     ///
+    /// It is read twice in a tick: in `PreUpdate`, before the action, and in `Last`, after the game's `FixedUpdate` and
+    /// `Update`.
+    ///
     /// The system returns a `Vec2`, or in three dimensions a `Vec3`: see [`IntoPlanPosition`].
     ///
     /// ```
@@ -190,20 +193,22 @@ impl ForeignGame {
         self.with(|description| description.proof = Some(ReaderFactory::new(system)))
     }
 
-    /// Adds a reward of each tick to other rewards. The system also runs once before the first tick, to read what
+    /// Adds a reward of each tick to other rewards. The system runs in `Last`, after the game's `FixedUpdate` and `Update`
+    /// and before [`end`](Self::end). It also runs once before the first tick, to read what
     /// happened before it, and pays nothing for that.
     pub fn reward<M: 'static>(self, system: impl IntoSystem<(), f32, M> + Clone + Send + Sync + 'static) -> Self {
         self.with(|description| description.rewards.push((SystemFactory::new(system, |reward| reward), false)))
     }
 
     /// Adds a reward by the growth of a value, such as a score, since the last tick. The value need not begin at 0 in
-    /// an episode.
+    /// an episode. The system runs as that of [`reward`](Self::reward) does.
     pub fn reward_delta<M: 'static>(self, system: impl IntoSystem<(), f32, M> + Clone + Send + Sync + 'static) -> Self {
         self.with(|description| description.rewards.push((SystemFactory::new(system, |value| value), true)))
     }
 
-    /// Declares whether and how the game is over after a tick. The system runs in `Last`, and once before the first tick,
-    /// where its answer does not count.
+    /// Declares whether and how the game is over after a tick. The system runs in `Last`, after the game's `FixedUpdate` and
+    /// `Update` and after [`reward`](Self::reward). A state that the game has set by `NextState` in this tick is not entered
+    /// yet. The system also runs once before the first tick, where its answer does not count.
     pub fn end<M: 'static>(
         self,
         system: impl IntoSystem<(), Option<EpisodeEnd>, M> + Clone + Send + Sync + 'static,

@@ -1,8 +1,9 @@
 //! Facts about a game that its sources show, read as text.
 
-use crate::verbs::init::manifest::GameManifest;
+use crate::verbs::init::folder::{GameManifest, SourceLine, SourceText, is_of_name, name};
 use playbot_harness::foreign::PLAYER_NAMES;
 use serde::Serialize;
+use std::{cmp::Reverse, ops::Range};
 
 /// Random numbers that differ from run to run.
 const RANDOM: [&str; 9] = [
@@ -65,6 +66,54 @@ const STEPS: [(&str, bool); 7] = [
     ("set_timestep(", false),
 ];
 
+/// Words in the names of states in which a round is played.
+const PLAYS: [&str; 12] =
+    ["Play", "Playing", "Game", "Gameplay", "Running", "Run", "Round", "Level", "Match", "Battle", "Fight", "Race"];
+
+/// Words in the names of states in which none is played.
+const RESTS: [&str; 37] = [
+    "Menu",
+    "Title",
+    "Splash",
+    "Intro",
+    "Load",
+    "Loading",
+    "Lobby",
+    "Select",
+    "Selection",
+    "Pause",
+    "Paused",
+    "Over",
+    "End",
+    "Ended",
+    "Ending",
+    "Finish",
+    "Finished",
+    "Complete",
+    "Completed",
+    "Failed",
+    "Won",
+    "Win",
+    "Victory",
+    "Lost",
+    "Lose",
+    "Defeat",
+    "Dead",
+    "Death",
+    "Died",
+    "Score",
+    "Scores",
+    "Credits",
+    "Settings",
+    "Options",
+    "Editor",
+    "Quit",
+    "Exit",
+];
+
+/// Code that takes down what a state has spawned.
+const CLEARS: [&str; 4] = ["despawn", "cleanup", "clean_up", "teardown"];
+
 /// Crates that load levels or assets while the game runs.
 const LOADERS: [&str; 3] = ["bevy_ecs_ldtk", "bevy_ecs_tiled", "bevy_asset_loader"];
 
@@ -73,111 +122,6 @@ const MANAGERS: [&str; 2] = ["leafwing-input-manager", "bevy_enhanced_input"];
 
 /// Crates of physics.
 const PHYSICS: [&str; 4] = ["avian2d", "avian3d", "bevy_rapier2d", "bevy_rapier3d"];
-
-/// A source file of a game.
-pub(super) struct SourceText {
-    /// Its path in the package, with `/`.
-    pub path: String,
-    /// Its text; comments are blank.
-    pub code: String,
-}
-
-impl SourceText {
-    /// Creates the source of a text.
-    pub fn new(path: &str, text: &str) -> Self {
-        Self { path: path.to_owned(), code: without_comments(text) }
-    }
-
-    fn at(&self, name: &str, offset: usize) -> SourceLine {
-        let line = self.code[..offset].matches('\n').count() + 1;
-        SourceLine { name: name.to_owned(), file: self.path.clone(), line }
-    }
-
-    /// Returns the lines that have one of these words, but for imports.
-    fn lines_with(&self, words: &[&str]) -> Vec<SourceLine> {
-        let lines = self.code.lines().enumerate();
-        let found = lines.filter_map(|(at, line)| {
-            let is_import = line.trim_start().trim_start_matches("pub ").starts_with("use ");
-            let word = words.iter().find(|word| line.contains(**word)).filter(|_| !is_import)?;
-            Some(SourceLine { name: word.trim().to_owned(), file: self.path.clone(), line: at + 1 })
-        });
-        found.collect()
-    }
-}
-
-/// Blanks the comments of a source. Lines keep their numbers.
-fn without_comments(text: &str) -> String {
-    let (mut code, mut rest) = (String::with_capacity(text.len()), text);
-    while let Some(first) = rest.chars().next() {
-        let (kept, skipped) = if rest.starts_with("//") {
-            (0, rest.find('\n').unwrap_or(rest.len()))
-        } else if rest.starts_with("/*") {
-            (0, length_of_comment(rest))
-        } else if first == '"' {
-            (length_of_text(rest), 0)
-        } else if first == 'r' && !code.ends_with(is_of_name) {
-            (length_of_raw_text(rest).unwrap_or(1), 0)
-        } else if rest.starts_with("'\"'") {
-            (3, 0)
-        } else {
-            (first.len_utf8(), 0)
-        };
-        code.push_str(&rest[..kept]);
-        code.extend(rest[kept..kept + skipped].chars().filter(|c| *c == '\n'));
-        rest = &rest[kept + skipped..];
-    }
-    code
-}
-
-/// Returns the length of a comment between signs, with those inside it.
-fn length_of_comment(text: &str) -> usize {
-    let (mut depth, mut at) = (0_u32, 0);
-    while at < text.len() {
-        let rest = &text.as_bytes()[at..];
-        if rest.starts_with(b"/*") {
-            (depth, at) = (depth + 1, at + 2);
-        } else if rest.starts_with(b"*/") {
-            (depth, at) = (depth.saturating_sub(1), at + 2);
-            if depth == 0 {
-                return at;
-            }
-        } else {
-            at += 1;
-        }
-    }
-    text.len()
-}
-
-/// Returns the length of a text with its quotes.
-fn length_of_text(text: &str) -> usize {
-    let mut is_escaped = false;
-    for (at, c) in text.char_indices().skip(1) {
-        match c {
-            '"' if !is_escaped => return at + 1,
-            _ => is_escaped = c == '\\' && !is_escaped,
-        }
-    }
-    text.len()
-}
-
-/// Returns the length of a raw text, if it is one.
-fn length_of_raw_text(text: &str) -> Option<usize> {
-    let hashes = text[1..].len() - text[1..].trim_start_matches('#').len();
-    let inner = text[1 + hashes..].strip_prefix('"')?;
-    let end = format!("\"{}", "#".repeat(hashes));
-    Some(inner.find(&end).map_or(text.len(), |at| 2 + hashes + at + end.len()))
-}
-
-/// A name with its line in the sources.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub(super) struct SourceLine {
-    /// The name.
-    pub name: String,
-    /// The file, in the package.
-    pub file: String,
-    /// The line, counted from 1.
-    pub line: usize,
-}
 
 /// A name that a program beside the game can use.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -199,6 +143,20 @@ pub(super) struct StateEnum {
     pub path: Option<String>,
     /// Its variants.
     pub variants: Vec<String>,
+    /// Whether it exists in another state only.
+    pub is_sub: bool,
+}
+
+/// A state that spawns a round whenever it is entered, and takes it down.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct RoundState {
+    /// Where the systems of its start are added. The name is that of the variant.
+    #[serde(flatten)]
+    pub at: SourceLine,
+    /// Name of the enum.
+    pub state: String,
+    /// Path of the enum behind the name of the crate, if it is public.
+    pub path: Option<String>,
 }
 
 /// The folder of assets that a game sets.
@@ -234,8 +192,12 @@ pub(super) struct GameFacts {
     pub added: Vec<NamedItem>,
     /// The states.
     pub states: Vec<StateEnum>,
+    /// The state that begins a round.
+    pub round: Option<RoundState>,
     /// Keys that are read.
     pub keys: Vec<String>,
+    /// Keys that mean the same, in lists of two or more.
+    pub aliases: Vec<Vec<String>>,
     /// Keys behind which the code leaves a level or goes on to another one.
     pub leaving_keys: Vec<SourceLine>,
     /// Those of them that are also read elsewhere.
@@ -284,6 +246,8 @@ impl GameFacts {
             let prefix = door.and_then(|door| prefix(sources, door, source));
             facts.read_source(source, prefix.as_deref());
         }
+        facts.round = round(&facts.states, sources);
+        facts.aliases = aliases(&facts.keys, sources);
         facts.also_playing.retain(|key| facts.leaving_keys.iter().any(|leaving| leaving.name == *key));
         let rank = |item: &NamedItem| match item.at.name.as_str() {
             "plugin" => 0,
@@ -314,9 +278,13 @@ impl GameFacts {
             self.functions.extend(functions_of_apps(code).into_iter().map(item));
             self.plugins.extend(unit_plugins(code).into_iter().map(item));
         }
-        for item in ["States", "SubStates"].into_iter().flat_map(|derived| deriving(code, derived, "enum ")) {
+        for (item, is_sub) in [("States", false), ("SubStates", true)]
+            .into_iter()
+            .flat_map(|(derived, is_sub)| deriving(code, derived, "enum ").into_iter().map(move |item| (item, is_sub)))
+        {
             let path = prefix.filter(|_| item.is_public).map(|prefix| format!("{prefix}{}", item.name));
-            self.states.push(StateEnum { at: source.at(item.name, item.offset), path, variants: variants(item.rest) });
+            let at = source.at(item.name, item.offset);
+            self.states.push(StateEnum { at, path, variants: variants(item.rest), is_sub });
         }
         add_new(&mut self.keys, names_behind(code, "KeyCode::"));
         for (key, offset) in keys_in(code) {
@@ -383,6 +351,12 @@ impl GameFacts {
         self.leaving_keys.iter().any(|leaving| leaving.name == key) && !self.also_playing.iter().any(|also| also == key)
     }
 
+    /// Returns the keys that mean the same as a key, without itself.
+    pub fn aliases_of<'a>(&'a self, key: &'a str) -> impl Iterator<Item = &'a str> {
+        let same = self.aliases.iter().filter(move |same| same.iter().any(|name| name == key)).flatten();
+        same.map(String::as_str).filter(move |name| *name != key)
+    }
+
     fn add_inputs(&mut self, sources: &[SourceText]) {
         let any = |words: &[&str]| sources.iter().any(|source| words.iter().any(|word| source.code.contains(word)));
         let rows: [(&'static str, bool); 6] = [
@@ -414,15 +388,6 @@ fn prefix(sources: &[SourceText], door: &SourceText, source: &SourceText) -> Opt
     };
     let is_public = above.code.contains(&format!("pub mod {name};"));
     prefix(sources, door, above).filter(|_| is_public).map(|outer| format!("{outer}{name}::"))
-}
-
-fn is_of_name(c: char) -> bool {
-    c.is_alphanumeric() || c == '_'
-}
-
-/// Returns the name at the start of a text.
-fn name(text: &str) -> &str {
-    &text[..text.find(|c| !is_of_name(c)).unwrap_or(text.len())]
 }
 
 fn add_new(all: &mut Vec<String>, more: Vec<String>) {
@@ -457,6 +422,70 @@ fn keys_in(code: &str) -> Vec<(&str, usize)> {
         (is_key && !line.trim_start_matches("pub ").starts_with("use ")).then_some((key, at))
     });
     found.collect()
+}
+
+/// Returns the keys that mean the same: the sources read one nowhere without the others.
+fn aliases(keys: &[String], sources: &[SourceText]) -> Vec<Vec<String>> {
+    let read: Vec<Vec<&str>> = sources.iter().flat_map(|source| alternatives(&source.code)).collect();
+    let places = |key: &str| -> Vec<usize> {
+        read.iter().enumerate().filter(|(_, together)| together.contains(&key)).map(|(at, _)| at).collect()
+    };
+    let mut found: Vec<(Vec<usize>, Vec<String>)> = Vec::new();
+    for key in keys {
+        let at = places(key);
+        match found.iter_mut().find(|(other, _)| !at.is_empty() && *other == at) {
+            Some((_, same)) => same.push(key.clone()),
+            None => found.push((at, vec![key.clone()])),
+        }
+    }
+    found.into_iter().map(|(_, same)| same).filter(|same| same.len() > 1).collect()
+}
+
+/// Returns the keys that code reads at each place: those of which one is enough are together, as in
+/// `any_pressed([A, B])`, `pressed(A) || pressed(B)` and the pattern `A | B`.
+fn alternatives(code: &str) -> Vec<Vec<&str>> {
+    let all: Vec<(&str, Range<usize>)> =
+        keys_in(code).into_iter().map(|(key, at)| (key, at..at + "KeyCode::".len() + key.len())).collect();
+    let (mut found, mut begin) = (Vec::new(), 0);
+    while begin < all.len() {
+        let before = code[..all[begin].1.start].trim_end();
+        let is_listed = ["any_pressed([", "any_just_pressed(["].iter().any(|call| before.ends_with(call));
+        // The call or comparison of the first key, which has to be that of the others.
+        let is_same = |call: &str| {
+            let is_whole = call.ends_with('(') || call.ends_with("==");
+            let head = before.strip_suffix(call).filter(|_| is_whole);
+            head.is_some_and(|head| !head.ends_with(is_of_call) && !binds(head))
+        };
+        let goes_on = |pair: &[(&str, Range<usize>)]| {
+            let between = code[pair[0].1.end..pair[1].1.start].trim();
+            let rest = between.strip_prefix(')').unwrap_or(between).trim_start();
+            let is_next = rest.strip_prefix("||").is_some_and(|call| is_same(call.trim_start()));
+            between == "|" || between == "," && is_listed || is_next
+        };
+        let more = all[begin..].windows(2).take_while(|pair| goes_on(pair)).count();
+        let end = begin + more + 1;
+        // `A || B && C` does not mean the same for both.
+        let behind = code[all[end - 1].1.end..].trim_start();
+        let behind = behind.strip_prefix(')').filter(|_| before.ends_with('(')).unwrap_or(behind).trim_start();
+        let keys = all[begin..end].iter().map(|(key, _)| *key);
+        if behind.starts_with("&&") && !is_listed {
+            found.extend(keys.map(|key| vec![key]));
+        } else {
+            found.push(keys.collect());
+        }
+        begin = end;
+    }
+    found
+}
+
+/// Returns true if the name of a call may begin before this.
+fn is_of_call(c: char) -> bool {
+    is_of_name(c) || c == '.'
+}
+
+/// Returns true if code ends with an operator that binds what follows more closely than `||`.
+fn binds(code: &str) -> bool {
+    ["&&", "!"].iter().any(|operator| code.trim_end().ends_with(operator))
 }
 
 /// Returns the code that depends on the key that stands there: the block behind it, the arm of a match, or the line of a
@@ -497,6 +526,8 @@ fn asset_folder(code: &str) -> Option<(usize, Option<String>)> {
     code.match_indices("AssetPlugin {").find_map(|(at, words)| {
         let fields = code[at + words.len()..].split('}').next()?;
         let (_, value) = fields.split_once("file_path")?;
+        // The first one may be the type that a function returns.
+        let at = fields.rfind(words).map_or(at, |inner| at + words.len() + inner);
         let text = value.trim_start().strip_prefix(':').and_then(|value| value.trim_start().strip_prefix('"'));
         Some((at, text.and_then(|text| text.split('"').next()).map(str::to_owned)))
     })
@@ -578,6 +609,93 @@ fn variants(rest: &str) -> Vec<String> {
         name(part).to_owned()
     });
     names.filter(|name| !name.is_empty()).collect()
+}
+
+/// Returns the state that spawns a round whenever it is entered, and takes it down: of several, the one with the likeliest
+/// name, and then the one in which most systems run. A state within another one cannot be entered from everywhere.
+fn round(states: &[StateEnum], sources: &[SourceText]) -> Option<RoundState> {
+    let mut found = Vec::new();
+    for source in sources {
+        for (state, variant, at) in named_in(&source.code, "OnEnter(") {
+            let known = states.iter().find(|known| known.at.name == state && !known.is_sub);
+            let Some(known) = known.filter(|known| known.variants.iter().any(|known| known == variant)) else {
+                continue;
+            };
+            let words = words_of(variant);
+            let start = code_of_systems(sources, &source.code, at);
+            let spawns =
+                start.iter().any(|code| code.match_indices("spawn").any(|(at, _)| !code[..at].ends_with("de")));
+            if !spawns || words.iter().any(|word| RESTS.contains(word)) {
+                continue;
+            }
+            let is_it = |(of, name, _): &(&str, &str, usize)| (*of, *name) == (state, variant);
+            let despawns = |code: &str| {
+                ["DespawnOnExit(", "StateScoped("].iter().any(|mark| named_in(code, mark).iter().any(is_it))
+            };
+            let leaves = sources.iter().flat_map(|source| {
+                let exits = named_in(&source.code, "OnExit(").into_iter().filter(is_it);
+                exits.flat_map(|(_, _, at)| code_of_systems(sources, &source.code, at)).collect::<Vec<_>>()
+            });
+            let clears = |code: &str| CLEARS.iter().any(|word| code.contains(word));
+            if !start.into_iter().chain(leaves).any(clears) && !sources.iter().any(|source| despawns(&source.code)) {
+                continue;
+            }
+            let running =
+                |source: &SourceText| named_in(&source.code, "in_state(").iter().filter(|at| is_it(at)).count();
+            let rank = (words.iter().any(|word| PLAYS.contains(word)), sources.iter().map(running).sum::<usize>());
+            let (state, path) = (state.to_owned(), known.path.clone());
+            found.push((Reverse(rank), RoundState { at: source.at(variant, at), state, path }));
+        }
+    }
+    found.sort_by_key(|(rank, _)| *rank);
+    found.into_iter().next().map(|(_, state)| state)
+}
+
+/// Returns the variants of states that stand behind this call, such as `OnEnter(Screen::Playing)`: enum, variant, and the
+/// offset of the call.
+fn named_in<'a>(code: &'a str, call: &str) -> Vec<(&'a str, &'a str, usize)> {
+    let found = code.match_indices(call).filter_map(|(at, words)| {
+        let (path, variant) = code[at + words.len()..].split(')').next()?.trim().rsplit_once("::")?;
+        let is_whole = !code[..at].ends_with(is_of_name) && variant.chars().all(is_of_name);
+        is_whole.then(|| (path.rsplit("::").next().unwrap_or(path), variant, at))
+    });
+    found.collect()
+}
+
+/// Returns the words of a name such as `GameOver`.
+fn words_of(name: &str) -> Vec<&str> {
+    let begins = name.char_indices().filter(|(at, c)| *at == 0 || c.is_uppercase()).map(|(at, _)| at);
+    let begins: Vec<usize> = begins.chain([name.len()]).collect();
+    begins.windows(2).map(|pair| &name[pair[0]..pair[1]]).collect()
+}
+
+/// Returns the code behind a schedule up to the end of the call that adds systems to it, and that of the functions that it
+/// names.
+fn code_of_systems<'a>(sources: &'a [SourceText], code: &'a str, schedule: usize) -> Vec<&'a str> {
+    let mut depth = 0_i32;
+    let end = code[schedule..].char_indices().find(|(_, c)| {
+        depth += i32::from("([{".contains(*c)) - i32::from(")]}".contains(*c));
+        depth < 0
+    });
+    let call = &code[schedule..end.map_or(code.len(), |(at, _)| schedule + at)];
+    let names = call.split(|c| !is_of_name(c)).filter(|name| name.starts_with(|c: char| c.is_lowercase() || c == '_'));
+    let bodies = names.flat_map(|name| sources.iter().filter_map(move |source| body_of(&source.code, name)));
+    std::iter::once(call).chain(bodies).collect()
+}
+
+/// Returns the body of a function.
+fn body_of<'a>(code: &'a str, function: &str) -> Option<&'a str> {
+    code.match_indices(function).find_map(|(at, _)| {
+        let behind = &code[at + function.len()..];
+        let is_defined = code[..at].ends_with("fn ") && behind.starts_with(['(', '<']);
+        let body = behind.find('{').filter(|_| is_defined)?;
+        let mut depth = 0_i32;
+        let end = behind[body..].char_indices().find(|(_, c)| {
+            depth += i32::from(*c == '{') - i32::from(*c == '}');
+            depth == 0
+        });
+        Some(&behind[body..end.map_or(behind.len(), |(at, _)| body + at)])
+    })
 }
 
 /// Returns the texts that stand within 20 lines behind a `Button`, or that the names there stand for.
@@ -682,18 +800,61 @@ mod tests {
     }
 
     #[test]
-    fn comments_are_blank_and_lines_keep_their_numbers() {
-        let text = "a // \"b\n/* c /* d */ \n e */ f\nlet g = \"// h\"; // i\nr#\"j // \"k\"# '\"' // l";
-        assert_eq!(without_comments(text), "a \n\n f\nlet g = \"// h\"; \nr#\"j // \"k\"# '\"' ");
-    }
-
-    #[test]
     fn keys_are_those_that_the_code_names() {
         let code = "use bevy::prelude::KeyCode::{self, Space};\n// KeyCode::KeyQ\n\
             keys.pressed(KeyCode::ArrowLeft) || keys.any_pressed([KeyCode::KeyA, KeyCode::ArrowLeft]);\nMyKeyCode::B;";
         let found = facts(&[("src/main.rs", code)]);
         assert_eq!(found.keys, ["Space", "ArrowLeft", "KeyA"]);
         assert_eq!(found.inputs, ["keyboard"]);
+    }
+
+    #[test]
+    fn keys_mean_the_same_if_one_is_never_read_without_the_other() {
+        let aliases = |code: &str| {
+            let same = facts(&[("src/main.rs", code)]).aliases;
+            same.iter().map(|same| same.join(" ")).collect::<Vec<_>>().join(", ")
+        };
+        for (code, same) in [
+            ("if keys.any_pressed([KeyCode::KeyW, KeyCode::ArrowUp]) { up(); }", "KeyW ArrowUp"),
+            ("keys.any_just_pressed([\n    KeyCode::KeyW,\n    KeyCode::ArrowUp,\n])", "KeyW ArrowUp"),
+            ("if keys.pressed(KeyCode::KeyW) || keys.pressed(KeyCode::ArrowUp) { up(); }", "KeyW ArrowUp"),
+            ("if on && (keys.pressed(KeyCode::KeyW)\n    || keys.pressed(KeyCode::ArrowUp)) { up(); }", "KeyW ArrowUp"),
+            ("if (k.pressed(KeyCode::KeyW) || k.pressed(KeyCode::ArrowUp)) && on { up(); }", "KeyW ArrowUp"),
+            ("if key == KeyCode::KeyW || key == KeyCode::ArrowUp { up(); }", "KeyW ArrowUp"),
+            ("match key { KeyCode::KeyW | KeyCode::ArrowUp => up(), KeyCode::KeyS => down() }", "KeyW ArrowUp"),
+            (
+                "k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::KeyB) || k.pressed(KeyCode::KeyC);\n\
+                 k.any_pressed([KeyCode::KeyX, KeyCode::KeyY]);",
+                "KeyA KeyB KeyC, KeyX KeyY",
+            ),
+            // The first line moves, the others animate: of four keys, two and two mean the same.
+            (
+                "k.any_pressed([KeyCode::KeyA, KeyCode::ArrowLeft, KeyCode::KeyD, KeyCode::ArrowRight]);\n\
+                 k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::ArrowLeft);\n\
+                 k.pressed(KeyCode::KeyD) || k.pressed(KeyCode::ArrowRight);",
+                "KeyA ArrowLeft, KeyD ArrowRight",
+            ),
+            // Read alone somewhere else, held together, by two functions, by two devices, or bound by another operator.
+            ("k.any_pressed([KeyCode::KeyA, KeyCode::KeyB]); k.pressed(KeyCode::KeyB);", ""),
+            ("k.all_pressed([KeyCode::KeyA, KeyCode::KeyB]);", ""),
+            ("k.pressed(KeyCode::KeyA) || k.just_pressed(KeyCode::KeyB)", ""),
+            ("a.pressed(KeyCode::KeyA) || aa.pressed(KeyCode::KeyB)", ""),
+            ("aa.pressed(KeyCode::KeyA) || a.pressed(KeyCode::KeyB)", ""),
+            ("k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::KeyB) && on", ""),
+            ("key == KeyCode::KeyA || key == KeyCode::KeyB && on", ""),
+            ("on && k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::KeyB)", ""),
+            ("!k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::KeyB)", ""),
+            ("k.pressed(KeyCode::KeyA) && k.pressed(KeyCode::KeyB)", ""),
+            ("[KeyCode::KeyA, KeyCode::KeyB].map(|key| k.pressed(key))", ""),
+        ] {
+            assert_eq!(aliases(code), same, "{code}");
+        }
+        let both = [
+            ("src/a.rs", "k.pressed(KeyCode::KeyA) || k.pressed(KeyCode::KeyB)"),
+            ("src/b.rs", "k.pressed(KeyCode::KeyA)"),
+        ];
+        assert_eq!(facts(&both[..1]).aliases.len(), 1);
+        assert_eq!(facts(&both).aliases, Vec::<Vec<String>>::new(), "another file reads it alone");
     }
 
     #[test]
@@ -707,10 +868,8 @@ mod tests {
         assert!(found.has_library);
         assert_eq!(paths(&found.functions), ["rules::plugin", "add"]);
         assert_eq!(paths(&found.plugins), ["All"]);
-        assert_eq!(
-            found.functions[1].at,
-            SourceLine { name: "add".to_owned(), file: "src/lib.rs".to_owned(), line: 4 }
-        );
+        let at = &found.functions[1].at;
+        assert_eq!((at.name.as_str(), at.file.as_str(), at.line), ("add", "src/lib.rs", 4));
     }
 
     #[test]
@@ -820,6 +979,44 @@ mod tests {
         assert_eq!(paths(&found.plugins), ["actors::hero::HeroPlugin"], "the other module is not public");
         assert_eq!(paths(&found.functions), ["ui::plugin", "ui::other"]);
         assert_eq!(paths(&found.added), ["ui::plugin", "actors::hero::HeroPlugin"]);
+    }
+
+    #[test]
+    fn a_round_begins_in_the_state_that_spawns_it_and_takes_it_down() {
+        let states = "#[derive(States)]\npub enum Screen { Menu, Playing, GameOver, Shop }\n\
+            #[derive(SubStates)]\npub enum Phase { Running }\n";
+        let round = |code: &str| {
+            let found = facts(&[("src/lib.rs", &format!("pub mod play;\n{states}")), ("src/play.rs", code)]).round?;
+            assert_eq!(
+                (found.state.as_str(), found.path.as_deref(), found.at.file.as_str()),
+                ("Screen", Some("Screen"), "src/play.rs")
+            );
+            Some((found.at.name, found.at.line))
+        };
+        let found = |variant: &str, line| Some((variant.to_owned(), line));
+        let whole = "fn plugin(app: &mut App) {\n    app.add_systems(OnEnter(crate::Screen::Playing), (set_up, other).chain())\n        \
+            .add_systems(OnExit(Screen::Playing), take_down);\n}\n\
+            fn set_up(mut commands: Commands) {\n    commands.spawn(Ball);\n}\n\
+            fn take_down(mut commands: Commands) {\n    commands.entity(ball).despawn();\n}\n";
+        assert_eq!(round(whole), found("Playing", 2));
+        for (left_out, why) in [
+            ("commands.spawn(Ball)", "nothing is spawned"),
+            (".despawn()", "nothing is despawned"),
+            ("OnExit(Screen::Playing)", "it is despawned somewhere else"),
+            ("OnEnter(crate::Screen::Playing)", "no state is entered"),
+        ] {
+            assert_eq!(round(&whole.replace(left_out, "nothing()")), None, "{why}");
+        }
+        let scoped = whole.replace(".despawn()", "").replace("Ball", "(Ball, DespawnOnExit(Screen::Playing))");
+        assert_eq!(round(&scoped), found("Playing", 2), "Bevy despawns it");
+        for variant in ["Menu", "GameOver"] {
+            assert_eq!(round(&whole.replace("Playing", variant)), None, "{variant} is no round");
+        }
+        assert_eq!(round(&whole.replace("Screen::Playing", "Phase::Running")), None, "a state within a state");
+        let shop = whole.replace("Playing", "Shop");
+        assert_eq!(round(&shop), found("Shop", 2));
+        let both = format!("{shop}{whole}");
+        assert_eq!(round(&both), found("Playing", shop.lines().count() + 2), "its name says that it is played");
     }
 
     #[test]
