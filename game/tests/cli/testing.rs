@@ -5,7 +5,7 @@ use std::{fs, path::Path, process::Output};
 use bevy_playbot::demo::file::{Decider, DemoReader, DemoWriter, EpisodeActions};
 use serde_json::Value;
 
-use crate::program::{code, done, ended, errors, lines, playbot, unsealed};
+use crate::program::{code, command, done, ended, errors, lines, playbot, unsealed};
 
 const FILES: [&str; 4] = ["results.json", "report.html", "junit.xml", "summary.md"];
 
@@ -117,6 +117,31 @@ fn build_servers_are_given_causes_positions_and_the_time_of_the_game() {
     assert!(junit.contains("classname=\"coinrun.hard:0-9.right-jump\"") && junit.contains("hostname=\"localhost\""));
     let cases = junit.lines().filter(|line| line.contains("<testcase ")).collect::<Vec<_>>();
     assert!(cases.len() == 10 && cases.iter().all(|line| line.contains(" time=\"")), "{cases:?}");
+}
+
+#[test]
+fn the_date_of_reproducible_builds_is_that_of_reports_for_build_servers() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let at = |out: &str, date: &str| {
+        let args = ["test", "coinrun", "--levels", "hard:0..1", "--bot", "right-jump", "--out", out];
+        playbot_shell::output(command(folder, &args).env("SOURCE_DATE_EPOCH", date)).expect("it starts")
+    };
+    for (out, date, written) in
+        [("none", "", None), ("day", "1767225600", Some("2026-01-01T00:00:00")), ("again", "1767225600", None)]
+    {
+        let output = at(out, date);
+        assert!([0, 1].contains(&code(&output)), "{}", errors(&output));
+        let stamps = read(folder, &format!("{out}/junit.xml")).matches(" timestamp=\"").count();
+        assert_eq!(stamps, usize::from(!date.is_empty()), "{out}");
+        let expected = written.map_or_else(String::new, |date| format!(" timestamp=\"{date}\""));
+        assert!(read(folder, &format!("{out}/junit.xml")).contains(&expected), "{out}");
+    }
+    assert_same(folder, "day", "again");
+    let output = at("refused", "today");
+    assert_eq!(code(&output), 3, "{}", errors(&output));
+    assert!(errors(&output).contains("SOURCE_DATE_EPOCH is `today`"), "{}", errors(&output));
+    assert!(!folder.join("refused").exists(), "it is refused before levels are played");
 }
 
 /// Returns a line of results as it was before there were maps.

@@ -161,7 +161,7 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
     };
     let repeats = log::init(cli.verbose, !matches!(cli.verb, Some(Verb::Bugs(_))));
     progress::start();
-    let _elsewhere = GamesPrintElsewhere::begin();
+    let elsewhere = GamesPrintElsewhere::begin(&repeats);
     let games = match Games::new(games) {
         Ok(games) => games,
         Err(error) => {
@@ -171,6 +171,8 @@ pub fn main(games: &[&dyn Game]) -> ExitCode {
     };
     let verb = cli.verb.unwrap_or_else(|| Verb::Quickstart(quickstart::Args::default()));
     let ended = std::panic::catch_unwind(AssertUnwindSafe(|| run(verb, &games)));
+    // What games have printed is counted then.
+    drop(elsewhere);
     // Before an error, which is the last line.
     repeats.report();
     match ended {

@@ -11,7 +11,10 @@ pub(crate) mod messages;
 pub(crate) mod log;
 pub(crate) mod program;
 
-use crate::{error::CliError, output::messages::for_programs};
+use crate::{
+    error::CliError,
+    output::{log::Repeats, messages::for_programs},
+};
 use playbot_harness::sealed_file::write_atomically;
 use playbot_learner::{disk, disk::DiskFile};
 use playbot_report::PlainTable;
@@ -20,7 +23,7 @@ use std::{
     fs::File,
     io::{self, Write},
     path::{Path, PathBuf},
-    sync::{Mutex, PoisonError},
+    sync::{Mutex, PoisonError, mpsc::Receiver},
 };
 
 /// Advice where nothing can be written.
@@ -63,27 +66,82 @@ pub(crate) fn print_table(table: &PlainTable) -> Result<(), CliError> {
 
 /// While this lives, what games print by `println!` goes to standard error, so that standard output holds the data of the
 /// verb alone. On Unix only: elsewhere it has no effect.
-pub(crate) struct GamesPrintElsewhere(());
+pub(crate) struct GamesPrintElsewhere {
+    /// Hears when the last line has been passed on. `None` if lines are not looked at.
+    #[cfg_attr(not(unix), allow(dead_code, reason = "standard output is redirected on Unix only"))]
+    passed_on: Option<Receiver<()>>,
+}
 
 impl GamesPrintElsewhere {
-    /// Redirects standard output of the process. If the system refuses, all is printed as before.
-    pub fn begin() -> Self {
+    /// Redirects standard output of the process. Equal lines are written once and counted, as messages of the log are. If
+    /// the system refuses, all is printed as before.
+    pub fn begin(repeats: &Repeats) -> Self {
         #[cfg(unix)]
         {
-            let own = redirect().ok();
+            let begun = if repeats.collapses() { redirect_lines(repeats) } else { redirect() };
+            let (own, passed_on) = begun.or_else(|_| redirect()).ok().unzip();
             *DATA.lock().unwrap_or_else(PoisonError::into_inner) = own;
+            Self { passed_on: passed_on.flatten() }
         }
-        Self(())
+        #[cfg(not(unix))]
+        {
+            let _ = repeats;
+            Self { passed_on: None }
+        }
     }
 }
 
-/// Lets the file of standard output be that of standard error, and returns the former.
+/// The former standard output, and the end of a thread that passes lines on.
 #[cfg(unix)]
-fn redirect() -> io::Result<File> {
+type Redirected = (File, Option<Receiver<()>>);
+
+/// Lets the file of standard output be that of standard error.
+#[cfg(unix)]
+fn redirect() -> io::Result<Redirected> {
     use std::os::fd::AsFd;
     let own = io::stdout().as_fd().try_clone_to_owned()?;
     rustix::stdio::dup2_stdout(io::stderr().as_fd())?;
-    Ok(own.into())
+    Ok((own.into(), None))
+}
+
+/// Lets standard output be a pipe, whose lines a thread passes on to standard error.
+#[cfg(unix)]
+fn redirect_lines(repeats: &Repeats) -> io::Result<Redirected> {
+    use std::os::fd::AsFd;
+    let own = io::stdout().as_fd().try_clone_to_owned()?;
+    let (reader, writer) = io::pipe()?;
+    let (passing, passed_on) = std::sync::mpsc::channel();
+    let repeats = repeats.clone();
+    std::thread::Builder::new().name("games print".to_owned()).spawn(move || {
+        pass_on(io::BufReader::new(reader), io::stderr(), &repeats);
+        // The other end hears that it is gone.
+        drop(passing);
+    })?;
+    // From now on standard output alone has the pipe open, so its lines end as soon as it is another file again.
+    rustix::stdio::dup2_stdout(&writer)?;
+    Ok((own.into(), Some(passed_on)))
+}
+
+/// Longest line that games print whole, in bytes: one without an end would fill the memory.
+#[cfg(any(unix, test))]
+const LONGEST_LINE: u64 = 16 * 1024;
+
+/// Passes on lines that were not there before, without empty ones, and counts the others, until there are no more.
+#[cfg(any(unix, test))]
+fn pass_on(mut lines: impl io::BufRead, mut to: impl Write, repeats: &Repeats) {
+    use io::{BufRead, Read};
+    let mut line = Vec::new();
+    while lines.by_ref().take(LONGEST_LINE).read_until(b'\n', &mut line).is_ok_and(|read| read > 0) {
+        let text = String::from_utf8_lossy(line.trim_ascii_end());
+        if !text.is_empty() && repeats.is_new(text.into_owned(), true, None) {
+            if !line.ends_with(b"\n") {
+                line.push(b'\n');
+            }
+            // Standard error may be closed. Lines are read all the same: a game would wait, or fail, if they were not.
+            let _ = to.write_all(&line);
+        }
+        line.clear();
+    }
 }
 
 impl Drop for GamesPrintElsewhere {
@@ -94,6 +152,10 @@ impl Drop for GamesPrintElsewhere {
             // A game may have begun a line. If standard error is closed, its words are lost.
             let _ = io::stdout().flush();
             let _ = rustix::stdio::dup2_stdout(&own);
+            // A program that a game has started may have the pipe open, and never end.
+            if let Some(passed_on) = &self.passed_on {
+                let _ = passed_on.recv_timeout(std::time::Duration::from_secs(1));
+            }
         }
         #[cfg(not(unix))]
         drop(own);
@@ -273,6 +335,30 @@ mod tests {
         let error = print_or_write("[]", Some(&path)).expect_err("taken");
         assert!(error.exit_code() == 3 && error.to_string().contains("name another --out"), "{error}");
         assert_eq!(fs::read_to_string(&path).expect("written"), "{}\n");
+    }
+
+    /// Returns what is passed on of what a game prints, and the lines about the rest.
+    fn passed_on(printed: &[u8]) -> (String, Vec<String>) {
+        let (mut out, repeats) = (Vec::new(), Repeats::default());
+        pass_on(printed, &mut out, &repeats);
+        (String::from_utf8_lossy(&out).into_owned(), repeats.lines())
+    }
+
+    #[test]
+    fn equal_lines_of_a_game_are_passed_on_once_and_counted() {
+        let (text, counts) = passed_on(b"jump\n\nscore 1\njump\r\n \nscore 2\njump\nlast");
+        assert_eq!(text, "jump\nscore 1\nscore 2\nlast\n");
+        assert_eq!(counts[1..], ["  2 times more: jump"]);
+        let (text, counts) = passed_on(b"a\xffb\n\x1b[31mred\x1b[0m\n");
+        assert_eq!((text.as_str(), counts.len()), ("a\u{fffd}b\n\u{1b}[31mred\u{1b}[0m\n", 0));
+    }
+
+    #[test]
+    fn a_line_without_an_end_is_passed_on_in_parts() {
+        let longest = LONGEST_LINE as usize;
+        let (text, counts) = passed_on(&[vec![b'a'; longest], vec![b'b'; 5]].concat());
+        assert_eq!(text, format!("{}\nbbbbb\n", "a".repeat(longest)));
+        assert!(counts.is_empty(), "{counts:?}");
     }
 
     #[test]

@@ -63,7 +63,7 @@ pub use crate::verdict::{
     maps::{FailurePath, LevelMaps, LevelPars, MapScope, SkillTicks, hash_of_files, level_name},
     merge::merge,
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
-    reports::{AGAINST, JUNIT, SUMMARY, action_search, rerun_commands, write_reports},
+    reports::{AGAINST, JUNIT, SUMMARY, action_search, report_date, rerun_commands, write_reports},
     results::{FinishTime, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, TesterTotal, results_folder},
     run::{TestEnd, TestObserver, run_tests, run_tests_keeping, test_in_turn},
     shard::{Shard, ShardError},

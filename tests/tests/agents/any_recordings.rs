@@ -23,17 +23,23 @@ use playbot_harness::{
     sensors::GameSensors,
     split::LevelSplit,
 };
-use playbot_tests::{Corridor, faulty::Fault, foreign::catch::catch_game};
+use playbot_tests::{
+    Corridor,
+    faulty::Fault,
+    foreign::{catch::catch_game, pong::pong_game},
+};
 use playbot_train::demo::Demonstrations;
 use proptest::prelude::*;
 
-/// The games that are recorded, with their modes. The last two have faults that some recordings show.
+/// The games that are recorded, with their modes. In `pong` a second agent plays along. The last two have faults that some
+/// recordings show.
 fn games() -> Vec<(Box<dyn Game>, Vec<&'static str>)> {
     vec![
         (Box::new(Corridor), vec!["plain"]),
         (Box::new(CoinRun::default()), vec!["easy", "hard"]),
         (Box::new(Maze2d { physics: false }), vec!["umaze", "umaze+end-at-goal", "medium+sparse"]),
         (Box::new(catch_game()), vec!["default"]),
+        (Box::new(pong_game()), vec!["default"]),
         (Box::new(Fault::SharedScore), vec!["bed"]),
         (Box::new(Fault::LeftOvers), vec!["bed"]),
     ]
@@ -153,7 +159,7 @@ proptest! {
 
     #[test]
     fn trainings_read_every_recording_that_demo_verify_accepts(
-        game in 0usize..6, all in takes(), threads in 1usize..3, pictures: bool,
+        game in 0usize..7, all in takes(), threads in 1usize..3, pictures: bool,
     ) {
         let (game, modes) = games().swap_remove(game);
         let game = game.as_ref();

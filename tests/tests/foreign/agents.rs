@@ -6,6 +6,7 @@ use std::{
 };
 
 use bevy::prelude::*;
+use bevy_playbot::vision::ObservationConfig;
 use playbot::prelude::*;
 use playbot_harness::{
     demo::verify_file,
@@ -22,7 +23,7 @@ use playbot_tests::{
     recording::record_random,
     training::check_resuming,
 };
-use playbot_train::{Trainer, experiment::file::parse_experiment};
+use playbot_train::{Trainer, demo::Demonstrations, experiment::file::parse_experiment};
 
 /// The episodes that have ended, in order.
 #[derive(Resource, Default)]
@@ -153,7 +154,7 @@ fn where_one_agent_plays_the_other_plays_along_in_a_way_that_depends_on_the_leve
 }
 
 #[test]
-fn a_recording_of_one_agent_replays_with_the_other_one() {
+fn a_recording_of_one_agent_replays_with_the_other_one_and_is_learned_from() {
     for restart in [Restart::Startup, Restart::Rebuild] {
         let game = pong_game().restart(restart);
         let folder = tempfile::tempdir().expect("a folder");
@@ -161,6 +162,9 @@ fn a_recording_of_one_agent_replays_with_the_other_one() {
         record_random(&game, "default", 5, &path, 0..8);
         let report = verify_file(&game, &path, |_| {}).expect("readable");
         assert_eq!((report.episodes, report.divergences), (8, Vec::new()));
+        let demos = Demonstrations::read(&game, &ObservationConfig::default(), folder.path(), None).expect("readable");
+        let dataset = demos.dataset(&game, 2, |_| {}).expect("it replays beside the other one");
+        assert_eq!(dataset.steps() as u64, report.ticks);
     }
 }
 

@@ -20,6 +20,17 @@ fn what_a_game_prints_is_not_among_the_data_of_a_verb() {
 }
 
 #[test]
+fn equal_lines_that_a_game_prints_are_written_once_and_counted() {
+    let doctor = ["doctor", "catch", "--ticks", "5", "--level", "0"];
+    let falling = |messages: &str| messages.lines().filter(|line| *line == "falling").count();
+    let (_, messages) = printed(&doctor);
+    assert_eq!(falling(&messages), 1, "{messages}");
+    assert!(messages.contains(" times more: falling\n"), "{messages}");
+    let (_, messages) = printed(&[&doctor[..], &["-v"]].concat());
+    assert!(falling(&messages) > 5 && !messages.contains(" more: falling"), "{messages}");
+}
+
+#[test]
 fn help_and_data_without_a_game_stay_where_they_are() {
     assert!(!printed(&["config", "presets"]).0.is_empty());
     assert!(printed(&["doctor", "--help"]).0.contains("--ticks"));

@@ -157,13 +157,32 @@ impl Kept {
 }
 
 impl Repeats {
+    /// Returns whether equal messages of games are written once.
+    pub const fn collapses(&self) -> bool {
+        self.counts_games
+    }
+
+    /// Notes a message. Returns false if an equal one was let through, which is counted if it is a game's.
+    pub fn is_new(&self, message: String, is_of_game: bool, tick: Option<LevelTick>) -> bool {
+        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(known) = kept.get_mut(&message) {
+            known.again += u64::from(is_of_game);
+            known.note(tick);
+            return false;
+        }
+        if kept.len() < MOST_KEPT {
+            kept.entry(message).or_default().note(tick);
+        }
+        true
+    }
+
     /// Prints which messages of a game came again, and how often.
     pub fn report(&self) {
         self.lines().iter().for_each(|line| report!("{line}"));
     }
 
     /// Returns the lines of the report, the most frequent message first.
-    fn lines(&self) -> Vec<String> {
+    pub(super) fn lines(&self) -> Vec<String> {
         let kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
         let mut again: Vec<(&str, &Kept)> = kept.iter().map(|(text, kept)| (text.as_str(), kept)).collect();
         again.retain(|(_, kept)| kept.again > 0);
@@ -201,16 +220,7 @@ impl<S: Subscriber> Layer<S> for Repeats {
         let mut message = Message(format!("{level} {target}:"));
         event.record(&mut message);
         let tick = tick_of_thread().filter(|_| !is_of_files);
-        let mut kept = self.kept.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(known) = kept.get_mut(&message.0) {
-            known.again += u64::from(!is_of_files);
-            known.note(tick);
-            return false;
-        }
-        if kept.len() < MOST_KEPT {
-            kept.entry(message.0).or_default().note(tick);
-        }
-        true
+        self.is_new(message.0, !is_of_files, tick)
     }
 }
 

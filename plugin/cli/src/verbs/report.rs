@@ -83,7 +83,7 @@ pub(crate) fn run_merge(args: &MergeArgs, games: &Games) -> Result<Outcome, CliE
     let game = games.get(&record.game).ok();
     let against = args.against.as_deref().map(results_folder);
     let results = Results { folder: &args.out, against, game, json: args.json };
-    results.check_folders()?;
+    results.check()?;
     // Nothing is written if the comparison fails.
     if let Some(before) = results.against {
         Comparison::check(before, &record)?;

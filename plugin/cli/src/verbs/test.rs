@@ -133,7 +133,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         path => (None, path.map(results_folder)),
     };
     let results = Results { folder: out, against, game: Some(game), json: args.json };
-    results.check_folders()?;
+    results.check()?;
     let recorded = recording.map(|recording| RecordedWins::read(game, &plan, recording)).transpose()?;
     if let Some(before) = results.against {
         Comparison::check(before, &record)?;

@@ -136,6 +136,12 @@ pub enum TestError {
     /// JUnit XML could not be written.
     #[error("the results cannot be written as JUnit XML: {0}")]
     Junit(String),
+    /// The variable with the date of reports is no number of seconds.
+    #[error(
+        "the variable SOURCE_DATE_EPOCH is `{0}`, and dates junit.xml by whole seconds since 1970: write a number such as \
+         1767225600 (`git log -1 --format=%ct` prints that of a commit), or unset it"
+    )]
+    Date(String),
     /// A finding could not be written.
     #[error(transparent)]
     Finding(#[from] FindingError),

@@ -23,6 +23,8 @@ use playbot_harness::{brief::shell_word, game::Game};
 use playbot_report::{counted, markdown_cell};
 use std::{cmp::Reverse, fmt::Display, path::Path};
 
+pub use crate::verdict::reports::junit::report_date;
+
 /// Name of the file with JUnit XML.
 pub const JUNIT: &str = "junit.xml";
 
@@ -42,10 +44,10 @@ const MOST_CHANGES: usize = 20;
 ///
 /// # Errors
 ///
-/// The folder has no results, they are damaged, or the files cannot be written.
+/// The folder has no results, they are damaged, the files cannot be written, or [`report_date`] returns an error.
 pub fn write_reports(folder: &Path, comparison: Option<&Comparison>, program: &str) -> Result<Overview, TestError> {
     let overview = Overview::read(folder)?;
-    write(&folder.join(JUNIT), &junit(folder, program)?)?;
+    write(&folder.join(JUNIT), &junit(folder, program, report_date()?.as_deref())?)?;
     write(&folder.join(SUMMARY), &summary(&overview, comparison, program))?;
     if let Some(comparison) = comparison {
         let path = folder.join(AGAINST);

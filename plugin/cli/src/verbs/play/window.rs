@@ -1,7 +1,7 @@
 //! `playbot play` in a program that was built with a window.
 
 use crate::{
-    arguments::{default_mode, level_number, player::LoadedPlayer},
+    arguments::{default_mode, level_number, player::LoadedPlayer, report_agents_along},
     error::{CliError, Outcome},
     output::program,
     progress::interrupt,
@@ -27,6 +27,7 @@ const LAST_LEVEL: u64 = u32::MAX as u64;
 
 pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let game = games.get(&args.game)?;
+    report_agents_along(game);
     let playlist = playlist(game, &args)?;
     let (autopilot, observation_config) = autopilot(game, &args)?;
     check_time_limit(game, &args)?;

@@ -11,7 +11,7 @@ use playbot_test::{
     findings::{FINDINGS, list_findings},
     verdict::{
         AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, SUMMARY,
-        TesterTotal, Trials, action_search, wilson, write_reports,
+        TesterTotal, Trials, action_search, report_date, wilson, write_reports,
     },
     verdict_report::{HtmlReport, REPORT, write_html},
 };
@@ -36,12 +36,13 @@ pub struct Results<'a> {
 }
 
 impl Results<'_> {
-    /// Checks that earlier results are not overwritten by those that are compared with them.
+    /// Checks that reports can be written after the test, without overwriting those that are compared with them.
     ///
     /// # Errors
     ///
-    /// Both folders are the same.
-    pub fn check_folders(&self) -> Result<(), CliError> {
+    /// Both folders are the same, or reports are to have a date that is none.
+    pub fn check(&self) -> Result<(), CliError> {
+        report_date()?;
         let is_same = |before: &Path| match (fs::canonicalize(before), fs::canonicalize(self.folder)) {
             (Ok(before), Ok(folder)) => before == folder,
             _ => before == self.folder,

@@ -1,7 +1,8 @@
 //! JUnit XML, with a test case for each level.
 //!
 //! The elements and attributes are those that the xUnit plugin of Jenkins accepts (its `junit-10.xsd`), which refuses a
-//! whole file for one attribute more. Equal results give equal bytes, so times are those of the game.
+//! whole file for one attribute more. Equal results give equal bytes, so times are those of the game, and a date is that of
+//! `SOURCE_DATE_EPOCH`.
 
 use crate::verdict::{
     LevelOutcome, LevelVerdict,
@@ -12,7 +13,7 @@ use crate::verdict::{
 };
 use playbot_harness::level_files::is_level_files;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
-use std::{path::Path, time::Duration};
+use std::{env, ffi::OsStr, path::Path, time::Duration};
 
 /// The host in every file: results are independent of the machine.
 const HOST: &str = "localhost";
@@ -20,9 +21,48 @@ const HOST: &str = "localhost";
 /// The attribute that [`quick_junit`] writes on `testsuites`, and the schema of Jenkins lacks.
 const REFUSED: &str = " skipped=\"0\"";
 
-/// Converts the results in a folder. A level that was not solved, that has a finding, or that no longer ends as recorded,
-/// has failed.
-pub(super) fn junit(folder: &Path, program: &str) -> Result<String, TestError> {
+/// Characters that XML 1.0 cannot hold, not even escaped, and [`quick_junit`] leaves in. Names of files may have them.
+const NO_CHARACTERS: [char; 2] = ['\u{fffe}', '\u{ffff}'];
+
+/// The variable with the date of files that can be made again, byte for byte: see
+/// <https://reproducible-builds.org/specs/source-date-epoch/>.
+const DATE: &str = "SOURCE_DATE_EPOCH";
+
+/// Seconds from 1970 to the year 10000, which has too many digits for a date.
+const DATES: u64 = 253_402_300_800;
+
+/// Returns the date in `junit.xml`, such as `2026-01-01T00:00:00`: that of the variable `SOURCE_DATE_EPOCH`. `None` if it
+/// is not set, because the time of the test would make other bytes of equal results.
+///
+/// # Errors
+///
+/// The variable is no number of seconds from 1970 to the year 9999.
+pub fn report_date() -> Result<Option<String>, TestError> {
+    let seconds = env::var_os(DATE).filter(|seconds| !seconds.is_empty());
+    seconds.map(|seconds| date(&seconds)).transpose()
+}
+
+/// Returns the date in UTC, without a time zone, which readers do not expect.
+fn date(seconds: &OsStr) -> Result<String, TestError> {
+    let number = seconds.to_str().and_then(|text| text.parse().ok()).filter(|&number: &u64| number < DATES);
+    let Some(number) = number else { return Err(TestError::Date(seconds.to_string_lossy().into_owned())) };
+    let (days, second) = (number / 86_400, number % 86_400);
+    // Howard Hinnant, "chrono-Compatible Low-Level Date Algorithms": years begin in March, after the leap day, and 400 of
+    // them have 146,097 days. The first day of 1970 is day 719,468 after 1 March of the year 0.
+    let (era, day) = ((days + 719_468) / 146_097, (days + 719_468) % 146_097);
+    let year = (day - day / 1_460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year + year / 4 - year / 100);
+    // From March on, five months in a row have 153 days.
+    let month = (5 * day + 2) / 153;
+    let day = day - (153 * month + 2) / 5 + 1;
+    let (year, month) = if month < 10 { (year, month + 3) } else { (year + 1, month - 9) };
+    let (hour, minute) = (second / 3_600, second / 60 % 60);
+    Ok(format!("{:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{:02}", 400 * era + year, second % 60))
+}
+
+/// Converts the results in a folder, with this date. A level that was not solved, that has a finding, or that no longer
+/// ends as recorded, has failed.
+pub(super) fn junit(folder: &Path, program: &str, date: Option<&str>) -> Result<String, TestError> {
     let mut lines = ResultLines::open(folder)?;
     let record = lines.record().clone();
     let class = class(&record);
@@ -34,28 +74,31 @@ pub(super) fn junit(folder: &Path, program: &str) -> Result<String, TestError> {
         match suites.last_mut() {
             Some(suite) if !has_files => add(suite, case),
             _ => {
-                let mut suite = suite(&record, has_files.then_some(level.level.as_str()));
+                let mut suite = suite(&record, has_files.then_some(level.level.as_str()), date);
                 add(&mut suite, case);
                 suites.push(suite);
             }
         }
     }
     if suites.is_empty() {
-        suites.push(suite(&record, None));
+        suites.push(suite(&record, None, date));
     }
     let mut report = Report::new(name.as_str());
     report.time = suites.iter().filter_map(|suite| suite.time).reduce(Duration::saturating_add);
     report.add_test_suites(suites);
     let text = report.to_string().map_err(|error| TestError::Junit(error.to_string()))?;
     // The first occurrence is the one on `testsuites`: quotation marks in names before it are escaped.
-    Ok(text.replacen(REFUSED, "", 1))
+    Ok(text.replacen(REFUSED, "", 1).replace(NO_CHARACTERS, ""))
 }
 
 /// Makes the suite of all levels, or that of a level file. Readers that show failures at files read the suite's file,
 /// because a case may not have one.
-fn suite(record: &TestRecord, file: Option<&str>) -> TestSuite {
+fn suite(record: &TestRecord, file: Option<&str>, date: Option<&str>) -> TestSuite {
     let levels = file.map_or_else(|| record.range.to_string(), str::to_owned);
     let mut suite = TestSuite::new(format!("{} {levels}", record.game));
+    if let Some(date) = date {
+        suite.extra.insert("timestamp".into(), date.into());
+    }
     suite.extra.insert("hostname".into(), HOST.into());
     if let Some(file) = file {
         suite.extra.insert("file".into(), file.into());
@@ -142,17 +185,18 @@ mod tests {
     use crate::{
         findings::{RecordedCourse, testing::course},
         verdict::{
-            Finding, TestedRun,
+            EpisodeScore, Finding, TestedRun,
             folder::{Earlier, TestFolder},
             testing,
-            testing::verdict,
+            testing::{tester, verdict},
         },
     };
-    use playbot_harness::split::LevelSplit;
+    use playbot_harness::{detector::LevelProof, split::LevelSplit};
     use quick_xml::{Reader, XmlVersion, events::Event};
     use std::collections::{BTreeMap, BTreeSet};
 
-    /// Elements of junit-10.xsd that are written: parent, name, required attributes, and others that are allowed.
+    /// Elements of junit-10.xsd that are written: parent, name, required attributes, and others that are allowed. The
+    /// schema lets the elements below a suite and a case come in any order.
     const SCHEMA: [(&str, &str, &[&str], &[&str]); 4] = [
         ("", "testsuites", &[], &["name", "time", "tests", "failures", "errors"]),
         (
@@ -165,11 +209,21 @@ mod tests {
         ("testcase", "failure", &[], &["type", "message"]),
     ];
 
+    /// Attributes that count elements.
+    const COUNTS: [&str; 4] = ["tests", "failures", "errors", "skipped"];
+
     /// An element of the XML.
     struct Element {
         parent: String,
         name: String,
         attributes: BTreeMap<String, String>,
+    }
+
+    impl Element {
+        /// Returns the value of an attribute that counts.
+        fn count(&self, attribute: &str) -> usize {
+            self.attributes[attribute].parse().expect("a count")
+        }
     }
 
     fn elements(text: &str) -> Vec<Element> {
@@ -195,11 +249,16 @@ mod tests {
                 Event::End(_) => {
                     open.pop();
                 }
+                Event::Text(words) if words.iter().all(u8::is_ascii_whitespace) => {}
+                Event::Text(_) | Event::GeneralRef(_) => {
+                    assert_eq!(open.last().map(String::as_str), Some("failure"), "text is elsewhere in {text}");
+                }
+                Event::Decl(_) => assert!(found.is_empty(), "{text}"),
                 Event::Eof => {
                     assert!(open.is_empty(), "{open:?} are not closed in {text}");
                     return found;
                 }
-                _ => {}
+                other => panic!("{other:?} in {text}"),
             }
         }
     }
@@ -218,51 +277,157 @@ mod tests {
         }
     }
 
+    /// Checks a file as the schema does, whose only type besides text is that of times, and its counts and dates besides.
+    fn check(text: &str) {
+        let is_character = |c: char| matches!(c, '\t' | '\n' | '\r' | ' '..='\u{fffd}' | '\u{10000}'..);
+        assert!(text.chars().all(is_character), "no XML 1.0: {text:?}");
+        let elements = elements(text);
+        for Element { parent, name, attributes } in &elements {
+            let known = SCHEMA.iter().find(|(above, own, ..)| above == parent && own == name);
+            let (_, _, required, others) = known.unwrap_or_else(|| panic!("{name} in {parent}: {text}"));
+            assert!(required.iter().all(|key| attributes.contains_key(*key)), "{name}: {text}");
+            for (key, value) in attributes {
+                let is_known = required.contains(&key.as_str()) || others.contains(&key.as_str());
+                assert!(is_known, "{name} has {attributes:?}: {text}");
+                let is_sound = match key.as_str() {
+                    // Digits and at most three more after the point.
+                    "time" => {
+                        let (whole, part) = value.split_once('.').unwrap_or((value.as_str(), ""));
+                        part.len() <= 3 && [whole, part].concat().bytes().all(|byte| byte.is_ascii_digit())
+                    }
+                    // The pattern of other schemas, which the xUnit plugin leaves open.
+                    "timestamp" => {
+                        let shape: String = value.chars().map(|c| if c.is_ascii_digit() { '0' } else { c }).collect();
+                        shape == "0000-00-00T00:00:00"
+                    }
+                    key if COUNTS.contains(&key) => value.bytes().all(|byte| byte.is_ascii_digit()),
+                    _ => true,
+                };
+                assert!(is_sound && !value.is_empty(), "{name} has {key}={value:?}: {text}");
+            }
+        }
+        let (all, rest) = elements.split_first().expect("an element");
+        let of = |elements: &[Element], name: &str| elements.iter().filter(|element| element.name == name).count();
+        assert_eq!((all.name.as_str(), of(rest, "testsuites")), ("testsuites", 0), "{text}");
+        let counts = ["tests", "failures", "errors"].map(|count| all.count(count));
+        assert_eq!(counts, [of(rest, "testcase"), of(rest, "failure"), 0], "{text}");
+        for suite in rest.chunk_by(|_, next| next.name != "testsuite") {
+            let counts = [of(suite, "testcase"), of(suite, "failure"), 0, 0];
+            assert_eq!(COUNTS.map(|count| suite[0].count(count)), counts, "{text}");
+            for case in suite[1..].chunk_by(|_, next| next.name != "testcase") {
+                assert!(case.len() <= 2, "a case has two failures: {text}");
+            }
+        }
+    }
+
     fn written(record: &TestRecord, levels: &[LevelVerdict]) -> String {
+        dated(record, levels, None)
+    }
+
+    /// Returns the file with this date, and checks it.
+    fn dated(record: &TestRecord, levels: &[LevelVerdict], date: Option<&str>) -> String {
         let parent = tempfile::tempdir().expect("a folder");
         let (mut folder, _) = TestFolder::open(parent.path(), record, Earlier::Keep).expect("new");
         levels.iter().for_each(|level| folder.keep(level).expect("writable"));
         folder.finish().expect("writable");
-        junit(parent.path(), "playbot").expect("results")
+        let text = junit(parent.path(), "playbot", date).expect("results");
+        check(&text);
+        text
     }
 
-    #[test]
-    fn jenkins_accepts_every_element_and_attribute() {
-        let finding = Finding {
+    /// A finding of `panic` with this message.
+    fn panicked(message: &str) -> Finding {
+        Finding {
             detector: "panic".to_owned(),
             tester: Some("random".to_owned()),
             episode: Some(0),
             tick: Some(3),
-            message: "a < b && \"c\" skipped=\"0\" \u{1b}[31m".to_owned(),
+            message: message.to_owned(),
             file: Some("findings/a.finding".to_owned()),
             settings: Vec::new(),
-        };
+        }
+    }
+
+    #[test]
+    fn jenkins_accepts_every_element_and_attribute() {
+        let words = panicked("a < b && \"c\" skipped=\"0\" ]]> \u{1b}[31m\u{0}\u{fffe}\u{ffff}\r\n\tin line 2");
         let timed = |index, solved| LevelVerdict { seconds: Some(1_234.5), ..verdict(index, solved, 2) };
-        let broken = LevelVerdict { findings: vec![finding], ..timed(2, 1) };
-        let levels = [timed(0, 2), timed(1, 0), broken, verdict(3, 2, 2)];
+        let found = LevelVerdict { findings: vec![words.clone(), panicked("again")], ..timed(2, 1) };
+        let (broken, proved) = (timed(3, 0), timed(4, 0));
+        let score = EpisodeScore { lost: 0, broken: 2, ..broken.score.clone() };
+        let broken = LevelVerdict { score, findings: vec![words], ..broken };
+        let proved = LevelVerdict {
+            outcome: LevelOutcome::ProvedUnsolvable,
+            proof: LevelProof::Unsolvable { why: "the goal is walled in".to_owned() },
+            seconds: None,
+            ..proved
+        };
+        let regression = LevelVerdict { recorded: Some(course(80)), ..verdict(5, 2, 2) };
+        let levels = [timed(0, 2), timed(1, 0), found, broken, proved, regression];
+        let testers = ["random", "search"].map(TesterRecord::bot).to_vec();
+        let by_two = TestRecord { testers, ..record("hard") };
+        let both = |level: &LevelVerdict| LevelVerdict {
+            testers: ["random", "search"].map(|name| tester(name, level.score.solved, 2, false)).to_vec(),
+            ..level.clone()
+        };
+        let shard = TestRecord { shard: Some("1/2".parse().expect("a shard")), ..record("hard") };
+        let in_shard: Vec<LevelVerdict> = levels.iter().skip(1).step_by(2).cloned().collect();
         let texts = [
             written(&record("hard"), &levels),
             written(&record("files:levels/*.json"), &levels),
             written(&record("skipped=\"0\""), &[]),
+            written(&by_two, &levels.each_ref().map(both)),
+            written(&shard, &in_shard),
         ];
-        for text in &texts {
-            for Element { parent, name, attributes } in elements(text) {
-                let known = SCHEMA.iter().find(|(above, own, ..)| *above == parent && *own == name);
-                let (_, _, required, others) = known.unwrap_or_else(|| panic!("{name} in {parent}: {text}"));
-                assert!(required.iter().all(|key| attributes.contains_key(*key)), "{name}: {text}");
-                let is_known = |key: &String| required.contains(&key.as_str()) || others.contains(&key.as_str());
-                assert!(attributes.keys().all(is_known), "{name} has {attributes:?}: {text}");
-                // The schema's pattern of a time: digits and at most three more after the point.
-                let is_time = |time: &String| {
-                    let (whole, part) = time.split_once('.').unwrap_or((time.as_str(), ""));
-                    part.len() <= 3 && [whole, part].iter().all(|half| half.bytes().all(|byte| byte.is_ascii_digit()))
-                };
-                assert!(attributes.get("time").is_none_or(is_time), "{name}: {text}");
-            }
-        }
-        assert_eq!(values(&texts[0], "testsuites", "failures"), [Some("2".to_owned())]);
-        assert_eq!(values(&texts[1], "testsuite", "tests"), vec![Some("1".to_owned()); 4]);
+        assert_eq!(values(&texts[0], "testsuites", "failures"), [Some("5".to_owned())]);
+        let types = ["bot-failed", "panic", "bot-failed", "proved-unsolvable", "recording"];
+        assert_eq!(values(&texts[0], "failure", "type"), types.map(|kind| Some(kind.to_owned())));
+        assert_eq!(values(&texts[1], "testsuite", "tests"), vec![Some("1".to_owned()); 6]);
         assert_eq!(values(&texts[2], "testsuite", "tests"), [Some("0".to_owned())]);
+        assert!(texts[3].contains("\nrandom: solved 0 of 2") && texts[3].contains("\nsearch: solved 0 of 2"));
+        assert_eq!(
+            values(&texts[4], "testcase", "name"),
+            ["hard:1", "hard:3", "hard:5"].map(|name| Some(name.to_owned()))
+        );
+    }
+
+    #[test]
+    fn a_name_without_a_place_in_xml_leaves_the_file_readable() {
+        let level = LevelVerdict { level: "levels/\u{ffff}a\u{fffe}\u{7}.json".to_owned(), ..verdict(0, 2, 2) };
+        let text = written(&record("files:levels/*.json"), &[level]);
+        assert_eq!(values(&text, "testsuite", "file"), [Some("levels/a.json".to_owned())]);
+    }
+
+    #[test]
+    fn the_date_is_that_of_the_variable_and_in_each_suite() {
+        let levels = [verdict(0, 2, 2), verdict(1, 0, 2)];
+        let day = Some("2026-01-01T00:00:00");
+        let text = dated(&record("files:levels/*.json"), &levels, day);
+        assert_eq!(values(&text, "testsuite", "timestamp"), vec![day.map(str::to_owned); 2]);
+        assert_eq!(text.matches("timestamp").count(), 2, "no reader's schema has one elsewhere: {text}");
+        assert!(!written(&record("hard"), &levels).contains("timestamp"));
+    }
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        // As GNU date writes them: `date -u -d @SECONDS +%FT%T`.
+        for (seconds, expected) in [
+            ("0", "1970-01-01T00:00:00"),
+            ("951782399", "2000-02-28T23:59:59"),
+            ("951782400", "2000-02-29T00:00:00"),
+            ("951868800", "2000-03-01T00:00:00"),
+            ("1704067199", "2023-12-31T23:59:59"),
+            ("1709251199", "2024-02-29T23:59:59"),
+            ("1767225600", "2026-01-01T00:00:00"),
+            ("4107542400", "2100-03-01T00:00:00"),
+            ("253402300799", "9999-12-31T23:59:59"),
+        ] {
+            assert_eq!(date(OsStr::new(seconds)).expect("a date"), expected, "{seconds}");
+        }
+        for seconds in ["-1", "1.5", "today", "253402300800", "99999999999999999999"] {
+            let words = date(OsStr::new(seconds)).expect_err("no date").to_string();
+            assert!(words.contains(&format!("SOURCE_DATE_EPOCH is `{seconds}`")), "{words}");
+        }
     }
 
     #[test]
