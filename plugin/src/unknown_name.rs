@@ -12,7 +12,7 @@ use thiserror::Error;
 
 /// The error of a name that does not exist.
 #[derive(Debug, Error, Clone, PartialEq, Eq)]
-#[error("unknown {what} `{name}`{}; {}", hint(.near), choice(.valid))]
+#[error("unknown {what} `{name}`{}; {}", question(.near.as_deref()), choice(.valid))]
 pub struct UnknownName {
     /// The kind of name: `game`, `mode`, `bot`.
     pub what: &'static str,
@@ -26,8 +26,19 @@ pub struct UnknownName {
 
 impl HasExitCode for UnknownName {}
 
-fn hint(near: &Option<String>) -> String {
-    near.as_ref().map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"))
+/// Returns the question for the names that were probably meant, to stand behind an unknown one; nothing without such a
+/// name.
+///
+/// ```
+/// use bevy_playbot::unknown_name::{nearest, question};
+///
+/// assert_eq!(question(nearest("hrad", &["easy", "hard"])), " (did you mean `hard`?)");
+/// assert_eq!(question(["one", "two"]), " (did you mean `one` or `two`?)");
+/// assert_eq!(question(None), "");
+/// ```
+pub fn question<'a>(meant: impl IntoIterator<Item = &'a str>) -> String {
+    let meant: Vec<String> = meant.into_iter().map(|name| format!("`{name}`")).collect();
+    if meant.is_empty() { String::new() } else { format!(" (did you mean {}?)", meant.join(" or ")) }
 }
 
 fn choice(valid: &[String]) -> String {

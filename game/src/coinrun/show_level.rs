@@ -45,6 +45,7 @@ pub(crate) fn show(game: &dyn Game, request: &LevelRequest) -> Result<LevelView,
     Ok(LevelView {
         text: format!("{}\n{LEGEND}", level.to_text()),
         json: serde_json::json!(level.to_level_text()).to_string(),
+        lacks_plan: false,
         picture: request.picture.then(|| draw(game, level)).transpose()?,
     })
 }

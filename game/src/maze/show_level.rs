@@ -72,6 +72,7 @@ pub fn show(game: &dyn Game, request: &LevelRequest, source: &MazeSource) -> Res
     Ok(LevelView {
         text: format!("{}\n\n{legend}", picture(&maze).join("\n")),
         json: json.to_string(),
+        lacks_plan: false,
         picture: request.picture.then(|| draw(&maze).map(LevelPicture::Drawing)).transpose()?,
     })
 }

@@ -13,7 +13,7 @@ use crate::{
         policy, quickstart, record, replay, report, runs, study, test, trace, train, view,
     },
 };
-use bevy_playbot::unknown_name::nearest;
+use bevy_playbot::unknown_name::{nearest, question};
 use clap::{Arg, ArgAction, Command, CommandFactory, FromArgMatches, Parser, Subcommand, error::ErrorKind};
 use playbot_harness::{
     game::Game,
@@ -545,7 +545,7 @@ fn unknown_level(game: &dyn Game, mode: &str, text: &str, option: LevelsOption) 
     let (mode, name) = own_mode(game, text).unwrap_or((mode, text));
     let names = game.tools().levels.level_names(mode);
     let known: Vec<&str> = names.iter().map(String::as_str).collect();
-    let near = nearest(name, &known).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
+    let near = question(nearest(name, &known));
     let listed = match known.as_slice() {
         [] => return None,
         [only] => format!("its level is {only}"),

@@ -313,7 +313,8 @@ fn build_eval_world(
     Ok(world)
 }
 
-/// Ticks until every agent has played its list, or the caller stops. With a game, stores the position of each agent after each tick.
+/// Ticks until every agent has played its list, or the caller stops. With a game, stores the position of each agent after
+/// each tick.
 fn play_out(
     world: &mut World,
     followed: Option<&dyn Game>,

@@ -90,8 +90,15 @@ impl<'a> HeldOut<'a> {
         Self { holds: !is_only_level(game, &split.mode), ..Self::levels_of(game, split) }
     }
 
+    /// Takes a split to look levels up in, whether or not they can be held out, with the layouts of the levels that come
+    /// before the caller stops.
+    pub fn levels_until(game: &'a dyn Game, split: &'a LevelSplit, stop: &(dyn Fn() -> bool + Sync)) -> Self {
+        let (layouts, _) = by_layout_until(game, split, stop);
+        Self { layouts: layouts.into(), ..Self::levels_of(game, split) }
+    }
+
     /// Takes a split to look levels up in, whether or not they can be held out.
-    pub(crate) fn levels_of(game: &'a dyn Game, split: &'a LevelSplit) -> Self {
+    pub fn levels_of(game: &'a dyn Game, split: &'a LevelSplit) -> Self {
         let family = game.tools().levels.family(&split.mode);
         let files = split.levels().map_while(|level| file_hash(game, &split.mode, level)).collect();
         Self { game, split, family, files, layouts: OnceLock::new(), holds: true }
@@ -238,7 +245,8 @@ impl<'a> HeldOut<'a> {
         found.extend(layouts.filter_map(|layout| self.layouts().get(&layout)).flatten());
     }
 
-    fn layouts(&self) -> &LevelsByLayout {
+    /// Returns the levels by their layout.
+    pub fn layouts(&self) -> &LevelsByLayout {
         self.layouts.get_or_init(|| by_layout(self.game, self.split))
     }
 

@@ -69,6 +69,8 @@ pub struct LevelView {
     pub text: String,
     /// One line of JSON.
     pub json: String,
+    /// True if a plan of the level could be shown, and the game has none.
+    pub lacks_plan: bool,
     /// The whole level, if it was asked for.
     pub picture: Option<LevelPicture>,
 }

@@ -5,7 +5,7 @@ use crate::{
     eval::{EpisodeResult, EvalError, EvalPlan, Player, evaluate_until},
     floor_plan::FloorPlan,
     game::{Game, idle_action, is_named_idle},
-    held_out::{AlikeLevels, HeldOut, by_layout_until},
+    held_out::{AlikeLevels, HeldOut, LevelsByLayout, by_layout_until},
     split::LevelSplit,
 };
 use bevy::math::{Rect, Vec2};
@@ -35,7 +35,12 @@ impl EqualLevels {
     /// ones.
     pub fn of_until(game: &dyn Game, split: &LevelSplit, stop: &(dyn Fn() -> bool + Sync)) -> Option<(Self, u64)> {
         let (layouts, count) = by_layout_until(game, split, stop);
-        (!layouts.is_empty()).then(|| (Self::of_groups(layouts.into_values()), count))
+        Some((Self::of_layouts(layouts)?, count))
+    }
+
+    /// Takes levels by their layout; `None` if there are none.
+    pub fn of_layouts(layouts: LevelsByLayout) -> Option<Self> {
+        (!layouts.is_empty()).then(|| Self::of_groups(layouts.into_values()))
     }
 
     /// Takes levels that were compared by their play: as many layouts as there are groups.
@@ -110,16 +115,8 @@ fn plan_hash(plan: &FloorPlan) -> u64 {
 
 /// Returns the levels of a split that are among others: by number, as a file, or by their layout. If the caller stops, these
 /// are the ones that were found by then.
-pub fn levels_in_until(
-    game: &dyn Game,
-    split: &LevelSplit,
-    others: &LevelSplit,
-    stop: &(dyn Fn() -> bool + Sync),
-) -> BTreeSet<u64> {
-    let (layouts, _) = by_layout_until(game, others, stop);
-    let others = HeldOut::levels_of(game, others);
-    let is_equal = |level| game.layout(&split.mode, level).is_some_and(|layout| layouts.contains_key(&layout));
-    let is_in = |level: &u64| others.contains(&split.mode, *level) || is_equal(*level);
+pub fn levels_in_until(split: &LevelSplit, others: &HeldOut<'_>, stop: &(dyn Fn() -> bool + Sync)) -> BTreeSet<u64> {
+    let is_in = |level: &u64| others.contains(&split.mode, *level) || others.resembles(&split.mode, *level);
     split.levels().take_while(|_| !stop()).filter(is_in).collect()
 }
 
@@ -252,7 +249,7 @@ mod tests {
         let (equal, count) = EqualLevels::of_until(&game, &levels, &stop).expect("layouts");
         assert_eq!((equal.groups, equal.layouts, count), (vec![vec![0, 3], vec![1, 4]], 3, 5));
         assert_eq!(EqualPlans::of_until(&game.clone().plan(|_| FloorPlan::default()), &levels, &stop), None);
-        assert_eq!(levels_in_until(&game, &levels, &levels, &stop), BTreeSet::new());
+        assert_eq!(levels_in_until(&levels, &HeldOut::levels_until(&game, &levels, &stop), &stop), BTreeSet::new());
         let game = game.keys([vec![], vec![KeyCode::Space]]).observe(["nothing"], || [0.0]).time_limit(3);
         let plain = PlainLevels::of_until(&game, &levels, 1, |_| {}, &stop);
         assert_eq!(plain.expect("it plays"), None);

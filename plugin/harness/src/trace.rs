@@ -6,7 +6,11 @@ use crate::{
     level_files::read::shown_path,
     worlds::build_world,
 };
-use bevy_playbot::{engine::misfit, prelude::*, unknown_name::nearest};
+use bevy_playbot::{
+    engine::misfit,
+    prelude::*,
+    unknown_name::{nearest, question},
+};
 
 /// Plays given discrete actions and prints the columns of [`TraceTools::row`](crate::game::TraceTools::row), the
 /// reward and whether the episode ended.
@@ -129,8 +133,7 @@ fn meant(word: &str, names: &[String]) -> String {
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let of_word: Vec<&str> = names.iter().copied().filter(has_word).collect();
     let meant = if of_word.is_empty() { nearest(word, &names).into_iter().collect() } else { of_word };
-    let shown: Vec<String> = meant.iter().take(MOST_MEANT).map(|name| format!("`{name}`")).collect();
-    if shown.is_empty() { String::new() } else { format!(" (did you mean {}?)", shown.join(" or ")) }
+    question(meant.into_iter().take(MOST_MEANT))
 }
 
 /// Most actions that are proposed for an unknown one.

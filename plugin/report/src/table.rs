@@ -4,7 +4,7 @@ use crate::{
     escape::{escape, one_line},
     number::{UNKNOWN, decimals_for, fixed, mean_and_error, percent},
     results::{Rank, ResultRow, ResultTable, rank_key, ranks},
-    text_table::{NO_SUCCESS, has_no_success},
+    text_table::{NO_SUCCESS, has_no_success, wrap_while},
 };
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -93,15 +93,8 @@ fn has_sentences(rows: &[Vec<String>], column: usize) -> bool {
 /// Breaks a text into indented lines of at most `most` letters. A longer word gets a line of its own, whole, so that it can
 /// be copied.
 fn indented(text: &str, most: usize) -> String {
-    let mut lines: Vec<String> = Vec::new();
-    for word in text.split_whitespace() {
-        let fits = |line: &String| INDENT + line.chars().count() + 1 + word.chars().count() <= most;
-        match lines.last_mut().filter(|line| fits(line)) {
-            Some(line) => *line = format!("{line} {word}"),
-            None => lines.push(word.to_owned()),
-        }
-    }
-    lines.iter().map(|line| format!("{:INDENT$}{line}\n", "")).collect()
+    let fits = |line: &str, word: &str| INDENT + line.chars().count() + 1 + word.chars().count() <= most;
+    wrap_while(text, fits).iter().map(|line| format!("{:INDENT$}{line}\n", "")).collect()
 }
 
 /// Takes letters from the widest column of words, again and again, until the table is no wider than `most`.
@@ -119,7 +112,7 @@ fn fit(widths: &mut [usize], numbers: &[bool], most: usize) {
 /// difference, or numbered where even that does not tell them apart.
 fn shortened(texts: &[&str], width: usize) -> Vec<String> {
     let mut cut: BTreeMap<&str, String> = texts.iter().map(|text| (*text, shorten(text, width))).collect();
-    // A group that is told apart in part becomes smaller each time.
+    // A group in which only some texts are different by then becomes smaller each time.
     for _ in 0..MOST_CUTS {
         let groups = same(&cut);
         for group in &groups {

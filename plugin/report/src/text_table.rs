@@ -118,10 +118,15 @@ fn char_width(c: char) -> f64 {
 
 /// Breaks text into lines of at most `width` pixels at its spaces; a longer word gets its own line.
 pub fn wrap(text: &str, width: f64, size: f64) -> Vec<String> {
+    wrap_while(text, |line, word| text_width(line, size) + text_width(word, size) + 0.6 * size <= width)
+}
+
+/// Breaks text into lines at its spaces. `fits` receives a line and the next word.
+pub(crate) fn wrap_while(text: &str, fits: impl Fn(&str, &str) -> bool) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
-            Some(line) if text_width(line, size) + text_width(word, size) + 0.6 * size <= width => {
+            Some(line) if fits(line, word) => {
                 line.push(' ');
                 line.push_str(word);
             }

@@ -117,7 +117,7 @@ fn levels_beyond_32_bits_are_a_fault_and_no_panic() {
 #[test]
 fn bodies_of_players_who_wait_for_their_first_level_have_a_context() {
     let (mut world, agents) = build_world(&CoinRun { physics: true }, "hard", 0, 0, 2);
-    world.ticks(3).expect("nobody plays");
+    world.ticks(3).expect("both are idle");
     world.entity_mut(agents[1]).insert((Control::Human, LevelQueue::Always(7)));
     world.ticks(3).expect("one of two plays");
 }

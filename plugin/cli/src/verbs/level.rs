@@ -13,7 +13,6 @@ use playbot_harness::{
     level_files::is_level_files,
 };
 use playbot_learner::ActionSpace;
-use serde_json::Value;
 use std::path::PathBuf;
 
 /// Show a level: its layout, or what is known of it without playing it.
@@ -75,16 +74,10 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         report!("picture: {}", file.path().display());
     }
     print_or_write(if args.json { &level.json } else { &level.text }, args.out.as_deref())?;
-    if lacks_plan(&level) {
+    if level.lacks_plan {
         instead(game, &args).iter().for_each(|advice| report!("{advice}"));
     }
     Ok(Outcome::Pass)
-}
-
-/// Returns true if a level could have been drawn, and its plan is not known.
-fn lacks_plan(level: &LevelView) -> bool {
-    let json: Option<Value> = serde_json::from_str(&level.json).ok();
-    json.is_some_and(|json| json.get("rows").is_some_and(Value::is_null))
 }
 
 /// Returns the commands that show a level without a plan. A level from standard input cannot be named in them.
@@ -166,9 +159,9 @@ mod tests {
             let request = LevelRequest { mode: Some("calm"), level: Some(level), ..LevelRequest::default() };
             game.show_level(&request).expect("a level")
         };
-        assert!(lacks_plan(&shown(&bare, 3)));
+        assert!(shown(&bare, 3).lacks_plan);
         let plan = FloorPlan { bounds: Rect::new(0.0, 0.0, 2.0, 1.0), goal: Vec2::X, ..FloorPlan::default() };
-        assert!(!lacks_plan(&shown(&bare.clone().plan(move |_| plan.clone()), 3)));
+        assert!(!shown(&bare.clone().plan(move |_| plan.clone()), 3).lacks_plan);
         let words = instead(&bare, &args(&["--level", "3"])).expect("commands");
         for part in
             ["view cards --level 3` shows", "trace cards --level 3 --actions 0` prints", "play cards --level 3` plays"]

@@ -10,7 +10,7 @@ use crate::{
 use playbot_harness::{
     game::Game,
     games::Games,
-    held_out::{AlikeLevels, PlacedLevel},
+    held_out::{AlikeLevels, HeldOut, PlacedLevel},
     level_audit::{EqualLevels, EqualPlans, PlainLevels, levels_in_until, plain_episodes},
     level_files::is_level_files,
     split::LevelSplit,
@@ -79,7 +79,8 @@ pub(crate) fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     let (equal, compared, alike) = compare(game, &levels, args, threads);
     let of_play = alike.filter(|alike| alike.by_state);
     let among = args.among.iter().enumerate().map(|(index, others)| {
-        let mut known = levels_in_until(game, &levels, others, &interrupt::asked_to_sum_up);
+        let stop = &interrupt::asked_to_sum_up;
+        let mut known = levels_in_until(&levels, &HeldOut::levels_until(game, others, stop), stop);
         known.extend(of_play.iter().flat_map(|alike| alike.among(index + 1)));
         (others.clone(), known)
     });

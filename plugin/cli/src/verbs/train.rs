@@ -19,7 +19,7 @@ use bevy_playbot::unknown_name::UnknownName;
 use playbot_harness::{
     game::Game,
     games::{Artifact, Games},
-    held_out::is_only_level,
+    held_out::{HeldOut, is_only_level},
     level_audit::{EqualLevels, levels_in_until},
     split::LevelSplit,
 };
@@ -199,9 +199,10 @@ fn equal_layouts(game: &dyn Game, train: &LevelSplit, test: &LevelSplit) -> Opti
     if train.len() > MOST_COMPARED {
         return None;
     }
-    let equal = EqualLevels::of(game, train)?;
+    let trained = HeldOut::levels_of(game, train);
+    let equal = EqualLevels::of_layouts(trained.layouts().clone())?;
     let known = match test.len() <= MOST_COMPARED && !is_only_level(game, &test.mode) {
-        true => levels_in_until(game, test, train, &|| false).len(),
+        true => levels_in_until(test, &trained, &|| false).len(),
         false => 0,
     };
     let layouts = counted(equal.layouts, "layout");

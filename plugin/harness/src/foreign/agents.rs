@@ -15,7 +15,7 @@ use bevy_playbot::{
     engine::{LevelFiles, PlaysAlong, begin_beside},
     episode::EpisodeEnded,
     streams::AgentStreams,
-    unknown_name::nearest,
+    unknown_name::{nearest, question},
     virtual_input::{VirtualButton, VirtualInput},
 };
 
@@ -201,7 +201,7 @@ impl SharingAgents {
             return Some(format!("has {method} for the agent `{agent}`, and names no agents: add `.agents`"));
         }
         let known: Vec<&str> = names.iter().map(String::as_str).collect();
-        let near = nearest(agent, &known).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
+        let near = question(nearest(agent, &known));
         let known = known.join("`, `");
         Some(format!("has {method} for an agent `{agent}`{near}, and `.agents` names `{known}`"))
     }

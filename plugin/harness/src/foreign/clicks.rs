@@ -26,7 +26,7 @@ use bevy_playbot::{
     engine::{Renewal, TickSchedules, check_actions},
     episode::EpisodeEnded,
     systems::{ObserveSchedule, PlaybotSystems},
-    unknown_name::nearest,
+    unknown_name::{nearest, question},
     virtual_input::{ClickAreas, HeldInput, PointerPosition, PressSystems, PressesForPeople, VirtualInput},
 };
 use std::{fmt::Debug, time::Duration};
@@ -113,7 +113,7 @@ impl ButtonClicks {
         let others = std::mem::take(&mut self.others);
         for name in std::mem::take(&mut self.absent) {
             let known: Vec<&str> = others.iter().map(String::as_str).collect();
-            let near = nearest(&name, &known).map_or_else(String::new, |near| format!(" (did you mean `{near}`?)"));
+            let near = question(nearest(&name, &known));
             let there = match known.as_slice() {
                 [] => "There was no button".to_owned(),
                 known => format!("There was `{}`", known.join("`, `")),

@@ -581,7 +581,8 @@ impl ForeignGame {
                 return Err(InspectError::Usage(why));
             }
         };
-        Ok(LevelView { text: known.text, json: known.json.to_string(), picture })
+        let KnownLevel { text, json, .. } = known;
+        Ok(LevelView { text, lacks_plan: json["rows"].is_null(), json: json.to_string(), picture })
     }
 
     /// Describes a level by its number and its plan.

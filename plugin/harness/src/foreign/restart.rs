@@ -7,7 +7,7 @@ use crate::{
         levels::{EditorLevel, LevelFromFile, editor_level_ahead, level_ahead},
         observe::forget_state,
         runtime::{AgentParts, Foreign, ForeignCell, LevelSeed, OwnRestartKind, Restart, active_agents, with_foreign},
-        snapshot::{note_frame, note_start},
+        snapshot::{note_frame, note_start, queued, ticks},
     },
     level_files::LevelDesigns,
 };
@@ -17,7 +17,7 @@ use bevy_playbot::{
     engine::{NextEpisode, Renewal, UnloadedAssets},
     episode::{Episode, StartEpisode},
 };
-use std::{any::TypeId, collections::BTreeSet};
+use std::collections::BTreeSet;
 
 /// Restarts the game as soon as the schedule allows it.
 pub(super) fn start(event: On<StartEpisode>, mut episodes: Query<&mut Episode>, mut commands: Commands) {
@@ -160,9 +160,8 @@ fn start_again(world: &mut World, foreign: &Foreign, before: Tick) {
 /// Only types that the game names are dropped. Others may carry work that is still to be done: loaded files for Bevy,
 /// or removed bodies for a physics engine. The restart has begun at the change tick `before`.
 fn forget_messages(world: &mut World, foreign: &Foreign, before: Tick) {
-    let forgotten = &foreign.game.description.forgotten;
-    forgotten.iter().for_each(|(_, forget)| forget(world));
-    LeftMessages::note(world, &forgotten.iter().map(|(queue, _)| *queue).collect(), before);
+    foreign.game.description.forgotten.iter().for_each(|(_, forget)| forget(world));
+    LeftMessages::note(world, foreign, before);
 }
 
 /// Types of messages that an episode leaves to the next one, in a World that has this resource.
@@ -182,9 +181,6 @@ pub(crate) struct LeftMessages {
     /// Whether an episode has begun. What the start of the program writes belongs to the first one.
     has_begun: bool,
 }
-
-/// The beginning of the names of all queues.
-const QUEUE: &str = "bevy_ecs::message::messages::Messages<";
 
 impl LeftMessages {
     /// Adds the types of another World.
@@ -209,17 +205,17 @@ impl LeftMessages {
     }
 
     /// Notes the types that wait, but for forgotten ones.
-    fn note(world: &mut World, forgotten: &BTreeSet<TypeId>, before: Tick) {
+    fn note(world: &mut World, foreign: &Foreign, before: Tick) {
         let Some(left) = world.get_resource::<Self>() else { return };
         let now = world.read_change_tick();
         let (mut unread, mut recent) = (Vec::new(), Vec::new());
         for (id, entity) in world.resource_entities().iter().filter(|_| left.has_begun) {
             let Some(info) = world.components().get_info(id) else { continue };
             let name = info.name().to_string();
-            let Some(message) = name.strip_prefix(QUEUE).and_then(|rest| rest.strip_suffix('>')) else { continue };
-            let is_forgotten = info.type_id().is_some_and(|queue| forgotten.contains(&queue));
-            let ticks = world.get_entity(entity).ok().and_then(|entity| entity.get_change_ticks_by_id(id));
-            let Some(ticks) = ticks.filter(|_| !is_forgotten) else { continue };
+            let Some(message) = queued(&name) else { continue };
+            let is_forgotten =
+                foreign.game.description.forgotten.iter().any(|(queue, _)| info.type_id() == Some(*queue));
+            let Some(ticks) = ticks(world, entity, id).filter(|_| !is_forgotten) else { continue };
             if ticks.changed.is_newer_than(before, now) {
                 unread.push(message.to_owned());
             } else if left.frames[0].is_some_and(|frame| ticks.changed.is_newer_than(frame, now)) {

@@ -44,7 +44,7 @@ use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
 
-pub(super) use value::Part;
+pub(super) use value::{Part, queued};
 
 /// The function that puts a saved state into a World. Returns false if the state is of another type.
 pub(super) type Load = Arc<dyn Fn(&mut World, &Snapshot) -> bool + Send + Sync>;
@@ -553,7 +553,7 @@ fn resources(world: &World) -> Vec<(ComponentId, Entity)> {
 }
 
 /// Returns when a value was added, and when it has changed.
-fn ticks(world: &World, entity: Entity, id: ComponentId) -> Option<ComponentTicks> {
+pub(super) fn ticks(world: &World, entity: Entity, id: ComponentId) -> Option<ComponentTicks> {
     world.get_entity(entity).ok()?.get_change_ticks_by_id(id)
 }
 

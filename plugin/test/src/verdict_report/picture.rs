@@ -21,8 +21,8 @@ const MOST_SQUARES: usize = 40;
 /// Opacities of squares, from few to many ends.
 const STRENGTHS: [&str; 4] = [".3", ".5", ".7", ".9"];
 
-/// Returns the drawing as an SVG element in the colours of the page, and the ends of its axes in words. `None` for a plan without extent, or with too
-/// many parts for a page with many levels.
+/// Returns the drawing as an SVG element in the colours of the page, and the ends of its axes in words. `None` for a plan
+/// without extent, or with too many parts for a page with many levels.
 pub(crate) fn picture(plan: &FloorPlan, level: &LevelVerdict) -> Option<(String, String)> {
     let side = plan.bounds.size().max_element() / END_SQUARES;
     let extent = extent(plan.bounds, side, &level.ends);

@@ -127,7 +127,7 @@ fn a_gem_that_was_touched_before_a_load_is_not_taken_after_it() {
         }
     }
     let saved = saved.expect("no message waits before the first gem");
-    assert!(touched > 0 && world.resource::<Run>().gems == 0, "the game is told in the next tick");
+    assert!(touched > 0 && world.resource::<Run>().gems == 0, "the game reads of it in the next tick");
     assert!(saved.restore(&game, &mut world, agents[0]));
     world.tick().expect("sound");
     assert_eq!(

@@ -632,11 +632,16 @@ fn is_of_bevy(name: &str) -> bool {
     package.is_some_and(|package| BEVY.split(' ').any(|other| other == package))
 }
 
+/// Returns the type of the messages in a queue, by Bevy's name of it; `None` for any other type.
+pub(crate) fn queued(name: &str) -> Option<&str> {
+    name.strip_prefix("bevy_ecs::message::messages::Messages<")?.strip_suffix('>')
+}
+
 /// Returns what the type of this name is.
 fn owner(name: &str, is_resource: bool) -> Owner {
     let begins = |beginnings: &[&str]| beginnings.iter().any(|beginning| name.starts_with(beginning));
     // The parameter of a generic type decides for these three.
-    if let Some(message) = name.strip_prefix("bevy_ecs::message::messages::Messages<") {
+    if let Some(message) = queued(name) {
         let is_of_game = !is_of_bevy(message) && !SKIPPED.iter().any(|beginning| message.starts_with(beginning));
         return if is_of_game { Owner::Messages } else { Owner::Skipped };
     }

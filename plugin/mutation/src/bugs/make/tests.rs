@@ -93,7 +93,7 @@ impl Game for Dash {
 impl LevelTools for Dash {
     fn show(&self, request: &LevelRequest) -> Option<Result<LevelView, InspectError>> {
         let json = distance(request.level.unwrap_or(0)).to_string();
-        Some(Ok(LevelView { text: json.clone(), json, picture: None }))
+        Some(Ok(LevelView { text: json.clone(), json, lacks_plan: false, picture: None }))
     }
 
     fn parse(&self, text: &str) -> Option<Result<LevelDesign, LevelTextError>> {
