@@ -518,7 +518,7 @@ mod tests {
         assert_eq!(message(&verdict(0, 4, 4)), "solved 4 of 4 episodes");
         let (kind, entity) = (StopKind::Furthest, None);
         level.stop = Some(CommonStop { kind, x: 12.4, y: 3.0, within: 0.5, episodes: 4, of: 4, entity });
-        let stopped = "all 4 episodes got no further than (12.4, 3.0), within 0.5";
+        let stopped = "all 4 episodes got no further from their start than (12.4, 3.0), within 0.5";
         assert_eq!(message(&level), format!("{start}; {stopped}"));
     }
 
