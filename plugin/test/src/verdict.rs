@@ -57,13 +57,13 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 pub use crate::verdict::{
-    compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange, RecordedWins, UnreachedSquares},
+    compare::{Change, Comparison, EarlierTest, FALSE_DISCOVERY_RATE, FindingChange, RecordedWins, UnreachedSquares},
     error::TestError,
     folder::{Earlier, TestFolder},
     maps::{FailurePath, LevelMaps, LevelPars, MapScope, SkillTicks, hash_of_files, level_name},
     merge::merge,
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
-    reports::{AGAINST, JUNIT, SUMMARY, action_search, rerun_commands, write_reports},
+    reports::{AGAINST, JUNIT, SUMMARY, action_search, comparable_command, rerun_commands, write_reports},
     results::{FinishTime, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, TesterTotal, results_folder},
     run::{TestEnd, TestObserver, run_tests, run_tests_keeping, test_in_turn},
     shard::{Shard, ShardError},

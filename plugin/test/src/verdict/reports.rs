@@ -10,7 +10,7 @@ use crate::{
     findings::{FindingFiles, Played, SeenFinding, SeenLevel},
     verdict::{
         Finding, LevelOutcome, LevelVerdict, SquareEnds,
-        compare::Comparison,
+        compare::{Comparison, EarlierTest},
         error::{TestError, io_error},
         maps::level_argument,
         plan::{TestPlan, TestRecord, Tester, TesterRecord},
@@ -121,7 +121,7 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
         lines.push(format!("| {} | {levels} | {episodes} | {places} |", markdown_cell(&tester.name)));
     }
     if let Some(comparison) = comparison {
-        lines.extend(compared(comparison));
+        lines.extend(compared(comparison, comparable_command(program, record, comparison)));
     }
     lines.extend(recorded(&overview.recorded));
     if !overview.worst.is_empty() {
@@ -177,11 +177,17 @@ pub(super) fn interval(of: Trials) -> String {
     format!(" ({low:.1} to {high:.1} %)")
 }
 
-fn compared(comparison: &Comparison) -> Vec<String> {
+/// Writes the changes since earlier results, with the command that makes the places comparable, if there is one.
+fn compared(comparison: &Comparison, comparable: Option<String>) -> Vec<String> {
     let mut lines = vec![String::new(), "## Since the earlier results".to_owned(), String::new()];
     let Comparison { levels, only_now, only_before, .. } = comparison;
     lines.push(format!("{} in both, {only_now} only now, {only_before} only before.", counted(*levels, "level")));
     lines.extend(comparison.left_out.iter().map(|why| format!("Left out: {}.", markdown_cell(why))));
+    lines.extend(comparison.places_left_out.iter().map(|why| format!("Places not compared: {}.", markdown_cell(why))));
+    if let Some(command) = comparable {
+        let what = "Places are compared after the same test as before:";
+        lines.extend(["", what, "", "```sh", &command, "```"].map(str::to_owned));
+    }
     for (title, changes) in [
         ("Unsolvable", texts(&comparison.unsolvable)),
         ("Harder", texts(&comparison.harder)),
@@ -381,6 +387,21 @@ pub fn action_search(program: &str, record: &TestRecord, level: &LevelVerdict) -
     ))
 }
 
+/// Returns the command of a test whose visited squares can be compared with the earlier ones: on the same levels as now, by
+/// the earlier testers, with their seed and number of episodes. `None` if they are compared, or no such test is possible.
+pub fn comparable_command(program: &str, now: &TestRecord, comparison: &Comparison) -> Option<String> {
+    let EarlierTest { folder, record } = comparison.earlier.as_ref()?;
+    let (game, levels, folder) =
+        (&now.game, shell_word(&now.range.to_string()), shell_word(&folder.display().to_string()));
+    let (played, episodes, seed) = (testers(&record.testers), record.episodes, record.seed);
+    let shard = now.shard.map_or_else(String::new, |shard| format!(" --shard {shard}"));
+    let detectors: String = now.options.iter().map(|word| format!(" {}", shell_word(word))).collect();
+    Some(format!(
+        "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{shard}{detectors} --against \
+         {folder} --out runs/comparable"
+    ))
+}
+
 /// Returns the testers as arguments of `playbot test`. The draws of a policy depend on its name, so the name is
 /// included.
 fn testers(testers: &[TesterRecord]) -> String {
@@ -520,6 +541,28 @@ mod tests {
         level.stop = Some(CommonStop { kind, x: 12.4, y: 3.0, within: 0.5, episodes: 4, of: 4, entity });
         let stopped = "all 4 episodes got no further from their start than (12.4, 3.0), within 0.5";
         assert_eq!(message(&level), format!("{start}; {stopped}"));
+    }
+
+    #[test]
+    fn places_that_are_not_compared_are_in_the_summary_with_the_command_that_compares_them() {
+        let before = TestRecord { seed: 4, ..testing::record("hard:0..3") };
+        let comparison = Comparison {
+            places_left_out: vec!["the testers differ (a; before: b): 1 unsolved level, such as hard:0".to_owned()],
+            earlier: Some(EarlierTest { folder: "my runs/a".into(), record: before.clone() }),
+            ..Comparison::default()
+        };
+        let command = comparable_command("jump", &before, &comparison).expect("there is an earlier test");
+        assert!(command.contains(" --bot random --episodes 1 --seed 4 --against 'my runs/a' "), "{command}");
+        let lines = compared(&comparison, Some(command.clone()));
+        for line in
+            ["Places not compared: the testers differ (a; before: b): 1 unsolved level, such as hard:0.", &command]
+        {
+            assert!(lines.iter().any(|found| found == line), "{line}: {lines:?}");
+        }
+        let page = crate::verdict_report::compared(&comparison, &before, "jump");
+        assert!(page.contains("<p>Places not compared: the testers differ (a; before: b): 1 "), "{page}");
+        assert!(page.contains("<pre><code>jump test garden --levels hard:0..3 "), "{page}");
+        assert_eq!(comparable_command("jump", &before, &Comparison::default()), None);
     }
 
     #[test]
