@@ -11,7 +11,7 @@ use playbot_test::{
     findings::{FINDINGS, list_findings},
     verdict::{
         AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, SUMMARY,
-        TesterTotal, Trials, action_search, comparable_command, wilson, write_reports,
+        TesterTotal, Trials, action_search, comparable_command, missing_failure, wilson, write_reports,
     },
     verdict_report::{HtmlReport, REPORT, write_html},
 };
@@ -90,6 +90,7 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     stops(&overview).iter().for_each(|line| report!("{line}"));
     search(&overview).iter().for_each(|line| report!("{line}"));
     replays(results.folder, &overview).iter().for_each(|line| report!("{line}"));
+    missing(&overview).iter().for_each(|line| report!("{line}"));
     if let Some(comparison) = &comparison {
         report_comparison(comparison, &overview);
     }
@@ -132,6 +133,12 @@ fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
         _ => {}
     }
     lines
+}
+
+/// Returns the worst levels without a kept failure in a test that keeps failures, with the reason and what to do.
+fn missing(overview: &Overview) -> Vec<String> {
+    let missing = |level| missing_failure(program::name(), &overview.record, level);
+    overview.worst.iter().filter_map(missing).collect()
 }
 
 /// Returns the command that shows a finding.
