@@ -66,6 +66,14 @@ fn a_failure_is_a_file_that_replays_in_another_process_and_gets_shorter() {
 }
 
 #[test]
+fn without_an_unsolved_level_no_failure_is_kept_and_the_program_says_so() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let test = ["test", "coinrun", "--levels", "easy:0..1", "--bot", "search", "--keep-failures", "--out", "t"];
+    let (_, words) = done(temporary.path(), &test);
+    assert!(words.contains("no failed episode is kept: each level was solved, or is proved unsolvable"), "{words}");
+}
+
+#[test]
 fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires() {
     let temporary = tempfile::tempdir().expect("a folder");
     let folder = temporary.path();

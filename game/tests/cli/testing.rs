@@ -263,6 +263,31 @@ fn a_level_that_no_longer_exists_as_it_was_is_named_and_the_same_code_raises_no_
     }
 }
 
+#[test]
+fn places_that_other_testers_visited_are_not_compared_and_the_program_says_so() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let folder = temporary.path();
+    let run = |out: &str, rest: &[&str]| {
+        let output = test(folder, out, &[&["--levels", "hard:0..9"], rest].concat());
+        assert!([0, 1].contains(&code(&output)), "{}", errors(&output));
+        errors(&output)
+    };
+    run("before", &["--bot", "right-jump,random"]);
+    let words = run("after", &["--bot", "right-jump", "--against", "before"]);
+    let why = "the testers differ (right-jump; before: right-jump, random): ";
+    let again = "playbot test coinrun --levels hard:0..9 --bot right-jump,random --episodes 1 --seed 0 --against before --out \
+                 runs/comparable";
+    assert!(words.contains(&format!("places not compared: {why}")) && words.contains(again), "{words}");
+    let summary = read(folder, "after/summary.md");
+    assert!(summary.contains(&format!("Places not compared: {why}")) && summary.contains(again), "{summary}");
+    let against: Value = serde_json::from_str(&read(folder, "after/against.json")).expect("JSON");
+    assert!(against["places_left_out"][0].as_str().is_some_and(|found| found.starts_with(why)), "{against}");
+    let page = read(folder, "after/report.html");
+    assert!(page.contains("<p>Places not compared: ") && page.contains(again), "{page}");
+    let words = run("same", &["--bot", "right-jump,random", "--against", "before"]);
+    assert!(!words.contains("not compared"), "{words}");
+}
+
 /// Writes a recording in which the episodes of a level are longer by one tick, as if the present game ended them too
 /// early.
 fn delay(from: &Path, to: &Path, level: u64) {

@@ -53,7 +53,7 @@ pub use crate::findings::{
     checks::{Check, Checks},
     course::{CourseEnd, RecordedCourse, course_of, course_of_recording, keeps_course},
     folder::{Date, DateError, FINDINGS, clear_findings, first_finding, gather_findings, list_findings},
-    keep::{FindingFiles, Played, Recheck, SeenFinding, SeenLevel, Sighting, recheck},
+    keep::{FindingFiles, KeptFailure, Played, Recheck, SeenFinding, SeenLevel, Sighting, recheck},
     minimise::{Budget, Lengths, Minimised, actions_of, lengths, minimise},
     play::{Breakage, CheckTick, Replayed, Unplayable, Watcher},
     regress::{PINS, Pin, PinState, Pins, Regress, RegressRow, Regression, regress, regress_until},

@@ -57,13 +57,16 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 pub use crate::verdict::{
-    compare::{Change, Comparison, FALSE_DISCOVERY_RATE, FindingChange, RecordedWins, UnreachedSquares},
+    compare::{Change, Comparison, EarlierTest, FALSE_DISCOVERY_RATE, FindingChange, RecordedWins, UnreachedSquares},
     error::TestError,
     folder::{Earlier, TestFolder},
     maps::{FailurePath, LevelMaps, LevelPars, MapScope, SkillTicks, hash_of_files, level_name},
     merge::merge,
     plan::{TestPlan, TestRecord, TestedRun, Tester, TesterRecord},
-    reports::{AGAINST, JUNIT, SUMMARY, action_search, report_date, rerun_commands, write_reports},
+    reports::{
+        AGAINST, JUNIT, SUMMARY, action_search, comparable_command, missing_failure, report_date, rerun_commands,
+        write_reports,
+    },
     results::{FinishTime, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, TesterTotal, results_folder},
     run::{TestEnd, TestObserver, run_tests, run_tests_keeping, test_in_turn},
     shard::{Shard, ShardError},
@@ -119,6 +122,11 @@ pub struct LevelVerdict {
     pub testers: Vec<TesterVerdict>,
     /// Findings.
     pub findings: Vec<Finding>,
+    /// The reason why no failed episode is in a file, for a level that no tester solved, in a test that
+    /// [keeps them](crate::findings::FindingFiles::keep_failures): tester, episode, and what happened when it was
+    /// played again.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub not_kept: Option<String>,
     /// Course of the actions that a recording of an earlier build solves it with, in a test against a recording that
     /// does. It is the last field: [`TestFolder::finish_against`] adds it to a line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -354,6 +362,7 @@ fn judge(
         reached: None,
         testers: testers.collect(),
         findings,
+        not_kept: None,
         recorded: None,
     };
     let has_maps = plan.maps().wants(verdict.is_perfect());
@@ -508,7 +517,9 @@ mod tests {
     #[test]
     fn older_results_are_read_and_newer_ones_read_back() {
         let old = serde_json::to_string(&verdict(3, 1, 2)).expect("serialises");
-        for name in ["maps", "places", "causes", "seconds", "stop", "solved_at_start", "reached", "recorded"] {
+        for name in
+            ["maps", "places", "causes", "seconds", "stop", "solved_at_start", "reached", "not_kept", "recorded"]
+        {
             assert!(!old.contains(name), "{old}");
         }
         assert_eq!(serde_json::from_str::<LevelVerdict>(&old).expect("whole"), verdict(3, 1, 2));
@@ -528,7 +539,8 @@ mod tests {
             furthest: None,
         };
         let recorded = Some(recorded);
-        let new = LevelVerdict { seconds: Some(0.1 + 0.2), reached: Some(reached), recorded, ..new };
+        let not_kept = Some("`a`, episode 0: it does not fail".to_owned());
+        let new = LevelVerdict { seconds: Some(0.1 + 0.2), reached: Some(reached), not_kept, recorded, ..new };
         let text = serde_json::to_string(&new).expect("serialises");
         assert_eq!(serde_json::from_str::<LevelVerdict>(&text).expect("whole"), new);
     }

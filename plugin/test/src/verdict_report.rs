@@ -26,7 +26,7 @@ mod tests;
 use crate::{
     verdict::{
         AGAINST, Comparison, EpisodeScore, LevelVerdict, Overview, RESULTS, RecordedTotal, TestError, TestRecord,
-        Trials, wilson,
+        Trials, comparable_command, wilson,
     },
     verdict_report::{
         drawn::Plans,
@@ -133,7 +133,7 @@ impl Page<'_> {
             record.seed
         );
         let body = numbers(self.overview)
-            + &self.comparison.map_or_else(String::new, compared)
+            + &self.comparison.map_or_else(String::new, |changes| compared(changes, record, self.program))
             + &recorded(&self.overview.recorded)
             + &level_table(record, self.selection, self.plans, self.program);
         format!(
@@ -193,13 +193,20 @@ pub(crate) fn numbers(overview: &Overview) -> String {
 }
 
 /// Writes the section of the page.
-pub(crate) fn compared(comparison: &Comparison) -> String {
+pub(crate) fn compared(comparison: &Comparison, record: &TestRecord, program: &str) -> String {
     let Comparison { levels, only_now, only_before, left_out, .. } = comparison;
     let [both, now, before] = [levels, only_now, only_before].map(|count| whole(*count as f64));
     let mut out = String::from("<section>\n<h2>Since the earlier results</h2>\n");
     let _ = writeln!(out, "<p>{both} levels in both, {now} only now, {before} only before.</p>");
     for why in left_out {
         let _ = writeln!(out, "<p>Left out: {}.</p>", text(why));
+    }
+    for why in &comparison.places_left_out {
+        let _ = writeln!(out, "<p>Places not compared: {}.</p>", text(why));
+    }
+    if let Some(command) = comparable_command(program, record, comparison) {
+        let what = "Places are compared after the same test as before:";
+        let _ = writeln!(out, "<p>{what}</p>\n<pre><code>{}</code></pre>", escape(&command));
     }
     let lists = [
         list("Unsolvable", &comparison.unsolvable, AGAINST),

@@ -151,7 +151,7 @@ fn a_failure_says_where_the_episodes_stopped() {
     let folder = tempfile::tempdir().expect("a folder");
     let test = playbot::test(&walled).levels("default:0..0").bot("runner").findings_in(folder.path());
     let found = message(|| test.assert_levels_solved());
-    assert!(found.contains("\n  the only episode got no further than (3.0, 0.0)\n"), "{found}");
+    assert!(found.contains("\n  the only episode got no further from its start than (3.0, 0.0)\n"), "{found}");
 }
 
 #[test]

@@ -133,7 +133,17 @@ fn tester(name: &str, action: u32) -> Tester {
 
 /// Tests levels 0 to 9 on so many threads, and returns the verdicts in their order.
 fn test(game: &dyn Game, testers: Vec<Tester>, folder: &Path, threads: usize) -> Vec<LevelVerdict> {
-    let split = "plain:0..9".parse().expect("levels");
+    test_levels(game, "plain:0..9", testers, folder, threads)
+}
+
+fn test_levels(
+    game: &dyn Game,
+    levels: &str,
+    testers: Vec<Tester>,
+    folder: &Path,
+    threads: usize,
+) -> Vec<LevelVerdict> {
+    let split = levels.parse().expect("levels");
     let detectors = Detectors::default();
     let plan = TestPlan { split, testers, episodes: 2, seed: 2, detectors, shard: None, threads };
     let files = FindingFiles {
@@ -176,6 +186,39 @@ fn a_test_writes_its_findings_as_files_which_are_the_same_on_any_number_of_threa
     let names: Vec<String> = files(&left).into_iter().map(|(name, _)| name).collect();
     assert_eq!(names.len(), 10);
     assert!(names.iter().all(|name| name.contains(".lost.left-")), "{names:?}");
+}
+
+/// A game that is lost after six turns, whatever the agent does.
+fn doomed() -> ForeignGame {
+    let game = |app: &mut App| {
+        app.insert_resource(Turn(0)).add_systems(Startup, |mut turn: ResMut<Turn>| turn.0 = 0);
+        app.add_systems(Update, |mut turn: ResMut<Turn>| turn.0 += 1);
+    };
+    ForeignGame::new("doomed", 1, game)
+        .keys([vec![], vec![KeyCode::KeyA]])
+        .observe(["turn"], |turn: Res<Turn>| [turn.0 as f32])
+        .end(|turn: Res<Turn>| (turn.0 >= 6).then_some(EpisodeEnd::LOST))
+        .restart(Restart::Startup)
+}
+
+#[derive(Resource)]
+struct Turn(u32);
+
+#[test]
+fn a_failed_episode_is_kept_of_each_unsolved_level_even_if_all_testers_draw() {
+    let random = |name: &str| Tester { player: Player::Blind(BlindBot::Uniform), ..tester(name, 0) };
+    let names = |testers: Vec<Tester>| {
+        let folder = tempfile::tempdir().expect("a folder");
+        let verdicts = test_levels(&doomed(), "default:0..3", testers, folder.path(), 2);
+        assert!(verdicts.iter().all(|verdict| verdict.score.lost > 0 && verdict.not_kept.is_none()), "{verdicts:?}");
+        files(folder.path()).into_iter().map(|(name, _)| name).collect::<Vec<_>>()
+    };
+    let drawn = names(vec![random("dice")]);
+    assert_eq!(drawn.len(), 4);
+    assert!(drawn.iter().all(|name| name.contains(".lost.dice-")), "{drawn:?}");
+    let both = names(vec![random("dice"), tester("idle", 0)]);
+    assert_eq!(both.len(), 4);
+    assert!(both.iter().all(|name| name.contains(".lost.idle-")), "it repeats itself: {both:?}");
 }
 
 #[test]

@@ -116,14 +116,17 @@ fn an_unsolved_level_says_where_most_episodes_stopped() {
     let stop = |testers: Vec<Tester>| verdicts(&plan("plain:0..0", testers, 3, 1))[0].stop.clone();
     // Level 0 starts in square 4, and the first tick leads to square 3: the abyss is 3 squares from there.
     let stopped = |tester| stop(vec![tester]).map(|stop| stop.to_string());
-    let left = "all 3 episodes got no further than (0.5, 0.5), within 0.0";
+    let left = "all 3 episodes got no further from their start than (0.5, 0.5), within 0.0";
     assert_eq!(stopped(constant("left", 0)).as_deref(), Some(left));
     let rest = "all 3 episodes stayed within 0.0 of (4.5, 0.5)";
     assert_eq!(stopped(constant("rest", 2)).as_deref(), Some(rest));
     assert_eq!(stop(vec![constant("left", 0), constant("right", 1)]), None, "it is solved");
     // Three of six is not most: three rest and three fall.
     let both = stop(vec![constant("rest", 2), constant("left", 0)]).map(|stop| stop.to_string());
-    assert_eq!(both.as_deref(), Some("the best of 6 episodes got no further than (0.5, 0.5)"));
+    assert_eq!(
+        both.as_deref(),
+        Some("of 6 episodes, the one that went furthest got no further from its start than (0.5, 0.5)")
+    );
 }
 
 #[test]
@@ -170,7 +173,7 @@ fn an_invisible_wall_shows_in_a_game_without_position_and_plan() {
         assert_eq!((reached.side, reached.cells.last(), reached.entity.as_deref()), (0.125, Some(&[24, 0]), entity));
         found[0].stop.as_ref().map(ToString::to_string).unwrap_or_default()
     };
-    let words = "all 3 episodes got no further than (3.0, 0.0), within 0.0";
+    let words = "all 3 episodes got no further from their start than (3.0, 0.0), within 0.0";
     assert_eq!(stopped(&walled, Some(entity)), format!("{words}, by the position of {entity}"));
     let declared = walled.position(|at: Single<&Transform, With<Player>>| at.translation.truncate());
     assert_eq!(stopped(&declared, None), words, "a declared position needs no guess");

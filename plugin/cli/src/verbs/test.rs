@@ -24,9 +24,9 @@ use playbot_harness::{game::Game, games::Games, level_audit::EqualLevels, split:
 use playbot_report::counted;
 use playbot_test::{
     detectors::Detectors,
-    findings::{Budget, Checks, FINDINGS, FindingFiles, RecordedCourse, list_findings},
+    findings::{Budget, Checks, FindingFiles, RecordedCourse},
     verdict::{
-        Comparison, Earlier, LevelVerdict, RecordedWins, Shard, TestEnd, TestFolder, TestObserver, TestPlan,
+        Comparison, Earlier, LevelVerdict, Overview, RecordedWins, Shard, TestEnd, TestFolder, TestObserver, TestPlan,
         results_folder, run_tests_keeping,
     },
 };
@@ -167,7 +167,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     };
     folder.finish_against(&courses)?;
     let outcome = report_results(&results)?;
-    args.findings.report_missing(out);
+    args.findings.report_missing(out)?;
     report_off(game, &plan.detectors);
     Ok(outcome)
 }
@@ -255,7 +255,7 @@ pub struct FindingArgs {
     /// one.
     #[arg(long)]
     minimise: bool,
-    /// Also write a failed episode of each level that no tester solved, if a deterministic tester failed there.
+    /// Also write a failed episode of each level that no tester solved, of a deterministic tester if one failed there.
     #[arg(long)]
     keep_failures: bool,
 }
@@ -271,13 +271,11 @@ impl FindingArgs {
         }
     }
 
-    /// Explains a missing failed episode, where one was requested.
-    pub fn report_missing(&self, folder: &Path) {
-        if self.keep_failures && list_findings(&folder.join(FINDINGS)).is_err() {
-            report!(
-                "no failed episode is kept: it takes a level that no tester solved, and a tester that failed there and leaves \
-                 nothing to chance, such as a policy with --greedy"
-            );
+    /// Explains why no failed episode is kept where one was asked for, but no level has one.
+    pub fn report_missing(&self, folder: &Path) -> Result<(), CliError> {
+        if self.keep_failures && Overview::read(folder)?.bot_failed == 0 {
+            report!("no failed episode is kept: each level was solved, or is proved unsolvable");
         }
+        Ok(())
     }
 }

@@ -176,7 +176,7 @@ impl<'a> Evidence<'a> {
             for played in
                 (0..self.plan.episodes.clamp(1, MOST_TRIES)).filter_map(|number| played(&tester.tester, number))
             {
-                let file = self.files.keep_failure(self.game, level, played)?;
+                let file = self.files.keep_failure(self.game, level, played)?.file();
                 if file.is_some() {
                     return Ok(file);
                 }

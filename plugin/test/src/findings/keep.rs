@@ -2,7 +2,7 @@
 
 use crate::findings::{
     FindingError, FindingHead, FindingStatus, StoredFinding,
-    checks::{Checks, failure_of},
+    checks::{Check, Checks, failure_of},
     course::{Look, look},
     folder::FINDINGS,
     io_error,
@@ -16,6 +16,7 @@ use playbot_harness::{
     level_files::{is_level_files, level_files_mode},
 };
 use playbot_learner::disk;
+use playbot_report::counted;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -26,7 +27,7 @@ pub struct FindingFiles {
     pub folder: PathBuf,
     /// The budget of minimisation; `None` for no minimisation.
     pub minimise: Option<Budget>,
-    /// Whether failed episodes of testers without random numbers are written as well, on levels that were not solved.
+    /// Whether a failed episode is written as well, of each level that was not solved.
     pub keep_failures: bool,
     /// Checks of the detectors. Findings without a check are not written.
     pub checks: Checks,
@@ -82,66 +83,145 @@ impl FindingFiles {
         }
         let settings = [self.checks.settings_of(game, seen.detector), seen.settings.to_vec()].concat();
         let head = FindingHead { settings, ..FindingHead::new(level.name, seen.detector, seen.message) };
-        let (mode, number) = alone(game, level);
-        match seen.played {
-            None => self.store(game, &mode, number, head, &[]),
+        let alone = alone(game, level);
+        let kept = match seen.played {
+            None => self.store(game, alone, head, &[]),
             Some(played) => {
-                let setting = Setting { game, mode: &mode, level: number, seed: played.seed };
-                let again = play_player(setting, played.player, played.observation_config);
+                let again = play_player(setting(game, &alone, played), played.player, played.observation_config);
                 // Cannot fail: the test has drawn the same observation.
                 let Ok((actions, _)) = again else { return Ok(None) };
-                self.store(game, &mode, number, by(head, played), &actions)
+                self.store(game, alone, by(head, played), &actions)
             }
-        }
+        };
+        Ok(kept?.file())
     }
 
-    /// Writes an episode that failed: as `lost` if the game ended it, or as `not-solved` if the time limit did. An
-    /// episode that does not fail again is not written.
+    /// Plays an episode that failed again, alone, and writes it: as `lost` if the game ended it, or as `not-solved` if
+    /// the time limit did. An episode that does not fail again, or whose actions do not lead to the same end, is not
+    /// written.
     ///
     /// # Errors
     ///
     /// The file cannot be written.
-    pub fn keep_failure(
-        &self,
-        game: &dyn Game,
-        level: SeenLevel,
-        played: Played,
-    ) -> Result<Option<String>, FindingError> {
-        let (mode, number) = alone(game, level);
-        let setting = Setting { game, mode: &mode, level: number, seed: played.seed };
-        let again = play_player(setting, played.player, played.observation_config);
-        let Ok((actions, replayed)) = again else { return Ok(None) };
-        let Some((detector, message)) = replayed.end.as_ref().and_then(failure_of) else { return Ok(None) };
-        let head = FindingHead::new(level.name, detector, message);
-        self.store(game, &mode, number, by(head, played), &actions)
+    pub fn keep_failure(&self, game: &dyn Game, level: SeenLevel, played: Played) -> Result<KeptFailure, FindingError> {
+        let alone = alone(game, level);
+        let again = play_player(setting(game, &alone, played), played.player, played.observation_config);
+        let (actions, replayed) = match again {
+            Ok(again) => again,
+            Err(error) => return Ok(KeptFailure::Missing(format!("it cannot be played alone: {error}"))),
+        };
+        let Some((detector, message)) = replayed.end.as_ref().and_then(failure_of) else {
+            return Ok(KeptFailure::Missing(format!(
+                "it does not fail when it is played alone: {}",
+                end_of(&replayed)
+            )));
+        };
+        self.store(game, alone, by(FindingHead::new(level.name, detector, message), played), &actions)
     }
 
     fn store(
         &self,
         game: &dyn Game,
-        mode: &str,
-        level: u64,
+        (mode, level): (String, u64),
         head: FindingHead,
         actions: &[ActionValue],
-    ) -> Result<Option<String>, FindingError> {
-        let found = StoredFinding::of_actions(game, mode, level, head, actions, &self.checks);
-        let Some(mut finding) = found else { return Ok(None) };
+    ) -> Result<KeptFailure, FindingError> {
+        let setting = Setting { game, mode: &mode, level, seed: head.seed };
+        let Some(check) = self.checks.of_finding(game, &head) else {
+            return Ok(KeptFailure::Missing(format!("the detector `{}` has no check", head.detector)));
+        };
+        let seen = match seen_again(setting, head, actions, &check) {
+            Ok(seen) => seen,
+            Err(missing) => return Ok(KeptFailure::Missing(missing)),
+        };
         // A minimised finding is the same one, though the numbers in its message may differ.
-        let name = finding.file_name();
-        if let Some(budget) = self.minimise
-            && let Ok(shorter) = minimise(game, &finding, &self.checks, budget, &|_| {}, &|| false)
-        {
-            finding = shorter.finding;
+        let name = seen.file_name();
+        let shorter = self.minimise.map(|budget| minimise(game, &seen, &self.checks, budget, &|_| {}, &|| false));
+        let shorter = shorter.and_then(Result::ok).map(|shorter| shorter.finding);
+        let mut missing = String::new();
+        // The shorter episode is another one. If it does not happen twice, the whole one may.
+        for finding in shorter.into_iter().chain([seen]) {
+            match difference(game, &finding, &self.checks) {
+                Some(difference) => missing = difference,
+                None => {
+                    let below = self.folder.join(FINDINGS);
+                    disk::create_dir_all(&below).map_err(io_error("create", &below))?;
+                    finding.write(&below.join(&name))?;
+                    return Ok(KeptFailure::File(format!("{FINDINGS}/{name}")));
+                }
+            }
         }
-        let again = recheck(game, &finding, &self.checks);
-        if !again.is_ok_and(|again| again.is_same(&finding)) {
-            return Ok(None);
-        }
-        let below = self.folder.join(FINDINGS);
-        disk::create_dir_all(&below).map_err(io_error("create", &below))?;
-        finding.write(&below.join(&name))?;
-        Ok(Some(format!("{FINDINGS}/{name}")))
+        Ok(KeptFailure::Missing(missing))
     }
+}
+
+/// The result of keeping a finding or a failed episode.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum KeptFailure {
+    /// Its file, relative to the folder of the test.
+    File(String),
+    /// There is no file, for this reason.
+    Missing(String),
+}
+
+impl KeptFailure {
+    /// Returns the file, if there is one.
+    pub fn file(self) -> Option<String> {
+        match self {
+            Self::File(file) => Some(file),
+            Self::Missing(_) => None,
+        }
+    }
+}
+
+/// Returns the finding that these actions lead to, or the reason why they do not.
+fn seen_again(
+    setting: Setting,
+    head: FindingHead,
+    actions: &[ActionValue],
+    check: &Check,
+) -> Result<StoredFinding, String> {
+    let Look { is_there, tick, replayed, .. } = look(setting, &head, actions, check);
+    if is_there {
+        return Ok(StoredFinding::of_replay(setting, head, actions, replayed, tick));
+    }
+    Err(format!("{}, but its actions lead elsewhere when they are played again: {}", head.message, end_of(&replayed)))
+}
+
+/// Describes the difference between a finding and its replay; `None` if it happens exactly as stored.
+fn difference(game: &dyn Game, finding: &StoredFinding, checks: &Checks) -> Option<String> {
+    let again = match recheck(game, finding, checks) {
+        Ok(again) => again,
+        Err(unplayable) => return Some(unplayable.to_string()),
+    };
+    if again.is_same(finding) {
+        return None;
+    }
+    let elsewhere = match again.sighting {
+        None => end_of(&again.replayed),
+        Some(Sighting { tick, .. }) if tick == finding.head.tick => "the state is another one in that tick".to_owned(),
+        Some(Sighting { tick, .. }) => {
+            let [then, now] = [finding.head.tick, tick].map(|tick| tick.unwrap_or(0));
+            format!("it happens in tick {now}, not in tick {then}")
+        }
+    };
+    Some(format!("{}, but the same actions lead elsewhere the next time: {elsewhere}", finding.head.message))
+}
+
+/// Describes how a replayed episode ended.
+fn end_of(replayed: &Replayed) -> String {
+    match (&replayed.broken, &replayed.end) {
+        (Some(broken), _) => format!("{} in tick {}: {}", broken.detector, broken.tick, broken.message),
+        (None, Some(end)) => failure_of(end).map_or_else(
+            || format!("the goal was reached after {}", counted(u64::from(end.ticks), "tick")),
+            |(_, failure)| failure,
+        ),
+        (None, None) => format!("the episode was not over after {}", counted(replayed.rewards.len() as u64, "tick")),
+    }
+}
+
+fn setting<'a>(game: &'a dyn Game, (mode, level): &'a (String, u64), played: Played) -> Setting<'a> {
+    Setting { game, mode, level: *level, seed: played.seed }
 }
 
 fn by(head: FindingHead, played: Played) -> FindingHead {
@@ -213,4 +293,73 @@ pub fn recheck(game: &dyn Game, finding: &StoredFinding, checks: &Checks) -> Res
     let Look { is_there, tick, replayed, .. } = look(setting, head, &finding.actions(), &check);
     let state_hash = tick.and_then(|tick| replayed.state_hash(tick));
     Ok(Recheck { sighting: is_there.then_some(Sighting { tick, state_hash }), replayed })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::findings::{
+        checks::{LOST, NOT_SOLVED},
+        folder::list_findings,
+    };
+    use bevy_playbot::bot::BlindBot;
+    use playbot_corridor::Corridor;
+    use std::path::Path;
+
+    fn files(folder: &Path) -> FindingFiles {
+        FindingFiles { folder: folder.to_owned(), minimise: None, keep_failures: true, checks: Checks::default() }
+    }
+
+    /// Keeps the episode of a player on level 3 of the corridor, as a failed one.
+    fn kept(folder: &Path, player: &Player) -> KeptFailure {
+        let level = SeenLevel { mode: "plain", level: 3, name: "plain:3" };
+        let played = Played { tester: "it", player, observation_config: &ObservationConfig::default(), seed: 5 };
+        files(folder).keep_failure(&Corridor::default(), level, played).expect("writable")
+    }
+
+    fn lost() -> Vec<ActionValue> {
+        vec![ActionValue::Discrete(0); 3]
+    }
+
+    #[test]
+    fn a_failed_episode_has_a_file_and_one_that_does_not_fail_alone_a_reason() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let idle = Player::Blind(BlindBot::Constant(ActionValue::Discrete(0)));
+        let file = kept(folder.path(), &idle).file().expect("it is lost");
+        assert!(file.starts_with("findings/plain-3.lost.it-") && folder.path().join(&file).is_file(), "{file}");
+        let KeptFailure::Missing(why) = kept(folder.path(), &Player::Demonstrator) else { panic!("it wins") };
+        assert!(why.starts_with("it does not fail when it is played alone: the goal was reached after "), "{why}");
+        assert_eq!(list_findings(folder.path()).expect("one").len(), 1);
+    }
+
+    #[test]
+    fn actions_that_lead_elsewhere_are_not_kept_and_say_where() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let head = FindingHead::new("plain:3", NOT_SOLVED, "time was up after 30 ticks");
+        let stored = files(folder.path()).store(&Corridor::default(), ("plain".to_owned(), 3), head, &lost());
+        let why = "time was up after 30 ticks, but its actions lead elsewhere when they are played again: the game ended the \
+                   episode after 3 ticks";
+        assert_eq!(stored.expect("writable"), KeptFailure::Missing(why.to_owned()));
+        assert!(list_findings(folder.path()).is_err(), "nothing is written");
+    }
+
+    #[test]
+    fn a_replay_that_differs_says_in_what() {
+        let (game, checks) = (Corridor::default(), Checks::default());
+        let head = FindingHead::new("plain:3", LOST, "lost");
+        let found = StoredFinding::of_actions(&game, "plain", 3, head, &lost(), &checks).expect("it is lost");
+        let said = |change: &dyn Fn(&mut FindingHead)| {
+            let mut other = found.clone();
+            change(&mut other.head);
+            difference(&game, &other, &checks)
+        };
+        assert_eq!(said(&|_| {}), None);
+        let why =
+            |elsewhere: &str| Some(format!("lost, but the same actions lead elsewhere the next time: {elsewhere}"));
+        assert_eq!(said(&|head| head.tick = Some(9)), why("it happens in tick 2, not in tick 9"));
+        let state = "the state is another one in that tick";
+        assert_eq!(said(&|head| head.state_hash = head.state_hash.map(|hash| hash + 1)), why(state));
+        let end = "the game ended the episode after 3 ticks";
+        assert_eq!(said(&|head| head.detector = NOT_SOLVED.to_owned()), why(end));
+    }
 }

@@ -5,6 +5,7 @@ use bevy::prelude::*;
 use bevy_playbot::{
     action::{Action, ActionSpace, ActionValue},
     agent::Control,
+    bot::BlindBot,
     demo::{
         file::{DemoEpisode, EpisodeActions},
         replay::Replay,
@@ -235,9 +236,13 @@ impl<'a> Solo<'a> {
         Replay::begin(Arc::new(recorded.clone()), &mut agent);
     }
 
-    /// Sets the agent's next action.
+    /// Sets the agent's next action, as that of a bot that knows nothing else.
+    ///
+    /// A tester's bot is a component of the agent, and so is this one. Bevy orders the entities of a query by the
+    /// numbers of their archetypes. An agent with a component less would shift the numbers of the game's own entities,
+    /// and a game that depends on that order would play another episode than the tester has.
     pub fn act(&mut self, action: ActionValue) {
-        self.world.entity_mut(self.agent).insert(Action(action));
+        self.world.entity_mut(self.agent).insert(BlindBot::Constant(action));
     }
 
     /// Runs the World. Returns whether that was a tick of the episode: a level that is still loading has no ticks.
@@ -534,6 +539,31 @@ mod tests {
         let blank =
             of("agent 0, level 3: each picture of an episode of 9 ticks was of a single colour; point it elsewhere");
         assert!(blank.detector == "blank-picture" && blank.message.starts_with("each picture"), "{blank:?}");
+    }
+
+    #[test]
+    fn played_actions_make_as_many_archetypes_as_the_bot_that_chose_them() {
+        let game = ForeignGame::new("line", 1, |_: &mut bevy::prelude::App| {})
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["x"], || [0.0])
+            .demonstrator("runner", || 1)
+            .time_limit(9);
+        let archetypes = |player: Option<Player>| {
+            let setting = Setting { game: &game, mode: "default", level: 0, seed: 3 };
+            let mut solo = Solo::new(setting, &ObservationConfig::default()).expect("a vector");
+            player.iter().for_each(|player| solo.seat(player));
+            while solo.ticks() < 4 {
+                if player.is_none() {
+                    solo.act(ActionValue::Discrete(1));
+                }
+                solo.tick().expect("it goes on");
+            }
+            assert_eq!(solo.action(), Some(ActionValue::Discrete(1)));
+            solo.world.archetypes().len()
+        };
+        let played = archetypes(None);
+        assert_eq!(archetypes(Some(Player::Demonstrator)), played);
+        assert_eq!(archetypes(Some(Player::Blind(BlindBot::Constant(ActionValue::Discrete(1))))), played);
     }
 
     #[test]

@@ -8,8 +8,8 @@ use crate::{
     verdict::{
         LevelVerdict, Shard, TesterVerdict,
         error::TestError,
-        maps::LevelMaps,
-        plan::{TestPlan, TestRecord},
+        maps::{LevelMaps, MapScope},
+        plan::{TestPlan, TestRecord, TesterRecord},
         results::ResultLines,
         statistics::{Trials, benjamini_hochberg, fisher_exact},
         track::ReachedCells,
@@ -27,7 +27,7 @@ use serde::Serialize;
 use std::{
     collections::{BTreeMap, BTreeSet},
     fmt,
-    path::Path,
+    path::{Path, PathBuf},
 };
 
 /// Expected share of false alarms among the levels reported as easier or harder.
@@ -63,6 +63,21 @@ pub struct Comparison {
     pub gone_findings: Vec<FindingChange>,
     /// Squares of levels that are not solved now, where no tester comes any more.
     pub unreached: Vec<UnreachedSquares>,
+    /// Reasons why the squares of other levels that are not solved now are not compared, with the number of levels.
+    pub places_left_out: Vec<String>,
+    /// The earlier test, if its squares can be compared with those of another test now: with its testers, its number of
+    /// episodes and its seed.
+    #[serde(skip)]
+    pub earlier: Option<EarlierTest>,
+}
+
+/// The test of earlier results.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EarlierTest {
+    /// Folder of the results.
+    pub folder: PathBuf,
+    /// Description of the test.
+    pub record: TestRecord,
 }
 
 impl Comparison {
@@ -81,13 +96,13 @@ impl Comparison {
         while let Some(level) = earlier.next_level()? {
             known.insert(level.level.clone(), Known::of(level, &common, &other_detectors, drawn));
         }
-        let (mut comparison, mut doubtful) = (Self { left_out, ..Self::default() }, Vec::new());
+        let (mut comparison, mut open) = (Self { left_out, ..Self::default() }, Open::default());
         while let Some(level) = lines.next_level()? {
             match known.remove(&level.level) {
                 Some(known) => {
                     let name = level.level.clone();
                     let level = Known::of(level, &common, &other_detectors, draws);
-                    comparison.compare(&known, &name, &level, &mut doubtful)
+                    comparison.compare(&known, &name, &level, &mut open)
                 }
                 None => comparison.only_now += 1,
             }
@@ -97,7 +112,13 @@ impl Comparison {
             return Err(TestError::Incomparable { folder: before.into(), differences });
         }
         comparison.only_before = known.len() as u64;
-        comparison.judge(doubtful);
+        comparison.judge(open.doubtful);
+        let [was, is] = [earlier.record(), lines.record()];
+        let left_out = open.places.iter().map(|(why, levels)| why.words(levels, was, is));
+        comparison.places_left_out = left_out.collect();
+        if open.places.keys().any(|why| matches!(why, PlacesLeftOut::Testers | PlacesLeftOut::Draws)) {
+            comparison.earlier = Some(EarlierTest { folder: before.into(), record: was.clone() });
+        }
         Ok(comparison)
     }
 
@@ -115,7 +136,7 @@ impl Comparison {
         !(self.unsolvable.is_empty() && self.harder.is_empty() && self.new_findings.is_empty())
     }
 
-    fn compare(&mut self, known: &Known, level: &str, now: &Known, doubtful: &mut Vec<Doubtful>) {
+    fn compare(&mut self, known: &Known, level: &str, now: &Known, open: &mut Open) {
         self.levels += 1;
         let changes = |these: &Known, those: &Known| {
             let added = these.findings.difference(&those.findings);
@@ -126,7 +147,10 @@ impl Comparison {
             };
             added.map(change).collect::<Vec<_>>()
         };
-        self.unreached.extend(UnreachedSquares::between(level, known, now));
+        match UnreachedSquares::between(level, known, now) {
+            Ok(unreached) => self.unreached.extend(unreached),
+            Err(why) => open.places.entry(why).or_default().push(level.to_owned()),
+        }
         self.new_findings.extend(changes(now, known));
         self.gone_findings.extend(changes(known, now));
         let change = |before: Trials, now: Trials| Change {
@@ -170,7 +194,7 @@ impl Comparison {
         if pooled_before.trials > 0 && pooled_now.trials > 0 {
             let probability = fisher_exact(pooled_before, pooled_now);
             let change = Change { probability: Some(probability), ..change(pooled_before, pooled_now) };
-            doubtful.push(Doubtful { change, probability });
+            open.doubtful.push(Doubtful { change, probability });
         }
     }
 
@@ -263,18 +287,35 @@ pub struct UnreachedSquares {
 const LARGE_PART: usize = 4;
 
 impl UnreachedSquares {
-    fn between(level: &str, before: &Known, now: &Known) -> Option<Self> {
-        if now.total.successes > 0 {
-            return None;
+    /// Compares the squares of a level. `None` if it is solved now, if no square is missing, or if the game has no
+    /// positions.
+    ///
+    /// # Errors
+    ///
+    /// The reason why the squares are not comparable.
+    fn between(level: &str, before: &Known, now: &Known) -> Result<Option<Self>, PlacesLeftOut> {
+        if now.total.successes > 0 || !(before.has_places || now.has_places) {
+            return Ok(None);
         }
-        let (was, is) = before.visited.as_ref()?.alike(now.visited.as_ref()?)?;
+        if !(before.is_theirs && now.is_theirs) {
+            return Err(PlacesLeftOut::Testers);
+        }
+        let was = before.visited.as_ref().ok_or(PlacesLeftOut::NoneBefore)?;
+        let is = now.visited.as_ref().ok_or(PlacesLeftOut::NoneNow)?;
+        let (was, is) = was.alike(is).ok_or(PlacesLeftOut::Squares)?;
+        let was_solved = before.total.successes > 0;
+        if !was_solved && !before.repeats(now) {
+            return Err(PlacesLeftOut::Draws);
+        }
         let lost: Vec<Square> = was.squares.difference(&is.squares).copied().collect();
-        let is_chance = !before.repeats(now) || lost.len() * LARGE_PART < was.squares.len();
-        if before.total.successes == 0 && is_chance {
-            return None;
-        }
+        let is_chance = !was_solved && lost.len() * LARGE_PART < was.squares.len();
+        Ok(if is_chance { None } else { Self::closest(level, &lost, &was, &is) })
+    }
+
+    /// Names the lost square that is closest to one that is still visited.
+    fn closest(level: &str, lost: &[Square], was: &VisitedSquares, is: &VisitedSquares) -> Option<Self> {
         let mut closest: Option<(f32, [Square; 2])> = None;
-        for square in &lost {
+        for square in lost {
             for reached in &is.squares {
                 let distance = was.middle(*square).distance_squared(was.middle(*reached));
                 // Of equal ones the first.
@@ -295,6 +336,61 @@ impl fmt::Display for UnreachedSquares {
         let squares = counted(*squares, "square");
         write!(f, "{level}: {squares} visited before, such as ({x:.1}, {y:.1}); now no tester comes further than ")?;
         write!(f, "({left:.1}, {below:.1}) there")
+    }
+}
+
+/// The reason why the squares of a level that is not solved now are not compared.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum PlacesLeftOut {
+    /// Other testers played.
+    Testers,
+    /// The level was not solved before either, and random testers play other episodes.
+    Draws,
+    /// The earlier results have no squares of it.
+    NoneBefore,
+    /// These results have no squares of it.
+    NoneNow,
+    /// The squares are others.
+    Squares,
+}
+
+impl PlacesLeftOut {
+    /// Describes the reason, with the levels that it applies to.
+    fn words(self, levels: &[String], before: &TestRecord, now: &TestRecord) -> String {
+        let why = match self {
+            Self::Testers => {
+                let [was, is] = [before, now]
+                    .map(|record| record.testers.iter().map(TesterRecord::describe).collect::<Vec<_>>().join(", "));
+                format!("the testers differ ({is}; before: {was})")
+            }
+            Self::Draws => {
+                let seeds = ("random seeds", before.seed, now.seed);
+                let episodes = ("numbers of episodes", u64::from(before.episodes), u64::from(now.episodes));
+                let differ = |(what, was, is): (&str, u64, u64)| {
+                    (was != is).then(|| format!("the {what} differ ({is}; before: {was})"))
+                };
+                let differ: Vec<String> = [seeds, episodes].into_iter().filter_map(differ).collect();
+                format!(
+                    "{}, so random testers went elsewhere on a level that no tester has solved",
+                    differ.join(" and ")
+                )
+            }
+            Self::NoneBefore => format!("the earlier results have no visited squares{}", few_maps(before)),
+            Self::NoneNow => format!("these results have no visited squares{}", few_maps(now)),
+            Self::Squares => {
+                "the squares are others: the floor plan has changed, or the entity whose position counts".to_owned()
+            }
+        };
+        let first = levels.first().map_or_else(String::new, |level| format!(", such as {level}"));
+        format!("{why}: {}{first}", counted(levels.len() as u64, "unsolved level"))
+    }
+}
+
+/// Explains levels without maps in a test of many levels.
+fn few_maps(record: &TestRecord) -> &'static str {
+    match record.maps {
+        MapScope::Failed => " (of so many levels, only failed ones have maps: test fewer)",
+        MapScope::None | MapScope::All => "",
     }
 }
 
@@ -362,6 +458,10 @@ impl VisitedSquares {
 
 /// Results of an earlier level that are kept in memory.
 struct Known {
+    /// Whether these testers alone played the level.
+    is_theirs: bool,
+    /// Whether the results have squares or cells of the level.
+    has_places: bool,
     /// Squares that the testers visited, if the level was played by these testers alone.
     visited: Option<VisitedSquares>,
     /// Random seed of the test, and episodes of each tester.
@@ -378,6 +478,7 @@ impl Known {
         let is_unsolvable = level.proof.why_unsolvable().is_some();
         let is_common = |name: &Option<String>| name.as_ref().is_none_or(|name| testers.contains(name));
         let is_theirs = level.testers.len() == testers.len();
+        let has_places = level.maps.is_some() || level.reached.is_some();
         let visited = if is_theirs { VisitedSquares::of(&level) } else { None };
         let findings = level
             .findings
@@ -394,7 +495,7 @@ impl Known {
             .collect();
         let mut total = Trials::default();
         own.iter().for_each(|tester| add(&mut total, tester.score.trials()));
-        Self { visited, draws, testers: own, total, is_unsolvable, findings }
+        Self { is_theirs, has_places, visited, draws, testers: own, total, is_unsolvable, findings }
     }
 
     /// Returns whether the other episodes are these once more if the level is the same.
@@ -475,6 +576,14 @@ impl RecordedWins {
         });
         played.into_iter().collect()
     }
+}
+
+/// What is open until all levels are compared.
+#[derive(Default)]
+struct Open {
+    doubtful: Vec<Doubtful>,
+    /// Levels whose squares are not compared, by the reason.
+    places: BTreeMap<PlacesLeftOut, Vec<String>>,
 }
 
 /// A level whose difference may be chance.

@@ -7,10 +7,10 @@ mod junit;
 
 use crate::{
     detectors::compares_testers,
-    findings::{FindingFiles, Played, SeenFinding, SeenLevel},
+    findings::{FindingFiles, KeptFailure, Played, SeenFinding, SeenLevel},
     verdict::{
-        Finding, LevelOutcome, LevelVerdict, SquareEnds,
-        compare::Comparison,
+        Finding, LevelOutcome, LevelVerdict, SquareEnds, TesterVerdict,
+        compare::{Comparison, EarlierTest},
         error::{TestError, io_error},
         maps::level_argument,
         plan::{TestPlan, TestRecord, Tester, TesterRecord},
@@ -68,7 +68,7 @@ pub(super) fn keep_findings(
     files: &FindingFiles,
     verdict: &mut LevelVerdict,
 ) -> Result<(), TestError> {
-    let LevelVerdict { level: name, index, outcome, testers, findings, .. } = verdict;
+    let LevelVerdict { level: name, index, outcome, testers, findings, not_kept, .. } = verdict;
     let level = SeenLevel { mode: &plan.split.mode, level: plan.split.first + *index, name };
     let played = |tester: &str, episode: u32| {
         let tester = plan.testers.iter().find(|known| known.record.name == tester)?;
@@ -82,12 +82,33 @@ pub(super) fn keep_findings(
         finding.file = files.keep(game, level, &seen)?;
     }
     if files.keep_failures && *outcome == LevelOutcome::BotFailed {
-        let failed = testers.iter().find(|tester| tester.exact && tester.score.lost + tester.score.timed_out > 0);
-        if let Some(played) = failed.and_then(|tester| played(&tester.tester, 0)) {
-            files.keep_failure(game, level, played)?;
+        let failed = failed_episodes(testers, plan.episodes).filter_map(|(tester, episode)| {
+            let played = played(tester, episode)?;
+            Some((format!("`{tester}`, episode {episode}"), played))
+        });
+        let mut missing = Vec::new();
+        for (episode, played) in failed {
+            match files.keep_failure(game, level, played)? {
+                KeptFailure::File(_) => return Ok(()),
+                KeptFailure::Missing(why) => missing.push(format!("{episode}: {why}")),
+            }
         }
+        *not_kept = (!missing.is_empty()).then(|| missing.join("; "));
     }
     Ok(())
+}
+
+/// Most episodes of a tester that are played again in search of one that can be kept.
+const MOST_TRIES: u32 = 3;
+
+/// Returns failed episodes of a level that no tester solved, by tester and number: first one of each tester that
+/// repeats itself exactly, then some of the others.
+fn failed_episodes(testers: &[TesterVerdict], episodes: u32) -> impl Iterator<Item = (&str, u32)> {
+    let failed = testers.iter().filter(|tester| tester.score.lost > 0 || tester.score.timed_out > 0);
+    let (exact, drawn): (Vec<_>, Vec<_>) = failed.partition(|tester| tester.exact);
+    let tries = move |tester: &TesterVerdict| if tester.exact { 1 } else { episodes.clamp(1, MOST_TRIES) };
+    let all = exact.into_iter().chain(drawn);
+    all.flat_map(move |tester| (0..tries(tester)).map(move |episode| (tester.tester.as_str(), episode)))
 }
 
 fn played_by(tester: &Tester, seed: u64) -> Played<'_> {
@@ -123,7 +144,7 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
         lines.push(format!("| {} | {levels} | {episodes} | {places} |", markdown_cell(&tester.name)));
     }
     if let Some(comparison) = comparison {
-        lines.extend(compared(comparison));
+        lines.extend(compared(comparison, comparable_command(program, record, comparison)));
     }
     lines.extend(recorded(&overview.recorded));
     if !overview.worst.is_empty() {
@@ -134,6 +155,9 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
             let what = markdown_cell(&failure(level));
             lines.push(format!("| {} | {} | {what} |", markdown_cell(&level.title()), level.outcome.name()));
         }
+        let missing: Vec<String> =
+            overview.worst.iter().filter_map(|level| missing_failure(program, record, level)).collect();
+        lines.extend(list("Failed episodes that are not kept", missing));
         // Testers show nothing of a level that only the recording no longer solves.
         let has_failed = |level: &&LevelVerdict| level.outcome != LevelOutcome::Solved || !level.findings.is_empty();
         let first = overview.worst.first().filter(has_failed);
@@ -179,11 +203,17 @@ pub(super) fn interval(of: Trials) -> String {
     format!(" ({low:.1} to {high:.1} %)")
 }
 
-fn compared(comparison: &Comparison) -> Vec<String> {
+/// Writes the changes since earlier results, with the command that makes the places comparable, if there is one.
+fn compared(comparison: &Comparison, comparable: Option<String>) -> Vec<String> {
     let mut lines = vec![String::new(), "## Since the earlier results".to_owned(), String::new()];
     let Comparison { levels, only_now, only_before, .. } = comparison;
     lines.push(format!("{} in both, {only_now} only now, {only_before} only before.", counted(*levels, "level")));
     lines.extend(comparison.left_out.iter().map(|why| format!("Left out: {}.", markdown_cell(why))));
+    lines.extend(comparison.places_left_out.iter().map(|why| format!("Places not compared: {}.", markdown_cell(why))));
+    if let Some(command) = comparable {
+        let what = "Places are compared after the same test as before:";
+        lines.extend(["", what, "", "```sh", &command, "```"].map(str::to_owned));
+    }
     for (title, changes) in [
         ("Unsolvable", texts(&comparison.unsolvable)),
         ("Harder", texts(&comparison.harder)),
@@ -311,6 +341,10 @@ fn squares(level: &LevelVerdict) -> String {
 /// Largest number of findings that are shown by their files.
 const MOST_FILES: usize = 3;
 
+/// Ticks for which the doctor searches for the cause of an episode that does not happen twice: many, because it is
+/// rare.
+const DOCTOR_TICKS: u32 = 10_000;
+
 /// Comment on the folder for the replay of findings: their files are named as in the results.
 const OF_RESULTS: &str = "# from the folder of the results:";
 
@@ -380,6 +414,35 @@ pub fn action_search(program: &str, record: &TestRecord, level: &LevelVerdict) -
     Some(format!(
         "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed} --detect {missing} --out \
          runs/actions"
+    ))
+}
+
+/// Returns the command of a test whose visited squares can be compared with the earlier ones: on the same levels as
+/// now, by the earlier testers, with their seed and number of episodes. `None` if they are compared, or no such test is
+/// possible.
+pub fn comparable_command(program: &str, now: &TestRecord, comparison: &Comparison) -> Option<String> {
+    let EarlierTest { folder, record } = comparison.earlier.as_ref()?;
+    let (game, levels, folder) =
+        (&now.game, shell_word(&now.range.to_string()), shell_word(&folder.display().to_string()));
+    let (played, episodes, seed) = (testers(&record.testers), record.episodes, record.seed);
+    let shard = now.shard.map_or_else(String::new, |shard| format!(" --shard {shard}"));
+    let detectors: String = now.options.iter().map(|word| format!(" {}", shell_word(word))).collect();
+    Some(format!(
+        "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{shard}{detectors} --against \
+         {folder} --out runs/comparable"
+    ))
+}
+
+/// Returns why no failed episode of a level is kept, with the command that searches for the cause. `None` if one is
+/// kept, or if the test keeps none.
+pub fn missing_failure(program: &str, record: &TestRecord, level: &LevelVerdict) -> Option<String> {
+    let why = level.not_kept.as_ref()?;
+    let (game, mode, number) = (&record.game, shell_word(&record.range.mode), record.range.first + level.index);
+    let doctor = format!("{program} doctor {game} --mode {mode} --level {number} --ticks {DOCTOR_TICKS}");
+    Some(format!(
+        "{}: no failed episode is kept, because the game does not play the same each time ({doctor} may find the cause): \
+         {why}",
+        level.title()
     ))
 }
 
@@ -520,8 +583,64 @@ mod tests {
         assert_eq!(message(&verdict(0, 4, 4)), "solved 4 of 4 episodes");
         let (kind, entity) = (StopKind::Furthest, None);
         level.stop = Some(CommonStop { kind, x: 12.4, y: 3.0, within: 0.5, episodes: 4, of: 4, entity });
-        let stopped = "all 4 episodes got no further than (12.4, 3.0), within 0.5";
+        let stopped = "all 4 episodes got no further from their start than (12.4, 3.0), within 0.5";
         assert_eq!(message(&level), format!("{start}; {stopped}"));
+    }
+
+    #[test]
+    fn failed_episodes_are_those_of_exact_testers_first_and_then_some_of_the_others() {
+        let testers = [
+            tester("random", 0, 9, false),
+            tester("solver", 9, 9, true),
+            tester("jumper", 0, 9, true),
+            tester("slow", 0, 9, true),
+        ];
+        let all: Vec<_> = failed_episodes(&testers, 9).collect();
+        assert_eq!(all, [("jumper", 0), ("slow", 0), ("random", 0), ("random", 1), ("random", 2)]);
+        assert_eq!(failed_episodes(&testers[..1], 1).collect::<Vec<_>>(), [("random", 0)]);
+    }
+
+    #[test]
+    fn a_failure_that_is_not_kept_is_in_the_summary_with_the_reason_and_the_next_step() {
+        let record = testing::record("hard:3..9");
+        let why = Some("`random`, episode 0: it does not fail when it is played alone".to_owned());
+        let level = LevelVerdict { not_kept: why, ..verdict(1, 0, 1) };
+        let words = "hard:1: no failed episode is kept, because the game does not play the same each time (jump doctor garden \
+                     --mode hard --level 4 --ticks 10000 may find the cause): `random`, episode 0: it does not fail when it \
+                     is played alone";
+        assert_eq!(missing_failure("jump", &record, &level).as_deref(), Some(words));
+        assert_eq!(missing_failure("jump", &record, &verdict(1, 0, 1)), None);
+        let parent = tempfile::tempdir().expect("a folder");
+        let (mut folder, _) = TestFolder::open(parent.path(), &record, Earlier::Keep).expect("new");
+        (0..7).for_each(|index| folder.keep(&LevelVerdict { index, ..level.clone() }).expect("writable"));
+        folder.finish().expect("writable");
+        let page = summary(&Overview::read(parent.path()).expect("results"), None, "jump");
+        assert!(
+            page.contains("Failed episodes that are not kept (7):\n\n- hard:1: no failed episode is kept, because "),
+            "{page}"
+        );
+    }
+
+    #[test]
+    fn places_that_are_not_compared_are_in_the_summary_with_the_command_that_compares_them() {
+        let before = TestRecord { seed: 4, ..testing::record("hard:0..3") };
+        let comparison = Comparison {
+            places_left_out: vec!["the testers differ (a; before: b): 1 unsolved level, such as hard:0".to_owned()],
+            earlier: Some(EarlierTest { folder: "my runs/a".into(), record: before.clone() }),
+            ..Comparison::default()
+        };
+        let command = comparable_command("jump", &before, &comparison).expect("there is an earlier test");
+        assert!(command.contains(" --bot random --episodes 1 --seed 4 --against 'my runs/a' "), "{command}");
+        let lines = compared(&comparison, Some(command.clone()));
+        for line in
+            ["Places not compared: the testers differ (a; before: b): 1 unsolved level, such as hard:0.", &command]
+        {
+            assert!(lines.iter().any(|found| found == line), "{line}: {lines:?}");
+        }
+        let page = crate::verdict_report::compared(&comparison, &before, "jump");
+        assert!(page.contains("<p>Places not compared: the testers differ (a; before: b): 1 "), "{page}");
+        assert!(page.contains("<pre><code>jump test garden --levels hard:0..3 "), "{page}");
+        assert_eq!(comparable_command("jump", &before, &Comparison::default()), None);
     }
 
     #[test]

@@ -13,6 +13,9 @@ const RADIUS: f32 = 0.1;
 /// Share of that distance that a common stop must have from the start.
 const FAR: f32 = 0.5;
 
+/// Returns to the start after which an episode moves to and fro: its furthest position is no obstacle.
+const MANY_RETURNS: u32 = 5;
+
 /// Progress of an agent in an episode.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Track {
@@ -35,12 +38,54 @@ pub(super) struct Route {
     pub end: Vec2,
     /// The entity whose position it is, if the game does not declare positions.
     pub entity: Option<String>,
+    /// Returns to the start, from far away.
+    pub returns: Returns,
 }
 
 impl Route {
+    fn new(start: Vec2, entity: Option<String>) -> Self {
+        Self { start, furthest: start, end: start, entity, returns: Returns::default() }
+    }
+
+    /// Adds a position of the same entity.
+    fn add(&mut self, position: Vec2) {
+        self.end = position;
+        let distance = self.start.distance(position);
+        if distance > self.length() {
+            self.furthest = position;
+        }
+        self.returns.add(distance, self.length());
+    }
+
     /// Returns the largest distance from the start.
     fn length(&self) -> f32 {
         self.start.distance(self.furthest)
+    }
+}
+
+/// Counter of an agent's returns to its start. Only those from distances of about its largest one count.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Returns {
+    /// Number of returns.
+    pub count: u32,
+    /// The largest distance at the time when the count began.
+    scale: f32,
+    is_far: bool,
+}
+
+impl Returns {
+    /// Adds a distance from the start; `length` is the largest one so far.
+    fn add(&mut self, distance: f32, length: f32) {
+        if length > 2.0 * self.scale {
+            // Returns from much nearer say nothing about an agent that has come further since.
+            *self = Self { count: 0, scale: length, is_far: false };
+        }
+        if distance >= FAR * length && length > 0.0 {
+            self.is_far = true;
+        } else if self.is_far && distance <= RADIUS * length {
+            self.is_far = false;
+            self.count = self.count.saturating_add(1);
+        }
     }
 }
 
@@ -81,13 +126,8 @@ impl TrackCounter {
         }
         match &mut self.now.route {
             // Distances from another entity's start mean nothing.
-            Some(route) if route.entity == entity => {
-                route.end = position;
-                if route.start.distance(position) > route.length() {
-                    route.furthest = position;
-                }
-            }
-            route => *route = Some(Route { start: position, furthest: position, end: position, entity }),
+            Some(route) if route.entity == entity => route.add(position),
+            route => *route = Some(Route::new(position, entity)),
         }
     }
 
@@ -218,23 +258,28 @@ pub enum StopKind {
     Start,
     /// The position furthest from the start of all episodes, which stopped at different ones.
     Best,
+    /// The start, to which the episodes returned again and again: such a position is no measure of progress.
+    Around,
 }
 
 impl fmt::Display for CommonStop {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { kind, x, y, within, episodes, of, entity } = self;
         match (kind, of) {
-            (StopKind::Best, _) => write!(f, "the best of {of} episodes ")?,
+            (StopKind::Best, _) => write!(f, "of {of} episodes, the one that went furthest ")?,
             (_, 1) => f.write_str("the only episode ")?,
             (_, 2) => f.write_str("both episodes ")?,
             _ if episodes == of => write!(f, "all {of} episodes ")?,
             _ => write!(f, "{episodes} of {of} episodes ")?,
         }
         match kind {
-            StopKind::Best | StopKind::Furthest if *episodes == 1 => write!(f, "got no further than ({x:.1}, {y:.1})")?,
-            StopKind::Best | StopKind::Furthest => {
-                write!(f, "got no further than ({x:.1}, {y:.1}), within {within:.1}")?;
+            StopKind::Best | StopKind::Furthest if *episodes == 1 => {
+                write!(f, "got no further from its start than ({x:.1}, {y:.1})")?;
             }
+            StopKind::Best | StopKind::Furthest => {
+                write!(f, "got no further from their start than ({x:.1}, {y:.1}), within {within:.1}")?;
+            }
+            StopKind::Around => write!(f, "went to and fro, within {within:.1} of ({x:.1}, {y:.1})")?,
             StopKind::End => write!(f, "ended within {within:.1} of ({x:.1}, {y:.1})")?,
             StopKind::Start => write!(f, "stayed within {within:.1} of ({x:.1}, {y:.1})")?,
         }
@@ -243,7 +288,9 @@ impl fmt::Display for CommonStop {
 }
 
 /// Returns the position at which more than half of these episodes stopped: the furthest one from the start, or else
-/// the last one, or else how far the best episode came. `None` without positions, or with those of different entities.
+/// the last one, or else how far the best episode came. If more than half of them returned to their start again and
+/// again, it is the start: the position of a paddle or of a cursor shows no progress. `None` without positions, or with
+/// those of different entities.
 pub(super) fn common_stop<'a>(tracks: impl Iterator<Item = &'a Track>) -> Option<CommonStop> {
     let routes: Vec<&Route> = tracks.filter_map(|track| track.route.as_ref()).collect();
     let entity = routes.first()?.entity.clone();
@@ -268,6 +315,13 @@ pub(super) fn common_stop<'a>(tracks: impl Iterator<Item = &'a Track>) -> Option
         // An entity that never moves may not be the agent's.
         let found = densest(&ends, 0.0).filter(is_most).filter(|_| entity.is_none())?;
         return Some(stop(StopKind::Start, found));
+    }
+    let around: Vec<&Route> =
+        routes.iter().copied().filter(|route| route.returns.count >= MANY_RETURNS && route.length() > 0.0).collect();
+    if 2 * around.len() as u64 > of {
+        let start = around[0].start;
+        let within = around.iter().map(|route| start.distance(route.start) + route.length()).fold(0.0, f32::max);
+        return Some(stop(StopKind::Around, (start, within, around.len() as u64)));
     }
     let radius = RADIUS * length;
     // Episodes that hardly left the start show no obstacle.
@@ -304,7 +358,7 @@ mod tests {
     /// Makes the track of an episode that goes from 0, 0 to `furthest` and ends at `end`.
     fn track(furthest: [f32; 2], end: [f32; 2]) -> Track {
         let [furthest, end] = [furthest, end].map(Vec2::from_array);
-        let route = Some(Route { start: Vec2::ZERO, furthest, end, entity: None });
+        let route = Some(Route { furthest, end, ..Route::new(Vec2::ZERO, None) });
         Track { route, ..Track::default() }
     }
 
@@ -316,14 +370,20 @@ mod tests {
     fn episodes_that_meet_an_obstacle_stop_at_the_same_distance() {
         let walled = [track([12.0, 3.0], [1.0, 0.0]), track([12.5, 3.0], [5.0, 0.0]), track([12.25, 3.0], [9.0, 0.0])];
         // Each is within a tenth of 12.9 of all, and the first counts.
-        assert_eq!(words(&walled).as_deref(), Some("all 3 episodes got no further than (12.0, 3.0), within 0.5"));
+        assert_eq!(
+            words(&walled).as_deref(),
+            Some("all 3 episodes got no further from their start than (12.0, 3.0), within 0.5")
+        );
         let mut rested = walled.to_vec();
         rested.push(track([0.5, 0.0], [0.0, 0.0]));
-        let most = "3 of 4 episodes got no further than (12.0, 3.0), within 0.5";
+        let most = "3 of 4 episodes got no further from their start than (12.0, 3.0), within 0.5";
         assert_eq!(words(&rested).as_deref(), Some(most));
-        let both = "both episodes got no further than (12.0, 3.0), within 0.5";
+        let both = "both episodes got no further from their start than (12.0, 3.0), within 0.5";
         assert_eq!(words(&walled[..2]).as_deref(), Some(both));
-        assert_eq!(words(&walled[..1]).as_deref(), Some("the only episode got no further than (12.0, 3.0)"));
+        assert_eq!(
+            words(&walled[..1]).as_deref(),
+            Some("the only episode got no further from its start than (12.0, 3.0)")
+        );
     }
 
     #[test]
@@ -337,11 +397,38 @@ mod tests {
         let tracks = [track([10.0, 0.0], [2.0, 1.0]), track([0.0, 10.0], [2.0, 1.5]), track([-10.0, 0.0], [2.0, 1.0])];
         assert_eq!(words(&tracks).as_deref(), Some("all 3 episodes ended within 0.5 of (2.0, 1.0)"));
         let apart = [track([10.0, 0.0], [9.0, 1.0]), track([0.0, 10.0], [2.0, 9.0]), track([-10.0, 0.0], [-5.0, 0.0])];
-        let best = "the best of 3 episodes got no further than (10.0, 0.0)";
+        let best = "of 3 episodes, the one that went furthest got no further from its start than (10.0, 0.0)";
         assert_eq!(words(&apart).as_deref(), Some(best), "they stopped at different positions");
-        let two = "the best of 2 episodes got no further than (10.0, 0.0)";
+        let two = "of 2 episodes, the one that went furthest got no further from its start than (10.0, 0.0)";
         assert_eq!(words(&apart[..2]).as_deref(), Some(two));
         assert_eq!(words(&[]), None);
+    }
+
+    /// Makes the track of an episode with these positions along a line.
+    fn along(line: impl IntoIterator<Item = f32>) -> Track {
+        let mut counter = TrackCounter::new(Entity::PLACEHOLDER);
+        line.into_iter().for_each(|x| counter.note(Vec2::new(2.0, x), None));
+        counter.take()
+    }
+
+    #[test]
+    fn an_agent_that_goes_to_and_fro_meets_no_obstacle_at_its_furthest_position() {
+        // A paddle: up to 9, back, down to -8 and back, three times.
+        let paddle = || along([0.0, 5.0, 9.0, 5.0, 0.0, -5.0, -8.0, -5.0].repeat(3).into_iter().chain([0.0]));
+        assert_eq!(words(&[paddle()]).as_deref(), Some("the only episode went to and fro, within 9.0 of (2.0, 0.0)"));
+        let tracks = [paddle(), along([0.0, 3.0, 6.0]), paddle()];
+        let most = "2 of 3 episodes went to and fro, within 9.0 of (2.0, 0.0)";
+        assert_eq!(words(&tracks).as_deref(), Some(most));
+        let few = [paddle(), along([0.0, 4.5, 9.0]), along([0.0, 4.0, 8.5])];
+        let met = "all 3 episodes got no further from their start than (2.0, 9.0), within 0.5";
+        assert_eq!(words(&few).as_deref(), Some(met), "one of three is not most");
+        let wall = along([0.0, 5.0, 9.0, 5.0, 0.0, 9.0, 9.0]);
+        let met = "the only episode got no further from its start than (2.0, 9.0)";
+        assert_eq!(words(&[wall]).as_deref(), Some(met), "one return is no habit");
+        // It trembles at the start, and walks away then.
+        let left = along([0.0, 1.0].repeat(20).into_iter().chain([2.0, 4.0, 6.0]));
+        let met = "the only episode got no further from its start than (2.0, 6.0)";
+        assert_eq!(words(&[left]).as_deref(), Some(met), "small returns do not count");
     }
 
     #[test]
@@ -355,7 +442,8 @@ mod tests {
         let all = |tracks: &[Track]| tracks.iter().map(|track| guessed(track.clone(), "the one")).collect::<Vec<_>>();
         assert_eq!(words(&all(&still)), None);
         let moved = vec![track([4.0, 0.0], [4.0, 0.0]); 3];
-        let named = "all 3 episodes got no further than (4.0, 0.0), within 0.0, by the position of the one";
+        let named =
+            "all 3 episodes got no further from their start than (4.0, 0.0), within 0.0, by the position of the one";
         assert_eq!(words(&all(&moved)).as_deref(), Some(named));
         let mixed: Vec<Track> =
             moved.iter().zip(["a", "b", "b"]).map(|(one, name)| guessed(one.clone(), name)).collect();
@@ -407,7 +495,8 @@ mod tests {
             counter.note(Vec2::new(x, 0.0), None);
         }
         let [start, furthest, end] = [1.0, 4.0, 2.0].map(|x| Vec2::new(x, 0.0));
-        assert_eq!(counter.take().route, Some(Route { start, furthest, end, entity: None }));
+        let route = counter.take().route.expect("positions are known");
+        assert_eq!((route.start, route.furthest, route.end, route.entity), (start, furthest, end, None));
         assert_eq!(counter.take(), Track::default(), "the next episode has its own");
     }
 }

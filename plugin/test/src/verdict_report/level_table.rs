@@ -1,7 +1,9 @@
 //! The table of levels, with the text above it.
 
 use crate::{
-    verdict::{Finding, LevelVerdict, ResultLines, TestError, TestRecord, TesterVerdict, rerun_commands},
+    verdict::{
+        Finding, LevelVerdict, ResultLines, TestError, TestRecord, TesterVerdict, missing_failure, rerun_commands,
+    },
     verdict_report::{
         drawn::{Drawer, Drawn, Plans, walks},
         interval,
@@ -187,6 +189,9 @@ pub(crate) fn details(record: &TestRecord, level: &LevelVerdict, program: &str, 
     }
     if let Some(news) = level.recorded_news() {
         let _ = writeln!(out, "<p>{}.</p>", text(&news));
+    }
+    if let Some(missing) = missing_failure(program, record, level) {
+        let _ = writeln!(out, "<p>{}.</p>", text(&missing));
     }
     out += &walks(level);
     out += &testers(&level.testers);

@@ -77,8 +77,8 @@ fn common_stops_and_levels_that_are_solved_in_their_first_tick_are_on_the_page()
     let stopped = LevelVerdict { stop, ..level(0, 0, 3, 0) };
     let at_start = LevelVerdict { solved_at_start: true, ..level(1, 3, 3, 1) };
     let html = page(&[stopped, at_start], &PLAIN);
-    let words = "lost 3; all 3 episodes got no further than (12.4, 3.0), within 0.5, by the position of the entity with \
-                 `Player&lt;T&gt;`";
+    let words = "lost 3; all 3 episodes got no further from their start than (12.4, 3.0), within 0.5, by the \
+                 position of the entity with `Player&lt;T&gt;`";
     assert!(html.contains(words), "{html}");
     assert!(html.contains("<p>1 level is solved in its first tick: hard:1.</p>"), "{html}");
 }

@@ -118,6 +118,7 @@ fn verdict(index: u64) -> LevelVerdict {
         reached: Some(ReachedCells { side: 0.5, cells: [[-1, 2], [3, 0]].into(), entity: Some("the one".to_owned()) }),
         testers: ["random", "chaos"].map(tester).to_vec(),
         findings: vec![finding],
+        not_kept: Some("`random`, episode 0: it does not fail when it is played alone".to_owned()),
         recorded: Some(recorded()),
     }
 }

@@ -11,7 +11,7 @@ use playbot_test::{
     findings::{FINDINGS, list_findings},
     verdict::{
         AGAINST, Comparison, JUNIT, LevelVerdict, MOST_WORST, Overview, RESULTS, RecordedTotal, ResultLines, SUMMARY,
-        TesterTotal, Trials, action_search, report_date, wilson, write_reports,
+        TesterTotal, Trials, action_search, comparable_command, missing_failure, report_date, wilson, write_reports,
     },
     verdict_report::{HtmlReport, REPORT, write_html},
 };
@@ -91,8 +91,9 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     stops(&overview).iter().for_each(|line| report!("{line}"));
     search(&overview).iter().for_each(|line| report!("{line}"));
     replays(results.folder, &overview).iter().for_each(|line| report!("{line}"));
+    missing(&overview).iter().for_each(|line| report!("{line}"));
     if let Some(comparison) = &comparison {
-        report_comparison(comparison);
+        report_comparison(comparison, &overview);
     }
     report_recording(&overview.recorded);
     let names = [RESULTS, REPORT, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
@@ -133,6 +134,12 @@ fn replays(folder: &Path, overview: &Overview) -> Vec<String> {
         _ => {}
     }
     lines
+}
+
+/// Returns the worst levels without a kept failure in a test that keeps failures, with the reason and what to do.
+fn missing(overview: &Overview) -> Vec<String> {
+    let missing = |level| missing_failure(program::name(), &overview.record, level);
+    overview.worst.iter().filter_map(missing).collect()
 }
 
 /// Returns the command that shows a finding.
@@ -215,8 +222,17 @@ fn hardest(overview: &Overview) -> PlainTable {
     }
 }
 
-fn report_comparison(comparison: &Comparison) {
+fn report_comparison(comparison: &Comparison, overview: &Overview) {
+    let Comparison { levels, only_now, only_before, .. } = comparison;
+    if only_now + only_before > 0 {
+        let levels = counted(*levels, "level");
+        report!("{levels} in both results are compared; {only_now} only now, {only_before} only before");
+    }
     comparison.left_out.iter().for_each(|why| report!("left out of the comparison: {why}"));
+    comparison.places_left_out.iter().for_each(|why| report!("places not compared: {why}"));
+    if let Some(command) = comparable_command(program::name(), &overview.record, comparison) {
+        report!("places are compared after the same test as before: {command}");
+    }
     let lists = [
         ("unsolvable", texts(&comparison.unsolvable)),
         ("harder", texts(&comparison.harder)),

@@ -4,6 +4,7 @@ use crate::verdict::{
     Finding, LevelMaps, LevelOutcome, TesterRecord,
     compare::*,
     folder::{Earlier, TestFolder},
+    reports::comparable_command,
     results::RESULTS,
     testing,
     testing::{tester, verdict},
@@ -147,6 +148,69 @@ fn without_maps_the_cells_of_positions_are_compared_in_the_larger_size() {
     assert!(unreached(went(1, 1.0, 6, None), went(0, 1.0, 5, Some("the one"))).is_empty(), "another entity");
     assert!(unreached(went(1, 0.0, 6, None), went(0, 1.0, 5, None)).is_empty(), "no side of a cell");
     assert!(unreached(went(1, 0.75, 6, None), went(0, 1.0, 5, None)).is_empty(), "no power of two");
+}
+
+/// Makes an unsolved level of these testers, with the cells of so many columns; without cells for none.
+fn unsolved(testers: &[&str], columns: i32) -> LevelVerdict {
+    let cells = (0..columns).map(|column| [column, 0]).collect();
+    let reached = (columns > 0).then_some(ReachedCells { side: 1.0, cells, entity: None });
+    LevelVerdict {
+        reached,
+        testers: testers.iter().map(|name| tester(name, 0, 1, false)).collect(),
+        ..verdict(0, 0, 1)
+    }
+}
+
+/// Compares a level with an earlier one. Returns why its places are not compared, and the command that compares them.
+fn left_out(before: (&TestRecord, LevelVerdict), now: (&TestRecord, LevelVerdict)) -> (Vec<String>, Option<String>) {
+    let parent = tempfile::tempdir().expect("a folder");
+    let (one, other) = (parent.path().join("before"), parent.path().join("now"));
+    written(&one, before.0, &[before.1]);
+    written(&other, now.0, &[now.1]);
+    let comparison = Comparison::read(&one, &other).expect("comparable");
+    let command = comparable_command("jump", now.0, &comparison);
+    let command = command.map(|command| command.replace(&one.display().to_string(), "BEFORE"));
+    assert!(comparison.unreached.is_empty(), "{comparison:?}");
+    (comparison.places_left_out, command)
+}
+
+#[test]
+fn places_of_other_testers_are_not_compared_and_the_command_names_the_earlier_ones() {
+    let (two, one) = (["chaos", "random"], ["chaos"]);
+    let before = TestRecord { seed: 4, episodes: 3, ..record(&two) };
+    let (why, command) = left_out((&before, unsolved(&two, 6)), (&record(&one), unsolved(&one, 2)));
+    let expected = "the testers differ (chaos; before: chaos, random): 1 unsolved level, such as hard:0";
+    assert_eq!(why, [expected]);
+    let expected = "jump test garden --levels hard:0..499 --bot chaos,random --episodes 3 --seed 4 --against BEFORE --out \
+                    runs/comparable";
+    assert_eq!(command.as_deref(), Some(expected));
+    let (why, command) = left_out((&record(&two), unsolved(&two, 0)), (&record(&one), unsolved(&one, 0)));
+    assert!(why.is_empty() && command.is_none(), "a game without positions: {why:?}");
+    let solved = LevelVerdict { testers: vec![tester("chaos", 1, 1, false)], ..verdict(0, 1, 1) };
+    let (why, _) = left_out((&record(&two), unsolved(&two, 6)), (&record(&one), solved));
+    assert!(why.is_empty(), "a solved level needs no explanation: {why:?}");
+}
+
+#[test]
+fn places_of_other_draws_and_of_results_without_positions_are_named() {
+    let testers = ["chaos"];
+    let (before, now) = (record(&testers), TestRecord { seed: 9, episodes: 2, ..record(&testers) });
+    let (why, command) = left_out((&before, unsolved(&testers, 6)), (&now, unsolved(&testers, 2)));
+    let expected = "the random seeds differ (9; before: 0) and the numbers of episodes differ (2; before: 1), so random \
+                    testers went elsewhere on a level that no tester has solved: 1 unsolved level, such as hard:0";
+    assert_eq!(why, [expected]);
+    assert!(command.is_some_and(|command| command.contains(" --episodes 1 --seed 0 ")));
+    let many = TestRecord { maps: MapScope::Failed, ..record(&testers) };
+    let (why, command) = left_out((&many, unsolved(&testers, 0)), (&before, unsolved(&testers, 2)));
+    let expected = "the earlier results have no visited squares (of so many levels, only failed ones have maps: test fewer): \
+                    1 unsolved level, such as hard:0";
+    assert_eq!((why, command), (vec![expected.to_owned()], None), "no other tester helps");
+    let (why, _) = left_out((&before, unsolved(&testers, 2)), (&before, unsolved(&testers, 0)));
+    assert_eq!(why, ["these results have no visited squares: 1 unsolved level, such as hard:0"]);
+    let mut moved = unsolved(&testers, 2);
+    moved.reached.iter_mut().for_each(|cells| cells.entity = Some("the one".to_owned()));
+    let (why, _) = left_out((&before, unsolved(&testers, 2)), (&before, moved));
+    assert!(why[0].starts_with("the squares are others: "), "{why:?}");
 }
 
 #[test]
