@@ -135,6 +135,72 @@ fn buttons_are_clicked_on_by_text_by_name_and_by_path() {
     }
 }
 
+/// Stands for the crate `bevy_ui_widgets`, which this program is built without. The real one is tested in
+/// `tests/foreign/default_features/orchard/tests/widgets.rs`.
+mod stand_in {
+    use bevy::prelude::*;
+
+    #[derive(Component, Reflect)]
+    #[reflect(Component)]
+    #[type_path = "bevy_ui_widgets::button"]
+    pub struct Button;
+}
+
+/// Buttons with a text, and neither `Interaction` nor a `Name`.
+fn bare_widgets(app: &mut App) {
+    let size = || Node { width: Val::Px(200.0), height: Val::Px(50.0), ..default() };
+    let build = move |mut commands: Commands| {
+        commands.spawn(Node::default()).with_children(|menu| {
+            menu.spawn((size(), stand_in::Button, children![Text::new("Start")]));
+            menu.spawn((size(), children![Text::new("Quit")])).observe(
+                |_: On<Pointer<Click>>, mut seen: ResMut<PointerEvents>| seen.0.push("observer of Quit".to_owned()),
+            );
+            menu.spawn((size(), stand_in::Button, children![Text::new("Back")]));
+            menu.spawn((size(), Button, children![Text::new("Back")]));
+            // Does nothing.
+            menu.spawn((size(), children![Text::new("Title")]));
+        });
+    };
+    let note =
+        |click: On<Pointer<Click>>, widgets: Query<(), With<stand_in::Button>>, mut seen: ResMut<PointerEvents>| {
+            seen.0.extend(widgets.get(click.entity).map(|()| "widget".to_owned()));
+        };
+    app.register_type::<stand_in::Button>().init_resource::<PointerEvents>();
+    app.add_observer(note).add_systems(Startup, build);
+}
+
+fn widgets(app: &mut App) {
+    bare_widgets(app);
+    app.add_systems(Startup, |mut commands: Commands| {
+        commands.spawn(Camera2d);
+    });
+}
+
+#[test]
+fn widgets_and_observed_nodes_are_clicked_on_by_text() {
+    for menu in [widgets as fn(&mut App), bare_widgets] {
+        let game = game(menu).keys([Vec::<KeyCode>::new()]).clicks(["Start", "Quit"]);
+        let (world, agent) = played(&game, &[1, 0, 0, 2, 0, 0]);
+        assert_eq!(world.resource::<PointerEvents>().0, ["widget", "observer of Quit"]);
+        assert_eq!(counts(&world, agent), (2, 0));
+    }
+}
+
+#[test]
+fn widgets_and_observed_nodes_are_in_the_warnings() {
+    let warning = |name: &'static str| {
+        let (world, agent) = played(&game(widgets).clicks([name]).time_limit(2), &[0, 0]);
+        assert_eq!(counts(&world, agent), (0, 2), "{name}");
+        let clicks = world.get::<ButtonClicks>(agent).expect("it clicks");
+        let [warning] = clicks.warnings() else { panic!("once: {:?}", clicks.warnings()) };
+        warning.clone()
+    };
+    let text = warning("Back");
+    assert!(text.contains("2 buttons are called `Back`"), "one of either kind: {text}");
+    let text = warning("Title");
+    assert!(text.ends_with("There was `Back`, `Back`, `Quit`, `Start`"), "a text is no button: {text}");
+}
+
 #[test]
 fn a_button_is_let_go_of_in_the_next_tick() {
     for menu in [menu as fn(&mut App), bare_menu] {

@@ -111,6 +111,10 @@ impl ForeignGame {
     /// text, by its `Name`, or by a path of `Name`s above it, such as `Options/Back`. It needs the feature `ui` of this
     /// crate.
     ///
+    /// Buttons are nodes with `Interaction`, and buttons, checkboxes, radio buttons, sliders and items of
+    /// `bevy_ui_widgets`. If none of them has the name, nodes with an observer of their own for `Pointer<Click>`,
+    /// `Pointer<Press>` or `Pointer<Release>` are searched, and then all nodes that have a `Name`.
+    ///
     /// The mouse cursor moves to the middle of the button, and the left mouse button goes down, and up before the next
     /// tick. So `Interaction`, `ButtonInput<MouseButton>` and Bevy's picking see a person's click. Where no camera of a
     /// window lays the button out, the mouse stands still. Then `Interaction` is set, and the events of Bevy's picking
