@@ -7,7 +7,7 @@ use bevy::{
     input::{ButtonState, mouse::MouseButtonInput},
     prelude::*,
     render::render_resource::TextureFormat,
-    ui::{InteractionDisabled, IsDefaultUiCamera},
+    ui::{InteractionDisabled, IsDefaultUiCamera, Pressed},
     window::{PrimaryWindow, WindowEvent},
 };
 use bevy_playbot::virtual_input::ActionAxis;
@@ -161,12 +161,29 @@ fn bare_widgets(app: &mut App) {
             menu.spawn((size(), children![Text::new("Title")]));
         });
     };
-    let note =
-        |click: On<Pointer<Click>>, widgets: Query<(), With<stand_in::Button>>, mut seen: ResMut<PointerEvents>| {
-            seen.0.extend(widgets.get(click.entity).map(|()| "widget".to_owned()));
-        };
     app.register_type::<stand_in::Button>().init_resource::<PointerEvents>();
-    app.add_observer(note).add_systems(Startup, build);
+    app.add_observer(press_widget).add_observer(click_widget).add_observer(release_widget);
+    app.add_systems(Startup, build);
+}
+
+type Widgets<'w, 's> = Query<'w, 's, Has<Pressed>, With<stand_in::Button>>;
+
+// As in `bevy_ui_widgets`, a widget that is not pressed is pressed, and one that is pressed is clicked on.
+
+fn press_widget(press: On<Pointer<Press>>, widgets: Widgets, mut commands: Commands) {
+    if widgets.get(press.entity).is_ok_and(|is_pressed| !is_pressed) {
+        commands.entity(press.entity).insert(Pressed);
+    }
+}
+
+fn click_widget(click: On<Pointer<Click>>, widgets: Widgets, mut seen: ResMut<PointerEvents>) {
+    seen.0.extend(widgets.get(click.entity).unwrap_or_default().then(|| "widget".to_owned()));
+}
+
+fn release_widget(release: On<Pointer<Release>>, widgets: Widgets, mut commands: Commands) {
+    if widgets.get(release.entity).unwrap_or_default() {
+        commands.entity(release.entity).remove::<Pressed>();
+    }
 }
 
 fn widgets(app: &mut App) {
@@ -180,9 +197,9 @@ fn widgets(app: &mut App) {
 fn widgets_and_observed_nodes_are_clicked_on_by_text() {
     for menu in [widgets as fn(&mut App), bare_widgets] {
         let game = game(menu).keys([Vec::<KeyCode>::new()]).clicks(["Start", "Quit"]);
-        let (world, agent) = played(&game, &[1, 0, 0, 2, 0, 0]);
-        assert_eq!(world.resource::<PointerEvents>().0, ["widget", "observer of Quit"]);
-        assert_eq!(counts(&world, agent), (2, 0));
+        let (world, agent) = played(&game, &[1, 1, 0, 0, 2, 0, 0]);
+        assert_eq!(world.resource::<PointerEvents>().0, ["widget", "widget", "observer of Quit"]);
+        assert_eq!(counts(&world, agent), (3, 0));
     }
 }
 

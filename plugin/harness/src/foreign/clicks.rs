@@ -290,6 +290,8 @@ fn trigger<E: Clone + Debug + Reflect>(world: &mut World, button: Entity, event:
         messages.write(event.clone());
     }
     world.trigger(event);
+    // Observers of the next event see what the commands of this one's do.
+    world.flush();
 }
 
 /// The result of a search for a button.
