@@ -195,6 +195,19 @@ fn a_game_without_snapshots_is_not_compared_with_any() {
 }
 
 #[test]
+fn inputs_that_snapshots_do_not_hold_are_named() {
+    let (clicking, turning) = (saving(true, true).clicks(["Start"]), saving(true, true).wheel([0.0, 1.0]));
+    for (game, inputs) in
+        [(turning.clone(), "`.wheel`"), (clicking, "`.clicks`"), (turning.clicks(["Start"]), "`.wheel` and `.clicks`")]
+    {
+        let report = examined(&game);
+        let skipped = report.of(DoctorComparison::Snapshots).and_then(|of| of.skipped.clone()).expect("none was saved");
+        let why = format!("(snapshots do not hold the state of {inputs}), so explorers return by replays");
+        assert!(skipped.starts_with("no snapshot was saved in ") && skipped.ends_with(&why), "{skipped}");
+    }
+}
+
+#[test]
 fn a_snapshot_that_cannot_be_loaded_is_not_compared() {
     let broken = strip().snapshot(
         |walker: Single<&Transform, With<Walker>>| **walker,

@@ -150,13 +150,16 @@ fn held_keys_go_on_and_keys_of_a_later_tick_are_not_held() {
 #[test]
 fn games_with_other_inputs_and_worlds_without_a_level_have_no_snapshot() {
     let with_pad = saving().gamepad_buttons([vec![], vec![GamepadButton::South], vec![], vec![]]);
-    for (game, is_saved) in [(saving(), true), (with_pad, false), (strip(), false)] {
+    let of_pad = Some("snapshots do not hold the state of gamepad buttons".to_owned());
+    // A game that declares no snapshots has no obstacle to them.
+    for (game, is_saved, obstacle) in [(saving(), true, None), (with_pad, false, of_pad), (strip(), false, None)] {
         let (mut world, agents) = build_world(&game, "default", 0, 0, 1);
         world.entity_mut(agents[0]).insert((Control::Bot, LevelQueue::Always(0)));
         assert!(SavedEpisode::of(&game, &world, agents[0]).is_none(), "nothing is played yet");
         hashes(&mut world, agents[0], &[2, 2]);
         let saved = SavedEpisode::of(&game, &world, agents[0]);
         assert_eq!(saved.is_some(), is_saved);
+        assert_eq!(game.tools().snapshots.obstacle(&world), obstacle);
         let (mut fresh, others) = build_world(&game, "default", 0, 0, 1);
         assert!(!saved.is_some_and(|saved| saved.restore(&game, &mut fresh, others[0])), "no level was built");
     }

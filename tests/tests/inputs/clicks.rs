@@ -7,7 +7,7 @@ use bevy::{
     input::{ButtonState, mouse::MouseButtonInput},
     prelude::*,
     render::render_resource::TextureFormat,
-    ui::{InteractionDisabled, IsDefaultUiCamera},
+    ui::{InteractionDisabled, IsDefaultUiCamera, Pressed},
     window::{PrimaryWindow, WindowEvent},
 };
 use bevy_playbot::virtual_input::ActionAxis;
@@ -133,6 +133,89 @@ fn buttons_are_clicked_on_by_text_by_name_and_by_path() {
             assert_eq!((still_pressed(&mut world), counts(&world, agent)), (1, (1, 0)), "action {action}");
         }
     }
+}
+
+/// Stands for the crate `bevy_ui_widgets`, which this program is built without. The real one is tested in
+/// `tests/foreign/default_features/orchard/tests/widgets.rs`.
+mod stand_in {
+    use bevy::prelude::*;
+
+    #[derive(Component, Reflect)]
+    #[reflect(Component)]
+    #[type_path = "bevy_ui_widgets::button"]
+    pub struct Button;
+}
+
+/// Buttons with a text, and neither `Interaction` nor a `Name`.
+fn bare_widgets(app: &mut App) {
+    let size = || Node { width: Val::Px(200.0), height: Val::Px(50.0), ..default() };
+    let build = move |mut commands: Commands| {
+        commands.spawn(Node::default()).with_children(|menu| {
+            menu.spawn((size(), stand_in::Button, children![Text::new("Start")]));
+            menu.spawn((size(), children![Text::new("Quit")])).observe(
+                |_: On<Pointer<Click>>, mut seen: ResMut<PointerEvents>| seen.0.push("observer of Quit".to_owned()),
+            );
+            menu.spawn((size(), stand_in::Button, children![Text::new("Back")]));
+            menu.spawn((size(), Button, children![Text::new("Back")]));
+            // Does nothing.
+            menu.spawn((size(), children![Text::new("Title")]));
+        });
+    };
+    app.register_type::<stand_in::Button>().init_resource::<PointerEvents>();
+    app.add_observer(press_widget).add_observer(click_widget).add_observer(release_widget);
+    app.add_systems(Startup, build);
+}
+
+type Widgets<'w, 's> = Query<'w, 's, Has<Pressed>, With<stand_in::Button>>;
+
+// As in `bevy_ui_widgets`, a widget that is not pressed is pressed, and one that is pressed is clicked on.
+
+fn press_widget(press: On<Pointer<Press>>, widgets: Widgets, mut commands: Commands) {
+    if widgets.get(press.entity).is_ok_and(|is_pressed| !is_pressed) {
+        commands.entity(press.entity).insert(Pressed);
+    }
+}
+
+fn click_widget(click: On<Pointer<Click>>, widgets: Widgets, mut seen: ResMut<PointerEvents>) {
+    seen.0.extend(widgets.get(click.entity).unwrap_or_default().then(|| "widget".to_owned()));
+}
+
+fn release_widget(release: On<Pointer<Release>>, widgets: Widgets, mut commands: Commands) {
+    if widgets.get(release.entity).unwrap_or_default() {
+        commands.entity(release.entity).remove::<Pressed>();
+    }
+}
+
+fn widgets(app: &mut App) {
+    bare_widgets(app);
+    app.add_systems(Startup, |mut commands: Commands| {
+        commands.spawn(Camera2d);
+    });
+}
+
+#[test]
+fn widgets_and_observed_nodes_are_clicked_on_by_text() {
+    for menu in [widgets as fn(&mut App), bare_widgets] {
+        let game = game(menu).keys([Vec::<KeyCode>::new()]).clicks(["Start", "Quit"]);
+        let (world, agent) = played(&game, &[1, 1, 0, 0, 2, 0, 0]);
+        assert_eq!(world.resource::<PointerEvents>().0, ["widget", "widget", "observer of Quit"]);
+        assert_eq!(counts(&world, agent), (3, 0));
+    }
+}
+
+#[test]
+fn widgets_and_observed_nodes_are_in_the_warnings() {
+    let warning = |name: &'static str| {
+        let (world, agent) = played(&game(widgets).clicks([name]).time_limit(2), &[0, 0]);
+        assert_eq!(counts(&world, agent), (0, 2), "{name}");
+        let clicks = world.get::<ButtonClicks>(agent).expect("it clicks");
+        let [warning] = clicks.warnings() else { panic!("once: {:?}", clicks.warnings()) };
+        warning.clone()
+    };
+    let text = warning("Back");
+    assert!(text.contains("2 buttons are called `Back`"), "one of either kind: {text}");
+    let text = warning("Title");
+    assert!(text.ends_with("There was `Back`, `Back`, `Quit`, `Start`"), "a text is no button: {text}");
 }
 
 #[test]

@@ -7,6 +7,7 @@ use crate::foreign::{
 };
 use bevy::{
     camera::{NormalizedRenderTarget, RenderTarget},
+    ecs::{component::ComponentId, observer::ObservedBy},
     input::InputSystems,
     picking::{
         backend::HitData,
@@ -289,6 +290,8 @@ fn trigger<E: Clone + Debug + Reflect>(world: &mut World, button: Entity, event:
         messages.write(event.clone());
     }
     world.trigger(event);
+    // Observers of the next event see what the commands of this one's do.
+    world.flush();
 }
 
 /// The result of a search for a button.
@@ -312,28 +315,54 @@ enum Target {
     WithoutMouse,
 }
 
+/// Type paths of the widgets of `bevy_ui_widgets` that do something when they are clicked on. They have no `Interaction`,
+/// and a game may have them while this crate is built without them.
+const WIDGETS: [&str; 6] = [
+    "bevy_ui_widgets::button::Button",
+    "bevy_ui_widgets::checkbox::Checkbox",
+    "bevy_ui_widgets::list::ListItem",
+    "bevy_ui_widgets::menu::MenuItem",
+    "bevy_ui_widgets::radio::RadioButton",
+    "bevy_ui_widgets::slider::Slider",
+];
+
+/// Returns the widgets among the components of a World.
+fn widgets(world: &World) -> Vec<ComponentId> {
+    let Some(registry) = world.get_resource::<AppTypeRegistry>().map(|registry| registry.read()) else {
+        return Vec::new();
+    };
+    let known = WIDGETS.iter().filter_map(|path| registry.get_with_type_path(path));
+    known.filter_map(|known| world.components().get_id(known.type_id())).collect()
+}
+
 /// Finds the button of this name. Buttons that cannot be clicked on do not make a name ambiguous.
 fn find(world: &mut World, name: &str) -> Found {
-    let mut nodes = world.query_filtered::<(Entity, Has<Interaction>), With<Node>>();
-    let nodes: Vec<(Entity, bool)> = nodes.iter(world).collect();
+    let mut nodes = world.query_filtered::<EntityRef, With<Node>>();
     let mut windows = world.query_filtered::<(Entity, &Window), With<PrimaryWindow>>();
     let windows = windows.single(world).ok().map(|(entity, window)| (entity, window.size(), window.scale_factor()));
     let world: &World = world;
-    let buttons = || nodes.iter().filter(|(_, is_button)| *is_button).map(|(entity, _)| *entity);
-    let mut meant: Vec<Entity> = buttons().filter(|&button| is_called(world, button, name)).collect();
-    if meant.is_empty() {
-        // Some buttons have no `Interaction`, such as those of `bevy_ui_widgets`. Their texts may be any text.
-        let has_name = |&entity: &Entity| world.get::<Name>(entity).is_some() && is_called(world, entity, name);
-        meant = nodes.iter().map(|(entity, _)| *entity).filter(has_name).collect();
-    }
+    let nodes: Vec<EntityRef> = nodes.iter(world).collect();
+    let widgets = widgets(world);
+    let is_button = |node: EntityRef| node.contains::<Interaction>() || widgets.iter().any(|id| node.contains_id(*id));
+    let is_observed = |node: EntityRef| is_observed(world, node);
+    // The texts of other nodes may be any text.
+    let kinds: [&dyn Fn(EntityRef) -> bool; 3] = [&is_button, &is_observed, &|node| node.contains::<Name>()];
+    let meant = |is_of_kind: &dyn Fn(EntityRef) -> bool| -> Vec<Entity> {
+        let meant = nodes.iter().filter(|node| is_of_kind(**node) && is_called(world, node.id(), name));
+        meant.map(EntityRef::id).collect()
+    };
+    let meant = kinds.into_iter().map(meant).find(|meant| !meant.is_empty());
     let paths = |entities: &mut dyn Iterator<Item = Entity>| {
         let mut paths: Vec<String> = entities.map(|entity| path(world, entity)).collect();
         paths.sort();
         paths
     };
-    if meant.is_empty() {
-        return Found::Missing(paths(&mut buttons()));
-    }
+    let Some(meant) = meant else {
+        // A name finds no node that has none, such as a screen that a click closes.
+        let has_name = |node: EntityRef| node.contains::<Name>() || !text(world, node.id()).is_empty();
+        let is_known = |node: EntityRef| is_button(node) || (is_observed(node) && has_name(node));
+        return Found::Missing(paths(&mut nodes.iter().filter(|node| is_known(**node)).map(EntityRef::id)));
+    };
     let reachable = meant.iter().filter_map(|&button| Some((button, target(world, button, windows)?)));
     let reachable: Vec<(Entity, Target)> = reachable.collect();
     match reachable.as_slice() {
@@ -341,6 +370,18 @@ fn find(world: &mut World, name: &str) -> Found {
         [(button, target)] => Found::One(*button, *target),
         several => Found::Several(paths(&mut several.iter().map(|(button, _)| *button))),
     }
+}
+
+/// Returns whether an observer of its own hears of clicks on a node.
+fn is_observed(world: &World, node: EntityRef) -> bool {
+    let clicks = [
+        world.event_key::<Pointer<Press>>(),
+        world.event_key::<Pointer<Release>>(),
+        world.event_key::<Pointer<Click>>(),
+    ];
+    let hears = |observer: &Observer| observer.descriptor().event_keys().iter().any(|key| clicks.contains(&Some(*key)));
+    let observers = node.get::<ObservedBy>().map_or(&[][..], ObservedBy::get);
+    observers.iter().any(|observer| world.get::<Observer>(*observer).is_some_and(hears))
 }
 
 /// Returns whether a name means this button: its text, its `Name`, or a path of `Name`s above it.

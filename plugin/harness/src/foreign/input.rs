@@ -111,6 +111,10 @@ impl ForeignGame {
     /// text, by its `Name`, or by a path of `Name`s above it, such as `Options/Back`. It needs the feature `ui` of this
     /// crate.
     ///
+    /// Buttons are nodes with `Interaction`, and buttons, checkboxes, radio buttons, sliders and items of
+    /// `bevy_ui_widgets`. If none of them has the name, nodes with an observer of their own for `Pointer<Click>`,
+    /// `Pointer<Press>` or `Pointer<Release>` are searched, and then all nodes that have a `Name`.
+    ///
     /// The mouse cursor moves to the middle of the button, and the left mouse button goes down, and up before the next
     /// tick. So `Interaction`, `ButtonInput<MouseButton>` and Bevy's picking see a person's click. Where no camera of a
     /// window lays the button out, the mouse stands still. Then `Interaction` is set, and the events of Bevy's picking
@@ -302,14 +306,22 @@ impl Input {
         }
     }
 
-    /// Returns whether actions hold nothing but keys and mouse buttons, or are passed on by the game's own system.
-    pub(super) fn is_of_buttons(&self) -> bool {
+    /// Returns why a tick cannot be saved, if actions hold more than keys and mouse buttons. Actions that the game's own
+    /// system passes on can be saved.
+    pub(super) fn unsaved(&self) -> Option<String> {
         let is_pad = |button: &VirtualButton| matches!(button, VirtualButton::Gamepad(_));
-        let has_others = !(self.pads.is_empty() && self.cursor.is_empty() && self.taps.is_empty());
-        let has_texts = !(self.texts.is_empty() && self.wheel.is_empty());
-        let has_parts = !self.clicks.is_empty() || self.axes.is_some() || self.whole.is_some();
-        let sets = self.sets();
-        !(has_others || has_texts || has_parts || sets.iter().flatten().any(is_pad))
+        let parts = [
+            ("gamepad buttons", !self.pads.is_empty() || self.sets().iter().flatten().any(is_pad)),
+            ("`.cursor`", !self.cursor.is_empty()),
+            ("`.taps`", !self.taps.is_empty()),
+            ("`.wheel`", !self.wheel.is_empty()),
+            ("`.types`", !self.texts.is_empty()),
+            ("`.clicks`", !self.clicks.is_empty()),
+            ("`.axes`", self.axes.is_some()),
+            ("`.input`", self.whole.is_some()),
+        ];
+        let parts: Vec<&str> = parts.into_iter().filter_map(|(name, is_said)| is_said.then_some(name)).collect();
+        (!parts.is_empty()).then(|| format!("snapshots do not hold the state of {}", parts.join(" and ")))
     }
 
     /// Returns the problem of the input: an unknown key, or parts that contradict each other. The text follows the name

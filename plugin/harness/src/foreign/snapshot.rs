@@ -206,7 +206,7 @@ struct SavedGame {
 
 impl SnapshotTools for ForeignGame {
     fn save(&self, world: &World, agent: Entity) -> Option<Snapshot> {
-        if !self.description.input.is_of_buttons() {
+        if self.description.input.unsaved().is_some() {
             return None;
         }
         let cell = world.get_resource::<ForeignCell>()?;
@@ -252,9 +252,7 @@ impl SnapshotTools for ForeignGame {
             return false;
         }
         world.flush();
-        for (part, last) in cell.lock().rewards().zip(&saved.rewards) {
-            part.last = *last;
-        }
+        cell.lock().rewards().zip(&saved.rewards).for_each(|(part, last)| part.last = *last);
         for (held, last) in cell.lock().held().zip(&saved.held) {
             *held = *last;
         }
@@ -281,12 +279,13 @@ impl SnapshotTools for ForeignGame {
 
     fn prepare(&self, world: &mut World) {
         if let Some(whole) = world.get_resource::<WholeCell>() {
-            whole.lock().is_prepared = true;
+            whole.lock().is_prepared = self.description.input.unsaved().is_none();
         }
     }
 
     fn obstacle(&self, world: &World) -> Option<String> {
-        world.get_resource::<WholeCell>()?.lock().obstacle()
+        let of_input = self.description.snapshot.as_ref().and_then(|_| self.description.input.unsaved());
+        of_input.or_else(|| world.get_resource::<WholeCell>()?.lock().obstacle())
     }
 }
 
