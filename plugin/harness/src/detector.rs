@@ -134,6 +134,8 @@ pub struct DetectorTick<'a> {
     pub reward: f32,
     /// Position of the agent on its level's plan, if the game reports it.
     pub position: Option<Vec2>,
+    /// Height of the agent, if the game reports it besides the position: the plan is seen from above then.
+    pub height: Option<f32>,
     /// True if the level's goal was reached, now or before.
     pub is_success: bool,
     /// The game's proofs.
@@ -162,22 +164,24 @@ impl<'a> DetectorTick<'a> {
             state_hash: 0,
             reward: 0.0,
             position: None,
+            height: None,
             is_success: false,
             proofs: &NoProofs,
         }
     }
 
-    /// Returns a hash of the known state: the game's own hash, the observation and the position.
+    /// Returns a hash of the known state: the game's own hash, the observation, the position and the height.
     pub fn fingerprint(&self) -> u64 {
         let position = self.position.map_or([0.0; 2], |position| position.to_array());
-        let numbers = self.observation.iter().copied().chain(position).map(|number| u64::from(number.to_bits()));
+        let numbers = self.observation.iter().copied().chain(position).chain(self.height);
+        let numbers = numbers.map(|number| u64::from(number.to_bits()));
         StateHash::of([self.state_hash].into_iter().chain(numbers)).0
     }
 
-    /// Returns the agent's height: its position on the plan, or else its transform.
+    /// Returns the agent's height: that of a plan seen from above, or else its position on the plan, or its transform.
     pub fn height(&self) -> Option<f32> {
         let transform = || self.world.get::<Transform>(self.agent).map(|transform| transform.translation.y);
-        self.position.map(|position| position.y).or_else(transform)
+        self.height.or_else(|| self.position.map(|position| position.y)).or_else(transform)
     }
 }
 

@@ -417,6 +417,12 @@ pub trait StateTools: Send + Sync {
         None
     }
 
+    /// Returns the height of an agent in a game whose [positions](Self::position) are seen from above. Returns `None`, by
+    /// default: the plan shows heights, or there are none.
+    fn height(&self, _world: &World, _agent: Entity) -> Option<f32> {
+        None
+    }
+
     /// Returns the likely position of an agent in a game that does not declare [`position`](Self::position). Reports of
     /// unsolved levels use it and name the entity; detectors and explorers do not. By default nothing is guessed.
     fn guessed_position(&self, _world: &World, _agent: Entity) -> Option<GuessedPosition> {
