@@ -43,6 +43,17 @@ pub trait Detector: Send + Sync {
         Vec::new()
     }
 
+    /// Returns the shortest episode in which it can find something: a test names the detectors for which all episodes
+    /// whose time was up were too short. By default a tick is enough.
+    fn least_episode(&self) -> LeastEpisode {
+        LeastEpisode::default()
+    }
+
+    /// Returns a setting, as `key=value`, with which it can find something in episodes of so many ticks, if there is one.
+    fn setting_for(&self, _ticks: u32) -> Option<String> {
+        None
+    }
+
     /// Starts to watch an episode; `None` if there is nothing to watch.
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         None
@@ -52,6 +63,15 @@ pub trait Detector: Send + Sync {
     fn watch_world(&self) -> Option<Box<dyn WorldWatcher>> {
         None
     }
+}
+
+/// The shortest episode in which a detector can find something.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LeastEpisode {
+    /// Its ticks.
+    pub ticks: u32,
+    /// True if the game must report the position of the agent as well.
+    pub needs_position: bool,
 }
 
 /// A setting of a detector.

@@ -7,9 +7,19 @@ use bevy::{
     prelude::Transform,
 };
 use playbot_harness::{
-    detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead},
+    detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LeastEpisode, LevelAhead},
     floor_plan::FloorPlan,
 };
+
+/// Returns the shortest episode for a window of so many ticks by positions: a tick is compared with the one before.
+fn after_the_first(ticks: f64) -> LeastEpisode {
+    LeastEpisode { ticks: (ticks as u32).saturating_add(1), needs_position: true }
+}
+
+/// Returns the setting of a window of half these ticks.
+pub(super) fn half(ticks: u32) -> Option<String> {
+    (ticks > 1).then(|| format!("ticks={}", ticks / 2))
+}
 
 /// A finding for agents that stay at one position for any action, away from the goal. An agent that wanders without
 /// progress, or holds a key against a wall, is not stuck.
@@ -50,6 +60,14 @@ impl Detector for Stuck {
             DetectorSetting::new("ticks", &mut self.ticks, "ticks in a row at the same position").at_least(1.0),
             DetectorSetting::new("distance", &mut self.distance, "how far the same position reaches, in tiles"),
         ]
+    }
+
+    fn least_episode(&self) -> LeastEpisode {
+        after_the_first(self.ticks)
+    }
+
+    fn setting_for(&self, ticks: u32) -> Option<String> {
+        half(ticks)
     }
 
     fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -163,6 +181,14 @@ impl Detector for FellThrough {
                 "how far below its start, in the game's units, without a plan from the side",
             ),
         ]
+    }
+
+    fn least_episode(&self) -> LeastEpisode {
+        after_the_first(self.ticks)
+    }
+
+    fn setting_for(&self, ticks: u32) -> Option<String> {
+        half(ticks)
     }
 
     fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {

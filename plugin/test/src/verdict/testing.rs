@@ -57,6 +57,7 @@ pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
         reached: None,
         testers: vec![tester("random", solved, episodes, false)],
         findings: Vec::new(),
+        too_short: Vec::new(),
         recorded: None,
     }
 }

@@ -114,6 +114,7 @@ pub(crate) fn level(index: u64, solved: u64, episodes: u64, ticks: u32) -> Level
         reached: None,
         testers: vec![TesterVerdict { tester: "random".to_owned(), score, exact: false, places: None }],
         findings: Vec::new(),
+        too_short: Vec::new(),
         recorded: None,
     }
 }
