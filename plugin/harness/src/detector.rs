@@ -72,6 +72,15 @@ pub struct LeastEpisode {
     pub ticks: u32,
     /// True if the game must report the position of the agent as well.
     pub needs_position: bool,
+    /// True if the game must [prove](crate::game::StateTools::proves_states) something about states as well.
+    pub needs_proofs: bool,
+}
+
+impl LeastEpisode {
+    /// Creates an episode of so many ticks, of any game.
+    pub fn of_ticks(ticks: u32) -> Self {
+        Self { ticks, needs_position: false, needs_proofs: false }
+    }
 }
 
 /// A setting of a detector.

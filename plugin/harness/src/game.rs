@@ -460,6 +460,12 @@ pub trait StateTools: Send + Sync {
     fn prove_from(&self, _world: &World, _agent: Entity) -> LevelProof {
         LevelProof::Unknown
     }
+
+    /// Returns whether [`prove_from`](Self::prove_from) proves anything: reports name the detector `soft-lock` only then if
+    /// it could not look. By default it does not.
+    fn proves_states(&self) -> bool {
+        false
+    }
 }
 
 /// The game's state of an episode at the end of a tick, of a type that only the game knows.

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use playbot::prelude::*;
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
-use playbot_harness::{eval::Player, foreign::ForeignGame};
+use playbot_harness::{detector::LevelProof, eval::Player, foreign::ForeignGame};
 use playbot_mutation::bugs::{Mutant, defect_kinds};
 use playbot_test::detectors::{DetectorChoice, Detectors};
 use playbot_tests::{Corridor, faulty::Fault as Garden};
@@ -251,10 +251,10 @@ fn detectors_for_which_episodes_are_too_short_say_what_they_need() {
     assert_eq!(had, expected, "`stuck` misses a position, and `frozen-world` is content with half the time limit");
     let settings: Vec<&str> = found.iter().filter_map(|it| it.setting.as_deref()).collect();
     assert_eq!(short(&names, &settings), [], "they can look with these");
-    let placed = titled([KeyCode::Enter]).position(|| Vec2::ZERO);
+    let placed = titled([KeyCode::Enter]).position(|| Vec2::ZERO).prove_from(|| LevelProof::Unknown);
     let tested = verdicts(&placed, "default:0..0", vec![random()], Detectors::defaults(&placed), 1);
     let had: Vec<_> = tested[0].too_short.iter().map(|it| (it.detector.as_str(), it.needs)).collect();
-    assert_eq!(had, [("stuck", 301), ("fell-through", 61)]);
+    assert_eq!(had, [("stuck", 301), ("soft-lock", 101), ("fell-through", 61)]);
 }
 
 #[test]

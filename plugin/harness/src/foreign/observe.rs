@@ -318,6 +318,10 @@ impl StateTools for ForeignGame {
         true
     }
 
+    fn proves_states(&self) -> bool {
+        self.description.proof.is_some()
+    }
+
     fn prove_from(&self, world: &World, agent: Entity) -> LevelProof {
         let is_playing = world.get::<Episode>(agent).is_some_and(Episode::is_running);
         let Some(cell) = world.get_resource::<ForeignCell>().filter(|_| is_playing) else {

@@ -146,7 +146,7 @@ impl Detector for FrozenWorld {
     }
 
     fn least_episode(&self) -> LeastEpisode {
-        LeastEpisode { ticks: (self.ticks as u32).min(LEAST).saturating_add(1), needs_position: false }
+        LeastEpisode::of_ticks((self.ticks as u32).min(LEAST).saturating_add(1))
     }
 
     fn setting_for(&self, ticks: u32) -> Option<String> {

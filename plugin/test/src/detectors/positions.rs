@@ -13,7 +13,7 @@ use playbot_harness::{
 
 /// Returns the shortest episode for a window of so many ticks by positions: a tick is compared with the one before.
 fn after_the_first(ticks: f64) -> LeastEpisode {
-    LeastEpisode { ticks: (ticks as u32).saturating_add(1), needs_position: true }
+    LeastEpisode { needs_position: true, ..LeastEpisode::of_ticks((ticks as u32).saturating_add(1)) }
 }
 
 /// Returns the setting of a window of half these ticks.

@@ -389,9 +389,11 @@ fn too_short(plan: &TestPlan, tested: &TestedLevel<'_>, played: &[&[Played]]) ->
         let had = episodes().map(|episode| episode.end.ticks()).max().unwrap_or(0);
         let has_positions =
             episodes().any(|episode| episode.track.route.as_ref().is_some_and(|it| it.entity.is_none()));
+        let has_proofs = tested.game.tools().state.proves_states();
         for detector in &plan.detectors.ticks {
             let least = detector.least_episode();
-            if had < least.ticks && (has_positions || !least.needs_position) {
+            let is_known = (has_positions || !least.needs_position) && (has_proofs || !least.needs_proofs);
+            if had < least.ticks && is_known {
                 found.push(short(detector.name(), least.ticks, had, detector.setting_for(had)));
             }
         }
