@@ -10,7 +10,7 @@ use playbot_test::{
     verdict::{
         CommonStop, Comparison, Earlier, EpisodeScore, FailurePath, Finding, FinishTime, LevelMaps, LevelOutcome,
         LevelVerdict, MapScope, Overview, Places, RESULTS, ReachedCells, ResultLines, Shard, SkillTicks, SquareEnds,
-        StopKind, TestFolder, TestRecord, TesterRecord, TesterVerdict, merge, wilson, write_reports,
+        StopKind, TestFolder, TestRecord, TesterRecord, TesterVerdict, TooShort, merge, wilson, write_reports,
     },
     verdict_report::{HtmlReport, html},
 };
@@ -118,6 +118,7 @@ fn verdict(index: u64) -> LevelVerdict {
         reached: Some(ReachedCells { side: 0.5, cells: [[-1, 2], [3, 0]].into(), entity: Some("the one".to_owned()) }),
         testers: ["random", "chaos"].map(tester).to_vec(),
         findings: vec![finding],
+        too_short: vec![too_short()],
         recorded: Some(recorded()),
     }
 }
@@ -125,6 +126,11 @@ fn verdict(index: u64) -> LevelVerdict {
 fn recorded() -> RecordedCourse {
     let (position, furthest) = (Some([12.5, 3.0]), Some([13.5, 3.0]));
     RecordedCourse { recorded_ticks: 120, ticks: 46, end: CourseEnd::Lost, differs: Some(45), position, furthest }
+}
+
+fn too_short() -> TooShort {
+    let setting = Some("fading-action.rest=8".to_owned());
+    TooShort { detector: "fading-action".to_owned(), needs: 400, had: 120, setting }
 }
 
 fn stop() -> CommonStop {
