@@ -189,6 +189,10 @@ impl StateTools for CoinRun {
         world.get::<LastOutcome>(agent)?.0?.cause()
     }
 
+    fn proves_states(&self) -> bool {
+        true
+    }
+
     fn prove_from(&self, world: &World, agent: Entity) -> LevelProof {
         prove_from(world, agent)
     }

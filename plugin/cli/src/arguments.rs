@@ -15,6 +15,7 @@ pub(crate) mod player;
 use crate::{error::CliError, output::prepare};
 use bevy_playbot::demo::file::{DemoFault, DemoFileError, DemoHeader, DemoWriter};
 use playbot_harness::{
+    doctor::UnequalSteps,
     game::Game,
     held_out::is_only_level,
     machine::usable_threads,
@@ -36,7 +37,31 @@ use std::{num::IntErrorKind, path::Path};
 ///
 /// The game panicked while it was added to the app, or in a startup system.
 pub(crate) fn check_start(game: &dyn Game, mode: &str, level: u64) -> Result<(), CliError> {
-    Ok(worlds::check_start(game, mode, level, |panic: &str| report!("the game panicked: {panic}"))?)
+    Ok(worlds::check_start(game, mode, level, report_panic)?)
+}
+
+/// Checks as [`check_start`] does, and warns if the game's fixed steps may see a press several times, or never: for verbs
+/// whose results depend on that.
+///
+/// # Errors
+///
+/// As for [`check_start`].
+pub(crate) fn check_start_and_steps(game: &dyn Game, mode: &str, level: u64) -> Result<(), CliError> {
+    unequal_steps(game, mode, level)?.iter().for_each(|steps| report!("warning: {}", steps.line()));
+    Ok(())
+}
+
+/// Checks as [`check_start`] does, and returns the lengths of frames and fixed steps, if they differ and that matters.
+fn unequal_steps(game: &dyn Game, mode: &str, level: u64) -> Result<Option<UnequalSteps>, CliError> {
+    let mut unequal = None;
+    worlds::check_start_and_look(game, mode, level, report_panic, |world, agent| {
+        unequal = UnequalSteps::of_presses(world, agent);
+    })?;
+    Ok(unequal)
+}
+
+fn report_panic(panic: &str) {
+    report!("the game panicked: {panic}");
 }
 
 /// More threads than any machine has cores.
@@ -354,10 +379,42 @@ pub(crate) fn report_agents_along(game: &dyn Game) {
 
 #[cfg(test)]
 mod tests {
-    use bevy_playbot::demo::file::DemoActions;
+    use std::sync::{
+        Arc,
+        atomic::{AtomicU32, Ordering},
+    };
+
+    use bevy::prelude::*;
+    use bevy_playbot::{action::ActionSpace, demo::file::DemoActions};
     use playbot_harness::foreign::ForeignGame;
 
     use super::*;
+
+    #[test]
+    fn the_first_world_shows_whether_fixed_steps_see_each_press_once() {
+        let built = Arc::new(AtomicU32::new(0));
+        let count = Arc::clone(&built);
+        let game = ForeignGame::new("hop", 1, move |app: &mut App| {
+            count.fetch_add(1, Ordering::Relaxed);
+            app.add_systems(FixedUpdate, |_: Res<ButtonInput<KeyCode>>| {});
+        });
+        let game = game.observe(["nothing"], || [0.0]);
+        let keys = || game.clone().keys([vec![], vec![KeyCode::Space]]);
+        let line = |game: ForeignGame| {
+            let unequal = unequal_steps(&game, "default", 0).expect("it starts");
+            unequal.map(|steps| steps.line())
+        };
+        let words = "a frame is 16.667 ms, a fixed step 15.625 ms: systems in fixed steps see a key that was just pressed \
+                     once or more often, and once if you set `.hz(64.0)` in the adapter, or \
+                     `Time::<Fixed>::from_hz(60.0)` in the game";
+        assert_eq!(line(keys()).as_deref(), Some(words));
+        assert_eq!(built.load(Ordering::Relaxed), 1, "one World is enough");
+        assert_eq!(line(keys().hz(64.0)), None, "the clocks agree");
+        assert_eq!(line(game.clone().actions(ActionSpace::Discrete(2), || {})), None, "its actions press nothing");
+        let broken = ForeignGame::new("hop", 1, |_: &mut App| panic!("no track"));
+        let broken = broken.keys([vec![], vec![KeyCode::Space]]).observe(["nothing"], || [0.0]);
+        assert!(unequal_steps(&broken, "default", 0).is_err());
+    }
 
     #[test]
     fn steps_are_read_with_underscores_and_powers_of_ten() {

@@ -43,6 +43,17 @@ pub trait Detector: Send + Sync {
         Vec::new()
     }
 
+    /// Returns the shortest episode in which it can find something: a test names the detectors for which all episodes
+    /// whose time was up were too short. By default a tick is enough.
+    fn least_episode(&self) -> LeastEpisode {
+        LeastEpisode::default()
+    }
+
+    /// Returns a setting, as `key=value`, with which it can find something in episodes of so many ticks, if there is one.
+    fn setting_for(&self, _ticks: u32) -> Option<String> {
+        None
+    }
+
     /// Starts to watch an episode; `None` if there is nothing to watch.
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         None
@@ -51,6 +62,24 @@ pub trait Detector: Send + Sync {
     /// Starts to watch a World; `None` if it watches agents only.
     fn watch_world(&self) -> Option<Box<dyn WorldWatcher>> {
         None
+    }
+}
+
+/// The shortest episode in which a detector can find something.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LeastEpisode {
+    /// Its ticks.
+    pub ticks: u32,
+    /// True if the game must report the position of the agent as well.
+    pub needs_position: bool,
+    /// True if the game must [prove](crate::game::StateTools::proves_states) something about states as well.
+    pub needs_proofs: bool,
+}
+
+impl LeastEpisode {
+    /// Creates an episode of so many ticks, of any game.
+    pub fn of_ticks(ticks: u32) -> Self {
+        Self { ticks, needs_position: false, needs_proofs: false }
     }
 }
 
@@ -134,6 +163,8 @@ pub struct DetectorTick<'a> {
     pub reward: f32,
     /// Position of the agent on its level's plan, if the game reports it.
     pub position: Option<Vec2>,
+    /// Height of the agent, if the game reports it besides the position: the plan is seen from above then.
+    pub height: Option<f32>,
     /// True if the level's goal was reached, now or before.
     pub is_success: bool,
     /// The game's proofs.
@@ -162,22 +193,24 @@ impl<'a> DetectorTick<'a> {
             state_hash: 0,
             reward: 0.0,
             position: None,
+            height: None,
             is_success: false,
             proofs: &NoProofs,
         }
     }
 
-    /// Returns a hash of the known state: the game's own hash, the observation and the position.
+    /// Returns a hash of the known state: the game's own hash, the observation, the position and the height.
     pub fn fingerprint(&self) -> u64 {
         let position = self.position.map_or([0.0; 2], |position| position.to_array());
-        let numbers = self.observation.iter().copied().chain(position).map(|number| u64::from(number.to_bits()));
+        let numbers = self.observation.iter().copied().chain(position).chain(self.height);
+        let numbers = numbers.map(|number| u64::from(number.to_bits()));
         StateHash::of([self.state_hash].into_iter().chain(numbers)).0
     }
 
-    /// Returns the agent's height: its position on the plan, or else its transform.
+    /// Returns the agent's height: that of a plan seen from above, or else its position on the plan, or its transform.
     pub fn height(&self) -> Option<f32> {
         let transform = || self.world.get::<Transform>(self.agent).map(|transform| transform.translation.y);
-        self.position.map(|position| position.y).or_else(transform)
+        self.height.or_else(|| self.position.map(|position| position.y)).or_else(transform)
     }
 }
 

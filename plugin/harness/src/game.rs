@@ -417,6 +417,12 @@ pub trait StateTools: Send + Sync {
         None
     }
 
+    /// Returns the height of an agent in a game whose [positions](Self::position) are seen from above. Returns `None`, by
+    /// default: the plan shows heights, or there are none.
+    fn height(&self, _world: &World, _agent: Entity) -> Option<f32> {
+        None
+    }
+
     /// Returns the likely position of an agent in a game that does not declare [`position`](Self::position). Reports of
     /// unsolved levels use it and name the entity; detectors and explorers do not. By default nothing is guessed.
     fn guessed_position(&self, _world: &World, _agent: Entity) -> Option<GuessedPosition> {
@@ -453,6 +459,12 @@ pub trait StateTools: Send + Sync {
     /// now and then during an episode, so it takes a millisecond at most. By default nothing is proved.
     fn prove_from(&self, _world: &World, _agent: Entity) -> LevelProof {
         LevelProof::Unknown
+    }
+
+    /// Returns whether [`prove_from`](Self::prove_from) proves anything: reports name the detector `soft-lock` only then if
+    /// it could not look. By default it does not.
+    fn proves_states(&self) -> bool {
+        false
     }
 }
 

@@ -110,6 +110,21 @@ pub fn build_observing_world(
 ///
 /// The game panicked: the panic's message, with its file, its line and, if they are known, its plugin or system.
 pub fn check_start(game: &dyn Game, mode: &str, level: u64, report: fn(&str)) -> Result<(), Fault> {
+    check_start_and_look(game, mode, level, report, |_, _| {})
+}
+
+/// Checks as [`check_start`] does. `look` gets the World and its agent after the first tick, unless the game panicked.
+///
+/// # Errors
+///
+/// As for [`check_start`].
+pub fn check_start_and_look(
+    game: &dyn Game,
+    mode: &str,
+    level: u64,
+    report: fn(&str),
+    look: impl FnOnce(&World, Entity),
+) -> Result<(), Fault> {
     if game.check_mode(mode).is_err() {
         return Ok(());
     }
@@ -120,8 +135,12 @@ pub fn check_start(game: &dyn Game, mode: &str, level: u64, report: fn(&str)) ->
     // Startup systems may read the level, but without an agent that plays it does not begin: a panic belongs to no level.
     world.trigger(NextEpisode { entity: agents[0], level });
     let started = panics::report_at_once(report, || world.tick());
+    if panics::refusal(&world).is_some() {
+        return started;
+    }
     // Other faults are those of a level, too.
-    if panics::refusal(&world).is_some() { started } else { Ok(()) }
+    look(&world, agents[0]);
+    Ok(())
 }
 
 /// Builds a World. If the game panics meanwhile, the World has no game, and each of its ticks is this fault.

@@ -100,6 +100,22 @@ pub trait LevelDetector: Send + Sync {
         true
     }
 
+    /// Returns the ticks that an episode must have at least for it to find anything: a test names the detectors for which
+    /// all episodes were too short. By default a tick is enough.
+    fn least_ticks(&self) -> u32 {
+        1
+    }
+
+    /// Returns the ticks of the longest episode that it examines; `None` if that is not known.
+    fn most_ticks(&self, level: &TestedLevel<'_>) -> Option<u32> {
+        level.episodes().map(|(_, _, result)| result.ticks).max()
+    }
+
+    /// Returns a setting, as `key=value`, with which it can find something in episodes of so many ticks, if there is one.
+    fn setting_for(&self, _ticks: u32) -> Option<String> {
+        None
+    }
+
     /// Returns the defects of a level.
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect>;
 
@@ -229,6 +245,11 @@ pub fn own_detectors(game: &dyn Game) -> Vec<String> {
 /// Returns whether the detector with this name compares several testers.
 pub(crate) fn compares_testers(name: &str) -> bool {
     general().any(|known| matches!(known, Known::Level(known) if known.name() == name && known.compares_testers()))
+}
+
+/// Returns whether the detector with this name examines levels after play.
+pub(crate) fn looks_after_play(name: &str) -> bool {
+    general().any(|known| matches!(known, Known::Level(known) if known.name() == name))
 }
 
 /// Returns all detectors for a game, its own included. A detector of the game replaces a general one with its name.

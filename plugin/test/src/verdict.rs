@@ -53,8 +53,13 @@ use playbot_harness::{
     detector::LevelProof,
     game::{Game, prove_level},
 };
+use playbot_report::counted;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::{
+    collections::BTreeMap,
+    fmt,
+    fmt::{Display, Formatter},
+};
 
 pub use crate::verdict::{
     compare::{Change, Comparison, EarlierTest, FALSE_DISCOVERY_RATE, FindingChange, RecordedWins, UnreachedSquares},
@@ -127,6 +132,9 @@ pub struct LevelVerdict {
     /// played again.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub not_kept: Option<String>,
+    /// Detectors that could find nothing, because the episodes were too short. Older results lack them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub too_short: Vec<TooShort>,
     /// Course of the actions that a recording of an earlier build solves it with, in a test against a recording that
     /// does. It is the last field: [`TestFolder::finish_against`] adds it to a line.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -269,6 +277,29 @@ pub struct Finding {
     pub settings: Vec<String>,
 }
 
+/// A detector that could find nothing on a level, because no episode was long enough for it.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct TooShort {
+    /// The detector.
+    pub detector: String,
+    /// Ticks that an episode must have at least.
+    pub needs: u32,
+    /// Ticks of the longest episode that it looks at.
+    pub had: u32,
+    /// Setting, as `name.key=value`, with which it can find something in such an episode, if there is one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub setting: Option<String>,
+}
+
+impl Display for TooShort {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { detector, needs, had, setting } = self;
+        write!(f, "{detector} (needs episodes of {}, and had at most {had}", counted(u64::from(*needs), "tick"))?;
+        setting.iter().try_for_each(|setting| write!(f, ": `--detector {setting}`"))?;
+        f.write_str(")")
+    }
+}
+
 /// Visited squares, among all that walls do not cut off from the start: see
 /// [`open_cells`](crate::explore::round). Under gravity, some of these may be unreachable.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -321,7 +352,8 @@ fn judge(
     let proof = if score.solved > 0 { LevelProof::Solvable } else { prove_level(game, mode, level) };
     let mut findings = broken(plan, played);
     findings.extend(seen(plan, played));
-    findings.extend(inspect(game, plan, (index, &name), played, stop));
+    let (inspected, too_short) = inspect(game, plan, (index, &name), played, stop);
+    findings.extend(inspected);
     let outcome = match proof.why_unsolvable() {
         _ if score.solved > 0 => LevelOutcome::Solved,
         None => LevelOutcome::BotFailed,
@@ -363,6 +395,7 @@ fn judge(
         testers: testers.collect(),
         findings,
         not_kept: None,
+        too_short,
         recorded: None,
     };
     let has_maps = plan.maps().wants(verdict.is_perfect());
@@ -412,11 +445,7 @@ fn is_solved_at_start<'a>(episodes: impl Iterator<Item = &'a Played>) -> bool {
 
 /// Returns the game time of episodes in seconds; `None` if the game has no ticks per second.
 fn seconds<'a>(episodes: impl Iterator<Item = &'a Played>, tick_hz: f64) -> Option<f64> {
-    let ticks = |episode: &Played| match &episode.end {
-        PlayedEnd::Ended { result, .. } => result.ticks,
-        PlayedEnd::Broken { tick, .. } => tick.unwrap_or(0),
-    };
-    let seconds = episodes.map(|episode| u64::from(ticks(episode))).sum::<u64>() as f64 / tick_hz;
+    let seconds = episodes.map(|episode| u64::from(episode.end.ticks())).sum::<u64>() as f64 / tick_hz;
     seconds.is_finite().then_some(seconds)
 }
 
@@ -517,9 +546,19 @@ mod tests {
     #[test]
     fn older_results_are_read_and_newer_ones_read_back() {
         let old = serde_json::to_string(&verdict(3, 1, 2)).expect("serialises");
-        for name in
-            ["maps", "places", "causes", "seconds", "stop", "solved_at_start", "reached", "not_kept", "recorded"]
-        {
+        let newer = [
+            "maps",
+            "places",
+            "causes",
+            "seconds",
+            "stop",
+            "solved_at_start",
+            "reached",
+            "not_kept",
+            "too_short",
+            "recorded",
+        ];
+        for name in newer {
             assert!(!old.contains(name), "{old}");
         }
         assert_eq!(serde_json::from_str::<LevelVerdict>(&old).expect("whole"), verdict(3, 1, 2));
@@ -540,7 +579,10 @@ mod tests {
         };
         let recorded = Some(recorded);
         let not_kept = Some("`a`, episode 0: it does not fail".to_owned());
-        let new = LevelVerdict { seconds: Some(0.1 + 0.2), reached: Some(reached), not_kept, recorded, ..new };
+        let setting = Some("stuck.ticks=60".to_owned());
+        let too_short = vec![TooShort { detector: "stuck".to_owned(), needs: 301, had: 120, setting }];
+        let seconds = Some(0.1 + 0.2);
+        let new = LevelVerdict { seconds, reached: Some(reached), not_kept, too_short, recorded, ..new };
         let text = serde_json::to_string(&new).expect("serialises");
         assert_eq!(serde_json::from_str::<LevelVerdict>(&text).expect("whole"), new);
     }

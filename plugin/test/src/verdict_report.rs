@@ -176,6 +176,9 @@ pub(crate) fn numbers(overview: &Overview) -> String {
     if let Some(levels) = overview.first_tick() {
         let _ = writeln!(out, "<p>{}.</p>", text(&levels));
     }
+    if let Some(detectors) = overview.could_not_look() {
+        let _ = writeln!(out, "<p>Detectors that could not look: {}.</p>", escape(&detectors));
+    }
     out += "</section>\n<section>\n<h2>Testers</h2>\n<div class=\"table\" role=\"region\" \
             aria-label=\"Testers\" tabindex=\"0\"><table>\n<thead><tr><th scope=\"col\">tester</th>\
             <th scope=\"col\">levels solved</th><th scope=\"col\">95 % interval</th><th scope=\"col\">episodes solved</th>\

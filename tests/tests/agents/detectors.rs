@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use playbot::prelude::*;
 use playbot_games::{antmaze::AntMaze, coinrun::CoinRun, maze2d::Maze2d};
-use playbot_harness::{eval::Player, foreign::ForeignGame};
+use playbot_harness::{detector::LevelProof, eval::Player, foreign::ForeignGame};
 use playbot_mutation::bugs::{Mutant, defect_kinds};
 use playbot_test::detectors::{DetectorChoice, Detectors};
 use playbot_tests::{Corridor, faulty::Fault as Garden};
@@ -224,13 +224,57 @@ fn titled(keys: [KeyCode; 1]) -> ForeignGame {
 fn a_menu_that_no_action_leaves_is_found_with_its_state_and_its_buttons() {
     let found = |key: KeyCode| {
         let game = titled([key]);
-        let detectors = only(&game, &["frozen-world"], &["frozen-world.ticks=40"]);
-        findings(&game, "default:0..0", vec![random()], detectors)
+        findings(&game, "default:0..0", vec![random()], Detectors::defaults(&game))
     };
     let frozen = found(KeyCode::Space);
     assert_eq!(frozen.len(), 1, "{frozen:?}");
-    let words = "nothing has changed since the start of the episode, for 40 ticks, whatever the agent did: the state \
+    let words = "nothing has changed since the start of the episode, for 59 ticks, whatever the agent did: the state \
                  `Screen` is `Title`; the buttons are `New game`, `QuitButton`";
-    assert_eq!(frozen[0].1.message, words);
+    assert_eq!((frozen[0].1.message.as_str(), frozen[0].1.tick), (words, Some(59)), "time was up");
     assert_silent(&found(KeyCode::Enter));
+}
+
+#[test]
+fn detectors_for_which_episodes_are_too_short_say_what_they_need() {
+    let game = titled([KeyCode::Enter]);
+    let short = |names: &[&str], settings: &[&str]| {
+        let mut tested = verdicts(&game, "default:0..0", vec![random()], only(&game, names, settings), 1);
+        tested.pop().map(|verdict| verdict.too_short).expect("a level")
+    };
+    let names = ["stuck", "frozen-world", "dead-action", "fading-action"];
+    let found = short(&names, &[]);
+    let had: Vec<_> = found.iter().map(|it| (it.detector.as_str(), it.needs, it.had, it.setting.as_deref())).collect();
+    let expected = [
+        ("dead-action", 7 * 20, 60, Some("dead-action.ticks=8")),
+        ("fading-action", 40 + 8 * 45, 60, Some("fading-action.rest=2")),
+    ];
+    assert_eq!(had, expected, "`stuck` misses a position, and `frozen-world` is content with half the time limit");
+    let settings: Vec<&str> = found.iter().filter_map(|it| it.setting.as_deref()).collect();
+    assert_eq!(short(&names, &settings), [], "they can look with these");
+    let placed = titled([KeyCode::Enter]).position(|| Vec2::ZERO).prove_from(|| LevelProof::Unknown);
+    let tested = verdicts(&placed, "default:0..0", vec![random()], Detectors::defaults(&placed), 1);
+    let had: Vec<_> = tested[0].too_short.iter().map(|it| (it.detector.as_str(), it.needs)).collect();
+    assert_eq!(had, [("stuck", 301), ("soft-lock", 101), ("fell-through", 61)]);
+}
+
+#[test]
+fn a_fall_in_space_is_one_along_the_height() {
+    #[derive(Component)]
+    struct Stone;
+    let falling = |way: Vec3| {
+        let game = move |app: &mut App| {
+            app.add_systems(Startup, |mut commands: Commands| _ = commands.spawn((Stone, Transform::default())))
+                .add_systems(Update, move |mut at: Single<&mut Transform, With<Stone>>| at.translation += way);
+        };
+        let game = ForeignGame::new("stone", 1, game)
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["nothing"], || [0.0])
+            .position(|at: Single<&Transform, With<Stone>>| at.translation)
+            .time_limit(100);
+        let detectors = only(&game, &["fell-through"], &["fell-through.depth=50"]);
+        findings(&game, "default:0..0", vec![random()], detectors)
+    };
+    let found = falling(Vec3::NEG_Y);
+    assert_eq!(found.iter().map(|(_, finding)| finding.tick).collect::<Vec<_>>(), [Some(60)], "{found:?}");
+    assert_silent(&falling(Vec3::NEG_Z));
 }

@@ -3,9 +3,9 @@
 use bevy::prelude::*;
 use playbot::prelude::*;
 use playbot_harness::{
-    doctor::{DoctorOptions, examine},
+    doctor::{DoctorOptions, UnequalSteps, examine},
     foreign::ForeignGame,
-    worlds::build_world,
+    worlds::{build_world, check_start_and_look},
 };
 
 /// Presses that the game has seen.
@@ -79,6 +79,27 @@ fn an_action_that_is_repeated_is_one_press_and_the_doctor_says_so() {
     let without = ForeignGame::new("still", 1, |app: &mut App| _ = app.init_resource::<Presses>());
     let without = without.actions(ActionSpace::Discrete(2), || {}).observe(["presses"], || [0.0]);
     assert!(!examined(&without).contains("Keys:"), "its actions press nothing");
+}
+
+/// The same words as the doctor's, from the World with which a verb checks that the game starts.
+#[test]
+fn the_first_world_of_a_run_shows_which_clocks_differ_if_actions_press_keys() {
+    let line = |game: &ForeignGame| {
+        let mut line = None;
+        let look =
+            |world: &World, agent: Entity| line = UnequalSteps::of_presses(world, agent).map(|steps| steps.line());
+        check_start_and_look(game, "default", 0, |_| {}, look).expect("it starts");
+        line
+    };
+    let words = line(&counting(game)).expect("60 frames and 64 steps a second");
+    for part in ["a frame is 16.667 ms, a fixed step 15.625 ms", "once or more often", "`.hz(64.0)`"] {
+        assert!(words.contains(part) && examined(&counting(game)).contains(part), "`{part}` is missing in: {words}");
+    }
+    assert!(line(&counting(game).hz(128.0)).expect("128 frames").contains("once or not at all"));
+    assert_eq!(line(&counting(game).hz(64.0)), None);
+    let still =
+        ForeignGame::new("still", 1, game).actions(ActionSpace::Discrete(2), || {}).observe(["presses"], || [0.0]);
+    assert_eq!(line(&still), None, "its actions press nothing");
 }
 
 /// Returns the doctor's report as text.

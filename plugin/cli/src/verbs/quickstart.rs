@@ -6,7 +6,7 @@ mod report;
 
 use crate::{
     arguments::{
-        Threads, check_start,
+        Threads, check_start_and_steps,
         experiment::{ExperimentArgs, option},
         number_of_steps, player, revision,
     },
@@ -111,7 +111,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let trained = Experiment { algorithm: Algorithm::ScorePpo, ..experiment.clone() };
     trained.check_levels(game)?;
     trained.check_memory(game)?;
-    check_start(game, &experiment.train.mode, experiment.train.first)?;
+    check_start_and_steps(game, &experiment.train.mode, experiment.train.first)?;
     check_folder(&args.run)?;
     // Not later: without recordings no folder is made.
     let demos = args.from.recordings(&experiment, games)?;

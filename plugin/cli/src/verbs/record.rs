@@ -2,7 +2,7 @@
 
 use crate::{
     arguments::{
-        OverwriteArgs, check_start, default_held_out, first_levels, number_of_steps,
+        OverwriteArgs, check_start_and_steps, default_held_out, first_levels, number_of_steps,
         player::{LoadedPlayer, PlayerArgs},
         report_agents_along,
     },
@@ -98,7 +98,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     let left_out = default_held_out(game).filter(|_| args.levels.is_none());
     let held_out: Vec<_> = args.hold_out.iter().chain(&left_out).cloned().collect();
     let chosen = choose_levels(game, &levels, &held_out)?;
-    check_start(game, &levels.mode, levels.first)?;
+    check_start_and_steps(game, &levels.mode, levels.first)?;
     match &left_out {
         Some(held_out) => report!("no --levels are named: recording {levels}, but for the held-out levels {held_out}"),
         None if args.levels.is_none() => report!("no --levels are named: recording {levels}"),

@@ -11,7 +11,7 @@ mod results;
 mod testers;
 
 use crate::{
-    arguments::{Compute, check_start, default_tested, experiment::quoted, report_agents_along},
+    arguments::{Compute, check_start_and_steps, default_tested, experiment::quoted, report_agents_along},
     error::{CliError, Outcome},
     progress,
     progress::interrupt,
@@ -199,7 +199,7 @@ fn plan(args: &Args, game: &dyn Game) -> Result<TestPlan, CliError> {
         }
     };
     split.check(game)?;
-    check_start(game, &split.mode, split.first)?;
+    check_start_and_steps(game, &split.mode, split.first)?;
     report_equal_levels(game, &split);
     let detectors = args.detectors.choose(game, &split)?;
     let testers = args.testers.load(game, &split, args.compute.device())?;

@@ -6,7 +6,7 @@ mod repeated;
 
 use crate::{
     arguments::{
-        Compute, check_start,
+        Compute, check_start_and_steps,
         experiment::{ExperimentArgs, Options, in_words, option, sets_key},
         number_of_steps, open, revision,
     },
@@ -167,7 +167,7 @@ fn start(
         None => None,
     };
     skills.iter().try_for_each(|model| check_asked(args, &experiment, model))?;
-    check_start(game, &experiment.train.mode, experiment.train.first)?;
+    check_start_and_steps(game, &experiment.train.mode, experiment.train.first)?;
     interrupt::leave("nothing is trained yet".to_owned());
     let (path, skill_file) = (args.run.as_path(), args.skills.as_deref());
     let (skills, init_from, force) = (skills.as_ref(), args.init_from.as_deref(), args.force);
@@ -268,7 +268,7 @@ fn resume(args: &Args, games: &Games, setup: &TrainingSetup<'_>) -> Result<Train
         return Err(open::untrained(&args.run, info.algorithm));
     }
     let experiment = resumed(args, saved, info, games)?;
-    check_start(game, &experiment.train.mode, experiment.train.first)?;
+    check_start_and_steps(game, &experiment.train.mode, experiment.train.first)?;
     let (whole, begun_on) = (saved.whole_steps(), info.device);
     let training = Training::resume(game, opened, &experiment, setup)?;
     let steps = training.trainer.steps();

@@ -2,7 +2,7 @@
 
 use crate::{
     doctor,
-    doctor::cause::CauseKind,
+    doctor::{cause::CauseKind, steps::holds_keys},
     foreign::LeftMessages,
     game::Game,
     saved_episode::SavedEpisode,
@@ -18,7 +18,7 @@ use bevy::{
     time::{Real, TimeSystems},
 };
 use bevy_playbot::{
-    action::{Action, ActionSpace, ActionValue},
+    action::{Action, ActionSpace},
     agent::{Agent, Control},
     bot::uniform,
     engine::{Renewal, into_world, tick_world},
@@ -30,7 +30,6 @@ use bevy_playbot::{
     reward::Reward,
     state_hash::StateHash,
     streams::AgentStreams,
-    virtual_input::VirtualInput,
 };
 use serde::Serialize;
 use std::{
@@ -170,10 +169,7 @@ impl GameCopy {
 
     /// Returns whether actions of the first agent hold keys or buttons.
     pub fn holds_keys(&self) -> bool {
-        let input = self.agents.first().and_then(|&agent| self.world.get::<VirtualInput>(agent));
-        let (Some(input), ActionSpace::Discrete(actions)) = (input, &self.space) else { return false };
-        let mut held = (0..*actions as u32).map(|action| input.held(&ActionValue::Discrete(action)));
-        held.any(|held| !held.buttons.is_empty() && !held.clicks)
+        self.agents.first().is_some_and(|&agent| holds_keys(&self.world, agent))
     }
 
     /// Returns the types of all components and resources in this World.

@@ -1,7 +1,13 @@
 //! Lengths of frames and of fixed steps, in games whose ticks are frames.
 
 use bevy::{prelude::*, time::TimeUpdateStrategy};
-use bevy_playbot::{engine::TickSchedules, placement::TickPlacement};
+use bevy_playbot::{
+    action::{ActionSpace, ActionValue},
+    agent::Agent,
+    engine::TickSchedules,
+    placement::TickPlacement,
+    virtual_input::VirtualInput,
+};
 use serde::Serialize;
 use std::{
     fmt,
@@ -31,17 +37,60 @@ impl UnequalSteps {
         let matters = placement == TickPlacement::Frame && has_systems && frame != step;
         matters.then_some(Self { frame, step })
     }
+
+    /// Returns the lengths in a World whose agent presses keys or buttons, if they differ and that matters.
+    pub fn of_presses(world: &World, agent: Entity) -> Option<Self> {
+        Self::of(world).filter(|_| holds_keys(world, agent))
+    }
+
+    /// Describes the lengths and what to set in one line.
+    pub fn line(&self) -> String {
+        let Words { lengths, times, remedy } = self.words();
+        format!(
+            "{lengths}: systems in fixed steps see a key that was just pressed {times}, and once if you set {remedy}"
+        )
+    }
+
+    fn words(self) -> Words {
+        let Self { frame, step } = self;
+        let milliseconds = |length: Duration| rounded(length.as_secs_f64() * 1000.0);
+        let hz = |length: Duration| rounded(1.0 / length.as_secs_f64());
+        let times = if frame < step { "once or not at all" } else { "once or more often" };
+        Words {
+            lengths: format!("a frame is {} ms, a fixed step {} ms", milliseconds(frame), milliseconds(step)),
+            times,
+            remedy: format!(
+                "`.hz({:?})` in the adapter, or `Time::<Fixed>::from_hz({:?})` in the game",
+                hz(step),
+                hz(frame)
+            ),
+        }
+    }
+}
+
+/// Lengths of frames and steps in words, with their effect and what makes them equal.
+struct Words {
+    lengths: String,
+    times: &'static str,
+    remedy: String,
+}
+
+/// Returns whether actions of an agent hold keys or buttons.
+pub(super) fn holds_keys(world: &World, agent: Entity) -> bool {
+    let (Some(input), Some(agent)) = (world.get::<VirtualInput>(agent), world.get::<Agent>(agent)) else {
+        return false;
+    };
+    let ActionSpace::Discrete(actions) = agent.actions else { return false };
+    let mut held = (0..actions as u32).map(|action| input.held(&ActionValue::Discrete(action)));
+    held.any(|held| !held.buttons.is_empty() && !held.clicks)
 }
 
 impl Display for UnequalSteps {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { frame, step } = *self;
-        let milliseconds = |length: Duration| rounded(length.as_secs_f64() * 1000.0);
-        let hz = |length: Duration| rounded(1.0 / length.as_secs_f64());
-        let times = if frame < step { "once or not at all" } else { "once or more often" };
-        writeln!(f, "Clocks: a frame is {} ms, a fixed step {} ms", milliseconds(frame), milliseconds(step))?;
+        let Words { lengths, times, remedy } = self.words();
+        writeln!(f, "Clocks: {lengths}")?;
         writeln!(f, "  Systems in fixed steps see a key that was just pressed {times}. They see it once if you set")?;
-        writeln!(f, "  `.hz({:?})` in the adapter, or `Time::<Fixed>::from_hz({:?})` in the game.", hz(step), hz(frame))
+        writeln!(f, "  {remedy}.")
     }
 }
 

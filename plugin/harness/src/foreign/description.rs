@@ -15,7 +15,10 @@ use crate::{
         observe,
         paths::ObservedPath,
         restart,
-        runtime::{Baseline, Foreign, ForeignCell, LevelSeed, PlayedAgent, ReaderFactory, Sensor, SystemFactory},
+        runtime::{
+            Baseline, Foreign, ForeignCell, LevelSeed, PlayedAgent, PositionAndHeight, ReaderFactory, Sensor,
+            SystemFactory,
+        },
         snapshot::{Part, SnapshotParts, add_whole},
     },
 };
@@ -60,7 +63,7 @@ pub(super) struct Description {
     pub(super) paths: Vec<String>,
     pub(super) has_camera: bool,
     /// Position of the agent on the plan of its level.
-    pub(super) position: Option<SystemFactory<Vec2>>,
+    pub(super) position: Option<SystemFactory<PositionAndHeight>>,
     /// The agent's state for explorers.
     pub(super) cell: Option<SystemFactory<Vec<i32>>>,
     /// The proof about the state of an episode.

@@ -105,7 +105,10 @@ impl ForeignGame {
         system: impl IntoSystem<(), Position, M> + Clone + Send + Sync + 'static,
     ) -> Self {
         self.with(|description| {
-            description.position = Some(SystemFactory::new(system, Position::into_plan_position));
+            description.position = Some(SystemFactory::new(system, |position: Position| {
+                let height = position.height();
+                (position.into_plan_position(), height)
+            }));
         })
     }
 
@@ -221,6 +224,11 @@ impl ForeignGame {
 pub trait IntoPlanPosition: 'static {
     /// Returns the position on the plan.
     fn into_plan_position(self) -> Vec2;
+
+    /// Returns the height, if the plan does not show it. By default the plan shows it, or there is none.
+    fn height(&self) -> Option<f32> {
+        None
+    }
 }
 
 impl IntoPlanPosition for Vec2 {
@@ -229,17 +237,24 @@ impl IntoPlanPosition for Vec2 {
     }
 }
 
-/// A position in space, seen from above: x and z of the World are x and y of the plan.
+/// A position in space, seen from above: x and z of the World are x and y of the plan, and y is the height.
 impl IntoPlanPosition for Vec3 {
     fn into_plan_position(self) -> Vec2 {
         self.xz()
     }
+
+    fn height(&self) -> Option<f32> {
+        Some(self.y)
+    }
 }
 
-/// Position of the agent on its level's plan. Missing while it is unknown.
+/// Position of the agent on its level's plan, and its height if the plan is seen from above. Missing while it is unknown.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Clone, Debug, PartialEq)]
-pub(super) struct ForeignPosition(Vec2);
+pub(super) struct ForeignPosition {
+    on_plan: Vec2,
+    height: Option<f32>,
+}
 
 /// State of the agent for explorers. Missing while it is unknown.
 #[derive(Component, Clone, Debug, PartialEq, Reflect)]
@@ -273,7 +288,11 @@ pub(super) fn forget_state(world: &mut World, agent: Entity) {
 
 impl StateTools for ForeignGame {
     fn position(&self, world: &World, agent: Entity) -> Option<Vec2> {
-        world.get::<ForeignPosition>(agent).map(|position| position.0)
+        world.get::<ForeignPosition>(agent).map(|position| position.on_plan)
+    }
+
+    fn height(&self, world: &World, agent: Entity) -> Option<f32> {
+        world.get::<ForeignPosition>(agent)?.height
     }
 
     fn guessed_position(&self, world: &World, _agent: Entity) -> Option<GuessedPosition> {
@@ -302,6 +321,10 @@ impl StateTools for ForeignGame {
 
     fn compares_levels(&self) -> bool {
         true
+    }
+
+    fn proves_states(&self) -> bool {
+        self.description.proof.is_some()
     }
 
     fn prove_from(&self, world: &World, agent: Entity) -> LevelProof {
@@ -349,7 +372,7 @@ fn read_state_of(world: &mut World, agent: Entity) {
         Ok((run(&mut parts.position, world)?, run(&mut parts.cell, world)?))
     });
     let (position, cell) = state.unwrap_or_default();
-    note(world, agent, position.map(ForeignPosition));
+    note(world, agent, position.map(|(on_plan, height)| ForeignPosition { on_plan, height }));
     note(world, agent, cell.map(ForeignExploreCell));
 }
 
@@ -627,12 +650,16 @@ mod tests {
     }
 
     #[test]
-    fn a_position_in_space_is_seen_from_above() {
+    fn a_position_in_space_is_seen_from_above_and_its_height_is_known() {
         let game = snail().position(|at: Single<&Transform, With<Snail>>| at.translation + Vec3::Z);
         let mut seen = Vec::new();
-        play(&game, |world, agent| seen.extend(game.tools().state.position(world, agent)));
-        // The snail is 5 high, which a view from above does not show.
-        assert_eq!(seen.last(), Some(&Vec2::new(6.0, 1.0)), "{seen:?}");
+        play(&game, |world, agent| {
+            let state = game.tools().state;
+            seen.extend(state.position(world, agent).zip(state.height(world, agent)));
+        });
+        assert_eq!(seen.last(), Some(&(Vec2::new(6.0, 1.0), 5.0)), "{seen:?}");
+        let flat = snail().position(|at: Single<&Transform, With<Snail>>| at.translation.truncate());
+        play(&flat, |world, agent| assert_eq!(flat.tools().state.height(world, agent), None, "its plan shows it"));
     }
 
     #[test]

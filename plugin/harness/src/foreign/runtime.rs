@@ -64,7 +64,7 @@ pub(super) struct RewardPart {
 /// The systems that are asked about one agent. Each agent has copies of its own, so each of them reads every message.
 pub(super) struct AgentParts {
     pub(super) sensor: Sensor,
-    pub(super) position: Option<OwnedSystem<Vec2>>,
+    pub(super) position: Option<OwnedSystem<PositionAndHeight>>,
     pub(super) cell: Option<OwnedSystem<Vec<i32>>>,
     pub(super) rewards: Vec<RewardPart>,
     pub(super) end: Option<OwnedSystem<Option<EpisodeEnd>>>,
@@ -404,6 +404,9 @@ impl<Out: 'static> SystemFactory<Out> {
         OwnedSystem { name: self.name, system: (self.make)(), is_initialized: false }
     }
 }
+
+/// A position on the plan, and the height if the plan is seen from above.
+pub(super) type PositionAndHeight = (Vec2, Option<f32>);
 
 /// A system of one World.
 pub(super) struct OwnedSystem<Out: 'static> {

@@ -9,6 +9,7 @@ use crate::{
 };
 use bevy_playbot::{
     action::{ActionSpace, ActionValue},
+    episode::EpisodeResult,
     fault::Fault,
 };
 use playbot_harness::{
@@ -60,6 +61,19 @@ impl LevelDetector for DeadAction {
         ]
     }
 
+    fn least_ticks(&self) -> u32 {
+        self.least().try_into().unwrap_or(u32::MAX)
+    }
+
+    fn most_ticks(&self, level: &TestedLevel<'_>) -> Option<u32> {
+        teller(level).and_then(first_episode).map(|result| result.ticks)
+    }
+
+    fn setting_for(&self, ticks: u32) -> Option<String> {
+        let held = f64::from(ticks) / (self.moments.floor() + 1.0);
+        (held >= 1.0).then(|| format!("ticks={}", held.floor()))
+    }
+
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         let Some(tester) = teller(level).filter(|_| level.is_sample(self.every)) else { return Vec::new() };
         // Other detectors report a panic.
@@ -79,8 +93,7 @@ impl LevelDetector for DeadAction {
 /// Returns the tester whose first episode is examined: the first tester that solved the level in it, else the one with
 /// the best reward.
 fn teller<'a, 'b>(level: &'b TestedLevel<'a>) -> Option<&'b TestedBy<'a>> {
-    let first = |tester: &'b TestedBy<'a>| tester.episodes.iter().find(|(number, _)| *number == 0);
-    let firsts = || level.testers.iter().filter_map(|tester| Some((tester, &first(tester)?.1)));
+    let firsts = || level.testers.iter().filter_map(|tester| Some((tester, first_episode(tester)?)));
     if level.episodes().any(|(_, _, result)| result.success) {
         return firsts().find(|(_, result)| result.success).map(|(tester, _)| tester);
     }
@@ -89,13 +102,22 @@ fn teller<'a, 'b>(level: &'b TestedLevel<'a>) -> Option<&'b TestedBy<'a>> {
     best.map(|(tester, _)| tester)
 }
 
+fn first_episode<'b>(tester: &'b TestedBy<'_>) -> Option<&'b EpisodeResult> {
+    tester.episodes.iter().find(|(number, _)| *number == 0).map(|(_, result)| result)
+}
+
 impl DeadAction {
+    /// Returns the ticks of the shortest episode in which it can look.
+    fn least(&self) -> usize {
+        (self.moments as usize).saturating_add(1).saturating_mul(self.ticks as usize)
+    }
+
     /// Returns the names of the dead actions. `has_solved`: whether the episode was solved in the test.
     fn dead(&self, script: &Script<'_>, has_solved: bool) -> Result<Vec<String>, Fault> {
         let (course, idle, led) = (script.course()?, idle_action(script.game), script.led_episodes());
         let (moments, ticks) = (self.moments as usize, self.ticks as usize);
         let length = course.actions.len();
-        if length < moments.saturating_add(1).saturating_mul(ticks) {
+        if length < self.least() {
             return Ok(Vec::new());
         }
         let moments: Vec<usize> = (1..=moments).map(|moment| length * moment / (moments + 1)).collect();
@@ -186,11 +208,7 @@ mod tests {
     use std::collections::BTreeMap;
 
     use bevy::prelude::*;
-    use bevy_playbot::{
-        bot::BlindBot,
-        episode::{EpisodeEnd, EpisodeResult},
-        vision::ObservationConfig,
-    };
+    use bevy_playbot::{bot::BlindBot, episode::EpisodeEnd, vision::ObservationConfig};
 
     use super::*;
     use playbot_harness::{eval::Player, foreign::ForeignGame};

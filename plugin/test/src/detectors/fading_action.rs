@@ -67,6 +67,22 @@ impl LevelDetector for FadingAction {
         false
     }
 
+    /// So many tries with an effect, and so many without.
+    fn least_ticks(&self) -> u32 {
+        (self.rest + (self.first + self.last) * (self.ticks + self.rest)) as u32
+    }
+
+    /// It plays an episode of its own, up to the game's time limit.
+    fn most_ticks(&self, level: &TestedLevel<'_>) -> Option<u32> {
+        level.game.tools().host.time_limit()
+    }
+
+    fn setting_for(&self, ticks: u32) -> Option<String> {
+        let tries = self.first + self.last;
+        let rest = ((f64::from(ticks) - tries * self.ticks) / (tries + 1.0)).floor();
+        (rest >= 1.0).then(|| format!("rest={rest}"))
+    }
+
     fn inspect(&self, level: &TestedLevel<'_>) -> Vec<LevelDefect> {
         let Some(tester) = level.testers.first().filter(|_| level.is_sample(self.every)) else { return Vec::new() };
         // The actions are given, so the player decides nothing, and neither its seed nor what it sees may matter: the

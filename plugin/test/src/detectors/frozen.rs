@@ -1,6 +1,6 @@
 //! Detectors of broken Worlds: games that stand still, cameras that see nothing, and numbers that run away.
 
-use crate::detectors::Efforts;
+use crate::detectors::{Efforts, positions::half};
 use bevy::{
     ecs::world::WorldId,
     prelude::*,
@@ -10,16 +10,20 @@ use bevy_playbot::{
     action::{ActionSpace, ActionValue},
     agent::{Agent, AgentOrder},
     engine::BlankEpisodes,
-    legal::LegalActions,
+    episode::{EpisodeEnd, EpisodeResult},
+    legal::{IdleAction, LegalActions},
 };
 use playbot_harness::detector::{
-    Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead, WorldTick, WorldWatcher,
+    Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LeastEpisode, LevelAhead, WorldTick, WorldWatcher,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
 /// A finding for games in which nothing changes for any action: not the state and not the observations. A menu that no
 /// action leaves is such a game, so the message names the game's states and buttons. Every action must have been taken
 /// a while ago, or the action must have changed in a tenth of the ticks.
+///
+/// In an episode that is too short for that, the half of it before time was up counts. An agent may rest or wait for
+/// so long, so every action must have been pressed, and released, without an effect.
 pub struct FrozenWorld {
     ticks: f64,
 }
@@ -40,34 +44,91 @@ struct Still {
     tried: BTreeSet<u32>,
     /// Ticks since every legal choice was taken.
     since_all: u32,
+    presses: Presses,
 }
 
 /// Ticks in which an action shows its effect: a button is pressed when it is released.
 const LATE: u32 = 100;
 
+/// Fewest ticks without any change before time is up.
+const LEAST: u32 = 30;
+
+/// Ticks in which a press shows its effect once it is released.
+const RELEASED: u32 = 15;
+
+/// Returns the legal choices of a moment; `None` if actions are no choices.
+fn legal_choices<'a>(moment: &DetectorTick<'a>) -> Option<impl Iterator<Item = u32> + Clone + use<'a>> {
+    let Some(&Agent { actions: ActionSpace::Discrete(count), .. }) = moment.world.get(moment.agent) else {
+        return None;
+    };
+    let legal = moment.world.get::<LegalActions>(moment.agent);
+    let is_legal = move |choice: &u32| legal.is_none_or(|legal| legal.allows(&ActionValue::Discrete(*choice)));
+    Some((0..count as u32).filter(is_legal))
+}
+
 impl Still {
     fn note(&mut self, moment: &DetectorTick<'_>) {
         self.efforts.note(moment.action);
-        if let ActionValue::Discrete(choice) = moment.action {
-            self.tried.insert(*choice);
-        }
-        self.since_all = if self.has_tried_all(moment) { self.since_all + 1 } else { 0 };
+        let (&ActionValue::Discrete(choice), Some(legal)) = (moment.action, legal_choices(moment)) else {
+            if let ActionValue::Discrete(choice) = moment.action {
+                self.tried.insert(*choice);
+            }
+            return;
+        };
+        self.tried.insert(choice);
+        // Bots that hold each action for a while seldom change it.
+        let has_tried_all = legal.clone().all(|choice| self.tried.contains(&choice));
+        self.since_all = if has_tried_all { self.since_all + 1 } else { 0 };
+        let idle = moment.world.get_resource::<IdleAction>().map_or(0, |idle| idle.0);
+        self.presses.note(choice, idle, legal);
     }
 
     fn restart(&mut self) {
         self.efforts.restart();
         self.tried.clear();
         self.since_all = 0;
+        self.presses.restart();
     }
 
-    /// Returns whether every action that is legal was taken. Bots that hold each action for a while seldom change it.
-    fn has_tried_all(&self, moment: &DetectorTick<'_>) -> bool {
-        let Some(&Agent { actions: ActionSpace::Discrete(count), .. }) = moment.world.get(moment.agent) else {
-            return false;
-        };
-        let legal = moment.world.get::<LegalActions>(moment.agent);
-        let is_legal = |choice: u32| legal.is_none_or(|legal| legal.allows(&ActionValue::Discrete(choice)));
-        (0..count as u32).all(|choice| self.tried.contains(&choice) || !is_legal(choice))
+    fn reported(&self, moment: &DetectorTick<'_>) -> String {
+        let since = if self.same == moment.tick { "since the start of the episode, " } else { "" };
+        let screen = screen(moment.world).map_or_else(String::new, |screen| format!(": {screen}"));
+        format!("nothing has changed {since}for {} ticks, whatever the agent did{screen}", self.same)
+    }
+}
+
+/// Choices that were pressed after the idle action and then released. A mouse button that goes on from one position to
+/// another is not pressed there, so a choice right after another one shows nothing.
+#[derive(Default)]
+struct Presses {
+    last: Option<u32>,
+    /// True if the last choice began after the idle action.
+    is_new: bool,
+    done: BTreeSet<u32>,
+    /// Ticks since this is so for every legal choice.
+    since_all: u32,
+}
+
+impl Presses {
+    fn note(&mut self, choice: u32, idle: u32, mut legal: impl Iterator<Item = u32> + Clone) {
+        if !legal.clone().any(|choice| choice == idle) {
+            // There is no rest between two presses.
+            self.done.insert(choice);
+        }
+        if let Some(last) = self.last.filter(|last| *last != choice) {
+            if self.is_new {
+                self.done.insert(last);
+            }
+            self.is_new = last == idle;
+        }
+        self.last = Some(choice);
+        let is_all = legal.all(|choice| choice == idle || self.done.contains(&choice));
+        self.since_all = if is_all && !self.done.is_empty() { self.since_all + 1 } else { 0 };
+    }
+
+    fn restart(&mut self) {
+        self.done.clear();
+        (self.is_new, self.since_all) = (false, 0);
     }
 }
 
@@ -82,6 +143,14 @@ impl Detector for FrozenWorld {
 
     fn settings(&mut self) -> Vec<DetectorSetting<'_>> {
         vec![DetectorSetting::new("ticks", &mut self.ticks, "ticks in a row without any change").at_least(1.0)]
+    }
+
+    fn least_episode(&self) -> LeastEpisode {
+        LeastEpisode::of_ticks((self.ticks as u32).min(LEAST).saturating_add(1))
+    }
+
+    fn setting_for(&self, ticks: u32) -> Option<String> {
+        half(ticks)
     }
 
     fn watch(&self, _level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -101,11 +170,18 @@ impl EpisodeWatcher for Still {
             self.restart();
         }
         let has_tried = || self.efforts.are_many(self.same) || self.since_all > LATE;
-        (self.same >= self.ticks && has_tried()).then(|| {
-            let since = if self.same == moment.tick { "since the start of the episode, " } else { "" };
-            let screen = screen(moment.world).map_or_else(String::new, |screen| format!(": {screen}"));
-            format!("nothing has changed {since}for {} ticks, whatever the agent did{screen}", self.same)
-        })
+        (self.same >= self.ticks && has_tried()).then(|| self.reported(moment))
+    }
+
+    /// Time was up before the ticks of the setting could pass.
+    fn end(&mut self, moment: &DetectorTick<'_>, result: &EpisodeResult) -> Option<String> {
+        let is_cut = result.end == EpisodeEnd::Truncated && !result.success && result.ticks <= self.ticks;
+        let is_long = self.same >= LEAST && self.same.saturating_mul(2) >= result.ticks;
+        let has_tried = || match moment.action {
+            ActionValue::Discrete(_) => self.presses.since_all > RELEASED,
+            ActionValue::Continuous(_) => self.efforts.are_many(self.same),
+        };
+        (is_cut && is_long && has_tried()).then(|| self.reported(moment))
     }
 }
 
@@ -336,6 +412,76 @@ mod tests {
         assert_eq!(tick_of_finding(&world, [0, 1, 2, 1]), None, "the last one may have an effect");
         world.entity_mut(agent).insert(LegalActions::new([true, true, true, false]));
         assert_eq!(tick_of_finding(&world, [0, 1, 2, 1]), Some(300), "it is illegal");
+    }
+
+    /// Plays these choices up to the time limit, in a World that stands still after a number of ticks, and returns the tick
+    /// of the finding.
+    fn cut(world: &World, agent: Entity, actions: &[u32], moving: u32, success: bool) -> Option<u32> {
+        let mut watch = FrozenWorld::default().watch(&room()).expect("it looks at each level");
+        let ticks = actions.len() as u32;
+        (0..).zip(actions).find_map(|(tick, action)| {
+            let (action, observation) = (ActionValue::Discrete(*action), [tick.min(moving) as f32]);
+            let moment = DetectorTick { agent, tick, observation: &observation, ..DetectorTick::of(world, &action) };
+            let end = EpisodeEnd::Truncated;
+            let result = EpisodeResult { level: 0, end, success, ticks, clipped: 0, total_reward: 0.0 };
+            let now = watch.tick(&moment);
+            let found = now.or_else(|| if tick + 1 == ticks { watch.end(&moment, &result) } else { None });
+            found.map(|_| tick)
+        })
+    }
+
+    /// Adds ticks without an action, up to this number in all.
+    fn resting(actions: &[u32], ticks: usize) -> Vec<u32> {
+        let mut all = actions.to_vec();
+        all.resize(ticks, 0);
+        all
+    }
+
+    #[test]
+    fn a_short_episode_is_frozen_if_each_action_was_pressed_and_released() {
+        let mut world = World::new();
+        let agent = world.spawn(Agent::new(0, ActionSpace::Discrete(3))).id();
+        let pressed = [[0; 4], [1; 4], [0; 4], [2; 4]].concat();
+        let found = |actions: &[u32]| cut(&world, agent, actions, 0, false);
+        assert_eq!(found(&resting(&pressed, 120)), Some(119), "when time is up");
+        assert_eq!(found(&resting(&pressed, 31)), None, "the last press may still show its effect");
+        assert_eq!(found(&resting(&pressed, 32)), Some(31), "16 ticks after it");
+        assert_eq!(found(&resting(&pressed, 400)), Some(300), "a long one is found earlier");
+        assert_eq!(found(&resting(&[0, 0, 1, 1, 2, 2], 120)), None, "the first button may be held on");
+        assert_eq!(found(&resting(&[1, 1, 0, 0, 2, 2], 120)), None, "the first press may be that of the change before");
+        assert_eq!(found(&[pressed.as_slice(), &[0, 1], &[2; 60]].concat()), Some(77), "each was released once");
+        assert_eq!(found(&[&pressed[..12], &[2; 60]].concat()), None, "the last one is not released");
+        assert_eq!(cut(&world, agent, &resting(&pressed, 120), 0, true), None, "it has won");
+    }
+
+    #[test]
+    fn illegal_actions_need_no_press_and_who_may_only_wait_has_tried_nothing() {
+        let mut world = World::new();
+        let agent = world.spawn(Agent::new(0, ActionSpace::Discrete(3))).id();
+        let mut found = |legal: [bool; 3], actions: &[u32]| {
+            world.entity_mut(agent).insert(LegalActions::new(legal));
+            cut(&world, agent, &resting(actions, 120), 0, false)
+        };
+        assert_eq!(found([true, true, false], &[0, 0, 1, 1]), Some(119));
+        assert_eq!(found([true, true, true], &[0, 0, 1, 1]), None, "the third one was not tried");
+        assert_eq!(found([true, false, false], &[]), None);
+        assert_eq!(found([false, false, true], &[2; 120]), Some(119), "there is no rest between two presses");
+    }
+
+    #[test]
+    fn what_changes_in_the_second_half_of_a_short_episode_is_sound() {
+        let mut world = World::new();
+        let agent = world.spawn(Agent::new(0, ActionSpace::Discrete(2))).id();
+        let actions = resting(&[vec![0; 70], vec![1; 4]].concat(), 120);
+        assert_eq!(cut(&world, agent, &actions, 59, false), Some(119), "half of the 120 ticks");
+        assert_eq!(cut(&world, agent, &actions, 60, false), None);
+    }
+
+    #[test]
+    fn a_short_window_needs_shorter_episodes() {
+        let least = |ticks: f64| FrozenWorld { ticks }.least_episode().ticks;
+        assert_eq!((least(300.0), least(9.0)), (31, 10));
+        assert_eq!(FrozenWorld::default().setting_for(20).as_deref(), Some("ticks=10"));
     }
 
     #[test]

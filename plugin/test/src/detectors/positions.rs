@@ -7,9 +7,19 @@ use bevy::{
     prelude::Transform,
 };
 use playbot_harness::{
-    detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead},
+    detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LeastEpisode, LevelAhead},
     floor_plan::FloorPlan,
 };
+
+/// Returns the shortest episode for a window of so many ticks by positions: a tick is compared with the one before.
+fn after_the_first(ticks: f64) -> LeastEpisode {
+    LeastEpisode { needs_position: true, ..LeastEpisode::of_ticks((ticks as u32).saturating_add(1)) }
+}
+
+/// Returns the setting of a window of half these ticks.
+pub(super) fn half(ticks: u32) -> Option<String> {
+    (ticks > 1).then(|| format!("ticks={}", ticks / 2))
+}
 
 /// A finding for agents that stay at one position for any action, away from the goal. An agent that wanders without
 /// progress, or holds a key against a wall, is not stuck.
@@ -50,6 +60,14 @@ impl Detector for Stuck {
             DetectorSetting::new("ticks", &mut self.ticks, "ticks in a row at the same position").at_least(1.0),
             DetectorSetting::new("distance", &mut self.distance, "how far the same position reaches, in tiles"),
         ]
+    }
+
+    fn least_episode(&self) -> LeastEpisode {
+        after_the_first(self.ticks)
+    }
+
+    fn setting_for(&self, ticks: u32) -> Option<String> {
+        half(ticks)
     }
 
     fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -122,7 +140,7 @@ impl EpisodeWatcher for Inside {
     }
 }
 
-/// A finding for agents that fall with nothing left below them.
+/// A finding for agents that fall with nothing left below them. A plan seen from above says nothing of heights.
 pub struct FellThrough {
     ticks: f64,
     depth: f64,
@@ -139,6 +157,8 @@ struct Falling {
     /// The lowest point of the level; unknown before the first tick in a level without a plan.
     lowest: Option<f32>,
     depth: f32,
+    /// True if the level's plan is seen from above.
+    is_above: bool,
     last: f32,
     fallen: u32,
 }
@@ -158,22 +178,33 @@ impl Detector for FellThrough {
             DetectorSetting::new(
                 "depth",
                 &mut self.depth,
-                "how far below its start, in the game's units, without a plan",
+                "how far below its start, in the game's units, without a plan from the side",
             ),
         ]
+    }
+
+    fn least_episode(&self) -> LeastEpisode {
+        after_the_first(self.ticks)
+    }
+
+    fn setting_for(&self, ticks: u32) -> Option<String> {
+        half(ticks)
     }
 
     fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
         let plan = level.plan.as_ref().filter(|plan| !plan.walls.is_empty());
         let lowest = plan.map(|plan| plan.bounds.min.y);
         let (ticks, depth) = (self.ticks as u32, self.depth as f32);
-        Some(Box::new(Falling { ticks, lowest, depth, last: f32::NEG_INFINITY, fallen: 0 }))
+        Some(Box::new(Falling { ticks, lowest, depth, is_above: false, last: f32::NEG_INFINITY, fallen: 0 }))
     }
 }
 
 impl EpisodeWatcher for Falling {
     fn tick(&mut self, moment: &DetectorTick<'_>) -> Option<String> {
         let height = moment.height()?;
+        if moment.height.is_some() && !self.is_above {
+            (self.is_above, self.lowest) = (true, None);
+        }
         let lowest = *self.lowest.get_or_insert(height - self.depth);
         self.fallen = if height < self.last { self.fallen + 1 } else { 0 };
         self.last = height;
@@ -423,6 +454,22 @@ mod tests {
         assert_eq!(found(&FellThrough::default(), &room(), &fall(0.02, -1e9)), None, "it is still inside");
         assert_eq!(found(&FellThrough::default(), &room(), &fall(0.5, -3.0)), None, "it has landed");
         assert_eq!(found(&FellThrough::default(), &LevelAhead::default(), &fall(0.5, -1e9)), None);
+    }
+
+    #[test]
+    fn in_a_plan_from_above_the_height_falls_and_not_the_position() {
+        let above = |speed: [f32; 2]| {
+            let step = |tick: usize| {
+                let [along, down] = speed.map(|speed| speed * tick as f32);
+                Step { height: Some(3.0 - down), ..Step::at(tick, 5.0, 5.0 - along) }
+            };
+            (0..200).map(step).collect::<Vec<_>>()
+        };
+        let deep = FellThrough { depth: 50.0, ..FellThrough::default() };
+        assert_eq!(found(&deep, &room(), &above([0.5, 0.0])), None, "it walks out of the plan");
+        let (tick, message) = found(&deep, &room(), &above([0.0, 0.5])).expect("it falls");
+        assert_eq!(tick, 101, "50 below its start is where it is after 100 ticks, whatever the plan");
+        assert!(message.contains("down to -47.5"), "{message}");
     }
 
     /// Upwards at x = 5, into the wall above, which is three tiles thick.

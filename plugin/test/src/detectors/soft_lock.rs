@@ -3,7 +3,7 @@
 use crate::explore::{CellGrid, ExploredCell};
 use bevy::math::Vec2;
 use bevy_playbot::episode::{EpisodeEnd, EpisodeResult};
-use playbot_harness::detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LevelAhead};
+use playbot_harness::detector::{Detector, DetectorSetting, DetectorTick, EpisodeWatcher, LeastEpisode, LevelAhead};
 use std::collections::BTreeMap;
 
 /// A finding for episodes that go on after the game [proves](playbot_harness::game::StateTools::prove_from) that their
@@ -58,6 +58,17 @@ impl Detector for SoftLock {
             .at_least(1.0),
             DetectorSetting::new("ticks", &mut self.ticks, "ticks that the episode goes on without hope"),
         ]
+    }
+
+    /// After the first question half the ticks are enough if time is up then.
+    fn least_episode(&self) -> LeastEpisode {
+        let ticks = (self.every as u32).saturating_add(self.ticks as u32 / 2).saturating_add(1);
+        LeastEpisode { needs_proofs: true, ..LeastEpisode::of_ticks(ticks) }
+    }
+
+    fn setting_for(&self, ticks: u32) -> Option<String> {
+        let left = ticks.saturating_sub(self.every as u32).saturating_sub(1);
+        (left > 0).then(|| format!("ticks={}", left.saturating_mul(2)))
     }
 
     fn watch(&self, level: &LevelAhead) -> Option<Box<dyn EpisodeWatcher>> {
@@ -179,6 +190,19 @@ mod tests {
         let trap = Trap::default();
         assert!(timed_out_proving(&quick(), &room(), &wander(27), &trap).is_some(), "16 ticks and time is up");
         assert!(timed_out_proving(&quick(), &room(), &wander(20), &trap).is_none(), "9 ticks may be a fall");
+    }
+
+    #[test]
+    fn it_says_how_long_an_episode_must_be() {
+        let found = |detector: &SoftLock, ticks: u32| {
+            timed_out_proving(detector, &room(), &wander(ticks as usize), &Trap::default()).is_some()
+        };
+        let least = quick().least_episode().ticks;
+        assert_eq!((least, SoftLock::default().least_episode().ticks), (26, 101));
+        assert!(found(&quick(), least) && !found(&quick(), least - 1));
+        assert_eq!(quick().setting_for(13).as_deref(), Some("ticks=4"));
+        assert!(found(&SoftLock { every: 10.0, ticks: 4.0 }, 13));
+        assert_eq!(quick().setting_for(11), None, "the first question is too late");
     }
 
     #[test]

@@ -18,6 +18,7 @@ use playbot_harness::{
 #[derive(Clone, Debug)]
 pub struct Step {
     pub position: Option<Vec2>,
+    pub height: Option<f32>,
     pub action: u32,
     pub seen: f32,
     pub reward: f32,
@@ -28,7 +29,7 @@ impl Step {
     /// An agent at this position; the number of the tick is its action.
     pub fn at(tick: usize, x: f32, y: f32) -> Self {
         let action = tick as u32 % 3;
-        Self { position: Some(Vec2::new(x, y)), action, seen: 0.5, reward: 0.0, is_success: false }
+        Self { position: Some(Vec2::new(x, y)), height: None, action, seen: 0.5, reward: 0.0, is_success: false }
     }
 }
 
@@ -91,6 +92,7 @@ fn play(
             state_hash: 0,
             reward: step.reward,
             position: step.position,
+            height: step.height,
             is_success: step.is_success,
             proofs,
         };

@@ -214,6 +214,7 @@ impl Looking {
             state_hash: world.get::<StateHash>(agent).map_or(0, |hash| hash.0),
             reward: world.get::<Reward>(agent).map_or(0.0, Reward::get),
             position: game.tools().state.position(world, agent),
+            height: game.tools().state.height(world, agent),
             is_success: end.map_or_else(|| episode.is_success(), |end| end.success),
             proofs: &proofs,
         };

@@ -59,6 +59,16 @@ pub(super) enum PlayedEnd {
     },
 }
 
+impl PlayedEnd {
+    /// Returns the ticks of the episode, or those before the game broke.
+    pub fn ticks(&self) -> u32 {
+        match self {
+            Self::Ended { result, .. } => result.ticks,
+            Self::Broken { tick, .. } => tick.unwrap_or(0),
+        }
+    }
+}
+
 /// A detector's finding in an episode.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct EpisodeFinding {

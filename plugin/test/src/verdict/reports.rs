@@ -136,6 +136,8 @@ pub(super) fn summary(overview: &Overview, comparison: Option<&Comparison>, prog
         lines.push(format!("{} of the open squares were visited.", overview.places.describe()));
     }
     lines.extend(overview.first_tick().map(|levels| format!("{}.", markdown_cell(&levels))));
+    let short = overview.could_not_look();
+    lines.extend(short.map(|detectors| format!("Detectors that could not look: {}.", markdown_cell(&detectors))));
     let head = ["", "| tester | levels solved | episodes solved | squares visited |", "|---|---:|---:|---:|"];
     lines.extend(head.map(str::to_owned));
     for tester in &overview.testers {
@@ -483,7 +485,7 @@ mod tests {
     use crate::{
         findings::testing::course,
         verdict::{
-            CommonStop, Finding, LevelVerdict, Places, StopKind, TestRecord, TestedRun, TesterRecord,
+            CommonStop, Finding, LevelVerdict, Places, StopKind, TestRecord, TestedRun, TesterRecord, TooShort,
             folder::{Earlier, TestFolder},
             testing,
             testing::{tester, verdict},
@@ -505,6 +507,12 @@ mod tests {
         assert!(!plain.contains("open squares") && !plain.contains("first tick"), "{plain}");
         let at_start = said(&LevelVerdict { solved_at_start: true, ..verdict(0, 2, 2) });
         assert!(at_start.contains("\n1 level is solved in its first tick: hard:0.\n"), "{at_start}");
+        let short = TooShort { detector: "own".to_owned(), needs: 9, had: 8, setting: None };
+        let mut level = LevelVerdict { too_short: vec![short], ..verdict(0, 1, 2) };
+        level.score.timed_out = 1;
+        let short = said(&level);
+        let words = "\nDetectors that could not look: own (needs episodes of 9 ticks, and had at most 8).\n";
+        assert!(short.contains(words) && !plain.contains("could not look"), "{short}");
         let named = said(&LevelVerdict { name: Some("Cave".to_owned()), ..verdict(0, 0, 2) });
         assert!(named.contains("\n| hard:0 Cave | bot-failed |"), "{named}");
         let mut level = LevelVerdict { places: Some(Places { visited: 3, open: 4 }), ..verdict(0, 2, 2) };

@@ -6,11 +6,14 @@
 #[cfg(test)]
 mod tests;
 
-use crate::verdict::{
-    LevelOutcome, LevelVerdict, Places,
-    error::{MAKE_AGAIN, TestError, io_error, json_fault},
-    plan::TestRecord,
-    statistics::Trials,
+use crate::{
+    detectors::looks_after_play,
+    verdict::{
+        LevelOutcome, LevelVerdict, Places, TooShort,
+        error::{MAKE_AGAIN, TestError, io_error, json_fault},
+        plan::TestRecord,
+        statistics::Trials,
+    },
 };
 use crc32fast::Hasher;
 use playbot_learner::BrokenSeal;
@@ -18,7 +21,7 @@ use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     fs::File,
     io,
     io::{BufRead, BufReader, Write},
@@ -313,6 +316,8 @@ pub struct Overview {
     pub hardest: Vec<LevelVerdict>,
     /// Levels of a recording of an earlier build, in a test against one.
     pub recorded: RecordedTotal,
+    /// Detectors that could find nothing on any level, because all episodes were too short.
+    pub too_short: Vec<TooShort>,
 }
 
 impl Overview {
@@ -325,13 +330,16 @@ impl Overview {
         let mut lines = ResultLines::open(folder)?;
         let mut overview = Self::empty(lines.record().clone());
         let mut shares = BTreeMap::<u64, u64>::new();
+        let mut short = ShortTotals::default();
         while let Some(level) = lines.next_level()? {
+            short.add(&level);
             if level.outcome == LevelOutcome::Solved {
                 *shares.entry(solved_share(&level)).or_default() += 1;
             }
             overview.add(level);
         }
         overview.keep_hardest(&shares);
+        overview.too_short = short.everywhere();
         Ok(overview)
     }
 
@@ -358,6 +366,7 @@ impl Overview {
             worst: Vec::new(),
             hardest: Vec::new(),
             recorded: RecordedTotal::default(),
+            too_short: Vec::new(),
         }
     }
 
@@ -421,9 +430,56 @@ impl Overview {
         (count > 0).then(|| format!("{} {are} solved in {their} first tick: {names}{more}", counted(count, "level")))
     }
 
+    /// Lists the detectors that could not look, because all episodes were too short, with what they need; `None` without
+    /// such detectors.
+    pub fn could_not_look(&self) -> Option<String> {
+        let detectors: Vec<String> = self.too_short.iter().map(ToString::to_string).collect();
+        (!detectors.is_empty()).then(|| detectors.join(", "))
+    }
+
     /// Returns whether every level was solved, has no finding, and ends as recorded.
     pub fn is_sound(&self) -> bool {
         self.findings == 0 && self.solved == self.levels && self.recorded.regressions.is_empty()
+    }
+}
+
+/// Detectors for which the episodes of levels were too short.
+#[derive(Default)]
+struct ShortTotals {
+    /// Number of all levels, and of those on which the time of an episode was up.
+    levels: u64,
+    timed_out: u64,
+    /// Each detector with its longest episode, and the number of levels on which that was too short.
+    short: Vec<(TooShort, u64)>,
+    /// Detectors with findings.
+    found: BTreeSet<String>,
+}
+
+impl ShortTotals {
+    fn add(&mut self, level: &LevelVerdict) {
+        self.levels += 1;
+        self.timed_out += u64::from(level.score.timed_out > 0);
+        self.found.extend(level.findings.iter().map(|finding| finding.detector.clone()));
+        for short in &level.too_short {
+            match self.short.iter_mut().find(|(known, _)| known.detector == short.detector) {
+                Some((known, levels)) => {
+                    *levels += 1;
+                    if known.had < short.had {
+                        *known = short.clone();
+                    }
+                }
+                None => self.short.push((short.clone(), 1)),
+            }
+        }
+    }
+
+    /// Returns the detectors that could find nothing on any level. Those that watch play say nothing of levels on which no
+    /// time was up.
+    fn everywhere(self) -> Vec<TooShort> {
+        let Self { levels, timed_out, short, found } = self;
+        let all = |detector: &str| if looks_after_play(detector) { levels } else { timed_out };
+        let short = short.into_iter().filter(|(short, count)| *count == all(&short.detector));
+        short.map(|(short, _)| short).filter(|short| !found.contains(&short.detector)).collect()
     }
 }
 

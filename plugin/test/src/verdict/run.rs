@@ -4,7 +4,7 @@ use crate::{
     detectors::{TestedBy, TestedLevel},
     findings::FindingFiles,
     verdict::{
-        Finding, LevelVerdict,
+        Finding, LevelVerdict, TooShort,
         error::TestError,
         judge,
         maps::level_name,
@@ -15,7 +15,10 @@ use crate::{
     },
 };
 use bevy::math::Vec2;
-use bevy_playbot::{episode::EpisodeResult, fault::Fault};
+use bevy_playbot::{
+    episode::{EpisodeEnd, EpisodeResult},
+    fault::Fault,
+};
 use playbot_harness::{eval::EvalError, game::Game, worlds::check_start};
 use std::{
     collections::{BTreeMap, BTreeSet},
@@ -335,17 +338,15 @@ pub(super) fn seen(plan: &TestPlan, played: &[&[Played]]) -> Vec<Finding> {
     findings
 }
 
-/// Returns the findings of detectors that look at a level after its test. Incomplete if `stop` returned true.
+/// Returns the findings of detectors that look at a level after its test, and the detectors for which its episodes were
+/// too short. Incomplete if `stop` returned true.
 pub(super) fn inspect(
     game: &dyn Game,
     plan: &TestPlan,
     (index, name): (u64, &str),
     played: &[&[Played]],
     stop: &dyn Fn() -> bool,
-) -> Vec<Finding> {
-    if plan.detectors.levels.is_empty() {
-        return Vec::new();
-    }
+) -> (Vec<Finding>, Vec<TooShort>) {
     let level = plan.split.first + index;
     let testers = plan.testers.iter().zip(played).map(|(tester, episodes)| TestedBy {
         name: &tester.record.name,
@@ -369,7 +370,41 @@ pub(super) fn inspect(
             settings: defect.settings,
         }));
     }
-    findings
+    (findings, too_short(plan, &tested, played))
+}
+
+/// Returns the detectors that could find nothing on a level, because its episodes were too short.
+fn too_short(plan: &TestPlan, tested: &TestedLevel<'_>, played: &[&[Played]]) -> Vec<TooShort> {
+    let short = |detector: &str, needs: u32, had: u32, setting: Option<String>| TooShort {
+        detector: detector.to_owned(),
+        needs,
+        had,
+        setting: setting.map(|setting| format!("{detector}.{setting}")),
+    };
+    let mut found = Vec::new();
+    let episodes = || played.iter().flat_map(|episodes| episodes.iter());
+    let is_cut = |episode: &Played| ended(episode).is_some_and(|end| end.end == EpisodeEnd::Truncated && !end.success);
+    // Those that ended by themselves show no more to anybody who waits.
+    if episodes().any(is_cut) {
+        let had = episodes().map(|episode| episode.end.ticks()).max().unwrap_or(0);
+        let has_positions =
+            episodes().any(|episode| episode.track.route.as_ref().is_some_and(|it| it.entity.is_none()));
+        let has_proofs = tested.game.tools().state.proves_states();
+        for detector in &plan.detectors.ticks {
+            let least = detector.least_episode();
+            let is_known = (has_positions || !least.needs_position) && (has_proofs || !least.needs_proofs);
+            if had < least.ticks && is_known {
+                found.push(short(detector.name(), least.ticks, had, detector.setting_for(had)));
+            }
+        }
+    }
+    for detector in &plan.detectors.levels {
+        let (needs, had) = (detector.least_ticks(), detector.most_ticks(tested));
+        if let Some(had) = had.filter(|had| *had < needs) {
+            found.push(short(detector.name(), needs, had, detector.setting_for(had)));
+        }
+    }
+    found
 }
 
 fn ended_by_defect((number, episode): (u32, &Played)) -> Option<(u32, EpisodeResult)> {

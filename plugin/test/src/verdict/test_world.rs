@@ -482,6 +482,7 @@ impl WatchedSeat {
             state_hash: world.get::<StateHash>(self.agent).map_or(0, |hash| hash.0),
             reward: reward.get(),
             position: if watches.is_empty() { None } else { game.tools().state.position(world, self.agent) },
+            height: if watches.is_empty() { None } else { game.tools().state.height(world, self.agent) },
             is_success: result.map_or_else(|| episode.is_success(), |result| result.success),
             proofs: &proofs,
         };

@@ -58,6 +58,7 @@ pub(super) fn verdict(index: u64, solved: u64, episodes: u64) -> LevelVerdict {
         testers: vec![tester("random", solved, episodes, false)],
         findings: Vec::new(),
         not_kept: None,
+        too_short: Vec::new(),
         recorded: None,
     }
 }

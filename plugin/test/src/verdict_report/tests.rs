@@ -4,7 +4,7 @@ use crate::{
     findings::{RecordedCourse, testing::course},
     verdict::{
         CommonStop, Comparison, FailurePath, FindingChange, LevelMaps, LevelVerdict, MapScope, Places, Shard,
-        SkillTicks, SquareEnds, StopKind, TestError, TestRecord, TesterVerdict, merge,
+        SkillTicks, SquareEnds, StopKind, TestError, TestRecord, TesterVerdict, TooShort, merge,
     },
     verdict_report::{
         HtmlReport, REPORT, STYLE, html,
@@ -81,6 +81,18 @@ fn common_stops_and_levels_that_are_solved_in_their_first_tick_are_on_the_page()
                  position of the entity with `Player&lt;T&gt;`";
     assert!(html.contains(words), "{html}");
     assert!(html.contains("<p>1 level is solved in its first tick: hard:1.</p>"), "{html}");
+}
+
+#[test]
+fn detectors_that_could_not_look_are_on_the_page() {
+    let too_short =
+        vec![TooShort { detector: "a<b".to_owned(), needs: 9, had: 8, setting: Some("a<b.ticks=4".to_owned()) }];
+    let mut short = LevelVerdict { too_short, ..level(0, 0, 3, 0) };
+    short.score.timed_out = 1;
+    let html = page(&[short], &PLAIN);
+    let words = "<p>Detectors that could not look: a&lt;b (needs episodes of 9 ticks, and had at most 8: `--detector \
+                 a&lt;b.ticks=4`).</p>";
+    assert!(html.contains(words), "{html}");
 }
 
 #[test]

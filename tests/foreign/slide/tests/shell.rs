@@ -1,6 +1,6 @@
 //! Tests of the verbs through the command line. Bots and people play with the mouse.
 
-use playbot_shell::GameProgram;
+use playbot_shell::{GameProgram, Shell, ended_in};
 
 const GAME: GameProgram = GameProgram {
     program: env!("CARGO_BIN_EXE_foreign_slide"),
@@ -25,11 +25,33 @@ playbot_shell::tests!(
     defects_are_planted_and_looked_for,
 );
 
+/// Its puzzles have 120 ticks.
+#[test]
+fn detectors_for_which_120_ticks_are_too_few_say_so() {
+    let shell = Shell::new(GAME.program);
+    let test = |settings: &[&str]| {
+        let call = ["test", "slide", "--levels", "default:4", "--bot", "chaos", "--out", "t", "--force", "--detect"];
+        let call = [&call[..], &["dead-action,fading-action"], settings].concat();
+        ended_in(shell.command(&call), &[0, 1]).2
+    };
+    let line = "could not look: dead-action (needs episodes of 140 ticks, and had at most 120: `--detector \
+                dead-action.ticks=17`), fading-action (needs episodes of 400 ticks, and had at most 120: `--detector \
+                fading-action.rest=8`)\n";
+    let messages = test(&[]);
+    assert!(messages.contains(line), "{messages}");
+    for file in ["summary.md", "report.html"] {
+        let text = std::fs::read_to_string(shell.path("t").join(file)).expect("it is written");
+        assert!(text.contains("Detectors that could not look: dead-action (needs episodes of 140 ticks"), "{text}");
+    }
+    let messages = test(&["--detector", "dead-action.ticks=17", "--detector", "fading-action.rest=8"]);
+    assert!(!messages.contains("could not look"), "{messages}");
+}
+
 /// Plays with the mouse in a window of this scale, and returns the first and the last recorded action. Positions are in
 /// pixels.
 #[cfg(feature = "screen")]
 fn recorded_by_mouse(scale: Option<&str>, start: [u32; 2], cell: [u32; 2]) -> [Option<u64>; 2] {
-    use playbot_shell::{Desk, Shell};
+    use playbot_shell::Desk;
 
     let (desk, shell) = (Desk::new(GAME.program), Shell::new(GAME.program));
     let args = ["play", "slide", "--levels", "0..0", "--record", "mine.demo", "--no-time-limit"];
@@ -65,7 +87,7 @@ fn leave_with(shell: &playbot_shell::Shell, seat: playbot_shell::Seat, file: &st
 /// Plays without a key, and returns the lengths of the episodes that are recorded. An episode of a bot has 120 ticks.
 #[cfg(feature = "screen")]
 fn lengths_of_a_slow_person(more: &[&str]) -> Vec<u64> {
-    use playbot_shell::{Desk, Shell};
+    use playbot_shell::Desk;
 
     let (desk, shell) = (Desk::new(GAME.program), Shell::new(GAME.program));
     let args = ["play", "slide", "--levels", "1..1", "--record", "slow.demo"];

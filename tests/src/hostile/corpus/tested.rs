@@ -10,7 +10,7 @@ use playbot_test::{
     verdict::{
         CommonStop, Comparison, Earlier, EpisodeScore, FailurePath, Finding, FinishTime, LevelMaps, LevelOutcome,
         LevelVerdict, MapScope, Overview, Places, RESULTS, ReachedCells, ResultLines, Shard, SkillTicks, SquareEnds,
-        StopKind, TestFolder, TestRecord, TesterRecord, TesterVerdict, merge, wilson, write_reports,
+        StopKind, TestFolder, TestRecord, TesterRecord, TesterVerdict, TooShort, merge, wilson, write_reports,
     },
     verdict_report::{HtmlReport, html},
 };
@@ -119,6 +119,7 @@ fn verdict(index: u64) -> LevelVerdict {
         testers: ["random", "chaos"].map(tester).to_vec(),
         findings: vec![finding],
         not_kept: Some("`random`, episode 0: it does not fail when it is played alone".to_owned()),
+        too_short: vec![too_short()],
         recorded: Some(recorded()),
     }
 }
@@ -134,6 +135,11 @@ fn recorded() -> RecordedCourse {
         position,
         furthest,
     }
+}
+
+fn too_short() -> TooShort {
+    let setting = Some("fading-action.rest=8".to_owned());
+    TooShort { detector: "fading-action".to_owned(), needs: 400, had: 120, setting }
 }
 
 fn stop() -> CommonStop {

@@ -88,6 +88,7 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     }
     report!("{}", counts(&overview));
     overview.first_tick().iter().for_each(|levels| report!("{levels}"));
+    overview.could_not_look().iter().for_each(|detectors| report!("could not look: {detectors}"));
     stops(&overview).iter().for_each(|line| report!("{line}"));
     search(&overview).iter().for_each(|line| report!("{line}"));
     replays(results.folder, &overview).iter().for_each(|line| report!("{line}"));

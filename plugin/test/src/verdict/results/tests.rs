@@ -238,6 +238,57 @@ fn levels_that_are_solved_in_their_first_tick_are_counted_and_the_first_few_are_
     assert_eq!(last, "7 levels are solved in their first tick: hard:7, hard:31, hard:40, hard:41, hard:42 and 2 more");
 }
 
+/// Totals of levels, each with the number of its episodes whose time was up, and its detectors with what they had.
+fn short(levels: &[(u64, &[(&str, u32)])]) -> Vec<String> {
+    let mut totals = ShortTotals::default();
+    for (index, (timed_out, detectors)) in (0..).zip(levels) {
+        let mut level = verdict(index, 1, 2);
+        level.score.timed_out = *timed_out;
+        level.too_short = detectors.iter().map(|(detector, had)| too_short(detector, *had)).collect();
+        totals.add(&level);
+    }
+    totals.everywhere().iter().map(|short| format!("{} {}", short.detector, short.had)).collect()
+}
+
+fn too_short(detector: &str, had: u32) -> TooShort {
+    let setting = Some(format!("{detector}.ticks={}", had / 2));
+    TooShort { detector: detector.to_owned(), needs: 301, had, setting }
+}
+
+#[test]
+fn detectors_for_which_all_episodes_were_too_short_are_named_with_the_longest_one() {
+    assert_eq!(short(&[(1, &[("stuck", 90)]), (2, &[("stuck", 120)])]), ["stuck 120"]);
+    assert!(short(&[(1, &[("stuck", 90)]), (1, &[])]).is_empty(), "it has looked on the second level");
+    assert_eq!(short(&[(1, &[("stuck", 90)]), (0, &[])]), ["stuck 90"], "no time was up on the second level");
+    assert_eq!(short(&[(1, &[("dead-action", 90)]), (0, &[("dead-action", 9)])]), ["dead-action 90"]);
+    assert!(short(&[(1, &[("dead-action", 90)]), (0, &[])]).is_empty(), "a solved episode shows what actions do");
+    let mut totals = ShortTotals::default();
+    let finding = Finding {
+        detector: "stuck".to_owned(),
+        tester: None,
+        episode: None,
+        tick: None,
+        message: String::new(),
+        file: None,
+        settings: Vec::new(),
+    };
+    let mut level =
+        LevelVerdict { findings: vec![finding], too_short: vec![too_short("stuck", 9)], ..verdict(0, 1, 2) };
+    level.score.timed_out = 1;
+    totals.add(&level);
+    assert!(totals.everywhere().is_empty(), "it has found something");
+}
+
+#[test]
+fn a_detector_that_could_not_look_names_what_it_needs_and_what_to_type() {
+    let mut overview = Overview::empty(record());
+    assert_eq!(overview.could_not_look(), None);
+    overview.too_short = vec![too_short("stuck", 120), TooShort { setting: None, ..too_short("own", 1) }];
+    let words = "stuck (needs episodes of 301 ticks, and had at most 120: `--detector stuck.ticks=60`), \
+                 own (needs episodes of 301 ticks, and had at most 1)";
+    assert_eq!(overview.could_not_look().as_deref(), Some(words));
+}
+
 #[test]
 fn quartiles_lie_between_the_values() {
     let of = |ticks: &[u32]| FinishTime::of(ticks.to_vec());
