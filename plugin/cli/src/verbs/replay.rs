@@ -98,6 +98,12 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     check_start(game, &finding.header.mode, finding.episode.level_seed)?;
     let again = play_again(game, &finding)?;
     let status = again.status(&finding);
+    let edited = finding.edited_level(game);
+    // The level as it is now is the one to show, and to name in a shorter finding.
+    let mut finding = finding;
+    if let (Some(_), Some(now)) = (&edited, &again.replayed.level_file) {
+        finding.episode.level_file = Some(now.clone());
+    }
     let shorter = match &args.out {
         Some(out) if status != FindingStatus::Gone => {
             Some((write_shorter(game, &finding, &stored, args.replays, out)?, out.as_path()))
@@ -108,6 +114,7 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         path: &args.finding,
         finding: &stored,
         again: &again,
+        edited: edited.as_deref(),
         shorter: shorter.as_ref().map(|(shorter, path)| (shorter, *path)),
     };
     report.print(args.json)?;
@@ -164,6 +171,8 @@ pub struct ReplayReport<'a> {
     pub finding: &'a StoredFinding,
     /// The result of playing it again.
     pub again: &'a Recheck,
+    /// Path of the level's file, if it has changed since the test.
+    pub edited: Option<&'a str>,
     /// The shorter one, and its file.
     pub shorter: Option<(&'a Minimised, &'a Path)>,
 }
@@ -195,6 +204,7 @@ impl ReplayReport<'_> {
             "detector": head.detector, "tester": head.tester, "message": head.message, "tick": head.tick,
             "state_hash": head.state_hash, "ticks": episode.len(), "original_ticks": head.original_ticks,
             "status": self.again.status(self.finding), "seen": self.again.sighting, "minimised": shorter,
+            "level_file_changed": self.edited.is_some(),
         })
     }
 
@@ -216,7 +226,9 @@ impl ReplayReport<'_> {
         };
         let ticks =
             if episode.is_empty() { String::new() } else { format!(" ({})", counted(episode.len() as u64, "tick")) };
-        format!("{} {}{who}{ticks}: {}: {}\n{now}", header.game, head.level, head.detector, head.message)
+        let edited =
+            self.edited.map_or_else(String::new, |path| format!("; the level file {path} has changed since the test"));
+        format!("{} {}{who}{ticks}: {}: {}\n{now}{edited}", header.game, head.level, head.detector, head.message)
     }
 
     fn shorter_sentence(&self) -> Option<String> {

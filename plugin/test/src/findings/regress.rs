@@ -6,6 +6,7 @@ use crate::findings::{
     folder::{Date, ENDING, list_findings},
     io_error,
     keep::{Sighting, recheck},
+    play::since_edited,
 };
 use playbot_harness::{game::Game, games::Games, level_files::read::read_text_file, parallel::on_threads};
 use serde::{Deserialize, Serialize};
@@ -158,7 +159,8 @@ fn row(request: &Regress, name: &str, path: &Path) -> RegressRow {
                 Some(_) if again.is_same(&finding) => head.message.clone(),
                 Some(seen) => format!("{}{}", head.message, elsewhere(seen, &finding)),
             };
-            let status = again.status(&finding);
+            let edited = finding.edited_level(game).map_or_else(String::new, |path| since_edited(&path));
+            let (status, message) = (again.status(&finding), format!("{message}{edited}"));
             RegressRow { status, message, seen: again.sighting, ..row }
         }
     }
