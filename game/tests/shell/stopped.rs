@@ -76,6 +76,27 @@ fn a_stopped_audit_of_levels_prints_what_it_has_compared() {
     }
 }
 
+#[test]
+fn a_stopped_exploration_prints_what_it_has_found_within_a_round() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let begun = Instant::now();
+    // The first round alone takes minutes.
+    let steps = ENDLESS.to_string();
+    let args = ["explore", "coinrun", "--level", "easy:0", "--until", "spent", "--batch", "200000", "--steps", &steps];
+    let mut explorer = command(temporary.path(), &[&args[..], &["--png", "seen.png", "--json"]].concat());
+    explorer.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let child = at_work(&mut explorer, || begun.elapsed() > Duration::from_secs(5));
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("a shell's kill");
+    assert!(sent.success());
+    let output = child.wait_with_output().expect("a child");
+    assert_eq!(code(&output), 130, "{}", errors(&output));
+    let found = &lines(&output)[0];
+    assert_eq!(found["stop"], "asked", "{found}");
+    assert!(found["cells"].as_u64().is_some_and(|cells| cells > 1), "{found}");
+    assert!(found["visits"].as_u64().is_some_and(|visits| visits > 0 && visits < 200_000), "{found}");
+    assert!(temporary.path().join("seen.png").exists(), "{}", errors(&output));
+}
+
 /// `nohup` has SIGHUP ignored, and a shell without job control SIGINT of what it starts in the background.
 #[cfg(target_os = "linux")]
 #[test]

@@ -70,7 +70,7 @@ pub use crate::explore::{
     archive::ReachedCell,
     cell::{CellGrid, ExploredCell, NoCell},
     known_paths::{ExplorationSummary, Route, follow_route, record_route},
-    round::{Round, check_cell, explore, open_cells},
+    round::{Round, check_cell, explore, explore_until, open_cells},
     snapshots::SnapshotFault,
     tried::Exhaustion,
 };

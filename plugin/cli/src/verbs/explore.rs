@@ -30,7 +30,7 @@ use playbot_harness::{
 use playbot_learner::{DeviceKind, ScoreConfig, SkillDraw, SkillModel, SkillSource};
 use playbot_report::counted;
 use playbot_test::explore::{
-    Exploration, ExplorationSummary, ExplorePlan, ExploredCell, Explorer, Route, Stop, Until, explore,
+    Exploration, ExplorationSummary, ExplorePlan, ExploredCell, Explorer, Route, Stop, Until, explore_until,
     round::check_cell,
 };
 use serde_json::json;
@@ -45,7 +45,7 @@ use std::{
 /// The method is Go-Explore (Ecoffet et al. 2021): return to seldom seen cells by the same actions, and explore from
 /// there. Cells are squares of the level where the game gives positions of agents, else observations that are alike.
 /// Skills or a policy explore instead of random actions if given. If the game does not play the same by the same
-/// actions, the first tick that differs is printed.
+/// actions, the first tick that differs is printed. Ctrl-C ends it with what is known by then.
 ///
 /// Exit code 1 if the level has a goal and no path to it was found, or if the cell of --cell was not reached.
 #[derive(clap::Args)]
@@ -255,7 +255,7 @@ fn plan(args: &Args, split: &LevelSplit, explorer: Explorer, observation_config:
 fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> {
     interrupt::listen();
     let bar = progress::bar("explore", plan.steps, "steps");
-    let explored = explore(
+    let explored = explore_until(
         game,
         plan,
         |ticks| bar.inc(ticks),
@@ -264,8 +264,10 @@ fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> 
                 .solution
                 .map_or_else(String::new, |ticks| format!(", solved in {}", counted(ticks.into(), "tick")));
             bar.set_message(format!("{}{solved}", counted(round.cells as u64, "cell")));
-            if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            ControlFlow::Continue(())
         },
+        // What is known is then recorded and drawn.
+        &interrupt::asked_to_sum_up,
     );
     bar.finish_and_clear();
     Ok(explored?)
