@@ -16,6 +16,7 @@ use crate::{
     verbs::replay::picture::Pictures,
 };
 use playbot_harness::{
+    brief::shell_word,
     game::Game,
     games::{Artifact, Games},
 };
@@ -110,14 +111,19 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         }
         _ => None,
     };
+    let is_stopped = shorter.as_ref().is_some_and(|(shorter, _)| !shorter.is_minimal) && interrupt::asked();
     let report = ReplayReport {
         path: &args.finding,
         finding: &stored,
         again: &again,
         edited: edited.as_deref(),
         shorter: shorter.as_ref().map(|(shorter, path)| (shorter, *path)),
+        is_stopped,
     };
     report.print(args.json)?;
+    if is_stopped {
+        return Ok(Outcome::Stopped);
+    }
     let shown = shorter.as_ref().map_or(&finding, |(Minimised { finding, .. }, _)| finding);
     pictures.write(game, shown)?;
     if args.window {
@@ -175,6 +181,8 @@ pub struct ReplayReport<'a> {
     pub edited: Option<&'a str>,
     /// The shorter one, and its file.
     pub shorter: Option<(&'a Minimised, &'a Path)>,
+    /// Whether Ctrl-C ended the search for the shorter one.
+    pub is_stopped: bool,
 }
 
 impl ReplayReport<'_> {
@@ -196,7 +204,7 @@ impl ReplayReport<'_> {
         let shorter = self.shorter.map(|(shorter, path)| {
             json!({
                 "path": path.display().to_string(), "ticks": shorter.finding.episode.len(), "replays": shorter.replays,
-                "is_minimal": shorter.is_minimal,
+                "is_minimal": shorter.is_minimal, "stopped": self.is_stopped,
             })
         });
         json!({
@@ -236,8 +244,16 @@ impl ReplayReport<'_> {
         let (now, original) = (shorter.finding.episode.len(), self.finding.head.original_ticks);
         let [before, after] = shorter.efforts;
         let percent = 100.0 * now as f64 / f64::from(original.max(1));
-        let end =
-            if shorter.is_minimal { "" } else { "; the budget was used up before nothing more could be left out" };
+        let end = if self.is_stopped {
+            let (program, path) = (program::name(), shell_word(&path.display().to_string()));
+            format!(
+                "; stopped before nothing more could be left out: `{program} replay {path} --minimise --out FILE` goes on"
+            )
+        } else if shorter.is_minimal {
+            String::new()
+        } else {
+            "; the budget was used up before nothing more could be left out".to_owned()
+        };
         Some(format!(
             "{}: {} of {original} that the tester played ({percent:.0} %), {} of {before} that do something, after {}{end}",
             path.display(),
@@ -261,11 +277,12 @@ pub(crate) fn write_shorter(
     replays: u32,
     out: &Path,
 ) -> Result<Minimised, CliError> {
+    interrupt::leave(format!("{} is not written", out.display()));
     interrupt::listen();
     let bar = progress::bar("minimise", replays.into(), "replays");
     let budget = Budget { replays, ..Budget::default() };
     let hear = |replays: u32| bar.set_position(replays.into());
-    let shorter = minimise(game, finding, &Checks::of_game(game), budget, &hear, &interrupt::asked);
+    let shorter = minimise(game, finding, &Checks::of_game(game), budget, &hear, &interrupt::asked_to_sum_up);
     bar.finish_and_clear();
     let shorter = shorter?;
     output::make_folder_of(out)?;
@@ -315,10 +332,38 @@ fn or_a_picture(error: WindowError) -> CliError {
     }
 }
 
-#[cfg(all(test, feature = "window"))]
+#[cfg(test)]
 mod tests {
     use super::*;
+    use bevy_playbot::demo::file::DemoEpisode;
+    use playbot_harness::foreign::ForeignGame;
+    use playbot_test::findings::{FindingHead, Replayed};
 
+    #[test]
+    fn a_search_that_was_stopped_is_distinguished_from_one_with_too_few_replays() {
+        let game = ForeignGame::new("walk", 1, |_: &mut bevy::prelude::App| {});
+        let header = game.demo_header("default");
+        let episode = DemoEpisode::new(0, header.actions);
+        let head = FindingHead { original_ticks: 9, ..FindingHead::new("default:0", "lost", "after 9 ticks") };
+        let finding = StoredFinding { header, head, episode };
+        let again = Recheck { sighting: None, replayed: Replayed::default() };
+        let minimised = |is_minimal| Minimised { finding: finding.clone(), replays: 3, efforts: [2, 1], is_minimal };
+        let said = |is_minimal, is_stopped| {
+            let shorter = minimised(is_minimal);
+            let path = Path::new("short one.finding");
+            let shorter = Some((&shorter, path));
+            let report = ReplayReport { path, finding: &finding, again: &again, edited: None, shorter, is_stopped };
+            (report.shorter_sentence().expect("there is a shorter one"), report.json())
+        };
+        assert!(said(true, false).0.ends_with(" after 3 replays"));
+        assert!(said(false, false).0.ends_with("; the budget was used up before nothing more could be left out"));
+        let (words, json) = said(false, true);
+        let advice = format!("`{} replay 'short one.finding' --minimise --out FILE` goes on", program::name());
+        assert!(words.contains("; stopped before") && words.ends_with(&advice), "{words}");
+        assert_eq!(json["minimised"]["stopped"], true);
+    }
+
+    #[cfg(feature = "window")]
     #[test]
     fn without_a_display_pictures_are_named() {
         let missing = || "DISPLAY is not set".to_owned();
