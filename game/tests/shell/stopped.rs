@@ -39,6 +39,7 @@ fn a_stopped_recording_says_how_the_rest_is_added() {
     assert!(words.contains("incomplete") && advice.starts_with("--append --levels easy:"), "{words}");
     let rest = (ENDLESS - recorded).to_string();
     assert!(advice.ends_with(&format!("..4000 --steps {rest} --seed 2")), "{recorded} steps: {words}");
+    assert!(words.contains("`, in place of its --levels, --steps and --seed"), "{words}");
 
     // As printed, but for the number of steps.
     let advice = advice.replace(&rest, "100");

@@ -259,6 +259,11 @@ impl OverwriteArgs {
         self.append && path.is_file()
     }
 
+    /// Returns whether an existing file is overwritten.
+    pub fn replaces(self) -> bool {
+        self.force
+    }
+
     /// Opens the file, and makes its folder.
     ///
     /// # Errors

@@ -99,7 +99,7 @@ pub struct Args {
     #[command(flatten)]
     compute: Compute,
     /// Record the shortest solution, or the path to --cell, into this .demo, once it has been replayed.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = output::demo)]
     out: Option<PathBuf>,
     /// Record and draw the path to this cell instead of the solution. Cells are named by their numbers, such as 3,4.
     #[arg(long, value_name = "CELL", allow_hyphen_values = true)]

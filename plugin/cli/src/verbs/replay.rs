@@ -72,8 +72,8 @@ pub struct Args {
     /// Leave out actions that it does not need, and write the shorter finding to --out. Pictures then show that one.
     #[arg(long, requires = "out")]
     minimise: bool,
-    /// File for the shorter finding.
-    #[arg(long, value_name = "FILE", requires = "minimise")]
+    /// File for the shorter finding, a .finding.
+    #[arg(long, value_name = "FILE", requires = "minimise", value_parser = output::finding)]
     out: Option<PathBuf>,
     /// Most replays for shortening.
     #[arg(long, default_value_t = 500, requires = "minimise", value_parser = clap::value_parser!(u32).range(1..))]

@@ -3,6 +3,7 @@
 use crate::{
     arguments::open,
     error::{CliError, Outcome},
+    output,
     output::{prepare, print_line},
 };
 use bevy_playbot::{
@@ -25,14 +26,14 @@ pub(super) struct FilterArgs {
     /// The recordings, in the order of their episodes in the new one.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// File to write, which must not exist.
-    #[arg(long)]
+    /// Recording to write, a .demo that does not exist.
+    #[arg(long, value_parser = output::demo)]
     out: PathBuf,
     /// Keep episodes with at least this return.
-    #[arg(long)]
+    #[arg(long, value_parser = a_return)]
     min_return: Option<f64>,
     /// Keep episodes with at most this return.
-    #[arg(long)]
+    #[arg(long, value_parser = a_return)]
     max_return: Option<f64>,
     /// Keep episodes that ended at the goal.
     #[arg(long)]
@@ -49,6 +50,16 @@ pub(super) struct FilterArgs {
     /// Print the result as a line of JSON.
     #[arg(long)]
     json: bool,
+}
+
+/// Parses a return.
+///
+/// # Errors
+///
+/// It is no number: episodes have no such return.
+fn a_return(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+    number.ok_or_else(|| "it must be a number, such as 0.5".to_owned())
 }
 
 /// Writes the episodes that meet all conditions into a new file. It is a finding if no episode does.
