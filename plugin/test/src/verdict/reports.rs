@@ -342,15 +342,16 @@ fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec
     let played = if compares { testers(&record.testers) } else { testers(std::slice::from_ref(tester)) };
     let shown = seen(tester);
     let (game, seed, episodes) = (&record.game, record.seed, record.episodes);
-    let levels = level_argument(&record.range, &level.level);
+    let (levels, place) = (level_argument(&record.range, &level.level), in_file_name(&level.level));
     let detectors: String = record.options.iter().map(|word| format!(" {}", shell_word(word))).collect();
     // The same episodes: they depend on seed, tester and level alone.
     let again = format!(
-        "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{detectors} --out again"
+        "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{detectors} --out \
+         again-{place}"
     );
     // A tester that draws random numbers draws others in a picture.
     let exact = level.testers.iter().any(|tester| tester.tester == *name && tester.exact);
-    let picture = format!("{program} view {game} --levels {levels} {shown} --episode --out again.png");
+    let picture = format!("{program} view {game} --levels {levels} {shown} --episode --out again-{place}.png");
     [again].into_iter().chain(exact.then_some(picture)).collect()
 }
 
@@ -373,12 +374,18 @@ pub fn action_search(program: &str, record: &TestRecord, level: &LevelVerdict) -
         return None;
     }
     let (game, seed, episodes, played) = (&record.game, record.seed, record.episodes, testers(&record.testers));
-    let levels = level_argument(&record.range, &level.level);
+    let (levels, place) = (level_argument(&record.range, &level.level), in_file_name(&level.level));
     let missing = missing.join(",");
     Some(format!(
         "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed} --detect {missing} --out \
-         runs/actions"
+         runs/actions-{place}"
     ))
+}
+
+/// Returns the name of a level as a part of the name of a file, so that the commands of several levels write to places of
+/// their own.
+fn in_file_name(level: &str) -> String {
+    level.chars().map(|letter| if letter.is_alphanumeric() || "-_".contains(letter) { letter } else { '-' }).collect()
 }
 
 /// Returns the testers as arguments of `playbot test`. The draws of a policy depend on its name, so the name is
@@ -550,7 +557,7 @@ mod tests {
         let command = |detectors: &str| {
             Some(format!(
                 "jump test garden --levels bed:6 --bot random --policy ppo.policy --episodes 2 --seed 3 --detect \
-                 {detectors} --out runs/actions"
+                 {detectors} --out runs/actions-bed-6"
             ))
         };
         assert_eq!(search(&record, &failed), command("dead-action,fading-action"));
@@ -574,8 +581,9 @@ mod tests {
         };
         let testers = vec![tester("random", 2, 2, true), tester("ppo.policy", 1, 2, true)];
         let level = LevelVerdict { level: "bed:6".to_owned(), testers, ..verdict(1, 3, 4) };
-        let again = "jump test garden --levels bed:6 --policy ppo.policy --greedy --episodes 2 --seed 3 --out again";
-        let shown = "jump view garden --levels bed:6 --policy ppo.policy --greedy --episode --out again.png";
+        let again =
+            "jump test garden --levels bed:6 --policy ppo.policy --greedy --episodes 2 --seed 3 --out again-bed-6";
+        let shown = "jump view garden --levels bed:6 --policy ppo.policy --greedy --episode --out again-bed-6.png";
         assert_eq!(rerun_commands("jump", &record, &level), [again, shown]);
         let mut named = record.clone();
         named.testers[1].file = Some("my runs/a.policy".to_owned());
@@ -587,6 +595,9 @@ mod tests {
         assert_eq!(rerun_commands("jump", &named, &level), [again, shown]);
         let mut drawn = level.clone();
         drawn.testers[1].exact = false;
+        let other = LevelVerdict { level: "lawns/my bed.json".to_owned(), ..level.clone() };
+        let elsewhere = rerun_commands("jump", &record, &other);
+        assert!(elsewhere[0].ends_with(" --out again-lawns-my-bed-json"), "each level has a folder: {elsewhere:?}");
         assert_eq!(rerun_commands("jump", &named, &drawn).len(), 1, "a picture would show another episode");
         let farmed = Finding {
             detector: "reward-farm".to_owned(),
@@ -598,8 +609,8 @@ mod tests {
             settings: Vec::new(),
         };
         let compared = LevelVerdict { findings: vec![farmed], ..level.clone() };
-        let again = "jump test garden --levels bed:6 --bot random --policy ppo.policy --greedy --episodes 2 --seed 3 --out again";
-        let shown = "jump view garden --levels bed:6 --bot random --episode --out again.png";
+        let again = "jump test garden --levels bed:6 --bot random --policy ppo.policy --greedy --episodes 2 --seed 3 --out again-bed-6";
+        let shown = "jump view garden --levels bed:6 --bot random --episode --out again-bed-6.png";
         assert_eq!(rerun_commands("jump", &record, &compared), [again, shown], "all are compared");
         let perfect = LevelVerdict { testers: vec![tester("random", 2, 2, false)], ..verdict(1, 2, 2) };
         assert!(rerun_commands("jump", &record, &perfect).is_empty());
