@@ -31,6 +31,9 @@ pub const RESULTS: &str = "results.json";
 /// Text between the description and the first level.
 const LEVELS: &str = ",\"levels\":[";
 
+/// The fault of a file that was cut off.
+const CUT: &str = "the file ends in the middle";
+
 /// Text after the last level in files of older versions.
 const END: &str = "]}";
 
@@ -129,7 +132,7 @@ impl ResultLines {
                 hash_line(&mut self.hasher, &line);
                 Ok(Some(line.strip_suffix(',').unwrap_or(&line).to_owned()))
             }
-            None => Err(self.damaged("the file ends in the middle")),
+            None => Err(self.damaged(CUT)),
         }
     }
 
@@ -140,7 +143,7 @@ impl ResultLines {
     /// The file is incomplete, is malformed, or cannot be read.
     pub fn next_level(&mut self) -> Result<Option<LevelVerdict>, TestError> {
         let Some(line) = self.next_line()? else { return Ok(None) };
-        serde_json::from_str(&line).map(Some).map_err(|error| self.damaged(&json_fault(&error)))
+        serde_json::from_str(&line).map(Some).map_err(|error| self.malformed(&error))
     }
 
     /// Returns the line of the next level, which must have this index in the range.
@@ -150,7 +153,7 @@ impl ResultLines {
     /// The next level is another one, or missing.
     pub(super) fn line_of(&mut self, index: u64) -> Result<String, TestError> {
         let line = self.next_line()?.ok_or_else(|| self.damaged("levels are missing"))?;
-        let found = serde_json::from_str::<Value>(&line).map_err(|error| self.damaged(&json_fault(&error)))?;
+        let found = serde_json::from_str::<Value>(&line).map_err(|error| self.malformed(&error))?;
         match found["index"].as_u64() {
             Some(found) if found == index => Ok(line),
             _ => Err(self.damaged(&format!("this is not the level with index {index}"))),
@@ -167,6 +170,16 @@ impl ResultLines {
             None => Ok(()),
             Some(_) => Err(self.damaged("there are more levels than were tested")),
         }
+    }
+
+    /// Returns the error of a line that is no level. The end of a file that was cut off is reported as by those who read
+    /// on without a look at the line.
+    fn malformed(&mut self, error: &serde_json::Error) -> TestError {
+        if error.is_eof() && self.lines.next().is_none() {
+            self.number += 1;
+            return self.damaged(CUT);
+        }
+        self.damaged(&json_fault(error))
     }
 
     fn damaged(&self, message: &str) -> TestError {

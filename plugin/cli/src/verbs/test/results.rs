@@ -86,6 +86,7 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
         }
     }
     report!("{}", counts(&overview));
+    results.game.and_then(|game| without_plans(game, &overview)).iter().for_each(|line| report!("{line}"));
     overview.first_tick().iter().for_each(|levels| report!("{levels}"));
     stops(&overview).iter().for_each(|line| report!("{line}"));
     search(&overview).iter().for_each(|line| report!("{line}"));
@@ -101,6 +102,19 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
         None => overview.is_sound(),
     };
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
+}
+
+/// Returns the reason why no squares were counted, if it is that the game draws no floor plans.
+fn without_plans(game: &dyn Game, overview: &Overview) -> Option<String> {
+    let range = &overview.record.range;
+    let is_known = overview.places.percent().is_some();
+    (!is_known && game.tools().levels.floor_plan(&range.mode, range.first).is_none()).then(|| {
+        format!(
+            "no squares were counted, and the page has no pictures: `{}` has no floor plans of these levels, which its \
+             adapter draws with `.plan` or `.plan_of_file`",
+            game.name()
+        )
+    })
 }
 
 /// Returns the positions at which the episodes of the worst levels stopped.

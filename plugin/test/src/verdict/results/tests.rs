@@ -79,6 +79,20 @@ fn what_is_no_result_is_named_with_its_line() {
 }
 
 #[test]
+fn a_file_that_was_cut_off_reads_the_same_to_everyone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let whole = written(&[r#"{"index":0,"interval":[0.0,1.0]}"#]);
+    let cut = whole.find("1.0").expect("a level");
+    fs::write(folder.path().join(RESULTS), &whole[..cut]).expect("writable");
+    let open = || ResultLines::open(folder.path()).expect("a head");
+    let said =
+        [ResultLines::open_whole(folder.path()).map(drop), open().next_level().map(drop), open().line_of(0).map(drop)]
+            .map(|read| read.expect_err("cut off").to_string());
+    assert!(said[0].contains("line 3: the file ends in the middle"), "{}", said[0]);
+    assert!(said[1] == said[0] && said[2] == said[0], "{said:?}");
+}
+
+#[test]
 fn the_file_stands_for_its_folder() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join(RESULTS);
