@@ -98,6 +98,17 @@ fn a_stopped_exploration_prints_what_it_has_found_within_a_round() {
     assert!(temporary.path().join("seen.png").exists(), "{}", errors(&output));
 }
 
+#[test]
+fn stopped_planting_says_that_nothing_is_written() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let args = ["bugs", "make", "coinrun", "--sound", "900000", "--out", "set"];
+    let folder = temporary.path();
+    let output = interrupted(folder, &args, || folder.join("set").is_dir());
+    let words = errors(&output);
+    assert!(words.contains("stopped; nothing is written in set: the same command begins again"), "{words}");
+    assert!(!folder.join("set/mutants.json").exists());
+}
+
 /// `nohup` has SIGHUP ignored, and a shell without job control SIGINT of what it starts in the background.
 #[cfg(target_os = "linux")]
 #[test]

@@ -174,11 +174,11 @@ pub(crate) fn run_make(args: &MakeArgs, games: &Games) -> Result<Outcome, CliErr
         return Err(BugError::IsTest(args.out.clone()).into());
     }
     let sources = sources(args, games)?;
+    interrupt::leave(format!("nothing is written in {}: the same command begins again", args.out.display()));
+    let planting = NothingToSave::listen();
     output::make_folder(&args.out)?;
     let plan = MakePlan { seed: args.seed, per_kind: args.per_kind, sound: args.sound, threads: args.threads.count() };
     let bar = progress::bar("bugs make", plan.steps(&sources), "levels and mutants");
-    interrupt::leave(format!("nothing is written in {}: the same command begins again", args.out.display()));
-    let planting = NothingToSave::listen();
     let made = make_bugs(&sources, &plan, &|steps| bar.inc(steps));
     bar.finish_and_clear();
     let made = made?;
