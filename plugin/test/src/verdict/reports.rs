@@ -13,7 +13,7 @@ use crate::{
         compare::Comparison,
         error::{TestError, io_error},
         maps::level_argument,
-        plan::{TestPlan, TestRecord, Tester, TesterRecord},
+        plan::{TestPlan, TestRecord, Tester, TesterRecord, testers},
         reports::junit::junit,
         results::{Overview, RecordedTotal},
         statistics::{Trials, wilson},
@@ -386,30 +386,6 @@ pub fn action_search(program: &str, record: &TestRecord, level: &LevelVerdict) -
 /// their own.
 fn in_file_name(level: &str) -> String {
     level.chars().map(|letter| if letter.is_alphanumeric() || "-_".contains(letter) { letter } else { '-' }).collect()
-}
-
-/// Returns the testers as arguments of `playbot test`. The draws of a policy depend on its name, so the name is
-/// included.
-fn testers(testers: &[TesterRecord]) -> String {
-    let bots: Vec<&str> =
-        testers.iter().filter(|tester| tester.checksum.is_none()).map(|tester| tester.name.as_str()).collect();
-    let bots = (!bots.is_empty()).then(|| format!("--bot {}", bots.join(",")));
-    let policies = testers.iter().filter(|tester| tester.checksum.is_some() && tester.run.is_none());
-    let policies = policies.map(|TesterRecord { name, file, .. }| {
-        let given = file.as_ref().map_or_else(|| name.clone(), |file| format!("{name}={file}"));
-        format!("--policy {}", shell_word(&given))
-    });
-    let greedy = testers.iter().any(|tester| tester.greedy).then(|| "--greedy".to_owned());
-    bots.into_iter().chain(policies).chain(runs(testers)).chain(greedy).collect::<Vec<_>>().join(" ")
-}
-
-/// Returns the arguments for runs among testers. One checkpoint applies to all, so runs with different checkpoints
-/// get none.
-fn runs(testers: &[TesterRecord]) -> Vec<String> {
-    let runs: Vec<_> = testers.iter().filter_map(|tester| tester.run.as_ref()).collect();
-    let folders = runs.iter().map(|run| format!("--run {}", shell_word(&run.folder)));
-    let step = runs.first().map(|run| run.step).filter(|step| runs.iter().all(|run| run.step == *step));
-    folders.chain(step.map(|step| format!("--checkpoint {step}"))).collect()
 }
 
 /// Returns a tester as an argument of `playbot view`, which takes the files of policies only.

@@ -8,17 +8,18 @@ mod tests;
 
 use crate::verdict::{
     LevelOutcome, LevelVerdict, Places,
-    error::{MAKE_AGAIN, TestError, io_error, json_fault},
-    plan::TestRecord,
+    error::{JOURNAL, MAKE_AGAIN, TestError, io_error, json_fault},
+    plan::{RECORD, TestRecord},
     statistics::Trials,
 };
 use crc32fast::Hasher;
-use playbot_learner::BrokenSeal;
+use playbot_learner::{BrokenSeal, unseal_json};
 use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::{
     collections::BTreeMap,
+    fs,
     fs::File,
     io,
     io::{BufRead, BufReader, Write},
@@ -65,7 +66,9 @@ impl ResultLines {
     pub fn open(folder: &Path) -> Result<Self, TestError> {
         let path = folder.join(RESULTS);
         let file = File::open(&path).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => TestError::NoResults(folder.into()),
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
+                TestError::NoResults { folder: folder.into(), resumed: unfinished(folder) }
+            }
             _ => TestError::Io { action: "read", path: path.clone(), source },
         })?;
         let mut lines = BufReader::new(file).lines();
@@ -186,6 +189,13 @@ impl ResultLines {
         let (path, message) = (self.path.clone(), message.to_owned());
         TestError::Damaged { path, line: self.number, message, next: MAKE_AGAIN }
     }
+}
+
+/// Returns the command that goes on with the test that was begun in a folder; `None` without one.
+fn unfinished(folder: &Path) -> Option<String> {
+    let text = fs::read_to_string(folder.join(RECORD)).ok().filter(|_| folder.join(JOURNAL).exists())?;
+    let record: TestRecord = serde_json::from_str(&unseal_json(&text).ok()?.text).ok()?;
+    Some(record.resumed_in(folder))
 }
 
 /// Writer of results, a level at a time.

@@ -53,7 +53,7 @@ fn the_file_is_one_object_and_reads_back_line_by_line() {
 fn what_is_no_result_is_named_with_its_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let open = || ResultLines::open(folder.path());
-    assert!(matches!(open(), Err(TestError::NoResults(path)) if path == folder.path()));
+    assert!(matches!(open(), Err(TestError::NoResults { folder: path, resumed: None }) if path == folder.path()));
     let text = written(&[r#"{"index":0}"#]);
     let head = text.lines().next().expect("a head");
     let cut = format!("{head}\n{{\"index\":0}}");
