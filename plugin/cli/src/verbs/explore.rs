@@ -62,7 +62,9 @@ pub struct Args {
     /// level 0 of that mode).
     #[arg(long, value_name = "MODE:N", value_parser = one_level)]
     level: Option<LevelSplit>,
-    /// Environment steps to use, including returns to known cells. The last visits may take some more.
+    /// Environment steps to use, including returns to known cells. A round of visits begins if there are steps for
+    /// --explore-ticks each, and a visit that goes on finding cells takes up to ten times as many. So the last round may
+    /// take up to 9 × --batch × --explore-ticks more (28,800 by default), and --steps 3000 may become 12,000.
     #[arg(long, default_value_t = 500_000, value_parser = at_least_one_step)]
     steps: u64,
     /// End earlier: solved (a path to the goal is found), covered (every open cell is reached, too), or spent (never).
@@ -128,8 +130,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     };
     let plan = plan(&args, &split, explorer, observation_config);
     plan.check(game)?;
-    if let Some(cell) = &args.cell {
-        check_cell(game, &plan, cell)?;
+    if let Some(cell) = &args.cell
+        && !check_cell(game, &plan, cell)?
+    {
+        report!("warning: by the level's plan, cell {cell} is a wall, or walls cut it off from the start");
     }
     let recording = args.out.as_deref().map(|path| RecordingFile::new(path, args.force)).transpose()?;
     let floor = match &args.png {

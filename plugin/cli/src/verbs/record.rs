@@ -130,6 +130,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         None => Ok(plan.build_world(game, writer)),
     };
     let (mut world, agent) = built.inspect_err(|_| leave_nothing(&args.out, is_new))?;
+    interrupt::leave(format!("the finished episodes are kept in {}", args.out.display()));
     let finished = play(&mut world, agent, count, args.steps);
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let counts = format!("{}, {}", counted(episodes, "episode"), counted(steps, "step"));

@@ -456,12 +456,13 @@ const MARGIN: i64 = 8;
 const SLACK: f32 = 1e-3;
 
 /// Plays one tick of the level, and checks a cell. It must have as many numbers as the level's cells, and must not lie
-/// far outside.
+/// far outside. Returns whether it may be reached by the level's plan: false in a wall, and where walls cut it off from
+/// the start. Agents may be there all the same, since a position may be that of their feet, and games have faults.
 ///
 /// # Errors
 ///
 /// [`ExploreError::Plan`] with the valid values, or the plan does not fit the game, or the game breaks its contract.
-pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &ExploredCell) -> Result<(), ExploreError> {
+pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &ExploredCell) -> Result<bool, ExploreError> {
     plan.check(game)?;
     let floor_plan = game.tools().levels.floor_plan(&plan.mode, plan.level);
     let grid = CellGrid::new(floor_plan.as_ref(), plan.cell_size);
@@ -471,7 +472,7 @@ pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &ExploredCell) -> R
     let route = Route::empty(&game.actions());
     let job = Job { number: 0, destination: Destination::START, route, saved: None, patience: 1, most: 1 };
     let visits = world.play(vec![job], &Archive::new(game.actions()), Hooks { progress: &|_| {}, stop: &|| false })?;
-    let Some(seen) = visits.iter().find_map(|(_, visited)| visited.seen.keys().next()) else { return Ok(()) };
+    let Some(seen) = visits.iter().find_map(|(_, visited)| visited.seen.keys().next()) else { return Ok(true) };
     if seen.0.len() != cell.0.len() {
         return Err(ExploreError::Plan(format!(
             "cell {cell} has the wrong count of numbers: cells of this level have {}, such as {seen}",
@@ -479,8 +480,11 @@ pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &ExploredCell) -> R
         )));
     }
     match floor_plan {
-        Some(floor_plan) if world.has_positions() => check_bounds(&grid, floor_plan.bounds, cell),
-        _ => Ok(()),
+        Some(floor_plan) if world.has_positions() => {
+            check_bounds(&grid, floor_plan.bounds, cell)?;
+            Ok(open_cells(&floor_plan, &grid).is_none_or(|open| open.contains(cell)))
+        }
+        _ => Ok(true),
     }
 }
 

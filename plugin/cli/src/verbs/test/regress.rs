@@ -70,6 +70,7 @@ fn play(
     let found = list_findings(folder)?;
     check_starts(&found, games)?;
     let total = found.len() as u64;
+    interrupt::leave("nothing is kept: the same command plays all of them".to_owned());
     interrupt::listen();
     let bar = progress::bar("replay findings", total, "findings");
     let checks = |game: &dyn Game| detectors.checks(game);
