@@ -336,7 +336,7 @@ impl HasExitCode for Unplayable {}
 
 impl StoredFinding {
     /// Checks that the game is the one that was tested, and that the level is still there. A level file that was
-    /// [edited](Self::edited_level) since then is there: whoever repairs a hand-made level edits its file.
+    /// [edited](Self::edited_level) since then is there: a hand-made level is repaired by editing its file.
     ///
     /// # Errors
     ///

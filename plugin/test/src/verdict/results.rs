@@ -175,8 +175,8 @@ impl ResultLines {
         }
     }
 
-    /// Returns the error of a line that is no level. The end of a file that was cut off is reported as by those who read
-    /// on without a look at the line.
+    /// Returns the error of a line that is no level. The end of a file that was cut off is reported as by readers that do
+    /// not parse the line.
     fn malformed(&mut self, error: &serde_json::Error) -> TestError {
         if error.is_eof() && self.lines.next().is_none() {
             self.number += 1;
