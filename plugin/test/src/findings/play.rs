@@ -369,7 +369,7 @@ impl StoredFinding {
         }
         let designs = read_level_designs(game, &header.mode).map_err(|error| gone(&error))?;
         match &episode.level_file {
-            Some(file) if is_edited(designs.files(), episode.level_seed, file) => Ok(()),
+            Some(file) if is_edited(&designs.files(), episode.level_seed, file) => Ok(()),
             Some(file) => {
                 let difference = designs.files().difference(episode.level_seed, file);
                 difference.map_or(Ok(()), |what| Err(Unplayable(format!("{what}, or remove the finding"))))
@@ -384,7 +384,7 @@ impl StoredFinding {
         let Self { header, episode, .. } = self;
         let file = episode.level_file.as_ref().filter(|_| is_level_files(&header.mode))?;
         let designs = read_level_designs(game, &header.mode).ok()?;
-        is_edited(designs.files(), episode.level_seed, file).then(|| file.path.clone())
+        is_edited(&designs.files(), episode.level_seed, file).then(|| file.path.clone())
     }
 }
 
