@@ -44,6 +44,8 @@ fn wrong_names_are_usage_errors_with_the_nearest_right_one() {
             "`a` is not an action of `coinrun`: write numbers from 0 to 14, or the names",
         ),
         (&["runs", "compare", "r", "--threshold", "abc"], "it must be a number, such as 0.5"),
+        (&["runs", "compare", "r", "--threshold", "nan"], "it must be a number, such as 0.5"),
+        (&["bench", "coinrun", "--seconds", "inf"], "it must be a number, such as 0.5"),
         (&["eval", "--bot", "robot"], "unknown bot `robot`"),
         (&["level", "maze2d", "--map", "lrage"], "; and there is no file of that name"),
         (&["policy", "export", "--out", "a.policy"], "<--run <RUN>|--skills <SKILLS>>"),

@@ -151,6 +151,16 @@ pub(crate) fn at_least_one_step(text: &str) -> Result<u64, String> {
     }
 }
 
+/// Parses a number that others can be compared with. Nothing is above or below NaN.
+///
+/// # Errors
+///
+/// It is no number, or is not finite.
+pub(crate) fn finite_number(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+    number.ok_or_else(|| "it must be a number, such as 0.5".to_owned())
+}
+
 /// Parses a number of at least one.
 ///
 /// # Errors
@@ -387,6 +397,10 @@ mod tests {
         }
         assert_eq!(at_least_one_step("0"), Err("it must be at least 1".to_owned()));
         assert_eq!(at_least_one_step("5e5"), Ok(500_000));
+        assert_eq!((finite_number("-1.5e3"), finite_number("0")), (Ok(-1500.0), Ok(0.0)));
+        for wrong in ["nan", "inf", "-inf", "1e999", "a", ""] {
+            assert_eq!(finite_number(wrong), Err("it must be a number, such as 0.5".to_owned()), "{wrong}");
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! `playbot demo filter` and `playbot demo label`: new recordings of chosen episodes, or with another player's name.
 
 use crate::{
-    arguments::open,
+    arguments::{finite_number, open},
     error::{CliError, Outcome},
     output,
     output::{prepare, print_line},
@@ -30,10 +30,10 @@ pub(super) struct FilterArgs {
     #[arg(long, value_parser = output::demo)]
     out: PathBuf,
     /// Keep episodes with at least this return.
-    #[arg(long, value_parser = a_return)]
+    #[arg(long, value_parser = finite_number)]
     min_return: Option<f64>,
     /// Keep episodes with at most this return.
-    #[arg(long, value_parser = a_return)]
+    #[arg(long, value_parser = finite_number)]
     max_return: Option<f64>,
     /// Keep episodes that ended at the goal.
     #[arg(long)]
@@ -50,16 +50,6 @@ pub(super) struct FilterArgs {
     /// Print the result as a line of JSON.
     #[arg(long)]
     json: bool,
-}
-
-/// Parses a return.
-///
-/// # Errors
-///
-/// It is no number: episodes have no such return.
-fn a_return(text: &str) -> Result<f64, String> {
-    let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
-    number.ok_or_else(|| "it must be a number, such as 0.5".to_owned())
 }
 
 /// Writes the episodes that meet all conditions into a new file. It is a finding if no episode does.
