@@ -73,7 +73,7 @@ pub fn misfit(action: &ActionValue, space: &ActionSpace) -> Option<String> {
     match (action, space) {
         (ActionValue::Discrete(index), ActionSpace::Discrete(n)) if (*index as usize) < *n => None,
         (ActionValue::Discrete(index), ActionSpace::Discrete(n)) => {
-            Some(format!("discrete action {index} is outside 0..{n}"))
+            Some(format!("discrete action {index} is outside of the numbers from 0 to {}", n.saturating_sub(1)))
         }
         (ActionValue::Continuous(values), ActionSpace::Continuous(n)) if values.len() != *n => {
             Some(format!("continuous action has {} values, the space has {n}", values.len()))

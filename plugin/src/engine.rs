@@ -20,7 +20,7 @@
 //! | check what agents see and do | [`check_actions`], [`check_observations`], [`misfit`], [`has_no_actions`], [`AgentLimit`] |
 //! | compare two pictures of a state | [`PictureDifference`], [`CLOSE`], [`BlankEpisodes`] |
 //! | record and replay | [`record_ticks`], [`flush_unfinished`], [`demo_actions`], [`recorded_action`] |
-//! | read, join, select and repair recordings | [`find_demos`], [`merge_demos`], [`select_demos`], [`relabel_demo`], [`repair()`] |
+//! | read, join, select and repair recordings | [`find_demos`], [`merge_demos`], [`select_demos`], [`relabel_demo`], [`repeated_episodes`], [`repair()`] |
 //! | read what a policy file sees | [`policy_observation`] |
 //! | let a person play in a window | [`PressesForPeople`], [`TappedKeys`] |
 //!
@@ -45,7 +45,7 @@ pub use crate::{
     action::{check_actions, misfit},
     agent::{AgentLimit, PlaysAlong, has_no_actions},
     demo::{
-        file::{find_demos, merge_demos, relabel_demo, repair::repair, select_demos},
+        file::{find_demos, merge_demos, relabel_demo, repair::repair, repeated_episodes, select_demos},
         recorder::{demo_actions, flush_unfinished, record_ticks},
         replay::recorded_action,
     },

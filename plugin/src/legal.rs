@@ -224,7 +224,7 @@ mod tests {
     fn an_action_outside_the_space_is_a_fault_under_a_mask_too() {
         let (mut app, _) = masked(BlindBot::Constant(ActionValue::Discrete(4)), &[true; 4]);
         let text = app.tick().expect_err("there are four").to_string();
-        assert!(text.contains("discrete action 4 is outside 0..4"), "{text}");
+        assert!(text.contains("discrete action 4 is outside of the numbers from 0 to 3"), "{text}");
     }
 
     #[test]

@@ -60,12 +60,15 @@ fn a_goal_that_is_not_found_is_a_finding() {
     assert!(!folder.join("none.demo").exists());
     // The outer wall.
     let cell = |cell: &str, json: &[&str], code: i32| {
-        ended(folder, &[&MAZE[..], &["--until", "solved", "--cell", cell], json].concat(), code).0
+        ended(folder, &[&MAZE[..], &["--until", "solved", "--cell", cell], json].concat(), code)
     };
-    assert!(cell("0,0", &[], 1).contains("cell 0,0 was not reached"));
-    assert_eq!(json_lines(&cell("0,0", &["--json"], 1))[0]["cell"]["ticks"], Value::Null);
-    let reached = json_lines(&cell("1,1", &["--json"], 0))[0]["cell"]["ticks"].as_u64().expect("it is free");
-    let reported = cell("1,1", &[], 0);
+    let (reported, words) = cell("0,0", &[], 1);
+    assert!(reported.contains("cell 0,0 was not reached"), "{reported}");
+    assert!(words.contains("by the level's plan, cell 0,0 is a wall, or walls cut it off from the start"), "{words}");
+    assert_eq!(json_lines(&cell("0,0", &["--json"], 1).0)[0]["cell"]["ticks"], Value::Null);
+    let reached = json_lines(&cell("1,1", &["--json"], 0).0)[0]["cell"]["ticks"].as_u64().expect("it is free");
+    let (reported, words) = cell("1,1", &[], 0);
+    assert!(!words.contains("by the level's plan"), "{words}");
     assert!(reported.contains(&format!("cell 1,1 is reached in {reached} tick")), "{reported}");
 }
 

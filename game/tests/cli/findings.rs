@@ -119,9 +119,26 @@ fn stored_findings_stay_red_until_they_are_pinned_and_again_when_the_pin_expires
     assert!(regress(&["--today", "2027-02-01"], 1).1.contains("has expired on 2027-01-31"));
     assert!(regress(&["--today", "soon"], 3).1.contains("is not a date"));
 
+    // Each edit is played: the wall that is left, and the one that is taken out.
+    let walled = json!({ "rows": ["#######", "#SO##G#", "#O#O###", "#######"], "rules": "sparse+end-at-goal" });
+    write(&walled);
+    let (said, _) = done(folder, &["replay", &file]);
+    let since = "; the level file sealed.json has changed since the test";
+    assert!(said.contains("it happens again") && said.contains(since), "{said}");
     write(&open);
+    let (said, _) = ended(folder, &["replay", &file], 1);
+    assert!(said.contains(&format!("it does not happen any more{since}")), "{said}");
+    assert_eq!(line(&ended(folder, &["replay", &file, "--json"], 1).0)["level_file_changed"], true);
+    let (rows, words) = regress(&["--today", "2027-02-01", "--json"], 0);
+    for row in json_lines(&rows) {
+        let said = row["message"].as_str().expect("text");
+        assert!(row["status"] == "gone" && said.ends_with(since), "{row}");
+    }
+    assert!(words.contains("0 unplayable"), "{words}");
+    // A file that is no level is no repair.
+    fs::write(folder.join("sealed.json"), "{}").expect("writable");
     let (_, words) = ended(folder, &["replay", &file], 3);
-    assert!(words.contains("it has changed") && words.contains("remove the finding"), "{words}");
+    assert!(words.contains("cannot be read any more") && words.contains("remove the finding"), "{words}");
     fs::remove_file(folder.join("sealed.json")).expect("it is there");
     let (_, words) = ended(folder, &["replay", &file], 3);
     assert!(

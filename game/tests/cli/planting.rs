@@ -2,7 +2,7 @@
 
 use std::{fs, path::Path};
 
-use crate::program::{code, done, errors, json_lines, playbot};
+use crate::program::{code, done, ended, errors, json_lines, playbot};
 
 const SMALL: [&str; 9] = ["bugs", "make", "coinrun", "--per-kind", "1", "--sound", "6", "--seed", "3"];
 
@@ -35,6 +35,13 @@ fn a_set_is_made_once_and_the_same_by_any_number_of_threads() {
     let set: serde_json::Value = serde_json::from_str(&text).expect("JSON");
     assert_eq!(set["mutants"].as_array().map(|all| all.len() as u64), Some(mutants));
     assert!(set["mutants"].as_array().is_some_and(|all| all.iter().any(|bug| bug["class"] == "short-time-out")));
+
+    // Not even the superuser writes there.
+    if cfg!(target_os = "linux") {
+        let args = ["bugs", "score", "one", "--tester", "random", "--out", "/proc/score.json"];
+        let (_, words) = ended(folder, &args, 2);
+        assert!(words.contains("cannot write /proc/score.json: ") && !words.contains(".jobs"), "{words}");
+    }
 
     done(folder, &[&SMALL[..], &["--out", "two", "--threads", "2"]].concat());
     assert_eq!(files(&folder.join("one")), files(&folder.join("two")));

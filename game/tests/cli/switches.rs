@@ -82,10 +82,19 @@ fn a_recording_holds_what_the_switches_of_record_say() {
     let (more, steps) = (seen["bytes"].as_u64(), seen["steps"].as_u64().expect("a number"));
     assert!(names > 0 && more > plain["bytes"].as_u64().map(|bytes| bytes + steps * names), "{seen}");
 
-    record("plain.demo", &["--levels", "easy:9..9", "--append"]);
+    let append =
+        |file: &str, more: &[&str]| done(folder, &[&["record", "coinrun", "--out", file, "--append"], more].concat()).1;
+    assert!(!append("plain.demo", &["--levels", "easy:9..9"]).contains("equal"));
     assert_eq!(levels("plain.demo"), [4, 5, 6, 9]);
     record("plain.demo", &["--levels", "easy:9..9", "--force"]);
     assert_eq!(levels("plain.demo"), [9]);
+    let words = append("plain.demo", &["--levels", "easy:8..9"]);
+    assert!(words.contains("1 episode is equal to one that was there before") && words.contains("--levels"), "{words}");
+    let half = ["--noise", "0.5"];
+    let words = append("two.demo", &[&three[..], &half, &["--seed", "2"]].concat());
+    assert!(words.contains("3 episodes are equal to ones that were there before"), "{words}");
+    assert!(words.contains("such as --seed 3"), "{words}");
+    assert!(!append("two.demo", &[&three[..], &half, &["--seed", "3"]].concat()).contains("equal"));
 }
 
 #[test]

@@ -25,7 +25,7 @@ fn traces_stop_at_the_end_and_read_back_exactly() {
     assert_eq!(output.stdout, from_names.stdout);
     let wrong = playbot(folder.path(), &["trace", "coinrun", "--actions", "99", "--json"]);
     assert_eq!(code(&wrong), 3);
-    assert!(errors(&wrong).contains("action 99 is outside 0..15"), "{}", errors(&wrong));
+    assert!(errors(&wrong).contains("action 99 is outside of the numbers from 0 to 14"), "{}", errors(&wrong));
 }
 
 #[test]

@@ -69,8 +69,8 @@ const WORKS: [Work; 9] = [
         kept: &["the printed rows are complete, and nothing else is kept"],
     },
     Work {
-        line: "record coinrun --levels easy:0..100000 --noise 0.2 --out NAME",
-        sign: ("NAME", 3000),
+        line: "record coinrun --levels easy:0..100000 --noise 0.2 --out NAME.demo",
+        sign: ("NAME.demo", 3000),
         kept: &["add the rest with the same command and `--append --levels easy:"],
     },
     // Its one training is done, and its policy is being measured.

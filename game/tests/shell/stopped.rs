@@ -39,6 +39,7 @@ fn a_stopped_recording_says_how_the_rest_is_added() {
     assert!(words.contains("incomplete") && advice.starts_with("--append --levels easy:"), "{words}");
     let rest = (ENDLESS - recorded).to_string();
     assert!(advice.ends_with(&format!("..4000 --steps {rest} --seed 2")), "{recorded} steps: {words}");
+    assert!(words.contains("`, in place of its --levels, --steps and --seed"), "{words}");
 
     // As printed, but for the number of steps.
     let advice = advice.replace(&rest, "100");
@@ -74,6 +75,38 @@ fn a_stopped_audit_of_levels_prints_what_it_has_compared() {
         let words = "the same command does all of it again";
         assert!(errors(&output).contains(words), "{}", errors(&output));
     }
+}
+
+#[test]
+fn a_stopped_exploration_prints_what_it_has_found_within_a_round() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let begun = Instant::now();
+    // The first round alone takes minutes.
+    let steps = ENDLESS.to_string();
+    let args = ["explore", "coinrun", "--level", "easy:0", "--until", "spent", "--batch", "200000", "--steps", &steps];
+    let mut explorer = command(temporary.path(), &[&args[..], &["--png", "seen.png", "--json"]].concat());
+    explorer.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let child = at_work(&mut explorer, || begun.elapsed() > Duration::from_secs(5));
+    let sent = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("a shell's kill");
+    assert!(sent.success());
+    let output = child.wait_with_output().expect("a child");
+    assert_eq!(code(&output), 130, "{}", errors(&output));
+    let found = &lines(&output)[0];
+    assert_eq!(found["stop"], "asked", "{found}");
+    assert!(found["cells"].as_u64().is_some_and(|cells| cells > 1), "{found}");
+    assert!(found["visits"].as_u64().is_some_and(|visits| visits > 0 && visits < 200_000), "{found}");
+    assert!(temporary.path().join("seen.png").exists(), "{}", errors(&output));
+}
+
+#[test]
+fn stopped_planting_says_that_nothing_is_written() {
+    let temporary = tempfile::tempdir().expect("a folder");
+    let args = ["bugs", "make", "coinrun", "--sound", "900000", "--out", "set"];
+    let folder = temporary.path();
+    let output = interrupted(folder, &args, || folder.join("set").is_dir());
+    let words = errors(&output);
+    assert!(words.contains("stopped; nothing is written in set: the same command begins again"), "{words}");
+    assert!(!folder.join("set/mutants.json").exists());
 }
 
 /// `nohup` has SIGHUP ignored, and a shell without job control SIGINT of what it starts in the background.

@@ -176,6 +176,16 @@ pub(crate) fn at_least_one_step(text: &str) -> Result<u64, String> {
     }
 }
 
+/// Parses a number that others can be compared with. Nothing is above or below NaN.
+///
+/// # Errors
+///
+/// It is no number, or is not finite.
+pub(crate) fn finite_number(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|number| number.is_finite());
+    number.ok_or_else(|| "it must be a number, such as 0.5".to_owned())
+}
+
 /// Parses a number of at least one.
 ///
 /// # Errors
@@ -282,6 +292,11 @@ impl OverwriteArgs {
     /// Returns whether the file exists and is added to.
     pub fn adds_to(self, path: &Path) -> bool {
         self.append && path.is_file()
+    }
+
+    /// Returns whether an existing file is overwritten.
+    pub fn replaces(self) -> bool {
+        self.force
     }
 
     /// Opens the file, and makes its folder.
@@ -439,6 +454,10 @@ mod tests {
         }
         assert_eq!(at_least_one_step("0"), Err("it must be at least 1".to_owned()));
         assert_eq!(at_least_one_step("5e5"), Ok(500_000));
+        assert_eq!((finite_number("-1.5e3"), finite_number("0")), (Ok(-1500.0), Ok(0.0)));
+        for wrong in ["nan", "inf", "-inf", "1e999", "a", ""] {
+            assert_eq!(finite_number(wrong), Err("it must be a number, such as 0.5".to_owned()), "{wrong}");
+        }
     }
 
     #[test]

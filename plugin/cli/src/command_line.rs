@@ -685,7 +685,7 @@ mod tests {
             ("test --out plain --levels Cave", "test --out plain --levels=easy:1"),
             ("test --out plain rooms --levels Cave", "test --out plain rooms --levels=easy:1"),
             ("eval rooms --run runs/a --levels Cave", "eval rooms --run runs/a --levels=easy:1"),
-            ("record rooms --out a --hold-out Cave", "record rooms --out a --hold-out=easy:1"),
+            ("record rooms --out a.demo --hold-out Cave", "record rooms --out a.demo --hold-out=easy:1"),
             // Each verb takes `--level`.
             ("test rooms --level Cave", "test rooms --level=easy:1"),
             ("eval rooms --level Cave --bot random", "eval rooms --level=easy:1 --bot random"),

@@ -268,6 +268,24 @@ pub(crate) fn html(text: &str) -> Result<PathBuf, String> {
     of_kind(text, "page", "html")
 }
 
+/// Parses the path of a recording. Folders of recordings are read by this ending.
+///
+/// # Errors
+///
+/// Its name ends otherwise.
+pub(crate) fn demo(text: &str) -> Result<PathBuf, String> {
+    of_kind(text, "recording", "demo")
+}
+
+/// Parses the path of a finding. Folders of findings are read by this ending.
+///
+/// # Errors
+///
+/// Its name ends otherwise.
+pub(crate) fn finding(text: &str) -> Result<PathBuf, String> {
+    of_kind(text, "finding", "finding")
+}
+
 fn of_kind(text: &str, what: &str, kind: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(text);
     if path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(kind)) {

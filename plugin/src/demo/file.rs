@@ -58,7 +58,7 @@ pub use crate::demo::file::header::DEMO_FORMAT;
 pub use crate::demo::file::preamble::DEMO_MAGIC;
 pub use crate::demo::file::repair::{DroppedRegion, RepairReport, repair};
 pub use crate::demo::file::{
-    copying::{MergeReport, merge_demos, relabel_demo, select_demos},
+    copying::{MergeReport, merge_demos, relabel_demo, repeated_episodes, select_demos},
     episode::{Decider, DemoEnd, DemoEpisode, EpisodeActions},
     error::{DemoFault, DemoFileError, EpisodeFault},
     header::{DemoActions, DemoHeader},

@@ -271,7 +271,7 @@ impl LevelTest<'_> {
     }
 
     /// Asserts that no finding in this folder happens any more, so that repaired defects stay repaired:
-    /// `playbot test --regress` for `cargo test`. Findings that are pinned in the folder's `pins.ron` do not count up to
+    /// `playbot test --regress` for `cargo test`. Findings that are pinned in a `pins.ron` there do not count up to
     /// their last day. Levels, testers and detectors are those of the files.
     ///
     /// # Panics

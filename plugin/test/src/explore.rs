@@ -70,7 +70,7 @@ pub use crate::explore::{
     archive::ReachedCell,
     cell::{CellGrid, ExploredCell, NoCell},
     known_paths::{ExplorationSummary, Route, follow_route, record_route},
-    round::{Round, check_cell, explore, open_cells},
+    round::{Round, check_cell, explore, explore_until, open_cells},
     snapshots::SnapshotFault,
     tried::Exhaustion,
 };
@@ -82,7 +82,9 @@ pub struct ExplorePlan {
     pub mode: String,
     /// Number of the level.
     pub level: u64,
-    /// Environment steps to use, with the paths back. A visit that finds something new may go on a little longer.
+    /// Environment steps to use, with the paths back. A round begins with visits of `explore_ticks` for which there are
+    /// steps, and each that goes on finding cells takes up to ten times as many. So the last round may take up to 9 ×
+    /// `batch` × `explore_ticks` more.
     pub steps: u64,
     /// The condition that ends the exploration sooner.
     pub until: Until,

@@ -48,7 +48,7 @@ use std::{
 };
 use thiserror::Error;
 
-pub(crate) use crate::findings::play::detector_of;
+pub(crate) use crate::findings::play::{detector_of, since_edited};
 pub use crate::findings::{
     checks::{Check, Checks},
     course::{CourseEnd, RecordedCourse, course_of, course_of_recording, keeps_course},

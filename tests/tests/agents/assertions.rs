@@ -164,10 +164,11 @@ fn a_failure_names_each_level_with_its_proof_and_the_commands_that_show_it() {
     let found = message(|| test("plain:4..5").assert_levels_solvable());
     let of = |begin: &str| file(folder.path(), begin).display().to_string();
     let again = |level: &str| {
+        let place = level.replace(':', "-");
         format!(
             "  the level again:\n    \
-             jump test lane --levels {level} --bot left --episodes 2 --seed 3 --no-detect all --out again\n    \
-             jump view lane --levels {level} --bot left --episode --out again.png"
+             jump test lane --levels {level} --bot left --episodes 2 --seed 3 --no-detect all --out again-{place}\n    \
+             jump view lane --levels {level} --bot left --episode --out again-{place}.png"
         )
     };
     let expected = [

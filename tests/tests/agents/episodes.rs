@@ -103,7 +103,7 @@ fn an_action_outside_its_space_is_reported() {
     let (mut app, agent) = app_with(1, &[7]);
     app.world_mut().entity_mut(agent).insert((Control::Human, Action(ActionValue::Discrete(9))));
     let fault = app.tick().expect_err("no such action").to_string();
-    assert!(fault.contains("agent 0") && fault.contains("action 9 is outside 0..3"), "{fault}");
+    assert!(fault.contains("agent 0") && fault.contains("action 9 is outside of the numbers from 0 to 2"), "{fault}");
 }
 
 #[test]

@@ -20,8 +20,8 @@ use playbot_harness::{
 };
 use playbot_learner::{Actions, PpoConfig, Prior, SkillDraw};
 use playbot_test::explore::{
-    Exhaustion, Exploration, ExploreError, ExplorePlan, ExploredCell, Explorer, Stop, Until, explore, follow_route,
-    record_route,
+    Exhaustion, Exploration, ExploreError, ExplorePlan, ExploredCell, Explorer, Stop, Until, explore, explore_until,
+    follow_route, record_route,
 };
 use playbot_tests::{
     Cell, Corridor, Drift, as_corridor, corridor_plugin, foreign::stubborn::stubborn_game, spawn_walker,
@@ -262,6 +262,34 @@ fn an_observer_can_stop_it_after_a_round() {
     assert_eq!((stopped.stop, stopped.visits, rounds.len()), (Stop::Asked, 64, 2));
     assert_eq!((stopped.steps, stopped.cells().len()), (rounds[1].steps, rounds[1].cells));
     assert_eq!(heard.into_inner(), stopped.steps);
+}
+
+#[test]
+fn a_stop_within_a_round_keeps_what_its_visits_have_seen() {
+    let (asked, heard) = (AtomicU64::new(0), AtomicU64::new(0));
+    let progress = |ticks| {
+        heard.fetch_add(ticks, Ordering::Relaxed);
+    };
+    // The first World is in its third tick then, and the others have not begun.
+    let stop = || asked.fetch_add(1, Ordering::Relaxed) >= 3;
+    let plan = ExplorePlan { threads: 1, ..plan("plain", 1, 100_000) };
+    let stopped = explore_until(&Cells, &plan, progress, |_| ControlFlow::Continue(()), &stop);
+    let stopped = stopped.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(stopped.stop, Stop::Asked);
+    assert!((1..=8).contains(&stopped.visits), "{} of 32 visits", stopped.visits);
+    assert_eq!(stopped.curve, [(stopped.steps, stopped.cells().len() as u64)]);
+    assert_eq!(heard.into_inner(), stopped.steps);
+    for (cell, reached) in stopped.cells() {
+        let route = stopped.route_to(cell).expect("reached");
+        assert_eq!(route.len(), reached.ticks() as usize);
+        assert_eq!(route.hashes.last().copied(), u32::try_from(cell.0[0]).ok(), "the hash is the cell");
+    }
+    assert!(stopped.cells().len() > 1, "{:?}", stopped.cells());
+    // A stop that never comes changes nothing.
+    let plan = ExplorePlan { steps: 3000, ..plan };
+    let whole = explore_until(&Cells, &plan, |_| {}, |_| ControlFlow::Continue(()), &|| false);
+    let whole = whole.unwrap_or_else(|error| panic!("{error}"));
+    assert_eq!(format!("{:?}", whole.summary(&Cells)), format!("{:?}", found(&Cells, &plan).summary(&Cells)));
 }
 
 #[test]

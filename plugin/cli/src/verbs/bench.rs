@@ -1,7 +1,7 @@
 //! `playbot bench`: steps per second of the whole and microseconds of its parts.
 
 use crate::{
-    arguments::{Device, MOST_THREADS, check_start, experiment::ExperimentArgs},
+    arguments::{Device, MOST_THREADS, check_start, experiment::ExperimentArgs, finite_number},
     error::{CliError, Outcome},
     output::print_line,
 };
@@ -47,7 +47,7 @@ pub struct Args {
     #[arg(long, default_value_t = threads_of_cases())]
     threads: usize,
     /// Least seconds to measure each case for.
-    #[arg(long, default_value_t = 5.0)]
+    #[arg(long, default_value_t = 5.0, value_parser = finite_number)]
     seconds: f64,
     /// Change a setting of the training cases, such as ppo.cnn=Impala() (repeatable).
     #[arg(long = "set", value_name = "KEY=VALUE")]

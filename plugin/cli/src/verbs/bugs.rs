@@ -14,6 +14,7 @@ use crate::{
     output,
     output::{print_line, program},
     progress,
+    progress::{interrupt, interrupt::NothingToSave},
     verbs::bugs::score::as_json,
 };
 use playbot_harness::{
@@ -173,12 +174,16 @@ pub(crate) fn run_make(args: &MakeArgs, games: &Games) -> Result<Outcome, CliErr
         return Err(BugError::IsTest(args.out.clone()).into());
     }
     let sources = sources(args, games)?;
+    interrupt::leave(format!("nothing is written in {}: the same command begins again", args.out.display()));
+    let planting = NothingToSave::listen();
     output::make_folder(&args.out)?;
     let plan = MakePlan { seed: args.seed, per_kind: args.per_kind, sound: args.sound, threads: args.threads.count() };
     let bar = progress::bar("bugs make", plan.steps(&sources), "levels and mutants");
     let made = make_bugs(&sources, &plan, &|steps| bar.inc(steps));
     bar.finish_and_clear();
     let made = made?;
+    // The set is written as a whole.
+    drop(planting);
     made.set.write(&args.out, &made.levels, args.force)?;
     for missing in &made.without_place {
         report!("warning: {}", missing.describe());

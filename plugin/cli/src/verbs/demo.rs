@@ -9,6 +9,7 @@ mod show;
 use crate::{
     arguments::{check_start, open},
     error::{CliError, Outcome},
+    output,
     output::{prepare, print_line, program},
     progress,
     progress::{interrupt, interrupt::NothingToSave},
@@ -97,8 +98,8 @@ enum Verb {
     Repair {
         /// The damaged file.
         file: PathBuf,
-        /// File to write (default: the damaged file itself, which is then kept beside it as FILE.bak).
-        #[arg(long)]
+        /// Recording to write, a .demo (default: the damaged file itself, which is then kept beside it as FILE.bak).
+        #[arg(long, value_parser = output::demo)]
         out: Option<PathBuf>,
         /// Another recording of the same game, mode and version. Its header is taken if both copies in the damaged file
         /// are damaged.
@@ -117,8 +118,8 @@ enum Verb {
         /// The recordings, in the order of their episodes in the new one.
         #[arg(required = true, value_name = "FILE")]
         files: Vec<PathBuf>,
-        /// File to write, which must not exist.
-        #[arg(long)]
+        /// Recording to write, a .demo that does not exist.
+        #[arg(long, value_parser = output::demo)]
         out: PathBuf,
         /// Print the result as a line of JSON.
         #[arg(long)]
@@ -133,8 +134,8 @@ enum Verb {
         /// Name of the player.
         #[arg(long, value_name = "NAME")]
         player: String,
-        /// File to write, which must not exist.
-        #[arg(long)]
+        /// Recording to write, a .demo that does not exist.
+        #[arg(long, value_parser = output::demo)]
         out: PathBuf,
         /// Print the result as a line of JSON.
         #[arg(long)]

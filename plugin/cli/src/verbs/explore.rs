@@ -30,7 +30,7 @@ use playbot_harness::{
 use playbot_learner::{DeviceKind, ScoreConfig, SkillDraw, SkillModel, SkillSource};
 use playbot_report::counted;
 use playbot_test::explore::{
-    Exploration, ExplorationSummary, ExplorePlan, ExploredCell, Explorer, Route, Stop, Until, explore,
+    Exploration, ExplorationSummary, ExplorePlan, ExploredCell, Explorer, Route, Stop, Until, explore_until,
     round::check_cell,
 };
 use serde_json::json;
@@ -45,7 +45,7 @@ use std::{
 /// The method is Go-Explore (Ecoffet et al. 2021): return to seldom seen cells by the same actions, and explore from
 /// there. Cells are squares of the level where the game gives positions of agents, else observations that are alike.
 /// Skills or a policy explore instead of random actions if given. If the game does not play the same by the same
-/// actions, the first tick that differs is printed.
+/// actions, the first tick that differs is printed. Ctrl-C ends it with what is known by then.
 ///
 /// Exit code 1 if the level has a goal and no path to it was found, or if the cell of --cell was not reached.
 #[derive(clap::Args)]
@@ -62,7 +62,9 @@ pub struct Args {
     /// level 0 of that mode).
     #[arg(long, value_name = "MODE:N", value_parser = one_level)]
     level: Option<LevelSplit>,
-    /// Environment steps to use, including returns to known cells. The last visits may take some more.
+    /// Environment steps to use, including returns to known cells. A round of visits begins if there are steps for
+    /// --explore-ticks each, and a visit that goes on finding cells takes up to ten times as many. So the last round may
+    /// take up to 9 × --batch × --explore-ticks more (28,800 by default), and --steps 3000 may become 12,000.
     #[arg(long, default_value_t = 500_000, value_parser = at_least_one_step)]
     steps: u64,
     /// End earlier: solved (a path to the goal is found), covered (every open cell is reached, too), or spent (never).
@@ -99,7 +101,7 @@ pub struct Args {
     #[command(flatten)]
     compute: Compute,
     /// Record the shortest solution, or the path to --cell, into this .demo, once it has been replayed.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", value_parser = output::demo)]
     out: Option<PathBuf>,
     /// Record and draw the path to this cell instead of the solution. Cells are named by their numbers, such as 3,4.
     #[arg(long, value_name = "CELL", allow_hyphen_values = true)]
@@ -128,8 +130,10 @@ pub fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     };
     let plan = plan(&args, &split, explorer, observation_config);
     plan.check(game)?;
-    if let Some(cell) = &args.cell {
-        check_cell(game, &plan, cell)?;
+    if let Some(cell) = &args.cell
+        && !check_cell(game, &plan, cell)?
+    {
+        report!("warning: by the level's plan, cell {cell} is a wall, or walls cut it off from the start");
     }
     let recording = args.out.as_deref().map(|path| RecordingFile::new(path, args.force)).transpose()?;
     let floor = match &args.png {
@@ -255,7 +259,7 @@ fn plan(args: &Args, split: &LevelSplit, explorer: Explorer, observation_config:
 fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> {
     interrupt::listen();
     let bar = progress::bar("explore", plan.steps, "steps");
-    let explored = explore(
+    let explored = explore_until(
         game,
         plan,
         |ticks| bar.inc(ticks),
@@ -264,8 +268,10 @@ fn search(game: &dyn Game, plan: &ExplorePlan) -> Result<Exploration, CliError> 
                 .solution
                 .map_or_else(String::new, |ticks| format!(", solved in {}", counted(ticks.into(), "tick")));
             bar.set_message(format!("{}{solved}", counted(round.cells as u64, "cell")));
-            if interrupt::asked() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            ControlFlow::Continue(())
         },
+        // What is known is then recorded and drawn.
+        &interrupt::asked_to_sum_up,
     );
     bar.finish_and_clear();
     Ok(explored?)

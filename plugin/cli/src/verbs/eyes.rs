@@ -1,7 +1,7 @@
 //! `playbot eyes`: the camera's and the raster's pictures, compared side by side.
 
 use crate::{
-    arguments::{check_start, first_levels, player::LoadedPlayer},
+    arguments::{check_start, finite_number, first_levels, player::LoadedPlayer},
     error::{CliError, Outcome},
     output,
     output::{print_line, program},
@@ -42,10 +42,10 @@ pub struct Args {
     #[arg(long, default_value_t = 64)]
     size: u32,
     /// Largest allowed mean absolute difference over all frames, of 255.
-    #[arg(long, default_value_t = 4.0)]
+    #[arg(long, default_value_t = 4.0, value_parser = finite_number)]
     most_mean: f64,
     /// Smallest allowed share of pixels whose colours are all within 8 of 255.
-    #[arg(long, default_value_t = 0.97)]
+    #[arg(long, default_value_t = 0.97, value_parser = finite_number)]
     least_close: f64,
     /// Folder for table.md, results.json and worst.png (raster, camera, and their difference four times as strong).
     #[arg(long)]

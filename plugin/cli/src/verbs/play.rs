@@ -5,9 +5,12 @@
 #[cfg(feature = "window")]
 mod window;
 
-use crate::arguments::{OverwriteArgs, player::PlayerArgs};
 #[cfg(not(feature = "window"))]
 use crate::error::{CliError, Outcome};
+use crate::{
+    arguments::{OverwriteArgs, player::PlayerArgs},
+    output,
+};
 #[cfg(not(feature = "window"))]
 use playbot_harness::games::Games;
 use std::path::PathBuf;
@@ -60,8 +63,8 @@ pub struct Args {
     /// is a rule of the game itself stays.
     #[arg(long)]
     no_time_limit: bool,
-    /// Recording to write.
-    #[arg(long, value_name = "FILE")]
+    /// Recording to write, a .demo.
+    #[arg(long, value_name = "FILE", value_parser = output::demo)]
     record: Option<PathBuf>,
     #[command(flatten)]
     overwrite: OverwriteArgs,

@@ -7,10 +7,13 @@ use crate::{
         report_agents_along,
     },
     error::{CliError, Outcome},
-    progress,
+    output, progress,
     progress::interrupt,
 };
-use bevy_playbot::{demo::recorder::Recorder, engine::flush_unfinished};
+use bevy_playbot::{
+    demo::recorder::Recorder,
+    engine::{flush_unfinished, repeated_episodes},
+};
 use playbot_harness::{
     demo::demonstration::DemonstrationPlan, game::Game, games::Games, held_out::HeldOut, prelude::*,
 };
@@ -48,8 +51,8 @@ pub struct Args {
     /// Leave out these levels, and any of the same layout as one of them (repeatable).
     #[arg(long, value_name = "LEVELS")]
     hold_out: Vec<LevelSplit>,
-    /// File to write.
-    #[arg(long)]
+    /// Recording to write, a .demo.
+    #[arg(long, value_parser = output::demo)]
     out: PathBuf,
     #[command(flatten)]
     player: PlayerArgs,
@@ -127,6 +130,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         None => Ok(plan.build_world(game, writer)),
     };
     let (mut world, agent) = built.inspect_err(|_| leave_nothing(&args.out, is_new))?;
+    interrupt::leave(format!("the finished episodes are kept in {}", args.out.display()));
     let finished = play(&mut world, agent, count, args.steps);
     let (episodes, steps) = (world.resource::<Recorder>().episodes(), world.resource::<Recorder>().steps());
     let counts = format!("{}, {}", counted(episodes, "episode"), counted(steps, "step"));
@@ -142,6 +146,11 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     })?;
     let ended = *world.get::<EpisodeCount>(agent).expect("required by Agent");
     report!("{}: {counts}{}", args.out.display(), wins(episodes, ended));
+    // The file is closed before it is read.
+    world.remove_resource::<Recorder>();
+    if !is_new {
+        warn_of_repeats(&args, episodes);
+    }
     if finished {
         return Ok(Outcome::Pass);
     }
@@ -164,6 +173,23 @@ fn wins(recorded: u64, ended: EpisodeCount) -> String {
     }
 }
 
+/// Warns if added episodes were in the recording before.
+fn warn_of_repeats(args: &Args, added: u64) {
+    // The recording is written; only the warning is lost.
+    let Ok(repeated @ 1..) = repeated_episodes(&args.out, usize::try_from(added).unwrap_or(usize::MAX)) else { return };
+    let (are, ones) = if repeated == 1 { ("is", "one") } else { ("are", "ones") };
+    let others = if args.noise > 0.0 {
+        format!("a --seed that was not used before, such as --seed {}", args.seed.wrapping_add(1))
+    } else {
+        "other --levels, or --noise".to_owned()
+    };
+    report!(
+        "warning: {} {are} equal to {ones} that {} before, and would count twice: record with {others}",
+        counted(repeated as u64, "episode"),
+        if repeated == 1 { "was there" } else { "were there" },
+    );
+}
+
 /// Removes a new recording without an episode, which would be in the way of the next attempt. Devices and links stay.
 fn leave_nothing(path: &Path, is_new: bool) {
     if is_new && fs::symlink_metadata(path).is_ok_and(|found| found.is_file()) && disk::remove_file(path).is_ok() {
@@ -183,20 +209,34 @@ struct StoppedRecording {
 
 impl StoppedRecording {
     /// Returns the changes of the call that resumes the recording. Each call begins with the first of its levels,
-    /// counts its own steps, and draws the same noise from the same seed.
+    /// counts its own steps, and draws the same noise from the same seed. Options that are given twice are an error.
     fn how_to_go_on(&self, args: &Args, levels: &LevelSplit) -> String {
         let mut changes = "--append".to_owned();
+        let mut replaced = Vec::new();
+        if args.overwrite.replaces() {
+            replaced.push("--force");
+        }
         if let Some(first) = self.level {
+            if args.levels.is_some() {
+                replaced.push("--levels");
+            }
             changes += &format!(" --levels {}", LevelSplit { first, ..levels.clone() });
             changes.extend(self.left_out.iter().map(|held_out| format!(" --hold-out {held_out}")));
         }
         if let Some(steps) = args.steps {
+            replaced.push("--steps");
             changes += &format!(" --steps {}", steps.saturating_sub(self.steps));
         }
         if args.noise > 0.0 {
+            replaced.push("--seed");
             changes += &format!(" --seed {}", args.seed.wrapping_add(1));
         }
-        format!("add the rest with the same command and `{changes}`")
+        let place = match replaced.as_slice() {
+            [] => String::new(),
+            [only] => format!(", in place of its {only}"),
+            [most @ .., last] => format!(", in place of its {} and {last}", most.join(", ")),
+        };
+        format!("add the rest with the same command and `{changes}`{place}")
     }
 }
 

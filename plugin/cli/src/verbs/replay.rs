@@ -16,6 +16,7 @@ use crate::{
     verbs::replay::picture::Pictures,
 };
 use playbot_harness::{
+    brief::shell_word,
     game::Game,
     games::{Artifact, Games},
 };
@@ -71,8 +72,8 @@ pub struct Args {
     /// Leave out actions that it does not need, and write the shorter finding to --out. Pictures then show that one.
     #[arg(long, requires = "out")]
     minimise: bool,
-    /// File for the shorter finding.
-    #[arg(long, value_name = "FILE", requires = "minimise")]
+    /// File for the shorter finding, a .finding.
+    #[arg(long, value_name = "FILE", requires = "minimise", value_parser = output::finding)]
     out: Option<PathBuf>,
     /// Most replays for shortening.
     #[arg(long, default_value_t = 500, requires = "minimise", value_parser = clap::value_parser!(u32).range(1..))]
@@ -98,19 +99,31 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     check_start(game, &finding.header.mode, finding.episode.level_seed)?;
     let again = play_again(game, &finding)?;
     let status = again.status(&finding);
+    let edited = finding.edited_level(game);
+    // The level as it is now is the one to show, and to name in a shorter finding.
+    let mut finding = finding;
+    if let (Some(_), Some(now)) = (&edited, &again.replayed.level_file) {
+        finding.episode.level_file = Some(now.clone());
+    }
     let shorter = match &args.out {
         Some(out) if status != FindingStatus::Gone => {
             Some((write_shorter(game, &finding, &stored, args.replays, out)?, out.as_path()))
         }
         _ => None,
     };
+    let is_stopped = shorter.as_ref().is_some_and(|(shorter, _)| !shorter.is_minimal) && interrupt::asked();
     let report = ReplayReport {
         path: &args.finding,
         finding: &stored,
         again: &again,
+        edited: edited.as_deref(),
         shorter: shorter.as_ref().map(|(shorter, path)| (shorter, *path)),
+        is_stopped,
     };
     report.print(args.json)?;
+    if is_stopped {
+        return Ok(Outcome::Stopped);
+    }
     let shown = shorter.as_ref().map_or(&finding, |(Minimised { finding, .. }, _)| finding);
     pictures.write(game, shown)?;
     if args.window {
@@ -164,8 +177,12 @@ pub struct ReplayReport<'a> {
     pub finding: &'a StoredFinding,
     /// The result of playing it again.
     pub again: &'a Recheck,
+    /// Path of the level's file, if it has changed since the test.
+    pub edited: Option<&'a str>,
     /// The shorter one, and its file.
     pub shorter: Option<(&'a Minimised, &'a Path)>,
+    /// Whether Ctrl-C ended the search for the shorter one.
+    pub is_stopped: bool,
 }
 
 impl ReplayReport<'_> {
@@ -187,7 +204,7 @@ impl ReplayReport<'_> {
         let shorter = self.shorter.map(|(shorter, path)| {
             json!({
                 "path": path.display().to_string(), "ticks": shorter.finding.episode.len(), "replays": shorter.replays,
-                "is_minimal": shorter.is_minimal,
+                "is_minimal": shorter.is_minimal, "stopped": self.is_stopped,
             })
         });
         json!({
@@ -195,6 +212,7 @@ impl ReplayReport<'_> {
             "detector": head.detector, "tester": head.tester, "message": head.message, "tick": head.tick,
             "state_hash": head.state_hash, "ticks": episode.len(), "original_ticks": head.original_ticks,
             "status": self.again.status(self.finding), "seen": self.again.sighting, "minimised": shorter,
+            "level_file_changed": self.edited.is_some(),
         })
     }
 
@@ -216,7 +234,9 @@ impl ReplayReport<'_> {
         };
         let ticks =
             if episode.is_empty() { String::new() } else { format!(" ({})", counted(episode.len() as u64, "tick")) };
-        format!("{} {}{who}{ticks}: {}: {}\n{now}", header.game, head.level, head.detector, head.message)
+        let edited =
+            self.edited.map_or_else(String::new, |path| format!("; the level file {path} has changed since the test"));
+        format!("{} {}{who}{ticks}: {}: {}\n{now}{edited}", header.game, head.level, head.detector, head.message)
     }
 
     fn shorter_sentence(&self) -> Option<String> {
@@ -224,8 +244,16 @@ impl ReplayReport<'_> {
         let (now, original) = (shorter.finding.episode.len(), self.finding.head.original_ticks);
         let [before, after] = shorter.efforts;
         let percent = 100.0 * now as f64 / f64::from(original.max(1));
-        let end =
-            if shorter.is_minimal { "" } else { "; the budget was used up before nothing more could be left out" };
+        let end = if self.is_stopped {
+            let (program, path) = (program::name(), shell_word(&path.display().to_string()));
+            format!(
+                "; stopped before nothing more could be left out: `{program} replay {path} --minimise --out FILE` goes on"
+            )
+        } else if shorter.is_minimal {
+            String::new()
+        } else {
+            "; the budget was used up before nothing more could be left out".to_owned()
+        };
         Some(format!(
             "{}: {} of {original} that the tester played ({percent:.0} %), {} of {before} that do something, after {}{end}",
             path.display(),
@@ -249,11 +277,12 @@ pub(crate) fn write_shorter(
     replays: u32,
     out: &Path,
 ) -> Result<Minimised, CliError> {
+    interrupt::leave(format!("{} is not written", out.display()));
     interrupt::listen();
     let bar = progress::bar("minimise", replays.into(), "replays");
     let budget = Budget { replays, ..Budget::default() };
     let hear = |replays: u32| bar.set_position(replays.into());
-    let shorter = minimise(game, finding, &Checks::of_game(game), budget, &hear, &interrupt::asked);
+    let shorter = minimise(game, finding, &Checks::of_game(game), budget, &hear, &interrupt::asked_to_sum_up);
     bar.finish_and_clear();
     let shorter = shorter?;
     output::make_folder_of(out)?;
@@ -303,10 +332,38 @@ fn or_a_picture(error: WindowError) -> CliError {
     }
 }
 
-#[cfg(all(test, feature = "window"))]
+#[cfg(test)]
 mod tests {
     use super::*;
+    use bevy_playbot::demo::file::DemoEpisode;
+    use playbot_harness::foreign::ForeignGame;
+    use playbot_test::findings::{FindingHead, Replayed};
 
+    #[test]
+    fn a_search_that_was_stopped_is_distinguished_from_one_with_too_few_replays() {
+        let game = ForeignGame::new("walk", 1, |_: &mut bevy::prelude::App| {});
+        let header = game.demo_header("default");
+        let episode = DemoEpisode::new(0, header.actions);
+        let head = FindingHead { original_ticks: 9, ..FindingHead::new("default:0", "lost", "after 9 ticks") };
+        let finding = StoredFinding { header, head, episode };
+        let again = Recheck { sighting: None, replayed: Replayed::default() };
+        let minimised = |is_minimal| Minimised { finding: finding.clone(), replays: 3, efforts: [2, 1], is_minimal };
+        let said = |is_minimal, is_stopped| {
+            let shorter = minimised(is_minimal);
+            let path = Path::new("short one.finding");
+            let shorter = Some((&shorter, path));
+            let report = ReplayReport { path, finding: &finding, again: &again, edited: None, shorter, is_stopped };
+            (report.shorter_sentence().expect("there is a shorter one"), report.json())
+        };
+        assert!(said(true, false).0.ends_with(" after 3 replays"));
+        assert!(said(false, false).0.ends_with("; the budget was used up before nothing more could be left out"));
+        let (words, json) = said(false, true);
+        let advice = format!("`{} replay 'short one.finding' --minimise --out FILE` goes on", program::name());
+        assert!(words.contains("; stopped before") && words.ends_with(&advice), "{words}");
+        assert_eq!(json["minimised"]["stopped"], true);
+    }
+
+    #[cfg(feature = "window")]
     #[test]
     fn without_a_display_pictures_are_named() {
         let missing = || "DISPLAY is not set".to_owned();

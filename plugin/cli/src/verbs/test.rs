@@ -145,6 +145,8 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     };
     let (mut folder, message) = TestFolder::open(out, &record, earlier)?;
     message.iter().for_each(|message| report!("warning: {message}"));
+    interrupt::leave(format!("the finished levels are kept in {}", out.display()));
+    interrupt::go_on_with("the same command and --resume".to_owned());
     interrupt::listen();
     if !args.resume {
         forget_slow_ticks(out)?;

@@ -10,7 +10,9 @@ use playbot_harness::{
 };
 use playbot_test::{
     detectors::{Detectors, ErrorLogReader, TestedBy, TestedLevel},
-    explore::{Exploration, ExploreError, ExplorePlan, ExploredCell, Explorer, ReachedCell, Route, Stop, explore},
+    explore::{
+        Exploration, ExploreError, ExplorePlan, ExploredCell, Explorer, ReachedCell, Route, Stop, explore_until,
+    },
     findings::{Breakage, Checks, FindingHead, Lengths, actions_of, minimise::lengths, scan},
     verdict::{Finding, LevelVerdict, TestError, TestObserver, TestPlan, Tester, TesterRecord, test_in_turn},
 };
@@ -148,7 +150,9 @@ impl Sightings {
 pub(super) fn search(trial: &Trial, explorer: &Explorer) -> Result<Option<JobResult>, ScoreError> {
     let mut sightings = Sightings { findings: Vec::new(), first: None, playable: Vec::new() };
     let ear = ErrorLogReader::new();
-    let explored = ear.listen(|| explore(trial.game, &exploration_plan(trial, explorer), |_| {}, |_| go_on(trial)));
+    let plan = exploration_plan(trial, explorer);
+    let go_on = |_| ControlFlow::Continue(());
+    let explored = ear.listen(|| explore_until(trial.game, &plan, |_| {}, go_on, trial.stop));
     hear_errors(trial, &ear, &mut sightings);
     let found = match explored {
         Ok(found) if found.stop == Stop::Asked => return Ok(None),
@@ -176,10 +180,6 @@ pub(super) fn search(trial: &Trial, explorer: &Explorer) -> Result<Option<JobRes
     let seconds = trial.clock.seconds();
     let shortened = shortened_exploration(trial, &sightings);
     Ok(Some(result(sightings, ticks, unsolvable, shortened, seconds)))
-}
-
-fn go_on(trial: &Trial) -> ControlFlow<()> {
-    if (trial.stop)() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
 fn exploration_plan(trial: &Trial, explorer: &Explorer) -> ExplorePlan {

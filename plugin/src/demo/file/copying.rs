@@ -8,7 +8,7 @@ use crate::demo::file::{
     writer::DemoWriter,
 };
 use std::{
-    collections::HashMap,
+    collections::{HashMap, HashSet},
     fs,
     hash::{DefaultHasher, Hash, Hasher},
     path::{Path, PathBuf},
@@ -75,6 +75,20 @@ pub fn relabel_demo(file: impl AsRef<Path>, player: &str, out: impl AsRef<Path>)
     let reader = DemoReader::open(file)?;
     let header = DemoHeader { demonstrator: player.to_owned(), ..reader.header().clone() };
     copy(vec![reader], header, out.as_ref(), &mut |_, episode| Some(episode))
+}
+
+/// Counts the last `added` episodes of a recording that play as one before them does, tick by tick.
+///
+/// # Errors
+///
+/// The file cannot be read, or is damaged.
+pub fn repeated_episodes(file: impl AsRef<Path>, added: usize) -> Result<usize, DemoFileError> {
+    let played: Result<Vec<u64>, DemoFileError> =
+        DemoReader::open(file)?.map(|episode| episode.map(|episode| hash_of_play(&episode))).collect();
+    let played = played?;
+    let (before, added) = played.split_at(played.len().saturating_sub(added));
+    let before: HashSet<&u64> = before.iter().collect();
+    Ok(added.iter().filter(|episode| before.contains(episode)).count())
 }
 
 /// Writes the chosen episodes under a header.

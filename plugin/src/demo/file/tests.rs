@@ -395,6 +395,16 @@ fn episodes_that_another_file_has_too_are_counted() {
 }
 
 #[test]
+fn added_episodes_that_were_there_before_are_counted() {
+    let folder = tempfile::tempdir().expect("temporary folder");
+    let (a, b, c) = (episode(1, 5), episode(2, 3), episode(3, 4));
+    let file = write(folder.path(), "one.demo", &[a.clone(), b.clone(), c.clone(), c, b, a]);
+    // Equal ones among the added count only if they were there before.
+    assert_eq!([0, 1, 2, 3, 4, 6].map(|added| repeated_episodes(&file, added).expect("whole")), [0, 1, 2, 3, 2, 0]);
+    repeated_episodes(folder.path().join("none.demo"), 1).expect_err("no such file");
+}
+
+#[test]
 fn files_that_do_not_belong_together_are_refused_by_name_and_nothing_is_written() {
     let folder = tempfile::tempdir().expect("temporary folder");
     let one = write(folder.path(), "one.demo", &[episode(1, 5)]);

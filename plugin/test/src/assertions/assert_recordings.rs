@@ -3,8 +3,8 @@
 use crate::{
     assertions::{LevelTest, examine::replay},
     findings::{
-        Checks, Date, FindingError, Recheck, Regress, RegressRow, Regression, StoredFinding, keep::recheck,
-        list_findings, regress,
+        Checks, Date, FindingError, Recheck, Regress, RegressRow, Regression, StoredFinding, list_findings, recheck,
+        regress, since_edited,
     },
 };
 use bevy_playbot::{demo::file::DemoFault, engine::find_demos};
@@ -58,8 +58,9 @@ impl LevelTest<'_> {
         let again = again.map_err(|error| format!("{}: {error}", path.display()))?;
         let Some(what) = difference(&finding, &again) else { return Ok(()) };
         let head = &finding.head;
+        let edited = finding.edited_level(self.game).map_or_else(String::new, |path| since_edited(&path));
         let found = format!("{}: {}: {}", head.level, head.detector, head.message);
-        Err(format!("{}: {what} ({found})\n    {}", path.display(), replay(&self.program, path)))
+        Err(format!("{}: {what}{edited} ({found})\n    {}", path.display(), replay(&self.program, path)))
     }
 
     /// Checks that no finding happens any more, and returns the message of a failure.

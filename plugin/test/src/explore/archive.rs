@@ -556,6 +556,11 @@ impl Visit {
         Divergence { level: self.level, tick, what }
     }
 
+    /// Returns whether the visit has played a tick beyond its path back.
+    pub fn has_explored(&self) -> bool {
+        !self.visited.piece.is_empty()
+    }
+
     /// Returns the result, with the number of the visit.
     pub fn finish(self) -> (u64, Visited) {
         (self.job.number, Visited { tried: self.notes.tried, ..self.visited })

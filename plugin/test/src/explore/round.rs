@@ -53,8 +53,24 @@ struct Crew<'a> {
     jobs: Vec<Job>,
 }
 
+/// Explores a level as [`explore_until`] does, without a stop within a round.
+///
+/// # Errors
+///
+/// As for [`explore_until`].
+pub fn explore(
+    game: &dyn Game,
+    plan: &ExplorePlan,
+    progress: impl Fn(u64) + Sync,
+    after_round: impl FnMut(Round) -> ControlFlow<()>,
+) -> Result<Exploration, ExploreError> {
+    explore_until(game, plan, progress, after_round, &|| false)
+}
+
 /// Explores a level. `progress` receives the ticks of each visit, from several threads. `after_round` may end the
-/// exploration, whose result is then that of the last finished round.
+/// exploration, whose result is then that of the last finished round. `stop` is asked before each tick, from several
+/// threads, and is to return true from the first time on. The result then has what the visits had seen by then, which
+/// depends on the moment.
 ///
 /// The same plan has the same result for any number of threads, arenas and Worlds, with and without snapshots. All
 /// visits of the first round that uses snapshots are made by replays, too, and later each 32nd one. If one of them
@@ -63,22 +79,33 @@ struct Crew<'a> {
 /// # Errors
 ///
 /// The plan does not fit the game, or the game breaks its contract or does not replay: see [`ExploreError`].
-pub fn explore(
+pub fn explore_until(
     game: &dyn Game,
     plan: &ExplorePlan,
     progress: impl Fn(u64) + Sync,
     mut after_round: impl FnMut(Round) -> ControlFlow<()>,
+    stop: &(dyn Fn() -> bool + Sync),
 ) -> Result<Exploration, ExploreError> {
     plan.check(game)?;
+    let hooks = Hooks { progress: &progress, stop };
     // Skills, and stacks of pictures, are no part of a snapshot. A World that is built anew has none either.
     let mut has_snapshots = plan.snapshots && !plan.explorer.is_policy() && game.built_anew().is_none();
     let mut snapshot_fault = None;
     loop {
-        match search(game, plan, has_snapshots, &progress, &mut after_round)? {
+        match search(game, plan, has_snapshots, hooks, &mut after_round)? {
             Attempt::Done(exploration) => return Ok(Exploration { snapshot_fault, ..*exploration }),
             Attempt::Distrusted(fault) => (has_snapshots, snapshot_fault) = (false, Some(fault)),
         }
     }
+}
+
+/// The caller's functions that are called within a round.
+#[derive(Clone, Copy)]
+struct Hooks<'a> {
+    /// Receives the ticks of each visit.
+    progress: &'a (dyn Fn(u64) + Sync),
+    /// Returns whether to stop.
+    stop: &'a (dyn Fn() -> bool + Sync),
 }
 
 /// The outcome of a whole exploration.
@@ -92,7 +119,7 @@ fn search(
     game: &dyn Game,
     plan: &ExplorePlan,
     has_snapshots: bool,
-    progress: &(impl Fn(u64) + Sync),
+    hooks: Hooks<'_>,
     after_round: &mut impl FnMut(Round) -> ControlFlow<()>,
 ) -> Result<Attempt, ExploreError> {
     let floor_plan = game.tools().levels.floor_plan(&plan.mode, plan.level);
@@ -110,12 +137,12 @@ fn search(
         if jobs.is_empty() {
             break Stop::Spent;
         }
-        visits += jobs.len() as u64;
         let round = Jobs { game, plan, archive: &archive, jobs };
-        let visited = match round.play(&mut crews, &mut has_restored, progress)? {
+        let visited = match round.play(&mut crews, &mut has_restored, hooks)? {
             Ok(visited) => visited,
             Err(fault) => return Ok(Attempt::Distrusted(fault)),
         };
+        visits += visited.len() as u64;
         for visited in visited {
             steps += visited.steps;
             restored_steps += u64::from(visited.restored);
@@ -125,7 +152,7 @@ fn search(
         let round =
             Round { steps, cells: archive.cells().len(), solution: archive.solution().map(|solution| solution.ticks) };
         curve.push((steps, round.cells as u64));
-        if after_round(round).is_break() {
+        if after_round(round).is_break() || (hooks.stop)() {
             break Stop::Asked;
         }
         let open = open.as_ref().filter(|_| has_positions(&crews));
@@ -230,12 +257,12 @@ impl Jobs<'_> {
         self,
         crews: &mut [Crew<'_>],
         has_restored: &mut bool,
-        progress: &(impl Fn(u64) + Sync),
+        hooks: Hooks<'_>,
     ) -> Result<Result<Vec<Visited>, SnapshotFault>, ExploreError> {
         let Self { game, plan, archive, jobs } = self;
         let threads = plan.threads;
         if jobs.iter().all(|job| job.saved.is_none()) {
-            return play_round(crews, jobs, threads, archive, progress).map(Ok);
+            return play_round(crews, jobs, threads, archive, hooks).map(Ok);
         }
         let is_first = !std::mem::replace(has_restored, true);
         let is_checked = |job: &Job| is_first || (job.saved.is_some() && job.number.is_multiple_of(CHECKED));
@@ -243,26 +270,32 @@ impl Jobs<'_> {
         let (places, replays): (Vec<usize>, Vec<Job>) =
             checked.map(|(place, job)| (place, Job { saved: None, ..job.clone() })).unzip();
         let fault = |tick| Ok(Err(SnapshotFault { game: game.name(), level: plan.level, tick }));
-        let restored = match play_round(crews, jobs, threads, archive, progress) {
+        let restored = match play_round(crews, jobs, threads, archive, hooks) {
             Ok(restored) => restored,
             // If the game itself is at fault, replays show it.
             Err(ExploreError::Diverged { divergence, .. }) => return fault(Some(divergence.tick)),
             Err(_) => return fault(None),
         };
-        let replayed = play_round(crews, replays, threads, archive, &|_| {})?;
+        let replayed = play_round(crews, replays, threads, archive, Hooks { progress: &|_| {}, ..hooks })?;
+        if (hooks.stop)() {
+            // There may be nothing to compare with. Nothing is known of snapshots before they were compared once.
+            let is_kept = |visited: &Visited| !is_first || visited.restored == 0;
+            return Ok(Ok(restored.into_iter().filter(is_kept).collect()));
+        }
         let mut pairs = places.into_iter().zip(&replayed);
         let difference = pairs.find_map(|(place, replayed)| restored[place].first_difference(replayed));
         if difference.is_some() { fault(difference) } else { Ok(Ok(restored)) }
     }
 }
 
-/// Makes all visits of a round, and returns their results in order.
+/// Makes all visits of a round, and returns their results in order. If the caller stops, those of the visits that had
+/// explored something by then are returned.
 fn play_round(
     crews: &mut [Crew<'_>],
     jobs: Vec<Job>,
     threads: usize,
     archive: &Archive,
-    progress: &(impl Fn(u64) + Sync),
+    hooks: Hooks<'_>,
 ) -> Result<Vec<Visited>, ExploreError> {
     let count = crews.len();
     let threads = if crews.iter().any(|crew| crew.world.is_bound_to_its_thread()) { 1 } else { threads };
@@ -271,7 +304,7 @@ fn play_round(
     }
     let parts = on_threads(crews, threads, |crew| {
         let jobs = std::mem::take(&mut crew.jobs);
-        crew.world.play(jobs, archive, progress)
+        crew.world.play(jobs, archive, hooks)
     });
     let mut all = Vec::new();
     for part in parts {
@@ -344,21 +377,30 @@ impl<'a> ExploreWorld<'a> {
         is_bound_to_its_thread(&self.world)
     }
 
-    /// Makes visits, several of them at a time. `progress` receives the ticks of each.
+    /// Makes visits, several of them at a time, or as many as there is time for until the caller stops.
     ///
     /// # Errors
     ///
     /// The game broke its contract, or does not replay.
-    pub fn play(
+    fn play(
         &mut self,
         jobs: Vec<Job>,
         archive: &Archive,
-        progress: &impl Fn(u64),
+        hooks: Hooks<'_>,
     ) -> Result<Vec<(u64, Visited)>, ExploreError> {
         let mut jobs = jobs.into_iter();
         let mut visits: Vec<Option<Visit>> = self.agents.iter().map(|_| None).collect();
         let mut done = Vec::new();
+        let finished = |visit: Visit| {
+            let (number, visited) = visit.finish();
+            (hooks.progress)(visited.steps);
+            (number, visited)
+        };
         loop {
+            if (hooks.stop)() {
+                done.extend(visits.into_iter().flatten().filter(Visit::has_explored).map(finished));
+                return Ok(done);
+            }
             for (visit, &agent) in visits.iter_mut().zip(&self.agents) {
                 let (game, mode) = (self.game, self.mode);
                 if visit.is_none()
@@ -396,9 +438,7 @@ impl<'a> ExploreWorld<'a> {
                     .note(world, agent, end, archive, spot, save)
                     .map_err(|divergence| diverged(game, mode, divergence))?;
                 if let Some(visit) = visit.take_if(|_| is_over) {
-                    let (number, visited) = visit.finish();
-                    progress(visited.steps);
-                    done.push((number, visited));
+                    done.push(finished(visit));
                 }
             }
         }
@@ -416,12 +456,13 @@ const MARGIN: i64 = 8;
 const SLACK: f32 = 1e-3;
 
 /// Plays one tick of the level, and checks a cell. It must have as many numbers as the level's cells, and must not lie
-/// far outside.
+/// far outside. Returns whether it may be reached by the level's plan: false in a wall, and where walls cut it off from
+/// the start. Agents may be there all the same, since a position may be that of their feet, and games have faults.
 ///
 /// # Errors
 ///
 /// [`ExploreError::Plan`] with the valid values, or the plan does not fit the game, or the game breaks its contract.
-pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &ExploredCell) -> Result<(), ExploreError> {
+pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &ExploredCell) -> Result<bool, ExploreError> {
     plan.check(game)?;
     let floor_plan = game.tools().levels.floor_plan(&plan.mode, plan.level);
     let grid = CellGrid::new(floor_plan.as_ref(), plan.cell_size);
@@ -430,8 +471,8 @@ pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &ExploredCell) -> R
     let mut world = ExploreWorld::new(game, &one, lookout, 0, 1)?;
     let route = Route::empty(&game.actions());
     let job = Job { number: 0, destination: Destination::START, route, saved: None, patience: 1, most: 1 };
-    let visits = world.play(vec![job], &Archive::new(game.actions()), &|_| {})?;
-    let Some(seen) = visits.iter().find_map(|(_, visited)| visited.seen.keys().next()) else { return Ok(()) };
+    let visits = world.play(vec![job], &Archive::new(game.actions()), Hooks { progress: &|_| {}, stop: &|| false })?;
+    let Some(seen) = visits.iter().find_map(|(_, visited)| visited.seen.keys().next()) else { return Ok(true) };
     if seen.0.len() != cell.0.len() {
         return Err(ExploreError::Plan(format!(
             "cell {cell} has the wrong count of numbers: cells of this level have {}, such as {seen}",
@@ -439,8 +480,11 @@ pub fn check_cell(game: &dyn Game, plan: &ExplorePlan, cell: &ExploredCell) -> R
         )));
     }
     match floor_plan {
-        Some(floor_plan) if world.has_positions() => check_bounds(&grid, floor_plan.bounds, cell),
-        _ => Ok(()),
+        Some(floor_plan) if world.has_positions() => {
+            check_bounds(&grid, floor_plan.bounds, cell)?;
+            Ok(open_cells(&floor_plan, &grid).is_none_or(|open| open.contains(cell)))
+        }
+        _ => Ok(true),
     }
 }
 

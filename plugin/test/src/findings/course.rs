@@ -13,6 +13,7 @@ use bevy_playbot::{
     action::ActionValue,
     demo::file::{DemoEnd, DemoEpisode, EpisodeActions},
     episode::EpisodeEnd,
+    level::LevelFile,
     vision::ObservationConfig,
 };
 use playbot_harness::{
@@ -211,13 +212,15 @@ impl StoredFinding {
         self
     }
 
-    /// Replaces mode, number and file of the level by those of another finding, so that the level has the name from the
-    /// test.
+    /// Replaces mode, number and path of the level by those of another finding, so that the level has the name from the
+    /// test. The hash stays: the file may have been edited since.
     #[must_use]
     pub fn with_level_of(mut self, other: &Self) -> Self {
         self.header.mode.clone_from(&other.header.mode);
         self.episode.level_seed = other.episode.level_seed;
-        self.episode.level_file.clone_from(&other.episode.level_file);
+        let hash = self.episode.level_file.as_ref().map(|file| file.hash);
+        let named = other.episode.level_file.clone();
+        self.episode.level_file = named.map(|file| LevelFile { hash: hash.unwrap_or(file.hash), ..file });
         self
     }
 
@@ -309,7 +312,6 @@ mod tests {
         action::ActionValue,
         bot::BlindBot,
         demo::file::{Decider, DemoActions, DemoEpisode, EpisodeActions},
-        level::LevelFile,
     };
     use playbot_corridor::{Corridor, Rule, to_the_goal};
     use playbot_harness::{foreign::ForeignGame, level_files::LevelDesign};

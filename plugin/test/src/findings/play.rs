@@ -340,12 +340,13 @@ pub struct Unplayable(pub String);
 impl HasExitCode for Unplayable {}
 
 impl StoredFinding {
-    /// Checks that the game is the one that was tested, and that the level is still there.
+    /// Checks that the game is the one that was tested, and that the level is still there. A level file that was
+    /// [edited](Self::edited_level) since then is there: a hand-made level is repaired by editing its file.
     ///
     /// # Errors
     ///
     /// [`Unplayable`]: another game or version, other actions, a mode that the game no longer has, a level file that is
-    /// gone or was changed.
+    /// gone or cannot be read.
     pub fn check_playable(&self, game: &dyn Game) -> Result<(), Unplayable> {
         let StoredFinding { header, episode, .. } = self;
         if header.game != game.name() {
@@ -373,6 +374,7 @@ impl StoredFinding {
         }
         let designs = read_level_designs(game, &header.mode).map_err(|error| gone(&error))?;
         match &episode.level_file {
+            Some(file) if is_edited(&designs.files(), episode.level_seed, file) => Ok(()),
             Some(file) => {
                 let difference = designs.files().difference(episode.level_seed, file);
                 difference.map_or(Ok(()), |what| Err(Unplayable(format!("{what}, or remove the finding"))))
@@ -380,6 +382,25 @@ impl StoredFinding {
             None => Err(Unplayable("it names no level file, though its levels are files".to_owned())),
         }
     }
+
+    /// Returns the path of the level's file if it holds another level than in the test. `None` if it does not, if it
+    /// cannot be read, and for levels that are not files.
+    pub fn edited_level(&self, game: &dyn Game) -> Option<String> {
+        let Self { header, episode, .. } = self;
+        let file = episode.level_file.as_ref().filter(|_| is_level_files(&header.mode))?;
+        let designs = read_level_designs(game, &header.mode).ok()?;
+        is_edited(&designs.files(), episode.level_seed, file).then(|| file.path.clone())
+    }
+}
+
+/// Returns whether the level's file is the recorded one by its path, but not by its hash.
+fn is_edited(files: &LevelFiles, level: u64, recorded: &LevelFile) -> bool {
+    files.of(level).is_some_and(|file| file.path == recorded.path && file.hash != recorded.hash)
+}
+
+/// Returns the words about an edited level file, as the end of a message.
+pub(crate) fn since_edited(path: &str) -> String {
+    format!("; the level file {path} has changed since the test")
 }
 
 /// Returns the error of a level file that cannot be read, without the general advice about patterns.
@@ -387,8 +408,8 @@ fn gone(error: &LevelFileError) -> Unplayable {
     Unplayable(match error {
         // The file may exist relative to the folder of the test.
         LevelFileError::NoFiles { pattern, folder } => format!(
-            "there is no level file {pattern}, neither seen from {folder} nor from a folder above the finding: do this from \
-             the folder where the test was run, or bring the recorded file back"
+            "there is no level file {pattern}, neither seen from {folder} nor unchanged in a folder above the finding: do \
+             this from the folder where the test was run, or bring the recorded file back"
         ),
         error => {
             format!("the level cannot be read any more: {error}; bring the recorded file back, or remove the finding")

@@ -3,9 +3,10 @@
 use crate::findings::{
     FindingError, FindingStatus, StoredFinding,
     checks::Checks,
-    folder::{Date, ENDING, list_findings},
+    folder::{Date, ENDING, FINDINGS, list_findings},
     io_error,
     keep::{Sighting, recheck},
+    play::since_edited,
 };
 use playbot_harness::{game::Game, games::Games, level_files::read::read_text_file, parallel::on_threads};
 use serde::{Deserialize, Serialize};
@@ -158,7 +159,8 @@ fn row(request: &Regress, name: &str, path: &Path) -> RegressRow {
                 Some(_) if again.is_same(&finding) => head.message.clone(),
                 Some(seen) => format!("{}{}", head.message, elsewhere(seen, &finding)),
             };
-            let status = again.status(&finding);
+            let edited = finding.edited_level(game).map_or_else(String::new, |path| since_edited(&path));
+            let (status, message) = (again.status(&finding), format!("{message}{edited}"));
             RegressRow { status, message, seen: again.sighting, ..row }
         }
     }
@@ -174,7 +176,7 @@ fn elsewhere(seen: Sighting, finding: &StoredFinding) -> String {
 
 // Pins of known findings.
 
-/// Name of the file with pins, beside the findings.
+/// Name of the file with pins, in the folder of a test or beside its findings.
 pub const PINS: &str = "pins.ron";
 
 /// A known finding, with a reason and a last day.
@@ -208,13 +210,23 @@ const MOST_PIN_BYTES: u64 = 1 << 20;
 pub struct Pins(Vec<Pin>);
 
 impl Pins {
-    /// Reads a folder's `pins.ron`; there are no pins if there is no such file.
+    /// Reads the pins of a folder of findings: its `pins.ron`, that of its `findings`, and that of the test's folder if
+    /// this is the `findings` of a test. So a test and its findings have the same pins. There are none without a file.
     ///
     /// # Errors
     ///
-    /// [`FindingError::Pins`] with line and column, or the file cannot be read.
+    /// [`FindingError::Pins`] with line and column, or a file cannot be read.
     pub fn read(folder: &Path) -> Result<Self, FindingError> {
-        let path = folder.join(PINS);
+        let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
+        let above = whole.parent().filter(|_| whole.ends_with(FINDINGS)).map(Path::to_owned);
+        let mut pins = Self::default();
+        for place in [folder.to_owned(), folder.join(FINDINGS)].into_iter().chain(above) {
+            pins.0.extend(Self::read_file(place.join(PINS))?.0);
+        }
+        Ok(pins)
+    }
+
+    fn read_file(path: PathBuf) -> Result<Self, FindingError> {
         let text = match read_text_file(&path, MOST_PIN_BYTES).map_err(io::Error::from) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
             text => text.map_err(io_error("read", &path))?,
@@ -279,6 +291,28 @@ mod tests {
         assert_eq!(pins.unknown(&["a", "c"]), ["b"]);
         let folder = tempfile::tempdir().expect("a folder");
         assert_eq!(Pins::read(folder.path()).expect("none"), Pins::default());
+    }
+
+    #[test]
+    fn a_test_and_its_findings_have_the_same_pins() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let below = folder.path().join(FINDINGS);
+        fs::create_dir(&below).expect("writable");
+        let pin = |name: &str| format!("[(finding: \"{name}\", reason: \"known\", until: \"2027-01-31\")]");
+        fs::write(folder.path().join(PINS), pin("a")).expect("writable");
+        fs::write(below.join(PINS), pin("b")).expect("writable");
+        let today = "2027-01-01".parse().expect("a day");
+        for place in [folder.path(), &below] {
+            let pins = Pins::read(place).expect("pins");
+            assert_eq!(["a", "b", "c"].map(|name| pins.of(name, today).is_some()), [true, true, false]);
+        }
+        // Another folder knows nothing of those above it.
+        let other = folder.path().join("other");
+        fs::create_dir(&other).expect("writable");
+        assert_eq!(Pins::read(&other).expect("none"), Pins::default());
+        fs::write(below.join(PINS), "a").expect("writable");
+        let error = Pins::read(folder.path()).expect_err("no pins").to_string();
+        assert!(error.contains("findings/pins.ron, line 1"), "{error}");
     }
 
     #[test]

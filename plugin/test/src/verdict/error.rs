@@ -65,8 +65,13 @@ pub enum TestError {
         differences: Vec<String>,
     },
     /// The folder has no results.
-    #[error("{} has no results.json{}", .0.display(), no_results(.0))]
-    NoResults(PathBuf),
+    #[error("{} has no results.json{}", folder.display(), no_results(folder, resumed.as_deref()))]
+    NoResults {
+        /// The folder.
+        folder: PathBuf,
+        /// The command that goes on with its test, if one is begun there.
+        resumed: Option<String>,
+    },
     /// A file is damaged.
     #[error("{}, line {line}: {message}; {next}", path.display())]
     Damaged {
@@ -215,13 +220,11 @@ fn shards_of(levels: u64) -> String {
     counted(levels, "shard")
 }
 
-fn no_results(folder: &Path) -> &'static str {
-    if folder.join(JOURNAL).exists() {
-        ": its test is not done, finish it with `playbot test --resume`"
-    } else if folder.exists() {
-        ": name the --out of a `playbot test`"
-    } else {
-        ", since there is no such folder: name the --out of a `playbot test`"
+fn no_results(folder: &Path, resumed: Option<&str>) -> String {
+    match resumed {
+        Some(command) => format!(": its test is not done, finish it with `{command}`"),
+        None if folder.exists() => ": name the --out of a `playbot test`".to_owned(),
+        None => ", since there is no such folder: name the --out of a `playbot test`".to_owned(),
     }
 }
 
@@ -285,11 +288,14 @@ mod tests {
     #[test]
     fn an_unfinished_test_is_distinguished_from_a_folder_without_one() {
         let folder = tempfile::tempdir().expect("a folder");
-        let words = || TestError::NoResults(folder.path().into()).to_string();
-        assert!(words().contains("has no results.json: name the --out"), "{}", words());
-        let none = TestError::NoResults(folder.path().join("none")).to_string();
+        let words = |folder: &Path, resumed: Option<&str>| {
+            TestError::NoResults { folder: folder.into(), resumed: resumed.map(str::to_owned) }.to_string()
+        };
+        let empty = words(folder.path(), None);
+        assert!(empty.contains("has no results.json: name the --out"), "{empty}");
+        let none = words(&folder.path().join("none"), None);
         assert!(none.contains("no such folder"), "{none}");
-        std::fs::write(folder.path().join(JOURNAL), "").expect("writable");
-        assert!(words().contains("--resume"), "{}", words());
+        let begun = words(folder.path(), Some("playbot test a --out b --resume"));
+        assert!(begun.ends_with(": its test is not done, finish it with `playbot test a --out b --resume`"), "{begun}");
     }
 }

@@ -11,7 +11,7 @@ use crate::{
     verdict::{
         LevelVerdict,
         error::{JOURNAL, TestError, io_error, json_fault},
-        plan::TestRecord,
+        plan::{RECORD, TestRecord},
         results::{RESULTS, ResultWriter},
     },
 };
@@ -26,9 +26,6 @@ use std::{
     io::{BufRead, BufReader, Read, Seek, SeekFrom, Write},
     path::{Path, PathBuf},
 };
-
-/// Name of the file with the description of the test.
-const RECORD: &str = "test.json";
 
 /// Treatment of earlier results in the folder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -307,6 +304,9 @@ mod tests {
         folder.keep(&verdict(1, 1, 1)).expect("writable");
         drop(folder);
         assert!(matches!(open(&record(), Earlier::Keep), Err(TestError::Exists(_))));
+        let error = ResultLines::open(&path).map(drop).expect_err("it is not done").to_string();
+        let resumed = "`playbot test garden --levels hard:0..2 --bot random --episodes 1 --seed 0 --out ";
+        assert!(error.contains(&format!("finish it with {resumed}{} --resume`", path.display())), "{error}");
         let other = TestRecord { seed: 1, shard: Some("0/2".parse().expect("a shard")), ..record() };
         let error = open(&other, Earlier::Resume).map(drop).expect_err("another test").to_string();
         assert!(error.contains("which differs (there and here) in seeds 0 and 1, all levels and shard 0/2"), "{error}");

@@ -11,6 +11,7 @@ use crate::{
 };
 use bevy_playbot::{state_hash::StateHash, vision::ObservationConfig};
 use playbot_harness::{
+    brief::shell_word,
     eval::{EvalError, Player},
     game::Game,
     machine::{MemoryError, check_bytes},
@@ -19,6 +20,9 @@ use playbot_harness::{
 };
 use serde::{Deserialize, Serialize};
 use std::path::Path;
+
+/// Name of the file with the description of a test, in its folder.
+pub(super) const RECORD: &str = "test.json";
 
 /// Bytes of a listed level, and of its entry in the journal.
 const LEVEL: usize = size_of::<u64>() + size_of::<(u64, (u64, usize))>();
@@ -188,6 +192,19 @@ impl TestRecord {
         found
     }
 
+    /// Returns the command that goes on with this test in a folder.
+    pub(super) fn resumed_in(&self, folder: &Path) -> String {
+        let Self { game, range, testers: records, episodes, seed, options, shard, .. } = self;
+        let [levels, folder] = [range.to_string(), folder.display().to_string()].map(|word| shell_word(&word));
+        let options: String = options.iter().map(|word| format!(" {}", shell_word(word))).collect();
+        let shard = shard.map_or_else(String::new, |shard| format!(" --shard {shard}"));
+        let played = testers(records);
+        format!(
+            "playbot test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{options}{shard} --out \
+             {folder} --resume"
+        )
+    }
+
     /// Describes the differences between the games and their versions.
     pub fn differences_of_game(&self, other: &Self) -> Vec<String> {
         if self.game != other.game {
@@ -275,6 +292,30 @@ impl TesterRecord {
         let checksum = self.checksum.as_ref().map_or_else(String::new, |sum| format!(" (file {sum})"));
         format!("{}{checksum}{}", self.name, if self.greedy { ", greedy" } else { "" })
     }
+}
+
+/// Returns the testers as arguments of `playbot test`. The draws of a policy depend on its name, so the name is
+/// included.
+pub(super) fn testers(testers: &[TesterRecord]) -> String {
+    let bots: Vec<&str> =
+        testers.iter().filter(|tester| tester.checksum.is_none()).map(|tester| tester.name.as_str()).collect();
+    let bots = (!bots.is_empty()).then(|| format!("--bot {}", bots.join(",")));
+    let policies = testers.iter().filter(|tester| tester.checksum.is_some() && tester.run.is_none());
+    let policies = policies.map(|TesterRecord { name, file, .. }| {
+        let given = file.as_ref().map_or_else(|| name.clone(), |file| format!("{name}={file}"));
+        format!("--policy {}", shell_word(&given))
+    });
+    let greedy = testers.iter().any(|tester| tester.greedy).then(|| "--greedy".to_owned());
+    bots.into_iter().chain(policies).chain(runs(testers)).chain(greedy).collect::<Vec<_>>().join(" ")
+}
+
+/// Returns the arguments for runs among testers. One checkpoint applies to all, so runs with different checkpoints
+/// get none.
+fn runs(testers: &[TesterRecord]) -> Vec<String> {
+    let runs: Vec<_> = testers.iter().filter_map(|tester| tester.run.as_ref()).collect();
+    let folders = runs.iter().map(|run| format!("--run {}", shell_word(&run.folder)));
+    let step = runs.first().map(|run| run.step).filter(|step| runs.iter().all(|run| run.step == *step));
+    folders.chain(step.map(|step| format!("--checkpoint {step}"))).collect()
 }
 
 #[cfg(test)]

@@ -13,7 +13,7 @@ use crate::{
         compare::{Comparison, EarlierTest},
         error::{TestError, io_error},
         maps::level_argument,
-        plan::{TestPlan, TestRecord, Tester, TesterRecord},
+        plan::{TestPlan, TestRecord, Tester, TesterRecord, testers},
         reports::junit::junit,
         results::{Overview, RecordedTotal},
         statistics::{Trials, wilson},
@@ -380,15 +380,16 @@ fn played_again(program: &str, record: &TestRecord, level: &LevelVerdict) -> Vec
     let played = if compares { testers(&record.testers) } else { testers(std::slice::from_ref(tester)) };
     let shown = seen(tester);
     let (game, seed, episodes) = (&record.game, record.seed, record.episodes);
-    let levels = level_argument(&record.range, &level.level);
+    let (levels, place) = (level_argument(&record.range, &level.level), in_file_name(&level.level));
     let detectors: String = record.options.iter().map(|word| format!(" {}", shell_word(word))).collect();
     // The same episodes: they depend on seed, tester and level alone.
     let again = format!(
-        "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{detectors} --out again"
+        "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed}{detectors} --out \
+         again-{place}"
     );
     // A tester that draws random numbers draws others in a picture.
     let exact = level.testers.iter().any(|tester| tester.tester == *name && tester.exact);
-    let picture = format!("{program} view {game} --levels {levels} {shown} --episode --out again.png");
+    let picture = format!("{program} view {game} --levels {levels} {shown} --episode --out again-{place}.png");
     [again].into_iter().chain(exact.then_some(picture)).collect()
 }
 
@@ -411,11 +412,11 @@ pub fn action_search(program: &str, record: &TestRecord, level: &LevelVerdict) -
         return None;
     }
     let (game, seed, episodes, played) = (&record.game, record.seed, record.episodes, testers(&record.testers));
-    let levels = level_argument(&record.range, &level.level);
+    let (levels, place) = (level_argument(&record.range, &level.level), in_file_name(&level.level));
     let missing = missing.join(",");
     Some(format!(
         "{program} test {game} --levels {levels} {played} --episodes {episodes} --seed {seed} --detect {missing} --out \
-         runs/actions"
+         runs/actions-{place}"
     ))
 }
 
@@ -448,28 +449,10 @@ pub fn missing_failure(program: &str, record: &TestRecord, level: &LevelVerdict)
     ))
 }
 
-/// Returns the testers as arguments of `playbot test`. The draws of a policy depend on its name, so the name is
-/// included.
-fn testers(testers: &[TesterRecord]) -> String {
-    let bots: Vec<&str> =
-        testers.iter().filter(|tester| tester.checksum.is_none()).map(|tester| tester.name.as_str()).collect();
-    let bots = (!bots.is_empty()).then(|| format!("--bot {}", bots.join(",")));
-    let policies = testers.iter().filter(|tester| tester.checksum.is_some() && tester.run.is_none());
-    let policies = policies.map(|TesterRecord { name, file, .. }| {
-        let given = file.as_ref().map_or_else(|| name.clone(), |file| format!("{name}={file}"));
-        format!("--policy {}", shell_word(&given))
-    });
-    let greedy = testers.iter().any(|tester| tester.greedy).then(|| "--greedy".to_owned());
-    bots.into_iter().chain(policies).chain(runs(testers)).chain(greedy).collect::<Vec<_>>().join(" ")
-}
-
-/// Returns the arguments for runs among testers. One checkpoint applies to all, so runs with different checkpoints
-/// get none.
-fn runs(testers: &[TesterRecord]) -> Vec<String> {
-    let runs: Vec<_> = testers.iter().filter_map(|tester| tester.run.as_ref()).collect();
-    let folders = runs.iter().map(|run| format!("--run {}", shell_word(&run.folder)));
-    let step = runs.first().map(|run| run.step).filter(|step| runs.iter().all(|run| run.step == *step));
-    folders.chain(step.map(|step| format!("--checkpoint {step}"))).collect()
+/// Returns the name of a level as a part of the name of a file, so that the commands of several levels write to places of
+/// their own.
+fn in_file_name(level: &str) -> String {
+    level.chars().map(|letter| if letter.is_alphanumeric() || "-_".contains(letter) { letter } else { '-' }).collect()
 }
 
 /// Returns a tester as an argument of `playbot view`, which takes the files of policies only.
@@ -679,7 +662,7 @@ mod tests {
         let command = |detectors: &str| {
             Some(format!(
                 "jump test garden --levels bed:6 --bot random --policy ppo.policy --episodes 2 --seed 3 --detect \
-                 {detectors} --out runs/actions"
+                 {detectors} --out runs/actions-bed-6"
             ))
         };
         assert_eq!(search(&record, &failed), command("dead-action,fading-action"));
@@ -703,8 +686,9 @@ mod tests {
         };
         let testers = vec![tester("random", 2, 2, true), tester("ppo.policy", 1, 2, true)];
         let level = LevelVerdict { level: "bed:6".to_owned(), testers, ..verdict(1, 3, 4) };
-        let again = "jump test garden --levels bed:6 --policy ppo.policy --greedy --episodes 2 --seed 3 --out again";
-        let shown = "jump view garden --levels bed:6 --policy ppo.policy --greedy --episode --out again.png";
+        let again =
+            "jump test garden --levels bed:6 --policy ppo.policy --greedy --episodes 2 --seed 3 --out again-bed-6";
+        let shown = "jump view garden --levels bed:6 --policy ppo.policy --greedy --episode --out again-bed-6.png";
         assert_eq!(rerun_commands("jump", &record, &level), [again, shown]);
         let mut named = record.clone();
         named.testers[1].file = Some("my runs/a.policy".to_owned());
@@ -716,6 +700,9 @@ mod tests {
         assert_eq!(rerun_commands("jump", &named, &level), [again, shown]);
         let mut drawn = level.clone();
         drawn.testers[1].exact = false;
+        let other = LevelVerdict { level: "lawns/my bed.json".to_owned(), ..level.clone() };
+        let elsewhere = rerun_commands("jump", &record, &other);
+        assert!(elsewhere[0].ends_with(" --out again-lawns-my-bed-json"), "each level has a folder: {elsewhere:?}");
         assert_eq!(rerun_commands("jump", &named, &drawn).len(), 1, "a picture would show another episode");
         let farmed = Finding {
             detector: "reward-farm".to_owned(),
@@ -727,8 +714,8 @@ mod tests {
             settings: Vec::new(),
         };
         let compared = LevelVerdict { findings: vec![farmed], ..level.clone() };
-        let again = "jump test garden --levels bed:6 --bot random --policy ppo.policy --greedy --episodes 2 --seed 3 --out again";
-        let shown = "jump view garden --levels bed:6 --bot random --episode --out again.png";
+        let again = "jump test garden --levels bed:6 --bot random --policy ppo.policy --greedy --episodes 2 --seed 3 --out again-bed-6";
+        let shown = "jump view garden --levels bed:6 --bot random --episode --out again-bed-6.png";
         assert_eq!(rerun_commands("jump", &record, &compared), [again, shown], "all are compared");
         let perfect = LevelVerdict { testers: vec![tester("random", 2, 2, false)], ..verdict(1, 2, 2) };
         assert!(rerun_commands("jump", &record, &perfect).is_empty());

@@ -10,18 +10,19 @@ use crate::{
     detectors::looks_after_play,
     verdict::{
         LevelOutcome, LevelVerdict, Places, TooShort,
-        error::{MAKE_AGAIN, TestError, io_error, json_fault},
-        plan::TestRecord,
+        error::{JOURNAL, MAKE_AGAIN, TestError, io_error, json_fault},
+        plan::{RECORD, TestRecord},
         statistics::Trials,
     },
 };
 use crc32fast::Hasher;
-use playbot_learner::BrokenSeal;
+use playbot_learner::{BrokenSeal, unseal_json};
 use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::{
     collections::{BTreeMap, BTreeSet},
+    fs,
     fs::File,
     io,
     io::{BufRead, BufReader, Write},
@@ -33,6 +34,9 @@ pub const RESULTS: &str = "results.json";
 
 /// Text between the description and the first level.
 const LEVELS: &str = ",\"levels\":[";
+
+/// The fault of a file that was cut off.
+const CUT: &str = "the file ends in the middle";
 
 /// Text after the last level in files of older versions.
 const END: &str = "]}";
@@ -65,7 +69,9 @@ impl ResultLines {
     pub fn open(folder: &Path) -> Result<Self, TestError> {
         let path = folder.join(RESULTS);
         let file = File::open(&path).map_err(|source| match source.kind() {
-            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => TestError::NoResults(folder.into()),
+            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
+                TestError::NoResults { folder: folder.into(), resumed: unfinished(folder) }
+            }
             _ => TestError::Io { action: "read", path: path.clone(), source },
         })?;
         let mut lines = BufReader::new(file).lines();
@@ -132,7 +138,7 @@ impl ResultLines {
                 hash_line(&mut self.hasher, &line);
                 Ok(Some(line.strip_suffix(',').unwrap_or(&line).to_owned()))
             }
-            None => Err(self.damaged("the file ends in the middle")),
+            None => Err(self.damaged(CUT)),
         }
     }
 
@@ -143,7 +149,7 @@ impl ResultLines {
     /// The file is incomplete, is malformed, or cannot be read.
     pub fn next_level(&mut self) -> Result<Option<LevelVerdict>, TestError> {
         let Some(line) = self.next_line()? else { return Ok(None) };
-        serde_json::from_str(&line).map(Some).map_err(|error| self.damaged(&json_fault(&error)))
+        serde_json::from_str(&line).map(Some).map_err(|error| self.malformed(&error))
     }
 
     /// Returns the line of the next level, which must have this index in the range.
@@ -153,7 +159,7 @@ impl ResultLines {
     /// The next level is another one, or missing.
     pub(super) fn line_of(&mut self, index: u64) -> Result<String, TestError> {
         let line = self.next_line()?.ok_or_else(|| self.damaged("levels are missing"))?;
-        let found = serde_json::from_str::<Value>(&line).map_err(|error| self.damaged(&json_fault(&error)))?;
+        let found = serde_json::from_str::<Value>(&line).map_err(|error| self.malformed(&error))?;
         match found["index"].as_u64() {
             Some(found) if found == index => Ok(line),
             _ => Err(self.damaged(&format!("this is not the level with index {index}"))),
@@ -172,10 +178,27 @@ impl ResultLines {
         }
     }
 
+    /// Returns the error of a line that is no level. The end of a file that was cut off is reported as by readers that do
+    /// not parse the line.
+    fn malformed(&mut self, error: &serde_json::Error) -> TestError {
+        if error.is_eof() && self.lines.next().is_none() {
+            self.number += 1;
+            return self.damaged(CUT);
+        }
+        self.damaged(&json_fault(error))
+    }
+
     fn damaged(&self, message: &str) -> TestError {
         let (path, message) = (self.path.clone(), message.to_owned());
         TestError::Damaged { path, line: self.number, message, next: MAKE_AGAIN }
     }
+}
+
+/// Returns the command that goes on with the test that was begun in a folder; `None` without one.
+fn unfinished(folder: &Path) -> Option<String> {
+    let text = fs::read_to_string(folder.join(RECORD)).ok().filter(|_| folder.join(JOURNAL).exists())?;
+    let record: TestRecord = serde_json::from_str(&unseal_json(&text).ok()?.text).ok()?;
+    Some(record.resumed_in(folder))
 }
 
 /// Writer of results, a level at a time.

@@ -32,6 +32,10 @@ const HEAD: &str = "\
 <th scope=\"col\">visited</th><th scope=\"col\">found by</th></tr></thead>
 ";
 
+/// Said of levels that the game does not draw.
+const WITHOUT_PLANS: &str = " There are no pictures of these levels, no maps of where agents went and no squares visited: \
+they need floor plans, which a game's adapter draws with <code>.plan</code> or <code>.plan_of_file</code>.";
+
 /// Sort key of an unknown share: before all others.
 const UNKNOWN: f64 = -1.0;
 
@@ -61,12 +65,14 @@ pub(crate) fn level_table(record: &TestRecord, selection: &Selection, plans: &Pl
     }
     if let Some(problem) = plans.problem() {
         let _ = write!(out, " There are no pictures: {}.", escape(problem));
-    } else if pictures == 0 {
-        out += " There are no pictures of these levels.";
+    } else if pictures == 0 && !selection.levels.is_empty() {
+        out += WITHOUT_PLANS;
     } else if selection.levels.len() > pictures {
         let _ = write!(out, " {pictures} of them have a picture.");
     }
-    out += map_scope(record.maps);
+    if pictures > 0 || plans.problem().is_some() {
+        out += map_scope(record.maps);
+    }
     out += "</p>\n";
     if pictures > 0 {
         out += &map_legend(drawer.maps > 0);
@@ -251,7 +257,21 @@ fn testers(testers: &[TesterVerdict]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::verdict_report::testing::{finding, level, record, tested};
+    use crate::{
+        verdict::MapScope,
+        verdict_report::testing::{finding, level, record, tested},
+    };
+    use playbot_harness::foreign::ForeignGame;
+
+    #[test]
+    fn levels_without_plans_are_not_said_to_have_maps() {
+        let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {});
+        let tested = TestRecord { maps: MapScope::All, ..record("default:0..0", None) };
+        let plans = Plans::Known { game: &game, range: &tested.range };
+        let selection = Selection { levels: vec![level(0, 1, 2, 30)], left_out: 0 };
+        let words = level_table(&tested, &selection, &plans, "jump");
+        assert!(words.contains(WITHOUT_PLANS) && !words.contains("are kept for all levels"), "{words}");
+    }
 
     #[test]
     fn findings_come_first_then_unsolved_levels_then_slow_ones() {

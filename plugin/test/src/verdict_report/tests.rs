@@ -154,7 +154,7 @@ fn joined_shards_give_the_page_of_the_whole() {
     let part = html(&shards[1], &PLAIN).expect("results");
     assert!(part.contains("shard 1/2") && part.contains("hard:9") && !part.contains("hard:8<"));
     let none = write_html(parent.path(), &parent.path().join(REPORT), &PLAIN);
-    assert!(matches!(none, Err(TestError::NoResults(_))));
+    assert!(matches!(none, Err(TestError::NoResults { .. })));
 }
 
 #[test]

@@ -108,7 +108,7 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
         threads: args.compute.threads(),
     };
     let score_run = ScoreRun::new(&plan)?;
-    output::make_folder_of(&args.out)?;
+    output::prepare(&args.out)?;
     if args.resume && args.out.exists() && !ScoreJournal::is_begun(&args.out) {
         let score = done_before(&args.out, &plan)?;
         report!("{} is done already", args.out.display());
@@ -126,6 +126,8 @@ pub(crate) fn run(args: Args, games: &Games) -> Result<Outcome, CliError> {
     }
     let total = score_run.jobs();
     let finished = journal.finished().len() as u64;
+    interrupt::leave(format!("the finished jobs are kept beside {}", args.out.display()));
+    interrupt::go_on_with("the same command and --resume".to_owned());
     interrupt::listen();
     let bar = progress::bar("bugs score", total.saturating_sub(finished), "jobs");
     let progress = |jobs: u64| bar.inc(jobs);

@@ -1,8 +1,9 @@
 //! `playbot demo filter` and `playbot demo label`: new recordings of chosen episodes, or with another player's name.
 
 use crate::{
-    arguments::open,
+    arguments::{finite_number, open},
     error::{CliError, Outcome},
+    output,
     output::{prepare, print_line},
 };
 use bevy_playbot::{
@@ -25,14 +26,14 @@ pub(super) struct FilterArgs {
     /// The recordings, in the order of their episodes in the new one.
     #[arg(required = true, value_name = "FILE")]
     files: Vec<PathBuf>,
-    /// File to write, which must not exist.
-    #[arg(long)]
+    /// Recording to write, a .demo that does not exist.
+    #[arg(long, value_parser = output::demo)]
     out: PathBuf,
     /// Keep episodes with at least this return.
-    #[arg(long)]
+    #[arg(long, value_parser = finite_number)]
     min_return: Option<f64>,
     /// Keep episodes with at most this return.
-    #[arg(long)]
+    #[arg(long, value_parser = finite_number)]
     max_return: Option<f64>,
     /// Keep episodes that ended at the goal.
     #[arg(long)]

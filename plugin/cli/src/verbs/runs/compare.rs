@@ -1,6 +1,7 @@
 //! `playbot runs compare`.
 
 use crate::{
+    arguments::finite_number,
     error::{CliError, Outcome},
     output,
     output::{print_line, print_table},
@@ -33,7 +34,7 @@ pub struct Args {
     metric: Option<String>,
     /// Count the steps until the metric first reaches this value (default for the success rate: the runs'
     /// `study.threshold`). Means over the last 100 episodes count from the 100th episode on.
-    #[arg(long)]
+    #[arg(long, value_parser = finite_number)]
     threshold: Option<f64>,
     /// Draw mean and spread over the seeds into this SVG file.
     #[arg(long, value_name = "FILE.svg", value_parser = output::svg)]

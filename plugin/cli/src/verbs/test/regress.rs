@@ -26,8 +26,9 @@ use std::{
 pub struct RegressArgs {
     /// Play the findings in this folder again instead, as a test or `playbot replay FINDING --minimise --out FILE` has
     /// written them, and print those that still happen. Exit code 1 if one does, or cannot be played. Findings that are
-    /// pinned in DIR/pins.ron do not count until the day after their last. Detectors have the settings with which they
-    /// found it, or those of --detector. Ctrl-C ends it with the results so far.
+    /// pinned in a pins.ron, in the folder of the test or beside the findings, do not count until the day after their
+    /// last. Detectors have the settings with which they found it, or those of --detector. Ctrl-C ends it with the results
+    /// so far.
     #[arg(
         long,
         value_name = "DIR",
@@ -69,6 +70,7 @@ fn play(
     let found = list_findings(folder)?;
     check_starts(&found, games)?;
     let total = found.len() as u64;
+    interrupt::leave("nothing is kept: the same command plays all of them".to_owned());
     interrupt::listen();
     let bar = progress::bar("replay findings", total, "findings");
     let checks = |game: &dyn Game| detectors.checks(game);

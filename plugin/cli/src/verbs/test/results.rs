@@ -87,6 +87,7 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
         }
     }
     report!("{}", counts(&overview));
+    results.game.and_then(|game| without_plans(game, &overview)).iter().for_each(|line| report!("{line}"));
     overview.first_tick().iter().for_each(|levels| report!("{levels}"));
     overview.could_not_look().iter().for_each(|detectors| report!("could not look: {detectors}"));
     stops(&overview).iter().for_each(|line| report!("{line}"));
@@ -104,6 +105,19 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
         None => overview.is_sound(),
     };
     Ok(if is_sound { Outcome::Pass } else { Outcome::Findings })
+}
+
+/// Returns the reason why no squares were counted, if it is that the game draws no floor plans.
+fn without_plans(game: &dyn Game, overview: &Overview) -> Option<String> {
+    let range = &overview.record.range;
+    let is_known = overview.places.percent().is_some();
+    (!is_known && game.tools().levels.floor_plan(&range.mode, range.first).is_none()).then(|| {
+        format!(
+            "no squares were counted, and the page has no pictures: `{}` has no floor plans of these levels, which its \
+             adapter draws with `.plan` or `.plan_of_file`",
+            game.name()
+        )
+    })
 }
 
 /// Returns the positions at which the episodes of the worst levels stopped.

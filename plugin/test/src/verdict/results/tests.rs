@@ -53,7 +53,7 @@ fn the_file_is_one_object_and_reads_back_line_by_line() {
 fn what_is_no_result_is_named_with_its_line() {
     let folder = tempfile::tempdir().expect("a folder");
     let open = || ResultLines::open(folder.path());
-    assert!(matches!(open(), Err(TestError::NoResults(path)) if path == folder.path()));
+    assert!(matches!(open(), Err(TestError::NoResults { folder: path, resumed: None }) if path == folder.path()));
     let text = written(&[r#"{"index":0}"#]);
     let head = text.lines().next().expect("a head");
     let cut = format!("{head}\n{{\"index\":0}}");
@@ -76,6 +76,20 @@ fn what_is_no_result_is_named_with_its_line() {
     let found = lines.next_level().expect_err("no level").to_string();
     assert!(found.contains(&format!("{RESULTS}, line 3: ")) && found.contains("(column 1"), "{found}");
     assert!(!found.contains("at line"), "one line is enough: {found}");
+}
+
+#[test]
+fn a_file_that_was_cut_off_reads_the_same_to_everyone() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let whole = written(&[r#"{"index":0,"interval":[0.0,1.0]}"#]);
+    let cut = whole.find("1.0").expect("a level");
+    fs::write(folder.path().join(RESULTS), &whole[..cut]).expect("writable");
+    let open = || ResultLines::open(folder.path()).expect("a head");
+    let said =
+        [ResultLines::open_whole(folder.path()).map(drop), open().next_level().map(drop), open().line_of(0).map(drop)]
+            .map(|read| read.expect_err("cut off").to_string());
+    assert!(said[0].contains("line 3: the file ends in the middle"), "{}", said[0]);
+    assert!(said[1] == said[0] && said[2] == said[0], "{said:?}");
 }
 
 #[test]
