@@ -83,6 +83,7 @@ fn what_played_is_played_once_more_by_the_command_of_the_summary() {
         let again = summary.lines().find_map(|line| line.strip_prefix("playbot test ")).expect("a level that was lost");
         let words: Vec<&str> = again.split_whitespace().collect();
         ended(folder, &[&["test"], &words[..], &["--force"]].concat(), 1);
-        assert_eq!(tested(folder, "again"), tested(folder, out), "{again}");
+        let place = words.iter().skip_while(|word| **word != "--out").nth(1).expect("a folder");
+        assert_eq!(tested(folder, place), tested(folder, out), "{again}");
     }
 }

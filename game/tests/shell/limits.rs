@@ -12,7 +12,7 @@ use std::{
 use crate::program::{code, errors};
 
 /// Limits in bytes.
-const LIMITS: [u64; 3] = [400_000_000, 600_000_000, 1_000_000_000];
+const LIMITS: [u64; 3] = [500_000_000, 600_000_000, 1_000_000_000];
 /// Programs that run at a time.
 const AT_ONCE: usize = 2;
 
