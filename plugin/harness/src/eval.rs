@@ -17,6 +17,7 @@ use bevy_playbot::{
     level::LevelQueue,
     policy::{ActionDraw, ActivePolicy},
     skill_prior::SkillPrior,
+    unknown_name::UnknownName,
     vision::{ObservationConfig, VisionError},
 };
 use playbot_learner::{HasExitCode, Policy, PolicyFile};
@@ -49,6 +50,8 @@ pub enum Player {
     Blind(BlindBot),
     /// The game's own demonstrator, without noise.
     Demonstrator,
+    /// One of the game's [other scripted bots](crate::game::BotTools::scripted_bots), by its name.
+    Scripted(&'static str),
 }
 
 /// The reason why an evaluation failed.
@@ -80,6 +83,17 @@ impl Player {
         Self::Policy { policy: file.policy.clone(), prior: file.skills.as_ref().map(SkillPrior::from), draw }
     }
 
+    /// Returns the bot of a game with this name: one of [`all_bots`].
+    ///
+    /// # Errors
+    ///
+    /// [`UnknownName`] with the game's bots.
+    pub fn bot(game: &dyn Game, name: &str) -> Result<Self, UnknownName> {
+        let (names, players): (Vec<_>, Vec<_>) = all_bots(game).into_iter().unzip();
+        let found = names.iter().zip(players).find(|(known, _)| **known == name);
+        found.map(|(_, player)| player).ok_or_else(|| UnknownName::new("bot", name, &names))
+    }
+
     /// Installs the player's networks and its source of skills in a World, once.
     pub fn install(&self, world: &mut World) {
         if let Self::Policy { policy, prior, draw } = self {
@@ -99,6 +113,10 @@ impl Player {
                 game.tools().bots.attach_demonstrator(world, agent, 0.0);
                 Control::Bot
             }
+            Self::Scripted(name) => {
+                game.tools().bots.attach_scripted(world, agent, name);
+                Control::Bot
+            }
         }
     }
 }
@@ -109,6 +127,25 @@ pub fn blind_bots(game: &dyn Game) -> Vec<(&'static str, BlindBot)> {
     if bots.iter().all(|(name, _)| *name != CHAOS) {
         bots.push((CHAOS, BlindBot::Chaos));
     }
+    bots
+}
+
+/// Returns the bots of a game that read its World: its demonstrator, if there is one, and [those that test
+/// it](crate::game::BotTools::scripted_bots).
+pub fn scripted_bots(game: &dyn Game) -> Vec<(&'static str, Player)> {
+    let bots = game.tools().bots;
+    let demonstrator = bots.demonstrator().map(|name| (name, Player::Demonstrator));
+    let others = bots.scripted_bots().into_iter().map(|name| (name, Player::Scripted(name)));
+    demonstrator.into_iter().chain(others).collect()
+}
+
+/// Returns all bots of a game: its demonstrator, if there is one, its [`blind_bots`], and its other [`scripted_bots`].
+/// The first one plays where none is named.
+pub fn all_bots(game: &dyn Game) -> Vec<(&'static str, Player)> {
+    let mut bots = scripted_bots(game);
+    let others = bots.split_off(usize::from(game.tools().bots.demonstrator().is_some()));
+    bots.extend(blind_bots(game).into_iter().map(|(name, bot)| (name, Player::Blind(bot))));
+    bots.extend(others);
     bots
 }
 
@@ -590,6 +627,20 @@ mod tests {
             assert_eq!(error(text), format!("`{text}` is not a lower bound: write success=0.9 or return=8.5"));
         }
         assert_eq!(error("success=90"), "`success=90`: success is a share from 0 to 1; write success=0.9 for 90 %");
+    }
+
+    #[test]
+    fn every_bot_of_a_game_is_found_by_its_name() {
+        let game = ForeignGame::new("garden", 1, |_: &mut bevy::prelude::App| {}).bot("mole", || 0);
+        let names = |game: &ForeignGame| all_bots(game).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+        assert_eq!(names(&game), ["random", "chaos", "mole"]);
+        let game = game.demonstrator("gardener", || 1);
+        assert_eq!(names(&game), ["gardener", "random", "chaos", "mole"]);
+        assert!(matches!(Player::bot(&game, "mole"), Ok(Player::Scripted("mole"))));
+        assert!(matches!(Player::bot(&game, "gardener"), Ok(Player::Demonstrator)));
+        assert!(matches!(Player::bot(&game, "chaos"), Ok(Player::Blind(BlindBot::Chaos))));
+        let error = Player::bot(&game, "mule").map(drop).expect_err("there is no such bot").to_string();
+        assert_eq!(error, "unknown bot `mule` (did you mean `mole`?); valid: gardener, random, chaos, mole");
     }
 
     #[test]

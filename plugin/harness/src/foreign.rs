@@ -163,6 +163,7 @@ impl ForeignGame {
             level: None,
             loaded: None,
             demonstrator: None,
+            bots: Vec::new(),
             hash: None,
             default_plugins: None,
             headless_plugins: None,
@@ -408,7 +409,8 @@ impl ForeignGame {
         self.with(|description| description.levels = Some(number))
     }
 
-    /// Declares a scripted bot that reads the whole World: a system that returns the action of each tick.
+    /// Declares a scripted bot that reads the whole World and shows how to play: a system that returns the action of each
+    /// tick.
     pub fn demonstrator<Wanted: IntoActionValue, M: 'static>(
         self,
         name: &'static str,
@@ -417,6 +419,35 @@ impl ForeignGame {
         self.with(|description| {
             description.demonstrator = Some((name, SystemFactory::new(system, Wanted::into_action)));
         })
+    }
+
+    /// Adds a scripted bot that tests the game, such as one that walks everywhere, or one that plays badly on purpose. Its
+    /// system returns the action of each tick, as that of the [`demonstrator`](Self::demonstrator) does. Several calls add
+    /// up. A name that another bot has is a [`problem`](crate::game::Game::problem).
+    ///
+    /// ```
+    /// use bevy::prelude::*;
+    /// use playbot_harness::{foreign::ForeignGame, prelude::*};
+    ///
+    /// let game = ForeignGame::new("walk", 1, |_: &mut App| {})
+    ///     .keys([vec![], vec![KeyCode::ArrowLeft], vec![KeyCode::ArrowRight]])
+    ///     .observe(["x"], || [0.0])
+    ///     .demonstrator("walker", || 2)
+    ///     .bot("backwards", || 1)
+    ///     .bot("pacer", |mut ticks: Local<u32>| {
+    ///         *ticks += 1;
+    ///         1 + *ticks / 30 % 2
+    ///     });
+    /// assert_eq!(game.tools().bots.scripted_bots(), ["backwards", "pacer"]);
+    /// let problem = game.bot("walker", || 0).problem().expect("the demonstrator has that name");
+    /// assert!(problem.contains("named `walker`, as its demonstrator is"), "{problem}");
+    /// ```
+    pub fn bot<Wanted: IntoActionValue, M: 'static>(
+        self,
+        name: &'static str,
+        system: impl IntoSystem<(), Wanted, M> + Clone + Send + Sync + 'static,
+    ) -> Self {
+        self.with(|description| description.bots.push((name, SystemFactory::new(system, Wanted::into_action))))
     }
 
     /// Sets the hash that a replay compares after each tick, instead of the transforms of all entities that the game
@@ -592,7 +623,7 @@ impl HostTools for ForeignGame {
         if self.description.modes.is_empty() {
             return Some(format!("`.modes` of the game `{name}` names no mode: name one, or leave it out"));
         }
-        let problem = self.description.level_parts.problem(name);
+        let problem = self.description.level_parts.problem(name).or_else(|| self.description.problem_of_bots());
         if problem.is_some() {
             return problem;
         }
@@ -614,7 +645,16 @@ impl BotTools for ForeignGame {
 
     fn attach_demonstrator(&self, world: &mut World, agent: Entity, noise: f64) {
         Renewal::carry_component::<ForeignBot>(world);
-        world.entity_mut(agent).insert(ForeignBot { noise });
+        world.entity_mut(agent).insert(ForeignBot { name: None, noise });
+    }
+
+    fn scripted_bots(&self) -> Vec<&'static str> {
+        self.description.bots.iter().map(|(name, _)| *name).collect()
+    }
+
+    fn attach_scripted(&self, world: &mut World, agent: Entity, name: &'static str) {
+        Renewal::carry_component::<ForeignBot>(world);
+        world.entity_mut(agent).insert(ForeignBot { name: Some(name), noise: 0.0 });
     }
 }
 

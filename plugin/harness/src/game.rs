@@ -601,6 +601,14 @@ pub trait BotTools: Send + Sync {
     /// is replaced by a uniformly random one. For continuous ones, it is the standard deviation of the normal noise on
     /// each value.
     fn attach_demonstrator(&self, _world: &mut World, _agent: Entity, _noise: f64) {}
+
+    /// Returns the names of further scripted bots, which test the game. They differ from all other names of bots.
+    fn scripted_bots(&self) -> Vec<&'static str> {
+        Vec::new()
+    }
+
+    /// Hands an agent over to one of the [`scripted_bots`](Self::scripted_bots).
+    fn attach_scripted(&self, _world: &mut World, _agent: Entity, _name: &'static str) {}
 }
 
 /// Detectors and planted defects of a game.

@@ -25,7 +25,7 @@ fn files(folder: &Path) -> Vec<PathBuf> {
 }
 
 /// Modules without a part in playing: the planted defects of the benchmark of testers, and a detector of the game's
-/// rules.
+/// rules with bots that test them.
 const APART: [&str; 2] = ["defects", "rules"];
 
 fn is_named_apart(path: &Path) -> bool {

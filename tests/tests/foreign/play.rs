@@ -51,6 +51,31 @@ fn a_bot_that_follows_catches_and_a_random_one_does_not() {
 }
 
 #[test]
+fn scripted_bots_play_each_in_its_own_way_on_any_number_of_threads() {
+    let game = catch_game().bot("left", || 1).bot(
+        "dreamer",
+        |apples: Query<&Transform, With<Apple>>, mut ticks: Local<u32>| {
+            *ticks += 1;
+            // It looks for a second, and sleeps for another one.
+            let is_awake = (*ticks / 60).is_multiple_of(2);
+            let apple = apples.iter().next().filter(|_| is_awake).map_or(4.0, |apple| apple.translation.x);
+            if apple > 4.0 { 2 } else { u32::from(apple < 4.0) }
+        },
+    );
+    let play = |name: &str| {
+        let player = Player::bot(&game, name).expect("a bot of the game");
+        let results = measure(&game, player.clone(), 2);
+        assert_eq!(results, measure(&game, player, 1), "threads do not count");
+        results
+    };
+    let [left, dreamer, follower] = ["left", "dreamer", "follower"].map(play);
+    let still = Player::Blind(BlindBot::Constant(ActionValue::Discrete(1)));
+    assert_eq!(left, measure(&game, still, 1), "it holds the key");
+    assert!(left != dreamer && dreamer != follower, "{left:?} {dreamer:?}");
+    assert_eq!(follower, measure(&catch_game(), Player::Demonstrator, 1), "as without other bots");
+}
+
+#[test]
 fn recordings_replay_and_are_learned_from() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("catch.demo");

@@ -12,12 +12,11 @@ use bevy_playbot::{
     policy::ActionDraw,
     policy_file::{PolicyMisfit, check_policy},
     skill_prior::SkillPrior,
-    unknown_name::UnknownName,
     vision::ObservationConfig,
 };
 use playbot_harness::{
     eval::{
-        EpisodeResult, EvalError, EvalPlan, EvalSummary, Player, Trail, blind_bots, evaluate, evaluate_with_trails,
+        EpisodeResult, EvalError, EvalPlan, EvalSummary, Player, Trail, all_bots, evaluate, evaluate_with_trails,
         summarize,
     },
     game::Game,
@@ -81,12 +80,11 @@ impl LoadedPlayer {
     ///
     /// The game has no such bot.
     pub fn bot(game: &dyn Game, name: &str) -> Result<Self, CliError> {
-        Ok(Self {
-            name: name.to_owned(),
-            player: bot(game, name)?,
-            observation_config: ObservationConfig::default(),
-            seen: None,
-        })
+        Ok(Self::of_bot(name, Player::bot(game, name)?))
+    }
+
+    fn of_bot(name: &str, player: Player) -> Self {
+        Self { name: name.to_owned(), player, observation_config: ObservationConfig::default(), seen: None }
     }
 
     /// Returns the demonstrator, or else the first of the game's bots.
@@ -95,10 +93,9 @@ impl LoadedPlayer {
     ///
     /// The game has none.
     pub fn default_of(game: &dyn Game) -> Result<Self, CliError> {
-        let bots = bot_names(game);
-        let name = game.tools().bots.demonstrator().or(bots.first().copied());
         let no_bot = || CliError::Usage(format!("`{}` has no bot: name a --policy or a --run", game.name()));
-        Self::bot(game, name.ok_or_else(no_bot)?)
+        let (name, player) = all_bots(game).into_iter().next().ok_or_else(no_bot)?;
+        Ok(Self::of_bot(name, player))
     }
 
     /// Loads the policy in a file, under the name of its algorithm.
@@ -278,27 +275,6 @@ impl PlayerArgs {
 }
 
 // Players by name, and their measurement for `eval` and `quickstart`.
-
-/// Returns the bot of a game with this name: one of its blind bots, chaos, or its demonstrator.
-///
-/// # Errors
-///
-/// [`UnknownName`] with the game's bots.
-pub(crate) fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
-    if game.tools().bots.demonstrator() == Some(name) {
-        return Ok(Player::Demonstrator);
-    }
-    let bots = blind_bots(game);
-    match bots.iter().find(|(bot, _)| *bot == name) {
-        Some((_, bot)) => Ok(Player::Blind(bot.clone())),
-        None => Err(UnknownName::new("bot", name, &bot_names(game))),
-    }
-}
-
-/// Returns the names of all bots of a game.
-pub(crate) fn bot_names(game: &dyn Game) -> Vec<&'static str> {
-    blind_bots(game).into_iter().map(|(name, _)| name).chain(game.tools().bots.demonstrator()).collect()
-}
 
 /// A measured player: its row of the result table, its episodes and its speed.
 pub struct Measured {

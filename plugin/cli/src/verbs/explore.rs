@@ -368,7 +368,7 @@ impl ExplorerSetup {
         chosen.check_fit(game)?;
         let explorer = match chosen.player {
             Player::Policy { policy, prior, draw } => Explorer::Policy { policy, prior, draw },
-            Player::Blind(_) | Player::Demonstrator => Explorer::Random,
+            Player::Blind(_) | Player::Demonstrator | Player::Scripted(_) => Explorer::Random,
         };
         Ok(Self { explorer, observation_config: chosen.observation_config })
     }

@@ -250,6 +250,9 @@ fn check_demonstrator(game: &dyn Game) -> Result<(), CliError> {
     if game.tools().input.records_people() {
         advice += &format!(", or play and record it yourself: `playbot play {name} --record FILE`");
     }
+    if let Some(bot) = game.tools().bots.scripted_bots().first() {
+        advice = format!("record another of its bots (`--bot {bot}`), or {advice}");
+    }
     Err(CliError::Usage(format!("`{name}` has no demonstrator that could be recorded: {advice}")))
 }
 
@@ -324,7 +327,7 @@ fn play(
 #[cfg(test)]
 mod tests {
     use bevy::prelude::{App, KeyCode, Res};
-    use bevy_playbot::demo::file::DemoReader;
+    use bevy_playbot::demo::file::{DemoReader, EpisodeActions};
     use clap::Parser;
     use playbot_harness::{foreign::ForeignGame, level_files::LevelDesigns};
 
@@ -357,6 +360,24 @@ mod tests {
         let args = Record::try_parse_from(words).unwrap_or_else(|error| panic!("{error}")).args;
         let games = [game as &dyn Game];
         run(args, &Games::new(&games).expect("one game")).map(drop)
+    }
+
+    #[test]
+    fn another_scripted_bot_is_recorded_by_its_name() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("paced.demo");
+        let game = ForeignGame::new("wait", 1, |_: &mut App| {})
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["x"], || [0.0])
+            .time_limit(3)
+            .bot("presser", || 1_u32);
+        let error = record(&game, &path, &[]).expect_err("it has no demonstrator").to_string();
+        assert!(error.contains("`wait` has no demonstrator") && error.contains("(`--bot presser`)"), "{error}");
+        record(&game, &path, &["--bot", "presser"]).expect("sound");
+        let mut reader = DemoReader::open(&path).expect("readable");
+        assert_eq!(reader.header().demonstrator, "presser");
+        let episode = reader.next().expect("one episode").expect("whole");
+        assert_eq!(episode.actions, EpisodeActions::Discrete(vec![1; 3]));
     }
 
     #[test]

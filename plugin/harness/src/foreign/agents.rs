@@ -23,7 +23,7 @@ impl ForeignGame {
     /// Names the agents that play together, such as two paddles. Default: one agent.
     ///
     /// They act in the same tick, on one level, in one episode: a restart is for all of them. The systems of observation,
-    /// reward, end, position, mask and demonstrator run once for each agent, and
+    /// reward, end, position, mask and scripted bots run once for each agent, and
     /// [`PlayedAgent`](crate::foreign::PlayedAgent) says for which. As soon as [`end`](Self::end) returns an end for one
     /// agent, the episode ends for all of them, as [`Truncated`](bevy_playbot::episode::EpisodeEnd::Truncated) for those
     /// without an end of their own. An agent that is out of the game earlier goes on without effect until then.
@@ -244,7 +244,7 @@ pub(super) fn add_agents_along(game: &ForeignGame, world: &mut World) {
         let mut other = world.entity_mut(other);
         other.insert(PlaysAlong);
         match &game.description.demonstrator {
-            Some(_) => other.insert(ForeignBot { noise: 0.0 }),
+            Some(_) => other.insert(ForeignBot { name: None, noise: 0.0 }),
             None => other.insert(BlindBot::Chaos),
         };
     }
@@ -263,7 +263,7 @@ pub(super) fn begin_agents_along(world: &mut World, level: u64) {
         begin_beside(world, other, level);
         world.entity_mut(other).insert(AgentStreams::new(seed, place as u32));
         with_foreign(world, other, |_, foreign| {
-            foreign.renew_bot();
+            foreign.renew_demonstrator();
             Ok(())
         });
     }

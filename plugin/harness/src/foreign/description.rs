@@ -5,6 +5,7 @@ use crate::foreign::clicks;
 use crate::{
     defect::DefectKind,
     detector::{Detector, LevelProof},
+    eval::CHAOS,
     foreign::{
         ForeignGame, Restart, agents,
         agents::SharingAgents,
@@ -37,6 +38,9 @@ use bevy_playbot::{
     virtual_input::{InputRoute, VirtualInputPlugin},
 };
 use std::{any::TypeId, sync::Arc};
+
+/// Names of bots and testers that every foreign game has, in tests and in scores of planted defects.
+const NAMES_OF_ALL_GAMES: [&str; 6] = ["random", CHAOS, "hold", "explore", "explore-skills", "demonstrator"];
 
 /// The settings of the builder.
 #[derive(Clone)]
@@ -89,6 +93,8 @@ pub(super) struct Description {
     /// Prepares a level that can be played.
     pub(super) loaded: Option<SystemFactory<()>>,
     pub(super) demonstrator: Option<(&'static str, SystemFactory<ActionValue>)>,
+    /// Scripted bots beside the demonstrator.
+    pub(super) bots: Vec<(&'static str, SystemFactory<ActionValue>)>,
     pub(super) hash: Option<SystemFactory<u64>>,
     /// Changes Bevy's plugins in a window and without.
     pub(super) default_plugins: Option<Arc<dyn Fn(PluginGroupBuilder) -> PluginGroupBuilder + Send + Sync>>,
@@ -126,6 +132,23 @@ impl Description {
     /// Returns the name of the system that observes, for messages.
     pub(super) fn sensor_name(&self) -> &'static str {
         self.observe.as_ref().map_or("of the paths", SystemFactory::name)
+    }
+
+    /// Returns why the names of bots cannot tell them apart.
+    pub(super) fn problem_of_bots(&self) -> Option<String> {
+        let is_demonstrator = |bot: &str| self.demonstrator.as_ref().is_some_and(|(name, _)| *name == bot);
+        self.bots.iter().enumerate().find_map(|(place, (bot, _))| {
+            let same = if is_demonstrator(bot) {
+                "its demonstrator is"
+            } else if self.bots[..place].iter().any(|(earlier, _)| earlier == bot) {
+                "another `.bot` is"
+            } else if NAMES_OF_ALL_GAMES.contains(bot) {
+                "a tester of every game is"
+            } else {
+                return None;
+            };
+            Some(format!("`.bot` of the game `{}` is named `{bot}`, as {same}: give it another name", self.name))
+        })
     }
 
     pub(super) fn observation(&self) -> ObservationSpace {
@@ -244,7 +267,7 @@ fn note_baseline(world: &mut World) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::game::Game;
+    use crate::{eval::blind_bots, game::Game};
 
     /// A game with actions, and no observation yet.
     fn deaf() -> ForeignGame {
@@ -260,6 +283,24 @@ mod tests {
         assert!(missing.contains("`mole`") && missing.contains("the feature `camera` of `playbot`"), "{missing}");
         assert!(nothing_seen("mole", false, true).is_some_and(|text| text.contains("`.camera`")));
         assert_eq!(nothing_seen("mole", true, true), None);
+    }
+
+    #[test]
+    fn a_name_that_another_bot_has_is_a_problem() {
+        let game = deaf().observe(["x"], || [0.0]).bot("idler", || 0);
+        let shown = game.clone().demonstrator("digger", || 1);
+        assert_eq!(shown.problem(), None);
+        let problem = |name| shown.clone().bot(name, || 0).problem().expect("the name is taken");
+        let words = "`.bot` of the game `mole` is named `idler`, as another `.bot` is: give it another name";
+        assert_eq!(problem("idler"), words);
+        assert!(problem("digger").contains("named `digger`, as its demonstrator is"), "{}", problem("digger"));
+        assert_eq!(
+            game.demonstrator("idler", || 1).problem(),
+            Some(words.replace("another `.bot`", "its demonstrator"))
+        );
+        for name in blind_bots(&deaf()).into_iter().map(|(name, _)| name).chain(NAMES_OF_ALL_GAMES) {
+            assert!(problem(name).contains("as a tester of every game is"), "{}", problem(name));
+        }
     }
 
     #[test]

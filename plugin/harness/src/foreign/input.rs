@@ -614,10 +614,12 @@ pub(super) fn act(world: &mut World) {
     }
 }
 
-/// Marks an agent that the game's demonstrator plays while its control is [`Control::Bot`].
+/// Marks an agent that a scripted bot of the game plays while its control is [`Control::Bot`].
 #[derive(Component, Clone, Copy, Debug, Reflect)]
 #[reflect(Component)]
 pub(super) struct ForeignBot {
+    /// Its name; `None` for the demonstrator.
+    pub(super) name: Option<&'static str>,
     /// Probability of a random action, or standard deviation of the noise.
     pub(super) noise: f64,
 }
@@ -629,17 +631,16 @@ pub(super) fn decide(world: &mut World) {
 }
 
 fn decide_for(world: &mut World, agent: Entity) {
-    let (Some(&ForeignBot { noise }), Some(Control::Bot)) = (world.get(agent), world.get::<Control>(agent)) else {
+    let (Some(&ForeignBot { name, noise }), Some(Control::Bot)) = (world.get(agent), world.get::<Control>(agent))
+    else {
         return;
     };
     let tick = world.get::<Episode>(agent).map_or(0, |episode| episode.tick);
     let planned = with_foreign(world, agent, |world, foreign| {
         let held = foreign.held_in(tick);
-        match &mut foreign.asked().bot {
-            // It sees every tick, since it may count them.
-            Some(bot) => bot.demand(world).map(|planned| held.map_or(planned, ActionValue::Discrete)),
-            None => Err("it has no demonstrator".to_owned()),
-        }
+        // It sees every tick, since it may count them.
+        let planned = foreign.asked().bot(name)?.demand(world)?;
+        Ok(held.map_or(planned, ActionValue::Discrete))
     });
     let Some(planned) = planned else { return };
     let mut entity = world.entity_mut(agent);

@@ -73,7 +73,9 @@ pub(super) struct AgentParts {
     pub(super) legal: Option<OwnedSystem<Vec<bool>>>,
     /// The last decision, if decisions hold for several ticks.
     pub(super) held: Option<u32>,
-    pub(super) bot: Option<OwnedSystem<ActionValue>>,
+    pub(super) demonstrator: Option<OwnedSystem<ActionValue>>,
+    /// The other scripted bots, with their names.
+    pub(super) bots: Vec<(&'static str, OwnedSystem<ActionValue>)>,
 }
 
 impl AgentParts {
@@ -94,7 +96,23 @@ impl AgentParts {
             act: description.act.as_ref().map(|system| system.make()),
             legal: description.legal.as_ref().map(|system| system.make()),
             held: None,
-            bot: description.demonstrator.as_ref().map(|(_, system)| system.make()),
+            demonstrator: description.demonstrator.as_ref().map(|(_, system)| system.make()),
+            bots: description.bots.iter().map(|(name, system)| (*name, system.make())).collect(),
+        }
+    }
+
+    /// Returns the scripted bot of this name; the demonstrator for `None`.
+    ///
+    /// # Errors
+    ///
+    /// The game has no such bot, in words.
+    pub(super) fn bot(&mut self, name: Option<&str>) -> Result<&mut OwnedSystem<ActionValue>, String> {
+        match name {
+            None => self.demonstrator.as_mut().ok_or_else(|| "it has no demonstrator".to_owned()),
+            Some(name) => {
+                let bot = self.bots.iter_mut().find(|(known, _)| *known == name).map(|(_, bot)| bot);
+                bot.ok_or_else(|| format!("it has no bot `{name}`"))
+            }
         }
     }
 }
@@ -185,9 +203,9 @@ impl Foreign {
     }
 
     /// Replaces the demonstrator of the agent that is asked about by a new one, which remembers no episode.
-    pub(super) fn renew_bot(&mut self) {
-        let bot = self.game.description.demonstrator.as_ref().map(|(_, system)| system.make());
-        self.asked().bot = bot;
+    pub(super) fn renew_demonstrator(&mut self) {
+        let demonstrator = self.game.description.demonstrator.as_ref().map(|(_, system)| system.make());
+        self.asked().demonstrator = demonstrator;
     }
 
     /// Returns the parts of the rewards of all agents.
@@ -542,7 +560,7 @@ impl IntoValues for Vec<f32> {
     }
 }
 
-/// The action of a demonstrator.
+/// The action of a scripted bot.
 pub trait IntoActionValue: 'static {
     /// Returns the action.
     fn into_action(self) -> ActionValue;

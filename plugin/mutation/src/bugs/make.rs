@@ -11,7 +11,7 @@ use crate::bugs::{
 use bevy_playbot::{bot::BlindBot, episode::EpisodeEnd, level::LevelFile};
 use playbot_harness::{
     defect::{DefectKind, Plant},
-    eval::{EpisodeResult, EvalPlan, Player, blind_bots, evaluate},
+    eval::{EpisodeResult, EvalPlan, Player, blind_bots, evaluate, scripted_bots},
     game::Game,
     held_out::HeldOut,
     parallel::on_threads,
@@ -36,8 +36,8 @@ const FEWEST_BASES: u64 = 24;
 /// Plants every kind of defect into every game. The same seed gives the same set, for any number of threads. Each
 /// mutant depends on the seed, its game, class and number alone.
 ///
-/// A defect of a game's own rules is planted on a level where it changes some bot's episode. That is the episode of the
-/// demonstrator, of a bot that holds an action, of chaos or of random actions. `progress` receives how many more
+/// A defect of a game's own rules is planted on a level where it changes some bot's episode. That is the episode of a
+/// scripted bot of the game, of a bot that holds an action, of chaos or of random actions. `progress` receives how many more
 /// unmutated levels were found, and how many of those mutants have their level.
 ///
 /// # Errors
@@ -302,7 +302,7 @@ impl<'a> SoundCourses<'a> {
         let is_constant = |bot: &BlindBot| matches!(bot, BlindBot::Constant(_));
         let constant = blind_bots(game).into_iter().map(|(_, bot)| bot).find(is_constant);
         let mut bots: Vec<(Player, u64)> = Vec::new();
-        bots.extend(game.tools().bots.demonstrator().map(|_| (Player::Demonstrator, 0)));
+        bots.extend(scripted_bots(game).into_iter().map(|(_, player)| (player, 0)));
         bots.extend(constant.map(|bot| (Player::Blind(bot), 0)));
         for seed in 0..SEEDS {
             bots.extend([BlindBot::Chaos, BlindBot::Uniform].map(|bot| (Player::Blind(bot), seed)));
@@ -439,6 +439,7 @@ mod effect_tests {
 
     use bevy::prelude::*;
     use bevy_playbot::{agent::Control, episode::Episode};
+    use playbot_harness::foreign::ForeignGame;
 
     use super::*;
     use crate::bugs::general::testing::Track;
@@ -479,6 +480,34 @@ mod effect_tests {
         }
         let none = DefectKind::level("nowhere", "no defect of rules", |_, _| None);
         assert!(bases_with_effect(&Track, ("plain", &levels), &[none], &plan(1), &|_| {}).is_empty());
+    }
+
+    /// Turns of a lock, which A and B open by turns. Other keys lock it again.
+    #[derive(Resource, Default)]
+    struct Lock(u32);
+
+    #[test]
+    fn a_defect_that_only_a_scripted_bot_of_the_game_notices_has_a_level() {
+        let turn = |keys: Res<ButtonInput<KeyCode>>, mut lock: ResMut<Lock>| {
+            let next = [KeyCode::KeyA, KeyCode::KeyB][lock.0 as usize % 2];
+            lock.0 = if keys.pressed(next) { lock.0 + 1 } else { 0 };
+        };
+        let game =
+            ForeignGame::new("lock", 1, move |app: &mut App| _ = app.init_resource::<Lock>().add_systems(Update, turn))
+                .keys([vec![], vec![KeyCode::KeyA], vec![KeyCode::KeyB]])
+                .observe(["turns"], |lock: Res<Lock>| [lock.0 as f32])
+                .time_limit(30)
+                .level(|mut lock: ResMut<Lock>| lock.0 = 0);
+        // No other bot comes so far.
+        let jammed = DefectKind::rules("jammed", "the lock jams", 1, |app, _| {
+            app.add_systems(PostUpdate, |mut lock: ResMut<Lock>| lock.0 = lock.0.min(25));
+        });
+        let plan = MakePlan { seed: 3, per_kind: 1, sound: 0, threads: 2 };
+        let base = |game: &ForeignGame| {
+            bases_with_effect(game, ("default", &[7, 8]), std::slice::from_ref(&jammed), &plan, &|_| {})[&("jammed", 0)]
+        };
+        assert_eq!(base(&game), None);
+        assert!(base(&game.bot("opener", |lock: Res<Lock>| 1 + lock.0 % 2)).is_some());
     }
 }
 

@@ -7,7 +7,7 @@ use bevy_playbot::{
     vision::ObservationConfig,
 };
 use playbot_harness::{
-    eval::{CHAOS, Player, blind_bots},
+    eval::{CHAOS, Player, blind_bots, scripted_bots},
     game::Game,
 };
 use playbot_test::{
@@ -80,7 +80,7 @@ impl ContestantRecord {
 
 impl Contestant {
     /// Returns the game's bots and the explorer without skills: [`RANDOM`], [`HOLD`], [`CHAOS`], [`EXPLORE`] and, under
-    /// its own name, the demonstrator, if there is one.
+    /// their own names, the [`scripted_bots`].
     pub fn defaults(game: &dyn Game) -> Vec<Self> {
         let bots = blind_bots(game);
         let is_constant = |bot: &BlindBot| matches!(bot, BlindBot::Constant(_));
@@ -92,7 +92,7 @@ impl Contestant {
             Self::bot(CHAOS, Player::Blind(BlindBot::Chaos)),
             Self::of(ContestantRecord::bot(EXPLORE), Means::Explores(Explorer::Random)),
         ];
-        all.extend(game.tools().bots.demonstrator().map(|name| Self::bot(name, Player::Demonstrator)));
+        all.extend(scripted_bots(game).into_iter().map(|(name, player)| Self::bot(name, player)));
         all
     }
 
@@ -279,7 +279,9 @@ fn thread_cpu_seconds() -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use bevy::prelude::{App, KeyCode};
     use playbot_corridor::Corridor;
+    use playbot_harness::foreign::ForeignGame;
 
     use super::*;
 
@@ -292,6 +294,26 @@ mod tests {
         assert!(matches!(&all[1].means, Means::Plays(Player::Blind(bot)) if *bot == hold));
         assert!(matches!(all[3].means, Means::Explores(Explorer::Random)));
         assert!(all.iter().all(|contestant| !contestant.record.skilled));
+    }
+
+    #[test]
+    fn scripted_bots_test_by_names_that_no_other_tester_has() {
+        let game = ForeignGame::new("mole", 1, |_: &mut App| {})
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["x"], || [0.0])
+            .demonstrator("digger", || 1)
+            .bot("idler", || 0)
+            .bot("pacer", |mut ticks: bevy::prelude::Local<u32>| {
+                *ticks += 1;
+                *ticks % 2
+            });
+        let all = Contestant::defaults(&game);
+        let names: Vec<&str> = all.iter().map(|contestant| contestant.record.name.as_str()).collect();
+        assert_eq!(names, [RANDOM, HOLD, CHAOS, EXPLORE, "digger", "idler", "pacer"]);
+        assert!(matches!(&all[5].means, Means::Plays(Player::Scripted("idler"))));
+        for name in [RANDOM, HOLD, CHAOS, EXPLORE, EXPLORE_SKILLS] {
+            assert!(game.clone().bot(name, || 0).problem().is_some(), "{name}");
+        }
     }
 
     #[test]

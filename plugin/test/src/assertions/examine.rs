@@ -3,7 +3,7 @@
 use crate::{
     assertions::{
         DEFAULT_PROGRAM, LevelTest, Wanted,
-        testers::{LevelTestError, Named, bot_names},
+        testers::{LevelTestError, Named, of_player},
     },
     detectors::{DetectorChoice, Detectors},
     findings::{Budget, Checks, FindingError, FindingFiles, Played, SeenFinding, SeenLevel},
@@ -12,7 +12,7 @@ use crate::{
         run_tests,
     },
 };
-use playbot_harness::{brief::shell_word, game::Game, level_files::is_level_files, split::LevelSplit};
+use playbot_harness::{brief::shell_word, eval::all_bots, game::Game, level_files::is_level_files, split::LevelSplit};
 use playbot_report::counted;
 use std::{
     collections::BTreeSet,
@@ -106,12 +106,12 @@ impl LevelTest<'_> {
         if !self.named.is_empty() {
             return self.named.iter().map(|named| named.tester(self.game)).collect();
         }
-        let bots = bot_names(self.game);
+        let bots = all_bots(self.game);
         let count = if matches!(wanted, Wanted::NoFindings | Wanted::Deterministic) { bots.len() } else { 1 };
         if bots.is_empty() {
             return Err(LevelTestError::NoBot(self.game.name()));
         }
-        bots.into_iter().take(count).map(|name| Named::Bot(name.to_owned()).tester(self.game)).collect()
+        Ok(bots.into_iter().take(count).map(|(name, player)| of_player(name, player)).collect())
     }
 
     /// Returns the selected detectors, or `determinism` alone for [`Wanted::Deterministic`].

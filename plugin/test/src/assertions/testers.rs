@@ -13,7 +13,7 @@ use bevy_playbot::{
     vision::{ObservationConfig, UnknownObservation, VisionError},
 };
 use playbot_harness::{
-    eval::{Player, blind_bots},
+    eval::Player,
     game::Game,
     mode::ModeError,
     sealed_file::{SealedFileError, file_checksum},
@@ -40,7 +40,7 @@ impl Named {
     /// Prepares the tester for the game.
     pub fn tester(&self, game: &dyn Game) -> Result<Tester, LevelTestError> {
         match self {
-            Self::Bot(name) => Ok(of_player(name, bot(game, name)?)),
+            Self::Bot(name) => Ok(of_player(name, Player::bot(game, name)?)),
             Self::Policy { path, draw } => policy(game, path, *draw),
             Self::Player { name, player } => Ok(of_player(name, player.clone())),
         }
@@ -55,24 +55,8 @@ impl Named {
     }
 }
 
-/// Returns the names of all bots of a game, the demonstrator first.
-pub(super) fn bot_names(game: &dyn Game) -> Vec<&'static str> {
-    let blind = blind_bots(game).into_iter().map(|(name, _)| name);
-    game.tools().bots.demonstrator().into_iter().chain(blind).collect()
-}
-
-fn bot(game: &dyn Game, name: &str) -> Result<Player, UnknownName> {
-    if game.tools().bots.demonstrator() == Some(name) {
-        return Ok(Player::Demonstrator);
-    }
-    let found = blind_bots(game).into_iter().find(|(bot, _)| *bot == name);
-    match found {
-        Some((_, bot)) => Ok(Player::Blind(bot)),
-        None => Err(UnknownName::new("bot", name, &bot_names(game))),
-    }
-}
-
-fn of_player(name: &str, player: Player) -> Tester {
+/// Returns a tester with vectors as observations.
+pub(super) fn of_player(name: &str, player: Player) -> Tester {
     Tester { record: TesterRecord::bot(name), player, observation_config: ObservationConfig::default() }
 }
 

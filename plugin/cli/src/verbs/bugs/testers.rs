@@ -32,8 +32,8 @@ pub struct ContestantArgs {
     /// Testers, separated by commas (default: all). They are random, hold, chaos, explore, explore-skills and
     /// demonstrator. The tester hold repeats the action that a bot of the game holds, or else the game's last action.
     /// The tester chaos holds random actions for up to 30 ticks each. The tester explore-skills uses a skill model, or
-    /// else the first policy that has skills. The demonstrator is the game's own bot, also by its own name. Policies
-    /// given with --policy test in any case.
+    /// else the first policy that has skills. The demonstrator is the game's own bot, also by its own name. Other
+    /// scripted bots of a game test by their names. Policies given with --policy test in any case.
     #[arg(long = "tester", value_name = "NAME", value_delimiter = ',', value_parser = name_in_list)]
     testers: Vec<String>,
     /// Policy file and its name in the score (repeatable). A name is used once for each game.
@@ -238,6 +238,27 @@ mod tests {
         assert!(words.contains("did you mean `chaos`?"), "{words}");
         let words = load(&["explore-skills"]).map(drop).expect_err("no skills").to_string();
         assert!(words.contains("--skills FILE"), "{words}");
+    }
+
+    #[test]
+    fn scripted_bots_test_by_their_names_and_the_demonstrator_by_two() {
+        let game = ForeignGame::new("runner", 1, |_: &mut bevy::prelude::App| {})
+            .keys([vec![], vec![KeyCode::Space]])
+            .observe(["x"], || [0.0])
+            .demonstrator("jumper", || 1)
+            .bot("idler", || 0);
+        let all: [&dyn Game; 1] = [&game];
+        let games = Games::new(&all).expect("one game");
+        let names = |testers: &[&str]| -> Vec<String> {
+            let loaded = arguments(testers).load(&all, &games, DeviceKind::default()).expect("they are there");
+            loaded[0].iter().map(|tester| tester.record.name.clone()).collect()
+        };
+        assert_eq!(names(&["idler"]), ["idler"]);
+        assert_eq!(
+            (names(&["jumper"]), names(&["demonstrator"])),
+            (vec!["jumper".to_owned()], vec!["jumper".to_owned()])
+        );
+        assert!(game.clone().bot(DEMONSTRATOR, || 0).problem().is_some(), "the name is that of all demonstrators");
     }
 
     #[test]

@@ -1,4 +1,6 @@
-//! Detector of the game's rules, tick by tick. Playing needs none of it.
+//! Detector of the game's rules, tick by tick, and a bot that goes where they can be broken. Playing needs none of it.
+
+use std::collections::{HashSet, VecDeque};
 
 use bevy::prelude::*;
 use playbot::harness::{
@@ -17,9 +19,41 @@ const TIME: u32 = 900;
 /// Ticks after a step in which the walker may rest.
 const REST: u32 = 8;
 
-/// Adds the detector and the possible defects to the game.
+/// Adds the detector, the bot and the possible defects to the game.
 pub fn add_to(game: ForeignGame) -> ForeignGame {
-    defects::add_to(game).detector(|| Rules)
+    defects::add_to(game).detector(|| Rules).bot("tourist", tour)
+}
+
+/// Goes to the nearest cell where it has not been, without falling into a pit, and to the exit when there is no more.
+fn tour(time: Res<Time>, room: Res<Room>, mut last: Local<f32>, mut seen: Local<HashSet<IVec2>>) -> u32 {
+    // The clock of the game begins anew with each episode.
+    let now = time.elapsed_secs();
+    if now <= *last {
+        seen.clear();
+    }
+    *last = now;
+    seen.insert(room.at);
+    way_to_news(&room, &seen).or_else(|| room.hint()).map_or(0, |way| way as u32 + 1)
+}
+
+/// Returns the first direction of a shortest path to a cell that was not seen, as an index of [`WAYS`].
+fn way_to_news(room: &Room, seen: &HashSet<IVec2>) -> Option<usize> {
+    let mut known = HashSet::from([room.clone()]);
+    let mut open = VecDeque::from([(room.clone(), None)]);
+    while let Some((room, first)) = open.pop_front() {
+        for (index, (_, way)) in WAYS.iter().enumerate() {
+            let (mut next, first) = (room.clone(), first.unwrap_or(index));
+            match next.step(*way) {
+                None | Some(Cell::Pit | Cell::Exit) => continue,
+                Some(_) if !seen.contains(&next.at) => return Some(first),
+                Some(_) => {}
+            }
+            if known.insert(next.clone()) {
+                open.push_back((next, Some(first)));
+            }
+        }
+    }
+    None
 }
 
 struct Rules;
@@ -109,6 +143,23 @@ mod tests {
             .enumerate()
             .for_each(|(x, cell)| room.put(IVec2::new(x as i32, 0), cell));
         room
+    }
+
+    #[test]
+    fn the_bot_sees_all_that_it_can_before_it_leaves() {
+        let mut room = corridor();
+        room.at = IVec2::new(1, 1);
+        for (x, cell) in [(0, Cell::Wall), (1, Cell::Floor), (2, Cell::Floor)] {
+            room.put(IVec2::new(x, 1), cell);
+        }
+        let mut seen = HashSet::from([room.at]);
+        while let Some(way) = way_to_news(&room, &seen) {
+            let cell = room.step(WAYS[way].1);
+            assert!(!matches!(cell, Some(Cell::Pit | Cell::Exit)), "{cell:?}");
+            seen.insert(room.at);
+        }
+        let cells = [[0, 0], [1, 0], [1, 1], [2, 1]].map(IVec2::from);
+        assert_eq!((seen, room.keys), (HashSet::from(cells), 1));
     }
 
     /// Returns the corridor after steps to the right.

@@ -32,6 +32,35 @@ fn rooms_are_named_as_in_their_editor() {
     assert!(lines.contains("\"name\":\"Pantry\"") && lines.contains("\"name\":\"Stairs\""), "{lines}");
 }
 
+#[test]
+fn a_scripted_bot_beside_the_demonstrator_is_measured_recorded_and_tests() {
+    let shell = Shell::new(GAME.program);
+    let measured = |bot: &str| {
+        let row = shell.answer(&["eval", "--bot", bot, "--levels", "default:0..1", "--json"]);
+        (
+            row["method"].as_str().map(str::to_owned),
+            row["success"].as_f64(),
+            row["length_mean"].as_f64().expect("a number"),
+        )
+    };
+    let [(_, _, short), (method, success, long)] = ["guide", "tourist"].map(measured);
+    assert_eq!((method.as_deref(), success), (Some("tourist"), Some(1.0)));
+    // By the rules, it takes 60 steps in the Pantry and 38 on the Stairs, and the guide 14 and 38.
+    assert!(long > 1.5 * short, "{long} ticks of the tourist, {short} of the guide");
+    let record = ["record", "cellar", "--bot", "tourist", "--noise", "0.1", "--levels", "default:0..1"];
+    shell.done(&[&record[..], &["--out", "tour.demo"]].concat());
+    let summary = shell.answer(&["demo", "ls", "tour.demo", "--json"]);
+    assert_eq!(summary["header"]["demonstrator"], "tourist", "{summary}");
+    let verified = shell.answer(&["demo", "verify", "tour.demo", "--json"]);
+    assert_eq!(verified["report"]["divergences"].as_array().map(Vec::len), Some(0), "{verified}");
+    shell.done(&["test", "cellar", "--level", "Pantry", "--bot", "tourist,guide", "--out", "tested"]);
+    let results = fs::read_to_string(shell.path("tested/results.json")).expect("results");
+    assert!(results.contains("\"tourist\"") && results.contains("\"guide\""), "{results}");
+    let printed = refused(&shell, &["eval", "--bot", "tourists", "--levels", "default:0"]);
+    let words = "unknown bot `tourists` (did you mean `tourist`?); valid: guide, random, chaos, tourist";
+    assert!(printed.contains(words), "{printed}");
+}
+
 /// Returns what a refused command prints.
 fn refused(shell: &Shell, args: &[&str]) -> String {
     let output = shell.command(args).output().expect("the program starts");
