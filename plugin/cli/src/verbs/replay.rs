@@ -247,7 +247,7 @@ impl ReplayReport<'_> {
         let end = if self.is_stopped {
             let (program, path) = (program::name(), shell_word(&path.display().to_string()));
             format!(
-                "; stopped before nothing more could be left out: `{program} replay {path} --minimise --out FILE` goes on"
+                "; stopped before nothing more could be left out: `{program} replay {path} --minimise --out FILE.finding` goes on"
             )
         } else if shorter.is_minimal {
             String::new()
@@ -358,7 +358,7 @@ mod tests {
         assert!(said(true, false).0.ends_with(" after 3 replays"));
         assert!(said(false, false).0.ends_with("; the budget was used up before nothing more could be left out"));
         let (words, json) = said(false, true);
-        let advice = format!("`{} replay 'short one.finding' --minimise --out FILE` goes on", program::name());
+        let advice = format!("`{} replay 'short one.finding' --minimise --out FILE.finding` goes on", program::name());
         assert!(words.contains("; stopped before") && words.ends_with(&advice), "{words}");
         assert_eq!(json["minimised"]["stopped"], true);
     }
