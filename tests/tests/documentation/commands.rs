@@ -50,8 +50,9 @@ fn arguments(words: &[String]) -> Option<Vec<String>> {
 
 /// Returns the games in `tests/foreign`, each of which has a program of its own, `foreign_` and its name.
 fn foreign_games() -> Vec<String> {
-    let entries = fs::read_dir(workspace().join("tests/foreign")).expect("the games are there");
-    let entries = entries.map(|entry| entry.expect("readable"));
+    let folders = ["tests/foreign", "tests/foreign/default_features"];
+    let entries = folders.map(|folder| fs::read_dir(workspace().join(folder)).expect("the games are there"));
+    let entries = entries.into_iter().flatten().map(|entry| entry.expect("readable"));
     let games = entries.filter(|entry| entry.path().join("src/main.rs").exists());
     games.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect()
 }
