@@ -155,11 +155,14 @@ pub(crate) fn mark_trees_on_one_thread(world: &mut World) {
     world.resource_scope::<Schedules, _>(|world, mut schedules| {
         for (_, schedule) in schedules.iter_mut() {
             let systems = &mut schedule.graph_mut().systems;
-            let found = systems.iter().find(|(_, system, _)| system.system_type() == bevys).map(|(key, ..)| key);
-            let Some(place) = found.and_then(|key| systems.get_mut(key)) else { continue };
-            let mut mark = IntoSystem::into_system(mark_changed_trees);
-            mark.initialize(world);
-            *place = SystemWithAccess::new(Box::new(mark));
+            let found = systems.iter().filter(|(_, system, _)| system.system_type() == bevys);
+            let found: Vec<SystemKey> = found.map(|(key, ..)| key).collect();
+            for place in found {
+                let Some(place) = systems.get_mut(place) else { continue };
+                let mut mark = IntoSystem::into_system(mark_changed_trees);
+                mark.initialize(world);
+                *place = SystemWithAccess::new(Box::new(mark));
+            }
         }
     });
 }
@@ -271,7 +274,8 @@ mod tests {
     fn moved(alone: bool) -> Vec<Vec<(Vec3, bool)>> {
         bevy::tasks::ComputeTaskPool::get_or_init(Default::default);
         let mut app = App::new();
-        app.add_plugins(TransformPlugin);
+        // As plugins with physics have it, with a second one in a schedule.
+        app.add_plugins(TransformPlugin).add_systems(PostUpdate, mark_dirty_trees.before(TransformSystems::Propagate));
         let family = family(app.world_mut());
         if alone {
             mark_trees_on_one_thread(app.world_mut());

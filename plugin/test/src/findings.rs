@@ -48,7 +48,6 @@ use std::{
 };
 use thiserror::Error;
 
-pub(crate) use crate::findings::play::{detector_of, since_edited};
 pub use crate::findings::{
     checks::{Check, Checks},
     course::{CourseEnd, RecordedCourse, course_of, course_of_recording, keeps_course},
@@ -58,6 +57,10 @@ pub use crate::findings::{
     play::{Breakage, CheckTick, Replayed, Unplayable, Watcher},
     regress::{PINS, Pin, PinState, Pins, Regress, RegressRow, Regression, regress, regress_until},
     scan::scan,
+};
+pub(crate) use crate::findings::{
+    folder::DAY,
+    play::{detector_of, since_edited},
 };
 
 /// Newest form of the head that is read and written.

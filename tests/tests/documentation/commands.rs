@@ -57,12 +57,15 @@ fn foreign_games() -> Vec<String> {
     games.map(|entry| entry.file_name().to_string_lossy().into_owned()).collect()
 }
 
-/// Replaces `foreign_NAME` by the command of each of these games, and `NAME` elsewhere by the game.
+/// Replaces `foreign_NAME` by the command of each of these games, and `NAME` elsewhere by the game; in a command with a file
+/// of `tests/foreign/NAME` by those that lie there.
 fn for_each_game(words: Vec<String>) -> Vec<Vec<String>> {
     if words.first().is_none_or(|program| program != "foreign_NAME") {
         return vec![words];
     }
-    let games = foreign_games();
+    let names_folder = words.iter().any(|word| word.starts_with("tests/foreign/NAME/"));
+    let lies_there = |game: &String| !names_folder || workspace().join("tests/foreign").join(game).exists();
+    let games: Vec<String> = foreign_games().into_iter().filter(lies_there).collect();
     games.iter().map(|game| words.iter().map(|word| word.replace("NAME", game)).collect()).collect()
 }
 

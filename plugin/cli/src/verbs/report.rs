@@ -82,7 +82,7 @@ pub(crate) fn run_merge(args: &MergeArgs, games: &Games) -> Result<Outcome, CliE
     // Without the game there are no pictures, and all else is the same.
     let game = games.get(&record.game).ok();
     let against = args.against.as_deref().map(results_folder);
-    let results = Results { folder: &args.out, against, game, json: args.json };
+    let results = Results { folder: &args.out, against, game, json: args.json, keeps_failures: false };
     results.check()?;
     // Nothing is written if the comparison fails.
     if let Some(before) = results.against {

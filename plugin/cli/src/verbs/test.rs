@@ -26,7 +26,7 @@ use playbot_test::{
     detectors::Detectors,
     findings::{Budget, Checks, FindingFiles, RecordedCourse},
     verdict::{
-        Comparison, Earlier, LevelVerdict, Overview, RecordedWins, Shard, TestEnd, TestFolder, TestObserver, TestPlan,
+        Comparison, Earlier, LevelVerdict, RecordedWins, Shard, TestEnd, TestFolder, TestObserver, TestPlan,
         results_folder, run_tests_keeping,
     },
 };
@@ -132,7 +132,8 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
         Some(path) if path.extension().is_some_and(|ending| ending == "demo") => (Some(path), None),
         path => (None, path.map(results_folder)),
     };
-    let results = Results { folder: out, against, game: Some(game), json: args.json };
+    let keeps_failures = args.findings.keep_failures;
+    let results = Results { folder: out, against, game: Some(game), json: args.json, keeps_failures };
     results.check()?;
     let recorded = recording.map(|recording| RecordedWins::read(game, &plan, recording)).transpose()?;
     if let Some(before) = results.against {
@@ -169,7 +170,6 @@ pub fn run(args: &Args, games: &Games) -> Result<Outcome, CliError> {
     };
     folder.finish_against(&courses)?;
     let outcome = report_results(&results)?;
-    args.findings.report_missing(out)?;
     report_off(game, &plan.detectors);
     Ok(outcome)
 }
@@ -271,13 +271,5 @@ impl FindingArgs {
             keep_failures: self.keep_failures,
             checks: Checks::default().with_detectors(detectors),
         }
-    }
-
-    /// Explains why no failed episode is kept where one was asked for, but no level has one.
-    pub fn report_missing(&self, folder: &Path) -> Result<(), CliError> {
-        if self.keep_failures && Overview::read(folder)?.bot_failed == 0 {
-            report!("no failed episode is kept: each level was solved, or is proved unsolvable");
-        }
-        Ok(())
     }
 }

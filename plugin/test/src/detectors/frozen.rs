@@ -69,13 +69,9 @@ fn legal_choices<'a>(moment: &DetectorTick<'a>) -> Option<impl Iterator<Item = u
 impl Still {
     fn note(&mut self, moment: &DetectorTick<'_>) {
         self.efforts.note(moment.action);
-        let (&ActionValue::Discrete(choice), Some(legal)) = (moment.action, legal_choices(moment)) else {
-            if let ActionValue::Discrete(choice) = moment.action {
-                self.tried.insert(*choice);
-            }
-            return;
-        };
+        let &ActionValue::Discrete(choice) = moment.action else { return };
         self.tried.insert(choice);
+        let Some(legal) = legal_choices(moment) else { return };
         // Bots that hold each action for a while seldom change it.
         let has_tried_all = legal.clone().all(|choice| self.tried.contains(&choice));
         self.since_all = if has_tried_all { self.since_all + 1 } else { 0 };

@@ -121,7 +121,7 @@ impl StoredFinding {
 // Dates.
 
 /// Seconds of a day.
-const DAY: u64 = 24 * 60 * 60;
+pub(crate) const DAY: u64 = 24 * 60 * 60;
 
 /// A date, such as `2027-01-31`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
@@ -146,7 +146,7 @@ impl Date {
     }
 
     /// Returns the date this many days after 1970-01-01.
-    fn of_day(mut days: u64) -> Self {
+    pub(crate) fn of_day(mut days: u64) -> Self {
         let mut year = 1970;
         while days >= days_of(year) {
             days -= days_of(year);

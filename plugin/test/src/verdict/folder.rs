@@ -145,12 +145,17 @@ fn remove(file: &Path) -> Result<(), TestError> {
     }
 }
 
-fn check_same(folder: &Path, file: &Path, record: &TestRecord) -> Result<(), TestError> {
+/// Reads the description of a test.
+pub(super) fn read_record(file: &Path) -> Result<TestRecord, TestError> {
     let text = fs::read_to_string(file).map_err(io_error("read", file))?;
     let next = "replace the results with --force, or choose another --out";
     let damaged = |line, message| TestError::Damaged { path: file.into(), line, message, next };
     let text = unseal_json(&text).map_err(|error| damaged(1, error.to_string()))?.text;
-    let known: TestRecord = serde_json::from_str(&text).map_err(|error| damaged(error.line(), json_fault(&error)))?;
+    serde_json::from_str(&text).map_err(|error| damaged(error.line(), json_fault(&error)))
+}
+
+fn check_same(folder: &Path, file: &Path, record: &TestRecord) -> Result<(), TestError> {
+    let known = read_record(file)?;
     let mut differences = known.differences(record);
     if known.shard != record.shard {
         let words =

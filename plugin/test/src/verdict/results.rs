@@ -11,18 +11,18 @@ use crate::{
     verdict::{
         LevelOutcome, LevelVerdict, Places, TooShort,
         error::{JOURNAL, MAKE_AGAIN, TestError, io_error, json_fault},
+        folder::read_record,
         plan::{RECORD, TestRecord},
         statistics::Trials,
     },
 };
 use crc32fast::Hasher;
-use playbot_learner::{BrokenSeal, unseal_json};
+use playbot_learner::BrokenSeal;
 use playbot_report::counted;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::{
     collections::{BTreeMap, BTreeSet},
-    fs,
     fs::File,
     io,
     io::{BufRead, BufReader, Write},
@@ -196,8 +196,7 @@ impl ResultLines {
 
 /// Returns the command that goes on with the test that was begun in a folder; `None` without one.
 fn unfinished(folder: &Path) -> Option<String> {
-    let text = fs::read_to_string(folder.join(RECORD)).ok().filter(|_| folder.join(JOURNAL).exists())?;
-    let record: TestRecord = serde_json::from_str(&unseal_json(&text).ok()?.text).ok()?;
+    let record = read_record(&folder.join(RECORD)).ok().filter(|_| folder.join(JOURNAL).exists())?;
     Some(record.resumed_in(folder))
 }
 

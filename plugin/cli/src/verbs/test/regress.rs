@@ -24,8 +24,8 @@ use std::{
 /// Options for stored findings.
 #[derive(clap::Args, Clone, Debug)]
 pub struct RegressArgs {
-    /// Play the findings in this folder again instead, as a test or `playbot replay FINDING --minimise --out FILE.finding` has
-    /// written them, and print those that still happen. Exit code 1 if one does, or cannot be played. Findings that are
+    /// Play the findings in this folder again instead, as a test or `playbot replay FINDING --minimise --out FILE.finding`
+    /// has written them, and print those that still happen. Exit code 1 if one does, or cannot be played. Findings that are
     /// pinned in a pins.ron, in the folder of the test or beside the findings, do not count until the day after their
     /// last. Detectors have the settings with which they found it, or those of --detector. Ctrl-C ends it with the results
     /// so far.

@@ -33,6 +33,8 @@ pub struct Results<'a> {
     pub game: Option<&'a dyn Game>,
     /// The levels are printed as JSON instead of tables.
     pub json: bool,
+    /// A failed episode of each level without a solution was to be kept.
+    pub keeps_failures: bool,
 }
 
 impl Results<'_> {
@@ -100,6 +102,9 @@ pub fn report_results(results: &Results) -> Result<Outcome, CliError> {
     report_recording(&overview.recorded);
     let names = [RESULTS, REPORT, JUNIT, SUMMARY].into_iter().chain(comparison.as_ref().map(|_| AGAINST));
     report!("{folder}: {}", names.collect::<Vec<_>>().join(", "));
+    if results.keeps_failures && overview.bot_failed == 0 {
+        report!("no failed episode is kept: each level was solved, or is proved unsolvable");
+    }
     let is_sound = match &comparison {
         Some(comparison) => !comparison.has_alarms() && overview.recorded.regressions.is_empty(),
         None => overview.is_sound(),

@@ -4,12 +4,15 @@
 //! whole file for one attribute more. Equal results give equal bytes, so times are those of the game, and a date is that of
 //! `SOURCE_DATE_EPOCH`.
 
-use crate::verdict::{
-    LevelOutcome, LevelVerdict,
-    error::TestError,
-    plan::{TestRecord, TesterRecord},
-    reports::{failure, rerun_commands},
-    results::ResultLines,
+use crate::{
+    findings::{DAY, Date},
+    verdict::{
+        LevelOutcome, LevelVerdict,
+        error::TestError,
+        plan::{TestRecord, TesterRecord},
+        reports::{failure, rerun_commands},
+        results::ResultLines,
+    },
 };
 use playbot_harness::level_files::is_level_files;
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
@@ -46,18 +49,9 @@ pub fn report_date() -> Result<Option<String>, TestError> {
 fn date(seconds: &OsStr) -> Result<String, TestError> {
     let number = seconds.to_str().and_then(|text| text.parse().ok()).filter(|&number: &u64| number < DATES);
     let Some(number) = number else { return Err(TestError::Date(seconds.to_string_lossy().into_owned())) };
-    let (days, second) = (number / 86_400, number % 86_400);
-    // Howard Hinnant, "chrono-Compatible Low-Level Date Algorithms": years begin in March, after the leap day, and 400 of
-    // them have 146,097 days. The first day of 1970 is day 719,468 after 1 March of the year 0.
-    let (era, day) = ((days + 719_468) / 146_097, (days + 719_468) % 146_097);
-    let year = (day - day / 1_460 + day / 36_524 - day / 146_096) / 365;
-    let day = day - (365 * year + year / 4 - year / 100);
-    // From March on, five months in a row have 153 days.
-    let month = (5 * day + 2) / 153;
-    let day = day - (153 * month + 2) / 5 + 1;
-    let (year, month) = if month < 10 { (year, month + 3) } else { (year + 1, month - 9) };
+    let second = number % DAY;
     let (hour, minute) = (second / 3_600, second / 60 % 60);
-    Ok(format!("{:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{:02}", 400 * era + year, second % 60))
+    Ok(format!("{}T{hour:02}:{minute:02}:{:02}", Date::of_day(number / DAY), second % 60))
 }
 
 /// Converts the results in a folder, with this date. A level that was not solved, that has a finding, or that no longer
