@@ -132,7 +132,7 @@ fn mix(hash: u64, x: &f32) -> u64 {
 
 #[test]
 fn updates_have_the_same_bits_everywhere() {
-    same_everywhere("updates_have_the_same_bits_everywhere", 0, || {
+    same_everywhere("updates_have_the_same_bits_everywhere", 0x842d_c65f_870d_574d, || {
         let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
         let config = PpoConfig { hidden: vec![256, 256], activation: Activation::Tanh, minibatches: 2, ..config() };
         let mut learner = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
@@ -145,7 +145,7 @@ fn updates_have_the_same_bits_everywhere() {
 
 #[test]
 fn skill_training_has_the_same_bits_everywhere() {
-    same_everywhere("skill_training_has_the_same_bits_everywhere", 0, || {
+    same_everywhere("skill_training_has_the_same_bits_everywhere", 0x0008_56d0_159f_44ea, || {
         let (obs_dim, dim, steps) = (29, 8, 220);
         let values = numbers(steps * (obs_dim + dim));
         let episode = DatasetEpisode {
@@ -165,7 +165,7 @@ fn skill_training_has_the_same_bits_everywhere() {
 
 #[test]
 fn discrete_sac_has_the_same_bits_everywhere() {
-    same_everywhere("discrete_sac_has_the_same_bits_everywhere", 0, || {
+    same_everywhere("discrete_sac_has_the_same_bits_everywhere", 0x2cfa_04ef_ec8c_20a4, || {
         let mut driver = Driver::new(8, 1);
         sac(crate::sac::config(), crate::sac::SPEC, |learner| driver.rollout(learner, 8))
     });
@@ -173,7 +173,7 @@ fn discrete_sac_has_the_same_bits_everywhere() {
 
 #[test]
 fn continuous_sac_has_the_same_bits_everywhere() {
-    same_everywhere("continuous_sac_has_the_same_bits_everywhere", 0, || {
+    same_everywhere("continuous_sac_has_the_same_bits_everywhere", 0xdaaa_438c_0147_20e3, || {
         let mut field = Field::new(&HURRY, 8, 1);
         sac(point::sac_config(), point::SPEC, |learner| field.rollout(learner, 8))
     });
@@ -194,7 +194,7 @@ fn sac(config: SacConfig, spec: PolicySpec, mut rollout: impl FnMut(&SacLearner)
 
 #[test]
 fn skill_training_on_images_has_the_same_bits_everywhere() {
-    same_everywhere("skill_training_on_images_has_the_same_bits_everywhere", 0, || {
+    same_everywhere("skill_training_on_images_has_the_same_bits_everywhere", 0x0008_09e9_2ffc_7a6b, || {
         let (shape, steps) = (ImageShape { channels: 3, height: 32, width: 32 }, 44);
         let pixels: Vec<u8> = numbers(steps * shape.numbers()).iter().map(|x| (x * 60.0 + 128.0) as u8).collect();
         let actions = Actions::Discrete((0..steps as u32).map(|t| t % 5).collect());
@@ -212,7 +212,7 @@ fn skill_training_on_images_has_the_same_bits_everywhere() {
 
 #[test]
 fn score_has_the_same_bits_everywhere() {
-    same_everywhere("score_has_the_same_bits_everywhere", 0, || {
+    same_everywhere("score_has_the_same_bits_everywhere", 0xe330_8ec6_e2d5_7d49, || {
         let learner = PpoLearner::with_skill(config(), ScoreConfig::default(), &model(1), 3, DeviceKind::Flex);
         let (mut learner, mut driver) = (learner.expect("good settings"), Driver::new(16, 1));
         let updates = (0..3).map(|_| learner.update(&driver.rollout(&learner, 32)).expect("finite"));
@@ -222,7 +222,7 @@ fn score_has_the_same_bits_everywhere() {
 
 #[test]
 fn ppo_of_continuous_actions_has_the_same_bits_everywhere() {
-    same_everywhere("ppo_of_continuous_actions_has_the_same_bits_everywhere", 0, || {
+    same_everywhere("ppo_of_continuous_actions_has_the_same_bits_everywhere", 0x8a59_6a2b_ec50_d9ac, || {
         let config = PpoConfig { hidden: vec![64, 64], activation: Activation::Tanh, ..config() };
         let mut learner = PpoLearner::new(config, point::SPEC, 1, DeviceKind::Flex).expect("good settings");
         let mut field = Field::new(&HURRY, 64, 1);
@@ -237,7 +237,7 @@ fn ppo_of_continuous_actions_has_the_same_bits_everywhere() {
 
 #[test]
 fn ppo_of_images_has_the_same_bits_everywhere() {
-    same_everywhere("ppo_of_images_has_the_same_bits_everywhere", 0, || {
+    same_everywhere("ppo_of_images_has_the_same_bits_everywhere", 0x4e4a_4e6e_4cb9_0211, || {
         let impala = CnnKind::Impala { channels: vec![16, 32, 32], feature: 64 };
         [impala, CnnKind::Nature { feature: 64 }].into_iter().fold(0, |hash, cnn| {
             let config = PpoConfig { cnn, epochs: 1, ..image_task::config() };
