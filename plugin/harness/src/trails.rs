@@ -318,9 +318,9 @@ impl Content {
 
 fn visits(trails: &[Trail], frame: &FloorFrame, out: &mut Vec<Shape>) {
     let visits = Visits::count(frame.bounds(), trails);
-    let most = (visits.most() as f64).ln_1p();
+    let most = libm::log1p(visits.most() as f64);
     out.extend(visits.visited().map(|(square, ticks)| {
-        let fill = heat((ticks as f64).ln_1p() / most);
+        let fill = heat(libm::log1p(ticks as f64) / most);
         Shape::Block { area: frame.area(square), fill }
     }));
 }

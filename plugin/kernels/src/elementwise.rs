@@ -6,10 +6,10 @@
 //! are minimax fits in relative error, by reweighted least squares.
 
 use crate::{
+    instructions::macerator::{AutoArch, Simd, WithSimd},
     kept_memory::share,
     tile::{LANES, Lanes},
 };
-use macerator::{AutoArch, Simd, WithSimd};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -95,7 +95,7 @@ fn horner(coefficients: &[f32; 5], x: f32) -> f32 {
     (((c4 * x + c3) * x + c2) * x + c1) * x + c0
 }
 
-/// Runs `loops` compiled for the widest vector instructions of this machine. Functions that it calls take part only
+/// Runs `loops` compiled for the widest [instructions](crate::instructions) of this machine. Functions that it calls take part only
 /// if they are inlined.
 #[inline]
 pub fn vectorized(loops: impl FnOnce()) {
@@ -159,7 +159,7 @@ pub(crate) fn log_softmax_in_place(logits: &mut [f32], choices: usize) {
             exp_into(rows, &mut exps);
         });
         for (row, exps) in rows.chunks_exact_mut(choices).zip(exps.chunks_exact(choices)) {
-            let ln_sum = exps.iter().sum::<f32>().ln();
+            let ln_sum = libm::logf(exps.iter().sum());
             row.iter_mut().for_each(|x| *x -= ln_sum);
         }
     });

@@ -1,7 +1,9 @@
-//! Operations on tensors for the backends whose numbers are in host memory: tanh, log-softmax and recurrent layers.
+//! Operations on tensors for the backends whose numbers are in host memory: tanh, exp, logarithms, log-softmax and
+//! recurrent layers.
 //!
 //! Each has its backward pass beside it and enters the gradient graph as one node. Devices without a kernel (see
-//! [`is_host`]) use plain tensor operations instead.
+//! [`is_host`]) use plain tensor operations instead. burn's own exp and logarithms are those of the system, whose last bits
+//! depend on the processor.
 
 #![allow(deprecated, reason = "ndarray is kept as a second opinion on flex")]
 
@@ -27,9 +29,72 @@ use burn::{
 };
 use std::sync::Arc;
 
-/// Returns tanh of every element, on a device with kernels.
+/// Returns tanh of every element.
 pub fn tanh<const D: usize>(x: Tensor<D>) -> Tensor<D> {
-    Tensor::from_dispatch(Dispatch::kernel_tanh(x.into_dispatch()))
+    Function::Tanh.of(x)
+}
+
+/// Returns exp of every element.
+pub fn exp<const D: usize>(x: Tensor<D>) -> Tensor<D> {
+    Function::Exp.of(x)
+}
+
+/// Returns the natural logarithm of every element.
+pub fn ln<const D: usize>(x: Tensor<D>) -> Tensor<D> {
+    Function::Ln.of(x)
+}
+
+/// Returns ln(1 + x) of every element, without loss of digits near 0.
+pub fn ln_1p<const D: usize>(x: Tensor<D>) -> Tensor<D> {
+    Function::Ln1p.of(x)
+}
+
+/// A function of single numbers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Function {
+    Tanh,
+    Exp,
+    Ln,
+    Ln1p,
+}
+
+impl Function {
+    fn of<const D: usize>(self, x: Tensor<D>) -> Tensor<D> {
+        if is_host(&x.device()) {
+            return Tensor::from_dispatch(Dispatch::kernel_function(x.into_dispatch(), self));
+        }
+        match self {
+            Self::Tanh => x.tanh(),
+            Self::Exp => x.exp(),
+            Self::Ln => x.log(),
+            Self::Ln1p => x.log1p(),
+        }
+    }
+
+    fn apply(self, values: &mut [f32]) {
+        match self {
+            Self::Tanh => elementwise::tanh_in_place(values),
+            Self::Exp => values.iter_mut().for_each(|x| *x = libm::expf(*x)),
+            Self::Ln => values.iter_mut().for_each(|x| *x = libm::logf(*x)),
+            Self::Ln1p => values.iter_mut().for_each(|x| *x = libm::log1pf(*x)),
+        }
+    }
+
+    /// Converts the gradient by the results to that by the elements; `kept` are the results of tanh and exp, and the
+    /// elements of logarithms.
+    fn backward(self, grad: &mut [f32], kept: &[f32]) {
+        if let Self::Tanh = self {
+            return elementwise::tanh_backward(grad, kept);
+        }
+        for (grad, kept) in grad.iter_mut().zip(kept) {
+            match self {
+                Self::Tanh => {}
+                Self::Exp => *grad *= kept,
+                Self::Ln => *grad /= kept,
+                Self::Ln1p => *grad /= 1.0 + kept,
+            }
+        }
+    }
 }
 
 impl Activation {
@@ -37,8 +102,7 @@ impl Activation {
     pub fn forward<const D: usize>(self, x: Tensor<D>) -> Tensor<D> {
         match self {
             Self::Relu => activation::relu(x),
-            Self::Tanh if is_host(&x.device()) => tanh(x),
-            Self::Tanh => x.tanh(),
+            Self::Tanh => tanh(x),
         }
     }
 }
@@ -81,8 +145,8 @@ pub fn gru(input: GruInput) -> Tensor<2> {
 /// A backend with kernels.
 #[backend_extension(Flex, NdArray, Autodiff)]
 pub(crate) trait Kernels: Backend {
-    /// Returns tanh of every element.
-    fn kernel_tanh(x: FloatTensor<Self>) -> FloatTensor<Self>;
+    /// Returns the function of every element.
+    fn kernel_function(x: FloatTensor<Self>, function: Function) -> FloatTensor<Self>;
 
     /// Returns ln softmax of each row.
     fn kernel_log_softmax(x: FloatTensor<Self>) -> FloatTensor<Self>;
@@ -101,8 +165,8 @@ pub(crate) trait Kernels: Backend {
 macro_rules! host_kernels {
     ($backend:ty) => {
         impl Kernels for $backend {
-            fn kernel_tanh(x: FloatTensor<Self>) -> FloatTensor<Self> {
-                edited::<Self>(x, elementwise::tanh_in_place)
+            fn kernel_function(x: FloatTensor<Self>, function: Function) -> FloatTensor<Self> {
+                edited::<Self>(x, |x| function.apply(x))
             }
 
             fn kernel_log_softmax(x: FloatTensor<Self>) -> FloatTensor<Self> {
@@ -129,12 +193,15 @@ host_kernels!(Flex);
 host_kernels!(NdArray);
 
 impl<B: Kernels + HostNumbers, C: CheckpointStrategy> Kernels for Autodiff<B, C> {
-    fn kernel_tanh(x: FloatTensor<Self>) -> FloatTensor<Self> {
+    fn kernel_function(x: FloatTensor<Self>, function: Function) -> FloatTensor<Self> {
         let (x, node) = x.into_parts();
-        let y = B::kernel_tanh(x);
-        match Tanh.prepare::<C>([node]).compute_bound().stateful() {
-            OpsKind::Tracked(prep) => prep.finish(y.clone(), y),
-            OpsKind::UnTracked(prep) => prep.finish(y),
+        match OfNumbers.prepare::<C>([node]).compute_bound().stateful() {
+            OpsKind::Tracked(prep) => {
+                let y = B::kernel_function(x.clone(), function);
+                let kept = if matches!(function, Function::Tanh | Function::Exp) { y.clone() } else { x };
+                prep.finish((kept, function), y)
+            }
+            OpsKind::UnTracked(prep) => prep.finish(B::kernel_function(x, function)),
         }
     }
 
@@ -183,15 +250,17 @@ fn scanned<B: HostNumbers>(
 }
 
 #[derive(Debug)]
-struct Tanh;
+struct OfNumbers;
 
-impl<B: Kernels> Backward<B, 1> for Tanh {
-    type State = FloatTensor<B>;
+impl<B: Kernels> Backward<B, 1> for OfNumbers {
+    /// What [`Function::backward`] needs.
+    type State = (FloatTensor<B>, Function);
 
     fn backward(self, ops: Ops<Self::State, 1>, grads: &mut Gradients, _: &mut Checkpointer) {
-        let y = data::<B>(ops.state);
+        let (kept, function) = ops.state;
+        let kept = data::<B>(kept);
         unary::<B, _>(ops.parents, ops.node, grads, |grad| {
-            edited::<B>(grad, |grad| elementwise::tanh_backward(grad, y.as_slice().expect("tensors are made of f32")))
+            edited::<B>(grad, |grad| function.backward(grad, kept.as_slice().expect("tensors are made of f32")))
         });
     }
 }
@@ -259,20 +328,27 @@ mod tests {
     use playbot_learner::nn::{host, vector};
 
     #[test]
-    fn tanh_and_its_gradient_agree_with_tensor_operations() {
-        let x: Vec<f32> = (-400..=400).map(|i| i as f32 / 40.0).collect();
-        for kind in DeviceKind::CPU {
-            let both = |function: fn(Tensor<1>) -> Tensor<1>| {
+    fn functions_and_their_gradients_agree_with_tensor_operations() {
+        type OfTensor = fn(Tensor<1>) -> Tensor<1>;
+        let functions: [(OfTensor, OfTensor, f32); 4] = [
+            (|x| Activation::Tanh.forward(x), |x| x.tanh(), 0.0),
+            (exp, |x| x.exp(), 0.0),
+            (ln, |x| x.log(), 10.1),
+            (ln_1p, |x| x.log1p(), 9.1),
+        ];
+        for (kind, (ours, burns, shift)) in DeviceKind::CPU.into_iter().flat_map(|kind| functions.map(|of| (kind, of)))
+        {
+            let x: Vec<f32> = (-400..=400).map(|i| i as f32 / 40.0 + shift).collect();
+            let both = |function: OfTensor| {
                 let x = vector(x.clone(), &kind.plain()).autodiff().require_grad();
                 let y = function(x.clone());
                 // Twice, so that gradients of two uses are added up.
                 let grads = (y.clone() * 2.0 + y.clone().square()).sum().backward();
                 [y.inner(), x.grad(&grads).expect("tracked")].map(|tensor| host(tensor).expect("readable"))
             };
-            let want = both(|x| x.tanh());
-            let got = both(|x| Activation::Tanh.forward(x));
+            let (want, got) = (both(burns), both(ours));
             for (want, got) in want.iter().flatten().zip(got.iter().flatten()) {
-                assert!((want - got).abs() <= 1e-6, "{got} is not {want} on {kind}");
+                assert!((want - got).abs() <= 1e-6 * want.abs().max(1.0), "{got} is not {want} on {kind}");
             }
             let nan = host(Activation::Tanh.forward(vector(vec![f32::NAN], &kind.plain()))).expect("readable");
             assert!(nan[0].is_nan());

@@ -1,8 +1,8 @@
 //! Layers of neural networks on CPUs, as operations of [burn](https://burn.dev).
 //!
 //! The operations are for the backends whose numbers are in host memory (flex and ndarray). Other backends, such as
-//! graphics cards, compute the same layers by burn's own tensors, which are also the oracle of the tests. Sums are made
-//! in an order that does not depend on the number of threads.
+//! graphics cards, compute the same layers by burn's own tensors, which are also the oracle of the tests. The numbers have
+//! the same bits on any number of threads and on every processor.
 //!
 //! The modules, in reading order:
 //!
@@ -10,6 +10,7 @@
 //! - [`dense`]: the dense layers of a network as one operation, for flex.
 //! - [`trunk`]: the convolutions of an image encoder as one operation, for flex.
 //! - [`elementwise`]: activations over slices, written for vector instructions.
+//! - [`instructions`]: the vector instructions of the loops, on which no number depends.
 //! - [`host_numbers`]: conversion between tensors and numbers in host memory.
 //! - [`among_workers`]: the threads on which the loops run.
 //! - [`kept_memory`]: memory that one pass hands to the next.
@@ -20,6 +21,7 @@ pub mod elementwise;
 mod gru_scan;
 pub mod host_numbers;
 pub mod host_ops;
+pub mod instructions;
 pub mod kept_memory;
 mod tile;
 pub mod trunk;

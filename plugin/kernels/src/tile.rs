@@ -2,9 +2,9 @@
 //! goes here.
 //!
 //! Each sum is made by fused multiply-adds in a fixed order. It does not depend on the rest of the tile, on the width
-//! of vectors, or on threads. A machine without such instructions rounds twice, and its last bits differ.
+//! of vectors, on threads, or on whether the machine has such instructions.
 
-use macerator::{Scalar, Simd, VFma};
+use crate::instructions::macerator::{self, Scalar, Simd, VFma};
 
 /// Number of channels at a time.
 pub(crate) const LANES: usize = 16;
@@ -135,10 +135,29 @@ fn pair_strip<S: Simd, const P: usize, G: FnMut(usize, usize, &Lanes)>(
     }
 }
 
-/// Returns x y + z, rounded once where the machine can.
+/// Returns x y + z, rounded once.
 #[inline(always)]
 pub(crate) fn fused<S: Simd>(x: f32, y: f32, z: f32) -> f32 {
-    if f32::is_accelerated::<S>() { x.mul_add(y, z) } else { x * y + z }
+    if f32::is_accelerated::<S>() { x.mul_add(y, z) } else { fused_of_doubles(x, y, z) }
+}
+
+/// Does [`fused`] by sums of doubles, which every machine has.
+///
+/// The product is exact as a double. The sum is rounded to odd: where it is not exact, its last bit is 1. So it lies on the
+/// right side of every middle between two `f32`s, and the second rounding does what a single one would (Boldo and Melquiond
+/// 2008, "Emulation of a FMA and correctly rounded sums: proved algorithms using rounding to odd").
+#[inline(always)]
+fn fused_of_doubles(x: f32, y: f32, z: f32) -> f32 {
+    let (product, z) = (f64::from(x) * f64::from(y), f64::from(z));
+    let sum = product + z;
+    // What the rounding of the sum has cut off (Knuth), exactly; NaN if the sum is not finite.
+    let of_z = sum - product;
+    let rest = (product - (sum - of_z)) + (z - of_z);
+    let bits = sum.to_bits();
+    // A step of an even number towards the exact sum, away from 0 or nearer to it.
+    let step = if (rest > 0.0) == (sum > 0.0) { 1 } else { u64::MAX };
+    let is_between = rest.abs() > 0.0 && bits & 1 == 0;
+    f64::from_bits(if is_between { bits.wrapping_add(step) } else { bits }) as f32
 }
 
 #[inline(always)]
@@ -328,5 +347,48 @@ pub(crate) fn column_sums<S: Simd>(y: &[f32], places: &[usize], sums: &mut [Lane
             }
             *sums = total;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use playbot_learner::rng::{Streams, below, unit};
+
+    #[test]
+    fn doubles_round_a_multiply_add_once() {
+        let mut rng = Streams::new(1).stream("fused", 0);
+        let mut twice = 0;
+        for case in 0..2_000_000 {
+            let [x, y, any] = [(); 3].map(|()| f32::from_bits(below(&mut rng, 1 << 32) as u32));
+            let z = match case % 3 {
+                // About as large as the product, so that bits meet.
+                0 => -x * y * (1.0 + f32::EPSILON * (8.0 * unit(&mut rng) - 4.0) as f32),
+                1 => x * y * 2f32.powi(below(&mut rng, 30) as i32 - 15) * (1.0 + unit(&mut rng) as f32),
+                _ => any,
+            };
+            let (want, got) = (x.mul_add(y, z), fused_of_doubles(x, y, z));
+            assert!(
+                got.to_bits() == want.to_bits() || got.is_nan() && want.is_nan(),
+                "{x:e} {y:e} {z:e}: {got:e}, {want:e}"
+            );
+            twice += u32::from((x * y + z).to_bits() != want.to_bits());
+        }
+        assert!(twice > 100_000, "only {twice} cases tell one rounding from two");
+    }
+
+    #[test]
+    fn a_sum_just_beside_a_middle_is_rounded_to_its_side() {
+        // 1 + 2^-24 lies in the middle between two numbers, and the product moves it by less than a double tells.
+        let (middle, tiny) = (1.0 + f32::EPSILON, 2f32.powi(-60));
+        for sign in [1.0, -1.0] {
+            let (x, y, z) = (f32::EPSILON / 2.0, 1.0 + sign * f32::EPSILON, middle);
+            assert_eq!(fused_of_doubles(x, y, z), x.mul_add(y, z));
+            assert_eq!(fused_of_doubles(sign * tiny, tiny, 1.0), (sign * tiny).mul_add(tiny, 1.0));
+        }
+        assert_eq!(fused_of_doubles(1.0, -0.0, 0.0).to_bits(), 0.0f32.to_bits());
+        assert_eq!(fused_of_doubles(f32::MAX, 2.0, f32::NEG_INFINITY), f32::NEG_INFINITY);
+        assert_eq!(fused_of_doubles(f32::MAX, 2.0, 0.0), f32::INFINITY);
+        assert!(fused_of_doubles(f32::INFINITY, 0.0, 1.0).is_nan());
     }
 }

@@ -114,8 +114,12 @@ mod once {
     #[cfg(feature = "wgpu")]
     pub(super) fn wgpu() -> Result<(), String> {
         static OPENED: Opened = OnceLock::new();
-        let open = || match burn::tensor::Device::wgpu_options().init() {
-            Ok(_) => Ok(()),
+        let open = || match burn::tensor::Device::wgpu_options().init_with_setup() {
+            Ok((_, setup)) => {
+                let card = setup.adapter.get_info();
+                tracing::info!("networks compute on {}, by {}", card.name, card.backend);
+                Ok(())
+            }
             Err(error) => Err(error.to_string()),
         };
         OPENED.get_or_init(|| caught(open).unwrap_or_else(Err)).clone()

@@ -48,7 +48,7 @@ pub fn marginal_densities(decoder: &HostDist, actions: &Actions) -> Result<Vec<f
     LearnError::check("width of the actions", dim, *width)?;
     LearnError::check("actions", decoder.head.len(), values.len())?;
     let densities = decoder.head.iter().zip(stds).zip(values);
-    let densities: Vec<f32> = densities.map(|((&m, &s), &a)| gaussian_log_prob(&[m], &[s], &[a]).exp()).collect();
+    let densities: Vec<f32> = densities.map(|((&m, &s), &a)| libm::expf(gaussian_log_prob(&[m], &[s], &[a]))).collect();
     Ok(densities.chunks_exact(dim).map(|row| row.iter().sum()).collect())
 }
 
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn densities_by_hand() {
-        let decoder = HostDist { dim: 2, head: vec![0.0, 1.0], log_std: Some(vec![0.0, 2.0f32.ln()]) };
+        let decoder = HostDist { dim: 2, head: vec![0.0, 1.0], log_std: Some(vec![0.0, std::f32::consts::LN_2]) };
         let action = Actions::Continuous { dim: 2, values: vec![1.0, 1.0] };
         // φ(1) + φ(0) / 2
         let got = marginal_densities(&decoder, &action).expect("they fit");

@@ -25,11 +25,11 @@ pub(crate) fn restrict(log_probs: &mut [f32], choices: usize, legal: &[bool]) {
         }
         let allowed = || row.iter().zip(legal).filter_map(|(&x, &is_legal)| is_legal.then_some(x));
         let top = f64::from(allowed().fold(f32::NEG_INFINITY, f32::max));
-        let total: f64 = allowed().map(|x| (f64::from(x) - top).exp()).sum();
-        let even = -(allowed().count() as f64).ln();
+        let total: f64 = allowed().map(|x| libm::exp(f64::from(x) - top)).sum();
+        let even = -libm::log(allowed().count() as f64);
         for (x, &is_legal) in row.iter_mut().zip(legal) {
             *x = match is_legal {
-                true if top.is_finite() => (f64::from(*x) - top - total.ln()) as f32,
+                true if top.is_finite() => (f64::from(*x) - top - libm::log(total)) as f32,
                 // All legal choices had probability 0.
                 true => even as f32,
                 false => ILLEGAL,
@@ -61,7 +61,7 @@ pub(crate) fn entropy_share(legal: &[bool], choices: usize) -> f64 {
     }
     let largest = |legal: &[bool]| match legal.iter().filter(|&&is_legal| is_legal).count() {
         0 => 1.0,
-        count => (count as f64).ln() / (choices as f64).ln(),
+        count => libm::log(count as f64) / libm::log(choices as f64),
     };
     let rows = legal.len() / choices;
     legal.chunks_exact(choices).map(largest).sum::<f64>() / rows as f64

@@ -82,7 +82,10 @@ pub use crate::{
     space::{ActionSpace, ActionValue, Actions, PolicySpec, TimeLimit},
     spirl::{SpirlConfig, SpirlLearner},
 };
-pub use playbot_kernels::among_workers::{among_awake_workers, among_workers, waited};
+pub use playbot_kernels::{
+    among_workers::{among_awake_workers, among_workers, waited},
+    instructions::Instructions,
+};
 
 /// Compiles and runs the examples of the README.
 #[cfg(doctest)]

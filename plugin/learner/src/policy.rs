@@ -363,7 +363,7 @@ impl PolicyOutput {
 }
 
 fn squash(numbers: &[f32]) -> Vec<f32> {
-    numbers.iter().map(|x| x.tanh()).collect()
+    numbers.iter().map(|&x| libm::tanhf(x)).collect()
 }
 
 fn unsquash(action: &[f32]) -> Vec<f32> {

@@ -104,9 +104,9 @@ pub fn unit<R: Rng + ?Sized>(rng: &mut R) -> f64 {
 
 /// Returns a standard normal number (Box and Muller; always two 64-bit draws, so positions stay predictable).
 pub fn normal<R: Rng + ?Sized>(rng: &mut R) -> f32 {
-    let radius = (-2.0 * (1.0 - unit(rng)).ln()).sqrt();
+    let radius = (-2.0 * libm::log(1.0 - unit(rng))).sqrt();
     let angle = std::f64::consts::TAU * unit(rng);
-    (radius * angle.cos()) as f32
+    (radius * libm::cos(angle)) as f32
 }
 
 /// Returns a uniform whole number below `bound`, without bias (Lemire's method).

@@ -317,7 +317,7 @@ fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
 
 /// Returns the next larger of 1, 2, 2.5, 5 times a power of ten.
 fn round_step(step: f64) -> f64 {
-    let power = 10f64.powf(step.log10().floor());
+    let power = 10f64.powi(libm::log10(step).floor() as i32);
     let digits = step / power;
     let rounded = [1.0, 2.0, 2.5, 5.0].into_iter().find(|d| digits <= d + 1e-9).unwrap_or(10.0);
     rounded * power

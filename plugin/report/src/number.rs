@@ -75,7 +75,7 @@ pub fn readable_with_spread(mean: f64, spread: f64) -> String {
 }
 
 fn decimals_of(size: f64) -> usize {
-    (3.0 - size.log10().floor()).clamp(0.0, 6.0) as usize
+    (3.0 - libm::log10(size).floor()).clamp(0.0, 6.0) as usize
 }
 
 /// Formats a share (0 to 1) in percent with one decimal, as `40.0 %`.
@@ -86,7 +86,7 @@ pub fn percent(share: f64) -> String {
 /// Returns the decimals that show at least one digit of every standard error above 0; 2 if there is no such error.
 pub(crate) fn decimals_for(errors: impl Iterator<Item = f64>) -> usize {
     let smallest = errors.filter(|e| *e > 0.0).fold(f64::INFINITY, f64::min);
-    if smallest.is_finite() { (-smallest.log10().floor()).clamp(0.0, 4.0) as usize } else { 2 }
+    if smallest.is_finite() { (-libm::log10(smallest).floor()).clamp(0.0, 4.0) as usize } else { 2 }
 }
 
 /// Formats a mean and, if known, its standard error.

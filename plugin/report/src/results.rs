@@ -84,7 +84,7 @@ fn error_of_difference(one: &ResultRow, other: &ResultRow) -> f64 {
     let in_pairs = PairedDifference::of(&[&one.level_returns], &[&other.level_returns]);
     // A single level shows no variation over levels.
     let in_pairs = in_pairs.filter(|difference| difference.levels > 1);
-    in_pairs.map_or_else(|| one.return_se.hypot(other.return_se), |difference| difference.se)
+    in_pairs.map_or_else(|| libm::hypot(one.return_se, other.return_se), |difference| difference.se)
 }
 
 /// Returns the key to the signs of [`Rank`] that occur.

@@ -28,9 +28,9 @@ use tracing_subscriber::{
 };
 
 /// Filters messages that need no warning: a window manager without settings, a renderer in software or none at all, and
-/// a log that is there already. A failed graphics card is reported by the error that follows.
+/// a log that is there already. A failed graphics card is reported by the error that follows; which card computes is told.
 const QUIET: &str = "warn,winit=error,bevy_render=error,bevy_render::extract_resource=off,bevy_gltf=error,bevy_log=off,\
-                     cubecl_runtime=error";
+                     cubecl_runtime=error,playbot_learner::device=info";
 
 /// Messages of broken games are left out.
 const WITHOUT_GAMES: &str = "off,bevy_playbot=warn,playbot=warn,playbot_games=off";
@@ -98,7 +98,11 @@ where
             }
             return self.full.format_event(context, writer, event);
         }
-        writer.write_str(if *event.metadata().level() == Level::ERROR { "error: " } else { "warning: " })?;
+        writer.write_str(match *event.metadata().level() {
+            Level::ERROR => "error: ",
+            Level::WARN => "warning: ",
+            _ => "",
+        })?;
         context.field_format().format_fields(writer.by_ref(), event)?;
         writeln!(writer)
     }

@@ -93,10 +93,10 @@ impl CellChart {
 
     fn floor(&self, frame: &FloorFrame, out: &mut Vec<Shape>) {
         let most = self.reached.iter().map(|(_, visits)| *visits).max().unwrap_or(0);
-        let most = (most as f64).ln_1p().max(f64::MIN_POSITIVE);
+        let most = libm::log1p(most as f64).max(f64::MIN_POSITIVE);
         for (area, visits) in &self.reached {
             let area = frame.area(*area).inflate(-SEAM);
-            out.push(Shape::Block { area, fill: heat((*visits as f64).ln_1p() / most) });
+            out.push(Shape::Block { area, fill: heat(libm::log1p(*visits as f64) / most) });
         }
         let FloorPlan { walls, hazards, platforms, start, goal, .. } = &self.plan;
         for (areas, fill) in [(walls, WALL), (platforms, PLATFORM), (hazards, HAZARD)] {

@@ -1,10 +1,10 @@
 //! Max-pooling of 3×3 pixels, at every second pixel.
 
 use crate::{
+    instructions::macerator::{self, Simd},
     tile::{LANES, Lanes},
     trunk::grid::{Grid, window_places},
 };
-use macerator::Simd;
 use std::ops::Range;
 
 /// Side of the window.

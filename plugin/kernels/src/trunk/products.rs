@@ -3,8 +3,10 @@
 //! As in [`tile`](crate::tile), each sum is made by fused multiply-adds in a fixed order, whatever the width of
 //! vectors.
 
-use crate::tile::{LANES, Lanes, fused, is_wide, lanes_at};
-use macerator::Simd;
+use crate::{
+    instructions::macerator::{self, Simd},
+    tile::{LANES, Lanes, fused, is_wide, lanes_at},
+};
 
 /// Number of rows at a time where a vector has all lanes: with two blocks of channels the sums take 16 of 32
 /// registers.

@@ -8,13 +8,13 @@
 
 use crate::{
     elementwise::Store,
+    instructions::macerator::{self, Simd},
     tile::{LANES, Lanes, lanes_at},
     trunk::{
         grid::{ConvShape, Grid, KernelIndex},
         products::{Matrices, add_products, products},
     },
 };
-use macerator::Simd;
 use std::ops::Range;
 
 /// G, which converts weights to points.

@@ -8,8 +8,10 @@ use crate::{
     },
 };
 use burn::tensor::{Device, Gradients, Tensor, TensorData};
-use macerator::Simd;
-use playbot_kernels::among_workers::are_awake;
+use playbot_kernels::{
+    among_workers::are_awake,
+    instructions::macerator::{self, Simd},
+};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::{borrow::Cow, collections::BTreeMap, iter::Peekable};

@@ -8,7 +8,7 @@ use burn::tensor::{Device, Int, Tensor, TensorData, activation::log_softmax};
 use playbot_kernels::{
     elementwise::exp_of,
     host_numbers::is_host,
-    host_ops,
+    host_ops::{self, exp},
     kept_memory::{OF_A_MOVE, share},
 };
 use std::ops::Range;
@@ -91,7 +91,7 @@ impl Dist {
                 Ok(log_probs.clone().gather(1, index.clone()).squeeze_dim(1))
             }
             (Self::Gaussian { mean, log_std }, ActionBatch::Continuous(action)) => {
-                let score = (action.clone() - mean.clone()) * log_std.clone().neg().exp();
+                let score = (action.clone() - mean.clone()) * exp(log_std.clone().neg());
                 let terms = score.square() * 0.5 + log_std.clone() + HALF_LN_TAU;
                 Ok(terms.sum_dim(1).squeeze_dim(1).neg())
             }
@@ -104,7 +104,7 @@ impl Dist {
     pub fn entropy(&self) -> Tensor<1> {
         match self {
             Self::Categorical { log_probs } => {
-                let terms = log_probs.clone().exp() * log_probs.clone();
+                let terms = exp(log_probs.clone()) * log_probs.clone();
                 terms.sum_dim(1).squeeze_dim(1).neg()
             }
             Self::Gaussian { log_std, .. } => (log_std.clone() + (0.5 + HALF_LN_TAU)).sum_dim(1).squeeze_dim(1),
@@ -121,12 +121,12 @@ impl Dist {
     pub fn kl(&self, other: &Self) -> Result<Tensor<1>, LearnError> {
         match (self, other) {
             (Self::Categorical { log_probs: p }, Self::Categorical { log_probs: q }) => {
-                let terms = p.clone().exp() * (p.clone() - q.clone());
+                let terms = exp(p.clone()) * (p.clone() - q.clone());
                 Ok(terms.sum_dim(1).squeeze_dim(1))
             }
             (Self::Gaussian { mean: mp, log_std: lp }, Self::Gaussian { mean: mq, log_std: lq }) => {
-                let ratio = ((lp.clone() - lq.clone()) * 2.0).exp();
-                let distance = ((mp.clone() - mq.clone()) * lq.clone().neg().exp()).square();
+                let ratio = exp((lp.clone() - lq.clone()) * 2.0);
+                let distance = ((mp.clone() - mq.clone()) * exp(lq.clone().neg())).square();
                 let terms = (ratio + distance - 1.0) * 0.5 + (lq.clone() - lp.clone());
                 Ok(terms.sum_dim(1).squeeze_dim(1))
             }
@@ -347,13 +347,13 @@ impl DistRows for GaussianRows<'_> {
     fn terms(&self, row: usize) -> RowTerms {
         let mut terms = RowTerms::default();
         for ([mean, log_std, action], other) in self.dims(row) {
-            let score = (action - mean) * (-log_std).exp();
+            let score = (action - mean) * libm::expf(-log_std);
             terms.log_prob -= score * score * 0.5 + log_std + HALF_LN_TAU_F32;
             terms.entropy += log_std + 0.5 + HALF_LN_TAU_F32;
             if let Some([m, s]) = other {
                 let (p, q) = if self.from_these { (log_std, s) } else { (s, log_std) };
-                let distance = (mean - m) * (-q).exp();
-                terms.kl += (((p - q) * 2.0).exp() + distance * distance - 1.0) * 0.5 + (q - p);
+                let distance = (mean - m) * libm::expf(-q);
+                terms.kl += (libm::expf((p - q) * 2.0) + distance * distance - 1.0) * 0.5 + (q - p);
             }
         }
         terms
@@ -361,20 +361,20 @@ impl DistRows for GaussianRows<'_> {
 
     fn gradient(&self, row: usize, by: RowTerms, head: &mut [f32], log_std_grads: &mut [f32]) {
         for ((([mean, log_std, action], other), to), of_std) in self.dims(row).zip(head).zip(log_std_grads) {
-            let inverse = (-log_std).exp();
+            let inverse = libm::expf(-log_std);
             let score = (action - mean) * inverse;
             *to = by.log_prob * score * inverse;
             *of_std += by.log_prob * (score * score - 1.0) + by.entropy;
             match other {
                 Some([m, s]) if self.from_these => {
-                    let inverse = (-s).exp();
+                    let inverse = libm::expf(-s);
                     *to += by.kl * (mean - m) * inverse * inverse;
-                    *of_std += by.kl * (((log_std - s) * 2.0).exp() - 1.0);
+                    *of_std += by.kl * (libm::expf((log_std - s) * 2.0) - 1.0);
                 }
                 Some([m, s]) => {
                     let distance = (mean - m) * inverse;
                     *to += by.kl * distance * inverse;
-                    *of_std += by.kl * (1.0 - ((s - log_std) * 2.0).exp() - distance * distance);
+                    *of_std += by.kl * (1.0 - libm::expf((s - log_std) * 2.0) - distance * distance);
                 }
                 None => {}
             }

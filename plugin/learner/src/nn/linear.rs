@@ -87,12 +87,13 @@ impl Linear {
     pub fn forward_held(&self, held: Tensor<2>, x: Tensor<2>, steps: usize) -> Tensor<2> {
         let [batch, width] = held.dims();
         let [inputs, outputs] = self.weight.dims();
-        let weight = self.weight.clone().slice([width..inputs, 0..outputs]);
-        let rest = linear(x, weight, Some(self.bias.clone()));
+        let part = |rows, bias| Self { weight: self.weight.clone().slice([rows, 0..outputs]), bias };
+        let rest = part(width..inputs, self.bias.clone()).forward(x);
         if width == 0 {
             return rest;
         }
-        let held = held.matmul(self.weight.clone().slice([0..width, 0..outputs])).reshape([1, batch, outputs]);
+        let without_bias = Tensor::zeros([outputs], &held.device());
+        let held = part(0..width, without_bias).forward(held).reshape([1, batch, outputs]);
         (rest.reshape([steps, batch, outputs]) + held).reshape([steps * batch, outputs])
     }
 }

@@ -5,6 +5,7 @@ use crate::{
     rng::{normal, unit},
 };
 use burn::tensor::{Device, Tensor};
+use playbot_kernels::host_ops::{exp, ln, ln_1p, tanh};
 use rand::Rng;
 use std::f64::consts::LN_2;
 
@@ -18,7 +19,7 @@ pub fn sample_categorical<R: Rng + ?Sized>(logits: &[f32], rng: &mut R) -> u32 {
 /// Returns the index at which the cumulative distribution of softmax(`logits`) exceeds `draw` in 0..1.
 pub(crate) fn categorical_at(logits: &[f32], draw: f64) -> u32 {
     let top = max(logits);
-    let weight = |x: f32| (f64::from(x) - top).exp();
+    let weight = |x: f32| libm::exp(f64::from(x) - top);
     let total: f64 = logits.iter().map(|&x| weight(x)).sum();
     let target = draw * total;
     let mut sum = 0.0;
@@ -38,8 +39,8 @@ pub(crate) fn categorical_at(logits: &[f32], draw: f64) -> u32 {
 /// If `index` is not below the number of logits.
 pub fn categorical_log_prob(logits: &[f32], index: u32) -> f32 {
     let top = max(logits);
-    let total: f64 = logits.iter().map(|&x| (f64::from(x) - top).exp()).sum();
-    (f64::from(logits[index as usize]) - top - total.ln()) as f32
+    let total: f64 = logits.iter().map(|&x| libm::exp(f64::from(x) - top)).sum();
+    (f64::from(logits[index as usize]) - top - libm::log(total)) as f32
 }
 
 /// Returns the index of the largest number; the first of equals, 0 of an empty slice.
@@ -55,14 +56,14 @@ pub fn argmax(values: &[f32]) -> u32 {
 
 /// Draws a vector from independent normal distributions, one draw per dimension.
 pub fn sample_gaussian<R: Rng + ?Sized>(mean: &[f32], log_std: &[f32], rng: &mut R) -> Vec<f32> {
-    mean.iter().zip(log_std).map(|(m, s)| m + normal(rng) * s.exp()).collect()
+    mean.iter().zip(log_std).map(|(m, s)| m + normal(rng) * libm::expf(*s)).collect()
 }
 
 /// Returns the log-density of `value`, summed over dimensions.
 pub fn gaussian_log_prob(mean: &[f32], log_std: &[f32], value: &[f32]) -> f32 {
     let terms = mean.iter().zip(log_std).zip(value).map(|((&m, &s), &x)| {
-        let score = (f64::from(x) - f64::from(m)) * (-f64::from(s)).exp();
-        -0.5 * score * score - f64::from(s) - 0.5 * std::f64::consts::TAU.ln()
+        let score = (f64::from(x) - f64::from(m)) * libm::exp(-f64::from(s));
+        -0.5 * score * score - f64::from(s) - HALF_LN_TAU
     });
     terms.sum::<f64>() as f32
 }
@@ -72,7 +73,7 @@ pub fn gaussian_log_prob(mean: &[f32], log_std: &[f32], value: &[f32]) -> f32 {
 pub fn squashed_log_prob(mean: &[f32], log_std: &[f32], pre_tanh: &[f32]) -> f32 {
     let slope = |x: f32| {
         let x = f64::from(x).abs();
-        2.0 * (std::f64::consts::LN_2 - x - (-2.0 * x).exp().ln_1p())
+        2.0 * (std::f64::consts::LN_2 - x - libm::log1p(libm::exp(-2.0 * x)))
     };
     let slopes: f64 = pre_tanh.iter().map(|&x| slope(x)).sum();
     (f64::from(gaussian_log_prob(mean, log_std, pre_tanh)) - slopes) as f32
@@ -92,7 +93,7 @@ const EPS: f64 = 1e-6;
 
 /// Returns ln σ = low + ½ (high - low) (tanh(raw) + 1): bounded, with a gradient everywhere.
 pub fn bounded_log_std<const D: usize>(raw: Tensor<D>, (low, high): (f64, f64)) -> Tensor<D> {
-    (raw.tanh() + 1.0) * (0.5 * (high - low)) + low
+    (tanh(raw) + 1.0) * (0.5 * (high - low)) + low
 }
 
 /// The form of the change of volume under tanh in a log-density.
@@ -139,21 +140,21 @@ impl SquashedGaussian {
     /// Draws x = mean + σ · noise squashed into an action, differentiable in mean and σ (the reparameterisation
     /// trick). `noise` is standard normal, `[n, dim]`.
     pub fn draw(&self, noise: Tensor<2>, form: LogProbForm) -> SquashedDraw {
-        let x = self.mean.clone() + self.log_std.clone().exp() * noise.clone();
-        let tanh = x.clone().tanh();
+        let x = self.mean.clone() + exp(self.log_std.clone()) * noise.clone();
+        let squashed = tanh(x.clone());
         let slope = match form {
-            LogProbForm::Eps => (((tanh.clone().square().neg() + 1.0) * self.scale.clone()) + EPS).log(),
+            LogProbForm::Eps => ln(((squashed.clone().square().neg() + 1.0) * self.scale.clone()) + EPS),
             LogProbForm::Exact => {
                 // Even in x, and the exponential of a number that is not positive cannot overflow.
                 let distance = x.clone().abs();
-                let rest = (distance.clone() * -2.0).exp().log1p();
-                ((distance + rest).neg() + LN_2) * 2.0 + self.scale.clone().log()
+                let rest = ln_1p(exp(distance.clone() * -2.0));
+                ((distance + rest).neg() + LN_2) * 2.0 + ln(self.scale.clone())
             }
         };
         let normal = (noise.square() * 0.5 + self.log_std.clone() + HALF_LN_TAU).neg();
         SquashedDraw {
             pre_tanh: x,
-            action: tanh * self.scale.clone() + self.bias.clone(),
+            action: squashed * self.scale.clone() + self.bias.clone(),
             log_prob: (normal - slope).sum_dim(1).squeeze_dim(1),
         }
     }
@@ -172,16 +173,16 @@ const EDGE: f64 = 0.999;
 /// width that a policy can have. Categorical distributions are unchanged.
 pub fn unsquashed(decoder: &HostDist) -> HostDist {
     let Some(stds) = &decoder.log_std else { return decoder.clone() };
-    let before = |action: f64| action.clamp(-EDGE, EDGE).atanh();
+    let before = |action: f64| libm::atanh(action.clamp(-EDGE, EDGE));
     let mut out = HostDist { dim: decoder.dim, head: Vec::new(), log_std: None };
     let mut log_std = Vec::with_capacity(stds.len());
     for (&mean, &log) in decoder.head.iter().zip(stds) {
         let mean = f64::from(mean).clamp(-EDGE, EDGE);
-        let std = f64::from(log).exp();
+        let std = libm::exp(f64::from(log));
         let spread = 0.5 * (before(mean + std) - before(mean - std));
         out.head.push(before(mean) as f32);
         // The smallest ln σ that a state-dependent decoder can have; guards against σ that rounding makes 0.
-        log_std.push(spread.ln().max(-10.0) as f32);
+        log_std.push(libm::log(spread).max(-10.0) as f32);
     }
     out.log_std = Some(log_std);
     out
@@ -191,7 +192,7 @@ pub fn unsquashed(decoder: &HostDist) -> HostDist {
 /// resolve, is clamped there.
 pub(crate) fn unsquashed_action(action: f32) -> f32 {
     let edge = 1.0 - 1e-6;
-    f64::from(action).clamp(-edge, edge).atanh() as f32
+    libm::atanh(f64::from(action).clamp(-edge, edge)) as f32
 }
 
 #[cfg(test)]

@@ -166,7 +166,7 @@ pub fn ratio_stats(log_ratios: &[f32], clip: f64) -> RatioStats {
     let (mut kl, mut old, mut clipped) = (0.0, 0.0, 0.0);
     for &l in log_ratios {
         let l = f64::from(l);
-        let moved = l.exp_m1();
+        let moved = libm::expm1(l);
         kl += moved - l;
         old -= l;
         if moved.abs() > clip {

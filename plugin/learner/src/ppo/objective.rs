@@ -5,6 +5,7 @@ use crate::{
     nn::{ActionBatch, Dist},
 };
 use burn::tensor::Tensor;
+use playbot_kernels::host_ops::exp;
 
 /// Advantages and returns, one per row of the rollout.
 #[derive(Clone, Debug, PartialEq)]
@@ -93,7 +94,7 @@ pub fn ppo_loss(
     clip_value: bool,
 ) -> Result<PpoLoss, LearnError> {
     let log_ratio = dist.log_prob(&batch.actions)? - batch.old_log_probs.clone();
-    let ratio = log_ratio.clone().exp();
+    let ratio = exp(log_ratio.clone());
     let gain = batch.advantages.clone().neg();
     let clipped = ratio.clone().clamp(1.0 - clip, 1.0 + clip);
     let policy_loss = (gain.clone() * ratio).max_pair(gain * clipped).mean();

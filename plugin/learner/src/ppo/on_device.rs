@@ -14,6 +14,7 @@ use crate::{
     score::TeacherBatch,
 };
 use burn::tensor::{Device, Int, Tensor, TensorData};
+use playbot_kernels::host_ops::exp;
 
 /// A whole rollout on a device.
 pub(super) struct SentRollout<'a> {
@@ -159,7 +160,7 @@ impl Reports {
             None => (Known(0.0), Known(0.0)),
         };
         let log_ratio = log_ratio.inner();
-        let moved = log_ratio.clone().exp() - 1.0;
+        let moved = exp(log_ratio.clone()) - 1.0;
         let approx_kl = (moved.clone() - log_ratio).mean();
         let clip_fraction = moved.abs().greater_elem(config.clip).float().mean();
         let augmentation_loss = match augmentation {

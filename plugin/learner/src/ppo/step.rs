@@ -399,11 +399,11 @@ impl<'a> Rows<'a> {
     fn add_policy_row(&self, row: usize, terms: RowTerms, sums: &mut StepMetrics) -> RowTerms {
         let (n, clip) = (self.values.len() as f64, self.config.clip as f32);
         let log_ratio = terms.log_prob - self.old_log_probs[row];
-        let (ratio, gain) = (log_ratio.exp(), -self.advantages[row]);
+        let (ratio, gain) = (libm::expf(log_ratio), -self.advantages[row]);
         let (free, clipped) = (gain * ratio, gain * ratio.clamp(1.0 - clip, 1.0 + clip));
         sums.policy_loss += f64::from(free.max(clipped));
         sums.entropy += f64::from(terms.entropy);
-        let moved = f64::from(log_ratio).exp_m1();
+        let moved = libm::expm1(f64::from(log_ratio));
         sums.approx_kl += moved - f64::from(log_ratio);
         sums.clip_fraction += f64::from(u8::from(moved.abs() > self.config.clip));
         let mut by = RowTerms {

@@ -143,7 +143,7 @@ impl SacConfig {
         let EntropyCoef::Auto { target_scale, .. } = self.entropy else { return None };
         Some(match space {
             ActionSpace::Continuous(dim) => -target_scale.unwrap_or(1.0) * dim as f64,
-            ActionSpace::Discrete(choices) => target_scale.unwrap_or(0.89) * (choices as f64).ln(),
+            ActionSpace::Discrete(choices) => target_scale.unwrap_or(0.89) * libm::log(choices as f64),
         })
     }
 }

@@ -202,7 +202,7 @@ impl SacNets {
             EntropyCoef::Auto { initial, .. } => initial,
             EntropyCoef::Fixed(_) => 1.0,
         };
-        let log_temperature = LogTemperature(vector(vec![initial.ln() as f32], &device));
+        let log_temperature = LogTemperature(vector(vec![libm::log(initial) as f32], &device));
         Ok(Self::tracked(&actor, &critics, &critics, &log_temperature))
     }
 
@@ -234,7 +234,7 @@ impl SacNets {
     /// # Errors
     /// [`LearnError::Device`] if it cannot be read.
     pub fn temperature(&self) -> Result<f64, LearnError> {
-        Ok(f64::from(crate::nn::scalar(self.log_temperature.0.clone().inner())?).exp())
+        Ok(libm::exp(f64::from(crate::nn::scalar(self.log_temperature.0.clone().inner())?)))
     }
 }
 

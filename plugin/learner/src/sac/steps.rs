@@ -11,7 +11,7 @@ use crate::{
     score::{Penalty, ScoreConfig, penalty},
 };
 use burn::tensor::{Device, Gradients, Tensor};
-use playbot_kernels::elementwise::Activation;
+use playbot_kernels::{elementwise::Activation, host_ops::exp};
 
 /// Metrics of a step of the critics, before it was taken.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -92,7 +92,7 @@ impl PolicyActions {
     /// Returns ln π of the draw, or E\[ln π\], `[n]`.
     fn log_prob(&self) -> Tensor<1> {
         match self {
-            Self::All(log_probs) => (log_probs.clone().exp() * log_probs.clone()).sum_dim(1).squeeze_dim(1),
+            Self::All(log_probs) => (exp(log_probs.clone()) * log_probs.clone()).sum_dim(1).squeeze_dim(1),
             Self::Sample { draw, .. } => draw.log_prob.clone(),
         }
     }
@@ -252,7 +252,7 @@ pub(super) fn explorer(space: ActionSpace, inputs: usize, device: &Device) -> Ac
         ActionSpace::Discrete(_) => LogStd::None,
         ActionSpace::Continuous(_) => {
             // In the middle of the range, to which the zeros lead.
-            let middle = NEARLY_UNIFORM.ln();
+            let middle = libm::log(NEARLY_UNIFORM);
             LogStd::Squashed { layer: zeros(), range: (middle - 1.0, middle + 1.0) }
         }
     };
@@ -274,7 +274,7 @@ pub fn soft_value(log_prob: Tensor<1>, q: Tensor<1>, temperature: f64) -> Tensor
 /// Returns V over all choices: Σ π (Q - α ln π), all inputs `[n, choices]`. The gradient flows through π and ln π.
 pub fn soft_value_of_choices(log_probs: Tensor<2>, q: Tensor<2>, temperature: f64) -> Tensor<1> {
     let values = q - log_probs.clone() * temperature;
-    (log_probs.exp() * values).sum_dim(1).squeeze_dim(1)
+    (exp(log_probs) * values).sum_dim(1).squeeze_dim(1)
 }
 
 /// Returns y = r + γ V', where `continues` is 1 for rows whose next state counts and 0 for the others.
@@ -289,7 +289,7 @@ pub fn critic_loss(q: Tensor<1>, target: Tensor<1>) -> Tensor<1> {
 
 /// Returns mean(-α (ln π + target entropy)), `[1]`, where `log_prob` is ln π of a draw or E\[ln π\], and constant.
 pub fn temperature_loss(log_temperature: Tensor<1>, log_prob: Tensor<1>, target_entropy: f64) -> Tensor<1> {
-    (log_prob + target_entropy).mean() * log_temperature.exp().neg()
+    (log_prob + target_entropy).mean() * exp(log_temperature).neg()
 }
 
 #[cfg(test)]

@@ -113,16 +113,16 @@ pub fn confidences(kind: ConfidenceKind, decoder: &HostDist, actions: &Actions) 
                 ConfidenceKind::BoundedDensity => logits[a as usize] - logits[argmax(logits) as usize],
                 _ => categorical_log_prob(logits, a),
             };
-            Ok(rows.zip(actions).with_min_len(ROWS).map(|row| log_prob(row).exp()).collect())
+            Ok(rows.zip(actions).with_min_len(ROWS).map(|row| libm::expf(log_prob(row))).collect())
         }
         (Some(stds), Actions::Continuous { dim: width, values }) if *width == dim => {
             let rows = rows.zip(stds.par_chunks_exact(dim)).zip(values.par_chunks_exact(dim));
             Ok(rows
                 .with_min_len(ROWS)
                 .map(|((mean, log_std), action)| match kind {
-                    ConfidenceKind::Density => gaussian_log_prob(mean, log_std, action).exp(),
-                    ConfidenceKind::BoundedDensity => (-0.5 * square_sum(mean, log_std, action)).exp() as f32,
-                    _ => (-0.5 * square_sum(mean, log_std, action) / dim as f64).exp() as f32,
+                    ConfidenceKind::Density => libm::expf(gaussian_log_prob(mean, log_std, action)),
+                    ConfidenceKind::BoundedDensity => libm::exp(-0.5 * square_sum(mean, log_std, action)) as f32,
+                    _ => libm::exp(-0.5 * square_sum(mean, log_std, action) / dim as f64) as f32,
                 })
                 .collect())
         }
@@ -133,7 +133,7 @@ pub fn confidences(kind: ConfidenceKind, decoder: &HostDist, actions: &Actions) 
 /// Returns Σ ((a - μ) / σ)².
 fn square_sum(mean: &[f32], log_std: &[f32], action: &[f32]) -> f64 {
     let scores = mean.iter().zip(log_std).zip(action);
-    scores.map(|((&m, &s), &a)| ((f64::from(a) - f64::from(m)) * (-f64::from(s)).exp()).powi(2)).sum()
+    scores.map(|((&m, &s), &a)| ((f64::from(a) - f64::from(m)) * libm::exp(-f64::from(s))).powi(2)).sum()
 }
 
 #[cfg(test)]
@@ -162,15 +162,15 @@ mod tests {
     #[test]
     fn continuous_by_hand() {
         // z-scores 1 and 2 in the first row, none in the second.
-        let ln2 = 2.0f32.ln();
+        let ln2 = std::f32::consts::LN_2;
         let log_std = Some(vec![0.0, ln2, 0.0, ln2]);
         let decoder = HostDist { dim: 2, head: vec![0.0, 1.0, 0.0, 1.0], log_std };
         let actions = Actions::Continuous { dim: 2, values: vec![1.0, -3.0, 0.0, 1.0] };
         let confidence = |kind| confidences(kind, &decoder, &actions).expect("they fit");
-        close(&confidence(ConfidenceKind::PolicyAction), &[(-1.25f64).exp(), 1.0]);
-        close(&confidence(ConfidenceKind::BoundedDensity), &[(-2.5f64).exp(), 1.0]);
+        close(&confidence(ConfidenceKind::PolicyAction), &[libm::exp(-1.25), 1.0]);
+        close(&confidence(ConfidenceKind::BoundedDensity), &[libm::exp(-2.5), 1.0]);
         let top = 1.0 / (2.0 * std::f64::consts::TAU);
-        close(&confidence(ConfidenceKind::Density), &[top * (-2.5f64).exp(), top]);
+        close(&confidence(ConfidenceKind::Density), &[top * libm::exp(-2.5), top]);
     }
 
     #[test]
@@ -179,7 +179,7 @@ mod tests {
         let actions = Actions::Continuous { dim: 1, values: vec![0.0, 2.0] };
         let mut rng = Streams::new(1).stream("own", 0);
         let weights = penalty_weights(&ScoreConfig::default(), &decoder, &actions, &mut rng).expect("they fit");
-        close(&weights, &[1.0, (-2.0f64).exp()]);
+        close(&weights, &[1.0, libm::exp(-2.0)]);
         let own = ConfidenceKind::OwnSample;
         assert_eq!(ConfidenceKind::Auto.resolved(false), own);
         assert_eq!(own.resolved(true), own, "who asks for it gets it");

@@ -13,7 +13,10 @@ use crate::{
     skill::{Dataset, SkillConfig, SkillDescription},
 };
 use burn::tensor::{Device, Tensor};
-use playbot_kernels::elementwise::Activation;
+use playbot_kernels::{
+    elementwise::Activation,
+    host_ops::{exp, tanh},
+};
 use rand::Rng;
 use std::sync::Arc;
 
@@ -135,8 +138,8 @@ impl SkillNets {
         let Dist::Gaussian { mean, log_std } = posterior else {
             return Err(LearnError::Action("the encoder is Gaussian".to_owned()));
         };
-        let latent = mean + noise * log_std.exp();
-        let decoder_latent = if self.tanh_latent { latent.tanh() } else { latent };
+        let latent = mean + noise * exp(log_std);
+        let decoder_latent = if self.tanh_latent { tanh(latent) } else { latent };
         let decoder_features = self.decoder.observe(states)?;
         let decoded = self.decoder.forward_held(decoder_latent.clone(), decoder_features.clone(), steps);
         let nll_per_step = decoded.log_prob(actions)?.neg();

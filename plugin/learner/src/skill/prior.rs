@@ -107,10 +107,10 @@ impl Prior {
         z.truncate(numbers);
         for (i, (z, s)) in z.iter_mut().zip(&log_std).enumerate() {
             if draw == SkillDraw::Sample {
-                *z += normal(i / self.latent) * s.exp();
+                *z += normal(i / self.latent) * libm::expf(*s);
             }
             if self.tanh {
-                *z = z.tanh();
+                *z = libm::tanhf(*z);
             }
         }
         if z.iter().any(|x| !x.is_finite()) {

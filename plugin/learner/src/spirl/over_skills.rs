@@ -58,7 +58,7 @@ impl OverSkills {
             Self::Ppo(learner) => learner.config().gamma,
             Self::Sac(learner) => learner.config().gamma,
         };
-        gamma.powf(1.0 / self.teacher().config.skill_interval as f64)
+        libm::pow(gamma, 1.0 / self.teacher().config.skill_interval as f64)
     }
 
     /// Learns π(z | s) from a rollout of ticks, and returns the metrics under names that differ from those of the

@@ -1,15 +1,17 @@
-//! Tests that the same seed gives the same bits, whatever the number of threads and the size of the batch.
+//! Tests that the same seed gives the same bits, whatever the number of threads, the size of the batch, and the processor.
 
 use crate::corridor::config;
-use crate::field::{Field, HURRY};
+use crate::field::{self, Field, HURRY};
+use crate::image_task;
 use crate::point;
 use crate::score::model;
+use crate::tick::Tick;
 use crate::toy::{Driver, OBS, SPACE};
 use playbot_learner::nn::{Activation, CnnKind};
 use playbot_learner::rng::{Streams, normal};
 use playbot_learner::{
-    ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, ImageShape, Learner, Policy, PolicyOutput, PolicySpec,
-    PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillConfig, SkillTrainer,
+    ActionSpace, Actions, Dataset, DatasetEpisode, DeviceKind, ImageShape, Instructions, Learner, Policy, PolicyOutput,
+    PolicySpec, PpoConfig, PpoLearner, Rollout, SacConfig, SacLearner, ScoreConfig, SkillConfig, SkillTrainer,
 };
 
 fn numbers(n: usize) -> Vec<f32> {
@@ -85,28 +87,43 @@ fn threads_with_clones_of_a_policy_agree() {
     assert!(outputs.iter().all(|output| *output == expected));
 }
 
-/// Checks that `digest` gives the same number with 1, 2 and 4 threads. `test` is the name of the test that calls this:
-/// the pool's size is fixed for a process, so the test runs itself in others.
-fn same_on_any_number_of_threads(test: &str, digest: fn() -> u64) {
+/// Processes in which `digest` is computed: threads, vector instructions, and what glibc is told of the processor, whose
+/// functions round otherwise without fused multiply-adds.
+const PROCESSES: [(usize, Instructions, &str); 4] = [
+    (1, Instructions::Widest, ""),
+    (2, Instructions::Widest, "glibc.cpu.hwcaps=-FMA,-FMA4,-AVX2,-AVX2_Usable,-FMA_Usable"),
+    (2, Instructions::Avx2, ""),
+    (4, Instructions::Portable, ""),
+];
+
+/// Checks that `digest` gives the number `want` on any number of threads, with any vector instructions, and so on every
+/// machine. `test` is the name of the test that calls this: the pool's size is fixed for a process, so the test runs itself
+/// in others.
+fn same_everywhere(test: &str, want: u64, digest: fn() -> u64) {
     const CHILD: &str = "PLAYBOT_TEST_THREADS_CHILD";
+    const INSTRUCTIONS: &str = "PLAYBOT_TEST_INSTRUCTIONS";
     if let Some(path) = std::env::var_os(CHILD) {
+        let limit = std::env::var(INSTRUCTIONS).expect("set beside the path");
+        limit.parse().map(Instructions::set_limit).expect("a name");
         std::fs::write(path, digest().to_string()).expect("writable");
         return;
     }
     let folder = tempfile::tempdir().expect("a folder");
-    let results = [1, 2, 4].map(|threads| {
-        let path = folder.path().join(threads.to_string());
+    let found = PROCESSES.map(|(threads, instructions, tunables)| {
+        let path = folder.path().join("digest");
         let status = std::process::Command::new(std::env::current_exe().expect("this test"))
             .args(["--exact", &format!("determinism::{test}")])
             .env(CHILD, &path)
+            .env(INSTRUCTIONS, instructions.name())
             .env("RAYON_NUM_THREADS", threads.to_string())
+            .env("GLIBC_TUNABLES", tunables)
             .stdout(std::process::Stdio::null())
             .status();
         assert!(status.expect("runs").success());
-        std::fs::read_to_string(path).expect("written")
+        let digest = std::fs::read_to_string(path).expect("written");
+        digest.parse::<u64>().expect("a number")
     });
-    assert_eq!(results[0], results[1]);
-    assert_eq!(results[0], results[2]);
+    assert_eq!(found, [want; PROCESSES.len()], "{found:#x?}, expected {want:#x} of each of {PROCESSES:?}");
 }
 
 fn mix(hash: u64, x: &f32) -> u64 {
@@ -114,8 +131,8 @@ fn mix(hash: u64, x: &f32) -> u64 {
 }
 
 #[test]
-fn updates_do_not_depend_on_the_number_of_threads() {
-    same_on_any_number_of_threads("updates_do_not_depend_on_the_number_of_threads", || {
+fn updates_have_the_same_bits_everywhere() {
+    same_everywhere("updates_have_the_same_bits_everywhere", 0x842d_c65f_870d_574d, || {
         let spec = PolicySpec { obs: OBS.into(), latent: 0, action_space: SPACE };
         let config = PpoConfig { hidden: vec![256, 256], activation: Activation::Tanh, minibatches: 2, ..config() };
         let mut learner = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
@@ -127,8 +144,8 @@ fn updates_do_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn skill_training_does_not_depend_on_the_number_of_threads() {
-    same_on_any_number_of_threads("skill_training_does_not_depend_on_the_number_of_threads", || {
+fn skill_training_has_the_same_bits_everywhere() {
+    same_everywhere("skill_training_has_the_same_bits_everywhere", 0x0008_56d0_159f_44ea, || {
         let (obs_dim, dim, steps) = (29, 8, 220);
         let values = numbers(steps * (obs_dim + dim));
         let episode = DatasetEpisode {
@@ -147,16 +164,16 @@ fn skill_training_does_not_depend_on_the_number_of_threads() {
 }
 
 #[test]
-fn discrete_sac_does_not_depend_on_the_number_of_threads() {
-    same_on_any_number_of_threads("discrete_sac_does_not_depend_on_the_number_of_threads", || {
+fn discrete_sac_has_the_same_bits_everywhere() {
+    same_everywhere("discrete_sac_has_the_same_bits_everywhere", 0x2cfa_04ef_ec8c_20a4, || {
         let mut driver = Driver::new(8, 1);
         sac(crate::sac::config(), crate::sac::SPEC, |learner| driver.rollout(learner, 8))
     });
 }
 
 #[test]
-fn continuous_sac_does_not_depend_on_the_number_of_threads() {
-    same_on_any_number_of_threads("continuous_sac_does_not_depend_on_the_number_of_threads", || {
+fn continuous_sac_has_the_same_bits_everywhere() {
+    same_everywhere("continuous_sac_has_the_same_bits_everywhere", 0xdaaa_438c_0147_20e3, || {
         let mut field = Field::new(&HURRY, 8, 1);
         sac(point::sac_config(), point::SPEC, |learner| field.rollout(learner, 8))
     });
@@ -176,8 +193,8 @@ fn sac(config: SacConfig, spec: PolicySpec, mut rollout: impl FnMut(&SacLearner)
 }
 
 #[test]
-fn skill_training_on_images_does_not_depend_on_the_number_of_threads() {
-    same_on_any_number_of_threads("skill_training_on_images_does_not_depend_on_the_number_of_threads", || {
+fn skill_training_on_images_has_the_same_bits_everywhere() {
+    same_everywhere("skill_training_on_images_has_the_same_bits_everywhere", 0x0008_09e9_2ffc_7a6b, || {
         let (shape, steps) = (ImageShape { channels: 3, height: 32, width: 32 }, 44);
         let pixels: Vec<u8> = numbers(steps * shape.numbers()).iter().map(|x| (x * 60.0 + 128.0) as u8).collect();
         let actions = Actions::Discrete((0..steps as u32).map(|t| t % 5).collect());
@@ -191,4 +208,76 @@ fn skill_training_on_images_does_not_depend_on_the_number_of_threads() {
             [metrics.loss, metrics.grad_norm].iter().fold(hash, mix)
         })
     });
+}
+
+#[test]
+fn score_has_the_same_bits_everywhere() {
+    same_everywhere("score_has_the_same_bits_everywhere", 0xe330_8ec6_e2d5_7d49, || {
+        let learner = PpoLearner::with_skill(config(), ScoreConfig::default(), &model(1), 3, DeviceKind::Flex);
+        let (mut learner, mut driver) = (learner.expect("good settings"), Driver::new(16, 1));
+        let updates = (0..3).map(|_| learner.update(&driver.rollout(&learner, 32)).expect("finite"));
+        updates.fold(0, |hash, of_update| [of_update.policy_loss, of_update.approx_kl].iter().fold(hash, mix))
+    });
+}
+
+#[test]
+fn ppo_of_continuous_actions_has_the_same_bits_everywhere() {
+    same_everywhere("ppo_of_continuous_actions_has_the_same_bits_everywhere", 0x8a59_6a2b_ec50_d9ac, || {
+        let config = PpoConfig { hidden: vec![64, 64], activation: Activation::Tanh, ..config() };
+        let mut learner = PpoLearner::new(config, point::SPEC, 1, DeviceKind::Flex).expect("good settings");
+        let mut field = Field::new(&HURRY, 64, 1);
+        for _ in 0..2 {
+            let played = field.rollout(&learner, 32);
+            learner.update(&played).expect("finite");
+        }
+        let output = learner.policy().forward(&[], &numbers(64 * field::OBS), 64).expect("finite");
+        output.head.iter().chain(&output.log_std).chain(&output.values).fold(0, mix)
+    });
+}
+
+#[test]
+fn ppo_of_images_has_the_same_bits_everywhere() {
+    same_everywhere("ppo_of_images_has_the_same_bits_everywhere", 0x4e4a_4e6e_4cb9_0211, || {
+        let impala = CnnKind::Impala { channels: vec![16, 32, 32], feature: 64 };
+        [impala, CnnKind::Nature { feature: 64 }].into_iter().fold(0, |hash, cnn| {
+            let config = PpoConfig { cnn, epochs: 1, ..image_task::config() };
+            let spec = PolicySpec { obs: SCREEN.into(), latent: 0, action_space: ActionSpace::Discrete(4) };
+            let mut learner = PpoLearner::new(config, spec, 1, DeviceKind::Flex).expect("good settings");
+            let played = pictures(&learner);
+            for _ in 0..2 {
+                learner.update(&played).expect("finite");
+            }
+            let output = learner.policy().forward(&[], &pixels(16), 16).expect("finite");
+            output.head.iter().chain(&output.values).fold(hash, mix)
+        })
+    });
+}
+
+/// Pictures large enough for every kind of convolution.
+const SCREEN: ImageShape = ImageShape { channels: 3, height: 40, width: 40 };
+
+fn pixels(images: usize) -> Vec<u8> {
+    numbers(images * SCREEN.numbers()).iter().map(|x| (x * 60.0 + 128.0) as u8).collect()
+}
+
+/// Returns some ticks of a player who sees noise.
+fn pictures(learner: &PpoLearner) -> Rollout {
+    let (rows, ticks, space) = (8, 4, ActionSpace::Discrete(4));
+    let (mut rollout, pixels) = (Rollout::new(rows, SCREEN, 0, &space), pixels(rows * (ticks + 1)));
+    let mut rng = Streams::new(5).stream("answers", 0);
+    let mut screens = pixels.chunks_exact(rows * SCREEN.numbers());
+    let policy = learner.policy();
+    for seen in screens.by_ref().take(ticks) {
+        let output = policy.forward(&[], seen, rows).expect("finite");
+        let mut tick = Tick::new(&space);
+        for row in 0..rows {
+            let (action, log_prob) = output.sample(row, &mut rng);
+            tick.push(&action, log_prob, (normal(&mut rng), row == 2, row == 5));
+        }
+        tick.add_to(&mut rollout, seen.into(), &[], &output.values);
+        rollout.push_cut(5, &seen[..SCREEN.numbers()], &[]).expect("images");
+    }
+    rollout.ends.next_obs = screens.next().expect("one more").to_vec().into();
+    rollout.bootstrap(&policy).expect("they fit");
+    rollout
 }

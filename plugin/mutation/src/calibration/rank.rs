@@ -21,8 +21,8 @@ impl RankCorrelation {
         let value = value.clamp(-1.0, 1.0);
         let is_exact = 1.0 - value.abs() < 1e-12;
         let interval = variance.filter(|_| !is_exact).map(|variance| {
-            let z = value.atanh();
-            [-Z_95, Z_95].map(|deviations| rounded((z + deviations * variance.sqrt()).tanh()))
+            let z = libm::atanh(value);
+            [-Z_95, Z_95].map(|deviations| rounded(libm::tanh(z + deviations * variance.sqrt())))
         });
         Self { value: rounded(value), interval }
     }

@@ -642,7 +642,7 @@ pub(super) fn short_number(value: f64) -> String {
         _ if size >= 1.0 => 2,
         _ if size < 0.001 => return "under 0.001".to_owned(),
         // Two digits behind the zeros.
-        _ => (1.0 - size.log10().floor()) as usize,
+        _ => (1.0 - libm::log10(size).floor()) as usize,
     };
     format!("{value:.decimals$}")
 }
